@@ -13,7 +13,7 @@ import tempfile
 import numpy as np
 
 from benchmarks.bridges import judged
-from benchmarks.row import Row
+from benchmarks.row import higher, Row
 from scenario_gen.base.errors import RefusedError
 from scenario_gen.closed_loop.config import ClosedLoopConfig, REPLAY
 from scenario_gen.closed_loop.ego import Pose
@@ -144,7 +144,7 @@ def reactive_planner(trials: Sequence[Trial], bad: Callable[[], Sequence[Outcome
     worst = rates(bad())["collisions"]
     apart = worst.share.low - good["collisions"].share.high
     name = "collisions among replayed others: constant speed's lower bound less the reactive planner's upper"
-    return [*rows, Row(name, apart, "", "higher", 0.0, f"constant speed: {worst}")]
+    return [*rows, higher(name, apart, "", 0.0, f"constant speed: {worst}")]
 
 
 def _write_problem(path: Path, trial: Trial) -> None:

@@ -9,7 +9,7 @@ import numpy as np
 
 from benchmarks._driving_worlds import as_scenario, PERIOD
 from benchmarks._size import sized
-from benchmarks.row import Row
+from benchmarks.row import lower, Row
 from scenario_gen.closed_loop.config import ClosedLoopConfig
 from scenario_gen.closed_loop.ego import Command
 from scenario_gen.closed_loop.simulation import ClosedLoop, Drive
@@ -85,5 +85,5 @@ def rear_ends() -> list[Row]:
             name = (
                 f"follower {gap:g} s behind an ego that brakes by {braking:g} m/s²: runs into it"
             )
-            rows.append(Row(name, 100.0 * second / DRIVES, "%", "lower", None, said))
+            rows.append(lower(name, 100.0 * second / DRIVES, "%", None, said))
     return rows

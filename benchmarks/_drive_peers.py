@@ -9,7 +9,7 @@ from tempfile import TemporaryDirectory
 from time import process_time
 
 from benchmarks._size import sized
-from benchmarks.row import Row
+from benchmarks.row import higher, Row
 
 STEPS = sized(300, quick=5)
 STREET = """<net version="1.20"><location netOffset="0,0" convBoundary="0,0,5000,0" origBoundary="0,0,5000,0" projParameter="!"/>
@@ -47,11 +47,10 @@ def highway_env(vehicles: int) -> list[Row]:
         best = max(best, done / (process_time() - began))
     env.close()
     return [
-        Row(
+        higher(
             f"highway-env, {vehicles} vehicles",
             best,
             "vehicle-steps/s",
-            "higher",
             None,
             "highway-v0, kinematics observed",
         )
@@ -94,11 +93,10 @@ def sumo(vehicles: int) -> list[Row]:
             best = max(best, 10 * STEPS * vehicles / (process_time() - began))
             libsumo.close()
     return [
-        Row(
+        higher(
             f"SUMO, {vehicles} vehicles",
             best,
             "vehicle-steps/s",
-            "higher",
             None,
             "libsumo, the ego moved by moveToXY",
         )

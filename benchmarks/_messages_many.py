@@ -9,7 +9,7 @@ from typing import Any
 
 from benchmarks._messages_processes import nodes
 from benchmarks._size import sized
-from benchmarks.row import Row
+from benchmarks.row import higher, lower, Row
 from scenario_gen.bags.storage.bag import bag_topics
 from scenario_gen.logs.synthetic import bundled
 
@@ -45,23 +45,21 @@ def many(domain: int, folder: Path, client: Any, until: Any) -> list[Row]:
     sizes = ", ".join(f"{node} {size:.0f}" for node, size in peaks.items())
     name = f"one request of {COUNT:,} scenarios: "
     return [
-        Row(
+        lower(
             f"{name}lost on the way to the bag",
             COUNT - there,
             "scenarios",
-            "lower",
             0.0,
             f"{there} in the bag",
         ),
-        Row(
+        higher(
             f"{name}recorded",
             there / seconds,
             "1/s",
-            "higher",
             None,
             "for one second of the recorder's CPU time",
         ),
-        Row(f"{name}largest process", max(peaks.values()), "MiB", "lower", MOST, sizes),
+        lower(f"{name}largest process", max(peaks.values()), "MiB", MOST, sizes),
     ]
 
 

@@ -13,7 +13,7 @@ import numpy as np
 import scipy.linalg
 
 from benchmarks._size import sized
-from benchmarks.row import Row
+from benchmarks.row import higher, lower, Row
 from scenario_gen.method.sampling.gp import Features, Observations, Regression, squared_exponential
 from scenario_gen.numerics.arrays import Floats
 
@@ -30,20 +30,13 @@ def rows() -> list[Row]:
         ours, mean, cov, seconds = _against_dense(x, y, noise, at)
         name = f"GP {n} seen, {m} asked"
         found.append(
-            Row(
-                f"{name}: mean, largest error",
-                float(np.abs(ours.mean - mean).max()),
-                "",
-                "lower",
-                1e-10,
-            )
+            lower(f"{name}: mean, largest error", float(np.abs(ours.mean - mean).max()), "", 1e-10)
         )
         found.append(
-            Row(
+            lower(
                 f"{name}: covariance, largest error",
                 float(np.abs(ours.covariance - cov).max()),
                 "",
-                "lower",
                 1e-10,
             )
         )
@@ -51,11 +44,10 @@ def rows() -> list[Row]:
             peer = min(_seconds(lambda: _sklearn(x, y, at)) for _ in range(3 if n < 500 else 1))  # noqa: B023
         except ImportError:
             found.append(
-                Row(
+                lower(
                     f"{name}: fit and {SAMPLES} samples",
                     1e3 * seconds,
                     "ms",
-                    "lower",
                     None,
                     "scikit-learn not installed",
                 )
@@ -63,22 +55,20 @@ def rows() -> list[Row]:
             continue
         plain = min(_seconds(lambda: _cholesky(x, y, noise, at)) for _ in range(3))  # noqa: B023
         found.append(
-            Row(
+            higher(
                 f"{name}: times faster than NumPy's Cholesky",
                 plain / seconds,
                 "×",
-                "higher",
                 None,
                 f"{1e3 * plain:.1f} ms",
             )
         )
         label = f"{name}: fit and {SAMPLES} samples, times faster"
         found.append(
-            Row(
+            higher(
                 label,
                 peer / seconds,
                 "×",
-                "higher",
                 target,
                 f"scikit-learn {1e3 * peer:.1f} ms, ours {1e3 * seconds:.2f} ms",
             )

@@ -20,7 +20,7 @@ import numpy as np
 import pandas as pd
 
 from benchmarks._size import sized
-from benchmarks.row import Row
+from benchmarks.row import higher, lower, Row
 from scenario_gen.bags.recordings.write import write_recording
 from scenario_gen.cli.demo import ROADS
 from scenario_gen.cli.folder import FolderRequest, generate_all
@@ -74,7 +74,7 @@ def run(full: bool | None = None) -> list[Row]:
         problems = _problems(bags, folder / "problems", sizes.problems)
         _say(f"{problems} problems written")
         driven = judges.submit(_driven, folder / "problems", problems)
-        rows = [Row("bridges.cases", len(bags), "cases", "higher")]
+        rows = [higher("bridges.cases", len(bags), "cases")]
         others = []
         for target, judge in (
             ("commonroad", _commonroad),
@@ -174,8 +174,8 @@ def _round_trip(folder: Path, bags: Sequence[Path], target: str) -> list[Row]:
                 place = max(place, float(np.abs(track.fix - scenario.position[n, there]).max()))
                 speed = max(speed, float(np.abs(track.speed - scenario.speed[n, there]).max()))
     return [
-        Row(f"bridges.{target}.round_trip.position", place, "m", "lower", 1e-3),
-        Row(f"bridges.{target}.round_trip.speed", speed, "m/s", "lower", 1e-2),
+        lower(f"bridges.{target}.round_trip.position", place, "m", 1e-3),
+        lower(f"bridges.{target}.round_trip.speed", speed, "m/s", 1e-2),
     ]
 
 
@@ -202,18 +202,11 @@ def _commonroad(folder: Path) -> list[Row]:
         return []
     peer = f"commonroad-io 2024.3, drivability checker 2025.4.0: {found['files']} files"
     return [
-        Row("bridges.commonroad.schema_errors", len(found["invalid"]), "files", "lower", 0, peer),
-        Row("bridges.commonroad.read_error", found["read_error"], "m", "lower", 1e-6, peer),
-        Row("bridges.commonroad.collisions", len(found["collisions"]), "files", "lower", 0, peer),
-        Row("bridges.commonroad.off_road", len(found["off_road"]), "files", "lower", 0, peer),
-        Row(
-            "bridges.commonroad.planted_not_found",
-            len(found["not_found"]),
-            "files",
-            "lower",
-            0,
-            peer,
-        ),
+        lower("bridges.commonroad.schema_errors", len(found["invalid"]), "files", 0, peer),
+        lower("bridges.commonroad.read_error", found["read_error"], "m", 1e-6, peer),
+        lower("bridges.commonroad.collisions", len(found["collisions"]), "files", 0, peer),
+        lower("bridges.commonroad.off_road", len(found["off_road"]), "files", 0, peer),
+        lower("bridges.commonroad.planted_not_found", len(found["not_found"]), "files", 0, peer),
     ]
 
 
@@ -225,7 +218,7 @@ def _asam(folder: Path) -> list[Row]:
     for kind, name in (("xosc", "openscenario"), ("xodr", "opendrive")):
         peer = f"asam-qc-{name}: {found[kind]} files, {found['rules'].get(kind, 0)} rules"
         issues = sum(path.endswith(kind) for path in found["issues"])
-        rows.append(Row(f"bridges.{name}.files_with_issues", issues, "files", "lower", 0, peer))
+        rows.append(lower(f"bridges.{name}.files_with_issues", issues, "files", 0, peer))
     return rows
 
 
@@ -237,8 +230,8 @@ def _omega(folder: Path) -> list[Row]:
         f"omega-prime 0.3.7: {found['files']} files, the map of {found['maps']} of {found['of']}"
     )
     return [
-        Row("bridges.osi.files_with_faults", len(found["faults"]), "files", "lower", 0, peer),
-        Row("bridges.osi.planted_not_found", len(found["missed"]), "faults", "lower", 0, peer),
+        lower("bridges.osi.files_with_faults", len(found["faults"]), "files", 0, peer),
+        lower("bridges.osi.planted_not_found", len(found["missed"]), "faults", 0, peer),
     ]
 
 
@@ -284,11 +277,10 @@ def _driven(folder: Path, problems: int) -> list[Row]:
     for name, (how, step) in found["outcomes"].items():
         peer += "" if how == "reached" else f"; {name}: {how} at step {step}"
     return [
-        Row(
+        higher(
             "bridges.commonroad.problems_solved",
             found["reached"] / found["problems"],
             "share",
-            "higher",
             0.9,
             peer,
         )

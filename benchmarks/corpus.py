@@ -29,7 +29,7 @@ from benchmarks._corpus_peers import costs, missing
 from benchmarks._corpus_primitives import f1, planted_encounter, score
 from benchmarks._corpus_store import bucket_with, spent, START
 from benchmarks._size import sized
-from benchmarks.row import Row
+from benchmarks.row import higher, lower, Row
 from scenario_gen.base.errors import RefusedError
 from scenario_gen.base.folders import sha256_of
 from scenario_gen.corpus.batch import seed_of
@@ -161,45 +161,35 @@ def mining(place: Path) -> list[Row]:
     stored = {stage: _bytes((out / stage).iterdir()) for stage in ("messages", "hours", "found")}
     cleaned = _cleaning(archive, place)
     return [
-        Row(f"recall, {what}", recall, "", "higher", 0.99),
-        Row("precision", precision, "", "higher", 0.99),
-        Row("kinds", kinds, "", "higher", 0.95),
-        Row(
+        higher(f"recall, {what}", recall, "", 0.99),
+        higher("precision", precision, "", 0.99),
+        higher("kinds", kinds, "", 0.95),
+        higher(
             "from text to the table of encounters",
             rows / all_of_it / 1e6,
             "M rows/CPU s",
-            "higher",
             0.6,
             peer,
         ),
-        Row(
+        higher(
             "from Parquet to the table of encounters",
             kept / (all_of_it - seconds["parse"]) / 1e6,
             "M rows/CPU s",
-            "higher",
             2.5,
         ),
-        Row(
-            "text to Parquet", rows / seconds["parse"] / 1e6, "M rows/CPU s", "higher", None, peer
-        ),
-        Row("cleaning of found encounters", cleaned, "CPU s each", "lower"),
-        Row("text", text / rows, "bytes/row", "lower"),
+        higher("text to Parquet", rows / seconds["parse"] / 1e6, "M rows/CPU s", None, peer),
+        lower("cleaning of found encounters", cleaned, "CPU s each"),
+        lower("text", text / rows, "bytes/row"),
+        *(lower(f"files of {stage}", size / rows, "bytes/row") for stage, size in stored.items()),
         *(
-            Row(f"files of {stage}", size / rows, "bytes/row", "lower")
+            lower(f"files of {stage}, share of text", 100.0 * size / text, "%", 5.0)
             for stage, size in stored.items()
         ),
         *(
-            Row(f"files of {stage}, share of text", 100.0 * size / text, "%", "lower", 5.0)
-            for stage, size in stored.items()
-        ),
-        *(
-            Row(f"a task of {stage}", seconds[f"{stage}, a task"], "CPU s", "higher")
+            higher(f"a task of {stage}", seconds[f"{stage}, a task"], "CPU s")
             for stage in ("parse", "search")
         ),
-        *(
-            Row(f"peak memory of {stage}", memory[stage], "MiB", "lower", 1024.0)
-            for stage in memory
-        ),
+        *(lower(f"peak memory of {stage}", memory[stage], "MiB", 1024.0) for stage in memory),
     ]
 
 
@@ -234,23 +224,18 @@ def memory_of(place: Path) -> list[Row]:
     whole = estimate(rows / seconds["parse"], rows / searching, cleaned, stored, shuffled, each)
     what = f"{rows / 1e6:.0f} M rows, {SPARSE['encounters']} encounters"
     return [
-        Row(f"{what}: recall", recall, "", "higher", 0.99),
-        Row(f"{what}: precision", precision, "", "higher", 0.99),
-        Row(f"{what}: kinds", kinds, "", "higher", 0.95),
-        Row(
-            f"{what}: from text",
-            rows / (seconds["parse"] + searching) / 1e6,
-            "M rows/CPU s",
-            "higher",
-            0.6,
+        higher(f"{what}: recall", recall, "", 0.99),
+        higher(f"{what}: precision", precision, "", 0.99),
+        higher(f"{what}: kinds", kinds, "", 0.95),
+        higher(
+            f"{what}: from text", rows / (seconds["parse"] + searching) / 1e6, "M rows/CPU s", 0.6
         ),
-        Row(f"{what}: from Parquet", rows / searching / 1e6, "M rows/CPU s", "higher", 2.5),
-        Row(f"{what}: peak memory", max(memory.values()), "MiB", "lower", 1024.0),
-        Row(
+        higher(f"{what}: from Parquet", rows / searching / 1e6, "M rows/CPU s", 2.5),
+        lower(f"{what}: peak memory", max(memory.values()), "MiB", 1024.0),
+        lower(
             f"{what}: peak memory by that of {ROWS / 1e6:.0f} M",
             max(memory.values()) / max(few.values()),
             "",
-            "lower",
             1.2,
         ),
         *whole,
@@ -283,28 +268,23 @@ def estimate(
     spent, kept = sum(hours.values()), sum(disk.values())
     reading = TEXT / 1e9 / spent * 16.0 / 3600.0
     return [
-        *(
-            Row(f"whole archive: {what}", value, "core-hours", "lower")
-            for what, value in hours.items()
-        ),
-        *(Row(f"whole archive: {what}", value, "GB", "lower") for what, value in disk.items()),
-        Row(
+        *(lower(f"whole archive: {what}", value, "core-hours") for what, value in hours.items()),
+        *(lower(f"whole archive: {what}", value, "GB") for what, value in disk.items()),
+        lower(
             "whole archive: computing",
             spent * CORE_HOUR,
             "$",
-            "lower",
             None,
             f"{spent:.1f} core-hours at {CORE_HOUR} $",
         ),
-        Row(
+        lower(
             "whole archive: storage",
             kept * STORED,
             "$ a month",
-            "lower",
             None,
             f"{kept:.0f} GB at {STORED} $",
         ),
-        Row("whole archive: sixteen cores read", reading, "GB/s", "lower"),
+        lower("whole archive: sixteen cores read", reading, "GB/s"),
     ]
 
 
@@ -335,19 +315,11 @@ def store(place: Path) -> list[Row]:
     what = f"{_bytes(archive.glob('*.csv')) / 1e6:.0f} MB of text, in and to s3"
     parts = f"{of['store']:.1f} and {of['local']:.1f} s, of which the libraries of the store take {loaded:.1f} s to load"
     return [
-        Row(
-            f"{what}: CPU over that of folders",
-            of["store"] / of["local"],
-            "×",
-            "lower",
-            1.2,
-            parts,
-        ),
-        Row(
+        lower(f"{what}: CPU over that of folders", of["store"] / of["local"], "×", 1.2, parts),
+        lower(
             f"{what}: the same without loading the libraries",
             (of["store"] - loaded) / of["local"],
             "×",
-            "lower",
         ),
     ]
 
@@ -380,9 +352,7 @@ def recorded(place: Path) -> list[Row]:
             shutil.copy(DATA / "trajectories" / folder / file, source)
         mined = mine([source], place / "recorded" / f"{folder}-corpus", CorpusConfig())
         kinds = ", ".join(f"{n} {kind}" for kind, n in sorted(mined.kinds.items()))
-        rows.append(
-            Row(f"encounters in {folder} ({kinds})", mined.encounters, "", "higher", least)
-        )
+        rows.append(higher(f"encounters in {folder} ({kinds})", mined.encounters, "", least))
     return rows
 
 
@@ -452,20 +422,17 @@ def batch(place: Path) -> list[Row]:
     causes = Counter(case["cause"] for case in cases if not case["published"])
     without = "; ".join(f"{n} × {cause}" for cause, n in causes.most_common(3))
     return [
-        Row(
-            f"{what}: CPU with two processes by that with one", cpu[2] / cpu[1], "", "lower", 1.15
-        ),
-        Row(
+        lower(f"{what}: CPU with two processes by that with one", cpu[2] / cpu[1], "", 1.15),
+        higher(
             f"{what}: the same bytes",
             float(_digests(place / "batch-1") == _digests(place / "batch-2")),
             "",
-            "higher",
             1.0,
         ),
-        Row(f"{what}: scenarios (cases without any: {without})", scenarios, "", "higher"),
-        Row("CPU of a template on a road", cpu[1] / len(cases), "s", "lower"),
-        Row("CPU of a scenario", cpu[1] / max(scenarios, 1), "s", "lower"),
-        *(Row(f"time with {n} processes", wall[n], "s", "lower") for n in (1, 2)),
+        higher(f"{what}: scenarios (cases without any: {without})", scenarios, ""),
+        lower("CPU of a template on a road", cpu[1] / len(cases), "s"),
+        lower("CPU of a scenario", cpu[1] / max(scenarios, 1), "s"),
+        *(lower(f"time with {n} processes", wall[n], "s") for n in (1, 2)),
     ]
 
 
@@ -481,18 +448,11 @@ def kills(place: Path) -> list[Row]:
         _words(corpus, place / "killed", 2, 5, few), place / "killed", KILLS
     )
     return [
-        Row(
-            f"SIGKILLs ({workers} of a worker, {runs} of the run)",
-            workers + runs,
-            "",
-            "higher",
-            KILLS,
-        ),
-        Row(
+        higher(f"SIGKILLs ({workers} of a worker, {runs} of the run)", workers + runs, "", KILLS),
+        higher(
             "after them the same bytes",
             float(_digests(place / "whole") == _digests(place / "killed")),
             "",
-            "higher",
             1.0,
         ),
     ]
@@ -522,32 +482,22 @@ def library(place: Path) -> list[Row]:
     )
     truth = np.concatenate([own for _, _, own in new])
     rows = [
-        Row(
+        lower(
             f"library of {LIBRARY} synthetic ({len(found.means)} primitives, 8 planted)",
             fitted,
             "CPU s",
-            "lower",
             1200.0,
         ),
-        Row("two seeds, adjusted Rand", adjusted_rand(*labels), "", "higher", 0.8),
-        Row(
-            "planted primitives, adjusted Rand",
-            adjusted_rand(planted, labels[0]),
-            "",
-            "higher",
-            0.9,
-        ),
-        Row(
+        higher("two seeds, adjusted Rand", adjusted_rand(*labels), "", 0.8),
+        higher("planted primitives, adjusted Rand", adjusted_rand(planted, labels[0]), "", 0.9),
+        lower(
             f"F1 of {NEW} new ones, alone less assigned",
             alone - assigned,
             "",
-            "lower",
             0.05,
             f"alone {alone:.3f}, assigned {assigned:.3f}",
         ),
-        Row(
-            "new ones, planted primitives, adjusted Rand", adjusted_rand(truth, told), "", "higher"
-        ),
+        higher("new ones, planted primitives, adjusted Rand", adjusted_rand(truth, told), ""),
     ]
     if not (DATA / "trajectories").is_dir():
         return rows
@@ -567,19 +517,9 @@ def library(place: Path) -> list[Row]:
         found, labels, fitted = _two_seeds(those)
         both = adjusted_rand(*(each[: sum(len(pair.time) for pair in real)] for each in labels))
         rows += [
-            Row(
-                f"library of {name} ({len(found.means)} primitives)",
-                fitted,
-                "CPU s",
-                "lower",
-                1200.0,
-            ),
-            Row(
-                f"library of {name}: two seeds, adjusted Rand of the recorded ones",
-                both,
-                "",
-                "higher",
-                0.8,
+            lower(f"library of {name} ({len(found.means)} primitives)", fitted, "CPU s", 1200.0),
+            higher(
+                f"library of {name}: two seeds, adjusted Rand of the recorded ones", both, "", 0.8
             ),
         ]
     return rows
@@ -622,22 +562,12 @@ def peers(place: Path) -> list[Row]:
     times = [theirs / one["ours"] for theirs, one in zip(chain, spent, strict=True)]
     what = f"{len(spent)} templates on roads × {COUNT}, median"
     return [
-        Row(
-            f"{what}: CPU of ours", float(np.median([one["ours"] for one in spent])), "s", "lower"
-        ),
-        Row(
-            f"{what}: CPU of the chain of peers",
-            float(np.median(chain)),
-            "s",
-            "lower",
-            None,
-            parts,
-        ),
-        Row(
+        lower(f"{what}: CPU of ours", float(np.median([one["ours"] for one in spent])), "s"),
+        lower(f"{what}: CPU of the chain of peers", float(np.median(chain)), "s", None, parts),
+        higher(
             f"{what}: chain by ours",
             float(np.median(times)),
             "×",
-            "higher",
             20.0,
             f"{min(times):.1f} to {max(times):.1f}",
         ),

@@ -27,7 +27,7 @@ import numpy as np
 from benchmarks._coverage_nulls import at_precision, jitters, joint_gain, speed_spread
 from benchmarks._size import sized
 from benchmarks.naturalness import DATA
-from benchmarks.row import Row
+from benchmarks.row import higher, lower, Row
 from scenario_gen.base.errors import ScenarioGenError
 from scenario_gen.logs import LogConfig, read_log
 from scenario_gen.method.chain import Chain
@@ -105,10 +105,10 @@ def _measured(
         members_of([(name, Set(own, members)) for name, own, members in sets])  # type: ignore[misc]
         for sets in ([*made, *recombined], shifted, mixed)
     )
-    yield Row(f"{setting}: encounters", len(found.recorded), "", "higher")
-    yield Row(f"{setting}: scenarios", len(found.made), "", "higher")
+    yield higher(f"{setting}: encounters", len(found.recorded), "")
+    yield higher(f"{setting}: scenarios", len(found.made), "")
     lost = {(member.template, member.other) for member in found.made if member.kind == APART}
-    yield Row(f"{setting}: sets that lose the shared area", len(lost), "", "lower", 0.0)
+    yield lower(f"{setting}: sets that lose the shared area", len(lost), "", 0.0)
     yield from _curve(setting, found)
     yield from _by_kind(setting, found)
     yield from _beside(setting, found, dict(zip(("shifted", "mixed"), nulls, strict=True)), rng)
@@ -125,20 +125,14 @@ def _by_kind(setting: str, found: Members) -> Iterator[Row]:
                 shares, axis=0, weights=[len(own.recorded) for own in enough]
             )
             message = f"{len(enough)} kinds; templates alone {alone:.2f}"
-            yield Row(
-                f"{setting}: coverage with {n} of a kind",
-                generated,
-                "",
-                "higher",
-                TARGETS.get(n),
-                message,
+            yield higher(
+                f"{setting}: coverage with {n} of a kind", generated, "", TARGETS.get(n), message
             )
             message = f"of the recorded {recorded:.2f}"
-            yield Row(
+            yield higher(
                 f"{setting}: precision with {n} of a kind",
                 precision,
                 "",
-                "higher",
                 OF_RECORDED * recorded,
                 message,
             )
@@ -149,25 +143,17 @@ def _curve(variety: str, found: Members) -> Iterator[Row]:
     for point in found.curve(TEMPLATES):
         n, multiplier = point.templates, point.multiplier
         alone = f"{in_words(point.generated)}; templates alone {in_words(point.alone)}"
-        yield Row(
-            f"{variety}: coverage with {n}",
-            point.generated.value,
-            "",
-            "higher",
-            TARGETS.get(n),
-            alone,
+        yield higher(
+            f"{variety}: coverage with {n}", point.generated.value, "", TARGETS.get(n), alone
         )
         recorded = f"of the recorded {in_words(point.recorded)}"
         least = OF_RECORDED * point.recorded.value if math.isfinite(point.recorded.value) else None
-        yield Row(
-            f"{variety}: precision with {n}", point.precision.value, "", "higher", least, recorded
-        )
+        yield higher(f"{variety}: precision with {n}", point.precision.value, "", least, recorded)
         name = f"{variety}: multiplier with {n} (inf: more than there are)"
-        yield Row(
+        yield higher(
             name,
             multiplier.value,
             "",
-            "higher",
             10.0,
             f"[{multiplier.low:.1f}, {multiplier.high:.1f}] over draws",
         )
@@ -184,40 +170,30 @@ def _beside(
         message = f"{name} {equal[0].value:.2f} at {equal[1].value:.2f}; as it is {plain[1].value:.2f} at {plain[2].value:.2f}"
         if name in nulls:
             gain = coverage.value - equal[0].value
-            yield Row(
+            yield higher(
                 f"{variety}: coverage with {MIDDLE} over {name} at equal precision",
                 gain,
                 "",
-                "higher",
                 0.12,
                 message,
             )
         else:
             best = max(best, (equal[0].value, message))
     gain = coverage.value - best[0]
-    yield Row(
+    yield higher(
         f"{variety}: coverage with {MIDDLE} over the best jitter at equal precision",
         gain,
         "",
-        "higher",
         0.25,
         best[1],
     )
     for kind, joint in joint_gain(found, nulls["mixed"], MIDDLE).items():
         target = 0.1 if kind == "following" else 0.05
-        yield Row(
-            f"{variety}: precision of joint features over mixed, {kind}",
-            joint,
-            "",
-            "higher",
-            target,
+        yield higher(
+            f"{variety}: precision of joint features over mixed, {kind}", joint, "", target
         )
-    yield Row(
-        f"{variety}: spread of speeds within a set over the recorded",
-        speed_spread(found),
-        "",
-        "higher",
-        0.4,
+    yield higher(
+        f"{variety}: spread of speeds within a set over the recorded", speed_spread(found), "", 0.4
     )
 
 

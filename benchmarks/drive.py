@@ -23,7 +23,7 @@ from benchmarks._drive_testing import discriminating
 from benchmarks._driving_worlds import Anything, draw_scenario, Witness
 from benchmarks._sampling_cases import cases, Prepared
 from benchmarks._size import sized
-from benchmarks.row import Row
+from benchmarks.row import higher, lower, Row
 from scenario_gen.closed_loop.config import ClosedLoopConfig, REACTIVE, REPLAY
 from scenario_gen.closed_loop.ego import Pose
 from scenario_gen.closed_loop.origin import Trial, units_of
@@ -127,11 +127,10 @@ def planners(trials: list[Trial]) -> tuple[list[Row], list[Outcome]]:
     share = paired_difference(np.array(more), unit, 0.95)
     said = f"{share.value:.3f}, {share.low:.3f} to {share.high:.3f}; {encounters} encounters"
     rows.append(
-        Row(
+        higher(
             "collisions: constant speed's less IDM's on the same scenarios, lower bound",
             share.low,
             "",
-            "higher",
             0.0,
             said,
         )
@@ -139,9 +138,7 @@ def planners(trials: list[Trial]) -> tuple[list[Row], list[Outcome]]:
     again = run_trials(trials[:40], GOOD, workers=2)
     config = ClosedLoopConfig()
     same = Drives(good[:40], GOOD, config).json() == Drives(again, GOOD, config).json()
-    rows.append(
-        Row("same bytes in a second run, with two workers", float(same), "", "higher", 1.0)
-    )
+    rows.append(higher("same bytes in a second run, with two workers", float(same), "", 1.0))
     return rows, [*bad, *good]
 
 
@@ -151,20 +148,12 @@ def collisions(outcomes: list[Outcome]) -> list[Row]:
     hits = sum(outcome.verdict.collision is not None for outcome in outcomes)
     of = f"{len(outcomes)} drives, {hits} with a collision"
     rows = [
-        Row("collisions at 1 ms that the verdict lacks", float(lacking), "", "lower", 0.0, of),
-        Row(
-            "collisions of the verdict that no millisecond shows",
-            float(brief),
-            "",
-            "lower",
-            None,
-            of,
-        ),
-        Row(
+        lower("collisions at 1 ms that the verdict lacks", float(lacking), "", 0.0, of),
+        lower("collisions of the verdict that no millisecond shows", float(brief), "", None, of),
+        lower(
             "collisions of the verdict that no microsecond of their step shows either",
             float(beyond),
             "",
-            "lower",
             0.0,
             of,
         ),
@@ -181,22 +170,14 @@ def collisions(outcomes: list[Outcome]) -> list[Row]:
         )
         said = f"commonroad-drivability-checker 2025.4.0: {sum(k is not None for k in theirs)} of {len(theirs)} drives"
         rows += [
-            Row(
+            lower(
                 "collisions of the drivability checker that the verdict lacks",
                 float(missed),
                 "",
-                "lower",
                 0.0,
                 said,
             ),
-            Row(
-                "collisions that it has earlier than the verdict",
-                float(late),
-                "",
-                "lower",
-                0.0,
-                said,
-            ),
+            lower("collisions that it has earlier than the verdict", float(late), "", 0.0, said),
         ]
     return rows
 
@@ -316,14 +297,13 @@ def witnesses(trials: list[Trial]) -> list[Row]:
         name = f"witness as ego, {policy}"
         of = f"{len(trials)} drives"
         rows += [
-            Row(f"{name}: collisions", float(hits), "", "lower", 0.0, of),
-            Row(f"{name}: off the road", float(off), "", "lower", 0.0, of),
-            Row(f"{name}: goal not reached", float(missed), "", "lower", 0.0, of),
-            Row(
+            lower(f"{name}: collisions", float(hits), "", 0.0, of),
+            lower(f"{name}: off the road", float(off), "", 0.0, of),
+            lower(f"{name}: goal not reached", float(missed), "", 0.0, of),
+            lower(
                 f"{name}: largest distance from the certified motion",
                 100.0 * deviation,
                 "cm",
-                "lower",
                 5.0,
                 of,
             ),
@@ -366,45 +346,32 @@ def anything() -> tuple[list[Row], list[Outcome]]:
     bounds = wilson(forced, RUNS, 0.95)
     said = f"{forced} of {RUNS}, {100 * bounds.low:.1f} to {100 * bounds.high:.1f} %"
     rows = [
-        Row(
-            "ego doing anything: contacts among the others",
-            float(met),
-            "",
-            "lower",
-            0.0,
-            f"{RUNS} runs",
+        lower(
+            "ego doing anything: contacts among the others", float(met), "", 0.0, f"{RUNS} runs"
         ),
-        Row(
+        lower(
             "ego doing anything: runs with a circle without the ego",
             float(stuck),
             "",
-            "lower",
             0.0,
             f"{RUNS} runs",
         ),
-        Row(
+        lower(
             f"ego doing anything: runs with a vehicle more than {LATE:g} s late after it",
             float(late),
             "",
-            "lower",
             0.0,
             f"{RUNS} runs",
         ),
-        Row(
+        lower(
             "ego doing anything: runs with braking that the order forced",
             bounds.value,
             "",
-            "lower",
             None,
             said,
         ),
-        Row(
-            "others' braking jerk, 99th percentile",
-            hardest,
-            "m/s³",
-            "lower",
-            10.0,
-            f"{len(jerk)} steps",
+        lower(
+            "others' braking jerk, 99th percentile", hardest, "m/s³", 10.0, f"{len(jerk)} steps"
         ),
     ]
     return rows, kept
@@ -426,13 +393,7 @@ def speed() -> list[Row]:
                 steps += drive.here.size
             best = max(best, steps / (process_time() - began))
         rows.append(
-            Row(
-                f"in process, reactive, {vehicles} vehicles",
-                best,
-                "vehicle-steps/s",
-                "higher",
-                40_000.0,
-            )
+            higher(f"in process, reactive, {vehicles} vehicles", best, "vehicle-steps/s", 40_000.0)
         )
         rows += [*highway_env(vehicles), *sumo(vehicles)]
     return rows
@@ -463,11 +424,10 @@ def gymnasium_steps() -> list[Row]:
                 over, steps = terminated or truncated, steps + 1
         best = max(best, steps / (process_time() - began))
     return [
-        Row(
+        higher(
             "Gymnasium environment, road of 600 m by 600 m",
             best,
             "steps/s",
-            "higher",
             3_000.0,
             "12 scenarios",
         )
@@ -490,21 +450,9 @@ def dds(made: GenerationResult | None) -> list[Row]:
     late = real_time(made, sized(200, quick=10))
     load = f"load {os.getloadavg()[0]:.1f} on {os.cpu_count()} cores"
     return [
-        Row(
-            f"lock-step over DDS, {count} vehicles at 10 Hz",
-            faster,
-            "× real time",
-            "higher",
-            20.0,
-            load,
+        higher(
+            f"lock-step over DDS, {count} vehicles at 10 Hz", faster, "× real time", 20.0, load
         ),
-        Row(
-            "CPU time of such a step, node and client",
-            used,
-            "ms",
-            "lower",
-            5.0,
-            "100 ms of the drive",
-        ),
-        Row("real time, 99th percentile of the period's error", late, "ms", "lower", 10.0, load),
+        lower("CPU time of such a step, node and client", used, "ms", 5.0, "100 ms of the drive"),
+        lower("real time, 99th percentile of the period's error", late, "ms", 10.0, load),
     ]

@@ -19,7 +19,7 @@ from scipy.spatial.distance import cdist
 
 from benchmarks._figure5 import LINEAR, measure, Measured, SEEDS
 from benchmarks._size import sized
-from benchmarks.row import Row
+from benchmarks.row import higher, lower, Row
 from scenario_gen.method.evaluation import dtw_distance, feature_matrix
 from scenario_gen.types.row_names import UNIFORM, WITH, WITHOUT
 
@@ -47,28 +47,20 @@ def _kernels() -> list[Row]:
         theirs, reference = _fastest(lambda: dtw_ndim.distance_fast(a, b, inner_dist="euclidean"))
         peer = f"dtaidistance C {1e3 * theirs:.1f} ms, ours {1e3 * ours:.1f} ms"
         rows += [
-            Row(
-                f"DTW, 2-D, T = {STEPS}: faster than dtaidistance",
-                theirs / ours,
-                "×",
-                "higher",
-                4.0,
-                peer,
+            higher(
+                f"DTW, 2-D, T = {STEPS}: faster than dtaidistance", theirs / ours, "×", 4.0, peer
             ),
-            Row(
+            lower(
                 "DTW: difference from dtaidistance",
                 abs(distance - reference),
                 "",
-                "lower",
                 1e-9,
                 "dtaidistance C",
             ),
         ]
     except ImportError:
         rows.append(
-            Row(
-                f"DTW, 2-D, T = {STEPS} (dtaidistance is not installed)", 1e3 * ours, "ms", "lower"
-            )
+            lower(f"DTW, 2-D, T = {STEPS} (dtaidistance is not installed)", 1e3 * ours, "ms")
         )
 
     def normalised() -> Any:
@@ -79,21 +71,13 @@ def _kernels() -> list[Row]:
     theirs, reference = _fastest(normalised)
     peer = f"scipy cdist {1e3 * theirs:.0f} ms, ours {1e3 * ours:.0f} ms"
     rows.append(
-        Row(
-            f"feature matrix, T = {STEPS}: faster than scipy",
-            theirs / ours,
-            "×",
-            "higher",
-            2.0,
-            peer,
-        )
+        higher(f"feature matrix, T = {STEPS}: faster than scipy", theirs / ours, "×", 2.0, peer)
     )
     rows.append(
-        Row(
+        lower(
             "feature matrix: difference from scipy",
             float(np.abs(matrix - reference).max()),
             "",
-            "lower",
             1e-12,
             "scipy",
         )
@@ -109,11 +93,10 @@ def _figure5(cases: Sequence[Measured]) -> list[Row]:
         [case for case in cases if not case.own_road],
     )
     rows = [
-        Row(
+        lower(
             "evaluation and report of 50 samples, most costly case",
             max(c.seconds for c in cases),
             "s CPU",
-            "lower",
             10.0,
         ),
         Row(
@@ -123,11 +106,10 @@ def _figure5(cases: Sequence[Measured]) -> list[Row]:
             "higher",
             peer=f"seeds {', '.join(map(str, SEEDS))}",
         ),
-        Row(
+        lower(
             "changepoints per second, most",
             max(c.evaluation.changepoints / c.evaluation.duration for c in cases),
             "1/s",
-            "lower",
             0.5,
         ),
     ]
@@ -140,11 +122,10 @@ def _figure5(cases: Sequence[Measured]) -> list[Row]:
             f"not {c.evaluation.encounter} on {c.evaluation.road}, seed {c.seed}" for c in worse
         )
         rows.append(
-            Row(
+            higher(
                 label,
                 1.0 - len(worse) / len(telling) if telling else float("nan"),
                 "share",
-                "higher",
                 1.0,
                 peer,
             )
@@ -155,11 +136,10 @@ def _figure5(cases: Sequence[Measured]) -> list[Row]:
         ):
             peer = f"uniform {_ratio(group, UNIFORM, key):.2f}, best linear pieces {_ratio(group, LINEAR, key):.2f}"
             rows.append(
-                Row(
+                lower(
                     f"E {kind}: median with / without, {name}",
                     _ratio(group, WITH, key),
                     "",
-                    "lower",
                     target,
                     peer,
                 )
@@ -172,24 +152,11 @@ def _figure5(cases: Sequence[Measured]) -> list[Row]:
         )
         label = f"E {kind}: below uniform, of {len(even)} cases"
         rows.append(
-            Row(
-                label,
-                _share(list(below.values())),
-                "share",
-                "higher",
-                targets[2],
-                ", ".join(shares),
-            )
+            higher(label, _share(list(below.values())), "share", targets[2], ", ".join(shares))
         )
         correlation = float(np.nanmedian([c.value(WITH, f"correlation_{kind}") for c in cases]))
         rows.append(
-            Row(
-                f"{kind}: correlation with the template's matrix, median",
-                correlation,
-                "",
-                "higher",
-                0.9,
-            )
+            higher(f"{kind}: correlation with the template's matrix, median", correlation, "", 0.9)
         )
     return rows
 

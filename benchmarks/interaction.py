@@ -35,7 +35,7 @@ from benchmarks._naturalness_cuts import cuts, recorded
 from benchmarks._naturalness_motion import displacement, Signals
 from benchmarks._size import sized
 from benchmarks.naturalness import DATA
-from benchmarks.row import Row
+from benchmarks.row import higher, Row
 from scenario_gen.base.errors import ScenarioGenError
 from scenario_gen.logs import read_log
 from scenario_gen.logs.synthetic import bundled
@@ -254,11 +254,10 @@ def _rows(found: Sequence[Case]) -> list[Row]:
     ]
     yields = [(case, told) for case in good for told in case.figures["figures"] if "early" in told]
     rows = [
-        Row(
+        higher(
             "encounters that generate",
             len(good) / max(len(found), 1),
             "share",
-            "higher",
             None,
             f"{len(found)} encounters",
         )

@@ -24,7 +24,7 @@ from typing import Any
 from benchmarks._archive import write_archive
 from benchmarks._kills_processes import BUCKET, end, Process, Processes, worker_of
 from benchmarks._size import sized
-from benchmarks.row import Row
+from benchmarks.row import higher, lower, Row
 
 KILLS = sized(15, quick=1)  # of each victim
 VICTIMS = ("client", "worker", "scheduler", "store")
@@ -95,15 +95,11 @@ def _rows(victim: str, seen: Seen) -> list[Row]:
     shares = ", ".join(f"{100.0 * moment:.0f}" for moment in sorted(seen.moments))
     what = f"{seen.runs} runs, {seen.lines} lines on the terminal at most; killed at {shares} % of the objects"
     return [
-        Row(f"{victim}: kills during the work", seen.kills, "", "higher", KILLS, what),
-        Row(f"{victim}: the same bytes", seen.same, "", "higher", KILLS),
-        Row(f"{victim}: temporary objects and files left", seen.left, "", "lower", 0.0),
-        Row(
-            f"{victim}: runs that hang or print a traceback",
-            seen.hung + seen.tracebacks,
-            "",
-            "lower",
-            0.0,
+        higher(f"{victim}: kills during the work", seen.kills, "", KILLS, what),
+        higher(f"{victim}: the same bytes", seen.same, "", KILLS),
+        lower(f"{victim}: temporary objects and files left", seen.left, "", 0.0),
+        lower(
+            f"{victim}: runs that hang or print a traceback", seen.hung + seen.tracebacks, "", 0.0
         ),
     ]
 

@@ -19,7 +19,7 @@ import numpy as np
 from benchmarks._messages_many import many
 from benchmarks._messages_processes import nodes, publisher
 from benchmarks._size import sized
-from benchmarks.row import Row
+from benchmarks.row import higher, lower, Row
 from msg_conventions.paths import encode_path
 from msg_conventions.scenarios import decode_scenario, encode_scenario
 from scenario_gen.bags.storage.bag import bag_topics
@@ -178,7 +178,7 @@ def _ratio(
 ) -> Row:
     peer, mine = _cpu(theirs, 5), _cpu(own, 200)
     words = f"built and serialised with rclpy: {1e3 * peer:.2f} ms, ours {1e3 * mine:.4f} ms"
-    return Row(name, peer / mine, "×", "higher", target, words)
+    return higher(name, peer / mine, "×", target, words)
 
 
 class _Client:
@@ -232,13 +232,8 @@ def _consumer(domain: int) -> Row:
         sender.wait(30.0)
     rate = (len(stamps) - 1) / (stamps[-1] - stamps[0]) if len(stamps) > 1 else 0.0
     words = f"{len(stamps)} of {SCENARIOS} messages of {size} bytes arrived, from one process to another"
-    return Row(
-        "scenarios received by a raw consumer (2 vehicles, 200 points)",
-        rate,
-        "1/s",
-        "higher",
-        500.0,
-        words,
+    return higher(
+        "scenarios received by a raw consumer (2 vehicles, 200 points)", rate, "1/s", 500.0, words
     )
 
 
@@ -249,11 +244,10 @@ def _recorder(domain: int, folder: Path) -> Row:
         sender.wait(60.0)
     (topic,) = bag_topics(bag)
     words = f"{topic.count} of {SMALL} messages of 100 bytes, 2,000 a second"
-    return Row(
+    return lower(
         "messages that the recorder lost at 2,000 a second",
         SMALL - topic.count,
         "messages",
-        "lower",
         0.0,
         words,
     )
@@ -299,11 +293,10 @@ def _calls(domain: int, folder: Path) -> list[Row]:
             _done(running)
             words = f"median {1e3 * float(np.median(taken)):.1f} ms; {CALLS} calls while generations of 50 run"
             rows.append(
-                Row(
+                lower(
                     f"{kind.__name__} round trip, 95th percentile",
                     1e3 * _high(taken),
                     "ms",
-                    "lower",
                     200.0,
                     words,
                 )
@@ -351,7 +344,7 @@ def _exit(domain: int, folder: Path, name: str, *signals: signal.Signals) -> Row
         if running.done():
             raise RuntimeError("the generation was over too soon")
         words = "all five, while a generation of 20,000 runs"
-        return Row(f"nodes end after {name}", suite.signalled(*signals), "s", "lower", 2.0, words)
+        return lower(f"nodes end after {name}", suite.signalled(*signals), "s", 2.0, words)
 
 
 def _ends(client: _Client) -> tuple[float, float, float]:

@@ -24,7 +24,7 @@ from benchmarks._naturalness_cuts import Cut, cuts, recorded
 from benchmarks._naturalness_generate import Job, Made, run_job
 from benchmarks._naturalness_motion import displacement, keeps_turn, roughness, Signals
 from benchmarks._size import sized
-from benchmarks.row import Row
+from benchmarks.row import higher, lower, Row
 
 DATA = Path(
     os.environ.get("SCENARIO_GEN_DATA", Path(__file__).resolve().parents[2] / "shared" / "data")
@@ -168,13 +168,8 @@ def run(
     ]
     if not chosen:
         return [
-            Row(
-                "recorded encounters",
-                0.0,
-                "cases",
-                "higher",
-                1.0,
-                "no recorded data (SCENARIO_GEN_DATA)",
+            higher(
+                "recorded encounters", 0.0, "cases", 1.0, "no recorded data (SCENARIO_GEN_DATA)"
             )
         ]
     names = roads.split(",") if roads else ["corridor"] if cases else ["corridor", "map", *ROADS]
@@ -234,11 +229,10 @@ def _motion(group: Sequence[Case], kind: str) -> list[Row]:
         ratios = of(f"{key}: ratio")
         told = f"template {np.median(of(f'{key}: template')):.3g}, samples {np.median(of(f'{key}: samples')):.3g} (medians)"
         rows.append(
-            Row(
+            lower(
                 f"{kind}: largest {key}, samples / template, median",
                 float(np.median(ratios)),
                 "×",
-                "lower",
                 median,
                 told,
             )
@@ -246,13 +240,8 @@ def _motion(group: Sequence[Case], kind: str) -> list[Row]:
         last = group[int(np.argmax(ratios))].figures
         told = f"{last['name']} on {last['road']}"
         rows.append(
-            Row(
-                f"{kind}: largest {key}, samples / template, worst",
-                max(ratios),
-                "×",
-                "lower",
-                worst,
-                told,
+            lower(
+                f"{kind}: largest {key}, samples / template, worst", max(ratios), "×", worst, told
             )
         )
     for key in ("acceleration", "lateral", "yaw"):
@@ -260,20 +249,18 @@ def _motion(group: Sequence[Case], kind: str) -> list[Row]:
         ratio = samples / template if template else float("nan")
         told = f"{ratio:.2f} ×; per 10 s: template {template / len(group):.2f}, samples {samples / len(group):.2f}"
         label = f"{kind}: changes of sign of {key}, ratio of means, from 1"
-        rows.append(Row(label, abs(ratio - 1.0), "×", "lower", 0.15, told))
+        rows.append(lower(label, abs(ratio - 1.0), "×", 0.15, told))
     rows += [
-        Row(
+        lower(
             f"{kind}: extra speed extrema per vehicle",
             float(np.mean(of("extrema: more"))),
             "",
-            "lower",
             0.2,
         ),
-        Row(
+        lower(
             f"{kind}: the same, fewer not set against more",
             float(np.mean(of("extrema: only more"))),
             "",
-            "lower",
         ),
     ]
     turns = [share for case in group for share in case.figures["turns kept"]]
@@ -283,11 +270,10 @@ def _motion(group: Sequence[Case], kind: str) -> list[Row]:
         if min(case.figures["turns kept"]) < 0.5
     ]
     rows.append(
-        Row(
+        higher(
             f"{kind}: vehicles with the template's turn",
             float(np.mean(turns)),
             "share",
-            "higher",
             0.99,
             ", ".join(lost),
         )
@@ -295,11 +281,10 @@ def _motion(group: Sequence[Case], kind: str) -> list[Row]:
     moved = of("displacement")
     told = f"least {min(moved):.2f} m"
     rows.append(
-        Row(
+        higher(
             f"{kind}: displacement without the clock, median",
             float(np.median(moved)),
             "m",
-            "higher",
             0.49,
             told,
         )
@@ -318,23 +303,15 @@ def _classifier(group: Sequence[Case], kind: str) -> list[Row]:
             continue
         target = 0.7 if kind == OWN else 0.8
         rows.append(
-            Row(
-                f"{kind}: classifier, {name}, AUC",
-                told.area,
-                "",
-                "lower",
-                target,
-                _explained(told),
-            )
+            lower(f"{kind}: classifier, {name}, AUC", told.area, "", target, _explained(told))
         )
         told = told_apart(oracles, series)
         if told is not None:
             rows.append(
-                Row(
+                lower(
                     f"{kind}: classifier, {name}, AUC of the oracle",
                     told.area,
                     "",
-                    "lower",
                     None,
                     f"± {told.error:.3f}",
                 )
@@ -363,30 +340,27 @@ def _similarity(group: Sequence[Case], kind: str) -> list[Row]:
             continue
         value = float(np.median(with_))
         rows.append(
-            Row(
+            lower(
                 f"{kind}: {label}, with / without, median",
                 value,
                 "",
-                "lower",
                 target,
                 f"{len(with_)} cases",
             )
         )
         rows.append(
-            Row(
+            higher(
                 f"{kind}: {label}, with below without",
                 _share(with_),
                 "share",
-                "higher",
                 0.97 if target else None,
             )
         )
         rows.append(
-            Row(
+            higher(
                 f"{kind}: {label}, below uniform",
                 _share(uniform),
                 "share",
-                "higher",
                 below,
                 f"{len(uniform)} cases",
             )
@@ -395,13 +369,8 @@ def _similarity(group: Sequence[Case], kind: str) -> list[Row]:
         numbers = [case.figures["changepoints"] for case in group]
         told = f"{min(numbers)} to {max(numbers)}"
         rows.append(
-            Row(
-                f"{kind}: K, mean number of changepoints",
-                float(np.mean(numbers)),
-                "",
-                "lower",
-                None,
-                told,
+            lower(
+                f"{kind}: K, mean number of changepoints", float(np.mean(numbers)), "", None, told
             )
         )
     return rows
@@ -429,11 +398,10 @@ def _yield(group: Sequence[Case], kind: str) -> list[Row]:
         else f"all {len(group)}"
     )
     rows = [
-        Row(
+        higher(
             f"{kind}: encounters and roads that generate",
             len(good) / len(group),
             "share",
-            "higher",
             None,
             told,
         )
@@ -445,20 +413,18 @@ def _yield(group: Sequence[Case], kind: str) -> list[Row]:
     seconds = [case.figures["seconds"] for case in good]
     return [
         *rows,
-        Row(
+        higher(
             f"{kind}: acceptance, median",
             float(np.median(acceptance)),
             "share",
-            "higher",
             None,
             f"worst {min(acceptance):.2f}",
         ),
-        Row(f"{kind}: sets that stayed short", float(short), "sets", "lower", 0.0),
-        Row(
+        lower(f"{kind}: sets that stayed short", float(short), "sets", 0.0),
+        lower(
             f"{kind}: CPU of one generation, median",
             float(np.median(seconds)),
             "s",
-            "lower",
             None,
             f"worst {max(seconds):.1f} s",
         ),

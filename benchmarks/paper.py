@@ -19,7 +19,7 @@ from benchmarks._paper_chain import ROADS
 from benchmarks._paper_claims import Claim, claims_of
 from benchmarks._paper_measure import PaperCase, run_case
 from benchmarks._size import sized
-from benchmarks.row import Row
+from benchmarks.row import higher, Row
 from scenario_gen.base.errors import RefusedError
 from scenario_gen.base.folders import Kind, replaced_folder, write_text
 from scenario_gen.base.parameters import flatten
@@ -190,11 +190,10 @@ def run(
     for case in cases:
         holds = [claim.holds for claim in claims_of(case) if claim.holds is not None]
         rows.append(
-            Row(
+            higher(
                 f"claims of the paper that hold, {case.encounter.name}",
                 float(sum(holds)),
                 f"of {len(holds)}",
-                "higher",
             )
         )
     return rows

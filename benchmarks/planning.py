@@ -31,7 +31,7 @@ from benchmarks._planning_maps import (
 )
 from benchmarks._planning_obstructed import CAR, dubins_length, first_path, obstructed, rrt_connect
 from benchmarks._size import sized
-from benchmarks.row import Row
+from benchmarks.row import higher, lower, Row
 from scenario_gen.base.errors import RefusedError
 from scenario_gen.base.road_users import Dynamics
 from scenario_gen.method.routing import plan_routes, PlanningConfig
@@ -128,7 +128,7 @@ def _field(road: Road) -> list[Row]:
         started = process_time()
         distance_transform(road.drivable, out)
         times.append(process_time() - started)
-    return [Row("clearance field, 1000×1000", 1e3 * median(times), "ms", "lower", 30.0)]
+    return [lower("clearance field, 1000×1000", 1e3 * median(times), "ms", 30.0)]
 
 
 def _first(cases: dict[str, Case]) -> list[Row]:
@@ -145,14 +145,14 @@ def _first(cases: dict[str, Case]) -> list[Row]:
                 started = process_time()
                 _ompl(road, ends, "ompl_rrt_connect", 60.0, 5.0, first=True, states=by_state)
                 theirs.append(process_time() - started)
-        rows.append(Row(f"{name}: first path, step 5", 1e3 * median(ours), "ms", "lower"))
+        rows.append(lower(f"{name}: first path, step 5", 1e3 * median(ours), "ms"))
         for theirs, how in (
             (exact, "our compiled exact edge check in it"),
             (states, "a Python callback per state"),
         ):
             peer = f"OMPL RRTConnect, {how}: {1e3 * median(theirs):.2f} ms"
             label = f"{name}: first path, speed-up{', state by state' if theirs is states else ''}"
-            rows.append(Row(label, median(theirs) / median(ours), "×", "higher", target, peer))
+            rows.append(higher(label, median(theirs) / median(ours), "×", target, peer))
     return rows
 
 
@@ -172,9 +172,7 @@ def _first_own_step(cases: dict[str, Case]) -> list[Row]:
         peer = (
             f"OMPL RRTConnect, our compiled exact edge check in it: {1e3 * median(theirs):.2f} ms"
         )
-        rows.append(
-            Row(f"{name}: first path, own step", 1e3 * median(ours), "ms", "lower", target, peer)
-        )
+        rows.append(lower(f"{name}: first path, own step", 1e3 * median(ours), "ms", target, peer))
     return rows
 
 
@@ -203,12 +201,10 @@ def _curves(cases: dict[str, Case]) -> list[Row]:
             )
             told = f"{peer} {theirs:.2e}"
             label = f"{name}: excess over the optimum at {budget:g} s"
-            rows.append(Row(label, ours, "", "lower", targets.get((name, budget)), told))
+            rows.append(lower(label, ours, "", targets.get((name, budget)), told))
             if name != "lane":
-                rows.append(
-                    Row(f"{label}, ours / best of OMPL", ours / theirs, "", "lower", 0.5, told)
-                )
-    return [*rows, Row("paths shorter than the optimum", float(below), "", "lower", 0.0)]
+                rows.append(lower(f"{label}, ours / best of OMPL", ours / theirs, "", 0.5, told))
+    return [*rows, lower("paths shorter than the optimum", float(below), "", 0.0)]
 
 
 def _excess_of_ours(road: Road, ends: Floats, best: float, budget: float, seed: int) -> float:
@@ -228,16 +224,14 @@ def _throughput(cases: dict[str, Case]) -> list[Row]:
         default = _per_iteration(road, ends, RrtStarConnectConfig(), FEW)
         few, more, many = (_per_iteration(road, ends, PAPER, n) for n in (FEW, MORE, MANY))
         for cost, label in ((default, "default"), (few, "paper preset")):
-            rows.append(
-                Row(f"{name}: iterations per second, {label}", 1.0 / cost, "1/s", "higher", 1e5)
-            )
+            rows.append(higher(f"{name}: iterations per second, {label}", 1.0 / cost, "1/s", 1e5))
         for base, start, target, told in (
             (few, FEW, 1.0, _growth_of_ompl(road, ends) if name == "T" else None),
             (more, MORE, None, "from where eq 10, not zeta, sets the radius"),
         ):
             growth = many / base / (np.log(MANY) / np.log(start))
             label = f"{name}: cost per iteration at {MANY:.0e} over {start:.0e}, over log n"
-            rows.append(Row(label, growth, "×", "lower", target, told))
+            rows.append(lower(label, growth, "×", target, told))
     return rows
 
 
@@ -291,14 +285,7 @@ def _soundness(queries: int = QUERIES) -> list[Row]:
             hits += enters_blocked(drivable, path)
     told = f"{found} paths, {missed} budgets spent"
     return [
-        Row(
-            f"paths into occupied cells, of {asked} random queries",
-            float(hits),
-            "",
-            "lower",
-            0.0,
-            told,
-        )
+        lower(f"paths into occupied cells, of {asked} random queries", float(hits), "", 0.0, told)
     ]
 
 
@@ -333,16 +320,15 @@ def _recorded(queries: int = QUERIES_OF_A_MAP) -> list[Row]:
                 times.append(process_time() - started)
             name = f"{road.name}, radius {radius:g} m"
             rows.append(
-                Row(
+                higher(
                     f"{name}: found where a way exists",
                     100.0 * (1 - failed / ways),
                     "%",
-                    "higher",
                     100.0,
                     f"{ways} ways",
                 )
             )
-            rows.append(Row(f"{name}: median time", 1e3 * median(times), "ms", "lower", 50.0))
+            rows.append(lower(f"{name}: median time", 1e3 * median(times), "ms", 50.0))
     return rows
 
 
@@ -383,24 +369,20 @@ def _drivable() -> list[Row]:
             .plan(road, Query(poses[0, :2], poses[1, :2], 0.95), Budget(2000), 0)
             .cost
         )
+        rows.append(lower(f"drivable, {name} turn: time", 1e3 * median(times[1:]), "ms", 150.0))
         rows.append(
-            Row(f"drivable, {name} turn: time", 1e3 * median(times[1:]), "ms", "lower", 150.0)
-        )
-        rows.append(
-            Row(
+            lower(
                 f"drivable, {name} turn: largest curvature",
                 float(curvature),
                 "1/m",
-                "lower",
                 Dynamics().planned.max_curvature,
             )
         )
         rows.append(
-            Row(
+            lower(
                 f"drivable, {name} turn: length",
                 float(route.length[-1]),
                 "m",
-                "lower",
                 None,
                 f"shortest {shortest:.2f} m",
             )
@@ -412,7 +394,7 @@ def _unsure(solved: list[tuple[bool, bool]]) -> Row:
     """Roads on which the judge found no way, for want of room or because there is none: how many each planner solved."""
     ours, theirs = (np.count_nonzero([each[k] for each in solved]) for k in (0, 1))
     name = f"obstructed: solved of {len(solved)} roads on which the judge finds no way with room"
-    return Row(name, float(ours), "", "higher", None, f"OMPL RRTConnect {theirs}")
+    return higher(name, float(ours), "", None, f"OMPL RRTConnect {theirs}")
 
 
 def _obstructed() -> list[Row]:
@@ -463,37 +445,31 @@ def _obstructed() -> list[Row]:
         f"OMPL RRTConnect {1e3 * median(theirs):.1f} ms, with Python callbacks" if theirs else ""
     )
     return [
-        Row(
+        higher(
             f"obstructed: solved within {WITHIN:g} s, of {feasible} roads a judge drives",
             share,
             "%",
-            "higher",
             99.0,
             peer,
         ),
         _unsure(unsure),
-        Row("obstructed: first path", 1e3 * median(ours), "ms", "lower", 5.0, told),
-        Row(
+        lower("obstructed: first path", 1e3 * median(ours), "ms", 5.0, told),
+        lower(
             "obstructed: length over the median of OMPL's, simplified",
             median(excess or [np.inf]),
             "×",
-            "lower",
             1.02,
         ),
-        Row("obstructed: roads on which that is at most 1.02", within, "%", "higher"),
-        Row(
+        higher("obstructed: roads on which that is at most 1.02", within, "%"),
+        higher(
             "obstructed: routes published, with side and margin kept",
             100.0 * len(routes) / feasible,
             "%",
-            "higher",
             99.0,
         ),
-        Row("obstructed: time of such a route", 1e3 * median(routes or [np.inf]), "ms", "lower"),
-        Row(
-            "obstructed: largest curvature of a route, median",
-            median(bends or [np.inf]),
-            "1/m",
-            "lower",
+        lower("obstructed: time of such a route", 1e3 * median(routes or [np.inf]), "ms"),
+        lower(
+            "obstructed: largest curvature of a route, median", median(bends or [np.inf]), "1/m"
         ),
     ]
 

@@ -50,3 +50,25 @@ class Row:
             "value": self.value if math.isfinite(self.value) else None,
             "met": self.met,
         }
+
+
+def lower(
+    id: str,  # noqa: A002
+    value: float,
+    unit: str = "",
+    target: float | None = None,
+    peer: str | None = None,
+) -> Row:
+    """Return a figure that is better when it is lower."""
+    return Row(id, value, unit, "lower", target, peer)
+
+
+def higher(
+    id: str,  # noqa: A002
+    value: float,
+    unit: str = "",
+    target: float | None = None,
+    peer: str | None = None,
+) -> Row:
+    """Return a figure that is better when it is higher."""
+    return Row(id, value, unit, "higher", target, peer)

@@ -19,7 +19,7 @@ from benchmarks._sampling_cases import (
 )
 from benchmarks._scaling_case import group
 from benchmarks._size import sized
-from benchmarks.row import Row
+from benchmarks.row import higher, lower, Row
 from scenario_gen.method.sampling import draw_scenarios, Plan, SamplingConfig
 from scenario_gen.method.validity import Checker
 from scenario_gen.numerics.arrays import Floats
@@ -73,19 +73,17 @@ def _crossing() -> list[Row]:
         spent, machine, count, acceptance = min(taken)
         told = f"acceptance {acceptance:.2f}; NumPy's fixed job beside it {machine:.3f} s"
         rows += [
-            Row(
+            higher(
                 f"crossing, {variety}: valid scenarios, checked, one core",
                 count / spent,
                 "1/s",
-                "higher",
                 None,
                 told,
             ),
-            Row(
+            lower(
                 f"crossing, {variety}: a scenario over NumPy's fixed job",
                 spent / count / machine,
                 "×",
-                "lower",
             ),
         ]
     return rows
@@ -108,25 +106,23 @@ def _throughput() -> list[Row]:
     )
     slowest = f"least of {REPEATS} runs; the slowest {SCENARIOS / max(times[0] for times in taken):.0f}/s"
     return [
-        Row(
+        higher(
             "valid two-vehicle 20 s scenarios, checked, one core",
             SCENARIOS / base,
             "1/s",
-            "higher",
             2000.0,
             slowest,
         ),
-        Row(
+        lower(
             "such a scenario over NumPy's fixed job",
             base / SCENARIOS / machine,
             "×",
-            "lower",
             None,
             f"{machine:.3f} s",
         ),
-        Row("cost of four times the samples", more, "×", "lower", 4.4),
-        Row("cost of twice the duration", longer, "×", "lower", 2.2),
-        Row("cost of four times the vehicles (8)", fuller, "×", "lower", 16.0),
+        lower("cost of four times the samples", more, "×", 4.4),
+        lower("cost of twice the duration", longer, "×", 2.2),
+        lower("cost of four times the vehicles (8)", fuller, "×", 16.0),
     ]
 
 
@@ -195,11 +191,10 @@ def _recorded(variety: str) -> list[Row]:
                 realism[name].append(value)
     if not acceptance:
         return [
-            Row(
+            higher(
                 "recorded encounters",
                 0.0,
                 "cases",
-                "higher",
                 1.0,
                 "no recorded data, or none can be planned",
             )
@@ -207,35 +202,26 @@ def _recorded(variety: str) -> list[Row]:
     everywhere = [value for values in acceptance.values() for value in values]
     peer = f"{len(everywhere)} encounters × roads, {refused} refused before sampling"
     rows = [
-        Row(
+        higher(
             f"{variety}: raw acceptance, worst encounter on its best road",
             min(max(v) for v in acceptance.values()),
             "",
-            "higher",
             0.7,
             peer,
         ),
-        Row(
-            f"{variety}: raw acceptance, worst encounter and road",
-            min(everywhere),
-            "",
-            "higher",
-            0.3,
-        ),
-        Row(f"{variety}: sets that stayed short", float(broken), "sets", "lower", 0.0),
-        Row(
+        higher(f"{variety}: raw acceptance, worst encounter and road", min(everywhere), "", 0.3),
+        lower(f"{variety}: sets that stayed short", float(broken), "sets", 0.0),
+        higher(
             f"{variety}: mean pairwise displacement, least",
             min(apart),
             "m",
-            "higher",
             0.5,
             f"median {np.median(apart):.2f} m",
         ),
-        Row(
+        higher(
             f"{variety}: the same without the clock's part, least",
             min(moved),
             "m",
-            "higher",
             0.5,
             f"median {np.median(moved):.2f} m",
         ),
@@ -243,21 +229,19 @@ def _recorded(variety: str) -> list[Row]:
     if spreads:
         label = f"{variety}: standard deviation of arrival at a crossing conflict, median"
         rows.append(
-            Row(
+            higher(
                 label,
                 float(np.median(spreads)),
                 "s",
-                "higher",
                 0.5,
                 f"from {min(spreads):.2f} to {max(spreads):.2f} s",
             )
         )
     rows += [
-        Row(
+        lower(
             f"{variety}: JS {name} to the fitted template, median",
             float(np.median(values)),
             "bit",
-            "lower",
             TARGETS[name],
             f"worst {max(values):.3f}",
         )

@@ -17,7 +17,7 @@ from time import process_time
 import numpy as np
 
 from benchmarks._size import sized
-from benchmarks.row import Row
+from benchmarks.row import lower, Row
 from scenario_gen.corpus.mine import inventory
 
 COUNT, SECONDS, CELL = 50, 20.0, 0.2
@@ -56,11 +56,10 @@ def _vehicles(sizes: tuple[int, ...]) -> list[Row]:
     for n in sized((2, 8), quick=(2,)):
         for stage in ("generation", "references", "evaluation"):
             rows.append(
-                Row(
+                lower(
                     f"{n} vehicles: share of {stage}",
                     100.0 * found[n][stage] / found[n]["all"],
                     "%",
-                    "lower",
                 )
             )
     return rows
@@ -82,22 +81,19 @@ def _rows(
             if part not in ("all", "mebibytes")
         )
         rows.append(
-            Row(
+            lower(
                 f"{size:,g} {what}",
                 case["all"],
                 "CPU s",
-                "lower",
                 (targets or {}).get(int(size)),
                 parts or None,
             )
         )
-        rows.append(Row(f"{size:,g} {what}: peak memory", case["mebibytes"], "MiB", "lower"))
+        rows.append(lower(f"{size:,g} {what}: peak memory", case["mebibytes"], "MiB"))
     slope = np.polyfit(np.log(list(found)), np.log([case["all"] for case in found.values()]), 1)[0]
     return [
         *rows,
-        Row(
-            f"exponent in {name}", slope, "", "lower", target, f"{min(found):g} to {max(found):g}"
-        ),
+        lower(f"exponent in {name}", slope, "", target, f"{min(found):g} to {max(found):g}"),
     ]
 
 
@@ -121,4 +117,4 @@ def _inventory(files: int) -> Row:
         found = len(inventory([Path(place)])[0])
         seconds = process_time() - begun
     assert found == files
-    return Row(f"inventory of {files} files", seconds, "CPU s", "lower", 10.0)
+    return lower(f"inventory of {files} files", seconds, "CPU s", 10.0)

@@ -14,7 +14,7 @@ import numpy as np
 from benchmarks._late_witness import brute_force, LateWitness, natural_scenarios
 from benchmarks._search_peers import first_failure, PYTHON
 from benchmarks._size import sized
-from benchmarks.row import Row
+from benchmarks.row import higher, lower, Row
 from scenario_gen.closed_loop.search.estimate import Search
 
 PLANNERS = {  # seconds late: drives of a search, failures of brute force, share of plain sampling's drives that is asked
@@ -62,13 +62,8 @@ def _verifai(problem: LateWitness) -> list[Row]:
             f"{seeds} seed(s); {len([k for k in first if k > most])} found none in {most} drives"
         )
         rows.append(
-            Row(
-                f"VerifAI {name}: drives until the first failure",
-                median(first),
-                "",
-                "lower",
-                None,
-                remark,
+            lower(
+                f"VerifAI {name}: drives until the first failure", median(first), "", None, remark
             )
         )
     return rows
@@ -88,24 +83,22 @@ def _planner(
     plain = [_plain(problem, seed) for seed in range(seeds)]
     name = f"failure rate {truth:.1e}, {budget} drives"
     return [
-        Row(f"{name}: intervals that hold it, of {seeds}", held, "", "higher", 0.9 * seeds),
-        Row(f"{name}: drives, as a share of plain sampling's", median(share), "", "lower", asked),
-        Row(
+        higher(f"{name}: intervals that hold it, of {seeds}", held, "", 0.9 * seeds),
+        lower(f"{name}: drives, as a share of plain sampling's", median(share), "", asked),
+        lower(
             f"{name}: drives until the first failure",
             median(first),
             "",
-            "lower",
             None,
             f"plain {median(plain):g}",
         ),
-        Row(
+        higher(
             f"{name}: plain sampling's over the search's",
             median(plain) / median(first),
             "×",
-            "higher",
             10.0 if truth < 2e-3 else None,
         ),
-        Row(f"{name}: CPU time a drive, without the drive", 1e3 * seconds, "ms", "lower"),
+        lower(f"{name}: CPU time a drive, without the drive", 1e3 * seconds, "ms"),
     ]
 
 

@@ -22,7 +22,7 @@ from benchmarks._segmentation_calibration import calibrate, Calibration, deciles
 from benchmarks._segmentation_data import driving, gaussian_hmm, Labelled, with_gaps, with_outliers
 from benchmarks._segmentation_scores import changes, f1, hamming, smoother
 from benchmarks._size import sized
-from benchmarks.row import Row
+from benchmarks.row import higher, lower, Row
 from scenario_gen.method.segmentation import (
     OnlineSegmenter,
     SamplerConfig,
@@ -92,7 +92,7 @@ def _first_call() -> Row:
         for name, code in parts.items()
     }
     text = "CPU after: " + ", ".join(f"{name} {seconds:.2f} s" for name, seconds in spent.items())
-    return Row("first call in a fresh process", spent["first answer"], "s", "lower", 2.0, text)
+    return lower("first call in a fresh process", spent["first answer"], "s", 2.0, text)
 
 
 def _fresh(code: str) -> float:
@@ -135,58 +135,51 @@ def _cell(cell: str, seconds: dict[str, float]) -> list[Row]:
     )
     calibration = Calibration(*deciles(np.concatenate(predicted), np.concatenate(truth)), 0.0, 0)
     return [
-        Row(
+        lower(
             f"{cell}: Hamming above the smoother's",
             float(np.median(lost_hamming)),
             "",
-            "lower",
             TARGET_HAMMING[cell],
             f"{known}; mean {np.mean(lost_hamming):.4f}, worst {max(lost_hamming):.3f}; {spread(lost_hamming)}",
         ),
-        Row(
+        lower(
             f"{cell}: F1 below the smoother's",
             float(np.median(lost_f1)),
             "",
-            "lower",
             TARGET_F1[cell],
             spread(lost_f1),
         ),
-        Row(
+        lower(
             f"{cell}: seeds with fewer states than the smoother finds, of {len(spent)}",
             short,
             "",
-            "lower",
             len(spent) / 40.0,
         ),
-        Row(f"{cell}: spurious states, worst seed", max(spurious), "", "lower", 1.0),
-        Row(
+        lower(f"{cell}: spurious states, worst seed", max(spurious), "", 1.0),
+        lower(
             f"{cell}: split R-hat, worst trace, median",
             float(np.median(np.max(r_hats, axis=1))),
             "",
-            "lower",
             1.1,
         ),
-        Row(
+        lower(
             f"{cell}: split R-hat, worst trace, 90 %",
             float(np.quantile(np.max(r_hats, axis=1), 0.9)),
             "",
-            "lower",
             1.2,
             traces,
         ),
-        Row(
+        lower(
             f"{cell}: calibration, worst decile with 30 samples or more",
             calibration.worst,
             "",
-            "lower",
             0.1,
             calibration.table,
         ),
-        Row(
+        lower(
             f"{cell}: CPU",
             seconds[cell],
             "s",
-            "lower",
             limit,
             f"{spread(spent)}; {np.median(sweeps):.0f} sweeps in all",
         ),
@@ -225,25 +218,23 @@ def _driving(seconds: dict[str, float]) -> list[Row]:
         else f"; ruptures: {NOT_INSTALLED}"
     )
     return [
-        Row("D: F1", float(np.median(scores)), "", "higher", 0.90, spread(scores) + rival),
-        Row(
+        higher("D: F1", float(np.median(scores)), "", 0.90, spread(scores) + rival),
+        higher(
             "D, 1 % outliers: F1",
             float(np.median(worse["1 % outliers"])),
             "",
-            "higher",
             0.90,
             spread(worse["1 % outliers"]),
         ),
-        Row(
+        higher(
             "D, 5 % lost: F1",
             float(np.median(worse["5 % lost"])),
             "",
-            "higher",
             0.92,
             spread(worse["5 % lost"]),
         ),
-        Row("D: changepoints found per true one", float(np.median(ratios)), "", "lower"),
-        Row("D: CPU", seconds["D"], "s", "lower", None, spread(spent)),
+        lower("D: changepoints found per true one", float(np.median(ratios)), ""),
+        lower("D: CPU", seconds["D"], "s", None, spread(spent)),
     ]
 
 
@@ -288,7 +279,7 @@ def _against_moseq(
     )
     same = peers.jax_moseq(sequence.x, sweeps)
     if same is None:
-        return [Row(title, 0.0, "×", "higher", None, NOT_INSTALLED) for title in titles]
+        return [higher(title, 0.0, "×", None, NOT_INSTALLED) for title in titles]
     until = peers.jax_moseq(
         sequence.x,
         MOST_SWEEPS,
@@ -304,12 +295,11 @@ def _against_moseq(
         for chain in (same, until)
     ]
     return [
-        Row(titles[0], same.seconds / ours, "×", "higher", None, f"{told[0]}; {mine}"),
-        Row(
+        higher(titles[0], same.seconds / ours, "×", None, f"{told[0]}; {mine}"),
+        higher(
             titles[1],
             until.seconds / ours,
             "×",
-            "higher",
             None,
             f"{reached} after {until.sweeps} sweeps: {told[1]}; {mine}",
         ),
@@ -330,13 +320,12 @@ def _sweeps() -> list[Row]:
                 segment_series(x, config)
                 spent.append(time.process_time() - started)
             cost[name] = (spent[1] - spent[0]) / 200.0
-        rows.append(Row(f"{cell}: a sweep, Gaussian", 1e6 * cost["Gaussian"], "µs", "lower"))
+        rows.append(lower(f"{cell}: a sweep, Gaussian", 1e6 * cost["Gaussian"], "µs"))
         rows.append(
-            Row(
+            lower(
                 f"{cell}: a Student-t sweep over a Gaussian one",
                 cost["Student-t"] / cost["Gaussian"],
                 "",
-                "lower",
             )
         )
     return rows
@@ -376,30 +365,20 @@ def _robust() -> list[Row]:
         note("1 % outliers of 20 deviations", sequence, x + 20.0 * far, base, best)
         note("1 % outliers of 1000 deviations", sequence, x + 1000.0 * far, base, best)
     rows = [
-        Row(
-            "B, Student-t noise of 3 degrees: Hamming",
-            float(np.median(lost.pop("t3"))),
-            "",
-            "lower",
-            0.06,
+        lower(
+            "B, Student-t noise of 3 degrees: Hamming", float(np.median(lost.pop("t3"))), "", 0.06
         ),
-        Row(
+        lower(
             "B, Student-t noise of 3 degrees: F1 below the smoother's",
             float(np.median(scores.pop("t3"))),
             "",
-            "lower",
             0.05,
         ),
     ]
     for name, values in lost.items():
         rows.append(
-            Row(
-                f"B, {name}: Hamming above that without",
-                max(values),
-                "",
-                "lower",
-                0.01,
-                "the worst seed",
+            lower(
+                f"B, {name}: Hamming above that without", max(values), "", 0.01, "the worst seed"
             )
         )
     many = [
@@ -408,11 +387,10 @@ def _robust() -> list[Row]:
     ]
     return [
         *rows,
-        Row(
+        higher(
             "30 states: found",
             float(np.median(many)),
             "",
-            "higher",
             30.0,
             f"T 12,000, means 4 apart; {many}",
         ),
@@ -423,19 +401,13 @@ def _calibration() -> list[Row]:
     """Sequences from the model's own prior: are probabilities and intervals right?"""
     found = calibrate(range(SEEDS[0], SEEDS[0] + PRIORS), d=1)
     return [
-        Row(
-            "calibration: worst decile with 30 samples or more",
-            found.worst,
-            "",
-            "lower",
-            0.1,
-            found.table,
+        lower(
+            "calibration: worst decile with 30 samples or more", found.worst, "", 0.1, found.table
         ),
-        Row(
+        higher(
             "calibration: coverage of 5-95 % intervals",
             found.coverage,
             "",
-            "higher",
             0.85,
             f"{found.intervals} intervals; 0.85-0.95",
         ),
@@ -462,8 +434,8 @@ def _online() -> list[Row]:
             if abs(truth - change.sample) <= 5:
                 delays.append((change.confirmed - truth) * 0.1)
     return [
-        Row("online D: F1", float(np.median(scores)), "", "higher", 0.85, spread(scores)),
-        Row("online D: median delay", float(np.median(delays)), "s", "lower", 1.5),
+        higher("online D: F1", float(np.median(scores)), "", 0.85, spread(scores)),
+        lower("online D: median delay", float(np.median(delays)), "s", 1.5),
         *_hour(),
     ]
 
@@ -485,14 +457,13 @@ def _hour() -> list[Row]:
             sizes.append(len(pickle.dumps(online)))
     spent = time.process_time() - started
     return [
-        Row(
+        lower(
             "online: growth of its state over an hour, 8 vehicles",
             (sizes[1] - sizes[0]) / 1024.0,
             "KiB",
-            "lower",
             64.0,
         ),
-        Row("online: CPU per sample, 8 vehicles", 1e3 * spent / TICKS, "ms", "lower", 100.0),
+        lower("online: CPU per sample, 8 vehicles", 1e3 * spent / TICKS, "ms", 100.0),
     ]
 
 
@@ -527,9 +498,7 @@ def _labelled() -> list[Row]:
     learned = [peers.hmmlearn(x, len(np.unique(z))) for x, z in mocap]
     wrong = [_mean(mocap, [p.labels for p in found], hamming) for found in moves]
     eight = [int(segment_series(x, SamplerConfig(chains=8), seed=1).kept.sum()) for x, _ in mocap]
-    rows.append(
-        Row("mocap6: chains of 8 that agree, worst sequence", min(eight), "", "higher", 6.0)
-    )
+    rows.append(higher("mocap6: chains of 8 that agree, worst sequence", min(eight), "", 6.0))
     stops, actions = (
         tuple(np.cumsum([len(x) for x, _ in mocap]).tolist()),
         np.concatenate([z for _, z in mocap]),
@@ -541,22 +510,17 @@ def _labelled() -> list[Row]:
         for k in LABELLED_SEEDS
     ]
     rows.append(
-        Row(
+        lower(
             "mocap6, all sequences at once: Hamming",
             float(np.mean(joint)),
             "",
-            "lower",
             0.2,
             f"ours by seed {joint}",
         )
     )
     rows.append(
-        Row(
-            "mocap6, all sequences at once: its standard deviation",
-            float(np.std(joint)),
-            "",
-            "lower",
-            0.02,
+        lower(
+            "mocap6, all sequences at once: its standard deviation", float(np.std(joint)), "", 0.02
         )
     )
     rows.append(
@@ -620,5 +584,5 @@ def _against(
     )
     text += f"; ours by seed {', '.join(f'{value:.3f}' for value in each)}"
     if better == "lower":
-        return Row(name, float(np.mean(each)), "", "lower", min(known) if known else None, text)
-    return Row(name, float(np.mean(each)), "", "higher", max(known) if known else None, text)
+        return lower(name, float(np.mean(each)), "", min(known) if known else None, text)
+    return higher(name, float(np.mean(each)), "", max(known) if known else None, text)

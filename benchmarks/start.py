@@ -19,7 +19,7 @@ import time
 from benchmarks._messages_processes import environment
 from benchmarks._size import sized
 from benchmarks.messages import _Client, _done
-from benchmarks.row import Row
+from benchmarks.row import lower, Row
 from scenario_gen.bags.storage.bag import read_messages
 from scenario_gen.base.ros_domain import free_domain, this_host_only
 
@@ -120,8 +120,8 @@ def _start(
             for process in processes:
                 process.wait(60.0)
     return [
-        Row(f"{name}: all active", wall, "s", "lower", target, peer),
-        Row(f"{name}: CPU until all are active", used, "s", "lower", None, peer),
+        lower(f"{name}: all active", wall, "s", target, peer),
+        lower(f"{name}: CPU until all are active", used, "s", None, peer),
     ]
 
 
@@ -181,20 +181,6 @@ def _exit(folder: Path, domain: int, peer: str) -> list[Row]:
     whole = len(list(read_messages(bag))) if killed == 0 else 0
     words = f"{len(used)} processes at a load of {LOAD} on {os.cpu_count()} cores; {whole} messages in the bag; {peer}"
     return [
-        Row(
-            "the slowest node ends after Ctrl-C, machine busy",
-            slowest,
-            "s",
-            "lower",
-            LAUNCH,
-            words,
-        ),
-        Row(
-            "nodes that launch would have killed, machine busy",
-            killed,
-            "nodes",
-            "lower",
-            0.0,
-            words,
-        ),
+        lower("the slowest node ends after Ctrl-C, machine busy", slowest, "s", LAUNCH, words),
+        lower("nodes that launch would have killed, machine busy", killed, "nodes", 0.0, words),
     ]

@@ -10,7 +10,7 @@ import numpy as np
 
 from benchmarks._recheck import recheck_published
 from benchmarks._size import sized
-from benchmarks.row import Row
+from benchmarks.row import higher, lower, Row
 from scenario_gen.method.validity import Checker
 from scenario_gen.numerics.arrays import Floats
 from scenario_gen.situation.interaction import find_conflicts, Wait
@@ -35,18 +35,16 @@ def run(count: int = sized(1000, quick=4)) -> list[Row]:
     rows = []
     for name, drives in CASES.items():
         rate = 1.0 / _seconds_per_check(drives, 201)
-        rows.append(Row(f"two vehicles, 20 s, T = 201, {name}", rate, "1/s", "higher", 4000.0))
+        rows.append(higher(f"two vehicles, 20 s, T = 201, {name}", rate, "1/s", 4000.0))
     base = _seconds_per_check(CASES["opposite directions"], 201)
     longer = _seconds_per_check(CASES["opposite directions"], 801) / base
-    rows.append(Row("cost of four times the samples (20 s, T = 801)", longer, "×", "lower", 4.0))
+    rows.append(lower("cost of four times the samples (20 s, T = 801)", longer, "×", 4.0))
     more = _seconds_per_check(PLATOONS, 201) / base
-    rows.append(
-        Row("cost of four times the vehicles (two platoons of four)", more, "×", "lower", 16.0)
-    )
+    rows.append(lower("cost of four times the vehicles (two platoons of four)", more, "×", 16.0))
     time, position, heading = _motion(PLATOONS[::2], 401)
     vehicles = tuple(Vehicle(str(i)) for i in range(4))
     conflict = _seconds(lambda: find_conflicts(vehicles, time, position, heading))
-    rows.append(Row("find_conflicts, four vehicles, T = 401", 1e3 * conflict, "ms", "lower", 10.0))
+    rows.append(lower("find_conflicts, four vehicles, T = 401", 1e3 * conflict, "ms", 10.0))
     return rows + _rechecked(count)
 
 
@@ -55,11 +53,10 @@ def _rechecked(count: int) -> list[Row]:
     account, planned = recheck_published(count)
     if not account.scenarios:
         return [
-            Row(
+            higher(
                 "published scenarios re-checked",
                 0.0,
                 "",
-                "higher",
                 1.0,
                 "no recorded data, or none can be planned",
             )
@@ -67,31 +64,28 @@ def _rechecked(count: int) -> list[Row]:
     wrong, moving = account.found.pop("passing_order", 0), account.found.pop("stop_not_kept", 0)
     causes = ", ".join(f"{n} × {cause}" for cause, n in account.found.most_common())
     return [
-        Row(
+        higher(
             "published scenarios re-checked independently",
             float(account.scenarios),
             "",
-            "higher",
             float(count),
             f"{planned} encounters × roads, {account.vehicles} vehicles, {account.instants} instants of the advancement",
         ),
-        Row(
+        lower(
             "violations found by the re-check",
             float(account.found.total()),
             "",
-            "lower",
             0.0,
             causes or None,
         ),
-        Row(
+        lower(
             "wrong passing orders",
             float(wrong),
             "",
-            "lower",
             0.0,
             f"{account.orders} orders, {account.ties} ties, {account.absent} conflicts that the road keeps apart",
         ),
-        Row("moving waits", float(moving), "", "lower", 0.0, f"{account.waits} waits"),
+        lower("moving waits", float(moving), "", 0.0, f"{account.waits} waits"),
     ]
 
 

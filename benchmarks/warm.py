@@ -19,7 +19,7 @@ import tempfile
 from time import perf_counter
 
 from benchmarks._size import sized
-from benchmarks.row import Row
+from benchmarks.row import lower, Row
 from scenario_gen import bundled, read_log
 
 RUNS = sized(5, quick=1)
@@ -62,7 +62,7 @@ def run() -> list[Row]:
 def _both(name: str, spent: Sequence[Sequence[float]], target: float | None = None) -> list[Row]:
     """Medians of the seconds of CPU and clock."""
     return [
-        Row(f"{name}: {what}", median(each[k] for each in spent), "s", "lower", target)
+        lower(f"{name}: {what}", median(each[k] for each in spent), "s", target)
         for k, what in enumerate(("CPU", "clock"))
     ]
 
