@@ -144,7 +144,7 @@ def test_a_broken_scenario_is_named_with_its_line(tmp_path):
     path, _ = commonroad(tmp_path)
     text = path.read_text()
     for old, new, said in (
-        ("<exact>3</exact>", "<exact>three</exact>", "line 1, <exact>: 'three' is no number"),
+        ("<exact>3</exact>", "<exact>three</exact>", "line 1, <exact>: 'three' is not a number"),
         ("<point>", "<circle>", "not XML"),
         ('timeStepSize="0.1"', 'timeStepSize="0"', "timeStepSize is 0 s"),
         ("<commonRoad ", "<!DOCTYPE x []><commonRoad ", "document type"),

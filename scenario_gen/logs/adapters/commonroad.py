@@ -26,7 +26,7 @@ from pathlib import Path
 import numpy as np
 
 from scenario_gen.base.errors import InputError
-from scenario_gen.base.markup import Element, has_root, read_xml
+from scenario_gen.base.xml_reader import Element, has_root, read_xml
 from scenario_gen.logs.config import LogConfig
 from scenario_gen.logs.raw import (
     check_size,
@@ -35,10 +35,6 @@ from scenario_gen.logs.raw import (
     only_file,
     RawLog,
     Segment,
-)
-
-_SKIPPED = frozenset(
-    ("lanelet", "trafficSign", "trafficLight", "intersection", "planningProblem", "staticObstacle")
 )
 
 
@@ -54,7 +50,7 @@ def read(paths: Sequence[Path], config: LogConfig) -> RawLog:
         InputError: it is broken, has no trajectories, or a state lacks its position or time; names file and line.
     """
     path = only_file(paths, config)
-    root = read_xml(path, str(path), _SKIPPED)
+    root = read_xml(path, str(path))
     if root.tag != "commonRoad":
         raise InputError(f"{root.place}: the root of a CommonRoad file is <commonRoad>")
     step = root.number("timeStepSize")
@@ -63,16 +59,16 @@ def read(paths: Sequence[Path], config: LogConfig) -> RawLog:
     vehicles: list[Observations] = []
     left_out: Counter[str] = Counter()
     row = 0
-    obstacles = [*root.all("obstacle"), *root.all("dynamicObstacle")]
+    obstacles = [*root.findall("obstacle"), *root.findall("dynamicObstacle")]
     check_vehicles(str(path), len(obstacles), config)
     for obstacle in obstacles:
-        kind = obstacle.first("type")
-        name = kind.text.strip() if kind is not None else ""
-        trajectory = obstacle.first("trajectory")
+        kind = obstacle.find("type")
+        name = kind.content if kind is not None else ""
+        trajectory = obstacle.find("trajectory")
         if trajectory is None:
             left_out[name or "unknown"] += 1
             continue
-        states = [*obstacle.all("initialState"), *trajectory.all("state")]
+        states = [*obstacle.findall("initialState"), *trajectory.findall("state")]
         check_size(str(path), 0, row + len(states), config)
         vehicles.append(replace(_observations(obstacle, states, step, row), kind=name))
         row += len(states)
@@ -91,14 +87,14 @@ def read(paths: Sequence[Path], config: LogConfig) -> RawLog:
 def _observations(obstacle: Element, states: list[Element], step: float, row: int) -> Observations:
     values = np.array([_state(state) for state in states]).reshape(-1, 5)
     stamps = np.round(values[:, 0] * (step * 1e9)).astype(np.int64)
-    box, disc = obstacle.first("shape", "rectangle"), obstacle.first("shape", "circle")
+    box, disc = obstacle.find("shape/rectangle"), obstacle.find("shape/circle")
     length, width = (
-        box.one(name).value() if box is not None else math.nan for name in ("length", "width")
+        box.child(name).value() if box is not None else math.nan for name in ("length", "width")
     )
     if disc is not None:
-        length = width = 2.0 * disc.one("radius").value()
+        length = width = 2.0 * disc.child("radius").value()
     return Observations.of_rows(
-        obstacle.get("id"),
+        obstacle.attribute("id"),
         stamps,
         values[:, 1:],
         np.arange(row, row + len(states)),
@@ -108,21 +104,21 @@ def _observations(obstacle: Element, states: list[Element], step: float, row: in
 
 def _state(state: Element) -> tuple[float, float, float, float, float]:
     """Return steps, x, y, heading, speed; NaN for heading and speed where they are missing."""
-    point = state.first("position", "point") or state.first("position", "rectangle", "center")
+    point = state.first_of("position/point", "position/rectangle/center")
     if point is None:
         raise InputError(f"{state.place} has no position that is a point")
     heading, speed = _exact(state, "orientation"), _exact(state, "velocity")
     time = _exact(state, "time")
     if math.isnan(time):
         raise InputError(f"{state.place} has no time")
-    return time, point.one("x").value(), point.one("y").value(), heading, abs(speed)
+    return time, point.child("x").value(), point.child("y").value(), heading, abs(speed)
 
 
 def _exact(state: Element, tag: str) -> float:
-    element = state.first(tag)
+    element = state.find(tag)
     if element is None:
         return math.nan
-    value = element.first("exact")
+    value = element.find("exact")
     if value is not None:
         return value.value()
-    return (element.one("intervalStart").value() + element.one("intervalEnd").value()) / 2.0
+    return (element.child("intervalStart").value() + element.child("intervalEnd").value()) / 2.0

@@ -23,7 +23,7 @@ import numpy as np
 import pandas as pd
 
 from scenario_gen.base.errors import InputError
-from scenario_gen.base.markup import read_xml
+from scenario_gen.base.xml_reader import read_xml
 from scenario_gen.logs.config import LogConfig
 from scenario_gen.logs.kinds import type_called, usual_size
 from scenario_gen.logs.raw import check_size, only_file, RawLog, Segment
@@ -41,17 +41,17 @@ def read(paths: Sequence[Path], config: LogConfig) -> RawLog:
     """
     path = only_file(paths, config)
     rows: list[tuple[float, str, float, float, float, float, str]] = []
-    for step in read_xml(path, str(path)).all("timestep"):
+    for step in read_xml(path, str(path)).findall("timestep"):
         time = step.number("time")
-        for one in step.children:
-            kind = "pedestrian" if one.tag == "person" else one.attributes.get("type", "")
+        for one in step:
+            kind = "pedestrian" if one.tag == "person" else one.get("type", "")
             values = (
                 one.number("x"),
                 one.number("y"),
                 one.number("speed", math.nan),
                 one.number("angle", math.nan),
             )
-            rows.append((time, one.get("id"), *values, kind))
+            rows.append((time, one.attribute("id"), *values, kind))
         check_size(str(path), 0, len(rows), config)
     if not rows:
         raise InputError(f"{path}: no vehicle in any of its steps")

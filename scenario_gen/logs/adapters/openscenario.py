@@ -25,8 +25,8 @@ from pathlib import Path
 import numpy as np
 
 from scenario_gen.base.errors import InputError
-from scenario_gen.base.markup import Element, has_root, read_xml
-from scenario_gen.logs.adapters.openscenario_values import resolved
+from scenario_gen.base.xml_reader import Element, has_root, read_xml
+from scenario_gen.logs.adapters.openscenario_values import resolve_references
 from scenario_gen.logs.config import LogConfig
 from scenario_gen.logs.raw import (
     check_size,
@@ -60,14 +60,14 @@ def read(paths: Sequence[Path], config: LogConfig) -> RawLog:
     root = read_xml(path, str(path))
     if root.tag != "OpenSCENARIO":
         raise InputError(f"{root.place}: the root of an OpenSCENARIO file is <OpenSCENARIO>")
-    root = resolved(root, path)
+    resolve_references(root, path)
     notes = ["read as OpenSCENARIO"]
     vehicles = _vehicles(root, notes)
     check_vehicles(str(path), len(vehicles), config)
     speeds = {
-        private.get("entityRef"): target.number("value")
-        for private in root.all("Storyboard/Init/Actions/Private")
-        for target in private.all(
+        private.attribute("entityRef"): target.number("value")
+        for private in root.findall("Storyboard/Init/Actions/Private")
+        for target in private.findall(
             "PrivateAction/LongitudinalAction/SpeedAction/SpeedActionTarget/AbsoluteTargetSpeed"
         )
     }
@@ -86,7 +86,7 @@ def read(paths: Sequence[Path], config: LogConfig) -> RawLog:
             continue
         rows += len(seen[name].fix)
         check_size(str(path), 0, rows, config)
-        if follow.first("TimeReference", "Timing") is None:
+        if follow.find("TimeReference/Timing") is None:
             notes.append(
                 f"{name} follows its trajectory without a time reference: its first speed, or its vertices' times count"
             )
@@ -108,21 +108,21 @@ def read(paths: Sequence[Path], config: LogConfig) -> RawLog:
 def _vehicles(root: Element, notes: list[str]) -> dict[str, Element]:
     """Return the vehicles by name; who is none that is read is noted."""
     vehicles: dict[str, Element] = {}
-    for entity in root.all("Entities/ScenarioObject"):
-        name, vehicle = entity.get("name"), entity.first("Vehicle") or entity.first("Pedestrian")
-        if vehicle is None or vehicle.first("BoundingBox") is None:
+    for entity in root.findall("Entities/ScenarioObject"):
+        name, vehicle = entity.attribute("name"), entity.first_of("Vehicle", "Pedestrian")
+        if vehicle is None or vehicle.find("BoundingBox") is None:
             notes.append(
                 f"{name} left out: it is no road user with a bounding box in this file or its catalogs"
             )
         else:
             vehicles[name] = vehicle
             notes += [
-                f"trailer {one.get('name')} of {name} left out: it is part of it"
-                for one in vehicle.all("Trailer/Trailer")
+                f"trailer {one.attribute('name')} of {name} left out: it is part of it"
+                for one in vehicle.findall("Trailer/Trailer")
             ]
-            parts = vehicle.all("Trailer/TrailerRef")
+            parts = vehicle.findall("Trailer/TrailerRef")
             notes += [
-                f"trailer {one.get('entityRef')} belongs to {name}: read as a road user by itself"
+                f"trailer {one.attribute('entityRef')} belongs to {name}: read as a road user by itself"
                 for one in parts
             ]
     return vehicles
@@ -130,9 +130,9 @@ def _vehicles(root: Element, notes: list[str]) -> dict[str, Element]:
 
 def _category(entity: Element) -> str:
     """Return what a file calls the type of a road user: its name where that is a type of the category, as in our own files."""
-    named = entity.attributes.get("name", "")
+    named = entity.get("name", "")
     key = {"Vehicle": "vehicleCategory", "Pedestrian": "pedestrianCategory"}[entity.tag]
-    category = entity.attributes.get(key, entity.tag)
+    category = str(entity.get(key, entity.tag))
     return (
         named
         if named in VEHICLE_TYPES and VEHICLE_TYPES[named].openscenario == category
@@ -142,18 +142,20 @@ def _category(entity: Element) -> str:
 
 def _followers(root: Element) -> Iterator[tuple[str, Element, float]]:
     """Yield who follows a trajectory, the action, and the second at which it begins; 0 where that is no matter of time."""
-    for private in root.all("Storyboard/Init/Actions/Private"):
-        yield from ((private.get("entityRef"), follow, 0.0) for follow in private.all(_FOLLOWS))
-    for group in root.all("Storyboard/Story/Act/ManeuverGroup"):
-        for event in group.all("Maneuver/Event"):
-            conditions = event.all(
+    for private in root.findall("Storyboard/Init/Actions/Private"):
+        yield from (
+            (private.attribute("entityRef"), follow, 0.0) for follow in private.findall(_FOLLOWS)
+        )
+    for group in root.findall("Storyboard/Story/Act/ManeuverGroup"):
+        for event in group.findall("Maneuver/Event"):
+            conditions = event.findall(
                 "StartTrigger/ConditionGroup/Condition/ByValueCondition/SimulationTimeCondition"
             )
             start = conditions[0].number("value") if conditions else 0.0
-            for follow in event.all(f"Action/{_FOLLOWS}"):
+            for follow in event.findall(f"Action/{_FOLLOWS}"):
                 yield from (
-                    (actor.get("entityRef"), follow, start)
-                    for actor in group.all("Actors/EntityRef")
+                    (actor.attribute("entityRef"), follow, start)
+                    for actor in group.findall("Actors/EntityRef")
                 )
 
 
@@ -169,12 +171,12 @@ def _observations(
         start: seconds at which the action begins.
         given: its first speed [m/s], 0 if it has none; the row of its first vertex.
     """
-    trajectory = follow.first("TrajectoryRef", "Trajectory") or follow.one(
-        "Trajectory"
-    )  # before, in 1.0
+    trajectory = follow.find("TrajectoryRef/Trajectory")
+    if trajectory is None:  # OpenSCENARIO 1.0
+        trajectory = follow.child("Trajectory")
     rows = []
-    for vertex in trajectory.one("Shape/Polyline").all("Vertex"):
-        world = vertex.one("Position/WorldPosition")
+    for vertex in trajectory.child("Shape/Polyline").findall("Vertex"):
+        world = vertex.child("Position/WorldPosition")
         rows.append(
             (
                 vertex.number("time", math.nan),
@@ -188,9 +190,9 @@ def _observations(
             f"{follow.place}: its polyline has {len(rows)} vertices; at least 2 are needed"
         )
     (time, x, y, heading), (speed, first) = np.array(rows).T, given
-    xy, timing = np.column_stack((x, y)), follow.first("TimeReference", "Timing")
+    xy, timing = np.column_stack((x, y)), follow.find("TimeReference/Timing")
     if timing is not None:
-        from_start = start if timing.get("domainAbsoluteRelative") == "relative" else 0.0
+        from_start = start if timing.attribute("domainAbsoluteRelative") == "relative" else 0.0
         time = time * timing.number("scale") + timing.number("offset") + from_start
     elif speed > 0.0:
         time = start + np.concatenate(([0.0], np.cumsum(edge_lengths(xy)))) / speed
@@ -200,7 +202,7 @@ def _observations(
         )
     step = np.gradient(xy, axis=0)
     heading = np.where(np.isnan(heading), np.arctan2(step[:, 1], step[:, 0]), heading)
-    center, size = vehicle.one("BoundingBox/Center"), vehicle.one("BoundingBox/Dimensions")
+    center, size = vehicle.child("BoundingBox/Center"), vehicle.child("BoundingBox/Dimensions")
     middle = place(np.column_stack((xy, heading)), center.number("x"), center.number("y"))
     speeds = _own_speeds(vehicle, len(rows))
     states = np.column_stack(
@@ -214,10 +216,10 @@ def _observations(
 
 def _own_speeds(vehicle: Element, count: int) -> Floats | None:
     """Return the speeds (K,) [m/s] that a file of ours has as a property; None if it has none, damaged ones or not so many."""
-    for own in vehicle.all("Properties/Property"):
-        if own.attributes.get("name") == OPENSCENARIO_SPEEDS:
+    for own in vehicle.findall("Properties/Property"):
+        if own.get("name") == OPENSCENARIO_SPEEDS:
             try:
-                speeds = np.array(own.get("value").split(), dtype=np.float64)
+                speeds = np.array(own.attribute("value").split(), dtype=np.float64)
             except ValueError:
                 return None
             return speeds if len(speeds) == count and np.isfinite(speeds).all() else None

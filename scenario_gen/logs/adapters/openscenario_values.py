@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""OpenSCENARIO files as they are meant: values for parameters and expressions, entries for references to catalogs.
+"""Parameters, expressions and catalog references of OpenSCENARIO files, replaced by their values.
 
 Source: ASAM OpenSCENARIO XML 1.2, "Parameters", "Expressions", "Catalogs".
 """
@@ -9,16 +9,16 @@ Source: ASAM OpenSCENARIO XML 1.2, "Parameters", "Expressions", "Catalogs".
 import ast
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import suppress
-from dataclasses import replace
+from copy import deepcopy
 import math
 import operator
 from pathlib import Path
 import re
 
 from scenario_gen.base.errors import InputError
-from scenario_gen.base.markup import Element, read_xml
+from scenario_gen.base.xml_reader import Element, read_xml
 
-MOST_FILES = 100  # of a catalog's folder
+_MAX_CATALOG_FILE_COUNT = 100
 _OPERATORS: dict[type[ast.AST], Callable[..., float]] = {
     ast.Add: operator.add,
     ast.Sub: operator.sub,
@@ -32,7 +32,7 @@ _FUNCTIONS: dict[str, Callable[..., float]] = {
     name: getattr(math, name)
     for name in ("floor", "ceil", "sqrt", "pow", "sin", "cos", "tan", "asin", "acos", "atan")
 } | {"round": round, "abs": abs, "max": max, "min": min}
-_NO_VALUE = (
+_EVALUATION_ERRORS = (
     KeyError,
     TypeError,
     ValueError,
@@ -43,83 +43,88 @@ _NO_VALUE = (
 )
 
 Catalogs = Mapping[tuple[str, str], Element]
-"""Entries by the names of their catalog and their own."""
+"""Catalog entries by the names of catalog and entry."""
 
 
-def resolved(root: Element, path: Path) -> Element:
-    """Return the root of a file with values and entries in place; what is declared nowhere, or in no catalog, stays as it is.
+def resolve_references(root: Element, path: Path) -> None:
+    """Replace parameters, expressions and catalog references by their values, in place.
+
+    A parameter that is not declared, or an entry that is in no catalog, stays unchanged.
 
     Args:
-        root: as it stands in the file.
-        path: of the file, from which the folders of catalogs are counted.
+        root: the root element.
+        path: its file; catalog folders are relative to it.
     """
-    return _resolved(root, {}, dict(_entries(root, path.parent)))
+    _resolve(root, {}, dict(_catalog_entries(root, path.parent)))
 
 
-def _entries(root: Element, folder: Path) -> Iterator[tuple[tuple[str, str], Element]]:
-    """Yield the entries of all catalogs in the folders that a file names."""
-    for location in (
-        location for locations in root.all("CatalogLocations") for location in locations.children
-    ):
-        for directory in location.all("Directory"):
-            for file in sorted((folder / directory.attributes.get("path", "")).glob("*.xosc"))[
-                :MOST_FILES
-            ]:
-                with suppress(InputError):  # a file beside those that are needed
-                    for catalog in read_xml(file, str(file)).all("Catalog"):
-                        yield from (
-                            ((catalog.get("name"), entry.get("name")), entry)
-                            for entry in catalog.children
-                        )
+def _catalog_entries(root: Element, folder: Path) -> Iterator[tuple[tuple[str, str], Element]]:
+    """Yield the entries of the catalogs in all folders that the file names."""
+    for directory in root.findall("CatalogLocations/*/Directory"):
+        files = sorted((folder / directory.get("path", "")).glob("*.xosc"))
+        for file in files[:_MAX_CATALOG_FILE_COUNT]:
+            with suppress(InputError):  # the folder may also hold files that are not needed
+                for catalog in read_xml(file, str(file)).findall("Catalog"):
+                    for entry in catalog:
+                        yield (catalog.attribute("name"), entry.attribute("name")), entry
 
 
-def _resolved(
+def _resolve(
     element: Element,
     scope: Mapping[str, str],
     catalogs: Catalogs,
     assigned: Mapping[str, str] = {},
-) -> Element:
-    own = dict(scope)
-    declared = element.all("ParameterDeclarations/ParameterDeclaration")
-    for each in (
-        *declared,
-        *declared,
-    ):  # twice: one may stand before another one of which it is made
-        own[each.get("name")] = value_of(each.get("value"), own)
-    own |= assigned
-    children = []
-    for child in element.children:
-        catalog, entry = (
-            value_of(child.attributes.get(key, ""), own) for key in ("catalogName", "entryName")
-        )
-        if child.tag == "CatalogReference" and (catalog, entry) in catalogs:
-            values = child.all("ParameterAssignments/ParameterAssignment")
-            given = {each.get("parameterRef"): value_of(each.get("value"), own) for each in values}
-            children.append(_resolved(catalogs[catalog, entry], {}, {}, given))
-        else:
-            children.append(_resolved(child, own, catalogs))
-    attributes = {key: value_of(text, own) for key, text in element.attributes.items()}
-    return replace(element, attributes=attributes, children=children)
+) -> None:
+    """Resolve an element and its descendants; `assigned` overrides declared parameters."""
+    scope = {**_declared_parameters(element, scope), **assigned}
+    for name, text in element.attrib.items():
+        element.set(name, value_of(text, scope))
+
+    for child in list(element):
+        names = child.get("catalogName", ""), child.get("entryName", "")
+        entry = catalogs.get((value_of(names[0], scope), value_of(names[1], scope)))
+        if child.tag != "CatalogReference" or entry is None:
+            _resolve(child, scope, catalogs)
+            continue
+        arguments = {
+            argument.attribute("parameterRef"): value_of(argument.attribute("value"), scope)
+            for argument in child.findall("ParameterAssignments/ParameterAssignment")
+        }
+        copy = deepcopy(entry)
+        copy.base = entry.file  # messages name the catalog
+        element.replace(child, copy)
+        _resolve(copy, {}, {}, arguments)
+
+
+def _declared_parameters(element: Element, scope: Mapping[str, str]) -> dict[str, str]:
+    """Return the parameters of the scope, and those that the element declares."""
+    parameters = dict(scope)
+    declared = element.findall("ParameterDeclarations/ParameterDeclaration")
+    for declaration in declared * 2:  # the first one may refer to the second one
+        text = declaration.attribute("value")
+        parameters[declaration.attribute("name")] = value_of(text, parameters)
+    return parameters
 
 
 def value_of(text: str, scope: Mapping[str, str]) -> str:
-    """Return what an attribute's text means: of a parameter ($name) or an expression (${…}) its value, else the text itself."""
+    """Return the value of an attribute: `$name`, `${expression}` or plain text."""
     if not text.startswith("$"):
         return text
     if not (text.startswith("${") and text.endswith("}")):
         return scope.get(text[1:], text)
+    expression = re.sub(r"\$(?=\w)", "", text[2:-1]).strip()
     try:
-        return repr(
-            _number(
-                ast.parse(re.sub(r"\$(?=\w)", "", text[2:-1]).strip(), mode="eval").body, scope
-            )
-        )
-    except _NO_VALUE:
+        return repr(_number(ast.parse(expression, mode="eval").body, scope))
+    except _EVALUATION_ERRORS:
         return text
 
 
 def _number(node: ast.expr, scope: Mapping[str, str]) -> float:
-    """The value of an expression; a KeyError, TypeError or ValueError if it is none of numbers."""
+    """Return the value of an expression.
+
+    Raises:
+        KeyError, TypeError, ValueError: it is not an expression of numbers.
+    """
     match node:
         case ast.Constant(value=value):
             return float(value)  # type: ignore[arg-type]

@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 
 from scenario_gen.base.errors import InputError, needs
-from scenario_gen.base.markup import read_xml
+from scenario_gen.base.xml_reader import read_xml
 from scenario_gen.numerics import Floats, wrap_angle
 from scenario_gen.output.exchange.cases import Case, Exported
 from scenario_gen.output.exchange.xml import date_of
@@ -28,7 +28,6 @@ OBJECTS, MAP = "ground_truth", "ground_truth_map"  # omega-prime's topics
 WHEEL_RADIUS = 0.325  # metres, as in OpenSCENARIO files
 LARGEST_ID = 2**63 - 1  # that readers with signed numbers can hold
 NS = 1_000_000_000
-_SKIPPED = frozenset(("road", "junction", "junctionGroup", "controller", "station"))
 
 
 @dataclass(frozen=True)
@@ -212,9 +211,9 @@ def _text(road: Path) -> str:
 
 def _frame(road: Path) -> Frame:
     """Return how an OpenDRIVE file says that its coordinates lie on the earth."""
-    header = read_xml(road, road.name, _SKIPPED).first("header")
-    reference = header.first("geoReference") if header is not None else None
-    offset = header.first("offset") if header is not None else None
+    header = read_xml(road, road.name).find("header")
+    reference = header.find("geoReference") if header is not None else None
+    offset = header.find("offset") if header is not None else None
     moved = None
     if offset is not None:
         moved = (
@@ -223,7 +222,7 @@ def _frame(road: Path) -> Frame:
             offset.number("z", 0.0),
             offset.number("hdg", 0.0),
         )
-    return Frame(" ".join(reference.text.split()) if reference is not None else "", moved)
+    return Frame(" ".join(reference.content.split()) if reference is not None else "", moved)
 
 
 @cache

@@ -14,7 +14,7 @@ import numpy as np
 
 from scenario_gen.base.documents import shown
 from scenario_gen.base.errors import InputError
-from scenario_gen.base.markup import Element
+from scenario_gen.base.xml_reader import Element
 from scenario_gen.numerics import Floats
 from scenario_gen.roads.vector.network import (
     by_id,
@@ -27,17 +27,6 @@ from scenario_gen.roads.vector.network import (
 from scenario_gen.roads.vector.signs import DraftRule, kind_of_sign
 from scenario_gen.types import CARS, DRIVERS, LANE_USERS, RuleKind
 
-SKIPPED = frozenset(
-    (
-        "obstacle",
-        "staticObstacle",
-        "dynamicObstacle",
-        "environmentObstacle",
-        "phantomObstacle",
-        "planningProblem",
-        "scenarioTags",
-    )
-)
 _BY_TYPE = {  # of a lanelet: who may use it, whatever users it names
     "sidewalk": frozenset(("pedestrian",)), "crosswalk": frozenset(("pedestrian",)), "bicycleLane": frozenset(("bicycle",)),
     "busLane": frozenset(("bus",)),
@@ -61,7 +50,7 @@ def lanes_of(root: Element) -> MapLanes:
         InputError: it is broken; names file and line.
     """
     faults = Faults()
-    lanelets = by_id(root.all("lanelet"), faults)
+    lanelets = by_id(root.findall("lanelet"), faults)
     refuse_too_many_lanes(len(lanelets), root.file)
     limits = _speed_signs(root, faults)
     junctions = _junctions(root, set(lanelets), faults)
@@ -74,16 +63,16 @@ def lanes_of(root: Element) -> MapLanes:
     drafts = []
     for name, lanelet in ((name, lanelets[name]) for name in users):
         with faults.leaving_out("lanelet", name):
-            left, right = (_points(lanelet.one(tag)) for tag in ("leftBound", "rightBound"))
-            successors = tuple(after.get("ref") for after in lanelet.all("successor"))
+            left, right = (_points(lanelet.child(tag)) for tag in ("leftBound", "rightBound"))
+            successors = tuple(after.attribute("ref") for after in lanelet.findall("successor"))
             for unknown in (after for after in successors if after not in lanelets):
                 reason = f"{lanelet.place}: lanelet {name} leads to lanelet {unknown}, which is not there"
                 faults.found.append(("link", f"{name} to {unknown}", reason))
             beside = tuple(
-                side.get("ref")
+                side.attribute("ref")
                 for tag in ("adjacentLeft", "adjacentRight")
-                for side in lanelet.all(tag)
-                if side.attributes.get("drivingDir") == "same"
+                for side in lanelet.findall(tag)
+                if side.get("drivingDir") == "same"
             )
             limit, junction = _speed_limit(lanelet, limits), junctions.get(name, "")
             draft = Draft(
@@ -100,9 +89,9 @@ def lanes_of(root: Element) -> MapLanes:
             drafts.append(replace(draft, crossing="crosswalk" in _texts(lanelet, "laneletType")))
             if name in both_ways:
                 before = tuple(
-                    f"{other.get('ref')}r"
-                    for other in lanelet.all("predecessor")
-                    if other.get("ref") in both_ways
+                    f"{other.attribute('ref')}r"
+                    for other in lanelet.findall("predecessor")
+                    if other.attribute("ref") in both_ways
                 )
                 borders = right[::-1], left[::-1]
                 drafts.append(
@@ -117,17 +106,19 @@ def lanes_of(root: Element) -> MapLanes:
                         users=back[name],
                     )
                 )
-    version = root.attributes.get("commonRoadVersion", "?")
+    version = root.get("commonRoadVersion", "?")
     notes = (f"CommonRoad {version}: coordinates as they stand, in metres", *_georeference(root))
     rules = list(
         _rules(root, {name: lanelets[name] for name, own in users.items() if own & CARS}, faults)
     )
-    others = [sign for sign in root.all("trafficSign") if not any(map(_means, _sign_names(sign)))]
+    others = [
+        sign for sign in root.findall("trafficSign") if not any(map(_means, _sign_names(sign)))
+    ]
     return MapLanes(drafts, notes, len(lanelets) - len(users), faults, rules, len(others))
 
 
 def _texts(lanelet: Element, tag: str) -> set[str]:
-    return {child.text.strip() for child in lanelet.all(tag)}
+    return {child.content for child in lanelet.findall(tag)}
 
 
 def _named(names: set[str]) -> frozenset[str]:
@@ -151,8 +142,8 @@ def _users(lanelet: Element) -> frozenset[str]:
 
 
 def _sign_names(sign: Element) -> list[str]:
-    ids = [element.first("trafficSignID") for element in sign.all("trafficSignElement")]
-    return [element.text.strip() for element in ids if element is not None]
+    ids = [element.find("trafficSignID") for element in sign.findall("trafficSignElement")]
+    return [element.content for element in ids if element is not None]
 
 
 def _means(name: str) -> bool:
@@ -163,26 +154,26 @@ def _means(name: str) -> bool:
 def _rules(root: Element, lanelets: dict[str, Element], faults: Faults) -> Iterator[DraftRule]:
     """Yield the rules of the signs and lights to which lanelets refer, one for each lanelet."""
     kinds: dict[tuple[str, str], RuleKind] = {}
-    for sign in root.all("trafficSign"):
+    for sign in root.findall("trafficSign"):
         known = [kind for kind in map(kind_of_sign, _sign_names(sign)) if kind is not None]
         if known:
-            kinds["trafficSignRef", sign.attributes.get("id", "?")] = known[0]
-    for light in root.all("trafficLight"):
-        kinds["trafficLightRef", light.attributes.get("id", "?")] = RuleKind.TRAFFIC_LIGHT
+            kinds["trafficSignRef", sign.get("id", "?")] = known[0]
+    for light in root.findall("trafficLight"):
+        kinds["trafficLightRef", light.get("id", "?")] = RuleKind.TRAFFIC_LIGHT
     for name, lanelet in lanelets.items():
         with faults.leaving_out("stop line", name):
-            stop = lanelet.first("stopLine")
+            stop = lanelet.find("stopLine")
             holders = [lanelet] if stop is None else [lanelet, stop]
             line = (
                 _points(stop)[:, :2]
-                if stop is not None and len(stop.all("point")) > 1
+                if stop is not None and len(stop.findall("point")) > 1
                 else np.zeros((0, 2))
             )
             refs = dict.fromkeys(
-                (tag, ref.get("ref"))
+                (tag, ref.attribute("ref"))
                 for tag, _ in kinds
                 for holder in holders
-                for ref in holder.all(tag)
+                for ref in holder.findall(tag)
             )
             for ref in refs:
                 if ref in kinds:
@@ -190,9 +181,9 @@ def _rules(root: Element, lanelets: dict[str, Element], faults: Faults) -> Itera
 
 
 def _georeference(root: Element) -> list[str]:
-    reference = root.first("location", "geoTransformation", "geoReference")
+    reference = root.find("location/geoTransformation/geoReference")
     return (
-        [f"geoReference {' '.join(reference.text.split())} is stated, not applied"]
+        [f"geoReference {' '.join(reference.content.split())} is stated, not applied"]
         if reference is not None
         else []
     )
@@ -200,9 +191,9 @@ def _georeference(root: Element) -> list[str]:
 
 def _points(bound: Element) -> Floats:
     """Points (P, 3) [m] of a bound or a line, with their height, NaN where it is not given."""
-    heights = [(point, point.first("z")) for point in bound.all("point")]
+    heights = [(point, point.find("z")) for point in bound.findall("point")]
     points = [
-        (p.one("x").value(), p.one("y").value(), math.nan if z is None else z.value())
+        (p.child("x").value(), p.child("y").value(), math.nan if z is None else z.value())
         for p, z in heights
     ]
     return np.array(points, dtype=np.float64).reshape(-1, 3)
@@ -211,29 +202,29 @@ def _points(bound: Element) -> Floats:
 def _speed_signs(root: Element, faults: Faults) -> dict[str, float]:
     """Speed limits [m/s] by the id of their sign; those of converters of data sets may have a unit: `50kmh`."""
     limits = {}
-    for sign in root.all("trafficSign"):
-        for element in sign.all("trafficSignElement"):
-            kind, value = element.first("trafficSignID"), element.first("additionalValue")
-            if kind is not None and value is not None and kind.text.strip() in _MAX_SPEED:
-                with faults.leaving_out("speed sign", sign.attributes.get("id", "?")):
-                    limit = speed_of(value.text, "m/s")
+    for sign in root.findall("trafficSign"):
+        for element in sign.findall("trafficSignElement"):
+            kind, value = element.find("trafficSignID"), element.find("additionalValue")
+            if kind is not None and value is not None and kind.content in _MAX_SPEED:
+                with faults.leaving_out("speed sign", sign.get("id", "?")):
+                    limit = speed_of(value.content, "m/s")
                     if math.isnan(limit):
                         raise InputError(
-                            f"{value.place}: {shown(value.text.strip(), 40)!r} is no speed"
+                            f"{value.place}: {shown(value.content, 40)!r} is no speed"
                         )
-                    limits[sign.get("id")] = limit
+                    limits[sign.attribute("id")] = limit
     return limits
 
 
 def _speed_limit(lanelet: Element, signs: dict[str, float]) -> float:
-    own = lanelet.first("speedLimit")
+    own = lanelet.find("speedLimit")
     if own is not None:
         return own.value()
     return min(
         (
-            signs[ref.get("ref")]
-            for ref in lanelet.all("trafficSignRef")
-            if ref.attributes.get("ref") in signs
+            signs[ref.attribute("ref")]
+            for ref in lanelet.findall("trafficSignRef")
+            if ref.get("ref") in signs
         ),
         default=math.nan,
     )
@@ -242,14 +233,14 @@ def _speed_limit(lanelet: Element, signs: dict[str, float]) -> float:
 def _junctions(root: Element, known: set[str], faults: Faults) -> dict[str, str]:
     """The intersection of each lanelet that lies in one: those that follow its incoming lanelets."""
     junctions: dict[str, str] = {}
-    for intersection in root.all("intersection"):
-        for incoming in intersection.all("incoming"):
+    for intersection in root.findall("intersection"):
+        for incoming in intersection.findall("incoming"):
             for tag in ("successorsLeft", "successorsRight", "successorsStraight"):
-                for ref in incoming.all(tag):
-                    with faults.leaving_out(
-                        "link of an intersection", ref.attributes.get("ref", "?")
-                    ):
-                        if ref.get("ref") not in known:
-                            raise InputError(f"{ref.place}: lanelet {ref.get('ref')} is not there")
-                        junctions[ref.get("ref")] = intersection.get("id")
+                for ref in incoming.findall(tag):
+                    with faults.leaving_out("link of an intersection", ref.get("ref", "?")):
+                        if ref.attribute("ref") not in known:
+                            raise InputError(
+                                f"{ref.place}: lanelet {ref.attribute('ref')} is not there"
+                            )
+                        junctions[ref.attribute("ref")] = intersection.attribute("id")
     return junctions

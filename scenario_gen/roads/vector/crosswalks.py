@@ -13,7 +13,7 @@ import numpy as np
 import shapely
 
 from scenario_gen.base.errors import InputError
-from scenario_gen.base.markup import Element
+from scenario_gen.base.xml_reader import Element
 from scenario_gen.numerics import Floats
 from scenario_gen.numerics.boxes import corners
 from scenario_gen.numerics.plane import ahead_and_left, place, unit_left
@@ -26,11 +26,11 @@ _LEAST_AREA = 0.1  # m²
 
 def crosswalks(road: OpenDriveRoad, faults: Faults) -> Iterator[Draft]:
     """Yield the crosswalks of a road, from its right to its left, named crosswalk road.object."""
-    objects = (element for group in road.element.all("objects") for element in group.all("object"))
-    for element in (
-        element for element in objects if element.attributes.get("type") == "crosswalk"
-    ):
-        name = f"crosswalk {road.id}.{element.attributes.get('id', '?')}"
+    objects = (
+        element for group in road.element.findall("objects") for element in group.findall("object")
+    )
+    for element in (element for element in objects if element.get("type") == "crosswalk"):
+        name = f"crosswalk {road.id}.{element.get('id', '?')}"
         with faults.leaving_out("crosswalk", name):
             (pose,) = _poses(road, np.array([[element.number("s"), element.number("t")]]))
             ring = _outline(road, element, pose)
@@ -74,17 +74,17 @@ def _outline(road: OpenDriveRoad, element: Element, pose: Floats) -> Floats:
     outline = next(
         (
             outline
-            for holder in (element, *element.all("outlines"))
-            for outline in holder.all("outline")
+            for holder in (element, *element.findall("outlines"))
+            for outline in holder.findall("outline")
         ),
         None,
     )
     if outline is None:
         return np.asarray(corners(own[None], element.number("length"), element.number("width"))[0])
     local = np.array(
-        [(corner.number("u"), corner.number("v")) for corner in outline.all("cornerLocal")]
+        [(corner.number("u"), corner.number("v")) for corner in outline.findall("cornerLocal")]
     )
     if len(local):
         return np.asarray(place(own, local[:, 0], local[:, 1]))
-    places = [(corner.number("s"), corner.number("t")) for corner in outline.all("cornerRoad")]
+    places = [(corner.number("s"), corner.number("t")) for corner in outline.findall("cornerRoad")]
     return np.asarray(_poses(road, np.array(places).reshape(-1, 2))[:, :2])

@@ -17,7 +17,7 @@ import re
 import numpy as np
 
 from scenario_gen.base.errors import InputError
-from scenario_gen.base.markup import Element, finite
+from scenario_gen.base.xml_reader import Element, to_number
 from scenario_gen.logs import local_frame, middle_of
 from scenario_gen.numerics import Floats
 from scenario_gen.roads.vector.network import (
@@ -66,7 +66,7 @@ class _Border:
     @property
     def key(self) -> tuple[str, bool]:
         """Its way and the direction."""
-        return self.way.get("id"), self.forth
+        return self.way.attribute("id"), self.forth
 
     def turned(self) -> "_Border":
         return replace(
@@ -101,7 +101,7 @@ def lanes_of(root: Element) -> MapLanes:
     faults = Faults()
     nodes, ways, relations = (  # without what editors have marked as deleted
         by_id(
-            (element for element in root.all(tag) if element.attributes.get("action") != "delete"),
+            (element for element in root.findall(tag) if element.get("action") != "delete"),
             faults,
         )
         for tag in ("node", "way", "relation")
@@ -115,19 +115,19 @@ def lanes_of(root: Element) -> MapLanes:
     refuse_too_many_lanes(len(used_by), root.file)
     sides: dict[str, list[str]] = {}
     for relation, _ in used_by:
-        with faults.leaving_out("lanelet", relation.get("id")):
+        with faults.leaving_out("lanelet", relation.attribute("id")):
             refs = _refs(relation, ways)
             for ref in refs:
                 _nodes(ways[ref], nodes)
-            sides[relation.get("id")] = refs
+            sides[relation.attribute("id")] = refs
     used = [ref for refs in sides.values() for ref in refs]
-    refuse_too_long(sum(len(ways[ref].children) for ref in used), root.file)
+    refuse_too_long(sum(len(ways[ref]) for ref in used), root.file)
     names = {ref: _nodes(ways[ref], nodes) for ref in used}
     signed, lines = list(_regulations(tagged, for_cars, ways)), {}
     for ref in dict.fromkeys(chain(*(refs for _, refs in signed))):
         with faults.leaving_out("stop line", ref):
             lines[ref] = _nodes(ways[ref], nodes)
-    of_cars = {ref for relation, _ in for_cars for ref in sides.get(relation.get("id"), ())}
+    of_cars = {ref for relation, _ in for_cars for ref in sides.get(relation.attribute("id"), ())}
     about = dict.fromkeys(
         chain(*(own for ref, own in names.items() if ref in of_cars), *lines.values())
     )
@@ -137,17 +137,20 @@ def lanes_of(root: Element) -> MapLanes:
     )
     drawn = []
     for relation, tags in used_by:
-        if relation.get("id") not in sides:
+        if relation.attribute("id") not in sides:
             continue
-        with faults.leaving_out("lanelet", relation.get("id")):
+        with faults.leaving_out("lanelet", relation.attribute("id")):
             borders = [
-                _border(ways[ref], names[ref], positions) for ref in sides[relation.get("id")]
+                _border(ways[ref], names[ref], positions)
+                for ref in sides[relation.attribute("id")]
             ]
             lanelet = _lanelet(relation, tags, borders)
             drawn.append(lanelet)
             if _is_for_both_ways(tags):
                 drawn.append(lanelet.turned())
-    limits = {relation.get("id"): _sign_limit(relation, tags, ways) for relation, tags in tagged}
+    limits = {
+        relation.attribute("id"): _sign_limit(relation, tags, ways) for relation, tags in tagged
+    }
     at = {
         ref: np.array([positions[name][:2] for name in own])
         for ref, own in lines.items()
@@ -187,9 +190,9 @@ def _regulations(
     under: dict[str, list[str]] = defaultdict(list)
     for lanelet, _ in lanelets:
         for ref in _members(lanelet, "regulatory_element"):
-            under[ref].append(lanelet.get("id"))
+            under[ref].append(lanelet.attribute("id"))
     for relation, tags in relations:
-        name, kind = relation.attributes.get("id", "?"), _kind(relation, tags, ways)
+        name, kind = relation.get("id", "?"), _kind(relation, tags, ways)
         if kind is None:
             continue
         lanes = tuple(_members(relation, "yield")) or tuple(under[name])
@@ -199,7 +202,7 @@ def _regulations(
 
 
 def _members(relation: Element, role: str) -> list[str]:
-    members = (member.attributes for member in relation.all("member"))
+    members = (member.attrib for member in relation.findall("member"))
     return [own.get("ref", "") for own in members if own.get("role") == role]
 
 
@@ -237,13 +240,13 @@ def _border(way: Element, names: Sequence[str], positions: Mapping[str, Floats])
     for name in names:
         if name not in positions:
             raise InputError(
-                f"{way.place}: way {way.get('id')} goes through node {name}, whose position is faulty"
+                f"{way.place}: way {way.attribute('id')} goes through node {name}, whose position is faulty"
             )
     return _Border(way, tuple(names), np.array([positions[name] for name in names]))
 
 
 def _tags(element: Element) -> dict[str, str]:
-    return {tag.get("k"): tag.get("v") for tag in element.all("tag")}
+    return {tag.attribute("k"): tag.attribute("v") for tag in element.findall("tag")}
 
 
 def _first(tags: dict[str, str], keys: Sequence[str]) -> str | None:
@@ -286,14 +289,12 @@ def _refs(relation: Element, ways: dict[str, Element]) -> list[str]:
     """
     refs = []
     for role in ("left", "right"):
-        members = [
-            member for member in relation.all("member") if member.attributes.get("role") == role
-        ]
+        members = [member for member in relation.findall("member") if member.get("role") == role]
         if len(members) != 1:
             raise InputError(
-                f"{relation.place}: lanelet {relation.get('id')} has {len(members)} members with role {role}; one is needed"
+                f"{relation.place}: lanelet {relation.attribute('id')} has {len(members)} members with role {role}; one is needed"
             )
-        ref = members[0].get("ref")
+        ref = members[0].attribute("ref")
         if ref not in ways:
             raise InputError(f"{members[0].place}: way {ref} is not in the map")
         refs.append(ref)
@@ -301,15 +302,15 @@ def _refs(relation: Element, ways: dict[str, Element]) -> list[str]:
 
 
 def _nodes(way: Element, nodes: dict[str, Element]) -> list[str]:
-    refs = [nd.get("ref") for nd in way.all("nd")]
+    refs = [nd.attribute("ref") for nd in way.findall("nd")]
     for ref in refs:
         if ref not in nodes:
             raise InputError(
-                f"{way.place}: way {way.get('id')} goes through node {ref}, which is not in the map"
+                f"{way.place}: way {way.attribute('id')} goes through node {ref}, which is not in the map"
             )
     if len(refs) < 2:
         raise InputError(
-            f"{way.place}: way {way.get('id')} has {len(refs)} node(s); two are needed"
+            f"{way.place}: way {way.attribute('id')} has {len(refs)} node(s); two are needed"
         )
     return refs
 
@@ -325,7 +326,7 @@ def _positions(
     Raises:
         InputError: no node has a position, or the nodes are far apart.
     """
-    ids, tags = [node.get("id") for node in nodes], [_tags(node) for node in nodes]
+    ids, tags = [node.attribute("id") for node in nodes], [_tags(node) for node in nodes]
     has_local = [{"local_x", "local_y"} <= own.keys() for own in tags]
     local = has_local[:count].count(True) * 2 > count
     found: dict[str, Floats] = {}
@@ -338,7 +339,8 @@ def _positions(
                 )
             if local:
                 place = [
-                    finite(own[key], f"{node.place}, tag {key}") for key in ("local_x", "local_y")
+                    to_number(own[key], f"{node.place}, tag {key}")
+                    for key in ("local_x", "local_y")
                 ]
             else:
                 place = [
@@ -380,9 +382,9 @@ def _height(tags: dict[str, str]) -> float:
 
 def _degrees(node: Element, key: str, most: float) -> float:
     """A node's latitude or longitude."""
-    if not node.attributes.get(key, ""):
+    if not node.get(key, ""):
         raise InputError(
-            f"{node.place}: node {node.get('id')} has neither tags local_x and local_y nor lat and lon"
+            f"{node.place}: node {node.attribute('id')} has neither tags local_x and local_y nor lat and lon"
         )
     value = node.number(key)
     if abs(value) > most:
@@ -409,7 +411,7 @@ def _lanelet(relation: Element, tags: dict[str, str], borders: Sequence[_Border]
         float((ring[:, 0] * after[:, 1] - ring[:, 1] * after[:, 0]).sum()) > 0.0
     ):  # counter-clockwise: left lies on the right
         left, right = left.turned(), right.turned()
-    return _Lanelet(relation.get("id"), relation, tags, left, right)
+    return _Lanelet(relation.attribute("id"), relation, tags, left, right)
 
 
 def _drafts(lanelets: list[_Lanelet], limits: dict[str, float]) -> Iterator[Draft]:
@@ -466,9 +468,9 @@ def _sign_limit(relation: Element, tags: dict[str, str], ways: dict[str, Element
         return math.nan
     texts = [tags.get("sign_type", ""), tags.get("speed_limit", "")]
     signs = [
-        ways[member.get("ref")]
-        for member in relation.all("member")
-        if member.attributes.get("ref") in ways
+        ways[member.attribute("ref")]
+        for member in relation.findall("member")
+        if member.get("ref") in ways
     ]
     for text in (*texts, *(_tags(sign).get("subtype", "") for sign in signs)):
         sign = re.fullmatch(r"(?:de)?274(?:\.1)?-([0-9]+)", text)
@@ -482,7 +484,7 @@ def _speed_limit(lanelet: _Lanelet, limits: dict[str, float]) -> float:
     own = speed_of(lanelet.tags.get("speed_limit", ""), "km/h")
     if not math.isnan(own):
         return own
-    members = [member.attributes.get("ref", "") for member in lanelet.relation.all("member")]
+    members = [member.get("ref", "") for member in lanelet.relation.findall("member")]
     signed = [limits[ref] for ref in members if not math.isnan(limits.get(ref, math.nan))]
     usual = _LIMITS.get(
         (lanelet.tags.get("subtype", "road"), lanelet.tags.get("location", "urban")), math.nan

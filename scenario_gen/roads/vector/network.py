@@ -17,7 +17,7 @@ from scipy.spatial import distance
 import shapely
 
 from scenario_gen.base.errors import InputError
-from scenario_gen.base.markup import Element
+from scenario_gen.base.xml_reader import Element
 from scenario_gen.numerics import Bools, Floats, runs
 from scenario_gen.numerics.plane import edge_lengths
 from scenario_gen.roads.vector.signs import DraftRule, rules_of_pieces, with_rules
@@ -141,11 +141,11 @@ def by_id(elements: Iterable[Element], faults: Faults) -> dict[str, Element]:
     """Return elements by their attribute `id`; those without one, and all but the first of an id, are left out."""
     seen: dict[str, Element] = {}
     for element in elements:
-        name = element.attributes.get("id")
+        name = element.get("id")
         if name is None:
             faults.found.append((element.tag, "?", f"{element.place} has no attribute id"))
         elif name in seen:
-            twice = f"{element.place}: {element.tag} {name} is there twice, first on line {seen[name].line}"
+            twice = f"{element.place}: {element.tag} {name} is there twice, first on line {seen[name].sourceline}"
             faults.found.append((element.tag, name, twice))
         else:
             seen[name] = element

@@ -15,7 +15,7 @@ import re
 import numpy as np
 
 from scenario_gen.base.errors import InputError
-from scenario_gen.base.markup import Element
+from scenario_gen.base.xml_reader import Element
 from scenario_gen.numerics import Floats
 from scenario_gen.roads.vector.crosswalks import crosswalks
 from scenario_gen.roads.vector.network import (
@@ -65,12 +65,12 @@ def lanes_of(root: Element) -> MapLanes:
     Raises:
         InputError: it is broken or has no road; names file and line.
     """
-    header = root.one("header")
-    version = ".".join(header.attributes.get(name, "?") for name in ("revMajor", "revMinor"))
+    header = root.child("header")
+    version = ".".join(header.get(name, "?") for name in ("revMajor", "revMinor"))
     roads: dict[str, OpenDriveRoad] = {}
     total, lanes, points = 0.0, 0, 0
     faults = Faults()
-    for name, element in by_id(root.all("road"), faults).items():
+    for name, element in by_id(root.findall("road"), faults).items():
         with faults.leaving_out("road", name):
             line = reference_line(element)
             total += line.length
@@ -92,15 +92,15 @@ def lanes_of(root: Element) -> MapLanes:
     joints = _Joints(roads, faults)
     for road in roads.values():
         joints.along(road)
-    for junction in root.all("junction"):
+    for junction in root.findall("junction"):
         joints.through(junction)
     notes = (f"OpenDRIVE {version}: {_projection(header)}", *joints.notes())
     rules = [*_signal_rules(roads, faults), *_priorities(root, roads)]
     signals = [
         signal
         for road in roads.values()
-        for group in road.element.all("signals")
-        for signal in group.all("signal")
+        for group in road.element.findall("signals")
+        for signal in group.findall("signal")
     ]
     others = [signal for signal in signals if not (_is_read(signal) or _kind_of_signal(signal))]
     lanes_found = [
@@ -123,24 +123,26 @@ def _signal_rules(roads: dict[str, OpenDriveRoad], faults: Faults) -> Iterator[D
     kinds: dict[str, RuleKind] = {}
     placed: list[tuple[OpenDriveRoad, Element]] = []
     for road in roads.values():
-        for group in road.element.all("signals"):
+        for group in road.element.findall("signals"):
             placed += [
                 (road, element)
                 for tag in ("signal", "signalReference")
-                for element in group.all(tag)
+                for element in group.findall(tag)
             ]
     for _, signal in placed:
         kind = _kind_of_signal(signal)
         if signal.tag == "signal" and kind is not None:
-            kinds[signal.attributes.get("id", "?")] = kind
+            kinds[signal.get("id", "?")] = kind
     stop_lines = [(road, element) for road, element in placed if _is_stop_line(element)]
     for road in roads.values():
         objects = (
-            element for group in road.element.all("objects") for element in group.all("object")
+            element
+            for group in road.element.findall("objects")
+            for element in group.findall("object")
         )
         stop_lines += [(road, element) for element in objects if _is_stop_line(element)]
     for road, element in placed:
-        name = element.attributes.get("id", "?")
+        name = element.get("id", "?")
         if name not in kinds:
             continue
         with faults.leaving_out("signal", name):
@@ -158,38 +160,32 @@ def _signal_rules(roads: dict[str, OpenDriveRoad], faults: Faults) -> Iterator[D
 
 
 def _kind_of_signal(signal: Element) -> RuleKind | None:
-    if signal.attributes.get("dynamic") == "yes":
-        return RuleKind.TRAFFIC_LIGHT if signal.attributes.get("type") in _LIGHTS else None
+    if signal.get("dynamic") == "yes":
+        return RuleKind.TRAFFIC_LIGHT if signal.get("type") in _LIGHTS else None
     return kind_of_sign(*_sign(signal))
 
 
 def _sign(signal: Element) -> tuple[str, str, str]:
     """The number of a signal's sign, the subtype behind it, and the country whose number it is."""
-    number, subtype, country = (
-        signal.attributes.get(name, "") for name in ("type", "subtype", "country")
-    )
+    number, subtype, country = (signal.get(name, "") for name in ("type", "subtype", "country"))
     return number, subtype, country
 
 
 def _is_stop_line(element: Element) -> bool:
     """Whether a signal or an object is a line at which one stops; some tools give it no type but a name."""
-    name = re.sub("[^a-z]", "", element.attributes.get("name", "").lower())
-    return element.attributes.get("type") == _STOP_LINE or name.startswith("stopline")
+    name = re.sub("[^a-z]", "", element.get("name", "").lower())
+    return element.get("type") == _STOP_LINE or name.startswith("stopline")
 
 
 def _is_read(signal: Element) -> bool:
     """Whether a signal is read that is no rule: a line, a speed limit, what is for pedestrians."""
-    return (
-        signal.attributes.get("type") in _READ
-        or _is_stop_line(signal)
-        or is_speed_limit(*_sign(signal))
-    )
+    return signal.get("type") in _READ or _is_stop_line(signal) or is_speed_limit(*_sign(signal))
 
 
 def _same_way(a: Element, b: Element) -> bool:
     """Whether two signals are for traffic of the same direction."""
     return (
-        "none" in (ways := {signal.attributes.get("orientation", "none") for signal in (a, b)})
+        "none" in (ways := {signal.get("orientation", "none") for signal in (a, b)})
         or len(ways) == 1
     )
 
@@ -197,8 +193,10 @@ def _same_way(a: Element, b: Element) -> bool:
 def _lanes_under(road: OpenDriveRoad, signal: Element, s: float) -> Iterator[SectionLane]:
     """The lanes for whose traffic a signal is, of the section at s."""
     first: dict[bool, int] = {}  # section at s, by side
-    bounds = [(int(v.number("fromLane")), int(v.number("toLane"))) for v in signal.all("validity")]
-    way = signal.attributes.get("orientation", "none")
+    bounds = [
+        (int(v.number("fromLane")), int(v.number("toLane"))) for v in signal.findall("validity")
+    ]
+    way = signal.get("orientation", "none")
     for lane in (lane for section in road.sections for lane in section.lanes.values()):
         _, section, number = lane.key
         if (
@@ -223,9 +221,9 @@ def _across(lane: SectionLane, s: float) -> Floats:
 
 def _priorities(root: Element, roads: dict[str, OpenDriveRoad]) -> Iterator[DraftRule]:
     """Yield the priorities of junctions between roads: traffic of the low one gives way."""
-    for junction in root.all("junction"):
-        for priority in junction.all("priority"):
-            high, low = (roads.get(priority.attributes.get(name, "")) for name in ("high", "low"))
+    for junction in root.findall("junction"):
+        for priority in junction.findall("priority"):
+            high, low = (roads.get(priority.get(name, "")) for name in ("high", "low"))
             if high is not None and low is not None:
                 first, last = (
                     tuple(
@@ -234,7 +232,7 @@ def _priorities(root: Element, roads: dict[str, OpenDriveRoad]) -> Iterator[Draf
                     for road in (high, low)
                 )
                 yield DraftRule(
-                    f"junction {junction.attributes.get('id', '?')}",
+                    f"junction {junction.get('id', '?')}",
                     RuleKind.GIVE_WAY,
                     last,
                     first,
@@ -242,10 +240,10 @@ def _priorities(root: Element, roads: dict[str, OpenDriveRoad]) -> Iterator[Draf
 
 
 def _projection(header: Element) -> str:
-    reference = header.first("geoReference")
-    text = " ".join(reference.text.split()) if reference is not None else ""
+    reference = header.find("geoReference")
+    text = " ".join(reference.content.split()) if reference is not None else ""
     stated = f"geoReference {text} is stated, not applied" if text else "no geoReference"
-    offset = header.first("offset")
+    offset = header.find("offset")
     moved = (
         ""
         if offset is None
@@ -300,7 +298,9 @@ class _Joints:
                 for tag, at in (("predecessor", 0), ("successor", 1)):
                     beyond = road.beyond(k, 1 if at else -1, lane.key[2])
                     for link in [
-                        child for group in lane.element.all("link") for child in group.all(tag)
+                        child
+                        for group in lane.element.findall("link")
+                        for child in group.findall(tag)
                     ]:
                         with self.faults.leaving_out("link", f"{tag} of lane {lane.name}"):
                             other = int(link.number("id"))
@@ -312,13 +312,11 @@ class _Joints:
                                 self._to_road(road, (lane.key, at), tag, other)
 
     def _to_road(self, road: OpenDriveRoad, end: End, tag: str, lane: int) -> None:
-        link = road.element.first("link", tag)
-        if link is None or link.attributes.get("elementType") != "road":
+        link = road.element.find(f"link/{tag}")
+        if link is None or link.get("elementType") != "road":
             return
         other = self.road(link, "elementId")
-        self.join(
-            end, self.end_of(other, link.attributes.get("contactPoint", "start"), lane), link.place
-        )
+        self.join(end, self.end_of(other, link.get("contactPoint", "start"), lane), link.place)
 
     def road(self, link: Element, name: str) -> OpenDriveRoad:
         """The road that an attribute names.
@@ -326,9 +324,9 @@ class _Joints:
         Raises:
             InputError: there is none of that id.
         """
-        if link.get(name) not in self.roads:
-            raise InputError(f"{link.place}: road {link.get(name)[:40]!r} is not in the map")
-        return self.roads[link.get(name)]
+        if link.attribute(name) not in self.roads:
+            raise InputError(f"{link.place}: road {link.attribute(name)[:40]!r} is not in the map")
+        return self.roads[link.attribute(name)]
 
     @staticmethod
     def end_of(road: OpenDriveRoad, contact: str, lane: int) -> End:
@@ -339,17 +337,17 @@ class _Joints:
 
     def through(self, junction: Element) -> None:
         """Join incoming lanes to those of the connecting roads."""
-        for connection in junction.all("connection"):
-            with self.faults.leaving_out("connection", connection.attributes.get("id", "?")):
+        for connection in junction.findall("connection"):
+            with self.faults.leaving_out("connection", connection.get("id", "?")):
                 self._through(connection)
 
     def _through(self, connection: Element) -> None:
-        name = "connectingRoad" if "connectingRoad" in connection.attributes else "linkedRoad"
-        if "incomingRoad" not in connection.attributes or name not in connection.attributes:
+        name = "connectingRoad" if "connectingRoad" in connection.attrib else "linkedRoad"
+        if "incomingRoad" not in connection.attrib or name not in connection.attrib:
             return  # a virtual connection
         incoming, connecting = self.road(connection, "incomingRoad"), self.road(connection, name)
-        contact = connection.attributes.get("contactPoint", "start")
-        for link in connection.all("laneLink"):
+        contact = connection.get("contactPoint", "start")
+        for link in connection.findall("laneLink"):
             target = self.end_of(connecting, contact, int(link.number("to")))
             goal = self.lane(target[0])
             if goal is None:
@@ -429,7 +427,7 @@ def _may_cross(lane: SectionLane, *, outwards: bool) -> bool:
         *_MARKED,
         "solid broken" if outwards else "broken solid",
     )  # its inner line is named first
-    marks = [mark.attributes for mark in lane.element.all("roadMark")]
+    marks = [mark.attrib for mark in lane.element.findall("roadMark")]
     return not any(
         mark.get("laneChange") in ("none", against) or mark.get("type") in not_crossed
         for mark in marks
@@ -438,13 +436,15 @@ def _may_cross(lane: SectionLane, *, outwards: bool) -> bool:
 
 def _speed_limit(road: OpenDriveRoad, lane: Element, s: float) -> float:
     """m/s: the lane's own first limit, else that of the road's type at s."""
-    records = lane.all("speed")
+    records = lane.findall("speed")
     if not records:
-        types = [kind for kind in road.element.all("type") if kind.number("s", 0.0) <= s + 1e-6]
-        records = types[-1].all("speed") if types else []
-    if not records or records[0].attributes.get("max") in ("no limit", "undefined", None):
+        types = [
+            kind for kind in road.element.findall("type") if kind.number("s", 0.0) <= s + 1e-6
+        ]
+        records = types[-1].findall("speed") if types else []
+    if not records or records[0].get("max") in ("no limit", "undefined", None):
         return math.nan
-    unit = records[0].attributes.get("unit", "m/s")
+    unit = records[0].get("unit", "m/s")
     if unit not in _SPEEDS:
         raise InputError(
             f"{records[0].place}: unit {unit[:20]!r}; one of {', '.join(_SPEEDS)} is needed"

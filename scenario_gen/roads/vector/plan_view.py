@@ -12,7 +12,7 @@ import math
 import numpy as np
 
 from scenario_gen.base.errors import InputError
-from scenario_gen.base.markup import Element
+from scenario_gen.base.xml_reader import Element
 from scenario_gen.numerics import Floats, Ints
 from scenario_gen.numerics.plane import place
 
@@ -103,7 +103,9 @@ def reference_line(road: Element) -> ReferenceLine:
     Raises:
         InputError: it has none, or a piece of no known shape or of impossible size.
     """
-    pieces = sorted(road.one("planView").all("geometry"), key=lambda piece: piece.number("s"))
+    pieces = sorted(
+        road.child("planView").findall("geometry"), key=lambda piece: piece.number("s")
+    )
     if not pieces:
         raise InputError(f"{road.place}: its <planView> has no <geometry>")
     for piece in pieces:
@@ -125,7 +127,7 @@ def reference_line(road: Element) -> ReferenceLine:
 
 
 def _shape(piece: Element) -> Element:
-    shape = next((child for child in piece.children if child.tag in _SHAPES), None)
+    shape = next((child for child in piece if child.tag in _SHAPES), None)
     if shape is None:
         raise InputError(f"{piece.place} holds none of {', '.join(_SHAPES)}")
     return shape
@@ -194,8 +196,8 @@ def _param_poly3(shape: Element, length: float, ds: Floats) -> tuple[Floats, Flo
 
 def _is_normalized(shape: Element, length: float) -> bool:
     """Whether p goes from 0 to 1, which is the default; where a file does not say, the speed of p shows if it is metres."""
-    if "pRange" in shape.attributes:
-        return shape.attributes["pRange"] == "normalized"
+    if "pRange" in shape.attrib:
+        return bool(shape.get("pRange") == "normalized")
     speed = math.hypot(shape.number("bU"), shape.number("bV"))
     return abs(speed - length) <= abs(speed - 1.0)
 

@@ -12,8 +12,8 @@ import numpy as np
 
 from scenario_gen.base.documents import shown
 from scenario_gen.base.errors import InputError, of_system, reading
-from scenario_gen.base.markup import Element, finite, read_xml
 from scenario_gen.base.stores import local
+from scenario_gen.base.xml_reader import Element, read_xml, to_number
 from scenario_gen.numerics import Floats, frozen
 from scenario_gen.roads.config import RoadConfig
 from scenario_gen.roads.vector import commonroad, lanelet2, opendrive
@@ -32,19 +32,17 @@ class MapFormat:
         name: of a file in it, with its article.
         root: the name of its root element.
         lanes_of: finds the lanes below the root.
-        skipped: elements that are passed over with all they hold.
     """
 
     name: str
     root: str
     lanes_of: Callable[[Element], MapLanes]
-    skipped: frozenset[str] = frozenset()
 
 
 FORMATS = {
     ".osm": MapFormat("a Lanelet2 map", "osm", lanelet2.lanes_of),
     ".xodr": MapFormat("an OpenDRIVE map", "OpenDRIVE", opendrive.lanes_of),
-    ".xml": MapFormat("a CommonRoad file", "commonRoad", commonroad.lanes_of, commonroad.SKIPPED),
+    ".xml": MapFormat("a CommonRoad file", "commonRoad", commonroad.lanes_of),
 }
 """By the ending of a file's name."""
 PARTS = ("lanelet", "junction", "box")
@@ -86,7 +84,7 @@ def read_network(path: Path) -> LaneNetwork:
 def _read(path: Path, _changed: int, _size: int) -> LaneNetwork:
     form = FORMATS[path.suffix.lower()]
     with reading(path):
-        root = read_xml(path, f"map {path}", form.skipped)
+        root = read_xml(path, f"map {path}")
         if root.tag != form.root:
             raise InputError(f"{root.place}: the root of {form.name} is <{form.root}>")
         return network_of(path.stem, form.lanes_of(root))
@@ -128,7 +126,7 @@ def box_of(network: LaneNetwork, part: str) -> Floats:
             f"map {network.name}: {shown(part, 60)!r}; box=x0,y0,x1,y1 in metres is needed"
         )
     corners = np.array(
-        [finite(number.strip(), f"map {network.name}, {part[:60]}") for number in numbers]
+        [to_number(number.strip(), f"map {network.name}, {part[:60]}") for number in numbers]
     ).reshape(2, 2)
     box = frozen(np.stack((corners.min(axis=0), corners.max(axis=0))))
     if (box[1] - box[0] < 1.0).any():

@@ -15,7 +15,7 @@ import math
 import numpy as np
 
 from scenario_gen.base.errors import InputError
-from scenario_gen.base.markup import Element
+from scenario_gen.base.xml_reader import Element
 from scenario_gen.numerics import Floats
 from scenario_gen.numerics.plane import unit_left
 from scenario_gen.roads.vector.network import refuse_too_long, refuse_too_many_lanes
@@ -85,12 +85,12 @@ class SectionLane:
     @property
     def kind(self) -> str:
         """Its type."""
-        return self.element.attributes.get("type", "none")
+        return str(self.element.get("type", "none"))
 
     @property
     def both_ways(self) -> bool:
         """Whether it is driven in both directions."""
-        return self.kind == "bidirectional" or self.element.attributes.get("direction") == "both"
+        return self.kind == "bidirectional" or self.element.get("direction") == "both"
 
     @cached_property
     def users(self) -> frozenset[str]:
@@ -101,14 +101,14 @@ class SectionLane:
         records: dict[tuple[str, str], set[str]] = defaultdict(
             set
         )  # who may, or may not, from some sOffset on
-        for access in self.element.all("access"):
+        for access in self.element.findall("access"):
             names = [
-                access.attributes.get("restriction"),
-                *(own.attributes.get("type") for own in access.children),
+                access.get("restriction"),
+                *(own.get("type") for own in access),
             ]  # before, in 1.8
-            records[
-                access.attributes.get("sOffset", "0"), access.attributes.get("rule", "deny")
-            ].update(filter(None, names))
+            records[access.get("sOffset", "0"), access.get("rule", "deny")].update(
+                filter(None, names)
+            )
         for (_, rule), restricted in records.items():
             named = frozenset[str]().union(
                 *(_RESTRICTED.get(name, frozenset()) for name in restricted)
@@ -180,19 +180,19 @@ def road_of_sections(element: Element, name: str, line: ReferenceLine) -> OpenDr
     Raises:
         InputError: it is broken; names file and line.
     """
-    junction = element.attributes.get("junction", "-1")
-    elevation = element.first("elevationProfile")
+    junction = element.get("junction", "-1")
+    elevation = element.find("elevationProfile")
     road = OpenDriveRoad(
         element,
         name,
         line,
         "" if junction == "-1" else junction,
-        element.attributes.get("rule", "RHT") == "LHT",
-        cubics(elevation.all("elevation") if elevation else [], "s"),
+        element.get("rule", "RHT") == "LHT",
+        cubics(elevation.findall("elevation") if elevation is not None else [], "s"),
     )
-    lanes = element.one("lanes")
-    offset = cubics(lanes.all("laneOffset"), "s")
-    sections = sorted(lanes.all("laneSection"), key=lambda section: section.number("s"))
+    lanes = element.child("lanes")
+    offset = cubics(lanes.findall("laneOffset"), "s")
+    sections = sorted(lanes.findall("laneSection"), key=lambda section: section.number("s"))
     if not sections:
         raise InputError(f"{lanes.place} has no <laneSection>")
     refuse_too_many_lanes(len(sections), element.file)
@@ -219,8 +219,8 @@ def road_of_sections(element: Element, name: str, line: ReferenceLine) -> OpenDr
 
 def _signs(section: Element) -> tuple[int, ...]:
     """The signs of the sides whose lanes a section lists: those that it has if it is for a single side, else both."""
-    single = section.attributes.get("singleSide") in ("true", "1")
-    return tuple(sign for side, sign in _SIDES if not single or section.first(side))
+    single = section.get("singleSide") in ("true", "1")
+    return tuple(sign for side, sign in _SIDES if not single or section.find(side) is not None)
 
 
 def _lanes(
@@ -234,8 +234,8 @@ def _lanes(
         lane
         for side, own in _SIDES
         if own == sign
-        for group in section.all(side)[:1]
-        for lane in group.all("lane")
+        for group in section.findall(side)[:1]
+        for lane in group.findall("lane")
     ]
     refuse_too_many_lanes(len(elements), section.file)
     refuse_too_long(len(elements) * len(s), section.file)
@@ -247,26 +247,27 @@ def _lanes(
             raise InputError(
                 f"{lane.place}: lane {name} is there twice, or those between it and the centre are missing"
             )
-        if lane.all("width"):
-            width = cubics(lane.all("width"), "sOffset").at(s - begin, end - begin)
+        if lane.findall("width"):
+            width = cubics(lane.findall("width"), "sOffset").at(s - begin, end - begin)
             across = across + sign * np.maximum(width, 0.0)
-        elif lane.all("border"):
+        elif lane.findall("border"):
             across = (
-                cubics(lane.all("border"), "sOffset").at(s - begin, end - begin) + stations.centre
+                cubics(lane.findall("border"), "sOffset").at(s - begin, end - begin)
+                + stations.centre
             )
         outer = stations.poses[:, :2] + across[:, None] * normal
-        forth = ((name < 0) != road.left_hand) != (lane.attributes.get("direction") == "reversed")
+        forth = ((name < 0) != road.left_hand) != (lane.get("direction") == "reversed")
         yield name, SectionLane((road.id, number, name), lane, s, inner, outer, forth)
         inner = outer
 
 
 def _lane_id(lane: Element, sign: int) -> int:
     try:
-        number = int(lane.get("id"))
+        number = int(lane.attribute("id"))
     except ValueError:
         number = 0
     if number * sign <= 0:
         raise InputError(
-            f"{lane.place}: id {lane.get('id')[:20]!r}; whole numbers {'above' if sign > 0 else 'below'} 0 are needed here"
+            f"{lane.place}: id {lane.attribute('id')[:20]!r}; whole numbers {'above' if sign > 0 else 'below'} 0 are needed here"
         )
     return number
