@@ -96,7 +96,7 @@ setup(
     entry_points={
         "console_scripts": [
             "scenario-gen = scenario_gen.__main__:main",
-            *(f"{node} = scenario_gen.ros.plumbing.start:{node}" for node in NODES),
+            *(f"{node} = scenario_gen.ros.common.start:main" for node in NODES),
         ],
     },
 )

@@ -60,7 +60,7 @@ def _calls(domain: int, steps: int, pid: int) -> tuple[float, float]:
     from std_srvs.srv import Trigger
 
     from msg_conventions.driving import encode_twist
-    from scenario_gen.ros.plumbing.topics import create_publisher
+    from scenario_gen.ros.common.topics import create_publisher
 
     def work(node: Any, spin: Callable[[Any], None]) -> tuple[float, float]:
         publisher, client = (
@@ -85,7 +85,7 @@ def _calls(domain: int, steps: int, pid: int) -> tuple[float, float]:
 
 
 def _periods(domain: int, periods: int) -> float:
-    from scenario_gen.ros.plumbing.topics import create_subscription
+    from scenario_gen.ros.common.topics import create_subscription
 
     def work(node: Any, spin: Callable[[Any], None]) -> float:
         at: list[float] = []

@@ -64,7 +64,7 @@ def nodes(folder: Path, domain: int, arguments: Mapping[str, Sequence[str]]) -> 
         command = [
             sys.executable,
             "-m",
-            "scenario_gen.ros.plumbing.start",
+            "scenario_gen.ros.common.start",
             node,
             "--ros-args",
             *own,

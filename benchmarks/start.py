@@ -105,7 +105,7 @@ def _start(
     *,
     cold: bool = False,
 ) -> list[Row]:
-    commands = [["-m", "scenario_gen.ros.plumbing.start", *words] for words in which]
+    commands = [["-m", "scenario_gen.ros.common.start", *words] for words in which]
     with tempfile.TemporaryDirectory() as cache, _Client(domain) as client:
         variables = {"NUMBA_CACHE_DIR": cache} if cold else {}
         started = time.monotonic()
@@ -145,10 +145,10 @@ def _peer(folder: Path, domain: int) -> str:
 def _exit(folder: Path, domain: int, peer: str) -> list[Row]:
     """End the nodes and a recorder as launch does, beside busy loops."""
     bag = folder / "bag"
-    commands = [["-m", "scenario_gen.ros.plumbing.start", node] for node in NODES]
+    commands = [["-m", "scenario_gen.ros.common.start", node] for node in NODES]
     record = [
         "-m",
-        "scenario_gen.ros.plumbing.start",
+        "scenario_gen.ros.common.start",
         "recorder",
         "--ros-args",
         "-p",

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""A planner under test among the vehicles of a bag: ros2 launch scenario_gen drive.launch.py bag:=out/demo/bag ego:=2."""
+"""A planner under test in the traffic of a bag: ros2 launch scenario_gen drive.launch.py bag:=out/demo/bag ego:=2."""
 
 from pathlib import Path
 
@@ -10,36 +10,37 @@ from launch import LaunchDescription
 from launch.actions import DeclareLaunchArgument, OpaqueFunction
 from launch_ros.actions import Node
 
-from scenario_gen.cli.launching import DRIVE, meanings, read
+from scenario_gen.ros.launch_arguments import descriptions, DRIVE_ARGUMENTS, parse_arguments
 
 SHARE = Path(get_package_share_directory("scenario_gen"))
 
 
-def start(launch):
+def start(context):
     """Return the processes."""
-    own, display = launch.own, ["-d", str(SHARE / "config" / "suite.rviz")]
+    launch = parse_arguments(DRIVE_ARGUMENTS, context.launch_configurations)
+    options = launch.options
     traffic = Node(
         package="scenario_gen",
         executable="traffic",
         name="traffic",
-        namespace=own.namespace,
+        namespace=options.namespace,
         parameters=launch.parameter_files(),
-        ros_arguments=["--log-level", own.log_level],
+        ros_arguments=["--log-level", options.log_level],
         output="screen",
-        respawn=own.respawn,
+        respawn=options.respawn,
     )
     rviz = Node(
-        package="rviz2", executable="rviz2", arguments=display, parameters=[{"use_sim_time": True}]
+        package="rviz2",
+        executable="rviz2",
+        arguments=["-d", str(SHARE / "config" / "suite.rviz")],
+        parameters=[{"use_sim_time": True}],
     )
-    return [traffic, rviz] if own.rviz else [traffic]
+    return [traffic, rviz] if options.rviz else [traffic]
 
 
 def generate_launch_description():
     arguments = [
         DeclareLaunchArgument(name, default_value="", description=text)
-        for name, text in meanings(DRIVE).items()
+        for name, text in descriptions(DRIVE_ARGUMENTS).items()
     ]
-    begin = OpaqueFunction(
-        function=lambda context: start(read(DRIVE, context.launch_configurations))
-    )
-    return LaunchDescription([*arguments, begin])
+    return LaunchDescription([*arguments, OpaqueFunction(function=start)])

@@ -10,47 +10,56 @@ from launch import LaunchDescription
 from launch.actions import DeclareLaunchArgument, OpaqueFunction
 from launch_ros.actions import Node
 
-from scenario_gen.cli.launching import meanings, NODES, read, SUITE
+from scenario_gen.ros.launch_arguments import descriptions, parse_arguments, SUITE_ARGUMENTS
+from scenario_gen.ros.node_names import SUITE
 
 SHARE = Path(get_package_share_directory("scenario_gen"))
 
 
-def start(launch):
+def start(context):
     """Return the processes."""
-    own = launch.own
+    launch = parse_arguments(SUITE_ARGUMENTS, context.launch_configurations)
+    options = launch.options
     common = {
         "package": "scenario_gen",
-        "namespace": own.namespace,
+        "namespace": options.namespace,
         "parameters": launch.parameter_files(SHARE / "config" / "suite.yaml"),
-        "ros_arguments": ["--log-level", own.log_level],
+        "ros_arguments": ["--log-level", options.log_level],
         "output": "screen",
         "respawn_delay": 2.0,
     }
-    names = [name for name in NODES if name not in launch.left_out]
-    if own.composed:  # without a name, for it would be that of every node in the process
-        started = [Node(executable="suite", arguments=["--nodes", ",".join(names)], **common)]
-    else:  # a bag is begun once
-        started = [
-            Node(executable=name, name=name, respawn=own.respawn and name != "recorder", **common)
+    names = [name for name in SUITE if name not in launch.excluded]
+    if options.composed:  # without a name, which every node of the process would get
+        nodes = [Node(executable="suite", arguments=["--nodes", ",".join(names)], **common)]
+    else:  # a recorder cannot continue a bag, so it does not respawn
+        nodes = [
+            Node(
+                executable=name,
+                name=name,
+                respawn=options.respawn and name != "recorder",
+                **common,
+            )
             for name in names
         ]
-    if own.rviz:
-        # tracks lie in local_enu: shown on the map's origin, so that RViz can show both
+    if options.rviz:
+        # RViz shows the tracks' frame, local_enu, at the map's origin.
         frames = ["--frame-id", "map", "--child-frame-id", "local_enu"]
         display = ["-d", str(SHARE / "config" / "suite.rviz")]
-        started += [
+        nodes += [
             Node(package="tf2_ros", executable="static_transform_publisher", arguments=frames),
-            Node(package="rviz2", executable="rviz2", arguments=display, namespace=own.namespace),
+            Node(
+                package="rviz2",
+                executable="rviz2",
+                arguments=display,
+                namespace=options.namespace,
+            ),
         ]
-    return started
+    return nodes
 
 
 def generate_launch_description():
     arguments = [
         DeclareLaunchArgument(name, default_value="", description=text)
-        for name, text in meanings(SUITE).items()
+        for name, text in descriptions(SUITE_ARGUMENTS).items()
     ]
-    begin = OpaqueFunction(
-        function=lambda context: start(read(SUITE, context.launch_configurations))
-    )
-    return LaunchDescription([*arguments, begin])
+    return LaunchDescription([*arguments, OpaqueFunction(function=start)])

@@ -3,20 +3,22 @@
 
 """Reports ⇄ diagnostic_msgs/DiagnosticArray: key-values with full node names, one status per subject.
 
-Used for `scenarios/info` (scenario_info.py), `road/info` and `fit/info` (hashes.py), `report` and `/diagnostics`.
-`header.stamp` is the template's, but on /diagnostics the time of the message: there a status about a template bears its stamp as
-the value `template_stamp`.
+Used for `scenarios/info` (scenario_info.py), `road/info` and `fit/info` (hashes.py), `report`
+and `/diagnostics`. `header.stamp` is the template's stamp. On /diagnostics it is the time of the
+message, and a status about a template has the template's stamp as the value `template_stamp`.
 """
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from enum import IntEnum
+from enum import IntEnum, StrEnum
+import re
 
 from msg_conventions.cdr import decode, encode
 from msg_conventions.layouts import DIAGNOSTICS
 
 TYPE = "diagnostic_msgs/msg/DiagnosticArray"
 TEMPLATE = "template_stamp"
+_DECIMAL_STAMP = re.compile(r"(\d{0,19})\.(\d{9})", re.ASCII)
 
 
 class Level(IntEnum):
@@ -28,26 +30,43 @@ class Level(IntEnum):
     STALE = 3
 
 
+class Subject(StrEnum):
+    """Subjects of statuses that other processes read."""
+
+    PROGRESS = "progress"
+    RECORDED = "recorded"
+
+
 @dataclass(frozen=True)
 class Status:
-    """One diagnostic_msgs/DiagnosticStatus."""
+    """One diagnostic_msgs/DiagnosticStatus; its name is the node's full name, `: ` and the subject."""
 
     name: str
     level: Level
     message: str
     values: Mapping[str, str] = field(default_factory=dict)
 
+    @property
+    def node(self) -> str:
+        """The full name of the node that reports it."""
+        return self.name.partition(": ")[0]
+
+    @property
+    def subject(self) -> str:
+        """The subject, such as `fit`, or `fit of 7` for vehicle 7."""
+        return self.name.partition(": ")[2]
+
 
 def encode_diagnostics(statuses: Sequence[Status], stamp_ns: int) -> bytes:
     """Return the statuses as CDR bytes."""
     fields = [
         {
-            "level": one.level,
-            "name": one.name,
-            "message": one.message,
-            "values": [{"key": key, "value": value} for key, value in one.values.items()],
+            "level": status.level,
+            "name": status.name,
+            "message": status.message,
+            "values": [{"key": key, "value": value} for key, value in status.values.items()],
         }
-        for one in statuses
+        for status in statuses
     ]
     return encode(DIAGNOSTICS, stamp=stamp_ns, statuses=fields)
 
@@ -61,34 +80,27 @@ def decode_diagnostics(data: bytes, what: str = "diagnostics") -> tuple[int, tup
     message = decode(DIAGNOSTICS, data, what)
     statuses = (
         Status(
-            one.name,
-            Level(min(one.level, Level.STALE)),
-            one.message,
-            {value.key: value.value for value in one.values},
+            status.name,
+            Level(min(status.level, Level.STALE)),
+            status.message,
+            {entry.key: entry.value for entry in status.values},
         )
-        for one in message.statuses
+        for status in message.statuses
     )
     return message.stamp, tuple(statuses)
 
 
 def decimal_stamp(stamp_ns: int) -> str:
-    """Return a stamp as seconds and nine digits behind the point."""
+    """Return a stamp as seconds with nine decimals."""
     return f"{stamp_ns // 10**9}.{stamp_ns % 10**9:09d}"
 
 
 def of_template(status: Status, stamp_ns: int) -> Status:
-    """Return a status with the stamp of the template that it is about, as the value `template_stamp`."""
+    """Return a status with its template's stamp as the value `template_stamp`."""
     return replace(status, values={**status.values, TEMPLATE: decimal_stamp(stamp_ns)})
 
 
 def template_of(status: Status, stamp_ns: int) -> int:
-    """Return the stamp [ns] of the template that a status is about; by default `stamp_ns`, its message's."""
-    seconds, point, rest = status.values.get(TEMPLATE, "").partition(".")
-    is_stamp = (
-        point
-        and len(rest) == 9
-        and (seconds + rest).isascii()
-        and (seconds + rest).isdecimal()
-        and len(seconds) < 20
-    )
-    return int(seconds + rest) if is_stamp else stamp_ns
+    """Return the stamp [ns] of a status's template; by default `stamp_ns`, its message's."""
+    match = _DECIMAL_STAMP.fullmatch(status.values.get(TEMPLATE, ""))
+    return int(match[1] + match[2]) if match else stamp_ns

@@ -102,7 +102,7 @@ def parameters() -> None:
 @installation.command()
 def doctor() -> None:
     """Check this environment: Python, packages, ROS 2. `ros2 doctor` checks the network and QoS."""
-    from scenario_gen.ros.plumbing.doctor import ERROR, examine
+    from scenario_gen.ros.common.doctor import ERROR, examine
 
     findings = []
     for finding in examine():

@@ -65,7 +65,7 @@ def recorder(
         InputError: ROS 2 is not installed.
     """
     try:
-        from scenario_gen.ros.plumbing.suite import Job, run_suite
+        from scenario_gen.ros.common.suite import Job, run_suite
     except ImportError as error:
         raise InputError(
             f"ROS 2 is not available ({error}); run `make install`, or leave out --ros"

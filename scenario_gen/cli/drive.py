@@ -16,12 +16,12 @@ import subprocess
 import tempfile
 
 from scenario_gen.base.errors import InputError
-from scenario_gen.base.interrupts import ending
 from scenario_gen.base.ros_domain import own_domain
+from scenario_gen.base.signals import cleaned_up
 from scenario_gen.closed_loop.config import ClosedLoopConfig
 from scenario_gen.closed_loop.origin import Trial
 from scenario_gen.closed_loop.trials import Outcome
-from scenario_gen.ros.nodes.traffic_of_trials import drive_trials
+from scenario_gen.ros.common.planner_trials import drive_trials
 
 END_S = 10.0  # seconds that a planner's node has to end by itself
 LINES = 8  # of what the planner wrote last, that an error shows
@@ -67,7 +67,7 @@ def drive_over_dds(
                 )
 
         try:
-            with ending(lambda: _end(process)):
+            with cleaned_up(lambda: _end(process)):
                 return drive_trials(trials, config, progress, command, check)
         finally:
             _end(process)

@@ -30,8 +30,8 @@ from scenario_gen.bags.recordings.read import (
 from scenario_gen.bags.storage.bag import within
 from scenario_gen.bags.storage.config import BagConfig
 from scenario_gen.base.errors import did_you_mean, InputError, ScenarioGenError
-from scenario_gen.base.interrupts import end_with_parent, starting
 from scenario_gen.base.parameters import parameter, Parameters
+from scenario_gen.base.signals import ctrl_c_blocked, end_with_parent
 from scenario_gen.closed_loop.bounded import bounded, Decisions, Timed, TooLongError
 from scenario_gen.closed_loop.config import ClosedLoopConfig
 from scenario_gen.closed_loop.origin import Origin, origins_of, Trial, units_of
@@ -336,7 +336,7 @@ def trial_runner(
                 )
                 for trial in trials
             )
-            with starting():
+            with ctrl_c_blocked():
                 results = pool.map(
                     _run_packed, tasks, chunksize=min(max(len(trials) // workers, 1), 4)
                 )

@@ -27,7 +27,7 @@ from scenario_gen.base.documents import read_json
 from scenario_gen.base.errors import describe, InputError, needs, of_system, ScenarioGenError
 from scenario_gen.base.folders import naming, scratch, sync, sync_tree, write_text
 from scenario_gen.base.folders.scratch import claimed, PREFIX, sweep_tree
-from scenario_gen.base.interrupts import ending, starting
+from scenario_gen.base.signals import cleaned_up, ctrl_c_blocked
 from scenario_gen.base.stores import create, fetched, Place, Remote, upload
 from scenario_gen.base.stores import temporary as scratch_folder
 
@@ -107,7 +107,7 @@ def held(out: Place) -> Iterator[None]:
     if isinstance(out, Remote):
         yield
         return
-    with claimed(out / f"{PREFIX}run", out), ending(partial(sweep_tree, out)):
+    with claimed(out / f"{PREFIX}run", out), cleaned_up(partial(sweep_tree, out)):
         sweep_tree(out)
         yield
         sweep_tree(out)
@@ -289,11 +289,11 @@ def _client(workers: int, scheduler: str) -> Iterator[Any]:
             }
             sizes = {"n_workers": workers, "threads_per_worker": 1, "memory_limit": 0}
             stack.enter_context(dask.config.set(settings))
-            with starting():
+            with ctrl_c_blocked():
                 cluster = stack.enter_context(
                     LocalCluster(**sizes, processes=True, dashboard_address="127.0.0.1:0")
                 )
-                stack.enter_context(ending(partial(_end, cluster)))
+                stack.enter_context(cleaned_up(partial(_end, cluster)))
         yield stack.enter_context(Client(cluster))
 
 

@@ -18,7 +18,7 @@ from scenario_gen.bags.storage.bag import read_messages
 from scenario_gen.base.errors import InputError, RefusedError
 from scenario_gen.logs import read_log
 from scenario_gen.pipeline import generate, PipelineConfig
-from scenario_gen.ros.plumbing.suite import Job, run_suite
+from scenario_gen.ros.common.suite import Job, run_suite
 
 pytestmark = [pytest.mark.dds, pytest.mark.slow]
 JOBS = (
@@ -40,7 +40,7 @@ def forked():
     with pytest.MonkeyPatch.context() as patch:
         context = SimpleNamespace(Process=process)
         patch.setattr(
-            "scenario_gen.ros.plumbing.suite.multiprocessing",
+            "scenario_gen.ros.common.suite.multiprocessing",
             SimpleNamespace(get_context=lambda _: context),
         )
         yield

@@ -10,7 +10,7 @@ import pytest
 from support.suite_processes import Client
 
 from msg_conventions.diagnostics import decode_diagnostics, Level, Status, template_of
-from scenario_gen.ros.plumbing.diagnostics import bounded, family, HOLD_S, LARGEST, MAX_STATUSES
+from scenario_gen.ros.common.diagnostics import bounded, family, HOLD_S, LARGEST, MAX_STATUSES
 
 pytestmark = pytest.mark.dds
 NODE = "/reporter"
@@ -23,7 +23,7 @@ class Reporter:
         import rclpy
         from rclpy.executors import SingleThreadedExecutor
 
-        from scenario_gen.ros.plumbing.diagnostics import NodeDiagnostics
+        from scenario_gen.ros.common.diagnostics import NodeDiagnostics
 
         self.context = rclpy.Context()
         rclpy.init(context=self.context, domain_id=domain)

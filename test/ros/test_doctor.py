@@ -10,7 +10,7 @@ import sys
 
 import pytest
 
-from scenario_gen.ros.plumbing.doctor import ERROR, examine, OK, packages, python
+from scenario_gen.ros.common.doctor import ERROR, examine, OK, packages, python
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -33,7 +33,7 @@ def test_a_sound_environment_is_sound_and_an_rmw_that_is_not_there_is_an_error(d
 
 def test_without_ros_and_without_packages_it_still_answers():
     """-S hides all that is installed."""
-    command = [sys.executable, "-S", "-m", "scenario_gen.ros.plumbing.doctor"]
+    command = [sys.executable, "-S", "-m", "scenario_gen.ros.common.doctor"]
     answer = subprocess.run(
         command, cwd=ROOT, capture_output=True, text=True, timeout=120, check=False
     )

@@ -15,7 +15,7 @@ pytestmark = pytest.mark.dds
 
 def test_a_node_says_that_kernels_are_compiled_and_ends_when_asked(tmp_path):
     """With an empty cache."""
-    command = [sys.executable, "-m", "scenario_gen.ros.plumbing.start", "segmenter"]
+    command = [sys.executable, "-m", "scenario_gen.ros.common.start", "segmenter"]
     environment = os.environ | {"PYTHONUNBUFFERED": "1", "NUMBA_CACHE_DIR": str(tmp_path)}
     node = subprocess.Popen(command, stderr=subprocess.PIPE, text=True, env=environment)
     try:

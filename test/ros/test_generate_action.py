@@ -17,8 +17,8 @@ import pytest
 from support.suite_processes import Client, ROOT
 
 from scenario_gen.base.ros_domain import free_domain, this_host_only
+from scenario_gen.ros.common.requests import Code
 from scenario_gen.ros.nodes.gp_sampler import GpSampler
-from scenario_gen.ros.plumbing.sampling_requests import Code
 
 pytestmark = pytest.mark.dds
 SUCCEEDED, CANCELED, ABORTED = 4, 5, 6  # action_msgs/GoalStatus
@@ -94,7 +94,7 @@ def suite(environment, tmp_path_factory):
     command = [
         sys.executable,
         "-m",
-        "scenario_gen.ros.plumbing.start",
+        "scenario_gen.ros.common.start",
         "suite",
         "--nodes",
         NODES,

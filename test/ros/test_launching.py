@@ -18,9 +18,15 @@ import yaml
 
 from scenario_gen.base.errors import InputError
 from scenario_gen.base.parameters import flatten
-from scenario_gen.cli.launching import DRIVE, LIVE, meanings, NODES, SUITE
-from scenario_gen.ros.plumbing.ros_parameters import config_of
-from scenario_gen.ros.plumbing.start import node_class
+from scenario_gen.ros.common.ros_parameters import config_of
+from scenario_gen.ros.common.start import node_class
+from scenario_gen.ros.launch_arguments import (
+    descriptions,
+    DRIVE_ARGUMENTS,
+    LIVE,
+    SUITE_ARGUMENTS,
+)
+from scenario_gen.ros.node_names import SUITE
 
 LOG = str(RESOURCES / "synthetic_c")
 
@@ -73,17 +79,17 @@ def words(node: SimpleNamespace) -> list[str]:
 
 def test_the_nodes_that_are_started(tmp_path):
     assert [(node.executable, node.name, node.respawn) for node in launched(log=LOG)] == [
-        (name, name, False) for name in NODES
+        (name, name, False) for name in SUITE
     ]
     recording = launched(
         log=LOG, bag=str(tmp_path / "bag"), respawn="true", log_level="debug", namespace="/a"
     )
-    assert [node.respawn for node in recording] == [name != "recorder" for name in NODES]
+    assert [node.respawn for node in recording] == [name != "recorder" for name in SUITE]
     assert all(
         node.ros_arguments == ["--log-level", "debug"] and node.namespace == "/a"
         for node in recording
     )
-    some = [name for name in NODES if name not in ("planner", "recorder")]
+    some = [name for name in SUITE if name not in ("planner", "recorder")]
     assert [node.executable for node in launched(log=LOG, without="planner, recorder")] == some
     (together, *pictures) = launched(
         log=LIVE, composed="true", rviz="true", without="planner,recorder"
@@ -97,12 +103,12 @@ def test_the_nodes_that_are_started(tmp_path):
 
 
 def test_arguments_are_parameters_of_nodes_and_count_only_where_they_are_given():
-    known = {name for node in NODES for name in flatten(config_of(node_class(node)))}
-    assert {name for name, _ in SUITE.values()} - known == {"autostart", "use_sim_time"}
-    assert {name for name, _ in DRIVE.values()} == set(
+    known = {name for node in SUITE for name in flatten(config_of(node_class(node)))}
+    assert {name for name, _ in SUITE_ARGUMENTS.values()} - known == {"autostart", "use_sim_time"}
+    assert {name for name, _ in DRIVE_ARGUMENTS.values()} == set(
         flatten(config_of(node_class("traffic")))
     ) - {"drive.patience"}
-    assert "(default: 50)" in meanings(SUITE)["count"]
+    assert "(default: 50)" in descriptions(SUITE_ARGUMENTS)["count"]
     (node, *_) = launched(log=LOG, count="50")
     assert yaml.safe_load(Path(node.parameters[-1]).read_text())["/**/**"]["ros__parameters"] == {
         "count": 50,
@@ -204,15 +210,15 @@ IN_ROS_PYTHON = """
 import json, sys
 before = set(sys.modules)
 from pathlib import Path
-from scenario_gen.cli.launching import DRIVE, read, SUITE
+from scenario_gen.ros.launch_arguments import DRIVE_ARGUMENTS, parse_arguments, SUITE_ARGUMENTS
 given = {"log": sys.argv[1], "bag": sys.argv[2], "starts": "'1: 31.8 68.45 0.0 10.7'"}
-for arguments, given in ((DRIVE, {}), (SUITE, given)):
+for arguments, given in ((DRIVE_ARGUMENTS, {}), (SUITE_ARGUMENTS, given)):
     for name, (_, entry) in arguments.items():
         text = entry.metadata["choices"][0] if entry.metadata["choices"] else "/tmp" if name == "results" else "1"
         given.setdefault(name, text if isinstance(entry.default, str) and name != "bag" else json.dumps(entry.default).strip('"'))
-    launch = read(arguments, given)
+    launch = parse_arguments(arguments, given)
 print(launch.parameter_files(Path("suite.yaml"))[-1])
-print(json.dumps(dict(launch.given)))
+print(json.dumps(dict(launch.parameters)))
 others = {name.partition(".")[0] for name in set(sys.modules) - before if getattr(sys.modules[name], "__file__", None)}
 assert others <= {*sys.stdlib_module_names, "scenario_gen", "yaml", "_yaml"}, others
 """

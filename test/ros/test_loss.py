@@ -89,7 +89,7 @@ def test_a_hanging_subscriber_is_waited_for_no_longer_than_patience(domain, clie
     from std_msgs.msg import String
 
     from msg_conventions.cdr import encode
-    from scenario_gen.ros.plumbing.topics import Pace
+    from scenario_gen.ros.common.topics import Pace
 
     publisher, told = client.node.create_publisher(String, "/hang", 5), []
     pace = Pace(publisher, 5, 0.2, told.append)

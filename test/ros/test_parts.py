@@ -19,10 +19,10 @@ from scenario_gen.base.errors import InputError
 from scenario_gen.base.parameters import flatten
 from scenario_gen.base.worker import Worker
 from scenario_gen.pipeline import PipelineConfig
+from scenario_gen.ros.common.ros_parameters import descriptor, with_values
+from scenario_gen.ros.common.stage_node import Inputs
+from scenario_gen.ros.common.suite import Job, parameters
 from scenario_gen.ros.nodes.road_server import road_of_url
-from scenario_gen.ros.plumbing.ros_parameters import descriptor, with_values
-from scenario_gen.ros.plumbing.stage_node import Inputs
-from scenario_gen.ros.plumbing.suite import Job, parameters
 
 ROOT = Path(__file__).resolve().parents[2]
 

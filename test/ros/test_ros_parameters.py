@@ -12,8 +12,8 @@ import yaml
 
 from scenario_gen.base.errors import InputError
 from scenario_gen.base.parameters import flatten
+from scenario_gen.ros.common.ros_parameters import meant, with_values
 from scenario_gen.ros.nodes.gp_sampler import Config
-from scenario_gen.ros.plumbing.ros_parameters import meant, with_values
 
 DECLARED = {name: entry for name, (entry, _) in flatten(Config()).items()}
 RESERVED = "start_type_description_service"  # read-only, of every rclpy node

@@ -20,7 +20,7 @@ pytestmark = pytest.mark.dds
 
 def _started(node: str, domain: int, *arguments: str) -> "subprocess.Popen[str]":
     return subprocess.Popen(
-        [sys.executable, "-m", "scenario_gen.ros.plumbing.start", node, "--ros-args", *arguments],
+        [sys.executable, "-m", "scenario_gen.ros.common.start", node, "--ros-args", *arguments],
         stdout=subprocess.PIPE,
         stderr=subprocess.STDOUT,
         text=True,
@@ -98,13 +98,11 @@ def test_ctrl_c_while_the_libraries_load(domain):
 
 
 STUCK = """
-from scenario_gen.base.interrupts import hear
-hear()
 import ctypes
 import sys
-from scenario_gen.ros.plumbing import process
+from scenario_gen.ros.common import process
 from rclpy.node import Node
-process.ENDING = 1.0
+process.NODE_END_S = 1.0
 class Stuck(Node):
     def __init__(self, namespace):
         super().__init__("stuck", namespace=namespace)

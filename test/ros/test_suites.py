@@ -11,7 +11,8 @@ from msg_conventions.scenarios import digest, encode_scenario
 from scenario_gen.base.ros_domain import free_domain
 from scenario_gen.logs import read_log
 from scenario_gen.pipeline import generate, PipelineConfig
-from scenario_gen.ros.plumbing.start import chosen, NODES
+from scenario_gen.ros.common.start import chosen_nodes
+from scenario_gen.ros.node_names import SUITE
 
 # namespace, domain (by number), log, road, seed
 SUITES = (
@@ -83,18 +84,18 @@ def test_each_suite_makes_its_own_scenarios_and_none_meets_another(suites, domai
             for name, space in clients[0].node.get_node_names_and_namespaces()
             if space == "/a"
         ]
-        assert sorted(names) == sorted(set(NODES) - {"player"})
+        assert sorted(names) == sorted(SUITE)
     finally:
         for client in clients:
             client.close()
 
 
 def test_nodes_are_chosen_by_name():
-    assert chosen(["suite", "--nodes", "segmenter,recorder", "--ros-args"]) == (
+    assert chosen_nodes(["suite", "--nodes", "segmenter,recorder", "--ros-args"]) == (
         ["recorder", "segmenter"],
         ["suite", "--ros-args"],
     )
-    assert "player" not in chosen(["suite"])[0]
+    assert "player" not in chosen_nodes(["suite"])[0]
     for words in (["--nodes", "no_such"], ["--nodes"]):
         with pytest.raises(SystemExit, match="usage"):
-            chosen(["suite", *words])
+            chosen_nodes(["suite", *words])

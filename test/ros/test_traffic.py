@@ -30,8 +30,8 @@ from scenario_gen.closed_loop.simulation import ClosedLoop
 from scenario_gen.closed_loop.tracking import of_twist
 from scenario_gen.closed_loop.trials import read_trials
 from scenario_gen.closed_loop.verdict import judge
-from scenario_gen.ros.nodes import traffic_of_trials
-from scenario_gen.ros.plumbing.driving import decode_command, FIRST_STAMP
+from scenario_gen.ros.common import planner_trials
+from scenario_gen.ros.common.driving import decode_command, FIRST_STAMP
 from scenario_gen.types.ego import with_witness
 from scenario_gen.types.names import token
 from scenario_gen.types.scenario import EgoSlot
@@ -207,7 +207,7 @@ def test_two_egos_and_a_late_one_are_said(traffic, client):
     """A second node that commands, and commands whose stamp is old: the drive goes on, and the verdict says both."""
     import rclpy
 
-    from scenario_gen.ros.plumbing.topics import create_publisher
+    from scenario_gen.ros.common.topics import create_publisher
 
     process = traffic(patience=0.2)
     client.announce("ego/cmd_vel_stamped")
@@ -352,7 +352,7 @@ def test_a_planner_that_is_a_node_gets_the_verdicts_that_it_gets_in_process(
         for out in ("over_dds", "in_process")
     )
     assert over_dds["drives"] == in_process["drives"] and len(in_process["drives"]) == 2
-    monkeypatch.setattr(traffic_of_trials, "SILENT_S", 1.0)
+    monkeypatch.setattr(planner_trials, "SILENT_S", 1.0)
     for planner, more, said in (
         (f"{sys.executable} -c 'print(7)'", (), "ended with code 0; its last output: 7"),
         ("no_such_program", (), "No such"),

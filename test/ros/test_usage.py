@@ -11,13 +11,14 @@ import sys
 import pytest
 from support.node_server import start_nodes
 
-from scenario_gen.ros.plumbing.ros_parameters import help_of
-from scenario_gen.ros.plumbing.start import node_class, NODES
+from scenario_gen.ros.common.ros_parameters import help_of
+from scenario_gen.ros.common.start import node_class
+from scenario_gen.ros.node_names import COMPOSABLE
 
 
 @pytest.mark.dds
 def test_the_player_lists_its_parameters():
-    command = [sys.executable, "-m", "scenario_gen.ros.plumbing.start", "player", "--help"]
+    command = [sys.executable, "-m", "scenario_gen.ros.common.start", "player", "--help"]
     done = subprocess.run(command, capture_output=True, text=True, timeout=180.0, check=False)
     assert done.returncode == 0 and done.stderr == ""
     assert "[--namespace NAME]... [--ros-args -p PARAMETER:=VALUE ...]" in done.stdout
@@ -53,7 +54,7 @@ def test_what_ros_cannot_read_is_one_line(words, said):
     )
 
 
-@pytest.mark.parametrize("name", NODES)
+@pytest.mark.parametrize("name", COMPOSABLE)
 def test_every_node_lists_all_of_its_parameters(name):
     module = importlib.import_module(f"scenario_gen.ros.nodes.{name}")
     text = help_of(name, (node_class(name),))

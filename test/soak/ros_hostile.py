@@ -33,7 +33,7 @@ from msg_conventions.tracks import encode_tracks
 from scenario_gen.base.errors import ScenarioGenError
 from scenario_gen.base.ros_domain import free_domain
 from scenario_gen.logs import read_log
-from scenario_gen.ros.plumbing.stage_node import refuse_damaged
+from scenario_gen.ros.common.stage_node import refuse_damaged
 
 MESSAGES = int(os.environ.get("SCENARIO_GEN_SOAK_MESSAGES", "10000"))
 MINUTES = float(os.environ.get("SCENARIO_GEN_SOAK_MINUTES", "30"))

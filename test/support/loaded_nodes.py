@@ -3,11 +3,10 @@
 
 """All nodes and their kernels, loaded once: multiprocessing's server imports this, and each node's process is forked from it."""
 
-from scenario_gen.ros.plumbing.process import kernels_ready
-from scenario_gen.ros.plumbing.start import node_class, NODES
+from scenario_gen.ros.common.process import kernels_ready
+from scenario_gen.ros.common.start import node_class
+from scenario_gen.ros.node_names import ALL
 
 kernels_ready(
-    dict.fromkeys(
-        stage for node in (*NODES, "traffic") for stage in getattr(node_class(node), "STAGES", ())
-    )
+    dict.fromkeys(stage for node in ALL for stage in getattr(node_class(node), "STAGES", ()))
 )

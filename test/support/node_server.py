@@ -3,7 +3,7 @@
 
 """Processes of nodes, forked from one that has loaded the libraries and the kernels, which takes each seconds of CPU otherwise.
 
-`start_nodes` stands for `subprocess.Popen([sys.executable, "-m", "scenario_gen.ros.plumbing.start", …])`. Nothing outlives the
+`start_nodes` stands for `subprocess.Popen([sys.executable, "-m", "scenario_gen.ros.common.start", …])`. Nothing outlives the
 tests. Tests of the start itself (signals while the libraries load, an empty cache, executables) start real executables instead.
 """
 
@@ -86,12 +86,12 @@ def _in_environment(environment: dict[str, str], target, args) -> None:
 
 def _become(arguments: list[str], folder: str, environment: dict[str, str], log: str) -> None:
     """Turn this process into what `python -m` would have made of it."""
-    from scenario_gen.base.interrupts import end_with_parent
+    from scenario_gen.base.signals import end_with_parent
+    from scenario_gen.ros.common import process as node_process
+    from scenario_gen.ros.common import start
     from scenario_gen.ros.nodes.recorder import Recorder
-    from scenario_gen.ros.plumbing import process as node_process
-    from scenario_gen.ros.plumbing import start
 
-    node_process.ENDING = Recorder.ENDING = 120.0  # on a busy machine 5 s are few
+    node_process.NODE_END_S = Recorder.END_S = 120.0  # on a busy machine 5 s are few
     end_with_parent()
     descriptor = os.open(log, os.O_WRONLY | os.O_CREAT | os.O_APPEND, 0o644)
     os.dup2(descriptor, 1)

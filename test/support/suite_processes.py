@@ -124,7 +124,7 @@ class Client:
     @staticmethod
     def _kind_of(topic: str):
         from msg_conventions.topics import topic_entry
-        from scenario_gen.ros.plumbing.topics import message_class, qos
+        from scenario_gen.ros.common.topics import message_class, qos
 
         kind, quality = topic_entry(topic)
         return message_class(kind), qos(quality)

@@ -17,7 +17,7 @@ from typing import NewType
 from scenario_gen.base.errors import describe, InputError, of_system
 from scenario_gen.base.folders.disk import sync, sync_tree, write_text
 from scenario_gen.base.folders.scratch import claimed, OLD, PREFIX
-from scenario_gen.base.interrupts import uninterrupted
+from scenario_gen.base.signals import signals_deferred
 
 MARKER, FORMAT = ".scenario_gen.json", 1
 UNTOUCHED = (
@@ -62,7 +62,7 @@ def replaced_folder(target: Path, kind: Kind, inputs: Iterable[Path] = ()) -> It
             new = above / place.name
             new.mkdir()
             yield new
-            with uninterrupted():
+            with signals_deferred():
                 _finish(new, kind)
                 _check(target, place, kind)
                 _put(target, place, new, kind)

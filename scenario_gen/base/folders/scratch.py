@@ -23,7 +23,7 @@ from filelock import FileLock, Timeout
 
 from scenario_gen.base.errors import InputError
 from scenario_gen.base.folders.disk import write_text
-from scenario_gen.base.interrupts import ending, uninterrupted
+from scenario_gen.base.signals import cleaned_up, signals_deferred
 
 PREFIX, LOCK, NEW, OLD = ".scenario_gen-", "lock", "new", "old"
 DEPTHS = ("*/", "*/*/")  # at which a corpus and a batch write below their own folder
@@ -57,9 +57,9 @@ def claimed(own: Path, what: Path, patience_s: float = PATIENCE_S) -> Iterator[P
                 folder.rmdir()  # fails where there is something: the result
         lock.release()
 
-    with ending(clean_up):
+    with cleaned_up(clean_up):
         try:
-            with uninterrupted():
+            with signals_deferred():
                 _acquire(lock, own, what, patience_s)
                 if not _emptied(own):
                     raise InputError(
@@ -68,7 +68,7 @@ def claimed(own: Path, what: Path, patience_s: float = PATIENCE_S) -> Iterator[P
                 (own / NEW).mkdir()
             yield own / NEW
         finally:
-            with uninterrupted():
+            with signals_deferred():
                 clean_up()
 
 

@@ -19,7 +19,7 @@ from scenario_gen.base.cancelling import stop_if_cancelled
 from scenario_gen.base.errors import InputError
 from scenario_gen.base.parameters import parameter, Parameters
 from scenario_gen.method.evaluation import evaluate_scenarios, EvaluationConfig
-from scenario_gen.ros.plumbing.stage_node import StageNode
+from scenario_gen.ros.common.stage_node import StageNode
 from scenario_gen.types import WITH
 
 Entries = Sequence[

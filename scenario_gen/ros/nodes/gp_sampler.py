@@ -18,16 +18,16 @@ from msg_conventions.lanes import TOPIC as LANES
 from msg_conventions.topics import vehicle_topic
 from msg_conventions.tracks import decode_tracks
 from scenario_gen.method.sampling import Cancelled
-from scenario_gen.ros.plumbing.goals import action_type, Goals
-from scenario_gen.ros.plumbing.sampling_requests import (
+from scenario_gen.ros.common.generate_action import action_type, Goals
+from scenario_gen.ros.common.requests import (
     Answer,
     answer_request,
     Config,
     OpenRequest,
     OpenRequests,
 )
-from scenario_gen.ros.plumbing.stage_node import Inputs, StageNode
-from scenario_gen.ros.plumbing.topics import unacknowledged
+from scenario_gen.ros.common.stage_node import Inputs, StageNode
+from scenario_gen.ros.common.topics import unacknowledged
 from scenario_gen.types import tokens
 
 ENDS = ("road/entries", "road/exits")  # needed only for requests with start or end states

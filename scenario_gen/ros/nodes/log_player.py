@@ -21,9 +21,9 @@ from msg_conventions.tracks import encode_tracks
 from scenario_gen.base.cancelling import stop_if_cancelled
 from scenario_gen.base.errors import InputError
 from scenario_gen.logs import latitude_longitude, LogConfig, read_log
-from scenario_gen.ros.plumbing.node_parameters import LogPlayerParameters
-from scenario_gen.ros.plumbing.services import offer_trigger
-from scenario_gen.ros.plumbing.stage_node import StageNode
+from scenario_gen.ros.common.node_parameters import LogPlayerParameters
+from scenario_gen.ros.common.services import offer_trigger
+from scenario_gen.ros.common.stage_node import StageNode
 from scenario_gen.types import Encounter, tokens
 
 HEAD_START_S = 1.0  # seconds in which listeners find the streams, which are not latched

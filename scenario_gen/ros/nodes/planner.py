@@ -35,8 +35,8 @@ from scenario_gen.method.fitting import FittingConfig
 from scenario_gen.method.routing import make_planner, plan_with_retry, PlanningConfig, Query
 from scenario_gen.method.validity import Limits
 from scenario_gen.numerics import Floats
-from scenario_gen.ros.plumbing.services import REQUESTS
-from scenario_gen.ros.plumbing.stage_node import Inputs, StageNode
+from scenario_gen.ros.common.services import REQUESTS
+from scenario_gen.ros.common.stage_node import Inputs, StageNode
 from scenario_gen.types import Road, tokens
 
 ROAD = ("map", "road/entries", "road/exits")

@@ -32,10 +32,10 @@ from scenario_gen.bags.storage.bag import bag_topics, BagMessage, read_messages
 from scenario_gen.bags.storage.config import BagConfig
 from scenario_gen.base.errors import InputError, ScenarioGenError
 from scenario_gen.base.parameters import parameter, Parameters
-from scenario_gen.ros.plumbing.diagnostics import NodeDiagnostics
-from scenario_gen.ros.plumbing.ros_parameters import ConfigParameters
-from scenario_gen.ros.plumbing.services import offer_trigger
-from scenario_gen.ros.plumbing.topics import (
+from scenario_gen.ros.common.diagnostics import NodeDiagnostics
+from scenario_gen.ros.common.ros_parameters import ConfigParameters
+from scenario_gen.ros.common.services import offer_trigger
+from scenario_gen.ros.common.topics import (
     message_class,
     OVERRIDABLE,
     Pace,

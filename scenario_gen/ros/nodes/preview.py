@@ -21,8 +21,8 @@ from msg_conventions.scenario_info import ScenarioEntry
 from scenario_gen.bags.recordings.arriving import ArrivingScenarios, TOPICS
 from scenario_gen.base.parameters import parameter, Parameters
 from scenario_gen.numerics import Floats
-from scenario_gen.ros.plumbing.stage_node import StageNode
-from scenario_gen.ros.plumbing.topics import create_frames_publisher
+from scenario_gen.ros.common.stage_node import StageNode
+from scenario_gen.ros.common.topics import create_frames_publisher
 from scenario_gen.situation import conflicts_in
 from scenario_gen.types import Scenario, tokens
 

@@ -28,11 +28,11 @@ from scenario_gen.bags.recordings.losses import Losses, remedy
 from scenario_gen.bags.storage.metadata import qos_yaml
 from scenario_gen.bags.storage.writer import BagWriter, Split
 from scenario_gen.base.errors import InputError, of_system
-from scenario_gen.ros.plumbing.diagnostics import NodeDiagnostics
-from scenario_gen.ros.plumbing.node_parameters import RecorderParameters
-from scenario_gen.ros.plumbing.ros_parameters import ConfigParameters
-from scenario_gen.ros.plumbing.services import offer_trigger
-from scenario_gen.ros.plumbing.topics import adapted_quality, message_class, qos
+from scenario_gen.ros.common.diagnostics import NodeDiagnostics
+from scenario_gen.ros.common.node_parameters import RecorderParameters
+from scenario_gen.ros.common.ros_parameters import ConfigParameters
+from scenario_gen.ros.common.services import offer_trigger
+from scenario_gen.ros.common.topics import adapted_quality, message_class, qos
 
 REST_S = 30.0  # seconds that are taken at most, at the end, for what has arrived
 AT_ONCE = 50  # messages of a topic, before others have their turn
@@ -76,7 +76,7 @@ def _disk_errors(
 class Recorder(Node):  # type: ignore[misc]
     """Records what matches."""
 
-    ENDING = REST_S + 5.0  # seconds
+    END_S = REST_S + 5.0  # it writes what has arrived
 
     def __init__(self, namespace: str | None = None) -> None:
         super().__init__("recorder", namespace=namespace)

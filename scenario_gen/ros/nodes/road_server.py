@@ -29,9 +29,9 @@ from msg_conventions.tracks import decode_tracks
 from scenario_gen.base.cancelling import stop_if_cancelled
 from scenario_gen.base.errors import InputError, ScenarioGenError
 from scenario_gen.roads import build_road, FAULTY, RoadConfig
-from scenario_gen.ros.plumbing.node_parameters import RoadServerParameters
-from scenario_gen.ros.plumbing.services import REQUESTS
-from scenario_gen.ros.plumbing.stage_node import StageNode
+from scenario_gen.ros.common.node_parameters import RoadServerParameters
+from scenario_gen.ros.common.services import REQUESTS
+from scenario_gen.ros.common.stage_node import StageNode
 
 
 @dataclass(frozen=True)

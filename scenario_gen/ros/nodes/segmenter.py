@@ -29,9 +29,9 @@ from scenario_gen.method.segmentation import (
     segment,
     SegmentationConfig,
 )
-from scenario_gen.ros.plumbing.live import LiveConfig, LiveStreams
-from scenario_gen.ros.plumbing.services import offer_trigger
-from scenario_gen.ros.plumbing.stage_node import StageNode
+from scenario_gen.ros.common.live_streams import LiveConfig, LiveStreams
+from scenario_gen.ros.common.services import offer_trigger
+from scenario_gen.ros.common.stage_node import StageNode
 from scenario_gen.types import Sample
 
 

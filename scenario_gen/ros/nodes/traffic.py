@@ -35,8 +35,8 @@ from scenario_gen.closed_loop.results import Drives
 from scenario_gen.closed_loop.simulation import ClosedLoop, State
 from scenario_gen.closed_loop.trials import Outcome, read_trials
 from scenario_gen.closed_loop.verdict import judge
-from scenario_gen.ros.plumbing.diagnostics import NodeDiagnostics
-from scenario_gen.ros.plumbing.driving import (
+from scenario_gen.ros.common.diagnostics import NodeDiagnostics
+from scenario_gen.ros.common.driving import (
     ArrivingTrials,
     decode_command,
     EgoCommand,
@@ -46,10 +46,10 @@ from scenario_gen.ros.plumbing.driving import (
     surroundings,
     task_messages,
 )
-from scenario_gen.ros.plumbing.node_parameters import TrafficParameters as Config
-from scenario_gen.ros.plumbing.ros_parameters import ConfigParameters
-from scenario_gen.ros.plumbing.services import offer_trigger
-from scenario_gen.ros.plumbing.topics import (
+from scenario_gen.ros.common.node_parameters import TrafficParameters as Config
+from scenario_gen.ros.common.ros_parameters import ConfigParameters
+from scenario_gen.ros.common.services import offer_trigger
+from scenario_gen.ros.common.topics import (
     create_frames_publisher,
     create_publisher,
     create_subscription,

@@ -14,7 +14,7 @@ from support.killed import killed_in
 
 from scenario_gen.base.folders import scratch
 from scenario_gen.base.folders.scratch import PREFIX, sweep, sweep_beside
-from scenario_gen.base.interrupts import leave, starting
+from scenario_gen.base.signals import ctrl_c_blocked, on_signal
 
 
 def left(folder):
@@ -41,13 +41,13 @@ def test_a_folder_goes_with_who_holds_it(tmp_path, number, stays):
     pid = os.fork()
     if not pid:
         try:
-            signal.signal(signal.SIGINT, leave)
+            signal.signal(signal.SIGINT, on_signal)
             os.dup2(os.open(os.devnull, os.O_WRONLY), 2)
             with scratch(tmp_path):
                 os.kill(os.getpid(), number)
         finally:
             os._exit(1)
-    assert os.waitstatus_to_exitcode(os.waitpid(pid, 0)[1]) == (-number if stays else 128 + number)
+    assert os.waitstatus_to_exitcode(os.waitpid(pid, 0)[1]) == -number
     assert bool(left(tmp_path)) == stays
     sweep(tmp_path)
     assert not left(tmp_path)
@@ -64,7 +64,7 @@ def test_what_is_started_hears_no_ctrl_c():
         signal.SIGINT, signal.default_int_handler
     )  # a job in the background ignores it
     try:
-        with starting():
+        with ctrl_c_blocked():
             context = multiprocessing.get_context("spawn")
             context.Semaphore()  # which needs the tracker that unblocks it
             assert said() == "deaf\n"

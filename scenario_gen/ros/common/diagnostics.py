@@ -21,7 +21,7 @@ from rclpy.node import Node
 from msg_conventions.diagnostics import encode_diagnostics, Level, of_template, Status
 from scenario_gen.base.errors import LONGEST_REFUSAL, presentable, ScenarioGenError
 from scenario_gen.base.worker import stop_if_abandoned
-from scenario_gen.ros.plumbing.topics import create_publisher, others_on, own_topics, publish
+from scenario_gen.ros.common.topics import create_publisher, others_on, own_topics, publish
 
 TICK_S = 0.25  # seconds of real time after which what has changed is published
 TICKS = 4  # after so many all is published, changed or not

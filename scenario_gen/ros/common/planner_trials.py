@@ -15,9 +15,9 @@ from scenario_gen.closed_loop.config import ClosedLoopConfig
 from scenario_gen.closed_loop.origin import Trial
 from scenario_gen.closed_loop.simulation import State
 from scenario_gen.closed_loop.trials import Outcome, saying_what_was_before, too_long
+from scenario_gen.ros.common.driving import INPUTS
+from scenario_gen.ros.common.node_parameters import TrafficParameters
 from scenario_gen.ros.nodes.traffic import Traffic
-from scenario_gen.ros.plumbing.driving import INPUTS
-from scenario_gen.ros.plumbing.node_parameters import TrafficParameters
 
 START_S = 60.0  # seconds that a planner's node may take until it publishes commands
 SETTLE_S = 1.0  # seconds from its first publisher until it has found the topics that it listens to

@@ -19,8 +19,8 @@ from rclpy.clock import Clock, ClockType
 from rclpy.qos import QoSProfile
 
 from msg_conventions.scenario_info import REFUSED
-from scenario_gen.ros.plumbing.sampling_requests import Code, OpenRequest, OpenRequests, Outcome
-from scenario_gen.ros.plumbing.services import REQUESTS
+from scenario_gen.ros.common.requests import Code, OpenRequest, OpenRequests, Outcome
+from scenario_gen.ros.common.services import REQUESTS
 
 NAME = "~/generate_scenarios"
 FEEDBACK_S = 0.1  # seconds between two feedbacks

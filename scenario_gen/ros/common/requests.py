@@ -3,7 +3,7 @@
 
 """The sampler's requests: its parameters, the open requests and their services, and how a request is answered.
 
-A request comes by the service `~/generate`, or by the action `~/generate_scenarios` (goals.py).
+A request comes by the service `~/generate`, or by the action `~/generate_scenarios` (generate_action.py).
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -37,9 +37,9 @@ from scenario_gen.method.fitting import FittingConfig
 from scenario_gen.method.routing import PlanningConfig
 from scenario_gen.method.sampling import Callbacks, SamplingConfig
 from scenario_gen.method.validity import Limits
-from scenario_gen.ros.plumbing.node_parameters import SamplerParameters
-from scenario_gen.ros.plumbing.ros_parameters import values_of_call
-from scenario_gen.ros.plumbing.services import offer_trigger, REQUESTS
+from scenario_gen.ros.common.node_parameters import SamplerParameters
+from scenario_gen.ros.common.ros_parameters import values_of_call
+from scenario_gen.ros.common.services import offer_trigger, REQUESTS
 from scenario_gen.types import BoundaryStates, EgoSlot, GenerationResult, Request, Scenario
 
 SHOWN = 20  # waiting requests that are named

@@ -27,9 +27,9 @@ from msg_conventions.topics import LATCHED, topic_entry
 from msg_conventions.tracks import decode_tracks
 from scenario_gen.base.errors import InputError
 from scenario_gen.base.worker import Job, Worker
-from scenario_gen.ros.plumbing.diagnostics import NodeDiagnostics
-from scenario_gen.ros.plumbing.ros_parameters import ConfigParameters
-from scenario_gen.ros.plumbing.topics import create_subscription, Outputs
+from scenario_gen.ros.common.diagnostics import NodeDiagnostics
+from scenario_gen.ros.common.ros_parameters import ConfigParameters
+from scenario_gen.ros.common.topics import create_subscription, Outputs
 from scenario_gen.situation import MOST_SAMPLES, refuse_too_large
 from scenario_gen.types import Encounter, Quality
 

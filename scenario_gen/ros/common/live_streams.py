@@ -16,7 +16,7 @@ from msg_conventions.topics import FIX_TYPE, TWIST_TYPE, vehicle_topic
 from scenario_gen.base.errors import InputError
 from scenario_gen.base.parameters import parameter, Parameters
 from scenario_gen.logs import LogConfig, RawLog, Streams
-from scenario_gen.ros.plumbing.topics import adapted_quality
+from scenario_gen.ros.common.topics import adapted_quality
 from scenario_gen.situation import MOST_VEHICLES
 from scenario_gen.types import Sample, token
 

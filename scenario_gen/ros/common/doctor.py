@@ -3,7 +3,7 @@
 
 """doctor: what this suite misses in an environment; `ros2 doctor` looks at the network, the middleware and the QoS of topics.
 
-Only the standard library is imported, so `python -m scenario_gen.ros.plumbing.doctor` also runs where the command cannot start.
+Only the standard library is imported, so `python -m scenario_gen.ros.common.doctor` also runs where the command cannot start.
 """
 
 from collections.abc import Iterator, Mapping
