@@ -117,14 +117,6 @@ def to_number(text: str, where: str) -> float:
     return number
 
 
-def has_root(path: Path, tag: str, *suffixes: str) -> bool:
-    """Return whether a file has one of these suffixes, and an element of that tag at its start."""
-    if path.suffix.lower() not in suffixes:
-        return False
-    with path.open("rb") as file:
-        return f"<{tag}".encode() in file.read(4096)
-
-
 def read_xml(path: Path, what: str) -> Element:
     """Return the root element of an XML file.
 

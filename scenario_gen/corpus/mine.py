@@ -23,7 +23,6 @@ from typing import Any
 
 import numpy as np
 
-from scenario_gen.bags.storage.files import SUFFIXES
 from scenario_gen.base.documents import COUNT, read_json
 from scenario_gen.base.errors import InputError, needs
 from scenario_gen.base.folders import scratch
@@ -55,7 +54,7 @@ from scenario_gen.corpus.messages import HOUR, parse_range, ranges, RangeTask
 from scenario_gen.corpus.page import sketch, write_page
 from scenario_gen.corpus.tables import rows_at, rows_of
 from scenario_gen.corpus.tasks import agree, arriving, check_out, held, spread, undone, Workers
-from scenario_gen.logs import is_bag, is_bsm, is_commonroad, is_fcd, is_nocturne, is_spmd, is_table
+from scenario_gen.logs import is_bag, is_log, is_spmd, is_table, LOG_FORMATS
 from scenario_gen.numerics import Ints
 from scenario_gen.situation import reactions_of
 
@@ -282,24 +281,16 @@ def _of_files(archive: Path) -> Files:
     bags = {path.parent for path in rest if path.name == "metadata.yaml" and is_bag(path.parent)}
     if bags:
         rest = [path for path in rest if bags.isdisjoint(path.parents)]
-    tables, rest = _parted(
-        rest,
-        lambda path: any(
-            is_log(path) for is_log in (is_table, is_commonroad, is_nocturne, is_bsm, is_fcd)
-        ),
-    )
-    loose, others = _parted(rest, lambda path: path.suffix in SUFFIXES)
-    if (
-        tables
-        and not (spmd or bags or loose)
-        and all(path.parent == archive and is_table(path) for path in tables)
-    ):
-        logs = [tables]  # one log in several tables
+    bag_files, rest = _parted(rest, is_bag)
+    files, others = _parted(rest, is_log)
+    are_tables = all(path.parent == archive and is_table(path) for path in files)
+    if files and are_tables and not (spmd or bags or bag_files):
+        logs = [files]  # one log in several tables
     else:
-        logs = [[path] for path in (*tables, *sorted(bags), *loose)]
+        logs = [[path] for path in (*files, *sorted(bags), *bag_files)]
     if not spmd and not logs:
         raise InputError(
-            f"{archive} holds no log that can be read: no SPMD file, table, bag or CommonRoad scenario"
+            f"{archive} has no log in a known format ({', '.join(LOG_FORMATS.names())})"
         )
     return spmd, logs, others
 

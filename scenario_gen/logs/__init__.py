@@ -3,11 +3,11 @@
 
 """Raw files and bags -> encounters (paper II-A)."""
 
-from scenario_gen.logs.adapters.commonroad import is_commonroad
-from scenario_gen.logs.adapters.nocturne import is_nocturne
 from scenario_gen.logs.adapters.openscenario import OPENSCENARIO_SPEEDS
 from scenario_gen.logs.cleaning import parse_origin
 from scenario_gen.logs.config import LogConfig
+from scenario_gen.logs.files import read_raw
+from scenario_gen.logs.formats import is_bag, is_log, is_spmd, is_table, LOG_FORMATS, LogFormat
 from scenario_gen.logs.gap import INTERACTS_M, METRES_PER_SECOND_APART, space_time_gap
 from scenario_gen.logs.geodesy import (
     azimuthal,
@@ -21,26 +21,14 @@ from scenario_gen.logs.geodesy import (
 from scenario_gen.logs.groups import OUT_OF_RANGE_S, shortest, ticks, windows
 from scenario_gen.logs.growing import Growth, Meeting
 from scenario_gen.logs.raw import Observations, RawLog, Rows, Segment, UnknownFormatError
-from scenario_gen.logs.read import (
-    encounters_of,
-    is_bag,
-    is_bsm,
-    is_fcd,
-    is_spmd,
-    is_table,
-    LogFormat,
-    LogResult,
-    NoEncounterError,
-    read_log,
-    read_raw,
-)
+from scenario_gen.logs.read import encounters_of, LogResult, NoEncounterError, read_log
 from scenario_gen.logs.streams import Streams
 from scenario_gen.logs.synthetic import bundled, CASES
 
 __all__ = [
-    "CASES", "INTERACTS_M", "METRES_PER_SECOND_APART", "OPENSCENARIO_SPEEDS", "OUT_OF_RANGE_S", "Growth", "LogConfig",
+    "CASES", "INTERACTS_M", "LOG_FORMATS", "METRES_PER_SECOND_APART", "OPENSCENARIO_SPEEDS", "OUT_OF_RANGE_S", "Growth", "LogConfig",
     "LogFormat", "LogResult", "Meeting", "NoEncounterError", "Observations", "RawLog", "Rows", "Segment", "Streams",
-    "UnknownFormatError", "azimuthal", "bundled", "encounters_of", "is_bag", "is_bsm", "is_commonroad", "is_fcd", "is_nocturne",
+    "UnknownFormatError", "azimuthal", "bundled", "encounters_of", "is_bag", "is_log",
     "is_spmd", "is_table", "latitude_longitude", "local_frame", "metres_per_degree", "middle_of", "parse_origin", "read_log",
     "read_raw", "reprojected", "shortest", "space_time_gap", "ticks", "utm", "windows",
 ]  # fmt: skip

@@ -8,24 +8,7 @@ from dataclasses import dataclass
 
 from scenario_gen.base.errors import did_you_mean, InputError
 from scenario_gen.base.parameters import parameter, Parameters
-
-FORMATS = (
-    *(
-        "auto",
-        "spmd",
-        "table",
-        "bag",
-        "argoverse2",
-        "interaction",
-        "ind",
-        "highd",
-        "commonroad",
-        "nocturne",
-        "osi",
-    ),
-    *("omega_prime", "bsm", "fcd", "openscenario"),
-)
-
+from scenario_gen.logs.formats import LOG_FORMATS
 
 POINTS = {"centre": 0.0, "front": -0.5, "rear": 0.5, "rear_axle": 0.3}
 """Points of a vehicle, and how many lengths its middle is ahead of them; behind its rear axle a car has a fifth of its length."""
@@ -38,8 +21,8 @@ class LogConfig(Parameters):
     format: str = parameter(
         "auto",
         "source format; auto looks at the file's name and content",
-        choices=FORMATS,
-        group="scenario_gen.logs",
+        choices=("auto", *LOG_FORMATS.built_in),
+        group=LOG_FORMATS.group,
     )
     columns: str = parameter(
         "",

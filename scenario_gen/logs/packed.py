@@ -15,9 +15,9 @@ from scenario_gen.base.errors import guarded, InputError
 from scenario_gen.base.folders import scratch
 from scenario_gen.base.stores import naming_objects, temporary
 from scenario_gen.logs.config import LogConfig
+from scenario_gen.logs.formats import is_packed, without_packing
 from scenario_gen.logs.raw import check_size
 
-PACKED = (".gz", ".zip")
 MOST_FILES = 10_000  # in a .zip
 DAMAGE = (
     OSError,
@@ -29,11 +29,6 @@ DAMAGE = (
 )  # or a password, or a method
 
 
-def without_packing(path: Path) -> Path:
-    """Return a name without .gz or .zip at its end."""
-    return path.with_suffix("") if path.suffix.lower() in PACKED else path
-
-
 @contextmanager
 def unpacked(paths: Sequence[Path], config: LogConfig) -> Iterator[list[Path]]:
     """Give the paths, those of packed files as the file, or the folder of several files, that is in them.
@@ -41,9 +36,7 @@ def unpacked(paths: Sequence[Path], config: LogConfig) -> Iterator[list[Path]]:
     Raises:
         InputError: a file is damaged, or too large when unpacked.
     """
-    packed = {
-        k: path for k, path in enumerate(paths) if path.is_file() and path.suffix.lower() in PACKED
-    }
+    packed = {k: path for k, path in enumerate(paths) if path.is_file() and is_packed(path)}
     if not packed:
         yield list(paths)
         return

@@ -3,37 +3,30 @@
 
 """From files to encounters: choose the reader, clean, smooth, group, cut."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import partial
-from importlib import import_module
 from itertools import combinations
 import math
 from pathlib import Path
-from typing import Any, TYPE_CHECKING
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
-from scenario_gen.bags.storage.files import files_of
-from scenario_gen.base.errors import did_you_mean, guarded, InputError, needs, reading
+from scenario_gen.base.errors import InputError
 from scenario_gen.base.folders.scratch import scratch
-from scenario_gen.base.registry import Registry
-from scenario_gen.base.stores import local, naming_objects, renamed, temporary
-from scenario_gen.logs.adapters.commonroad import is_commonroad
-from scenario_gen.logs.adapters.nocturne import is_nocturne
-from scenario_gen.logs.adapters.openscenario import is_openscenario
+from scenario_gen.base.stores import naming_objects, temporary
 from scenario_gen.logs.cleaning import clean, Drops
 from scenario_gen.logs.clock import check_unit, retimed
 from scenario_gen.logs.config import LogConfig, picked
 from scenario_gen.logs.encounters import Piece, pieces_of, plausible
+from scenario_gen.logs.files import read_raw
 from scenario_gen.logs.geodesy import about_its_middle, EARTH_M
 from scenario_gen.logs.groups import distances, driven, find_groups, ticks
 from scenario_gen.logs.growing import Group, Meeting
 from scenario_gen.logs.kinds import typed
-from scenario_gen.logs.packed import unpacked, without_packing
 from scenario_gen.logs.quality import EncounterQuality, find_overlaps, Quality, VehicleQuality
-from scenario_gen.logs.raw import LONGEST_HEADER, natural, Observations, RawLog, UnknownFormatError
+from scenario_gen.logs.raw import natural, Observations, RawLog
 from scenario_gen.logs.smoothing import DOUBTED_MPS
 from scenario_gen.logs.units import remarks_on_units
 from scenario_gen.numerics import runs
@@ -42,19 +35,9 @@ from scenario_gen.types import cut, Encounter, tokens, Vehicle
 if TYPE_CHECKING:
     from pandas import DataFrame
 
-TABLES = (".csv", ".tsv", ".txt", ".parquet", ".pq")
-MCAP = b"\x89MCAP0\r\n\x01"  # begins the file, and its header
-OSI = (
-    b"net.asam.osi",
-    b"osi3.",
-    b"ground_truth",
-)  # what is near the beginning or the end of a trace of OSI
-HEAD_BYTES = 65_536  # bytes
 FAR_M = 200_000.0  # from an origin that is given: there distances are 0.02 % too long
-BSM_ENDINGS = (".json", ".jsonl", ".ndjson", ".txt")
 MUCH = 0.02  # of the rows: if more are left out, people are told at once
 TABLE = "dataframe.csv"  # as which a DataFrame is read
-SPMD_FIELDS = 19  # of a line; `tables.COLUMNS` names them
 
 
 @dataclass(frozen=True)
@@ -409,196 +392,3 @@ def time_near(a: Piece, b: Piece, config: LogConfig) -> tuple[float, float, floa
         max(driven(a, first, last, config), driven(b, first, last, config)),
         float(apart.min()),
     )
-
-
-def is_bag(path: Path) -> bool:
-    """Return whether it is a bag's folder or a bare .mcap, .db3 or .bag file."""
-    return bool(files_of(path).files)
-
-
-def is_osi(path: Path) -> bool:
-    """Return whether a file is an MCAP file of no ROS recorder, with a name of ASAM OSI near its beginning or end."""
-    if path.suffix.lower() != ".mcap" or not path.is_file():
-        return False
-    with path.open("rb") as file:
-        head = file.read(HEAD_BYTES)
-        file.seek(max(path.stat().st_size - HEAD_BYTES, 0))
-        tail = file.read(HEAD_BYTES)
-    profile = head[17 : 17 + 8]  # after the header's length
-    return (
-        head.startswith(MCAP)
-        and profile != b"\x04\0\0\0ros2"
-        and any(sign in part for sign in OSI for part in (head, tail))
-    )
-
-
-def is_spmd(path: Path) -> bool:
-    """Return whether the first line has 19 fields and all of them are numbers or empty."""
-    if path.suffix.lower() not in (".csv", ".txt"):
-        return False
-    with path.open(encoding="utf-8-sig", errors="replace") as file:
-        fields = file.readline(LONGEST_HEADER).split(",")
-    try:
-        return len(fields) == SPMD_FIELDS and bool(
-            [float(field.strip() or "nan") for field in fields]
-        )
-    except ValueError:
-        return False
-
-
-def is_bsm(path: Path) -> bool:
-    """Return whether a file is of basic safety messages, in JSON or in a table made of it, by its name and beginning."""
-    if path.suffix.lower() not in (*BSM_ENDINGS, ".csv") or not path.is_file():
-        return False
-    return (
-        b"coredata_position_lat" if path.suffix.lower() == ".csv" else b'"coredata"'
-    ) in beginning(path).lower()
-
-
-def is_fcd(path: Path) -> bool:
-    """Return whether a file is floating-car data of SUMO, by its name and beginning."""
-    return path.suffix.lower() == ".xml" and path.is_file() and b"<fcd-export" in beginning(path)
-
-
-def beginning(path: Path) -> bytes:
-    """Return the first bytes of a file."""
-    with path.open("rb") as file:
-        return file.read(HEAD_BYTES)
-
-
-def is_table(path: Path) -> bool:
-    """Return whether the name is that of a table, also of a packed one."""
-    return without_packing(path).suffix.lower() in TABLES
-
-
-def is_known(path: Path, name: str) -> bool:
-    """Return whether a table's header is that of a public data set (`adapters.formats`)."""
-    if not is_table(path):
-        return False
-    from scenario_gen.logs.adapters.tracks import recognised
-
-    return recognised(path) == name
-
-
-Reader = Callable[[Sequence[Path], LogConfig], RawLog]
-
-
-def late(module: str, extra: tuple[str, ...] = (), **options: Any) -> Reader:
-    """Return the function `read` of a module of this room, which is loaded when it reads: libraries take up to a second.
-
-    Args:
-        module: in `scenario_gen.logs`.
-        extra: the extra that brings its libraries, and their names.
-        options: further arguments of its `read`.
-    """
-
-    def read(paths: Sequence[Path], config: LogConfig) -> RawLog:
-        if extra:
-            needs(*extra)
-        log: RawLog = import_module(f"scenario_gen.logs.{module}").read(paths, config, **options)
-        return log
-
-    return read
-
-
-@dataclass(frozen=True)
-class LogFormat:
-    """A format of logs.
-
-    Attributes:
-        accepts: whether a file (or a bag's folder) is of this format, by its name and first bytes; it never fails on others.
-        read: returns the log in files of which each was accepted, or for which `format` names this format. It raises
-            InputError, naming file and row, where they cannot be read, and keeps `size_limit`, `row_limit` and `vehicle_limit`.
-    """
-
-    accepts: Callable[[Path], bool]
-    read: Reader
-
-
-FORMATS = Registry[
-    LogFormat
-](
-    "scenario_gen.logs",
-    {  # tried in this order: a table without a header is SPMD, and a trace of OSI has the name of a bag's file
-        "osi": LogFormat(
-            is_osi, late("adapters.osi", ("osi", "betterosi", "lz4", "mcap", "zstandard"))
-        ),
-        "bag": LogFormat(is_bag, late("bag", ("bags", "lz4", "mcap", "rosbags", "zstandard"))),
-        "commonroad": LogFormat(is_commonroad, late("adapters.commonroad")),
-        "openscenario": LogFormat(is_openscenario, late("adapters.openscenario")),
-        "bsm": LogFormat(is_bsm, late("adapters.bsm")),
-        "fcd": LogFormat(is_fcd, late("adapters.fcd")),
-        "nocturne": LogFormat(is_nocturne, late("adapters.nocturne")),
-        "spmd": LogFormat(is_spmd, late("tables", spmd=True)),
-        **{
-            name: LogFormat(partial(is_known, name=name), late("adapters.tracks", name=name))
-            for name in ("argoverse2", "interaction", "ind", "highd", "omega_prime")
-        },
-        "table": LogFormat(is_table, late("tables")),
-    },
-    LogFormat,
-)
-"""The formats of logs by name; `config.FORMATS` repeats the names of the built-in ones."""
-
-
-def read_raw(paths: Sequence[Path], config: LogConfig) -> RawLog:
-    """Read one log from files or a folder in the first format that accepts all of them; those of plugins come last.
-
-    Raises:
-        InputError: nothing is there, no reader accepts it, or the one that does cannot read it.
-    """
-    with guarded(str(paths[0]), OSError):  # no permission, a name too long, a file that goes away
-        found = [file for path in paths for file in present(path)]
-    with unpacked(found, config) as files:
-        log = _read_files([file for path in files for file in present(path)], config)
-        return replace(
-            log, segments=tuple(replace(one, label=renamed(one.label)) for one in log.segments)
-        )
-
-
-def _read_files(files: Sequence[Path], config: LogConfig) -> RawLog:
-    """Read one log from files as `read_raw` does."""
-    with guarded(str(files[0]), OSError):
-        if config.format == "auto":
-            known = next(
-                (known for known in FORMATS.values() if all(map(known.accepts, files))), None
-            )
-        else:
-            known = FORMATS[config.format]
-    if known is None:
-        raise UnknownFormatError(
-            f"{files[0]} is not a log that can be read. Known: tables and SPMD files ({', '.join(TABLES)}), "
-            "CommonRoad and OpenSCENARIO scenarios, SUMO's floating-car data, basic safety messages and scenes of Nocturne and "
-            "GPUDrive (.json), rosbag2 folders, .mcap (also of OSI), .db3, .bag; each also in .gz or .zip. "
-            "If its name misleads: --set log.format=table"
-        )
-    with reading(files[0]):
-        return known.read(files, config)
-
-
-def present(path: Path) -> list[Path]:
-    """Return the files to read of a path: those of a folder of tables; a file and a bag's folder stand for themselves.
-
-    Raises:
-        InputError: there is nothing there that can be read.
-    """
-    if not path.exists():
-        beside = [file.name for file in path.parent.iterdir()] if path.parent.is_dir() else []
-        local(path, "a log")
-        raise InputError(
-            f"{path} does not exist; check the name and the folder{did_you_mean(path.name, beside)}"
-        )
-    if not (path.is_file() or path.is_dir()):
-        raise InputError(f"{path} is neither a file nor a folder")
-    if path.is_dir() and not any(path.iterdir()):
-        raise InputError(f"{path} is an empty folder; name a folder with a recording")
-    if path.is_file() and path.stat().st_size == 0:
-        raise InputError(f"{path} is empty (0 bytes); copy it again")
-    if path.is_file() or is_bag(path):
-        return [path]
-    tables = {file for file in path.iterdir() if is_table(file) and file.stat().st_size}
-    return sorted(
-        file
-        for file in tables
-        if without_packing(file) == file or without_packing(file) not in tables
-    ) or [path]

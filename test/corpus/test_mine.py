@@ -197,7 +197,7 @@ def test_nothing_to_read_is_an_error(tmp_path):
     with pytest.raises(InputError, match="does not exist"):
         mine([tmp_path / "nowhere"], tmp_path / "out")
     (tmp_path / "empty").mkdir()
-    with pytest.raises(InputError, match="holds no log that can be read"):
+    with pytest.raises(InputError, match="has no log in a known format"):
         mine([tmp_path / "empty"], tmp_path / "out")
 
 

@@ -104,6 +104,13 @@ assert "| **Speed** |" in evaluation.to_markdown()
 """
 
 
+def test_mining_finds_logs_of_the_format(python):
+    (python.folder / "archive").mkdir()
+    shutil.copy(python.folder / "log.jsonl", python.folder / "archive")
+
+    assert "1 encounter" in python("-m", "scenario_gen", "mine", "archive", "--out", "corpus")
+
+
 @pytest.mark.long
 def test_the_library_takes_all_by_name(python):
     python("-c", USE)

@@ -8,7 +8,7 @@ from support.harness import corpus, CRASHES, found_crashes, fuzz, targets
 from support.lengths import LONG
 from support.skips import NO_RECORDS
 
-from scenario_gen.logs.read import FORMATS
+from scenario_gen.logs import LOG_FORMATS
 
 pytestmark = pytest.mark.spread
 TARGETS = targets()
@@ -28,7 +28,7 @@ def test_nothing_but_errors_of_ours_comes_out(name, tmp_path):
 
 def test_every_format_of_logs_has_a_target():
     named = {"bag": "mcap_log", "commonroad": "commonroad_log"}
-    assert {named.get(name, name) for name in FORMATS.built_in} <= set(TARGETS)
+    assert {named.get(name, name) for name in LOG_FORMATS.built_in} <= set(TARGETS)
 
 
 @pytest.mark.recorded

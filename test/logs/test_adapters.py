@@ -24,11 +24,11 @@ from support.recording_files import (
 )
 
 from scenario_gen.base.errors import InputError
-from scenario_gen.logs import config, LogConfig, read, read_log
+from scenario_gen.logs import LogConfig, read_log, read_raw
 
 
 def test_whose_trailer_it_is_is_said(tmp_path):
-    found = read.read_raw([osi(tmp_path)[0]], LogConfig())
+    found = read_raw([osi(tmp_path)[0]], LogConfig())
     assert (
         "trailer 7 belongs to 8: read as a road user by itself" in found.notes
         and len(found.vehicles) == 3
@@ -152,11 +152,6 @@ def test_a_broken_scenario_is_named_with_its_line(tmp_path):
         path.write_text(text.replace(old, new, 1))
         with pytest.raises(InputError, match=said):
             read_log(path)
-
-
-def test_the_parameter_format_offers_every_built_in_format():
-    assert set(config.FORMATS) == {"auto", *read.FORMATS.built_in}
-    assert read.FORMATS.group == LogConfig.__dataclass_fields__["format"].metadata["group"]
 
 
 def test_the_unit_of_headings_of_a_scene_is_told_from_its_velocities(tmp_path):

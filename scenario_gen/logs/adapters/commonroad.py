@@ -26,7 +26,7 @@ from pathlib import Path
 import numpy as np
 
 from scenario_gen.base.errors import InputError
-from scenario_gen.base.xml_reader import Element, has_root, read_xml
+from scenario_gen.base.xml_reader import Element, read_xml
 from scenario_gen.logs.config import LogConfig
 from scenario_gen.logs.raw import (
     check_size,
@@ -36,11 +36,6 @@ from scenario_gen.logs.raw import (
     RawLog,
     Segment,
 )
-
-
-def is_commonroad(path: Path) -> bool:
-    """Return whether a file is CommonRoad by its name and beginning."""
-    return has_root(path, "commonRoad", ".xml")
 
 
 def read(paths: Sequence[Path], config: LogConfig) -> RawLog:

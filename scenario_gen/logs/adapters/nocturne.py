@@ -41,14 +41,6 @@ MOVES = 2.0  # m/s from which on a velocity has the vehicle's direction
 PER_OBJECT = 1000.0  # m/s, m: beyond, a value is a mark of absence
 
 
-def is_nocturne(path: Path) -> bool:
-    """Return whether a file is such a scenario by its name and beginning."""
-    if path.suffix.lower() != ".json":
-        return False
-    with path.open("rb") as file:
-        return b'"objects"' in file.read(4096)
-
-
 def read(paths: Sequence[Path], config: LogConfig) -> RawLog:
     """Read the vehicles of one scenario.
 

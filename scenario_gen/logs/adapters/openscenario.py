@@ -25,7 +25,7 @@ from pathlib import Path
 import numpy as np
 
 from scenario_gen.base.errors import InputError
-from scenario_gen.base.xml_reader import Element, has_root, read_xml
+from scenario_gen.base.xml_reader import Element, read_xml
 from scenario_gen.logs.adapters.openscenario_values import resolve_references
 from scenario_gen.logs.config import LogConfig
 from scenario_gen.logs.raw import (
@@ -43,11 +43,6 @@ from scenario_gen.types import VEHICLE_TYPES
 OPENSCENARIO_SPEEDS = "speed_mps"
 """Name of a vehicle's property that holds its speed at each vertex, for which the format has no place."""
 _FOLLOWS = "PrivateAction/RoutingAction/FollowTrajectoryAction"
-
-
-def is_openscenario(path: Path) -> bool:
-    """Return whether a file is OpenSCENARIO by its name and beginning."""
-    return has_root(path, "OpenSCENARIO", ".xosc", ".xml")
 
 
 def read(paths: Sequence[Path], config: LogConfig) -> RawLog:

@@ -14,7 +14,7 @@
 | speed | base.velocity.x, y | m/s |
 
 Source: OSI 3.8, osi_groundtruth.proto and osi_object.proto. Coordinates are read as they stand: `proj_string` is not applied. The
-messages become the columns of omega-prime's table, and are read as it is (`formats.FORMATS`).
+messages become the columns of omega-prime's table, and are read as it is (`data_sets.DATA_SETS`).
 """
 
 from collections.abc import Iterator, Sequence
@@ -33,7 +33,7 @@ from scenario_gen.bags.storage.mcap import DamagedError, McapFile, open_mcap
 from scenario_gen.base.documents import shown
 from scenario_gen.base.errors import guarded, InputError
 from scenario_gen.logs.adapters import tracks
-from scenario_gen.logs.adapters.formats import Format
+from scenario_gen.logs.adapters.data_sets import DataSet
 from scenario_gen.logs.config import listed, LogConfig
 from scenario_gen.logs.raw import check_size, RawLog
 
@@ -72,7 +72,7 @@ def read(paths: Sequence[Path], config: LogConfig) -> RawLog:
 
 
 def _table(
-    trailers: dict[str, str], path: Path, _: Format, before: int, config: LogConfig
+    trailers: dict[str, str], path: Path, _: DataSet, before: int, config: LogConfig
 ) -> pd.DataFrame:
     """Return the moving objects of all messages as omega-prime's table; without velocities where no object has any.
 

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Tables of public data sets (`formats`) to observations."""
+"""Tables of public data sets (`data_sets`) to observations."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
@@ -13,7 +13,7 @@ import numpy as np
 import pandas as pd
 
 from scenario_gen.base.errors import guarded, InputError, needs
-from scenario_gen.logs.adapters.formats import Format, FORMATS
+from scenario_gen.logs.adapters.data_sets import DATA_SETS, DataSet
 from scenario_gen.logs.config import LogConfig
 from scenario_gen.logs.raw import check_size, RawLog
 from scenario_gen.logs.tables import (
@@ -25,7 +25,7 @@ from scenario_gen.logs.tables import (
     vehicle_name,
 )
 
-Load = Callable[[Path, Format, int, LogConfig], pd.DataFrame]
+Load = Callable[[Path, DataSet, int, LogConfig], pd.DataFrame]
 
 
 def read(
@@ -36,13 +36,13 @@ def read(
     Args:
         paths: its file, or the folder's files, of which one holds the tracks.
         config: bounds sizes.
-        name: of the format, a key of `FORMATS`.
+        name: of the format, a key of `DATA_SETS`.
         load: returns the columns of a file as they stand, of which so many rows were read before; by default of a table.
 
     Raises:
         InputError: a file is damaged or missing, has not the format's columns, or there are several recordings.
     """
-    known = FORMATS[name]
+    known = DATA_SETS[name]
     tracks = [path for path in paths if not _companion_ending(path, known)]
     tracks.sort(key=lambda path: _is_of_pedestrians(path, name))
     main = [path for path in tracks if not _is_of_pedestrians(path, name)]
@@ -80,7 +80,7 @@ def recognised(path: Path) -> str:
         except Exception:  # the reader of tables reports what is wrong with it
             return ""
     elif path.suffix.lower() == ".csv":
-        for known in FORMATS.values():
+        for known in DATA_SETS.values():
             if known.companions and (ending := _companion_ending(path, known)):
                 main = path.with_name(path.name.removesuffix(ending) + known.companions[0])
                 return recognised(main) if main.is_file() else ""
@@ -93,10 +93,10 @@ def recognised(path: Path) -> str:
             return "interaction"
     else:
         return ""
-    return next((name for name, known in FORMATS.items() if known.needed <= names), "")
+    return next((name for name, known in DATA_SETS.items() if known.needed <= names), "")
 
 
-def _companion_ending(path: Path, known: Format) -> str:
+def _companion_ending(path: Path, known: DataSet) -> str:
     """Return the ending by which a file belongs to another one of tracks, "" if it does not."""
     return next(
         (ending for ending in (known.companions or ())[1:] if path.name.endswith(ending)), ""
@@ -108,7 +108,7 @@ def _is_of_pedestrians(path: Path, name: str) -> bool:
     return name == "interaction" and path.name.startswith("pedestrian")
 
 
-def _read_table(path: Path, known: Format, before: int, config: LogConfig) -> pd.DataFrame:
+def _read_table(path: Path, known: DataSet, before: int, config: LogConfig) -> pd.DataFrame:
     """Return the columns of a file as they stand; `before` rows were read from other files."""
     check_size(str(path), path.stat().st_size, before, config)
     if path.suffix.lower() == ".parquet":
@@ -121,7 +121,7 @@ def _read_table(path: Path, known: Format, before: int, config: LogConfig) -> pd
     table.columns = pd.Index([str(column).strip() for column in table.columns])
     missing = sorted(known.needed - set(table.columns))
     if missing and not (
-        known is FORMATS["interaction"] and _is_of_pedestrians(path, "interaction")
+        known is DATA_SETS["interaction"] and _is_of_pedestrians(path, "interaction")
     ):
         raise InputError(
             f"{path} lacks columns of {known.title}: {', '.join(missing)}; it has {', '.join(table.columns)}"
@@ -130,7 +130,7 @@ def _read_table(path: Path, known: Format, before: int, config: LogConfig) -> pd
 
 
 def _read_companion(
-    path: Path, known: Format, which: int, columns: tuple[str, ...]
+    path: Path, known: DataSet, which: int, columns: tuple[str, ...]
 ) -> pd.DataFrame:
     """Return a companion of a file of tracks.
 
@@ -154,7 +154,7 @@ def _read_companion(
     return frame
 
 
-def _kinds(path: Path, known: Format, table: pd.DataFrame) -> "pd.Series[Any]":
+def _kinds(path: Path, known: DataSet, table: pd.DataFrame) -> "pd.Series[Any]":
     """Return the class of every row, in small letters."""
     if known.names:
         return _named(known, table)
@@ -174,7 +174,7 @@ def _kinds(path: Path, known: Format, table: pd.DataFrame) -> "pd.Series[Any]":
     return table[column].map(vehicle_name).map(lambda name: classes.get(name, "without a class"))
 
 
-def _named(known: Format, table: pd.DataFrame) -> "pd.Series[Any]":
+def _named(known: DataSet, table: pd.DataFrame) -> "pd.Series[Any]":
     """Return the class of every row, by the numbers in its columns."""
 
     def named(quantity: str) -> "pd.Series[Any]":
@@ -193,7 +193,7 @@ def _named(known: Format, table: pd.DataFrame) -> "pd.Series[Any]":
     )
 
 
-def _convert(table: pd.DataFrame, path: Path, known: Format) -> pd.DataFrame:
+def _convert(table: pd.DataFrame, path: Path, known: DataSet) -> pd.DataFrame:
     """Return the table in our quantities and units."""
     columns = {
         quantity: column

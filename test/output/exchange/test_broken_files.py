@@ -26,7 +26,7 @@ GOOD = {
         ("xml", b"", BOMB, "line 2"),
         ("xosc", b"", b"<OpenSCENARIO><Entities></OpenSCENARIO>", "line 1"),
         ("xml", b"", b"", "empty"),
-        ("xml", b"", b"<osm/>", "is not a log that can be read"),
+        ("xml", b"", b"<osm/>", "is not in a known log format"),
         ("xml", b'timeStepSize="0.1"', b'timeStepSize="0"', "timeStepSize"),
         ("xosc", b"Polyline", b"Nurbs", "<Shape> has no <Polyline>"),
         ("xosc", b"WorldPosition", b"LanePosition", "<Position> has no <WorldPosition>"),

@@ -18,6 +18,7 @@ from scenario_gen.bags.recordings.read import read_recording
 from scenario_gen.bags.storage.definitions import type_store
 from scenario_gen.base.errors import InputError
 from scenario_gen.cli.commands import app
+from scenario_gen.corpus.mine import mine
 from scenario_gen.logs import read_log
 from scenario_gen.logs.geodesy import geodetic
 from scenario_gen.output.exchange.cases import read_cases
@@ -90,6 +91,14 @@ def test_lanes_do_not_depend_on_what_is_chosen(small_bag):
         (same,) = [one for one in everything if one.number == case.number]
         lanes = zip(case.lane_map.network.lanes, same.lane_map.network.lanes, strict=True)
         assert all(np.array_equal(a.left, b.left) for a, b in lanes)
+
+
+def test_exported_scenarios_are_mined(small_bag, tmp_path):
+    export_bag(small_bag, tmp_path / "scenarios", "openscenario")
+    mined = mine([tmp_path / "scenarios"], tmp_path / "corpus")
+
+    files = list((tmp_path / "scenarios").glob("*.xosc"))
+    assert mined.encounters == len(files) > 0 and not mined.failed
 
 
 def test_round_trips_close(small_bag, tmp_path):

@@ -15,7 +15,7 @@ from scenario_gen.logs.columns import Column
 
 
 @dataclass(frozen=True)
-class Format:
+class DataSet:
     """How a data set writes its tracks.
 
     Attributes:
@@ -92,8 +92,8 @@ _OSI_NAMES = (  # 0 and 1 are unknown and other: a vehicle, no more is said
 OSI_VEHICLES = dict(enumerate(_OSI_NAMES))
 _LEVELX = ("_tracks.csv", "_tracksMeta.csv", "_recordingMeta.csv")  # their times are frames
 
-FORMATS = {
-    "argoverse2": Format(
+DATA_SETS = {
+    "argoverse2": DataSet(
         title="Argoverse 2 motion forecasting",
         source="av2-api: av2.datasets.motion_forecasting.data_schema (Track, ObjectState), columns of Parquet; steps are 0.1 s",
         columns=_columns(
@@ -102,7 +102,7 @@ FORMATS = {
         ),
         signs=("scenario_id",),
     ),
-    "interaction": Format(
+    "interaction": DataSet(
         title="INTERACTION",
         source="INTERACTION: vehicle_tracks_*.csv and pedestrian_tracks_*.csv (Zhan et al. 2019, and the README of its tools)",
         columns=_columns(
@@ -111,7 +111,7 @@ FORMATS = {
         ),
         signs=("frame_id",),
     ),
-    "ind": Format(
+    "ind": DataSet(
         title="inD, rounD",
         source="inD, rounD: format pages of the data sets (Bock et al. 2020, Krajewski et al. 2020); frame rate in recordingMeta",
         columns=_columns(
@@ -120,7 +120,7 @@ FORMATS = {
         ),
         companions=_LEVELX,
     ),
-    "highd": Format(
+    "highd": DataSet(
         title="highD",
         source="highD: format page (Krajewski et al. 2018): x, y the upper left corner, y down, width along the road",
         columns=_columns(
@@ -130,7 +130,7 @@ FORMATS = {
         image=True,
         signs=("laneId",),
     ),
-    "omega_prime": Format(
+    "omega_prime": DataSet(
         title="omega-prime",
         source="omega-prime 0.3.7: omega_prime.schemas, columns of CSV and Parquet; numbers of types: OSI 3.8, MovingObject",
         columns=_columns(

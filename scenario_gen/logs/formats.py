@@ -1,0 +1,202 @@
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""The formats of logs: how a file is recognised, and which reader it needs."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import partial
+from importlib import import_module
+from pathlib import Path
+from typing import Any, TYPE_CHECKING
+
+from scenario_gen.bags.storage.files import files_of
+from scenario_gen.base.errors import needs
+from scenario_gen.base.registry import Registry
+
+if TYPE_CHECKING:
+    from scenario_gen.logs.config import LogConfig
+    from scenario_gen.logs.raw import RawLog
+
+HEAD_BYTES = 65_536
+"""Part of a file in which the marks of its format are expected, from either end."""
+
+_TABLE_SUFFIXES = (".csv", ".tsv", ".txt", ".parquet", ".pq")
+_PACKED_SUFFIXES = (".gz", ".zip")
+_MCAP_MAGIC = b"\x89MCAP0\r\n\x01"
+_MCAP_PROFILE = slice(17, 25)  # after the magic, the header's opcode and its length
+_ROS2_PROFILE = b"\x04\0\0\0ros2"
+_OSI_MARKS = (b"net.asam.osi", b"osi3.", b"ground_truth")
+_SPMD_COLUMN_COUNT = 19
+
+Predicate = Callable[[Path], bool]
+Reader = Callable[[Sequence[Path], "LogConfig"], "RawLog"]
+
+
+@dataclass(frozen=True)
+class LogFormat:
+    """A format of logs.
+
+    Attributes:
+        accepts: whether a file, or the folder of a bag, has this format, judged by its name and
+            its first bytes; it never fails on other files.
+        read: returns the log in files that were accepted, or for which the parameter `format`
+            names this format. It raises InputError with file and row where they cannot be read,
+            and respects `size_limit`, `row_limit` and `vehicle_limit`.
+    """
+
+    accepts: Predicate
+    read: Reader
+
+
+def without_packing(path: Path) -> Path:
+    """Return a path without the suffix .gz or .zip."""
+    return path.with_suffix("") if is_packed(path) else path
+
+
+def is_packed(path: Path) -> bool:
+    """Return whether a name ends with .gz or .zip."""
+    return path.suffix.lower() in _PACKED_SUFFIXES
+
+
+def is_bag(path: Path) -> bool:
+    """Return whether a path is the folder of a bag, or a single .mcap, .db3 or .bag file."""
+    return bool(files_of(path).files)
+
+
+def is_osi(path: Path) -> bool:
+    """Return whether a file is a trace of ASAM OSI: MCAP without ROS's profile, with OSI's names."""
+    if path.suffix.lower() != ".mcap" or not path.is_file():
+        return False
+    with path.open("rb") as file:
+        head = file.read(HEAD_BYTES)
+        file.seek(max(path.stat().st_size - HEAD_BYTES, 0))
+        tail = file.read(HEAD_BYTES)
+    is_foreign_mcap = head.startswith(_MCAP_MAGIC) and head[_MCAP_PROFILE] != _ROS2_PROFILE
+    return is_foreign_mcap and any(mark in head or mark in tail for mark in _OSI_MARKS)
+
+
+def is_spmd(path: Path) -> bool:
+    """Return whether a file's first line has the 19 numbers of SPMD's messages."""
+    if path.suffix.lower() not in (".csv", ".txt") or not path.is_file():
+        return False
+    with path.open(encoding="utf-8-sig", errors="replace") as file:
+        fields = file.readline(HEAD_BYTES).split(",")
+    return len(fields) == _SPMD_COLUMN_COUNT and all(map(_is_number_or_empty, fields))
+
+
+def is_bsm(path: Path) -> bool:
+    """Return whether a file has basic safety messages, in JSON or in a table made from it."""
+    if path.suffix.lower() == ".csv":
+        return b"coredata_position_lat" in _head(path).lower()
+    is_json = path.suffix.lower() in (".json", ".jsonl", ".ndjson", ".txt")
+    return is_json and b'"coredata"' in _head(path).lower()
+
+
+def is_table(path: Path) -> bool:
+    """Return whether a name is that of a table, possibly packed."""
+    return without_packing(path).suffix.lower() in _TABLE_SUFFIXES
+
+
+def _starts_with(path: Path, mark: bytes, *suffixes: str) -> bool:
+    """Return whether a file has one of these suffixes and the mark near its beginning."""
+    return path.suffix.lower() in suffixes and mark in _head(path)
+
+
+def _is_of_data_set(path: Path, name: str) -> bool:
+    """Return whether a table has the header of a public data set."""
+    if not is_table(path):
+        return False
+    from scenario_gen.logs.adapters.tracks import recognised
+
+    return recognised(path) == name
+
+
+def _is_number_or_empty(text: str) -> bool:
+    try:
+        float(text.strip() or "nan")
+    except ValueError:
+        return False
+    return True
+
+
+def _head(path: Path) -> bytes:
+    """Return the first bytes of a file; none of a folder."""
+    if not path.is_file():
+        return b""
+    with path.open("rb") as file:
+        return file.read(HEAD_BYTES)
+
+
+def _lazy_reader(module: str, extra: tuple[str, ...] = (), **options: Any) -> Reader:
+    """Return a reader that imports its module when it is called: libraries take up to a second.
+
+    Args:
+        module: name below `scenario_gen.logs`; its function `read` is called.
+        extra: the extra that installs the libraries, and their names.
+        options: keyword arguments of `read`.
+    """
+
+    def read(paths: Sequence[Path], config: "LogConfig") -> "RawLog":
+        if extra:
+            needs(*extra)
+        log: RawLog = import_module(f"scenario_gen.logs.{module}").read(paths, config, **options)
+        return log
+
+    return read
+
+
+def _data_set(name: str) -> LogFormat:
+    return LogFormat(
+        partial(_is_of_data_set, name=name), _lazy_reader("adapters.tracks", name=name)
+    )
+
+
+LOG_FORMATS = Registry[LogFormat](
+    "scenario_gen.logs",
+    {
+        "osi": LogFormat(
+            is_osi, _lazy_reader("adapters.osi", ("osi", "betterosi", "lz4", "mcap", "zstandard"))
+        ),
+        "bag": LogFormat(
+            is_bag, _lazy_reader("bag", ("bags", "lz4", "mcap", "rosbags", "zstandard"))
+        ),
+        "commonroad": LogFormat(
+            lambda path: _starts_with(path, b"<commonRoad", ".xml"),
+            _lazy_reader("adapters.commonroad"),
+        ),
+        "openscenario": LogFormat(
+            lambda path: _starts_with(path, b"<OpenSCENARIO", ".xosc", ".xml"),
+            _lazy_reader("adapters.openscenario"),
+        ),
+        "bsm": LogFormat(is_bsm, _lazy_reader("adapters.bsm")),
+        "fcd": LogFormat(
+            lambda path: _starts_with(path, b"<fcd-export", ".xml"), _lazy_reader("adapters.fcd")
+        ),
+        "nocturne": LogFormat(
+            lambda path: _starts_with(path, b'"objects"', ".json"),
+            _lazy_reader("adapters.nocturne"),
+        ),
+        "spmd": LogFormat(is_spmd, _lazy_reader("tables", spmd=True)),
+        "argoverse2": _data_set("argoverse2"),
+        "interaction": _data_set("interaction"),
+        "ind": _data_set("ind"),
+        "highd": _data_set("highd"),
+        "omega_prime": _data_set("omega_prime"),
+        "table": LogFormat(is_table, _lazy_reader("tables")),
+    },
+    LogFormat,
+)
+"""All formats by name, tried in this order: the built-in ones, then those of plugins.
+
+The order matters: an OSI trace has the suffix of a bag, and an SPMD file that of a table.
+"""
+
+
+def is_log(path: Path) -> bool:
+    """Return whether a file, or the folder of a bag, has any of the formats.
+
+    Raises:
+        InputError: a plugin cannot be loaded.
+    """
+    return any(log_format.accepts(path) for log_format in LOG_FORMATS.values())
