@@ -21,6 +21,7 @@ from scenario_gen.method.chain import Chain
 from scenario_gen.method.config import PipelineConfig
 from scenario_gen.method.segmentation import segment
 from scenario_gen.roads import build_road
+from scenario_gen.situation import Situation
 from scenario_gen.types.encounter import Encounter
 from scenario_gen.types.road import Road
 from scenario_gen.types.route import Route
@@ -55,7 +56,7 @@ def costs(encounter: Encounter, name: str, count: int, seed: int) -> dict[str, f
     begun = process_time()
     road = build_road(name, encounter, config.road)
     made = Chain(
-        encounter,
+        Situation.of(encounter),
         segment(encounter, config.segmentation, seed),
         road,
         config,

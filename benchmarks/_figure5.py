@@ -22,6 +22,7 @@ from scenario_gen.method.sampling import SamplingConfig
 from scenario_gen.method.segmentation import segment
 from scenario_gen.output.report.page import render, ReportInput
 from scenario_gen.roads import build_road
+from scenario_gen.situation import Situation
 from scenario_gen.types.encounter import Encounter
 from scenario_gen.types.evaluation import Evaluation
 from scenario_gen.types.generation import GenerationResult
@@ -92,7 +93,9 @@ def _measure(
     try:
         road = build_road(name, encounter, config.road)
         made = {
-            seed: Chain(encounter, segmentation, road, config, count=COUNT, seed=seed).run()
+            seed: Chain(
+                Situation.of(encounter), segmentation, road, config, count=COUNT, seed=seed
+            ).run()
             for seed in SEEDS
         }
     except (InputError, RefusedError) as error:
@@ -109,7 +112,13 @@ def _measure(
         for name_of, reference in references.items():
             try:
                 arms[name_of] = Chain(
-                    encounter, reference, road, config, count=COUNT, seed=seed, waits=()
+                    Situation.of(encounter),
+                    reference,
+                    road,
+                    config,
+                    count=COUNT,
+                    seed=seed,
+                    waits=(),
                 ).run()
             except RefusedError as error:
                 say(f"{encounter.name} on {road.name}, seed {seed}, {name_of}: {error}")

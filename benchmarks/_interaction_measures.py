@@ -67,9 +67,9 @@ def following(edge: Reaction, template: Motion, scenarios: Sequence[Motion]) -> 
     middles = [
         float(np.median(gaps))
         for one in scenarios
-        if len(gaps := time_gaps(one, edge.who, edge.whom)) > 0
+        if len(gaps := time_gaps(lane_gaps(one), edge.who, edge.whom)) > 0
     ]
-    base = time_gaps(template, edge.who, edge.whom)
+    base = time_gaps(lane_gaps(template), edge.who, edge.whom)
     relative = (
         np.array(middles) / float(np.median(base)) if middles and len(base) else np.array([np.nan])
     )
@@ -97,7 +97,7 @@ def shared(motion: Motion) -> tuple[list[tuple[int, int]], list[tuple[int, int]]
 
 def tailgates(motion: Motion, who: int, whom: int) -> bool:
     """Whether one drives 5 % of its time nearer to another one than 0.3 s, bumper to bumper."""
-    gaps = time_gaps(motion, who, whom)
+    gaps = time_gaps(lane_gaps(motion), who, whom)
     return len(gaps) > 0 and float(np.mean(gaps < _TAILGATES)) >= _FOR
 
 

@@ -22,6 +22,7 @@ from scenario_gen.method.sampling import checker_of, NaturalScenarios, plan_of
 from scenario_gen.method.segmentation import segment
 from scenario_gen.numerics import Floats
 from scenario_gen.roads import road_and_template
+from scenario_gen.situation import Situation
 from scenario_gen.types import Request, Scenario
 
 SEED = 7
@@ -33,7 +34,11 @@ def natural_scenarios() -> NaturalScenarios:
     (encounter,) = read_log([bundled("b")]).encounters
     road, encounter = road_and_template("t_intersection", encounter, config.road)
     attempt = Chain(
-        encounter, segment(encounter, config.segmentation, SEED), road, config, seed=SEED
+        Situation.of(encounter),
+        segment(encounter, config.segmentation, SEED),
+        road,
+        config,
+        seed=SEED,
     )
     plan = plan_of(attempt.plan(), config.sampling, config.limits, Request())
     checker = checker_of(plan, config.sampling, config.limits, Request())

@@ -23,6 +23,7 @@ from scenario_gen.method.segmentation import segment
 from scenario_gen.method.validity import Checker
 from scenario_gen.numerics.arrays import Floats
 from scenario_gen.roads import build_road
+from scenario_gen.situation import Situation
 from scenario_gen.situation.gaps import conflict_of, conflicts_in
 from scenario_gen.situation.interaction import Conflict, find_waits, Wait
 from scenario_gen.types.encounter import Encounter
@@ -65,7 +66,7 @@ class Prepared:
         checker = Checker(self.road, self.fit.requested, self.conflicts, self.waits)
         check = checker.check if checked else lambda scenarios: [Verdict() for _ in scenarios]
         plan = Plan(
-            self.encounter,
+            Situation.of(self.encounter),
             self.segmentation,
             self.road,
             self.routes,

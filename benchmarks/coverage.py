@@ -37,6 +37,7 @@ from scenario_gen.method.recombination import recombinations
 from scenario_gen.method.sampling import SamplingConfig
 from scenario_gen.method.segmentation import segment
 from scenario_gen.roads import road_and_template
+from scenario_gen.situation import Situation
 from scenario_gen.types import Encounter, Scenario
 
 PAIRS = Path(__file__).with_name("_coverage_pairs.json")
@@ -206,7 +207,7 @@ def _generated(
         try:
             road, template = road_and_template("corridor", encounter, config.road)
             chain = Chain(
-                template,
+                Situation.of(template),
                 segment(template, config.segmentation, SEED),
                 road,
                 config,

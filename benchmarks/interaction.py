@@ -45,8 +45,8 @@ from scenario_gen.method.segmentation import segment
 from scenario_gen.numerics.arrays import Floats
 from scenario_gen.pipeline import PipelineConfig
 from scenario_gen.roads import build_road
+from scenario_gen.situation import Situation
 from scenario_gen.situation.gaps import Motion
-from scenario_gen.situation.reactions import reactions_of
 from scenario_gen.types.encounter import Encounter
 from scenario_gen.types.reaction import FOLLOW, Reaction
 
@@ -133,7 +133,7 @@ def _encounters(*, held_out: bool) -> Any:
 
 def _measured(name: str, encounter: Encounter, road_name: str, count: int, variety: str) -> Case:
     """Generate on a road, and measure."""
-    graph = reactions_of(encounter)
+    graph = Situation.of(encounter).reactions
     config = PipelineConfig()
     config = replace(config, sampling=replace(config.sampling, variety=variety))
     case = Case(
@@ -150,7 +150,9 @@ def _measured(name: str, encounter: Encounter, road_name: str, count: int, varie
             segment(encounter, config.segmentation, SEED),
         )
         begun = process_time()
-        made = Chain(encounter, segmentation, road, config, count=count, seed=SEED).run()
+        made = Chain(
+            Situation.of(encounter), segmentation, road, config, count=count, seed=SEED
+        ).run()
         seconds = process_time() - begun
     except ScenarioGenError as error:
         case.figures["refused"] = str(error)

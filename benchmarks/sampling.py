@@ -23,6 +23,7 @@ from benchmarks.row import higher, lower, Row
 from scenario_gen.method.sampling import draw_scenarios, Plan, SamplingConfig
 from scenario_gen.method.validity import Checker
 from scenario_gen.numerics.arrays import Floats
+from scenario_gen.situation import Situation
 from scenario_gen.situation.interaction import find_conflicts
 from scenario_gen.types.encounter import Encounter, Vehicle
 from scenario_gen.types.road import Road
@@ -160,7 +161,9 @@ def _seconds(vehicles: int, duration: float, count: int) -> float:
     checker = Checker(road, asked, find_conflicts(names, time, position, heading), ())
     started = process_time()
     found = draw_scenarios(
-        Plan(encounter, segmentation, road, routes, asked, ()), checker.check, count=count
+        Plan(Situation.of(encounter), segmentation, road, routes, asked, ()),
+        checker.check,
+        count=count,
     )
     spent = process_time() - started
     if len(found.scenarios) < count:

@@ -17,6 +17,7 @@ from scenario_gen.method.sampling import Callbacks, Progress
 from scenario_gen.method.segmentation import segment
 from scenario_gen.method.suitable_roads import AUTO, on_first_suitable_road
 from scenario_gen.roads import road_and_template
+from scenario_gen.situation import Situation
 from scenario_gen.types import (
     causes_in_words,
     Encounter,
@@ -74,9 +75,10 @@ def generate(
             partial(again, [encounter, *population]), encounter, config, seed
         )
     road, encounter = road_and_template(road, encounter, config.road)
+    situation = Situation.of(encounter)
     segmentation = segment(encounter, config.segmentation, seed)
     chain = Chain(
-        encounter, segmentation, road, config, request, count, seed, population=population
+        situation, segmentation, road, config, request, count, seed, population=population
     )
     planned = replace(chain.plan(), provenance=what_makes_it_again(config, request))
     result = chain.sample(planned, Callbacks(progress, accepts=partial(accepts, road)))
@@ -91,7 +93,7 @@ def generate(
             f"recombined of {parents[0]} and {parents[1]}: this encounter was not recorded"
         )
     if config.evaluation.compare:
-        result = with_references(result, config, request, population)
+        result = with_references(result, situation, config, request, population)
     result = replace(result, replay=replay(encounter, result.road_and_fit()[1], road.frame_id))
     coverage = coverage_of(encounter, result.generated.scenarios)
     return replace(result, evaluation=evaluate(result, config.evaluation), coverage=coverage)

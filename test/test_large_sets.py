@@ -35,7 +35,7 @@ from scenario_gen.method.sampling.sampler import (
 from scenario_gen.method.segmentation import segment
 from scenario_gen.output.report.page import render, ReportInput
 from scenario_gen.roads import build_road
-from scenario_gen.situation.interaction import waits_to_keep
+from scenario_gen.situation import Situation
 from scenario_gen.types.request import Request
 from scenario_gen.types.row_names import UNIFORM, WITH, WITHOUT
 
@@ -103,10 +103,15 @@ def test_a_level_does_not_run_out_of_candidates(chain, monkeypatch):
     last = beyond.scenarios[-1]
     placed, waits = (
         answer(chain, Request(), count=1),
-        waits_to_keep(chain.encounter, chain.segmentation),
+        Situation.of(chain.encounter).waits_to_keep(chain.segmentation),
     )
     plan = Plan(
-        chain.encounter, chain.segmentation, chain.road, placed.routes, placed.fit.requested, waits
+        Situation.of(chain.encounter),
+        chain.segmentation,
+        chain.road,
+        placed.routes,
+        placed.fit.requested,
+        waits,
     )
     assert same(regenerate(plan, chain.sampling, seed=chain.seed, index=last.index), last)
 

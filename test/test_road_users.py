@@ -25,7 +25,7 @@ from scenario_gen.numerics.boxes import footprint_gaps
 from scenario_gen.output.report.summary import summary
 from scenario_gen.output.results import write_results
 from scenario_gen.roads import build_road, cells_of, RoadConfig
-from scenario_gen.situation import reactions_of
+from scenario_gen.situation import Situation
 from scenario_gen.types import Dynamics, VEHICLE_TYPES
 
 T = np.arange(0.0, 14.05, 0.1)
@@ -148,7 +148,7 @@ def test_road_users_of_all_types_are_generated_within_their_limits(road, name):
     )
     edges = [
         (encounter.vehicles[one.who].id, encounter.vehicles[one.whom].id, one.kind)
-        for one in reactions_of(encounter).edges
+        for one in Situation.of(encounter).reactions.edges
     ]
     assert edge is None or edge in edges
     case, account = generate(encounter, road, count=5, seed=1), Account()
@@ -347,6 +347,6 @@ def test_cars_that_wait_for_pedestrians_are_found():
         (encounter,) = read_log(waits_for_pedestrian(walks, drives, away)).encounters
         found += any(
             edge.kind == "yield" and encounter.vehicles[edge.who].id == "c"
-            for edge in reactions_of(encounter).edges
+            for edge in Situation.of(encounter).reactions.edges
         )
     assert found >= 18

@@ -37,6 +37,7 @@ from scenario_gen.method.evaluation import at_period, criticality
 from scenario_gen.method.fitting import LostEncounterError
 from scenario_gen.method.segmentation import segment
 from scenario_gen.roads import build_road, road_and_template
+from scenario_gen.situation import Situation
 from scenario_gen.types import GenerationResult, most_exposed
 
 BATCH = "batch.json"
@@ -241,7 +242,12 @@ def _generate_case(
         road, encounter = road_and_template(task.road, encounter, request.config.road)
         segmentation = segment(encounter, request.config.segmentation, seed)
         result = Chain(
-            encounter, segmentation, road, request.config, count=request.count, seed=seed
+            Situation.of(encounter),
+            segmentation,
+            road,
+            request.config,
+            count=request.count,
+            seed=seed,
         ).run()
     except (RefusedError, InputError) as error:
         message = LOST_CONFLICT if isinstance(error, LostEncounterError) else str(error)

@@ -36,7 +36,7 @@ from scenario_gen.logs import (
 )
 from scenario_gen.logs.tables import EPOCH_NS
 from scenario_gen.method.evaluation import at_period, criticality, EvaluationConfig
-from scenario_gen.situation import reactions_of
+from scenario_gen.situation import Situation
 from scenario_gen.types import Encounter
 
 ROW = {  # what is read of a row, and of which kinds it is
@@ -201,7 +201,7 @@ def row_of(encounter: Encounter, source: str, config: CorpusConfig) -> dict[str,
         "name": encounter.name,
         "source": source,
         "kind": pairs[0][3],
-        "reactions": json.dumps(reactions_of(encounter).document(encounter.vehicles)),
+        "reactions": json.dumps(Situation.of(encounter).reactions.document(encounter.vehicles)),
         "kinds": json.dumps(
             {
                 f"{encounter.vehicles[i].id} {encounter.vehicles[j].id}": kind

@@ -44,7 +44,7 @@ from scenario_gen.method.segmentation import (
     USUAL_R_HAT,
 )
 from scenario_gen.numerics import Ints
-from scenario_gen.situation import reactions_of
+from scenario_gen.situation import Situation
 from scenario_gen.types import Encounter, FOLLOW, YIELD
 
 LIBRARY = Kind("primitive library")
@@ -247,7 +247,7 @@ def assign_table(task: AssignTask) -> None:
             found = assign(pair, library, task.config)
             rows.append({
                 "encounter": row["name"], "kind": row["kind"], "pair": pair.name, "seconds": pair.duration,
-                "reactions": json.dumps(reactions_of(pair).document(pair.vehicles)),
+                "reactions": json.dumps(Situation.of(pair).reactions.document(pair.vehicles)),
                 "changepoints": found.segmentation.changepoints.tolist(), "primitives": found.primitives.tolist(),
             })  # fmt: skip
     texts, ints = dict.fromkeys(("encounter", "kind", "pair", "reactions"), "string"), "int64[]"
@@ -326,7 +326,7 @@ def _write_page(
 
 def _answers(pair: Encounter) -> set[str]:
     """Return who reacts in a pair, and how."""
-    edges = reactions_of(pair).edges
+    edges = Situation.of(pair).reactions.edges
     return {f"the {('first', 'second')[edge.who]} {VERBS[edge.kind]}" for edge in edges} or {
         "nobody reacts"
     }

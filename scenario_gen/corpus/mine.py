@@ -56,7 +56,7 @@ from scenario_gen.corpus.tables import rows_at, rows_of
 from scenario_gen.corpus.tasks import agree, arriving, check_out, held, spread, undone, Workers
 from scenario_gen.logs import is_bag, is_log, is_spmd, is_table, LOG_FORMATS
 from scenario_gen.numerics import Ints
-from scenario_gen.situation import reactions_of
+from scenario_gen.situation import Situation
 
 ARCHIVE, PAGE = "archive.json", "encounters.html"
 ACCOUNT = {  # of a range of text: what was left out, by file; rows by hour
@@ -209,7 +209,7 @@ def _write_gallery(path: Path, tables: _Encounters, made: Mined) -> None:
             "; ".join(
                 f"vehicles {pair}: {kind}" for pair, kind in json.loads(row["kinds"]).items()
             ),
-            *reactions_of(encounter).sentences(encounter.vehicles),
+            *Situation.of(encounter).reactions.sentences(encounter.vehicles),
         ]
         cards.append(
             {

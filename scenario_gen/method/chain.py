@@ -11,7 +11,7 @@ from scenario_gen.method.evaluation import measures_in
 from scenario_gen.method.fitting import fit_template
 from scenario_gen.method.routing import plan_routes
 from scenario_gen.method.sampling import Callbacks, sample_scenarios
-from scenario_gen.situation import Wait
+from scenario_gen.situation import Situation, Wait
 from scenario_gen.types import Encounter, GenerationResult, Request, Road, Segmentation
 
 
@@ -20,7 +20,7 @@ class Chain:
     """What the stages after the segmentation take.
 
     Attributes:
-        encounter: the template.
+        situation: of the template.
         segmentation: its changepoints, found or given.
         road: the target.
         config: the parameters of every stage.
@@ -31,7 +31,7 @@ class Chain:
         population: recorded encounters that say, with `sampling.variety=population`, how encounters differ.
     """
 
-    encounter: Encounter
+    situation: Situation
     segmentation: Segmentation
     road: Road
     config: PipelineConfig
@@ -41,6 +41,11 @@ class Chain:
     waits: tuple[Wait, ...] | None = None
     population: Sequence[Encounter] = ()
 
+    @property
+    def encounter(self) -> Encounter:
+        """The template."""
+        return self.situation.encounter
+
     def plan(self) -> GenerationResult:
         """Fit and plan: the template on its road, with no scenarios yet.
 
@@ -49,7 +54,7 @@ class Chain:
         """
         config = self.config
         fit = fit_template(
-            self.encounter, self.segmentation, self.road, config.fitting,
+            self.situation, self.segmentation, self.road, config.fitting,
             request=self.request, limits=config.limits,
         )  # fmt: skip
         routes = plan_routes(self.road, fit, config.planning, self.seed, config.limits)
@@ -67,7 +72,7 @@ class Chain:
         """
         return sample_scenarios(
             planned, self.config.sampling, self.config.limits, self.request,
-            count=self.count, waits=self.waits, callbacks=callbacks,
+            count=self.count, waits=self.waits, situation=self.situation, callbacks=callbacks,
             measures=measures_in(self.config.sampling.variety, self.encounter, self.population),
         )  # fmt: skip
 

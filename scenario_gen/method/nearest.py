@@ -29,6 +29,7 @@ from scenario_gen.roads import (
     nearest_pose_with_room,
     road_and_template,
 )
+from scenario_gen.situation import Situation
 from scenario_gen.types import (
     Encounter,
     ENDS,
@@ -153,7 +154,7 @@ def answer_refusal(
     road, encounter = road_and_template(road, encounter, config.road)
     segmentation = segment(encounter, config.segmentation, seed)
     return suggest_nearest(
-        error, Chain(encounter, segmentation, road, config, request, count, seed)
+        error, Chain(Situation.of(encounter), segmentation, road, config, request, count, seed)
     )
 
 

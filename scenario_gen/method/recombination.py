@@ -29,8 +29,8 @@ from scenario_gen.method.evaluation.law import Law
 from scenario_gen.method.evaluation.population import APART, DISTANCE, member_of
 from scenario_gen.numerics import Floats
 from scenario_gen.numerics.plane import ahead_and_left, place
-from scenario_gen.situation import clean_tracks, Conflict, conflict_of, reactions_of, time_gaps
-from scenario_gen.types import Encounter, FOLLOW, once_per_object, Reaction, RECOMBINED, YIELD
+from scenario_gen.situation import Conflict, Situation, time_gaps
+from scenario_gen.types import Encounter, FOLLOW, Reaction, RECOMBINED, YIELD
 
 LEAST_S = 5.0  # that a new encounter lasts
 TRIES = 40  # pairs that are looked at for each encounter wanted
@@ -54,17 +54,22 @@ class Pair:
     """The two of an encounter that have most to do with each other.
 
     Attributes:
-        encounter: with all its vehicles.
+        situation: of the encounter, with all its vehicles.
         kind: of `scenario_gen.method.evaluation.population`; `features` (F,), too.
         conflict: of the two.
         reactions: of one of them to the other.
     """
 
-    encounter: Encounter
+    situation: Situation
     kind: str
     features: Floats
     conflict: Conflict
     reactions: tuple[Reaction, ...]
+
+    @property
+    def encounter(self) -> Encounter:
+        """The encounter, with all its vehicles."""
+        return self.situation.encounter
 
     @property
     def graph(self) -> frozenset[tuple[bool, str]]:
@@ -114,20 +119,20 @@ class Pair:
         return np.asarray(self.encounter.present[n] * self.encounter.dt)
 
 
-@once_per_object
 def pair_of(encounter: Encounter) -> Pair | None:
     """Return the pair of an encounter; None if no two of it share an area."""
+    situation = Situation.of(encounter)
     member = member_of(encounter, "", 0)
     if (
         member.kind == APART
         or member.pair is None
-        or (conflict := conflict_of(encounter, *member.pair)) is None
+        or (conflict := situation.conflict(*member.pair)) is None
     ):
         return None
     edges = tuple(
-        edge for edge in reactions_of(encounter).edges if {edge.who, edge.whom} == set(member.pair)
+        edge for edge in situation.reactions.edges if {edge.who, edge.whom} == set(member.pair)
     )
-    return Pair(encounter, member.kind, member.features, conflict, edges)
+    return Pair(situation, member.kind, member.features, conflict, edges)
 
 
 def recombined(one: Encounter, other: Encounter) -> Encounter:
@@ -141,6 +146,12 @@ def recombined(one: Encounter, other: Encounter) -> Encounter:
     a, b = pair_of(one), pair_of(other)
     if a is None or b is None or a.kind != b.kind:
         raise RefusedError("they are of different kinds")
+    return _combined(a, b)
+
+
+def _combined(a: Pair, b: Pair) -> Encounter:
+    """Return the first vehicle of one pair with the second vehicle of another of its kind."""
+    one, other = a.encounter, b.encounter
     begin, motion = _following(a, b) if b.follows else _meeting(a, b)
     first, second = one.vehicles[a.conflict.first], other.vehicles[b.conflict.second]
     second = replace(second, id=f"{second.id}_2") if second.id == first.id else second
@@ -203,7 +214,7 @@ def recombinations(
         ):
             continue
         try:
-            made.append(recombined(a.encounter, b.encounter))
+            made.append(_combined(a, b))
         except RefusedError as error:
             refused[str(error)] += 1
     return made, refused
@@ -223,7 +234,7 @@ def _meeting(a: Pair, b: Pair) -> tuple[float, Floats]:
 
 def _following(a: Pair, b: Pair) -> tuple[float, Floats]:
     """When the two begin [s], and the motion (T, 4) of the second of `b` behind the first of `a`."""
-    gaps = time_gaps(b.encounter, b.conflict.second, b.conflict.first)
+    gaps = time_gaps(b.situation.lane_gaps, b.conflict.second, b.conflict.first)
     least, usual, most = _GAPS_S
     tau = min(max(float(np.median(gaps)) if len(gaps) else usual, least), most)
     later = _alike(a, b)
@@ -231,10 +242,10 @@ def _following(a: Pair, b: Pair) -> tuple[float, Floats]:
     span = np.array([max(own[0], led[0]), min(own[1], led[1])])
     at = _common(a, a.there(a.conflict.first) + np.array([tau, 0.0]), span)
     leader, follower = (
-        clean_tracks(b.encounter)[b.conflict.first],
-        clean_tracks(b.encounter)[b.conflict.second],
+        b.situation.tracks[b.conflict.first],
+        b.situation.tracks[b.conflict.second],
     )
-    track = clean_tracks(a.encounter)[a.conflict.first]
+    track = a.situation.tracks[a.conflict.first]
     theirs, ours = b.encounter.time, a.encounter.time
     speed = np.interp(at - tau, ours, track.speed) - np.interp(
         at - later - tau, theirs, leader.speed
@@ -288,7 +299,7 @@ def _led(pair: Pair, dt: float) -> Floats:
 def _way(pair: Pair, station: Floats) -> Floats:
     """(T, 3) the poses at distances (T,) on the path of the second one, beyond its end beside that of the first."""
     ahead, own = (
-        clean_tracks(pair.encounter)[n].curve for n in (pair.conflict.first, pair.conflict.second)
+        pair.situation.tracks[n].curve for n in (pair.conflict.first, pair.conflict.second)
     )
     poses, over = own.at(station), station - own.length
     join, aside = (float(value[0]) for value in ahead.project(own.points[-1:, :2]))
@@ -300,8 +311,8 @@ def _way(pair: Pair, station: Floats) -> Floats:
 def _on_path(pair: Pair) -> Floats:
     """(T,) how far [m] the first one is on the path of the second, at the samples of their encounter."""
     curve, track = (
-        clean_tracks(pair.encounter)[pair.conflict.second].curve,
-        clean_tracks(pair.encounter)[pair.conflict.first],
+        pair.situation.tracks[pair.conflict.second].curve,
+        pair.situation.tracks[pair.conflict.first],
     )
     station, aside = curve.project(pair.encounter.position[pair.conflict.first])
     on = track.there & (station > 0.0) & (station < curve.length) & (np.abs(aside) < _ASIDE_M)

@@ -10,11 +10,13 @@ from scenario_gen.base.errors import RefusedError
 from scenario_gen.method.chain import Chain
 from scenario_gen.method.config import PipelineConfig
 from scenario_gen.method.evaluation import MEASURED, uniform_changepoints, without_changepoints
+from scenario_gen.situation import Situation
 from scenario_gen.types import Encounter, GenerationResult, NARROW, Request, UNIFORM, WITHOUT
 
 
 def with_references(
     result: GenerationResult,
+    situation: Situation,
     config: PipelineConfig,
     request: Request = Request(),
     population: Sequence[Encounter] = (),
@@ -31,7 +33,7 @@ def with_references(
     road, _ = result.road_and_fit()
     count = min(result.generated.requested, MEASURED)
     plain = Chain(
-        result.encounter,
+        situation,
         result.segmentation,
         road,
         config,

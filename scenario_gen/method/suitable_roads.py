@@ -20,7 +20,13 @@ from scenario_gen.roads import (
     ROADS,
     ROUNDABOUT,
 )
-from scenario_gen.situation import conflict_of, conflicts_in, refuse_reversing, refuse_too_large
+from scenario_gen.situation import (
+    conflict_of,
+    conflicts_in,
+    refuse_reversing,
+    refuse_too_large,
+    Situation,
+)
 from scenario_gen.types import Encounter, GenerationResult, join_ego, Road, Segmentation
 
 AUTO = "auto"
@@ -46,7 +52,7 @@ def suitable_roads(
 
     The last is `corridor`, its own road.
     """
-    ring = drives_about_ring(encounter, config.road)
+    ring = drives_about_ring(Situation.of(encounter), config.road)
     names = sorted(ROADS.built_in, key=lambda name: ring and name != ROUNDABOUT)
     return (name for name in names if takes(name, encounter, segmentation, config))
 

@@ -14,7 +14,7 @@ from scenario_gen.base.errors import RefusedError
 from scenario_gen.numerics import Floats, runs
 from scenario_gen.numerics.plane import unit
 from scenario_gen.roads import build_road, is_vector_map, Place, places, read_network, split
-from scenario_gen.situation import clean_tracks, drivers_of
+from scenario_gen.situation import Situation
 from scenario_gen.types import DRIVERS, Encounter, LaneNetwork, Road
 from scenario_gen.types.markings import markings
 
@@ -68,9 +68,7 @@ def map_picture(name: str, encounter: Encounter | None = None) -> tuple[str, lis
     found: list[Place] = []
     if encounter is not None:
         try:
-            found = list(
-                islice(_apart(places(network, drivers_of(clean_tracks(encounter)))), PLACES)
-            )
+            found = list(islice(_apart(places(network, Situation.of(encounter).drivers)), PLACES))
         except RefusedError as error:
             said.append(f"no place for {encounter.name}: {error}")
         said += [

@@ -25,12 +25,11 @@ from scenario_gen.roads.shaped import bends, draw_along, draw_merge, fitting_wid
 from scenario_gen.roads.vector.ground import cells_of
 from scenario_gen.roads.vector.read import FORMATS, is_vector_map, read_network, split, vector_road
 from scenario_gen.situation import (
-    clean_tracks,
-    driven_tracks,
     main_line,
     mirrored,
     refuse_reversing,
     refuse_too_large,
+    Situation,
     to_frenet,
     traffic_side,
 )
@@ -148,7 +147,7 @@ def _bare_road(name_or_path: str, encounter: Encounter | None, config: RoadConfi
         return draw_paper(name_or_path, config)
     if is_vector_map(name_or_path):
         return vector_road(
-            name_or_path, None if encounter is None else driven_tracks(encounter), config
+            name_or_path, None if encounter is None else Situation.of(encounter).drivers, config
         )
     path = Path(name_or_path)
     if path.suffix.lower() in (".yaml", ".yml"):
@@ -179,7 +178,7 @@ def _bare_road(name_or_path: str, encounter: Encounter | None, config: RoadConfi
 
 def _with_room_to_walk(road: Road, encounter: Encounter, config: RoadConfig) -> Road:
     """A road whose grid reaches as far beyond what is paved as people walk away from where somebody drives."""
-    tracks = clean_tracks(encounter)
+    tracks = Situation.of(encounter).tracks
     walked = [track.poses[:, :2] for track in tracks if track.vehicle.kind.walks]
     driven = [track.poses[:, :2] for track in tracks if not track.vehicle.kind.walks]
     if not walked or not driven:
@@ -199,7 +198,8 @@ def draw_main_road(name: str, encounter: Encounter | None, config: RoadConfig) -
         if name == "curve":
             return draw_along(name, PLAIN_LINE, max(config.lanes, 1), config)
         return draw(name, layout_for(name, None, config), config)
-    tracks = driven_tracks(encounter)
+    situation = Situation.of(encounter)
+    tracks = situation.drivers
     config = fitting_width(tracks, config)
     try:
         frenet = to_frenet(tracks)
@@ -207,7 +207,7 @@ def draw_main_road(name: str, encounter: Encounter | None, config: RoadConfig) -
         if name in ("t_intersection", "four_way") and not any(
             track.makes_u_turn for track in tracks
         ):
-            return draw_junction(name, encounter, config)
+            return draw_junction(name, situation, config)
     else:
         main = main_line(frenet, tracks)
         if bends(name, main):

@@ -35,7 +35,7 @@ from scenario_gen.roads.pavement import (
     swept,
 )
 from scenario_gen.roads.ways import draw_u_turn
-from scenario_gen.situation import own_paths, pair_crossings, to_frenet, Track
+from scenario_gen.situation import pair_crossings, Situation, to_frenet, Track
 from scenario_gen.types import DrawnFor, Encounter, LaneNetwork, Road
 
 _VERGE = 2.0  # metres of kerb drawn beside a road
@@ -241,7 +241,7 @@ def draw_corridor(name: str, encounter: Encounter | None, config: RoadConfig) ->
     if encounter is None:
         raise InputError(f"road {name} is drawn around a recording; give a log too")
     surface, paths, widths = list[BaseGeometry](), dict[str, Curve](), dict[str, float]()
-    for track in own_paths(encounter).tracks:
+    for track in Situation.of(encounter).separation.tracks:
         reach = config.corridor_margin if track.still else config.corridor_run_out
         path = track.curve.cut(-reach, track.travelled + reach, _STEP)
         widths[track.vehicle.id] = track.vehicle.width + 2.0 * config.corridor_margin

@@ -23,10 +23,9 @@ from scenario_gen.roads.pavement import ARM_COUNT, LANE_GAP, ROOM, SHORTEST, SLA
 from scenario_gen.roads.shaped import fitting_width
 from scenario_gen.roads.ways import draw_ring_route, draw_route
 from scenario_gen.situation import (
-    driven_tracks,
     driver_rows,
-    reactions_of,
     sharpness_of,
+    Situation,
     Track,
     turn_of,
 )
@@ -104,18 +103,18 @@ class _Direction:
         )
 
 
-def draw_junction(name: str, encounter: Encounter, config: RoadConfig) -> Road:
+def draw_junction(name: str, situation: Situation, config: RoadConfig) -> Road:
     """Draw a junction whose arms are where the template comes and goes.
 
     Args:
         name: `t_intersection` or `four_way`.
-        encounter: the template.
+        situation: of the template.
         config: how it is drawn.
 
     Raises:
         RefusedError: the template needs more arms or lanes than the road has, or the grid would be too large.
     """
-    tracks = driven_tracks(encounter)
+    tracks = situation.drivers
     centre = junction_centre(tracks)
     directions = _directions(name, tracks, centre)
     longest = max(
@@ -155,24 +154,24 @@ def draw_junction(name: str, encounter: Encounter, config: RoadConfig) -> Road:
                     )
                 )
     aim = aligned(tracks, lane_of, np.array([*centre, 0.0]), np.array([0.0, 0.0, turn]))
-    yielding = _yielding_arms(encounter, lane_of, config)
+    yielding = _yielding_arms(situation, lane_of, config)
     return draw_plan(Plan(arms, driven=driven, yielding=yielding, drawn_for=aim), name, config)
 
 
 def _yielding_arms(
-    encounter: Encounter, lane_of: Mapping[tuple[int, bool], tuple[int, int]], config: RoadConfig
+    situation: Situation, lane_of: Mapping[tuple[int, bool], tuple[int, int]], config: RoadConfig
 ) -> set[int]:
     """Return the arms of those who yield to others of other arms, but for those to whom somebody yields.
 
     Args:
-        encounter: the template.
+        situation: of the template.
         lane_of: arm and lane of the ends of the tracks of those who drive, by vehicle and whether it comes in.
         config: whether priorities are shown.
     """
     came_by = {vehicle: arm for (vehicle, inward), (arm, _) in lane_of.items() if inward}
     edges, rows = (
-        reactions_of(encounter).edges if config.priority == "auto" else (),
-        driver_rows(encounter),
+        situation.reactions.edges if config.priority == "auto" else (),
+        driver_rows(situation.encounter),
     )
     yields = [(rows.get(e.who, -1), rows.get(e.whom, -1)) for e in edges if e.kind == YIELD]
     ways = [(came_by[who], came_by[whom]) for who, whom in yields if {who, whom} <= came_by.keys()]
@@ -189,9 +188,11 @@ def draw_roundabout(name: str, encounter: Encounter | None, config: RoadConfig) 
     radius, fastest, length, wide, notes = _RING[0], 0.0, 5.0, 2.0, list[str]()
     directions = [_Direction(k * np.pi / 2.0, []) for k in range(4)]
     tracks: tuple[Track, ...] = ()
+    situation: Situation | None = None
     centre = np.zeros(2)
     if encounter is not None:
-        tracks = driven_tracks(encounter)
+        situation = Situation.of(encounter)
+        tracks = situation.drivers
         config = fitting_width(tracks, config)
         driven_about = _ring_driven(tracks, config)
         centre = junction_centre(tracks) if driven_about is None else driven_about[0]
@@ -237,16 +238,16 @@ def draw_roundabout(name: str, encounter: Encounter | None, config: RoadConfig) 
     }
     aim = aligned(tracks, lane_of, np.array([*centre, 0.0]), np.array([0.0, 0.0, turn]))
     yielding = set(range(len(arms))) - {arm for (_, inward), (arm, _) in lane_of.items() if inward}
-    yielding |= set() if encounter is None else _yielding_arms(encounter, lane_of, config)
+    yielding |= set() if situation is None else _yielding_arms(situation, lane_of, config)
     plan = Plan(
         arms, driven=driven, ring=radius, yielding=yielding, drawn_for=aim, notes=tuple(notes)
     )
     return draw_plan(plan, name, config)
 
 
-def drives_about_ring(encounter: Encounter, config: RoadConfig) -> bool:
+def drives_about_ring(situation: Situation, config: RoadConfig) -> bool:
     """Whether somebody in the template drives about the ring of a roundabout."""
-    return _ring_driven(driven_tracks(encounter), config) is not None
+    return _ring_driven(situation.drivers, config) is not None
 
 
 def _ring_driven(tracks: tuple[Track, ...], config: RoadConfig) -> tuple[Floats, float] | None:

@@ -18,12 +18,11 @@ from scenario_gen.roads.drawn import aligned, Arm, draw_plan, Driven, Plan
 from scenario_gen.roads.pavement import ARM_COUNT, ROOM, SHORTEST, SIDE_ARMS, SLACK
 from scenario_gen.roads.ways import draw_route, extended
 from scenario_gen.situation import (
-    driven_tracks,
     driver_rows,
     FrenetTracks,
     MainLine,
-    reactions_of,
     sharpness_of,
+    Situation,
     to_frenet,
     Track,
 )
@@ -102,7 +101,8 @@ def draw_merge(name: str, encounter: Encounter | None, config: RoadConfig) -> Ro
     tracks: tuple[Track, ...] = ()
     who, joins = list[int](), np.zeros(3)  # where the template's vehicles join, heading as they do
     if encounter is not None:
-        tracks = driven_tracks(encounter)
+        situation = Situation.of(encounter)
+        tracks = situation.drivers
         config = fitting_width(tracks, config)
         frenet = to_frenet(tracks)
         who = _merging(tracks, frenet)
@@ -126,8 +126,7 @@ def draw_merge(name: str, encounter: Encounter | None, config: RoadConfig) -> Ro
         )
         rows = driver_rows(encounter)
         yields = any(
-            edge.kind == YIELD and rows.get(edge.who) in who
-            for edge in reactions_of(encounter).edges
+            edge.kind == YIELD and rows.get(edge.who) in who for edge in situation.reactions.edges
         )
         joins = frenet.line.beside(np.array(along * join), float(np.mean(frenet.offset[who, -1])))
         joins[2] += 0.0 if along > 0.0 else np.pi

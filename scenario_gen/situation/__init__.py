@@ -6,10 +6,14 @@
 from scenario_gen.situation.frenet import FrenetTracks, main_line, MainLine, to_frenet
 from scenario_gen.situation.gaps import (
     conflict_of,
+    conflicts_by_pair,
     conflicts_in,
     departure,
     lag_behind,
     lane_gaps,
+    LaneGaps,
+    Meetings,
+    meetings,
     Motion,
     passing,
     time_gaps,
@@ -23,7 +27,6 @@ from scenario_gen.situation.interaction import (
     STAND_SPEED,
     Wait,
     WAIT_SPEED,
-    waits_to_keep,
 )
 from scenario_gen.situation.manoeuvre import (
     in_words,
@@ -36,14 +39,14 @@ from scenario_gen.situation.manoeuvre import (
 )
 from scenario_gen.situation.path_crossing import pair_crossings, path_crossing
 from scenario_gen.situation.placement_lsq import Equation, solve_starts
-from scenario_gen.situation.reactions import reactions_of
+from scenario_gen.situation.reactions import find_reactions
 from scenario_gen.situation.separation import (
-    least_gap,
     least_gaps,
-    own_paths,
     separate,
+    separate_recorded,
     smallest_gaps,
 )
+from scenario_gen.situation.situation import Situation
 from scenario_gen.situation.size import (
     MOST_SAMPLES,
     MOST_VEHICLES,
@@ -52,7 +55,6 @@ from scenario_gen.situation.size import (
 )
 from scenario_gen.situation.tracks import (
     clean_tracks,
-    driven_tracks,
     driver_rows,
     drivers_of,
     Track,
@@ -68,38 +70,41 @@ __all__ = [
     "Conflict",
     "Equation",
     "FrenetTracks",
+    "LaneGaps",
     "MainLine",
+    "Meetings",
     "Motion",
+    "Situation",
     "Track",
     "Wait",
     "clean_tracks",
     "closest_crossing",
     "conflict_of",
+    "conflicts_by_pair",
     "conflicts_in",
     "departure",
-    "driven_tracks",
     "driver_rows",
     "drivers_of",
     "find_conflicts",
+    "find_reactions",
     "find_waits",
     "in_words",
     "keeps",
     "lag_behind",
     "lane_gaps",
-    "least_gap",
     "least_gaps",
     "main_line",
     "manoeuvre_of",
+    "meetings",
     "mirrored",
-    "own_paths",
     "pair_crossings",
     "passing",
     "path_crossing",
-    "reactions_of",
     "refuse_reversing",
     "refuse_too_large",
     "required_orders",
     "separate",
+    "separate_recorded",
     "sharpness_of",
     "smallest_gaps",
     "solve_starts",
@@ -108,5 +113,4 @@ __all__ = [
     "traffic_side",
     "turn_of",
     "turns_to_keep",
-    "waits_to_keep",
 ]  # fmt: skip

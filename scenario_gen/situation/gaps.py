@@ -3,8 +3,8 @@
 
 """How a reaction shows in a motion, recorded or generated: when one passes behind another, how near one drives behind another."""
 
-from collections.abc import Iterable
-from functools import lru_cache
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
 from itertools import permutations
 from typing import Protocol
 
@@ -16,13 +16,17 @@ from scenario_gen.numerics.boxes import footprint_gaps
 from scenario_gen.numerics.plane import ahead_and_left
 from scenario_gen.situation.interaction import Conflict, find_conflicts
 from scenario_gen.situation.tracks import Track
-from scenario_gen.types import once_per_object, together, Vehicle
+from scenario_gen.types import together, Vehicle
 
 FAR = 60.0  # m, within which one follows
 LANE = 2.2  # m, to the side of the other's path
 ALIKE = 0.5  # rad, of two headings on one way
 _LEFT = 0.5  # m, by which one that merges keeps away from the place that the other one leaves
 SLOWEST = 2.0  # m/s, below which a time gap says nothing
+
+
+LaneGaps = Mapping[tuple[int, int], tuple[Floats, Floats]]  # see `lane_gaps`
+Meetings = Mapping[tuple[int, int], Conflict]  # by vehicles, the lower index first
 
 
 class Motion(Protocol):
@@ -54,38 +58,46 @@ class Motion(Protocol):
 
 
 def conflict_of(motion: Motion, a: int, b: int) -> Conflict | None:
-    """Return the conflict of two vehicles of a motion; None without one."""
-    return _conflicts(motion).get((min(a, b), max(a, b)))
+    """Return the conflict between two vehicles of a motion; None if they have none.
+
+    For more than one pair `conflicts_in` is faster.
+    """
+    pair = [min(a, b), max(a, b)]
+    vehicles = (motion.vehicles[pair[0]], motion.vehicles[pair[1]])
+    conflicts = find_conflicts(
+        vehicles,
+        motion.time,
+        motion.position[pair],
+        motion.heading[pair],
+        motion.present[pair],
+    )
+    if not conflicts:
+        return None
+    (conflict,) = conflicts
+    return replace(conflict, first=pair[conflict.first], second=pair[conflict.second])
 
 
 def conflicts_in(motion: Motion) -> tuple[Conflict, ...]:
-    """Return the conflicts of a motion, as `find_conflicts` does; they are looked for once."""
-    return tuple(_conflicts(motion).values())
-
-
-@once_per_object
-def _conflicts(motion: Motion) -> dict[tuple[int, int], Conflict]:
-    """Return the conflict of each pair of vehicles that has one."""
-    return _by_pair(
-        find_conflicts(
-            motion.vehicles, motion.time, motion.position, motion.heading, motion.present
-        )
+    """Return the conflicts of a motion, as `find_conflicts` does."""
+    return find_conflicts(
+        motion.vehicles, motion.time, motion.position, motion.heading, motion.present
     )
 
 
-def _by_pair(conflicts: Iterable[Conflict]) -> dict[tuple[int, int], Conflict]:
-    return {one.pair: one for one in conflicts}
+def conflicts_by_pair(conflicts: Iterable[Conflict]) -> dict[tuple[int, int], Conflict]:
+    """Return conflicts by their vehicles, the lower index first."""
+    return {conflict.pair: conflict for conflict in conflicts}
 
 
-@lru_cache(maxsize=4)  # of one template many places are looked at
-def meetings(tracks: tuple[Track, ...]) -> dict[tuple[int, int], Conflict]:
+def meetings(tracks: Sequence[Track]) -> Meetings:
     """Return the conflicts of some tracks by their vehicles, the lower index first."""
-    poses, present = (
-        np.stack([getattr(track, name) for track in tracks]) for name in ("poses", "present")
-    )
+    poses = np.stack([track.poses for track in tracks])
+    present = np.stack([track.present for track in tracks])
     time = np.arange(poses.shape[1], dtype=np.float64) * tracks[0].dt
     vehicles = tuple(track.vehicle for track in tracks)
-    return _by_pair(find_conflicts(vehicles, time, poses[..., :2], poses[..., 2], present))
+    return conflicts_by_pair(
+        find_conflicts(vehicles, time, poses[..., :2], poses[..., 2], present)
+    )
 
 
 def departure(motion: Motion, who: int, entry: float) -> float:
@@ -172,8 +184,7 @@ def bumper_gaps(motion: Motion, who: int, whom: int) -> Floats:
     return np.asarray(apart - 0.5 * (motion.vehicles[who].length + motion.vehicles[whom].length))
 
 
-@once_per_object
-def lane_gaps(motion: Motion) -> dict[tuple[int, int], tuple[Floats, Floats]]:
+def lane_gaps(motion: Motion) -> LaneGaps:
     """Return (who, whom): speeds (k,) [m/s] and gaps (k,) [m], bumper to bumper, of all who drive behind another one."""
     found = {}
     for who, whom in permutations(range(len(motion.vehicles)), 2):
@@ -184,8 +195,8 @@ def lane_gaps(motion: Motion) -> dict[tuple[int, int], tuple[Floats, Floats]]:
     return found
 
 
-def time_gaps(motion: Motion, who: int, whom: int) -> Floats:
+def time_gaps(gaps: LaneGaps, who: int, whom: int) -> Floats:
     """Return the time gaps (k,) [s], bumper to bumper, of a vehicle that drives (2 m/s or more) behind another one."""
-    speed, gap = lane_gaps(motion).get((who, whom), (np.zeros(0), np.zeros(0)))
+    speed, gap = gaps.get((who, whom), (np.zeros(0), np.zeros(0)))
     drives = speed > SLOWEST
     return np.asarray(gap[drives] / speed[drives])

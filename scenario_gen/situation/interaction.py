@@ -26,8 +26,6 @@ from scenario_gen.types import (
     ALWAYS,
     CAR,
     Encounter,
-    once_per_object,
-    Segmentation,
     Vehicle,
     VEHICLE_TYPES,
 )
@@ -98,7 +96,6 @@ class Conflict:
         return self.entry_second - self.entry_first
 
 
-@once_per_object
 def find_waits(encounter: Encounter) -> tuple[Wait, ...]:
     """Return the waits of every vehicle, in order of vehicle and time.
 
@@ -120,11 +117,6 @@ def find_waits(encounter: Encounter) -> tuple[Wait, ...]:
         for a, b in runs((speed < encounter.vehicles[vehicle].kind.waits_below) & there)
         if time[b - 1] - time[a] >= WAIT_DURATION - 1e-9
     )
-
-
-def waits_to_keep(encounter: Encounter, segmentation: Segmentation) -> tuple[Wait, ...]:
-    """Return the template's waits that every scenario keeps; without changepoints there is no dwell to hold (paper V-B)."""
-    return find_waits(encounter) if segmentation.changepoints.size else ()
 
 
 def _moves_slowly(speed: Floats, time: Floats) -> bool:

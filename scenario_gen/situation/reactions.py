@@ -23,15 +23,14 @@ from scenario_gen.numerics.plane import ahead_and_left, angle_between
 from scenario_gen.situation.gaps import (
     ALIKE,
     bumper_gaps,
-    conflicts_in,
     is_behind,
     LANE,
     passing,
     SLOWEST,
 )
-from scenario_gen.situation.interaction import Conflict, find_waits
-from scenario_gen.situation.tracks import clean_tracks
-from scenario_gen.types import Encounter, FOLLOW, once_per_object, Reaction, ReactionGraph, YIELD
+from scenario_gen.situation.interaction import Conflict, Wait
+from scenario_gen.situation.tracks import Track
+from scenario_gen.types import Encounter, FOLLOW, Reaction, ReactionGraph, YIELD
 
 LONG_ENOUGH = 2.0  # s, for which one drives behind another
 LAGS = 0.3, 3.0  # s, between which a follower answers
@@ -81,13 +80,34 @@ class _Seen:
     edge: Reaction | None
 
 
-@once_per_object
-def reactions_of(encounter: Encounter) -> ReactionGraph:
-    """Return who reacts to whom."""
-    seen, leaders = _nearest_leaders(encounter)
-    conflicts = conflicts_in(encounter)
+@dataclass(frozen=True, eq=False)
+class _Recording:
+    """An encounter with its tracks, conflicts and waits."""
+
+    encounter: Encounter
+    tracks: Sequence[Track]
+    conflicts: Sequence[Conflict]
+    waits: Sequence[Wait]
+
+
+def find_reactions(
+    encounter: Encounter,
+    tracks: Sequence[Track],
+    conflicts: Sequence[Conflict],
+    waits: Sequence[Wait],
+) -> ReactionGraph:
+    """Return the graph of reactions.
+
+    Args:
+        encounter: the recording.
+        tracks: its cleaned tracks.
+        conflicts: its conflicts.
+        waits: its waits.
+    """
+    recording = _Recording(encounter, tracks, conflicts, waits)
+    seen, leaders = _nearest_leaders(recording)
     passes = [
-        found for conflict in conflicts if (found := _passes(encounter, conflict)) is not None
+        found for conflict in conflicts if (found := _passes(recording, conflict)) is not None
     ]
     led = {edge.who: edge for edge in leaders}
     met = {
@@ -99,11 +119,11 @@ def reactions_of(encounter: Encounter) -> ReactionGraph:
     }
     met |= {(found.who, found.whom) for found in [*seen, *(one for one in passes if one.edge)]}
     pairs = [pair for pair in permutations(range(len(encounter.vehicles)), 2) if pair not in met]
-    short = [edge for pair in pairs if (edge := _gives_way(encounter, *pair)) is not None]
+    short = [edge for pair in pairs if (edge := _gives_way(recording, *pair)) is not None]
     best: dict[tuple[int, float], Reaction] = {}
     for edge in [*short, *(found.edge for found in passes if found.edge is not None)]:
         if not _explained(
-            edge, led.get(edge.who), encounter
+            edge, led.get(edge.who), waits
         ):  # of several that a wait is for, the last to clear lets it go
             key = edge.who, edge.until
             best[key] = max(
@@ -157,12 +177,12 @@ def _closeness(apart: float, limits: tuple[float, float]) -> float:
     return float(np.interp(apart, [near, far], [NEAR, 0.5])) if apart <= far else 0.0
 
 
-def _need(encounter: Encounter, who: int, whom: int) -> float:
+def _need(recording: _Recording, who: int, whom: int) -> float:
     """The confidence that one had to act, and did: it foresees the other in its way, and comes there later than foreseen.
 
     It foresees itself at its speed, its acceleration fading over a second, on its own path; the other one as it drives.
     """
-    one, other = clean_tracks(encounter)[who], clean_tracks(encounter)[whom]
+    one, other = recording.tracks[who], recording.tracks[whom]
     rows = np.flatnonzero(one.there & other.there)
     speed = _smoothed(one.speed, one.dt)
     begins = rows[:: max(round(_LOOKS[0] / one.dt), 1)]
@@ -191,8 +211,9 @@ def _need(encounter: Encounter, who: int, whom: int) -> float:
 # --- followers --------------------------------------------------------------------------------------------------------
 
 
-def _nearest_leaders(encounter: Encounter) -> tuple[list[_Seen], list[Reaction]]:
+def _nearest_leaders(recording: _Recording) -> tuple[list[_Seen], list[Reaction]]:
     """What is seen of all who drive behind another one, and at most one edge per follower: to the nearest one ahead."""
+    encounter = recording.encounter
     n = len(encounter.vehicles)
     leaders, seen = [], []
     for who in range(n):
@@ -204,7 +225,7 @@ def _nearest_leaders(encounter: Encounter) -> tuple[list[_Seen], list[Reaction]]
         }
         nearest = np.min([np.where(ahead[whom], gaps[whom], np.inf) for whom in ahead], axis=0)
         found = [
-            _follows(encounter, who, whom, ahead[whom] & (gaps[whom] <= nearest), gaps[whom])
+            _follows(recording, who, whom, ahead[whom] & (gaps[whom] <= nearest), gaps[whom])
             for whom in ahead
         ]
         seen += [one for one in found if one is not None]
@@ -215,9 +236,10 @@ def _nearest_leaders(encounter: Encounter) -> tuple[list[_Seen], list[Reaction]]
 
 
 def _follows(
-    encounter: Encounter, who: int, whom: int, behind: Bools, gaps: Floats
+    recording: _Recording, who: int, whom: int, behind: Bools, gaps: Floats
 ) -> _Seen | None:
     """What is seen of a vehicle that drives `behind` (T,) another one with `gaps` (T,) [m]; None if it does so for too short."""
+    encounter = recording.encounter
     dt, time = encounter.dt, encounter.time
     rows = np.flatnonzero(behind)
     own, other = _smoothed(encounter.speed[who], dt), _smoothed(encounter.speed[whom], dt)
@@ -227,7 +249,7 @@ def _follows(
     apart = float(seconds[round(_KEPT_FOR / dt)])
     lag, drop = _best_lag(np.gradient(own, dt), np.gradient(other, dt), behind, dt)
     near = _closeness(apart, IN_LANE)
-    confidence = 1.0 - (1.0 - near) * (1.0 - _need(encounter, who, whom)) * (
+    confidence = 1.0 - (1.0 - near) * (1.0 - _need(recording, who, whom)) * (
         1.0 - (0.0 if near else drop)
     )
     if confidence < SURE:
@@ -319,10 +341,10 @@ def _standard_error(a: Floats, b: Floats) -> float:
 # --- those who pass second --------------------------------------------------------------------------------------------
 
 
-def _passes(encounter: Encounter, conflict: Conflict) -> _Seen | None:
+def _passes(recording: _Recording, conflict: Conflict) -> _Seen | None:
     """What is seen of the second one at a conflict, unless it drives behind the first before and after."""
-    who, whom = conflict.second, conflict.first
-    aside = _from_aside(encounter, conflict)
+    encounter, who, whom = recording.encounter, conflict.second, conflict.first
+    aside = _from_aside(recording, conflict)
     k = max(int(np.searchsorted(encounter.time, conflict.entry_second)) - 1, 0)
     if k <= encounter.present[who, 0] or (
         not aside and (conflict.following or is_behind(encounter, who, whom)[k])
@@ -337,13 +359,13 @@ def _passes(encounter: Encounter, conflict: Conflict) -> _Seen | None:
         else math.inf
     )
     near = _closeness(apart, PASSES)
-    since, until, stands = _slow_before(encounter, who, clears, enters)
+    since, until, stands = _slow_before(recording, who, clears, enters)
     soon = (
         _soon(until - clears, encounter.duration)
         if stands and until - clears > -ANTICIPATES
         else 0.0
     )
-    need = _need(encounter, who, whom) * float(
+    need = _need(recording, who, whom) * float(
         np.interp(gap, [PASSES[1], 2.0 * PASSES[1]], [1.0, 0.0])
     )
     confidence = 1.0 - (1.0 - near) * (1.0 - need) * (1.0 - soon)
@@ -367,14 +389,15 @@ def _passes(encounter: Encounter, conflict: Conflict) -> _Seen | None:
     return _Seen(who, whom, apart, edge)
 
 
-def _from_aside(encounter: Encounter, conflict: Conflict) -> bool:
+def _from_aside(recording: _Recording, conflict: Conflict) -> bool:
     """Whether the second one comes into the first one's lane from beside it."""
-    time, who = encounter.time, conflict.second
+    encounter, who = recording.encounter, conflict.second
+    time = encounter.time
     rows = np.flatnonzero(
         encounter.there[who]
         & (np.abs(time - conflict.entry_second + 0.5 * _ASIDE) <= 0.5 * _ASIDE)
     )
-    path = clean_tracks(encounter)[conflict.first].curve
+    path = recording.tracks[conflict.first].curve
     station, left = path.project(encounter.position[who, rows])
     turned = wrap_angle(path.at(station)[:, 2] - encounter.heading[who, rows])
     return bool(((station > 0.0) & ((np.abs(left) > LANE) | (np.abs(turned) > ALIKE))).any())
@@ -389,8 +412,9 @@ def _turned(encounter: Encounter, *passed: tuple[int, float]) -> float:
     )
 
 
-def _gives_way(encounter: Encounter, who: int, whom: int) -> Reaction | None:
+def _gives_way(recording: _Recording, who: int, whom: int) -> Reaction | None:
     """The edge of one who slows down for another that it does not come behind: it stops before it, or lets it pass close by."""
+    encounter = recording.encounter
     between = encounter.position[whom] - encounter.position[who]
     ahead, aside = ahead_and_left(between, encounter.heading[who])
     both = np.flatnonzero(encounter.there[who] & encounter.there[whom])
@@ -402,7 +426,7 @@ def _gives_way(encounter: Encounter, who: int, whom: int) -> Reaction | None:
         rows = rows[rows <= both[int(np.argmin(np.hypot(ahead, aside)[both]))]]
     speed = encounter.speed[who, rows]
     top = int(np.argmax(speed))
-    if speed[top] - speed[-1] < _SLOWS_BY or (need := _need(encounter, who, whom)) < SURE:
+    if speed[top] - speed[-1] < _SLOWS_BY or (need := _need(recording, who, whom)) < SURE:
         return None
     since, until = (float(encounter.time[k]) for k in (rows[top], rows[-1]))
     return Reaction(
@@ -411,16 +435,17 @@ def _gives_way(encounter: Encounter, who: int, whom: int) -> Reaction | None:
 
 
 def _slow_before(
-    encounter: Encounter, who: int, clears: float, enters: float
+    recording: _Recording, who: int, clears: float, enters: float
 ) -> tuple[float, float, bool]:
     """When [s] a vehicle begins to slow down or stand before it enters, and is slowest or drives off; whether it stands.
 
     Slow instants in one approach are one wait. Both are when it enters, if it does not slow down.
     """
+    encounter = recording.encounter
     time = encounter.time
     stands = [
         wait
-        for wait in find_waits(encounter)
+        for wait in recording.waits
         if wait.vehicle == who and wait.start < clears and wait.end <= enters + 1.0
     ]
     place = encounter.position[who, min(int(np.searchsorted(time, enters)), len(time) - 1)]
@@ -441,11 +466,11 @@ def _slow_before(
     return float(time[rows[top]]), float(time[rows[low]]), False
 
 
-def _explained(edge: Reaction, leader: Reaction | None, encounter: Encounter) -> bool:
+def _explained(edge: Reaction, leader: Reaction | None, waits: Sequence[Wait]) -> bool:
     """Whether a yielder stands behind its leader, who leaves shortly before it: it waits for that one."""
     if leader is None or not edge.stands or not leader.since <= edge.until <= leader.until:
         return False
     return any(
         wait.vehicle == leader.whom and 0.0 <= edge.until - wait.end <= LAGS[1] + 1.0
-        for wait in find_waits(encounter)
+        for wait in waits
     )

@@ -15,8 +15,8 @@ from scenario_gen.numerics import Floats, frozen
 from scenario_gen.numerics.boxes import footprint_gaps
 from scenario_gen.numerics.curve import Curve
 from scenario_gen.numerics.plane import ahead_and_left
-from scenario_gen.situation.tracks import clean_tracks, Track
-from scenario_gen.types import Encounter, once_per_object, together
+from scenario_gen.situation.tracks import Track
+from scenario_gen.types import Encounter, together
 
 _ROUNDS = 400
 _ALONG = 0.3  # how readily a vehicle is set forward or back on its path
@@ -170,14 +170,12 @@ OWN_CLEARANCE = 0.5  # metres between footprints
 OWN_MAX_SHIFT = 3.0
 
 
-@once_per_object
-def own_paths(encounter: Encounter) -> Separation:
-    """Clean the template's paths and separate its vehicles.
+def separate_recorded(tracks: Sequence[Track]) -> Separation:
+    """Separate the cleaned tracks of a recording where its vehicles overlap.
 
     Raises:
         RefusedError: they overlap so far that shifts of up to 3 m do not separate them.
     """
-    tracks = clean_tracks(encounter)
     separation = separate(tracks, OWN_CLEARANCE, OWN_MAX_SHIFT)
     notes = [
         f"vehicle {track.vehicle.id}: the record was smoothed by up to {track.deviation:.2f} m into a path that can be driven"
@@ -187,7 +185,6 @@ def own_paths(encounter: Encounter) -> Separation:
     return replace(separation, notes=(*notes, *separation.notes))
 
 
-@once_per_object
 def least_gaps(encounter: Encounter) -> Floats:
     """Return the least gap (N,) [m] of each vehicle to any other, negative if they overlap; inf if it is never beside one."""
     poses = np.concatenate([encounter.position, encounter.heading[..., None]], axis=-1)
@@ -198,8 +195,3 @@ def least_gaps(encounter: Encounter) -> Floats:
             gap, _ = footprint_gaps(half[a], poses[a, common], half[b], poses[b, common])
             least[[a, b]] = np.minimum(least[[a, b]], float(gap.min()))
     return frozen(least)
-
-
-def least_gap(encounter: Encounter) -> float:
-    """Return the least gap [m] of any two vehicles while both are there, negative if they overlap; inf if never two are."""
-    return float(least_gaps(encounter).min(initial=np.inf))

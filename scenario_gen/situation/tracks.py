@@ -22,7 +22,7 @@ from scenario_gen.base.cancelling import stop_if_cancelled
 from scenario_gen.numerics import Bools, Floats, frozen, frozen_ints, Ints, wrap_angle
 from scenario_gen.numerics.curve import Curve
 from scenario_gen.numerics.plane import polyline_of, unit
-from scenario_gen.types import Encounter, mask, ON_THE_SPOT, once_per_object, Vehicle
+from scenario_gen.types import Encounter, mask, ON_THE_SPOT, Vehicle
 
 _WAVELENGTHS = (
     8.0,
@@ -111,7 +111,6 @@ class Track:
         return abs(self.turning(30.0)) > _TURN
 
 
-@once_per_object
 def clean_tracks(encounter: Encounter) -> tuple[Track, ...]:
     """Return one cleaned track per vehicle."""
     return tuple(_clean(encounter, i) for i in range(len(encounter.vehicles)))
@@ -120,11 +119,6 @@ def clean_tracks(encounter: Encounter) -> tuple[Track, ...]:
 def drivers_of(tracks: tuple[Track, ...]) -> tuple[Track, ...]:
     """Return those who drive, whom lanes are for; everybody, where nobody does."""
     return tuple(track for track in tracks if not track.vehicle.kind.walks) or tracks
-
-
-def driven_tracks(encounter: Encounter) -> tuple[Track, ...]:
-    """Return the clean tracks of those who drive; of everybody, where nobody does."""
-    return drivers_of(clean_tracks(encounter))
 
 
 def driver_rows(encounter: Encounter) -> dict[int, int]:

@@ -16,6 +16,7 @@ from scenario_gen.method.chain import Chain
 from scenario_gen.method.segmentation import segment
 from scenario_gen.pipeline import PipelineConfig
 from scenario_gen.roads import build_road
+from scenario_gen.situation import lane_gaps, Situation
 from scenario_gen.situation.gaps import conflict_of, lag_behind, time_gaps
 from scenario_gen.types.ego import join_ego, with_witness
 
@@ -40,7 +41,11 @@ def generated(encounter, count):
         build_road("corridor", encounter, CONFIG.road),
         segment(encounter, CONFIG.segmentation, 1),
     )
-    return Chain(encounter, segmentation, road, CONFIG, count=count, seed=1).run().generated
+    return (
+        Chain(Situation.of(encounter), segmentation, road, CONFIG, count=count, seed=1)
+        .run()
+        .generated
+    )
 
 
 @pytest.fixture(scope="module")
@@ -91,4 +96,6 @@ def test_followers_among_the_others_keep_their_distance_to_one_that_the_ego_hold
         for share in (0.7, 0.4):
             motion = ClosedLoop(scenario, "1").drive(Slower(share)).motion
             for edge in made.reactions[1:]:
-                assert time_gaps(motion, edge.who, edge.whom).min() > 0.5 * edge.headway[0]
+                assert (
+                    time_gaps(lane_gaps(motion), edge.who, edge.whom).min() > 0.5 * edge.headway[0]
+                )

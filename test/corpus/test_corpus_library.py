@@ -12,7 +12,7 @@ from scenario_gen.corpus.encounters import encounter_of, tables_of
 from scenario_gen.corpus.library import adjusted_rand, build, pair_encounters
 from scenario_gen.corpus.tables import rows_of
 from scenario_gen.method.segmentation.library import PrimitiveLibrary
-from scenario_gen.situation.reactions import reactions_of
+from scenario_gen.situation import Situation
 from scenario_gen.types.encounter import Encounter, Vehicle
 
 pytestmark = pytest.mark.xdist_group("corpus")
@@ -66,7 +66,7 @@ def test_a_library_of_a_corpus(corpus):
         assert all(0 < point < len(pairs[row["pair"]].time) for point in row["changepoints"])
         assert json.loads(row["reactions"])["edges"] == [
             edge.document(pairs[row["pair"]].vehicles)
-            for edge in reactions_of(pairs[row["pair"]]).edges
+            for edge in Situation.of(pairs[row["pair"]]).reactions.edges
         ]
     page = (out / "library" / "library.html").read_text()
     assert "the second follows in" in page and "nobody reacts in" in page

@@ -24,7 +24,7 @@ from scenario_gen.corpus.messages import parse_range, ranges
 from scenario_gen.corpus.mine import clean_tasks, mine
 from scenario_gen.corpus.tables import rows_of
 from scenario_gen.logs.config import LogConfig
-from scenario_gen.situation.reactions import reactions_of
+from scenario_gen.situation import Situation
 
 pytestmark = pytest.mark.xdist_group("corpus")  # one archive for all
 
@@ -73,7 +73,7 @@ def test_who_reacts_to_whom_stands_in_table_and_page(corpus):
             (row["lat"], row["lon"]),
         )
         assert found["edges"] == [
-            edge.document(encounter.vehicles) for edge in reactions_of(encounter).edges
+            edge.document(encounter.vehicles) for edge in Situation.of(encounter).reactions.edges
         ]
         assert all(sentence in page for sentence in found["sentences"])
         kinds.setdefault(row["kind"], []).append([edge["kind"] for edge in found["edges"]])

@@ -13,7 +13,7 @@ from support.textbook_motions import labelled
 from scenario_gen import generate, recombined, RefusedError
 from scenario_gen.method.evaluation.population import member_of
 from scenario_gen.method.recombination import pair_of, recombinations
-from scenario_gen.situation import conflict_of, time_gaps
+from scenario_gen.situation import conflict_of, lane_gaps, time_gaps
 from scenario_gen.types import FOLLOW, YIELD
 
 WAITS, FOLLOWS, MERGES, TURNS = (
@@ -82,7 +82,9 @@ def test_who_follows_keeps_its_own_distance_behind_another_leader():
             assert [edge.kind for edge in pair_of(made).reactions] == [FOLLOW]
             for found, motion in ((makes, made), (wanted, other), (others, one)):
                 conflict = conflict_of(motion, 0, 1)
-                found.append(float(np.median(time_gaps(motion, conflict.second, conflict.first))))
+                found.append(
+                    float(np.median(time_gaps(lane_gaps(motion), conflict.second, conflict.first)))
+                )
     assert len(makes) >= 8
     off, off_ones = (np.abs(np.subtract(makes, gaps)).mean() for gaps in (wanted, others))
     assert off < 0.25 and off < 0.6 * off_ones, (off, off_ones)

@@ -17,7 +17,8 @@ from scenario_gen.method.chain import Chain
 from scenario_gen.method.segmentation import segment
 from scenario_gen.method.validity import Checker
 from scenario_gen.roads import build_road
-from scenario_gen.situation.interaction import find_conflicts, waits_to_keep
+from scenario_gen.situation import Situation
+from scenario_gen.situation.interaction import find_conflicts
 from scenario_gen.types.ego import join_ego, with_witness
 from scenario_gen.types.encounter import Vehicle
 from scenario_gen.types.reaction import LOST
@@ -61,7 +62,13 @@ def test_a_slot_that_cannot_be_driven_is_refused(chain):
     request = Request(ego="1", goals="1: 16.0 8.07 3.14159 40.0")
     with pytest.raises(RefusedError):
         Chain(
-            chain.encounter, chain.segmentation, chain.road, chain.config, request, 2, chain.seed
+            Situation.of(chain.encounter),
+            chain.segmentation,
+            chain.road,
+            chain.config,
+            request,
+            2,
+            chain.seed,
         ).run()
 
 
@@ -103,7 +110,7 @@ def test_the_others_stay_valid_among_themselves(data, ego):
     conflicts = find_conflicts(
         vehicles, encounter.time, encounter.position[kept], encounter.heading[kept]
     )
-    kept_waits = waits_to_keep(chain.encounter, chain.segmentation)
+    kept_waits = Situation.of(chain.encounter).waits_to_keep(chain.segmentation)
     waits = [
         replace(wait, vehicle=kept.index(wait.vehicle))
         for wait in kept_waits
@@ -112,7 +119,9 @@ def test_the_others_stay_valid_among_themselves(data, ego):
     asked = BoundaryStates(outcome.fit.requested.start[kept], outcome.fit.requested.end[kept])
     checker = Checker(chain.road, asked, conflicts, waits)
     assert all(verdict.valid for verdict in checker.check(outcome.generated.scenarios))
-    everybody = Checker.of_template(encounter, chain.road, outcome.fit.requested, kept_waits)
+    everybody = Checker.of_template(
+        Situation.of(encounter), chain.road, outcome.fit.requested, kept_waits
+    )
     place = np.argsort([*kept, ego]).tolist()
     for scenario in map(join_ego, outcome.generated.scenarios):
         arrays = {

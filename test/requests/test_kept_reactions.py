@@ -17,6 +17,7 @@ from scenario_gen.method.validity import Limits
 from scenario_gen.output.review.validation import validate_bag
 from scenario_gen.pipeline import PipelineConfig
 from scenario_gen.roads import build_road
+from scenario_gen.situation import Situation
 from scenario_gen.types.ego import join_ego
 from scenario_gen.types.reaction import FOLLOW
 from scenario_gen.types.request import Request
@@ -37,7 +38,9 @@ def made(encounter, request=Request(), count=30):
         build_road("corridor", encounter, CONFIG.road),
         segment(encounter, CONFIG.segmentation, 1),
     )
-    return Chain(encounter, segmentation, road, CONFIG, request, count=count, seed=1).run()
+    return Chain(
+        Situation.of(encounter), segmentation, road, CONFIG, request, count=count, seed=1
+    ).run()
 
 
 def wholes(result):

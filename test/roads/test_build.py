@@ -10,7 +10,8 @@ from scenario_gen.base.errors import InputError
 from scenario_gen.logs import read_log
 from scenario_gen.roads import build_road, RoadConfig
 from scenario_gen.roads.clearance import footprint_fits
-from scenario_gen.situation.separation import own_paths, smallest_gaps
+from scenario_gen.situation import Situation
+from scenario_gen.situation.separation import smallest_gaps
 
 ARMS = {"straight": 2, "t_intersection": 3, "four_way": 4}
 
@@ -78,7 +79,7 @@ def test_every_recorded_encounter_has_a_corridor_in_which_its_separated_paths_fi
     for path in paths:
         for encounter in read_log(path).encounters:
             road = build_road("corridor", encounter)
-            separation = own_paths(encounter)
+            separation = Situation.of(encounter).separation
             assert smallest_gaps(separation.tracks).min() > 0.49
             assert separation.moved.max() <= 3.0
             for track in separation.tracks:

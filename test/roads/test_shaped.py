@@ -14,7 +14,7 @@ from scenario_gen.pipeline import generate
 from scenario_gen.roads import build_road, RoadConfig
 from scenario_gen.roads.vector.ground import on_lane
 from scenario_gen.roads.ways import draw_ring_route
-from scenario_gen.situation import reactions_of
+from scenario_gen.situation import Situation
 from scenario_gen.types import RuleKind
 from scenario_gen.types.encounter import Encounter, Vehicle
 from scenario_gen.types.segmentation import Segmentation
@@ -188,7 +188,7 @@ def test_roads_without_a_template_are_of_their_kind():
 )
 def test_arms_of_those_who_yield_give_way_and_the_line_lies_across_their_lanes(priority, kind):
     encounter = labelled("crossing, stops", 1).encounter
-    (edge,) = reactions_of(encounter).edges
+    (edge,) = Situation.of(encounter).reactions.edges
     road = build_road("four_way", encounter, RoadConfig(priority=priority, lanes=2))
     assert {rule.kind for rule in road.lanes.rules} == ({kind} if kind else set())
     for rule in road.lanes.rules:

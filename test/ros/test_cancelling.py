@@ -18,6 +18,7 @@ from scenario_gen.method.nearest import suggest_nearest
 from scenario_gen.method.routing import plan_routes
 from scenario_gen.method.segmentation import segment
 from scenario_gen.roads import build_road
+from scenario_gen.situation import Situation
 from scenario_gen.types import Request
 
 CASE = "scenario_gen/resources/synthetic_c"
@@ -37,7 +38,13 @@ def test_every_stage_of_a_node_can_be_cancelled(request):
         lambda: plan_routes(road, fit),
         lambda: suggest_nearest(
             RefusedError("no"),
-            Chain(encounter, segmentation, road, PipelineConfig(), Request(starts="1: 0 0 0")),
+            Chain(
+                Situation.of(encounter),
+                segmentation,
+                road,
+                PipelineConfig(),
+                Request(starts="1: 0 0 0"),
+            ),
         ),
     ):
         with cancellable(lambda: True), pytest.raises(CancelledError):

@@ -10,7 +10,8 @@ import pytest
 from support.reaction_scenes import answering, crossing, lane_encounter, wander
 from support.textbook_motions import CHANCE, labelled, NOTHING, REACTIONS
 
-from scenario_gen.situation.reactions import reactions_of, without_circles
+from scenario_gen.situation import Situation
+from scenario_gen.situation.reactions import without_circles
 from scenario_gen.types import Vehicle
 from scenario_gen.types.reaction import FOLLOW, Reaction, YIELD
 
@@ -22,7 +23,7 @@ def test_a_planted_lag_and_gain_are_found(lag):
     found = []
     for seed in range(6):
         leader = wander(np.random.default_rng(seed), 400)
-        (edge,) = reactions_of(lane_encounter(leader, answering(leader, lag, 0.8))).edges
+        (edge,) = Situation.of(lane_encounter(leader, answering(leader, lag, 0.8))).reactions.edges
         assert (edge.kind, edge.who, edge.whom) == (FOLLOW, 1, 0)
         assert edge.gain == pytest.approx(0.8, abs=0.1)
         found.append(edge.lag)
@@ -35,16 +36,16 @@ def test_independent_drives_hardly_ever_react():
     for seed in range(40):
         rng = np.random.default_rng(seed)
         leader, other = wander(rng, 300, 1.5), wander(rng, 300, 1.5) - 2.5
-        behind += bool(reactions_of(lane_encounter(leader, other, 58.0)).edges)
-        beside += bool(reactions_of(lane_encounter(leader, other, 25.0, lane=3.5)).edges)
+        behind += bool(Situation.of(lane_encounter(leader, other, 58.0)).reactions.edges)
+        beside += bool(Situation.of(lane_encounter(leader, other, 25.0, lane=3.5)).reactions.edges)
     assert beside == 0
     assert behind <= 4
 
 
 @pytest.mark.parametrize("lag", [0.3, 1.5, 2.5])
 def test_who_waits_for_another_one_and_leaves_behind_it_yields(lag):
-    clears = reactions_of(crossing(8.0)).edges[0].clears
-    graph = reactions_of(crossing(clears + lag))
+    clears = Situation.of(crossing(8.0)).reactions.edges[0].clears
+    graph = Situation.of(crossing(clears + lag)).reactions
     (edge,) = graph.edges
     assert (edge.kind, edge.who, edge.whom, edge.stands) == (YIELD, 1, 0, True)
     assert edge.lag == pytest.approx(lag, abs=0.35)  # it leaves when it is faster than 0.5 m/s
@@ -52,7 +53,7 @@ def test_who_waits_for_another_one_and_leaves_behind_it_yields(lag):
 
 
 def test_who_leaves_long_after_waits_for_something_else():
-    graph = reactions_of(crossing(14.0))
+    graph = Situation.of(crossing(14.0)).reactions
     assert graph.edges == ()
     assert graph.sentences(TWO)[0].startswith(
         "no vehicle is seen to react to another: the nearest are vehicle 2 and vehicle 1"
@@ -76,7 +77,7 @@ def pairs_of(encounter):
     """The surest edge of each pair: one may both come behind another and follow it."""
     return {
         (one.who, one.whom): one
-        for one in sorted(reactions_of(encounter).edges, key=lambda one: one.confidence)
+        for one in sorted(Situation.of(encounter).reactions.edges, key=lambda one: one.confidence)
     }.values()
 
 
@@ -100,9 +101,11 @@ def test_confidence_is_how_often_an_edge_is_right():
 
 
 def test_why_none_is_seen_is_said():
-    apart = reactions_of(labelled("crossing, long after", 0).encounter)
+    apart = Situation.of(labelled("crossing, long after", 0).encounter).reactions
     assert "never within" in apart.why and apart.sentences(TWO)[0].endswith(apart.why)
-    assert "none drives behind another" in reactions_of(labelled("beside", 1).encounter).why
+    assert (
+        "none drives behind another" in Situation.of(labelled("beside", 1).encounter).reactions.why
+    )
 
 
 def edge(who, whom, confidence):

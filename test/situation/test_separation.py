@@ -6,7 +6,8 @@
 import numpy as np
 import pytest
 
-from scenario_gen.situation.separation import least_gap, least_gaps
+from scenario_gen.situation import Situation
+from scenario_gen.situation.separation import least_gaps
 from scenario_gen.types.encounter import Encounter, Vehicle
 from scenario_gen.types.presence import ALWAYS
 
@@ -28,9 +29,9 @@ def queue(*places, present=ALWAYS):
 def test_the_least_gap_of_each_is_to_its_nearest():
     encounter = queue(0.0, 4.4, 10.0, 30.0)
     assert least_gaps(encounter) == pytest.approx([0.4, 0.4, 1.6, 16.0])
-    assert least_gap(encounter) == pytest.approx(0.4)
+    assert Situation.of(encounter).least_gap == pytest.approx(0.4)
 
 
 def test_gaps_of_two_that_never_meet_and_of_two_in_one_place():
-    assert least_gap(queue(0.0, 5.0, present=np.array([[0, 9], [20, 29]]))) == np.inf
+    assert Situation.of(queue(0.0, 5.0, present=np.array([[0, 9], [20, 29]]))).least_gap == np.inf
     assert (least_gaps(queue(0.0, 1.0)) < 0.0).all()

@@ -10,7 +10,7 @@ import numpy as np
 
 from scenario_gen.method.evaluation.geometry import footprint_distance, time_to_collision
 from scenario_gen.method.evaluation.motion import Motion
-from scenario_gen.situation import conflict_of
+from scenario_gen.situation import conflicts_in
 
 
 @dataclass(frozen=True)
@@ -49,10 +49,7 @@ def criticality(motion: Motion, horizon: float) -> Criticality:
         (a, b, motion.together(a, b)) for a, b in combinations(range(len(motion.vehicles)), 2)
     ]
     pairs = [(a, b, both) for a, b, both in pairs if both.stop > both.start]
-    everybody = combinations(range(len(motion.vehicles)), 2)
-    conflicts = [
-        conflict for a, b in everybody if (conflict := conflict_of(motion, a, b)) is not None
-    ]
+    conflicts = conflicts_in(motion)
     encroachments = [c.encroachment for c in conflicts if not c.following]
     return Criticality(
         min_distance=min(

@@ -27,7 +27,7 @@ from scenario_gen.method.evaluation.measures import figures_of, PERIOD
 from scenario_gen.method.evaluation.motion import at_period, Motion
 from scenario_gen.numerics import Bools, Floats, Ints
 from scenario_gen.numerics.plane import ahead_and_left
-from scenario_gen.situation import Conflict, conflict_of
+from scenario_gen.situation import Conflict, conflicts_by_pair, conflicts_in
 from scenario_gen.types import (
     Encounter,
     GenerationResult,
@@ -229,7 +229,8 @@ def member_of(
     """
     whole = at_period(motion, PERIOD)
     figures = {own.pair: own for own in figures_of(motion) if pair in (None, own.pair)}
-    conflicts = {own: found for own in figures if (found := conflict_of(whole, *own)) is not None}
+    met = conflicts_by_pair(conflicts_in(whole))
+    conflicts: dict[Pair, Conflict] = {own: met[own] for own in met if own in figures}
     if not conflicts:
         return Member(APART, np.zeros(len(FEATURES)), recording, template, pair)
 

@@ -13,8 +13,8 @@ from scenario_gen.method.fitting.kept import find_losses
 from scenario_gen.method.fitting.placement import Placement
 from scenario_gen.numerics import Bools, Floats, frozen_ints, Ints, runs
 from scenario_gen.roads import ground_for, nearest_pose_with_room
-from scenario_gen.situation import clean_tracks, manoeuvre_of, Track, turn_of
-from scenario_gen.types import BoundaryStates, Encounter, Fit, FittedVehicle, Road, Segmentation
+from scenario_gen.situation import manoeuvre_of, Situation, Track, turn_of
+from scenario_gen.types import BoundaryStates, Fit, FittedVehicle, Road, Segmentation
 
 _STAND_LENGTH = 0.5  # metres
 _PATH_STEP = 0.5  # metres between two poses of a fitted path
@@ -22,7 +22,7 @@ STAND_SPEED = 0.3  # m/s: slower is standing
 
 
 def finish(
-    encounter: Encounter,
+    situation: Situation,
     segmentation: Segmentation,
     road: Road,
     placement: Placement,
@@ -36,7 +36,8 @@ def finish(
     Raises:
         RefusedError: an anchor is farther than `max_move` from the nearest pose with room.
     """
-    last, tracks = encounter.speed.shape[1] - 1, clean_tracks(encounter)
+    encounter, tracks = situation.encounter, situation.tracks
+    last = encounter.speed.shape[1] - 1
     index = frozen_ints(np.concatenate(([0], segmentation.changepoints, [last])))
     notes = list(placement.notes)
     fitted, states = [], []

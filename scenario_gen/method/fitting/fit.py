@@ -17,7 +17,7 @@ from scenario_gen.method.fitting.placement import Placement
 from scenario_gen.method.fitting.requested import refuse_impossible, refuse_misfits
 from scenario_gen.method.fitting.search import place_by_search
 from scenario_gen.numerics import Floats
-from scenario_gen.situation import clean_tracks, refuse_reversing
+from scenario_gen.situation import refuse_reversing, Situation
 from scenario_gen.types import Encounter, Fit, Request, Road, Segmentation, TypeLimits
 
 _AT_HOME = 0.98  # share of footprints with room at which any road is taken for the template's own
@@ -25,7 +25,7 @@ _NEAR_HOME = 0.5  # the same for a map without lanes to go by: recorded cars lea
 
 
 def fit_template(
-    encounter: Encounter,
+    encounter: Encounter | Situation,
     segmentation: Segmentation,
     road: Road,
     config: FittingConfig = FittingConfig(),
@@ -38,7 +38,7 @@ def fit_template(
     """Place a template on a road (paper III-A, eqs 7-9 put right).
 
     Args:
-        encounter: the template.
+        encounter: the template, or its situation, if that is known.
         segmentation: its changepoints; they decide which anchors are reported, never where start and end are.
         road: the target.
         config: which way, and how far things may be scaled and moved.
@@ -52,37 +52,40 @@ def fit_template(
         RefusedError: it does not fit, or a requested state cannot be had; the message says why, with figures.
         InputError: `starts` and `goals` disagree with the encounter, or a vehicle that is named does not exist.
     """
+    situation = Situation.of(encounter)
+    encounter = situation.encounter
     refuse_reversing(encounter)
     request.ego_of(encounter)  # no such vehicle: refused before anything is placed
     if request.moves:
-        return _fit_request(encounter, segmentation, road, config, request, limits)
+        return _fit_request(situation, segmentation, road, config, request, limits)
     if starts is not None or goals is not None:
-        placement, given = place_given(encounter, road, config, starts, goals)
-        return finish(encounter, segmentation, road, placement, config, given)
-    placement = _place(encounter, road.cleared, config)
-    fit = finish(encounter, segmentation, road, placement, config)
+        placement, given = place_given(situation, road, config, starts, goals)
+        return finish(situation, segmentation, road, placement, config, given)
+    placement = _place(situation, road.cleared, config)
+    fit = finish(situation, segmentation, road, placement, config)
     if not placement.at_home:
         refuse_lost(fit.losses, config.allow, road.name)
     return fit
 
 
 def _fit_request(
-    encounter: Encounter,
+    situation: Situation,
     segmentation: Segmentation,
     road: Road,
     config: FittingConfig,
     request: Request,
     limits: TypeLimits,
 ) -> Fit:
+    encounter = situation.encounter
     starts, goals = (request.rows(end, encounter) for end in ("starts", "goals"))
     refuse_impossible(encounter, road, starts, goals, limits)
     base = (
-        _place(encounter, road.cleared, config)
+        _place(situation, road.cleared, config)
         if np.isnan(starts).any() or np.isnan(goals).any()
         else None
     )
-    placement, given = place_given(encounter, road, config, starts, goals, base)
-    fit = finish(encounter, segmentation, road, placement, config, given)
+    placement, given = place_given(situation, road, config, starts, goals, base)
+    fit = finish(situation, segmentation, road, placement, config, given)
     refuse_misfits(fit, starts, goals)
     refuse_lost(
         (loss for loss in fit.losses if loss.kind == "conflict"), config.allow, road.name
@@ -91,16 +94,16 @@ def _fit_request(
 
 
 @lru_cache(maxsize=1)  # changepoints have no part in it: the references have the same
-def _place(encounter: Encounter, road: Road, config: FittingConfig) -> Placement:
-    tracks = clean_tracks(encounter)
+def _place(situation: Situation, road: Road, config: FittingConfig) -> Placement:
+    tracks = situation.tracks
     if config.placement == "search":
         return place_by_search(tracks, road, config)
     if config.placement == "lanes" or (config.placement == "auto" and road.map_lanes is not None):
         return place_on_lanes(tracks, road, config)
-    share = share_at_home(encounter, road)
+    share = share_at_home(tracks, road)
     reason, own = "", None
     try:
-        own = place_in_own_frame(encounter, road, config)
+        own = place_in_own_frame(situation, road, config)
     except RefusedError as error:
         reason = f"where it was recorded, {error}"
         if config.placement == "identity":

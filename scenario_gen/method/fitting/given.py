@@ -3,6 +3,7 @@
 
 """Start and goal given: by the template's own frame, or by the user (eqs 7-9, put right)."""
 
+from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
 
@@ -22,17 +23,17 @@ from scenario_gen.numerics import Floats, frozen
 from scenario_gen.numerics.curve import Curve
 from scenario_gen.numerics.plane import place
 from scenario_gen.roads import draw_route
-from scenario_gen.situation import clean_tracks, own_paths, Track
+from scenario_gen.situation import Situation, Track
 from scenario_gen.types import Encounter, Road
 
 
-def place_in_own_frame(encounter: Encounter, road: Road, config: FittingConfig) -> Placement:
+def place_in_own_frame(situation: Situation, road: Road, config: FittingConfig) -> Placement:
     """Leave the template where it was recorded (only pulled apart where the record has vehicles overlap).
 
     Raises:
         RefusedError: a sampled pose is farther than `max_move` from the nearest with room.
     """
-    separation = own_paths(encounter)
+    separation = situation.separation
     max_repair(
         [track for track in separation.tracks if share_with_room(road, track) < 1.0],
         road,
@@ -44,9 +45,9 @@ def place_in_own_frame(encounter: Encounter, road: Road, config: FittingConfig) 
     )
 
 
-def share_at_home(encounter: Encounter, road: Road) -> float:
+def share_at_home(tracks: Sequence[Track], road: Road) -> float:
     """The share of sampled footprints that have room on a road where they were recorded, 0 to 1."""
-    return float(np.mean([share_with_room(road, track) for track in clean_tracks(encounter)]))
+    return float(np.mean([share_with_room(road, track) for track in tracks]))
 
 
 _CHORD = 2.0  # metres: a shorter one gives no direction (eq 8) and no scale (eq 9)
@@ -55,7 +56,7 @@ _TURN = np.radians(50.0)  # a drawn route may turn by this much more or less tha
 
 
 def place_given(
-    encounter: Encounter,
+    situation: Situation,
     road: Road,
     config: FittingConfig,
     starts: Floats | None,
@@ -78,7 +79,7 @@ def place_given(
         InputError: shapes disagree with the encounter, or a value is not finite.
         RefusedError: a scale is out of range, or a vehicle that waits throughout is asked to move.
     """
-    tracks = clean_tracks(encounter)
+    encounter, tracks = situation.encounter, situation.tracks
     states = np.stack(
         (
             _states("starts", starts, encounter, 0, base),

@@ -23,7 +23,7 @@ from scenario_gen.method.sampling.directed import (
 from scenario_gen.method.sampling.plan import Cancelled
 from scenario_gen.method.sampling.sampler import BLOCK, DIRECTED, Label, LEVELS, Sampler, STAGED
 from scenario_gen.numerics import Floats
-from scenario_gen.situation import closest_crossing, Conflict, conflict_of, conflicts_in
+from scenario_gen.situation import closest_crossing, Conflict, conflict_of, Situation
 from scenario_gen.types import (
     Cause,
     Encounter,
@@ -103,15 +103,16 @@ def _reactions_lost(verdict: Verdict) -> dict[tuple[int, ...], str]:
     return {own.vehicles: own.message for own in verdict.violations if own.cause == Cause.REACTION}
 
 
-def aim_of(encounter: Encounter, request: Request, measures: Measures | None) -> Aim | None:
+def aim_of(situation: Situation, request: Request, measures: Measures | None) -> Aim | None:
     """What is aimed at: the targets, and for a swapped order the arrival gap of the other sign; None if nothing is.
 
     Raises:
         InputError: a target names a vehicle that does not exist, or nothing can be measured.
     """
+    encounter = situation.encounter
     targets, beyond, note = request.targets, 0.0, ""
     if request.order == "swap":
-        closest = closest_crossing(conflicts_in(encounter))
+        closest = closest_crossing(situation.conflicts)
         if closest is not None:
             names = tuple(encounter.vehicles[n].id for n in (closest.first, closest.second))
             targets = (Target("arrival_gap", -np.inf, 0.0, names), *targets)
@@ -130,7 +131,7 @@ def aim_of(encounter: Encounter, request: Request, measures: Measures | None) ->
 
 
 def label_of(
-    encounter: Encounter,
+    situation: Situation,
     request: Request,
     aim: Aim | None,
     measures: Measures | None,
@@ -141,9 +142,10 @@ def label_of(
 
     `lost` are the pairs (who, whom) whose reaction, or whose least gap, scenarios are not held to on this road.
     """
+    encounter = situation.encounter
     names = [token(vehicle.id) for vehicle in encounter.vehicles]
     held = reaction_facts(names, reactions, lost)
-    conflicts = () if request.order == "keep" else conflicts_in(encounter)
+    conflicts = () if request.order == "keep" else situation.conflicts
 
     def label(whole: Scenario) -> dict[str, str]:
         facts = held | (measures.nearness(whole) if measures is not None else {})

@@ -11,7 +11,7 @@ from scenario_gen.method.sampling.plan import Callbacks, Plan
 from scenario_gen.method.sampling.prepare import kept_reactions
 from scenario_gen.method.sampling.sample import draw_scenarios
 from scenario_gen.method.validity import Checker, Limits
-from scenario_gen.situation import reactions_of, Wait, waits_to_keep
+from scenario_gen.situation import Situation, Wait
 from scenario_gen.types import GenerationResult, Measures, MIRRORED, Request, TypeLimits
 
 
@@ -23,6 +23,7 @@ def sample_scenarios(
     *,
     count: int,
     waits: tuple[Wait, ...] | None = None,
+    situation: Situation | None = None,
     callbacks: Callbacks = Callbacks(),
     measures: Measures | None = None,
 ) -> GenerationResult:
@@ -35,6 +36,7 @@ def sample_scenarios(
         request: what is requested.
         count: valid scenarios wanted.
         waits: that are kept; the template's unless given.
+        situation: of the template, if it is known.
         callbacks: called on progress and with valid scenarios.
         measures: what measures a scenario for a target or a choice.
 
@@ -42,7 +44,7 @@ def sample_scenarios(
         InputError: road or fit are not known.
         RefusedError: as `draw_scenarios`.
     """
-    plan = plan_of(planned, sampling, limits, request, waits)
+    plan = plan_of(planned, sampling, limits, request, waits, situation)
     check = checker_of(plan, sampling, limits, request).check
     drawn = draw_scenarios(
         plan,
@@ -61,7 +63,7 @@ def sample_scenarios(
         if note.startswith(MIRRORED)
     ]
     drawn = replace(
-        drawn, adaptations=(*mirrored, *drawn.adaptations), graph=reactions_of(plan.encounter)
+        drawn, adaptations=(*mirrored, *drawn.adaptations), graph=plan.situation.reactions
     )
     return replace(planned, fit=replace(fit, requested=plan.requested), generated=drawn)
 
@@ -72,20 +74,18 @@ def plan_of(
     limits: TypeLimits,
     request: Request,
     waits: tuple[Wait, ...] | None = None,
+    situation: Situation | None = None,
 ) -> Plan:
     """Return what the scenarios of a request are drawn from: with preset `wide` the states leave the template's where they may.
 
     Raises:
         InputError: road or fit are not known.
     """
-    encounter, segmentation, (road, fit) = (
-        planned.encounter,
-        planned.segmentation,
-        planned.road_and_fit(),
-    )
-    states = relaxed_states(fit.requested, encounter, sampling, request)
-    waits = waits_to_keep(encounter, segmentation) if waits is None else waits
-    return Plan(encounter, segmentation, road, planned.routes, states, waits, limits)
+    situation = situation or Situation.of(planned.encounter)
+    segmentation, (road, fit) = planned.segmentation, planned.road_and_fit()
+    states = relaxed_states(fit.requested, situation, sampling, request)
+    waits = situation.waits_to_keep(segmentation) if waits is None else waits
+    return Plan(situation, segmentation, road, planned.routes, states, waits, limits)
 
 
 def checker_of(plan: Plan, sampling: SamplingConfig, limits: Limits, request: Request) -> Checker:
@@ -94,7 +94,7 @@ def checker_of(plan: Plan, sampling: SamplingConfig, limits: Limits, request: Re
     Raises:
         RefusedError: an order is to be swapped, and there is none.
     """
-    edges = kept_reactions(plan.encounter, sampling, request.order).edges
+    edges = kept_reactions(plan.situation, sampling, request.order).edges
     return Checker.of_template(
-        plan.encounter, plan.road, plan.requested, plan.waits, limits, request.order, edges
+        plan.situation, plan.road, plan.requested, plan.waits, limits, request.order, edges
     )

@@ -20,7 +20,8 @@ from scenario_gen.method.sampling.config import SamplingConfig
 from scenario_gen.method.sampling.time_warp import Clock, LONGEST_SHARE, SHORTEST_SHARE
 from scenario_gen.method.sampling.window import seconds_left_out
 from scenario_gen.numerics import Bools, Floats
-from scenario_gen.types import BoundaryStates, CAR, Encounter, Request, Vehicle
+from scenario_gen.situation import Situation
+from scenario_gen.types import BoundaryStates, CAR, Request, Vehicle
 
 CATALOGUE = (
     (3.60, 1.62),
@@ -60,12 +61,13 @@ def cut(z: Floats, bound: float) -> Floats:
 
 
 def relaxed_states(
-    requested: BoundaryStates, encounter: Encounter, config: SamplingConfig, request: Request
+    requested: BoundaryStates, situation: Situation, config: SamplingConfig, request: Request
 ) -> BoundaryStates:
     """Return the states with how far each may be left: 0 where it was asked for, or nothing is freed.
 
     A vehicle that starts a seconds later or earlier, starts as far along its lane as it drives in that time.
     """
+    encounter = situation.encounter
     config = config.drawn
     if config.variety != "wide":
         return (
@@ -90,7 +92,7 @@ def relaxed_states(
         + bound * config.wait_sigma
     )
     seconds += config.duration_tolerance * length
-    free = (seconds + seconds_left_out(encounter, config.leave_out)).tolist()
+    free = (seconds + seconds_left_out(situation, config.leave_out)).tolist()
     slowest = 1.0 / SHORTEST_SHARE
     steps = [max(int(np.ceil(slowest * each / encounter.dt)), 1) for each in free]
     across = config.freedom * config.place_sigma

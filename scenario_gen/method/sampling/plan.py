@@ -6,7 +6,7 @@
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
-from scenario_gen.situation import Wait
+from scenario_gen.situation import Situation, Wait
 from scenario_gen.types import (
     BoundaryStates,
     EgoSlot,
@@ -32,7 +32,7 @@ class Plan:
     """A template planned on a road.
 
     Attributes:
-        encounter: the template.
+        situation: of the template.
         segmentation: its changepoints.
         road: the target road, for the room it leaves.
         routes: one per vehicle, with an anchor at start, changepoints and end.
@@ -41,13 +41,18 @@ class Plan:
         limits: of each type's motion, within which speeds are planned.
     """
 
-    encounter: Encounter
+    situation: Situation
     segmentation: Segmentation
     road: Road
     routes: Sequence[Route]
     requested: BoundaryStates
     waits: Sequence[Wait]
     limits: TypeLimits = TypeLimits()
+
+    @property
+    def encounter(self) -> Encounter:
+        """The template."""
+        return self.situation.encounter
 
 
 @dataclass(frozen=True)

@@ -30,8 +30,8 @@ from scenario_gen.method.sampling.time_warp import Clock, TimeWarp
 from scenario_gen.method.sampling.window import window_of
 from scenario_gen.numerics import Bools, Floats
 from scenario_gen.roads import ground_for
-from scenario_gen.situation import least_gaps, reactions_of
-from scenario_gen.types import Encounter, FOLLOW, ReactionGraph, Road
+from scenario_gen.situation import Situation
+from scenario_gen.types import FOLLOW, ReactionGraph, Road
 
 _STRETCHES = 9
 _TIME_SHARE = (
@@ -130,10 +130,13 @@ def prepare(plan: Plan, config: SamplingConfig, order: str = "keep") -> Prepared
         _model(routed, road, *mean, config, sentences)
         for routed, mean in zip(routed_vehicles, feasible, strict=True)
     ]
-    reactions, window = kept_reactions(encounter, config, order), None
+    reactions, window = kept_reactions(plan.situation, config, order), None
     if config.variety == "wide":
         answers = {edge.who for edge in reactions.edges}
-        tied, gaps = (requested.relaxed[..., 0] == 0.0).any(axis=0), least_gaps(encounter).tolist()
+        tied, gaps = (
+            (requested.relaxed[..., 0] == 0.0).any(axis=0),
+            plan.situation.least_gaps.tolist(),
+        )
         vehicles = [
             replace(
                 v,
@@ -150,18 +153,18 @@ def prepare(plan: Plan, config: SamplingConfig, order: str = "keep") -> Prepared
             )
             for n, (v, routed) in enumerate(zip(vehicles, routed_vehicles, strict=True))
         ]
-        window = window_of(encounter, config.leave_out, tied)
+        window = window_of(plan.situation, config.leave_out, tied)
     return Prepared(CandidateModel(tuple(vehicles), warp, reactions, window), tuple(sentences))
 
 
 def kept_reactions(
-    encounter: Encounter, config: SamplingConfig, order: str = "keep"
+    situation: Situation, config: SamplingConfig, order: str = "keep"
 ) -> ReactionGraph:
     """Return the reactions of the template that scenarios keep, without edges where none is to be kept.
 
     Where an `order` other than the template's is requested, nobody is made to wait for anybody.
     """
-    graph = reactions_of(encounter)
+    graph = situation.reactions
     if config.reactions != "keep":
         return replace(graph, edges=())
     return replace(

@@ -29,8 +29,8 @@ from scenario_gen.method.sampling.speed_profile.stops import (
 )
 from scenario_gen.method.sampling.time_warp import Clock
 from scenario_gen.numerics import Floats
-from scenario_gen.situation import clean_tracks, Track, Wait
-from scenario_gen.types import Dynamics, Encounter, Vehicle
+from scenario_gen.situation import Situation, Track, Wait
+from scenario_gen.types import Dynamics, Vehicle
 
 _MOST_SCALE = (
     4.0  # largest factor on the template's speeds; a longer route only has the mean speed raised
@@ -254,8 +254,11 @@ def routed_vehicle(
         for k, still in zip((0, -1), knots.still[[0, -1]], strict=True)
     ]
     lines = rounded_lines(spline, knots, time, scale * speed, (recorded[0], recorded[1]))
-    jerk, sideways = _largest_jerk(scale * speed, encounter.dt), _largest_sideways(encounter, n)
-    track = clean_tracks(encounter)[n]
+    jerk, sideways = (
+        _largest_jerk(scale * speed, encounter.dt),
+        _largest_sideways(plan.situation, n),
+    )
+    track = plan.situation.tracks[n]
     return RoutedVehicle(
         vehicle,
         path,
@@ -308,10 +311,11 @@ def _largest_jerk(speed: Floats, dt: float) -> float:
     return float(np.abs(np.diff(speed, 2)).max(initial=0.0)) / (dt * dt)
 
 
-def _largest_sideways(encounter: Encounter, n: int) -> float:
+def _largest_sideways(situation: Situation, n: int) -> float:
     """Largest lateral acceleration [m/s²] of the template's vehicle n, over half a second."""
+    encounter = situation.encounter
     first, last = encounter.present[n].tolist()
-    yaw = clean_tracks(encounter)[n].poses[first : last + 1, 2]
+    yaw = situation.tracks[n].poses[first : last + 1, 2]
     width = 2 * round(0.5 * _SMOOTH / encounter.dt) + 1
     sideways = np.gradient(yaw, encounter.dt) * encounter.speed[n, first : last + 1]
     return float(np.abs(ndimage.uniform_filter1d(sideways, width, mode="nearest")).max())

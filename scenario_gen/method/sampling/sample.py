@@ -93,13 +93,13 @@ def draw_scenarios(
             count, (), 1, Counter({Cause.SPEED_PROFILE: 1}), (prepared.refusal,), slot
         )
     else:
-        aim = aim_of(encounter, request, measures)
+        aim = aim_of(plan.situation, request, measures)
         sampler = Sampler(
             prepared.model,
             seed,
             plan.road.frame_id,
             ego,
-            label=label_of(encounter, request, aim, measures),
+            label=label_of(plan.situation, request, aim, measures),
         )
         judge = Judge.of(sampler, check, _enough(config, request))
         kept = tuple(
@@ -108,7 +108,7 @@ def draw_scenarios(
             if (edge.who, edge.whom) not in judge.lost
         )
         sampler = replace(
-            sampler, label=label_of(encounter, request, aim, measures, kept, judge.lost)
+            sampler, label=label_of(plan.situation, request, aim, measures, kept, judge.lost)
         )
         loop = _Loop(
             sampler,
@@ -157,13 +157,13 @@ def regenerate(
     prepared = prepare(plan, config, request.order)
     if prepared.model is None:
         return None
-    ego, aim = request.ego_of(plan.encounter), aim_of(plan.encounter, request, measures)
+    ego, aim = request.ego_of(plan.encounter), aim_of(plan.situation, request, measures)
     sampler = Sampler(
         prepared.model,
         seed,
         plan.road.frame_id,
         ego,
-        label=label_of(plan.encounter, request, aim, measures),
+        label=label_of(plan.situation, request, aim, measures),
     )
     if place_of(index)[0] == DIRECTED:
         if aim is None or check is None:

@@ -15,8 +15,7 @@ import numpy as np
 from scipy import special
 
 from scenario_gen.numerics import Bools, Floats
-from scenario_gen.situation import conflicts_in
-from scenario_gen.types import Encounter
+from scenario_gen.situation import Situation
 
 AFTER_S = 1.0  # that are left after the second has entered and the first has left
 LEAST_S = 3.0  # that are left of a template in any case
@@ -46,15 +45,15 @@ class Window:
         return np.asarray(span + np.array([1.0, -1.0]) * self.share * special.ndtr(z) * room)
 
 
-def window_of(encounter: Encounter, share: float, tied: Bools) -> Window | None:
+def window_of(situation: Situation, share: float, tied: Bools) -> Window | None:
     """Return what scenarios of a template may leave out; None if nothing, as where vehicles share no area.
 
     Args:
-        encounter: the template.
+        situation: of the template.
         share: of the time before and after its conflicts, at most.
         tied: (2,) whether start and end states are asked of any vehicle.
     """
-    conflicts = conflicts_in(encounter)
+    conflicts = situation.conflicts
     if not conflicts or share == 0.0 or tied.all():
         return None
     first = min(conflict.entry_first for conflict in conflicts)
@@ -65,12 +64,14 @@ def window_of(encounter: Encounter, share: float, tied: Bools) -> Window | None:
     return Window(between, np.where(tied, 0.0, share))
 
 
-def seconds_left_out(encounter: Encounter, share: float) -> Floats:
+def seconds_left_out(situation: Situation, share: float) -> Floats:
     """Return (2,) how many seconds of a template's start and end scenarios leave out at most."""
-    window = window_of(encounter, share, np.zeros(2, dtype=np.bool_))
+    window = window_of(situation, share, np.zeros(2, dtype=np.bool_))
     if window is None:
         return np.zeros(2)
-    spare = (window.between - np.array([0.0, encounter.duration])) * np.array([1.0, -1.0])
+    spare = (window.between - np.array([0.0, situation.encounter.duration])) * np.array(
+        [1.0, -1.0]
+    )
     return np.asarray(window.share * np.maximum(spare, 0.0))
 
 

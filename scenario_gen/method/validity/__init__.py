@@ -6,8 +6,7 @@
 from scenario_gen.method.validity.checker import Checker
 from scenario_gen.method.validity.dynamics import control_points
 from scenario_gen.method.validity.limits import Limits
-from scenario_gen.method.validity.reactions import LaneGaps
 
 __all__ = [
-    "Checker", "LaneGaps", "Limits", "control_points",
+    "Checker", "Limits", "control_points",
 ]  # fmt: skip

@@ -16,23 +16,24 @@ from scenario_gen.method.validity import dynamics
 from scenario_gen.method.validity.dynamics import control_points, is_motion
 from scenario_gen.method.validity.limits import Limits
 from scenario_gen.method.validity.presence import driven_on
-from scenario_gen.method.validity.reactions import broken_reactions, LaneGaps, tailgaters
+from scenario_gen.method.validity.reactions import broken_reactions, tailgaters
 from scenario_gen.numerics import Bools, Floats, runs
 from scenario_gen.numerics.plane import edge_lengths
 from scenario_gen.roads import drives_against, ground_for, RuleCheck
 from scenario_gen.situation import (
     Conflict,
-    conflict_of,
+    conflicts_by_pair,
     conflicts_in,
     lane_gaps,
+    LaneGaps,
     required_orders,
+    Situation,
     Wait,
 )
 from scenario_gen.types import (
     at_ends,
     BoundaryStates,
     Cause,
-    Encounter,
     Reaction,
     Road,
     Scenario,
@@ -98,7 +99,7 @@ class Checker:
     @classmethod
     def of_template(
         cls,
-        encounter: Encounter,
+        situation: Situation,
         road: Road,
         requested: BoundaryStates,
         waits: Sequence[Wait],
@@ -109,7 +110,7 @@ class Checker:
         """Return the checker of scenarios of a template, with all of its vehicles.
 
         Args:
-            encounter: the template, whose conflicts are kept.
+            situation: of the template, whose conflicts are kept.
             road: the road they drive on.
             requested: start and end states of all vehicles.
             waits: the template's waits that are kept.
@@ -120,8 +121,8 @@ class Checker:
         Raises:
             RefusedError: an order is to be swapped, and there is none.
         """
-        conflicts = conflicts_in(encounter)
-        own = (limits or Limits()).for_template(encounter)
+        encounter, conflicts = situation.encounter, situation.conflicts
+        own = (limits or Limits()).for_template(situation)
         ends = at_ends(encounter.present, len(encounter.time))
         return cls(
             road,
@@ -132,7 +133,7 @@ class Checker:
             required_orders(conflicts, order),
             reactions,
             ends,
-            lane_gaps(encounter),
+            situation.lane_gaps,
         )
 
     @property
@@ -168,6 +169,8 @@ class Checker:
         half = np.array([vehicle.half for vehicle in scenario.vehicles])
         control = np.empty((n, t - 1, 4, 2))
         control_points(time, scenario.position, heading, scenario.speed, control)
+        conflicts = conflicts_in(scenario)
+        gaps_in_lane = lane_gaps(scenario)
         violations = [
             *self._ends(scenario),
             *self._boundary_states(scenario),
@@ -175,17 +178,17 @@ class Checker:
             *self._contacts(scenario, control, half),
             *self._exits(scenario, control, half),
             *self._wrong_ways(scenario),
-            *self._broken_rules(scenario),
+            *self._broken_rules(scenario, conflicts),
             *self._waits(scenario),
         ]
-        conflicts = [
-            conflict_of(scenario, conflict.first, conflict.second)
-            for conflict in self.conflicts or ()
+        by_pair = conflicts_by_pair(conflicts)
+        recorded = [by_pair.get(conflict.pair) for conflict in self.conflicts or ()]
+        wrong, present, absent = self._passing_orders(recorded)
+        reactions = [
+            *broken_reactions(scenario, recorded, self.reactions, self._limits, gaps_in_lane)
         ]
-        wrong, present, absent = self._passing_orders(conflicts)
-        reactions = [*broken_reactions(scenario, conflicts, self.reactions, self._limits)]
         if self.lane_gaps is not None:
-            reactions += tailgaters(scenario, self.lane_gaps, self._limits)
+            reactions += tailgaters(scenario, gaps_in_lane, self.lane_gaps, self._limits)
         return Verdict((*violations, *wrong, *reactions), present, absent)
 
     def _refuse_misfits(self, scenario: Scenario) -> None:
@@ -460,11 +463,13 @@ class Checker:
             message = f"vehicle {i}: drives against its lane near ({x:.2f}, {y:.2f}), {int(against.sum())} samples in all"
             yield Violation(Cause.WRONG_WAY, float(scenario.time[k]), (i,), message)
 
-    def _broken_rules(self, scenario: Scenario) -> Iterator[Violation]:
+    def _broken_rules(
+        self, scenario: Scenario, conflicts: Sequence[Conflict]
+    ) -> Iterator[Violation]:
         """Stop lines that are run, and rights of way that are taken."""
         if self._rules is None or not self._rules.rules:
             return
-        for breach in self._rules.breaches(scenario, conflicts_in(scenario)):
+        for breach in self._rules.breaches(scenario, conflicts):
             message = f"vehicle {scenario.vehicles[breach.vehicles[0]].id}: {breach.message}"
             yield Violation(Cause.TRAFFIC_RULE, breach.time, breach.vehicles, message)
 

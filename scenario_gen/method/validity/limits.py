@@ -6,8 +6,8 @@
 from dataclasses import dataclass, replace
 
 from scenario_gen.base.parameters import parameter
-from scenario_gen.situation import least_gap
-from scenario_gen.types import Encounter, TypeLimits
+from scenario_gen.situation import Situation
+from scenario_gen.types import TypeLimits
 
 _SHARE_OF_GAP, _MOST_CLEARANCE = 0.5, 0.5  # of the template's least gap; m
 
@@ -112,11 +112,11 @@ class Limits(TypeLimits):
         """Gap [m] that must be exceeded; 0 where it follows a template and none is known."""
         return max(self.min_clearance, 0.0)
 
-    def for_template(self, encounter: Encounter) -> "Limits":
+    def for_template(self, situation: Situation) -> "Limits":
         """Return the limits of scenarios of a template, whose own least gap says how near vehicles may come to one another."""
         if self.min_clearance >= 0.0:
             return self
         return replace(
             self,
-            min_clearance=min(max(_SHARE_OF_GAP * least_gap(encounter), 0.0), _MOST_CLEARANCE),
+            min_clearance=min(max(_SHARE_OF_GAP * situation.least_gap, 0.0), _MOST_CLEARANCE),
         )

@@ -3,14 +3,14 @@
 
 """The certificate of interaction: who passes behind another one does so as a human would, and nobody tailgates."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 import math
 
 import numpy as np
 
 from scenario_gen.method.validity.limits import Limits
 from scenario_gen.numerics import Floats
-from scenario_gen.situation import Conflict, departure, lane_gaps, passing, time_gaps
+from scenario_gen.situation import Conflict, departure, LaneGaps, passing, time_gaps
 from scenario_gen.types import Cause, FOLLOW, Reaction, Scenario, Violation
 
 _ROUNDED = 0.1  # s, by which an entry or a clearing is known between samples
@@ -21,16 +21,18 @@ _SUCH_A_SPEED, _QUICK = (
 _NEAR_ENOUGH = 0.05  # m
 _ENOUGH = 4.0, 1.5  # m and s, of a gap that nobody keeps because it is needed
 
-LaneGaps = Mapping[tuple[int, int], tuple[Floats, Floats]]  # as of `lane_gaps`
-
 
 def broken_reactions(
     scenario: Scenario,
     conflicts: Sequence[Conflict | None],
     edges: Sequence[Reaction],
     limits: Limits,
+    gaps_in_lane: LaneGaps,
 ) -> Iterator[Violation]:
-    """Yield those who enter or leave too early or too late, or follow too far behind, in a scenario with `conflicts`."""
+    """Yield those who enter or leave too early or too late, or follow too far behind, in a scenario with `conflicts`.
+
+    `gaps_in_lane` are those of the scenario.
+    """
     met = {
         (conflict.second, conflict.first): conflict
         for conflict in conflicts
@@ -44,7 +46,10 @@ def broken_reactions(
         )
         conflict = met.get(pair)
         if edge.kind == FOLLOW:
-            gaps, high = time_gaps(scenario, *pair), (1.0 + limits.headway_share) * edge.headway[2]
+            gaps, high = (
+                time_gaps(gaps_in_lane, *pair),
+                (1.0 + limits.headway_share) * edge.headway[2],
+            )
             if len(gaps) and gaps.max() > high:
                 message = f"vehicle {who}: drives up to {gaps.max():.2f} s behind vehicle {whom}; allowed are {high:.2f} s"
                 yield Violation(Cause.REACTION, 0.0, pair, message)
@@ -78,9 +83,11 @@ def _enters(
         yield Violation(Cause.REACTION, enters, (edge.who, edge.whom), f"vehicle {who}: {message}")
 
 
-def tailgaters(scenario: Scenario, recorded: LaneGaps, limits: Limits) -> Iterator[Violation]:
+def tailgaters(
+    scenario: Scenario, gaps_in_lane: LaneGaps, recorded: LaneGaps, limits: Limits
+) -> Iterator[Violation]:
     """Yield those who come nearer to one ahead of them in their lane than they do in the template, at the samples."""
-    for (who, whom), (speed, gap) in lane_gaps(scenario).items():
+    for (who, whom), (speed, gap) in gaps_in_lane.items():
         floor = least_gaps(speed, *recorded.get((who, whom), (np.zeros(0), np.zeros(0))), limits)
         k = int(np.argmax(floor - gap))
         if floor[k] - gap[k] > _NEAR_ENOUGH:

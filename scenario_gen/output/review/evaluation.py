@@ -20,7 +20,7 @@ from scenario_gen.method.evaluation import coverage_of, evaluate_scenarios, Eval
 from scenario_gen.method.validity import Limits
 from scenario_gen.output.results import EVALUATED, write_evaluation
 from scenario_gen.output.review.validation import Checkers, kept_reactions
-from scenario_gen.situation import reactions_of
+from scenario_gen.situation import Situation
 from scenario_gen.types import (
     CheckCounts,
     EgoSlot,
@@ -91,7 +91,8 @@ def _result(
 ) -> GenerationResult:
     encounter, segmentation, road = namespace.encounter, namespace.segmentation, namespace.road
     fit, routes = namespace.fit
-    graph = reactions_of(encounter)
+    situation = Situation.of(encounter)
+    graph = situation.reactions
     checkers, scenarios, verdicts = Checkers(namespace, limits), [], list[Verdict]()
     for k in range(len(namespace.hashes)):
         stamp, scenario = namespace.scenario(k)
@@ -133,7 +134,7 @@ def _result(
             for k in (0, -1)
         )
         ego = EgoSlot(witness.vehicles[0], first, last)
-    held = [kept_reactions(encounter, namespace.entry(k)) for k in range(len(scenarios))]
+    held = [kept_reactions(situation, namespace.entry(k)) for k in range(len(scenarios))]
     generated = ScenarioSet(
         len(scenarios), tuple(scenarios), counts.candidates, Counter(counts.refused), _left_out(namespace), ego,
         reactions=tuple(edge for edge in graph.edges if all(edge in kept for kept in held)), graph=graph,

@@ -35,7 +35,7 @@ from scenario_gen.method.routing import PlanningConfig
 from scenario_gen.method.sampling import checker_of, plan_of, regenerate, SamplingConfig
 from scenario_gen.method.segmentation import segment, SegmentationConfig
 from scenario_gen.method.validity import Limits
-from scenario_gen.situation import mirrored
+from scenario_gen.situation import mirrored, Situation
 from scenario_gen.types import Encounter, GenerationResult, Request, Scenario, Segmentation
 
 REGENERATED = Kind("regenerated bag")
@@ -212,7 +212,9 @@ def _replan(found: "_Found", what: str, log: Path | None) -> Replanned:
         fitting = read_parameters(FittingConfig(), values, "fitting.", what)
         planning = read_parameters(PlanningConfig(), values, "planning.", what)
         config = replace(config, fitting=fitting, planning=planning)
-        planned = Chain(encounter, segmentation, road, config, requested, seed=seed).plan()
+        planned = Chain(
+            Situation.of(encounter), segmentation, road, config, requested, seed=seed
+        ).plan()
     return Replanned(planned, requested, config.sampling, config.limits)
 
 

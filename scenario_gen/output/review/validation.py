@@ -28,22 +28,19 @@ from scenario_gen.bags.recordings.read import (
 from scenario_gen.bags.storage.bag import within
 from scenario_gen.bags.storage.config import BagConfig
 from scenario_gen.base.errors import InputError
-from scenario_gen.method.validity import Checker, LaneGaps, Limits
+from scenario_gen.method.validity import Checker, Limits
 from scenario_gen.numerics import Bools
 from scenario_gen.situation import (
     Conflict,
-    conflicts_in,
-    find_waits,
-    lane_gaps,
-    reactions_of,
+    LaneGaps,
     required_orders,
+    Situation,
     Wait,
 )
 from scenario_gen.types import (
     at_ends,
     BoundaryStates,
     Cause,
-    Encounter,
     join_ego,
     lost_pairs,
     Reaction,
@@ -119,25 +116,25 @@ class Reference:
     @classmethod
     def of(
         cls,
-        encounter: Encounter,
+        situation: Situation,
         segmentation: Segmentation | None,
         road: Road | None,
         entry: ScenarioEntry | None,
     ) -> "Reference":
         """Return what a scenario with this entry is held against; without a segmentation its waits are not known."""
-        conflicts = conflicts_in(encounter)
+        encounter, conflicts = situation.encounter, situation.conflicts
         waits: tuple[Wait, ...] | None = None
         if segmentation is not None:
-            waits = tuple(find_waits(encounter)) if segmentation.changepoints.size else ()
+            waits = situation.waits_to_keep(segmentation)
         return cls(
             road,
             tokens(vehicle.id for vehicle in encounter.vehicles),
             tuple(conflicts),
             waits,
             required_orders(conflicts, entry.order if entry else "keep"),
-            kept_reactions(encounter, entry),
+            kept_reactions(situation, entry),
             at_ends(encounter.present, len(encounter.time)),
-            kept_gaps(encounter, entry),
+            kept_gaps(situation, entry),
         )
 
     def checker(
@@ -303,24 +300,24 @@ def _validate(namespace: Namespace, limits: Limits | None, tick: Callable[[], No
     return result
 
 
-def kept_reactions(encounter: Encounter, entry: ScenarioEntry | None) -> tuple[Reaction, ...]:
+def kept_reactions(situation: Situation, entry: ScenarioEntry | None) -> tuple[Reaction, ...]:
     """Return the reactions of a template that an entry says its scenario keeps."""
-    names = tokens(vehicle.id for vehicle in encounter.vehicles)
+    names = tokens(vehicle.id for vehicle in situation.encounter.vehicles)
     kept = split_pieces(entry.facts.get("reactions", "")) if entry else []
     return (
-        tuple(edge for edge in reactions_of(encounter).edges if edge.name(names) in kept)
+        tuple(edge for edge in situation.reactions.edges if edge.name(names) in kept)
         if kept
         else ()
     )
 
 
-def kept_gaps(encounter: Encounter, entry: ScenarioEntry | None) -> LaneGaps:
+def kept_gaps(situation: Situation, entry: ScenarioEntry | None) -> LaneGaps:
     """Return the template's gaps in a lane; zeros for the pairs that an entry says its scenario is not held to."""
-    names = tokens(vehicle.id for vehicle in encounter.vehicles)
+    names = tokens(vehicle.id for vehicle in situation.encounter.vehicles)
     lost = lost_pairs(entry.facts, names) if entry else ()
     return {
         pair: (speed, 0.0 * gap if pair in lost else gap)
-        for pair, (speed, gap) in lane_gaps(encounter).items()
+        for pair, (speed, gap) in situation.lane_gaps.items()
     }
 
 
@@ -346,4 +343,4 @@ def _reference(
     encounter = namespace.tracks_of(entry, stamp)
     if encounter is None:
         return Reference(road, None, (), None)
-    return Reference.of(encounter, namespace.segmentation_of(encounter), road, entry)
+    return Reference.of(Situation.of(encounter), namespace.segmentation_of(encounter), road, entry)

@@ -29,7 +29,7 @@ from scenario_gen.situation import (
     turns_to_keep,
     WAIT_SPEED,
 )
-from scenario_gen.situation.gaps import meetings
+from scenario_gen.situation.gaps import Meetings
 from scenario_gen.types import CARS, LaneNetwork, RuleKind
 
 NEAR = 8.0  # metres: a chain begins on a lane that passes a vehicle's start at most so far away
@@ -240,6 +240,7 @@ def middle(points: Floats) -> Curve:
 def match(
     chains: Chains,
     tracks: Sequence[Track],
+    met: Meetings,
     spot: Spot,
     scale: float = 1.0,
     ends: Sequence[tuple[str, str]] = (),
@@ -253,6 +254,7 @@ def match(
     Args:
         chains: of the map or the part of it.
         tracks: the template.
+        met: its conflicts by their vehicles, see `meetings`.
         spot: where it lies.
         scale: s of eq 9, of the distances driven.
         ends: by vehicle, the ids of the lanes by which it comes and goes, "" where any may be; (): any for all.
@@ -273,11 +275,16 @@ def match(
             return
         courses.append(course)
     yield judged(
-        chains, _tied(chains.network, courses, tracks, scale, [None] * len(courses)), tracks, spot
+        chains,
+        _tied(chains.network, courses, tracks, met, scale, [None] * len(courses)),
+        tracks,
+        spot,
     )
     begins = [_start_to_turn(course, track) for course, track in zip(courses, tracks, strict=True)]
     if any(begin is not None for begin in begins):
-        yield judged(chains, _tied(chains.network, courses, tracks, scale, begins), tracks, spot)
+        yield judged(
+            chains, _tied(chains.network, courses, tracks, met, scale, begins), tracks, spot
+        )
 
 
 def _placed(track: Track, spot: Spot) -> Floats:
@@ -400,6 +407,7 @@ def _tied(
     network: LaneNetwork,
     courses: list[Course],
     tracks: Sequence[Track],
+    met: Meetings,
     scale: float,
     begins: Sequence[float | None],
 ) -> list[Course]:
@@ -410,7 +418,6 @@ def _tied(
     """
     known = [Equation(((i, 1.0),), course.start, _PRIOR) for i, course in enumerate(courses)]
     crossing_of = {(a, b): crossing for a, b, crossing in pair_crossings(tracks)}
-    met = meetings(tuple(tracks))
     for a in range(len(tracks)):
         for b in range(a):
             crossing = crossing_of.get((a, b))

@@ -21,7 +21,7 @@ from scenario_gen.roads.vector.rules import RuleCheck
 from scenario_gen.roads.vector.search import crossing_spots, find_spots, Spot, spot_at
 from scenario_gen.roads.vector.street import along_streets
 from scenario_gen.situation import conflicts_in, separate, Track
-from scenario_gen.situation.gaps import meetings
+from scenario_gen.situation.gaps import Meetings, meetings
 from scenario_gen.types import LaneNetwork, lanes_for, LEVEL, once_per_object, Scenario
 
 _HOME = 1.0  # m²: where lanes of its directions lie so near the recorded paths, the template is at home
@@ -74,7 +74,8 @@ def placements(
     """
     chains = chains_of(network)
     home = spot_at(network, tracks, np.zeros(3))
-    judged = _Judged(network, tracks)
+    met = meetings(tracks)
+    judged = _Judged(network, tracks, met)
     drawn_for = network.drawn_for
     sized = (
         None
@@ -82,14 +83,20 @@ def placements(
         else spot_at(network, tracks, drawn_for.frame)
     )
     search = _Search(
-        chains, tracks, scales, judged, sized, drawn_for.lanes if drawn_for is not None else ()
+        chains,
+        tracks,
+        met,
+        scales,
+        judged,
+        sized,
+        drawn_for.lanes if drawn_for is not None else (),
     )
     found, recorded = False, ""
     owns = any(
         map(chains.own_of, tracks)
     )  # who has lanes of its own on a drawn road is not at home on those of cars
     if lanes is None and home.cost <= _HOME and not (network.drawn and owns):
-        own = next(match(chains, tracks, home))
+        own = next(match(chains, tracks, met, home))
         broken = own.reason or judged.broken(own)
         if not broken:
             found = True
@@ -122,6 +129,7 @@ class _Search:
 
     Attributes:
         chains, tracks, scales: as of `placements`.
+        met: conflicts of the tracks by their vehicles, see `meetings`.
         judged: whether a placement keeps the rules.
         sized: where the road was drawn for the template, None if it was not.
         ends: the lanes that it was drawn with, for each vehicle.
@@ -130,6 +138,7 @@ class _Search:
 
     chains: Chains
     tracks: tuple[Track, ...]
+    met: Meetings
     scales: Sequence[float]
     judged: "_Judged"
     sized: Spot | None
@@ -148,7 +157,7 @@ class _Search:
                     any(map(self.chains.own_of, self.tracks)),
                 )
                 variants = (
-                    match(self.chains, self.tracks, spot, scale, ends, own=own)
+                    match(self.chains, self.tracks, self.met, spot, scale, ends, own=own)
                     for own in (True, False)[not owns :]
                 )
                 for placement in chain.from_iterable(variants):
@@ -191,11 +200,11 @@ class _Search:
 class _Judged:
     """Whether placements keep the traffic rules of a network, and lie on one level where vehicles meet."""
 
-    def __init__(self, network: LaneNetwork, tracks: tuple[Track, ...]) -> None:
+    def __init__(self, network: LaneNetwork, tracks: tuple[Track, ...], met: Meetings) -> None:
         self._network = network
         self._check = RuleCheck(network)
         self._tracks = tracks
-        self._met = {pair for pair, met in meetings(tracks).items() if not met.following}
+        self._met = {pair for pair, conflict in met.items() if not conflict.following}
 
     def broken(self, placement: Match) -> str:
         """Return what a placement breaks; "" if nothing."""

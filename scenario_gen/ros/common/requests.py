@@ -40,6 +40,7 @@ from scenario_gen.method.validity import Limits
 from scenario_gen.ros.common.node_parameters import SamplerParameters
 from scenario_gen.ros.common.ros_parameters import values_of_call
 from scenario_gen.ros.common.services import offer_trigger, REQUESTS
+from scenario_gen.situation import Situation
 from scenario_gen.types import BoundaryStates, EgoSlot, GenerationResult, Request, Scenario
 
 SHOWN = 20  # waiting requests that are named
@@ -443,7 +444,9 @@ def answer_request(
         sampling=config.sampling,
         limits=config.limits,
     )
-    chain = Chain(encounter, segmentation, road, stages, config, config.count, config.seed)
+    chain = Chain(
+        Situation.of(encounter), segmentation, road, stages, config, config.count, config.seed
+    )
     try:
         outcome = chain.sample(
             chain.plan() if config.moves else replace(template, seed=config.seed), callbacks

@@ -37,6 +37,7 @@ from scenario_gen.method.validity import Limits
 from scenario_gen.numerics import Floats
 from scenario_gen.ros.common.services import REQUESTS
 from scenario_gen.ros.common.stage_node import Inputs, StageNode
+from scenario_gen.situation import Situation
 from scenario_gen.types import Road, tokens
 
 ROAD = ("map", "road/entries", "road/exits")
@@ -103,7 +104,9 @@ class Planner(StageNode):
         stages = PipelineConfig(
             fitting=config.fitting, planning=config.planning, limits=config.limits
         )
-        planned = Chain(encounter, segmentation, road, stages, seed=config.seed).plan()
+        planned = Chain(
+            Situation.of(encounter), segmentation, road, stages, seed=config.seed
+        ).plan()
         (_, fit), routes = planned.road_and_fit(), planned.routes
         stop_if_cancelled()
         anchors = anchor_stamps(encounter, segmentation.changepoints)

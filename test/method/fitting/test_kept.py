@@ -19,6 +19,7 @@ from scenario_gen.method.fitting.placement import Placement
 from scenario_gen.method.nearest import suggest_nearest
 from scenario_gen.method.segmentation import segment
 from scenario_gen.numerics.curve import Curve
+from scenario_gen.situation import Situation
 from scenario_gen.situation.tracks import clean_tracks
 from scenario_gen.types.encounter import Encounter, Vehicle
 from scenario_gen.types.request import Request
@@ -163,7 +164,8 @@ def test_what_is_lost_is_refused_by_name_and_taken_by_name(place):
 
 def test_the_refusal_names_roads_that_keep_it():
     answer = suggest_nearest(
-        LostEncounterError("lost"), Chain(CROSSING, SEGMENTATION, OPEN, PipelineConfig())
+        LostEncounterError("lost"),
+        Chain(Situation.of(CROSSING), SEGMENTATION, OPEN, PipelineConfig()),
     )
     assert isinstance(answer, LostEncounterError)
     assert re.match(r"lost\. Nearest possible: road (t_intersection|four_way)", str(answer))

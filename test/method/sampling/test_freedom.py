@@ -25,6 +25,7 @@ from scenario_gen.method.sampling.freedom import (
 from scenario_gen.method.sampling.pace import clock_of
 from scenario_gen.method.sampling.prepare import prepare
 from scenario_gen.method.validity import Checker
+from scenario_gen.situation import Situation
 from scenario_gen.types.encounter import Vehicle
 from scenario_gen.types.request import Request
 
@@ -39,8 +40,10 @@ def normal(count, size, seed=0):
 def batch(count=300, request=Request(), **parameters):
     encounter, segmentation, road, routes, asked, waits = scene()
     config = replace(SamplingConfig(), **parameters)
-    states = relaxed_states(asked, encounter, config, request)
-    model = prepare(Plan(encounter, segmentation, road, routes, states, waits), config).model
+    states = relaxed_states(asked, Situation.of(encounter), config, request)
+    model = prepare(
+        Plan(Situation.of(encounter), segmentation, road, routes, states, waits), config
+    ).model
     return model, model.draw(normal(count, model.size), Scale())
 
 
@@ -122,12 +125,12 @@ def test_what_is_asked_holds_and_what_is_freed_keeps_its_bounds():
     config = SamplingConfig()
     x, y, yaw, speed = asked.start[0]
     request = Request(starts=f"a: {x} {y} {yaw} {speed}")
-    states = relaxed_states(asked, encounter, config, request)
+    states = relaxed_states(asked, Situation.of(encounter), config, request)
     assert (states.relaxed[0, 0] == 0.0).all()
     assert (states.relaxed[0, 1] > 0.0).all()
     check = Checker(None, states, None, None).check
     made = draw_scenarios(
-        Plan(encounter, segmentation, road, routes, states, waits),
+        Plan(Situation.of(encounter), segmentation, road, routes, states, waits),
         check,
         config,
         count=40,
@@ -143,16 +146,22 @@ def test_what_is_asked_holds_and_what_is_freed_keeps_its_bounds():
 
 def test_nothing_is_freed_by_preset_narrow():
     encounter, *_, asked, _ = scene()
-    assert relaxed_states(asked, encounter, SamplingConfig(variety="narrow"), Request()) is asked
+    assert (
+        relaxed_states(asked, Situation.of(encounter), SamplingConfig(variety="narrow"), Request())
+        is asked
+    )
 
 
 def test_a_start_off_its_bounds_is_refused():
     encounter, segmentation, road, routes, asked, waits = scene()
     config = SamplingConfig()
-    states = relaxed_states(asked, encounter, config, Request())
+    states = relaxed_states(asked, Situation.of(encounter), config, Request())
     given = (encounter, segmentation, road, routes, states)
     made = draw_scenarios(
-        Plan(*given, waits), Checker(None, states, None, None).check, config, count=20
+        Plan(Situation.of(given[0]), *given[1:], waits),
+        Checker(None, states, None, None).check,
+        config,
+        count=20,
     )
     assert len(made.scenarios) == 20
     tight = replace(states, relaxed=0.0 * states.relaxed)

@@ -21,8 +21,7 @@ from scenario_gen.method.sampling.prepare import prepare
 from scenario_gen.method.segmentation import segment
 from scenario_gen.pipeline import PipelineConfig
 from scenario_gen.roads import build_road
-from scenario_gen.situation.interaction import waits_to_keep
-from scenario_gen.situation.reactions import reactions_of
+from scenario_gen.situation import Situation
 from scenario_gen.types.reaction import FOLLOW
 from scenario_gen.types.request import Request
 
@@ -41,15 +40,22 @@ def case(request):
     )
 
     def made(config=CONFIG, count=40):
-        return Chain(encounter, segmentation, road, config, count=count, seed=1).run()
+        return Chain(
+            Situation.of(encounter), segmentation, road, config, count=count, seed=1
+        ).run()
 
     return encounter, made, made(), made(FREE)
 
 
 def model_of(encounter, result):
-    waits = waits_to_keep(encounter, result.segmentation)
+    waits = Situation.of(encounter).waits_to_keep(result.segmentation)
     plan = Plan(
-        encounter, result.segmentation, result.road, result.routes, result.fit.requested, waits
+        Situation.of(encounter),
+        result.segmentation,
+        result.road,
+        result.routes,
+        result.fit.requested,
+        waits,
     )
     return prepare(plan, CONFIG.sampling).model
 
@@ -57,7 +63,7 @@ def model_of(encounter, result):
 def test_roots_keep_their_numbers_and_the_others_are_gaussian_with_the_stated_residual(case):
     encounter, _, made, _ = case
     model = model_of(encounter, made)
-    (edge,) = kept_reactions(encounter, CONFIG.sampling).edges
+    (edge,) = kept_reactions(Situation.of(encounter), CONFIG.sampling).edges
     first = np.cumsum([model.warp.size] + [v.size for v in model.vehicles]).tolist()
     mixing = Mixing.of(model.vehicles, first, model.warp.nominal, model.reactions, Scale())
     eps = np.random.default_rng(0).standard_normal((20_000, model.size))
@@ -128,7 +134,7 @@ def test_what_is_published_answers_as_the_template_does(case):
 
 def test_who_gives_way_is_slow_when_the_other_one_passes():
     encounter = labelled("meets another one closely", 3).encounter
-    (edge,) = reactions_of(encounter).edges
+    (edge,) = Situation.of(encounter).reactions.edges
     road, segmentation = (
         build_road("corridor", encounter, CONFIG.road),
         segment(encounter, CONFIG.segmentation, 1),
@@ -136,7 +142,7 @@ def test_who_gives_way_is_slow_when_the_other_one_passes():
     lost = []
     for config in (CONFIG, FREE):
         scenarios = (
-            Chain(encounter, segmentation, road, config, count=30, seed=1)
+            Chain(Situation.of(encounter), segmentation, road, config, count=30, seed=1)
             .run()
             .generated.scenarios
         )
@@ -163,8 +169,8 @@ def test_a_scenario_comes_again_by_its_index(case):
 
 
 def test_nobody_is_made_to_wait_where_another_order_is_asked_for():
-    assert kept_reactions(CROSSING, CONFIG.sampling).edges
-    assert kept_reactions(CROSSING, CONFIG.sampling, "free").edges == ()
-    assert kept_reactions(CROSSING, CONFIG.sampling, "swap").edges == ()
-    assert kept_reactions(LANE, CONFIG.sampling, "free").edges
-    assert kept_reactions(LANE, SamplingConfig(reactions="none")).edges == ()
+    assert kept_reactions(Situation.of(CROSSING), CONFIG.sampling).edges
+    assert kept_reactions(Situation.of(CROSSING), CONFIG.sampling, "free").edges == ()
+    assert kept_reactions(Situation.of(CROSSING), CONFIG.sampling, "swap").edges == ()
+    assert kept_reactions(Situation.of(LANE), CONFIG.sampling, "free").edges
+    assert kept_reactions(Situation.of(LANE), SamplingConfig(reactions="none")).edges == ()

@@ -17,6 +17,7 @@ from scenario_gen.method.sampling.plan import Plan
 from scenario_gen.method.sampling.prepare import prepare
 from scenario_gen.method.segmentation import segment
 from scenario_gen.roads import build_road
+from scenario_gen.situation import Situation
 from scenario_gen.situation.interaction import find_waits
 from scenario_gen.types.encounter import Encounter, Vehicle
 
@@ -80,10 +81,10 @@ def rolls_out():
 def undisturbed(encounter, segmentation):
     """The drive without deviations on the own road, and what was adapted."""
     road = build_road("corridor", encounter, CONFIG.road)
-    planned = Chain(encounter, segmentation, road, CONFIG).plan()
+    planned = Chain(Situation.of(encounter), segmentation, road, CONFIG).plan()
     done = prepare(
         Plan(
-            encounter,
+            Situation.of(encounter),
             segmentation,
             road,
             planned.routes,

@@ -15,6 +15,7 @@ from scenario_gen.method.sampling import draw_scenarios, Plan, regenerate, Sampl
 from scenario_gen.method.segmentation import segment
 from scenario_gen.method.validity import Checker
 from scenario_gen.roads import build_road
+from scenario_gen.situation import Situation
 from scenario_gen.situation.interaction import find_conflicts, find_waits, STAND_SPEED, WAIT_SPEED
 
 CASES = (
@@ -45,7 +46,7 @@ def test_recorded_encounter(data, case, ablation):
         Checker(road, fit.requested, conflicts, waits),
         SamplingConfig(variety="narrow"),
     )
-    plan = Plan(encounter, segmentation, road, routes, fit.requested, waits)
+    plan = Plan(Situation.of(encounter), segmentation, road, routes, fit.requested, waits)
     found = draw_scenarios(plan, checker.check, config, count=30, seed=2)
     assert len(found.scenarios) == 30
     assert found.acceptance > 0.7

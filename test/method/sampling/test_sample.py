@@ -24,6 +24,7 @@ from scenario_gen.method.sampling.prepare import prepare
 from scenario_gen.method.sampling.sampler import LEVEL_SIZE
 from scenario_gen.method.validity import Checker
 from scenario_gen.numerics.arrays import wrap_angle
+from scenario_gen.situation import Situation
 from scenario_gen.situation.interaction import find_waits, Wait
 from scenario_gen.types.road import Road
 from scenario_gen.types.scenario import BoundaryStates, Cause, Verdict, Violation
@@ -37,13 +38,20 @@ def all_valid(scenarios):
 
 def drawn(count=50, check=all_valid, config=None, seed=5):
     *head, waits = scene()
-    return draw_scenarios(Plan(*head, waits), check, config or PLAIN, count=count, seed=seed)
+    return draw_scenarios(
+        Plan(Situation.of(head[0]), *head[1:], waits),
+        check,
+        config or PLAIN,
+        count=count,
+        seed=seed,
+    )
 
 
 def batch(samples=200, scale=None, **changes):
     *head, waits = scene(120.0)
     model = prepare(
-        Plan(*head, waits), SamplingConfig(variety="narrow", bend_acceleration=5.0, **changes)
+        Plan(Situation.of(head[0]), *head[1:], waits),
+        SamplingConfig(variety="narrow", bend_acceleration=5.0, **changes),
     ).model
     return model, model.draw(
         np.random.default_rng(1).standard_normal((samples, model.size)), scale or Scale()
@@ -127,7 +135,9 @@ def test_same_seed_same_bytes_and_any_one_again(fifty):
         )
         np.testing.assert_allclose(c.position, a.position, atol=1e-9)
     last = more.scenarios[-1]
-    one = regenerate(Plan(*head, waits), PLAIN, seed=5, index=last.index)
+    one = regenerate(
+        Plan(Situation.of(head[0]), *head[1:], waits), PLAIN, seed=5, index=last.index
+    )
     for name in ("time", "position", "heading", "speed", "acceleration"):
         np.testing.assert_allclose(getattr(one, name), getattr(last, name), atol=1e-9)
     assert (
@@ -214,7 +224,7 @@ def test_lateral_deviation_leaves_room_on_a_narrow_road():
     lane[57:63] = True  # 1.5 m to either side of y = 0
     narrow = Road("lane", lane, 0.5, road.origin, [], [])
     done = prepare(
-        Plan(encounter, segmentation, narrow, routes, asked, waits),
+        Plan(Situation.of(encounter), segmentation, narrow, routes, asked, waits),
         SamplingConfig(variety="narrow"),
     )
     some = done.model.draw(
@@ -239,7 +249,9 @@ def test_refusals_are_counted_by_cause_and_levels_are_tried():
     assert max(s.index for s in found.scenarios) >= LEVEL_SIZE
     *head, waits = scene()
     last = found.scenarios[-1]
-    again = regenerate(Plan(*head, waits), PLAIN, seed=5, index=last.index)
+    again = regenerate(
+        Plan(Situation.of(head[0]), *head[1:], waits), PLAIN, seed=5, index=last.index
+    )
     np.testing.assert_allclose(again.position, last.position, atol=1e-9)
 
 
@@ -256,7 +268,9 @@ def test_progress_and_cancellation():
     *head, waits = scene()
     seen = []
     callbacks = Callbacks(progress=lambda *a: seen.append(a), cancelled=lambda: len(seen) > 2)
-    found = draw_scenarios(Plan(*head, waits), all_valid, count=500, callbacks=callbacks)
+    found = draw_scenarios(
+        Plan(Situation.of(head[0]), *head[1:], waits), all_valid, count=500, callbacks=callbacks
+    )
     assert 0 < len(found.scenarios) < 500
     assert seen[-1] == (len(found.scenarios), 500, found.candidates)
     assert "cancelled" in found.adaptations
@@ -266,7 +280,9 @@ def test_nothing_is_given_out_after_a_cancellation():
     *head, waits = scene()
     given = []
     callbacks = Callbacks(found=lambda *a: given.append(a[0]), cancelled=lambda: len(given) == 3)
-    made = draw_scenarios(Plan(*head, waits), all_valid, count=500, callbacks=callbacks)
+    made = draw_scenarios(
+        Plan(Situation.of(head[0]), *head[1:], waits), all_valid, count=500, callbacks=callbacks
+    )
     assert [s.index for s in given] == [s.index for s in made.scenarios]
     assert len(given) == 3
 
@@ -274,7 +290,10 @@ def test_nothing_is_given_out_after_a_cancellation():
 def test_a_wait_stands_where_the_vehicle_does_not_where_it_creeps():
     *head, _ = scene()
     speed = (
-        prepare(Plan(*head, (Wait(1, 6.8, 13.2),)), SamplingConfig(variety="narrow"))
+        prepare(
+            Plan(Situation.of(head[0]), *head[1:], (Wait(1, 6.8, 13.2),)),
+            SamplingConfig(variety="narrow"),
+        )
         .model.vehicles[1]
         .speed
     )
@@ -300,7 +319,9 @@ def test_a_creeping_wait_stays_slow_and_does_not_stand():
         (routes[0], own, routes[2]),
         BoundaryStates(asked.start, ends),
     )
-    made = draw_scenarios(Plan(*given, waits), all_valid, PLAIN, count=20, seed=1).scenarios
+    made = draw_scenarios(
+        Plan(Situation.of(given[0]), *given[1:], waits), all_valid, PLAIN, count=20, seed=1
+    ).scenarios
     verdicts = Checker(None, None, None, waits).check(made)
     assert not any(
         violation.cause is Cause.STOP_NOT_KEPT
@@ -308,7 +329,7 @@ def test_a_creeping_wait_stays_slow_and_does_not_stand():
         for violation in verdict.violations
     )
     assert all((s.speed[1] > 0.0).all() for s in made)
-    stands = Plan(*given, (replace(waits[0], moves_slowly=False),))
+    stands = Plan(Situation.of(given[0]), *given[1:], (replace(waits[0], moves_slowly=False),))
     stood = draw_scenarios(stands, all_valid, PLAIN, count=20, seed=1).scenarios
     assert all((s.speed[1] == 0.0).sum() > 30 for s in stood)
 
@@ -316,7 +337,7 @@ def test_a_creeping_wait_stays_slow_and_does_not_stand():
 def test_stretched_clock_is_said():
     encounter, segmentation, road, routes, asked, waits = scene()
     plan = Plan(
-        encounter,
+        Situation.of(encounter),
         segmentation,
         road,
         routes,
@@ -340,5 +361,7 @@ def test_routes_that_do_not_suit():
     encounter, segmentation, road, routes, asked, waits = scene()
     with pytest.raises(InputError, match="routes do not suit"):
         draw_scenarios(
-            Plan(encounter, segmentation, road, routes[:2], asked, waits), all_valid, count=5
+            Plan(Situation.of(encounter), segmentation, road, routes[:2], asked, waits),
+            all_valid,
+            count=5,
         )

@@ -13,7 +13,7 @@ from support.textbook_motions import labelled
 from scenario_gen import generate, PipelineConfig
 from scenario_gen.method.sampling import SamplingConfig
 from scenario_gen.method.sampling.window import AFTER_S, Window, window_of
-from scenario_gen.situation import conflict_of, conflicts_in
+from scenario_gen.situation import conflict_of, conflicts_in, Situation
 from scenario_gen.types import ALWAYS, Request
 
 FREE = np.zeros(2, dtype=np.bool_)
@@ -58,13 +58,16 @@ def test_where_an_ego_slot_keeps_its_states_nothing_is_left_out(encounter):
 
 def test_what_stays_is_the_conflict_and_a_second(encounter):
     (conflict,) = conflicts_in(encounter)
-    window = window_of(encounter, 0.5, FREE)
+    window = window_of(Situation.of(encounter), 0.5, FREE)
     assert window.between[0] == min(conflict.entry_first, conflict.entry_second)
     assert window.between[1] >= max(conflict.entry_second, conflict.exit_first) + AFTER_S
-    assert window_of(encounter, 0.0, FREE) is None and window_of(encounter, 0.5, ~FREE) is None
+    assert (
+        window_of(Situation.of(encounter), 0.0, FREE) is None
+        and window_of(Situation.of(encounter), 0.5, ~FREE) is None
+    )
     position = encounter.position.copy()
     position[0] += 1000.0
-    assert window_of(replace(encounter, position=position), 0.5, FREE) is None
+    assert window_of(Situation.of(replace(encounter, position=position)), 0.5, FREE) is None
 
 
 def test_the_largest_numbers_leave_out_the_whole_share_and_no_room_is_not_widened():

@@ -13,6 +13,7 @@ from scenario_gen.base.errors import InputError
 from scenario_gen.method.validity import Checker, checker, Limits
 from scenario_gen.method.validity.dynamics import LARGEST
 from scenario_gen.method.validity.presence import driven_on
+from scenario_gen.situation import Situation
 from scenario_gen.situation.interaction import Conflict, find_waits, Wait
 from scenario_gen.types.encounter import Encounter, Vehicle
 from scenario_gen.types.scenario import BoundaryStates, Cause
@@ -91,7 +92,9 @@ def test_who_stands_in_the_way_does_not_vanish(present, ends):
         Encounter("t", *names),
         BoundaryStates(states(template, 0), states(template, -1)),
     )
-    own = Checker.of_template(encounter, open_road(), asked, find_waits(encounter), FREE)
+    own = Checker.of_template(
+        Situation.of(encounter), open_road(), asked, find_waits(encounter), FREE
+    )
     assert not own.check([template])[0].violations
     (verdict,) = own.check([replace(template, present=np.array([present, [0, 100]]))])
     assert Cause.BOUNDARY_STATE in {violation.cause for violation in verdict.violations}
@@ -100,7 +103,7 @@ def test_who_stands_in_the_way_does_not_vanish(present, ends):
         in verdict.violations[0].message
     )
     late = replace(encounter, present=np.array([[20, 80], [0, 100]]))
-    own = Checker.of_template(late, open_road(), asked, find_waits(late), FREE)
+    own = Checker.of_template(Situation.of(late), open_road(), asked, find_waits(late), FREE)
     assert not own.check([replace(template, present=np.array([[10, 90], [0, 100]]))])[
         0
     ].violations, "who comes late may"

@@ -12,6 +12,7 @@ from support.motions import arc, open_road, scenario_of, straight
 from scenario_gen.base.errors import InputError
 from scenario_gen.base.road_users import Dynamics
 from scenario_gen.method.validity import Checker, Limits
+from scenario_gen.situation import Situation
 from scenario_gen.situation.interaction import Conflict, find_conflicts, Wait
 from scenario_gen.types.encounter import Encounter, Vehicle
 from scenario_gen.types.scenario import BoundaryStates, Cause
@@ -305,13 +306,13 @@ def test_the_least_gap_follows_the_template_unless_it_is_given():
         np.full((2, 51), 5.0),
     )
     assert Limits().clearance == 0.0  # nothing is known of a template
-    assert Limits().for_template(beside).clearance == pytest.approx(
+    assert Limits().for_template(Situation.of(beside)).clearance == pytest.approx(
         0.3
     )  # half of 2.5 m less the width
     far = replace(beside, position=position + np.array([[[0.0, 0.0]], [[0.0, 8.0]]]))
-    assert Limits().for_template(far).clearance == 0.5
+    assert Limits().for_template(Situation.of(far)).clearance == 0.5
     overlapping = replace(beside, position=position * np.array([1.0, 0.2]))
-    assert Limits().for_template(overlapping).clearance == 0.0
-    assert Limits(min_clearance=0.1).for_template(beside).clearance == 0.1
+    assert Limits().for_template(Situation.of(overlapping)).clearance == 0.0
+    assert Limits(min_clearance=0.1).for_template(Situation.of(beside)).clearance == 0.1
     late = replace(beside, present=np.array([[0, 20], [10, 50]]), position=position)
-    assert Limits().for_template(late).clearance == pytest.approx(0.3)
+    assert Limits().for_template(Situation.of(late)).clearance == pytest.approx(0.3)

@@ -11,9 +11,9 @@ from support.reaction_scenes import answering, crossing, lane_encounter, wander
 from support.textbook_motions import labelled, REACTIONS
 
 from scenario_gen.method.validity import Checker, Limits
+from scenario_gen.situation import Situation
 from scenario_gen.situation.gaps import lane_gaps
 from scenario_gen.situation.interaction import find_conflicts
-from scenario_gen.situation.reactions import reactions_of
 from scenario_gen.types.scenario import Cause, Scenario
 
 
@@ -38,7 +38,7 @@ def refusals(scenario, template, limits=None):
         conflicts,
         None,
         limits,
-        reactions=reactions_of(template).edges,
+        reactions=Situation.of(template).reactions.edges,
         lane_gaps=lane_gaps(template),
     )
     (verdict,) = checker.check([scenario])
@@ -46,7 +46,7 @@ def refusals(scenario, template, limits=None):
 
 
 TEMPLATE = crossing(8.0)
-CLEARS = reactions_of(TEMPLATE).edges[0].clears
+CLEARS = Situation.of(TEMPLATE).reactions.edges[0].clears
 
 
 @pytest.mark.parametrize(
@@ -63,7 +63,7 @@ CLEARS = reactions_of(TEMPLATE).edges[0].clears
 )
 def test_a_yielder_leaves_neither_before_the_other_has_cleared_nor_long_after(lag, kept):
     """It is seen to leave 0.25 s after its speed begins to rise."""
-    own = reactions_of(TEMPLATE).edges[0].lag
+    own = Situation.of(TEMPLATE).reactions.edges[0].lag
     assert -0.1 < own < 2.0
     found = refusals(as_scenario(crossing(CLEARS + lag)), TEMPLATE)
     assert (found == []) == kept
@@ -107,7 +107,7 @@ def test_a_follower_keeps_its_own_drivers_gaps(ahead, kept):
 def test_nobody_drives_nearer_than_half_a_second_even_without_a_reaction():
     """A driver who in the template is far behind, at any speed of it."""
     far = lane_encounter(LEADER, LEADER, 75.0)
-    assert reactions_of(far).edges == ()
+    assert Situation.of(far).reactions.edges == ()
     for gap, kept in ((12.0, True), (9.0, False)):  # between centres, at 12 m/s
         found = refusals(as_scenario(lane_encounter(LEADER, LEADER, gap)), far)
         assert (found == []) == kept

@@ -35,6 +35,7 @@ from scenario_gen.output.report.page import render, ReportInput, write_report
 from scenario_gen.output.review.evaluation import bag_results
 from scenario_gen.pipeline import PipelineConfig
 from scenario_gen.roads import build_road
+from scenario_gen.situation import Situation
 from scenario_gen.types.scenario import Cause, ScenarioSet
 
 QUICK = EvaluationConfig(resamples=50)
@@ -47,7 +48,12 @@ def real_run():
     config = PipelineConfig()
     road = build_road("straight", encounter, config.road)
     return Chain(
-        encounter, segment(encounter, config.segmentation, 7), road, config, count=3, seed=7
+        Situation.of(encounter),
+        segment(encounter, config.segmentation, 7),
+        road,
+        config,
+        count=3,
+        seed=7,
     ).run()
 
 

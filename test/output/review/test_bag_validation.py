@@ -32,6 +32,7 @@ from scenario_gen.output.review.regenerate import regenerate_scenario
 from scenario_gen.output.review.validation import ALTERED, NO_WITNESS, UNUSABLE, validate_bag
 from scenario_gen.pipeline import PipelineConfig
 from scenario_gen.roads import build_road
+from scenario_gen.situation import Situation
 from scenario_gen.types.request import Request
 from scenario_gen.types.scenario import BoundaryStates
 
@@ -43,7 +44,12 @@ def run():
     config = PipelineConfig(sampling=SamplingConfig(variety="narrow"))
     road = build_road("straight", encounter, config.road)
     return Chain(
-        encounter, segment(encounter, config.segmentation, 7), road, config, count=4, seed=7
+        Situation.of(encounter),
+        segment(encounter, config.segmentation, 7),
+        road,
+        config,
+        count=4,
+        seed=7,
     ).run()
 
 
@@ -101,7 +107,12 @@ def test_the_reactions_that_an_entry_names_are_proven_again(tmp_path):
     config = PipelineConfig()
     road = build_road("t_intersection", encounter, config.road)
     made = Chain(
-        encounter, segment(encounter, config.segmentation, 7), road, config, count=4, seed=7
+        Situation.of(encounter),
+        segment(encounter, config.segmentation, 7),
+        road,
+        config,
+        count=4,
+        seed=7,
     ).run()
     assert [edge.name("12") for edge in made.generated.reactions] == ["2 yields to 1"]
     bag = write_recording(tmp_path / "b", {"/here": made})
