@@ -13,6 +13,7 @@ from scenario_gen.method.nearest import suggest_nearest
 from scenario_gen.method.routing import PlanningConfig
 from scenario_gen.method.sampling import Callbacks, SamplingConfig
 from scenario_gen.method.validity import Limits
+from scenario_gen.situation import Situation
 from scenario_gen.types.encounter import Encounter
 from scenario_gen.types.road import Road
 from scenario_gen.types.segmentation import Segmentation
@@ -44,7 +45,13 @@ class Given:
 def answer(given, request, *, count, cancelled=lambda: False):
     """Return what comes of a request; the nearest possible one is looked for where it cannot be had."""
     asked = Chain(
-        given.encounter, given.segmentation, given.road, given.config, request, count, given.seed
+        Situation.of(given.encounter),
+        given.segmentation,
+        given.road,
+        given.config,
+        request,
+        count,
+        given.seed,
     )
     try:
         return asked.run(Callbacks(cancelled=cancelled))

@@ -312,7 +312,7 @@ def test_the_command_answers_with_its_exit_code(run, tmp_path):
 def test_an_ego_is_checked_with_its_witness(run, tmp_path):
     """The witness is a part of what is proven: one that hits another is found, one that is lost or altered is said."""
     slot = Chain(
-        run.encounter,
+        Situation.of(run.encounter),
         run.segmentation,
         run.road,
         PipelineConfig(),
