@@ -1,14 +1,14 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Corpus: what mining finds, what it costs, batches by one and two processes and through SIGKILLs, the library.
+"""Corpus: what mining finds, what it costs, batches by one and two processes.
 
 Everything is synthetic but the full recordings. CPU seconds depend on what else the machine does; DuckDB's own copy of the same
 text to Parquet stands beside them, from the same run.
 """
 
 from collections import Counter
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from contextlib import suppress
 from functools import cache
 from importlib.util import find_spec
@@ -24,9 +24,7 @@ import time
 import numpy as np
 
 from benchmarks._archive import Planted, read_planted
-from benchmarks._corpus_kills import killed_batch
 from benchmarks._corpus_peers import costs, missing
-from benchmarks._corpus_primitives import f1, planted_encounter, score
 from benchmarks._corpus_store import bucket_with, spent, START
 from benchmarks._size import sized
 from benchmarks.row import higher, lower, Row
@@ -35,14 +33,9 @@ from scenario_gen.base.folders import sha256_of
 from scenario_gen.corpus.batch import seed_of
 from scenario_gen.corpus.config import CorpusConfig
 from scenario_gen.corpus.encounters import encounter_of, tables_of
-from scenario_gen.corpus.library import adjusted_rand, labels_of, pair_encounters, SHARED
 from scenario_gen.corpus.mine import mine
 from scenario_gen.corpus.tables import rows_of
 from scenario_gen.logs.tables import COLUMNS
-from scenario_gen.method.segmentation import segment
-from scenario_gen.method.segmentation.library import assign, build_library, PrimitiveLibrary
-from scenario_gen.numerics.arrays import Ints
-from scenario_gen.types.encounter import Encounter
 
 DATA = Path(
     os.environ.get("SCENARIO_GEN_DATA", Path(__file__).resolve().parents[2] / "shared" / "data")
@@ -61,21 +54,17 @@ SPARSE = {
     "outside": sized(268, quick=6),
 }
 """As many encounters in a row as the Safety Pilot's archive has: 462,161 in 43 · 10⁹."""
-MESSAGES, ENCOUNTERS, TEXT = 43.1e9, 462_161, 5.4e12  # of that archive; bytes
-CORE_HOUR, STORED = 0.05, 0.023  # $ for a core-hour, and for a GB and month
 ARCHIVES = {"dense": DENSE, "sparse": SPARSE}
 CLEANED = sized(300, quick=10)
 TEMPLATES, COUNT = sized((200, 50), quick=(2, 2))
 ROADS = ("corridor", "t_intersection")
-KILLS = sized(20, quick=1)
 PEERS = sized(3, quick=1)
-STORED, ROUNDS = sized((4_000_000, 3), quick=(20_000, 1))
-LIBRARY, NEW = sized((1000, 100), quick=(8, 2))
+STORED, ROUNDS = sized((4_000_000, 3), quick=(80_000, 1))
 TRUE = 1 << 40
 
 
 def run(part: str = "all") -> list[Row]:
-    """Measure; `part` is mine, memory, store, recorded, batch, kills, library or peers."""
+    """Measure; `part` is mine, memory, store, recorded, batch or peers."""
     rows: list[Row] = []
     with tempfile.TemporaryDirectory() as folder:
         place = Path(folder)
@@ -212,16 +201,6 @@ def memory_of(place: Path) -> list[Row]:
     recall, precision, kinds = _scores(read_planted(archive), out)
     rows = json.loads((archive / "synthetic.json").read_text())["rows"]
     searching = seconds["search"] + seconds["group"]
-    stored, shuffled = (
-        float(sum(path.stat().st_size for path in (out / folder).glob(pattern))) / rows
-        for folder, pattern in (("messages", "*.parquet"), ("hours", "*.parquet"))
-    )
-    cleaned = _cleaning(archive, place)
-    each = (
-        sum(path.stat().st_size for path in (place / "small" / "encounters").glob("*.parquet"))
-        / CLEANED
-    )
-    whole = estimate(rows / seconds["parse"], rows / searching, cleaned, stored, shuffled, each)
     what = f"{rows / 1e6:.0f} M rows, {SPARSE['encounters']} encounters"
     return [
         higher(f"{what}: recall", recall, "", 0.99),
@@ -238,53 +217,6 @@ def memory_of(place: Path) -> list[Row]:
             "",
             1.2,
         ),
-        *whole,
-    ]
-
-
-def estimate(
-    parsed: float, searched: float, cleaned: float, stored: float, shuffled: float, each: float
-) -> list[Row]:
-    """Return what the whole archive of the Safety Pilot would cost, by stage, from measured rates.
-
-    Args:
-        parsed: rows of text per CPU second.
-        searched: rows of Parquet per CPU second, grouping included.
-        cleaned: CPU seconds for an encounter.
-        stored: bytes of `messages/` for each row.
-        shuffled: bytes of `hours/` for each row.
-        each: bytes of `encounters/` for an encounter.
-    """
-    hours = {
-        f"parsing, {parsed / 1e6:.2f} M rows per CPU s": MESSAGES / parsed / 3600.0,
-        f"searching, {searched / 1e6:.2f} M rows per CPU s": MESSAGES / searched / 3600.0,
-        f"cleaning, {cleaned:.3f} CPU s each": ENCOUNTERS * cleaned / 3600.0,
-    }
-    disk = {
-        f"messages/, {stored:.2f} bytes a row": MESSAGES * stored / 1e9,
-        f"hours/, {shuffled:.2f} bytes a row": MESSAGES * shuffled / 1e9,
-        f"encounters/, {each / 1e3:.1f} kB each": ENCOUNTERS * each / 1e9,
-    }
-    spent, kept = sum(hours.values()), sum(disk.values())
-    reading = TEXT / 1e9 / spent * 16.0 / 3600.0
-    return [
-        *(lower(f"whole archive: {what}", value, "core-hours") for what, value in hours.items()),
-        *(lower(f"whole archive: {what}", value, "GB") for what, value in disk.items()),
-        lower(
-            "whole archive: computing",
-            spent * CORE_HOUR,
-            "$",
-            None,
-            f"{spent:.1f} core-hours at {CORE_HOUR} $",
-        ),
-        lower(
-            "whole archive: storage",
-            kept * STORED,
-            "$ a month",
-            None,
-            f"{kept:.0f} GB at {STORED} $",
-        ),
-        lower("whole archive: sixteen cores read", reading, "GB/s"),
     ]
 
 
@@ -436,112 +368,6 @@ def batch(place: Path) -> list[Row]:
     ]
 
 
-def kills(place: Path) -> list[Row]:
-    """SIGKILLs of workers and of the run, and what is then missing, doubled or other."""
-    corpus, few = _corpus(place), min(40, TEMPLATES)
-    subprocess.run(
-        [sys.executable, "-m", "scenario_gen", *_words(corpus, place / "whole", 1, 5, few)],
-        check=True,
-        capture_output=True,
-    )
-    workers, runs = killed_batch(
-        _words(corpus, place / "killed", 2, 5, few), place / "killed", KILLS
-    )
-    return [
-        higher(f"SIGKILLs ({workers} of a worker, {runs} of the run)", workers + runs, "", KILLS),
-        higher(
-            "after them the same bytes",
-            float(_digests(place / "whole") == _digests(place / "killed")),
-            "",
-            1.0,
-        ),
-    ]
-
-
-def library(place: Path) -> list[Row]:
-    """A library of encounters whose primitives are planted, then of all recorded pairs with them; new ones assigned."""
-    random = np.random.default_rng(2)
-    made = [planted_encounter(random, str(k)) for k in range(LIBRARY + NEW)]
-    old, new = made[:LIBRARY], made[LIBRARY:]
-    encounters = [encounter for encounter, _, _ in old]
-    found, labels, fitted = _two_seeds(encounters)
-    planted = np.concatenate([own for _, _, own in old])
-    again = [assign(e, found, SHARED) for e, _, _ in new]
-    assigned = score(
-        [
-            f1(one.segmentation.changepoints, points)
-            for one, (_, points, _) in zip(again, new, strict=True)
-        ]
-    )
-    alone = score([f1(segment(e).changepoints, points) for e, points, _ in new])
-    told = np.concatenate(
-        [
-            labels_of(a.segmentation.changepoints, a.primitives, e)
-            for a, (e, _, _) in zip(again, new, strict=True)
-        ]
-    )
-    truth = np.concatenate([own for _, _, own in new])
-    rows = [
-        lower(
-            f"library of {LIBRARY} synthetic ({len(found.means)} primitives, 8 planted)",
-            fitted,
-            "CPU s",
-            1200.0,
-        ),
-        higher("two seeds, adjusted Rand", adjusted_rand(*labels), "", 0.8),
-        higher("planted primitives, adjusted Rand", adjusted_rand(planted, labels[0]), "", 0.9),
-        lower(
-            f"F1 of {NEW} new ones, alone less assigned",
-            alone - assigned,
-            "",
-            0.05,
-            f"alone {alone:.3f}, assigned {assigned:.3f}",
-        ),
-        higher("new ones, planted primitives, adjusted Rand", adjusted_rand(truth, told), ""),
-    ]
-    if not (DATA / "trajectories").is_dir():
-        return rows
-    if not (place / "recorded").is_dir():
-        recorded(place)
-    corpora = sorted((place / "recorded").glob("*-corpus"))
-    real = [
-        pair
-        for corpus in corpora
-        for row in rows_of(sorted((corpus / "encounters").glob("*.parquet")))
-        for pair in pair_encounters(encounter_of(row), CorpusConfig().interaction)
-    ]
-    for name, those in (
-        (f"{len(real)} recorded pairs", real),
-        (f"{len(real)} recorded and {LIBRARY} synthetic", real + encounters),
-    ):
-        found, labels, fitted = _two_seeds(those)
-        both = adjusted_rand(*(each[: sum(len(pair.time) for pair in real)] for each in labels))
-        rows += [
-            lower(f"library of {name} ({len(found.means)} primitives)", fitted, "CPU s", 1200.0),
-            higher(
-                f"library of {name}: two seeds, adjusted Rand of the recorded ones", both, "", 0.8
-            ),
-        ]
-    return rows
-
-
-def _two_seeds(encounters: Sequence[Encounter]) -> tuple[PrimitiveLibrary, list[Ints], float]:
-    """A library, the primitive of each sample by each of two seeds, and CPU seconds of the first."""
-    begun = time.process_time()
-    found, assignments = build_library(encounters, SHARED, 0)
-    fitted = time.process_time() - begun
-    labels = [
-        np.concatenate(
-            [
-                labels_of(a.segmentation.changepoints, a.primitives, e)
-                for a, e in zip(each, encounters, strict=True)
-            ]
-        )
-        for each in (assignments, build_library(encounters, SHARED, 1)[1])
-    ]
-    return found, labels, fitted
-
-
 def peers(place: Path) -> list[Row]:
     """A few templates on the roads of a batch by a chain of peers; no row where one is not installed (`make bench`)."""
     if missing():
@@ -580,7 +406,5 @@ PARTS = {
     "store": store,
     "recorded": recorded,
     "batch": batch,
-    "kills": kills,
-    "library": library,
     "peers": peers,
 }
