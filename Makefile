@@ -85,7 +85,7 @@ install: $(READY)
 
 # The core first: with it the kernels of the stages are compiled, once for this user, while pip installs the rest.
 STAGES := numerics situation roads method
-$(RUN): requirements/core.lock requirements/run.lock requirements/ros.lock setup.py
+$(RUN): requirements/core.lock requirements/run.lock requirements/ros.lock pyproject.toml
 	@$(PYTHON) -c 'import sys; v = sys.version_info[:2]; sys.exit(not (3, 11) <= v <= (3, 13) and f"Python {v[0]}.{v[1]} found; 3.11, 3.12 or 3.13 is needed: make PYTHON=python3.12")'
 	$(PYTHON) -m venv $(if $(SOURCED),--system-site-packages) .venv
 	$(LOCKED) -r requirements/core.lock

@@ -45,7 +45,7 @@ def needs(extra: str, *modules: str) -> None:
     """Check that the modules of an extra are installed.
 
     Args:
-        extra: a key of `extras_require` in setup.py.
+        extra: one of the extras in pyproject.toml.
         modules: top-level names; they are looked for, not imported.
 
     Raises:

@@ -66,8 +66,8 @@ class Outcome:
     name: str
     verdict: DriveVerdict
     drive: Drive
-    origin: Origin = Origin()  # noqa: RUF009 - frozen
-    decisions: Decisions = Decisions()  # noqa: RUF009 - frozen
+    origin: Origin = Origin()
+    decisions: Decisions = Decisions()
 
 
 @dataclass(frozen=True)

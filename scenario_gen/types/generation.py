@@ -62,9 +62,9 @@ class GenerationResult:
     road: Road | None
     fit: Fit | None
     routes: Sequence[Route]
-    generated: ScenarioSet = ScenarioSet(0, (), 0)  # noqa: RUF009 - frozen
+    generated: ScenarioSet = ScenarioSet(0, (), 0)
     seed: int = 0
-    evaluation: Evaluation = Evaluation.empty()  # noqa: RUF009 - frozen
+    evaluation: Evaluation = Evaluation.empty()
     references: Mapping[str, ScenarioSet] = field(default_factory=dict)
     refusals: Mapping[str, str] = field(default_factory=dict)
     replay: Scenario | None = None

@@ -6,9 +6,9 @@
 from collections.abc import Iterator, Mapping, Sequence
 import csv
 from importlib.metadata import Distribution, distributions, PackageNotFoundError
-from itertools import chain
 from pathlib import Path
 import re
+import tomllib
 import xml.etree.ElementTree as ET
 
 from packaging.requirements import Requirement
@@ -24,8 +24,10 @@ TOLD = {  # what metadata does not say, or says only on Windows; looked up in th
     "colorama": "BSD-3-Clause",
     "coloredlogs": "MIT",
     "humanfriendly": "MIT",
+    "pyclothoids": "MIT",
     "pyreadline3": "BSD-3-Clause",
     "pywin32": "PSF-2.0",
+    "tzdata": "Apache-2.0",
     "axe-playwright-python": "MIT; axe-core MPL-2.0",
     "apsw": "any OSI-approved licence",
     "empy": "BSD",
@@ -99,33 +101,24 @@ def _of_manifests(found: Distribution) -> Iterator[str]:
 
 
 def extras() -> dict[str, list[Requirement]]:
-    """Return what core.in, run.in and extras.in ask for at run time, by the extra that it is for, or "core"."""
-    found: dict[str, list[Requirement]] = {}
-    texts = [
-        (REQUIREMENTS / f"{name}.in").read_text(encoding="utf-8")
-        for name in ("core", "run", "extras")
-    ]
-    for line in "".join(text.partition("# to build")[0] for text in texts).splitlines():
-        if line.startswith("#"):
-            heading = line.removeprefix("# ").removeprefix("extra ")
-        else:
-            found.setdefault(heading, []).append(Requirement(line))
-    return found
+    """Return the requirements in pyproject.toml by extra, the core's as "core"; included extras are left out."""
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    listed = {"core": project["dependencies"]} | project["optional-dependencies"]
+    return {
+        name: [wanted for wanted in map(Requirement, texts) if wanted.name != project["name"]]
+        for name, texts in listed.items()
+    }
 
 
 def run_time() -> list[Requirement]:
-    """Return what setup.py asks for, all extras included."""
-    ros = (REQUIREMENTS / "ros.in").read_text(encoding="utf-8").splitlines()
-    return [
-        *chain.from_iterable(extras().values()),
-        *(Requirement(line) for line in ros if not line.startswith("#")),
-    ]
+    """Return the requirements of the core and of all extras but the test's."""
+    return [wanted for name, listed in extras().items() if name != "test" for wanted in listed]
 
 
 def needed_at_run_time(
     known: Mapping[str, Distribution], wanted: Sequence[Requirement] | None = None
 ) -> set[str]:
-    """Return the names of all that requirements (all of setup.py's) lead to on this platform."""
+    """Return the names of all that requirements (by default all of pyproject.toml) lead to on this platform."""
     open_ = run_time() if wanted is None else list(wanted)
     found: set[str] = set()
     seen: set[tuple[str, str]] = set()

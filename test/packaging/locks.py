@@ -1,31 +1,45 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Write the locks that `make` installs, with uv, onto those that are there, whose pins stay: python test/packaging/locks.py.
+"""Write the locks that `make` installs, with uv: python test/packaging/locks.py, then `make licences`.
 
-One version for all Pythons wherever wheels allow it.
-
-Each lock holds what its list asks for beyond the locks that are installed before it. Then `make licences`.
+Existing pins stay, and one version serves all Pythons wherever wheels allow it. The requirements
+come from pyproject.toml and, for packages that build, test or judge, from requirements/*.in. Each
+lock has only the packages that the locks installed before it lack.
 """
 
-from itertools import chain
+from dataclasses import dataclass
 from pathlib import Path
 import re
 import subprocess
 import tempfile
 
-from licences import REQUIREMENTS
+from licences import extras, REQUIREMENTS
 
-BEFORE = {  # what is installed before each; ROS's wheels may come from a sourced Jazzy instead
-    "core": (),
-    "run": ("core",),
-    "ros": ("core", "run"),
-    "extras": ("core", "run"),
-    "test": ("core", "run", "extras"),
-    "ros-test": ("core", "run", "ros", "extras", "test"),
-    "bench": ("core", "run", "extras", "test"),
-}  # the others are installed into environments of their own
+
+@dataclass(frozen=True)
+class Lock:
+    """A lock of the project's environment: the extras that it installs, and the locks before it."""
+
+    extras: tuple[str, ...] = ()
+    before: tuple[str, ...] = ()
+
+
+LOCKS = {
+    "core": Lock(("core",)),
+    "run": Lock(("bags", "report", "cli"), ("core",)),
+    # A sourced Jazzy may replace these wheels, so no other lock builds on them.
+    "ros": Lock(("ros",), ("core", "run")),
+    "extras": Lock(
+        ("parquet", "plot", "planners", "gym", "corpus", "stores", "osi", "openscenario"),
+        ("core", "run"),
+    ),
+    "test": Lock((), ("core", "run", "extras")),
+    "ros-test": Lock((), ("core", "run", "ros", "extras", "test")),
+    "bench": Lock((), ("core", "run", "extras", "test")),
+}
 OPTIONS = [
+    "--quiet",
     "--universal",
     "--python-version",
     "3.11",
@@ -39,46 +53,45 @@ OPTIONS = [
 
 def pins(text: str) -> dict[str, str]:
     """Return the pins of a lock with their hashes, by their first lines."""
-    return {
-        block.partition("\n")[0]: block
-        for block in re.split(r"^(?=\w)", text, flags=re.MULTILINE)
-        if "==" in block
-    }
+    blocks = re.split(r"^(?=\w)", text, flags=re.MULTILINE)
+    return {block.partition("\n")[0]: block for block in blocks if "==" in block}
+
+
+def requirements(name: str) -> str:
+    """Return the requirements of one lock, a line each."""
+    known = extras()
+    lines = [str(wanted) for extra in LOCKS.get(name, Lock()).extras for wanted in known[extra]]
+    file = REQUIREMENTS / f"{name}.in"
+    if file.exists():
+        lines += file.read_text(encoding="utf-8").splitlines()
+    return "\n".join(lines) + "\n"
 
 
 def main() -> None:
-    """Write all of them."""
-    whole: dict[str, dict[str, str]] = {}
+    """Write all locks."""
+    names = dict.fromkeys([*LOCKS, *sorted(path.stem for path in REQUIREMENTS.glob("*.in"))])
+    resolved: dict[str, dict[str, str]] = {}
     with tempfile.TemporaryDirectory() as folder:
-        out = Path(folder) / "whole.lock"
-        for name in dict.fromkeys(
-            [*BEFORE, *sorted(path.stem for path in REQUIREMENTS.glob("*.in"))]
-        ):
-            before, lock = BEFORE.get(name, ()), REQUIREMENTS / f"{name}.lock"
-            known = dict.fromkeys(
-                chain(
-                    *(whole[each].values() for each in before),
-                    pins(lock.read_text(encoding="utf-8")).values(),
-                )
-            )
-            out.write_text("".join(known), encoding="utf-8")
-            lists = [str(REQUIREMENTS / f"{each}.in") for each in (*before, name)]
-            command = [
-                "uv",
-                "pip",
-                "compile",
-                "--quiet",
-                *OPTIONS,
-                *lists,
-                "--output-file",
-                str(out),
-            ]
+        output = Path(folder) / "resolved.lock"
+        wanted = Path(folder) / "wanted.in"
+        for name in names:
+            before = LOCKS.get(name, Lock()).before
+            lock = REQUIREMENTS / f"{name}.lock"
+
+            known: dict[str, str] = {}
+            for each in before:
+                known |= resolved[each]
+            known |= pins(lock.read_text(encoding="utf-8"))
+            output.write_text("".join(known.values()), encoding="utf-8")
+            wanted.write_text("".join(map(requirements, (*before, name))), encoding="utf-8")
+
+            command = ["uv", "pip", "compile", *OPTIONS, str(wanted), "--output-file", str(output)]
             subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
-            whole[name] = pins(out.read_text(encoding="utf-8"))
+            resolved[name] = pins(output.read_text(encoding="utf-8"))
             new = [
                 block
-                for first, block in whole[name].items()
-                if not any(first in whole[each] for each in before)
+                for first, block in resolved[name].items()
+                if not any(first in resolved[each] for each in before)
             ]
             lock.write_text("".join(new), encoding="utf-8")
 

@@ -76,8 +76,8 @@ def test_every_public_name_is_on_the_page_of_the_library_and_every_page_on_the_s
 
 
 def test_the_version_is_the_same_everywhere():
-    assert f'version="{scenario_gen.__version__}"' in (ROOT / "setup.py").read_text()
     assert f"<version>{scenario_gen.__version__}</version>" in (ROOT / "package.xml").read_text()
+    assert f"\nversion: {scenario_gen.__version__}\n" in (ROOT / "CITATION.cff").read_text()
     assert (
         re.search(r"^(\d+\.\d+\.\d+)\n-----$", (ROOT / "CHANGELOG.rst").read_text(), re.MULTILINE)[
             1

@@ -9,11 +9,15 @@ from pathlib import Path
 import re
 import subprocess
 import sys
+import tarfile
+import tomllib
 import xml.etree.ElementTree as ET
 
 from catkin_pkg.package import parse_package
 import pytest
 from support.source_files import ROOT
+
+from scenario_gen.ros.node_names import ALL
 
 
 @pytest.mark.linter
@@ -69,20 +73,10 @@ def test_make_leaves_a_sourced_jazzy_its_rclpy(tmp_path, sourced):
     assert ("--system-site-packages" in said) is sourced
 
 
-def test_every_executable_exists(tmp_path):
-    command = [sys.executable, "setup.py", "--quiet", "egg_info", "--egg-base", str(tmp_path)]
-    subprocess.run(command, cwd=ROOT, check=True, capture_output=True)
-    lines = (tmp_path / "scenario_gen.egg-info" / "entry_points.txt").read_text().splitlines()
-    scripts = dict(line.split(" = ") for line in lines if " = " in line)
-    assert {
-        "scenario-gen",
-        "segmenter",
-        "planner",
-        "gp_sampler",
-        "road_server",
-        "log_player",
-        "recorder",
-    } <= set(scripts)
+def test_every_node_has_an_executable():
+    scripts = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["scripts"]
+    files = {path.stem for path in (ROOT / "scenario_gen" / "ros" / "nodes").glob("[!_]*.py")}
+    assert set(scripts) == {"scenario-gen", "suite", *files} and files == set(ALL)
     for name, target in scripts.items():
         module, _, function = target.partition(":")
         assert callable(getattr(importlib.import_module(module), function)), name
@@ -153,6 +147,29 @@ def test_colcon_builds_what_ros2_run_needs(colcon):
         command, cwd=base, env=variables, capture_output=True, text=True, check=False
     )
     assert ran.returncode == 0 and "regenerate" in ran.stdout, ran.stderr
+
+
+def test_colcon_builds_with_symlinks(tmp_path):
+    """The build runs setup.py in a folder that has links to the listed files only."""
+    colcon = Path(sys.executable).with_name("colcon")
+    folders = [f"--{name}-base={tmp_path / name}" for name in ("build", "install")]
+    command = [colcon, f"--log-base={tmp_path / 'log'}", "build", "--symlink-install"]
+    command += ["--base-paths", ROOT, *folders]
+    built = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert built.returncode == 0, built.stderr
+    prefix = tmp_path / "install" / "scenario_gen"
+    assert (prefix / "lib" / "scenario_gen" / "gp_sampler").is_file()
+    assert (prefix / "share" / "scenario_gen" / "launch" / "suite.launch.py").is_symlink()
+
+
+def test_the_source_distribution_has_what_a_build_and_a_reader_need(tmp_path):
+    command = [sys.executable, "setup.py", "--quiet", "egg_info", "--egg-base", tmp_path]
+    subprocess.run([*command, "sdist", "--dist-dir", tmp_path], cwd=ROOT, check=True)
+    (archive,) = tmp_path.glob("*.tar.gz")
+    with tarfile.open(archive) as file:
+        names = {name.partition("/")[2] for name in file.getnames()}
+    assert {"README.md", "CITATION.cff", "SECURITY.md", "pyproject.toml", "package.xml"} <= names
+    assert {"docs/index.md", "config/suite.yaml", "launch/suite.launch.py"} <= names
 
 
 def test_colcon_test_runs_pytest_and_reports(colcon):

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The short tests on the newest releases that the bounds in requirements/*.in allow, in an environment of its own."""
+"""The short tests on the newest releases that the bounds in pyproject.toml allow, in an environment of its own."""
 
 from collections.abc import Iterator
 import os
@@ -12,7 +12,7 @@ import sys
 
 from figures import Figure, ROOT
 
-LISTS = ("core", "run", "extras", "test", "ros", "ros-test")
+LISTS = ("run", "extras", "test", "ros-test")
 SHOWN = ("numpy", "scipy", "numba", "rosbags", "mcap", "pandas", "shapely", "pyproj")
 PYTEST = ("-n", "2", "--dist", "loadgroup", "--max-worker-restart", "0", "--timeout", "600")
 
@@ -23,7 +23,11 @@ def install(python: Path) -> None:
         subprocess.run([sys.executable, "-m", "venv", python.parents[1]], check=True)
     pip = [python, "-m", "pip", "install", "--quiet", "--upgrade", "--upgrade-strategy", "eager"]
     subprocess.run(
-        [*pip, *(word for name in LISTS for word in ("-r", ROOT / "requirements" / f"{name}.in"))],
+        [
+            *pip,
+            *(word for name in LISTS for word in ("-r", ROOT / "requirements" / f"{name}.in")),
+            f"{ROOT}[ros]",
+        ],
         check=True,
     )
     subprocess.run(

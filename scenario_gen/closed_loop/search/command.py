@@ -69,7 +69,7 @@ class SearchRequest:
     limits: Limits
     planner: str
     ego: str = ""
-    objective: Objective = Objective()  # noqa: RUF009 - frozen
+    objective: Objective = Objective()
     budget: int = 1000
     seed: int = 0
     worst: bool = False

@@ -195,7 +195,7 @@ class _Loop:
     adaptations: list[str] = field(default_factory=list)
     aim: Aim | None = None
     measures: Measures | None = None
-    usual: Usual = Usual()  # noqa: RUF009 - frozen
+    usual: Usual = Usual()
     reached: Reached | None = None
 
     def run_request(self, attempts: int) -> None:
