@@ -20,12 +20,18 @@ import shapely
 from benchmarks._recheck_motion import advance, boxes_at, Lanes, Paces, SLOT, TOUCH
 from benchmarks._sampling_cases import cases, Prepared
 from scenario_gen.method.validity import Limits
-from scenario_gen.method.validity.dynamics import OF_TYPE
 from scenario_gen.numerics.arrays import Bools, Floats, Ints
 from scenario_gen.types.encounter import Encounter
 from scenario_gen.types.road import Road
 from scenario_gen.types.scenario import BoundaryStates, Scenario
 
+OF_TYPE = (
+    "max_speed",
+    "max_acceleration",
+    "max_deceleration",
+    "max_lateral_acceleration",
+    "sharpest",
+)
 ALIKE = 0.5  # rad, headings of vehicles on the same path
 FOLLOWING = 3.0  # vehicle lengths of shared path that are following
 ROOMS = (1.0, 0.5, 0.2)  # m

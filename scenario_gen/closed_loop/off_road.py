@@ -14,8 +14,7 @@ import numpy as np
 from scipy.interpolate import CubicHermiteSpline
 
 from scenario_gen.closed_loop.simulation import Drive
-from scenario_gen.method.validity import containment as inside
-from scenario_gen.method.validity import control_points
+from scenario_gen.method.validity import control_points, first_exits, Ground, Proof
 from scenario_gen.numerics import Bools, Floats, sealed
 from scenario_gen.numerics.kernels import B2, F1, F2, kernel, OUT2
 from scenario_gen.numerics.plane import edge_lengths, unit
@@ -59,10 +58,8 @@ def road_use(drive: Drive, road: Road | None, limit: float) -> RoadUse:
     )
     control, out = np.empty((1, len(time) - 1, 4, 2)), np.empty((1, 2))
     control_points(time, motion.position[ego, until], heading, motion.speed[ego, until], control)
-    inside.first_exits(
-        time, control, heading, np.array([half]), inside.Ground.of(road), RESOLUTION, out
-    )
-    if out[0, 0] == inside.PROVEN:
+    first_exits(time, control, heading, np.array([half]), Ground.of(road), RESOLUTION, out)
+    if out[0, 0] == Proof.PROVEN:
         poses = np.column_stack([motion.position[drive.ego, until], heading[0]])
         room = _measured(road, poses, half, outside=False)[:, 0].min()
         return RoadUse(max(float(room), RESOLUTION), 0.0, math.nan)

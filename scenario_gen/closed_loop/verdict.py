@@ -14,8 +14,7 @@ from scenario_gen.closed_loop.reasons import CutIn, Reason, reason_of, Runner, S
 from scenario_gen.closed_loop.score import not_behind, Terms, terms
 from scenario_gen.closed_loop.simulation import ClosedLoop, Drive
 from scenario_gen.method.evaluation import footprint_distance, Motion, time_to_collision
-from scenario_gen.method.validity import collision as apart
-from scenario_gen.method.validity import control_points
+from scenario_gen.method.validity import control_points, first_contacts, Proof
 from scenario_gen.numerics import Floats
 from scenario_gen.numerics.plane import unit
 from scenario_gen.situation import find_conflicts
@@ -305,8 +304,8 @@ def _contact_in(motion: Scenario, pair: list[int], span: slice) -> float | None:
     control, out = np.empty((2, len(time) - 1, 4, 2)), np.empty((1, 3))
     control_points(time, position, heading, speed, control)
     half = np.array([vehicle.half for vehicle in vehicles])
-    apart.first_contacts(time, control, heading, half, 0.0, RESOLUTION, out)
-    if out[0, 0] == apart.PROVEN:
+    first_contacts(time, control, heading, half, 0.0, RESOLUTION, out)
+    if out[0, 0] == Proof.PROVEN:
         return None
     found, step = float(out[0, 1]), float(motion.time[1])  # any instant of the contact
     k = min(int(found / step + 1e-9), len(motion.time) - 2)

@@ -1,12 +1,20 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The independent checker: valid at every instant, or refused with the cause (docs/validity.md)."""
+"""The independent checker: valid at every instant, or refused with the cause."""
 
 from scenario_gen.method.validity.checker import Checker
-from scenario_gen.method.validity.dynamics import control_points
+from scenario_gen.method.validity.collision import first_contacts
+from scenario_gen.method.validity.containment import first_exits, Ground
+from scenario_gen.method.validity.cubic import control_points, Proof
 from scenario_gen.method.validity.limits import Limits
 
 __all__ = [
-    "Checker", "Limits", "control_points",
-]  # fmt: skip
+    "Checker",
+    "Ground",
+    "Limits",
+    "Proof",
+    "control_points",
+    "first_contacts",
+    "first_exits",
+]

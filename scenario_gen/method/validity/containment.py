@@ -3,150 +3,37 @@
 
 """Proof that every footprint stays in drivable cells at every instant.
 
-Fast: discs that cover the footprint, each nearer to its cell's centre than the clearance there allows, with what the
-vehicle moves in the meantime added. Exact: over a stretch of time the footprint lies in a rectangle at its middle pose,
-longer and wider by what the control points and the rotation can add; that rectangle is compared with the cells row by row.
-Where neither suffices the stretch is halved, until it is proven, the footprint itself is off the road, or it is too short.
+The quick proof covers the footprint with discs; each disc must be nearer to the centre of its cell
+than the clearance there, after the motion of the vehicle was added. The exact proof encloses the
+footprint over an interval in a rectangle at its middle pose, longer and wider by the effect of the
+control points and the rotation, and compares that rectangle with the cells row by row. Where
+neither suffices, the interval is halved until it is proven, the footprint is off the road, or the
+interval is too short.
 """
 
+from collections.abc import Callable, Iterator
 from typing import NamedTuple
 
 import numpy as np
 
-from scenario_gen.method.validity.dynamics import stretch
+from scenario_gen.method.validity.cubic import Proof, split_cubic
+from scenario_gen.method.validity.dynamics import vehicle_groups
 from scenario_gen.numerics import Counts, Floats
 from scenario_gen.numerics.kernels import F, F1, F2, F4, kernel, N2, named, OUT2
 from scenario_gen.roads import blocked_before, clearance_in_cells
-from scenario_gen.types import Road
+from scenario_gen.types import Cause, Road, Scenario, Vehicle, Violation
 
-CONTACT = 1e-9  # cells, an overlap this small only touches
-PROVEN, FOUND, UNPROVEN = 0.0, 1.0, 2.0
-
-
-@kernel(inline=True)
-def _rectangle_drivable(
-    blocked: Counts, x: float, y: float, c: float, s: float, length: float, width: float
-) -> bool:
-    """Whether the rectangle centred at (x, y), half sizes length and width, all in cells, covers drivable cells only."""
-    a, b = length, width
-    if c < 0.0:  # half a turn changes nothing
-        c, s = -c, -s
-    if s < 0.0:  # a quarter turn exchanges length and width
-        a, b, c, s = b, a, -s, c
-    top, right = (
-        a * s + b * c,
-        a * c + b * s,
-    )  # the highest and the rightmost corner, seen from the centre
-    turn = a * s - b * c  # height of the rightmost corner; the leftmost is at -turn
-    rows, columns = blocked.shape[0], blocked.shape[1] - 1
-    first, last = int(np.floor(y - top + CONTACT)), int(np.ceil(y + top - CONTACT)) - 1
-    if first < 0 or last >= rows or x - right < -CONTACT or x + right > columns + CONTACT:
-        return False
-    for row in range(first, last + 1):
-        low, high = (
-            max(row - y, -top),
-            min(row + 1 - y, top),
-        )  # the rectangle's part in this row of cells
-        to = from_ = right
-        if low > turn:  # above the rightmost corner: the front edge
-            to = (a - low * s) / c
-        elif high < turn:  # below it: the right-hand edge
-            to = (high * c + b) / s
-        if low > -turn:  # above the leftmost corner
-            from_ = (b - low * c) / s
-        elif high < -turn:
-            from_ = (a + high * s) / c
-        begin = max(int(np.floor(x - min(from_, right) + CONTACT)), 0)
-        end = min(int(np.ceil(x + min(to, right) - CONTACT)), columns)
-        if end > begin and blocked[row, end] != blocked[row, begin]:
-            return False
-    return True
-
-
-@kernel(inline=True)
-def _discs_drivable(
-    clearance: Floats,
-    x: float,
-    y: float,
-    c: float,
-    s: float,
-    length: float,
-    width: float,
-    moved: float,
-) -> bool:
-    """Whether covering discs prove a footprint that moves by at most `moved` drivable; all in cells."""
-    rows, columns = clearance.shape
-    count = max(1, int(np.ceil(1.5 * length / width)))
-    spacing = 2.0 * length / count
-    radius = np.sqrt(0.25 * spacing * spacing + width * width) + moved
-    for i in range(count):
-        ahead = (i + 0.5) * spacing - length
-        px, py = x + ahead * c, y + ahead * s
-        column, row = int(np.floor(px)), int(np.floor(py))
-        if row < 0 or column < 0 or row >= rows or column >= columns:
-            return False
-        dx, dy, spare = px - column - 0.5, py - row - 0.5, clearance[row, column] - radius
-        if spare < 0.0 or spare * spare < dx * dx + dy * dy:
-            return False
-    return True
-
-
-@kernel(inline=True)
-def _first_exit(
-    b: Floats,
-    h: float,
-    yaw: Floats,
-    half: Floats,
-    clearance: Floats,
-    blocked: Counts,
-    resolution: float,
-) -> tuple[float, float]:
-    """(status, u) of one interval: control points b (4, 2), start and change of heading (2,), half sizes, in cells."""
-    length, width = half
-    part = np.empty((4, 2))
-    u, step = 0.0, 1.0
-    while u < 1.0:
-        middle = u + 0.5 * step
-        stretch(b, middle, middle, part)
-        x, y, at, turn = part[0, 0], part[0, 1], yaw[0] + yaw[1] * middle, 0.5 * step * abs(yaw[1])
-        stretch(b, u, u + step, part)
-        c, s = np.cos(at), np.sin(at)
-        ahead = aside = 0.0
-        for i in range(4):
-            dx, dy = part[i, 0] - x, part[i, 1] - y
-            ahead, aside = max(ahead, abs(c * dx + s * dy)), max(aside, abs(c * dy - s * dx))
-        if _discs_drivable(
-            clearance,
-            x,
-            y,
-            c,
-            s,
-            length,
-            width,
-            np.sqrt(ahead * ahead + aside * aside) + length * turn,
-        ) or _rectangle_drivable(
-            blocked, x, y, c, s, length + ahead + width * turn, width + aside + length * turn
-        ):
-            u += step
-            step = min(2.0 * step, 1.0 - u)
-            continue
-        if not _rectangle_drivable(blocked, x, y, c, s, length, width):
-            return FOUND, middle
-        step *= 0.5
-        if step * h < resolution:
-            return UNPROVEN, middle
-    return PROVEN, 1.0
+_CONTACT_CELLS = 1e-9  # a smaller overlap is a mere contact
 
 
 class Ground(NamedTuple):
-    """A road as `first_exits` reads it.
+    """The drivable cells of a road.
 
     Attributes:
-        clearance: (H, W) distance [cells] from each centre to the nearest cell that is not drivable.
-        blocked: (H, W + 1) from `blocked_before`.
-        x: of the grid's lower-left corner, metres.
-        y: likewise.
-        size: of a cell, metres.
+        clearance: (H, W) distance [cells] from each centre to the nearest cell that is blocked.
+        blocked: (H, W + 1) number of blocked cells to the left, see `blocked_before`.
+        x, y: lower-left corner of the grid [m].
+        size: of a cell [m].
     """
 
     clearance: Floats
@@ -157,14 +44,148 @@ class Ground(NamedTuple):
 
     @classmethod
     def of(cls, road: Road) -> "Ground":
-        """Read a road."""
-        return cls(
-            clearance_in_cells(road),
-            blocked_before(road),
-            road.origin[0],
-            road.origin[1],
-            road.resolution,
+        """Return the cells of a road."""
+        x, y = road.origin
+        return cls(clearance_in_cells(road), blocked_before(road), x, y, road.resolution)
+
+
+class _Rectangle(NamedTuple):
+    """A rectangle in units of cells: centre, direction, half length and half width."""
+
+    x: float
+    y: float
+    cos: float
+    sin: float
+    length: float
+    width: float
+
+
+@kernel(inline=True)
+def _is_drivable(blocked: Counts, box: _Rectangle) -> bool:
+    """Whether a rectangle covers drivable cells only."""
+    a, b, c, s = box.length, box.width, box.cos, box.sin
+    if c < 0.0:  # half a turn gives the same rectangle
+        c, s = -c, -s
+    if s < 0.0:  # a quarter turn exchanges length and width
+        a, b = b, a
+        c, s = -s, c
+    top = a * s + b * c  # of the highest corner, relative to the centre
+    right = a * c + b * s  # of the rightmost corner
+    rows, columns = blocked.shape[0], blocked.shape[1] - 1
+    first = int(np.floor(box.y - top + _CONTACT_CELLS))
+    last = int(np.ceil(box.y + top - _CONTACT_CELLS)) - 1
+    if first < 0 or last >= rows:
+        return False
+    if box.x - right < -_CONTACT_CELLS or box.x + right > columns + _CONTACT_CELLS:
+        return False
+    for row in range(first, last + 1):
+        low, high = max(row - box.y, -top), min(row + 1 - box.y, top)
+        left_end, right_end = _row_ends(a, b, c, s, low, high)
+        begin = max(int(np.floor(box.x - left_end + _CONTACT_CELLS)), 0)
+        end = min(int(np.ceil(box.x + right_end - _CONTACT_CELLS)), columns)
+        if end > begin and blocked[row, end] != blocked[row, begin]:
+            return False
+    return True
+
+
+@kernel(inline=True)
+def _row_ends(
+    a: float, b: float, c: float, s: float, low: float, high: float
+) -> tuple[float, float]:
+    """How far a rectangle reaches to the left and right between two heights above its centre.
+
+    Args:
+        a: half size along the direction.
+        b: half size across it.
+        c: cosine of the direction, not negative.
+        s: its sine, not negative.
+        low: the lower height.
+        high: the upper height.
+    """
+    right = a * c + b * s
+    corner = a * s - b * c  # height of the rightmost corner; that of the leftmost one is negative
+    left_end = right_end = right
+    if low > corner:  # the front edge
+        right_end = (a - low * s) / c
+    elif high < corner:  # the right-hand edge
+        right_end = (high * c + b) / s
+    if low > -corner:  # the left-hand edge
+        left_end = (b - low * c) / s
+    elif high < -corner:  # the rear edge
+        left_end = (a + high * s) / c
+    return min(left_end, right), min(right_end, right)
+
+
+@kernel(inline=True)
+def _discs_are_drivable(clearance: Floats, box: _Rectangle, moved: float) -> bool:
+    """Whether discs that cover a footprint, which moves by at most `moved` cells, are drivable."""
+    rows, columns = clearance.shape
+    count = max(1, int(np.ceil(1.5 * box.length / box.width)))
+    spacing = 2.0 * box.length / count
+    radius = np.sqrt(0.25 * spacing * spacing + box.width * box.width) + moved
+    for i in range(count):
+        ahead = (i + 0.5) * spacing - box.length
+        x, y = box.x + ahead * box.cos, box.y + ahead * box.sin
+        column, row = int(np.floor(x)), int(np.floor(y))
+        if row < 0 or column < 0 or row >= rows or column >= columns:
+            return False
+        dx, dy = x - column - 0.5, y - row - 0.5
+        spare = clearance[row, column] - radius
+        if spare < 0.0 or spare * spare < dx * dx + dy * dy:
+            return False
+    return True
+
+
+@kernel(inline=True)
+def _first_exit(
+    b: Floats, h: float, yaw: Floats, half: Floats, ground: Ground, resolution: float
+) -> tuple[int, float]:
+    """Outcome, and fraction of the interval where it is not proven.
+
+    Args:
+        b: (4, 2) control points [cells].
+        h: duration [s].
+        yaw: (2,) heading at the start and its change [rad].
+        half: (2,) half length and half width [cells].
+        ground: the cells.
+        resolution: shortest interval [s] of a proof.
+    """
+    length, width = half
+    part = np.empty((4, 2))
+    u, step = 0.0, 1.0
+    while u < 1.0:
+        middle = u + 0.5 * step
+        split_cubic(b, middle, middle, part)
+        angle = yaw[0] + yaw[1] * middle
+        box = _Rectangle(part[0, 0], part[0, 1], np.cos(angle), np.sin(angle), length, width)
+        split_cubic(b, u, u + step, part)
+        ahead = left = 0.0
+        for i in range(4):
+            dx, dy = part[i, 0] - box.x, part[i, 1] - box.y
+            ahead = max(ahead, abs(box.cos * dx + box.sin * dy))
+            left = max(left, abs(box.cos * dy - box.sin * dx))
+        turn = 0.5 * step * abs(yaw[1])
+        moved = np.sqrt(ahead * ahead + left * left) + length * turn
+        swept = _Rectangle(
+            box.x,
+            box.y,
+            box.cos,
+            box.sin,
+            length + ahead + width * turn,
+            width + left + length * turn,
         )
+        if _discs_are_drivable(ground.clearance, box, moved) or _is_drivable(
+            ground.blocked, swept
+        ):
+            u += step
+            step = min(2.0 * step, 1.0 - u)
+            continue
+        if not _is_drivable(ground.blocked, box):
+            return Proof.VIOLATED.value, middle
+        step *= 0.5
+        if step * h < resolution:
+            return Proof.UNPROVEN.value, middle
+    return Proof.PROVEN.value, 1.0
 
 
 @kernel(F1, F4, F2, F2, named(Ground, F2, N2, F, F, F), F, OUT2)
@@ -177,37 +198,71 @@ def first_exits(
     resolution: float,
     out: Floats,
 ) -> None:
-    """Fill `out` (N, 2) with status and time [s] at which each vehicle first leaves drivable cells.
+    """Find when each vehicle first leaves drivable cells.
 
     Args:
         time: (T,) seconds.
-        control: (N, T - 1, 4, 2) control points, metres.
+        control: (N, T - 1, 4, 2) control points [m].
         heading: (N, T) rad.
-        half: (N, 2) half lengths and half widths, metres.
+        half: (N, 2) half lengths and half widths [m].
         ground: the road.
-        resolution: shortest stretch of time [s] looked at.
-        out: status PROVEN, FOUND or UNPROVEN, and the time where not proven.
+        resolution: shortest interval [s] of a proof.
+        out: (N, 2) filled with the outcome (`Proof`) and, where it is not proven, the time [s].
     """
-    size = ground.size
     b, yaw, extent = np.empty((4, 2)), np.empty(2), np.empty(2)
     for i in range(control.shape[0]):
-        out[i, 0] = PROVEN
-        extent[0], extent[1] = half[i, 0] / size, half[i, 1] / size
+        out[i, 0] = Proof.PROVEN.value
+        extent[0], extent[1] = half[i, 0] / ground.size, half[i, 1] / ground.size
         for k in range(control.shape[1]):
-            stands = k > 0 and heading[i, k + 1] == heading[i, k]
+            yaw[0], yaw[1] = heading[i, k], heading[i, k + 1] - heading[i, k]
+            moves = yaw[1] != 0.0
             for c in range(4):
-                b[c, 0], b[c, 1] = (
-                    (control[i, k, c, 0] - ground.x) / size,
-                    (control[i, k, c, 1] - ground.y) / size,
-                )
-                stands = stands and b[c, 0] == b[0, 0] and b[c, 1] == b[0, 1]
-            if stands:  # where it stood at the end of the interval before
+                b[c, 0] = (control[i, k, c, 0] - ground.x) / ground.size
+                b[c, 1] = (control[i, k, c, 1] - ground.y) / ground.size
+                moves = moves or b[c, 0] != b[0, 0] or b[c, 1] != b[0, 1]
+            if k > 0 and not moves:  # it stands where the interval before ended
                 continue
             h = time[k + 1] - time[k]
-            yaw[0], yaw[1] = heading[i, k], heading[i, k + 1] - heading[i, k]
-            status, u = _first_exit(
-                b, h, yaw, extent, ground.clearance, ground.blocked, resolution
-            )
-            if status != PROVEN:
+            status, u = _first_exit(b, h, yaw, extent, ground, resolution)
+            if status != Proof.PROVEN.value:
                 out[i, 0], out[i, 1] = status, time[k] + u * h
                 break
+
+
+def exit_violations(
+    scenario: Scenario,
+    control: Floats,
+    half: Floats,
+    ground_of: Callable[[Vehicle], Ground],
+    resolution: float,
+) -> Iterator[Violation]:
+    """Yield the vehicles that are not proven to stay on the road.
+
+    Args:
+        scenario: the vehicles.
+        control: (N, T - 1, 4, 2) control points [m].
+        half: (N, 2) half lengths and half widths [m].
+        ground_of: returns the cells in which a vehicle may drive or walk.
+        resolution: shortest interval [s] of a proof.
+    """
+    out = np.full((len(half), 2), np.nan)  # NaN is no proof
+    for rows, span in vehicle_groups(scenario):
+        first_exits(
+            scenario.time[span],
+            control[rows, span.start : span.stop - 1],
+            scenario.heading[rows, span],
+            half[rows],
+            ground_of(scenario.vehicles[rows.start]),
+            resolution,
+            out[rows],
+        )
+    for i, (status, time) in enumerate(out.tolist()):
+        if status == Proof.PROVEN:
+            continue
+        fault = "leaves drivable space"
+        if status != Proof.VIOLATED:
+            fault = "cannot be proven inside drivable space"
+        x = float(np.interp(time, scenario.time, scenario.position[i, :, 0]))
+        y = float(np.interp(time, scenario.time, scenario.position[i, :, 1]))
+        message = f"vehicle {i}: footprint {fault} at {time:.3f} s near ({x:.2f}, {y:.2f})"
+        yield Violation(Cause.OFF_ROAD, time, (i,), message)

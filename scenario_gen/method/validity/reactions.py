@@ -1,9 +1,10 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The certificate of interaction: who passes behind another one does so as a human would, and nobody tailgates."""
+"""The certificate of interaction: yielding as a human does, following, and no tailgating."""
 
 from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 import math
 
 import numpy as np
@@ -13,13 +14,27 @@ from scenario_gen.numerics import Floats
 from scenario_gen.situation import Conflict, departure, LaneGaps, passing, time_gaps
 from scenario_gen.types import Cause, FOLLOW, Reaction, Scenario, Violation
 
-_ROUNDED = 0.1  # s, by which an entry or a clearing is known between samples
-_SUCH_A_SPEED, _QUICK = (
-    2.0,
-    3.0,
-)  # m/s, by which two speeds are alike; above which a time gap counts
-_NEAR_ENOUGH = 0.05  # m
-_ENOUGH = 4.0, 1.5  # m and s, of a gap that nobody keeps because it is needed
+
+@dataclass(frozen=True)
+class _Following:
+    """What counts as a gap that a driver keeps.
+
+    Attributes:
+        similar_speed: m/s within which recorded gaps apply; recordings are too short for less.
+        moving_speed: m/s above which a time gap is meaningful.
+        tolerance: metres; gaps at the samples differ by this from those in between.
+        ample_gap, ample_time_gap: m and s; a larger gap is not kept because it is needed.
+    """
+
+    similar_speed: float = 2.0
+    moving_speed: float = 3.0
+    tolerance: float = 0.05
+    ample_gap: float = 4.0
+    ample_time_gap: float = 1.5
+
+
+_FOLLOWING = _Following()
+_EVENT_ROUNDING_S = 0.1  # an entry or a clearing is known to a sample
 
 
 def broken_reactions(
@@ -27,83 +42,110 @@ def broken_reactions(
     conflicts: Sequence[Conflict | None],
     edges: Sequence[Reaction],
     limits: Limits,
-    gaps_in_lane: LaneGaps,
+    gaps: LaneGaps,
 ) -> Iterator[Violation]:
-    """Yield those who enter or leave too early or too late, or follow too far behind, in a scenario with `conflicts`.
+    """Yield the reactions of a template that a scenario does not keep.
 
-    `gaps_in_lane` are those of the scenario.
+    Args:
+        scenario: the vehicles.
+        conflicts: the scenario's conflicts that the template has, too.
+        edges: the reactions.
+        limits: shares and tolerances.
+        gaps: between the scenario's followers and leaders.
     """
-    met = {
-        (conflict.second, conflict.first): conflict
-        for conflict in conflicts
-        if conflict is not None
-    }
+    known = (conflict for conflict in conflicts if conflict is not None)
+    by_pair = {(conflict.second, conflict.first): conflict for conflict in known}
     for edge in edges:
-        pair, who, whom = (
-            (edge.who, edge.whom),
-            scenario.vehicles[edge.who].id,
-            scenario.vehicles[edge.whom].id,
-        )
-        conflict = met.get(pair)
+        pair = (edge.who, edge.whom)
+        message = ""
+        time = 0.0
         if edge.kind == FOLLOW:
-            gaps, high = (
-                time_gaps(gaps_in_lane, *pair),
-                (1.0 + limits.headway_share) * edge.headway[2],
-            )
-            if len(gaps) and gaps.max() > high:
-                message = f"vehicle {who}: drives up to {gaps.max():.2f} s behind vehicle {whom}; allowed are {high:.2f} s"
-                yield Violation(Cause.REACTION, 0.0, pair, message)
+            message = _following_fault(scenario, edge, limits, gaps)
         elif edge.gap == math.inf:
-            continue  # that it stops is a wait, and that it does not go first an order
-        elif conflict is None:
-            message = f"vehicle {who}: does not come behind vehicle {whom}, for which it waits in the recording"
-            yield Violation(Cause.REACTION, 0.0, pair, message)
+            continue  # it stops, which is a wait, or does not go first, which is an order
+        elif pair not in by_pair:
+            leader = scenario.vehicles[edge.whom].id
+            message = f"does not pass behind vehicle {leader}, for which it waits in the recording"
         else:
-            yield from _enters(scenario, conflict, edge, limits)
+            message, time = _yielding_fault(scenario, by_pair[pair], edge, limits)
+        if message:
+            vehicle = scenario.vehicles[edge.who].id
+            yield Violation(Cause.REACTION, time, pair, f"vehicle {vehicle}: {message}")
 
 
-def _enters(
+def _following_fault(
+    scenario: Scenario, edge: Reaction, limits: Limits, lane_gaps: LaneGaps
+) -> str:
+    """Return how a follower falls back too far, "" if it does not."""
+    gaps = time_gaps(lane_gaps, edge.who, edge.whom)
+    high = (1.0 + limits.headway_share) * edge.headway[2]
+    if not len(gaps) or gaps.max() <= high:
+        return ""
+    leader = scenario.vehicles[edge.whom].id
+    return f"drives up to {gaps.max():.2f} s behind vehicle {leader}; at most {high:.2f} s allowed"
+
+
+def _yielding_fault(
     scenario: Scenario, conflict: Conflict, edge: Reaction, limits: Limits
-) -> Iterator[Violation]:
-    who, whom = scenario.vehicles[edge.who].id, scenario.vehicles[edge.whom].id
+) -> tuple[str, float]:
+    """Return how a yielder enters or leaves too early or too late ("" if not), and when [s]."""
+    other = scenario.vehicles[edge.whom].id
     clears, enters = passing(scenario, conflict, merges=edge.merges)
+    gap = enters - clears
     low = min(edge.gap, max((1.0 - limits.gap_share) * edge.gap - limits.anticipation, 0.0))
     high = (1.0 + limits.gap_share) * max(edge.gap, 0.0) + limits.patience
     message = ""
-    if not low - _ROUNDED <= enters - clears <= high:
-        message = f"enters {enters - clears:.2f} s after vehicle {whom} has cleared; allowed are {low:.2f} to {high:.2f} s"
-    if edge.stands:
-        before, most = (
-            clears - departure(scenario, edge.who, enters),
-            max(-edge.lag, 0.0) + limits.anticipation,
+    if not low - _EVENT_ROUNDING_S <= gap <= high:
+        message = (
+            f"enters {gap:.2f} s after vehicle {other} has cleared; "
+            f"{low:.2f} to {high:.2f} s allowed"
         )
-        if before > most:
-            message = f"leaves {before:.2f} s before vehicle {whom} has cleared; allowed are {most:.2f} s"
-    if message:
-        yield Violation(Cause.REACTION, enters, (edge.who, edge.whom), f"vehicle {who}: {message}")
+    if edge.stands:
+        lead = clears - departure(scenario, edge.who, enters)
+        max_lead = max(-edge.lag, 0.0) + limits.anticipation
+        if lead > max_lead:
+            message = (
+                f"leaves {lead:.2f} s before vehicle {other} has cleared; "
+                f"at most {max_lead:.2f} s allowed"
+            )
+    return message, enters
 
 
 def tailgaters(
-    scenario: Scenario, gaps_in_lane: LaneGaps, recorded: LaneGaps, limits: Limits
+    scenario: Scenario, gaps: LaneGaps, recorded: LaneGaps, limits: Limits
 ) -> Iterator[Violation]:
-    """Yield those who come nearer to one ahead of them in their lane than they do in the template, at the samples."""
-    for (who, whom), (speed, gap) in gaps_in_lane.items():
-        floor = least_gaps(speed, *recorded.get((who, whom), (np.zeros(0), np.zeros(0))), limits)
+    """Yield the vehicles that, at the samples, follow closer than they do in the template."""
+    none = (np.zeros(0), np.zeros(0))
+    for pair, (speed, gap) in gaps.items():
+        floor = least_gaps(speed, *recorded.get(pair, none), limits)
         k = int(np.argmax(floor - gap))
-        if floor[k] - gap[k] > _NEAR_ENOUGH:
+        if floor[k] - gap[k] > _FOLLOWING.tolerance:
+            follower, leader = (scenario.vehicles[n].id for n in pair)
             message = (
-                f"vehicle {scenario.vehicles[who].id}: comes within {gap[k]:.2f} m of vehicle {scenario.vehicles[whom].id} "
-                f"ahead of it, at {speed[k]:.1f} m/s; its driver keeps {floor[k]:.2f} m"
+                f"vehicle {follower}: comes within {gap[k]:.2f} m of vehicle {leader} ahead at "
+                f"{speed[k]:.1f} m/s; the recorded minimum allows {floor[k]:.2f} m"
             )
-            yield Violation(Cause.REACTION, 0.0, (who, whom), message)
+            yield Violation(Cause.REACTION, 0.0, pair, message)
 
 
 def least_gaps(speed: Floats, recorded: Floats, gap: Floats, limits: Limits) -> Floats:
-    """Return the least gaps (k,) [m], bumper to bumper, at speeds (k,) [m/s], of a driver with recorded speeds and gaps (m,)."""
-    alike = np.abs(speed[:, None] - recorded) <= _SUCH_A_SPEED
-    least = np.min(np.where(alike, gap, np.inf), axis=1, initial=np.inf)
-    nearest = np.where(alike & (recorded > _QUICK), gap / np.maximum(recorded, _QUICK), np.inf)
-    enough = _ENOUGH[0] + _ENOUGH[1] * speed
-    own = np.where(np.isfinite(least), np.minimum(limits.floor_share * least, enough), -np.inf)
-    human = (speed > _QUICK) & (np.min(nearest, axis=1, initial=np.inf) >= limits.least_headway)
-    return np.where(human, np.maximum(own, limits.least_headway * speed), own)
+    """Return the smallest allowed bumper-to-bumper gaps (k,) [m].
+
+    Args:
+        speed: (k,) m/s of a follower.
+        recorded: (m,) m/s of its driver in the template.
+        gap: (m,) metres at these speeds.
+        limits: shares and time gaps.
+    """
+    similar = np.abs(speed[:, None] - recorded) <= _FOLLOWING.similar_speed
+    moving = _FOLLOWING.moving_speed
+    smallest = np.min(np.where(similar, gap, np.inf), axis=1, initial=np.inf)
+    time_gap = np.where(similar & (recorded > moving), gap / np.maximum(recorded, moving), np.inf)
+
+    ample = _FOLLOWING.ample_gap + _FOLLOWING.ample_time_gap * speed
+    kept = np.minimum(limits.floor_share * smallest, ample)
+    kept = np.where(np.isfinite(smallest), kept, -np.inf)
+
+    keeps_headway = np.min(time_gap, axis=1, initial=np.inf) >= limits.least_headway
+    headway = limits.least_headway * speed
+    return np.where((speed > moving) & keeps_headway, np.maximum(kept, headway), kept)

@@ -10,9 +10,9 @@ import pytest
 from support.motions import FREE, open_road, scenario_of, straight
 
 from scenario_gen.base.errors import InputError
-from scenario_gen.method.validity import Checker, checker, Limits
-from scenario_gen.method.validity.dynamics import LARGEST
-from scenario_gen.method.validity.presence import driven_on
+from scenario_gen.method.validity import Checker, containment, dynamics, Limits
+from scenario_gen.method.validity.collision import ExtendedMotion
+from scenario_gen.method.validity.dynamics import LARGEST_VALUE_RATIO
 from scenario_gen.situation import Situation
 from scenario_gen.situation.interaction import Conflict, find_waits, Wait
 from scenario_gen.types.encounter import Encounter, Vehicle
@@ -75,7 +75,7 @@ def test_a_wait_or_a_conflict_of_nobody_is_refused(index):
 
 
 @pytest.mark.parametrize(
-    ("present", "ends"), [([0, 1], "goes"), ([99, 100], "comes"), ([50, 51], "comes")]
+    ("present", "ends"), [([0, 1], "leaves"), ([99, 100], "enters"), ([50, 51], "enters")]
 )
 def test_who_stands_in_the_way_does_not_vanish(present, ends):
     """Its first and last state are as asked, it never moves, and it is gone when the other one drives through its place."""
@@ -99,7 +99,7 @@ def test_who_stands_in_the_way_does_not_vanish(present, ends):
     (verdict,) = own.check([replace(template, present=np.array([present, [0, 100]]))])
     assert Cause.BOUNDARY_STATE in {violation.cause for violation in verdict.violations}
     assert (
-        f"vehicle 0: {ends} at {0.1 * present[ends == 'goes']:.3f} s"
+        f"vehicle 0: {ends} at {0.1 * present[ends == 'leaves']:.3f} s"
         in verdict.violations[0].message
     )
     late = replace(encounter, present=np.array([[20, 80], [0, 100]]))
@@ -142,7 +142,7 @@ def test_the_margin_is_whole_at_every_instant(step, margin):
     time = np.round(np.arange(101) * step, 9)
     for at in range(1, 99):
         scenario = replace(passing(time), present=np.array([[at, 100], [0, at]]))
-        (first, _), (_, last) = time[driven_on(scenario, margin)[3]]
+        (first, _), (_, last) = time[ExtendedMotion.of(scenario, margin).present]
         for reached, whole in (
             (time[at] - first, time[at]),
             (last - time[at], time[-1] - time[at]),
@@ -160,7 +160,7 @@ def test_who_stands_does_not_turn_in_many_short_steps():
     assert causes(scenario_of([long], TIME)) == []
 
 
-@pytest.mark.parametrize("far", [2.0 * LARGEST, 1e15, 1e300])
+@pytest.mark.parametrize("far", [2.0 * LARGEST_VALUE_RATIO, 1e15, 1e300])
 def test_where_coordinates_are_too_coarse_nothing_is_proven(far):
     time = np.array([0.0, 1.0, 2.0])
     crossing = scenario_of(
@@ -194,8 +194,8 @@ def test_a_jump_there_and_back_is_refused():
 
 
 def test_what_no_kernel_filled_in_is_refused(monkeypatch):
-    monkeypatch.setattr(checker.dynamics, "worst_excess", lambda *_: None)
-    monkeypatch.setattr(checker.inside, "first_exits", lambda *_: None)
+    monkeypatch.setattr(dynamics, "worst_excess", lambda *_: None)
+    monkeypatch.setattr(containment, "first_exits", lambda *_: None)
     found = causes(passing(), road=open_road())
     assert found.count(Cause.OFF_ROAD) == 2
     assert {Cause.SPEED, Cause.CURVATURE, Cause.LATERAL_ACCELERATION} <= set(found)

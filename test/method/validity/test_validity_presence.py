@@ -16,7 +16,7 @@ from support.motions import FREE, open_road, scenario_of, straight, wander
 from support.oracle import boxes_beyond, overlapping
 
 from scenario_gen.base.road_users import Dynamics
-from scenario_gen.method.validity import Checker, checker
+from scenario_gen.method.validity import Checker, collision
 from scenario_gen.situation.interaction import Wait
 from scenario_gen.types.encounter import Vehicle
 from scenario_gen.types.lanes import Lane, LaneNetwork
@@ -89,7 +89,7 @@ def test_who_follows_may_come_where_the_leader_drove():
 
 
 def test_a_pair_that_nothing_looks_at_is_refused(monkeypatch):
-    monkeypatch.setattr(checker.apart, "first_contacts", lambda *_: None)
+    monkeypatch.setattr(collision, "first_contacts", lambda *_: None)
     for present in ([[0, 100], [0, 100]], [[0, 60], [40, 100]], [[0, 50], [50, 100]]):
         found, verdict = causes(together(present))
         assert found == [Cause.OVERLAP] and "were not compared" in verdict.violations[0].message

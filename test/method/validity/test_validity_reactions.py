@@ -86,7 +86,7 @@ def test_a_yielder_that_no_longer_meets_the_other_does_not_yield():
     moved = TEMPLATE.position.copy()
     moved[0, :, 1] += 500.0
     (found,) = refusals(as_scenario(replace(TEMPLATE, position=moved)), TEMPLATE)
-    assert "does not come behind" in found.message
+    assert "does not pass behind" in found.message
 
 
 LEADER = wander(np.random.default_rng(3), 200)
