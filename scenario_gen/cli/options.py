@@ -73,7 +73,7 @@ def configured(file: Path | None, assignments: list[str] | None) -> "PipelineCon
 
 def remind(bag: Path) -> None:
     """Say what is missing of a bag that is read all the same."""
-    from scenario_gen.bags.storage.files import remarks
+    from scenario_gen.bags.storage.files import metadata_warnings
 
-    for remark in remarks(bag):
+    for remark in metadata_warnings(bag):
         say(remark)

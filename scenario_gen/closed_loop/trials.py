@@ -27,7 +27,7 @@ from scenario_gen.bags.recordings.read import (
     SCENARIOS,
     WITNESS,
 )
-from scenario_gen.bags.storage.bag import within
+from scenario_gen.bags.storage.bag import naming_bag
 from scenario_gen.bags.storage.config import BagConfig
 from scenario_gen.base.errors import did_you_mean, InputError, ScenarioGenError
 from scenario_gen.base.parameters import parameter, Parameters
@@ -145,7 +145,7 @@ def read_trials(
         InputError: the bag is damaged or holds no scenario, or one has no vehicle `ego`, or a slot for another.
     """
     trials: list[Trial] = []
-    with within(bag):
+    with naming_bag(bag):
         for namespace in read_recording(
             bag, config, ("map", "road/lanes", "fit/info", SCENARIOS, INFO)
         ).namespaces.values():

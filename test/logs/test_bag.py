@@ -213,7 +213,7 @@ def test_a_channel_without_schema_or_of_another_kind_breaks_nothing(tmp_path):
                 writer.add_message(bare, log_time=line.stamp, data=b"{}", publish_time=line.stamp)
         writer.finish()
     assert len(read_log(tmp_path / "a.mcap").encounters) == 1
-    with pytest.raises(InputError, match=r"topic /bare is of no type"):
+    with pytest.raises(InputError, match=r"topic /bare has no type"):
         list(read_messages(tmp_path / "a.mcap", lambda name: name == "/bare"))
 
 

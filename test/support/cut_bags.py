@@ -9,7 +9,7 @@ from pathlib import Path
 from mcap.records import Chunk, Message
 from mcap.stream_reader import breakup_chunk, StreamReader
 
-from scenario_gen.bags.storage.config import Allowance, BagConfig
+from scenario_gen.bags.storage.config import BagConfig, ReadBudget
 from scenario_gen.bags.storage.mcap import McapFile
 from scenario_gen.bags.storage.writer import BagWriter
 
@@ -44,10 +44,10 @@ def salvaged(data: bytes, path: Path) -> list[tuple[int, bytes]]:
     path.write_bytes(data)
     config = BagConfig()
     with path.open("rb") as file:
-        whole = McapFile(file, len(data), Allowance(config, str(path), len(data)))
+        whole = McapFile(file, len(data), ReadBudget(config, str(path), len(data)))
         whole.scan()
-        whole.allowance = Allowance(config, str(path), len(data))
+        whole.budget = ReadBudget(config, str(path), len(data))
         known = {
             channel.id for channel in whole.channels.values() if channel.schema_id in whole.schemas
         }
-        return [(stamp, message) for stamp, _, message in whole.in_order(known)]
+        return [(message.stamp_ns, message.data) for message in whole.messages(known)]

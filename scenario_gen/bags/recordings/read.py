@@ -34,7 +34,7 @@ from scenario_gen.bags.recordings.template import (
     lanes_beside,
     template_statuses,
 )
-from scenario_gen.bags.storage.bag import BagMessage, read_messages, within
+from scenario_gen.bags.storage.bag import BagMessage, naming_bag, read_messages
 from scenario_gen.bags.storage.config import BagConfig
 from scenario_gen.base.errors import InputError
 from scenario_gen.types import (
@@ -404,7 +404,7 @@ def read_scenario_set(
     found = read_recording(path, config, (SCENARIOS, INFO)).namespaces.get(namespace)
     if found is None:
         raise InputError(f"{path}: no request was closed on {namespace}/{INFO}")
-    with within(path):
+    with naming_bag(path):
         return found.scenario_set()
 
 
@@ -439,7 +439,7 @@ def result_in(recording: Recording, namespace: str = "") -> GenerationResult:
             f"{recording.path}: namespace {namespace!r} holds no recording with scenarios; {remedy}"
         )
     found = recording.namespaces[namespace]
-    with within(recording.path):
+    with naming_bag(recording.path):
         fit, routes = found.fit
         generated = found.scenario_set()
         seed = next((scenario.seed for scenario in generated), 0)

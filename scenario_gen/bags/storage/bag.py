@@ -1,37 +1,46 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Any bag, MCAP, SQLite or of ROS 1, of one or several files, as raw messages (CDR) in order of their stamps."""
+"""Any bag (MCAP, SQLite, ROS 1) of one or several files as raw messages (CDR) by their stamps."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Collection, Iterator
 from contextlib import contextmanager, ExitStack
 from dataclasses import dataclass, replace
 import heapq
+from operator import attrgetter
 from pathlib import Path
 import tempfile
+from typing import Protocol
 
 import zstandard
 
-from scenario_gen.bags.storage.config import Allowance, BagConfig
+from scenario_gen.bags.storage.config import BagConfig, ReadBudget
 from scenario_gen.bags.storage.files import BagFiles, files_of, METADATA
 from scenario_gen.bags.storage.mcap import (
     BagTopic,
     DamagedError,
-    decompressed,
-    McapFile,
+    decompress_zstd,
+    LoggedMessage,
     open_mcap,
 )
-from scenario_gen.bags.storage.others import open_ros1, open_sqlite, RosbagsFile
+from scenario_gen.bags.storage.rosbags_files import open_ros1, open_sqlite
 from scenario_gen.base.documents import shown
 from scenario_gen.base.errors import guarded, InputError
 from scenario_gen.base.folders import scratch
 
-COPIED = 1 << 20  # bytes at a time
+_BLOCK_BYTES = 1 << 20
+
+
+class _StoredFile(Protocol):
+    """An open file of a bag."""
+
+    def list_topics(self) -> list[BagTopic]: ...
+    def messages(self, channels: Collection[int]) -> Iterator[LoggedMessage]: ...
 
 
 @dataclass(frozen=True)
 class BagMessage:
-    """A message as it lies in the bag: CDR bytes and the time it was logged, nanoseconds."""
+    """A message of a bag: CDR bytes, and the time at which it was logged."""
 
     topic: str
     type: str
@@ -41,167 +50,166 @@ class BagMessage:
 
 @dataclass(frozen=True)
 class StoredBag:
-    """An open bag: its files, whether each message is compressed by itself, and the bounds of reading them."""
+    """An open bag.
 
-    files: list[tuple[Path, McapFile | RosbagsFile]]
-    compressed: bool
-    allowance: Allowance
+    Attributes:
+        files: path and contents of each file.
+        is_compressed_by_message: whether each message is compressed on its own.
+        budget: bounds of reading it.
+    """
+
+    files: list[tuple[Path, _StoredFile]]
+    is_compressed_by_message: bool
+    budget: ReadBudget
 
     def topics(self) -> tuple[BagTopic, ...]:
-        """Return the topics, sorted by name; of one that is in several files the first one's, with the messages of all.
+        """Return the topics by name; a topic in several files as in the first, with all messages.
 
         Raises:
             InputError: a file is damaged.
         """
-        found: dict[str, BagTopic] = {}
-        for stored in (
-            topic for file, storage in self.files for topic in _topics(file, storage).values()
-        ):
-            before = found.get(stored.name)
-            found[stored.name] = (
-                replace(before, count=before.count + stored.count) if before else stored
-            )
-        return tuple(found[name] for name in sorted(found))
+        topics: dict[str, BagTopic] = {}
+        for path, file in self.files:
+            for topic in _topics(path, file):
+                first = topics.get(topic.name)
+                count = topic.count + (first.count if first else 0)
+                topics[topic.name] = replace(first or topic, count=count)
+        return tuple(topics[name] for name in sorted(topics))
 
     def messages(
         self, wanted: Callable[[str, str], bool] = lambda _topic, _type: True
     ) -> Iterator[BagMessage]:
-        """Yield the messages of the topics that are `wanted`, by name and type, in order of their stamps; of all files together.
+        """Yield the messages of all files by their stamps, of topics with a `wanted` name and type.
 
         Raises:
-            InputError: a file is damaged, there are more messages than the bounds allow, or a topic's are no CDR of a known type.
+            InputError: a file is damaged, there are more messages than the bounds allow, or a
+                topic is not CDR of a known type.
         """
-        for message in heapq.merge(
-            *(self._of_file(*entry, wanted) for entry in self.files), key=lambda m: m.stamp_ns
-        ):
-            self.allowance.hold(len(message.data))
+        streams = [self._messages_of_file(path, file, wanted) for path, file in self.files]
+        for message in heapq.merge(*streams, key=attrgetter("stamp_ns")):
+            self.budget.spend_message(len(message.data))
             yield message
 
-    def _of_file(
-        self, file: Path, storage: McapFile | RosbagsFile, wanted: Callable[[str, str], bool]
+    def _messages_of_file(
+        self, path: Path, file: _StoredFile, wanted: Callable[[str, str], bool]
     ) -> Iterator[BagMessage]:
-        topics = {
-            number: topic
-            for number, topic in _topics(file, storage).items()
-            if wanted(topic.name, topic.type)
-        }
+        topics = {t.id: t for t in _topics(path, file) if wanted(t.name, t.type)}
         for topic in topics.values():
             if topic.encoding != "cdr" or not topic.type:
-                how = f"encoded as {shown(topic.encoding)!r}" if topic.type else "of no type"
+                how = f"is encoded as {shown(topic.encoding)!r}" if topic.type else "has no type"
                 raise InputError(
-                    f"{file}: topic {shown(topic.name)} is {how}; only CDR of a ROS type is read: choose others"
+                    f"{path}: topic {shown(topic.name)} {how}; only CDR of a ROS type can be "
+                    "read: choose other topics"
                 )
-        with _place(file):
-            for stamp, number, data in storage.in_order(topics) if topics else ():
-                yield BagMessage(
-                    topics[number].name, topics[number].type, self._whole(data, file), stamp
-                )
+        if not topics:
+            return
+        with _naming_damaged(path):
+            for message in file.messages(topics):
+                topic = topics[message.channel_id]
+                data = message.data
+                if self.is_compressed_by_message:
+                    data = self._decompress(data, path)
+                yield BagMessage(topic.name, topic.type, data, message.stamp_ns)
 
-    def _whole(self, data: bytes, file: Path) -> bytes:
-        """Return a message, decompressed where the bag compresses each by itself."""
-        if not self.compressed:
-            return data
-        most = self.allowance.config.most_chunk_bytes
-        with guarded(f"{file}: a message cannot be decompressed"):
-            whole = decompressed(data, most)
-        if len(whole) > most:
+    def _decompress(self, data: bytes, path: Path) -> bytes:
+        """Return a message that was compressed on its own."""
+        max_bytes = self.budget.config.most_chunk_bytes
+        with guarded(f"{path}: a message cannot be decompressed"):
+            message = decompress_zstd(data, max_bytes)
+        if len(message) > max_bytes:
             raise InputError(
-                f"{file}: a message decompresses to more than bag.most_chunk_bytes ({most})"
+                f"{path}: a message decompresses to more than bag.most_chunk_bytes ({max_bytes})"
             )
-        self.allowance.unpack(len(whole))
-        return whole
+        self.budget.spend_decompressed(len(message))
+        return message
 
 
-def _topics(file: Path, storage: McapFile | RosbagsFile) -> dict[int, BagTopic]:
-    """Return the topics of a file by the numbers that its messages bear."""
-    with _place(file):
-        return {topic.id: topic for topic in storage.list_topics()}
+def _topics(path: Path, file: _StoredFile) -> list[BagTopic]:
+    with _naming_damaged(path):
+        return file.list_topics()
 
 
 @contextmanager
-def _place(file: Path) -> Iterator[None]:
+def _naming_damaged(path: Path) -> Iterator[None]:
     """Name the file in errors about damage."""
     try:
         yield
     except DamagedError as error:
-        bag = file.parent if (file.parent / METADATA).exists() else file
-        remedy = f"`scenario-gen reindex {bag}` saves what is whole"
-        raise InputError(f"{file}: cut off or damaged, at {error}; {remedy}") from error
+        bag = path.parent if (path.parent / METADATA).exists() else path
+        raise InputError(
+            f"{path}: cut off or damaged at {error}; `scenario-gen reindex {bag}` recovers what is "
+            "whole"
+        ) from error
     except OSError as error:
-        raise InputError(f"{file}: cannot be read ({error.strerror or error})") from error
+        raise InputError(f"{path}: cannot be read ({error.strerror or error})") from error
 
 
 @contextmanager
 def open_bag(
-    path: Path, config: BagConfig = BagConfig(), bound: str = "bag.most_bytes"
+    path: Path, config: BagConfig = BagConfig(), parameter: str = "bag.most_bytes"
 ) -> Iterator[StoredBag]:
-    """Open a bag for reading: its folder, or one of its files.
+    """Open a bag for reading.
 
     Args:
-        path: the folder or file.
+        path: its folder, or one of its files.
         config: the bounds.
-        bound: the parameter that `most_bytes` came from, for messages.
+        parameter: name of the parameter that sets `most_bytes`, for messages.
 
     Raises:
-        InputError: the bag is missing, or a file of it is damaged or was not closed.
+        InputError: the bag does not exist, or one of its files is damaged or was not closed.
     """
-    with guarded(f"{shown(str(path))}: no path of a bag", OSError, ValueError):
-        found = files_of(path) if path.is_dir() or path.is_file() else BagFiles(())
-    if not found.files:
-        why = "is not a bag" if path.exists() else "does not exist"
+    with guarded(f"{shown(str(path))}: not the path of a bag", OSError, ValueError):
+        bag_files = files_of(path) if path.is_dir() or path.is_file() else BagFiles(())
+    if not bag_files.files:
+        problem = "is not a bag" if path.exists() else "does not exist"
         raise InputError(
-            f"{path} {why}; name a folder with .mcap, .db3 or .bag files, or one of these files"
+            f"{path} {problem}; name a folder with .mcap, .db3 or .bag files, or one of the files"
         )
-    allowance = Allowance(
-        config, str(path), sum(file.stat().st_size for file in found.files), bound
-    )
+    size = sum(file.stat().st_size for file in bag_files.files)
+    budget = ReadBudget(config, str(path), size, parameter)
+    is_compressed = bag_files.compression == "file"
     with ExitStack() as stack:
-        files = [
-            (file, _opened(file, found.compression == "file", allowance, stack))
-            for file in found.files
-        ]
-        yield StoredBag(files, found.compression == "message", allowance)
+        files = [(file, _open(file, is_compressed, budget, stack)) for file in bag_files.files]
+        yield StoredBag(files, bag_files.compression == "message", budget)
 
 
-def _opened(
-    file: Path, compressed: bool, allowance: Allowance, stack: ExitStack
-) -> McapFile | RosbagsFile:
+def _open(file: Path, is_compressed: bool, budget: ReadBudget, stack: ExitStack) -> _StoredFile:
     """Open one file of a bag, which may be compressed as a whole."""
     if file.stat().st_size == 0:
         raise InputError(f"{file} is empty (0 bytes); record or copy it again")
-    real = _unpacked(file, stack, allowance) if compressed else file
-    if real.suffix == ".db3":
-        return stack.enter_context(open_sqlite(real, file, allowance))
-    if real.suffix == ".bag":
-        return stack.enter_context(open_ros1(real, allowance))
-    with _place(file):
-        return open_mcap(stack.enter_context(real.open("rb")), real.stat().st_size, allowance)
+    path = _decompressed(file, stack, budget) if is_compressed else file
+    if path.suffix == ".db3":
+        return stack.enter_context(open_sqlite(path, file, budget))
+    if path.suffix == ".bag":
+        return stack.enter_context(open_ros1(path, budget))
+    with _naming_damaged(file):
+        return open_mcap(stack.enter_context(path.open("rb")), path.stat().st_size, budget)
 
 
-def _unpacked(file: Path, stack: ExitStack, allowance: Allowance) -> Path:
-    """Return a file that rosbag2 compressed as a whole (`name.mcap.zstd`), decompressed to a scratch folder.
+def _decompressed(file: Path, stack: ExitStack, budget: ReadBudget) -> Path:
+    """Decompress a file that rosbag2 compressed (`name.mcap.zstd`) to a temporary folder.
 
     Raises:
         InputError: it is damaged, or too large.
     """
     target = stack.enter_context(scratch(Path(tempfile.gettempdir()))) / file.stem
-    problem = guarded(
+    damage = guarded(
         f"{file}: cannot be decompressed", zstandard.ZstdError, remedy="copy it again"
     )
-    with file.open("rb") as packed, target.open("wb") as whole, problem:
-        reader = zstandard.ZstdDecompressor().stream_reader(packed, read_across_frames=True)
-        while block := reader.read(COPIED):
-            allowance.unpack(len(block))
-            whole.write(block)
+    with file.open("rb") as source, target.open("wb") as output, damage:
+        reader = zstandard.ZstdDecompressor().stream_reader(source, read_across_frames=True)
+        while block := reader.read(_BLOCK_BYTES):
+            budget.spend_decompressed(len(block))
+            output.write(block)
     return target
 
 
 @contextmanager
-def within(path: Path) -> Iterator[None]:
-    """Name the bag in errors about its content: a decoder knows the topic only.
+def naming_bag(path: Path) -> Iterator[None]:
+    """Name the bag in errors about its content: decoders know the topic only.
 
     Raises:
-        InputError: as raised inside, with the bag's name.
+        InputError: as raised inside, with the name of the bag.
     """
     try:
         yield
@@ -212,14 +220,14 @@ def within(path: Path) -> Iterator[None]:
 
 
 def bag_topics(path: Path, config: BagConfig = BagConfig()) -> tuple[BagTopic, ...]:
-    """Return the topics of a bag, sorted by name.
+    """Return the topics of a bag by name.
 
     Args:
-        path: a bag's folder, or one of its files.
-        config: what is read at most.
+        path: its folder, or one of its files.
+        config: bounds of reading it.
 
     Raises:
-        InputError: the bag is missing, damaged or empty of metadata.
+        InputError: the bag does not exist, or is damaged.
     """
     with open_bag(path, config) as bag:
         return bag.topics()
@@ -228,10 +236,10 @@ def bag_topics(path: Path, config: BagConfig = BagConfig()) -> tuple[BagTopic, .
 def read_messages(
     path: Path, wanted: Callable[[str], bool] = lambda _: True, config: BagConfig = BagConfig()
 ) -> Iterator[BagMessage]:
-    """Yield the messages of the topics that are `wanted`, in the order they were logged; those of all files of a bag together.
+    """Yield the messages of topics with a `wanted` name, by their stamps.
 
     Raises:
-        InputError: the bag is missing or damaged, or larger than `config` allows.
+        InputError: the bag does not exist, is damaged, or larger than `config` allows.
     """
     with open_bag(path, config) as bag:
         yield from bag.messages(lambda topic, _: wanted(topic))

@@ -8,18 +8,21 @@ from dataclasses import dataclass
 from scenario_gen.base.errors import InputError
 from scenario_gen.base.parameters import parameter, Parameters
 
-MESSAGE_BYTES = 256  # that a message costs beside its own
-FOUND_BYTES = 1024  # that finding a message in a chunk counts for: a chunk of few bytes may hold very many messages
-SHRINK = 100  # times that a file may grow by decompression before it is suspected; maps shrink most, 10 to 50 times
+FIND_COST_BYTES = 1024
+"""Cost of finding a message in a chunk: a chunk of few bytes may hold very many messages."""
+
+_MESSAGE_COST_BYTES = 256
+_MAX_GROWTH_RATIO = 100
+"""Growth by decompression above which a file is suspicious; maps grow most, 10 to 50 times."""
 
 
 @dataclass(frozen=True)
 class BagConfig(Parameters):
-    """Bounds of reading a bag, so that a small damaged or malicious file cannot take all memory."""
+    """Bounds of reading a bag, so that a small damaged or malicious file cannot use all memory."""
 
     most_bytes: int = parameter(
         512 * 1024**2,
-        "most bytes of messages that are read from one bag, 256 beside its own for each",
+        "largest total size of the messages read from one bag; each counts 256 bytes extra",
         low=1,
         high=2**62,
     )
@@ -31,48 +34,50 @@ class BagConfig(Parameters):
     )
 
 
-class Allowance:
-    """Counts the bytes that reading one bag takes, and refuses too many."""
+class ReadBudget:
+    """Counts the bytes that reading one bag costs, and refuses to exceed the bounds."""
 
     def __init__(
-        self, config: BagConfig, what: str, file_bytes: int, bound: str = "bag.most_bytes"
+        self, config: BagConfig, bag: str, file_bytes: int, parameter: str = "bag.most_bytes"
     ) -> None:
-        """Start with nothing counted.
+        """Begin with nothing spent.
 
         Args:
             config: the bounds.
-            what: names the bag in messages.
-            file_bytes: size of its files; decompressed they may be 100 times that, or `most_bytes`.
-            bound: the parameter that `most_bytes` came from, for messages.
+            bag: its name in messages.
+            file_bytes: size of its files; they may decompress to 100 times that, or `most_bytes`.
+            parameter: name of the parameter that sets `most_bytes`, for messages.
         """
         self.config = config
-        self._what = what
-        self._bound = bound
-        self._unpacked = max(config.most_bytes, SHRINK * file_bytes)
-        self._held = config.most_bytes
+        self._bag = bag
+        self._parameter = parameter
+        self._decompressed_left = max(config.most_bytes, _MAX_GROWTH_RATIO * file_bytes)
+        self._messages_left = config.most_bytes
 
-    def unpack(self, count: int) -> None:
-        """Count bytes that were decompressed or passed over.
+    def spend_decompressed(self, count: int) -> None:
+        """Count bytes that were decompressed or skipped.
 
         Raises:
-            InputError: there are too many for the size of the file.
+            InputError: the bag decompresses to more than its size makes plausible.
         """
-        self._unpacked -= count
-        if self._unpacked < 0:
+        self._decompressed_left -= count
+        if self._decompressed_left < 0:
             raise InputError(
-                f"{self._what}: decompresses to more than {SHRINK} times its size and more than {self._bound} "
-                f"({self.config.most_bytes} bytes), as no recording does; set {self._bound} if it is one"
+                f"{self._bag}: decompresses to more than {_MAX_GROWTH_RATIO} times its size and "
+                f"more than {self._parameter} ({self.config.most_bytes} bytes), which is unusual "
+                f"for a recording; raise {self._parameter} if the file is sound"
             )
 
-    def hold(self, count: int) -> None:
-        """Count a message that is passed on.
+    def spend_message(self, count: int) -> None:
+        """Count a message of so many bytes that is passed on.
 
         Raises:
-            InputError: there are too many.
+            InputError: the messages exceed `most_bytes`.
         """
-        self._held -= count + MESSAGE_BYTES
-        if self._held < 0:
+        self._messages_left -= count + _MESSAGE_COST_BYTES
+        if self._messages_left < 0:
             raise InputError(
-                f"{self._what}: its messages take more than {self._bound} ({self.config.most_bytes} bytes); set {self._bound} if "
-                "there is memory for more, or read fewer topics"
+                f"{self._bag}: its messages take more than {self._parameter} "
+                f"({self.config.most_bytes} bytes); raise {self._parameter} if there is enough "
+                "memory, or read fewer topics"
             )

@@ -1,9 +1,8 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Which files make up a bag."""
+"""The files of a bag, as its metadata.yaml lists them."""
 
-from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -11,101 +10,122 @@ from typing import Any
 from scenario_gen.base.documents import read_yaml, shown
 from scenario_gen.base.errors import InputError
 
-SUFFIXES = (".mcap", ".db3", ".bag")
 METADATA = "metadata.yaml"
-LOST = "scenario_gen.lost:"  # begins the keys of custom_data that name what is not in the bag, by topic
+NOT_RECORDED = "scenario_gen.lost:"
+"""Prefix of the keys in custom_data that say what of a topic was not recorded."""
+
+_SUFFIXES = (".mcap", ".db3", ".bag")
+_MAX_NAME_BYTES = 255
 
 
 @dataclass(frozen=True)
 class BagFiles:
-    """The files of a bag in order; `compression` is "", "file" or "message", as rosbag2 calls it."""
+    """The files of a bag in order; `compression` is "", "file" or "message", as in rosbag2."""
 
     files: tuple[Path, ...]
     compression: str = ""
 
 
 def files_of(path: Path) -> BagFiles:
-    """Return the files of a bag: those that metadata.yaml lists, or else those in the folder; none if it is no bag.
+    """Return the files of a bag by metadata.yaml, or else those in its folder; none if no bag.
 
     Raises:
-        InputError: metadata.yaml is damaged, or lists a file that is not there.
+        InputError: metadata.yaml is damaged, or lists a file that does not exist.
     """
     if path.is_file():
-        return BagFiles((path,) if path.suffix in SUFFIXES else ())
+        return BagFiles((path,) if path.suffix in _SUFFIXES else ())
     metadata = path / METADATA
     if not metadata.exists():
-        return BagFiles(_in_folder(path))
+        return BagFiles(_files_in(path))
     try:
-        names, compression = _listed(read_yaml(metadata), metadata)
+        bag_files = _listed(_information(metadata), metadata)
     except InputError as error:
-        there = ", ".join(file.name for file in _in_folder(path)[:3])
-        remedy = (
-            f"`scenario-gen reindex {path}` makes it anew from its files ({there}, …)"
-            if there
-            else "copy the bag again"
-        )
+        remedy = "copy the bag again"
+        files = ", ".join(file.name for file in _files_in(path)[:3])
+        if files:
+            remedy = f"`scenario-gen reindex {path}` writes it from the files ({files}, …)"
         raise InputError(f"{error}; {remedy}") from error
-    for name in names:
-        if not (path / name).is_file():
+    for file in bag_files.files:
+        if not file.is_file():
             raise InputError(
-                f"{metadata} lists {shown(name)}, which is not there; `scenario-gen reindex {path}` reads what is"
+                f"{metadata} lists {shown(file.name)}, which does not exist; "
+                f"`scenario-gen reindex {path}` reads the other files"
             )
-    return BagFiles(tuple(path / name for name in names), compression)
+    return bag_files
 
 
-def _in_folder(path: Path) -> tuple[Path, ...]:
+def _files_in(folder: Path) -> tuple[Path, ...]:
+    """Return the bag files in a folder; bag_10 follows bag_9."""
     try:
-        found = [file for file in path.iterdir() if file.suffix in SUFFIXES and file.is_file()]
+        files = [file for file in folder.iterdir() if file.suffix in _SUFFIXES and file.is_file()]
     except OSError as error:
-        raise InputError(f"{path}: {error.strerror}") from error
-    return tuple(sorted(found, key=lambda file: (len(file.name), file.name)))
+        raise InputError(f"{folder}: {error.strerror}") from error
+    return tuple(sorted(files, key=lambda file: (len(file.name), file.name)))
 
 
-def _listed(document: Any, metadata: Path) -> tuple[list[str], str]:
-    """Return the files' names and the mode of compression.
+def _information(metadata: Path) -> dict[str, Any]:
+    """Return the content of metadata.yaml.
 
     Raises:
-        InputError: the document does not hold them.
+        InputError: it is not the metadata of a bag.
     """
-    info = document.get("rosbag2_bagfile_information") if isinstance(document, dict) else None
-    listed = info.get("relative_file_paths") if isinstance(info, dict) else None
-    if not isinstance(info, dict) or not isinstance(listed, list):
-        raise InputError(
-            f"{metadata}: damaged, it lists no files under rosbag2_bagfile_information: relative_file_paths"
-        )
-    for name in listed:
-        if (
-            not isinstance(name, str)
-            or not 0 < len(Path(name).name.encode()) < 256
-            or "\0" in name
-        ):
+    document = read_yaml(metadata)
+    information = document.get("rosbag2_bagfile_information") if isinstance(document, dict) else 0
+    if not isinstance(information, dict):
+        raise InputError(f"{metadata}: damaged, it has no rosbag2_bagfile_information")
+    return information
+
+
+def _listed(information: dict[str, Any], metadata: Path) -> BagFiles:
+    """Return the listed files.
+
+    Raises:
+        InputError: the list is damaged, or the compression is unknown.
+    """
+    names = information.get("relative_file_paths")
+    if not isinstance(names, list):
+        raise InputError(f"{metadata}: damaged, it has no relative_file_paths")
+    for name in names:
+        if not _is_file_name(name):
             raise InputError(
-                f"{metadata}: damaged, relative_file_paths holds {shown(name)}, no file's name"
+                f"{metadata}: damaged, relative_file_paths contains {shown(name)}, which is not "
+                "the name of a file"
             )
-    mode, kind = (shown(info.get(f"compression_{key}") or "") for key in ("mode", "format"))
-    if mode.lower() not in ("", "none", "file", "message") or (
-        mode.lower() in ("file", "message") and kind != "zstd"
-    ):
+    mode = shown(information.get("compression_mode") or "none").lower()
+    compressor = shown(information.get("compression_format") or "")
+    if mode != "none" and (mode not in ("file", "message") or compressor != "zstd"):
         raise InputError(
-            f"{metadata}: compression {kind!r} by {mode!r}; zstd by file or message is known"
+            f"{metadata}: compression {compressor!r} by {mode!r} is unknown; zstd by file or by "
+            "message can be read"
         )
-    return [Path(name).name for name in listed], mode.lower().replace("none", "")
+    files = tuple(metadata.parent / Path(name).name for name in names)
+    return BagFiles(files, mode.replace("none", ""))
 
 
-def remarks(path: Path) -> tuple[str, ...]:
-    """Return remarks on a bag's folder that is read though its metadata.yaml is missing, or names what was not recorded."""
+def _is_file_name(name: Any) -> bool:
+    if not isinstance(name, str) or "\0" in name:
+        return False
+    return 0 < len(Path(name).name.encode()) <= _MAX_NAME_BYTES
+
+
+def metadata_warnings(path: Path) -> tuple[str, ...]:
+    """Return warnings that metadata.yaml of a bag is missing, or names what was not recorded."""
     if not path.is_dir():
         return ()
-    if not (path / METADATA).exists():
-        words = f"has no metadata.yaml: its files are read in order of their names; `scenario-gen reindex {path}` writes it"
-        return (f"{path} {words}",) if _in_folder(path) else ()
-    with suppress(InputError, KeyError, TypeError, AttributeError):
-        custom = read_yaml(path / METADATA)["rosbag2_bagfile_information"]["custom_data"]
-        notes = {
-            key.removeprefix(LOST): text for key, text in custom.items() if key.startswith(LOST)
-        }
-        return tuple(
-            f"not whole, by its recorder: {shown(topic)}: {shown(text, 400)}"
-            for topic, text in notes.items()
+    metadata = path / METADATA
+    if not metadata.exists():
+        warning = (
+            f"{path} has no metadata.yaml: its files are read in order of their names; "
+            f"`scenario-gen reindex {path}` writes it"
         )
-    return ()
+        return (warning,) if _files_in(path) else ()
+    try:
+        entries = _information(metadata).get("custom_data")
+    except InputError:
+        return ()
+    return tuple(
+        f"not complete, by its recorder: {shown(str(key).removeprefix(NOT_RECORDED))}: "
+        f"{shown(text, 400)}"
+        for key, text in (entries.items() if isinstance(entries, dict) else ())
+        if str(key).startswith(NOT_RECORDED)
+    )

@@ -1,11 +1,14 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""MCAP files by mcap's stream reader, with bounds.
+"""MCAP files, read within bounds, whole or damaged.
 
-mcap trusts the lengths that a file announces. Here it is given one record at a time, of a size that is there and within bounds,
-and a chunk is decompressed to the size that it announces and no more. Damage is a `DamagedError` with its place: an error for the
-reader of a bag, a gap for `reindex`.
+The mcap library decodes each record. Its readers are not used, since they trust the lengths that
+a file declares and stop at the first damage. Here each declared length is checked before bytes
+are read or decompressed, and damage is a `DamagedError` with its place: an error for the reader of
+a bag, a gap for `reindex`.
+
+Source: MCAP file format specification, https://mcap.dev/spec.
 """
 
 from collections import Counter
@@ -15,11 +18,12 @@ import heapq
 import io
 import mmap
 import re
-from typing import Any, BinaryIO
+import struct
+from typing import Any, BinaryIO, NamedTuple
 import zlib
 
 import lz4.frame
-from mcap.exceptions import EndOfFile
+from mcap.data_stream import ReadDataStream
 from mcap.opcode import Opcode
 from mcap.records import (
     Channel,
@@ -27,35 +31,39 @@ from mcap.records import (
     ChunkIndex,
     Footer,
     Header,
-    Message,
     MessageIndex,
     Schema,
     Statistics,
 )
-from mcap.stream_reader import StreamReader
 import zstandard
 
-from scenario_gen.bags.storage.config import Allowance, FOUND_BYTES
+from scenario_gen.bags.storage.config import FIND_COST_BYTES, ReadBudget
 from scenario_gen.bags.storage.metadata import quality_of
 from scenario_gen.base.documents import shown
 from scenario_gen.base.errors import describe, InputError, ScenarioGenError
 from scenario_gen.types import Quality
 
-MAGIC = b"\x89MCAP0\r\n"
-HEAD_BYTES, FOOTER_BYTES = (
-    9,
-    29,
-)  # of any record's kind and length, and of the footer's record, before the last magic
-OPCODES = frozenset(
-    (*range(Opcode.HEADER, Opcode.CHUNK_INDEX + 1), Opcode.STATISTICS)
-)  # of records that matter here
-LATEST = 2**63  # rosbag2's stamps are signed
-SLACK = 1024  # bytes that a record may have beside the content that is bounded
-WINDOW = 128 * 1024**2  # zstd's own default [bytes]
-CHUNK = re.compile(
-    rb"(?=\x06.{4}\x00{4})", re.DOTALL
-)  # may begin the record of a chunk of less than 4 GiB
-Logged = tuple[int, int, bytes]  # stamp [ns], channel, message
+MAX_STAMP_NS = 2**63
+"""Stamps of rosbag2 are signed."""
+
+_MAGIC = b"\x89MCAP0\r\n"
+_PREFIX_BYTES = 9  # opcode and length of a record
+_FOOTER_BYTES = 29  # with its prefix
+_EXTRA_RECORD_BYTES = 1024  # beside the data of a chunk
+_ZSTD_WINDOW_BYTES = 128 * 1024**2  # zstd's own default
+_MESSAGE_OPCODE = int(Opcode.MESSAGE)
+_MESSAGE = struct.Struct("<HIQQ")  # channel, sequence, log time, publish time
+_CHUNK_START = re.compile(rb"(?=\x06.{4}\x00{4})", re.DOTALL)  # of less than 4 GiB
+_RECORDS: dict[int, Any] = {
+    Opcode.HEADER: Header,
+    Opcode.FOOTER: Footer,
+    Opcode.SCHEMA: Schema,
+    Opcode.CHANNEL: Channel,
+    Opcode.CHUNK: Chunk,
+    Opcode.MESSAGE_INDEX: MessageIndex,
+    Opcode.CHUNK_INDEX: ChunkIndex,
+    Opcode.STATISTICS: Statistics,
+}
 
 
 class DamagedError(ScenarioGenError):
@@ -63,14 +71,21 @@ class DamagedError(ScenarioGenError):
 
     def __init__(self, offset: int, problem: str) -> None:
         super().__init__(f"byte {offset}: {problem}")
-        self.offset, self.problem = offset, problem
+        self.offset = offset
+        self.problem = problem
 
 
 @dataclass(frozen=True)
 class BagTopic:
-    """A topic of a bag: its full name, type ("" if it has none), what its first publisher offered, its number of messages.
+    """A topic of a bag.
 
-    In one file it has an `id`, too, and an `encoding`.
+    Attributes:
+        name: full name.
+        type: "" if it has none.
+        quality: offered by its first publisher.
+        count: number of its messages.
+        id: its number in one file.
+        encoding: of its messages, in one file.
     """
 
     name: str
@@ -83,7 +98,7 @@ class BagTopic:
 
 @dataclass(frozen=True)
 class Gap:
-    """Bytes that were passed over: the first one, how many, why, and how many messages were in them as far as known."""
+    """Skipped bytes: the first one, their number, the problem, and the known messages in them."""
 
     offset: int
     size: int
@@ -91,83 +106,116 @@ class Gap:
     messages: int = 0
 
 
-def parsed(data: bytes, offset: int) -> Iterator[Any]:
-    """Yield the records in some bytes, which lie at byte `offset` of a file.
+class LoggedMessage(NamedTuple):
+    """A message in a file; sorted by stamp, then by its place."""
 
-    Raises:
-        DamagedError: one is damaged.
-    """
-    stream = io.BytesIO(data)
-    found = StreamReader(
-        stream, skip_magic=True, emit_chunks=True, record_size_limit=len(data)
-    ).records
-    while stream.tell() < len(data):
-        try:
-            yield next(found)
-        except StopIteration:
-            return
-        except EndOfFile:
-            raise DamagedError(offset, "a record is cut off") from None
-        except Exception as error:  # mcap fails in any way on damaged bytes
-            raise DamagedError(offset, describe(error)) from error
+    stamp_ns: int
+    offset: int
+    number: int
+    channel_id: int
+    data: bytes
 
 
-def unpacked(chunk: Chunk, offset: int, allowance: Allowance) -> bytes:
+def decompress_zstd(data: bytes, max_bytes: int) -> bytes:
+    """Return the first `max_bytes` + 1 decompressed bytes at most."""
+    decompressor = zstandard.ZstdDecompressor(max_window_size=_ZSTD_WINDOW_BYTES)
+    with decompressor.stream_reader(io.BytesIO(data), read_across_frames=True) as reader:
+        return bytes(reader.read(max_bytes + 1))
+
+
+def _decompress_chunk(chunk: Chunk, offset: int, budget: ReadBudget) -> bytes:
     """Return the records of a chunk.
 
     Raises:
-        DamagedError: it is too large, cannot be decompressed, or has not the size or checksum that it announces.
+        DamagedError: the chunk is too large, cannot be decompressed, or does not have the size or
+            checksum that it declares.
         InputError: the bag as a whole is too large.
     """
-    size, most = chunk.uncompressed_size, allowance.config.most_chunk_bytes
-    if size > most:
+    size = chunk.uncompressed_size
+    max_bytes = budget.config.most_chunk_bytes
+    if size > max_bytes:
         raise DamagedError(
-            offset, f"a chunk of {size} bytes after decompression; bag.most_chunk_bytes is {most}"
+            offset,
+            f"a chunk of {size} bytes after decompression; bag.most_chunk_bytes is {max_bytes}",
         )
-    allowance.unpack(size)
-    raw = chunk.data
+    budget.spend_decompressed(size)
     try:
-        if chunk.compression == "zstd":
-            raw = decompressed(raw, size)
-        elif chunk.compression == "lz4":
-            raw = lz4.frame.LZ4FrameDecompressor().decompress(raw, max_length=size + 1)
-        elif chunk.compression:
-            raise DamagedError(
-                offset,
-                f"compression {shown(chunk.compression, 40)!r} is unknown; zstd and lz4 are known",
-            )
+        match chunk.compression:
+            case "zstd":
+                data = decompress_zstd(chunk.data, size)
+            case "lz4":
+                decompressor = lz4.frame.LZ4FrameDecompressor()
+                data = decompressor.decompress(chunk.data, max_length=size + 1)
+            case "":
+                data = chunk.data
+            case unknown:
+                raise DamagedError(
+                    offset, f"compression {shown(unknown, 40)!r} is unknown (known: zstd, lz4)"
+                )
     except (zstandard.ZstdError, RuntimeError, MemoryError, EOFError) as error:
         raise DamagedError(
             offset, f"a chunk cannot be decompressed ({describe(error)})"
         ) from error
-    if len(raw) != size or (chunk.uncompressed_crc and zlib.crc32(raw) != chunk.uncompressed_crc):
-        raise DamagedError(
-            offset, f"a chunk has not the {size} bytes or the checksum that it announces"
-        )
-    return bytes(raw)
+    crc = chunk.uncompressed_crc  # 0: not computed
+    if len(data) != size or (crc and zlib.crc32(data) != crc):
+        raise DamagedError(offset, f"a chunk differs from its declared size ({size}) or checksum")
+    return bytes(data)
 
 
-def decompressed(data: bytes, most: int) -> bytes:
-    """Return what zstd compressed, or more than `most` bytes of it."""
-    with zstandard.ZstdDecompressor(max_window_size=WINDOW).stream_reader(
-        io.BytesIO(data), read_across_frames=True
-    ) as reader:
-        return bytes(reader.read(most + 1))
+def _split_records(data: bytes, offset: int) -> Iterator[tuple[int, bytes]]:
+    """Yield opcode and content of the records in some bytes from byte `offset` of a file.
+
+    Raises:
+        DamagedError: a record is cut off.
+    """
+    start = 0
+    while start < len(data):
+        content_start = start + _PREFIX_BYTES
+        end = content_start + int.from_bytes(data[start + 1 : content_start], "little")
+        if data[start] == 0 or end > len(data):
+            raise DamagedError(offset, "a record is cut off")
+        yield data[start], data[content_start:end]
+        start = end
+
+
+def _decode(opcode: int, content: bytes, offset: int) -> Any:
+    """Return a record: a LoggedMessage, or a class of mcap.records; None if it is not needed.
+
+    Raises:
+        DamagedError: it is damaged.
+    """
+    try:
+        if opcode == _MESSAGE_OPCODE:
+            channel_id, _, stamp_ns, _ = _MESSAGE.unpack_from(content)
+            if stamp_ns >= MAX_STAMP_NS:
+                raise ValueError(f"log time {stamp_ns} ns is out of range")
+            return LoggedMessage(stamp_ns, offset, 0, channel_id, content[_MESSAGE.size :])
+        kind = _RECORDS.get(opcode)
+        return kind and kind.read(ReadDataStream(io.BytesIO(content)))
+    except Exception as error:  # mcap raises various exceptions on damaged bytes
+        raise DamagedError(offset, describe(error)) from error
 
 
 @dataclass
 class McapFile:
-    """What is in an MCAP file: schemas and channels by id, messages by channel, and where they lie.
+    """Contents of an MCAP file.
 
     Attributes:
-        entries: a stamp [ns] before which a chunk, or a message outside of chunks, has nothing, and its offset.
-        gaps: what was passed over, in order.
-        closed: whether its recorder closed the file.
+        file: the open file.
+        size: its size in bytes.
+        budget: bounds of reading it.
+        schemas: by id.
+        channels: by id.
+        counts: number of messages by channel.
+        entries: lower bound of the stamps [ns] in a chunk, or in a message outside of chunks, and
+            its offset.
+        gaps: skipped bytes, in order.
+        closed: whether the recorder closed the file.
     """
 
     file: BinaryIO
     size: int
-    allowance: Allowance
+    budget: ReadBudget
     schemas: dict[int, Schema] = field(default_factory=dict)
     channels: dict[int, Channel] = field(default_factory=dict)
     counts: Counter[int] = field(default_factory=Counter)
@@ -175,47 +223,62 @@ class McapFile:
     gaps: list[Gap] = field(default_factory=list)
     closed: bool = False
 
-    def __post_init__(self) -> None:
-        self._lost = False  # whether the last chunk is, whose indexes follow
-
-    def _bytes(self, start: int, size: int) -> bytes:
+    def _read(self, start: int, size: int) -> bytes:
         """Return bytes of the file.
 
         Raises:
-            DamagedError: there are not so many, or they are more than the bounds allow.
+            DamagedError: the file ends before, or they are more than the bounds allow.
         """
-        left, most = self.size - start, self.allowance.config.most_chunk_bytes
+        left = self.size - start
+        max_bytes = self.budget.config.most_chunk_bytes
         if not 0 <= size <= left:
-            raise DamagedError(start, f"{size} bytes are announced where {left} are left")
-        if size > most + SLACK:
-            raise DamagedError(start, f"a record of {size} bytes; bag.most_chunk_bytes is {most}")
+            raise DamagedError(start, f"{size} bytes are declared, {left} are left")
+        if size > max_bytes + _EXTRA_RECORD_BYTES:
+            raise DamagedError(
+                start, f"a record of {size} bytes; bag.most_chunk_bytes is {max_bytes}"
+            )
         self.file.seek(start)
         return self.file.read(size)
 
     def record(self, offset: int) -> tuple[Any, int]:
-        """Return the record at a place, None if it is of no kind that matters here, and where the next one begins.
+        """Return the record at an offset, None if it is not needed, and the next offset.
 
         Raises:
             DamagedError: there is none, or it is damaged or too large.
         """
-        head = self._bytes(offset, HEAD_BYTES)
-        length, start = int.from_bytes(head[1:], "little"), offset + HEAD_BYTES
-        if head[0] == 0 or length > self.size - start:
+        prefix = self._read(offset, _PREFIX_BYTES)
+        length = int.from_bytes(prefix[1:], "little")
+        start = offset + _PREFIX_BYTES
+        if prefix[0] == 0 or length > self.size - start:
             raise DamagedError(
-                offset, f"{length} bytes are announced where {self.size - start} are left"
+                offset, f"{length} bytes are declared, {self.size - start} are left"
             )
-        if head[0] not in OPCODES:
+        if prefix[0] not in _RECORDS and prefix[0] != _MESSAGE_OPCODE:
             return None, start + length
-        return next(parsed(head + self._bytes(start, length), offset), None), start + length
+        return _decode(prefix[0], self._read(start, length), offset), start + length
+
+    def has_magic(self, offset: int) -> bool:
+        """Return whether MCAP's magic bytes are at an offset."""
+        return offset + len(_MAGIC) <= self.size and self._read(offset, len(_MAGIC)) == _MAGIC
+
+    def footer_offset(self) -> int:
+        """Return where the footer begins in a file that was closed."""
+        return max(self.size - _FOOTER_BYTES - len(_MAGIC), 0)
 
     def read_summary(self, footer: Footer) -> bool:
-        """Read topics and places from the summary; return whether it has all of them.
+        """Read topics and chunks from the summary; return whether it is complete.
 
         Raises:
             DamagedError: it is damaged.
         """
-        statistics, start = None, footer.summary_start
-        for record in parsed(self._bytes(start, self.size - start), start) if start else ():
+        start: int = footer.summary_start
+        if not start:
+            return False
+        statistics = None
+        for opcode, content in _split_records(
+            self._read(start, self.footer_offset() - start), start
+        ):
+            record = _decode(opcode, content, start)
             if isinstance(record, Statistics):
                 statistics = record
             elif isinstance(record, ChunkIndex):
@@ -225,65 +288,42 @@ class McapFile:
         if statistics is None or statistics.chunk_count != len(self.entries):
             return False
         self.counts = Counter(statistics.channel_message_counts)
-        return bool(self.entries or not statistics.message_count) and set(self.counts) <= set(
-            self.channels
-        )
+        is_chunked = bool(self.entries) or not statistics.message_count
+        return is_chunked and self.counts.keys() <= self.channels.keys()
 
     def scan(self) -> None:
-        """Read the whole file for topics and places; damage is noted among the gaps, and left out."""
+        """Read the whole file for topics and messages; damaged parts become gaps."""
         self.entries.clear()
         self.counts.clear()
-        start = 0
-        while start < self.size and not self.closed:
+        offset = len(_MAGIC)
+        if not self.has_magic(0):
+            offset = self._skip_to_chunk(0, "the file does not begin as MCAP")
+        while offset < self.size and not self.closed:
             try:
-                if not start and self._bytes(0, len(MAGIC)) != MAGIC:
-                    raise DamagedError(0, "not the beginning of an MCAP file")
-                record, after = self.record(start or len(MAGIC))
-                self._note(start or len(MAGIC), record, after)
-                self.closed = (
-                    isinstance(record, Footer) and self._bytes(after, len(MAGIC)) == MAGIC
-                )
+                record, next_offset = self.record(offset)
             except DamagedError as error:
-                after = self._next_chunk(start + 1)
-                self.gaps.append(Gap(start, after - start, error.problem))
-            start = after
+                offset = self._skip_to_chunk(offset, error.problem)
+                continue
+            self._register(offset, record, next_offset)
+            self.closed = isinstance(record, Footer) and self.has_magic(next_offset)
+            offset = next_offset
 
-    def _note(self, offset: int, record: Any, after: int) -> None:
-        """Take a record at the top level of the file, or note that it is lost."""
-        try:
-            if isinstance(record, Chunk):
-                self._lost = False
-                messages = list(self._in_chunk(record, offset, None))
-                self.entries.append((min((message[0] for message in messages), default=0), offset))
-                self.counts.update(message[3] for message in messages)
-            elif isinstance(record, Message):
-                self.entries.append((_stamp(record, offset), offset))
-                self.counts[record.channel_id] += 1
-            elif isinstance(record, MessageIndex) and self._lost:
-                self.gaps[-1] = replace(
-                    self.gaps[-1], messages=self.gaps[-1].messages + len(record.records)
-                )
-            else:
-                self._describe(record)
-        except (DamagedError, InputError) as error:
-            self.gaps.append(Gap(offset, after - offset, getattr(error, "problem", str(error))))
-            self._lost = True
-
-    def _describe(self, record: Any) -> None:
-        """Learn of a schema or a channel."""
-        if isinstance(record, Schema):
-            self.schemas[record.id] = record
-        elif isinstance(record, Channel):
-            self.channels[record.id] = record
+    def _skip_to_chunk(self, offset: int, problem: str) -> int:
+        """Note a gap up to the next whole chunk, or to the end of the file; return its end."""
+        end = self._next_chunk(offset + 1)
+        self.gaps.append(Gap(offset, end - offset, problem))
+        return end
 
     def _next_chunk(self, start: int) -> int:
-        """Return where the next whole chunk from byte `start` begins; the size of the file if there is none."""
+        """Return where the next whole chunk begins; the size of the file if there is none."""
+        if start >= self.size:
+            return self.size
         with mmap.mmap(self.file.fileno(), self.size, access=mmap.ACCESS_READ) as data:
-            for match in CHUNK.finditer(data, start):
+            for match in _CHUNK_START.finditer(data, start):
                 try:
-                    record, _ = self.record(match.start())
-                    self.allowance.unpack(len(record.data))
-                    unpacked(record, match.start(), self.allowance)
+                    chunk, _ = self.record(match.start())
+                    self.budget.spend_decompressed(len(chunk.data))
+                    _decompress_chunk(chunk, match.start(), self.budget)
                     return match.start()
                 except DamagedError:
                     continue
@@ -291,111 +331,134 @@ class McapFile:
                     break
         return self.size
 
-    def _in_chunk(
-        self, chunk: Chunk, offset: int, wanted: Collection[int] | None
-    ) -> Iterator[tuple[int, int, int, int, bytes]]:
-        """Yield stamp, offset, number, channel and bytes of the messages of a chunk; learn what it says of topics."""
-        raw = unpacked(chunk, offset, self.allowance)
+    def _register(self, offset: int, record: Any, next_offset: int) -> None:
+        """Register a record at the top level of the file, or note that its content is lost."""
+        last_gap = self.gaps[-1] if self.gaps else None
         try:
-            for number, record in enumerate(parsed(raw, offset)):
-                if not isinstance(record, Message):
-                    self._describe(record)
-                    continue
-                self.allowance.unpack(FOUND_BYTES)
-                if wanted is None or record.channel_id in wanted:
-                    yield _stamp(record, offset), offset, number, record.channel_id, record.data
-        except DamagedError as error:
-            raise DamagedError(offset, f"in a chunk: {error.problem}") from error
+            if isinstance(record, (Chunk, LoggedMessage)):
+                messages = list(self._messages_of(record, offset, None))
+                first_ns = min((message.stamp_ns for message in messages), default=0)
+                self.entries.append((first_ns, offset))
+                self.counts.update(message.channel_id for message in messages)
+            elif isinstance(record, MessageIndex) and last_gap and self._follows_gap(offset):
+                known = last_gap.messages + len(record.records)
+                size = next_offset - last_gap.offset
+                self.gaps[-1] = replace(last_gap, messages=known, size=size)
+            else:
+                self._describe(record)
+        except (DamagedError, InputError) as error:
+            problem = error.problem if isinstance(error, DamagedError) else str(error)
+            self.gaps.append(Gap(offset, next_offset - offset, problem))
+
+    def _follows_gap(self, offset: int) -> bool:
+        """Return whether the last gap ends at an offset."""
+        return bool(self.gaps) and self.gaps[-1].offset + self.gaps[-1].size == offset
+
+    def _describe(self, record: Any) -> None:
+        """Remember a schema or a channel."""
+        if isinstance(record, Schema):
+            self.schemas[record.id] = record
+        elif isinstance(record, Channel):
+            self.channels[record.id] = record
 
     def list_topics(self) -> list[BagTopic]:
-        """Return the channels, with their types and numbers of messages.
+        """Return the channels with their types and numbers of messages.
 
         Raises:
-            DamagedError: the type of one is missing that should be there.
+            DamagedError: the type of a channel is missing.
         """
-        found = []
+        topics = []
         for channel in self.channels.values():
-            if channel.schema_id and channel.schema_id not in self.schemas:
+            schema = self.schemas.get(channel.schema_id)
+            if channel.schema_id and schema is None:
                 raise DamagedError(0, f"the type of topic {shown(channel.topic)} is missing")
-            kind = self.schemas[channel.schema_id].name if channel.schema_id else ""
-            quality = quality_of(channel.metadata.get("offered_qos_profiles", ""))
-            count = self.counts[channel.id]
-            found.append(
-                BagTopic(channel.topic, kind, quality, count, channel.id, channel.message_encoding)
+            topic = BagTopic(
+                name=channel.topic,
+                type=schema.name if schema else "",
+                quality=quality_of(channel.metadata.get("offered_qos_profiles", "")),
+                count=self.counts[channel.id],
+                id=channel.id,
+                encoding=channel.message_encoding,
             )
-        return found
+            topics.append(topic)
+        return topics
 
-    def in_order(self, wanted: Collection[int] | None) -> Iterator[Logged]:
-        """Yield messages of some channels (None: all) in order of their stamps, those of one stamp in the order of the file.
+    def messages(self, channels: Collection[int] | None = None) -> Iterator[LoggedMessage]:
+        """Yield the messages of some channels (None: all) by their stamps, then by their place.
 
         Raises:
             DamagedError: a chunk is damaged.
         """
-        heap: list[tuple[int, int, int, int, bytes]] = []
-        for start, offset in sorted(self.entries):
-            while heap and heap[0][0] < start:
-                stamp, _, _, channel, data = heapq.heappop(heap)
-                yield stamp, channel, data
-            for message in self._at(offset, wanted):
-                if message[0] < start:
+        heap: list[LoggedMessage] = []
+        for start_ns, offset in sorted(self.entries):
+            while heap and heap[0].stamp_ns < start_ns:
+                yield heapq.heappop(heap)
+            record, _ = self.record(offset)
+            if not isinstance(record, (Chunk, LoggedMessage)):
+                raise DamagedError(offset, "the index names a chunk that is not there")
+            for message in self._messages_of(record, offset, channels):
+                if message.stamp_ns < start_ns:
                     raise DamagedError(
                         offset,
-                        f"a message is logged at {message[0]} ns, before its chunk's start at {start} ns",
+                        f"a message is logged at {message.stamp_ns} ns, before the start of its "
+                        f"chunk at {start_ns} ns",
                     )
                 heapq.heappush(heap, message)
         while heap:
-            stamp, _, _, channel, data = heapq.heappop(heap)
-            yield stamp, channel, data
+            yield heapq.heappop(heap)
 
-    def _at(
-        self, offset: int, wanted: Collection[int] | None
-    ) -> Iterator[tuple[int, int, int, int, bytes]]:
-        """Yield the messages of the chunk, or the one outside of chunks, at a place, as `_in_chunk` does."""
-        record, _ = self.record(offset)
-        if isinstance(record, Chunk):
-            yield from self._in_chunk(record, offset, wanted)
-        elif not isinstance(record, Message):
-            raise DamagedError(offset, "no chunk where one is announced")
-        elif wanted is None or record.channel_id in wanted:
-            self.allowance.unpack(len(record.data) + FOUND_BYTES)
-            yield _stamp(record, offset), offset, 0, record.channel_id, record.data
+    def _messages_of(
+        self, record: Chunk | LoggedMessage, offset: int, channels: Collection[int] | None
+    ) -> Iterator[LoggedMessage]:
+        """Yield the messages of a chunk, or a message outside of chunks; register topics.
+
+        Raises:
+            DamagedError: the chunk is damaged.
+        """
+        if isinstance(record, LoggedMessage):
+            self.budget.spend_decompressed(len(record.data) + FIND_COST_BYTES)
+            if channels is None or record.channel_id in channels:
+                yield record
+            return
+        data = _decompress_chunk(record, offset, self.budget)
+        for number, (opcode, content) in enumerate(_split_records(data, offset)):
+            inner = _decode(opcode, content, offset)
+            if not isinstance(inner, LoggedMessage):
+                self._describe(inner)
+                continue
+            self.budget.spend_decompressed(FIND_COST_BYTES)
+            if channels is None or inner.channel_id in channels:
+                yield inner._replace(number=number)
 
 
-def _stamp(message: Message, offset: int) -> int:
-    stamp: int = message.log_time
-    if stamp >= LATEST:
-        raise DamagedError(offset, f"a message is logged at {stamp} ns, later than a stamp can be")
-    return stamp
-
-
-def open_mcap(file: BinaryIO, size: int, allowance: Allowance) -> McapFile:
-    """Return the content of an MCAP file of `size` bytes.
+def open_mcap(file: BinaryIO, size: int, budget: ReadBudget) -> McapFile:
+    """Return the contents of an MCAP file of `size` bytes.
 
     Raises:
         DamagedError: it is damaged, or was not closed.
-        InputError: its messages are of ROS 1.
+        InputError: its messages are those of ROS 1.
     """
-    found = McapFile(file, size, allowance)
-    if size < len(MAGIC) or file.read(len(MAGIC)) != MAGIC:
-        raise DamagedError(0, "not the beginning of an MCAP file")
-    header, _ = found.record(len(MAGIC))
+    mcap = McapFile(file, size, budget)
+    if not mcap.has_magic(0):
+        raise DamagedError(0, "the file does not begin as MCAP")
+    header, _ = mcap.record(len(_MAGIC))
     if not isinstance(header, Header):
-        raise DamagedError(len(MAGIC), "no header at the beginning of the file")
+        raise DamagedError(len(_MAGIC), "the file has no header")
     if header.profile == "ros1":
         raise InputError(
-            f"{file.name}: an MCAP file of profile 'ros1'; name the .bag file that it was made of"
+            f"{file.name}: an MCAP file of profile 'ros1'; name the .bag file that it was made from"
         )
-    end = max(size - FOOTER_BYTES - len(MAGIC), 0)
     try:
-        footer, _ = found.record(end)
+        footer, _ = mcap.record(mcap.footer_offset())
     except DamagedError:
         footer = None
     if not isinstance(footer, Footer):
         raise DamagedError(
-            end, "not the end of an MCAP file: its recorder was stopped, or it is cut off"
+            mcap.footer_offset(),
+            "the file has no footer: its recorder was killed, or it is cut off",
         )
-    if not found.read_summary(footer):
-        found.scan()
-        if found.gaps:
-            raise DamagedError(found.gaps[0].offset, found.gaps[0].problem)
-    return found
+    if not mcap.read_summary(footer):
+        mcap.scan()
+        if mcap.gaps:
+            raise DamagedError(mcap.gaps[0].offset, mcap.gaps[0].problem)
+    return mcap

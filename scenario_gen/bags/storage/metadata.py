@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""rosbag2's metadata.yaml, version 9, written; QoS profiles, written, and read as any version of rosbag2 wrote them."""
+"""rosbag2's metadata.yaml, version 9, and QoS profiles, as any version of rosbag2 writes them."""
 
 from dataclasses import dataclass, field
 from functools import cache, lru_cache
@@ -9,21 +9,28 @@ from typing import Any
 
 import yaml
 
-from scenario_gen.bags.storage.files import LOST
+from scenario_gen.bags.storage.files import NOT_RECORDED
 from scenario_gen.base.documents import parse_yaml
 from scenario_gen.base.errors import InputError
 from scenario_gen.types import Quality
 
-ENTRIES = {
-    **dict.fromkeys(("history", "reliability", "durability", "liveliness"), str | int),
-    **dict.fromkeys(("deadline", "lifespan", "liveliness_lease_duration"), dict),
-    **{"depth": int, "avoid_ros_namespace_conventions": bool},
+_MAX_STAMP_NS = 2**63 - 1
+_INFINITE = {"sec": 9223372036, "nsec": 854775807}  # rmw's infinite duration
+_PROFILE_TYPES: dict[str, Any] = {
+    "history": str | int,
+    "depth": int,
+    "reliability": str | int,
+    "durability": str | int,
+    "deadline": dict,
+    "lifespan": dict,
+    "liveliness": str | int,
+    "liveliness_lease_duration": dict,
+    "avoid_ros_namespace_conventions": bool,
 }
-FOREVER = {"sec": 9223372036, "nsec": 854775807}  # rmw's infinite duration
 
 
-class _PlainDumper(yaml.CSafeDumper):  # type: ignore[misc]
-    """No anchors: rosbag2's YAML reader does not want them."""
+class _Dumper(yaml.CSafeDumper):  # type: ignore[misc]
+    """Writes no anchors: rosbag2's YAML reader does not accept them."""
 
     def ignore_aliases(self, data: Any) -> bool:
         return True
@@ -31,7 +38,7 @@ class _PlainDumper(yaml.CSafeDumper):  # type: ignore[misc]
 
 @dataclass
 class TopicInfo:
-    """The metadata of one topic; `qos` is a YAML list of profiles."""
+    """The metadata of a topic; `qos` is a YAML list of profiles."""
 
     name: str
     type: str
@@ -41,127 +48,128 @@ class TopicInfo:
 
     @property
     def document(self) -> dict[str, Any]:
-        """As in metadata.yaml."""
-        about: dict[str, Any] = {
-            "name": self.name,
-            "type": self.type,
-            "serialization_format": "cdr",
+        """The topic as in metadata.yaml."""
+        return {
+            "topic_metadata": {
+                "name": self.name,
+                "type": self.type,
+                "serialization_format": "cdr",
+                "offered_qos_profiles": profiles(self.qos),
+                "type_description_hash": self.type_hash,
+            },
+            "message_count": self.count,
         }
-        about |= {
-            "offered_qos_profiles": profiles(self.qos),
-            "type_description_hash": self.type_hash,
-        }
-        return {"topic_metadata": about, "message_count": self.count}
 
 
 @dataclass
 class FileInfo:
-    """The metadata of one file, or of several: stamps in nanoseconds."""
+    """The metadata of a file."""
 
     path: str
-    start_ns: int = 2**63 - 1
+    start_ns: int = _MAX_STAMP_NS
     end_ns: int = 0
     count: int = 0
 
-    def add(self, start_ns: int, end_ns: int, count: int = 1) -> None:
-        """Count messages between two stamps."""
-        self.start_ns, self.end_ns = min(self.start_ns, start_ns), max(self.end_ns, end_ns)
-        self.count += count
-
-    @property
-    def document(self) -> dict[str, Any]:
-        """First stamp, duration and count as in metadata.yaml; zeros where there is no message."""
-        start, duration = (self.start_ns, self.end_ns - self.start_ns) if self.count else (0, 0)
-        times = {
-            "starting_time": {"nanoseconds_since_epoch": start},
-            "duration": {"nanoseconds": duration},
-        }
-        return times | {"message_count": self.count}
+    def add(self, stamp_ns: int) -> None:
+        """Count a message."""
+        self.start_ns = min(self.start_ns, stamp_ns)
+        self.end_ns = max(self.end_ns, stamp_ns)
+        self.count += 1
 
 
 @dataclass
 class BagInfo:
-    """The metadata of a bag."""
+    """The metadata of a bag; `not_recorded` says by topic what is missing."""
 
     topics: list[TopicInfo] = field(default_factory=list)
     files: list[FileInfo] = field(default_factory=list)
-    lost: dict[str, str] = field(default_factory=dict)  # topic -> what of it is not in the bag
+    not_recorded: dict[str, str] = field(default_factory=dict)
 
 
-def dump(value: Any) -> str:
-    """Return YAML without anchors, in the order given."""
-    text: str = yaml.dump(value, Dumper=_PlainDumper, sort_keys=False, default_flow_style=False)
+def _statistics(files: list[FileInfo]) -> dict[str, Any]:
+    """Return first stamp, duration and count of files as in metadata.yaml; zeros if empty."""
+    used = [file for file in files if file.count]
+    start_ns = min((file.start_ns for file in used), default=0)
+    end_ns = max((file.end_ns for file in used), default=0)
+    return {
+        "starting_time": {"nanoseconds_since_epoch": start_ns},
+        "duration": {"nanoseconds": end_ns - start_ns},
+        "message_count": sum(file.count for file in used),
+    }
+
+
+def metadata_yaml(info: BagInfo) -> str:
+    """Return the text of metadata.yaml."""
+    not_recorded = {f"{NOT_RECORDED}{topic}": text for topic, text in info.not_recorded.items()}
+    document = {
+        "version": 9,
+        "storage_identifier": "mcap",
+        **_statistics(info.files),
+        "topics_with_message_count": [topic.document for topic in info.topics],
+        "compression_format": "",
+        "compression_mode": "",
+        "relative_file_paths": [file.path for file in info.files],
+        "files": [{"path": file.path, **_statistics([file])} for file in info.files],
+        "custom_data": not_recorded or None,
+        "ros_distro": "jazzy",
+    }
+    return _dump({"rosbag2_bagfile_information": document})
+
+
+def _dump(value: Any) -> str:
+    """Return YAML without anchors, in the given order."""
+    text: str = yaml.dump(value, Dumper=_Dumper, sort_keys=False, default_flow_style=False)
     return text
 
 
 @cache
 def qos_yaml(quality: Quality) -> str:
-    """Return the offered QoS profile as the list that rosbag2 writes."""
+    """Return an offered QoS profile as the list that rosbag2 writes."""
     profile = {
         "history": "keep_last",
         "depth": quality.depth,
         "reliability": "reliable" if quality.reliable else "best_effort",
         "durability": "transient_local" if quality.transient_local else "volatile",
-        "deadline": FOREVER,
-        "lifespan": FOREVER,
+        "deadline": _INFINITE,
+        "lifespan": _INFINITE,
         "liveliness": "automatic",
-        "liveliness_lease_duration": FOREVER,
+        "liveliness_lease_duration": _INFINITE,
         "avoid_ros_namespace_conventions": False,
     }
-    return dump([profile]).rstrip("\n")
-
-
-def metadata_yaml(info: BagInfo) -> str:
-    """Return the text of metadata.yaml."""
-    whole = FileInfo("")
-    for file in info.files:
-        whole.add(file.start_ns, file.end_ns, file.count)
-    about = {"version": 9, "storage_identifier": "mcap", **whole.document}
-    about |= {"topics_with_message_count": [topic.document for topic in info.topics]}
-    about |= {
-        "compression_format": "",
-        "compression_mode": "",
-        "relative_file_paths": [file.path for file in info.files],
-    }
-    about |= {"files": [{"path": file.path} | file.document for file in info.files]}
-    about |= {
-        "custom_data": {f"{LOST}{topic}": words for topic, words in info.lost.items()} or None,
-        "ros_distro": "jazzy",
-    }
-    return dump({"rosbag2_bagfile_information": about})
+    return _dump([profile]).rstrip("\n")
 
 
 @lru_cache(maxsize=256)
 def profiles(text: str) -> list[dict[str, Any]]:
-    """Return the profiles, none if the text is damaged: a bag can be read without them."""
+    """Return the profiles in a YAML list; none if the text is damaged, since a bag is readable without."""
+    if not text:
+        return []
     try:
-        found = parse_yaml(text, "offered_qos_profiles") if text else []
+        entries = parse_yaml(text, "offered_qos_profiles")
     except InputError:
         return []
-    return found if isinstance(found, list) and all(map(_is_whole, found)) else []
+    return entries if isinstance(entries, list) and all(map(_is_profile, entries)) else []
 
 
-def _is_whole(profile: Any) -> bool:
-    """Return whether a profile has the entries that every reader needs."""
-    if not isinstance(profile, dict) or not all(
-        isinstance(profile.get(key), kind) for key, kind in ENTRIES.items()
-    ):
+def _is_profile(entry: Any) -> bool:
+    """Return whether an entry has what every reader needs."""
+    if not isinstance(entry, dict):
         return False
-    return all(
-        {"sec", "nsec"} <= set(value) for value in profile.values() if isinstance(value, dict)
-    )
+    if not all(isinstance(entry.get(key), kind) for key, kind in _PROFILE_TYPES.items()):
+        return False
+    durations = (value for value in entry.values() if isinstance(value, dict))
+    return all({"sec", "nsec"} <= value.keys() for value in durations)
 
 
 def quality_of(text: str) -> Quality:
-    """Return the quality that the first of the profiles offers: volatile, depth 10 where there is none."""
-    for profile in profiles(text)[:1]:
-        reliable = str(profile["reliability"]).lower() not in (
-            "best_effort",
-            "2",
-        )  # a number, as rosbag2 wrote before Jazzy
-        return Quality(
-            max(1, profile["depth"]),
-            reliable,
-            str(profile["durability"]).lower() in ("transient_local", "1"),
-        )
-    return Quality(depth=10, transient_local=False)
+    """Return the quality of the first profile in a YAML list; volatile, depth 10, if there is none."""
+    found = profiles(text)
+    if not found:
+        return Quality(depth=10, transient_local=False)
+    profile = found[0]
+    # rosbag2 wrote rmw's numbers before Jazzy: best effort is 2, transient local is 1.
+    return Quality(
+        depth=max(1, profile["depth"]),
+        reliable=str(profile["reliability"]).lower() not in ("best_effort", "2"),
+        transient_local=str(profile["durability"]).lower() in ("transient_local", "1"),
+    )

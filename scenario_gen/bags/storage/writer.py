@@ -13,24 +13,28 @@ from typing import Any, Self
 from mcap.writer import CompressionType, Writer
 
 from scenario_gen.bags.storage.definitions import definition
+from scenario_gen.bags.storage.files import METADATA
 from scenario_gen.bags.storage.metadata import BagInfo, FileInfo, metadata_yaml, TopicInfo
 from scenario_gen.base.errors import InputError
 from scenario_gen.base.folders import Kind, naming, replaced_folder, sync, write_text
 
-CHUNK_BYTES = 1024 * 1024
-WRITTEN = Kind("bag")
+_CHUNK_BYTES = 1024 * 1024
+_WRITTEN = Kind("bag")
 
 
 @dataclass(frozen=True)
 class Split:
-    """Begin a new file when the current one holds `bytes` of messages or spans `seconds`; 0 is never."""
+    """When to begin a new file: after `bytes` of messages, or after `seconds`; 0 means never."""
 
     bytes: int = 0
     seconds: float = 0.0
 
 
 class BagWriter:
-    """Writes one bag; a context manager. Flushed chunk by chunk, so a killed process loses the last one only (see `let_go`)."""
+    """Writes one bag; a context manager.
+
+    Each full chunk is flushed, so that a killed process loses its last chunk only; see `flush`.
+    """
 
     def __init__(
         self,
@@ -38,9 +42,9 @@ class BagWriter:
         *,
         compress: bool = True,
         split: Split = Split(),
-        chunk_bytes: int = CHUNK_BYTES,
+        chunk_bytes: int = _CHUNK_BYTES,
     ) -> None:
-        """Create `folder` and its first file.
+        """Create the folder and its first file.
 
         Raises:
             InputError: the folder exists.
@@ -52,16 +56,16 @@ class BagWriter:
         self._chunk_bytes = chunk_bytes
         self._split = split
         self._topics: dict[str, tuple[TopicInfo, tuple[str, str]]] = {}
-        self._broken = False
+        self._failed = False
         try:
             folder.mkdir(parents=True)
         except FileExistsError:
             raise InputError(
-                f"{folder} exists already; name another folder for the bag, or remove it"
+                f"{folder} already exists; remove it, or name another folder for the bag"
             ) from None
-        self._open()
+        self._open_file()
 
-    def _open(self) -> None:
+    def _open_file(self) -> None:
         self._file = FileInfo(f"{self.folder.name}_{len(self.info.files)}.mcap")
         self._bytes = 0
         self.info.files.append(self._file)
@@ -91,31 +95,31 @@ class BagWriter:
         type_hash: str = "",
         schema: tuple[str, str] | None = None,
     ) -> None:
-        """Announce a topic; a second time is ignored.
+        """Add a topic, unless it was added before.
 
         Args:
-            name: full topic name.
+            name: full name.
             kind: its type, e.g. `nav_msgs/msg/Path`.
             qos: YAML list of the offered QoS profiles.
-            type_hash: RIHS01 hash, if it is known better than by the definition.
-            schema: encoding and text of the type's definition, if it need not be looked up.
+            type_hash: RIHS01 hash; "": computed from the definition.
+            schema: encoding and text of the type's definition; None: looked up.
 
         Raises:
-            InputError: no definition of the type can be found.
+            InputError: the definition of the type is unknown.
         """
         if name in self._topics:
             return
-        known_hash = ""
         if schema is None:
-            text, known_hash = definition(kind)
+            text, computed_hash = definition(kind)
             schema = ("ros2msg", text)
-        topic = TopicInfo(name, kind, qos, type_hash or known_hash)
+            type_hash = type_hash or computed_hash
+        topic = TopicInfo(name, kind, qos, type_hash)
         self._topics[name] = (topic, schema)
         self.info.topics.append(topic)
         self._channel(name)
 
     def _channel(self, name: str) -> int:
-        """Return the channel of a topic in the current file, created at its first use."""
+        """Return the channel of a topic in the current file; create it at its first use."""
         if name not in self._channels:
             topic, (encoding, text) = self._topics[name]
             if topic.type not in self._schemas:
@@ -129,7 +133,7 @@ class BagWriter:
         return self._channels[name]
 
     def write(self, name: str, data: bytes, stamp_ns: int) -> None:
-        """Append one CDR message to an announced topic, logged at `stamp_ns`.
+        """Append a CDR message of a topic that was added, logged at `stamp_ns`.
 
         Raises:
             InputError: the stamp is negative, which an MCAP file cannot hold.
@@ -137,61 +141,65 @@ class BagWriter:
         """
         if stamp_ns < 0:
             raise InputError(
-                f"{name}: stamp {stamp_ns} ns is before 1970; an MCAP file cannot hold it"
+                f"{name}: stamp {stamp_ns} ns is before 1970, which an MCAP file cannot hold"
             )
+        topic, _ = self._topics[name]
         with self._writing():
-            full = self._split.bytes and self._bytes >= self._split.bytes
-            long = (
-                self._split.seconds
-                and self._file.count
-                and stamp_ns - self._file.start_ns >= self._split.seconds * 1e9
-            )
-            if full or long:
+            if self._is_full(stamp_ns):
                 self._close_file()
-                self._open()
-            topic, _ = self._topics[name]
-            channel = self._channel(name)
+                self._open_file()
             self._writer.add_message(
-                channel, log_time=stamp_ns, data=data, publish_time=stamp_ns, sequence=topic.count
+                self._channel(name),
+                log_time=stamp_ns,
+                data=data,
+                publish_time=stamp_ns,
+                sequence=topic.count,
             )
             self._stream.flush()  # a full chunk, which the writer has just written
-        self._file.add(stamp_ns, stamp_ns)
+        self._file.add(stamp_ns)
         self._bytes += len(data)
         topic.count += 1
 
+    def _is_full(self, stamp_ns: int) -> bool:
+        """Return whether a message with this stamp begins a new file."""
+        if self._split.bytes and self._bytes >= self._split.bytes:
+            return True
+        span_ns = stamp_ns - self._file.start_ns
+        return self._split.seconds > 0.0 and span_ns >= self._split.seconds * 1e9
+
     @contextmanager
     def _writing(self) -> Iterator[None]:
-        """Name the current file in errors; after one, part of a record may be written, and nothing more is."""
+        """Name the current file in errors, after which nothing more is written."""
         try:
             yield
         except OSError as error:
             error.filename = str(self.folder / self._file.path)
-            self._broken = True
+            self._failed = True
             raise
 
-    def let_go(self) -> None:
-        """Write the current chunk, if there is one, so that a killed process does not lose it.
+    def flush(self) -> None:
+        """Write the current chunk, so that a killed process does not lose it.
 
         Raises:
             OSError: the disk is full, or fails; nothing more can be written.
         """
-        if not self._broken:
+        if not self._failed:
             with self._writing():
                 self._writer.flush()
 
     def close(self) -> None:
-        """Write indexes and metadata.yaml; where a write has failed, leave the files as they are, for `reindex`.
+        """Write indexes and metadata.yaml; after a failed write, leave the files for `reindex`.
 
         Raises:
             OSError: the disk is full, or fails.
         """
         try:
-            if not self._broken:
+            if not self._failed:
                 self._close_file()
-                partial = self.folder / "metadata.yaml.partial"
+                partial = self.folder / f"{METADATA}.partial"
                 write_text(partial, metadata_yaml(self.info))
                 sync(partial)
-                partial.replace(self.folder / "metadata.yaml")
+                partial.replace(self.folder / METADATA)
                 sync(self.folder)
         finally:
             with suppress(OSError):
@@ -211,18 +219,18 @@ class BagWriter:
 
 @contextmanager
 def atomic_bag(
-    folder: Path, kind: Kind = WRITTEN, inputs: Iterable[Path] = (), **options: Any
+    folder: Path, kind: Kind = _WRITTEN, inputs: Iterable[Path] = (), **options: Any
 ) -> Iterator[BagWriter]:
-    """Yield a bag to write: it appears complete or not at all, and may replace an earlier one of the same kind.
+    """Yield a bag to write, which appears complete or not at all.
 
     Args:
-        folder: where it will be.
-        kind: of result; only an earlier one of that kind is replaced.
-        inputs: what is read for it, and may not lie in `folder`.
-        options: BagWriter's.
+        folder: of the bag; it may replace an earlier one of the same kind.
+        kind: kind of the result.
+        inputs: paths that are read meanwhile, and must not be in `folder`.
+        options: those of `BagWriter`.
 
     Raises:
-        InputError: `folder` is there and may not be replaced, its place cannot be written, or the disk is full, or fails.
+        InputError: the folder exists and may not be replaced, or the disk is full, or fails.
     """
     with replaced_folder(folder, kind, inputs) as partial:
         partial.rmdir()  # the writer creates it

@@ -18,7 +18,6 @@ messages become the columns of omega-prime's table, and are read as it is (`data
 """
 
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
 from dataclasses import replace
 from functools import partial
 import math
@@ -28,7 +27,7 @@ from typing import Any
 import betterosi
 import pandas as pd
 
-from scenario_gen.bags.storage.config import Allowance, BagConfig
+from scenario_gen.bags.storage.config import BagConfig, ReadBudget
 from scenario_gen.bags.storage.mcap import DamagedError, McapFile, open_mcap
 from scenario_gen.base.documents import shown
 from scenario_gen.base.errors import guarded, InputError
@@ -37,7 +36,7 @@ from scenario_gen.logs.adapters.data_sets import DataSet
 from scenario_gen.logs.config import listed, LogConfig
 from scenario_gen.logs.raw import check_size, RawLog
 
-KINDS = ("osi3.GroundTruth", "GroundTruth")
+_MESSAGE_TYPES = ("osi3.GroundTruth", "GroundTruth")
 LATEST = 9_000_000_000  # seconds that a stamp in 64 bits of nanoseconds can be
 COLUMNS = (
     "total_nanos",
@@ -102,53 +101,39 @@ def _table(
 
 
 def _messages(path: Path, config: LogConfig) -> Iterator[Any]:
-    """Yield the GroundTruth messages of one channel, in order of their stamps in the file."""
+    """Yield the GroundTruth messages of one channel by their stamps in the file."""
     size = path.stat().st_size
     check_size(str(path), size, 0, config)
-    allowance = Allowance(
-        BagConfig(most_bytes=config.size_limit << 20), str(path), size, "log.size_limit"
-    )
-    with path.open("rb") as stream, _whole(path):
-        file = open_mcap(stream, size, allowance)
-        channel = _channel(file, path, config)
-        for k, (_, _, data) in enumerate(file.in_order([channel])):
-            allowance.hold(len(data))
-            with guarded(f"{path}, message {k + 1} is no GroundTruth"):
-                message = betterosi.GroundTruth.from_binary(data)
-            yield message
-
-
-@contextmanager
-def _whole(path: Path) -> Iterator[None]:
-    """Name the file in errors about damage."""
+    bounds = BagConfig(most_bytes=config.size_limit << 20)
+    budget = ReadBudget(bounds, str(path), size, "log.size_limit")
     try:
-        yield
+        with path.open("rb") as stream:
+            file = open_mcap(stream, size, budget)
+            channel = _channel(file, path, config)
+            for number, logged in enumerate(file.messages([channel]), 1):
+                budget.spend_message(len(logged.data))
+                with guarded(f"{path}, message {number} is not a GroundTruth"):
+                    message = betterosi.GroundTruth.from_binary(logged.data)
+                yield message
     except DamagedError as error:
-        raise InputError(f"{path}: cut off or damaged, at {error}; copy it again") from error
+        raise InputError(f"{path}: cut off or damaged at {error}; copy it again") from error
 
 
 def _channel(file: McapFile, path: Path, config: LogConfig) -> int:
-    """Return the number of the one channel of GroundTruth messages, or of the one that the parameter `topics` names.
+    """Return the id of the only GroundTruth channel, or of the one that `topics` names.
 
     Raises:
         InputError: there is none, or several.
     """
     topics = file.list_topics()
-    found = [topic for topic in topics if topic.type in KINDS and topic.encoding == "protobuf"]
+    known = [t for t in topics if t.type in _MESSAGE_TYPES and t.encoding == "protobuf"]
     wanted = listed(config.topics)
-    chosen = [topic for topic in found if topic.name in wanted] if wanted else found
-    if len(chosen) != 1:
-        there = (
-            ", ".join(f"{shown(topic.name)} ({shown(topic.type)})" for topic in (found or topics))
-            or "no topics"
-        )
-        need = (
-            "choose one with the parameter topics"
-            if found
-            else "one of osi3.GroundTruth is needed"
-        )
-        raise InputError(f"{path} has {there}; {need}")
-    return chosen[0].id
+    chosen = [topic for topic in known if not wanted or topic.name in wanted]
+    if len(chosen) == 1:
+        return chosen[0].id
+    listing = ", ".join(f"{shown(topic.name)} ({shown(topic.type)})" for topic in known or topics)
+    remedy = "choose one with --set log.topics=…" if known else "one of osi3.GroundTruth is needed"
+    raise InputError(f"{path} has {listing or 'no topics'}; {remedy}")
 
 
 def _offset(message: Any) -> tuple[float, float, float] | None:

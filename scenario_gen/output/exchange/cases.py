@@ -16,7 +16,7 @@ from scenario_gen.bags.recordings.read import (
     SCENARIOS,
     WITNESS,
 )
-from scenario_gen.bags.storage.bag import within
+from scenario_gen.bags.storage.bag import naming_bag
 from scenario_gen.bags.storage.config import BagConfig
 from scenario_gen.base.errors import InputError, RefusedError
 from scenario_gen.base.provenance import read_parameters
@@ -138,7 +138,7 @@ def read_cases(
             raise InputError(
                 f"{bag}: no scenarios in namespace {namespace!r}; there are: {', '.join(n or '/' for n in namespaces)}"
             )
-    with within(bag):
+    with naming_bag(bag):
         groups = [(space, group) for space in spaces for group in _groups(space, export)]
         cases = [
             _case(k + 1, space, group, export, indices) for k, (space, group) in enumerate(groups)

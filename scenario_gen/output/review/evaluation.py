@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from scenario_gen.bags.recordings.read import Namespace, NO_ENTRY, read_recording, SCENARIOS
-from scenario_gen.bags.storage.bag import within
+from scenario_gen.bags.storage.bag import naming_bag
 from scenario_gen.bags.storage.config import BagConfig
 from scenario_gen.base.errors import InputError
 from scenario_gen.base.folders import replaced_folder
@@ -58,7 +58,7 @@ def bag_results(
         raise InputError(
             f"{path}: no namespace holds both `tracks` and `scenarios`; there is nothing to compare"
         )
-    with within(path):
+    with naming_bag(path):
         total, done = sum(len(namespace.hashes) for namespace in complete), count(1)
 
         def tick() -> None:

@@ -19,7 +19,7 @@ from scenario_gen.bags.recordings.read import (
 )
 from scenario_gen.bags.recordings.template import decode_template, missing_topics
 from scenario_gen.bags.recordings.write import add_message, distance_apart, same_tracks
-from scenario_gen.bags.storage.bag import BagMessage, within
+from scenario_gen.bags.storage.bag import BagMessage, naming_bag
 from scenario_gen.bags.storage.config import BagConfig
 from scenario_gen.bags.storage.writer import atomic_bag
 from scenario_gen.base.errors import InputError, ScenarioGenError
@@ -98,7 +98,7 @@ def regenerate_scenario(
         InputError: the bag, the index, or something that is needed is not there or ambiguous; the log is another one.
         ScenarioGenError: it comes out differently (another version); the message names what differs.
     """
-    with within(bag):
+    with naming_bag(bag):
         found = _find(bag, index, namespace, request, config)
         return _regenerate(found, f"{bag}: request {found.entry.request}", log)
 
@@ -160,7 +160,7 @@ def replanned(
     Raises:
         InputError: the bag or something that is needed is not there, or several namespaces hold scenarios.
     """
-    with within(bag):
+    with naming_bag(bag):
         entries = _entries(bag, config)
         names = sorted({where.name for where, _, _ in entries})
         if namespace is None and len(names) > 1:

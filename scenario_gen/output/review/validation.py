@@ -25,7 +25,7 @@ from scenario_gen.bags.recordings.read import (
     SCENARIOS,
     WITNESS,
 )
-from scenario_gen.bags.storage.bag import within
+from scenario_gen.bags.storage.bag import naming_bag
 from scenario_gen.bags.storage.config import BagConfig
 from scenario_gen.base.errors import InputError
 from scenario_gen.method.validity import Checker, Limits
@@ -201,7 +201,7 @@ def validate_bag(
         raise InputError(
             f"{path}: no topic `scenarios` in any namespace; there is nothing to check"
         )
-    with within(path):
+    with naming_bag(path):
         total = sum(len(namespace.hashes) for namespace in checked)
         done = count(1)
         return tuple(

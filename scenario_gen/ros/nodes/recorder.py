@@ -125,8 +125,8 @@ class Recorder(Node):  # type: ignore[misc]
         bag, self._bag = self._bag, None
         if bag is None:
             return ""
-        bag.info.lost = dict(self._losses.summary(ended=True))
-        self._warn(bag.info.lost)
+        bag.info.not_recorded = dict(self._losses.summary(ended=True))
+        self._warn(bag.info.not_recorded)
         with _disk_errors():
             bag.close()
         self._report(Level.OK, f"{bag.folder} is closed")
@@ -209,7 +209,7 @@ class Recorder(Node):  # type: ignore[misc]
         """Write what came in the last seconds."""
         if self._bag is not None:
             with self._guarded():
-                self._bag.let_go()
+                self._bag.flush()
 
     def _listen(self, topic: str, kind: str) -> None:
         publishers = self.get_publishers_info_by_topic(topic)

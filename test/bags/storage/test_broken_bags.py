@@ -18,7 +18,7 @@ from scenario_gen.bags.recordings.template import decode_template
 from scenario_gen.bags.recordings.write import result_messages, write_recording
 from scenario_gen.bags.storage.bag import read_messages
 from scenario_gen.bags.storage.config import BagConfig
-from scenario_gen.bags.storage.files import remarks
+from scenario_gen.bags.storage.files import metadata_warnings
 from scenario_gen.bags.storage.reindex import reindex
 from scenario_gen.bags.storage.writer import BagWriter
 from scenario_gen.base.errors import InputError
@@ -29,9 +29,9 @@ from scenario_gen.output.review.validation import UNUSABLE, validate_bag
 
 def test_a_bag_without_metadata_is_read_and_that_is_said(tmp_path):
     bag = write_recording(tmp_path / "bag", hand_made_run())
-    assert not remarks(bag)
+    assert not metadata_warnings(bag)
     (bag / "metadata.yaml").unlink()
-    assert "no metadata.yaml" in remarks(bag)[0]
+    assert "no metadata.yaml" in metadata_warnings(bag)[0]
     assert len(list(read_messages(bag))) == len(list(result_messages(hand_made_run())))
 
 

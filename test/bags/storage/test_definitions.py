@@ -5,10 +5,10 @@
 
 import pytest
 
-from scenario_gen.bags.storage.definitions import definition, kept, type_store
+from scenario_gen.bags.storage.definitions import definition, stored_definitions, type_store
 
 
-@pytest.mark.parametrize("kind", sorted(kept()))
+@pytest.mark.parametrize("kind", sorted(stored_definitions()))
 def test_a_kept_definition_is_that_of_rosbags(kind):
     text, _ = type_store().generate_msgdef(kind, ros_version=2)
     assert definition(kind) == (text, type_store().hash_rihs01(kind))
