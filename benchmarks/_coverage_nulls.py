@@ -12,8 +12,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from scenario_gen.method.evaluation.population import APART, FEATURES, KINDS, Member, Members
+from scenario_gen.method.evaluation.population import FEATURES, KINDS, Member, Members
 from scenario_gen.numerics import Bools, Floats
+from scenario_gen.situation import EncounterKind
 from scenario_gen.types import Interval
 
 JOINT = (
@@ -52,7 +53,11 @@ def scaled(null: Members, times: float) -> Members:
 
 def jitters(found: Members, rng: np.random.Generator) -> Iterator[tuple[str, Members]]:
     """Yield nulls that add noise to the templates: of the spread of each feature, of one spread for all, of all correlations."""
-    noise: dict[str, dict[str, Floats]] = {"per feature": {}, "isotropic": {}, "covariance": {}}
+    noise: dict[str, dict[EncounterKind | None, Floats]] = {
+        "per feature": {},
+        "isotropic": {},
+        "covariance": {},
+    }
     for kind in {own.kind for own in found.recorded}:
         own = np.array([member.features for member in found.recorded if member.kind == kind])
         off = deviations(found, kind)
@@ -72,7 +77,7 @@ def jitters(found: Members, rng: np.random.Generator) -> Iterator[tuple[str, Mem
         yield name, replace(found, made=made)
 
 
-def deviations(found: Members, kind: str) -> Floats:
+def deviations(found: Members, kind: EncounterKind | None) -> Floats:
     """Return by how much members of a kind differ from their templates (S, F); a row of zeros where there are none."""
     pairs = [(member, found.recorded[member.template]) for member in found.made]
     off = [
@@ -81,12 +86,12 @@ def deviations(found: Members, kind: str) -> Floats:
     return np.array(off).reshape(-1, len(FEATURES)) if off else np.zeros((1, len(FEATURES)))
 
 
-def joint_gain(found: Members, mixed: Members, count: int) -> dict[str, float]:
+def joint_gain(found: Members, mixed: Members, count: int) -> dict[EncounterKind, float]:
     """Return by kind: precision in JOINT, over that of mixed pairs."""
     gains = {}
     for kind in KINDS:
         of_kind = [sets.of_kind(kind) for sets in (found, mixed)]
-        if kind == APART or of_kind[0].recordings < 2:
+        if of_kind[0].recordings < 2:
             continue
         most = max(min(count, len(of_kind[0].recorded) // 2), 1)
         precision = [

@@ -21,7 +21,7 @@ from benchmarks.naturalness import DATA
 from scenario_gen.base.errors import InputError
 from scenario_gen.logs import LogConfig, read_log
 from scenario_gen.method.evaluation.law import SHIPPED
-from scenario_gen.method.evaluation.population import APART, FEATURES, KINDS, Member, member_of
+from scenario_gen.method.evaluation.population import FEATURES, KINDS, Member, member_of
 
 WINDOWS = "trajectories/ngsim_commonroad/USA_*_all_vehicles.csv"
 SOURCE = "NGSIM, Lankershim Boulevard and Peachtree Street (US Department of Transportation, public domain)"
@@ -46,7 +46,9 @@ def members() -> list[Member]:
         for member in found
     ]
     return [
-        member for member, near in zip(found, close, strict=True) if near and member.kind != APART
+        member
+        for member, near in zip(found, close, strict=True)
+        if near and member.kind is not None
     ]
 
 
@@ -72,7 +74,7 @@ def main() -> None:
     rows = {
         kind: np.array([member.features for member in seen if member.kind == kind])
         for kind in KINDS
-        if kind != APART
+        if any(member.kind == kind for member in seen)
     }
     scatter = {
         kind: (own - own.mean(axis=0)).T @ (own - own.mean(axis=0)) for kind, own in rows.items()

@@ -32,7 +32,7 @@ from scenario_gen.base.errors import ScenarioGenError
 from scenario_gen.logs import LogConfig, read_log
 from scenario_gen.method.chain import Chain
 from scenario_gen.method.config import PipelineConfig
-from scenario_gen.method.evaluation.population import APART, in_words, KINDS, Members, members_of
+from scenario_gen.method.evaluation.population import in_words, KINDS, Members, members_of
 from scenario_gen.method.recombination import recombinations
 from scenario_gen.method.sampling import SamplingConfig
 from scenario_gen.method.segmentation import segment
@@ -108,7 +108,7 @@ def _measured(
     )
     yield higher(f"{setting}: encounters", len(found.recorded), "")
     yield higher(f"{setting}: scenarios", len(found.made), "")
-    lost = {(member.template, member.other) for member in found.made if member.kind == APART}
+    lost = {(member.template, member.other) for member in found.made if member.kind is None}
     yield lower(f"{setting}: sets that lose the shared area", len(lost), "", 0.0)
     yield from _curve(setting, found)
     yield from _by_kind(setting, found)

@@ -21,7 +21,6 @@ from scenario_gen.base.errors import guarded, InputError
 from scenario_gen.base.stores import fetched, Place
 from scenario_gen.corpus.config import CorpusConfig
 from scenario_gen.corpus.grouping import Found, label, part_of, read_found
-from scenario_gen.corpus.kinds import kind_of, Motion
 from scenario_gen.corpus.messages import DEGREE
 from scenario_gen.corpus.tables import write_table
 from scenario_gen.logs import (
@@ -175,25 +174,18 @@ def read_one_log(task: LogTask) -> None:
 
 def row_of(encounter: Encounter, source: str, config: CorpusConfig) -> dict[str, Any]:
     """Return an encounter's row: its kind is that of the two vehicles that have most to do with each other."""
-    pairs = []
+    situation, pairs = Situation.of(encounter), []
     for i, j in combinations(range(len(encounter.vehicles)), 2):
         both = np.flatnonzero(encounter.there[i] & encounter.there[j])
         if len(both) < 2:
             continue
         apart = np.linalg.norm(encounter.position[i, both] - encounter.position[j, both], axis=1)
-        both = (
-            both[apart < config.log.proximity]
-            if (apart < config.log.proximity).sum() > 1
-            else both
+        near = both[apart < config.log.proximity]
+        rows = near if len(near) > 1 else both
+        gap, _, _ = space_time_gap(
+            encounter.position[i, rows], encounter.position[j, rows], encounter.dt
         )
-        a, b = (
-            Motion(
-                encounter.position[n, both], encounter.heading[n, both], encounter.speed[n, both]
-            )
-            for n in (i, j)
-        )
-        gap, _, _ = space_time_gap(a.position, b.position, encounter.dt)
-        pairs.append((gap, i, j, kind_of(a, b, encounter.dt)))
+        pairs.append((gap, i, j, situation.kind(i, j)))
     pairs.sort()
     measures = criticality(at_period(encounter, encounter.dt), EvaluationConfig().ttc_horizon)
     latitude, longitude = encounter.origin or (None, None)
@@ -201,7 +193,7 @@ def row_of(encounter: Encounter, source: str, config: CorpusConfig) -> dict[str,
         "name": encounter.name,
         "source": source,
         "kind": pairs[0][3],
-        "reactions": json.dumps(Situation.of(encounter).reactions.document(encounter.vehicles)),
+        "reactions": json.dumps(situation.reactions.document(encounter.vehicles)),
         "kinds": json.dumps(
             {
                 f"{encounter.vehicles[i].id} {encounter.vehicles[j].id}": kind

@@ -24,7 +24,7 @@ from scenario_gen.numerics import Ints
 START = datetime(2004, 1, 1, tzinfo=UTC)
 PARTITION = 5000  # meetings that one task groups, at least
 COLUMNS = {
-    **dict.fromkeys(("name", "kind"), "string"),
+    "name": "string",
     "devices": "int64[]",
     **dict.fromkeys(("start", "end", "earliest"), "int64"),
     **dict.fromkeys(("gap", "distance", "lat", "lon"), "double"),
@@ -35,7 +35,6 @@ COLUMNS = {
 class Meeting(Met):
     """Two vehicles near each other, times in µs since 2004, with what the table says of them."""
 
-    kind: str
     distance: float
     lat: float
     lon: float
@@ -124,7 +123,7 @@ def group_partition(task: GroupTask) -> None:
     """Write the table of a partition's encounters, in order of time; `earliest` is the start of the first of its meetings."""
     from pyarrow import parquet
 
-    names = ("gap", "start", "a", "b", "end", "kind", "distance", "lat", "lon")
+    names = ("gap", "start", "a", "b", "end", "distance", "lat", "lon")
     inside = [("start", ">=", task.begin), ("start", "<", task.end)]
     with fetched([task.corpus / "hours" / f"hour-{hour}.parquet" for hour in task.hours]) as here:
         tables = [
@@ -133,7 +132,7 @@ def group_partition(task: GroupTask) -> None:
         ]
     rows = [
         {
-            "name": one.name, "devices": list(one.devices), "start": one.start, "end": one.end, "kind": one.meetings[0].kind,
+            "name": one.name, "devices": list(one.devices), "start": one.start, "end": one.end,
             "gap": one.meetings[0].gap, "distance": min(meeting.distance for meeting in one.meetings),
             "lat": one.meetings[0].lat, "lon": one.meetings[0].lon, "earliest": min(meeting.start for meeting in one.meetings),
         }

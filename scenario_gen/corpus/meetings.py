@@ -127,11 +127,7 @@ def _search(
     ]
     found.sort(key=lambda one: (one["start"], one["a"], one["b"]))
     numbers = dict.fromkeys(("gap", "distance", "travel", "lat", "lon"), pa.float64())
-    kinds = {
-        **dict.fromkeys(("a", "b", "start", "end"), pa.int64()),
-        **numbers,
-        "kind": pa.string(),
-    }
+    kinds = {**dict.fromkeys(("a", "b", "start", "end"), pa.int64()), **numbers}
     table = pa.Table.from_pylist(found, schema=pa.schema(list(kinds.items())))
     wanted = _excerpt(rows, found)
     excerpt = {name: values[wanted] for name, values in rows.items()}

@@ -10,7 +10,6 @@ from typing import Any
 import numpy as np
 
 from scenario_gen.corpus.config import CorpusConfig
-from scenario_gen.corpus.kinds import kind_of, Motion, unwrapped
 from scenario_gen.logs import (
     metres_per_degree,
     OUT_OF_RANGE_S,
@@ -28,6 +27,14 @@ NORTH = 111_120.0  # m of one, within 0.5 % of it anywhere
 LONGITUDE = 111_320.0  # m of a degree of longitude at the equator
 MAX_SAME = 64  # vehicles that share an id in an hour
 OUTLIER_M = 15.0  # m from the median of five messages, beyond what is driven meanwhile: further is no position
+
+
+@dataclass(frozen=True, eq=False)
+class Motion:
+    """A vehicle's positions (T, 2) [m] and speeds (T,) [m/s]."""
+
+    position: Floats
+    speed: Floats
 
 
 @dataclass(frozen=True, eq=False)
@@ -121,10 +128,7 @@ def meetings(
                 + begin
                 - first
             )
-            p, q = (
-                Motion(m.position[there], m.heading[there], m.speed[there])
-                for m, _ in (one, other)
-            )
+            p, q = (Motion(m.position[there], m.speed[there]) for m, _ in (one, other))
             travel = max(float(m.speed.sum()) for m in (p, q)) * config.log.period
             if travel < config.log.travel:
                 continue
@@ -134,7 +138,6 @@ def meetings(
             found.append({
                 "a": a.device, "b": b.device, "start": begin * period, "end": (end - 1) * period, "gap": gap,
                 "distance": float(apart[there].min()), "travel": travel, "lat": origin[0], "lon": origin[1],
-                "kind": kind_of(p, q, config.log.period),
             })  # fmt: skip
     return found
 
@@ -169,8 +172,7 @@ def _at(
         & (at <= t[-1])
         & (t[after] - t[after - 1] <= config.log.longest_gap * 1e6 + 1.0)
     )
-    heading = np.interp(when, seconds, unwrapped(track.heading[own]))
-    return Motion(position, heading, np.interp(when, seconds, track.speed[own])), there
+    return Motion(position, np.interp(when, seconds, track.speed[own])), there
 
 
 def tell_apart(t: Ints, lat: Floats, lon: Floats, speed: Floats) -> Ints:

@@ -26,10 +26,10 @@ import numpy as np
 
 from scenario_gen.base.errors import RefusedError
 from scenario_gen.method.evaluation.law import Law
-from scenario_gen.method.evaluation.population import APART, DISTANCE, member_of
+from scenario_gen.method.evaluation.population import DISTANCE, member_of
 from scenario_gen.numerics import Floats
 from scenario_gen.numerics.plane import ahead_and_left, place
-from scenario_gen.situation import Conflict, Situation, time_gaps
+from scenario_gen.situation import Conflict, EncounterKind, Situation, time_gaps
 from scenario_gen.types import Encounter, FOLLOW, Reaction, RECOMBINED, YIELD
 
 LEAST_S = 5.0  # that a new encounter lasts
@@ -61,7 +61,7 @@ class Pair:
     """
 
     situation: Situation
-    kind: str
+    kind: EncounterKind
     features: Floats
     conflict: Conflict
     reactions: tuple[Reaction, ...]
@@ -124,7 +124,7 @@ def pair_of(encounter: Encounter) -> Pair | None:
     situation = Situation.of(encounter)
     member = member_of(encounter, "", 0)
     if (
-        member.kind == APART
+        member.kind is None
         or member.pair is None
         or (conflict := situation.conflict(*member.pair)) is None
     ):

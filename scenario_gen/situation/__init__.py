@@ -28,6 +28,7 @@ from scenario_gen.situation.interaction import (
     Wait,
     WAIT_SPEED,
 )
+from scenario_gen.situation.kind import EncounterKind, kind_of
 from scenario_gen.situation.manoeuvre import (
     in_words,
     keeps,
@@ -68,6 +69,7 @@ __all__ = [
     "STAND_SPEED",
     "WAIT_SPEED",
     "Conflict",
+    "EncounterKind",
     "Equation",
     "FrenetTracks",
     "LaneGaps",
@@ -90,6 +92,7 @@ __all__ = [
     "find_waits",
     "in_words",
     "keeps",
+    "kind_of",
     "lag_behind",
     "lane_gaps",
     "least_gaps",

@@ -11,6 +11,7 @@ import numpy as np
 from scenario_gen.numerics import Floats
 from scenario_gen.situation.gaps import conflicts_in, lane_gaps, LaneGaps
 from scenario_gen.situation.interaction import Conflict, find_waits, Wait
+from scenario_gen.situation.kind import EncounterKind, kind_of
 from scenario_gen.situation.reactions import find_reactions
 from scenario_gen.situation.separation import least_gaps, separate_recorded, Separation
 from scenario_gen.situation.tracks import clean_tracks, drivers_of, Track
@@ -102,6 +103,10 @@ class Situation:
     def least_gap(self) -> float:
         """Least gap [m] between any two vehicles; negative: they overlap; inf: never together."""
         return float(np.min(self.least_gaps, initial=np.inf))
+
+    def kind(self, a: int, b: int) -> EncounterKind:
+        """Return what two vehicles do, see `kind_of`."""
+        return kind_of(self.encounter, a, b)
 
     @property
     def traffic_side(self) -> str:

@@ -19,7 +19,6 @@ from scenario_gen.corpus import grouping
 from scenario_gen.corpus.config import CorpusConfig
 from scenario_gen.corpus.encounters import encounter_of, tables_of
 from scenario_gen.corpus.grouping import group, label, Meeting, partitions
-from scenario_gen.corpus.kinds import kind_of, Motion
 from scenario_gen.corpus.messages import parse_range, ranges
 from scenario_gen.corpus.mine import clean_tasks, mine
 from scenario_gen.corpus.tables import rows_of
@@ -78,7 +77,7 @@ def test_who_reacts_to_whom_stands_in_table_and_page(corpus):
         assert all(sentence in page for sentence in found["sentences"])
         kinds.setdefault(row["kind"], []).append([edge["kind"] for edge in found["edges"]])
     assert ["follow"] in kinds["following"] and not any(
-        "follow" in found for found in kinds["opposing"]
+        "follow" in found for found in kinds["oncoming"]
     )
 
 
@@ -201,36 +200,8 @@ def test_nothing_to_read_is_an_error(tmp_path):
         mine([tmp_path / "empty"], tmp_path / "out")
 
 
-def straight(x, y, heading, speed, seconds=12.0):
-    time = np.arange(0.0, seconds, 0.1)
-    way = speed * (time - seconds / 2.0)
-    place = np.stack([x + way * np.cos(heading), y + way * np.sin(heading)], axis=1)
-    return Motion(place, np.full(len(time), heading), np.full(len(time), speed))
-
-
-@given(
-    turned=strategies.floats(-3.0, 3.0),
-    case=strategies.sampled_from(
-        [
-            ("following", (0.0, 0.0, 0.0), (-15.0, 0.5, 0.0)),
-            ("opposing", (0.0, 0.0, 0.0), (0.0, 3.5, np.pi)),
-            ("crossing", (0.0, 0.0, 0.0), (0.0, 5.0, np.pi / 2.0)),
-            ("other", (0.0, 0.0, 0.0), (0.0, 3.5, 0.0)),
-        ]
-    ),
-)
-def test_the_kind_depends_neither_on_the_direction_nor_on_the_order(turned, case):
-    kind, *both = case
-    cos, sin = np.cos(turned), np.sin(turned)
-    a, b = (
-        straight(cos * x - sin * y, sin * x + cos * y, heading + turned, 10.0)
-        for x, y, heading in both
-    )
-    assert kind_of(a, b, 0.1) == kind == kind_of(b, a, 0.1)
-
-
 def meeting(a, b, start, end, gap):
-    return Meeting(gap, int(start * 1e6), a, b, int(end * 1e6), "following", gap, 42.0, -83.0)
+    return Meeting(gap, int(start * 1e6), a, b, int(end * 1e6), gap, 42.0, -83.0)
 
 
 def test_who_is_joined_to_whom():

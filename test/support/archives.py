@@ -21,7 +21,7 @@ import pyproj
 from scenario_gen.numerics import Floats, Ints
 
 TRUTH = "synthetic.json"
-KINDS = ("crossing", "opposing", "following", "merging", "turning")
+KINDS = ("crossing", "oncoming", "following", "merging", "left_turn")
 THRESHOLDS = ("proximity", "duration", "presence", "travel", "beside", "late")
 """Of the miner, at each of which encounters are planted inside and outside: the distance, how long the pass takes, how long both
 are recorded, how far one drives, how far beside each other they pass, how long after each other."""
@@ -264,7 +264,7 @@ def _crossing(draft: _Draft, late: tuple[float, float] = (1.0, 2.4)) -> list[dic
     ]
 
 
-def _opposing(draft: _Draft, beside: tuple[float, float] = (3.2, 4.5)) -> list[dict[str, float]]:
+def _oncoming(draft: _Draft, beside: tuple[float, float] = (3.2, 4.5)) -> list[dict[str, float]]:
     return [
         {"heading": 0.0, "speed": draft.between(6.0, 14.0), **_recorded(draft)},
         {
@@ -315,7 +315,7 @@ def _merging(draft: _Draft) -> list[dict[str, float]]:
     ]
 
 
-def _turning(draft: _Draft) -> list[dict[str, float]]:
+def _left_turn(draft: _Draft) -> list[dict[str, float]]:
     radius, lane, speed, other = (
         draft.between(8.0, 11.0),
         3.5,
@@ -341,7 +341,7 @@ def _turning(draft: _Draft) -> list[dict[str, float]]:
     ]
 
 
-_OF_KIND = dict(zip(KINDS, (_crossing, _opposing, _following, _merging, _turning), strict=True))
+_OF_KIND = dict(zip(KINDS, (_crossing, _oncoming, _following, _merging, _left_turn), strict=True))
 
 
 def _at_threshold(
@@ -360,11 +360,11 @@ def _at_threshold(
     if threshold == "duration":  # nearer than 100 m for almost 5 s
         closing = 200.0 / margin(5.0, 0.6)
         same = {"speed": closing / 2.0, "begin": -9.0, "lasts": 18.0}
-        return "opposing", [same | {"heading": k * np.pi, "y": k * 3.6} for k in range(2)]
+        return "oncoming", [same | {"heading": k * np.pi, "y": k * 3.6} for k in range(2)]
     if threshold == "presence":  # the second is recorded for almost 5 s
         lasts = margin(5.0, 0.6)
-        first, second = _opposing(draft)
-        return "opposing", [
+        first, second = _oncoming(draft)
+        return "oncoming", [
             first | {"speed": 7.0},
             second | {"speed": 7.0, "begin": -lasts / 2.0, "lasts": lasts},
         ]
@@ -374,7 +374,7 @@ def _at_threshold(
         return "following", [{"heading": 0.0, **times, **each} for each in places]
     if threshold == "beside":  # on two roads side by side
         beside = margin(6.0, -1.3)
-        return "opposing", _opposing(draft, (beside, beside))
+        return "oncoming", _oncoming(draft, (beside, beside))
     late = margin(3.0, -0.5)
     return "crossing", _crossing(draft, (late, late))
 

@@ -27,6 +27,7 @@ import scenario_gen
 from scenario_gen.method.evaluation.measures import MEASURES
 from scenario_gen.method.evaluation.population import FEATURES, generated_member, Member, member_of
 from scenario_gen.numerics import Floats
+from scenario_gen.situation import EncounterKind
 from scenario_gen.types import Encounter, Measures, once_per_object, Scenario
 
 SHIPPED = Path(scenario_gen.__file__).parent / "resources" / "population.json"
@@ -51,9 +52,9 @@ class Law:
     precision: Floats
 
     @classmethod
-    def of(cls, kind: str, seen: Sequence[Floats]) -> "Law":
+    def of(cls, kind: EncounterKind, seen: Sequence[Floats]) -> "Law":
         """Learn the law of a kind from the features (F,) of recorded encounters and the shipped law."""
-        (mean, covariance), n = _shipped()[kind], len(seen)
+        (mean, covariance), n = _shipped_law(kind), len(seen)
         rows = np.array(seen).reshape(n, len(mean))
         mean = (MEAN_ENCOUNTERS * mean + rows.sum(axis=0)) / (MEAN_ENCOUNTERS + n)
         off = rows - mean
@@ -94,16 +95,16 @@ def rarity_in(
             members.append(member)
     laws = {
         kind: Law.of(kind, [member.features for member in members if member.kind == kind])
-        for kind in _shipped()
+        for kind in EncounterKind
     }
 
     @once_per_object
     def rarity(scenario: Scenario) -> float:
         member = generated_member(scenario, _member(encounter), encounter)
         return (
-            laws[member.kind].distance(member.features) / USUAL
-            if member.kind in laws
-            else math.inf
+            math.inf
+            if member.kind is None
+            else laws[member.kind].distance(member.features) / USUAL
         )
 
     return rarity
@@ -123,6 +124,12 @@ def measures_in(
 @once_per_object
 def _member(encounter: Encounter) -> Member:
     return member_of(encounter, encounter.name, 0)
+
+
+def _shipped_law(kind: EncounterKind) -> tuple[Floats, Floats]:
+    """Return mean (F,) and covariance (F, F) of a kind; of one that is not shipped those of crossings."""
+    laws = _shipped()
+    return laws[kind if kind in laws else EncounterKind.CROSSING]
 
 
 @cache

@@ -26,8 +26,13 @@ from scenario_gen.method.evaluation.geometry import footprint_distance
 from scenario_gen.method.evaluation.measures import figures_of, PERIOD
 from scenario_gen.method.evaluation.motion import at_period, Motion
 from scenario_gen.numerics import Bools, Floats, Ints
-from scenario_gen.numerics.plane import ahead_and_left
-from scenario_gen.situation import Conflict, conflicts_by_pair, conflicts_in
+from scenario_gen.situation import (
+    Conflict,
+    conflicts_by_pair,
+    conflicts_in,
+    EncounterKind,
+    kind_of,
+)
 from scenario_gen.types import (
     Encounter,
     GenerationResult,
@@ -38,8 +43,8 @@ from scenario_gen.types import (
     Scenario,
 )
 
-APART = "apart"  # a scenario whose pair shares no area any more: it is near nothing
-KINDS = ("crossing", "turn", "merge", "following", APART)
+NO_SHARED_AREA = "apart"  # counts the scenarios whose pair shares no area: they are near nothing
+KINDS = tuple(EncounterKind)
 EACH = (
     "first speed",
     "least speed before",
@@ -51,7 +56,6 @@ EACH = (
 COMMON = ("gap", "arrival gap", "distance", "time to collision", "closing speed", "approach")
 FEATURES = (*COMMON, *(f"{name} of the {who}" for who in ("first", "second") for name in EACH))
 DISTANCE = FEATURES.index("distance")
-TURNS, BESIDE_M = math.radians(45.0), 2.0
 LONGEST_S, FARTHEST_M = 10.0, 30.0  # gaps and times above, distances above, are as good as this
 SECOND = round(1.0 / PERIOD)  # samples
 STANDS_MPS = 0.5
@@ -70,7 +74,7 @@ class Member:
     """An encounter, recorded or generated.
 
     Attributes:
-        kind: of KINDS.
+        kind: what the pair does; None if it shares no area.
         features: (F,).
         recording: its name; of a generated one that of its template.
         template: place of its template among the recorded.
@@ -79,13 +83,18 @@ class Member:
         scenario: its number, -1 of a recorded one.
     """
 
-    kind: str
+    kind: EncounterKind | None
     features: Floats
     recording: str
     template: int
     pair: Pair | None
     other: int = -1
     scenario: int = -1
+
+    @property
+    def kind_name(self) -> str:
+        """The kind in words."""
+        return self.kind or NO_SHARED_AREA
 
 
 @dataclass(frozen=True)
@@ -225,14 +234,14 @@ def member_of(
     """Return kind and features of a motion's pair, the one that has most to do with each other by default.
 
     That is, of the pairs that cross or merge the one with the least PET, and where there are none the followers nearest to each
-    other. The kind is APART where the pair, or every pair, shares no area.
+    other. The kind is None where the pair, or every pair, shares no area.
     """
     whole = at_period(motion, PERIOD)
     figures = {own.pair: own for own in figures_of(motion) if pair in (None, own.pair)}
     met = conflicts_by_pair(conflicts_in(whole))
     conflicts: dict[Pair, Conflict] = {own: met[own] for own in met if own in figures}
     if not conflicts:
-        return Member(APART, np.zeros(len(FEATURES)), recording, template, pair)
+        return Member(None, np.zeros(len(FEATURES)), recording, template, pair)
 
     def closeness(own: Pair) -> tuple[bool, float]:
         conflict = conflicts[own]
@@ -256,7 +265,7 @@ def member_of(
     entries = (conflict.entry_first, conflict.entry_second)
     each = [_driving(whole, n, entry) for n, entry in zip((first, second), entries, strict=True)]
     return Member(
-        _kind(whole, conflict),
+        kind_of(whole, first, second),
         np.array([*common, *each[0], *each[1]]),
         recording,
         template,
@@ -271,19 +280,6 @@ def generated_member(scenario: Scenario, template: Member, encounter: Encounter)
     return replace(
         member_of(scenario, template.recording, template.template, (a, b)), scenario=scenario.index
     )
-
-
-def _kind(motion: Motion, conflict: Conflict) -> str:
-    """What the two do; whoever begins beside the way of the one whose way it then shares merges."""
-    both = motion.together(conflict.first, conflict.second)
-    if conflict.following:
-        away = motion.position[conflict.second, both.start] - motion.position[conflict.first, both]
-        nearest = int(np.hypot(*away.T).argmin())
-        _, left = ahead_and_left(away[nearest], motion.heading[conflict.first, both][nearest])
-        return "merge" if abs(left) > BESIDE_M else "following"
-    headings = motion.heading[[conflict.first, conflict.second], both]
-    turned = np.abs(headings[:, -1] - headings[:, 0]).max()
-    return "turn" if turned >= TURNS else "crossing"
 
 
 def _headway(motion: Motion, conflict: Conflict) -> float:
@@ -343,10 +339,10 @@ def population_of(
         )
     near, points = found.near, found.curve(drawn, draws=draws, seed=seed)
     counted, generated = (
-        dict(Counter(member.kind for member in members))
+        dict(Counter(member.kind_name for member in members))
         for members in (found.recorded, found.made)
     )
-    by_kind = {}
+    by_kind: dict[str, tuple[Point, ...]] = {}
     for kind in KINDS:
         own = found.of_kind(kind)
         few = [n for n in drawn if n <= CHOSEN * len(own.recorded)]
@@ -461,7 +457,7 @@ def members_of(results: Iterable[tuple[str, GenerationResult]]) -> Members:
     recombined: list[tuple[tuple[str, ...], list[Member]]] = []
     for recording, result in results:
         own = member_of(result.encounter, recording, len(recorded))
-        if own.kind == APART:
+        if own.kind is None:
             continue
         generated = [
             generated_member(join_ego(scenario), own, result.encounter) for scenario in result
@@ -519,7 +515,9 @@ class _Near:
         """Scale features by kind, and measure all distances."""
         every = [*recorded, *made]
         recording = np.unique([member.recording for member in recorded], return_inverse=True)[1]
-        kinds = np.array([KINDS.index(member.kind) for member in every])
+        kinds = np.array(
+            [-1 if member.kind is None else KINDS.index(member.kind) for member in every]
+        )
         scaled = np.array([member.features for member in every])
         apart = np.full((len(every), len(recorded)), math.inf)
         for kind in np.unique(kinds[: len(recorded)]):
@@ -602,7 +600,7 @@ class _Near:
                 found.append(
                     Unreached(
                         names[n],
-                        member.kind,
+                        member.kind_name,
                         float(far[nearest]),
                         self._differ(nearest, n, far[nearest]),
                     )
@@ -615,7 +613,7 @@ class _Near:
         nearest = away.min(axis=1, initial=math.inf)
         return tuple(
             Unreached(
-                found.name_of(own := found.made[n]), own.kind, float(nearest[n]),
+                found.name_of(own := found.made[n]), own.kind_name, float(nearest[n]),
                 self._differ(len(self.members) + n, int(away[n].argmin()), nearest[n]), own.scenario,
             )
             for n in np.argsort(-nearest, kind="stable")[:SHOWN].tolist()

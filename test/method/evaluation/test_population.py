@@ -64,8 +64,8 @@ def apart(encounter):
 def test_kinds_are_those_of_the_drawn_motions():
     wanted = {
         "crossing, stops": "crossing",
-        "left turn before oncoming, stops": "turn",
-        "merges": "merge",
+        "left turn before oncoming, stops": "left_turn",
+        "merges": "merging",
         "follows": "following",
     }
     for kind, name in wanted.items():
