@@ -96,7 +96,7 @@ def fit_statuses(
         for k, (vehicle, fitted) in enumerate(zip(fit.vehicles, fit.fitted, strict=True))
     )
     sentences = (*fit.notes, *(remark for each in remarks for remark in each))
-    notes = {f"note.{k}": note for k, note in enumerate(sentences)}
+    notes = {f"note.{k}": str(note) for k, note in enumerate(sentences)}
     lost = {
         f"lost.{k}": json.dumps([loss.kind, list(loss.vehicles), loss.message])
         for k, loss in enumerate(fit.losses)

@@ -28,7 +28,15 @@ from msg_conventions.markers import ADD, DELETE, LINE_LIST, Marker
 from msg_conventions.trajectory import FARTHEST
 from scenario_gen.base.errors import InputError
 from scenario_gen.numerics import Floats
-from scenario_gen.types import DrawnFor, Lane, LaneNetwork, RuleKind, TrafficRule
+from scenario_gen.types import (
+    DrawnFor,
+    Lane,
+    LaneNetwork,
+    note_kinds,
+    recorded_notes,
+    RuleKind,
+    TrafficRule,
+)
 
 TOPIC = "road/lanes"
 TAIL = 1  # bytes by which the message ends behind a multiple of 4
@@ -85,7 +93,12 @@ def _document(network: LaneNetwork) -> dict[str, Any]:
         }
         for rule in network.rules
     ]
-    document: dict[str, Any] = {"name": network.name, "notes": network.notes, "lanes": lanes}
+    document: dict[str, Any] = {
+        "name": network.name,
+        "notes": list(map(str, network.notes)),
+        "note_kinds": note_kinds(network.notes),
+        "lanes": lanes,
+    }
     document |= {"rules": rules, "rules_kept": network.rules_kept} if rules else {}
     document |= ({"drawn": True} if network.drawn else {}) | (
         {"origin": network.origin} if network.origin else {}
@@ -117,7 +130,7 @@ def decode_lanes(data: bytes, what: str = TOPIC) -> tuple[str, LaneNetwork | Non
     try:
         document = json.loads(found.text)
         lanes = tuple(_lanes(document["lanes"], points, what))
-        notes = tuple(str(note) for note in document["notes"])
+        notes = recorded_notes(map(str, document["notes"]), str(document.get("note_kinds", "")))
         rules = tuple(map(_rule, document.get("rules", ())))
         kept, drawn = (
             document.get("rules_kept", True) is not False,

@@ -28,7 +28,9 @@ from scenario_gen.types import (
     Cause,
     EgoSlot,
     FACTS,
+    note_kinds,
     ORDERS,
+    recorded_notes,
     Scenario,
     ScenarioSet,
     Vehicle,
@@ -36,6 +38,7 @@ from scenario_gen.types import (
 
 INFO = "scenarios/info"
 REFUSED, ADAPTATION, TARGET = "refused.", "adaptation.", "target."
+KINDS = f"{ADAPTATION}kinds"  # of the adaptations, in their order
 REACTION, CUT = (
     "reaction.",
     "reaction.cut.",
@@ -203,8 +206,13 @@ class RequestSummary:
             scenarios=scenarios,
             candidates=_count(self.values, "candidates", what),
             refused=Counter(refused),
-            adaptations=tuple(
-                text for key, text in self.values.items() if key.startswith(ADAPTATION)
+            adaptations=recorded_notes(
+                (
+                    text
+                    for key, text in self.values.items()
+                    if key.startswith(ADAPTATION) and key != KINDS
+                ),
+                self.values.get(KINDS, ""),
             ),
         )
 
@@ -394,7 +402,8 @@ def request_summary(
             f"{REFUSED}{cause.value}": str(count)
             for cause, count in sorted(result.refused.items())
         },
-        **{f"{ADAPTATION}{k}": text for k, text in enumerate(result.adaptations)},
+        **{f"{ADAPTATION}{k}": str(note) for k, note in enumerate(result.adaptations)},
+        **({KINDS: note_kinds(result.adaptations)} if result.adaptations else {}),
         **{
             f"{key}{k}": json.dumps(edge)
             for key, found in edges.items()

@@ -22,6 +22,8 @@ from scenario_gen.types import (
     causes_in_words,
     Encounter,
     GenerationResult,
+    Note,
+    NoteKind,
     Request,
     Road,
     Scenario,
@@ -86,12 +88,11 @@ def generate(
         causes = ", ".join(
             f"{count} × {cause}" for cause, count in causes_in_words(result.generated.refused)
         )
-        why = "; ".join((causes or "none was drawn", *result.generated.adaptations))
+        notes = map(str, result.generated.adaptations)
+        why = "; ".join((causes or "none was drawn", *notes))
         raise RefusedError(f"none of {result.generated.candidates} candidates is valid: {why}")
     if parents := encounter.parents:
-        result = result.noted(
-            f"recombined of {parents[0]} and {parents[1]}: this encounter was not recorded"
-        )
+        result = result.noted(Note.of(NoteKind.RECOMBINED, first=parents[0], second=parents[1]))
     if config.evaluation.compare:
         result = with_references(result, situation, config, request, population)
     result = replace(result, replay=replay(encounter, result.road_and_fit()[1], road.frame_id))

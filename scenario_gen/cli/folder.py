@@ -18,8 +18,7 @@ from scenario_gen.method.nearest import answer_refusal
 from scenario_gen.method.recombination import recombinations
 from scenario_gen.output.results import BAG, GENERATED, provenance_of, write_results
 from scenario_gen.pipeline import generate, PipelineConfig
-from scenario_gen.roads import FAULTY
-from scenario_gen.types import Encounter, GenerationResult, Request
+from scenario_gen.types import Encounter, GenerationResult, NoteKind, Request
 
 if TYPE_CHECKING:
     from scenario_gen.closed_loop.reacting import Testing
@@ -228,7 +227,10 @@ def faults_of(cases: Sequence[GenerationResult]) -> list[str]:
         if case.road is not None and case.road.lanes is not None
     }
     return [
-        f"map {name}: {note}" for name, notes in maps.items() for note in notes if FAULTY in note
+        f"map {name}: {note}"
+        for name, notes in maps.items()
+        for note in notes
+        if note.kind is NoteKind.FAULTY
     ]
 
 
@@ -293,7 +295,7 @@ def generate_all(
                 ", ".join(f"{number} × {cause}" for cause, number in refused.most_common())
                 or "no candidate was drawn"
             )
-            causes = case.generated.adaptations[-1] if requested.for_testing else causes
+            causes = str(case.generated.adaptations[-1]) if requested.for_testing else causes
             refusals.append(
                 f"{encounter.name} on {road}: only {n_scenarios} of {count} scenarios: {causes}"
             )

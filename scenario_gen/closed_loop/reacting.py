@@ -23,6 +23,8 @@ from scenario_gen.types import (
     GenerationResult,
     join_ego,
     join_pieces,
+    Note,
+    NoteKind,
     Request,
     Road,
     Scenario,
@@ -82,7 +84,7 @@ class Testing:
                         f"sampling.{name}={getattr(tried.config.sampling, name):g}"
                         for name in FREER
                     )
-                    case = _noted(case, f"drawn with more freedom: {freer}")
+                    case = _noted(case, Note.of(NoteKind.MORE_FREEDOM, parameters=freer))
                 if most is None or len(case.generated) > len(most.generated):
                     most = case
                 if len(case.generated) == count:
@@ -94,10 +96,10 @@ class Testing:
             if other != ego
         )
         advice = f"has to react as ego: {others}" if others else self.elsewhere()
-        said = f"for testing ego {ego}: {kept} of {count} scenarios found in which it has to react; {advice}"
+        note = Note.of(NoteKind.EGO_TESTS, ego=ego, kept=kept, requested=count, advice=advice)
         if most is None:
-            raise TargetError(said)
-        return _noted(most, said)
+            raise TargetError(str(note))
+        return _noted(most, note)
 
     def generate(self, count: int, progress: Progress = lambda *_: None) -> GenerationResult:
         """Return `count` scenarios, or as many as the parameters give.
@@ -181,7 +183,7 @@ class Testing:
         )
 
 
-def _noted(case: GenerationResult, note: str) -> GenerationResult:
+def _noted(case: GenerationResult, note: Note) -> GenerationResult:
     """Return a result with one more note on how it was drawn."""
     return replace(
         case, generated=replace(case.generated, adaptations=(*case.generated.adaptations, note))

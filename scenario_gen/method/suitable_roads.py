@@ -27,7 +27,15 @@ from scenario_gen.situation import (
     refuse_too_large,
     Situation,
 )
-from scenario_gen.types import Encounter, GenerationResult, join_ego, Road, Segmentation
+from scenario_gen.types import (
+    Encounter,
+    GenerationResult,
+    join_ego,
+    Note,
+    NoteKind,
+    Road,
+    Segmentation,
+)
 
 AUTO = "auto"
 LOOKED_AT = 50  # scenarios of a set, whether they keep the areas that vehicles share
@@ -75,9 +83,7 @@ def on_first_suitable_road(
     )
     for name in suitable_roads(encounter, segment(encounter, config.segmentation, seed), config):
         try:
-            return _refuse_lost(generate(name)).noted(
-                f"road auto: {name}, the first built-in road that keeps the encounter"
-            )
+            return _refuse_lost(generate(name)).noted(Note.of(NoteKind.AUTO_ROAD, road=name))
         except RefusedError as error:
             kind = TargetError if isinstance(error, TargetError) else RefusedError
             refusal = kind(f"{encounter.name} on road {name}, the last that takes it: {error}")

@@ -63,7 +63,7 @@ def map_picture(name: str, encounter: Encounter | None = None) -> tuple[str, lis
     arms = f"{len(network.entries)} entries, {len(network.exits)} exits"
     said = [
         f"{network.name}: {len(network.lanes)} lanes, {len(junctions)} junctions, {arms}",
-        *network.notes,
+        *map(str, network.notes),
     ]
     found: list[Place] = []
     if encounter is not None:

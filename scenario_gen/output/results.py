@@ -71,7 +71,7 @@ def _figures(case: GenerationResult) -> dict[str, Any]:
     vehicles = zip(case.encounter.vehicles, case.routes, strict=True) if case.routes else ()
     figures: dict[str, Any] = {"similarity": case.similarity(), "reactions": case.reacting}
     figures |= json.loads(case.evaluation.to_json()) | {
-        "adaptations": list(case.generated.adaptations)
+        "adaptations": [str(note) for note in case.generated.adaptations]
     }
     fit = {} if case.fit is None else case.fit.figures()
     coverage = {} if case.coverage is None else case.coverage.document()

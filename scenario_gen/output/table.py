@@ -8,7 +8,13 @@ from typing import TYPE_CHECKING
 
 from scenario_gen.base.errors import describe, InputError
 from scenario_gen.method.evaluation import MEASURES
-from scenario_gen.types import Evaluation, GenerationResult, join_ego
+from scenario_gen.types import (
+    Evaluation,
+    GenerationResult,
+    join_ego,
+    Note,
+    NoteKind,
+)
 
 if TYPE_CHECKING:
     from pandas import DataFrame
@@ -66,7 +72,7 @@ def filter_scenarios(result: GenerationResult, condition: str) -> GenerationResu
         raise InputError(
             f"condition {condition!r}: {describe(error)}; the columns are {columns}"
         ) from error
-    note = f"filtered by {condition!r}: {len(scenarios)} of {len(result)} scenarios"
+    note = Note.of(NoteKind.FILTERED, condition=condition, kept=len(scenarios), total=len(result))
     generated = replace(
         result.generated, scenarios=scenarios, adaptations=(*result.generated.adaptations, note)
     )

@@ -42,7 +42,6 @@ from scenario_gen.roads.vector.ground import (
     own_ground,
 )
 from scenario_gen.roads.vector.match import Course
-from scenario_gen.roads.vector.network import FAULTY
 from scenario_gen.roads.vector.place import (
     NoPlaceError,
     Place,
@@ -56,7 +55,7 @@ from scenario_gen.roads.vector.rules import RuleCheck
 from scenario_gen.roads.ways import draw_route
 
 __all__ = [
-    "BUILT_IN", "CONTACT", "CORRIDOR", "FAULTY", "ROADS", "ROUNDABOUT", "Arm", "Course", "DrawRoad", "Driven", "NoPlaceError",
+    "BUILT_IN", "CONTACT", "CORRIDOR", "ROADS", "ROUNDABOUT", "Arm", "Course", "DrawRoad", "Driven", "NoPlaceError",
     "Place", "Plan", "RoadConfig", "RuleCheck", "along_lanes", "blocked_before", "build_road", "cells_of", "clearance_field",
     "clearance_in_cells", "common_component", "component_cells", "distance_transform", "draw", "draw_plan", "draw_route",
     "drivable_beside", "drives_about_ring", "drives_against", "footprint_fits", "free_length", "ground_for", "is_vector_map",

@@ -33,7 +33,7 @@ from scenario_gen.situation import (
     to_frenet,
     traffic_side,
 )
-from scenario_gen.types import Encounter, LaneNetwork, MIRRORED, Road
+from scenario_gen.types import Encounter, LaneNetwork, Note, NoteKind, Road
 
 
 def build_road(
@@ -102,9 +102,8 @@ def road_and_template(
     with suppress(RefusedError):
         there = build_road(name_or_path, other, config)
         if there.lanes is not None and _on_other_side(encounter, there):
-            note = (
-                f"{MIRRORED}: traffic on road {there.name} keeps to the {there.lanes.traffic_side}"
-            )
+            side = there.lanes.traffic_side
+            note = Note.of(NoteKind.MIRRORED, road=there.name, side=side)
             return replace(
                 there, lanes=replace(there.lanes, notes=(note, *there.lanes.notes))
             ), other

@@ -25,7 +25,15 @@ from scenario_gen.roads.pavement import drivable_beside, Inside, inside, paved, 
 from scenario_gen.roads.vector.raster import road_of
 from scenario_gen.roads.ways import draw_route, reverse, TIGHTEST
 from scenario_gen.situation import Track
-from scenario_gen.types import DrawnFor, Lane, LaneNetwork, Road, RuleKind, TrafficRule
+from scenario_gen.types import (
+    DrawnFor,
+    Lane,
+    LaneNetwork,
+    Note,
+    Road,
+    RuleKind,
+    TrafficRule,
+)
 
 Way = tuple[int, int, int, int]
 """Arm and lane that a way comes from, arm and lane that it leads to; lanes count from the dividing line."""
@@ -107,7 +115,7 @@ class Plan:
         ring: radius [m] of the lane of a roundabout about the origin; 0: it is none.
         yielding: the arms that give way, if priorities are shown.
         drawn_for: where the template that it is drawn for lies, about the same origin.
-        notes: what was decided, in sentences.
+        notes: what was decided.
     """
 
     arms: Sequence[Arm]
@@ -116,7 +124,7 @@ class Plan:
     ring: float = 0.0
     yielding: Collection[int] = ()
     drawn_for: DrawnFor | None = None
-    notes: tuple[str, ...] = ()
+    notes: tuple[Note, ...] = ()
 
 
 def lane_id(arm: int, lane: int, *, inward: bool) -> str:

@@ -29,7 +29,13 @@ from scenario_gen.situation import (
     Track,
     turn_of,
 )
-from scenario_gen.types import Encounter, Road, YIELD
+from scenario_gen.types import (
+    Encounter,
+    Note,
+    NoteKind,
+    Road,
+    YIELD,
+)
 
 _RING = (
     13.0,
@@ -185,7 +191,7 @@ def draw_roundabout(name: str, encounter: Encounter | None, config: RoadConfig) 
     Raises:
         RefusedError: the template drives too fast for it, side by side, or by more than four arms.
     """
-    radius, fastest, length, wide, notes = _RING[0], 0.0, 5.0, 2.0, list[str]()
+    radius, fastest, length, wide, notes = _RING[0], 0.0, 5.0, 2.0, list[Note]()
     directions = [_Direction(k * np.pi / 2.0, []) for k in range(4)]
     tracks: tuple[Track, ...] = ()
     situation: Situation | None = None
@@ -202,9 +208,7 @@ def draw_roundabout(name: str, encounter: Encounter | None, config: RoadConfig) 
         )
         directions = _directions(name, tracks, centre, radius + _NEAR_RING)
         if driven_about is None:
-            notes.append(
-                f"no recorded vehicle drives round a ring; one of {radius:.0f} m radius is drawn in its middle"
-            )
+            notes.append(Note.of(NoteKind.NO_RING, radius=radius))
     if fastest > np.sqrt(_RING_FASTEST * radius):
         possible = float(np.sqrt(_RING_FASTEST * _RING[1]))
         raise RefusedError(

@@ -16,7 +16,12 @@ from scenario_gen.numerics.boxes import footprint_gaps
 from scenario_gen.numerics.curve import Curve
 from scenario_gen.numerics.plane import ahead_and_left
 from scenario_gen.situation.tracks import Track
-from scenario_gen.types import Encounter, together
+from scenario_gen.types import (
+    Encounter,
+    Note,
+    NoteKind,
+    together,
+)
 
 _ROUNDS = 400
 _ALONG = 0.3  # how readily a vehicle is set forward or back on its path
@@ -29,12 +34,12 @@ class Separation:
     Attributes:
         tracks: N tracks.
         moved: (N,) metres each was shifted, 0 where it was left alone.
-        notes: one sentence per shifted vehicle, with figures.
+        notes: one per shifted vehicle.
     """
 
     tracks: tuple[Track, ...]
     moved: Floats
-    notes: tuple[str, ...]
+    notes: tuple[Note, ...]
 
 
 def smallest_gaps(tracks: Sequence[Track]) -> Floats:
@@ -98,9 +103,15 @@ def separate(
     moved = np.hypot(*shift.T)
     before = smallest_gaps(tracks).min(axis=1)
     notes = tuple(
-        f"vehicle {tracks[k].vehicle.id} came within {before[k]:.2f} m of another{' (overlap)' if before[k] < 0 else ''}: "
-        f"its path is set {abs(shift[k, 1]):.2f} m to the {'left' if shift[k, 1] > 0 else 'right'} and "
-        f"{abs(shift[k, 0]):.2f} m {'forward' if shift[k, 0] > 0 else 'back'} throughout"
+        Note.of(
+            NoteKind.SEPARATED,
+            vehicle=tracks[k].vehicle.id,
+            gap=before[k],
+            sideways=abs(shift[k, 1]),
+            side="left" if shift[k, 1] > 0.0 else "right",
+            along=abs(shift[k, 0]),
+            direction="forward" if shift[k, 0] > 0.0 else "back",
+        )
         for k in range(n)
         if moved[k] > 1e-3
     )
@@ -178,7 +189,7 @@ def separate_recorded(tracks: Sequence[Track]) -> Separation:
     """
     separation = separate(tracks, OWN_CLEARANCE, OWN_MAX_SHIFT)
     notes = [
-        f"vehicle {track.vehicle.id}: the record was smoothed by up to {track.deviation:.2f} m into a path that can be driven"
+        Note.of(NoteKind.SMOOTHED, vehicle=track.vehicle.id, distance=track.deviation)
         for track in tracks
         if track.deviation > 1.0
     ]

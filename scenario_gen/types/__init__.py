@@ -41,12 +41,12 @@ from scenario_gen.types.lanes import (
     LaneNetwork,
     lanes_for,
     LEVEL,
-    MIRRORED,
     RuleKind,
     TrafficRule,
 )
 from scenario_gen.types.measures import Measure, Measures
 from scenario_gen.types.names import token, tokens, vehicle_index
+from scenario_gen.types.notes import Note, note_kinds, NoteKind, recorded_notes
 from scenario_gen.types.pieces import join_pieces, read_numbers, split_pieces
 from scenario_gen.types.presence import (
     ALWAYS,
@@ -61,7 +61,6 @@ from scenario_gen.types.qos import Quality
 from scenario_gen.types.reaction import (
     FOLLOW,
     lost_pairs,
-    NOT_KEPT,
     Reaction,
     reaction_facts,
     ReactionGraph,
@@ -97,15 +96,15 @@ from scenario_gen.types.target import Pair, Reached, Target, UNITS
 
 __all__ = [
     "ALWAYS", "CAR", "CARS", "COARSEST", "DRIVERS", "ENDS", "ERRORS", "FACTS", "FARTHEST", "FINEST", "FOLLOW", "LANE_USERS",
-    "LEVEL", "MIRRORED", "NARROW", "NOT_KEPT", "OF_CARS", "ON_THE_SPOT", "ORDERS", "OTHER", "RECOMBINED", "RECORDING", "REPLAY",
+    "LEVEL", "NARROW", "OF_CARS", "ON_THE_SPOT", "ORDERS", "OTHER", "RECOMBINED", "RECORDING", "REPLAY",
     "SCHEMA", "UNIFORM", "UNITS", "VEHICLE_TYPES", "WHEELBASE", "WITH", "WITHOUT", "YIELD", "BoundaryStates", "Cause",
     "CheckCounts", "Coverage", "DrawnFor", "Dynamics", "EgoSlot", "Encounter", "Evaluation", "Fit", "FittedVehicle",
-    "GenerationResult", "Interval", "Lane", "LaneNetwork", "LiveChangepoints", "Loss", "Measure", "Measures", "Metric", "Pair",
+    "GenerationResult", "Interval", "Lane", "LaneNetwork", "LiveChangepoints", "Loss", "Measure", "Measures", "Metric", "Note", "NoteKind", "Pair",
     "Quality", "Reached", "Reaction", "ReactionGraph", "Request", "Road", "Route", "Row", "RuleKind", "Sample", "Scenario",
     "ScenarioSet", "Segmentation", "Spread", "State", "Target", "Tracks", "TrafficRule", "TypeLimits", "Vehicle",
     "VehicleType", "Verdict", "Violation", "always", "as_markdown", "at_ends", "canonical_presence", "causes_in_words", "cut",
-    "formatted", "height", "join_ego", "join_pieces", "lanes_for", "lost_pairs", "mask", "most_exposed", "once_per_object",
-    "reaction_facts", "read_numbers", "read_states", "rear_axle", "routes_in_words", "row_name", "shifted", "split_off",
+    "formatted", "height", "join_ego", "join_pieces", "lanes_for", "lost_pairs", "mask", "most_exposed", "note_kinds", "once_per_object",
+    "reaction_facts", "read_numbers", "read_states", "rear_axle", "recorded_notes", "routes_in_words", "row_name", "shifted", "split_off",
     "split_pieces", "together", "token",
     "tokens", "usual_type", "vehicle_index", "with_witness", "words", "yielders_of",
 ]  # fmt: skip

@@ -13,6 +13,7 @@ from typing import Any, Literal
 
 from scenario_gen.base.documents import COUNT, NUMBER, parse_json
 from scenario_gen.base.errors import printable
+from scenario_gen.types.notes import Note, NoteKind
 from scenario_gen.types.row_names import FORMER, row_name
 from scenario_gen.types.scenario import Cause, ScenarioSet, Verdict
 
@@ -132,13 +133,13 @@ class Row:
         name: e.g. "with changepoints".
         samples: number of scenarios.
         values: estimates by metric id; what could not be had is absent or NaN.
-        notes: what a reader must know, in sentences.
+        notes: what a reader must know.
     """
 
     name: str
     samples: int
     values: Mapping[str, Interval]
-    notes: tuple[str, ...] = ()
+    notes: tuple[Note, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -193,7 +194,7 @@ class Evaluation:
                 {
                     "name": row.name,
                     "samples": row.samples,
-                    "notes": row.notes,
+                    "notes": [str(note) for note in row.notes],
                     "values": {
                         key: {name: _number(figure) for name, figure in vars(e).items()}
                         for key, e in row.values.items()
@@ -299,5 +300,5 @@ def _row(document: Mapping[str, Any]) -> Row:
         FORMER.get(document["name"], document["name"]),
         document["samples"],
         values,
-        tuple(document["notes"]),
+        tuple(Note(NoteKind.TEXT, recorded=text) for text in document["notes"]),
     )

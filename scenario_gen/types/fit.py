@@ -11,6 +11,7 @@ import numpy as np
 from scenario_gen.base.renaming import Renamed
 from scenario_gen.numerics import Bools, canonical_poses, Floats, freeze, frozen, Ints
 from scenario_gen.types.encounter import Vehicle
+from scenario_gen.types.notes import Note
 from scenario_gen.types.scenario import BoundaryStates
 
 
@@ -85,7 +86,7 @@ class Fit:
         fitted: N fitted vehicles; none where only the requested states are known.
         anchor_index: (K + 2,) sample index in the template of each anchor (0, changepoints, T - 1).
         requested: start and end states requested of every scenario (after repair).
-        notes: what was decided, in sentences (an entry chosen and why, an anchor moved by how much).
+        notes: what was decided (an entry chosen and why, an anchor moved by how much).
         losses: what of the template's turns, conflicts and neighbours is lost on this road; none where nothing is.
     """
 
@@ -93,7 +94,7 @@ class Fit:
     fitted: tuple[FittedVehicle, ...]
     anchor_index: Ints
     requested: BoundaryStates
-    notes: tuple[str, ...]
+    notes: tuple[Note, ...]
     losses: tuple[Loss, ...] = ()
     lost = Renamed("losses")
 

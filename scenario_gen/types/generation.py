@@ -16,7 +16,7 @@ from scenario_gen.types.coverage import Coverage
 from scenario_gen.types.encounter import Encounter
 from scenario_gen.types.evaluation import Evaluation
 from scenario_gen.types.fit import Fit
-from scenario_gen.types.reaction import NOT_KEPT
+from scenario_gen.types.notes import Note, NoteKind
 from scenario_gen.types.road import Road
 from scenario_gen.types.route import Route
 from scenario_gen.types.row_names import NARROW, REPLAY, UNIFORM, WITH, WITHOUT
@@ -94,7 +94,7 @@ class GenerationResult:
     def __getitem__(self, k: int) -> Scenario:
         return self.generated[k]
 
-    def noted(self, note: str) -> "GenerationResult":
+    def noted(self, note: Note) -> "GenerationResult":
         """Return the result with a note in front of the others."""
         return replace(
             self,
@@ -116,7 +116,7 @@ class GenerationResult:
         lines = [
             *self.reacting["sentences"],
             f"refused candidates: {refused}",
-            *self.generated.adaptations,
+            *map(str, self.generated.adaptations),
         ]
         return f"<b>{escape(repr(self))}</b><ul>{''.join(f'<li>{escape(line)}</li>' for line in lines)}</ul>"
 
@@ -253,7 +253,7 @@ class GenerationResult:
     def lost_reactions(self) -> tuple[str, ...]:
         """Which reactions of the template the scenarios could not keep, in sentences."""
         return tuple(
-            message for message in self.generated.adaptations if message.startswith(NOT_KEPT)
+            str(note) for note in self.generated.adaptations if note.kind is NoteKind.REACTION_LOST
         )
 
     @property

@@ -16,9 +16,9 @@ from scenario_gen.base.road_users import CAR, LANE_USERS
 from scenario_gen.numerics import Floats, freeze, frozen
 from scenario_gen.numerics.plane import edge_yaws
 from scenario_gen.types.derived import once_per_object
+from scenario_gen.types.notes import Note
 
 LEVEL = 2.5  # metres between the heights of two lanes of which one lies above the other
-MIRRORED = "the recording is mirrored"  # begins the note of a map whose traffic keeps to the other side than the template's
 DRIVERS = LANE_USERS - {"pedestrian"}
 CARS = frozenset((CAR,))
 _ONCOMING = -0.9  # cosine between directions of traffic
@@ -175,7 +175,7 @@ class LaneNetwork:
 
     name: str
     lanes: tuple[Lane, ...]
-    notes: tuple[str, ...] = field(default=())
+    notes: tuple[Note, ...] = field(default=())
     rules: tuple[TrafficRule, ...] = ()
     rules_kept: bool = True
     drawn: bool = False

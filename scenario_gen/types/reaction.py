@@ -15,7 +15,6 @@ FOLLOW, YIELD = "follow", "yield"
 DOUBTFUL = 0.5  # confidence below which an edge is called doubtful
 _FOLLOWS, _YIELDS = " follows ", " yields to "  # of names
 LOST = "reactions_lost"  # the fact of a scenario that names the pairs, "who>whom", which it is not held to
-NOT_KEPT = "on this road a reaction is not kept"  # begins the sentence of a set's adaptations that gives the figures
 
 
 @dataclass(frozen=True)

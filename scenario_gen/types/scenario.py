@@ -22,6 +22,7 @@ from scenario_gen.numerics import (
     Ints,
 )
 from scenario_gen.types.encounter import columns_of, Vehicle
+from scenario_gen.types.notes import Note
 from scenario_gen.types.presence import ALWAYS, always, canonical_presence, held, mask
 from scenario_gen.types.reaction import Reaction, ReactionGraph
 from scenario_gen.types.target import Reached
@@ -234,7 +235,7 @@ class EgoSlot:
 class ScenarioSet:
     """What a request got: valid scenarios, and an account of every candidate.
 
-    `refused` counts refused candidates by their first cause; `adaptations` names what was changed to get there. `ego` is the
+    `refused` counts refused candidates by their first cause; `adaptations` are notes on how they were drawn. `ego` is the
     vehicle that was left out for a planner under test, if one was; each scenario then has its reference drive.
     The scenarios of a large set are not in memory but drawn again whenever they are looked at. `reached` says what sampling
     towards a target came to.
@@ -245,7 +246,7 @@ class ScenarioSet:
     scenarios: Sequence[Scenario]
     candidates: int
     refused: Counter[Cause] = field(default_factory=Counter)
-    adaptations: Sequence[str] = ()
+    adaptations: Sequence[Note] = ()
     ego: EgoSlot | None = None
     reached: Reached | None = None
     reactions: tuple[Reaction, ...] = ()

@@ -9,6 +9,7 @@ import math
 from scenario_gen.base.errors import InputError
 from scenario_gen.types.encounter import Encounter
 from scenario_gen.types.names import vehicle_index
+from scenario_gen.types.notes import Note, NoteKind
 from scenario_gen.types.pieces import join_pieces, split_pieces
 
 UNITS = {
@@ -100,14 +101,23 @@ class Reached:
             "directed": str(self.directed).lower(),
         }
 
-    def sentence(self) -> str:
-        """Say it."""
-        requested = join_pieces(self.targets)
-        share, low, high = (f"{100 * value:.3g}" for value in (self.share, self.low, self.high))
-        text = f"target {requested}: {share} % [{low}, {high}] of natural candidates are valid and in the range"
-        if not self.directed:
-            return f"{text}; drawn as without a target, all weights are 1"
-        return f"{text}; drawn from a proposal (stages: {self.stages}, candidates: {self.candidates}), each with its weight"
+    def note(self) -> Note:
+        """Return a note with the share and how the scenarios were drawn."""
+        if self.directed:
+            sampling = (
+                f"drawn from a proposal (stages: {self.stages}, candidates: {self.candidates}), "
+                "with weights"
+            )
+        else:
+            sampling = "drawn as without a target, all weights are 1"
+        return Note.of(
+            NoteKind.TARGET_REACHED,
+            target=join_pieces(self.targets),
+            share=100.0 * self.share,
+            low=100.0 * self.low,
+            high=100.0 * self.high,
+            sampling=sampling,
+        )
 
 
 def read_targets(text: str) -> tuple[Target, ...]:

@@ -41,6 +41,8 @@ from scenario_gen.types import (
     Encounter,
     Fit,
     GenerationResult,
+    Note,
+    NoteKind,
     Road,
     Route,
     ScenarioSet,
@@ -381,7 +383,7 @@ class Namespace(RecordedScenarios):
             text for key, text in self.statuses.get("fit", {}).items() if key.startswith("note.")
         )
         notes = tuple(
-            text for text in noted if text not in remarks
+            Note(NoteKind.TEXT, recorded=text) for text in noted if text not in remarks
         )  # the remarks come from the routes themselves
         return Fit(
             encounter.vehicles,

@@ -37,6 +37,8 @@ from scenario_gen.types import (
     EgoSlot,
     GenerationResult,
     Interval,
+    Note,
+    NoteKind,
     Request,
     ScenarioSet,
     with_witness,
@@ -282,7 +284,7 @@ def _write(
         if ego is not None:  # the request left it out
             slot = EgoSlot(encounter.vehicles[ego], asked.start[ego], asked.end[ego])
             scenarios = tuple(with_witness(one, ego) for one in scenarios)
-        note = f"failures of {request.planner}, found by a search: they are no random sample of the natural scenarios"
+        note = Note.of(NoteKind.SEARCHED, planner=request.planner)
         drawn = ScenarioSet(len(scenarios), scenarios, len(scenarios), Counter(), (note,), slot)
         texts = (
             value if isinstance(value, str) else json.dumps(value, ensure_ascii=False)

@@ -20,6 +20,8 @@ from scenario_gen.types import (
     Evaluation,
     GenerationResult,
     Interval,
+    Note,
+    NoteKind,
     RECORDING,
     REPLAY,
     Row,
@@ -186,27 +188,21 @@ def _template_row(template: Template) -> Row:
         for key, value in group.of_template(template).items()
     }
     resampled = template.steps < template.encounter.speed.shape[1]
-    notes = (
-        (
-            f"longer than max_steps and max_entries allow: the feature matrices have {template.steps} instants",
-        )
-        if resampled
-        else ()
-    )
+    notes = (Note.of(NoteKind.RESAMPLED, steps=template.steps),) if resampled else ()
     return Row(RECORDING, 1, values, notes)
 
 
 def _row(name: str, size: int, samples: Samples) -> Row:
     """The row of a set of this size, of which the samples are measured."""
     if not samples.scenarios:
-        return Row(name, 0, VALIDITY.measure(samples), ("there is no scenario in this row",))
+        return Row(name, 0, VALIDITY.measure(samples), (Note.of(NoteKind.EMPTY),))
     values: dict[str, Interval] = {}
     for group in METRICS.values():
         values |= group.measure(samples)
     return Row(name, len(samples.scenarios), values, _notes(size, values, samples))
 
 
-def _notes(size: int, values: Mapping[str, Interval], samples: Samples) -> tuple[str, ...]:
+def _notes(size: int, values: Mapping[str, Interval], samples: Samples) -> tuple[Note, ...]:
     notes = []
     measured, vehicles, enough = (
         len(samples.scenarios),
@@ -214,27 +210,21 @@ def _notes(size: int, values: Mapping[str, Interval], samples: Samples) -> tuple
         samples.template.config.enough,
     )
     if apart := vehicles * (vehicles - 1) // 2 - len(samples.pairs):
-        notes.append(
-            f"E leaves out {apart} pair(s) of vehicles that are not there together for {COMMON:g} s"
-        )
+        notes.append(Note.of(NoteKind.PAIRS_LEFT_OUT, count=apart, time=COMMON))
     if measured < size:
-        notes.append(
-            f"measured on {measured:,} of {size:,} scenarios, in {RUNS} evenly spaced runs; candidates are all counted"
-        )
+        notes.append(Note.of(NoteKind.SUBSET_MEASURED, measured=measured, total=size, runs=RUNS))
     if 1 < measured < enough:
-        notes.append(
-            f"few scenarios: every figure, E included, comes from {measured}, not {enough}"
-        )
+        notes.append(Note.of(NoteKind.FEW_SCENARIOS, measured=measured, enough=enough))
     if np.isnan(values["min_distance"].value):
-        return (*notes, "one vehicle is left: there is no pair to be measured")
+        return (*notes, Note.of(NoteKind.ONE_VEHICLE))
     notes += [
-        f"E for {what} is undefined: the recording's matrix is constant for every pair of vehicles"
+        Note.of(NoteKind.E_UNDEFINED, quantity=what)
         for what in ("position", "speed")
         if not np.isfinite(values[f"e_{what}"].value)
     ]
     if values["vanished_conflicts"].value > 0.0:
         vanished, kept = (values[key].value for key in ("vanished_conflicts", "conflicts"))
         notes.append(
-            f"{vanished:.3g} of the recording's {vanished + kept:.0f} conflict(s) vanish, mean over scenarios"
+            Note.of(NoteKind.CONFLICTS_VANISHED, vanished=vanished, total=vanished + kept)
         )
     return tuple(notes)

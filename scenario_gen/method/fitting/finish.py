@@ -14,7 +14,15 @@ from scenario_gen.method.fitting.placement import Placement
 from scenario_gen.numerics import Bools, Floats, frozen_ints, Ints, runs
 from scenario_gen.roads import ground_for, nearest_pose_with_room
 from scenario_gen.situation import manoeuvre_of, Situation, Track, turn_of
-from scenario_gen.types import BoundaryStates, Fit, FittedVehicle, Road, Segmentation
+from scenario_gen.types import (
+    BoundaryStates,
+    Fit,
+    FittedVehicle,
+    Note,
+    NoteKind,
+    Road,
+    Segmentation,
+)
 
 _STAND_LENGTH = 0.5  # metres
 _PATH_STEP = 0.5  # metres between two poses of a fitted path
@@ -51,10 +59,10 @@ def finish(
             anchors[progress == progress[0]] = given[i, 0, :3]
         if given is not None and given_ends[1] and not track.still:
             anchors[progress == progress[-1]] = given[i, 1, :3]
-        anchors, moved, sentences = _repaired(
+        anchors, moved, moves = _repaired(
             ground, track, anchors, progress, [float(t) for t in index * encounter.dt], config
         )
-        notes += sentences
+        notes += moves
         moved = moved + placement.moved[i]
         if moved.max() > config.max_move:
             raise RefusedError(
@@ -120,11 +128,11 @@ def _repaired(
     progress: Floats,
     times: list[float],
     config: FittingConfig,
-) -> tuple[Floats, Floats, list[str]]:
-    """Anchors (K + 2, 3), how far each was moved (K + 2,), and sentences about it."""
+) -> tuple[Floats, Floats, list[Note]]:
+    """Anchors (K + 2, 3), how far each was moved (K + 2,), and notes on it."""
     anchors = anchors.copy()
     moved = np.zeros(len(anchors))
-    sentences = []
+    notes = []
     for k in range(len(anchors)):
         if k and progress[k] == progress[k - 1]:
             anchors[k], moved[k] = anchors[k - 1], moved[k - 1]
@@ -148,7 +156,7 @@ def _repaired(
             )
         anchors[k], moved[k] = answer
         if moved[k] > 0.0:
-            sentences.append(
-                f"vehicle {vehicle.id}: its {what} had no room and was moved by {moved[k]:.2f} m"
+            notes.append(
+                Note.of(NoteKind.ANCHOR_MOVED, vehicle=vehicle.id, anchor=what, distance=moved[k])
             )
-    return anchors, moved, sentences
+    return anchors, moved, notes

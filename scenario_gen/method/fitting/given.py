@@ -24,7 +24,12 @@ from scenario_gen.numerics.curve import Curve
 from scenario_gen.numerics.plane import place
 from scenario_gen.roads import draw_route
 from scenario_gen.situation import Situation, Track
-from scenario_gen.types import Encounter, Road
+from scenario_gen.types import (
+    Encounter,
+    Note,
+    NoteKind,
+    Road,
+)
 
 
 def place_in_own_frame(situation: Situation, road: Road, config: FittingConfig) -> Placement:
@@ -39,7 +44,7 @@ def place_in_own_frame(situation: Situation, road: Road, config: FittingConfig) 
         road,
         config.max_move,
     )
-    notes = (f"placed on road {road.name} in the recording's own frame", *separation.notes)
+    notes = (Note.of(NoteKind.AT_HOME, road=road.name), *separation.notes)
     return replace(
         Placement.of(separation.tracks, 1.0, notes), moved=separation.moved, at_home=True
     )
@@ -103,10 +108,12 @@ def place_given(
         placed, scale, how = _place(track, ends[n], joint, road, config)
         rows.append((placed, scale, 0.0))
         which = "start and goal" if has_state[n].all() else "start" if has_state[n, 0] else "goal"
-        notes.append(f"vehicle {track.vehicle.id}: {which} as given, {how}")
+        notes.append(
+            Note.of(NoteKind.STATE_GIVEN, vehicle=track.vehicle.id, states=which, method=how)
+        )
     on_road, scales, moves = zip(*rows, strict=True)
-    sentences = (*(() if base is None else base.notes), *notes)
-    return Placement(on_road, frozen(scales), frozen(moves), sentences), given
+    notes = [*(() if base is None else base.notes), *notes]
+    return Placement(on_road, frozen(scales), frozen(moves), tuple(notes)), given
 
 
 def _ends_of(base: Placement, encounter: Encounter) -> Floats:

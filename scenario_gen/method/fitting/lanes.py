@@ -24,7 +24,13 @@ from scenario_gen.numerics.curve import Curve
 from scenario_gen.numerics.plane import ahead_and_left, place
 from scenario_gen.roads import Course, placements, tracks_on, users_of, ways_through
 from scenario_gen.situation import drivers_of, in_words, MOST_CHANGE, to_frenet, Track, turn_of
-from scenario_gen.types import LaneNetwork, lanes_for, Road
+from scenario_gen.types import (
+    LaneNetwork,
+    lanes_for,
+    Note,
+    NoteKind,
+    Road,
+)
 
 _END_ROOM = 1.0  # metres kept between a footprint and the end of the road
 _ROUNDING = 1e-3  # metres that a shortened template is shorter than it might be: which side it rounds to depends on the CPU
@@ -64,7 +70,7 @@ def place_on_lanes(tracks: tuple[Track, ...], road: Road, config: FittingConfig)
             *(_note(c, t, network) for c, t in zip(match.courses, drivers, strict=True)),
         ]
         if scale * shortened != 1.0:
-            notes.append(f"scaled by {scale * shortened:.3g} to fit the lanes")
+            notes.append(Note.of(NoteKind.SCALED, scale=scale * shortened))
         placement = Placement.of(
             _with_walkers(tracks, drivers, tracks_on(match, laid)), scale * shortened, notes
         )
@@ -165,14 +171,14 @@ def _lanes_of(road: Road) -> LaneNetwork:
     return road.lanes
 
 
-def _note(course: Course, track: Track, network: LaneNetwork) -> str:
+def _note(course: Course, track: Track, network: LaneNetwork) -> Note:
     """Which lanes a vehicle drives, and how fast against their limit."""
     lanes = ", ".join(network.lanes[k].id for k in course.lanes)
     limit = max((network.lanes[k].speed_limit for k in course.lanes), default=math.nan)
     fastest = float(track.speed.max())
     speed = (
-        f"; its {fastest:.1f} m/s are more than their limit of {limit:.1f} m/s"
+        f"; its {fastest:.1f} m/s exceed their limit of {limit:.1f} m/s"
         if fastest > limit + 0.5
         else ""
     )
-    return f"vehicle {track.vehicle.id} drives on lanes {lanes}{speed}"
+    return Note.of(NoteKind.ON_LANES, vehicle=track.vehicle.id, lanes=f"{lanes}{speed}")

@@ -13,7 +13,7 @@ from scenario_gen.method.fitting.config import FittingConfig
 from scenario_gen.numerics import Floats, frozen
 from scenario_gen.roads import footprint_fits, ground_for, nearest_pose_with_room
 from scenario_gen.situation import separate, smallest_gaps, Track
-from scenario_gen.types import Loss, Road, Vehicle
+from scenario_gen.types import Loss, Note, Road, Vehicle
 
 SCALES = (1.0, 0.9, 1.1, 0.8, 1.2)  # that are tried, the best first
 _LOOKED = 12.0  # metres within which a pose with room is looked for, to say how far it is
@@ -29,7 +29,7 @@ class Placement:
         tracks: paths on the road, and the progress along them at each of the template's samples.
         scale: (N,) s of eq 9.
         moved: (N,) metres by which whole paths were shifted to keep vehicles apart.
-        notes: what was decided, in sentences.
+        notes: what was decided.
         unused: arms of the road that nobody uses.
         at_home: the template is in its own frame, on the road that it was recorded on.
     """
@@ -37,12 +37,12 @@ class Placement:
     tracks: tuple[Track, ...]
     scale: Floats
     moved: Floats
-    notes: tuple[str, ...]
+    notes: tuple[Note, ...]
     unused: tuple[Loss, ...] = ()
     at_home: bool = False
 
     @classmethod
-    def of(cls, tracks: tuple[Track, ...], scale: float, notes: Iterable[str]) -> "Placement":
+    def of(cls, tracks: tuple[Track, ...], scale: float, notes: Iterable[Note]) -> "Placement":
         """Return the placement of tracks on the road that all have one scale s of eq 9, none of them shifted."""
         return cls(
             tracks,
@@ -120,7 +120,7 @@ def max_repair(tracks: Sequence[Track], road: Road, max_move: float) -> float:
             can be done.
     """
     farthest = 0.0
-    astray = []
+    astray: dict[str, str] = {}
     for track in tracks:
         first, last = track.present.tolist()
         poses, ground = track.poses, ground_for(road, track.vehicle)
@@ -142,17 +142,18 @@ def max_repair(tracks: Sequence[Track], road: Road, max_move: float) -> float:
         if worst > max_move:
             far = f"{worst:.1f} m" if worst <= _LOOKED else f"more than {_LOOKED:g} m"
             x, y = poses[at, :2]
-            astray.append(
-                f"vehicle {track.vehicle.id} is {far} from any pose with room at sample {at} (x {x:.1f}, y {y:.1f})"
+            astray[track.vehicle.id] = (
+                f"vehicle {track.vehicle.id} is {far} from any pose with room at sample {at} "
+                f"(x {x:.1f}, y {y:.1f})"
             )
     if astray:
-        ids = ", ".join(text.split(" ", 2)[1] for text in astray)
+        ids = ", ".join(astray)
         remedy = (
             "the map is another one, or lies elsewhere"
             if len(astray) == len(tracks) > 1
             else f"set fitting.max_move to more, mend the map there, or leave {ids} out (log.vehicles names who is kept)"
         )
         raise RefusedError(
-            f"on road {road.name} {'; '.join(astray)}; at most {max_move:g} m is bridged; {remedy}"
+            f"on road {road.name} {'; '.join(astray.values())}; at most {max_move:g} m is bridged; {remedy}"
         )
     return farthest

@@ -29,7 +29,11 @@ from scenario_gen.numerics.pattern_search import pattern_search
 from scenario_gen.numerics.plane import place
 from scenario_gen.roads import clearance_field
 from scenario_gen.situation import Track
-from scenario_gen.types import Road
+from scenario_gen.types import (
+    Note,
+    NoteKind,
+    Road,
+)
 
 _CELL = 1.0  # metres of the coarse search
 _TURNS = 72
@@ -92,9 +96,13 @@ def _tried(
     tracks: tuple[Track, ...], centre: Floats, motion: _Motion, road: Road, config: FittingConfig
 ) -> tuple[Placement, float, float]:
     """The placement of one similarity, the share of its footprints that have room, the farthest repair [m]."""
-    note = (
-        f"placed on road {road.name} as one piece: turned by {np.degrees(motion.yaw) % 360.0:.0f}°, scale "
-        f"{motion.scale:g}, its centre at x {motion.at[0]:.1f}, y {motion.at[1]:.1f}"
+    note = Note.of(
+        NoteKind.AS_ONE_PIECE,
+        road=road.name,
+        degrees=np.degrees(motion.yaw) % 360.0,
+        scale=motion.scale,
+        x=motion.at[0],
+        y=motion.at[1],
     )
     as_laid = Placement.of(_moved(tracks, centre, motion), motion.scale, [note])
     placement = separated(as_laid, config, sideways=1.0)

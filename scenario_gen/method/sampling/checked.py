@@ -12,7 +12,13 @@ from scenario_gen.method.sampling.prepare import kept_reactions
 from scenario_gen.method.sampling.sample import draw_scenarios
 from scenario_gen.method.validity import Checker, Limits
 from scenario_gen.situation import Situation, Wait
-from scenario_gen.types import GenerationResult, Measures, MIRRORED, Request, TypeLimits
+from scenario_gen.types import (
+    GenerationResult,
+    Measures,
+    NoteKind,
+    Request,
+    TypeLimits,
+)
 
 
 def sample_scenarios(
@@ -60,7 +66,7 @@ def sample_scenarios(
     mirrored = [
         note
         for note in (road.lanes.notes if road.lanes is not None else ())
-        if note.startswith(MIRRORED)
+        if note.kind is NoteKind.MIRRORED
     ]
     drawn = replace(
         drawn, adaptations=(*mirrored, *drawn.adaptations), graph=plan.situation.reactions

@@ -31,7 +31,13 @@ from scenario_gen.method.sampling.window import window_of
 from scenario_gen.numerics import Bools, Floats
 from scenario_gen.roads import ground_for
 from scenario_gen.situation import Situation
-from scenario_gen.types import FOLLOW, ReactionGraph, Road
+from scenario_gen.types import (
+    FOLLOW,
+    Note,
+    NoteKind,
+    ReactionGraph,
+    Road,
+)
 
 _STRETCHES = 9
 _TIME_SHARE = (
@@ -55,12 +61,12 @@ class Prepared:
 
     Attributes:
         model: draws candidates; None if no speed exists even for the undisturbed routes.
-        adaptations: what was changed to get there, in sentences.
+        adaptations: what was changed to get there.
         refusal: why there is no model, "" if there is one.
     """
 
     model: CandidateModel | None
-    adaptations: tuple[str, ...]
+    adaptations: tuple[Note, ...]
     refusal: str = ""
 
 
@@ -87,7 +93,7 @@ def prepare(plan: Plan, config: SamplingConfig, order: str = "keep") -> Prepared
     routed_vehicles = [
         routed_vehicle(n, plan, times, waits, config) for n in range(len(encounter.vehicles))
     ]
-    clock, sentences = _slowed(routed_vehicles, template_grid(encounter), config)
+    clock, notes = _slowed(routed_vehicles, template_grid(encounter), config)
     left = (1.0 + config.max_stretch) * float(times[-1]) / float(clock.time[-1])
     best: tuple[float, float, list[MeanSpeed]] | None = None
     failed: list[tuple[RoutedVehicle, str]] = []
@@ -119,15 +125,12 @@ def prepare(plan: Plan, config: SamplingConfig, order: str = "keep") -> Prepared
         return Prepared(None, (), "; ".join(reasons))
     _, stretch, feasible = best
     if stretch > 1.0:
-        share = 100.0 * (stretch - 1.0)
-        sentences.append(
-            f"clock stretched by {share:.1f} % so that every vehicle can keep to its limits and its changepoints"
-        )
+        notes.append(Note.of(NoteKind.STRETCHED, percent=100.0 * (stretch - 1.0)))
     warp = TimeWarp(
         clock_of(clock.grid, stretch * clock.rate), config, least_shares(clock.grid, waits)
     )
     vehicles = [
-        _model(routed, road, *mean, config, sentences)
+        _model(routed, road, *mean, config, notes)
         for routed, mean in zip(routed_vehicles, feasible, strict=True)
     ]
     reactions, window = kept_reactions(plan.situation, config, order), None
@@ -154,7 +157,7 @@ def prepare(plan: Plan, config: SamplingConfig, order: str = "keep") -> Prepared
             for n, (v, routed) in enumerate(zip(vehicles, routed_vehicles, strict=True))
         ]
         window = window_of(plan.situation, config.leave_out, tied)
-    return Prepared(CandidateModel(tuple(vehicles), warp, reactions, window), tuple(sentences))
+    return Prepared(CandidateModel(tuple(vehicles), warp, reactions, window), tuple(notes))
 
 
 def kept_reactions(
@@ -201,7 +204,7 @@ def _freedom(
 
 def _slowed(
     routed_vehicles: Sequence[RoutedVehicle], grid: Floats, config: SamplingConfig
-) -> tuple[Clock, list[str]]:
+) -> tuple[Clock, list[Note]]:
     """The nominal clock on template times (G,) [s], and the notes on it."""
     plain = clock_of(grid, np.ones(len(grid)))
     slowdowns = []
@@ -215,8 +218,13 @@ def _slowed(
         return plain, []
     worst, k = divmod(int(np.argmax(slowdowns)), len(grid))
     return clock, [
-        f"the pace is lowered by up to {100.0 * (1.0 - 1.0 / clock.rate.max()):.0f} % ahead of bends, most for vehicle "
-        f"{routed_vehicles[worst].vehicle.id} at {grid[k]:.1f} s; in all the clock is {clock.time[-1] - grid[-1]:.1f} s longer"
+        Note.of(
+            NoteKind.SLOWED,
+            percent=100.0 * (1.0 - 1.0 / clock.rate.max()),
+            vehicle=routed_vehicles[worst].vehicle.id,
+            time=grid[k],
+            delay=clock.time[-1] - grid[-1],
+        )
     ]
 
 
@@ -227,18 +235,16 @@ def _model(
     motion: Motion,
     bounds: Bounds,
     config: SamplingConfig,
-    sentences: list[str],
+    notes: list[Note],
 ) -> VehicleModel:
-    """The vehicle's model; what was changed for it is added to the sentences."""
-    name, path, spline = f"vehicle {routed.vehicle.id}", routed.path, routed.spline
+    """The vehicle's model; what was changed for it is added to the notes."""
+    name, path, spline = routed.vehicle.id, routed.path, routed.spline
     shift = routed.largest_shift(mean)
     if shift > _REPORTED_SHIFT:
-        sentences.append(f"{name} passes changepoints up to {shift:.2f} m from their place")
+        notes.append(Note.of(NoteKind.CHANGEPOINTS_SHIFTED, vehicle=name, distance=shift))
     jerk = float(np.abs(motion.jerk @ mean).max())
     if jerk > bounds.jerk + _REPORTED_JERK:
-        sentences.append(
-            f"{name} needs a jerk of {jerk:.1f} m/s³; {bounds.jerk:.1f} m/s³ would be smooth"
-        )
+        notes.append(Note.of(NoteKind.JERKY, vehicle=name, jerk=jerk, smooth=bounds.jerk))
     room = lateral_room(
         path,
         routed.vehicle,
@@ -247,9 +253,8 @@ def _model(
     )
     narrow = room < ROOM_SIGMAS * config.lateral_sigma
     if narrow.any() and config.lateral_sigma > 0.0 and path.length > 0.0:
-        sentences.append(
-            f"{name} varies less across {100.0 * narrow.mean():.0f} % of its route, where the road is narrow"
-        )
+        percent = 100.0 * float(narrow.mean())
+        notes.append(Note.of(NoteKind.NARROW, vehicle=name, percent=percent))
     length = min(config.longitudinal_time, _TIME_SHARE * float(routed.times[-1] - routed.times[0]))
     sigma = config.of(routed.vehicle.kind).longitudinal_sigma
     speed = speed_model(spline, mean, motion, bounds, routed.time, routed.speed, sigma, length)

@@ -32,7 +32,8 @@ from scenario_gen.types import (
     Cause,
     EgoSlot,
     Measures,
-    NOT_KEPT,
+    Note,
+    NoteKind,
     Reached,
     Request,
     Scenario,
@@ -89,9 +90,8 @@ def draw_scenarios(
         else EgoSlot(encounter.vehicles[ego], plan.requested.start[ego], plan.requested.end[ego])
     )
     if prepared.model is None:
-        drawn = ScenarioSet(
-            count, (), 1, Counter({Cause.SPEED_PROFILE: 1}), (prepared.refusal,), slot
-        )
+        notes: tuple[Note, ...] = (Note.of(NoteKind.NOT_DRIVABLE, reasons=prepared.refusal),)
+        drawn = ScenarioSet(count, (), 1, Counter({Cause.SPEED_PROFILE: 1}), notes, slot)
     else:
         aim = aim_of(plan.situation, request, measures)
         sampler = Sampler(
@@ -121,7 +121,9 @@ def draw_scenarios(
         if measures is not None and measures.rarity is not None:
             loop.usual = Usual.among(measures.rarity, pilot(sampler, judge, FEW)[1])
         loop.run_request(config.attempts)
-        lost = [f"{NOT_KEPT}: {message}" for message in judge.lost.values()]
+        lost = [
+            Note.of(NoteKind.REACTION_LOST, message=message) for message in judge.lost.values()
+        ]
         notes = (*prepared.adaptations, *lost, *loop.usual.notes(), *loop.adaptations)
         drawn = ScenarioSet(
             count, loop.scenarios(), loop.candidates, loop.refused, notes, slot, loop.reached, kept,
@@ -130,7 +132,7 @@ def draw_scenarios(
         causes = ", ".join(
             f"{number} × {cause.value}" for cause, number in drawn.refused.most_common()
         )
-        more = f"; {'; '.join(drawn.adaptations)}" if drawn.adaptations else ""
+        more = "".join(f"; {note}" for note in drawn.adaptations)
         raise RefusedError(
             f"none of {drawn.candidates} candidate(s) with the requested states is valid ({causes}{more})"
         )
@@ -192,7 +194,7 @@ class _Loop:
     index: Any = field(default_factory=lambda: array("q"))  # of all that are valid
     refused: Counter[Cause] = field(default_factory=Counter)
     candidates: int = 0
-    adaptations: list[str] = field(default_factory=list)
+    adaptations: list[Note] = field(default_factory=list)
     aim: Aim | None = None
     measures: Measures | None = None
     usual: Usual = Usual()
@@ -245,18 +247,20 @@ class _Loop:
             self.reached = Reached(
                 aim.targets, result.stages, result.candidates, share, low, high, directed
             )
-            self.adaptations.append(self.reached.sentence())
+            self.adaptations.append(self.reached.note())
             if self.sampler.base:
                 self._describe(self.sampler.base, 2)
         if len(self.index) < self.count and not self.callbacks.cancelled():
-            message = f"target {'; '.join(map(str, aim.targets))}: "
-            drawn = f"{result.candidates} candidates of {1 + result.stages} stage(s) and {self.candidates} more"
-            message += (
-                f"{len(self.index)} found in {drawn}; reachable: {reachable(aim, result.seen)}"
+            missed = Note.of(
+                NoteKind.TARGET_MISSED,
+                target="; ".join(map(str, aim.targets)),
+                found=len(self.index),
+                drawn=result.candidates + self.candidates,
+                reachable=reachable(aim, result.seen),
             )
             if not self.index:
-                raise TargetError(message)
-            self.adaptations.append(message)
+                raise TargetError(str(missed))
+            self.adaptations.append(missed)
 
     def _take_pilot(self, pilot: Sequence[tuple[int, Scenario | None, Cause | None]]) -> None:
         """Take the candidates of a level that were drawn and checked already."""
@@ -343,15 +347,18 @@ class _Loop:
     def _describe(self, best: int, tried: int) -> None:
         """Put what was adapted into sentences."""
         if tried > 1 and best == 0:
-            self.adaptations.append(
-                "few candidates were valid, and smaller standard deviations did not help"
-            )
+            self.adaptations.append(Note.of(NoteKind.FEW_VALID))
         elif tried > 1:
             s = LEVELS[best]
-            own = f", {s.own:g} of each vehicle's own clock" if self.sampler.free else ""
+            free = self.sampler.free
             self.adaptations.append(
-                f"few candidates were valid: standard deviations multiplied by {s.lateral:g} across the route, "
-                f"{s.longitudinal:g} along it, {s.time:g} in time{own}"
+                Note.of(
+                    NoteKind.LESS_VARIATION_EACH if free else NoteKind.LESS_VARIATION,
+                    lateral=s.lateral,
+                    longitudinal=s.longitudinal,
+                    time=s.time,
+                    vehicle=s.own,
+                )
             )
         if self.callbacks.cancelled():
-            self.adaptations.append("cancelled")
+            self.adaptations.append(Note.of(NoteKind.CANCELLED))

@@ -13,7 +13,11 @@ import math
 
 from scenario_gen.method.sampling.adapt import Judge
 from scenario_gen.method.sampling.sampler import BLOCK, LEVELS, Sampler
-from scenario_gen.types import Scenario
+from scenario_gen.types import (
+    Note,
+    NoteKind,
+    Scenario,
+)
 
 PILOT = 2 * BLOCK  # candidates by which a level is judged
 FEW = 20  # valid candidates that are too few to find the bound by
@@ -49,17 +53,13 @@ class Usual:
         """Valid candidates of which one is kept, in the worst case."""
         return 1 if self.rarity is None else math.ceil(1.0 / LEAST_RARE)
 
-    def notes(self) -> tuple[str, ...]:
+    def notes(self) -> tuple[Note, ...]:
         """Return what is to be said of the bound: nothing where what is kept is usual."""
         if self.rarity is None or self.most <= 1.0:
             return ()
         if math.isinf(self.most):
-            return (
-                "vehicles share no area, so nothing is known of such encounters: whatever is valid counts as usual",
-            )
-        return (
-            f"the recording is unusual among recorded encounters (rarity 1): scenarios up to {self.most:.2f} are kept",
-        )
+            return (Note.of(NoteKind.NO_SHARED_AREA),)
+        return (Note.of(NoteKind.UNUSUAL, rarity=self.most),)
 
 
 def pilot(sampler: Sampler, judge: Judge, few: int = 0) -> tuple[int, list[Scenario]]:

@@ -165,9 +165,8 @@ def _format(target: str, road: str) -> ExportFormat:
 
 def _origin(case: Case, export: ExportConfig) -> str:
     if export.map:
-        return "; ".join(
-            (f"the lanes of {Path(export.map).name}", *read_network(Path(export.map)).notes)
-        )
+        notes = map(str, read_network(Path(export.map)).notes)
+        return "; ".join((f"the lanes of {Path(export.map).name}", *notes))
     return case.lane_map.origin
 
 

@@ -26,6 +26,8 @@ from scenario_gen.types import (
     EgoSlot,
     GenerationResult,
     join_ego,
+    Note,
+    NoteKind,
     ScenarioSet,
     Verdict,
     WITHOUT,
@@ -110,10 +112,11 @@ def _result(
         config=config,
         seed=seed,
     )
-    notes = list(namespace.missing)
+    notes = [Note.of(NoteKind.TEXT, text=text) for text in namespace.missing]
     lost = sum(entry is None for entry in namespace.unknown.values())
     if lost:
-        notes.append(f"{lost} of {len(scenarios)} scenarios are unaccounted: {NO_ENTRY}")
+        total = len(scenarios)
+        notes.append(Note.of(NoteKind.UNACCOUNTED, count=lost, total=total, reason=NO_ENTRY))
     rows = [
         replace(row, notes=(*row.notes, *notes)) if row.name == SCENARIOS else row
         for row in evaluation.rows
@@ -154,15 +157,12 @@ def _result(
     )
 
 
-def _left_out(namespace: Namespace) -> tuple[str, ...]:
-    """Say what the bag has not, and what follows from it; and what its requests say they came to."""
-    messages = [
-        "all scenarios of the bag are shown and measured, valid or not; start and end states were not checked"
-    ]
+def _left_out(namespace: Namespace) -> tuple[Note, ...]:
+    """Return notes on the checks that a bag lacks data for, and on the outcomes of its requests."""
+    notes = [Note.of(NoteKind.BAG_MEASURED)]
     if "map" not in namespace.messages:
-        messages.append("the bag has no map: whether vehicles leave the road was not checked")
+        notes.append(Note.of(NoteKind.BAG_WITHOUT_MAP))
     if "changepoints" not in namespace.messages:
-        messages.append(
-            "the bag has no changepoints: the recording counts as one primitive, and its waits were not checked"
-        )
-    return (*messages, *(summary.sentence() for summary in namespace.summaries))
+        notes.append(Note.of(NoteKind.BAG_WITHOUT_CHANGEPOINTS))
+    outcomes = (summary.sentence() for summary in namespace.summaries)
+    return (*notes, *(Note.of(NoteKind.TEXT, text=text) for text in outcomes))

@@ -25,7 +25,14 @@ from scenario_gen.roads.vector.network import (
     speed_of,
 )
 from scenario_gen.roads.vector.signs import DraftRule, kind_of_sign
-from scenario_gen.types import CARS, DRIVERS, LANE_USERS, RuleKind
+from scenario_gen.types import (
+    CARS,
+    DRIVERS,
+    LANE_USERS,
+    Note,
+    NoteKind,
+    RuleKind,
+)
 
 _BY_TYPE = {  # of a lanelet: who may use it, whatever users it names
     "sidewalk": frozenset(("pedestrian",)), "crosswalk": frozenset(("pedestrian",)), "bicycleLane": frozenset(("bicycle",)),
@@ -107,7 +114,8 @@ def lanes_of(root: Element) -> MapLanes:
                     )
                 )
     version = root.get("commonRoadVersion", "?")
-    notes = (f"CommonRoad {version}: coordinates as they stand, in metres", *_georeference(root))
+    coordinates = Note.of(NoteKind.COORDINATES, format=f"CommonRoad {version}")
+    notes = (coordinates, *_georeference(root))
     rules = list(
         _rules(root, {name: lanelets[name] for name, own in users.items() if own & CARS}, faults)
     )
@@ -180,13 +188,12 @@ def _rules(root: Element, lanelets: dict[str, Element], faults: Faults) -> Itera
                     yield DraftRule(ref[1], kinds[ref], (name,), line=line)
 
 
-def _georeference(root: Element) -> list[str]:
+def _georeference(root: Element) -> list[Note]:
     reference = root.find("location/geoTransformation/geoReference")
-    return (
-        [f"geoReference {' '.join(reference.content.split())} is stated, not applied"]
-        if reference is not None
-        else []
-    )
+    if reference is None:
+        return []
+    text = " ".join(reference.content.split())
+    return [Note.of(NoteKind.GEOREFERENCE_IGNORED, reference=text)]
 
 
 def _points(bound: Element) -> Floats:

@@ -30,7 +30,14 @@ from scenario_gen.roads.vector.network import (
     speed_of,
 )
 from scenario_gen.roads.vector.signs import DraftRule, kind_of_sign
-from scenario_gen.types import CARS, DRIVERS, LANE_USERS, RuleKind
+from scenario_gen.types import (
+    CARS,
+    DRIVERS,
+    LANE_USERS,
+    Note,
+    NoteKind,
+    RuleKind,
+)
 
 _BY_SUBTYPE = {  # who may use a lanelet, if no participant is named
     "road": DRIVERS, "play_street": LANE_USERS, "exit": LANE_USERS, "highway": DRIVERS - {"bicycle"},
@@ -172,7 +179,7 @@ def lanes_of(root: Element) -> MapLanes:
     left_out = len(lanelets) - len(used_by)
     return MapLanes(
         list(_drafts(drawn, limits)),
-        (f"Lanelet2: {note}",),
+        (note,),
         left_out,
         faults,
         rules,
@@ -317,8 +324,8 @@ def _nodes(way: Element, nodes: dict[str, Element]) -> list[str]:
 
 def _positions(
     nodes: list[Element], count: int, file: str, faults: Faults
-) -> tuple[dict[str, Floats], str, tuple[float, ...]]:
-    """Metres (3,) of each node by its id, x, y and its height; a sentence on how they were found; the origin in degrees.
+) -> tuple[dict[str, Floats], Note, tuple[float, ...]]:
+    """Metres (3,) of each node by its id, x, y and its height; a note on how they were found; the origin in degrees.
 
     Local coordinates are taken if most of the first `count` nodes have them, about whose middle the local frame lies else; nodes
     of the other frame are faulty.
@@ -352,7 +359,7 @@ def _positions(
             faults.found[0][2] if faults.found else f"{file}: no lanelet for cars has borders"
         )
     if local:
-        return found, "coordinates are the tags local_x and local_y, in metres", ()
+        return found, Note.of(NoteKind.LOCAL_TAGS), ()
     degrees = np.array(list(found.values()))
     about = np.isin(list(found), ids[:count])
     latitude, longitude = middle_of(degrees[about, :2] if about.any() else degrees[:, :2])
@@ -364,7 +371,7 @@ def _positions(
         raise InputError(
             f"{file}: its nodes are up to {size / 1000.0:.0f} km from their middle; at most {_FARTHEST / 1000.0:g} are read"
         )
-    note = f"latitude and longitude in metres east and north of {latitude:.7f}, {longitude:.7f} (azimuthal equidistant, WGS84)"
+    note = Note.of(NoteKind.PROJECTED, latitude=latitude, longitude=longitude)
     return (
         dict(zip(found, np.column_stack((metres, degrees[:, 2])), strict=True)),
         note,

@@ -21,14 +21,13 @@ from scenario_gen.base.xml_reader import Element
 from scenario_gen.numerics import Bools, Floats, runs
 from scenario_gen.numerics.plane import edge_lengths
 from scenario_gen.roads.vector.signs import DraftRule, rules_of_pieces, with_rules
-from scenario_gen.types import CARS, DRIVERS, Lane, LaneNetwork, LEVEL
+from scenario_gen.types import CARS, DRIVERS, Lane, LaneNetwork, LEVEL, Note, NoteKind
 
 _SECTION = 1.0  # metres between cross-sections at most
 _SHORTEST = 0.05  # metres of a border
 MOST_SECTIONS = 2_000_000  # of a whole map
 MOST_LANES = 30_000  # a city of some 1000 km of streets
 MOST_LINKS = 100  # of a lane to lanes that follow it, or lie beside it
-FAULTY = "faulty"  # in notes on elements that were left out
 _NAMED = 5  # faulty elements that a note names
 _QUERIED = 64  # lanes whose neighbours are looked up at once
 _MOST_COMPARED = 400_000  # pairs of lanes whose boxes meet
@@ -62,19 +61,25 @@ class Faults:
         except InputError as error:
             self.found.append((kind, name, str(error)))
 
-    def notes(self) -> tuple[str, ...]:
-        """Return a sentence for each kind: how many were left out, which, and why the first one was."""
+    def notes(self) -> tuple[Note, ...]:
+        """Return a note on each kind of element: how many were left out, which, and why the first one was."""
         kinds = dict.fromkeys(kind for kind, _, _ in self.found)
-        sentences = []
+        notes = []
         for kind in kinds:
             own = [(name, reason) for each, name, reason in self.found if each == kind]
             names = ", ".join(name for name, _ in own[:_NAMED]) + (
                 ", …" if len(own) > _NAMED else ""
             )
-            sentences.append(
-                f"{len(own)} {FAULTY} {kind}{'s' if len(own) > 1 else ''} left out ({names}), first: {own[0][1]}"
+            notes.append(
+                Note.of(
+                    NoteKind.FAULTY,
+                    count=len(own),
+                    elements=f"{kind}s" if len(own) > 1 else kind,
+                    names=names,
+                    reason=own[0][1],
+                )
             )
-        return tuple(sentences)
+        return tuple(notes)
 
 
 @dataclass(frozen=True, eq=False)
@@ -129,7 +134,7 @@ class MapLanes:
     """
 
     drafts: Sequence[Draft]
-    notes: tuple[str, ...]
+    notes: tuple[Note, ...]
     left_out: int = 0
     faults: Faults = field(default_factory=Faults)
     rules: Sequence[DraftRule] = ()
@@ -257,15 +262,11 @@ def network_of(name: str, draft_lanes: MapLanes) -> LaneNetwork:
     if network.others:
         counts = Counter(user for lane in network.others for user in lane.users)
         words = ", ".join(f"{user} {count}" for user, count in sorted(counts.items()))
-        notes += (f"{len(network.others)} lanes are for others than cars: {words}",)
+        notes += (Note.of(NoteKind.OTHER_LANES, count=len(network.others), users=words),)
     if draft_lanes.left_out:
-        notes += (
-            f"{draft_lanes.left_out} lanes are for none of the types of road users and were left out",
-        )
+        notes += (Note.of(NoteKind.UNUSED_LANES, count=draft_lanes.left_out),)
     if draft_lanes.other_signs:
-        notes += (
-            f"{draft_lanes.other_signs} signs of other kinds than stop, give way, priority and speed limit are not read",
-        )
+        notes += (Note.of(NoteKind.UNREAD_SIGNS, count=draft_lanes.other_signs),)
     notes += faults.notes()
     network = replace(network, notes=notes)
     named = any(lane.junction for lane in network.lanes)
@@ -373,7 +374,7 @@ def _on_one_level(one: Lane, other: Lane) -> bool:
     return not abs(one.height[a] - other.height[b]) > LEVEL
 
 
-def part_of(network: LaneNetwork, box: Floats, note: str) -> LaneNetwork:
+def part_of(network: LaneNetwork, box: Floats, note: Note) -> LaneNetwork:
     """Return the part of a network inside a box (2, 2) [m]: lanes are cut where their centre lines leave it.
 
     Raises:

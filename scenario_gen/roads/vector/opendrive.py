@@ -40,7 +40,12 @@ from scenario_gen.roads.vector.sections import (
     STEP,
 )
 from scenario_gen.roads.vector.signs import DraftRule, is_speed_limit, kind_of_sign
-from scenario_gen.types import DRIVERS, RuleKind
+from scenario_gen.types import (
+    DRIVERS,
+    Note,
+    NoteKind,
+    RuleKind,
+)
 
 _SPEEDS = {"m/s": 1.0, "km/h": 1.0 / 3.6, "mph": 0.44704}
 _LINKED = 3.0  # metres between the ends of lanes that are linked, at most
@@ -94,7 +99,7 @@ def lanes_of(root: Element) -> MapLanes:
         joints.along(road)
     for junction in root.findall("junction"):
         joints.through(junction)
-    notes = (f"OpenDRIVE {version}: {_projection(header)}", *joints.notes())
+    notes = (*_coordinate_notes(header, version), *joints.notes())
     rules = [*_signal_rules(roads, faults), *_priorities(root, roads)]
     signals = [
         signal
@@ -239,17 +244,18 @@ def _priorities(root: Element, roads: dict[str, OpenDriveRoad]) -> Iterator[Draf
                 )
 
 
-def _projection(header: Element) -> str:
+def _coordinate_notes(header: Element, version: str) -> list[Note]:
+    """Return notes on the coordinates of a map, and on the parts of its header that are ignored."""
+    notes = [Note.of(NoteKind.COORDINATES, format=f"OpenDRIVE {version}")]
     reference = header.find("geoReference")
     text = " ".join(reference.content.split()) if reference is not None else ""
-    stated = f"geoReference {text} is stated, not applied" if text else "no geoReference"
+    if text:
+        notes.append(Note.of(NoteKind.GEOREFERENCE_IGNORED, reference=text))
     offset = header.find("offset")
-    moved = (
-        ""
-        if offset is None
-        else f", offset x {offset.number('x', 0.0):g}, y {offset.number('y', 0.0):g} not applied"
-    )
-    return f"coordinates as they stand, in metres; {stated}{moved}"
+    if offset is not None:
+        x, y = (offset.number(axis, 0.0) for axis in "xy")
+        notes.append(Note.of(NoteKind.OFFSET_IGNORED, x=x, y=y))
+    return notes
 
 
 class _Joints:
@@ -261,13 +267,17 @@ class _Joints:
         self.of: dict[End, list[End]] = defaultdict(list)
         self.apart: list[str] = []  # places of links that join lanes whose ends are apart
 
-    def notes(self) -> list[str]:
-        """Say what was not believed."""
+    def notes(self) -> list[Note]:
+        """Return a note on links that were left out."""
         if not self.apart:
             return []
         return [
-            f"{len(self.apart)} links join lanes whose ends are more than {_LINKED:g} m apart and were left out, first at "
-            f"{self.apart[0]}"
+            Note.of(
+                NoteKind.LINKS_LEFT_OUT,
+                count=len(self.apart),
+                distance=_LINKED,
+                place=self.apart[0],
+            )
         ]
 
     def lane(self, key: Key) -> SectionLane | None:

@@ -22,7 +22,15 @@ from scenario_gen.roads.vector.search import crossing_spots, find_spots, Spot, s
 from scenario_gen.roads.vector.street import along_streets
 from scenario_gen.situation import conflicts_in, separate, Track
 from scenario_gen.situation.gaps import Meetings, meetings
-from scenario_gen.types import LaneNetwork, lanes_for, LEVEL, once_per_object, Scenario
+from scenario_gen.types import (
+    LaneNetwork,
+    lanes_for,
+    LEVEL,
+    Note,
+    NoteKind,
+    once_per_object,
+    Scenario,
+)
 
 _HOME = 1.0  # m²: where lanes of its directions lie so near the recorded paths, the template is at home
 _SPOTS = 15  # placements as one piece, and
@@ -119,7 +127,7 @@ def placements(
         what, why = ("road", network.notes) if network.drawn else ("map", ())
         *_, reason = min(search.failures, default=("it has no lanes of its directions",))
         raise NoPlaceError(
-            f"the recording fits no place on {what} {network.name}: {'; '.join((recorded + reason, *why))}"
+            f"the recording fits no place on {what} {network.name}: {'; '.join((recorded + reason, *map(str, why)))}"
         )
 
 
@@ -343,8 +351,8 @@ def users_of(tracks: Sequence[Track]) -> frozenset[str]:
 
 def best_part(
     network: LaneNetwork, tracks: tuple[Track, ...], lanes: Sequence[int] | None = None
-) -> tuple[Floats, str]:
-    """Return the box (2, 2) [m] around the best place of a template on a map, and a sentence that names it.
+) -> tuple[Floats, Note]:
+    """Return the box (2, 2) [m] around the best place of a template on a map, and a note on it.
 
     Raises:
         NoPlaceError: there is no place for it.
@@ -352,5 +360,5 @@ def best_part(
     best = next(places(network, tracks, lanes))
     return (
         best.box,
-        f"the best place for the recording is at {best.where}: {best.part} (cost {best.cost:.1f} m²)",
+        Note.of(NoteKind.BEST_PLACE, place=best.where, part=best.part, cost=best.cost),
     )

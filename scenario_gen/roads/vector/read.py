@@ -17,11 +17,11 @@ from scenario_gen.base.xml_reader import Element, read_xml, to_number
 from scenario_gen.numerics import Floats, frozen
 from scenario_gen.roads.config import RoadConfig
 from scenario_gen.roads.vector import commonroad, lanelet2, opendrive
-from scenario_gen.roads.vector.network import extent, FAULTY, MapLanes, network_of, part_of
+from scenario_gen.roads.vector.network import extent, MapLanes, network_of, part_of
 from scenario_gen.roads.vector.place import best_part
 from scenario_gen.roads.vector.raster import road_of
 from scenario_gen.situation import Track
-from scenario_gen.types import LaneNetwork, Road
+from scenario_gen.types import LaneNetwork, Note, NoteKind, Road
 
 
 @dataclass(frozen=True)
@@ -106,7 +106,7 @@ def chosen_lanes(network: LaneNetwork, part: str) -> tuple[int, ...]:
             listed = ", ".join(known[:_NAMED]) + (
                 f" and {len(known) - _NAMED} more" if len(known) > _NAMED else ""
             )
-            faulty = "".join(f"; {note}" for note in network.notes if FAULTY in note)
+            faulty = "".join(f"; {note}" for note in network.notes if note.kind is NoteKind.FAULTY)
             raise InputError(
                 f"map {network.name} has no {kind} {shown(name, 40)!r} that cars may use; it has {listed or 'none'}{faulty}"
             )
@@ -167,14 +167,14 @@ def vector_road(name: str, tracks: tuple[Track, ...] | None, config: RoadConfig)
         network = replace(network, rules_kept=False)
     lanes = chosen_lanes(network, part) if part and not part.startswith("box=") else None
     if part.startswith("box="):
-        box, note = box_of(network, part), f"part {part} of the map"
+        box, note = box_of(network, part), Note.of(NoteKind.MAP_PART, part=part)
     elif tracks is not None:
         box, note = best_part(network, tracks, lanes)
     elif lanes:
         points = np.concatenate([network.lanes[k].outline for k in lanes])
         box, note = (
             np.stack((points.min(axis=0) - _AROUND, points.max(axis=0) + _AROUND)),
-            f"{_AROUND:g} m around {part}",
+            Note.of(NoteKind.MAP_AROUND, distance=_AROUND, part=part),
         )
     else:
         return road_of(network, None, config)

@@ -14,7 +14,13 @@ import re
 import numpy as np
 
 from scenario_gen.numerics import Floats
-from scenario_gen.types import LaneNetwork, RuleKind, TrafficRule
+from scenario_gen.types import (
+    LaneNetwork,
+    Note,
+    NoteKind,
+    RuleKind,
+    TrafficRule,
+)
 
 _SIGNS = {
     "de": {
@@ -123,12 +129,9 @@ def with_rules(network: LaneNetwork, drafts: Sequence[DraftRule]) -> LaneNetwork
         words = ", ".join(
             f"{count} {kind.replace('_', ' ')}" for kind, count in counts.items() if count
         )
-        off = (
-            "; lights have no state, so signs hold as where lights are off"
-            if counts[RuleKind.TRAFFIC_LIGHT]
-            else ""
-        )
-        notes += (f"traffic rules: {words}{off}",)
+        notes += (Note.of(NoteKind.TRAFFIC_RULES, rules=words),)
+        if counts[RuleKind.TRAFFIC_LIGHT]:
+            notes += (Note.of(NoteKind.LIGHTS_OFF),)
     return replace(network, rules=known, notes=notes)
 
 

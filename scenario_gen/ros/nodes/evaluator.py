@@ -20,7 +20,11 @@ from scenario_gen.base.errors import InputError
 from scenario_gen.base.parameters import parameter, Parameters
 from scenario_gen.method.evaluation import evaluate_scenarios, EvaluationConfig
 from scenario_gen.ros.common.stage_node import StageNode
-from scenario_gen.types import WITH
+from scenario_gen.types import (
+    Note,
+    NoteKind,
+    WITH,
+)
 
 Entries = Sequence[
     tuple[bytes, ScenarioEntry]
@@ -164,7 +168,12 @@ class Evaluator(StageNode):
         )
         stop_if_cancelled()
         statuses = []
-        chosen = f"measured on {len(decoded)} of {summary.published} scenarios, chosen by seed {self.config.seed}"
+        chosen = Note.of(
+            NoteKind.RANDOM_SUBSET,
+            measured=len(decoded),
+            total=summary.published,
+            seed=self.config.seed,
+        )
         for row in evaluation.rows:
             figures = {
                 key: repr(entry.value)
@@ -187,7 +196,7 @@ class Evaluator(StageNode):
                 Status(
                     f"{self.get_fully_qualified_name()}: {row.name}",
                     Level.OK,
-                    "; ".join(notes),
+                    "; ".join(map(str, notes)),
                     values,
                 )
             )

@@ -28,10 +28,11 @@ from msg_conventions.roads import encode_map, encode_poses
 from msg_conventions.tracks import decode_tracks
 from scenario_gen.base.cancelling import stop_if_cancelled
 from scenario_gen.base.errors import InputError, ScenarioGenError
-from scenario_gen.roads import build_road, FAULTY, RoadConfig
+from scenario_gen.roads import build_road, RoadConfig
 from scenario_gen.ros.common.node_parameters import RoadServerParameters
 from scenario_gen.ros.common.services import REQUESTS
 from scenario_gen.ros.common.stage_node import StageNode
+from scenario_gen.types import NoteKind
 
 
 @dataclass(frozen=True)
@@ -123,7 +124,9 @@ class RoadServer(StageNode):
         height, width = road.drivable.shape
         message = f"{road.name}: {width} x {height} cells of {road.resolution:.2f} m, {len(road.entries)} entries"
         faults = [
-            note for note in (road.lanes.notes if road.lanes is not None else ()) if FAULTY in note
+            str(note)
+            for note in (road.lanes.notes if road.lanes is not None else ())
+            if note.kind is NoteKind.FAULTY
         ]
         level, message = (
             (Level.WARN, "; ".join([message, *faults])) if faults else (Level.OK, message)
