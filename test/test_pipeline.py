@@ -22,7 +22,6 @@ from scenario_gen.method.sampling import SamplingConfig
 from scenario_gen.output.report.summary import summary
 from scenario_gen.output.results import write_results
 from scenario_gen.pipeline import generate, PipelineConfig
-from scenario_gen.types.reaction import NOT_KEPT
 from scenario_gen.types.request import Request
 from scenario_gen.types.row_names import NARROW, REPLAY, UNIFORM, WITH, WITHOUT
 
@@ -183,11 +182,8 @@ def test_the_figures_of_a_reaction_that_the_road_does_not_keep_are_said(tmp_path
     )
     asked = Request(starts=f"2: {x + 13.0:.2f} {y:.2f} {yaw:.3f}")
     made = generate(lane, "corridor", config, count=2, seed=3, request=asked)
-    (sentence,) = [said for said in made.generated.adaptations if "reaction" in said]
-    assert (
-        sentence.startswith(f"{NOT_KEPT}: vehicle 2: comes within ")
-        and made.generated.reactions == ()
-    )
+    (sentence,) = made.lost_reactions
+    assert "vehicle 2: comes within " in sentence and made.generated.reactions == ()
     page, figures = written(made, tmp_path)
     text = printed(made)
     assert (
@@ -197,4 +193,4 @@ def test_the_figures_of_a_reaction_that_the_road_does_not_keep_are_said(tmp_path
     assert (
         page.count(str(escape(sentence))) > 1 and "are not held to it" in page
     )  # beside the reaction, and in accounts
-    assert figures["adaptations"] == list(made.generated.adaptations)
+    assert figures["adaptations"] == list(map(str, made.generated.adaptations))

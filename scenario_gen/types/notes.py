@@ -128,7 +128,7 @@ class NoteKind(Enum):
     UNACCOUNTED = "{count} of {total} scenarios are unaccounted for: {reason}"
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Note:
     """Something that a stage reports to the user. Program logic reads the kind, never the text.
 
@@ -139,13 +139,19 @@ class Note:
     """
 
     kind: NoteKind
-    values: Mapping[str, object] = field(default_factory=dict, hash=False)
+    values: Mapping[str, object] = field(default_factory=dict)
     recorded: str = ""
 
     @classmethod
     def of(cls, kind: NoteKind, **values: object) -> "Note":
         """Return the note of a kind with these values."""
         return cls(kind, values)
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, Note) and (self.kind, str(self)) == (other.kind, str(other))
+
+    def __hash__(self) -> int:
+        return hash((self.kind, str(self)))
 
     def __str__(self) -> str:
         return self.recorded or self.kind.value.format_map(self.values)

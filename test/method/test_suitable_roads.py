@@ -17,6 +17,7 @@ from scenario_gen.method.sampling import TargetError
 from scenario_gen.method.segmentation import segment
 from scenario_gen.method.suitable_roads import on_first_suitable_road, suitable_roads
 from scenario_gen.pipeline import generate, PipelineConfig
+from scenario_gen.types import NoteKind
 from scenario_gen.types.request import Request
 
 LOG = Path(__file__).resolve().parents[2] / "examples" / "my_log.csv"
@@ -32,7 +33,8 @@ def crossing():
 def test_auto_takes_the_first_road_that_keeps_the_conflict_and_says_so(crossing):
     result = generate(crossing, "auto", count=2, seed=7)
     assert result.road.name == "four_way" and len(result.generated.scenarios) == 2
-    assert result.generated.adaptations[0].startswith("road auto: four_way")
+    note = result.generated.adaptations[0]
+    assert (note.kind, note.values["road"]) == (NoteKind.AUTO_ROAD, "four_way")
     plain = generate(crossing, "four_way", count=2, seed=7)
     assert all(
         (a.position == b.position).all()
@@ -57,7 +59,7 @@ def test_auto_leaves_out_a_road_on_which_vehicles_share_no_area_any_more(crossin
         return replace(made, generated=replace(made.generated, scenarios=(one, apart)))
 
     result = on_first_suitable_road(on, crossing, PipelineConfig(), 7)
-    assert "road auto: four_way" not in result.generated.adaptations[0]
+    assert result.generated.adaptations[0].values["road"] != "four_way"
     with pytest.raises(
         RefusedError,
         match=r"on road corridor, the last that takes it: vehicles .* and .* share no area there in scenario",

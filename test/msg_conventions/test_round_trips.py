@@ -41,6 +41,7 @@ from msg_conventions.cdr import decode
 from msg_conventions.layouts import POLYGON
 from scenario_gen.base.errors import InputError
 from scenario_gen.numerics.arrays import canonical_angle
+from scenario_gen.types import Note, NoteKind
 from scenario_gen.types.ego import with_witness
 from scenario_gen.types.encounter import Vehicle
 from scenario_gen.types.fit import Fit, FittedVehicle
@@ -158,7 +159,7 @@ def test_lanes(seed, count):
     sent = LaneNetwork(
         "map",
         tuple(own),
-        ("read so",),
+        (Note.of(NoteKind.LIGHTS_OFF),),
         rules[: int(rng.integers(5))],
         bool(rng.integers(2)),
         True,
@@ -260,7 +261,13 @@ def _fit(template, at) -> Fit:
         for a in anchors
     )
     start, end = (np.concatenate([anchors[:, j], rng.random((n, 1))], axis=1) for j in (0, -1))
-    return Fit(template.vehicles, fitted, at, BoundaryStates(start, end), ("an entry was chosen",))
+    return Fit(
+        template.vehicles,
+        fitted,
+        at,
+        BoundaryStates(start, end),
+        (Note.of(NoteKind.SCALED, scale=0.9),),
+    )
 
 
 def test_fit():
@@ -284,7 +291,7 @@ def test_reports():
         (scenario(1),),
         70,
         Counter({Cause.OVERLAP: 15, Cause.OFF_ROAD: 5}),
-        ("clock stretched by 5 %",),
+        (Note.of(NoteKind.STRETCHED, percent=5.0),),
     )
     template = encounter(3)
     fit = _fit(template, np.array([0, 7, 20, 39]))

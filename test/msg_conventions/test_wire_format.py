@@ -33,6 +33,7 @@ from msg_conventions import (
 from msg_conventions.cdr import encode
 from msg_conventions.layouts import FIX
 from scenario_gen.base.errors import InputError
+from scenario_gen.types import Note, NoteKind
 from scenario_gen.types.encounter import Vehicle
 from scenario_gen.types.lanes import Lane, LaneNetwork
 from scenario_gen.types.road import Road
@@ -59,7 +60,9 @@ def _messages():
         yield roads.MAP_TYPE, roads.encode_map(road, 5)
         border = np.column_stack((np.arange(seed + 1.0), np.zeros(seed + 1)))
         network = LaneNetwork(
-            "m", (Lane("7", border + 1.0, border, (0,), (), 8.5 * seed, "j" * seed),), ("née",)
+            "m",
+            (Lane("7", border + 1.0, border, (0,), (), 8.5 * seed, "j" * seed),),
+            (Note.of(NoteKind.TEXT, text="née"),),
         )
         yield markers.TYPE, lanes.encode_lanes(network if seed > 1 else None, frame, 5)
         yield roads.POSES_TYPE, roads.encode_poses(road.entries, frame, 5)

@@ -40,7 +40,7 @@ def test_a_condition_keeps_the_scenarios_it_holds_for_and_says_so():
     made = run_with_distances()
     near = made.filter("distance < 1.0")
     assert [scenario.index for scenario in near] == [3, 4]
-    assert near.generated.adaptations[-1] == "filtered by 'distance < 1.0': 2 of 5 scenarios"
+    assert str(near.generated.adaptations[-1]) == "filtered by 'distance < 1.0': 2 of 5 scenarios"
     assert not near.evaluation.rows and near.coverage is None and len(made) == 5
     assert len(made.filter("pet < 2")) == 0 and len(made.filter("distance < 1.0 or ttc > 1")) == 5
 

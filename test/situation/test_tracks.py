@@ -168,7 +168,7 @@ def test_overlapping_vehicles_are_pulled_apart_by_the_least():
     separation = separate(tracks, 0.5, 3.0)
     assert smallest_gaps(separation.tracks)[0, 1] > 0.499
     assert separation.moved.tolist() == pytest.approx([0.45, 0.45], abs=0.01)
-    assert len(separation.notes) == 2 and "0.45 m" in separation.notes[0]
+    assert len(separation.notes) == 2 and "0.45 m" in str(separation.notes[0])
     with pytest.raises(RefusedError, match="vehicles 1 and 0"):
         separate(tracks, 0.5, 0.3)
 

@@ -13,6 +13,7 @@ from msg_conventions.topics import topic_entry
 from scenario_gen.bags.storage.bag import BagMessage, read_messages
 from scenario_gen.bags.storage.metadata import qos_yaml
 from scenario_gen.bags.storage.writer import atomic_bag
+from scenario_gen.types import Note, NoteKind
 from scenario_gen.types.encounter import Encounter, Vehicle
 from scenario_gen.types.fit import Fit, FittedVehicle
 from scenario_gen.types.generation import GenerationResult
@@ -55,7 +56,7 @@ def hand_made_run() -> GenerationResult:
     )
     states = np.concatenate([anchors, speed[:, index, None]], axis=-1)
     asked = BoundaryStates(states[:, 0], states[:, -1])
-    fit = Fit(vehicles, fitted, index, asked, ("both keep right",))
+    fit = Fit(vehicles, fitted, index, asked, (Note.of(NoteKind.SCALED, scale=0.9),))
     routes = tuple(
         Route(
             np.column_stack([p[::2], h[::2]]),

@@ -10,6 +10,7 @@ from functools import cache
 import numpy as np
 
 from scenario_gen.method.evaluation import evaluate_scenarios, EvaluationConfig
+from scenario_gen.types import Note, NoteKind
 from scenario_gen.types.ego import with_witness
 from scenario_gen.types.encounter import Encounter, Vehicle
 from scenario_gen.types.evaluation import CheckCounts
@@ -103,10 +104,7 @@ def report_case(count=12, name="crossing", without=True):
         np.column_stack([encounter.position[:, k], encounter.heading[:, k], encounter.speed[:, k]])
         for k in (0, -1)
     ]
-    notes = (
-        "west enters at 1 and leaves at 1: straight, as in the template",
-        "south: anchor 1 moved by 0.12 m",
-    )
+    notes = (Note.of(NoteKind.ANCHOR_MOVED, vehicle="south", anchor="end", distance=0.12),)
     fit = Fit(encounter.vehicles, tuple(fitted), index, BoundaryStates(*ends), notes)
     oracle = replayed(encounter)
     near = ScenarioSet(
@@ -114,7 +112,7 @@ def report_case(count=12, name="crossing", without=True):
         tuple(samples(encounter, count)),
         count + 5,
         Counter({Cause.OVERLAP: 3, Cause.LATERAL_ACCELERATION: 2}),
-        ("the clock was stretched by 3 %",),
+        (Note.of(NoteKind.STRETCHED, percent=3.0),),
     )
     far = ScenarioSet(
         count,

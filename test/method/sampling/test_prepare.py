@@ -19,6 +19,7 @@ from scenario_gen.method.segmentation import segment
 from scenario_gen.roads import build_road
 from scenario_gen.situation import Situation
 from scenario_gen.situation.interaction import find_waits
+from scenario_gen.types import NoteKind
 from scenario_gen.types.encounter import Encounter, Vehicle
 
 DT = 0.1
@@ -104,7 +105,7 @@ def undisturbed(encounter, segmentation):
 def test_the_own_road_is_driven_as_the_template_did(encounter):
     segmentation = segment(encounter, CONFIG.segmentation)
     drive, adapted, planned = undisturbed(encounter, segmentation)
-    assert not [one for one in adapted if "pace" in one or "stretched" in one]
+    assert not {NoteKind.SLOWED, NoteKind.STRETCHED} & {note.kind for note in adapted}
     assert drive.speed.shape == encounter.speed.shape
     for n, route in enumerate(planned.routes):
         assert distances_to_line(route.points, encounter.position[n]).max() < 0.1

@@ -19,6 +19,7 @@ from benchmarks.paper import write_page
 from scenario_gen.logs import read_log
 from scenario_gen.logs.synthetic import bundled
 from scenario_gen.output.report.page import render, ReportInput, write_report
+from scenario_gen.types import Note, NoteKind
 from scenario_gen.types.row_names import UNIFORM
 
 RUNS = "top.ran=1"
@@ -66,6 +67,7 @@ def hostile_case(names):
     """The case of the report with hostile names wherever a log or a bag has its say."""
     case = report_case(4, name=names[0])
     ids = names[1:3]
+    notes = tuple(Note.of(NoteKind.TEXT, text=name) for name in names)
 
     def renamed(vehicles):
         return tuple(
@@ -79,7 +81,7 @@ def hostile_case(names):
                 replace(s, vehicles=renamed(s.vehicles), frame_id=names[0])
                 for s in group.scenarios
             ),
-            adaptations=names,
+            adaptations=notes,
         )
 
     segmentation = replace(case.segmentation, descriptions=names[:3])
@@ -92,14 +94,14 @@ def hostile_case(names):
             case.fit,
             vehicles=renamed(case.fit.vehicles),
             fitted=tuple(replace(f, manoeuvre=names[4]) for f in case.fit.fitted),
-            notes=names,
+            notes=notes,
         ),
         generated=made(case.generated),
         references={name: made(group) for name, group in case.references.items()},
         evaluation=replace(
             case.evaluation,
             vehicles=ids,
-            rows=tuple(replace(row, notes=(*row.notes, *names)) for row in case.evaluation.rows),
+            rows=tuple(replace(row, notes=(*row.notes, *notes)) for row in case.evaluation.rows),
         ),
         replay=replace(case.replay, vehicles=renamed(case.replay.vehicles)),
         refusals={UNIFORM: names[5]},

@@ -48,8 +48,8 @@ def test_names_are_escaped_and_figures_are_there(page):
     for text in (
         "12 rows dropped",
         "demo.mcap",
-        "anchor 1 moved by 0.12 m",
-        "the clock was stretched",
+        "end moved by 0.12 m",
+        "clock stretched by",
         "lateral acceleration",
     ):
         assert text in page
@@ -159,9 +159,9 @@ def test_what_the_fitting_lost_and_how_far_a_route_is_from_it_are_said(tmp_path)
     assert figures["fit"]["vehicles"]["west"]["turned_on_road_deg"] == 20.1
     assert figures["routes"]["south"]["farthest_from_fit_m"] == 2.25
     read = read_recording(tmp_path / "bag").namespaces[""]
-    assert (
-        read.fit[0].losses == (lost,) and read.fit[0].notes == case.fit.notes
-    )  # a remark about a route is not a note
+    assert read.fit[0].losses == (lost,) and [*map(str, read.fit[0].notes)] == [
+        *map(str, case.fit.notes)
+    ]  # a remark about a route is not a note
     assert [route.figures() for route in read.fit[1]] == [route.figures() for route in routes]
 
 

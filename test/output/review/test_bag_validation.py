@@ -259,7 +259,7 @@ def test_a_scenario_whose_entry_was_lost_is_unaccounted(run, tmp_path):
     assert answer.exit_code == 0 and "2 without an entry" in answer.output
     (case,) = bag_results(cut)
     assert any(
-        "2 of 4 scenarios are unaccounted" in note
+        "2 of 4 scenarios are unaccounted" in str(note)
         for note in case.evaluation.row("scenarios").notes
     )
     assert "unaccounted" in case.evaluation.to_json()

@@ -24,7 +24,9 @@ from scenario_gen.output.results import provenance_of
 from scenario_gen.output.review.regenerate import regenerate_scenario, write_regenerated
 from scenario_gen.output.review.validation import validate_bag
 from scenario_gen.pipeline import generate, PipelineConfig
-from scenario_gen.types.lanes import MIRRORED
+from scenario_gen.types import (
+    NoteKind,
+)
 from scenario_gen.types.request import Request
 
 LOG, ROAD, SEED = bundled("b"), "t_intersection", 7
@@ -76,7 +78,8 @@ def mirrored_bag(tmp_path_factory):
 def test_a_mirrored_template_says_so_and_comes_again_from_the_log(mirrored_bag):
     bag, log = mirrored_bag
     (summary,) = read_recording(bag).namespaces["/left"].summaries
-    assert summary.values[f"{ADAPTATION}0"].startswith(MIRRORED)
+    assert summary.values[f"{ADAPTATION}0"] == str(summary.result().adaptations[0])
+    assert summary.result().adaptations[0].kind is NoteKind.MIRRORED
     data = published(bag, "/left")[0]
     assert regenerate_scenario(bag, 0).data == regenerate_scenario(bag, 0, log=log).data == data
 

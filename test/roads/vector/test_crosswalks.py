@@ -46,6 +46,6 @@ def test_one_without_a_size_is_left_out_and_named(tmp_path):
         tmp_path, road(section(right=lane(-1)), more=crossing(attributes='length="0" width="0"'))
     )
     assert not network.others and any(
-        "1 faulty crosswalk left out (crosswalk 1.7)" in note for note in network.notes
+        "1 faulty crosswalk left out (crosswalk 1.7)" in str(note) for note in network.notes
     )
     assert not read(tmp_path, road(section(right=lane(-1)), more=crossing(kind="tree"))).others

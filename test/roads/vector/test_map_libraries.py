@@ -42,7 +42,7 @@ def lanelet2_map(request, data):
     """Our network; the library's map, its lanelets for cars and its routing graph, in the same frame."""
     path = data / "maps" / "lanelet2" / f"{request.param}.osm"
     network = read_network(path)
-    stated = re.search(r"north of (-?[0-9.]+), (-?[0-9.]+)", network.notes[0])
+    stated = re.search(r"north of (-?[0-9.]+), (-?[0-9.]+)", str(network.notes[0]))
     origin = (
         (float(stated[1]), float(stated[2])) if stated else (0.666, -0.559)
     )  # where simple_cross_map's degrees lie

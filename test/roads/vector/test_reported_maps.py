@@ -16,7 +16,10 @@ from scenario_gen.logs import geodesy
 from scenario_gen.roads import placements, read_network, tracks_on
 from scenario_gen.roads.vector.signs import kind_of_sign
 from scenario_gen.situation import clean_tracks
-from scenario_gen.types import RuleKind
+from scenario_gen.types import (
+    NoteKind,
+    RuleKind,
+)
 
 LINE = '<geometry s="0" x="{}" y="{}" hdg="{}" length="{}"><line/></geometry>'
 
@@ -113,7 +116,7 @@ def test_a_record_that_begins_where_a_section_ends_is_the_next_ones(tmp_path, ki
     network = read(tmp_path, road("".join(sections), offsets=offset))
     assert all(np.allclose(lane.centre[:, 1], -1.75) for lane in network.lanes)
     assert [len(names) for names in after(network).values()] == [1] * (len(sections) - 1) + [0]
-    assert not [note for note in network.notes if "apart" in note]
+    assert NoteKind.LINKS_LEFT_OUT not in {note.kind for note in network.notes}
 
 
 def test_a_section_for_one_side_leaves_the_other_as_it_is(tmp_path):
@@ -163,9 +166,7 @@ def test_a_road_without_length_joins_those_beside_it(tmp_path):
 def test_access_says_whether_cars_may_use_a_lane(tmp_path, access, open_to_cars):
     network = read(tmp_path, road(section(right=lane(-1) + lane(-2, more=access))))
     assert set(by_id(network)) == {"1.0.-1", "1.0.-2"} - (set() if open_to_cars else {"1.0.-2"})
-    assert open_to_cars != any(
-        "1 lanes are for others than cars" in note for note in network.notes
-    )
+    assert open_to_cars != any(note.kind is NoteKind.OTHER_LANES for note in network.notes)
 
 
 def test_a_lane_says_in_which_directions_it_is_driven(tmp_path):
@@ -236,7 +237,7 @@ def test_a_stop_line_may_have_a_name_alone(tmp_path):
     network = read(tmp_path, road(section(right=lane(-1)), more=f"<signals>{signals}</signals>"))
     (rule,) = network.rules
     assert rule.kind == RuleKind.STOP and np.allclose(rule.line[:, 0], 88.0)
-    assert not [note for note in network.notes if "not read" in note]
+    assert NoteKind.UNREAD_SIGNS not in {note.kind for note in network.notes}
 
 
 def test_a_marked_stop_line_of_autoware_is_one_to_stop_at(tmp_path):

@@ -12,7 +12,13 @@ from support.map_builders import ARMS, at, FORMATS, HALF, write
 from scenario_gen.base.errors import RefusedError
 from scenario_gen.roads import places, read_network, RuleCheck
 from scenario_gen.situation import clean_tracks, find_conflicts
-from scenario_gen.types import Encounter, RuleKind, Scenario, Vehicle
+from scenario_gen.types import (
+    Encounter,
+    NoteKind,
+    RuleKind,
+    Scenario,
+    Vehicle,
+)
 
 DT = 0.1
 KINDS = {
@@ -78,7 +84,7 @@ def test_a_sign_concerns_its_lane_and_who_goes_first_are_the_others(tmp_path, su
     if len(rule.line):
         assert np.allclose(rule.line.mean(axis=0), at("s", -HALF, 1.75), atol=1.1)
     assert (sign == "206") <= len(rule.line)
-    assert any(note.startswith("traffic rules: 1 ") for note in network.notes)
+    assert NoteKind.TRAFFIC_RULES in {note.kind for note in network.notes}
 
 
 @pytest.mark.parametrize("suffix", FORMATS)

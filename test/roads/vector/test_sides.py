@@ -9,8 +9,8 @@ from support import map_builders
 
 from scenario_gen.roads import build_road, road_and_template
 from scenario_gen.situation.traffic_side import mirrored
+from scenario_gen.types import Note, NoteKind
 from scenario_gen.types.encounter import Encounter, Vehicle
-from scenario_gen.types.lanes import MIRRORED
 
 
 def oncoming(side):
@@ -55,13 +55,10 @@ def test_a_template_is_mirrored_on_a_map_of_the_other_side(crossroads):
         assert road.lanes.traffic_side == side
         if own == side:
             assert driven is encounter and not any(
-                note.startswith(MIRRORED) for note in road.lanes.notes
+                note.kind is NoteKind.MIRRORED for note in road.lanes.notes
             )
         else:
-            assert (
-                road.lanes.notes[0]
-                == f"{MIRRORED}: traffic on road {road.name} keeps to the {side}"
-            )
+            assert road.lanes.notes[0] == Note.of(NoteKind.MIRRORED, road=road.name, side=side)
             assert driven.name == "o mirrored" and np.array_equal(
                 driven.position, mirrored(encounter).position
             )

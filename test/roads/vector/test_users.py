@@ -20,7 +20,13 @@ from scenario_gen.roads import (
 )
 from scenario_gen.roads.obstacles import read_obstacles, with_obstacles
 from scenario_gen.situation import clean_tracks
-from scenario_gen.types import Encounter, lanes_for, Vehicle, VEHICLE_TYPES
+from scenario_gen.types import (
+    Encounter,
+    lanes_for,
+    NoteKind,
+    Vehicle,
+    VEHICLE_TYPES,
+)
 
 DRIVE = "bicycle,bus,car,motorcycle,truck,van"
 
@@ -102,7 +108,7 @@ def test_types_and_users_of_commonroad_lanelets(tmp_path, inner, own):
     text = commonroad().replace("<laneletType>urban</laneletType>", inner, 1)
     network = read_network(write(tmp_path, ".xml", text))
     assert users(network) == own
-    assert any("1 lanes are for none of the types" in note for note in network.notes) == (
+    assert any(note.kind is NoteKind.UNUSED_LANES for note in network.notes) == (
         "restricted" in inner
     )
 
