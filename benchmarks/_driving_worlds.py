@@ -11,7 +11,7 @@ from scenario_gen.closed_loop.ego import Command, Pose
 from scenario_gen.closed_loop.simulation import Observation, Task
 from scenario_gen.method.validity import Checker
 from scenario_gen.numerics.arrays import Floats
-from scenario_gen.types.encounter import Vehicle
+from scenario_gen.types import Vehicle
 from scenario_gen.types.scenario import Scenario
 
 PERIOD = 0.1

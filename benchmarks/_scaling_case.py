@@ -64,14 +64,14 @@ def group(vehicles: int, seconds: float) -> Encounter:
         heading.append(np.full(steps, np.pi / 2.0 * (k % 2)))
     names = tuple(Vehicle(str(k)) for k in range(vehicles))
     speed = np.full((vehicles, steps), SPEED)
-    return Encounter(
-        "group",
+    return Encounter.sampled(
         names,
-        1_600_000_000_000_000_000,
-        100_000_000,
+        0.1,
         np.array(position),
         np.array(heading),
         speed,
+        "group",
+        1_600_000_000_000_000_000,
     )
 
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from scenario_gen.numerics.arrays import Floats, Ints
-from scenario_gen.types.encounter import Encounter, Vehicle
+from scenario_gen.types import Encounter, Vehicle
 
 
 @dataclass(frozen=True)
@@ -124,14 +124,13 @@ def driving(seed: int, samples: int = 1200) -> Labelled:
     labels = np.concatenate([[0], np.cumsum(changed)]).astype(np.int64)
     noisy_speed = np.maximum(np.array(speeds) + rng.normal(size=(2, samples)) * 0.1, 0.0)
     noisy_position = np.array(positions) + rng.normal(size=(2, samples, 2)) * 0.15
-    encounter = Encounter(
+    encounter = Encounter.sampled(
+        (Vehicle("0"), Vehicle("1")),
+        0.1,
+        noisy_position,
+        np.array(headings),
+        noisy_speed,
         name=f"D-{seed}",
-        vehicles=(Vehicle("0"), Vehicle("1")),
-        start_ns=0,
-        dt_ns=100_000_000,
-        position=noisy_position,
-        heading=np.array(headings),
-        speed=noisy_speed,
     )
     x = np.column_stack([noisy_position[0], noisy_speed[0], noisy_position[1], noisy_speed[1]])
     return Labelled(x, labels, encounter=encounter)

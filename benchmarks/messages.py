@@ -26,7 +26,7 @@ from scenario_gen.bags.storage.bag import bag_topics
 from scenario_gen.base.ros_domain import free_domain, this_host_only
 from scenario_gen.logs.synthetic import bundled
 from scenario_gen.numerics.arrays import Floats
-from scenario_gen.types.encounter import Vehicle
+from scenario_gen.types import Vehicle
 from scenario_gen.types.scenario import Scenario
 
 POINTS = 200

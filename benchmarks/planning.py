@@ -52,7 +52,7 @@ from scenario_gen.method.routing.search.rrt_star_connect import (
 from scenario_gen.numerics.arrays import Floats
 from scenario_gen.roads.clearance import clearance_in_cells, distance_transform
 from scenario_gen.roads.connectivity import common_component, component_at, components
-from scenario_gen.types.encounter import Vehicle
+from scenario_gen.types import Vehicle
 from scenario_gen.types.fit import Fit, FittedVehicle
 from scenario_gen.types.road import Road
 from scenario_gen.types.scenario import BoundaryStates

@@ -25,7 +25,7 @@ from scenario_gen.method.validity import Checker
 from scenario_gen.numerics.arrays import Floats
 from scenario_gen.situation import Situation
 from scenario_gen.situation.interaction import find_conflicts
-from scenario_gen.types.encounter import Encounter, Vehicle
+from scenario_gen.types import Encounter, Vehicle
 from scenario_gen.types.road import Road
 from scenario_gen.types.route import Route
 from scenario_gen.types.scenario import BoundaryStates
@@ -146,7 +146,7 @@ def _seconds(vehicles: int, duration: float, count: int) -> float:
             Route(np.column_stack([20.0 + s, np.full_like(s, lane[n, 0]), 0.0 * s]), anchor, s)
         )
     names = tuple(Vehicle(str(n)) for n in range(vehicles))
-    encounter = Encounter("side by side", names, 0, 100_000_000, position, heading, speed)
+    encounter = Encounter.sampled(names, 0.1, position, heading, speed, "side by side")
     labels = np.searchsorted(changes, np.arange(len(time)), side="right")
     segmentation = Segmentation(labels, changes, np.zeros(len(time)), ("",) * (len(changes) + 1))
     drivable = np.ones((5 * (40 + 4 * vehicles), 5 * int(along.max() + 60)), dtype=bool)

@@ -14,7 +14,7 @@ from benchmarks.row import higher, lower, Row
 from scenario_gen.method.validity import Checker
 from scenario_gen.numerics.arrays import Floats
 from scenario_gen.situation.interaction import find_conflicts, Wait
-from scenario_gen.types.encounter import Vehicle
+from scenario_gen.types import Vehicle
 from scenario_gen.types.road import Road
 from scenario_gen.types.scenario import BoundaryStates, Scenario
 

@@ -150,7 +150,7 @@ def _joined(
         seed,
         index,
         head.frame_id,
-        np.array(present, dtype=np.int64),
+        present=np.array(present, dtype=np.int64),
     )
 
 

@@ -35,7 +35,7 @@ def encode_samples(encounter: Encounter, at: Ints) -> bytes:
         encounter.speed[:, at],
         acceleration[:, at],
     )
-    there = None if encounter.all_present else encounter.there[:, at]
+    there = None if encounter.all_present else encounter.is_present[:, at]
     return trajectory.encode(
         Trajectory(
             encounter.start_ns,
@@ -80,8 +80,13 @@ def decode_tracks(data: bytes, name: str = "tracks") -> Encounter:
         )
     states = (message.position, message.heading, message.speed)
     present = ALWAYS if message.there is None else _spans(message.there, message.vehicles, name)
-    return Encounter(
-        name, message.vehicles, message.stamp_ns, int(steps[0]), *states, present=present
+    return Encounter.sampled(
+        message.vehicles,
+        int(steps[0]) * 1e-9,
+        *states,
+        name=name,
+        start_ns=message.stamp_ns,
+        present=present,
     )
 
 

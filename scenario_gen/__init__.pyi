@@ -54,7 +54,7 @@ from scenario_gen.output.review.regenerate import regenerate_scenario as regener
 from scenario_gen.output.table import filter_scenarios as filter_scenarios, measures as measures
 from scenario_gen.pipeline import generate as generate
 from scenario_gen.roads import build_road as build_road, RoadConfig as RoadConfig
-from scenario_gen.types.encounter import Encounter as Encounter, Vehicle as Vehicle
+from scenario_gen.types.encounter import Encounter as Encounter
 from scenario_gen.types.evaluation import Evaluation as Evaluation
 from scenario_gen.types.fit import Fit as Fit
 from scenario_gen.types.generation import GenerationResult as GenerationResult
@@ -69,6 +69,7 @@ from scenario_gen.types.scenario import (
     Violation as Violation,
 )
 from scenario_gen.types.segmentation import Segmentation as Segmentation
+from scenario_gen.types.vehicle import Vehicle as Vehicle
 
 __version__: str
 __all__: list[str]

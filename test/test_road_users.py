@@ -114,7 +114,7 @@ WORLDS = {
 def proven(scenario, limits=Limits()):
     """Whether a scenario keeps to the limits of each type and no footprints overlap, at its instants alone."""
     for n, vehicle in enumerate(scenario.vehicles):
-        own, there = limits.of(vehicle.type), scenario.there[n]
+        own, there = limits.of(vehicle.type), scenario.is_present[n]
         step, speed, turn = (
             np.diff(scenario.time[there]),
             scenario.speed[n, there],
@@ -132,7 +132,7 @@ def proven(scenario, limits=Limits()):
             return False
     poses = np.concatenate((scenario.position, scenario.heading[..., None]), axis=-1)
     a, b = scenario.vehicles
-    both = scenario.there.all(axis=0)
+    both = scenario.is_present.all(axis=0)
     return bool((footprint_gaps(a.half, poses[0, both], b.half, poses[1, both])[0] > 0.0).all())
 
 
@@ -290,7 +290,7 @@ def test_a_bicycle_is_on_the_cycle_lane_where_there_is_one(tmp_path, road, table
     ):  # as the ego it is on the road there, too
         loop = ClosedLoop(trial.scenario, trial.ego, trial.road)
         assert loop.road.drivable_at(trial.scenario.position[loop.ego])[
-            trial.scenario.there[loop.ego]
+            trial.scenario.is_present[loop.ego]
         ].all()
 
 

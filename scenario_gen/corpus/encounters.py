@@ -176,7 +176,7 @@ def row_of(encounter: Encounter, source: str, config: CorpusConfig) -> dict[str,
     """Return an encounter's row: its kind is that of the two vehicles that have most to do with each other."""
     situation, pairs = Situation.of(encounter), []
     for i, j in combinations(range(len(encounter.vehicles)), 2):
-        both = np.flatnonzero(encounter.there[i] & encounter.there[j])
+        both = np.flatnonzero(encounter.is_present[i] & encounter.is_present[j])
         if len(both) < 2:
             continue
         apart = np.linalg.norm(encounter.position[i, both] - encounter.position[j, both], axis=1)
@@ -210,7 +210,7 @@ def row_of(encounter: Encounter, source: str, config: CorpusConfig) -> dict[str,
         "lon": longitude,
         "ttc": measures.min_ttc,
         "pet": measures.pet,
-        "speed": float((encounter.speed * encounter.there).max()),
+        "speed": float((encounter.speed * encounter.is_present).max()),
         "tracks": tracks_bytes(encounter),
     }
 

@@ -126,11 +126,16 @@ def pair_encounters(encounter: Encounter, interaction: float) -> Iterator[Encoun
         faster = float(encounter.speed[j, own].mean()) > float(encounter.speed[i, own].mean())
         order = [j, i] if when_b < when_a or (when_a == when_b and faster) else [i, j]
         vehicles = tuple(encounter.vehicles[n] for n in order)
-        yield Encounter(
-            f"{encounter.name} {vehicles[0].id} {vehicles[1].id}", vehicles, encounter.start_ns + first * encounter.dt_ns,
-            encounter.dt_ns, encounter.position[order, own], encounter.heading[order, own], encounter.speed[order, own],
+        yield Encounter.sampled(
+            vehicles,
+            encounter.dt,
+            encounter.position[order, own],
+            encounter.heading[order, own],
+            encounter.speed[order, own],
+            f"{encounter.name} {vehicles[0].id} {vehicles[1].id}",
+            encounter.start_ns + first * encounter.dt_ns,
             encounter.origin,
-        )  # fmt: skip
+        )
 
 
 def build(

@@ -22,7 +22,7 @@ POINTS = 60  # of a drawn track
 
 def sketch(encounter: Encounter | Scenario, span: tuple[int, int] | None = None) -> Markup:
     """Return a drawing of a motion: a line for each vehicle, a dot where it begins; in `span` (samples) it is thick."""
-    there = encounter.there
+    there = encounter.is_present
     places = encounter.position[there]
     low, high = places.min(axis=0), places.max(axis=0)
     scale = min((WIDTH - 2.0 * BORDER), (HEIGHT - 2.0 * BORDER)) / max(

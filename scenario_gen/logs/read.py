@@ -4,7 +4,7 @@
 """From files to encounters: choose the reader, clean, smooth, group, cut."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import combinations
 import math
 from pathlib import Path
@@ -261,17 +261,7 @@ def between(encounter: Encounter, config: LogConfig) -> tuple[Encounter, tuple[s
             f"{(last - 1) * encounter.dt:g} s; at least 2 are needed: change --set log.start=…, log.end=… or log.vehicles=…"
         )
     first, last = first + int(inside[rows, 0].min()), first + int(inside[rows, 1].max()) + 1
-    chosen = replace(
-        encounter,
-        vehicles=tuple(encounter.vehicles[n] for n in rows),
-        start_ns=encounter.start_ns + first * encounter.dt_ns,
-        **{
-            name: getattr(encounter, name)[rows, first:last]
-            for name in ("position", "heading", "speed")
-        },
-        present=cut(encounter.present[rows], first, last),
-    )
-    return chosen, notes
+    return encounter.select(rows, first, last - 1), notes
 
 
 def encounter_quality(encounter: Encounter) -> EncounterQuality:
@@ -311,16 +301,14 @@ def cut_encounter(
         member.track.id for member in members
     )  # refuses ids that are one name in ROS, before anything is made of them
     dt_ns = round(config.period * 1e9)
-    encounter = Encounter(
+    encounter = Encounter.sampled(
+        tuple(Vehicle(p.track.id, p.track.length, p.track.width, p.track.kind) for p in members),
+        config.period,
+        np.array(position),
+        np.array(heading),
+        np.array(speed),
         name=name,
-        vehicles=tuple(
-            Vehicle(p.track.id, p.track.length, p.track.width, p.track.kind) for p in members
-        ),
         start_ns=origin_ns + group.start * dt_ns,
-        dt_ns=dt_ns,
-        position=np.array(position),
-        heading=np.array(heading),
-        speed=np.array(speed),
         origin=members[0].track.origin,
         present=np.array(list(spans.values())) - group.start - np.array([0, 1]),
     )

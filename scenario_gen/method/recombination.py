@@ -157,14 +157,14 @@ def _combined(a: Pair, b: Pair) -> Encounter:
     second = replace(second, id=f"{second.id}_2") if second.id == first.id else second
     rows = np.stack([a.motion(a.conflict.first, begin + one.time[: len(motion)]), motion])
     start = one.start_ns + round(begin / one.dt) * one.dt_ns
-    made = Encounter(
-        f"{one.name}{RECOMBINED}{other.name}",
+    made = Encounter.sampled(
         (first, second),
-        start,
-        one.dt_ns,
+        one.dt,
         rows[..., :2],
         rows[..., 2],
         rows[..., 3],
+        f"{one.name}{RECOMBINED}{other.name}",
+        start,
     )
     found, change = pair_of(made), np.diff(made.speed[1]) / made.dt
     if found is None or found.kind != a.kind or found.conflict.second != 1:

@@ -9,8 +9,7 @@ from typing import Any, TYPE_CHECKING
 import numpy as np
 
 from scenario_gen.base.errors import needs
-from scenario_gen.types import DRIVERS, GenerationResult, Road, Scenario
-from scenario_gen.types.encounter import Tracks
+from scenario_gen.types import DRIVERS, GenerationResult, Motion, Road
 from scenario_gen.types.markings import Marking, markings
 
 if TYPE_CHECKING:
@@ -20,7 +19,7 @@ _MOST = 200  # scenarios drawn: with more, one hides the other
 
 
 def plot(
-    shown: GenerationResult | Scenario | Tracks,
+    shown: GenerationResult | Motion,
     ax: "Axes | None" = None,
     *,
     road: Road | None = None,
@@ -39,7 +38,7 @@ def plot(
     import matplotlib.pyplot as plt
 
     axes = plt.subplots()[1] if ax is None else ax
-    drawn: Sequence[Scenario | Tracks] = (
+    drawn: Sequence[Motion] = (
         list(shown)[:_MOST] if isinstance(shown, GenerationResult) else [shown]
     )
     road = shown.road if isinstance(shown, GenerationResult) and road is None else road
@@ -48,7 +47,7 @@ def plot(
     limits: list[Any] = []
     for k, scenario in enumerate(drawn):
         for n, vehicle in enumerate(scenario.vehicles):
-            path = scenario.position[n, scenario.there[n]]
+            path = scenario.position[n, scenario.is_present[n]]
             label = f"vehicle {vehicle.id}" if k == 0 else "_"
             axes.plot(
                 *path.T, color=f"C{n}", alpha=max(0.1, 1.0 / np.sqrt(len(drawn))), label=label
@@ -95,9 +94,9 @@ def _draw_road(axes: "Axes", road: Road) -> None:
         axes.plot(*bar.T, color="white", linewidth=1.5, zorder=0.6)
 
 
-def _title(shown: GenerationResult | Scenario | Tracks) -> str:
+def _title(shown: GenerationResult | Motion) -> str:
     if isinstance(shown, GenerationResult):
         return f"{len(shown)} scenarios, {shown.title}" + (
             f" (the first {_MOST})" if len(shown) > _MOST else ""
         )
-    return f"scenario {shown.index}" if isinstance(shown, Scenario) else f"encounter {shown.name}"
+    return shown.title

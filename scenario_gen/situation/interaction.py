@@ -113,7 +113,7 @@ def find_waits(encounter: Encounter) -> tuple[Wait, ...]:
             float(time[b - 1]),
             _moves_slowly(encounter.speed[vehicle, a:b], time[a:b]),
         )
-        for vehicle, (speed, there) in enumerate(zip(smooth, encounter.there, strict=True))
+        for vehicle, (speed, there) in enumerate(zip(smooth, encounter.is_present, strict=True))
         for a, b in runs((speed < encounter.vehicles[vehicle].kind.waits_below) & there)
         if time[b - 1] - time[a] >= WAIT_DURATION - 1e-9
     )

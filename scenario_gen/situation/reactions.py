@@ -394,7 +394,7 @@ def _from_aside(recording: _Recording, conflict: Conflict) -> bool:
     encounter, who = recording.encounter, conflict.second
     time = encounter.time
     rows = np.flatnonzero(
-        encounter.there[who]
+        encounter.is_present[who]
         & (np.abs(time - conflict.entry_second + 0.5 * _ASIDE) <= 0.5 * _ASIDE)
     )
     path = recording.tracks[conflict.first].curve
@@ -417,8 +417,8 @@ def _gives_way(recording: _Recording, who: int, whom: int) -> Reaction | None:
     encounter = recording.encounter
     between = encounter.position[whom] - encounter.position[who]
     ahead, aside = ahead_and_left(between, encounter.heading[who])
-    both = np.flatnonzero(encounter.there[who] & encounter.there[whom])
-    rows = np.flatnonzero(encounter.there[who])
+    both = np.flatnonzero(encounter.is_present[who] & encounter.is_present[whom])
+    rows = np.flatnonzero(encounter.is_present[who])
     if len(both) == 0:
         return None
     stops = bool(encounter.speed[who, rows[-1]] <= SLOWEST and ahead[both[-1]] > 0.0)
@@ -457,7 +457,7 @@ def _slow_before(
         < _WAITS_WITHIN
     ):
         return stands[-1].start, stands[-1].end, True
-    rows = np.flatnonzero(encounter.there[who] & (time <= enters))
+    rows = np.flatnonzero(encounter.is_present[who] & (time <= enters))
     speed = encounter.speed[who, rows]
     low = int(np.argmin(speed))
     top = int(np.argmax(speed[: low + 1]))

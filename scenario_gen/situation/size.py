@@ -68,7 +68,11 @@ def refuse_reversing(encounter: Encounter) -> None:
         RefusedError: a vehicle moves against its heading for more than `REVERSED` in all.
     """
     for vehicle, position, heading, there in zip(
-        encounter.vehicles, encounter.position, encounter.heading, encounter.there, strict=True
+        encounter.vehicles,
+        encounter.position,
+        encounter.heading,
+        encounter.is_present,
+        strict=True,
     ):
         step, yaw = np.diff(position[there], axis=0), heading[there]
         ahead, aside = ahead_and_left(step, (yaw[1:] + yaw[:-1]) / 2.0)

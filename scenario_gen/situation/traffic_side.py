@@ -25,8 +25,8 @@ def traffic_side(encounter: Encounter) -> str:
     votes = 0
     for a in range(len(encounter.vehicles)):
         both = (
-            encounter.there[a]
-            & encounter.there
+            encounter.is_present[a]
+            & encounter.is_present
             & (encounter.speed[a] > _MOVES)
             & (encounter.speed > _MOVES)
         )

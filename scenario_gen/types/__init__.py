@@ -20,7 +20,7 @@ from scenario_gen.types.body import height, rear_axle, shifted, WHEELBASE
 from scenario_gen.types.coverage import Coverage, Spread
 from scenario_gen.types.derived import once_per_object
 from scenario_gen.types.ego import join_ego, split_off, with_witness
-from scenario_gen.types.encounter import Encounter, most_exposed, RECOMBINED, Tracks, Vehicle
+from scenario_gen.types.encounter import Encounter, RECOMBINED
 from scenario_gen.types.evaluation import (
     as_markdown,
     CheckCounts,
@@ -45,6 +45,7 @@ from scenario_gen.types.lanes import (
     TrafficRule,
 )
 from scenario_gen.types.measures import Measure, Measures
+from scenario_gen.types.motion import Motion, States
 from scenario_gen.types.names import token, tokens, vehicle_index
 from scenario_gen.types.notes import Note, note_kinds, NoteKind, recorded_notes
 from scenario_gen.types.pieces import join_pieces, read_numbers, split_pieces
@@ -93,15 +94,16 @@ from scenario_gen.types.scenario import (
 )
 from scenario_gen.types.segmentation import LiveChangepoints, Segmentation
 from scenario_gen.types.target import Pair, Reached, Target, UNITS
+from scenario_gen.types.vehicle import most_exposed, Vehicle
 
 __all__ = [
     "ALWAYS", "CAR", "CARS", "COARSEST", "DRIVERS", "ENDS", "ERRORS", "FACTS", "FARTHEST", "FINEST", "FOLLOW", "LANE_USERS",
     "LEVEL", "NARROW", "OF_CARS", "ON_THE_SPOT", "ORDERS", "OTHER", "RECOMBINED", "RECORDING", "REPLAY",
     "SCHEMA", "UNIFORM", "UNITS", "VEHICLE_TYPES", "WHEELBASE", "WITH", "WITHOUT", "YIELD", "BoundaryStates", "Cause",
     "CheckCounts", "Coverage", "DrawnFor", "Dynamics", "EgoSlot", "Encounter", "Evaluation", "Fit", "FittedVehicle",
-    "GenerationResult", "Interval", "Lane", "LaneNetwork", "LiveChangepoints", "Loss", "Measure", "Measures", "Metric", "Note", "NoteKind", "Pair",
+    "GenerationResult", "Interval", "Lane", "LaneNetwork", "LiveChangepoints", "Loss", "Measure", "Measures", "Metric", "Motion", "Note", "NoteKind", "Pair",
     "Quality", "Reached", "Reaction", "ReactionGraph", "Request", "Road", "Route", "Row", "RuleKind", "Sample", "Scenario",
-    "ScenarioSet", "Segmentation", "Spread", "State", "Target", "Tracks", "TrafficRule", "TypeLimits", "Vehicle",
+    "ScenarioSet", "Segmentation", "Spread", "State", "States", "Target", "TrafficRule", "TypeLimits", "Vehicle",
     "VehicleType", "Verdict", "Violation", "always", "as_markdown", "at_ends", "canonical_presence", "causes_in_words", "cut",
     "formatted", "height", "join_ego", "join_pieces", "lanes_for", "lost_pairs", "mask", "most_exposed", "note_kinds", "once_per_object",
     "reaction_facts", "read_numbers", "read_states", "rear_axle", "recorded_notes", "routes_in_words", "row_name", "shifted", "split_off",

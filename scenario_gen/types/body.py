@@ -7,7 +7,7 @@ import numpy as np
 
 from scenario_gen.numerics import Floats
 from scenario_gen.numerics.plane import unit
-from scenario_gen.types.encounter import Vehicle
+from scenario_gen.types.vehicle import Vehicle
 
 REAR_AXLE = 0.3  # of the length, from the footprint's centre back: 1.44 m of a car of 4.8 m
 WHEELBASE = 0.6  # of the length

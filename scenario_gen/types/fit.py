@@ -10,9 +10,9 @@ import numpy as np
 
 from scenario_gen.base.renaming import Renamed
 from scenario_gen.numerics import Bools, canonical_poses, Floats, freeze, frozen, Ints
-from scenario_gen.types.encounter import Vehicle
 from scenario_gen.types.notes import Note
 from scenario_gen.types.scenario import BoundaryStates
+from scenario_gen.types.vehicle import Vehicle
 
 
 @dataclass(frozen=True, eq=False)

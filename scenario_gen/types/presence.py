@@ -77,9 +77,10 @@ def mask(present: Ints, samples: int) -> Bools:
     return there
 
 
-def together(present: Ints, a: int, b: int) -> slice:
-    """Return the samples at which vehicles `a` and `b` are both there, of presence (N, 2); empty if there is none."""
-    first, last = int(present[[a, b], 0].max()), int(present[[a, b], 1].min())
+def together(present: Ints, *rows: int) -> slice:
+    """Return the samples at which all of these vehicles are present, from presence (N, 2); empty if there are none."""
+    first = int(present[list(rows), 0].max())
+    last = int(present[list(rows), 1].min())
     return slice(first, max(last + 1, first))
 
 

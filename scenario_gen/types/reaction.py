@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import math
 from typing import Any
 
-from scenario_gen.types.encounter import Vehicle
 from scenario_gen.types.pieces import join_pieces, split_pieces
+from scenario_gen.types.vehicle import Vehicle
 
 FOLLOW, YIELD = "follow", "yield"
 DOUBTFUL = 0.5  # confidence below which an edge is called doubtful

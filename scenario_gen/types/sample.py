@@ -6,7 +6,7 @@
 from dataclasses import dataclass
 
 from scenario_gen.numerics import Floats
-from scenario_gen.types.encounter import Vehicle
+from scenario_gen.types.vehicle import Vehicle
 
 
 @dataclass(frozen=True, eq=False)

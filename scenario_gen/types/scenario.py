@@ -7,28 +7,20 @@ from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from enum import StrEnum
-from typing import TYPE_CHECKING
+from typing import Any, TYPE_CHECKING
 
 import numpy as np
 
 from scenario_gen.base.renaming import Renamed
-from scenario_gen.numerics import (
-    Bools,
-    canonical_heading,
-    canonical_poses,
-    Floats,
-    freeze,
-    frozen,
-    Ints,
-)
-from scenario_gen.types.encounter import columns_of, Vehicle
+from scenario_gen.numerics import canonical_poses, Floats, freeze, frozen
+from scenario_gen.types.motion import Motion
 from scenario_gen.types.notes import Note
-from scenario_gen.types.presence import ALWAYS, always, canonical_presence, held, mask
+from scenario_gen.types.presence import held
 from scenario_gen.types.reaction import Reaction, ReactionGraph
 from scenario_gen.types.target import Reached
+from scenario_gen.types.vehicle import Vehicle
 
 if TYPE_CHECKING:
-    from matplotlib.axes import Axes
     from pandas import DataFrame
 
 NEARNESS = {"closest_approach": "gap", "pet": "pet"}
@@ -47,81 +39,58 @@ FACTS = (
 
 
 @dataclass(frozen=True, eq=False)
-class Scenario:
-    """N vehicles over T instants on a target road.
-
-    Between two instants the motion is defined: position is the cubic Hermite interpolant of the two positions and
-    velocity vectors (speed along heading), heading is interpolated linearly. The checker proves validity of that motion.
+class Scenario(Motion):
+    """The motion of N vehicles on a target road; its times start at 0 s.
 
     Attributes:
-        vehicles: N identities and footprints.
-        time: (T,) seconds from the scenario's start, strictly increasing, time[0] = 0.
-        position: (N, T, 2) metres in the road's frame, of the footprint's centre.
-        heading: (N, T) rad, unwrapped.
-        speed: (N, T) m/s in the body frame, >= 0.
-        acceleration: (N, T) m/s², longitudinal.
-        seed: the request's seed; index: the scenario's number within the request.
-        frame_id: the road's frame.
-        present: (N, 2) first and last instant at which each vehicle is there, as in `Tracks`; default: everybody throughout.
-        reference_drive: of a scenario with an ego slot: the motion of the vehicle that was left out, as a scenario of it alone
-            on the same clock. Both together were proven valid, so the slot can be driven.
-        facts: what else its entry in `scenarios/info` says: `closest_approach`, `pet`, `rarity`, `weight`, `target.…`, `order`,
-            `passing_order`, `reactions`, `search.…` (FACTS).
+        acceleration: (N, T) m/s², longitudinal; linear between two samples.
+        seed: of the request.
+        index: number of the scenario within the request.
+        frame_id: the road's frame, in which positions and headings are.
+        reference_drive: only with an ego slot: the motion of the vehicle that was left out, as a
+            scenario of it alone on the same clock. Both together were proven valid, so the slot
+            can be driven.
+        facts: further entries of `scenarios/info`: `closest_approach`, `pet`, `rarity`, `weight`,
+            `target.…`, `order`, `passing_order`, `reactions`, `search.…` (FACTS).
     """
 
-    vehicles: tuple[Vehicle, ...]
-    time: Floats
-    position: Floats
-    heading: Floats
-    speed: Floats
     acceleration: Floats
     seed: int = 0
     index: int = 0
     frame_id: str = "map"
-    present: Ints = field(default_factory=lambda: ALWAYS)
     reference_drive: "Scenario | None" = None
     facts: Mapping[str, str] = field(default_factory=dict)
     witness = Renamed("reference_drive")
 
     def __post_init__(self) -> None:
-        n, t = len(self.vehicles), len(self.time)
-        present = canonical_presence(self.present, n, t, f"scenario {self.index}")
-        freeze(
-            self, time=frozen(np.round(self.time, 9)), present=present
-        )  # whole nanoseconds, as on the wire
-        freeze(self, heading=held(canonical_heading(self.heading), present))
-        for name in ("position", "speed", "acceleration"):
-            freeze(self, **{name: held(frozen(getattr(self, name)), present)})
+        super().__post_init__()
+        freeze(self, acceleration=held(frozen(self.acceleration), self.present))
 
     def __repr__(self) -> str:
         return f"Scenario({self.index}, {len(self.vehicles)} vehicles, {self.time[-1]:.1f} s)"
 
     @property
-    def all_present(self) -> bool:
-        """Whether every vehicle is there throughout."""
-        return always(self.present, len(self.time))
+    def title(self) -> str:
+        """Its name in messages."""
+        return f"scenario {self.index}"
 
     @property
-    def there(self) -> Bools:
-        """(N, T) whether each vehicle is there at each instant."""
-        return mask(self.present, len(self.time))
+    def array_names(self) -> tuple[str, ...]:
+        """The names of the arrays (N, T, ...)."""
+        return (*super().array_names, "acceleration")
+
+    def _arrays_at(self, time: Floats) -> dict[str, Any]:
+        """Return the arrays at times (M,) [s], by field."""
+        acceleration = [np.interp(time, self.time, row) for row in self.acceleration]
+        return {**super()._arrays_at(time), "acceleration": np.array(acceleration)}
 
     def to_dataframe(self) -> "DataFrame":
-        """Return a row for each vehicle and instant at which it is there.
+        """Return a table with a row for each vehicle and each sample at which it is present.
 
-        Columns: scenario (its index), vehicle (id), time [s], x, y [m], heading [rad], speed [m/s], acceleration [m/s²].
+        Columns: scenario (its index), vehicle (id), time [s], x, y [m], heading [rad],
+        speed [m/s], acceleration [m/s²].
         """
         return dataframe([self])
-
-    def plot(self, ax: "Axes | None" = None) -> "Axes":
-        """Draw the vehicles' paths, as `scenario_gen.plot` does.
-
-        Raises:
-            MissingExtraError: matplotlib is not installed.
-        """
-        import scenario_gen
-
-        return scenario_gen.plot(self, ax)
 
 
 def dataframe(scenarios: Iterable[Scenario]) -> "DataFrame":
@@ -131,8 +100,8 @@ def dataframe(scenarios: Iterable[Scenario]) -> "DataFrame":
     tables = [
         pd.DataFrame(
             {"scenario": one.index}
-            | columns_of(one)
-            | {"acceleration": one.acceleration[one.there]}
+            | one.columns()
+            | {"acceleration": one.acceleration[one.is_present]}
         )
         for one in scenarios
     ]

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import math
 
 from scenario_gen.numerics import Floats, freeze, frozen, frozen_ints, Ints
-from scenario_gen.types.encounter import Vehicle
+from scenario_gen.types.vehicle import Vehicle
 
 LONG_WITHOUT = 15.0  # s without a changepoint that are worth a word
 

@@ -152,7 +152,7 @@ def test_who_comes_late_and_leaves_early_is_there_for_that_time_only():
     loop = ClosedLoop(scenario, 0)
     drive = loop.drive(Witness(scenario, 0), lambda state: state.step >= 149)
     assert (
-        drive.here == scenario.there
+        drive.here == scenario.is_present
     ).sum() >= drive.here.size - 1  # at the very end of its presence it has gone
     assert np.abs((drive.motion.position - scenario.position)[drive.here]).max() < 1e-9
     x, y = scenario.position[1, 30].tolist()

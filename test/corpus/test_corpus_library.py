@@ -13,7 +13,7 @@ from scenario_gen.corpus.library import adjusted_rand, build, pair_encounters
 from scenario_gen.corpus.tables import rows_of
 from scenario_gen.method.segmentation.library import PrimitiveLibrary
 from scenario_gen.situation import Situation
-from scenario_gen.types.encounter import Encounter, Vehicle
+from scenario_gen.types import Encounter, Vehicle
 
 pytestmark = pytest.mark.xdist_group("corpus")
 
@@ -24,8 +24,8 @@ def following(order):
     ways = {"early": 10.0 * time, "late": 10.0 * time - 15.0}
     position = np.array([np.stack([ways[name], np.zeros(100)], axis=1) for name in order])
     vehicles = tuple(Vehicle(name) for name in order)
-    return Encounter(
-        "e", vehicles, 0, 100_000_000, position, np.zeros((2, 100)), np.full((2, 100), 10.0)
+    return Encounter.sampled(
+        vehicles, 0.1, position, np.zeros((2, 100)), np.full((2, 100), 10.0), "e"
     )
 
 

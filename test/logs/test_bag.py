@@ -20,7 +20,7 @@ from scenario_gen.bags.storage.definitions import definition, type_store
 from scenario_gen.bags.vehicles import FIX, ODOMETRY, TWIST
 from scenario_gen.base.errors import InputError
 from scenario_gen.logs import LogConfig, read_log
-from scenario_gen.types.encounter import Encounter, Vehicle
+from scenario_gen.types import Encounter, Vehicle
 
 STORES = type_store()
 TRACKS = "trajectory_msgs/msg/MultiDOFJointTrajectory"
@@ -325,7 +325,7 @@ def test_recorded_tracks_are_the_same_encounter_bit_for_bit(tmp_path, plain):
             {"vehicles": (Vehicle("a", 1e308, 1.0), Vehicle("b"))},
             r"joint name .*0.01 to 1000 m each",
         ),
-        ({"dt_ns": 1}, "topic /tracks, message 1: 49 steps of 1e-09 s"),
+        ({"period": 1e-9}, "topic /tracks, message 1: 49 steps of 1e-09 s"),
     ],
 )
 def test_tracks_of_no_road_are_refused(tmp_path, change, said):
@@ -333,9 +333,11 @@ def test_tracks_of_no_road_are_refused(tmp_path, change, said):
         "position": np.zeros((2, 50, 2)),
         "speed": np.ones((2, 50)),
         "vehicles": (Vehicle("a"), Vehicle("b")),
-        "dt_ns": 10**8,
+        "period": 0.1,
     }
-    encounter = Encounter(name="e", start_ns=10**18, heading=np.zeros((2, 50)), **(plain | change))
+    encounter = Encounter.sampled(
+        name="e", start_ns=10**18, heading=np.zeros((2, 50)), **(plain | change)
+    )
     bag = write(tmp_path / "bag", [Line("/tracks", TRACKS, 10**18, encode_tracks(encounter))])
     with pytest.raises(InputError, match=said):
         read_log(bag)

@@ -19,7 +19,7 @@ from msg_conventions.scenarios import decode_scenario, digest, encode_scenario, 
 from msg_conventions.tracks import decode_tracks, encode_tracks
 from msg_conventions.trajectory import decode, encode
 from scenario_gen.base.errors import InputError
-from scenario_gen.types.encounter import Encounter, Vehicle
+from scenario_gen.types import Encounter, Vehicle
 from scenario_gen.types.scenario import BoundaryStates, Scenario
 
 TIME = np.round(0.1 * np.arange(41), 9)
@@ -66,7 +66,9 @@ def test_who_takes_every_message_for_itself_sees_each_vehicle_where_it_is_and_no
             }
     there = {
         (vehicle.id, round(t * 1e9)): tuple(place)
-        for vehicle, xy, row in zip(made.vehicles, made.position.tolist(), made.there, strict=True)
+        for vehicle, xy, row in zip(
+            made.vehicles, made.position.tolist(), made.is_present, strict=True
+        )
         for t, place, is_there in zip(TIME.tolist(), xy, row, strict=True)
         if is_there
     }
@@ -123,19 +125,21 @@ def test_the_entry_says_who_is_there_when_and_which_messages_are_the_scenario():
 def test_tracks_come_back_and_show_nobody_on_the_ground_who_is_not_there():
     made = scenario([(0, 40), (5, 40), (0, 20)])
     arrays = (made.position, made.heading, made.speed)
-    encounter = Encounter("tracks", made.vehicles, 5, 100_000_000, *arrays, present=made.present)
+    encounter = Encounter.sampled(
+        made.vehicles, 0.1, *arrays, name="tracks", start_ns=5, present=made.present
+    )
     data = encode_tracks(encounter)
     again = decode_tracks(data)
     for name in ("position", "heading", "speed", "present"):
         assert getattr(again, name).tobytes() == getattr(encounter, name).tobytes()
     assert encode_tracks(again) == data
-    assert (decode(data, "tracks").there == encounter.there).all()
+    assert (decode(data, "tracks").there == encounter.is_present).all()
 
 
 def test_tracks_in_which_a_vehicle_comes_back_are_refused():
     made = scenario([(0, 40), (0, 40)])
     heard = decode(encode_scenario(made, 5), "scenarios")
-    there = made.there.copy()
+    there = made.is_present.copy()
     there[1, 10:20] = False
     with pytest.raises(InputError, match="vehicle v1 is there 2 times"):
         decode_tracks(encode(replace(heard, there=there)))

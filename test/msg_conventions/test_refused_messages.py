@@ -16,7 +16,7 @@ from msg_conventions.trajectory import Trajectory
 from scenario_gen.base.errors import InputError
 from scenario_gen.numerics.arrays import canonical_heading
 from scenario_gen.roads import build_road
-from scenario_gen.types.encounter import Vehicle
+from scenario_gen.types import Vehicle
 
 UNTURNED = np.array([0.0, 0.0, 0.0, 1.0]).tobytes()
 

@@ -41,9 +41,8 @@ from msg_conventions.cdr import decode
 from msg_conventions.layouts import POLYGON
 from scenario_gen.base.errors import InputError
 from scenario_gen.numerics.arrays import canonical_angle
-from scenario_gen.types import Note, NoteKind
+from scenario_gen.types import Note, NoteKind, Vehicle
 from scenario_gen.types.ego import with_witness
-from scenario_gen.types.encounter import Vehicle
 from scenario_gen.types.fit import Fit, FittedVehicle
 from scenario_gen.types.lanes import DrawnFor, Lane, LaneNetwork, RuleKind, TrafficRule
 from scenario_gen.types.names import token, tokens

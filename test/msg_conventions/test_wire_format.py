@@ -33,8 +33,7 @@ from msg_conventions import (
 from msg_conventions.cdr import encode
 from msg_conventions.layouts import FIX
 from scenario_gen.base.errors import InputError
-from scenario_gen.types import Note, NoteKind
-from scenario_gen.types.encounter import Vehicle
+from scenario_gen.types import Note, NoteKind, Vehicle
 from scenario_gen.types.lanes import Lane, LaneNetwork
 from scenario_gen.types.road import Road
 from scenario_gen.types.scenario import BoundaryStates

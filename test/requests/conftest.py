@@ -11,7 +11,7 @@ from scenario_gen.logs import read_log
 from scenario_gen.logs.synthetic import bundled
 from scenario_gen.method.segmentation import segment
 from scenario_gen.roads import build_road
-from scenario_gen.types.encounter import Encounter, Vehicle
+from scenario_gen.types import Encounter, Vehicle
 from scenario_gen.types.request import Request
 
 
@@ -30,7 +30,7 @@ def following():
     )
     vehicles = (Vehicle("1"), Vehicle("2"))
     flat = np.zeros((2, 201))
-    encounter = Encounter("following", vehicles, 0, 100_000_000, position, flat, flat + 8.0)
+    encounter = Encounter.sampled(vehicles, 0.1, position, flat, flat + 8.0, "following")
     return Given(encounter, segment(encounter, seed=7), build_road("straight", encounter), 7)
 
 
@@ -53,6 +53,4 @@ def crossing():
     )
     heading = np.stack([0.0 * time, 0.0 * time + 0.5 * np.pi])
     vehicles = (Vehicle("a", 4.0, 2.0), Vehicle("b", 4.0, 2.0))
-    return Encounter(
-        "crossing", vehicles, 0, 100_000_000, position, heading, np.full((2, 101), 10.0)
-    )
+    return Encounter.sampled(vehicles, 0.1, position, heading, np.full((2, 101), 10.0), "crossing")

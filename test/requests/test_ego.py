@@ -19,8 +19,8 @@ from scenario_gen.method.validity import Checker
 from scenario_gen.roads import build_road
 from scenario_gen.situation import Situation
 from scenario_gen.situation.interaction import find_conflicts
+from scenario_gen.types import Vehicle
 from scenario_gen.types.ego import join_ego, with_witness
-from scenario_gen.types.encounter import Vehicle
 from scenario_gen.types.reaction import LOST
 from scenario_gen.types.request import Request
 from scenario_gen.types.scenario import BoundaryStates, Scenario

@@ -16,8 +16,7 @@ from scenario_gen.method.sampling.sampler import LEVEL_SIZE
 from scenario_gen.method.segmentation import segment
 from scenario_gen.method.validity import Limits
 from scenario_gen.roads import build_road
-from scenario_gen.types import NoteKind
-from scenario_gen.types.encounter import Encounter, Vehicle
+from scenario_gen.types import Encounter, NoteKind, Vehicle
 from scenario_gen.types.request import Request
 from scenario_gen.types.scenario import Cause
 
@@ -34,14 +33,13 @@ def platoons(count):
         position.append(np.column_stack([x, np.full(time.size, -1.75 if east else 1.75)]))
         heading.append(np.full(time.size, 0.0 if east else np.pi))
     vehicles = tuple(Vehicle(f"car_{k}", 4.5 + 0.1 * k, 1.8) for k in range(count))
-    return Encounter(
-        "platoons",
+    return Encounter.sampled(
         vehicles,
-        0,
-        100_000_000,
+        0.1,
         np.array(position),
         np.array(heading),
         np.tile(speed, (count, 1)),
+        "platoons",
     )
 
 

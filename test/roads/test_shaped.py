@@ -15,8 +15,7 @@ from scenario_gen.roads import build_road, RoadConfig
 from scenario_gen.roads.vector.ground import on_lane
 from scenario_gen.roads.ways import draw_ring_route
 from scenario_gen.situation import Situation
-from scenario_gen.types import RuleKind
-from scenario_gen.types.encounter import Encounter, Vehicle
+from scenario_gen.types import Encounter, RuleKind, Vehicle
 from scenario_gen.types.segmentation import Segmentation
 
 T = 140
@@ -46,7 +45,7 @@ def bend(angle, radius, before):
 def made(*motions, width=1.9):
     poses, speed = np.stack([m[0] for m in motions]), np.stack([m[1] for m in motions])
     vehicles = tuple(Vehicle(str(i), 4.8, width) for i in range(len(poses)))
-    return Encounter("made", vehicles, 0, 100_000_000, poses[..., :2], poses[..., 2], speed)
+    return Encounter.sampled(vehicles, 0.1, poses[..., :2], poses[..., 2], speed, "made")
 
 
 def ring_of(road):

@@ -38,7 +38,7 @@ def _repeated(encounter: Encounter, samples: int) -> bytes:
     return encode_tracks(
         replace(
             encounter,
-            dt_ns=1_000_000,
+            time=np.arange(samples) * 1e-3,
             position=np.repeat(encounter.position[:, :1], samples, axis=1),
             heading=np.repeat(encounter.heading[:, :1], samples, axis=1),
             speed=np.repeat(encounter.speed[:, :1], samples, axis=1),

@@ -23,7 +23,7 @@ from msg_conventions.scenarios import digest, encode_scenario
 from scenario_gen.bags.storage.bag import bag_topics, read_messages
 from scenario_gen.bags.storage.config import BagConfig
 from scenario_gen.cli.commands import app
-from scenario_gen.types.encounter import Vehicle
+from scenario_gen.types import Vehicle
 from scenario_gen.types.scenario import BoundaryStates, Scenario
 
 pytestmark = pytest.mark.dds

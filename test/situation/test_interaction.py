@@ -13,7 +13,7 @@ import shapely
 
 from scenario_gen.logs import read_log
 from scenario_gen.situation.interaction import find_conflicts, find_waits, Wait
-from scenario_gen.types.encounter import Encounter, Vehicle
+from scenario_gen.types import Encounter, Vehicle
 
 CARS = (Vehicle("a"), Vehicle("b"))
 TIME = np.arange(101) * 0.1
@@ -32,9 +32,7 @@ def conflicts(*tracks, vehicles=CARS, time=TIME):
 
 def encounter(speed):
     n, t = speed.shape
-    return Encounter(
-        "test", CARS[:n], 0, 100_000_000, np.zeros((n, t, 2)), np.zeros((n, t)), speed
-    )
+    return Encounter.sampled(CARS[:n], 0.1, np.zeros((n, t, 2)), np.zeros((n, t)), speed, "test")
 
 
 def box(length, width, x, y, yaw):

@@ -58,13 +58,12 @@ def test_the_kind_depends_neither_on_the_direction_nor_on_the_order(turned, case
     station = 10.0 * (time - 6.0)
     east, north = x + station * np.cos(heading), y + station * np.sin(heading)
     cos, sin = np.cos(turned), np.sin(turned)
-    encounter = Encounter(
-        "straight",
+    encounter = Encounter.sampled(
         (Vehicle("1"), Vehicle("2")),
-        0,
-        100_000_000,
+        0.1,
         np.stack([cos * east - sin * north, sin * east + cos * north], axis=-1),
         np.broadcast_to(heading + turned, (2, len(time))),
         np.full((2, len(time)), 10.0),
+        "straight",
     )
     assert kind_of(encounter, 0, 1) == kind == kind_of(encounter, 1, 0)

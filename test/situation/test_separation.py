@@ -8,7 +8,7 @@ import pytest
 
 from scenario_gen.situation import Situation
 from scenario_gen.situation.separation import least_gaps
-from scenario_gen.types.encounter import Encounter, Vehicle
+from scenario_gen.types import Encounter, Vehicle
 from scenario_gen.types.presence import ALWAYS
 
 TIME = 0.1 * np.arange(30)
@@ -21,9 +21,7 @@ def queue(*places, present=ALWAYS):
     count = len(places)
     vehicles = tuple(Vehicle(str(n), 4.0, 2.0) for n in range(count))
     flat = np.zeros((count, 30))
-    return Encounter(
-        "queue", vehicles, 0, 100_000_000, position, flat, flat + 5.0, present=present
-    )
+    return Encounter.sampled(vehicles, 0.1, position, flat, flat + 5.0, "queue", present=present)
 
 
 def test_the_least_gap_of_each_is_to_its_nearest():

@@ -9,13 +9,13 @@ import pytest
 from scenario_gen.base.errors import RefusedError
 from scenario_gen.pipeline import generate, PipelineConfig
 from scenario_gen.situation.size import refuse_too_large
-from scenario_gen.types.encounter import Encounter, Vehicle
+from scenario_gen.types import Encounter, Vehicle
 
 
 def standing(count, seconds):
     flat = np.zeros((count, round(seconds / 0.1) + 1))
     vehicles = tuple(Vehicle(str(k)) for k in range(count))
-    return Encounter("large", vehicles, 0, 100_000_000, np.zeros((*flat.shape, 2)), flat, flat)
+    return Encounter.sampled(vehicles, 0.1, np.zeros((*flat.shape, 2)), flat, flat, "large")
 
 
 def test_too_many_vehicle_seconds_are_refused_before_any_work():
@@ -37,8 +37,8 @@ def driving(offset=0.0, jump=0.0, samples=100, period_ns=100_000_000):
     position[1, :, 1] = 4.0 + offset
     position[1, samples // 2, 1] += jump
     flat = np.zeros((2, samples))
-    return Encounter(
-        "tracks", (Vehicle("a"), Vehicle("b")), 0, period_ns, position, flat, flat + 10.0
+    return Encounter.sampled(
+        (Vehicle("a"), Vehicle("b")), period_ns * 1e-9, position, flat, flat + 10.0, "tracks"
     )
 
 

@@ -15,7 +15,7 @@ from scenario_gen.numerics.curve import crossings, Curve
 from scenario_gen.situation.frenet import to_frenet
 from scenario_gen.situation.separation import separate, smallest_gaps
 from scenario_gen.situation.tracks import clean_tracks
-from scenario_gen.types.encounter import Encounter, Vehicle
+from scenario_gen.types import Encounter, Vehicle
 
 
 def encounter_of(*motions, dt=0.1):
@@ -24,7 +24,7 @@ def encounter_of(*motions, dt=0.1):
     step = np.hypot(*np.moveaxis(np.diff(poses[:, :, :2], axis=1), 2, 0)) / dt
     speed = np.concatenate((step, step[:, -1:]), axis=1)
     vehicles = tuple(Vehicle(str(i)) for i in range(len(poses)))
-    return Encounter("made", vehicles, 0, round(dt * 1e9), poses[..., :2], poses[..., 2], speed)
+    return Encounter.sampled(vehicles, dt, poses[..., :2], poses[..., 2], speed, "made")
 
 
 def line(x0, y0, yaw, speed, t=100):

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from scenario_gen.situation.traffic_side import mirrored, traffic_side
-from scenario_gen.types.encounter import Encounter, Vehicle
+from scenario_gen.types import Encounter, Vehicle
 
 
 def oncoming(side):
@@ -20,14 +20,13 @@ def oncoming(side):
         np.column_stack([50.0 - 10.0 * time, np.full(101, 1.75 * side)]),
     )
     heading = np.stack([np.zeros(101), np.full(101, np.pi)])
-    return Encounter(
-        "o",
+    return Encounter.sampled(
         (Vehicle("1"), Vehicle("2")),
-        0,
-        100_000_000,
+        0.1,
         np.stack([there, back]),
         heading,
         np.full((2, 101), 10.0),
+        "o",
     )
 
 

@@ -13,8 +13,7 @@ from msg_conventions.topics import topic_entry
 from scenario_gen.bags.storage.bag import BagMessage, read_messages
 from scenario_gen.bags.storage.metadata import qos_yaml
 from scenario_gen.bags.storage.writer import atomic_bag
-from scenario_gen.types import Note, NoteKind
-from scenario_gen.types.encounter import Encounter, Vehicle
+from scenario_gen.types import Encounter, Note, NoteKind, Vehicle
 from scenario_gen.types.fit import Fit, FittedVehicle
 from scenario_gen.types.generation import GenerationResult
 from scenario_gen.types.road import Road
@@ -44,8 +43,8 @@ def hand_made_run() -> GenerationResult:
     heading = np.array([[0.0], [np.pi]]) * np.ones_like(x)
     speed = np.array([[5.0], [6.0]]) * np.ones_like(x)
     vehicles = (Vehicle("1"), Vehicle("bus 2", 12.0, 2.5))
-    encounter = Encounter(
-        "made by hand", vehicles, 1_600_000_000_000_000_000, 100_000_000, position, heading, speed
+    encounter = Encounter.sampled(
+        vehicles, 0.1, position, heading, speed, "made by hand", 1_600_000_000_000_000_000
     )
     labels = np.searchsorted(k, np.arange(t), side="right")
     segmentation = Segmentation(labels, k, np.isin(np.arange(t), k) * 0.9, ("a", "b", "c"))

@@ -10,9 +10,8 @@ from functools import cache
 import numpy as np
 
 from scenario_gen.method.evaluation import evaluate_scenarios, EvaluationConfig
-from scenario_gen.types import Note, NoteKind
+from scenario_gen.types import Encounter, Note, NoteKind, Vehicle
 from scenario_gen.types.ego import with_witness
-from scenario_gen.types.encounter import Encounter, Vehicle
 from scenario_gen.types.evaluation import CheckCounts
 from scenario_gen.types.fit import Fit, FittedVehicle
 from scenario_gen.types.generation import GenerationResult
@@ -35,8 +34,8 @@ def crossing(dt=0.1, steps=121, lag=2.0):
     zero = np.zeros_like(time)
     position = np.stack([np.stack([east, zero], -1), np.stack([zero, north], -1)])
     heading = np.stack([zero, zero + np.pi / 2])
-    return Encounter(
-        "crossing", CARS, 0, round(dt * 1e9), position, heading, np.stack([zero + 10.0, pace])
+    return Encounter.sampled(
+        CARS, dt, position, heading, np.stack([zero + 10.0, pace]), "crossing"
     )
 
 

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 import numpy as np
 
 from msg_conventions.paths import chord_length
-from scenario_gen.types.encounter import Encounter, Vehicle
+from scenario_gen.types import Encounter, Vehicle
 from scenario_gen.types.route import Route
 from scenario_gen.types.scenario import Scenario
 from scenario_gen.types.segmentation import Segmentation
@@ -37,14 +37,14 @@ def headings(rng: np.random.Generator, n: int, t: int) -> np.ndarray:
 
 def encounter(seed: int, n: int = 3, t: int = 40) -> Encounter:
     rng = generator(seed)
-    return Encounter(
+    return Encounter.sampled(
+        tuple(Vehicle(f"car_{k}" if k else "7", 4.0 + k / 3, 1.9) for k in range(n)),
+        0.1,
+        rng.normal(0.0, 100.0, (n, t, 2)),
+        headings(rng, n, t),
+        np.abs(rng.normal(0.0, 10.0, (n, t))),
         name="tracks",
-        vehicles=tuple(Vehicle(f"car_{k}" if k else "7", 4.0 + k / 3, 1.9) for k in range(n)),
         start_ns=int(rng.integers(0, 2**31)) * 1_000_000_000 + int(rng.integers(0, 1_000_000_000)),
-        dt_ns=100_000_000,
-        position=rng.normal(0.0, 100.0, (n, t, 2)),
-        heading=headings(rng, n, t),
-        speed=np.abs(rng.normal(0.0, 10.0, (n, t))),
     )
 
 

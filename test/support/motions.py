@@ -7,7 +7,7 @@ import numpy as np
 
 from scenario_gen.base.road_users import Dynamics
 from scenario_gen.method.validity import Limits
-from scenario_gen.types.encounter import Vehicle
+from scenario_gen.types import Vehicle
 from scenario_gen.types.road import Road
 from scenario_gen.types.scenario import Scenario
 

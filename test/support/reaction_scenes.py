@@ -5,7 +5,7 @@
 
 import numpy as np
 
-from scenario_gen.types.encounter import Encounter, Vehicle
+from scenario_gen.types import Encounter, Vehicle
 
 DT = 0.1
 
@@ -33,14 +33,13 @@ def along(speed, start, lane=0.0):
 def lane_encounter(leader, follower, gap=20.0, lane=0.0):
     """Two vehicles on the x axis, the second `gap` metres behind the first."""
     position = np.stack([along(leader, gap), along(follower, 0.0, lane)])
-    return Encounter(
-        "lane",
+    return Encounter.sampled(
         (Vehicle("1"), Vehicle("2")),
-        0,
-        100_000_000,
+        0.1,
         position,
         np.zeros((2, len(leader))),
         np.stack([leader, follower]),
+        "lane",
     )
 
 
@@ -59,8 +58,8 @@ def crossing(wait_until, speed=8.0, seconds=20.0):
     position = np.stack([first, np.column_stack([np.full(len(time), 0.0), y])])
     heading = np.stack([np.zeros(len(time)), np.full(len(time), 0.5 * np.pi)])
     speeds = np.stack([np.full(len(time), speed), own])
-    return Encounter(
-        "crossing", (Vehicle("1"), Vehicle("2")), 0, 100_000_000, position, heading, speeds
+    return Encounter.sampled(
+        (Vehicle("1"), Vehicle("2")), 0.1, position, heading, speeds, "crossing"
     )
 
 
@@ -71,8 +70,8 @@ def platoon(count, rows=200, seed=3):
         speeds.append(answering(speeds[-1], 1.2, 0.9))
     position = np.stack([along(speed, 20.0 * (count - 1 - k)) for k, speed in enumerate(speeds)])
     vehicles = tuple(Vehicle(str(k + 1)) for k in range(count))
-    return Encounter(
-        "platoon", vehicles, 0, 100_000_000, position, np.zeros((count, rows)), np.stack(speeds)
+    return Encounter.sampled(
+        vehicles, 0.1, position, np.zeros((count, rows)), np.stack(speeds), "platoon"
     )
 
 
@@ -84,12 +83,6 @@ def led_crossing(wait_until=8.0):
         for name in ("heading", "speed")
     }
     position = np.concatenate([two.position, two.position[:1] + np.array([20.0, 0.0])])
-    return Encounter(
-        "led",
-        (*two.vehicles, Vehicle("3")),
-        0,
-        two.dt_ns,
-        position,
-        rows["heading"],
-        rows["speed"],
+    return Encounter.sampled(
+        (*two.vehicles, Vehicle("3")), two.dt, position, rows["heading"], rows["speed"], "led"
     )

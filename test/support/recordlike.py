@@ -19,7 +19,7 @@ from PIL import Image
 from rosbags.rosbag2 import StoragePlugin, Writer
 
 from scenario_gen.logs.geodesy import geodetic
-from scenario_gen.types.encounter import Vehicle
+from scenario_gen.types import Vehicle
 from support import map_builders
 from support.synthetic_cases import coloured_noise, Drive, LANE, Leg, Phase, quarter, STORES
 

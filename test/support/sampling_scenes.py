@@ -9,7 +9,7 @@ import numpy as np
 
 from benchmarks._paper_speed_profile import SpeedProfile
 from scenario_gen.situation.interaction import Wait
-from scenario_gen.types.encounter import Encounter, Vehicle
+from scenario_gen.types import Encounter, Vehicle
 from scenario_gen.types.road import Road
 from scenario_gen.types.route import Route
 from scenario_gen.types.scenario import BoundaryStates
@@ -55,8 +55,8 @@ def scene(width=60.0):
     routes.append(Route(np.array([[30.0, 15.0, 0.3]]), np.zeros(5, dtype=int), [0.0]))
     speed = np.array([steady, stopping, np.zeros(201)])
     vehicles = (Vehicle("a"), Vehicle("b"), Vehicle("c"))
-    encounter = Encounter(
-        "scene", vehicles, 0, 100_000_000, np.zeros((3, 201, 2)), np.zeros((3, 201)), speed
+    encounter = Encounter.sampled(
+        vehicles, 0.1, np.zeros((3, 201, 2)), np.zeros((3, 201)), speed, "scene"
     )
     segmentation = Segmentation(
         np.searchsorted(CHANGES, np.arange(201), side="right"), CHANGES, np.zeros(201), ("",) * 4

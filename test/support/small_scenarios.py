@@ -8,7 +8,7 @@ import numpy as np
 from scenario_gen.logs import LogConfig, read_raw
 from scenario_gen.output.exchange.cases import Case, Exported
 from scenario_gen.output.exchange.derived_lanes import derived_lanes
-from scenario_gen.types.encounter import Vehicle
+from scenario_gen.types import Vehicle
 from scenario_gen.types.scenario import Scenario
 
 

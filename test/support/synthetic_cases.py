@@ -37,7 +37,7 @@ from scenario_gen.bags.vehicles import FIX, TWIST
 from scenario_gen.logs.geodesy import geodetic
 from scenario_gen.logs.synthetic import CASES, RESOURCES
 from scenario_gen.numerics.arrays import Floats
-from scenario_gen.types.encounter import Vehicle
+from scenario_gen.types import Vehicle
 
 STORES = type_store()
 ORIGIN = (42.3, -83.7)  # degrees; the roads are invented, nothing was recorded there

@@ -19,7 +19,6 @@ from scenario_gen.logs import read_log
 from scenario_gen.logs.synthetic import bundled
 from scenario_gen.roads import build_road
 from scenario_gen.types.lanes import Lane, LaneNetwork
-from scenario_gen.types.presence import ALWAYS
 from support.harness import Target
 from support.map_builders import FORMATS
 from support.mutators import BYTES, NUMBERS, TEXT, tree
@@ -76,9 +75,7 @@ def texts(rng: random.Random, data: bytes, seeds: Sequence[bytes]) -> bytes:
 @cache
 def template() -> object:
     """An encounter that is laid on what was read: six seconds of two cars, for which there is place."""
-    whole, own = read_log([bundled("b")]).encounters[0], slice(0, 61)
-    parts = {name: getattr(whole, name)[:, own] for name in ("position", "heading", "speed")}
-    return replace(whole, **parts, present=ALWAYS)
+    return read_log([bundled("b")]).encounters[0].between(0, 60)
 
 
 def place(path: Path) -> None:

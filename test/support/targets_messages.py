@@ -35,7 +35,7 @@ from msg_conventions.scenarios import decode_scenario, encode_scenario
 from msg_conventions.topics import FIX_TYPE, TWIST_TYPE
 from scenario_gen.bags.recordings.template import decode_template
 from scenario_gen.bags.recordings.write import result_messages
-from scenario_gen.types.encounter import Vehicle
+from scenario_gen.types import Vehicle
 from scenario_gen.types.scenario import EgoSlot
 from support.bag_examples import hand_made_run
 from support.harness import Target

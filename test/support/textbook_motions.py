@@ -15,7 +15,7 @@ from scipy import ndimage, spatial
 
 from scenario_gen.numerics.boxes import corners
 from scenario_gen.numerics.curve import Curve
-from scenario_gen.types.encounter import Encounter, Vehicle
+from scenario_gen.types import Encounter, Vehicle
 
 DT, LENGTH, WIDTH = 0.1, 4.6, 1.85
 Drive = tuple[np.ndarray, np.ndarray]  # (T, 3) poses, (T,) m/s
@@ -373,5 +373,5 @@ def labelled(kind: str, seed: int) -> Labelled:
         rows.append((xy, np.unwrap(poses[:, 2]), speed))
     position, heading, speeds = (np.stack(part) for part in zip(*rows, strict=True))
     vehicles = tuple(Vehicle(str(n), LENGTH, WIDTH) for n in (1, 2))
-    encounter = Encounter(f"{kind} {seed}", vehicles, 0, 100_000_000, position, heading, speeds)
+    encounter = Encounter.sampled(vehicles, 0.1, position, heading, speeds, f"{kind} {seed}")
     return Labelled(kind, encounter, None if kind in NOTHING else (0, 1) if swap else (1, 0))

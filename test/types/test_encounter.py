@@ -8,15 +8,14 @@ import pytest
 
 from scenario_gen.base.errors import InputError
 from scenario_gen.numerics.arrays import canonical_angle, canonical_heading
-from scenario_gen.types.encounter import Encounter, Vehicle
+from scenario_gen.types import Encounter, Vehicle
 
 
 def encounter(**changes):
     arguments = {
         "name": "test",
         "vehicles": (Vehicle("a"), Vehicle("b")),
-        "start_ns": 0,
-        "dt_ns": 100_000_000,
+        "time": np.arange(5) * 0.1,
         "position": np.zeros((2, 5, 2)),
         "heading": np.zeros((2, 5)),
         "speed": np.zeros((2, 5)),

@@ -110,7 +110,7 @@ def test_results_are_counted_indexed_and_made_a_table():
         and result[1] is result.generated.scenarios[1]
     )
     table = result.to_dataframe()
-    assert len(table) == sum(int(scenario.there.sum()) for scenario in result)
+    assert len(table) == sum(int(scenario.is_present.sum()) for scenario in result)
     assert list(table.columns) == [
         "scenario",
         "vehicle",
@@ -123,7 +123,7 @@ def test_results_are_counted_indexed_and_made_a_table():
     ]
     first = result[0]
     own = table[(table.scenario == first.index) & (table.vehicle == first.vehicles[0].id)]
-    assert (own[["x", "y"]].to_numpy() == first.position[0][first.there[0]]).all()
+    assert (own[["x", "y"]].to_numpy() == first.position[0][first.is_present[0]]).all()
     assert list(dataframe([]).columns) == list(table.columns)
     for thing in (result, result.generated, first, result.encounter, result.road):
         assert len(repr(thing)) < 120 and repr(thing).startswith(type(thing).__name__)

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from scenario_gen.base.errors import InputError
-from scenario_gen.types.encounter import Encounter, Vehicle
+from scenario_gen.types import Encounter, Vehicle
 from scenario_gen.types.presence import ALWAYS, canonical_presence, cut, held, mask, together
 from scenario_gen.types.scenario import Scenario
 
@@ -25,15 +25,8 @@ def presences(draw, count=3, samples=9):
 def encounter(present=ALWAYS):
     clock = np.arange(9.0)
     position = np.stack((np.tile(clock, (2, 1)), np.zeros((2, 9))), axis=-1)
-    return Encounter(
-        "test",
-        VEHICLES,
-        0,
-        100_000_000,
-        position,
-        np.zeros((2, 9)),
-        np.ones((2, 9)),
-        present=present,
+    return Encounter.sampled(
+        VEHICLES, 0.1, position, np.zeros((2, 9)), np.ones((2, 9)), "test", present=present
     )
 
 
@@ -75,7 +68,7 @@ def test_an_encounter_holds_the_edge_values_where_a_vehicle_is_not_there():
     assert made.position[0, :, 0].tolist() == [0, 1, 2, 3, 4, 5, 6, 6, 6]
     assert made.position[1, :, 0].tolist() == [2, 2, 2, 3, 4, 5, 6, 7, 8]
     assert not made.all_present
-    assert made.there.sum() == 14
+    assert made.is_present.sum() == 14
 
 
 def test_a_scenario_holds_them_too():
@@ -90,7 +83,7 @@ def test_a_scenario_holds_them_too():
         present=np.array([[0, 6], [2, 8]]),
     )
     assert made.position[1, 0, 0] == 2.0
-    assert made.there.sum() == 14
+    assert made.is_present.sum() == 14
 
 
 @pytest.mark.parametrize(

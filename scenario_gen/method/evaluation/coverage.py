@@ -76,7 +76,7 @@ def coverage_of(encounter: Encounter, scenarios: Sequence[Scenario]) -> Coverage
 
 
 def _row(motion: Scenario | Encounter, figures: PairFigures | None) -> dict[str, float]:
-    there = motion.there
+    there = motion.is_present
     row = dict.fromkeys(LABELS, math.nan) | {"speed": float(motion.speed[there].mean())}
     if figures is not None:
         row |= {name: getattr(figures, name) for name in LABELS if name != "speed"}

@@ -324,11 +324,14 @@ CRITICALITY = MetricGroup(
 
 def _diversity(samples: Samples) -> Estimates:
     position = np.stack([motion.position for motion in samples.motions])
-    table, interval = diversity.displacements(position, samples.there), samples.bootstrap.interval
+    table, interval = (
+        diversity.displacements(position, samples.is_present),
+        samples.bootstrap.interval,
+    )
     result = {"diversity": interval(partial(diversity.diversity, table))}
     if samples.template.fitted is not None:
         error = diversity.displacement_to(
-            position, samples.template.fitted.position, samples.there
+            position, samples.template.fitted.position, samples.is_present
         )
         result["min_ade"] = interval(partial(diversity.weighted_min, error))
     return result

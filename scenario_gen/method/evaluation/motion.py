@@ -59,7 +59,7 @@ class Motion:
         return always(self.present, self.speed.shape[1])
 
     @property
-    def there(self) -> Bools:
+    def is_present(self) -> Bools:
         """(N, T) whether each vehicle is there at each instant."""
         return mask(self.present, self.speed.shape[1])
 

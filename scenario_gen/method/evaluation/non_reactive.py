@@ -68,5 +68,7 @@ def baseline_margin(motion: Motion, a: int, b: int) -> float:
         [motion.time[own.start] + dt * np.arange(len(stations)), route.at(np.array(stations))]
     )
     return least_shift(
-        poses, timed_poses(motion, motion.there[b], b), (motion.vehicles[a], motion.vehicles[b])
+        poses,
+        timed_poses(motion, motion.is_present[b], b),
+        (motion.vehicles[a], motion.vehicles[b]),
     )

@@ -104,9 +104,9 @@ class Samples:
         return tuple(map(self.template.periodic, self.scenarios))
 
     @cached_property
-    def there(self) -> Bools:
+    def is_present(self) -> Bools:
         """(N, T) vehicles and even instants that the template and all samples have."""
-        there = [self.template.motion.there, *(motion.there for motion in self.motions)]
+        there = [self.template.motion.is_present, *(motion.is_present for motion in self.motions)]
         return np.asarray(np.logical_and.reduce(there))
 
     @cached_property

@@ -293,7 +293,7 @@ class Batch:
                     seed,
                     index[s],
                     frame_id,
-                    self.present[s],
+                    present=self.present[s],
                 )
             )
         return results

@@ -8,7 +8,7 @@ from itertools import pairwise
 import numpy as np
 
 from scenario_gen.numerics import Floats, Ints
-from scenario_gen.types import Tracks, VehicleType
+from scenario_gen.types import Motion, VehicleType
 
 STEADY = 0.25
 TURNING = np.deg2rad(15.0)
@@ -38,7 +38,7 @@ def describe_motion(speed: Floats, heading: Floats, dt: float, kind: VehicleType
     return f"{verb} from {first:.1f} to {last:.1f} m/s{bend}"
 
 
-def describe_segments(encounter: Tracks, changepoints: Ints) -> tuple[str, ...]:
+def describe_segments(encounter: Motion, changepoints: Ints) -> tuple[str, ...]:
     """One sentence per segment between changepoints (K,), naming every vehicle by its id."""
     edges = [0, *(int(c) for c in changepoints), encounter.speed.shape[1]]
     return tuple(
@@ -50,7 +50,7 @@ def describe_segments(encounter: Tracks, changepoints: Ints) -> tuple[str, ...]:
     )
 
 
-def _in_segment(encounter: Tracks, i: int, a: int, b: int) -> str:
+def _in_segment(encounter: Motion, i: int, a: int, b: int) -> str:
     """Describe what vehicle i does from sample a to before b, as far as it is there."""
     first, last = encounter.present[i].tolist()
     if last < a:

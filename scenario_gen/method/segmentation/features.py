@@ -19,7 +19,7 @@ from numpy.lib.stride_tricks import sliding_window_view
 
 from scenario_gen.method.segmentation.hdp_hmm.problem import moving_mean
 from scenario_gen.numerics import Floats
-from scenario_gen.types import Tracks
+from scenario_gen.types import Motion
 
 STAND_BLUR = 0.2
 STAND_WINDOW = 0.9
@@ -80,7 +80,7 @@ def without_spikes(values: Floats, floor: float) -> Floats:
     return values
 
 
-def without_outliers(encounter: Tracks) -> Tracks:
+def without_outliers(encounter: Motion) -> Motion:
     """Return the encounter without single positions and speeds that no vehicle could have had between its neighbours."""
     position = np.stack([without_spikes(xy, POSITION_FLOOR) for xy in encounter.position])
     speed = np.stack([without_spikes(v[:, None], SPEED_FLOOR)[:, 0] for v in encounter.speed])
@@ -114,7 +114,7 @@ def moving(speed: Floats, dt: float, slow: float) -> Floats:
 
 
 def driving_features(
-    encounter: Tracks,
+    encounter: Motion,
     speed_window: float,
     turn_window: float,
     speed_noise: float,
@@ -144,7 +144,7 @@ def driving_features(
     )
 
 
-def paper_features(encounter: Tracks) -> Floats:
+def paper_features(encounter: Motion) -> Floats:
     """(T, 3N) positions and speeds as the paper stacks them; NaN where a vehicle is not there."""
     stacked = np.concatenate((encounter.position, encounter.speed[..., None]), axis=-1)
-    return np.column_stack(list(np.where(encounter.there[..., None], stacked, np.nan)))
+    return np.column_stack(list(np.where(encounter.is_present[..., None], stacked, np.nan)))

@@ -21,7 +21,7 @@ from scenario_gen.method.segmentation.posterior import in_order, Posterior
 from scenario_gen.method.segmentation.series import segment_series
 from scenario_gen.method.segmentation.trends import course, Trends
 from scenario_gen.numerics import Floats, Ints
-from scenario_gen.types import Segmentation, Tracks, Vehicle
+from scenario_gen.types import Motion, Segmentation, Vehicle
 
 DRIVING_SAMPLER = SamplerConfig(weight=0.5, chains=3, sweeps=60)
 
@@ -88,7 +88,7 @@ DEFAULT = SegmentationConfig()
 
 
 def segment(
-    encounter: Tracks, config: SegmentationConfig = DEFAULT, seed: int = 0
+    encounter: Motion, config: SegmentationConfig = DEFAULT, seed: int = 0
 ) -> Segmentation:
     """Cut an encounter into joint primitives (paper II-B).
 
@@ -150,22 +150,14 @@ def segment_track(
         raise InputError(f"a track holds finite positions and speeds, dt > 0 s apart; dt is {dt}")
     heading = course(position, speed, dt)[0]
     return segment(
-        Tracks(
-            "track",
-            (Vehicle("0"),),
-            0,
-            round(dt * 1e9),
-            position[None],
-            heading[None],
-            speed[None],
-        ),
+        Motion.sampled((Vehicle("0"),), dt, position[None], heading[None], speed[None]),
         config,
         seed,
     )
 
 
 def on_trends(
-    encounter: Tracks, posterior: Posterior, points: Ints, config: SegmentationConfig
+    encounter: Motion, posterior: Posterior, points: Ints, config: SegmentationConfig
 ) -> Ints:
     """Put changepoints (K,) where trends change, see `trends`, and keep the most useful ones up to `max_rate`."""
     trends = Trends.of(

@@ -259,7 +259,7 @@ class Checker:
                 continue
             ground = ground_for(self.road, vehicle)
             against = drives_against(ground, scenario.position[i], scenario.heading[i])
-            against &= scenario.there[i]
+            against &= scenario.is_present[i]
             if against.any():
                 k = int(np.argmax(against))
                 x, y = scenario.position[i, k].tolist()

@@ -159,7 +159,7 @@ def _missing_wait(
 
 def _slow_spans(scenario: Scenario, i: int, limit: float) -> list[tuple[int, int]]:
     """First and last sample of each time in which neither speed nor displacement reach a limit."""
-    slow = (scenario.speed[i] < limit) & scenario.there[i]
+    slow = (scenario.speed[i] < limit) & scenario.is_present[i]
     moved = edge_lengths(scenario.position[i])
     still = slow[:-1] & slow[1:] & (moved < limit * np.diff(scenario.time))
     return runs(still)  # of steps, so the end of a run is a sample

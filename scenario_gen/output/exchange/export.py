@@ -253,7 +253,7 @@ def refuse_other_map(case: Case, path: Path) -> None:
     """
     lanes = area_of(read_network(path).whole)
     prepare(lanes)
-    places = np.concatenate([one.others.position[one.others.there] for one in case.scenarios])
+    places = np.concatenate([one.others.position[one.others.is_present] for one in case.scenarios])
     share = float(contains_xy(lanes, places).mean())
     if share < ON_LANES:
         raise InputError(

@@ -145,7 +145,7 @@ def _objects(moving: _Moving, k: int) -> Iterator[Any]:
     import betterosi as osi
 
     motion = moving.motion
-    for n in np.flatnonzero(motion.there[:, k]).tolist():
+    for n in np.flatnonzero(motion.is_present[:, k]).tolist():
         vehicle, heading = motion.vehicles[n], motion.heading[n, k]
         cos, sin = float(np.cos(heading)), float(np.sin(heading))
         speed, along, rate = (

@@ -69,7 +69,7 @@ def description(case: Case, exported: Exported, export: ExportConfig) -> dict[st
 
 def _track(motion: Scenario, n: int, vehicle: Vehicle) -> dict[str, Any]:
     """Return the states of one vehicle; zeros while it is not there."""
-    there = motion.there[n]
+    there = motion.is_present[n]
     steps = len(motion.time)
 
     def masked(values: Any) -> Any:

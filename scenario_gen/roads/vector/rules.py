@@ -90,7 +90,7 @@ class RuleCheck:
 
     def _runs(self, scenario: Scenario, n: int) -> Iterator[Breach]:
         """Stop lines that vehicle n crosses without a stop."""
-        there = scenario.there[n]
+        there = scenario.is_present[n]
         if not self._stops or there.sum() < 2:
             return
         heading, speed = scenario.heading[n, there], scenario.speed[n, there]
@@ -162,7 +162,7 @@ class RuleCheck:
     ) -> set[int]:
         """Those of some lanes on which a vehicle drives in the last metres before a time [s]."""
         steps = np.concatenate(([0.0], np.cumsum(edge_lengths(scenario.position[n]))))
-        at = scenario.there[n] & (scenario.time <= entry + 1e-9)
+        at = scenario.is_present[n] & (scenario.time <= entry + 1e-9)
         if not at.any():
             return set()
         at &= steps >= steps[at][-1] - _REACH
@@ -180,7 +180,7 @@ def _waits_before(scenario: Scenario, met: Conflict) -> bool:
     """Whether the second one at a conflict stands before it while the first one passes."""
     n, time = met.second, scenario.time
     passes: Bools = (
-        scenario.there[n]
+        scenario.is_present[n]
         & (time >= met.entry_first)
         & (time <= min(met.exit_first, met.entry_second))
     )

@@ -32,7 +32,7 @@ def set_of(count):
             all_of_it.acceleration,
         )
         one = with_witness(
-            Scenario(all_of_it.vehicles, *arrays, 3, index, all_of_it.frame_id, present), 3
+            Scenario(all_of_it.vehicles, *arrays, 3, index, all_of_it.frame_id, present=present), 3
         )
         data = encode_scenario(one, 17)
         slot = EgoSlot(one.reference_drive.vehicles[0], np.zeros(4), np.ones(4))

@@ -34,7 +34,7 @@ from scenario_gen.bags.storage.reindex import reindex
 from scenario_gen.bags.storage.writer import BagWriter, Split
 from scenario_gen.base.errors import InputError
 from scenario_gen.logs.synthetic import bundled
-from scenario_gen.types.encounter import Vehicle
+from scenario_gen.types import Vehicle
 from scenario_gen.types.generation import GenerationResult
 
 

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from scenario_gen.method.evaluation import coverage_of
-from scenario_gen.types.encounter import Encounter, Vehicle
+from scenario_gen.types import Encounter, Vehicle
 from scenario_gen.types.scenario import Scenario
 
 TIME = np.arange(101) * 0.1
@@ -42,9 +42,7 @@ def crossing(behind, index=0):
 @pytest.fixture
 def template():
     one = crossing(20.0)
-    return Encounter(
-        "crossing", one.vehicles, 0, 100_000_000, one.position, one.heading, one.speed
-    )
+    return Encounter.sampled(one.vehicles, 0.1, one.position, one.heading, one.speed, "crossing")
 
 
 def test_figures_matrix_and_picks(template):

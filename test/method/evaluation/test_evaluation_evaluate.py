@@ -142,13 +142,7 @@ def test_who_arrives_late_is_measured_while_there():
         config=QUICK,
     )
     # for the pair the same as where both are there from then on
-    cut = replace(
-        whole,
-        position=whole.position[:, 40:],
-        heading=whole.heading[:, 40:],
-        speed=whole.speed[:, 40:],
-        present=ALWAYS,
-    )
+    cut = whole.between(40, len(whole.time) - 1)
     rows = [replayed_from(sample, 40) for sample in samples(whole, 3)]
     after = evaluate_scenarios(cut, {"x": rows}, changepoints=K, config=QUICK)
     for key in ("e_position", "e_speed"):
@@ -244,14 +238,8 @@ def test_the_oracle_keeps_a_dwell_and_a_short_chord():
     time = np.arange(21) * 0.1
     x = np.minimum(time, 1.0) * 4.0
     position = np.stack([np.stack([x, 0 * x], -1), np.stack([0.1 * np.sin(time), 20 + 0 * x], -1)])
-    encounter = Encounter(
-        "stop",
-        CARS,
-        0,
-        100_000_000,
-        position,
-        np.zeros((2, 21)),
-        np.stack([np.gradient(x, 0.1), 0 * x]),
+    encounter = Encounter.sampled(
+        CARS, 0.1, position, np.zeros((2, 21)), np.stack([np.gradient(x, 0.1), 0 * x]), "stop"
     )
     first = np.array([[0, 0, 0], [8, 0, 0], [8, 0, 0.0]])
     second = np.array([[50, 0, np.pi / 2], [50, 0.2, np.pi / 2], [50, 0.2, np.pi / 2]])

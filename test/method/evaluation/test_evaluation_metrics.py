@@ -25,7 +25,7 @@ from scenario_gen.method.evaluation.distributions import (
 from scenario_gen.method.evaluation.dtw import feature_matrix
 from scenario_gen.method.evaluation.geometry import footprint_distance, time_to_collision
 from scenario_gen.method.evaluation.motion import at_count, at_period, Motion
-from scenario_gen.types.encounter import Vehicle
+from scenario_gen.types import Vehicle
 
 ONCE = np.ones((1, 1))
 

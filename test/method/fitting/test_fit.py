@@ -14,7 +14,7 @@ from scenario_gen.numerics.curve import Curve
 from scenario_gen.roads import build_road, RoadConfig
 from scenario_gen.roads.clearance import footprint_fits
 from scenario_gen.situation.interaction import find_conflicts
-from scenario_gen.types.encounter import Encounter, Vehicle
+from scenario_gen.types import Encounter, Vehicle
 from scenario_gen.types.road import Road
 from scenario_gen.types.segmentation import Segmentation
 
@@ -48,7 +48,7 @@ def driven(curve, speed, dt=0.1):
 def encounter_of(*motions):
     poses, speed = np.stack([m[0] for m in motions]), np.stack([m[1] for m in motions])
     vehicles = tuple(Vehicle(str(i)) for i in range(len(poses)))
-    return Encounter("made", vehicles, 0, 100_000_000, poses[..., :2], poses[..., 2], speed)
+    return Encounter.sampled(vehicles, 0.1, poses[..., :2], poses[..., 2], speed, "made")
 
 
 def turn(x, y, yaw, before, angle, radius, after=60.0):
@@ -218,14 +218,13 @@ def crossing_pair():
 def test_who_comes_from_the_right_still_does_and_arrival_times_are_kept(road_name, yaw):
     encounter = crossing_pair()
     rotation = np.array([[np.cos(yaw), -np.sin(yaw)], [np.sin(yaw), np.cos(yaw)]])
-    turned = Encounter(
-        "turned",
+    turned = Encounter.sampled(
         encounter.vehicles,
-        0,
-        100_000_000,
+        0.1,
         encounter.position @ rotation.T + 500.0,
         encounter.heading + yaw,
         encounter.speed,
+        "turned",
     )
     fit = fit_template(turned, every(turned, 5), build_road(road_name, turned))
     first, second = (f.anchors for f in fit.fitted)

@@ -21,7 +21,7 @@ from scenario_gen.method.segmentation import segment
 from scenario_gen.numerics.curve import Curve
 from scenario_gen.situation import Situation
 from scenario_gen.situation.tracks import clean_tracks
-from scenario_gen.types.encounter import Encounter, Vehicle
+from scenario_gen.types import Encounter, Vehicle
 from scenario_gen.types.request import Request
 from scenario_gen.types.road import Road
 
@@ -91,7 +91,7 @@ def along(*offsets, ahead=0.0, kind="car"):
     heading = np.zeros(position.shape[:2])
     vehicles = (Vehicle("1", type=kind), Vehicle("2", type=kind))
     return clean_tracks(
-        Encounter("two", vehicles, 0, 100_000_000, position, heading, np.full(heading.shape, 10.0))
+        Encounter.sampled(vehicles, 0.1, position, heading, np.full(heading.shape, 10.0), "two")
     )
 
 
@@ -137,7 +137,7 @@ def test_who_passes_whom_and_on_which_side_is_kept():
         speed = np.array([[0.0 if still else 5.0], [20.0]]) * np.ones((2, 150))
         vehicles = (Vehicle("1"), Vehicle("2"))
         return clean_tracks(
-            Encounter("two", vehicles, 0, 100_000_000, position, np.zeros((2, 150)), speed)
+            Encounter.sampled(vehicles, 0.1, position, np.zeros((2, 150)), speed, "two")
         )
 
     for still, kind in ((False, "overtaking"), (True, "stand")):

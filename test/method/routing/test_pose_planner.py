@@ -31,7 +31,7 @@ from scenario_gen.method.routing.search.pose_planner import (
 )
 from scenario_gen.method.routing.search.sweep import sweep_is_free
 from scenario_gen.roads.obstacles import read_obstacles, with_obstacles
-from scenario_gen.types.encounter import Vehicle
+from scenario_gen.types import Vehicle
 from scenario_gen.types.fit import Fit, FittedVehicle
 from scenario_gen.types.route import Route, routes_in_words
 from scenario_gen.types.scenario import BoundaryStates

@@ -16,7 +16,7 @@ from benchmarks._planning_maps import recorded_maps, road_of
 from scenario_gen.base.errors import InputError, RefusedError
 from scenario_gen.method.routing import deviations, plan_routes, PlanningConfig
 from scenario_gen.roads.clearance import nearest_pose_with_room
-from scenario_gen.types.encounter import Vehicle
+from scenario_gen.types import Vehicle
 from scenario_gen.types.fit import Fit, FittedVehicle
 from scenario_gen.types.scenario import BoundaryStates
 

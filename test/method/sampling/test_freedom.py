@@ -26,7 +26,7 @@ from scenario_gen.method.sampling.pace import clock_of
 from scenario_gen.method.sampling.prepare import prepare
 from scenario_gen.method.validity import Checker
 from scenario_gen.situation import Situation
-from scenario_gen.types.encounter import Vehicle
+from scenario_gen.types import Vehicle
 from scenario_gen.types.request import Request
 
 GRID = 0.1 * np.arange(201)

@@ -19,8 +19,7 @@ from scenario_gen.method.segmentation import segment
 from scenario_gen.roads import build_road
 from scenario_gen.situation import Situation
 from scenario_gen.situation.interaction import find_waits
-from scenario_gen.types import NoteKind
-from scenario_gen.types.encounter import Encounter, Vehicle
+from scenario_gen.types import Encounter, NoteKind, Vehicle
 
 DT = 0.1
 CONFIG = PipelineConfig()
@@ -49,13 +48,12 @@ def s_bend():
         for late in (0.0, 1.5)
     ]
     position = np.stack([one[0] for one in drives]) + np.array([[[0.0, 0.0]], [[-22.0, 0.0]]])
-    return Encounter(
-        "s",
+    return Encounter.sampled(
         (Vehicle("1"), Vehicle("2")),
-        0,
-        100_000_000,
+        0.1,
         position,
         *(np.stack([d[k] for d in drives]) for k in (1, 2)),
+        name="s",
     )
 
 
@@ -69,13 +67,12 @@ def rolls_out():
         for v in (slow, hard)
     ]
     position = np.stack([one[0] for one in drives]) + np.array([[[0.0, 0.0]], [[0.0, 4.0]]])
-    return Encounter(
-        "r",
+    return Encounter.sampled(
         (Vehicle("1"), Vehicle("2")),
-        0,
-        100_000_000,
+        0.1,
         position,
         *(np.stack([d[k] for d in drives]) for k in (1, 2)),
+        name="r",
     )
 
 

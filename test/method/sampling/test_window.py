@@ -14,7 +14,7 @@ from scenario_gen import generate, PipelineConfig
 from scenario_gen.method.sampling import SamplingConfig
 from scenario_gen.method.sampling.window import AFTER_S, Window, window_of
 from scenario_gen.situation import conflict_of, conflicts_in, Situation
-from scenario_gen.types import ALWAYS, Request
+from scenario_gen.types import Request
 
 FREE = np.zeros(2, dtype=np.bool_)
 
@@ -85,11 +85,7 @@ def test_what_a_recording_holds_by_its_last_sample_is_kept(kind, seed, variety):
     """The record ends as the second one enters, and the drive without deviations ends before."""
     whole = labelled(kind, seed).encounter
     last = math.ceil(conflict_of(whole, 0, 1).entry_second / whole.dt) + 1
-    cut = replace(
-        whole,
-        **{name: getattr(whole, name)[:, :last] for name in ("position", "heading", "speed")},
-        present=ALWAYS,
-    )
+    cut = whole.between(0, last - 1)
     made = generate(
         cut, "corridor", PipelineConfig(sampling=SamplingConfig(variety=variety)), count=10, seed=1
     )

@@ -8,7 +8,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from scenario_gen.types.encounter import Encounter, Vehicle
+from scenario_gen.types import Encounter, Vehicle
 
 
 def straight_encounter(speeds: np.ndarray, noise: float = 0.0, seed: int = 0) -> Encounter:
@@ -20,7 +20,7 @@ def straight_encounter(speeds: np.ndarray, noise: float = 0.0, seed: int = 0) ->
     position += rng.normal(size=position.shape) * noise
     measured = np.maximum(speeds + rng.normal(size=speeds.shape) * noise, 0.0)
     vehicles = tuple(Vehicle(str(i)) for i in range(len(speeds)))
-    return Encounter("made", vehicles, 0, 100_000_000, position, np.zeros_like(speeds), measured)
+    return Encounter.sampled(vehicles, 0.1, position, np.zeros_like(speeds), measured, "made")
 
 
 @pytest.fixture(scope="session")

@@ -9,8 +9,7 @@ import pytest
 from msg_conventions import trajectory
 from msg_conventions.changepoints import encode_live_changepoints
 from scenario_gen.method.segmentation import LiveSegmenter, OnlineSegmenter
-from scenario_gen.types import Sample
-from scenario_gen.types.encounter import Vehicle
+from scenario_gen.types import Sample, Vehicle
 
 TICK = 100_000_000
 START = 10**18

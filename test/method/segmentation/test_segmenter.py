@@ -13,7 +13,7 @@ from support.lengths import LONG
 
 from scenario_gen.base.errors import InputError
 from scenario_gen.method.segmentation import segment, segment_track, SegmentationConfig
-from scenario_gen.types.encounter import Encounter, Tracks, Vehicle
+from scenario_gen.types import Encounter, Motion, Vehicle
 
 
 def wait_and_brake(encounter_of) -> Encounter:
@@ -197,7 +197,7 @@ def test_steps_of_a_pedestrian_are_no_changepoints_and_its_halt_is_seen():
     for speed, changes in ((steady, []), (halts, [6.0, 9.0])):
         position = np.stack([np.cumsum(speed) * 0.1, 0.0 * time], axis=1)
         walker, heading = Vehicle("p", 0.5, 0.5, "pedestrian"), 0.0 * speed[None]
-        alone = Tracks("p", (walker,), 0, 100_000_000, position[None], heading, speed[None])
+        alone = Motion.sampled((walker,), 0.1, position[None], heading, speed[None])
         found = segment(alone, seed=1)
         assert all(min(abs(0.1 * found.changepoints - change)) < 0.5 for change in changes)
         assert len(changes) <= len(found.changepoints) <= 2 * len(changes)

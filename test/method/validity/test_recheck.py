@@ -13,7 +13,7 @@ from support.oracle import off_road, overlapping
 from test_validity_presence import random_case
 
 from benchmarks._recheck import Account, Recheck
-from scenario_gen.types.encounter import Encounter, Vehicle
+from scenario_gen.types import Encounter, Vehicle
 from scenario_gen.types.presence import ALWAYS
 from scenario_gen.types.scenario import BoundaryStates
 
@@ -33,14 +33,13 @@ def crossing(delay=3.0):
 
 
 def recheck_of(scenario, road=None, changepoints=True):
-    encounter = Encounter(
-        "t",
+    encounter = Encounter.sampled(
         scenario.vehicles,
-        0,
-        100_000_000,
+        0.1,
         scenario.position,
         scenario.heading,
         scenario.speed,
+        "t",
         present=scenario.present,
     )
     ends = (

@@ -15,7 +15,7 @@ from scenario_gen.method.validity.collision import ExtendedMotion
 from scenario_gen.method.validity.dynamics import LARGEST_VALUE_RATIO
 from scenario_gen.situation import Situation
 from scenario_gen.situation.interaction import Conflict, find_waits, Wait
-from scenario_gen.types.encounter import Encounter, Vehicle
+from scenario_gen.types import Encounter, Vehicle
 from scenario_gen.types.scenario import BoundaryStates, Cause
 
 TIME = np.arange(101) * 0.1
@@ -80,16 +80,9 @@ def test_a_wait_or_a_conflict_of_nobody_is_refused(index):
 def test_who_stands_in_the_way_does_not_vanish(present, ends):
     """Its first and last state are as asked, it never moves, and it is gone when the other one drives through its place."""
     template = scenario_of([straight(0, 0, 0, 0.0, TIME), straight(-25, 9, 0, 5.0, TIME)], TIME)
-    names = (
-        template.vehicles,
-        0,
-        100_000_000,
-        template.position,
-        template.heading,
-        template.speed,
-    )
+    arrays = (template.time, template.position, template.heading, template.speed)
     encounter, asked = (
-        Encounter("t", *names),
+        Encounter(template.vehicles, *arrays, "t"),
         BoundaryStates(states(template, 0), states(template, -1)),
     )
     own = Checker.of_template(

@@ -13,7 +13,7 @@ from support.motions import arc, FREE, open_road, road_of, scenario_of, straight
 from support.oracle import boxes_at, drivable_area, footprints, off_road, overlapping
 
 from scenario_gen.method.validity import Checker, Limits
-from scenario_gen.types.encounter import Vehicle
+from scenario_gen.types import Vehicle
 from scenario_gen.types.scenario import Cause
 
 COARSE = np.arange(5) * 1.0

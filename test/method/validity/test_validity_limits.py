@@ -14,7 +14,7 @@ from scenario_gen.base.road_users import Dynamics
 from scenario_gen.method.validity import Checker, Limits
 from scenario_gen.situation import Situation
 from scenario_gen.situation.interaction import Conflict, find_conflicts, Wait
-from scenario_gen.types.encounter import Encounter, Vehicle
+from scenario_gen.types import Encounter, Vehicle
 from scenario_gen.types.scenario import BoundaryStates, Cause
 
 TIME = np.arange(201) * 0.1
@@ -296,14 +296,13 @@ def test_the_least_gap_follows_the_template_unless_it_is_given():
             np.column_stack([5.0 * time, np.full(51, 2.5)]),
         ]
     )
-    beside = Encounter(
-        "beside",
+    beside = Encounter.sampled(
         (Vehicle("a"), Vehicle("b")),
-        0,
-        100_000_000,
+        0.1,
         position,
         np.zeros((2, 51)),
         np.full((2, 51), 5.0),
+        "beside",
     )
     assert Limits().clearance == 0.0  # nothing is known of a template
     assert Limits().for_template(Situation.of(beside)).clearance == pytest.approx(

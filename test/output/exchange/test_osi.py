@@ -43,10 +43,10 @@ def test_the_motion_is_that_of_the_bag(small_bag, exported):
         for k, message in enumerate(found):
             things = {thing.id.value: thing for thing in message.moving_object}
             assert set(things) == {
-                int(scenario.vehicles[n].id) for n in np.flatnonzero(scenario.there[:, k])
+                int(scenario.vehicles[n].id) for n in np.flatnonzero(scenario.is_present[:, k])
             }
             for n, vehicle in enumerate(scenario.vehicles):
-                if not scenario.there[n, k]:
+                if not scenario.is_present[n, k]:
                     continue
                 base = things[int(vehicle.id)].base
                 assert np.allclose(
@@ -90,8 +90,8 @@ def test_what_is_exported_is_read_back(small_bag, exported):
         assert set(found) == {vehicle.id for vehicle in scenario.vehicles}
         for n, vehicle in enumerate(scenario.vehicles):
             track = found[vehicle.id]
-            assert np.allclose(track.fix, scenario.position[n, scenario.there[n]], atol=1e-6)
-            assert np.allclose(track.speed, scenario.speed[n, scenario.there[n]], atol=1e-6)
+            assert np.allclose(track.fix, scenario.position[n, scenario.is_present[n]], atol=1e-6)
+            assert np.allclose(track.speed, scenario.speed[n, scenario.is_present[n]], atol=1e-6)
 
 
 def test_ids_that_are_no_numbers_are_counted_and_that_is_said(small_bag, tmp_path):

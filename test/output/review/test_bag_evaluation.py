@@ -242,7 +242,6 @@ def test_what_a_bag_does_not_hold_is_left_out_and_said(tmp_path):
     assert case.road is None and case.evaluation.changepoints == 0
     page = render(ReportInput([case]))
     assert (
-        "not checked whether vehicles leave the road" in page
-        and "counts as one primitive" in page
+        "not checked whether vehicles leave the road" in page and "counts as one primitive" in page
     )
     assert '"road":null,' in page

@@ -27,8 +27,8 @@ def left_turn(median, start):
     speed = np.stack((np.full(STEPS, 4.0), np.where(np.arange(STEPS) < 39, 8.0, 0.0)))
     heading = np.stack((yaw, np.full(STEPS, np.pi)))
     vehicles = (Vehicle("turns", 4.0, 1.8), Vehicle("oncoming", 4.0, 1.8))
-    return Encounter(
-        "left turn", vehicles, 0, round(DT * 1e9), np.stack((turning, oncoming)), heading, speed
+    return Encounter.sampled(
+        vehicles, DT, np.stack((turning, oncoming)), heading, speed, "left turn"
     )
 
 

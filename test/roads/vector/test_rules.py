@@ -51,9 +51,9 @@ def crossing(first="w", second="s", stands=True):
 
 
 def template(motion):
-    names = ("vehicles", "position", "heading", "speed")
-    own = {name: getattr(motion, name) for name in names}
-    return Encounter(name="crossing", start_ns=0, dt_ns=round(DT * 1e9), **own)
+    return Encounter.sampled(
+        motion.time, motion.heading, motion.speed, "crossing", motion.vehicles, motion.position
+    )
 
 
 def network_with(folder, suffix, signs):

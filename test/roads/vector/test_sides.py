@@ -9,8 +9,7 @@ from support import map_builders
 
 from scenario_gen.roads import build_road, road_and_template
 from scenario_gen.situation.traffic_side import mirrored
-from scenario_gen.types import Note, NoteKind
-from scenario_gen.types.encounter import Encounter, Vehicle
+from scenario_gen.types import Encounter, Note, NoteKind, Vehicle
 
 
 def oncoming(side):
@@ -21,14 +20,8 @@ def oncoming(side):
         [np.column_stack([sign * way, np.full(81, -1.75 * side * sign)]) for sign in (1.0, -1.0)]
     )
     heading = np.stack([np.zeros(81), np.full(81, np.pi)])
-    return Encounter(
-        "o",
-        (Vehicle("1"), Vehicle("2")),
-        0,
-        100_000_000,
-        position,
-        heading,
-        np.full((2, 81), 10.0),
+    return Encounter.sampled(
+        (Vehicle("1"), Vehicle("2")), 0.1, position, heading, np.full((2, 81), 10.0), "o"
     )
 
 

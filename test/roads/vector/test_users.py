@@ -154,7 +154,7 @@ def beside(kind):
     size = VEHICLE_TYPES[kind]
     vehicles = (Vehicle("a", 4.5, 1.8), Vehicle("b", size.length, size.width, kind))
     states = {"position": position, "heading": np.zeros((2, 80)), "speed": np.full((2, 80), 5.0)}
-    return Encounter(name="beside", start_ns=0, dt_ns=100_000_000, vehicles=vehicles, **states)
+    return Encounter.sampled(vehicles, 0.1, name="beside", **states)
 
 
 def street(tmp_path, kind, access=""):

@@ -1,0 +1,266 @@
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""The motion of vehicles on one clock; encounters and scenarios are motions."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import Any, NamedTuple, Self, TYPE_CHECKING
+
+import numpy as np
+
+from scenario_gen.numerics import Bools, canonical_heading, Floats, freeze, frozen, Ints
+from scenario_gen.numerics.boxes import corners
+from scenario_gen.numerics.hermite import fill_states
+from scenario_gen.types.presence import ALWAYS, always, canonical_presence, held, mask, together
+from scenario_gen.types.vehicle import Vehicle
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from pandas import DataFrame
+
+TIME_TOLERANCE_S = 1e-9  # times are whole nanoseconds
+
+
+class States(NamedTuple):
+    """The states of N vehicles at M times, or, without the axis M, at one time.
+
+    Attributes:
+        position: (N, M, 2) metres.
+        heading: (N, M) rad.
+        speed: (N, M) m/s.
+        is_present: (N, M) whether the vehicle is present.
+    """
+
+    position: Floats
+    heading: Floats
+    speed: Floats
+    is_present: Bools
+
+    @property
+    def poses(self) -> Floats:
+        """(N, M, 3) x, y [m], heading [rad]."""
+        return np.concatenate([self.position, self.heading[..., None]], axis=-1)
+
+
+@dataclass(frozen=True, eq=False)
+class Motion:
+    """N vehicles over T >= 2 samples.
+
+    The motion is defined between two samples, too: position is the cubic Hermite interpolant of
+    the two positions and velocity vectors (speed along heading); heading and speed are linear.
+    The validity checker proves that motion.
+
+    Attributes:
+        vehicles: N identities and footprints.
+        time: (T,) seconds, strictly increasing, rounded to nanoseconds.
+        position: (N, T, 2) metres, of the footprints' centres.
+        heading: (N, T) rad, counter-clockwise from x, continuous in time (unwrapped).
+        speed: (N, T) m/s, >= 0.
+        present: (N, 2) first and last sample at which each vehicle is present. The rows of the
+            arrays hold their first or last value outside of it. Default: always present.
+
+    Example:
+        >>> import numpy as np
+        >>> position = np.array([[[0.0, 0.0], [1.0, 0.0], [2.0, 0.0]]])
+        >>> heading, speed = np.zeros((1, 3)), np.full((1, 3), 10.0)
+        >>> motion = Motion.sampled((Vehicle("a"),), 0.1, position, heading, speed)
+        >>> motion.at(0.15).position.round(3)
+        array([[1.5, 0. ]])
+    """
+
+    vehicles: tuple[Vehicle, ...]
+    time: Floats
+    position: Floats
+    heading: Floats
+    speed: Floats
+    present: Ints = field(default_factory=lambda: ALWAYS, kw_only=True)
+
+    @classmethod
+    def sampled(
+        cls,
+        vehicles: tuple[Vehicle, ...],
+        period: float,
+        position: Floats,
+        heading: Floats,
+        speed: Floats,
+        *args: Any,
+        **fields: Any,
+    ) -> Self:
+        """Return a motion that is sampled every `period` [s] from 0 s on; the rest as in the class."""
+        time = frozen(np.arange(np.shape(speed)[-1]) * period)
+        return cls(vehicles, time, position, heading, speed, *args, **fields)
+
+    def __post_init__(self) -> None:
+        present = canonical_presence(self.present, len(self.vehicles), len(self.time), self.title)
+        freeze(
+            self,
+            time=frozen(np.round(self.time, 9)),
+            position=held(frozen(self.position), present),
+            heading=held(canonical_heading(self.heading), present),
+            speed=held(frozen(self.speed), present),
+            present=present,
+        )
+
+    @property
+    def title(self) -> str:
+        """Its name in messages."""
+        return "motion"
+
+    @property
+    def dt(self) -> float:
+        """Seconds between the first two samples: the period of an evenly sampled motion."""
+        return float(self.time[1] - self.time[0])
+
+    @property
+    def duration(self) -> float:
+        """Seconds from the first to the last sample."""
+        return float(self.time[-1] - self.time[0])
+
+    @property
+    def all_present(self) -> bool:
+        """Whether every vehicle is always present."""
+        return always(self.present, len(self.time))
+
+    @cached_property
+    def is_present(self) -> Bools:
+        """(N, T) whether each vehicle is present at each sample."""
+        return mask(self.present, len(self.time))
+
+    @property
+    def poses(self) -> Floats:
+        """(N, T, 3) x, y [m], heading [rad]."""
+        return np.concatenate([self.position, self.heading[..., None]], axis=-1)
+
+    def present_slice(self, *rows: int) -> slice:
+        """Return the samples at which all of these vehicles are present; empty if there are none."""
+        return together(self.present, *rows)
+
+    def at(self, time: Floats | float) -> States:
+        """Return the states of all vehicles at times (M,) or at one time [s].
+
+        A vehicle that is not present has its first or last state.
+        """
+        times = np.atleast_1d(np.asarray(time, dtype=np.float64))
+        out = np.empty((len(self.vehicles), len(times), 4))
+        arrays = (self.position, self.heading, self.speed)
+        fill_states(self.time, *arrays, self.present, times, out)
+        first, last = self.time[self.present].T
+        is_present = (times >= first[:, None] - TIME_TOLERANCE_S) & (
+            times <= last[:, None] + TIME_TOLERANCE_S
+        )
+        if np.ndim(time) == 0:
+            out, is_present = out[:, 0], is_present[:, 0]
+        return States(out[..., :2], out[..., 2], out[..., 3], is_present)
+
+    def resampled(self, dt: float) -> Self:
+        """Return the motion every `dt` [s] from its start on; a last part shorter than dt is dropped."""
+        count = int(np.floor(self.duration / dt + 1e-6)) + 1
+        return self.at_times(np.minimum(self.time[0] + np.arange(count) * dt, self.time[-1]))
+
+    def at_times(self, time: Floats) -> Self:
+        """Return the motion sampled at other times (M,) [s] within it; M >= 2.
+
+        A vehicle has two samples at least, be its presence ever so short.
+        """
+        if self.time.shape == time.shape and np.allclose(
+            time, self.time, rtol=0.0, atol=TIME_TOLERANCE_S
+        ):
+            return self
+        ends = self.time[self.present]
+        first = np.searchsorted(time, ends[:, 0] - TIME_TOLERANCE_S)
+        last = np.searchsorted(time, ends[:, 1] + TIME_TOLERANCE_S, side="right") - 1
+        first = np.minimum(first, len(time) - 2)
+        present = np.column_stack([first, np.maximum(last, first + 1)])
+        return replace(self, time=time, present=present, **self._arrays_at(time))
+
+    def _arrays_at(self, time: Floats) -> dict[str, Any]:
+        """Return the arrays at times (M,) [s], by field."""
+        states = self.at(time)
+        return {"position": states.position, "heading": states.heading, "speed": states.speed}
+
+    def between(self, first: int, last: int) -> Self:
+        """Return the motion from sample `first` to sample `last`, as `select` does."""
+        return self.select(range(len(self.vehicles)), first, last)
+
+    def select(self, rows: Sequence[int], first: int = 0, last: int | None = None) -> Self:
+        """Return some vehicles, in this order, from sample `first` to `last` (default: the last one).
+
+        The clock of the result starts at 0 s.
+
+        Raises:
+            InputError: a vehicle has less than two samples there.
+        """
+        last = len(self.time) - 1 if last is None else last
+        chosen, part = list(rows), slice(first, last + 1)
+        return replace(
+            self,
+            vehicles=tuple(self.vehicles[n] for n in chosen),
+            time=self.time[part] - self.time[first],
+            present=np.clip(self.present[chosen] - first, 0, last - first),
+            **{name: getattr(self, name)[chosen, part] for name in self.array_names},
+        )
+
+    def pair(self, i: int, j: int) -> "Motion":
+        """Return the motion of two vehicles while both are present, on the same clock.
+
+        Raises:
+            InputError: they have less than two common samples.
+        """
+        both = self.present_slice(i, j)
+        rows = [i, j]
+        return Motion(
+            (self.vehicles[i], self.vehicles[j]),
+            self.time[both],
+            self.position[rows, both],
+            self.heading[rows, both],
+            self.speed[rows, both],
+        )
+
+    @property
+    def array_names(self) -> tuple[str, ...]:
+        """The names of the arrays (N, T, ...)."""
+        return ("position", "heading", "speed")
+
+    def footprints(self, k: int) -> Floats:
+        """Return the corners (N, 4, 2) [m] of all vehicles at sample k, from the front left one counter-clockwise."""
+        poses = self.poses[:, k]
+        return np.concatenate(
+            [
+                corners(pose[None], vehicle.length, vehicle.width)
+                for pose, vehicle in zip(poses, self.vehicles, strict=True)
+            ]
+        )
+
+    def columns(self) -> dict[str, Any]:
+        """Return the columns of its table: a row for each vehicle and each sample at which it is present."""
+        row, sample = np.nonzero(self.is_present)
+        ids = np.array([vehicle.id for vehicle in self.vehicles], dtype=object)
+        return {
+            "vehicle": ids[row],
+            "time": self.time[sample],
+            "x": self.position[row, sample, 0],
+            "y": self.position[row, sample, 1],
+            "heading": self.heading[row, sample],
+            "speed": self.speed[row, sample],
+        }
+
+    def to_dataframe(self) -> "DataFrame":
+        """Return a table with a row for each vehicle and each sample at which it is present.
+
+        Columns: vehicle (id), time [s], x, y [m], heading [rad], speed [m/s]. `read_log` reads such tables.
+        """
+        import pandas as pd
+
+        return pd.DataFrame(self.columns())
+
+    def plot(self, ax: "Axes | None" = None) -> "Axes":
+        """Draw the vehicles' paths, as `scenario_gen.plot` does.
+
+        Raises:
+            MissingExtraError: matplotlib is not installed.
+        """
+        import scenario_gen
+
+        return scenario_gen.plot(self, ax)
