@@ -8,7 +8,7 @@ from contextlib import suppress
 from dataclasses import dataclass, Field, field, fields, is_dataclass, replace
 import math
 from pathlib import Path
-from typing import Any, ClassVar, TypeVar
+from typing import Any, TypeVar
 
 from scenario_gen.base.documents import parse_yaml, read_yaml, shown, WHOLE
 from scenario_gen.base.errors import did_you_mean, InputError
@@ -54,14 +54,9 @@ def parameter(
 class Parameters:
     """Base of every configuration: its values are checked when it is created.
 
-    Attributes:
-        replaced: of names that parameters had in earlier versions, the parameters that are set instead.
-
     Raises:
         InputError: a value has the wrong type or is out of range.
     """
-
-    replaced: ClassVar[Mapping[str, str]] = {}
 
     @property
     def of_plugins(self) -> "Mapping[str, Parameters]":
@@ -122,14 +117,7 @@ def _of_plugins(config: Any) -> Mapping[str, Parameters]:
 
 
 def _unknown(config: Any, name: str, prefix: str = "") -> str:
-    """Return the message on a name that is no parameter of a configuration, or no longer one."""
-    holder, own = config, name
-    while "." in own and is_dataclass(getattr(holder, own.partition(".")[0], None)):
-        head, _, own = own.partition(".")
-        holder = getattr(holder, head)
-    replaced = getattr(holder, "replaced", {})
-    if own in replaced:
-        return f"parameter {prefix}{name} is no longer there; set {replaced[own]}, by which all stages go"
+    """Return the message on a name that is no parameter of a configuration."""
     near = did_you_mean(name, flatten(config))
     return f"unknown parameter {prefix}{shown(name)}; `scenario-gen parameters` lists them{near}"
 

@@ -10,7 +10,7 @@ Walking: Weidmann 1993 (1.34 m/s, to 2 m/s); running ends at 5 m/s. Bicycles: 45
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 import math
 
 from scenario_gen.base.parameters import parameter, Parameters
@@ -147,11 +147,6 @@ VEHICLE_TYPES = Registry[VehicleType](
 """By name; those of installed packages come last."""
 
 
-OF_CARS = {
-    entry.name: f"limits.{CAR}.{entry.name} (or that of another type)"
-    for entry in fields(Dynamics)
-}
-"""Names that parameters of all vehicles had, in several configurations, and the parameters of cars."""
 _BUILT_IN = VEHICLE_TYPES.built_in
 
 
@@ -162,8 +157,6 @@ class TypeLimits(Parameters):
     Attributes:
         plugins: of types of installed packages, what was set, by name; the last one counts. Else they keep those of their entry.
     """
-
-    replaced = OF_CARS
 
     car: Dynamics = _BUILT_IN[CAR].dynamics
     van: Dynamics = _BUILT_IN["van"].dynamics

@@ -64,7 +64,6 @@ class Drive:
             help="Also drive the non-reactive baseline, to show how many scenarios need no reaction."
         ),
     ] = True
-    unlooking: Annotated[bool, typer.Option(hidden=True)] = True  # earlier name of --baseline
     out: Annotated[
         Path, typer.Option(help="Folder for drives.json, junit.xml and drives.html.")
     ] = Path("out/drives")
@@ -99,7 +98,7 @@ def drive(options: Drive) -> None:
             options.out,
             progress=lambda done, total: advance(planner, done, total),
             run=_over_dds() if options.ros else processes,
-            baseline=processes if options.baseline and options.unlooking else None,
+            baseline=processes if options.baseline else None,
         )
     _report(result, options.out)
     if result.broken:

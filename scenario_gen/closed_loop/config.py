@@ -3,9 +3,7 @@
 
 """The parameters of a drive in closed loop."""
 
-from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import ClassVar
 
 from scenario_gen.base.parameters import parameter, Parameters
 from scenario_gen.base.road_users import TypeLimits
@@ -19,13 +17,6 @@ TEMPLATE, NEVER = "template", "never"
 @dataclass(frozen=True)
 class ClosedLoopConfig(Parameters):
     """How the others drive, what the ego's body can do, when a drive ends, and what the verdict counts."""
-
-    replaced: ClassVar[Mapping[str, str]] = {
-        "ego_acceleration": "limits.<type of the ego>.max_acceleration",
-        "ego_braking": "limits.<type of the ego>.max_deceleration",
-        "ego_speed": "limits.<type of the ego>.max_speed",
-        "ego_curvature": "limits.<type of the ego>.max_curvature",
-    }
 
     step: float = parameter(0.1, "time between two decisions", unit="s", low=0.005, high=0.5)
     policy: str = parameter(

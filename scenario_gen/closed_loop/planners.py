@@ -160,6 +160,3 @@ class ReferenceFollower:
         )
         x, y = s.position[n, k].tolist()
         return Pose(x, y, float(s.heading[n, k]), float(s.speed[n, k]))
-
-
-Unlooking, WitnessFollower = NonReactive, ReferenceFollower  # by their names of an earlier version

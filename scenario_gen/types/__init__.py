@@ -7,7 +7,6 @@ from scenario_gen.base.road_users import (
     CAR,
     Dynamics,
     LANE_USERS,
-    OF_CARS,
     ON_THE_SPOT,
     OTHER,
     TypeLimits,
@@ -75,7 +74,6 @@ from scenario_gen.types.row_names import (
     NARROW,
     RECORDING,
     REPLAY,
-    row_name,
     UNIFORM,
     WITH,
     WITHOUT,
@@ -98,7 +96,7 @@ from scenario_gen.types.vehicle import most_exposed, Vehicle
 
 __all__ = [
     "ALWAYS", "CAR", "CARS", "COARSEST", "DRIVERS", "ENDS", "ERRORS", "FACTS", "FARTHEST", "FINEST", "FOLLOW", "LANE_USERS",
-    "LEVEL", "NARROW", "OF_CARS", "ON_THE_SPOT", "ORDERS", "OTHER", "RECOMBINED", "RECORDING", "REPLAY",
+    "LEVEL", "NARROW", "ON_THE_SPOT", "ORDERS", "OTHER", "RECOMBINED", "RECORDING", "REPLAY",
     "SCHEMA", "UNIFORM", "UNITS", "VEHICLE_TYPES", "WHEELBASE", "WITH", "WITHOUT", "YIELD", "BoundaryStates", "Cause",
     "CheckCounts", "Coverage", "DrawnFor", "Dynamics", "EgoSlot", "Encounter", "Evaluation", "Fit", "FittedVehicle",
     "GenerationResult", "Interval", "Lane", "LaneNetwork", "LiveChangepoints", "Loss", "Measure", "Measures", "Metric", "Motion", "Note", "NoteKind", "Pair",
@@ -106,7 +104,7 @@ __all__ = [
     "ScenarioSet", "Segmentation", "Spread", "State", "States", "Target", "TrafficRule", "TypeLimits", "Vehicle",
     "VehicleType", "Verdict", "Violation", "always", "as_markdown", "at_ends", "canonical_presence", "causes_in_words", "cut",
     "formatted", "height", "join_ego", "join_pieces", "lanes_for", "lost_pairs", "mask", "most_exposed", "note_kinds", "once_per_object",
-    "reaction_facts", "read_numbers", "read_states", "rear_axle", "recorded_notes", "routes_in_words", "row_name", "shifted", "split_off",
+    "reaction_facts", "read_numbers", "read_states", "rear_axle", "recorded_notes", "routes_in_words", "shifted", "split_off",
     "split_pieces", "together", "token",
     "tokens", "usual_type", "vehicle_index", "with_witness", "words", "yielders_of",
 ]  # fmt: skip

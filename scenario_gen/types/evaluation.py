@@ -14,7 +14,6 @@ from typing import Any, Literal
 from scenario_gen.base.documents import COUNT, NUMBER, parse_json
 from scenario_gen.base.errors import printable
 from scenario_gen.types.notes import Note, NoteKind
-from scenario_gen.types.row_names import FORMER, row_name
 from scenario_gen.types.scenario import Cause, ScenarioSet, Verdict
 
 Better = Literal["lower", "higher", ""]
@@ -174,7 +173,6 @@ class Evaluation:
 
     def row(self, name: str) -> Row | None:
         """Return the row of that name, or None."""
-        name = row_name(name)
         return next((row for row in self.rows if row.name == name), None)
 
     def value(self, row: str, metric: str) -> float:
@@ -297,7 +295,7 @@ def _row(document: Mapping[str, Any]) -> Row:
         for key, entry in document["values"].items()
     }
     return Row(
-        FORMER.get(document["name"], document["name"]),
+        document["name"],
         document["samples"],
         values,
         tuple(Note(NoteKind.TEXT, recorded=text) for text in document["notes"]),

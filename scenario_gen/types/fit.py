@@ -8,7 +8,6 @@ from typing import Any
 
 import numpy as np
 
-from scenario_gen.base.renaming import Renamed
 from scenario_gen.numerics import Bools, canonical_poses, Floats, freeze, frozen, Ints
 from scenario_gen.types.notes import Note
 from scenario_gen.types.scenario import BoundaryStates
@@ -96,7 +95,6 @@ class Fit:
     requested: BoundaryStates
     notes: tuple[Note, ...]
     losses: tuple[Loss, ...] = ()
-    lost = Renamed("losses")
 
     def figures(self) -> dict[str, Any]:
         """Return what is lost, and by vehicle what was decided, ready for JSON."""

@@ -11,7 +11,6 @@ from pathlib import Path
 from typing import Any, TYPE_CHECKING
 
 from scenario_gen.base.errors import InputError
-from scenario_gen.base.renaming import Renamed
 from scenario_gen.types.coverage import Coverage
 from scenario_gen.types.encounter import Encounter
 from scenario_gen.types.evaluation import Evaluation
@@ -73,12 +72,6 @@ class GenerationResult:
     valid: int | None = None
     coverage: Coverage | None = None
     not_compared: str = ""
-    apart, row, oracle = Renamed("not_compared"), Renamed("row_name"), Renamed("replay")
-    outdone, placed, lost = (
-        Renamed("better_references"),
-        Renamed("road_and_fit"),
-        Renamed("losses"),
-    )
 
     def __repr__(self) -> str:
         road = self.road.name if self.road is not None else "no road"

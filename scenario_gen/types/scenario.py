@@ -11,7 +11,6 @@ from typing import Any, TYPE_CHECKING
 
 import numpy as np
 
-from scenario_gen.base.renaming import Renamed
 from scenario_gen.numerics import canonical_poses, Floats, freeze, frozen
 from scenario_gen.types.motion import Motion
 from scenario_gen.types.notes import Note
@@ -60,7 +59,6 @@ class Scenario(Motion):
     frame_id: str = "map"
     reference_drive: "Scenario | None" = None
     facts: Mapping[str, str] = field(default_factory=dict)
-    witness = Renamed("reference_drive")
 
     def __post_init__(self) -> None:
         super().__post_init__()

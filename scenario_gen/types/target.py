@@ -24,7 +24,6 @@ UNITS = {
 Pair = tuple[int, ...]  # of vehicle indices; one: with whom it is the most critical
 _FORM = "NAME=LOW..HIGH, NAME[a]=LOW..HIGH or NAME[a,b]=LOW..HIGH"
 _EXAMPLE = "pet=0.5..1.5; ttc[1,2]=1..2"
-_RENAMED = {"unlooking": "baseline_margin"}  # names of earlier versions
 
 
 @dataclass(frozen=True)
@@ -130,7 +129,7 @@ def read_targets(text: str) -> tuple[Target, ...]:
     for piece in split_pieces(text):
         head, _, bounds = piece.partition("=")
         name, bracket, inside = head.strip().partition("[")
-        name = _RENAMED.get(name.strip(), name.strip())
+        name = name.strip()
         ids = tuple(word.strip() for word in inside.rstrip("] ").split(",")) if bracket else ()
         words = bounds.split("..")
         if len(words) != 2 or (

@@ -58,13 +58,3 @@ def test_each_type_has_limits_of_its_own_to_set():
     assert Dynamics().planned == Dynamics(40.0, 4.5, 8.0, 5.0, 0.225)
     with pytest.raises(InputError, match=r"limits\.bus.*max_acceleration is -1"):
         assigned(PipelineConfig(), "limits.bus.max_acceleration=-1")
-
-
-@pytest.mark.parametrize(
-    "name", ["sampling.max_speed", "planning.max_curvature", "limits.max_acceleration"]
-)
-def test_a_name_of_before_is_refused_with_the_one_that_replaces_it(name):
-    with pytest.raises(
-        InputError, match=rf"{name} is no longer there; set limits\.car\.{name.partition('.')[2]}"
-    ):
-        assigned(PipelineConfig(), f"{name}=1")

@@ -13,7 +13,6 @@ from support.driving_scenes import crossing
 from support.lengths import LONG
 
 from benchmarks._driving_worlds import Anything, as_scenario, draw_scenario, PERIOD, Witness
-from scenario_gen.base.errors import InputError
 from scenario_gen.base.parameters import assigned
 from scenario_gen.closed_loop.config import ClosedLoopConfig
 from scenario_gen.closed_loop.ego import Command, EgoState, move, Pose
@@ -183,16 +182,10 @@ class Late(Witness):
         return super().act(replace(seen, time=seen.time + self.begin))
 
 
-def test_limits_of_its_type_bind_the_ego_and_their_former_names_are_refused():
+def test_limits_of_its_type_bind_the_ego():
     config = assigned(ClosedLoopConfig(), "limits.car.max_acceleration=1.2")
     loop = ClosedLoop(crossing(), 0, config=config)
     state = loop.step(loop.start(), Command(9.0, 0.0))
     assert (
         state.ego.acceleration == pytest.approx(1.2) and loop.task().limits.max_acceleration == 1.2
     )
-    for name in ("acceleration", "braking", "speed", "curvature"):
-        with pytest.raises(
-            InputError,
-            match=rf"ego_{name} is no longer there; set limits\.<type of the ego>\.max_",
-        ):
-            assigned(ClosedLoopConfig(), f"ego_{name}=1")

@@ -12,7 +12,6 @@ from typer.testing import CliRunner
 
 from benchmarks._driving_worlds import as_scenario
 from scenario_gen.cli.commands import app
-from scenario_gen.closed_loop import planners
 from scenario_gen.closed_loop.config import ClosedLoopConfig
 from scenario_gen.closed_loop.ego import Command
 from scenario_gen.closed_loop.origin import Trial
@@ -30,7 +29,6 @@ from scenario_gen.closed_loop.verdict import judge
 from scenario_gen.logs.synthetic import bundled
 from scenario_gen.output.review.regenerate import regenerate_scenario
 from scenario_gen.output.review.validation import validate_bag
-from scenario_gen.types.target import read_targets
 
 
 class FullThrottle(RouteFollower):
@@ -148,8 +146,3 @@ def test_a_set_that_hardly_tests_says_so(tmp_path):
         == "".join(drives.notes()).count("baseline passes")
     )
     assert 'name="policy" value="reactive"' in (tmp_path / "junit.xml").read_text()
-
-
-def test_planners_and_targets_of_earlier_names_are_those_of_today():
-    assert planners.Unlooking is NonReactive
-    assert read_targets("unlooking[2]=..0") == read_targets("baseline_margin[2]=..0")

@@ -127,34 +127,3 @@ def test_results_are_counted_indexed_and_made_a_table():
     assert list(dataframe([]).columns) == list(table.columns)
     for thing in (result, result.generated, first, result.encounter, result.road):
         assert len(repr(thing)) < 120 and repr(thing).startswith(type(thing).__name__)
-
-
-def test_names_of_the_version_before_still_work_with_a_warning():
-    """Fields, properties, methods and the row of the replay; a set that is measured under the old name is the replay."""
-    made = hand_made_run()
-    names = {"apart": "not_compared", "row": "row_name", "oracle": "replay", "lost": "losses"}
-    for old, new in names.items():
-        with pytest.warns(DeprecationWarning, match=f"GenerationResult.{old} is now {new}"):
-            assert getattr(made, old) is getattr(made, new) or getattr(made, old) == getattr(
-                made, new
-            )
-    with pytest.warns(DeprecationWarning, match="road_and_fit"):
-        assert made.placed() == made.road_and_fit()
-    with pytest.warns(DeprecationWarning, match=r"Fit.lost is now losses"):
-        assert made.fit.lost == made.fit.losses
-    with pytest.warns(DeprecationWarning, match=r"Scenario.witness is now reference_drive"):
-        assert made[0].witness is made[0].reference_drive
-
-
-def test_the_replay_is_found_by_the_name_that_its_row_had():
-    case = result(**FIVE)
-    with pytest.warns(DeprecationWarning, match="row 'oracle' of an evaluation is now 'replay'"):
-        assert (
-            case.evaluation.value("oracle", "e_position")
-            == case.evaluation.value(REPLAY, "e_position")
-            == 0.001
-        )
-    former = replace(case.evaluation, level=0.95).to_json().replace('"replay"', '"oracle"')
-    assert [row.name for row in Evaluation.from_json(former).rows] == [
-        row.name for row in case.evaluation.rows
-    ]

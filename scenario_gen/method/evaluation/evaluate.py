@@ -25,7 +25,6 @@ from scenario_gen.types import (
     RECORDING,
     REPLAY,
     Row,
-    row_name,
     Scenario,
     ScenarioSet,
 )
@@ -96,11 +95,7 @@ def evaluate_scenarios(
     Raises:
         InputError: a scenario has a vehicle that the encounter has not.
     """
-    named = (
-        {row_name(name): given for name, given in sets.items()}
-        if isinstance(sets, Mapping)
-        else {"scenarios": sets}
-    )
+    named = sets if isinstance(sets, Mapping) else {"scenarios": sets}
     accounts = {
         name: CheckCounts.of_set(given)
         for name, given in named.items()

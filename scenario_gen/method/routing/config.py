@@ -16,7 +16,6 @@ from scenario_gen.method.routing.search.rrt_star_connect import (
     RrtStarConnect,
     RrtStarConnectConfig,
 )
-from scenario_gen.types import OF_CARS
 
 
 class MakePlanner(Protocol):
@@ -50,8 +49,6 @@ PLANNERS = Registry[MakePlanner](
 @dataclass(frozen=True)
 class PlanningConfig(Parameters):
     """How routes are planned."""
-
-    replaced = OF_CARS
 
     planner: str = parameter(
         "rrt_star_connect",

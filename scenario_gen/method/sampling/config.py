@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 from scenario_gen.base.parameters import parameter, Parameters
-from scenario_gen.types import OF_CARS, VehicleType
+from scenario_gen.types import VehicleType
 
 POPULATION = {
     "arrival_sigma": 2.0,
@@ -25,8 +25,6 @@ class SamplingConfig(Parameters):
 
     Source: σ_f and l of eq 14, σ_ω of eq 13; the others are ours.
     """
-
-    replaced = OF_CARS
 
     variety: str = parameter(
         "wide",

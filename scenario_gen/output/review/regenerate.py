@@ -25,7 +25,6 @@ from scenario_gen.bags.storage.writer import atomic_bag
 from scenario_gen.base.errors import InputError, ScenarioGenError
 from scenario_gen.base.folders import Kind, sha256_of
 from scenario_gen.base.provenance import read_parameters, versions
-from scenario_gen.base.renaming import Renamed
 from scenario_gen.logs import LogConfig, read_log
 from scenario_gen.method.chain import Chain
 from scenario_gen.method.config import PipelineConfig
@@ -60,7 +59,6 @@ class Regenerated:
     messages: tuple[BagMessage, ...]
     sha256: str
     distance: float | None
-    apart = Renamed("distance")
 
     @property
     def comparison(self) -> str:
