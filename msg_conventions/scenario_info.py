@@ -30,6 +30,8 @@ from scenario_gen.types import (
     FACTS,
     note_kinds,
     ORDERS,
+    Recombined,
+    Recorded,
     recorded_notes,
     Scenario,
     ScenarioSet,
@@ -38,6 +40,7 @@ from scenario_gen.types import (
 
 INFO = "scenarios/info"
 REFUSED, ADAPTATION, TARGET = "refused.", "adaptation.", "target."
+RECOMBINED = ("recombined.first", "recombined.second")  # encounters that the vehicles come from
 KINDS = f"{ADAPTATION}kinds"  # of the adaptations, in their order
 REACTION, CUT = (
     "reaction.",
@@ -182,8 +185,15 @@ class RequestSummary:
             key: value
             for key, value in self.values.items()
             if key not in known
+            and key not in RECOMBINED
             and not key.startswith((REFUSED, ADAPTATION, TARGET, REACTION, "ego"))
         }
+
+    @property
+    def source(self) -> Recorded | Recombined:
+        """Whether the vehicles of the template were recorded together."""
+        names = [self.values[key] for key in RECOMBINED if key in self.values]
+        return Recombined(*names) if len(names) == len(RECOMBINED) else Recorded()
 
     def result(self, scenarios: tuple[Scenario, ...] = ()) -> ScenarioSet:
         """Return the counts as a set of these scenarios.
@@ -254,6 +264,13 @@ class RequestSummary:
 
 
 Info = ScenarioEntry | RequestSummary
+
+
+def source_values(source: Recorded | Recombined) -> dict[str, str]:
+    """Return the values of a summary that say which encounters a recombined template comes from."""
+    if isinstance(source, Recorded):
+        return {}
+    return dict(zip(RECOMBINED, (source.first, source.second), strict=True))
 
 
 def encode_info(info: Info, stamp_ns: int) -> bytes:

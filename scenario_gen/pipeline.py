@@ -24,6 +24,7 @@ from scenario_gen.types import (
     GenerationResult,
     Note,
     NoteKind,
+    Recombined,
     Request,
     Road,
     Scenario,
@@ -91,8 +92,8 @@ def generate(
         notes = map(str, result.generated.adaptations)
         why = "; ".join((causes or "none was drawn", *notes))
         raise RefusedError(f"none of {result.generated.candidates} candidates is valid: {why}")
-    if parents := encounter.parents:
-        result = result.noted(Note.of(NoteKind.RECOMBINED, first=parents[0], second=parents[1]))
+    if isinstance(encounter.source, Recombined):
+        result = result.noted(Note.of(NoteKind.RECOMBINED, **vars(encounter.source)))
     if config.evaluation.compare:
         result = with_references(result, situation, config, request, population)
     result = replace(result, replay=replay(encounter, result.road_and_fit()[1], road.frame_id))

@@ -18,7 +18,7 @@ from scenario_gen.method.nearest import answer_refusal
 from scenario_gen.method.recombination import recombinations
 from scenario_gen.output.results import BAG, GENERATED, provenance_of, write_results
 from scenario_gen.pipeline import generate, PipelineConfig
-from scenario_gen.types import Encounter, GenerationResult, NoteKind, Request
+from scenario_gen.types import Encounter, GenerationResult, NoteKind, Recombined, Recorded, Request
 
 if TYPE_CHECKING:
     from scenario_gen.closed_loop.reacting import Testing
@@ -180,7 +180,8 @@ def recombine(
     """Return encounters recombined of recorded ones, which are put among the sources; tell how many, and why not more."""
     made, refused = recombinations(recorded, requested.recombine, requested.seed)
     for encounter in made:
-        one, other = (sources[name] for name in encounter.parents)
+        assert isinstance(encounter.source, Recombined)
+        one, other = sources[encounter.source.first], sources[encounter.source.second]
         sources[encounter.name] = Source(
             encounter, one.roads, ", ".join(dict.fromkeys((one.recording, other.recording)))
         )
@@ -255,7 +256,7 @@ def generate_all(
         requested.seed,
         requested.request,
     )
-    population = [encounter for encounter, _ in pairs if not encounter.parents]
+    population = [encounter for encounter, _ in pairs if isinstance(encounter.source, Recorded)]
     cases: list[GenerationResult] = []
     refusals: list[str] = []
     for encounter, road in pairs:

@@ -30,7 +30,7 @@ from scenario_gen.method.evaluation.population import DISTANCE, member_of
 from scenario_gen.numerics import Floats
 from scenario_gen.numerics.plane import ahead_and_left, place
 from scenario_gen.situation import Conflict, EncounterKind, Situation, time_gaps
-from scenario_gen.types import Encounter, FOLLOW, Reaction, RECOMBINED, YIELD
+from scenario_gen.types import Encounter, FOLLOW, Reaction, Recombined, YIELD
 
 LEAST_S = 5.0  # that a new encounter lasts
 TRIES = 40  # pairs that are looked at for each encounter wanted
@@ -157,14 +157,16 @@ def _combined(a: Pair, b: Pair) -> Encounter:
     second = replace(second, id=f"{second.id}_2") if second.id == first.id else second
     rows = np.stack([a.motion(a.conflict.first, begin + one.time[: len(motion)]), motion])
     start = one.start_ns + round(begin / one.dt) * one.dt_ns
+    source = Recombined(one.name, other.name)
     made = Encounter.sampled(
         (first, second),
         one.dt,
         rows[..., :2],
         rows[..., 2],
         rows[..., 3],
-        f"{one.name}{RECOMBINED}{other.name}",
+        source.name,
         start,
+        source=source,
     )
     found, change = pair_of(made), np.diff(made.speed[1]) / made.dt
     if found is None or found.kind != a.kind or found.conflict.second != 1:

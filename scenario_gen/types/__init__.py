@@ -19,7 +19,7 @@ from scenario_gen.types.body import height, rear_axle, shifted, WHEELBASE
 from scenario_gen.types.coverage import Coverage, Spread
 from scenario_gen.types.derived import once_per_object
 from scenario_gen.types.ego import join_ego, split_off, with_witness
-from scenario_gen.types.encounter import Encounter, RECOMBINED
+from scenario_gen.types.encounter import Encounter, Recombined, Recorded
 from scenario_gen.types.evaluation import (
     as_markdown,
     CheckCounts,
@@ -96,11 +96,11 @@ from scenario_gen.types.vehicle import most_exposed, Vehicle
 
 __all__ = [
     "ALWAYS", "CAR", "CARS", "COARSEST", "DRIVERS", "ENDS", "ERRORS", "FACTS", "FARTHEST", "FINEST", "FOLLOW", "LANE_USERS",
-    "LEVEL", "NARROW", "ON_THE_SPOT", "ORDERS", "OTHER", "RECOMBINED", "RECORDING", "REPLAY",
+    "LEVEL", "NARROW", "ON_THE_SPOT", "ORDERS", "OTHER", "RECORDING", "REPLAY",
     "SCHEMA", "UNIFORM", "UNITS", "VEHICLE_TYPES", "WHEELBASE", "WITH", "WITHOUT", "YIELD", "BoundaryStates", "Cause",
     "CheckCounts", "Coverage", "DrawnFor", "Dynamics", "EgoSlot", "Encounter", "Evaluation", "Fit", "FittedVehicle",
     "GenerationResult", "Interval", "Lane", "LaneNetwork", "LiveChangepoints", "Loss", "Measure", "Measures", "Metric", "Motion", "Note", "NoteKind", "Pair",
-    "Quality", "Reached", "Reaction", "ReactionGraph", "Request", "Road", "Route", "Row", "RuleKind", "Sample", "Scenario",
+    "Quality", "Reached", "Reaction", "ReactionGraph", "Recombined", "Recorded", "Request", "Road", "Route", "Row", "RuleKind", "Sample", "Scenario",
     "ScenarioSet", "Segmentation", "Spread", "State", "States", "Target", "TrafficRule", "TypeLimits", "Vehicle",
     "VehicleType", "Verdict", "Violation", "always", "as_markdown", "at_ends", "canonical_presence", "causes_in_words", "cut",
     "formatted", "height", "join_ego", "join_pieces", "lanes_for", "lost_pairs", "mask", "most_exposed", "note_kinds", "once_per_object",

@@ -13,10 +13,30 @@ from scenario_gen.base.errors import InputError
 from scenario_gen.numerics import Floats, freeze
 from scenario_gen.types.motion import Motion
 
-RECOMBINED = (
-    " + "  # between the names of the two encounters that a recombined one has its vehicles of
-)
 MAX_UNEVEN_S = 1e-6  # a time may differ by this from a whole multiple of the period
+
+
+@dataclass(frozen=True)
+class Recorded:
+    """Source of an encounter: its vehicles were recorded together."""
+
+
+@dataclass(frozen=True)
+class Recombined:
+    """Source of an encounter: its vehicles come from two recorded encounters.
+
+    Attributes:
+        first: name of the encounter with the first vehicle.
+        second: name of the encounter with the second vehicle.
+    """
+
+    first: str
+    second: str
+
+    @property
+    def name(self) -> str:
+        """A name for the encounter."""
+        return f"{self.first} + {self.second}"
 
 
 @dataclass(frozen=True, eq=False)
@@ -27,6 +47,7 @@ class Encounter(Motion):
         name: where it comes from, for people.
         start_ns: stamp of the first sample, nanoseconds on the log's clock.
         origin: (latitude, longitude) in degrees of the frame's origin, or None if the log is in metres.
+        source: whether its vehicles were recorded together.
 
     Raises:
         InputError: shapes disagree, a value is not finite, a speed is negative, ids repeat, the sampling is
@@ -36,6 +57,7 @@ class Encounter(Motion):
     name: str
     start_ns: int = 0
     origin: tuple[float, float] | None = None
+    source: Recorded | Recombined = Recorded()
 
     def __post_init__(self) -> None:
         _check_arrays(self)
@@ -67,12 +89,6 @@ class Encounter(Motion):
         """Return some vehicles between two samples, as `Motion.select` does."""
         start_ns = self.start_ns + first * self.dt_ns
         return replace(super().select(rows, first, last), start_ns=start_ns)
-
-    @property
-    def parents(self) -> tuple[str, ...]:
-        """The names of the two encounters that it is recombined of; none if it was recorded."""
-        one, _, other = self.name.partition(RECOMBINED)
-        return (one, other) if other else ()
 
 
 def _check_arrays(encounter: Encounter) -> None:

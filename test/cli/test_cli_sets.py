@@ -4,13 +4,17 @@
 """Sets of results on the command line: two seeds side by side, and any bag as a page."""
 
 import json
+from pathlib import Path
+from shutil import copyfile
 
 import pytest
 from support.textbook_motions import labelled
 
 from scenario_gen import bundled, generate, load, read_log
 from scenario_gen.base.folders import MARKER
-from scenario_gen.types import NoteKind
+from scenario_gen.types import NoteKind, Recombined, Recorded
+
+EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 
 
 def test_two_seeds_are_compared_metric_by_metric(results, run):
@@ -69,7 +73,7 @@ def test_coverage_measures_recordings_and_their_sets_and_draws_a_page(run, tmp_p
     code, said = run("coverage", *bags, "--templates", 1)
     assert (
         code == 0
-        and "2 encounters whose vehicles share an area (1 following, 1 turn), 4 scenarios" in said
+        and "2 encounters whose vehicles share an area (1 following, 1 left_turn), 4 scenarios" in said
     )
     assert "with generated" in said and "never reached" in said
     page = (tmp_path / "coverage.html").read_text()
@@ -108,6 +112,10 @@ def test_recordings_are_recombined_and_what_is_generated_from_them_counts_for_bo
     assert all(
         NoteKind.RECOMBINED in {note.kind for note in case.generated.adaptations} for case in made
     )
+    assert {case.encounter.source for case in made} == {
+        Recombined("log", "log (2)"),
+        Recombined("log (2)", "log"),
+    }
     provenance = json.loads((tmp_path / "out" / "evaluation.json").read_text())["provenance"]
     assert (
         provenance["recombine"] == "9" and sum(key.startswith("log ") for key in provenance) == 3
@@ -135,3 +143,12 @@ def test_recordings_are_recombined_and_what_is_generated_from_them_counts_for_bo
         and "recombined encounters: 0 of 9 (no more pairs are of one kind; --recording adds some)"
         in said
     )
+
+
+def test_a_log_whose_name_has_a_plus_is_a_recording(run, tmp_path):
+    log = tmp_path / "north + south.csv"
+    copyfile(EXAMPLES / "my_log.csv", log)
+    out = tmp_path / "out"
+    code, _ = run("generate", log, "--road", "auto", "--count", 2, "--out", out)
+    assert code == 0 and "not recorded" not in (out / "report.html").read_text()
+    assert load(out / "bag").encounter.source == Recorded()

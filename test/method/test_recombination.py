@@ -14,7 +14,7 @@ from scenario_gen import generate, recombined, RefusedError
 from scenario_gen.method.evaluation.population import member_of
 from scenario_gen.method.recombination import pair_of, recombinations
 from scenario_gen.situation import conflict_of, lane_gaps, time_gaps
-from scenario_gen.types import FOLLOW, YIELD
+from scenario_gen.types import FOLLOW, Recorded, YIELD
 
 WAITS, FOLLOWS, MERGES, TURNS = (
     "crossing, stops",
@@ -108,11 +108,15 @@ def test_what_is_not_alike_is_refused_and_says_why():
         recombined(waits, late)
 
 
+def parents_of(encounter):
+    return encounter.source.first, encounter.source.second
+
+
 def test_each_reacts_as_in_its_own_recording():
     waits, free = recorded(WAITS, *range(5)), recorded("crossing, by chance", *range(12))
     free = [encounter for encounter in free if not pair_of(encounter).graph][:5]
     made = [*recombinations([*waits, *free], 90)[0]]
-    of_both = [[name.startswith(WAITS) for name in encounter.parents] for encounter in made]
+    of_both = [[name.startswith(WAITS) for name in parents_of(encounter)] for encounter in made]
     for second in (True, False):
         found = [
             pair_of(own).graph
@@ -131,10 +135,7 @@ def test_pairs_are_drawn_by_the_seed_and_those_that_give_none_are_counted():
         "ordered pairs of four, of two kinds"
     )
     assert len({encounter.name for encounter in made}) == len(made)
-    assert all(
-        len(encounter.parents) == 2 and encounter.parents[0][:8] == encounter.parents[1][:8]
-        for encounter in made
-    )
+    assert all(first[:8] == second[:8] for first, second in map(parents_of, made))
     few, again = (recombinations(known, 3, seed=5)[0] for _ in range(2))
     assert [encounter.name for encounter in few] == [
         encounter.name for encounter in again
@@ -142,7 +143,7 @@ def test_pairs_are_drawn_by_the_seed_and_those_that_give_none_are_counted():
     np.testing.assert_array_equal(few[0].position, again[0].position)
     assert (
         recombinations(known[:1], 5) == recombinations([], 5) == ([], {})
-        and known[0].parents == ()
+        and known[0].source == Recorded()
     )
     assert recombinations([known[0], replace(known[0], name="the same again")], 5) == ([], {})
 
@@ -163,7 +164,7 @@ def test_recombined_encounters_are_like_recorded_ones_and_new():
             away = np.sqrt(
                 np.square((member_of(encounter, "", 0).features - features) / spread).mean(axis=-1)
             )
-            parents = [names.index(name) for name in encounter.parents]
+            parents = [names.index(name) for name in parents_of(encounter)]
             to_parents.append(away[parents].min())
             away[parents] = math.inf
             nearest.append(away.min())

@@ -294,7 +294,10 @@ class Namespace(RecordedScenarios):
     @cached_property
     def encounter(self) -> Encounter:
         """The newest tracks."""
-        return decode_tracks(self.data("tracks")[-1], f"{self.path.stem}{self.name}")
+        encounter = decode_tracks(self.data("tracks")[-1], f"{self.path.stem}{self.name}")
+        return (
+            replace(encounter, source=self.summaries[-1].source) if self.summaries else encounter
+        )
 
     @cached_property
     def statuses(self) -> Statuses:

@@ -19,7 +19,7 @@ from msg_conventions.paths import encode_route
 from msg_conventions.pictures import road_markers, scenario_markers
 from msg_conventions.request_messages import footprint_messages, RequestMessages
 from msg_conventions.roads import encode_map, encode_poses
-from msg_conventions.scenario_info import encode_info, INFO, request_summary
+from msg_conventions.scenario_info import encode_info, INFO, request_summary, source_values
 from msg_conventions.scenarios import decode_scenario, digest, encode_scenario
 from msg_conventions.topics import topic_entry, vehicle_topic
 from msg_conventions.tracks import encode_tracks
@@ -91,7 +91,7 @@ def result_messages(
             yield topic, data, logged
         yield "markers", scenario_markers(scenario, stamp), logged
         logged += SCENARIO_STEP_NS
-    provenance = {**result.provenance, **hashes}
+    provenance = {**result.provenance, **hashes, **source_values(encounter.source)}
     summary = request_summary(
         result.generated,
         request,

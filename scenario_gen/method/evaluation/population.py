@@ -39,7 +39,7 @@ from scenario_gen.types import (
     Interval,
     join_ego,
     Pair,
-    RECOMBINED,
+    Recombined,
     Scenario,
 )
 
@@ -379,9 +379,8 @@ class Members:
 
     def name_of(self, member: Member) -> str:
         """Return the name of a member's template."""
-        return self.names[member.template] + (
-            RECOMBINED + self.names[member.other] if member.other >= 0 else ""
-        )
+        first = self.names[member.template]
+        return Recombined(first, self.names[member.other]).name if member.other >= 0 else first
 
     def of_kind(self, kind: str) -> "Members":
         """Return the recorded of a kind, and what is generated from them, of whatever kind that is."""
@@ -454,7 +453,7 @@ def members_of(results: Iterable[tuple[str, GenerationResult]]) -> Members:
     recorded: list[Member] = []
     made: list[Member] = []
     names: list[str] = []
-    recombined: list[tuple[tuple[str, ...], list[Member]]] = []
+    recombined: list[tuple[Recombined, list[Member]]] = []
     for recording, result in results:
         own = member_of(result.encounter, recording, len(recorded))
         if own.kind is None:
@@ -462,15 +461,16 @@ def members_of(results: Iterable[tuple[str, GenerationResult]]) -> Members:
         generated = [
             generated_member(join_ego(scenario), own, result.encounter) for scenario in result
         ]
-        if parents := result.encounter.parents:
-            recombined.append((parents, generated))
+        if isinstance(result.encounter.source, Recombined):
+            recombined.append((result.encounter.source, generated))
         else:
             recorded.append(own)
             names.append(result.encounter.name)
             made += generated
-    for (one, other), generated in recombined:
-        if one in names and other in names:
-            first, second = recorded[names.index(one)], names.index(other)
+    for source, generated in recombined:
+        if {source.first, source.second} <= set(names):
+            first = recorded[names.index(source.first)]
+            second = names.index(source.second)
             made += [
                 replace(member, recording=first.recording, template=first.template, other=second)
                 for member in generated
