@@ -51,8 +51,8 @@ def crossing(first="w", second="s", stands=True):
 
 
 def template(motion):
-    return Encounter.sampled(
-        motion.time, motion.heading, motion.speed, "crossing", motion.vehicles, motion.position
+    return Encounter(
+        motion.vehicles, motion.time, motion.position, motion.heading, motion.speed, "crossing"
     )
 
 
