@@ -12,6 +12,7 @@ import typer
 from scenario_gen.base.errors import RefusedError
 from scenario_gen.cli.options import configured, ParametersOption, remind, SetOption, takes
 from scenario_gen.cli.output import bars, Commands, give, is_verbose, say, status
+from scenario_gen.situation import Situation
 
 if TYPE_CHECKING:
     from scenario_gen.types import GenerationResult
@@ -209,7 +210,9 @@ def roads(
         names = [*BUILT_IN, "corridor"]
         if template is not None:
             names = list(
-                suitable_roads(template, segment(template, config.segmentation, 0), config)
+                suitable_roads(
+                    Situation.of(template), segment(template, config.segmentation, 0), config
+                )
             )
         give(roads=names)
         say(

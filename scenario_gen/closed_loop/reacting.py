@@ -18,6 +18,7 @@ from scenario_gen.method.sampling import Progress, TargetError
 from scenario_gen.method.segmentation import segment
 from scenario_gen.method.suitable_roads import suitable_roads
 from scenario_gen.pipeline import generate, PipelineConfig
+from scenario_gen.situation import Situation
 from scenario_gen.types import (
     Encounter,
     GenerationResult,
@@ -166,7 +167,7 @@ class Testing:
         segmentation = segment(self.encounter, self.config.segmentation, self.seed)
         names = (
             name
-            for name in suitable_roads(self.encounter, segmentation, self.config)
+            for name in suitable_roads(Situation.of(self.encounter), segmentation, self.config)
             if name != self.road
         )
         found: list[str] = []

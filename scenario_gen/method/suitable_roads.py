@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The built-in roads that take a template: one is chosen for `road="auto"`, and a refusal of a road names them."""
+"""The built-in roads that fit an encounter: `road="auto"` uses the first one, refusals name them."""
 
 from collections.abc import Callable, Iterator
 from contextlib import suppress
@@ -22,7 +22,6 @@ from scenario_gen.roads import (
 )
 from scenario_gen.situation import (
     conflict_of,
-    conflicts_in,
     refuse_reversing,
     refuse_too_large,
     Situation,
@@ -38,31 +37,35 @@ from scenario_gen.types import (
 )
 
 AUTO = "auto"
-LOOKED_AT = 50  # scenarios of a set, whether they keep the areas that vehicles share
+CHECKED_SCENARIOS = 50  # scenarios in which the conflicts of the encounter are looked for
 
 
-def takes(
-    road: Road | str, encounter: Encounter, segmentation: Segmentation, config: PipelineConfig
+def fits_road(
+    road: Road | str, situation: Situation, segmentation: Segmentation, config: PipelineConfig
 ) -> bool:
-    """Whether the template fits a road, and nothing of its encounter is lost there."""
+    """Whether an encounter fits a road without losing anything."""
+    encounter = situation.encounter
     try:
-        there, template = road_and_template(road, encounter, config.road)
-        fit_template(template, segmentation, there, replace(config.fitting, allow=""))
+        built, template = road_and_template(road, encounter, config.road)
+        if template is not encounter:  # mirrored for the other side of traffic
+            situation = Situation.of(template)
+        fit_template(situation, segmentation, built, replace(config.fitting, allow=""))
     except (RefusedError, InputError):
         return False
     return True
 
 
 def suitable_roads(
-    encounter: Encounter, segmentation: Segmentation, config: PipelineConfig
+    situation: Situation, segmentation: Segmentation, config: PipelineConfig
 ) -> Iterator[str]:
-    """Yield the names of the built-in roads that take the template: `roundabout` first for who drives about a ring.
+    """Yield the names of the built-in roads that fit an encounter.
 
-    The last is `corridor`, its own road.
+    If a vehicle drives round a ring, `roundabout` is the first one. The last one is `corridor`,
+    which is drawn around the encounter.
     """
-    ring = drives_about_ring(Situation.of(encounter), config.road)
+    ring = drives_about_ring(situation, config.road)
     names = sorted(ROADS.built_in, key=lambda name: ring and name != ROUNDABOUT)
-    return (name for name in names if takes(name, encounter, segmentation, config))
+    return (name for name in names if fits_road(name, situation, segmentation, config))
 
 
 def on_first_suitable_road(
@@ -71,52 +74,58 @@ def on_first_suitable_road(
     config: PipelineConfig,
     seed: int,
 ) -> GenerationResult:
-    """Return what is generated on the first built-in road that takes the template; the result says which it is.
+    """Return the result on the first built-in road that fits; the result names it.
 
     Raises:
-        RefusedError: the encounter is too large, or nothing can be generated on any of them; a TargetError if that is why.
+        RefusedError: the encounter is too large, or no road gives a scenario.
+        TargetError: the last road gives none in the requested range.
     """
     refuse_too_large(encounter)
     refuse_reversing(encounter)
     refusal = RefusedError(
-        f"{encounter.name}: no built-in road takes this encounter; give the path of a map"
+        f"{encounter.name} does not fit any built-in road; give the path of a map"
     )
-    for name in suitable_roads(encounter, segment(encounter, config.segmentation, seed), config):
+    segmentation = segment(encounter, config.segmentation, seed)
+    for name in suitable_roads(Situation.of(encounter), segmentation, config):
         try:
-            return _refuse_lost(generate(name)).noted(Note.of(NoteKind.AUTO_ROAD, road=name))
+            result = generate(name)
+            _refuse_lost_conflicts(result)
         except RefusedError as error:
             kind = TargetError if isinstance(error, TargetError) else RefusedError
-            refusal = kind(f"{encounter.name} on road {name}, the last that takes it: {error}")
+            refusal = kind(f"{encounter.name} on road {name}, the last one tried: {error}")
+        else:
+            return result.noted(Note.of(NoteKind.AUTO_ROAD, road=name))
     raise refusal
 
 
 def with_suitable_roads(
     error: RefusedError, encounter: Encounter, road: Road | str, config: PipelineConfig, seed: int
 ) -> RefusedError:
-    """Return a refusal with the names of the built-in roads that take the template, if the road is why it was refused."""
+    """Return a refusal with the names of suitable roads if the road is the reason."""
     with suppress(RefusedError):
         refuse_too_large(encounter)
+        situation = Situation.of(encounter)
         segmentation = segment(encounter, config.segmentation, seed)
-        if isinstance(error, NoPlaceError) or not takes(road, encounter, segmentation, config):
-            names = ", ".join(suitable_roads(encounter, segmentation, config))
-            return RefusedError(f"{error}. Roads that take it: {names}" if names else str(error))
+        no_place = isinstance(error, NoPlaceError)
+        if no_place or not fits_road(road, situation, segmentation, config):
+            names = ", ".join(suitable_roads(situation, segmentation, config))
+            return RefusedError(f"{error}. It fits these roads: {names}" if names else str(error))
     return error
 
 
-def _refuse_lost(result: GenerationResult) -> GenerationResult:
-    """Return a result whose vehicles share the areas that they share in the template.
+def _refuse_lost_conflicts(result: GenerationResult) -> None:
+    """Refuse a result in which two vehicles do not meet that meet in the recording.
 
     Raises:
-        RefusedError: two of them do not in one of its scenarios.
+        RefusedError: it names the vehicles and the scenario.
     """
     encounter = result.encounter
-    for conflict in conflicts_in(encounter):
-        names = tuple(encounter.vehicles[n].id for n in conflict.pair)
-        for scenario in map(join_ego, islice(result, LOOKED_AT)):
+    for conflict in Situation.of(encounter).conflicts:
+        names = [encounter.vehicles[n].id for n in conflict.pair]
+        for scenario in map(join_ego, islice(result, CHECKED_SCENARIOS)):
             ids = [vehicle.id for vehicle in scenario.vehicles]
-            a, b = sorted(map(ids.index, names))
-            if conflict_of(scenario, a, b) is None:
+            if conflict_of(scenario, *map(ids.index, names)) is None:
                 raise RefusedError(
-                    f"vehicles {names[0]} and {names[1]} share no area there in scenario {scenario.index}"
+                    f"vehicles {names[0]} and {names[1]} share no area there"
+                    f" in scenario {scenario.index}"
                 )
-    return result

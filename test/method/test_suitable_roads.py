@@ -17,6 +17,7 @@ from scenario_gen.method.sampling import TargetError
 from scenario_gen.method.segmentation import segment
 from scenario_gen.method.suitable_roads import on_first_suitable_road, suitable_roads
 from scenario_gen.pipeline import generate, PipelineConfig
+from scenario_gen.situation import Situation
 from scenario_gen.types import NoteKind
 from scenario_gen.types.request import Request
 
@@ -44,7 +45,7 @@ def test_auto_takes_the_first_road_that_keeps_the_conflict_and_says_so(crossing)
 
 def test_where_roads_suit_but_the_target_cannot_be_had_that_is_said(crossing):
     with pytest.raises(
-        TargetError, match=r"on road corridor, the last that takes it: target gap=50\.\.60"
+        TargetError, match=r"on road corridor, the last one tried: target gap=50\.\.60"
     ):
         generate(crossing, "auto", count=1, seed=7, request=Request(target="gap=50..60"))
 
@@ -62,22 +63,26 @@ def test_auto_leaves_out_a_road_on_which_vehicles_share_no_area_any_more(crossin
     assert result.generated.adaptations[0].values["road"] != "four_way"
     with pytest.raises(
         RefusedError,
-        match=r"on road corridor, the last that takes it: vehicles .* and .* share no area there in scenario",
+        match=r"on road corridor, the last one tried: vehicles .* and .* share no area there in scenario",
     ):
         on_first_suitable_road(lambda _: on("four_way"), crossing, PipelineConfig(), 7)
 
 
 def test_a_refusal_names_the_roads_that_suit_to_a_command(crossing):
     config = PipelineConfig()
-    names = list(suitable_roads(crossing, segment(crossing, config.segmentation, 7), config))
+    names = list(
+        suitable_roads(Situation.of(crossing), segment(crossing, config.segmentation, 7), config)
+    )
     assert "four_way" in names and names[-1] == "corridor" and "t_intersection" not in names
     with pytest.raises(RefusedError, match=r"choose another road$") as caught:
         generate(crossing, "t_intersection", count=2, seed=7)
     answer = answer_refusal(caught.value, crossing, "t_intersection", config, Request(), 2, 7)
-    assert str(answer).endswith(f"Roads that take it: {', '.join(names)}")
+    assert str(answer).endswith(f"It fits these roads: {', '.join(names)}")
 
 
 def test_who_drives_about_a_ring_is_taken_to_a_roundabout_first():
     encounter, config = labelled("roundabout entry", 1).encounter, PipelineConfig()
-    names = list(suitable_roads(encounter, segment(encounter, config.segmentation, 7), config))
+    names = list(
+        suitable_roads(Situation.of(encounter), segment(encounter, config.segmentation, 7), config)
+    )
     assert names[0] == "roundabout" and names[-1] == "corridor"
