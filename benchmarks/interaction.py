@@ -47,8 +47,8 @@ from scenario_gen.pipeline import PipelineConfig
 from scenario_gen.roads import build_road
 from scenario_gen.situation import Situation
 from scenario_gen.situation.gaps import Motion
+from scenario_gen.types import FOLLOW, Reaction
 from scenario_gen.types.encounter import Encounter
-from scenario_gen.types.reaction import FOLLOW, Reaction
 
 COUNT = sized(30, quick=4)
 LOGS = sized(None, quick=1)

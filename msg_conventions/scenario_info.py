@@ -19,6 +19,7 @@ from msg_conventions.cdr import stamp_of
 from msg_conventions.diagnostics import decode_diagnostics, encode_diagnostics, Level, Status
 from msg_conventions.ego import ego_values
 from msg_conventions.hashes import MAP_HASH, TEMPLATE_HASH
+from msg_conventions.scenario_facts import decode_facts, fact_values
 from msg_conventions.scenarios import digest, encode_scenario, messages_of
 from scenario_gen.base.documents import parse_json
 from scenario_gen.base.errors import guarded, InputError
@@ -27,9 +28,8 @@ from scenario_gen.types import (
     BoundaryStates,
     Cause,
     EgoSlot,
-    FACTS,
+    Facts,
     note_kinds,
-    ORDERS,
     Recombined,
     Recorded,
     recorded_notes,
@@ -90,23 +90,13 @@ class ScenarioEntry:
     map_hash = _value(MAP_HASH, None)
 
     @property
-    def order(self) -> str:
-        """Who was to go first: "keep" (the default), "free" or "swap".
+    def facts(self) -> Facts:
+        """What is known about the scenario.
 
         Raises:
-            InputError: it is none of these.
+            InputError: a value is damaged.
         """
-        text = self.status.values.get("order", "keep")
-        if text not in ORDERS:
-            raise InputError(
-                f"{INFO}: order of {self.status.message} is none of {', '.join(ORDERS)}"
-            )
-        return text
-
-    @property
-    def facts(self) -> dict[str, str]:
-        """Further values about the scenario, see `Scenario.facts`."""
-        return {key: text for key, text in self.status.values.items() if key.startswith(FACTS)}
+        return decode_facts(self.status.values, f"{INFO}: {self.status.message}")
 
     def asked(self, what: str = INFO, *, witness: bool = False) -> BoundaryStates | None:
         """Return the requested start and end states (N, 4), None where they are not there.
@@ -363,7 +353,7 @@ def scenario_entry(
             else {}
         ),
         **(about or {}),
-        **scenario.facts,
+        **fact_values(scenario.facts),
         **ego_values(ego),
         **(
             {}

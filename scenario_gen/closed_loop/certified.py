@@ -21,7 +21,7 @@ from scenario_gen.numerics.boxes import boxes_meet, fill_box
 from scenario_gen.numerics.kernels import B1, F, F1, F2, F3, I, kernel, named, OUT2, OUT3
 from scenario_gen.numerics.plane import unit
 from scenario_gen.situation import conflict_of, passing
-from scenario_gen.types import Scenario, tokens, yielders_of
+from scenario_gen.types import Scenario, tokens, YIELD
 
 CELL = 0.1  # seconds of a certified clock that are taken together
 ROOM = 0.05  # metres by which the box of a cell is larger than its ends ask for: what bends between them, and a little distance
@@ -103,8 +103,11 @@ def world_of(scenario: Scenario, ego: int | str, step: float = 0.1) -> World:
     spans = frozen(time[scenario.present])
     fill_cells(time, motion, half, spans, CELL, cells)
     fill_order(cells, CELL, order)
-    reactions = scenario.facts.get("reactions", "")
-    for who, whom in yielders_of(reactions, tokens(ids)) if reactions else ():
+    names = tokens(ids)
+    for reaction in scenario.facts.reactions:
+        if reaction.kind != YIELD or not {reaction.who, reaction.whom} <= set(names):
+            continue
+        who, whom = names.index(reaction.who), names.index(reaction.whom)
         if ego not in (who, whom):
             _keep_waiting(scenario, who, whom, order[who, whom])
     leaves = np.asarray((speed[:, -1] >= STANDS) | (spans[:, 1] < time[-1]))

@@ -77,9 +77,9 @@ def _figures(case: GenerationResult) -> dict[str, Any]:
     coverage = {} if case.coverage is None else case.coverage.document()
     reached = {} if case.generated.reached is None else case.generated.reached.figures()
     weights = {
-        str(scenario.index): scenario.facts["weight"]
+        str(scenario.index): scenario.facts.weight
         for scenario in case.generated.scenarios
-        if "weight" in scenario.facts
+        if scenario.facts.weight is not None
     }
     figures |= {"coverage": coverage, "target": {**reached, "weights": weights} if reached else {}}
     return figures | {

@@ -7,7 +7,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 import math
 
-from scenario_gen.types.scenario import NEARNESS, Scenario
+from scenario_gen.types.facts import Facts
+from scenario_gen.types.scenario import Scenario
 from scenario_gen.types.target import Pair
 
 Measure = Callable[
@@ -27,9 +28,14 @@ class Measures:
     figure: Measure
     rarity: Callable[[Scenario], float] | None = None
 
-    def nearness(self, scenario: Scenario) -> dict[str, str]:
-        """Return the facts that say how near vehicles come, and how rare that is; none of a figure that the scenario lacks."""
-        figures = {key: self.figure(scenario, name, None) for key, name in NEARNESS.items()}
-        if self.rarity is not None:
-            figures["rarity"] = self.rarity(scenario)
-        return {key: f"{value:.3f}" for key, value in figures.items() if math.isfinite(value)}
+    def facts(self, scenario: Scenario) -> Facts:
+        """Return how near the vehicles of a scenario come, and how rare that is."""
+        return Facts(
+            closest_approach_m=_known(self.figure(scenario, "gap", None)),
+            pet_s=_known(self.figure(scenario, "pet", None)),
+            rarity=None if self.rarity is None else _known(self.rarity(scenario)),
+        )
+
+
+def _known(value: float) -> float | None:
+    return value if math.isfinite(value) else None

@@ -3,18 +3,15 @@
 
 """A reaction: who answers to whom in an encounter, how late and how strongly, and how sure that is."""
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 import math
 from typing import Any
 
-from scenario_gen.types.pieces import join_pieces, split_pieces
+from scenario_gen.types.facts import FOLLOW, NamedReaction
 from scenario_gen.types.vehicle import Vehicle
 
-FOLLOW, YIELD = "follow", "yield"
 DOUBTFUL = 0.5  # confidence below which an edge is called doubtful
-_FOLLOWS, _YIELDS = " follows ", " yields to "  # of names
-LOST = "reactions_lost"  # the fact of a scenario that names the pairs, "who>whom", which it is not held to
 
 
 @dataclass(frozen=True)
@@ -62,9 +59,9 @@ class Reaction:
         """When [s] the other has cleared the shared area, on the template's clock; of a yielder."""
         return self.until - self.lag
 
-    def name(self, ids: Sequence[str]) -> str:
-        """Return who reacts to whom, by the vehicles' ids: as it is named in an entry of `scenarios/info`."""
-        return f"{ids[self.who]}{_FOLLOWS if self.kind == FOLLOW else _YIELDS}{ids[self.whom]}"
+    def named(self, ids: Sequence[str]) -> NamedReaction:
+        """Return the reaction with the names `ids` of the vehicles."""
+        return NamedReaction(self.kind, ids[self.who], ids[self.whom])
 
     def words(self, vehicles: Sequence[Vehicle]) -> str:
         """Return the reaction in words, with the vehicles' types and ids."""
@@ -144,30 +141,3 @@ class ReactionGraph:
             "cut": [edge.document(vehicles) for edge in self.cut],
             "sentences": list(self.sentences(vehicles, kept)),
         }
-
-
-def yielders_of(names: str, ids: Sequence[str]) -> tuple[tuple[int, int], ...]:
-    """Return (who, whom) of the yielding reactions that an entry names ("2 yields to 1; 3 follows 2"), of vehicles `ids`."""
-    pairs = [name.split(_YIELDS) for name in split_pieces(names) if _YIELDS in name]
-    return tuple(
-        (ids.index(who), ids.index(whom)) for who, whom in pairs if who in ids and whom in ids
-    )
-
-
-def reaction_facts(
-    names: Sequence[str], kept: Sequence[Reaction], lost: Iterable[Sequence[int]]
-) -> dict[str, str]:
-    """Return the facts that name the reactions that a scenario keeps, and the pairs (who, whom) that it is not held to."""
-    pieces = {
-        "reactions": [edge.name(names) for edge in kept],
-        LOST: [f"{names[who]}>{names[whom]}" for who, whom in lost],
-    }
-    return {key: join_pieces(found) for key, found in pieces.items() if found}
-
-
-def lost_pairs(facts: Mapping[str, str], ids: Sequence[str]) -> tuple[tuple[int, int], ...]:
-    """Return the pairs (who, whom) that facts say a scenario is not held to, of vehicles `ids`."""
-    pairs = [name.split(">") for name in split_pieces(facts.get(LOST, ""))]
-    return tuple(
-        (ids.index(who), ids.index(whom)) for who, whom in pairs if who in ids and whom in ids
-    )

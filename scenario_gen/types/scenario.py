@@ -12,6 +12,7 @@ from typing import Any, TYPE_CHECKING
 import numpy as np
 
 from scenario_gen.numerics import canonical_poses, Floats, freeze, frozen
+from scenario_gen.types.facts import Facts
 from scenario_gen.types.motion import Motion
 from scenario_gen.types.notes import Note
 from scenario_gen.types.presence import held
@@ -21,20 +22,6 @@ from scenario_gen.types.vehicle import Vehicle
 
 if TYPE_CHECKING:
     from pandas import DataFrame
-
-NEARNESS = {"closest_approach": "gap", "pet": "pet"}
-"""Facts that say how near vehicles come [m, s], and the figures (`UNITS`) that they are, of the most critical pair."""
-FACTS = (
-    *NEARNESS,
-    "rarity",
-    "weight",
-    "target.",
-    "order",
-    "passing_order",
-    "reactions",
-    "search.",
-)
-"""How the names of a scenario's facts begin."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,8 +36,7 @@ class Scenario(Motion):
         reference_drive: only with an ego slot: the motion of the vehicle that was left out, as a
             scenario of it alone on the same clock. Both together were proven valid, so the slot
             can be driven.
-        facts: further entries of `scenarios/info`: `closest_approach`, `pet`, `rarity`, `weight`,
-            `target.…`, `order`, `passing_order`, `reactions`, `search.…` (FACTS).
+        facts: what else is known about it.
     """
 
     acceleration: Floats
@@ -58,7 +44,7 @@ class Scenario(Motion):
     index: int = 0
     frame_id: str = "map"
     reference_drive: "Scenario | None" = None
-    facts: Mapping[str, str] = field(default_factory=dict)
+    facts: Facts = Facts()
 
     def __post_init__(self) -> None:
         super().__post_init__()

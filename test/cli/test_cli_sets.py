@@ -73,7 +73,8 @@ def test_coverage_measures_recordings_and_their_sets_and_draws_a_page(run, tmp_p
     code, said = run("coverage", *bags, "--templates", 1)
     assert (
         code == 0
-        and "2 encounters whose vehicles share an area (1 following, 1 left_turn), 4 scenarios" in said
+        and "2 encounters whose vehicles share an area (1 following, 1 left_turn), 4 scenarios"
+        in said
     )
     assert "with generated" in said and "never reached" in said
     page = (tmp_path / "coverage.html").read_text()

@@ -18,6 +18,7 @@ from scenario_gen.pipeline import PipelineConfig
 from scenario_gen.roads import build_road
 from scenario_gen.situation import lane_gaps, Situation
 from scenario_gen.situation.gaps import conflict_of, lag_behind, time_gaps
+from scenario_gen.types import Facts
 from scenario_gen.types.ego import join_ego, with_witness
 
 CONFIG = PipelineConfig()
@@ -52,7 +53,7 @@ def generated(encounter, count):
 def led():
     """Vehicle 2 waits for vehicle 1, which follows vehicle 3."""
     made = generated(led_crossing(), 4)
-    assert {edge.name("123") for edge in made.reactions} == {"2 yields to 1", "1 follows 3"}
+    assert {str(edge.named("123")) for edge in made.reactions} == {"2 yields to 1", "1 follows 3"}
     return made.scenarios
 
 
@@ -64,7 +65,7 @@ def test_a_yielder_among_the_others_waits_for_one_that_the_ego_holds_up(led, sha
     for scenario in led:
         driven = join_ego(with_witness(scenario, 2)) if slot else scenario
         own = lag_behind(driven, conflict_of(driven, 1, 0))
-        for facts, kept in ((driven.facts, True), ({}, False)):
+        for facts, kept in ((driven.facts, True), (Facts(), False)):
             loop = ClosedLoop(replace(driven, facts=facts), "3")
             motion = loop.drive(Slower(share)).motion
             conflict = conflict_of(motion, 1, 0)

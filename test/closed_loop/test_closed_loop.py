@@ -19,7 +19,12 @@ from scenario_gen.closed_loop.ego import Command, EgoState, move, Pose
 from scenario_gen.closed_loop.simulation import ClosedLoop
 from scenario_gen.closed_loop.verdict import judge
 from scenario_gen.situation.gaps import conflict_of
-from scenario_gen.types import Dynamics
+from scenario_gen.types import (
+    Dynamics,
+    Facts,
+    NamedReaction,
+    YIELD,
+)
 
 EXAMPLES = 10_000 if LONG else 25
 FAR = Pose(1e4, 1e4, 0.0, 0.0)
@@ -31,10 +36,10 @@ def prepared(seed, reactions=False, **config):
     ids = [vehicle.id for vehicle in scenario.vehicles]
     if reactions:
         found = [conflict_of(scenario, a, b) for b in range(len(ids)) for a in range(b)]
-        names = "; ".join(
-            f"{ids[c.second]} yields to {ids[c.first]}" for c in found if c is not None
+        yields = tuple(
+            NamedReaction(YIELD, ids[c.second], ids[c.first]) for c in found if c is not None
         )
-        scenario = replace(scenario, facts={"reactions": names})
+        scenario = replace(scenario, facts=Facts(reactions=yields))
     ego = seed % len(ids)
     return scenario, ego, ClosedLoop(scenario, ego, config=ClosedLoopConfig(**config))
 

@@ -66,7 +66,7 @@ def bag(tmp_path_factory):
 
 def test_scenarios_that_test_are_rare_and_say_how_rare(bag):
     scenarios = [trial.scenario for trial in read_trials(bag)]
-    assert all(0.0 < float(scenario.facts["weight"]) < 0.5 for scenario in scenarios)
+    assert all(0.0 < scenario.facts.weight < 0.5 for scenario in scenarios)
     assert (
         len({float(scenario.speed[1, 0]) for scenario in scenarios}) == 3
     )  # the ego's motion varies, too

@@ -21,7 +21,6 @@ from scenario_gen.situation import Situation
 from scenario_gen.situation.interaction import find_conflicts
 from scenario_gen.types import Vehicle
 from scenario_gen.types.ego import join_ego, with_witness
-from scenario_gen.types.reaction import LOST
 from scenario_gen.types.request import Request
 from scenario_gen.types.scenario import BoundaryStates, Scenario
 
@@ -131,9 +130,9 @@ def test_the_others_stay_valid_among_themselves(data, ego):
         whole = replace(scenario, vehicles=tuple(scenario.vehicles[k] for k in place), **arrays)
         (verdict,) = everybody.check([whole])
         lost = [
-            ">".join(encounter.vehicles[n].id for n in violation.vehicles)
+            tuple(encounter.vehicles[n].id for n in violation.vehicles)
             for violation in verdict.violations
         ]
-        assert set(lost) <= set(scenario.facts.get(LOST, "").split("; ")), (
+        assert set(lost) <= set(scenario.facts.lost_reactions), (
             "the witness is certified together with the others"
         )

@@ -18,8 +18,8 @@ from scenario_gen.output.review.validation import validate_bag
 from scenario_gen.pipeline import PipelineConfig
 from scenario_gen.roads import build_road
 from scenario_gen.situation import Situation
+from scenario_gen.types import FOLLOW
 from scenario_gen.types.ego import join_ego
-from scenario_gen.types.reaction import FOLLOW
 from scenario_gen.types.request import Request
 
 CONFIG = PipelineConfig()
@@ -63,8 +63,8 @@ def assert_kept(result, names):
     """Every scenario names these reactions; followers are as fast as their leaders, at their own gaps; no yielder is early."""
     ids, scenarios = [vehicle.id for vehicle in result.encounter.vehicles], wholes(result)
     edges = result.generated.reactions
-    assert [edge.name(ids) for edge in edges] == names
-    assert {scenario.facts["reactions"] for scenario in scenarios} == {"; ".join(names)}
+    assert [str(edge.named(ids)) for edge in edges] == names
+    assert {tuple(map(str, scenario.facts.reactions)) for scenario in scenarios} == {tuple(names)}
     for edge in edges:
         if edge.kind == FOLLOW:
             seen = following(edge, result.encounter, scenarios)

@@ -24,6 +24,7 @@ from scenario_gen.output.results import provenance_of
 from scenario_gen.output.review.regenerate import regenerate_scenario
 from scenario_gen.output.review.validation import validate_bag
 from scenario_gen.pipeline import generate
+from scenario_gen.types import Facts, OrderChange
 from scenario_gen.types.ego import join_ego
 from scenario_gen.types.request import Request
 from scenario_gen.types.target import read_targets
@@ -57,10 +58,8 @@ def test_all_are_in_the_range_and_have_weights_and_figures(directed):
     assert len(directed.scenarios) == 20
     for scenario in directed.scenarios:
         assert LOW <= measure(scenario, "pet") <= HIGH
-        assert float(scenario.facts["target.pet"]) == pytest.approx(
-            measure(scenario, "pet"), rel=1e-5
-        )
-        assert 0.0 < float(scenario.facts["weight"]) <= 10.0
+        assert scenario.facts.targets["pet"] == pytest.approx(measure(scenario, "pet"), rel=1e-5)
+        assert 0.0 < scenario.facts.weight <= 10.0
     assert (
         directed.reached.directed
         and directed.reached.low <= directed.reached.share <= directed.reached.high
@@ -112,7 +111,7 @@ def test_another_order_is_named_and_only_then_allowed(chain, tmp_path):
     )  # with one clock for all nobody passes anybody
     made = answer(chain, Request(order="swap"), count=3)
     for scenario in made.generated.scenarios:
-        assert "swapped" in scenario.facts["passing_order"]
+        assert OrderChange.SWAPPED in {order.change for order in scenario.facts.passing_order}
         assert (
             most_critical(figures_of(scenario)).first
             != most_critical(figures_of(chain.encounter)).first
@@ -121,7 +120,8 @@ def test_another_order_is_named_and_only_then_allowed(chain, tmp_path):
     (found,) = validate_bag(bag)
     assert not found.invalid
     kept = replace(
-        made.generated, scenarios=tuple(replace(one, facts={}) for one in made.generated.scenarios)
+        made.generated,
+        scenarios=tuple(replace(one, facts=Facts()) for one in made.generated.scenarios),
     )
     (found,) = validate_bag(write_recording(tmp_path / "kept", replace(made, generated=kept)))
     assert "passing_order" in found.found and found.invalid == 3, (

@@ -6,8 +6,7 @@
 from dataclasses import replace
 import math
 
-from scenario_gen.types import Vehicle
-from scenario_gen.types.reaction import FOLLOW, Reaction, ReactionGraph, YIELD, yielders_of
+from scenario_gen.types import FOLLOW, Reaction, ReactionGraph, Vehicle, YIELD
 
 SURE = Reaction(YIELD, 1, 0, 1.4, 1.0, 0.6, 0.9, 3.0, 9.0, stands=True, gap=2.4)
 DOUBTFUL = Reaction(FOLLOW, 2, 1, 1.2, 0.8, 1.5, 0.4, 0.0, 20.0, (0.9, 1.3, 2.0))
@@ -65,10 +64,3 @@ def test_the_document_has_lag_strength_own_part_and_confidence():
     }  # fmt: skip
     assert [edge["who"] for edge in document["cut"]] == ["a"]
     assert document["sentences"] == list(GRAPH.sentences(VEHICLES, [DOUBTFUL]))
-
-
-def test_the_names_of_yielders_are_read_back():
-    names = "; ".join(edge.name(IDS) for edge in (SURE, DOUBTFUL))
-    assert names == "b yields to a; c follows b"
-    assert yielders_of(names, IDS) == ((1, 0),)
-    assert yielders_of(names, ("c", "b")) == () and yielders_of("", IDS) == ()

@@ -252,7 +252,7 @@ def decode_with_witness(
     seed, index = (entry.seed, entry.index) if entry else (0, k)
     late = bool(entry and entry.ego)  # the ego that was left out may have been the first vehicle
     stamp, scenario = decode_scenario(data, seed=seed, index=index, what=what, late=late)
-    if entry and entry.facts:
+    if entry is not None:
         scenario = replace(scenario, facts=entry.facts)
     if witness is None:
         return stamp, scenario

@@ -19,7 +19,11 @@ from scenario_gen.closed_loop.simulation import ClosedLoop
 from scenario_gen.closed_loop.trials import Outcome
 from scenario_gen.closed_loop.verdict import judge
 from scenario_gen.numerics.plane import edge_lengths
-from scenario_gen.types import Scenario
+from scenario_gen.types import (
+    Facts,
+    Failure,
+    Scenario,
+)
 
 SHOWN = 100  # failures that are kept as scenarios, at most
 OF_ONE_KIND = 30  # of these, at most of one kind
@@ -61,10 +65,8 @@ class Finding:
 
     def scenario(self) -> Scenario:
         """Return the scenario of all vehicles, with what the search says of it."""
-        facts = {"search.kind": self.kind, "search.deviation": f"{self.deviation:.4g}"}
-        if self.weight is not None:
-            facts["search.weight"] = repr(self.weight)
-        return replace(self.trial.scenario, facts=facts)
+        failure = Failure(self.kind, self.deviation, self.weight)
+        return replace(self.trial.scenario, facts=Facts(failure=failure))
 
 
 def findings_of(

@@ -13,7 +13,14 @@ from scenario_gen.method.evaluation.evaluate import measured
 from scenario_gen.method.evaluation.measures import figures_of, most_critical, PairFigures
 from scenario_gen.numerics import Floats
 from scenario_gen.situation import manoeuvre_of
-from scenario_gen.types import Coverage, Encounter, join_ego, Scenario, Spread
+from scenario_gen.types import (
+    Coverage,
+    Encounter,
+    join_ego,
+    join_pieces,
+    Scenario,
+    Spread,
+)
 
 EDGES = (0.0, 0.5, 1.0, 2.0, 4.0)  # s of PET
 BINS = ("below 0 s", "0 … 0.5 s", "0.5 … 1 s", "1 … 2 s", "2 … 4 s", "4 s and more", "no crossing")
@@ -59,7 +66,9 @@ def coverage_of(encounter: Encounter, scenarios: Sequence[Scenario]) -> Coverage
             kind = " and ".join(sorted(names[n] for n in figure.pair))
             pairs.setdefault(kind, Counter())[_bin(figure.pet)] += 1
     orders = Counter(
-        scenario.facts["passing_order"] for scenario in whole if "passing_order" in scenario.facts
+        join_pieces(scenario.facts.passing_order)
+        for scenario in whole
+        if scenario.facts.passing_order
     )
     index = tuple(scenario.index for scenario in whole)
     return Coverage(

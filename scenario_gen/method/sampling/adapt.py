@@ -26,10 +26,11 @@ from scenario_gen.numerics import Floats
 from scenario_gen.situation import closest_crossing, Conflict, conflict_of, Situation
 from scenario_gen.types import (
     Cause,
-    Encounter,
+    Facts,
     Measures,
+    OrderChange,
+    PassingOrder,
     Reaction,
-    reaction_facts,
     Request,
     Scenario,
     Target,
@@ -138,45 +139,41 @@ def label_of(
     reactions: Sequence[Reaction] = (),
     lost: Iterable[tuple[int, ...]] = (),
 ) -> Label:
-    """Return what says a scenario's facts: nearness, figures of targets, reactions that it keeps, orders if they are not kept.
+    """Return what gives the facts of a scenario: nearness, figures of targets, kept reactions, passing orders.
 
     `lost` are the pairs (who, whom) whose reaction, or whose least gap, scenarios are not held to on this road.
     """
-    encounter = situation.encounter
-    names = [token(vehicle.id) for vehicle in encounter.vehicles]
-    held = reaction_facts(names, reactions, lost)
+    names = [token(vehicle.id) for vehicle in situation.encounter.vehicles]
+    kept = tuple(edge.named(names) for edge in reactions)
+    lost_names = tuple((names[pair[0]], names[pair[1]]) for pair in lost)
     conflicts = () if request.order == "keep" else situation.conflicts
 
-    def label(whole: Scenario) -> dict[str, str]:
-        facts = held | (measures.nearness(whole) if measures is not None else {})
+    def label(whole: Scenario) -> Facts:
+        targets = {}
         if aim is not None:
-            facts |= {
-                f"target.{t.label}": f"{v:.6g}"
-                for t, v in zip(aim.targets, aim.values(whole), strict=True)
-            }
-        if request.order == "keep":
-            return facts
-        messages = [_order(encounter, own, whole) for own in conflicts]
-        return facts | {
-            "order": request.order,
-            "passing_order": "; ".join(messages) or "nobody meets anybody",
-        }
+            labels = [target.label for target in aim.targets]
+            targets = dict(zip(labels, map(float, aim.values(whole)), strict=True))
+        return replace(
+            Facts() if measures is None else measures.facts(whole),
+            targets=targets,
+            order=request.order,
+            passing_order=tuple(_passing_order(names, own, whole) for own in conflicts),
+            reactions=kept,
+            lost_reactions=lost_names,
+        )
 
     return label
 
 
-def _order(encounter: Encounter, own: Conflict, whole: Scenario) -> str:
-    """Say who goes first in a scenario at one of the template's conflicts."""
-    a, b = sorted((own.first, own.second))
-    conflict = conflict_of(whole, a, b)
-    one, two = (encounter.vehicles[n].id for n in (own.first, own.second))
+def _passing_order(names: Sequence[str], recorded: Conflict, whole: Scenario) -> PassingOrder:
+    """Return who passes one of the template's conflicts first in a scenario."""
+    conflict = conflict_of(whole, *sorted((recorded.first, recorded.second)))
+    change = OrderChange.NONE
     if conflict is None:
-        return f"{one} and {two} do not meet (in the recording {one} goes first)"
-    return (
-        f"{one} before {two}, as in the recording"
-        if conflict.first == own.first
-        else f"{two} before {one}, swapped"
-    )
+        change = OrderChange.NO_CONFLICT
+    elif conflict.first != recorded.first:
+        change = OrderChange.SWAPPED
+    return PassingOrder(names[recorded.first], names[recorded.second], change)
 
 
 @dataclass(frozen=True, eq=False)

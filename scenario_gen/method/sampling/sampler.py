@@ -15,9 +15,13 @@ from scenario_gen.method.sampling.candidates import Scale
 from scenario_gen.method.sampling.directed import Proposal
 from scenario_gen.method.sampling.model import CandidateModel
 from scenario_gen.numerics import Floats, Ints
-from scenario_gen.types import Scenario, with_witness
+from scenario_gen.types import (
+    Facts,
+    Scenario,
+    with_witness,
+)
 
-Label = Callable[[Scenario], dict[str, str]]
+Label = Callable[[Scenario], Facts]
 
 LEVELS = (
     Scale(),
@@ -77,7 +81,7 @@ class Sampler:
     )
     base: int = 0  # level whose standard deviations the candidates of a proposal have
     proposal: Proposal | None = None
-    label: Label = lambda _: {}  # facts of a candidate of all vehicles
+    label: Label = lambda _: Facts()  # facts of a candidate of all vehicles
 
     def block(self, level: int, number: int) -> tuple[list[int], list[Scenario | None]]:
         """The indices of candidates number·BLOCK … of a level, and these; None for one without a speed profile."""
@@ -111,8 +115,8 @@ class Sampler:
         """A candidate of all vehicles as it is published: with its facts, the ego's motion apart, as witness."""
         facts = self.label(whole)
         if self.proposal is not None:
-            facts = {"weight": repr(self.weight(whole.index)), **facts}
-        named = replace(whole, facts=facts) if facts else whole
+            facts = replace(facts, weight=self.weight(whole.index))
+        named = replace(whole, facts=facts)
         return named if self.ego is None else with_witness(named, self.ego)
 
     def weight(self, index: int) -> float:

@@ -41,13 +41,12 @@ from scenario_gen.types import (
     at_ends,
     BoundaryStates,
     Cause,
+    Facts,
     join_ego,
-    lost_pairs,
     Reaction,
     Road,
     Scenario,
     Segmentation,
-    split_pieces,
     tokens,
 )
 
@@ -131,7 +130,7 @@ class Reference:
             tokens(vehicle.id for vehicle in encounter.vehicles),
             tuple(conflicts),
             waits,
-            required_orders(conflicts, entry.order if entry else "keep"),
+            required_orders(conflicts, entry.facts.order if entry else "keep"),
             kept_reactions(situation, entry),
             at_ends(encounter.present, len(encounter.time)),
             kept_gaps(situation, entry),
@@ -226,18 +225,15 @@ class Checkers:
         """
         entry = self._namespace.entry(k) or self._namespace.unknown.get(k)
         is_lost = k in self._namespace.unknown and entry is None
-        kept = (
-            ()
-            if entry is None
-            else tuple(text for key, text in entry.facts.items() if key.startswith("reactions"))
-        )
+        facts = Facts() if entry is None else entry.facts
         place = (
             stamp,
             is_lost,
             entry and entry.template_hash,
             entry and entry.map_hash,
-            entry and entry.order,
-            kept,
+            facts.order,
+            facts.reactions,
+            facts.lost_reactions,
         )
         of_these = b"" if states is None else states.start.tobytes() + states.end.tobytes()
         key = (place, tuple(vehicle.id for vehicle in scenario.vehicles), of_these)
@@ -303,21 +299,17 @@ def _validate(namespace: Namespace, limits: Limits | None, tick: Callable[[], No
 def kept_reactions(situation: Situation, entry: ScenarioEntry | None) -> tuple[Reaction, ...]:
     """Return the reactions of a template that an entry says its scenario keeps."""
     names = tokens(vehicle.id for vehicle in situation.encounter.vehicles)
-    kept = split_pieces(entry.facts.get("reactions", "")) if entry else []
-    return (
-        tuple(edge for edge in situation.reactions.edges if edge.name(names) in kept)
-        if kept
-        else ()
-    )
+    kept = entry.facts.reactions if entry else ()
+    return tuple(edge for edge in situation.reactions.edges if edge.named(names) in kept)
 
 
 def kept_gaps(situation: Situation, entry: ScenarioEntry | None) -> LaneGaps:
     """Return the template's gaps in a lane; zeros for the pairs that an entry says its scenario is not held to."""
     names = tokens(vehicle.id for vehicle in situation.encounter.vehicles)
-    lost = lost_pairs(entry.facts, names) if entry else ()
+    lost = entry.facts.lost_reactions if entry else ()
     return {
-        pair: (speed, 0.0 * gap if pair in lost else gap)
-        for pair, (speed, gap) in situation.lane_gaps.items()
+        (who, whom): (speed, 0.0 * gap if (names[who], names[whom]) in lost else gap)
+        for (who, whom), (speed, gap) in situation.lane_gaps.items()
     }
 
 

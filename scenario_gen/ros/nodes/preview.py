@@ -90,13 +90,8 @@ class Preview(StageNode):
             if self._newest is None:
                 return
             scenario, entry = self._newest
-            reactions = dict(
-                sorted(
-                    (part.split(" ", 1)[0], part)
-                    for part in entry.status.values.get("reactions", "").split("; ")
-                    if part
-                )
-            )
+            texts = {reaction.who: str(reaction) for reaction in entry.facts.reactions}
+            reactions = dict(sorted(texts.items()))
             self._shown = shown = Shown(scenario, now, reactions, conflicts_of(scenario))
         self._publish(shown, min(now - shown.since, float(shown.scenario.time[-1])))
 

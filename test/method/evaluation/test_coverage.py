@@ -10,7 +10,13 @@ import numpy as np
 import pytest
 
 from scenario_gen.method.evaluation import coverage_of
-from scenario_gen.types import Encounter, Vehicle
+from scenario_gen.types import (
+    Encounter,
+    Facts,
+    OrderChange,
+    PassingOrder,
+    Vehicle,
+)
 from scenario_gen.types.scenario import Scenario
 
 TIME = np.arange(101) * 0.1
@@ -63,8 +69,10 @@ def test_figures_matrix_and_picks(template):
 
 
 def test_outcomes_of_the_order_are_counted_and_an_empty_set_has_no_picks(template):
+    kept, swapped = (PassingOrder("a", "b", change) for change in list(OrderChange)[:2])
     named = [
-        replace(crossing(15.0, k), facts={"passing_order": said}) for k, said in enumerate("aab")
+        replace(crossing(15.0, k), facts=Facts(order="free", passing_order=(order,)))
+        for k, order in enumerate((kept, kept, swapped))
     ]
-    assert coverage_of(template, named).orders == {"a": 2, "b": 1}
+    assert coverage_of(template, named).orders == {str(kept): 2, str(swapped): 1}
     assert coverage_of(template, []).picks == {}

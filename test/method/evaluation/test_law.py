@@ -134,11 +134,11 @@ def test_approaches_of_a_set_spread_towards_those_of_the_population(sets, encoun
 
 def test_scenarios_say_their_rarity_and_the_others_are_counted(sets):
     population, wide = (made.generated for made in sets)
-    rarities = np.array([float(scenario.facts["rarity"]) for scenario in population])
+    rarities = np.array([scenario.facts.rarity for scenario in population])
     assert len(population) == 40 and population.refused[Cause.UNUSUAL] > 0
     (note,) = (note for note in population.adaptations if note.kind is NoteKind.UNUSUAL)
     assert 1.0 < rarities.max() <= round(note.values["rarity"], 3)
-    assert not wide.refused[Cause.UNUSUAL] and "rarity" not in wide[0].facts
+    assert not wide.refused[Cause.UNUSUAL] and wide[0].facts.rarity is None
 
 
 def test_the_same_seed_gives_the_same_and_an_index_one_alone(sets, encounters):
@@ -185,6 +185,6 @@ def test_the_encounters_of_a_command_are_its_population(encounters):
     for number in (1, 2):
         made = generate_all(pairs[:number], folder)[0][0]
         rarity = measures_in("population", encounters[0], encounters[:number]).rarity
-        assert [float(one.facts["rarity"]) for one in made] == pytest.approx(
+        assert [one.facts.rarity for one in made] == pytest.approx(
             [rarity(one) for one in made], abs=1e-3
         )

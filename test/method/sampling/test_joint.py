@@ -22,7 +22,7 @@ from scenario_gen.method.segmentation import segment
 from scenario_gen.pipeline import PipelineConfig
 from scenario_gen.roads import build_road
 from scenario_gen.situation import Situation
-from scenario_gen.types.reaction import FOLLOW
+from scenario_gen.types import FOLLOW
 from scenario_gen.types.request import Request
 
 LANE = lane_encounter(LEADER := wander(np.random.default_rng(3), 200), answering(LEADER, 1.2, 0.9))
@@ -109,13 +109,15 @@ def test_what_is_published_answers_as_the_template_does(case):
     encounter, _, made, free = case
     (edge,) = made.generated.reactions
     named = "2 follows 1" if edge.kind == FOLLOW else "2 yields to 1"
-    assert {scenario.facts["reactions"] for scenario in made.generated.scenarios} == {named}
-    assert free.generated.reactions == () and "reactions" not in free.generated.scenarios[0].facts
+    assert {
+        "; ".join(map(str, scenario.facts.reactions)) for scenario in made.generated.scenarios
+    } == {named}
+    assert free.generated.reactions == () and not free.generated.scenarios[0].facts.reactions
     assert len(made.generated.scenarios) == 40
     for scenario in made.generated.scenarios[:3]:
         (figures,) = figures_of(scenario)
-        assert float(scenario.facts["closest_approach"]) == pytest.approx(figures.gap, abs=5e-4)
-        assert float(scenario.facts.get("pet", "nan")) == pytest.approx(
+        assert scenario.facts.closest_approach_m == pytest.approx(figures.gap, abs=5e-4)
+        assert (scenario.facts.pet_s or np.nan) == pytest.approx(
             figures.pet, abs=5e-4, nan_ok=True
         )
     if edge.kind == FOLLOW:
