@@ -17,10 +17,10 @@ from ompl import base, geometric, util
 
 from benchmarks._planning_maps import road_of
 from scenario_gen.base.errors import RefusedError
+from scenario_gen.method.routing.search.car_planner import PoseRrtStarConnect
 from scenario_gen.method.routing.search.dubins import Pose
-from scenario_gen.method.routing.search.planner import Budget
-from scenario_gen.method.routing.search.pose_planner import PoseQuery, PoseRrtStarConnect
-from scenario_gen.method.routing.search.steering import curve_cost
+from scenario_gen.method.routing.search.planner import Budget, path_length, PoseQuery
+from scenario_gen.method.routing.search.steering import steering_cost
 from scenario_gen.method.routing.search.sweep import car_scene
 from scenario_gen.numerics.arrays import Floats
 from scenario_gen.roads.clearance import footprint_fits, to_cells
@@ -95,8 +95,8 @@ def rrt_connect(
     util.setLogLevel(util.LOG_NONE)
     started = process_time()
     road, query = case.road, case.query
-    scene, cell = car_scene(road, (query.length, query.width), query.curvature), road.resolution
-    space = base.DubinsStateSpace(scene.body.turn)
+    scene, cell = car_scene(road, query), road.resolution
+    space = base.DubinsStateSpace(scene.body.turn_radius)
     bounds = base.RealVectorBounds(2)
     for axis, extent in enumerate(road.drivable.shape[::-1]):
         bounds.setLow(axis, 0.0)
@@ -106,7 +106,7 @@ def rrt_connect(
 
     def free(a: Any, b: Any) -> bool:
         return (
-            curve_cost(
+            steering_cost(
                 Pose(a.getX(), a.getY(), a.getYaw()), Pose(b.getX(), b.getY(), b.getYaw()), scene
             )
             < np.inf
@@ -152,9 +152,9 @@ def rrt_connect(
 def dubins_length(case: Obstructed, path: Floats) -> float:
     """Length [m] of a chain of Dubins curves (P, 3) in cells, infinity if it is not free: judged by the same sweep for all."""
     road, query = case.road, case.query
-    scene = car_scene(road, (query.length, query.width), query.curvature)
+    scene = car_scene(road, query)
     return road.resolution * float(
-        np.sum([curve_cost(Pose(*a), Pose(*b), scene) for a, b in pairwise(path.tolist())])
+        np.sum([steering_cost(Pose(*a), Pose(*b), scene) for a, b in pairwise(path.tolist())])
     )
 
 
@@ -162,9 +162,9 @@ def first_path(case: Obstructed, seconds: float, seed: int) -> tuple[float, floa
     """Our first path: CPU seconds it took, and its length [m]; None if it took longer, or there is none."""
     started = process_time()
     try:
-        plan = PoseRrtStarConnect().plan(
+        plan = PoseRrtStarConnect().plan_poses(
             case.road, case.query, Budget(None, seconds, first=True), seed
         )
     except RefusedError:
         return None
-    return process_time() - started, float(plan.step.sum())
+    return process_time() - started, path_length(plan.path)

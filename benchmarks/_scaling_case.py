@@ -23,8 +23,8 @@ from scenario_gen import pipeline
 from scenario_gen.method.chain import Chain
 from scenario_gen.method.config import PipelineConfig
 from scenario_gen.method.evaluation import EvaluationConfig
-from scenario_gen.method.routing.search.planner import Budget
-from scenario_gen.method.routing.search.pose_planner import PoseQuery, PoseRrtStarConnect
+from scenario_gen.method.routing.search.car_planner import PoseRrtStarConnect
+from scenario_gen.method.routing.search.planner import Budget, PoseQuery
 from scenario_gen.roads import build_road, clearance_in_cells, RoadConfig
 from scenario_gen.types import Encounter, Vehicle
 
@@ -105,7 +105,7 @@ def planned(cells: int) -> dict[str, float]:
         np.array([middle, middle - far, -np.pi / 2.0]),
     )
     query = PoseQuery(start, goal, 4.5, 1.8, 0.2)
-    PoseRrtStarConnect().plan(road, query, Budget(1_000_000, first=True), 1)
+    PoseRrtStarConnect().plan_poses(road, query, Budget(1_000_000, first=True), 1)
     times.append(process_time())
     return dict(zip(("drawing", "distances", "path"), np.diff(times).tolist(), strict=True)) | {
         "all": times[-1] - times[0]

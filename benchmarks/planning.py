@@ -16,6 +16,7 @@ import os
 from pathlib import Path
 from statistics import median
 from time import process_time
+from typing import Any
 
 import numpy as np
 
@@ -35,19 +36,19 @@ from benchmarks.row import higher, lower, Row
 from scenario_gen.base.errors import RefusedError
 from scenario_gen.base.road_users import Dynamics
 from scenario_gen.method.routing import plan_routes, PlanningConfig
-from scenario_gen.method.routing.search.ompl.solve import Options, PLANNERS, solve
+from scenario_gen.method.routing.search.car_planner import PoseRrtStarConnect
+from scenario_gen.method.routing.search.disc_planner import (
+    PAPER,
+    RrtStarConnect,
+    RrtStarConnectConfig,
+)
+from scenario_gen.method.routing.search.ompl.solve import exact_plane, plane, PLANNERS, solve
 from scenario_gen.method.routing.search.planner import (
     Budget,
     BudgetSpentError,
     path_length,
     plan_with_retry,
     Query,
-)
-from scenario_gen.method.routing.search.pose_planner import PoseRrtStarConnect
-from scenario_gen.method.routing.search.rrt_star_connect import (
-    PAPER,
-    RrtStarConnect,
-    RrtStarConnectConfig,
 )
 from scenario_gen.numerics.arrays import Floats
 from scenario_gen.roads.clearance import clearance_in_cells, distance_transform
@@ -116,9 +117,23 @@ def _ompl(
         return process_time() - started > seconds
 
     field = clearance_in_cells(road)
-    return solve(
-        field, ends, 0.0, name, stop, Options(step, simplify=not first, state_by_state=states)
-    ).simplified
+    information = _plane_by_states(field) if states else exact_plane(field, 0.0)
+    return solve(information, ends, name, stop, step=step, simplify=not first)[0]
+
+
+def _plane_by_states(field: Floats) -> Any:
+    """The plane as OMPL's Python users have it: edges checked state by state, a cell apart."""
+
+    def is_free(state: Any) -> bool:
+        row, column = min(int(state[1]), len(field) - 1), min(int(state[0]), len(field[0]) - 1)
+        return bool(field[row, column] > 0.0)
+
+    information = plane(field)
+    information.setStateValidityChecker(is_free)
+    extent = information.getStateSpace().getMaximumExtent()
+    information.setStateValidityCheckingResolution(1.0 / extent)
+    information.setup()
+    return information
 
 
 def _field(road: Road) -> list[Row]:
@@ -255,7 +270,8 @@ def _growth_of_ompl(road: Road, ends: Floats) -> str:
         for iterations in (FEW, MORE):
             started = process_time()
             until = partial(lt, iterations)  # so many have been made
-            solve(clearance_in_cells(road), ends, 0.0, name, until, Options(5.0, simplify=False))
+            information = exact_plane(clearance_in_cells(road), 0.0)
+            solve(information, ends, name, until, step=5.0, simplify=False)
             cost.append((process_time() - started) / iterations)
         told.append(f"{PLANNERS[name]} {cost[1] / cost[0] / (np.log(MORE) / np.log(FEW)):.2f}")
     return f"OMPL at {MORE:.0e} over {FEW:.0e}: {', '.join(told)}"
@@ -432,10 +448,10 @@ def _obstructed() -> list[Row]:
         if len(excess) < MEASURED and len(path):
             simplified = [rrt_connect(case, WITHIN, simplify=True)[0] for _ in range(3)]
             lengths = [dubins_length(case, each) for each in simplified if len(each)]
-            plan = PoseRrtStarConnect().plan(
+            plan = PoseRrtStarConnect().plan_poses(
                 case.road, case.query, Budget(20 * PlanningConfig().iterations), 0
             )
-            excess += [float(plan.step.sum()) / median(lengths)] if lengths else []
+            excess += [path_length(plan.path) / median(lengths)] if lengths else []
     share, peer = (
         100.0 * len(ours) / feasible,
         f"OMPL RRTConnect {100.0 * len(theirs) / feasible:.1f} %",

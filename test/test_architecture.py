@@ -58,7 +58,10 @@ CONCEPTS = {
         "situation/placement_lsq.py",
         r"def \w*(?:least_squares|solve_starts)\(",
     ),
-    "RRT*-Connect": ("method/routing/search/growth.py", r"def _?cheapest_parent\("),
+    "RRT*-Connect": (
+        "method/routing/search/rrt_star_connect.py",
+        r"def _?choose_parent\(",
+    ),
     "fit, plan, sample": ("method/chain.py", r"(?s)\A(?=.*\bfit_template\()(?=.*\bplan_routes\()"),
     "latitude and longitude": ("logs/geodesy.py", r"(?:import|from) pyproj|6_?378_?137|6_?371_?0"),
     "folders that replace others": ("base/folders/", r"renameat2|RENAME_EXCHANGE"),

@@ -5,6 +5,7 @@
 
 from scenario_gen.method.routing.config import MakePlanner, PlanningConfig
 from scenario_gen.method.routing.plan import deviations, make_planner, plan_routes
+from scenario_gen.method.routing.search.disc_planner import PAPER
 from scenario_gen.method.routing.search.planner import (
     Budget,
     BudgetSpentError,
@@ -12,11 +13,25 @@ from scenario_gen.method.routing.search.planner import (
     Plan,
     plan_with_retry,
     Planner,
+    PosePlanner,
+    PoseQuery,
     Query,
 )
-from scenario_gen.method.routing.search.rrt_star_connect import PAPER
 
 __all__ = [
-    "PAPER", "Budget", "BudgetSpentError", "MakePlanner", "Plan", "Planner", "PlanningConfig", "Query", "check_query",
-    "deviations", "make_planner", "plan_routes", "plan_with_retry",
-]  # fmt: skip
+    "PAPER",
+    "Budget",
+    "BudgetSpentError",
+    "MakePlanner",
+    "Plan",
+    "Planner",
+    "PlanningConfig",
+    "PosePlanner",
+    "PoseQuery",
+    "Query",
+    "check_query",
+    "deviations",
+    "make_planner",
+    "plan_routes",
+    "plan_with_retry",
+]

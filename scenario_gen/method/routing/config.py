@@ -9,17 +9,14 @@ from typing import Protocol
 
 from scenario_gen.base.parameters import parameter, Parameters
 from scenario_gen.base.registry import Registry
+from scenario_gen.method.routing.search.car_planner import PoseRrtStarConnect, PoseSearchConfig
+from scenario_gen.method.routing.search.disc_planner import RrtStarConnect, RrtStarConnectConfig
 from scenario_gen.method.routing.search.ompl.planners import OmplConfig, OmplPlanner
 from scenario_gen.method.routing.search.planner import Planner
-from scenario_gen.method.routing.search.pose_planner import PoseRrtStarConnect, PoseSearchConfig
-from scenario_gen.method.routing.search.rrt_star_connect import (
-    RrtStarConnect,
-    RrtStarConnectConfig,
-)
 
 
 class MakePlanner(Protocol):
-    """What the parameter `planner` names: makes a `Planner` from all parameters of planning."""
+    """The function behind a name of the parameter `planner`."""
 
     def __call__(self, config: "PlanningConfig", /) -> Planner:
         """Return a planner with its own part of the parameters."""
@@ -27,21 +24,21 @@ class MakePlanner(Protocol):
 
 
 class PaperPlanner(RrtStarConnect):
-    """RRT*-Connect: in the plane for a disc, and from pose to pose for the vehicle itself."""
+    """RRT*-Connect: in the plane for a disc, and from pose to pose for a vehicle."""
 
     def __init__(self, config: "PlanningConfig") -> None:
         super().__init__(config.rrt_star_connect)
-        self.plan_poses = PoseRrtStarConnect(config.pose).plan
+        self.plan_poses = PoseRrtStarConnect(config.pose).plan_poses
 
 
 def _ompl(name: str, config: "PlanningConfig") -> Planner:
     return OmplPlanner(name, config.ompl)
 
 
-_OF_OMPL = ("ompl_rrt_connect", "ompl_rrt_star", "ompl_informed_rrt_star", "ompl_bit_star")
+_OMPL_NAMES = ("ompl_rrt_connect", "ompl_rrt_star", "ompl_informed_rrt_star", "ompl_bit_star")
 PLANNERS = Registry[MakePlanner](
     "scenario_gen.planners",
-    {"rrt_star_connect": PaperPlanner, **{name: partial(_ompl, name) for name in _OF_OMPL}},
+    {"rrt_star_connect": PaperPlanner, **{name: partial(_ompl, name) for name in _OMPL_NAMES}},
 )
 """The geometric planners by name."""
 
@@ -60,17 +57,22 @@ class PlanningConfig(Parameters):
         1000, "iterations of the planner between two anchors", low=1, high=10_000_000
     )
     margin: float = parameter(
-        0.3, "room to keep beside the footprint where the road has it", unit="m", low=0.0, high=5.0
+        0.3,
+        "clearance wanted beside the footprint where the road has it",
+        unit="m",
+        low=0.0,
+        high=5.0,
     )
     drivable: bool = parameter(
-        True, "smooth routes that can be driven; false: the planner's bare polylines"
+        True, "smooth routes that can be driven; false: the planner's polylines"
     )
     spacing: float = parameter(
         0.5, "largest distance between two points of a route", unit="m", low=0.05, high=0.5
     )
     keep_side: float = parameter(
         0.05,
-        "price of a metre driven a metre beside a leg's direct line, threefold towards oncoming traffic; 0: no side is dearer",
+        "cost of a metre driven a metre away from the direct curve between two anchors, three "
+        "times as much towards oncoming traffic; 0: no side costs more",
         unit="1/m",
         low=0.0,
         high=10.0,

@@ -1,224 +1,212 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Drivable mode: an elastic band drawn through the anchors, then a spline whose heading and curvature are continuous.
+"""Drivable curves: an elastic band through the anchors, then a spline of continuous curvature.
 
-The band (see `band.relax`) trades four things: nearness to a first guess, nearness to the anchors, little bending, and room
-beside the footprint. Where the curvature limit or the room is violated, the weights there rise from step to step. The
-cubic spline through the band is clamped to the requested headings at both ends, and it is the spline that is verified.
+The band (see `band.relax`) trades four things: closeness to a first guess, closeness to the
+anchors, little bending, and clearance. Where the curvature limit or the clearance is violated,
+weights rise from step to step. The cubic spline through the band has the requested headings at
+both ends; it is the spline that is verified.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 from scipy.interpolate import CubicSpline
 
-from scenario_gen.method.routing.band import Band, relax
-from scenario_gen.method.routing.config import PlanningConfig
+from scenario_gen.method.routing.band import Band, relax, Weights
+from scenario_gen.method.routing.matching import monotone_matching, squared_distances
 from scenario_gen.method.routing.search.planner import path_length
 from scenario_gen.method.routing.search.sweep import sweep_is_free
-from scenario_gen.numerics import Floats, Ints, wrap_angle
+from scenario_gen.method.routing.task import VehicleTask
+from scenario_gen.numerics import Floats, wrap_angle
 from scenario_gen.numerics.plane import edge_lengths, unit
 from scenario_gen.roads import clearance_field
-from scenario_gen.types import Road, Vehicle
 
-ROUNDS, STEPS = 40, 8  # the band is resampled between rounds
-BEND = 4.0**4  # [m^4] with hold = 1 a kink spreads over about 4 m
-ANCHOR_WEIGHT = 200.0  # weight of an anchor
-DISCS = 5  # that cover a footprint
-TAPER = 0.05  # how fast the wanted clearance rises from what there is at the ends
-CHECK = 0.1  # [m] between two poses that are verified
+ROUND_STEPS = 8  # of the band, before it is resampled
+CHECK_ROUNDS = 4  # after so many the spline is verified
+ANCHOR_WEIGHT = 200.0
+INITIAL_PUSH_WEIGHT = 5.0  # of the obstacles
+DISCS_COUNT = 5  # that cover a footprint
+TAPER_RATIO = 0.05  # m of wanted clearance per metre from an end, where it may be less
+CHECK_SPACING_M = 0.1  # between two poses that are verified
+STILL_M = 0.02  # a band that moves less has converged
+MIN_POINTS_COUNT = 8  # of a band
 
 
 @dataclass(frozen=True, eq=False)
 class Guess:
-    """Where the band starts: dense points (G, 2) [m] and how strongly each holds it (G,)."""
+    """Where the band starts: dense points (G, 2) [m], and the weight of each (G,)."""
 
     points: Floats
     hold: Floats
 
+    @classmethod
+    def even(cls, poses: Floats, weight: float) -> "Guess":
+        """Return a guess of poses (G, 2 or more) with one weight."""
+        return cls(poses[:, :2], np.full(len(poses), weight))
 
-@dataclass(frozen=True, eq=False)
-class Targets:
-    """Interior anchors in their order: (A, 2) [m], and how strongly each draws the band (A,), 1 in full."""
+    @classmethod
+    def joined(cls, guesses: Sequence["Guess"]) -> "Guess":
+        """Return guesses end to end; the first point of all but the first is dropped."""
+        points = [guesses[0].points] + [guess.points[1:] for guess in guesses[1:]]
+        hold = [guesses[0].hold] + [guess.hold[1:] for guess in guesses[1:]]
+        return cls(np.concatenate(points), np.concatenate(hold))
 
-    points: Floats
-    weight: Floats
+    def resampled(self, spacing: float, count: int | None = None) -> "Guess":
+        """Return the guess at equal distances of about `spacing` [m], or with `count` points."""
+        length = np.concatenate(([0.0], np.cumsum(edge_lengths(self.points))))
+        s = np.linspace(0.0, length[-1], count or _count(length[-1], spacing))
+        points = [np.interp(s, length, self.points[:, axis]) for axis in range(2)]
+        return Guess(np.column_stack(points), np.interp(s, length, self.hold))
 
 
 @dataclass(frozen=True, eq=False)
 class Curve:
-    """A verified or failed curve: the spline over `knots` (G,) [m], and what is wrong with it."""
+    """A verified or failed curve.
+
+    Attributes:
+        spline: the curve.
+        parameter: (M,) values of its parameter.
+        arc: (M,) its arc length there [m].
+        curvature: the largest one [1/m].
+        sharpest: (2,) where that is [m].
+        off_road: (B, 3) poses at which the footprint leaves the road.
+    """
 
     spline: CubicSpline
-    end: float
+    parameter: Floats
+    arc: Floats
     curvature: float
-    sharpest: Floats  # (2,) where that is
-    off_road: Floats  # (B, 3) poses at which the footprint leaves the road
+    sharpest: Floats
+    off_road: Floats
 
-    @cached_property
-    def _arc(self) -> tuple[Floats, Floats]:
-        u = np.linspace(0.0, self.end, int(np.ceil(self.end / CHECK)) + 1)
-        speed = np.hypot(*self.spline(u, 1).T)
-        middle = np.hypot(*self.spline(0.5 * (u[1:] + u[:-1]), 1).T)
-        pieces = np.diff(u) * (speed[:-1] + 4.0 * middle + speed[1:]) / 6.0  # Simpson
-        return u, np.concatenate(([0.0], np.cumsum(pieces)))
-
-    @property
-    def length(self) -> float:
-        """Arc length [m]."""
-        return float(self._arc[1][-1])
+    def is_drivable(self, max_curvature: float) -> bool:
+        """Whether the curve is within a curvature [1/m] and on the road."""
+        return self.curvature <= max_curvature and not len(self.off_road)
 
     def poses(self, length: Floats) -> Floats:
-        """Poses (M, 3) at arc lengths (M,); yaw unwrapped."""
-        u = np.interp(length, self._arc[1], self._arc[0])
+        """Return poses (M, 3) at arc lengths (M,); yaw unwrapped."""
+        u = np.interp(length, self.arc, self.parameter)
         slope = self.spline(u, 1)
         return np.column_stack((self.spline(u), np.unwrap(np.arctan2(slope[:, 1], slope[:, 0]))))
 
 
-def smooth(
-    road: Road,
-    vehicle: Vehicle,
-    ends: tuple[Floats, Floats],
-    targets: Targets,
-    guess: Guess,
-    config: PlanningConfig,
-    max_curvature: float,
-    rounds: int = ROUNDS,
-) -> Curve:
-    """Draw a curve between `ends` (poses (3,)), near the interior `targets` and near a guess that is free.
-
-    It is no sharper than `max_curvature` [1/m].
+def smooth(task: VehicleTask, weights: Floats, guess: Guess, rounds: int) -> Curve:
+    """Draw a curve between the end anchors, near the others and near a guess that is free.
 
     Source: elastic bands (Quinlan & Khatib 1993).
 
+    Args:
+        task: the vehicle.
+        weights: (A,) how strongly each anchor attracts the curve, 0 to 1.
+        guess: see `Guess`.
+        rounds: most rounds of the band.
+
     Returns:
-        The first curve within the limits; if there is none, the last one, with what is wrong about it.
+        The first curve within the limits, else the last one.
     """
-    start, end = ends
-    disc = (np.arange(DISCS) - 0.5 * (DISCS - 1)) * vehicle.length / DISCS
-    cover = float(np.hypot(0.5 * vehicle.width, 0.5 * vehicle.length / DISCS))
-    headings = np.stack([unit(start[2]), unit(end[2])])
-    guess = resampled(guess, config.spacing)
-    points = guess.points
-    points[0], points[-1] = start[:2], end[:2]
-    stiff, push = np.ones(len(points)), np.full(len(points), 5.0)
-    field = clearance_field(road)
-    curve: Curve | None = None
-    for round_ in range(rounds):
-        spacing = path_length(points) / (len(points) - 1)
-        anchor, pull = _assigned(points, targets)
-        required = np.minimum(_room(road, guess.points, disc), cover)
-        wish = _wished(road, disc, cover + config.margin, start, end, spacing, len(points))
-        before, points = points, np.ascontiguousarray(points - road.origin)
-        band = Band(
-            field, road.resolution, guess.points - road.origin, guess.hold, anchor - road.origin, pull, headings, disc,
-            required, wish, spacing, BEND, max_curvature,
-        )  # fmt: skip
-        relax(STEPS, band, stiff, push, points)
-        points = points + road.origin
-        still = np.abs(points - before).max() < 0.02
-        if still or round_ % 4 == 3:
-            curve = verified(road, vehicle, points, start, end)
-            if curve.curvature <= max_curvature and not len(curve.off_road):
-                return curve
-        count = max(int(np.ceil(path_length(points) / config.spacing)) + 1, 8)
+    spacing, length = task.config.spacing, task.vehicle.length
+    disc = (np.arange(DISCS_COUNT) - 0.5 * (DISCS_COUNT - 1)) * length / DISCS_COUNT
+    guess = guess.resampled(spacing)
+    points = guess.points.copy()
+    points[0], points[-1] = task.anchors[0, :2], task.anchors[-1, :2]
+    adaptive = Weights(np.ones(len(points)), np.full(len(points), INITIAL_PUSH_WEIGHT))
+    for k in range(1, rounds + 1):
+        band = _band(task, weights, guess, points, disc)
+        origin = task.road.origin
+        moved, adaptive = relax(band, adaptive, points - origin, ROUND_STEPS)
+        is_still = np.abs(moved + origin - points).max() < STILL_M
+        points = moved + origin
+        if is_still or k % CHECK_ROUNDS == 0:
+            curve = _verified(task, points)
+            if curve.is_drivable(task.max_curvature):
+                break
+        count = _count(path_length(points), spacing)
         old, new = np.linspace(0.0, 1.0, len(points)), np.linspace(0.0, 1.0, count)
-        stiff, push = np.interp(new, old, stiff), np.interp(new, old, push)
-        guess = resampled(guess, config.spacing, count)
-        points = resampled(Guess(points, np.ones(len(points))), config.spacing, count).points
-    assert curve is not None
+        adaptive = Weights(*(np.interp(new, old, values) for values in adaptive))
+        guess = guess.resampled(spacing, count)
+        points = Guess.even(points, 1.0).resampled(spacing, count).points
     return curve
 
 
-def _room(road: Road, points: Floats, disc: Floats) -> Floats:
-    """Clearance (G, D) [m] of the discs of a footprint along a polyline (G, 2) [m]."""
+def _count(length: float, spacing: float) -> int:
+    return max(int(np.ceil(length / spacing)) + 1, MIN_POINTS_COUNT)
+
+
+def _band(task: VehicleTask, weights: Floats, guess: Guess, points: Floats, disc: Floats) -> Band:
+    """Return the band for points (M, 2) and a guess of as many points."""
+    road, vehicle = task.road, task.vehicle
+    cover = float(np.hypot(0.5 * vehicle.width, 0.5 * vehicle.length / DISCS_COUNT))
+    spacing = path_length(points) / (len(points) - 1)
+    anchor, pull = _anchors_of(points, task.anchors[weights > 0.0, :2], weights[weights > 0.0])
+    return Band(
+        field=clearance_field(road),
+        resolution=road.resolution,
+        guess=guess.points - road.origin,
+        hold=guess.hold,
+        anchor=anchor - road.origin,
+        pull=pull,
+        yaws=task.anchors[[0, -1], 2],
+        disc=disc,
+        required=np.minimum(_clearance_along(task, guess.points, disc), cover),
+        wish=_wanted_clearance(task, disc, cover + task.config.margin, spacing, len(points)),
+        spacing=spacing,
+        max_curvature=task.max_curvature,
+    )
+
+
+def _clearance_along(task: VehicleTask, points: Floats, disc: Floats) -> Floats:
+    """Return the clearance (G, D) [m] of the discs of a footprint along a polyline (G, 2) [m]."""
     tangent = np.gradient(points, axis=0)
     tangent /= np.maximum(np.hypot(*tangent.T), 1e-9)[:, None]
-    row, column, inside = road.cells(points[:, None] + disc[None, :, None] * tangent[:, None])
-    return np.where(inside, clearance_field(road)[row, column], 0.0)
+    centres = points[:, None] + disc[None, :, None] * tangent[:, None]
+    row, column, inside = task.road.cells(centres)
+    return np.where(inside, clearance_field(task.road)[row, column], 0.0)
 
 
-def _wished(
-    road: Road, disc: Floats, wish: float, start: Floats, end: Floats, spacing: float, count: int
+def _wanted_clearance(
+    task: VehicleTask, disc: Floats, wish: float, spacing: float, count: int
 ) -> Floats:
-    """Clearance wanted along the band (count,): what there is at its ends, rising from there by 5 cm per metre to `wish`."""
-    field = clearance_field(road)
-    along = np.arange(count) * spacing
-    room = np.full(count, wish)
-    for pose, distance in ((start, along), (end, along[::-1])):
-        row, column, _ = road.cells(pose[:2] + disc[:, None] * unit(pose[2]))
-        room = np.minimum(room, field[row, column].min() + TAPER * distance)
-    return room
+    """Return the wanted clearance (count,) [m]: at the ends what there is, rising to `wish`."""
+    field = clearance_field(task.road)
+    distance = np.arange(count) * spacing
+    wanted = np.full(count, wish)
+    for pose, from_pose in ((task.anchors[0], distance), (task.anchors[-1], distance[::-1])):
+        row, column, _ = task.road.cells(pose[:2] + disc[:, None] * unit(pose[2]))
+        wanted = np.minimum(wanted, field[row, column].min() + TAPER_RATIO * from_pose)
+    return wanted
 
 
-def verified(road: Road, vehicle: Vehicle, points: Floats, start: Floats, end: Floats) -> Curve:
-    """Lay the clamped spline through the band (G, 2) [m], from pose to pose (3,), and measure it."""
-    knots = np.concatenate(([0.0], np.cumsum(edge_lengths(points))))
-    spline = CubicSpline(knots, points, bc_type=((1, unit(start[2])), (1, unit(end[2]))))
-    u = np.linspace(0.0, knots[-1], int(np.ceil(knots[-1] / CHECK)) + 1)
-    first, second = spline(u, 1), spline(u, 2)
-    bend = (
-        np.abs(first[:, 0] * second[:, 1] - first[:, 1] * second[:, 0]) / np.hypot(*first.T) ** 3
-    )
-    poses = np.column_stack((spline(u), np.arctan2(first[:, 1], first[:, 0])))
-    turned = np.abs(wrap_angle(np.diff(poses[:, 2]))) / np.maximum(
-        edge_lengths(poses[:, :2]), 1e-6
-    )
-    bend[1:] = np.maximum(
-        bend[1:], turned
-    )  # a cusp on a straight line has no curvature, but turns round
-    poses[0], poses[-1] = start, end
-    fits = sweep_is_free(road, poses, vehicle.length, vehicle.width)[:, 0] > 0.0
-    return Curve(
-        spline, float(knots[-1]), float(bend.max()), poses[np.argmax(bend), :2], poses[~fits]
-    )
-
-
-def resampled(guess: Guess, spacing: float, count: int | None = None) -> Guess:
-    """The polyline at equal distances of about `spacing` (or with `count` points)."""
-    step = edge_lengths(guess.points)
-    at = np.concatenate(([0.0], np.cumsum(step)))
-    count = count or max(int(np.ceil(at[-1] / spacing)) + 1, 8)
-    s = np.linspace(0.0, at[-1], count)
-    points = np.column_stack([np.interp(s, at, guess.points[:, axis]) for axis in range(2)])
-    return Guess(points, np.interp(s, at, guess.hold))
-
-
-def _assigned(points: Floats, targets: Targets) -> tuple[Floats, Floats]:
-    """Give each target to the point of the band that a monotone matching says: positions (M, 2), weights (M,)."""
+def _anchors_of(points: Floats, anchors: Floats, weight: Floats) -> tuple[Floats, Floats]:
+    """Give each anchor (A, 2) to a point of the band: positions (M, 2), weights (M,)."""
     anchor, pull = points.copy(), np.zeros(len(points))
-    if len(targets.points):
-        index = monotone_matching(squared_gaps(targets.points, points))
-        for m, point, weight in zip(index, targets.points, targets.weight, strict=True):
-            if weight * ANCHOR_WEIGHT > pull[m]:
-                anchor[m], pull[m] = point, weight * ANCHOR_WEIGHT
+    if len(anchors):
+        nearest = monotone_matching(squared_distances(anchors, points))
+        order = np.argsort(-weight, kind="stable")[::-1]  # the strongest one of a point comes last
+        anchor[nearest[order]] = anchors[order]
+        pull[nearest[order]] = ANCHOR_WEIGHT * weight[order]
     return anchor, pull
 
 
-def squared_gaps(rows: Floats, columns: Floats) -> Floats:
-    """Return the squares (A, M) of the distances [m] of places (A, 2) from others (M, 2), axis by axis: a long drive has many."""
-    squares = np.zeros((len(rows), len(columns)))
-    for axis in (0, 1):
-        squares += np.square(rows[:, axis, None] - columns[None, :, axis])
-    return squares
-
-
-def monotone_matching(cost: Floats) -> Ints:
-    """Match rows (A) of `cost` (A, M), of any unit, to columns without going back, so that its sum is least: (A,) columns.
-
-    Source: dynamic programming (Bellman 1957).
-    """
-    total = cost[0]
-    came_from = np.empty(cost.shape, dtype=np.int32)
-    for k in range(1, len(cost)):
-        lowest = np.minimum.accumulate(total)
-        new = np.concatenate(([True], total[1:] < lowest[:-1]))
-        came_from[k] = np.maximum.accumulate(np.where(new, np.arange(len(total)), 0))
-        total = lowest + cost[k]
-    index = np.empty(len(cost), dtype=np.int64)
-    index[-1] = np.argmin(total)
-    for k in range(len(cost) - 1, 0, -1):
-        index[k - 1] = came_from[k, index[k]]
-    return index
+def _verified(task: VehicleTask, points: Floats) -> Curve:
+    """Lay the clamped spline through a band (G, 2) [m], and measure it."""
+    start, end = task.anchors[0], task.anchors[-1]
+    knots = np.concatenate(([0.0], np.cumsum(edge_lengths(points))))
+    spline = CubicSpline(knots, points, bc_type=((1, unit(start[2])), (1, unit(end[2]))))
+    u = np.linspace(0.0, knots[-1], int(np.ceil(knots[-1] / CHECK_SPACING_M)) + 1)
+    first, second = spline(u, 1), spline(u, 2)
+    speed = np.hypot(*first.T)
+    curvature = np.abs(first[:, 0] * second[:, 1] - first[:, 1] * second[:, 0]) / speed**3
+    poses = np.column_stack((spline(u), np.arctan2(first[:, 1], first[:, 0])))
+    turn = np.abs(wrap_angle(np.diff(poses[:, 2])))
+    step = np.maximum(edge_lengths(poses[:, :2]), 1e-6)
+    curvature[1:] = np.maximum(curvature[1:], turn / step)  # sees a cusp on a straight line
+    poses[0], poses[-1] = start, end
+    fits = sweep_is_free(task.road, poses, task.vehicle.length, task.vehicle.width)[:, 0] > 0.0
+    middle = np.hypot(*spline(0.5 * (u[1:] + u[:-1]), 1).T)
+    pieces = np.diff(u) * (speed[:-1] + 4.0 * middle + speed[1:]) / 6.0  # Simpson's rule
+    arc = np.concatenate(([0.0], np.cumsum(pieces)))
+    sharpest = poses[np.argmax(curvature), :2]
+    return Curve(spline, u, arc, float(curvature.max()), sharpest, poses[~fits])

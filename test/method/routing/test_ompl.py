@@ -8,9 +8,8 @@ import pytest
 
 from benchmarks._planning_maps import enters_blocked, optimum, t_intersection
 from scenario_gen.method.routing.search.ompl.planners import OmplConfig, OmplPlanner
-from scenario_gen.method.routing.search.ompl.solve import Options, PLANNERS, solve
+from scenario_gen.method.routing.search.ompl.solve import PLANNERS
 from scenario_gen.method.routing.search.planner import Budget, BudgetSpentError, Query
-from scenario_gen.roads.clearance import clearance_in_cells
 
 ROAD, ENDS = t_intersection()
 
@@ -33,11 +32,3 @@ def test_a_hang_a_crash_and_a_change_of_mind_are_answers():
         OmplPlanner("no such planner").plan(ROAD, query, endless, 0)
     with pytest.raises(BudgetSpentError, match="cancelled"):
         OmplPlanner("ompl_rrt_star").plan(ROAD, query, Budget(None, cancelled=lambda: True), 0)
-
-
-def test_state_by_state_ompl_finds_a_way_too():
-    field = clearance_in_cells(ROAD)
-    options = Options(step=5.0, simplify=False, state_by_state=True)
-    answer = solve(field, ENDS, 0.0, "ompl_rrt_connect", lambda calls: calls > 10**5, options)
-    np.testing.assert_array_equal(answer.path[[0, -1]], ENDS)
-    assert np.hypot(*np.diff(answer.path, axis=0).T).max() <= 5.0 + 1e-9

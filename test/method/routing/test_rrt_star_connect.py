@@ -18,6 +18,12 @@ from benchmarks._planning_maps import (
     t_intersection,
 )
 from scenario_gen.base.errors import RefusedError
+from scenario_gen.method.routing.search.disc_planner import (
+    PAPER,
+    RrtStarConnect,
+    RrtStarConnectConfig,
+    straight_path,
+)
 from scenario_gen.method.routing.search.planner import (
     BlockedError,
     Budget,
@@ -27,14 +33,6 @@ from scenario_gen.method.routing.search.planner import (
     plan_with_retry,
     Query,
 )
-from scenario_gen.method.routing.search.rrt_star_connect import (
-    PAPER,
-    RrtStarConnect,
-    RrtStarConnectConfig,
-    straight_path,
-)
-from scenario_gen.method.routing.search.tree import CHUNK, COST, EDGE, PARENT
-from scenario_gen.method.routing.search.two_trees import LARGE
 from scenario_gen.roads.clearance import segments_free
 from scenario_gen.roads.connectivity import common_component
 
@@ -127,37 +125,48 @@ def small():
 
 
 def grown(road, ends, config, iterations):
-    """Both trees after so many iterations, and the ids of all their nodes."""
+    """The search after some iterations, and the nodes of both trees."""
     search = RrtStarConnect(config).search(road, Query(*ends), 1, 2)
+    search.grow(iterations)
     while search.iteration < iterations:
         search.grow(iterations - search.iteration)
-    found = []
-    for first in search.tree.head[search.tree.head >= 0]:
-        k = first
-        while k >= 0:
-            found.append(k * CHUNK + np.arange(search.tree.chunk[k, 1]))
-            k = search.tree.chunk[k, 0]
-    return search, np.concatenate(found)
+    return search, [tree.node[: tree.size[0]] for tree in search.trees]
+
+
+def xy(node):
+    return np.column_stack((node["x"], node["y"]))
 
 
 @pytest.mark.parametrize("config", [RrtStarConnectConfig(), PAPER], ids=["default", "paper"])
 @pytest.mark.parametrize("case", [clutter, lane, small])
 def test_large_trees_are_whole(config, case):
     road, ends = case()
-    search, m = grown(road, ends, config, 60_000)
-    assert len(m) == len(np.unique(m)) == search.state["nodes"].sum()
-    assert len(search.drawn) > 0 or len(m) <= LARGE
-    m = m[search.tree.link[m, PARENT] >= 0]
-    parent = search.tree.link[m, PARENT]
-    edge = np.hypot(*(search.tree.node[m, :2] - search.tree.node[parent, :2]).T)
-    np.testing.assert_allclose(search.tree.node[m, EDGE], edge, atol=1e-9)
-    np.testing.assert_allclose(
-        search.tree.node[m, COST], search.tree.node[parent, COST] + edge, atol=1e-7
-    )
-    assert segments_free(road, search.tree.node[parent, :2], search.tree.node[m, :2], 0.0).all()
+    search, trees = grown(road, ends, config, 20_000)
+    for tree, node in zip(search.trees, trees, strict=True):
+        linked = []
+        for first in tree.bucket[tree.bucket >= 0]:
+            m = first
+            while m >= 0:
+                linked.append(m)
+                m = node["next_in_bucket"][m]
+        assert sorted(linked) == list(range(len(node)))
+        child = node[1:]
+        parent = node[child["parent"]]
+        edge = np.hypot(*(xy(child) - xy(parent)).T)
+        np.testing.assert_allclose(child["edge_cost"], edge, atol=1e-9)
+        np.testing.assert_allclose(child["cost"], parent["cost"] + edge, atol=1e-7)
+        assert segments_free(road, xy(parent), xy(child), 0.0).all()
     path = straight_path(search)
     assert path_length(path) == pytest.approx(search.best)
     np.testing.assert_array_equal(path[[0, -1]], ends)
+
+
+def test_the_cheapest_of_all_meeting_nodes_wins():
+    search, trees = grown(*t_intersection(), PAPER, 5_000)
+    count = search.state["meetings"][0]
+    costs = sum(node["cost"][search.meeting[:count, k]] for k, node in enumerate(trees))
+    assert count > 100
+    assert search.best == costs.min()
 
 
 def test_only_an_informed_search_leaves_out_what_cannot_help():
@@ -168,10 +177,10 @@ def test_only_an_informed_search_leaves_out_what_cannot_help():
         (PAPER, True),
         (RrtStarConnectConfig(greedy=False, pull=False), False),
     ):
-        search, m = grown(road, ends, config, 4_000)
-        place = search.tree.node[m, :2]
-        by_way_of = np.hypot(*(place - ends[0]).T) + np.hypot(*(place - ends[1]).T)
-        assert (np.mean(by_way_of > 2.0 * search.best) > 0.3) == everywhere
+        search, trees = grown(road, ends, config, 4_000)
+        places = np.concatenate([xy(node) for node in trees])
+        detour = np.hypot(*(places - ends[0]).T) + np.hypot(*(places - ends[1]).T)
+        assert (np.mean(detour > 2.0 * search.best) > 0.3) == everywhere
 
 
 def test_same_seed_same_path():

@@ -1,18 +1,23 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""What every geometric planner takes and gives: the Protocol, its budget and its answer."""
+"""The interface of all geometric planners: queries, budget, answer, and the two protocols."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
-from typing import Protocol
+from dataclasses import dataclass, field
+import math
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 
 from scenario_gen.base.errors import RefusedError
-from scenario_gen.numerics import Floats, frozen
+from scenario_gen.numerics import Floats, frozen, sealed
+from scenario_gen.numerics.plane import edge_lengths
 from scenario_gen.roads import common_component, segments_free
 from scenario_gen.types import Road
+
+NO_POSES = sealed(np.empty((0, 3)))
+RETRY_FACTOR = 100  # more iterations for a first path where connected components prove a route
 
 
 class BlockedError(RefusedError):
@@ -28,12 +33,12 @@ class NoWayError(RefusedError):
 
 
 class BudgetSpentError(RefusedError):
-    """A way may exist, but none was found within the budget, or the search was cancelled."""
+    """A route may exist, but none was found within the budget, or the search was cancelled."""
 
 
 @dataclass(frozen=True)
 class Query:
-    """From where to where, for a disc: start and goal (2,) [m] in the road's frame, radius [m]."""
+    """A query for a disc: start and goal (2,) [m] in the road's frame, radius [m]."""
 
     start: Floats
     goal: Floats
@@ -44,9 +49,49 @@ class Query:
         object.__setattr__(self, "goal", frozen(np.reshape(self.goal, 2)))
 
 
+@dataclass(frozen=True, eq=False)
+class Preferences:
+    """What a path for a vehicle should avoid, as costs on top of its length.
+
+    Attributes:
+        clearance: wanted beside the footprint [m].
+        clearance_cost: extra cost of a metre without any clearance.
+        guide: (G, 3) poses of a line to stay near; empty: no side costs more.
+        left_cost: extra cost of a metre driven a metre left of the guide [1/m].
+        right_cost: extra cost of a metre driven a metre right of the guide [1/m].
+        max_left: largest allowed offset to the left of the guide [m].
+        max_right: largest allowed offset to the right of the guide [m].
+        samples: (S, 3) poses to sample near; empty: the poses of a path for a disc.
+    """
+
+    clearance: float = 0.0
+    clearance_cost: float = 1.0
+    guide: Floats = field(default_factory=lambda: NO_POSES)
+    left_cost: float = 0.0
+    right_cost: float = 0.0
+    max_left: float = math.inf
+    max_right: float = math.inf
+    samples: Floats = field(default_factory=lambda: NO_POSES)
+
+
+@dataclass(frozen=True, eq=False)
+class PoseQuery:
+    """A query for a vehicle: start and goal (3,) x [m], y [m], yaw [rad]; footprint [m].
+
+    Its path turns with at most `curvature` [1/m].
+    """
+
+    start: Floats
+    goal: Floats
+    length: float
+    width: float
+    curvature: float
+    preferences: Preferences = field(default_factory=Preferences)
+
+
 @dataclass(frozen=True)
 class Budget:
-    """When a search stops: after `iterations`, after `seconds` of CPU time, or when `cancelled()` says so; what comes first.
+    """Limits of a search: `iterations`, `seconds` of CPU time, `cancelled()`.
 
     Only iterations give the same answer every time. `first` stops at the first path.
     """
@@ -62,9 +107,9 @@ class Plan:
     """A planner's answer.
 
     Attributes:
-        path: (P, 2) metres, from start to goal.
-        cost: its Euclidean length [m].
-        iterations: how many were made (0 if the planner does not tell).
+        path: (P, 2) x, y [m] from start to goal; of a vehicle (P, 3) with yaw [rad].
+        cost: its length [m], and the extra costs of the preferences.
+        iterations: number of iterations (0 if the planner does not report it).
         history: (h, 3) iteration, CPU seconds, cost [m] of each improvement.
     """
 
@@ -88,14 +133,25 @@ class Planner(Protocol):
         ...
 
 
-RETRY_FACTOR = 100
-"""Times the iterations that a search may go on for a first path, where connected components have shown that there is a way."""
+@runtime_checkable
+class PosePlanner(Protocol):
+    """Finds a short drivable path for a vehicle; routes are then searched with this method."""
+
+    def plan_poses(self, road: Road, query: PoseQuery, budget: Budget, seed: int) -> Plan:
+        """Return the best path found within the budget.
+
+        Raises:
+            BlockedError: the footprint has no room at start or goal.
+            NoWayError: there is no route.
+            BudgetSpentError: none was found within the budget.
+        """
+        ...
 
 
 def plan_with_retry(
     planner: Planner, road: Road, query: Query, iterations: int, seed: int
 ) -> Plan:
-    """Return the best path found in so many iterations; where there is none yet, the first that more patience finds.
+    """Return the best path within `iterations`, or else the first path of a longer search.
 
     Raises:
         BlockedError, NoWayError, BudgetSpentError: as `Planner.plan`.
@@ -110,31 +166,38 @@ def check_query(road: Road, query: Query) -> int:
     """Raise BlockedError or NoWayError if no search could succeed.
 
     Returns:
-        The label of the component (see `roads.connectivity`) that joins start and goal; 0: only the straight way does.
+        The label of the component that joins start and goal (see `roads.connectivity`);
+        0: only the straight line joins them.
     """
     label = common_component(road, query.start, query.goal, query.radius)
-    if label:  # both ends move freely to a cell of it
+    if label:  # both ends can move to one of its cells
         return label
     ends = np.stack((query.start, query.goal))
-    for end, xy, free in zip(
-        ("start", "goal"), ends, segments_free(road, ends, ends, query.radius), strict=True
-    ):
-        if not free:
+    free = segments_free(road, ends, ends, query.radius)
+    for name, (x, y), is_free in zip(("start", "goal"), ends, free, strict=True):
+        if not is_free:
             raise BlockedError(
-                end,
-                f"the {end} ({xy[0]:.2f}, {xy[1]:.2f}) m is not drivable on road {road.name!r} for a disc of radius "
-                f"{query.radius:.2f} m",
+                name,
+                f"the {name} ({x:.2f}, {y:.2f}) m is not drivable on road {road.name!r} "
+                f"for a disc of radius {query.radius:.2f} m",
             )
     if label is None:
-        (x0, y0), (x1, y1) = query.start, query.goal
         raise NoWayError(
-            f"no route leads from ({x0:.2f}, {y0:.2f}) m to ({x1:.2f}, {y1:.2f}) m on road {road.name!r} "
-            f"for a disc of radius {query.radius:.2f} m"
+            f"{no_route(road, query.start, query.goal)} for a disc of radius {query.radius:.2f} m"
         )
     return label
 
 
+def no_route(road: Road, start: Floats, goal: Floats) -> str:
+    """Return the sentence that there is no route between two positions (2 or more) [m]."""
+    from_x, from_y = start[:2]
+    to_x, to_y = goal[:2]
+    return (
+        f"no route leads from ({from_x:.2f}, {from_y:.2f}) m to ({to_x:.2f}, {to_y:.2f}) m "
+        f"on road {road.name!r}"
+    )
+
+
 def path_length(path: Floats) -> float:
-    """Length of a polyline (P, 2), in its unit, metres or cells."""
-    edge = path[1:] - path[:-1]
-    return float(np.hypot(edge[:, 0], edge[:, 1]).sum())
+    """Return the length of a polyline (P, 2 or more), in its unit."""
+    return float(edge_lengths(path[:, :2]).sum())

@@ -1,142 +1,220 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""RRT*-Connect (the paper's Algorithms 1-5) in the plane: straight lines for a disc."""
+"""RRT*-Connect: Algorithms 1-5 of the paper's appendix, with steering as a parameter.
 
-from dataclasses import dataclass
-import math
+Two rapidly-exploring trees rewire, meet, and keep growing. `steering` defines their edges:
+straight lines, as in the paper, or Dubins curves of a vehicle. Lengths are in cells.
+"""
 
 import numpy as np
 
-from scenario_gen.base.parameters import parameter, Parameters
-from scenario_gen.method.routing.search.dubins import Pose
-from scenario_gen.method.routing.search.planner import (
-    Budget,
-    check_query,
-    path_length,
-    Plan,
-    Query,
+from scenario_gen.method.routing.search.dubins import length_of, Pose
+from scenario_gen.method.routing.search.sampler import random_pose, RULES, Rules, STATES
+from scenario_gen.method.routing.search.steering import distance, edge_cost, pose_on_edge, steer
+from scenario_gen.method.routing.search.sweep import SCENE, Scene
+from scenario_gen.method.routing.search.trees import (
+    add_node,
+    attach,
+    detach,
+    has_room,
+    near_nodes,
+    nearest_node,
+    pose_of,
+    propagate_cost,
+    Records,
+    TREE,
+    Tree,
 )
-from scenario_gen.method.routing.search.shortcut import pull_string
-from scenario_gen.method.routing.search.sweep import Disc, NO_PRICES, NOWHERE, Scene
-from scenario_gen.method.routing.search.tree_samples import Rules
-from scenario_gen.method.routing.search.two_trees import Search
-from scenario_gen.numerics import Floats, sealed
-from scenario_gen.roads import clearance_in_cells, component_cells, to_cells, to_metres
-from scenario_gen.types import Road
+from scenario_gen.numerics import Ints
+from scenario_gen.numerics.kernels import I, kernel, OUTI2
 
-RADIUS_MARGIN = 1e-7  # [cells] added to the disc, so that rounding touches no corner
-BATCH = 512  # iterations between two looks at the clock
-NO_GRID, NO_ROWS = sealed(np.zeros((0, 1), dtype=np.int32)), np.empty((2, 0))
+TRAPPED_CODE, ADVANCED_CODE, REACHED_CODE = 0, 1, 2
+MIN_GAIN_CELLS = 1e-6  # a smaller decrease of a cost changes nothing
+SAME_POSE_CELLS = 1e-6  # closer poses are the same
+MAX_CONNECT_STEPS = 1_000_000
 
 
-@dataclass(frozen=True)
-class RrtStarConnectConfig(Parameters):
-    """Settings of RRT*-Connect; lengths in cells, as in the paper."""
-
-    step: float = parameter(
-        120.0, "longest new edge (the paper's preset: 5)", unit="cells", low=0.1, high=1e6
-    )
-    zeta: float = parameter(
-        120.0,
-        "largest near radius, zeta of eq 10; it decides quality (the paper's preset: 30)",
-        unit="cells",
-        low=0.1,
-        high=1e6,
-    )
-    gamma_factor: float = parameter(
-        1.1,
-        "gamma of eq 10 as a multiple of the minimum that is asymptotically optimal",
-        low=1.0,
-        high=10.0,
-    )
-    greedy: bool = parameter(
-        True, "extend as far as possible until the first path is found (the paper: one step)"
-    )
-    skip: bool = parameter(
-        True, "let new edges skip visible ancestors, as Quick-RRT* does (the paper: no)"
-    )
-    corners: float = parameter(
-        0.5,
-        "share of samples beside convex corners of obstacles (the paper: 0)",
-        low=0.0,
-        high=0.9,
-    )
-    informed: bool = parameter(True, "sample only where a shorter path can lie, once there is one")
-    pull: bool = parameter(True, "pull the path taut at the end (string pulling)")
+@kernel(inline=True, forced=True)
+def _near_radius(tree: Tree, rules: Rules) -> float:
+    """Return |V| of eq 10, never capped at the step size (Karaman & Frazzoli 2011)."""
+    n = float(max(tree.size[0], 2))
+    return float(min(rules.gamma * (np.log(n) / n) ** rules.exponent, rules.zeta))  # eq 10
 
 
-PAPER = RrtStarConnectConfig(
-    step=5.0, zeta=30.0, greedy=False, skip=False, corners=0.0, informed=False, pull=False
-)
+@kernel(inline=True, forced=True)
+def _choose_parent(
+    tree: Tree, nearest: int, pose: Pose, cost: float, count: int, scene: Scene
+) -> tuple[int, float]:
+    """Algorithm 4: return the parent by which a pose costs least, and the cost of the edge."""
+    parent = nearest  # line 1
+    least = tree.node[nearest].cost + cost  # line 2
+    for k in range(count):  # line 3
+        m = tree.near[k].node
+        root_cost = tree.node[m].cost
+        if root_cost + tree.near[k].distance >= least - MIN_GAIN_CELLS:
+            continue
+        start = pose_of(tree, m)
+        edge = steer(start, pose, scene.body)
+        if root_cost + length_of(edge) >= least - MIN_GAIN_CELLS:
+            continue
+        other_cost = edge_cost(start, pose, edge, scene)
+        if root_cost + other_cost < least - MIN_GAIN_CELLS:  # line 4
+            parent, cost = m, other_cost  # line 5
+            least = root_cost + cost  # line 6
+    return parent, cost  # line 7
 
 
-class RrtStarConnect:
-    """The paper's planner, behind the Protocol of all planners.
+@kernel(inline=True, forced=True)
+def _rewire(tree: Tree, new: int, count: int, scene: Scene) -> None:
+    """Algorithm 5: make near nodes children of a new node where this lowers their cost."""
+    start, root_cost = pose_of(tree, new), tree.node[new].cost
+    for k in range(count):  # line 1
+        m = tree.near[k].node
+        most = tree.node[m].cost - MIN_GAIN_CELLS
+        if root_cost + tree.near[k].distance >= most:
+            continue
+        end = pose_of(tree, m)
+        edge = steer(start, end, scene.body)
+        if root_cost + length_of(edge) >= most:
+            continue
+        cost = edge_cost(start, end, edge, scene)
+        if root_cost + cost < most:  # line 2
+            detach(tree, m)
+            attach(tree, m, new, cost)  # lines 3 and 4
+            propagate_cost(tree, m)
 
-    Source: paper III-B and appendix.
+
+@kernel(inline=True, forced=True)
+def _extend(
+    tree: Tree, target: Pose, nearest: int, greedy: bool, scene: Scene, rules: Rules, bound: float
+) -> tuple[int, int]:
+    """Algorithm 2: one step of a tree towards a pose; return its outcome and the new node.
+
+    `nearest` is the node nearest to the pose if it is known, else -1.
     """
-
-    def __init__(self, config: RrtStarConnectConfig = RrtStarConnectConfig()) -> None:
-        self.config = config
-
-    def search(self, road: Road, query: Query, label: int, seed: int) -> Search:
-        """The trees of a query, with no more than their roots; `label` is that of the component to sample from."""
-        config = self.config
-        scene = Scene(
-            clearance_in_cells(road), NO_GRID, NOWHERE, Disc(query.radius / road.resolution), NO_PRICES, NO_ROWS
-        )  # fmt: skip
-        start, goal = (
-            Pose(x, y, 0.0)
-            for x, y in to_cells(road, np.array((query.start, query.goal))).tolist()
-        )
-        cells, corners = component_cells(road, query.radius, label)
-        least_gamma = 2.0 * math.sqrt(
-            1.5 * max(len(cells), 1) / math.pi
-        )  # Karaman & Frazzoli 2011, d = 2
-        rules = Rules(
-            start, goal, cells, corners, NOWHERE, config.corners, 0.0, 0.0, config.step, 0.0, config.gamma_factor * least_gamma,
-            config.zeta, config.greedy, config.skip, config.informed,
-        )  # fmt: skip
-        return Search(road, scene, rules, seed)
-
-    def plan(self, road: Road, query: Query, budget: Budget, seed: int) -> Plan:
-        """See `Planner.plan`; with a budget in iterations the answer depends on the seed only.
-
-        Raises:
-            BudgetSpentError: no path was found within the budget.
-        """
-        search = self.search(road, query, check_query(road, query), seed)
-        known, size = np.inf, BATCH
-        while (batch := search.batch(size, budget.iterations, budget)) > 0:
-            search.grow(batch)
-            size = min(2 * batch, BATCH)
-            if search.best < known:
-                size = (
-                    16 if known == np.inf else size
-                )  # look often at first: a path pulled taut bounds what follows
-                known = search.best
-                path = straight_path(search)
-                if self.config.pull:
-                    path = string_pulled(
-                        search.scene.clearance, path, query.radius / road.resolution
-                    )
-                search.keep(path, path_length(path))
-            if search.path is not None and (budget.first or search.is_straight()):
-                break
-        metres = to_metres(road, search.result())
-        metres[0], metres[-1] = query.start, query.goal
-        return Plan(metres, path_length(metres), search.iteration, np.array(search.history))
+    if nearest < 0:
+        nearest = nearest_node(tree, target, scene.body)  # line 1
+    start, pose, status = pose_of(tree, nearest), target, REACHED_CODE
+    edge = steer(start, target, scene.body)
+    if length_of(edge) < SAME_POSE_CELLS:
+        return REACHED_CODE, nearest
+    if length_of(edge) > rules.step:
+        pose = pose_on_edge(start, target, edge, rules.step, scene.body)  # line 2
+        edge = steer(start, pose, scene.body)
+        status = ADVANCED_CODE
+    cost = edge_cost(start, pose, edge, scene)
+    if cost == np.inf:  # line 3
+        return TRAPPED_CODE, -1
+    count, parent = 0, nearest
+    if not greedy:
+        count = near_nodes(tree, pose, _near_radius(tree, rules))  # line 4
+        parent, cost = _choose_parent(tree, nearest, pose, cost, count, scene)  # line 5
+    if tree.node[parent].cost + cost + distance(pose, tree.goal) >= bound:
+        return TRAPPED_CODE, -1
+    new = add_node(tree, pose, parent, cost)  # line 6
+    _rewire(tree, new, count, scene)  # line 7
+    return status, new  # lines 8 to 12
 
 
-def straight_path(search: Search) -> Floats:
-    """The trees' best path (P, 2), start to goal, in cells."""
-    ours, theirs = search.chains()
-    return search.tree.node[ours + theirs[1:], :2]
+@kernel(inline=True)
+def _connect(
+    tree: Tree,
+    target: Pose,
+    max_steps: int,
+    greedy: bool,
+    scene: Scene,
+    rules: Rules,
+    bound: float,
+) -> tuple[int, int]:
+    """Algorithm 3: extend a tree until it reaches a pose or is trapped; return the last node.
+
+    With one step at most it is Algorithm 2. Without a new node, the node is -1.
+    """
+    status, last, steps = ADVANCED_CODE, -1, 0
+    while status == ADVANCED_CODE and steps < max_steps and has_room(tree):
+        # the node added last is the nearest one
+        status, new = _extend(tree, target, last, greedy, scene, rules, bound)
+        last = new if new >= 0 else last
+        steps += 1
+    return status, last
 
 
-def string_pulled(clearance: Floats, path: Floats, radius: float, passes: int = 30) -> Floats:
-    """`path` (P, 2), shortened by string pulling for a disc of `radius` (and a margin for rounding at corners); in cells."""
-    room = np.empty((2 * len(path) + 32, 2))
-    room[: len(path)] = path
-    return room[: pull_string(clearance, len(path), radius + RADIUS_MARGIN, passes, room)].copy()
+@kernel(inline=True, forced=True)
+def _turned_back(pose: Pose) -> Pose:
+    """Return a pose of one tree in the direction of the other one."""
+    return Pose(pose.x, pose.y, pose.yaw + np.pi)
+
+
+@kernel(inline=True)
+def _next_target(tree: Tree, start_tree: Tree, scene: Scene, rules: Rules, state: Records) -> Pose:
+    """Line 3 of Algorithm 1; the first sample is the root of the other tree: the direct edge."""
+    if state[0].iteration == 0:
+        return tree.goal
+    pose = random_pose(start_tree.root, start_tree.goal, scene, rules, state)
+    return pose if state[0].active == 0 else _turned_back(pose)
+
+
+@kernel(inline=True)
+def _extend_and_connect(
+    tree: Tree,
+    other: Tree,
+    target: Pose,
+    greedy: bool,
+    scene: Scene,
+    rules: Rules,
+    bound: float,
+) -> tuple[int, int]:
+    """Lines 4 and 5 of Algorithm 1; return the nodes at which the trees meet, or -1 and -1."""
+    steps = MAX_CONNECT_STEPS if greedy else 1
+    _, new = _connect(tree, target, steps, greedy, scene, rules, bound)  # line 4
+    if new < 0:
+        return -1, -1
+    target = _turned_back(pose_of(tree, new))
+    steps = MAX_CONNECT_STEPS
+    status, reached = _connect(other, target, steps, greedy, scene, rules, bound)  # line 5
+    return (new, reached) if status == REACHED_CODE else (-1, -1)
+
+
+@kernel(I, SCENE, RULES, TREE, TREE, OUTI2, STATES)
+def grow(
+    iterations: int,
+    scene: Scene,
+    rules: Rules,
+    start_tree: Tree,
+    goal_tree: Tree,
+    meeting: Ints,
+    state: Records,
+) -> None:
+    """Algorithm 1 for at most `iterations`; returns early at the first meeting and without room.
+
+    Args:
+        iterations: K.
+        scene: what edges are checked against.
+        rules: how the trees grow.
+        start_tree: T_a at first.
+        goal_tree: T_b at first.
+        meeting: (M, 2) nodes of both trees at which they meet; all are recorded.
+        state: (1,) of `STATE`.
+    """
+    s = state[0]
+    for _ in range(iterations):  # line 2
+        has_rows = s.meetings < meeting.shape[0]
+        if not (has_rows and has_room(start_tree) and has_room(goal_tree)):
+            return
+        forward = s.active == 0
+        tree, other = (start_tree, goal_tree) if forward else (goal_tree, start_tree)
+        target = _next_target(tree, start_tree, scene, rules, state)
+        greedy = rules.greedy and s.meetings == 0
+        new, reached = _extend_and_connect(tree, other, target, greedy, scene, rules, s.bound)
+        s.iteration += 1
+        s.active = 1 - s.active  # line 6
+        if new < 0:
+            continue
+        meeting[s.meetings, 0 if forward else 1] = new
+        meeting[s.meetings, 1 if forward else 0] = reached
+        s.meetings += 1
+        if rules.informed:
+            s.bound = min(s.bound, tree.node[new].cost + other.node[reached].cost)
+        if s.meetings == 1:
+            return

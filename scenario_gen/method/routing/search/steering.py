@@ -1,130 +1,86 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Steering, the parameter of the search: the straight lines of a disc, or the Dubins curves of a car.
+"""Steering, the parameter of the search: straight lines of a disc, or Dubins curves of a vehicle.
 
-An edge is a `Curve`; a straight line is one whose arcs have no length. What moves decides at compile time: numba takes the
-function for a `Disc` or that for a `Car`. Lengths are in cells.
+The scene's body decides: a turning radius of 0 means straight lines. An edge is a `Curve`; a
+straight line is one whose arcs have no length. Lengths are in cells.
 """
 
-from collections.abc import Callable
-from functools import partial
-from typing import Any
-
-from numba.extending import overload
 import numpy as np
 
-from scenario_gen.method.routing.search.dubins import Curve, end_of, LSL, POSE, Pose, shortest
-from scenario_gen.method.routing.search.sweep import Car, CAR_SCENE, Disc, follow, Scene
-from scenario_gen.method.routing.search.tree_samples import (
-    Rules,
-    sample_point,
-    sample_pose,
-    States,
+from scenario_gen.method.routing.search.dubins import (
+    Curve,
+    LSL_CODE,
+    POSE,
+    Pose,
+    pose_along,
+    shortest,
 )
-from scenario_gen.numerics.kernels import kernel
-from scenario_gen.roads import free_length, segment_free
-
-_overload: Callable[..., Callable[[Callable[..., Any]], Any]] = partial(
-    overload, jit_options={"forceinline": True}, strict=False
+from scenario_gen.method.routing.search.sweep import (
+    Body,
+    cost_at,
+    follow,
+    footprint_is_free,
+    SCENE,
+    Scene,
 )
+from scenario_gen.numerics import Floats
+from scenario_gen.numerics.kernels import F2, kernel, OUT1
+from scenario_gen.roads import segment_free
 
 
-def _is_disc(body: Any) -> bool:
-    return bool(body.instance_class is Disc)
+@kernel(inline=True, forced=True)
+def distance(a: Pose, b: Pose) -> float:
+    """Return the straight distance between two poses: no edge between them is shorter."""
+    dx, dy = b.x - a.x, b.y - a.y
+    return float(np.sqrt(dx * dx + dy * dy))
 
 
-def steer(start: Pose, end: Pose, body: Disc | Car) -> Curve:
+@kernel(inline=True, forced=True)
+def steer(start: Pose, end: Pose, body: Body) -> Curve:
     """Return the shortest edge from pose to pose."""
-    raise NotImplementedError  # for kernels only, as all that follow
+    if body.turn_radius == 0.0:
+        return Curve(LSL_CODE, 0.0, distance(start, end), 0.0)
+    return shortest(start, end, body.turn_radius)
 
 
-def end_of_first(start: Pose, end: Pose, first: Curve, length: float, body: Disc | Car) -> Pose:
-    """Return the pose at the end of the first part of an edge, which is so long in all."""
-    raise NotImplementedError
+@kernel(inline=True, forced=True)
+def pose_on_edge(start: Pose, end: Pose, edge: Curve, length: float, body: Body) -> Pose:
+    """Return the pose at a length of an edge between two poses."""
+    if body.turn_radius == 0.0:
+        share = length / edge.second
+        x = start.x + (end.x - start.x) * share
+        return Pose(x, start.y + (end.y - start.y) * share, 0.0)
+    return pose_along(start, edge, length, body.turn_radius)
 
 
-def price(start: Pose, end: Pose, edge: Curve, body: Disc | Car, scene: Scene) -> float:
-    """Return what an edge costs: its length or, of curves, more (see `follow`); infinity if it is not free."""
-    raise NotImplementedError
+@kernel(inline=True, forced=True)
+def edge_cost(start: Pose, end: Pose, edge: Curve, scene: Scene) -> float:
+    """Return the cost of an edge from a free pose; infinity if it is not free."""
+    body = scene.body
+    if body.turn_radius > 0.0:
+        return follow(start, edge, scene)
+    free = segment_free(scene.clearance, start.x, start.y, end.x, end.y, body.half_length)
+    return edge.second if free else np.inf
 
 
-def surely_free(start: Pose, end: Pose, body: Disc | Car, scene: Scene) -> float:
-    """Return how much of an edge is free, infinity if all is; 0: it must be looked at piece by piece."""
-    raise NotImplementedError
+@kernel(inline=True)
+def is_free(pose: Pose, scene: Scene) -> bool:
+    """Whether the body at a pose is free."""
+    if scene.body.turn_radius > 0.0:
+        return footprint_is_free(pose, scene)
+    return segment_free(scene.clearance, pose.x, pose.y, pose.x, pose.y, scene.body.half_length)
 
 
-def sample(body: Disc | Car, scene: Scene, rules: Rules, state: States) -> Pose:
-    """Return a pose to grow to."""
-    raise NotImplementedError
+@kernel(POSE, POSE, SCENE)
+def steering_cost(start: Pose, end: Pose, scene: Scene) -> float:
+    """Return the cost of the shortest edge between two poses, of which the first is free."""
+    return edge_cost(start, end, steer(start, end, scene.body), scene)
 
 
-@_overload(steer)
-def _steer(start: Any, end: Any, body: Any) -> Any:
-    def line(start: Pose, end: Pose, body: Disc) -> Curve:
-        dx, dy = end.x - start.x, end.y - start.y
-        return Curve(LSL, 0.0, np.sqrt(dx * dx + dy * dy), 0.0)
-
-    def curve(start: Pose, end: Pose, body: Car) -> Curve:
-        return shortest(start, end, body.turn)
-
-    return line if _is_disc(body) else curve
-
-
-@_overload(end_of_first)
-def _end_of_first(start: Any, end: Any, first: Any, length: Any, body: Any) -> Any:
-    def line(start: Pose, end: Pose, first: Curve, length: float, body: Disc) -> Pose:
-        return Pose(
-            start.x + (end.x - start.x) * first.b / length,
-            start.y + (end.y - start.y) * first.b / length,
-            0.0,
-        )
-
-    def curve(start: Pose, end: Pose, first: Curve, length: float, body: Car) -> Pose:
-        return end_of(start, first, body.turn)
-
-    return line if _is_disc(body) else curve
-
-
-@_overload(price)
-def _price(start: Any, end: Any, edge: Any, body: Any, scene: Any) -> Any:
-    def line(start: Pose, end: Pose, edge: Curve, body: Disc, scene: Scene) -> float:
-        return (
-            edge.b
-            if segment_free(scene.clearance, start.x, start.y, end.x, end.y, body.radius)
-            else np.inf
-        )
-
-    def curve(start: Pose, end: Pose, edge: Curve, body: Car, scene: Scene) -> float:
-        free, cost = follow(start, edge, body, scene)
-        return cost if free else np.inf
-
-    return line if _is_disc(body) else curve
-
-
-@_overload(surely_free)
-def _surely_free(start: Any, end: Any, body: Any, scene: Any) -> Any:
-    def line(start: Pose, end: Pose, body: Disc, scene: Scene) -> float:
-        return float(free_length(scene.clearance, start.x, start.y, end.x, end.y, body.radius))
-
-    def curve(start: Pose, end: Pose, body: Car, scene: Scene) -> float:
-        return 0.0
-
-    return line if _is_disc(body) else curve
-
-
-@_overload(sample)
-def _sample(body: Any, scene: Any, rules: Any, state: Any) -> Any:
-    def point(body: Disc, scene: Scene, rules: Rules, state: States) -> Pose:
-        return sample_point(scene.clearance, rules, state)
-
-    def pose(body: Car, scene: Scene, rules: Rules, state: States) -> Pose:
-        return sample_pose(body, scene, rules, state)
-
-    return point if _is_disc(body) else pose
-
-
-@kernel(POSE, POSE, CAR_SCENE)
-def curve_cost(start: Pose, end: Pose, scene: Scene) -> float:
-    """What the shortest curve between two poses costs, the first of which is free; infinity if the curve is not."""
-    return price(start, end, steer(start, end, scene.body), scene.body, scene)
+@kernel(F2, SCENE, OUT1)
+def costs_per_length(poses: Floats, scene: Scene, costs: Floats) -> None:
+    """Write the cost per length (P,) at each of P free poses (P, 3)."""
+    for k in range(poses.shape[0]):
+        costs[k] = cost_at(Pose(poses[k, 0], poses[k, 1], poses[k, 2]), scene)

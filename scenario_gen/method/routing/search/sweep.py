@@ -1,68 +1,56 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Whether a footprint can follow a curve: the area that it sweeps against the grid, cell by cell; and how much room it leaves.
+"""Whether a footprint can follow a curve: its swept area against the grid, cell by cell.
 
-Between two near poses the convex hull of both footprints, widened by what an arc rises above its chord, is compared with the
-cells: the swept area lies in it, so nothing slips between two poses. Lengths are in cells, in kernels.
+Between two near poses the convex hull of both footprints, widened by the sagitta of the arc, is
+compared with the cells. The hull contains the swept area, so no obstacle between two poses is
+missed. Lengths are in cells.
 """
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from scenario_gen.method.routing.search.dubins import Curve, part_of, Pose, TURNS
-from scenario_gen.numerics import Counts, Floats, sealed
+from scenario_gen.method.routing.search.planner import PoseQuery
+from scenario_gen.numerics import Counts, Floats, sealed, wrap_angle
 from scenario_gen.numerics.kernels import F, F2, kernel, N2, named, OUT2
 from scenario_gen.roads import blocked_before, clearance_in_cells, CONTACT, to_cells
 from scenario_gen.types import Road
 
-SWEEP = 0.2  # [m] between two poses that are compared with the grid
-FEELERS = 6  # most discs that cover a footprint
-FAR = 1e9  # [cells] room where nothing is near
-LONGEST = 64.0  # [cells] no two near poses are farther apart
+SWEEP_M = 0.2  # between two poses whose hull is compared with the grid
+MAX_DISCS_COUNT = 6  # that cover a footprint
+FAR_CELLS = 1e9  # room where no obstacle is near
+MAX_STEP_CELLS = 64.0  # between two poses, rotation included
+NO_GRID = sealed(np.zeros((0, 1), dtype=np.int32))
 
 
-class Disc(NamedTuple):
-    """What moves along straight lines, as in the paper; its headings mean nothing."""
-
-    radius: float
-
-
-class Car(NamedTuple):
-    """What moves along Dubins curves.
+class Body(NamedTuple):
+    """What moves.
 
     Attributes:
-        turn: radius of its arcs.
-        half_length: of the footprint.
-        half_width: likewise.
-        sweep: largest distance between two poses that are looked at.
+        turn_radius: of its tightest arcs; 0: a disc, which moves along straight lines.
+        half_length: of the footprint; of a disc, its radius.
+        half_width: of the footprint.
+        sweep: largest distance between two poses that are checked.
     """
 
-    turn: float
+    turn_radius: float
     half_length: float
     half_width: float
     sweep: float
 
 
-class Prices(NamedTuple):
-    """What is dearer than its length.
+class Costs(NamedTuple):
+    """The `Preferences` of a query, in cells."""
 
-    Attributes:
-        room: wished for beside the footprint.
-        lack: what its lack costs per length.
-        left: what a cell left of the guide costs per length.
-        right: likewise right of it.
-        most_left: how far left of it one may be at all.
-        most_right: likewise right of it.
-    """
-
-    room: float
-    lack: float
-    left: float
-    right: float
-    most_left: float
-    most_right: float
+    clearance: float
+    clearance_cost: float
+    left_cost: float
+    right_cost: float
+    max_left: float
+    max_right: float
 
 
 class Scene(NamedTuple):
@@ -70,30 +58,23 @@ class Scene(NamedTuple):
 
     Attributes:
         clearance: (H, W).
-        blocked: (H, W + 1) from `blocked_before`; of a disc, none.
-        guide: (G, 3) poses of the line to keep to; none: no side is dearer.
-        body: what moves, a `Disc` or a `Car`: it says what an edge is, see `steering`.
-        prices: what is dear.
-        rows: (2, R) scratch for as many rows of cells as the footprint is long across, and more; of a disc, none.
+        blocked: (H, W + 1) from `blocked_before`; unused by a disc.
+        guide: (G, 3) poses of the line to stay near; may be empty.
+        body: what moves.
+        costs: extra costs.
+        rows: (2, R) scratch for the rows of cells that a step sweeps; unused by a disc.
     """
 
     clearance: Floats
     blocked: Counts
     guide: Floats
-    body: Any
-    prices: Prices
+    body: Body
+    costs: Costs
     rows: Floats
 
 
-PRICES = named(Prices, F, F, F, F, F, F)
-CAR_SCENE = named(Scene, F2, N2, F2, named(Car, F, F, F, F), PRICES, OUT2)
-DISC_SCENE = named(Scene, F2, N2, F2, named(Disc, F), PRICES, OUT2)
-NOWHERE = sealed(np.empty((0, 3)))
-NO_PRICES = Prices(0.0, 0.0, 0.0, 0.0, np.inf, np.inf)
-
-
-class _Stance(NamedTuple):
-    """A place, and cosine and sine of the heading."""
+class _Frame(NamedTuple):
+    """A position, and cosine and sine of the heading; or a step in such a frame."""
 
     x: float
     y: float
@@ -101,93 +82,137 @@ class _Stance(NamedTuple):
     sin: float
 
 
+SCENE = named(Scene, F2, N2, F2, named(Body, F, F, F, F), named(Costs, *6 * (F,)), OUT2)
+
+
 @kernel(inline=True)
-def _spread(
-    ax: float, ay: float, bx: float, by: float, first: int, low: Floats, high: Floats
-) -> None:
-    """Widen the extents in x of the rows of cells from `first` on by the segment a-b."""
-    if ay > by:
-        ax, ay, bx, by = bx, by, ax, ay
-    rows = low.shape[0]
-    slope = (bx - ax) / (by - ay) if by > ay else 0.0
-    begin, end = max(int(np.floor(ay)), first), min(int(np.floor(by)), first + rows - 1)
+def _frame_of(pose: Pose) -> _Frame:
+    return _Frame(pose.x, pose.y, np.cos(pose.yaw), np.sin(pose.yaw))
+
+
+@kernel(inline=True)
+def _compose(frame: _Frame, step: _Frame) -> _Frame:
+    """Return the frame after a step: x ahead, y to the left, then the rotation."""
+    return _Frame(
+        frame.x + frame.cos * step.x - frame.sin * step.y,
+        frame.y + frame.sin * step.x + frame.cos * step.y,
+        frame.cos * step.cos - frame.sin * step.sin,
+        frame.sin * step.cos + frame.cos * step.sin,
+    )
+
+
+@kernel(inline=True)
+def _widen(a: _Frame, b: _Frame, first: int, low: Floats, high: Floats) -> None:
+    """Widen the extents in x of the rows of cells from `first` by the segment from a to b."""
+    bottom, top = (a, b) if a.y <= b.y else (b, a)
+    slope = (top.x - bottom.x) / (top.y - bottom.y) if top.y > bottom.y else 0.0
+    begin = max(int(np.floor(bottom.y)), first)
+    end = min(int(np.floor(top.y)), first + low.shape[0] - 1)
     for i in range(begin, end + 1):
-        p = ax + slope * (max(ay, float(i)) - ay)
-        q = bx if by <= i + 1.0 else ax + slope * (i + 1.0 - ay)
+        enter = bottom.x + slope * (max(bottom.y, float(i)) - bottom.y)
+        leave = top.x if top.y <= i + 1.0 else bottom.x + slope * (i + 1.0 - bottom.y)
         k = i - first
-        low[k], high[k] = min(low[k], p, q), max(high[k], p, q)
+        low[k] = min(low[k], enter, leave)
+        high[k] = max(high[k], enter, leave)
 
 
 @kernel(inline=True)
-def _swept_free(
-    blocked: Counts, here: _Stance, there: _Stance, body: Car, bulge: float, rows: Floats
-) -> bool:
-    """Whether the hull of the footprints at two near stances covers drivable cells only; `bulge` is added on every side."""
-    a, b = body.half_length + bulge, body.half_width + bulge
-    reach0, reach1 = a * abs(here.sin) + b * abs(here.cos), a * abs(there.sin) + b * abs(there.cos)
-    bottom, top = min(here.y - reach0, there.y - reach1), max(here.y + reach0, there.y + reach1)
-    first, last = int(np.floor(bottom + CONTACT)), int(np.ceil(top - CONTACT)) - 1
-    height, width = blocked.shape[0], blocked.shape[1] - 1
-    if first < 0 or last >= height:
-        return False
-    count = last - first + 1
-    low, high = rows[0, :count], rows[1, :count]
-    for k in range(count):
-        low[k], high[k] = np.inf, -np.inf
+def _hull_extents(
+    a: _Frame, b: _Frame, length: float, width: float, first: int, rows: Floats
+) -> None:
+    """Write the extents in x, row by row, of the hull of two footprints of these half sizes."""
+    low, high = rows[0], rows[1]
+    low[:] = np.inf
+    high[:] = -np.inf
     for k in range(4):
-        u, v = a if k in (0, 3) else -a, b if k < 2 else -b
-        w, z = a if k in (3, 2) else -a, b if k in (3, 0) else -b  # the next corner
-        px, py = here.x + here.cos * u - here.sin * v, here.y + here.sin * u + here.cos * v
-        qx, qy = there.x + there.cos * u - there.sin * v, there.y + there.sin * u + there.cos * v
-        rx, ry = here.x + here.cos * w - here.sin * z, here.y + here.sin * w + here.cos * z
-        sx, sy = there.x + there.cos * w - there.sin * z, there.y + there.sin * w + there.cos * z
-        _spread(px, py, rx, ry, first, low, high)
-        _spread(qx, qy, sx, sy, first, low, high)
-        _spread(px, py, qx, qy, first, low, high)
-    for k in range(count):
-        begin, end = int(np.floor(low[k] + CONTACT)), int(np.ceil(high[k] - CONTACT))
-        if (
-            begin < 0
-            or end > width
-            or (end > begin and blocked[first + k, end] != blocked[first + k, begin])
-        ):
+        ahead = length if k in (0, 3) else -length
+        left = width if k < 2 else -width
+        next_ahead = length if k in (2, 3) else -length
+        next_left = width if k in (0, 3) else -width
+        corner = _Frame(ahead, left, 1.0, 0.0)
+        next_corner = _Frame(next_ahead, next_left, 1.0, 0.0)
+        corner_a, corner_b = _compose(a, corner), _compose(b, corner)
+        _widen(corner_a, _compose(a, next_corner), first, low, high)
+        _widen(corner_b, _compose(b, next_corner), first, low, high)
+        _widen(corner_a, corner_b, first, low, high)
+
+
+@kernel(inline=True)
+def _hull_is_free(a: _Frame, b: _Frame, margin: float, scene: Scene) -> bool:
+    """Whether the hull of the footprints at two frames, wider by `margin`, is drivable."""
+    blocked = scene.blocked
+    length, width = scene.body.half_length + margin, scene.body.half_width + margin
+    reach_a = length * abs(a.sin) + width * abs(a.cos)
+    reach_b = length * abs(b.sin) + width * abs(b.cos)
+    first = int(np.floor(min(a.y - reach_a, b.y - reach_b) + CONTACT))
+    last = int(np.ceil(max(a.y + reach_a, b.y + reach_b) - CONTACT)) - 1
+    if first < 0 or last >= blocked.shape[0]:
+        return False
+    rows = scene.rows[:, : last - first + 1]
+    _hull_extents(a, b, length, width, first, rows)
+    for k in range(rows.shape[1]):
+        begin = int(np.floor(rows[0, k] + CONTACT))
+        end = int(np.ceil(rows[1, k] - CONTACT))
+        if begin < 0 or end >= blocked.shape[1]:
+            return False
+        if end > begin and blocked[first + k, end] != blocked[first + k, begin]:
             return False
     return True
 
 
 @kernel(inline=True)
-def _room_beside(clearance: Floats, at: _Stance, body: Car) -> tuple[float, float]:
-    """What a footprint surely has around it, and about what it has beside it; -FAR if it is blocked.
+def _room_around(frame: _Frame, scene: Scene) -> tuple[float, float]:
+    """Return room around a footprint that is proven, and about the room beside it.
 
-    The first is proven by discs that cover the footprint: below 0 it says nothing.
+    Discs that cover the footprint prove the first; if negative, it proves nothing. Both are
+    -FAR_CELLS where the footprint is blocked.
     """
-    height, width = clearance.shape
-    count = min(max(1, int(np.ceil(1.5 * body.half_length / body.half_width))), FEELERS)
+    body, clearance = scene.body, scene.clearance
+    count = int(np.ceil(1.5 * body.half_length / body.half_width))
+    count = min(max(1, count), MAX_DISCS_COUNT)
     spacing = 2.0 * body.half_length / count
-    cover = np.sqrt(0.25 * spacing * spacing + body.half_width * body.half_width)
-    sure, beside = FAR, FAR
+    radius = np.sqrt(0.25 * spacing * spacing + body.half_width * body.half_width)
+    proven, room = FAR_CELLS, FAR_CELLS
     for i in range(count):
         ahead = (i + 0.5) * spacing - body.half_length
-        px, py = at.x + ahead * at.cos, at.y + ahead * at.sin
-        column, row = int(np.floor(px)), int(np.floor(py))
-        if (
-            row < 0
-            or column < 0
-            or row >= height
-            or column >= width
-            or clearance[row, column] == 0.0
-        ):
-            return -FAR, -FAR
-        dx, dy = px - column - 0.5, py - row - 0.5
-        off = np.sqrt(dx * dx + dy * dy)
-        sure = min(sure, clearance[row, column] - off - cover)
-        beside = min(beside, clearance[row, column] - body.half_width)
-    return sure, beside
+        x = frame.x + ahead * frame.cos
+        y = frame.y + ahead * frame.sin
+        row, column = int(np.floor(y)), int(np.floor(x))
+        inside = 0 <= row < clearance.shape[0] and 0 <= column < clearance.shape[1]
+        if not inside or clearance[row, column] == 0.0:
+            return -FAR_CELLS, -FAR_CELLS
+        dx, dy = x - column - 0.5, y - row - 0.5
+        proven = min(proven, clearance[row, column] - np.sqrt(dx * dx + dy * dy) - radius)
+        room = min(room, clearance[row, column] - body.half_width)
+    return proven, room
 
 
 @kernel(inline=True)
-def _offset_from(x: float, y: float, guide: Floats) -> float:
-    """How far (x, y) lies left of a guide (G, 3), at its nearest pose."""
+def _sweep_step(a: _Frame, b: _Frame, scene: Scene) -> tuple[bool, float]:
+    """Whether the footprint can move between two near frames, and the room beside it at b."""
+    body = scene.body
+    proven, room = _room_around(b, scene)
+    dx, dy, dc, ds = b.x - a.x, b.y - a.y, b.cos - a.cos, b.sin - a.sin
+    moved = np.sqrt(dx * dx + dy * dy) + body.half_length * (abs(dc) + abs(ds))
+    if proven >= moved:
+        return True, room
+    if proven == -FAR_CELLS or moved >= MAX_STEP_CELLS:
+        return False, room
+    rotation = np.sqrt(dc * dc + ds * ds)
+    sagitta = 0.125 * rotation * (moved + (body.half_length + body.half_width) * rotation)
+    return _hull_is_free(a, b, sagitta, scene), room
+
+
+@kernel(inline=True)
+def footprint_is_free(pose: Pose, scene: Scene) -> bool:
+    """Whether the footprint at a pose is free."""
+    frame = _frame_of(pose)
+    return bool(_sweep_step(frame, frame, scene)[0])
+
+
+@kernel(inline=True)
+def _offset_from_guide(x: float, y: float, guide: Floats) -> float:
+    """Return how far (x, y) lies to the left of a guide (G, 3), at the nearest pose."""
     best, nearest = np.inf, 0
     for k in range(guide.shape[0]):
         dx, dy = x - guide[k, 0], y - guide[k, 1]
@@ -199,84 +224,76 @@ def _offset_from(x: float, y: float, guide: Floats) -> float:
 
 
 @kernel(inline=True)
-def pose_is_free(pose: Pose, body: Car, scene: Scene) -> bool:
-    """Whether the footprint at a pose is free."""
-    at = _Stance(pose.x, pose.y, np.cos(pose.yaw), np.sin(pose.yaw))
-    return bool(_swept_free(scene.blocked, at, at, body, 0.0, scene.rows))
+def _extra_cost(frame: _Frame, room: float, scene: Scene) -> tuple[bool, float]:
+    """Whether the offset from the guide is allowed, and the extra cost per length."""
+    costs, extra, allowed = scene.costs, 0.0, True
+    if costs.clearance > 0.0:
+        extra = costs.clearance_cost * max(costs.clearance - room, 0.0) / costs.clearance
+    if scene.guide.shape[0] > 0:
+        offset = _offset_from_guide(frame.x, frame.y, scene.guide)
+        allowed = -costs.max_right <= offset <= costs.max_left
+        extra += max(costs.left_cost * offset, -costs.right_cost * offset)
+    return allowed, extra
 
 
 @kernel(inline=True)
-def follow(pose: Pose, curve: Curve, body: Car, scene: Scene) -> tuple[bool, float]:
-    """Whether a footprint can follow a Dubins curve from a free pose on, and what that costs, or the way to where it cannot.
+def cost_at(pose: Pose, scene: Scene) -> float:
+    """Return the cost per length at a free pose."""
+    frame = _frame_of(pose)
+    room = _room_around(frame, scene)[1]
+    return 1.0 + _extra_cost(frame, room, scene)[1]
 
-    The cost is the length, more where there is less room beside the footprint than wished for, and away from the guide.
+
+@kernel(inline=True)
+def _follow_part(frame: _Frame, turn: float, length: float, scene: Scene) -> tuple[float, _Frame]:
+    """Return the cost of an arc or a line (infinity: not free), and the frame at its end."""
+    radius = scene.body.turn_radius
+    steps = int(np.ceil(length / scene.body.sweep))
+    h = length / steps
+    step = _Frame(h, 0.0, 1.0, 0.0)
+    if turn != 0.0:
+        cos, sin = np.cos(h / radius), np.sin(h / radius)
+        step = _Frame(radius * sin, turn * radius * (1.0 - cos), cos, turn * sin)
+    cost = 0.0
+    for _ in range(steps):
+        following = _compose(frame, step)
+        free, room = _sweep_step(frame, following, scene)
+        allowed, extra = _extra_cost(following, room, scene)
+        if not (free and allowed):
+            return np.inf, frame
+        frame = following
+        cost += h * (1.0 + extra)
+    return cost, frame
+
+
+@kernel(inline=True)
+def follow(pose: Pose, curve: Curve, scene: Scene) -> float:
+    """Return the cost of a Dubins curve from a free pose: its length and extra costs.
+
+    It is infinite where the footprint cannot follow the curve.
     """
-    prices, radius = scene.prices, body.turn
-    cost, since, dear = 0.0, np.inf, 0.0
-    at = _Stance(pose.x, pose.y, np.cos(pose.yaw), np.sin(pose.yaw))
+    cost, frame = 0.0, _frame_of(pose)
     for part in range(3):
-        turn, length = TURNS[curve.word, part], part_of(curve, part)
-        if length <= 0.0:
-            continue
-        steps = int(np.ceil(length / body.sweep))
-        h = length / steps
-        ahead, aside, dc, ds, bulge = h, 0.0, 1.0, 0.0, 0.0
-        if turn != 0.0:
-            dc, ds = np.cos(h / radius), turn * np.sin(h / radius)
-            ahead, aside = radius * turn * ds, turn * radius * (1.0 - dc)
-            bulge = (radius + body.half_length) * h * h / (8.0 * radius * radius)
-        slack = 0.5 * h * (1.0 + body.half_length / radius)
-        for _ in range(steps):
-            x, y = at.x + at.cos * ahead - at.sin * aside, at.y + at.sin * ahead + at.cos * aside
-            there = _Stance(x, y, at.cos * dc - at.sin * ds, at.sin * dc + at.cos * ds)
-            sure, beside = _room_beside(scene.clearance, there, body)
-            if sure == -FAR:
-                return False, cost
-            if sure < slack and not _swept_free(scene.blocked, at, there, body, bulge, scene.rows):
-                return False, cost
-            at = there
-            since += h
-            if since >= 5.0 * body.sweep and scene.guide.shape[0] > 0:
-                since, offset = 0.0, _offset_from(x, y, scene.guide)
-                if offset > prices.most_left or offset < -prices.most_right:
-                    return False, cost
-                dear = max(prices.left * offset, -prices.right * offset)
-            lack = max(prices.room - beside, 0.0) / prices.room if prices.room > 0.0 else 0.0
-            cost += h * (1.0 + prices.lack * lack + dear)
-    return True, cost
+        length = part_of(curve, part)
+        if length > 0.0 and cost < np.inf:
+            part_cost, frame = _follow_part(frame, TURNS[curve.word, part], length, scene)
+            cost += part_cost
+    return cost
 
 
-@kernel(F2, N2, F2, F, F, OUT2)
-def check_sweep(
-    clearance: Floats,
-    blocked: Counts,
-    poses: Floats,
-    half_length: float,
-    half_width: float,
-    out: Floats,
-) -> None:
-    """Whether the footprint can move from each of M near poses (M, 3) [cells, rad] to the next; all in cells.
+@kernel(F2, SCENE, OUT2)
+def check_sweep(poses: Floats, scene: Scene, out: Floats) -> None:
+    """Check the step to each of M near poses (M, 3) [cells, rad] from the one before.
 
-    Writes `out` (M, 2): 1 where the way to the pose (for the first: the pose itself) is free, else 0; and about the room beside.
+    Writes `out` (M, 2): 1 where the step is free (the first: the pose itself), else 0; and about
+    the room beside the footprint.
     """
-    body = Car(0.0, half_length, half_width, LONGEST)
-    rows = int(2.0 * np.sqrt(half_length * half_length + half_width * half_width) + LONGEST) + 8
-    scratch = np.empty((2, rows))
+    before = _frame_of(Pose(poses[0, 0], poses[0, 1], poses[0, 2]))
     for m in range(poses.shape[0]):
-        k = max(m - 1, 0)
-        here = _Stance(poses[k, 0], poses[k, 1], np.cos(poses[k, 2]), np.sin(poses[k, 2]))
-        there = _Stance(poses[m, 0], poses[m, 1], np.cos(poses[m, 2]), np.sin(poses[m, 2]))
-        sure, out[m, 1] = _room_beside(clearance, there, body)
-        dx, dy = there.x - here.x, there.y - here.y
-        moved = np.sqrt(dx * dx + dy * dy) + half_length * (
-            abs(there.cos - here.cos) + abs(there.sin - here.sin)
-        )
-        free = sure >= moved
-        if not free and sure > -FAR and moved < LONGEST:
-            turned = np.sqrt((there.cos - here.cos) ** 2 + (there.sin - here.sin) ** 2)
-            bulge = 0.125 * turned * (moved + (half_length + half_width) * turned)
-            free = _swept_free(blocked, here, there, body, bulge, scratch)
+        frame = _frame_of(Pose(poses[m, 0], poses[m, 1], poses[m, 2]))
+        free, out[m, 1] = _sweep_step(before, frame, scene)
         out[m, 0] = 1.0 if free else 0.0
+        before = frame
 
 
 def sweep_is_free(road: Road, poses: Floats, length: float, width: float) -> Floats:
@@ -284,41 +301,56 @@ def sweep_is_free(road: Road, poses: Floats, length: float, width: float) -> Flo
 
     Args:
         road: the grid.
-        poses: x [m], y [m], yaw [rad], some 0.2 m apart or less.
-        length: metres along the yaw.
-        width: metres across it.
+        poses: (M, 3) x [m], y [m], yaw [rad], about 0.2 m apart or less.
+        length: of the footprint, along the yaw [m].
+        width: across the yaw [m].
 
     Returns:
-        (M, 2) 1 where the way to the pose from the one before is free, else 0; metres.
+        (M, 2): 1 where the step from the pose before is free, else 0; room [m].
     """
-    poses = np.ascontiguousarray(np.reshape(poses, (-1, 3)), dtype=np.float64)
-    grid = np.column_stack((to_cells(road, poses[:, :2]), poses[:, 2]))
+    poses = np.reshape(poses, (-1, 3))
     out = np.empty((len(poses), 2))
-    check_sweep(
-        clearance_in_cells(road),
-        blocked_before(road),
-        grid,
-        0.5 * length / road.resolution,
-        0.5 * width / road.resolution,
-        out,
-    )
+    if len(poses):
+        grid = np.column_stack((to_cells(road, poses[:, :2]), poses[:, 2]))
+        check_sweep(grid, car_scene(road, PoseQuery(poses[0], poses[-1], length, width, 1.0)), out)
     out[:, 1] *= road.resolution
     return out
 
 
-def car_scene(
-    road: Road,
-    size: tuple[float, float],
-    curvature: float,
-    prices: Prices = NO_PRICES,
-    guide: Floats = NOWHERE,
-) -> Scene:
-    """The scene of a car of some length and width [m] that turns within a curvature [1/m]; prices and guide in cells."""
-    half_length, half_width = (0.5 * extent / road.resolution for extent in size)
-    body = Car(
-        1.0 / (curvature * road.resolution), half_length, half_width, SWEEP / road.resolution
+def car_scene(road: Road, query: PoseQuery) -> Scene:
+    """Return the scene of a query for a vehicle."""
+    cell, wanted = road.resolution, query.preferences
+    half_length, half_width = 0.5 * query.length / cell, 0.5 * query.width / cell
+    body = Body(1.0 / (query.curvature * cell), half_length, half_width, SWEEP_M / cell)
+    costs = Costs(
+        wanted.clearance / cell,
+        wanted.clearance_cost,
+        wanted.left_cost * cell,
+        wanted.right_cost * cell,
+        wanted.max_left / cell,
+        wanted.max_right / cell,
     )
-    rows = int(2.0 * np.hypot(half_length, half_width) + body.sweep) + 8
+    rows = int(2.0 * np.hypot(half_length, half_width) + MAX_STEP_CELLS) + 8
     return Scene(
-        clearance_in_cells(road), blocked_before(road), guide, body, prices, np.empty((2, rows))
+        clearance_in_cells(road),
+        blocked_before(road),
+        poses_in_cells(road, wanted.guide),
+        body,
+        costs,
+        np.empty((2, rows)),
     )
+
+
+def disc_scene(road: Road, radius: float) -> Scene:
+    """Return the scene of a disc of `radius` [m]."""
+    cells = radius / road.resolution
+    nothing = np.empty((0, 3))
+    no_costs = Costs(0.0, 0.0, 0.0, 0.0, np.inf, np.inf)
+    body = Body(0.0, cells, cells, 1.0)
+    return Scene(clearance_in_cells(road), NO_GRID, nothing, body, no_costs, nothing)
+
+
+def poses_in_cells(road: Road, poses: Floats) -> Floats:
+    """Convert poses (..., 3) [m, rad] to cells."""
+    poses = np.asarray(poses, dtype=np.float64)
+    return np.concatenate((to_cells(road, poses[..., :2]), wrap_angle(poses[..., 2:])), axis=-1)

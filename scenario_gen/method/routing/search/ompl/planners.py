@@ -3,9 +3,10 @@
 
 """OMPL's planners behind the same Protocol, each search in a process of its own.
 
-Some of OMPL's planners hang, and some take their process down. So every search runs in a child forked from a clean server
-process that has OMPL loaded; it is ended when its time is over or the caller cancels, and its death is an answer, not a crash.
-A fresh child also makes a seed mean the same thing every time (OMPL takes one per process only).
+Some of OMPL's planners hang, and some crash their process. So every search runs in a child, forked
+from a clean server process that has loaded OMPL. The child is killed when its time is over or the
+caller cancels; its death is an answer, not a crash. A fresh child also gives a seed the same
+meaning every time: OMPL accepts only one per process.
 """
 
 from dataclasses import dataclass
@@ -30,7 +31,7 @@ from scenario_gen.numerics import Floats
 from scenario_gen.roads import clearance_in_cells, to_cells, to_metres
 from scenario_gen.types import Road
 
-GLANCE = 0.05  # [s] between two looks at the child and at the caller's wish to cancel
+POLL_S = 0.05  # between two checks of the child and of the caller's `cancelled`
 
 
 @dataclass(frozen=True)
@@ -61,67 +62,71 @@ class OmplPlanner:
         self.config = config
 
     def plan(self, road: Road, query: Query, budget: Budget, seed: int) -> Plan:
-        """See `Planner.plan`; an iteration is one look of OMPL's at its termination condition.
+        """See `Planner.plan`; an iteration is one check of OMPL's termination condition.
 
         Raises:
             BudgetSpentError: no path was found within the budget.
         """
         check_query(road, query)
         needs("planners", "ompl")
-        from scenario_gen.method.routing.search.ompl.child import search  # loads OMPL
+        from scenario_gen.method.routing.search.ompl.solve import solve_in_child  # loads OMPL
 
         started = thread_time()
-        ends = to_cells(road, np.stack((query.start, query.goal)))
         context = multiprocessing.get_context("forkserver")
-        context.set_forkserver_preload(["scenario_gen.method.routing.search.ompl.child"])
-        ours, theirs = context.Pipe(duplex=False)
-        request = (
-            clearance_in_cells(road),
-            ends,
-            query.radius / road.resolution,
-            self.name,
-            self.config,
-        )
+        context.set_forkserver_preload(["scenario_gen.method.routing.search.ompl.solve"])
+        receiver, sender = context.Pipe(duplex=False)
+        options = {"step": self.config.step or None, "simplify": self.config.simplify}
         child = context.Process(
-            target=search,
-            args=(theirs, request, budget.iterations, budget.seconds, seed),
+            target=solve_in_child,
+            args=(
+                sender,
+                clearance_in_cells(road),
+                to_cells(road, np.stack((query.start, query.goal))),
+                query.radius / road.resolution,
+                self.name,
+                options,
+                (budget.iterations, budget.seconds, seed),
+            ),
             daemon=True,
         )
         child.start()
-        theirs.close()
+        sender.close()
         try:
-            path, iterations, seconds = self._await(ours, child, budget)
+            path, iterations, seconds = self._answer(receiver, child, budget)
         finally:
-            if child.is_alive():
-                child.kill()
+            child.kill()  # OMPL's destructors may crash
             child.join()
-            ours.close()
+            receiver.close()
         if not len(path):
             raise BudgetSpentError(
-                f"{self.name} found no path on road {road.name!r} within {iterations} iterations, {seconds:.2f} s"
+                f"{self.name} found no path on road {road.name!r} within {iterations} iterations, "
+                f"{seconds:.2f} s"
             )
         metres = to_metres(road, path)
         metres[0], metres[-1] = query.start, query.goal
         cost = path_length(metres)
-        return Plan(
-            metres,
-            cost,
-            iterations,
-            np.array([[iterations, seconds + thread_time() - started, cost]]),
-        )
+        history = np.array([[iterations, seconds + thread_time() - started, cost]])
+        return Plan(metres, cost, iterations, history)
 
-    def _await(self, ours: Connection, child: Any, budget: Budget) -> tuple[Floats, int, float]:
-        """The child's answer; BudgetSpentError if it dies, takes too long or is no longer wanted."""
+    def _answer(
+        self, receiver: Connection, child: Any, budget: Budget
+    ) -> tuple[Floats, int, float]:
+        """Return the child's path, iterations and CPU seconds.
+
+        Raises:
+            BudgetSpentError: it died or took too long, or the caller cancelled.
+        """
         deadline = monotonic() + self.config.time_limit + (budget.seconds or 0.0)
-        while not ours.poll(GLANCE):
+        while not receiver.poll(POLL_S):
             if budget.cancelled and budget.cancelled():
                 raise BudgetSpentError(f"{self.name} was cancelled")
             if monotonic() > deadline:
                 raise BudgetSpentError(
-                    f"{self.name} did not answer within {self.config.time_limit:.0f} s and was ended"
+                    f"{self.name} did not answer within {self.config.time_limit:.0f} s "
+                    "and was ended"
                 )
         try:
-            answer: tuple[Floats, int, float] = ours.recv()
+            answer: tuple[Floats, int, float] = receiver.recv()
         except EOFError:
             child.join(1.0)
             raise BudgetSpentError(

@@ -1,15 +1,15 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""One query for one of OMPL's planners, in this process: see `planners` for the way that cannot hang or crash the caller.
+"""A query for one of OMPL's planners, in this process; `planners` protects the caller from it.
 
-OMPL sees the same exact edge check as our own planner (a motion validator around the compiled kernel), so neither its default
-checking resolution of 1 % of the extent nor a Python callback per state stands in its way. For comparison it can also be
-had as its Python users have it: state by state, one cell apart, which is not exact.
+OMPL uses the exact edge check of our own planner through a motion validator around the compiled
+kernel. So neither its default checking resolution, 1 % of the extent, nor a Python callback per
+state slows it down.
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from time import process_time
 from typing import Any
 
 import numpy as np
@@ -26,54 +26,62 @@ PLANNERS = {
 }
 
 
-@dataclass(frozen=True, eq=False)
-class Answer:
-    """What OMPL found, in cells: the path (P, 2) as it is (empty: none found), the same simplified, termination checks made."""
+class ExactEdges(base.MotionValidator):  # type: ignore[misc]
+    """The exact edge check, for a disc in a clearance field (H, W); in cells."""
 
-    path: Floats
-    simplified: Floats
-    checks: int
+    def __init__(self, information: Any, clearance: Floats, radius: float) -> None:
+        super().__init__(information)
+        self.clearance, self.radius = clearance, radius
+
+    def checkMotion(self, a: Any, b: Any, *_: Any) -> bool:  # noqa: N802 - OMPL's name
+        """Whether the straight line between two states is free."""
+        return bool(segment_free(self.clearance, a[0], a[1], b[0], b[1], self.radius))
 
 
-@dataclass(frozen=True)
-class Options:
-    """How OMPL searches.
+def plane(clearance: Floats) -> Any:
+    """Return OMPL's space information for the plane of a grid (H, W) in cells, without checks."""
+    space = base.RealVectorStateSpace(2)
+    bounds = base.RealVectorBounds(2)
+    for axis, extent in enumerate(clearance.shape[::-1]):
+        bounds.setLow(axis, 0.0)
+        bounds.setHigh(axis, float(extent))
+    space.setBounds(bounds)
+    return base.SpaceInformation(space)
 
-    Attributes:
-        step: longest edge [cells]; None: OMPL's own choice.
-        simplify: also run OMPL's path simplifier.
-        state_by_state: check edges by a Python callback per state, a cell apart, instead of exactly.
-    """
 
-    step: float | None = None
-    simplify: bool = True
-    state_by_state: bool = False
+def exact_plane(clearance: Floats, radius: float) -> Any:
+    """Return OMPL's space information for the plane, with exact checks for a disc."""
+    information = plane(clearance)
+    validator = ExactEdges(information, clearance, radius)
+    information.setStateValidityChecker(lambda state: validator.checkMotion(state, state))
+    information.setMotionValidator(validator)
+    information.setup()
+    return information
 
 
 def solve(
-    clearance: Floats,
+    information: Any,
     ends: Floats,
-    radius: float,
     planner: str,
     stop: Callable[[int], bool],
-    options: Options = Options(),
-    seed: int | None = None,
-) -> Answer:
-    """Let one of OMPL's planners search for a path.
+    *,
+    step: float | None = None,
+    simplify: bool = True,
+) -> tuple[Floats, int]:
+    """Search for a path with one of OMPL's planners.
 
     Args:
-        clearance: (H, W) cells.
+        information: the plane and its checks.
         ends: (2, 2) start and goal [cells].
-        radius: disc radius [cells].
         planner: a name of PLANNERS.
-        stop: called with the number of calls so far (about one per iteration); True ends the search.
-        options: how it searches.
-        seed: of OMPL's random numbers; only the first search of a process can set it.
+        stop: called with the number of calls so far (about one per iteration); True ends it.
+        step: longest edge [cells]; None: OMPL's default.
+        simplify: whether to run OMPL's path simplifier.
+
+    Returns:
+        The path (P, 2) in cells, without a row if none was found; and the number of calls.
     """
     util.setLogLevel(util.LOG_NONE)
-    if seed is not None:
-        util.RNG.setSeed(seed % (2**31 - 1) + 1)
-    information = _space(clearance, radius, state_by_state=options.state_by_state)
     problem = base.ProblemDefinition(information)
     states = []
     for end in ends:
@@ -83,64 +91,50 @@ def solve(
     problem.setStartAndGoalStates(*states)
     problem.setOptimizationObjective(base.PathLengthOptimizationObjective(information))
     search = getattr(geometric, PLANNERS[planner])(information)
-    if options.step is not None:
-        search.setRange(options.step)
+    if step is not None:
+        search.setRange(step)
     search.setProblemDefinition(problem)
     search.setup()
     calls = 0
 
-    def ended() -> bool:
+    def is_over() -> bool:
         nonlocal calls
         calls += 1
         return stop(calls)
 
-    search.solve(base.PlannerTerminationCondition(ended))
+    search.solve(base.PlannerTerminationCondition(is_over))
     if not problem.hasExactSolution():
-        return Answer(np.empty((0, 2)), np.empty((0, 2)), calls)
+        return np.empty((0, 2)), calls
     path = problem.getSolutionPath()
-    bare = _vertices(path)
-    if options.simplify:
+    if simplify:
         geometric.PathSimplifier(information).simplifyMax(path)
-    return Answer(bare, _vertices(path), calls)
+    states = [path.getState(k) for k in range(path.getStateCount())]
+    return np.array([[state[0], state[1]] for state in states]), calls
 
 
-def _space(clearance: Floats, radius: float, *, state_by_state: bool) -> Any:
-    """The plane of the grid, with the check of states and edges."""
-    height, width = clearance.shape
-    space = base.RealVectorStateSpace(2)
-    bounds = base.RealVectorBounds(2)
-    for axis, extent in enumerate((width, height)):
-        bounds.setLow(axis, 0.0)
-        bounds.setHigh(axis, float(extent))
-    space.setBounds(bounds)
-    information = base.SpaceInformation(space)
+def solve_in_child(
+    answer: Any,
+    clearance: Floats,
+    ends: Floats,
+    radius: float,
+    planner: str,
+    options: dict[str, Any],
+    limits: tuple[int | None, float | None, int],
+) -> None:
+    """Search in a child process, and send path, calls and CPU seconds through a connection.
 
-    class Edges(base.MotionValidator):  # type: ignore[misc]
-        """The exact edge check."""
+    `limits` are iterations, seconds and the seed: only a process's first search can set it.
+    """
+    iterations, seconds, seed = limits
+    util.RNG.setSeed(seed % (2**31 - 1) + 1)
+    started = process_time()
 
-        def checkMotion(self, a: Any, b: Any, *_: Any) -> bool:  # noqa: N802 - OMPL's name
-            return bool(segment_free(clearance, a[0], a[1], b[0], b[1], radius))
+    def stop(calls: int) -> bool:
+        if iterations is not None and calls > iterations:
+            return True
+        return seconds is not None and process_time() - started > seconds
 
-    def is_free(state: Any) -> bool:
-        x, y = state[0], state[1]
-        return bool(segment_free(clearance, x, y, x, y, radius))
-
-    def is_in_free_cell(state: Any) -> bool:
-        return bool(
-            clearance[min(int(state[1]), height - 1), min(int(state[0]), width - 1)] > radius
-        )
-
-    if state_by_state:
-        information.setStateValidityChecker(is_in_free_cell)
-        information.setStateValidityCheckingResolution(1.0 / space.getMaximumExtent())
-    else:
-        information.setStateValidityChecker(is_free)
-        information.setMotionValidator(Edges(information))
-    information.setup()
-    return information
-
-
-def _vertices(path: Any) -> Floats:
-    return np.array(
-        [[path.getState(k)[0], path.getState(k)[1]] for k in range(path.getStateCount())]
-    )
+    information = exact_plane(clearance, radius)
+    path, calls = solve(information, ends, planner, stop, **options)
+    answer.send((path, calls, process_time() - started))
+    answer.close()

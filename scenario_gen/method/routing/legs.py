@@ -1,0 +1,115 @@
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""The legs of a route: a free curve between each two neighbouring waypoints."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from scenario_gen.base.cancelling import stop_if_cancelled
+from scenario_gen.base.errors import RefusedError
+from scenario_gen.method.routing.connecting_curves import direct_curve
+from scenario_gen.method.routing.distance import distances_to_line
+from scenario_gen.method.routing.leg_search import Leg, search_path
+from scenario_gen.method.routing.search.sweep import sweep_is_free
+from scenario_gen.method.routing.smooth import Guess
+from scenario_gen.method.routing.task import VehicleTask
+from scenario_gen.method.routing.waypoints import eased_pose
+from scenario_gen.numerics import Floats, wrap_angle
+from scenario_gen.numerics.plane import edge_lengths
+
+FITTED_WEIGHT, DIRECT_WEIGHT, SEARCHED_WEIGHT = 1.0, 0.3, 0.1  # of a guess, by its source
+ON_PATH_M = 0.05  # an anchor closer to the fitted path lies on it
+
+
+@dataclass(frozen=True, eq=False)
+class Legs:
+    """All legs of a route.
+
+    Attributes:
+        guess: the legs, end to end.
+        waypoints: indices of the anchors that they join.
+        left_out: indices of the waypoints that no free path goes through.
+        joined: number of legs that a direct curve joined.
+        searched: number of legs that had to be searched for.
+    """
+
+    guess: Guess
+    waypoints: list[int]
+    left_out: tuple[int, ...]
+    joined: int
+    searched: int
+
+
+def join_waypoints(task: VehicleTask, waypoints: list[int], curvature: float) -> Legs:
+    """Join waypoints (indices of anchors) by legs within a curvature [1/m].
+
+    A waypoint between the ends that cannot be passed as fitted (one at the road's edge that heads
+    off it, say) is eased first, and left out if that does not help.
+
+    Raises:
+        RefusedError: there is no route from start to end.
+    """
+    kept, eased = list(waypoints), set[int]()
+    guesses = list[Guess]()
+    poses = task.anchors.copy()
+    while len(guesses) < len(kept) - 1:
+        stop_if_cancelled()
+        first, second = kept[len(guesses)], kept[len(guesses) + 1]
+        leg = Leg(first, second, poses[first], poses[second], curvature, len(kept) == 2)
+        try:
+            guesses.append(_guess(task, leg))
+        except RefusedError:
+            inner = [w for w in (first, second) if w not in (kept[0], kept[-1])]
+            if not inner:
+                raise
+            place = _ease_or_drop(task, kept, inner, eased, poses)
+            del guesses[place - 1 :]  # the legs to and from this waypoint
+    searched = sum(guess.hold[0] == SEARCHED_WEIGHT for guess in guesses)
+    left_out = tuple(w for w in waypoints if w not in kept)
+    return Legs(Guess.joined(guesses), kept, left_out, len(guesses) - searched, searched)
+
+
+def _ease_or_drop(
+    task: VehicleTask, kept: list[int], inner: list[int], eased: set[int], poses: Floats
+) -> int:
+    """Ease a waypoint of a leg that failed, or drop one if all are eased; return its place."""
+    fresh = [w for w in inner if w not in eased]
+    waypoint = fresh[0] if fresh else inner[-1]
+    place = kept.index(waypoint)
+    if fresh:
+        eased.add(waypoint)
+        before, after = poses[kept[place - 1]], poses[kept[place + 1]]
+        poses[waypoint] = eased_pose(task, before, poses[waypoint], after)
+    else:
+        kept.remove(waypoint)
+    return place
+
+
+def _guess(task: VehicleTask, leg: Leg) -> Guess:
+    """Return the first that is free: the fitted path, a direct curve, a path that is searched."""
+    fitted = _fitted_piece(task, leg.start, leg.end)
+    if fitted is not None:
+        return Guess.even(fitted, FITTED_WEIGHT)
+    curve = direct_curve(task.road, task.vehicle, leg.start, leg.end, task.max_curvature)
+    if curve is not None:
+        return Guess.even(curve, DIRECT_WEIGHT)
+    return Guess.even(search_path(task, leg), SEARCHED_WEIGHT)
+
+
+def _fitted_piece(task: VehicleTask, start: Floats, end: Floats) -> Floats | None:
+    """Return the fitted path (P, 3) from pose to pose if both lie on it and it is drivable."""
+    path = task.fitted.path
+    if len(path) < 2:
+        return None
+    first, last = (int(np.argmin(np.hypot(*(path - pose)[:, :2].T))) for pose in (start, end))
+    if last - first < 2 or max(distances_to_line(np.stack([start, end]), path)) > ON_PATH_M:
+        return None
+    piece = path[first : last + 1]
+    curvature = np.abs(wrap_angle(np.diff(piece[:, 2]))) / edge_lengths(piece[:, :2])
+    poses = np.vstack([start, piece[1:-1], end])
+    if curvature.max() > task.max_curvature or edge_lengths(poses[:, :2]).min() < 1e-6:
+        return None
+    free = sweep_is_free(task.road, poses, task.vehicle.length, task.vehicle.width)[:, 0] > 0.0
+    return poses if free.all() else None

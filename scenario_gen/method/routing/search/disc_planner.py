@@ -1,0 +1,135 @@
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""RRT*-Connect in the plane, as in the paper: straight lines for a disc."""
+
+from dataclasses import dataclass
+import math
+
+import numpy as np
+
+from scenario_gen.base.parameters import parameter, Parameters
+from scenario_gen.method.routing.search.dubins import Pose
+from scenario_gen.method.routing.search.planner import (
+    Budget,
+    check_query,
+    NO_POSES,
+    path_length,
+    Plan,
+    Query,
+)
+from scenario_gen.method.routing.search.sampler import Rules
+from scenario_gen.method.routing.search.search import Search
+from scenario_gen.method.routing.search.shortcuts import string_pulled
+from scenario_gen.method.routing.search.sweep import disc_scene
+from scenario_gen.numerics import Floats
+from scenario_gen.roads import component_cells, to_cells
+from scenario_gen.types import Road
+
+MAX_ROUND_ITERATIONS = 512  # between two checks of the budget
+CORNER_SPREAD_CELLS = 0.5  # of samples near convex corners
+
+
+@dataclass(frozen=True)
+class RrtStarConnectConfig(Parameters):
+    """Settings of RRT*-Connect; lengths in cells, as in the paper."""
+
+    step: float = parameter(
+        120.0, "longest new edge (the paper's preset: 5)", unit="cells", low=0.1, high=1e6
+    )
+    zeta: float = parameter(
+        120.0,
+        "largest near radius, zeta of eq 10; it decides quality (the paper's preset: 30)",
+        unit="cells",
+        low=0.1,
+        high=1e6,
+    )
+    gamma_factor: float = parameter(
+        1.1,
+        "gamma of eq 10 as a multiple of the minimum that is asymptotically optimal",
+        low=1.0,
+        high=10.0,
+    )
+    greedy: bool = parameter(
+        True, "extend as far as possible until the first path is found (the paper: one step)"
+    )
+    corners: float = parameter(
+        0.5,
+        "share of samples near convex corners of obstacles (the paper: 0)",
+        low=0.0,
+        high=0.9,
+    )
+    informed: bool = parameter(True, "sample only where a shorter path can lie, once there is one")
+    pull: bool = parameter(True, "pull the path taut at the end (string pulling)")
+
+
+PAPER = RrtStarConnectConfig(
+    step=5.0, zeta=30.0, greedy=False, corners=0.0, informed=False, pull=False
+)
+
+
+class RrtStarConnect:
+    """The paper's planner.
+
+    Source: paper III-B and appendix.
+    """
+
+    def __init__(self, config: RrtStarConnectConfig = RrtStarConnectConfig()) -> None:
+        self.config = config
+
+    def search(self, road: Road, query: Query, label: int, seed: int) -> Search:
+        """Return the search of a query before it grows; it samples from a component's cells."""
+        config = self.config
+        ends = to_cells(road, np.array((query.start, query.goal))).tolist()
+        cells, _ = component_cells(road, query.radius, label)
+        least_gamma = 2.0 * math.sqrt(1.5 * max(len(cells), 1) / math.pi)  # of eq 10, d = 2
+        rules = Rules(
+            cells=cells,
+            near=NO_POSES,
+            near_share=config.corners,
+            spread=CORNER_SPREAD_CELLS,
+            yaw_spread=0.0,
+            step=config.step,
+            gamma=config.gamma_factor * least_gamma,
+            zeta=config.zeta,
+            exponent=0.5,
+            greedy=config.greedy,
+            informed=config.informed,
+        )
+        start, goal = (Pose(x, y, 0.0) for x, y in ends)
+        return Search(road, disc_scene(road, query.radius), rules, (start, goal), seed)
+
+    def plan(self, road: Road, query: Query, budget: Budget, seed: int) -> Plan:
+        """See `Planner.plan`; with a budget in iterations the answer depends on the seed only.
+
+        Raises:
+            BudgetSpentError: no path was found within the budget.
+        """
+        label = check_query(road, query)
+        search = self.search(road, query, label, seed)
+        for improved in search.rounds(budget, MAX_ROUND_ITERATIONS):
+            if improved:
+                if search.path is None:
+                    corners = _corner_poses(road, query.radius, label)
+                    search.rules = search.rules._replace(near=corners)
+                path = straight_path(search)
+                if self.config.pull:
+                    clearance, radius = search.scene.clearance, search.scene.body.half_length
+                    path = string_pulled(clearance, path, radius)
+                search.keep(path, path_length(path))
+            if search.path is not None and (budget.first or search.is_straight()):
+                break
+        return search.plan(query.start, query.goal)
+
+
+def straight_path(search: Search) -> Floats:
+    """Return the best path (P, 2) of the trees, from start to goal, in cells."""
+    first, second = search.chains()
+    return np.concatenate((first, second[-2::-1]))[:, :2]
+
+
+def _corner_poses(road: Road, radius: float, label: int) -> Floats:
+    """Return poses (c, 3) [cells] in front of convex corners of obstacles, where paths bend."""
+    _, corners = component_cells(road, radius, label)
+    row, column = np.divmod(corners, road.drivable.shape[1])
+    return np.column_stack((column + 0.5, row + 0.5, np.zeros(len(corners))))
