@@ -19,7 +19,7 @@ import numpy as np
 
 from scenario_gen.base.errors import InputError
 from scenario_gen.logs import LogConfig, read_log
-from scenario_gen.logs.read import read_raw
+from scenario_gen.logs import read_raw
 
 TABLE = Path(__file__).with_suffix(".json")
 SEED = 2016

@@ -1,17 +1,18 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Cleaning: impossible values are dropped and counted; the rest is put in order of time and into metres."""
+"""Cleaning: impossible values are dropped and counted; the rest is sorted by time, in metres."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from enum import Enum
 from typing import Any
 
 import numpy as np
 
 from scenario_gen.base.errors import InputError
-from scenario_gen.logs.clock import beyond
-from scenario_gen.logs.config import LogConfig, picked
+from scenario_gen.logs.clock import is_out_of_range
+from scenario_gen.logs.config import chosen_vehicles, LogConfig
 from scenario_gen.logs.geodesy import local_frame, middle_of, on_sphere, sites_of
 from scenario_gen.logs.kinds import usual_size
 from scenario_gen.logs.quality import Dropped
@@ -19,238 +20,289 @@ from scenario_gen.logs.raw import Observations, RawLog
 from scenario_gen.numerics import Bools, Floats, Ints
 from scenario_gen.types import CAR, VEHICLE_TYPES
 
-SLOWEST_S = 5.0  # s between fixes: a slower source does not show how a vehicle drives, or its unit of time is another one
-FARTHEST_M = 1e8  # m from the origin of any frame: a quarter of the way to the moon
-UNITS = {"milliseconds": ("ms", 1e-3), "microseconds": ("us", 1e-6), "nanoseconds": ("ns", 1e-9)}
-USUAL = (0.005, 2.0)  # s between fixes of usual sources
-FASTEST_MPS = 70.0  # m/s: no road vehicle's measured speed is above it (an SPMD unit sends 163.8 for "unknown")
-TELEPORT_SLACK_M = 3.0  # m that a fix may lie beyond what the speeds allow: GPS noise
-TELEPORT_SLACK_MPS = (
-    10.0  # m/s by which a measured speed may be wrong before a fix counts as a jump
-)
-LONGEST_M, WIDEST_M = 100.0, 4.0  # of a vehicle
-SIZES = (
-    ("feet", "ft", 0.3048),
-    ("centimetres", "cm", 0.01),
-    ("millimetres", "mm", 0.001),
-)  # that sizes may be in
-MOVES_MPS = 1.0  # m/s: above it a vehicle is not where it was
-BORNE_OUT = 0.2  # of a measured speed: what the positions drive at least, in whatever unit it is
-RELOCATED = 5  # fixes in a row that agree with each other and are then a new place, not jumps
+
+@dataclass(frozen=True)
+class CleaningLimits:
+    """Bounds that tell measurements from errors.
+
+    Attributes:
+        max_period_s: longest median time between fixes: a slower source does not show how a
+            vehicle drives, or its unit of time is wrong.
+        max_coordinate_m: a quarter of the way to the moon; no frame's origin is farther.
+        max_speed_mps: no measured speed of a road vehicle is above it (an SPMD unit sends 163.8
+            for "unknown").
+        jump_slack_m: distance by which a fix may exceed what the speeds allow: GPS noise.
+        jump_slack_mps: possible error of a measured speed before a fix counts as a jump.
+        max_length_m: longest road vehicle.
+        max_width_m: widest road vehicle.
+        moving_mps: above this speed, a vehicle changes its position between fixes.
+        min_speed_share: share of a measured speed that the positions of a moving vehicle confirm
+            at least, in whatever unit the speed is.
+        relocation_count: fixes in a row that agree with each other and are then a new place.
+    """
+
+    max_period_s: float = 5.0
+    max_coordinate_m: float = 1e8
+    max_speed_mps: float = 70.0
+    jump_slack_m: float = 3.0
+    jump_slack_mps: float = 10.0
+    max_length_m: float = 100.0
+    max_width_m: float = 4.0
+    moving_mps: float = 1.0
+    min_speed_share: float = 0.2
+    relocation_count: int = 5
+
+
+CLEANING = CleaningLimits()
+
+_USUAL_PERIOD_S = (0.005, 2.0)  # between fixes
+_TIME_UNITS = {
+    "ms": ("milliseconds", 1e-3),
+    "us": ("microseconds", 1e-6),
+    "ns": ("nanoseconds", 1e-9),
+}
+_SIZE_UNITS = {"ft": ("feet", 0.3048), "cm": ("centimetres", 0.01), "mm": ("millimetres", 0.001)}
+
+
+class Cause(Enum):
+    """Why rows are dropped or sorted; the value is for people."""
+
+    STAMP_OUT_OF_RANGE = "stamp is out of range"
+    STAMP_DISORDER = "stamp out of order (sorted)"
+    STAMP_REPEATED = "stamp repeated"
+    NO_POSITION = "position is not a number"
+    ZERO_POSITION = "position is (0, 0)"
+    NOT_ON_EARTH = "position is not on Earth"
+    REPEATED_POSITION = "position repeated while the vehicle moves (the first is kept)"
+    JUMP = "position jumps"
+    NO_SPEED = "speed is not a number"
+    NEGATIVE_SPEED = "speed is negative"
+    SPEED_TOO_HIGH = f"speed is above {CLEANING.max_speed_mps:g} m/s"
 
 
 @dataclass
 class Drops:
-    """Counts of dropped rows by reason, with the first row of each; and notes on what was replaced."""
+    """Dropped rows by cause: their number, and the first of them; notes on what was replaced.
 
-    count: dict[str, int] = field(default_factory=dict)
-    first: dict[str, int] = field(default_factory=dict)
+    The causes of readers are texts.
+    """
+
+    count: dict[Cause | str, int] = field(default_factory=dict)
+    first: dict[Cause | str, int] = field(default_factory=dict)
     notes: list[str] = field(default_factory=list)
 
-    def add(self, reason: str, rows: Ints) -> None:
-        """Count `rows` (K,) of the log as dropped for `reason`."""
+    def add(self, cause: Cause | str, rows: Ints) -> None:
+        """Count rows (K,) of the log as dropped."""
         if len(rows):
-            self.count[reason] = self.count.get(reason, 0) + len(rows)
-            self.first[reason] = min(self.first.get(reason, int(rows[0])), int(rows.min()))
+            self.count[cause] = self.count.get(cause, 0) + len(rows)
+            self.first[cause] = min(self.first.get(cause, int(rows[0])), int(rows.min()))
 
-    def of(self, log: RawLog) -> tuple[Dropped, ...]:
-        """Return the reasons with their counts and the places in the log."""
+    def located(self, log: RawLog) -> tuple[Dropped, ...]:
+        """Return the causes with numbers of rows and places in the log."""
         return tuple(
-            Dropped(reason, count, log.where(self.first[reason]))
-            for reason, count in self.count.items()
+            Dropped(
+                cause.value if isinstance(cause, Cause) else cause,
+                count,
+                log.where(self.first[cause]),
+            )
+            for cause, count in self.count.items()
         )
 
 
 def clean(log: RawLog, config: LogConfig) -> tuple[tuple[Observations, ...], Drops]:
-    """Drop impossible values and bring every vehicle into the local frame.
+    """Drop impossible values and project every vehicle into a local frame.
 
     Returns:
-        The vehicles with at least two fixes, in metres, stamps strictly increasing, no NaN but in headings, one after another for
-        each site (`in_metres`); and the drops.
+        The vehicles with at least two fixes, in metres, with strictly increasing stamps, without
+        NaN except in headings, once for each site (`in_metres`); and the drops.
 
     Raises:
-        InputError: nothing usable is left, or `strict` is set and a row had to be repaired.
+        InputError: nothing usable is left, or `strict` is set and a row needs repair.
     """
     drops = Drops()
-    for reason, row in log.dropped:
-        drops.add(reason, np.array([row]))
-    known = {vehicle.id: vehicle for vehicle in log.vehicles}
-    sound = [
-        sound_observations(known[name], log.geographic, drops)
-        for name in picked(list(known), config, log.name)
-    ]
-    window = time_window(sound, log, drops, config)
-    sound = [within(vehicle, *window) for vehicle in sound]
-    if not any(len(vehicle.fix_ns) for vehicle in sound):
+    for cause, row in log.dropped:
+        drops.add(cause, np.array([row]))
+    by_id = {vehicle.id: vehicle for vehicle in log.vehicles}
+    names = chosen_vehicles(list(by_id), config, log.name)
+    vehicles = [_without_invalid(by_id[name], log.geographic, drops) for name in names]
+
+    first_ns, last_ns = _time_window(vehicles, log, drops, config)
+    vehicles = [_in_window(vehicle, first_ns, last_ns) for vehicle in vehicles]
+    if not any(len(vehicle.fix_ns) for vehicle in vehicles):
         raise InputError(
-            f"{log.name}: no position between {config.start:g} s and {config.end:g} s; change --set log.start=… or log.end=…"
+            f"{log.name}: no position between {config.start:g} s and {config.end:g} s; "
+            "change --set log.start=… or log.end=…"
         )
-    sound = [in_order(vehicle, log, drops) for vehicle in sound]
-    sound = [without_held(vehicle, drops, geographic=log.geographic) for vehicle in sound]
-    check_clock(sound, log, config)
-    tracks, notes = sized(
-        [without_jumps(vehicle, drops, geographic=log.geographic) for vehicle in sound], config
-    )
-    drops.notes += notes
+    vehicles = [_in_order(vehicle, log, drops) for vehicle in vehicles]
+    vehicles = [_without_repeats(vehicle, drops, log.geographic) for vehicle in vehicles]
+    _check_clock(vehicles, log, config)
+    vehicles = [_without_jumps(vehicle, drops, log.geographic) for vehicle in vehicles]
+    vehicles = _with_sizes(vehicles, drops, config)
     if config.strict and drops.count:
-        worst = drops.of(log)[0]
+        worst = drops.located(log)[0]
         raise InputError(
             f"{worst.first}: {worst.reason} ({worst.count} such rows), and strict is set"
         )
     if log.geographic:
-        tracks = in_metres(tracks, config)
-    return tuple(track for track in tracks if len(track.fix_ns) >= 2), drops
+        vehicles = in_metres(vehicles, config)
+    return tuple(vehicle for vehicle in vehicles if len(vehicle.fix_ns) >= 2), drops
 
 
-def sound_observations(vehicle: Observations, geographic: bool, drops: Drops) -> Observations:
+def _without_invalid(vehicle: Observations, geographic: bool, drops: Drops) -> Observations:
     """Return the observations without impossible positions and speeds."""
-    fix, speed = vehicle.fix, vehicle.speed
-    checks: list[tuple[str, Any]] = [
-        ("stamp is out of range", beyond(vehicle.fix_ns)),
-        ("position is not a number", ~np.isfinite(fix).all(axis=1)),
-    ]
+    fix = vehicle.fix
+    speed = vehicle.speed
+    position_checks: dict[Cause, Any] = {
+        Cause.STAMP_OUT_OF_RANGE: is_out_of_range(vehicle.fix_ns),
+        Cause.NO_POSITION: ~np.isfinite(fix).all(axis=1),
+    }
     if geographic:
-        checks.append(("position is (0, 0)", (np.abs(fix) < 1e-6).all(axis=1)))
-        checks.append(
-            ("position is not on Earth", (np.abs(fix[:, 0]) > 90.0) | (np.abs(fix[:, 1]) > 180.0))
-        )
+        position_checks[Cause.ZERO_POSITION] = (np.abs(fix) < 1e-6).all(axis=1)
+        off_earth = (np.abs(fix) > (90.0, 180.0)).any(axis=1)
     else:
-        checks.append(("position is not on Earth", (np.abs(fix) > FARTHEST_M).any(axis=1)))
-    keep = judge(checks, vehicle.fix_row, drops)
-    slow_checks: list[tuple[str, Any]] = [
-        ("stamp is out of range", beyond(vehicle.speed_ns)),
-        ("speed is not a number", ~np.isfinite(speed)),
-        ("speed is negative", speed < 0.0),
-        (f"speed is above {FASTEST_MPS:g} m/s", speed > FASTEST_MPS),
-    ]
-    keep_speed = judge(slow_checks, vehicle.speed_row, drops)
-    return select(vehicle, keep, keep_speed)
+        off_earth = (np.abs(fix) > CLEANING.max_coordinate_m).any(axis=1)
+    position_checks[Cause.NOT_ON_EARTH] = off_earth
+    speed_checks: dict[Cause, Any] = {
+        Cause.STAMP_OUT_OF_RANGE: is_out_of_range(vehicle.speed_ns),
+        Cause.NO_SPEED: ~np.isfinite(speed),
+        Cause.NEGATIVE_SPEED: speed < 0.0,
+        Cause.SPEED_TOO_HIGH: speed > CLEANING.max_speed_mps,
+    }
+    valid_fix = _passing(position_checks, vehicle.fix_row, drops)
+    return select(vehicle, valid_fix, _passing(speed_checks, vehicle.speed_row, drops))
 
 
-def judge(checks: list[tuple[str, Any]], rows: Ints, drops: Drops) -> Bools:
-    """Return which rows (T,) pass all checks, each a reason and (T,) flags; a row counts once, for its first reason."""
-    keep = np.ones(len(rows), dtype=bool)
-    for reason, bad in checks:
-        drops.add(reason, rows[keep & bad])
-        keep &= ~bad
-    return keep
+def _passing(checks: Mapping[Cause, Any], rows: Ints, drops: Drops) -> Bools:
+    """Return which rows (T,) pass all checks (T,); a row counts once, for its first cause."""
+    passing = np.ones(len(rows), dtype=bool)
+    for cause, is_bad in checks.items():
+        drops.add(cause, rows[passing & is_bad])
+        passing &= ~is_bad
+    return passing
 
 
-def select(vehicle: Observations, fixes: Bools | Ints, speeds: Bools | Ints) -> Observations:
-    """Return the vehicle with only the chosen observations, in the order given: flags (F,) and (S,), or indices."""
-    return replace(
+def select(
+    vehicle: Observations, fixes: Bools | Ints, speeds: Bools | Ints | None = None
+) -> Observations:
+    """Return the vehicle with the chosen observations only, in the given order.
+
+    Args:
+        vehicle: the observations.
+        fixes: flags (F,) or indices.
+        speeds: flags (S,) or indices; None: all.
+    """
+    chosen = replace(
         vehicle,
-        **{
-            name: getattr(vehicle, name)[fixes] for name in ("fix_ns", "fix", "fix_row", "heading")
-        },
-        **{name: getattr(vehicle, name)[speeds] for name in ("speed_ns", "speed", "speed_row")},
+        fix_ns=vehicle.fix_ns[fixes],
+        fix=vehicle.fix[fixes],
+        fix_row=vehicle.fix_row[fixes],
+        heading=vehicle.heading[fixes],
+    )
+    if speeds is None:
+        return chosen
+    return replace(
+        chosen,
+        speed_ns=vehicle.speed_ns[speeds],
+        speed=vehicle.speed[speeds],
+        speed_row=vehicle.speed_row[speeds],
     )
 
 
-def time_window(
-    sound: list[Observations], log: RawLog, drops: Drops, config: LogConfig
+def _time_window(
+    vehicles: Sequence[Observations], log: RawLog, drops: Drops, config: LogConfig
 ) -> tuple[int, int]:
-    """Return the first and last stamp wanted [ns].
+    """Return the first and the last stamp of the requested window [ns].
 
     Raises:
-        InputError: there is no usable position at all.
+        InputError: there is no usable position, or the window is empty.
     """
-    stamps = [vehicle.fix_ns for vehicle in sound if len(vehicle.fix_ns)]
-    if not stamps:
-        causes = "; ".join(map(str, drops.of(log)))
+    stamps = np.concatenate([vehicle.fix_ns for vehicle in vehicles])
+    if not len(stamps):
+        causes = "; ".join(map(str, drops.located(log)))
         raise InputError(
-            f"{log.segments[0].label} holds no usable position among {log.rows} rows"
+            f"{log.segments[0].label}: no usable position in {log.rows} rows"
             + (f" ({causes})" if causes else "")
-            + looks_like(log)
+            + _unit_hint(log)
             + "; check the columns and their units, or name them with --set log.columns=…"
         )
-    first, last = min(int(s.min()) for s in stamps), max(int(s.max()) for s in stamps)
+    first_ns = int(stamps.min())
+    last_ns = int(stamps.max())
     if config.end and config.end <= config.start:
         raise InputError(
             f"parameter end is {config.end:g} s; it must be after start ({config.start:g} s), or 0"
         )
-    if config.start * 1e9 > last - first:
+    if config.start * 1e9 > last_ns - first_ns:
         raise InputError(
-            f"parameter start is {config.start:g} s, but {log.name} is only {(last - first) * 1e-9:.1f} s long"
+            f"parameter start is {config.start:g} s, but {log.name} is only "
+            f"{(last_ns - first_ns) * 1e-9:.1f} s long"
         )
-    return first + round(config.start * 1e9), first + round(
-        config.end * 1e9
-    ) if config.end else last
+    end_ns = first_ns + round(config.end * 1e9) if config.end else last_ns
+    return first_ns + round(config.start * 1e9), end_ns
 
 
-def looks_like(log: RawLog) -> str:
-    """Return what positions of which none can be used look like, "" if like nothing that is known."""
-    fix = np.concatenate([vehicle.fix for vehicle in log.vehicles] or [np.zeros((0, 2))])
-    fix = np.abs(fix[np.isfinite(fix).all(axis=1)])
+def _unit_hint(log: RawLog) -> str:
+    """Return what unusable latitudes and longitudes look like; "" if unknown."""
     if not log.geographic:
         return ""
+    fix = np.concatenate([vehicle.fix for vehicle in log.vehicles] or [np.zeros((0, 2))])
+    fix = np.abs(fix[np.isfinite(fix).all(axis=1)])
     if not len(fix):
         return "; the receivers had no fix, or the fields are empty"
     latitude, longitude = np.median(fix, axis=0)
-    for unit, what, whole in (
-        ("ddmm", "degrees and minutes, as of NMEA", (9_000.0, 18_000.0)),
-        ("e7", "1e-7 degrees", (9e8, 1.8e9)),
-    ):
-        if max(latitude, longitude) > 180.0 and latitude <= whole[0] and longitude <= whole[1]:
-            return f"; they look like {what}: --set log.columns=lat=…:{unit},lon=…:{unit}"
-    return (
-        "; lat and lon may be swapped: --set log.columns=lat=…,lon=…"
-        if 90.0 < latitude <= 180.0
-        else ""
-    )
-
-
-def within(vehicle: Observations, first: int, last: int) -> Observations:
-    """Return the vehicle's observations between two stamps."""
-    return select(
-        vehicle,
-        (vehicle.fix_ns >= first) & (vehicle.fix_ns <= last),
-        (vehicle.speed_ns >= first) & (vehicle.speed_ns <= last),
-    )
-
-
-def in_metres(vehicles: list[Observations], config: LogConfig) -> list[Observations]:
-    """Project latitude and longitude to east and north of the parameter `origin`, or else of the middle of their site.
-
-    Sites are groups of fixes far from each other (`geodesy.sites_of`), however far: each has a frame of its own. A vehicle that
-    is recorded at two sites is returned once for each.
-    """
-    everything = np.concatenate([vehicle.fix for vehicle in vehicles])
-    site = np.zeros(len(everything), dtype=np.int64) if config.origin else sites_of(everything)
-    origins = [
-        parse_origin(config.origin)
-        if config.origin
-        else middle_of(everything[site == k], left_out=5.0, digits=5)
-        for k in range(int(site.max()) + 1)
-    ]
-    found = []
-    for vehicle, own in zip(
-        vehicles,
-        np.split(site, np.cumsum([len(vehicle.fix) for vehicle in vehicles])[:-1]),
-        strict=True,
-    ):
-        at = (
-            own[np.clip(np.searchsorted(vehicle.fix_ns, vehicle.speed_ns), 0, len(own) - 1)]
-            if len(own)
-            else own
+    if 90.0 < latitude <= 180.0:
+        return "; lat and lon may be swapped: --set log.columns=lat=…,lon=…"
+    if max(latitude, longitude) > 180.0 and latitude <= 9_000.0 and longitude <= 18_000.0:
+        return (
+            "; they look like degrees and minutes, as of NMEA: "
+            "--set log.columns=lat=…:ddmm,lon=…:ddmm"
         )
-        for k in np.unique(own):
-            part = select(vehicle, own == k, at == k)
-            found.append(
-                replace(
-                    part,
-                    fix=local_frame(part.fix[:, 0], part.fix[:, 1], origins[k]),
-                    origin=origins[k],
-                )
-            )
-    return found
+    if max(latitude, longitude) > 180.0 and latitude <= 9e8 and longitude <= 1.8e9:
+        return "; they look like 1e-7 degrees: --set log.columns=lat=…:e7,lon=…:e7"
+    return ""
+
+
+def _in_window(vehicle: Observations, first_ns: int, last_ns: int) -> Observations:
+    """Return the vehicle's observations between two stamps."""
+    fixes = (vehicle.fix_ns >= first_ns) & (vehicle.fix_ns <= last_ns)
+    speeds = (vehicle.speed_ns >= first_ns) & (vehicle.speed_ns <= last_ns)
+    return select(vehicle, fixes, speeds)
+
+
+def in_metres(vehicles: Sequence[Observations], config: LogConfig) -> list[Observations]:
+    """Project latitude and longitude to east and north.
+
+    The origin is the parameter `origin`, or else the middle of the site. Sites are groups of fixes
+    far from each other (`geodesy.sites_of`): each has its own frame. A vehicle that is recorded at
+    two sites is returned once for each.
+    """
+    fixes = np.concatenate([vehicle.fix for vehicle in vehicles])
+    if config.origin:
+        site = np.zeros(len(fixes), dtype=np.int64)
+        origins = [parse_origin(config.origin)]
+    else:
+        site = sites_of(fixes)
+        origins = [
+            middle_of(fixes[site == k], left_out=5.0, digits=5) for k in range(int(site.max()) + 1)
+        ]
+    ends = np.cumsum([len(vehicle.fix) for vehicle in vehicles])
+    projected = []
+    for vehicle, fix_site in zip(vehicles, np.split(site, ends[:-1]), strict=True):
+        if not len(fix_site):
+            continue
+        next_fix = np.searchsorted(vehicle.fix_ns, vehicle.speed_ns)
+        speed_site = fix_site[np.clip(next_fix, 0, len(fix_site) - 1)]
+        for k in np.unique(fix_site):
+            part = select(vehicle, fix_site == k, speed_site == k)
+            fix = local_frame(part.fix[:, 0], part.fix[:, 1], origins[k])
+            projected.append(replace(part, fix=fix, origin=origins[k]))
+    return projected
 
 
 def parse_origin(text: str, parameter: str = "origin") -> tuple[float, float]:
-    """Return latitude and longitude of a text `latitude,longitude`, in degrees, that a parameter has.
+    """Return latitude and longitude [degrees] of a text `latitude,longitude`.
 
     Raises:
-        InputError: it is not of that form, or no place on the globe.
+        InputError: it does not have that form, or is not on the globe; names the parameter.
     """
     try:
         latitude, longitude = (float(part) for part in text.split(","))
@@ -263,81 +315,77 @@ def parse_origin(text: str, parameter: str = "origin") -> tuple[float, float]:
     return latitude, longitude
 
 
-def in_order(vehicle: Observations, log: RawLog, drops: Drops) -> Observations:
+def _in_order(vehicle: Observations, log: RawLog, drops: Drops) -> Observations:
     """Sort by stamp and drop repeated stamps.
 
     Raises:
-        InputError: the stamps run backwards half of the time, or stand still.
+        InputError: half of the stamps run backwards, or most repeat.
     """
-    fixes, speeds = np.diff(vehicle.fix_ns), np.diff(vehicle.speed_ns)
-    back = np.flatnonzero(fixes < 0) + 1
-    repeated = int((fixes == 0).sum())
-    if len(fixes) >= 4 and (len(back) > len(fixes) / 2 or repeated > 0.9 * len(fixes)):
-        row = vehicle.fix_row[back[0] if len(back) else 1]
-        fault = (
-            f"runs backwards {len(back)} times" if len(back) else f"stands still {repeated} times"
-        )
+    steps = np.diff(vehicle.fix_ns)
+    backward = np.flatnonzero(steps < 0) + 1
+    n_repeated = int((steps == 0).sum())
+    if len(steps) >= 4 and (len(backward) > len(steps) / 2 or n_repeated > 0.9 * len(steps)):
+        row = vehicle.fix_row[backward[0] if len(backward) else 1]
+        fault = f"stands still {n_repeated} times"
+        if len(backward):
+            fault = f"runs backwards {len(backward)} times"
         raise InputError(
-            f"{log.where(int(row))}: the clock of vehicle {vehicle.id} {fault} in {len(fixes)} rows; check the time column"
+            f"{log.where(int(row))}: the clock of vehicle {vehicle.id} {fault} in {len(steps)} "
+            "rows; check the time column"
         )
-    drops.add("stamp out of order (sorted)", vehicle.fix_row[back])
-    late = set(back.tolist())
-    same = [
-        i + 1
-        for i in np.flatnonzero(speeds < 0)
-        if i + 1 not in late and len(vehicle.speed_row) != len(vehicle.fix_row)
-    ]
-    drops.add("stamp out of order (sorted)", vehicle.speed_row[same])
-    keep, again = first_of_each(vehicle.fix_ns)
-    keep_speed, _ = first_of_each(vehicle.speed_ns)
-    drops.add("stamp repeated", vehicle.fix_row[again])
-    return select(vehicle, keep, keep_speed)
+    drops.add(Cause.STAMP_DISORDER, vehicle.fix_row[backward])
+    if len(vehicle.speed_row) != len(vehicle.fix_row):  # else rows have both, and count once
+        speed_backward = np.flatnonzero(np.diff(vehicle.speed_ns) < 0) + 1
+        only_speeds = np.setdiff1d(speed_backward, backward)
+        drops.add(Cause.STAMP_DISORDER, vehicle.speed_row[only_speeds])
+
+    _, first_fixes = np.unique(vehicle.fix_ns, return_index=True)
+    _, first_speeds = np.unique(vehicle.speed_ns, return_index=True)
+    repeated = np.delete(np.arange(len(vehicle.fix_ns)), first_fixes)
+    drops.add(Cause.STAMP_REPEATED, vehicle.fix_row[repeated])
+    return select(vehicle, first_fixes, first_speeds)
 
 
-def without_held(vehicle: Observations, drops: Drops, *, geographic: bool) -> Observations:
-    """Keep the first of positions that repeat while the vehicle moves: the others are no measurements.
+def _without_repeats(vehicle: Observations, drops: Drops, geographic: bool) -> Observations:
+    """Drop positions that repeat while the vehicle moves: they are not measurements.
 
-    It moves if its measured speeds say so and the next position bears them out; without speeds, if it comes and goes by steps
-    that are as fast as a vehicle, the repeats included.
+    It moves if its measured speeds say so and the next new position confirms them; without speeds,
+    if the steps between new positions are as fast as a vehicle, including the repeats.
     """
-    repeats = np.concatenate([[False], (np.diff(vehicle.fix, axis=0) == 0.0).all(axis=1)])
-    new = np.flatnonzero(~repeats)
-    if not repeats.any() or len(new) < 2:
+    is_repeat = np.concatenate([[False], (np.diff(vehicle.fix, axis=0) == 0.0).all(axis=1)])
+    new = np.flatnonzero(~is_repeat)
+    if not is_repeat.any() or len(new) < 2:
         return vehicle
     places = on_sphere(vehicle.fix[new]) if geographic else vehicle.fix[new]
-    rate = np.linalg.norm(np.diff(places, axis=0), axis=1) / (np.diff(vehicle.fix_ns[new]) * 1e-9)
+    seconds = np.diff(vehicle.fix_ns[new]) * 1e-9
+    rate = np.linalg.norm(np.diff(places, axis=0), axis=1) / seconds
     if len(vehicle.speed_ns) >= 2:
         speed = np.interp(vehicle.fix_ns, vehicle.speed_ns, vehicle.speed)
-        counts = np.diff(np.append(new, len(repeats)))
-        goes = rate > BORNE_OUT * (np.add.reduceat(speed, new) / counts)[:-1]
-        moves = speed > MOVES_MPS
+        counts = np.diff(np.append(new, len(is_repeat)))
+        mean_speed = np.add.reduceat(speed, new) / counts
+        advances = rate > CLEANING.min_speed_share * mean_speed[:-1]
+        is_moving = speed > CLEANING.moving_mps
     else:
-        goes = np.minimum(rate, np.insert(rate[:-1], 0, rate[0])) > 2.0 * MOVES_MPS
-        moves = np.ones(len(repeats), dtype=bool)
-    goes = np.append(goes, (goes & (np.diff(new) > 1)).any())  # the last one, if there are others
-    held = repeats & moves & goes[np.cumsum(~repeats) - 1]
-    drops.add(
-        "position repeated while the vehicle moves (the first is kept)", vehicle.fix_row[held]
-    )
-    return select(vehicle, ~held, np.ones(len(vehicle.speed_ns), dtype=bool))
+        previous_rate = np.insert(rate[:-1], 0, rate[0])
+        advances = np.minimum(rate, previous_rate) > 2.0 * CLEANING.moving_mps
+        is_moving = np.ones(len(is_repeat), dtype=bool)
+    has_repeats = (advances & (np.diff(new) > 1)).any()
+    advances = np.append(advances, has_repeats)  # nothing follows the last new position
+    is_held = is_repeat & is_moving & advances[np.cumsum(~is_repeat) - 1]
+    drops.add(Cause.REPEATED_POSITION, vehicle.fix_row[is_held])
+    return select(vehicle, ~is_held)
 
 
-def first_of_each(stamps: Ints) -> tuple[Ints, Ints]:
-    """Return, of stamps (T,), the indices of the first row of each in order of time, and of the rows that repeat one."""
-    _, keep = np.unique(stamps, return_index=True)
-    return keep, np.delete(np.arange(len(stamps)), keep)
+def _check_clock(vehicles: Sequence[Observations], log: RawLog, config: LogConfig) -> None:
+    """Check that the common clock has at most `tick_limit` ticks, and the likely unit of time.
 
-
-def check_clock(vehicles: Sequence[Observations], log: RawLog, config: LogConfig) -> None:
-    """Refuse tracks whose common clock would have more than `tick_limit` ticks, or whose unit of time seems to be wrong.
-
-    The clock has a tick for every period between a vehicle's first and last stamp: with one wrong stamp these may be years apart,
-    and the clock would need hundreds of gibibytes.
+    The clock has a tick for every period between a vehicle's first and last stamp: with one wrong
+    stamp these may be years apart, and the clock would need hundreds of gibibytes.
 
     Args:
-        vehicles: stamps in order.
+        vehicles: observations with stamps in order.
         log: names the places.
-        config: holds the limit and the period.
+        config: names limit and period.
 
     Raises:
         InputError: the clock is too long, or the fixes are too far apart in time.
@@ -345,116 +393,141 @@ def check_clock(vehicles: Sequence[Observations], log: RawLog, config: LogConfig
     vehicles = [vehicle for vehicle in vehicles if len(vehicle.fix_ns) >= 2]
     if not vehicles:
         return
-    typical = (
-        float(np.median(np.concatenate([np.diff(vehicle.fix_ns) for vehicle in vehicles]))) * 1e-9
-    )
-    if typical > max(SLOWEST_S, config.longest_gap):
-        likely = [
-            (name, unit)
-            for name, (unit, factor) in UNITS.items()
-            if USUAL[0] <= typical * factor <= USUAL[1]
-        ]
-        hint = f"this looks like {likely[0][0]} read as seconds; " if likely else ""
+    steps = np.concatenate([np.diff(vehicle.fix_ns) for vehicle in vehicles])
+    period = float(np.median(steps)) * 1e-9
+    if period > max(CLEANING.max_period_s, config.longest_gap):
+        unit, hint = _likely_time_unit(period)
         raise InputError(
-            f"{log.where(int(vehicles[0].fix_row[1]))}: positions are {typical:g} s apart (median), at most {SLOWEST_S:g} s make "
-            f"a track; {hint}name the unit with the parameter columns, time=<column>:{likely[0][1] if likely else '<unit>'}"
+            f"{log.where(int(vehicles[0].fix_row[1]))}: positions are {period:g} s apart (median); "
+            f"a track needs at most {CLEANING.max_period_s:g} s; {hint}name the unit with "
+            f"--set log.columns=time=<column>:{unit}"
         )
     spans = [int(vehicle.fix_ns[-1]) - int(vehicle.fix_ns[0]) for vehicle in vehicles]
-    ticks = round(sum(spans) / (config.period * 1e9))
-    if ticks > config.tick_limit:
+    n_ticks = round(sum(spans) / (config.period * 1e9))
+    if n_ticks > config.tick_limit:
         longest = vehicles[int(np.argmax(spans))]
-        after = int(np.argmax(np.diff(longest.fix_ns))) + 1
-        gap = int(longest.fix_ns[after]) - int(longest.fix_ns[after - 1])
+        row = int(np.argmax(np.diff(longest.fix_ns))) + 1
+        gap_ns = int(longest.fix_ns[row]) - int(longest.fix_ns[row - 1])
         raise InputError(
-            f"{log.where(int(longest.fix_row[after]))}: the stamp of vehicle {longest.id[:50]} is {gap * 1e-9:g} s after the one "
-            f"before, so the clock has {ticks} ticks of {config.period:g} s in all; at most {config.tick_limit} are made: "
-            "correct the stamp, cut the log (parameters start, end), or raise --set log.tick_limit=…"
+            f"{log.where(int(longest.fix_row[row]))}: the stamp of vehicle {longest.id[:50]} is "
+            f"{gap_ns * 1e-9:g} s after the previous one, so the common clock needs {n_ticks} "
+            f"ticks of {config.period:g} s (limit {config.tick_limit}): correct the stamp, cut the "
+            "log (log.start, log.end), or raise --set log.tick_limit=…"
         )
 
 
-def without_jumps(vehicle: Observations, drops: Drops, *, geographic: bool) -> Observations:
-    """Drop fixes that the vehicle cannot have reached at its measured speeds, except several in a row that agree."""
-    limit = reach(vehicle)
+def _likely_time_unit(period: float) -> tuple[str, str]:
+    """Return a unit in which the time between fixes would be usual, and a hint; or a blank."""
+    shortest, longest = _USUAL_PERIOD_S
+    for unit, (name, factor) in _TIME_UNITS.items():
+        if shortest <= period * factor <= longest:
+            return unit, f"this looks like {name} read as seconds; "
+    return "<unit>", ""
+
+
+def _without_jumps(vehicle: Observations, drops: Drops, geographic: bool) -> Observations:
+    """Drop fixes that the measured speeds do not allow, except several in a row that agree."""
+    speed_limit = _max_speeds(vehicle)
     places = on_sphere(vehicle.fix) if geographic else vehicle.fix
     step = np.linalg.norm(np.diff(places, axis=0), axis=1)
-    seconds = np.diff(vehicle.fix_ns) * 1e-9
-    keep = np.ones(len(vehicle.fix_ns), dtype=bool)
-    if (step > TELEPORT_SLACK_M + limit[1:] * seconds).any():
-        keep = reachable(vehicle.fix_ns.astype(np.float64) * 1e-9, places, limit)
-        drops.add("position jumps", vehicle.fix_row[~keep])
-    every = np.ones(len(vehicle.speed_ns), dtype=bool)
-    return select(vehicle, keep, every)
+    seconds = vehicle.fix_ns.astype(np.float64) * 1e-9
+    step_s = np.diff(vehicle.fix_ns) * 1e-9
+    if not (step > CLEANING.jump_slack_m + speed_limit[1:] * step_s).any():
+        return vehicle
+    reachable = _reachable(seconds, places, speed_limit)
+    drops.add(Cause.JUMP, vehicle.fix_row[~reachable])
+    return select(vehicle, reachable)
 
 
-def sized(vehicles: list[Observations], config: LogConfig) -> tuple[list[Observations], list[str]]:
-    """Return the vehicles with lengths and widths, those of `config` where there are none, or such as no car has; and notes."""
-    found, wrong = [], []
-    for vehicle in vehicles:
-        length, width, usual = vehicle.length, vehicle.width, usual_size(vehicle.kind, config)
-        walks = VEHICLE_TYPES[vehicle.kind or CAR].walks  # wider than long
-        # comparisons with NaN, where one is not recorded, are false
-        if width <= 0.0 or width > WIDEST_M or (width > length and not walks):
-            wrong.append(vehicle)
-            length, width = np.nan, np.nan
-        elif length <= 0.0 or length > LONGEST_M:
-            wrong.append(vehicle)
-            length = np.nan
-        length, width = (
-            own if np.isfinite(own) else known
-            for own, known in zip((length, width), usual, strict=True)
-        )
-        found.append(replace(vehicle, length=length, width=width))
-    if not wrong:
-        return found, []
-    size = (wrong[0].length, wrong[0].width)
-    ways = {"swapped (log.columns=length=…,width=…)": size[::-1]} | {
-        f"in {name} (name the unit: log.columns=length=…:{unit},width=…:{unit})": (
-            factor * size[0],
-            factor * size[1],
-        )
-        for name, unit, factor in SIZES
-    }
-    way = next(
-        (words for words, (long, wide) in ways.items() if 2.5 < long < 20.0 and 1.2 < wide < 2.7),
-        "",
-    )
-    more = f" ({len(wrong)} vehicles have such sizes)" if len(wrong) > 1 else ""
-    return found, [
-        f"vehicle {wrong[0].id} is recorded as {size[0]:g} m long and {size[1]:g} m wide, which no car is{more}"
-        + (f"; it looks {way}" if way else "")
-        + ": what is wrong is taken as {:g} m × {:g} m".format(*usual_size(wrong[0].kind, config))
-    ]
-
-
-def reach(vehicle: Observations) -> Floats:
-    """Return the highest speeds (F,) [m/s] that the vehicle may have had at its fixes."""
+def _max_speeds(vehicle: Observations) -> Floats:
+    """Return the highest possible speeds (F,) [m/s] at the fixes."""
     if len(vehicle.speed_ns) < 2:
-        return np.full(len(vehicle.fix_ns), FASTEST_MPS)
-    return 1.5 * np.interp(vehicle.fix_ns, vehicle.speed_ns, vehicle.speed) + TELEPORT_SLACK_MPS
+        return np.full(len(vehicle.fix_ns), CLEANING.max_speed_mps)
+    measured = np.interp(vehicle.fix_ns, vehicle.speed_ns, vehicle.speed)
+    return 1.5 * measured + CLEANING.jump_slack_mps
 
 
-def reachable(seconds: Floats, fix: Floats, limit: Floats) -> Bools:
+def _reachable(seconds: Floats, fix: Floats, speed_limit: Floats) -> Bools:
     """Return which fixes (F,) can be reached from the last accepted one.
 
     Args:
         seconds: (F,) their stamps.
         fix: (F, 2) or (F, 3) [m].
-        limit: (F,) the highest speeds that the vehicle may have had [m/s].
+        speed_limit: (F,) the highest possible speeds [m/s].
     """
-    keep = np.ones(len(fix), dtype=bool)
-    last, n_doubted = 0, 0
+
+    def reaches(start: int, end: int) -> bool:
+        distance = np.linalg.norm(fix[end] - fix[start])
+        reach = speed_limit[end] * (seconds[end] - seconds[start])
+        return bool(distance <= CLEANING.jump_slack_m + reach)
+
+    accepted = np.ones(len(fix), dtype=bool)
+    last = 0
+    n_doubted = 0
     for i in range(1, len(fix)):
-        if np.linalg.norm(fix[i] - fix[last]) <= TELEPORT_SLACK_M + limit[i] * (
-            seconds[i] - seconds[last]
-        ):
-            last, n_doubted = i, 0
+        if reaches(last, i):
+            last = i
+            n_doubted = 0
             continue
-        agrees = n_doubted and np.linalg.norm(fix[i] - fix[i - 1]) <= TELEPORT_SLACK_M + limit[
-            i
-        ] * (seconds[i] - seconds[i - 1])
-        n_doubted = n_doubted + 1 if agrees else 1
-        keep[i] = False
-        if n_doubted >= RELOCATED:
-            keep[i - n_doubted + 1 : i + 1] = True
-            last, n_doubted = i, 0
-    return keep
+        n_doubted = n_doubted + 1 if n_doubted and reaches(i - 1, i) else 1
+        accepted[i] = False
+        if n_doubted >= CLEANING.relocation_count:
+            accepted[i - n_doubted + 1 : i + 1] = True
+            last = i
+            n_doubted = 0
+    return accepted
+
+
+def _with_sizes(
+    vehicles: Sequence[Observations], drops: Drops, config: LogConfig
+) -> list[Observations]:
+    """Return the vehicles with lengths and widths; missing and impossible ones are replaced."""
+    sized = []
+    impossible = []
+    for vehicle in vehicles:
+        length, width = vehicle.length, vehicle.width  # comparisons with NaN are false
+        walks = VEHICLE_TYPES[vehicle.kind or CAR].walks  # wider than long
+        if width <= 0.0 or width > CLEANING.max_width_m or (width > length and not walks):
+            impossible.append(vehicle)
+            length = width = np.nan
+        elif length <= 0.0 or length > CLEANING.max_length_m:
+            impossible.append(vehicle)
+            length = np.nan
+        usual_length, usual_width = usual_size(vehicle.kind, config)
+        sized.append(
+            replace(
+                vehicle,
+                length=length if np.isfinite(length) else usual_length,
+                width=width if np.isfinite(width) else usual_width,
+            )
+        )
+    if impossible:
+        drops.notes.append(_size_note(impossible, config))
+    return sized
+
+
+def _size_note(impossible: Sequence[Observations], config: LogConfig) -> str:
+    """Return a note on impossible sizes, with the unit that would explain them."""
+    vehicle = impossible[0]
+    more = f" ({len(impossible)} vehicles have such sizes)" if len(impossible) > 1 else ""
+    usual_length, usual_width = usual_size(vehicle.kind, config)
+    return (
+        f"vehicle {vehicle.id}: {vehicle.length:g} m × {vehicle.width:g} m is not the size of a "
+        f"car{more}{_size_hint(vehicle.length, vehicle.width)}; used instead: "
+        f"{usual_length:g} m × {usual_width:g} m"
+    )
+
+
+def _size_hint(length: float, width: float) -> str:
+    """Return what impossible sizes look like; "" if unknown."""
+
+    def is_usual(length: float, width: float) -> bool:
+        return 2.5 < length < 20.0 and 1.2 < width < 2.7
+
+    if is_usual(width, length):
+        return ", it looks swapped (log.columns=length=…,width=…)"
+    for unit, (name, factor) in _SIZE_UNITS.items():
+        if is_usual(factor * length, factor * width):
+            columns = f"log.columns=length=…:{unit},width=…:{unit}"
+            return f", it looks like {name} (name the unit: {columns})"
+    return ""

@@ -1,10 +1,11 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The clock of a log: stamps before 1970, and clocks that are set back or start anew while the log is written.
+"""The clock of a log: stamps before 1970, and clocks that are set back or restart while recording.
 
-A log's order shows when a clock is set back: stamps begin anew while the vehicle drives on, so that sorting them would put two
-motions in one time. What follows is read as later, after a gap, so that no encounter reaches across.
+The order of the rows shows when a clock is set back: stamps restart while the vehicle drives on, so
+sorting them would put two motions into one time. The rows after such a step are moved to a later
+time, after a gap, so that no encounter spans it.
 """
 
 from collections.abc import Sequence
@@ -18,186 +19,239 @@ from scenario_gen.logs.geodesy import on_sphere
 from scenario_gen.logs.raw import Observations, RawLog
 from scenario_gen.numerics import Bools, Floats, Ints
 
-LATEST_NS = 2**62  # years 1823 to 2116: so the difference of any two stamps fits in 64 bits
-ROWS = 5  # on either side of a step: fewer are rows out of order
-LONGER = {"min": 60.0, "h": 3600.0, "d": 86400.0}  # units of time, in s
-QUICKEST_S, SOURCE_S = (
-    0.005,
-    (0.02, 2.0),
-)  # s between fixes: less is another unit's; and what is usual
-LEAST = 2  # rows in the time that is there twice
-SLOW_S = 0.4  # s between fixes: of a slower source a single row counts, if the next follows after a usual step, and so does a
-USUAL, FEW = (
-    1.5,
-    3,
-)  # stamp that stands: a usual step is so many medians at most; stamps of a vehicle that stand, at most
-APART_M = 3.0  # m between two places at one time: not one vehicle
-ONWARD_SHARE = 0.5  # share of that distance within which the next row lies, if the vehicle drives on and its clock does not
-SAME_NS = 2_000_000_000  # steps of two vehicles this near are one
+_S_TO_NS = 10**9
+_MAX_STAMP_NS = 2**62  # years 1823 to 2116: differences of two stamps fit into 64 bits
+_TIME_UNITS_S = {"min": 60.0, "h": 3600.0, "d": 86400.0}
+_MIN_PERIOD_S = 0.005  # between fixes; less has another unit
+_USUAL_PERIOD_S = (0.02, 2.0)
+_SAME_STEP_NS = 2_000_000_000  # steps of two vehicles that are this near are the same
 
 
 @dataclass(frozen=True)
-class _Step:
+class StepLimits:
+    """What tells a step of the clock from rows out of order.
+
+    Attributes:
+        min_row_count: rows on either side of a step; fewer are out of order.
+        min_repeated_count: rows in the time that is recorded twice.
+        slow_period_s: a slower source needs a single row only, if the next one follows in time.
+        usual_step_ratio: longest step that follows in time, over the median step.
+        max_standing_count: repeated stamps of a vehicle whose clock restarts.
+        min_distance_m: distance of two places at one time that one vehicle cannot have.
+        continuation_share: share of that distance within which the next row lies if the vehicle
+            drives on and its clock does not.
+    """
+
+    min_row_count: int = 5
+    min_repeated_count: int = 2
+    slow_period_s: float = 0.4
+    usual_step_ratio: float = 1.5
+    max_standing_count: int = 3
+    min_distance_m: float = 3.0
+    continuation_share: float = 0.5
+
+
+_STEP = StepLimits()
+
+
+@dataclass(frozen=True)
+class _ClockStep:
     """The stamps [ns] before and after a step of the clock, and the row of the log after it."""
 
     before: int
     after: int
     row: int
 
+    def matches(self, before: int, after: int) -> bool:
+        """Return whether two stamps belong to this step."""
+        near_before = abs(before - self.before) < _SAME_STEP_NS
+        return near_before and abs(after - self.after) < _SAME_STEP_NS
 
-def beyond(stamps: Ints) -> Bools:
-    """Return which stamps (T,) [ns] are so far from 1970 that differences of them may overflow."""
-    return (stamps < -LATEST_NS) | (stamps > LATEST_NS)
+
+def is_out_of_range(stamps: Ints) -> Bools:
+    """Return which stamps (T,) [ns] are so far from 1970 that their differences may overflow."""
+    return (stamps < -_MAX_STAMP_NS) | (stamps > _MAX_STAMP_NS)
 
 
-def retimed(log: RawLog, config: LogConfig) -> tuple[RawLog, tuple[str, ...]]:
-    """Return a log whose clock runs on, from 1970 on; and notes on what was shifted."""
+def retimed(log: RawLog, config: LogConfig) -> tuple[RawLog, list[str]]:
+    """Return the log on a clock that increases, from 1970 on; and notes on what was shifted."""
     notes = []
-    steps = _steps(log)
+    steps = _clock_steps(log)
     if steps:
-        log = _run_on(log, steps, config)
+        log = _without_steps(log, steps, config)
         more = f" and {len(steps) - 1} more times" if len(steps) > 1 else ""
         notes.append(
-            f"the clock starts anew, from {steps[0].before * 1e-9:.10g} to {steps[0].after * 1e-9:.10g} s, at "
-            f"{log.where(steps[0].row)}{more}: what follows is read as later, and apart"
+            f"the clock steps from {steps[0].before / _S_TO_NS:.10g} to "
+            f"{steps[0].after / _S_TO_NS:.10g} s at {log.where(steps[0].row)}{more}: later rows "
+            "are read as a separate, later part"
         )
-    first = min(
-        (int(own.fix_ns[~beyond(own.fix_ns)].min(initial=0)) for own in log.vehicles), default=0
-    )
-    if first < 0:
-        seconds = -(first // 10**9)
-        log = _shifted(
-            log,
-            [
-                (own.fix_ns * 0 + seconds * 10**9, own.speed_ns * 0 + seconds * 10**9)
-                for own in log.vehicles
-            ],
-        )
+    stamps = np.concatenate([vehicle.fix_ns for vehicle in log.vehicles] or [np.zeros(0, int)])
+    first_ns = int(stamps[~is_out_of_range(stamps)].min(initial=0))
+    if first_ns < 0:
+        seconds = -(first_ns // _S_TO_NS)
+        shift = np.array(seconds * _S_TO_NS)
+        log = _shifted(log, [(shift, shift)] * len(log.vehicles))
         notes.append(f"times begin before 1970, or before an event: {seconds} s are added to all")
-    return log, tuple(notes)
+    return log, notes
 
 
 def check_unit(log: RawLog, config: LogConfig) -> None:
-    """Refuse a log that is too short for any encounter, and would not be if its time were in minutes, hours or days.
+    """Check that a log is not too short for an encounter because its time has a longer unit.
 
     Raises:
-        InputError: it is; the message names the unit.
+        InputError: its time is likely in minutes, hours or days; the message names the unit.
     """
-    stamps = [np.sort(own.fix_ns[~beyond(own.fix_ns)]) * 1e-9 for own in log.vehicles]
-    steps = np.concatenate([np.zeros(0), *map(np.diff, stamps)])
-    typical = float(np.median(steps)) if len(steps) else np.inf
-    span = max((float(np.ptp(own)) for own in stamps if len(own)), default=0.0)
-    for unit, seconds in LONGER.items() if typical < QUICKEST_S else ():
-        if (
-            span < config.min_duration < span * seconds
-            and SOURCE_S[0] < typical * seconds < SOURCE_S[1]
-        ):
+    stamps_ns = (vehicle.fix_ns[~is_out_of_range(vehicle.fix_ns)] for vehicle in log.vehicles)
+    tracks = [np.sort(stamps) / _S_TO_NS for stamps in stamps_ns if len(stamps) > 1]
+    if not tracks:
+        return
+    period = float(np.median(np.concatenate([np.diff(stamps) for stamps in tracks])))
+    span = max(float(np.ptp(stamps)) for stamps in tracks)
+    if period >= _MIN_PERIOD_S or span >= config.min_duration:
+        return
+    for unit, factor in _TIME_UNITS_S.items():
+        is_usual = _USUAL_PERIOD_S[0] < period * factor < _USUAL_PERIOD_S[1]
+        if is_usual and config.min_duration < span * factor:
             raise InputError(
-                f"{log.segments[0].label}: all lasts {span:g} s, positions are {typical:g} s apart (median); the time may be in "
-                f"{unit}: --set log.columns=time=<column>:{unit}"
+                f"{log.segments[0].label}: the log lasts {span:g} s, positions are {period:g} s "
+                f"apart (median); the time may be in {unit}: "
+                f"--set log.columns=time=<column>:{unit}"
             )
 
 
-def _shifted(log: RawLog, by: Sequence[tuple[Ints, Ints]]) -> RawLog:
-    """Return the log with nanoseconds added to the fixes' and the speeds' stamps of each vehicle; wild ones stay."""
+def _shifted(log: RawLog, shifts: Sequence[tuple[Ints, Ints]]) -> RawLog:
+    """Return the log with nanoseconds added to the stamps of each vehicle's fixes and speeds."""
+
+    def add(stamps: Ints, shift: Ints) -> Ints:
+        return np.where(is_out_of_range(stamps), stamps, stamps + shift)
+
     vehicles = tuple(
         replace(
-            own,
-            fix_ns=np.where(beyond(own.fix_ns), own.fix_ns, own.fix_ns + fixes),
-            speed_ns=np.where(beyond(own.speed_ns), own.speed_ns, own.speed_ns + speeds),
+            vehicle,
+            fix_ns=add(vehicle.fix_ns, fix_shift),
+            speed_ns=add(vehicle.speed_ns, speed_shift),
         )
-        for own, (fixes, speeds) in zip(log.vehicles, by, strict=True)
+        for vehicle, (fix_shift, speed_shift) in zip(log.vehicles, shifts, strict=True)
     )
     return replace(log, vehicles=vehicles)
 
 
-def _steps(log: RawLog) -> list[_Step]:
-    """Return the steps of the log's clock, in the log's order, each once."""
-    found: list[_Step] = []
-    for own in log.vehicles:
-        for step in _own_steps(own, log):
-            if not any(_is_same(step.before, step.after, other) for other in found):
-                found.append(step)
-    return sorted(found, key=lambda step: step.row)
+def _clock_steps(log: RawLog) -> list[_ClockStep]:
+    """Return the different steps of the log's clock, by row."""
+    steps: list[_ClockStep] = []
+    for vehicle in log.vehicles:
+        for step in _vehicle_steps(vehicle, log):
+            if not any(known.matches(step.before, step.after) for known in steps):
+                steps.append(step)
+    return sorted(steps, key=lambda step: step.row)
 
 
-def _is_same(before: int, after: int, step: _Step) -> bool:
-    return abs(before - step.before) < SAME_NS and abs(after - step.after) < SAME_NS
-
-
-def _own_steps(own: Observations, log: RawLog) -> list[_Step]:
-    """Return where a vehicle's stamps go back while it is at another place than it was at those stamps."""
-    sound = np.isfinite(own.fix).all(axis=1) & ~beyond(own.fix_ns)
-    stamps, rows, fix = own.fix_ns[sound], own.fix_row[sound], own.fix[sound]
-    back = _backs(stamps)
-    if not len(back):
-        return []
-    usual = float(np.median(np.diff(stamps)))
-    edges = np.concatenate([[0], back, [len(stamps)]])
-    places = on_sphere(fix) if log.geographic else fix
+def _vehicle_steps(vehicle: Observations, log: RawLog) -> list[_ClockStep]:
+    """Return where a vehicle's stamps go back while it is not where it was at those stamps."""
+    valid = np.isfinite(vehicle.fix).all(axis=1) & ~is_out_of_range(vehicle.fix_ns)
+    stamps = vehicle.fix_ns[valid]
+    rows = vehicle.fix_row[valid]
+    places = on_sphere(vehicle.fix[valid]) if log.geographic else vehicle.fix[valid]
+    backward = _backward_rows(stamps)
+    edges = np.concatenate([[0], backward, [len(stamps)]]).tolist()
     steps = []
-    for at, begin, end in zip(back.tolist(), edges[:-2].tolist(), edges[2:].tolist(), strict=True):
-        if min(at - begin, end - at) < ROWS or log.segment(int(rows[at])) != log.segment(
-            int(rows[at - 1])
-        ):
+    for begin, row, end in zip(edges, edges[1:], edges[2:], strict=False):
+        is_long = min(row - begin, end - row) >= _STEP.min_row_count
+        if not is_long or log.segment(int(rows[row])) != log.segment(int(rows[row - 1])):
             continue
-        again = at + np.flatnonzero(
-            (stamps[at:end] <= stamps[at - 1]) & (stamps[at:end] >= stamps[begin])
-        )
-        onwards = at + 1 < end and 0 < stamps[at + 1] - stamps[at] < USUAL * usual
-        if len(again) < LEAST and not (onwards and usual > SLOW_S * 1e9):
-            continue
-        then = _at(stamps[begin:at], places[begin:at], stamps[again])
-        apart = float(np.percentile(np.linalg.norm(places[again] - then, axis=1), 25))
-        onward = float(np.linalg.norm(places[at] - places[at - 1]))
-        if apart > APART_M or (apart > APART_M / 4.0 and onward < ONWARD_SHARE * apart):
-            steps.append(_Step(int(stamps[at - 1]), int(stamps[at]), int(rows[at])))
+        if _is_clock_step(stamps[begin:end], places[begin:end], row - begin, np.diff(stamps)):
+            steps.append(_ClockStep(int(stamps[row - 1]), int(stamps[row]), int(rows[row])))
     return steps
 
 
-def _backs(stamps: Ints) -> Ints:
-    """Return where stamps (T,) go back, or stand if they seldom do."""
+def _is_clock_step(stamps: Ints, places: Floats, row: int, all_steps: Ints) -> bool:
+    """Return whether the clock was set back between two rows of a track.
+
+    Args:
+        stamps: (T,) [ns], increasing before and after the row.
+        places: (T, D) [m].
+        row: the first one after the step.
+        all_steps: steps [ns] of the vehicle's stamps.
+    """
+    before = stamps[:row]
+    is_repeated = (stamps[row:] <= before[-1]) & (stamps[row:] >= before[0])
+    repeated = row + np.flatnonzero(is_repeated)
+    usual_ns = float(np.median(all_steps))
+    next_step = int(stamps[row + 1] - stamps[row]) if row + 1 < len(stamps) else 0
+    continues = 0 < next_step < _STEP.usual_step_ratio * usual_ns
+    is_slow = usual_ns > _STEP.slow_period_s * _S_TO_NS
+    n_needed = 1 if continues and is_slow else _STEP.min_repeated_count
+    if len(repeated) < n_needed:
+        return False
+    earlier = _interpolate(before, places[:row], stamps[repeated])
+    distances = np.linalg.norm(places[repeated] - earlier, axis=1)
+    distance = float(np.percentile(distances, 25))
+    advance = float(np.linalg.norm(places[row] - places[row - 1]))
+    if distance > _STEP.min_distance_m:
+        return True
+    drives_on = advance < _STEP.continuation_share * distance
+    return distance > _STEP.min_distance_m / 4.0 and drives_on
+
+
+def _backward_rows(stamps: Ints) -> Ints:
+    """Return the rows whose stamps go back, or repeat if few do, in stamps (T,)."""
     step = np.diff(stamps)
-    return np.flatnonzero((step < 0) | ((step == 0) & ((step == 0).sum() <= FEW))) + 1
+    repeats = step == 0
+    counts_repeats = repeats.sum() <= _STEP.max_standing_count
+    return np.flatnonzero((step < 0) | (repeats & counts_repeats)) + 1
 
 
-def _at(stamps: Ints, places: Floats, when: Ints) -> Floats:
-    """Return where a vehicle was (K, D) at stamps (K,)."""
-    seconds = (stamps - stamps[0]) * 1e-9
-    return np.column_stack(
-        [np.interp((when - stamps[0]) * 1e-9, seconds, axis) for axis in places.T]
-    )
+def _interpolate(stamps: Ints, places: Floats, wanted: Ints) -> Floats:
+    """Return the places (K, D) of a vehicle at stamps (K,) [ns]."""
+    seconds = (stamps - stamps[0]) / _S_TO_NS
+    wanted_s = (wanted - stamps[0]) / _S_TO_NS
+    return np.column_stack([np.interp(wanted_s, seconds, axis) for axis in places.T])
 
 
-def _run_on(log: RawLog, steps: list[_Step], config: LogConfig) -> RawLog:
-    """Return the log with what comes after each step later than all before it, by more than any gap that is bridged."""
-
-    def eras(stamps: Ints, rows: Ints) -> Ints:
-        back = _backs(stamps)
-        same = [
-            [i for i in back.tolist() if _is_same(int(stamps[i - 1]), int(stamps[i]), step)]
-            for step in steps
-        ]
-        own = sorted({i[0] for i in same if i})
-        if own:
-            return np.searchsorted(own, np.arange(len(stamps)), side="right")
-        return np.searchsorted(
-            [step.row for step in steps], rows, side="right"
-        )  # it comes or goes with the step
-
-    era = [
-        (eras(own.fix_ns, own.fix_row), eras(own.speed_ns, own.speed_row)) for own in log.vehicles
+def _without_steps(log: RawLog, steps: Sequence[_ClockStep], config: LogConfig) -> RawLog:
+    """Return the log with the rows after each step moved later, by more than a bridged gap."""
+    parts = [
+        (
+            _part_of_rows(vehicle.fix_ns, vehicle.fix_row, steps),
+            _part_of_rows(vehicle.speed_ns, vehicle.speed_row, steps),
+        )
+        for vehicle in log.vehicles
     ]
-    gap, shift, last = round((2.5 * config.longest_gap + 15.0) * 1e9), [0], None
+    gap_ns = round((2.5 * config.longest_gap + 15.0) * _S_TO_NS)
+    shifts = [0]
+    last_ns: int | None = None
     for k in range(len(steps) + 1):
-        own_ns = [
-            v.fix_ns[(which == k) & ~beyond(v.fix_ns)]
-            for v, (which, _) in zip(log.vehicles, era, strict=True)
-        ]
-        stamps = np.concatenate(own_ns)
-        if last is not None:
-            later = last + gap - int(stamps.min(initial=last + gap))
-            shift.append(-(-later // 10**9) * 10**9 if later > 0 else shift[-1])
-        last = int(stamps.max(initial=0)) + shift[-1] if len(stamps) else last
-    by = np.array(shift)
-    return _shifted(log, [(by[fixes], by[speeds]) for fixes, speeds in era])
+        stamps = np.concatenate(
+            [
+                vehicle.fix_ns[(part == k) & ~is_out_of_range(vehicle.fix_ns)]
+                for vehicle, (part, _) in zip(log.vehicles, parts, strict=True)
+            ]
+        )
+        if last_ns is not None:
+            lag_ns = last_ns + gap_ns - int(stamps.min(initial=last_ns + gap_ns))
+            whole_seconds = -(-lag_ns // _S_TO_NS)
+            shifts.append(whole_seconds * _S_TO_NS if lag_ns > 0 else shifts[-1])
+        if len(stamps):
+            last_ns = int(stamps.max()) + shifts[-1]
+    by_part = np.array(shifts)
+    return _shifted(log, [(by_part[fixes], by_part[speeds]) for fixes, speeds in parts])
+
+
+def _part_of_rows(stamps: Ints, rows: Ints, steps: Sequence[_ClockStep]) -> Ints:
+    """Return for each stamp (T,) of a vehicle how many steps of the clock precede it.
+
+    A vehicle whose stamps show none of the steps is divided by the rows of the steps.
+    """
+    starts = []
+    for step in steps:
+        matching = (
+            row
+            for row in _backward_rows(stamps).tolist()
+            if step.matches(int(stamps[row - 1]), int(stamps[row]))
+        )
+        start = next(matching, None)
+        if start is not None:
+            starts.append(start)
+    if starts:
+        return np.searchsorted(np.unique(starts), np.arange(len(stamps)), side="right")
+    return np.searchsorted([step.row for step in steps], rows, side="right")

@@ -10,8 +10,11 @@ from scenario_gen.base.errors import did_you_mean, InputError
 from scenario_gen.base.parameters import parameter, Parameters
 from scenario_gen.logs.formats import LOG_FORMATS
 
-POINTS = {"centre": 0.0, "front": -0.5, "rear": 0.5, "rear_axle": 0.3}
-"""Points of a vehicle, and how many lengths its middle is ahead of them; behind its rear axle a car has a fifth of its length."""
+_POINTS = {"centre": 0.0, "front": -0.5, "rear": 0.5, "rear_axle": 0.3}
+"""Recorded points of a vehicle, and how many lengths its centre is ahead of them.
+
+The rear overhang of a car is a fifth of its length.
+"""
 
 
 @dataclass(frozen=True)
@@ -26,7 +29,8 @@ class LogConfig(Parameters):
     )
     columns: str = parameter(
         "",
-        "columns of a table, e.g. vehicle=who,speed=v:kmh; y=-y flips an axis; point=front, rear or rear_axle of a vehicle",
+        "columns of a table, e.g. vehicle=who,speed=v:kmh; y=-y flips an axis; point=front, rear or "
+        "rear_axle: the recorded point of a vehicle",
     )
     topics: str = parameter(
         "", "topics of a bag to read, separated by commas; empty: all that can be used"
@@ -34,7 +38,7 @@ class LogConfig(Parameters):
     vehicles: str = parameter("", "vehicles to keep, separated by commas; empty: all")
     types: str = parameter(
         "",
-        "types of road users to keep, e.g. car,van,truck,bus; `other` is who is of no type that is known; empty: all",
+        "types of road users to keep, e.g. car,van,truck,bus; `other`: of unknown type; empty: all",
     )
     start: float = parameter(
         0.0, "start of the time window, counted from the log's first stamp", unit="s", low=0.0
@@ -47,7 +51,7 @@ class LogConfig(Parameters):
     )
     origin: str = parameter(
         "",
-        "latitude,longitude of the local frame's origin in degrees; empty: the middle of the log's fixes",
+        "latitude,longitude of the local frame's origin in degrees; empty: the middle of the fixes",
     )
     strict: bool = parameter(
         False, "refuse a log with rows that need repair, instead of repairing and counting them"
@@ -144,37 +148,37 @@ class LogConfig(Parameters):
 
 
 def listed(text: str) -> list[str]:
-    """Return the parts of a text that are separated by commas, without those that are empty."""
+    """Return the non-empty parts of a text that commas separate."""
     return [part.strip() for part in text.split(",") if part.strip()]
 
 
-def ahead_of_point(config: LogConfig) -> float:
-    """Return how far the middle of a vehicle is ahead of its recorded positions, in lengths of the vehicle.
+def points_ahead(config: LogConfig) -> float:
+    """Return how far the centre of a vehicle is ahead of its recorded point, in vehicle lengths.
 
     Raises:
-        InputError: `columns` names a point that is not known.
+        InputError: the parameter `columns` names an unknown point.
     """
-    points = [
-        part.partition("=")[2].strip()
-        for part in listed(config.columns)
-        if part.partition("=")[0].strip() == "point"
-    ]
-    for unknown in (point for point in points if point not in POINTS):
-        raise InputError(
-            f"parameter columns: point is one of {', '.join(POINTS)}, not {unknown!r}"
-        )
-    return POINTS[points[-1]] if points else 0.0
+    point = "centre"
+    for part in listed(config.columns):
+        name, _, value = part.partition("=")
+        if name.strip() == "point":
+            point = value.strip()
+    if point not in _POINTS:
+        raise InputError(f"parameter columns: point is one of {', '.join(_POINTS)}, not {point!r}")
+    return _POINTS[point]
 
 
-def picked(known: Sequence[str], config: LogConfig, where: str) -> list[str]:
-    """Return the vehicles that the parameter `vehicles` names, all by default.
+def chosen_vehicles(known: Sequence[str], config: LogConfig, log: str) -> list[str]:
+    """Return the vehicles that the parameter `vehicles` names; all if it is empty.
 
     Raises:
-        InputError: one of them is not there; the message lists those that are.
+        InputError: the log does not have one of them; the message lists those that it has.
     """
     names = listed(config.vehicles)
-    for unknown in (name for name in names if name not in known):
-        raise InputError(
-            f"parameter vehicles: {where} has no vehicle {unknown!r}; it has {', '.join(known)}{did_you_mean(unknown, known)}"
-        )
+    for name in names:
+        if name not in known:
+            raise InputError(
+                f"parameter vehicles: {log} has no vehicle {name!r}; it has {', '.join(known)}"
+                f"{did_you_mean(name, known)}"
+            )
     return list(dict.fromkeys(names)) or list(known)

@@ -9,15 +9,8 @@ from itertools import pairwise
 
 import numpy as np
 
-from scenario_gen.logs.cleaning import (
-    FASTEST_MPS,
-    RELOCATED,
-    select,
-    SLOWEST_S,
-    TELEPORT_SLACK_M,
-    TELEPORT_SLACK_MPS,
-)
-from scenario_gen.logs.config import ahead_of_point, LogConfig
+from scenario_gen.logs.cleaning import CLEANING, select
+from scenario_gen.logs.config import LogConfig, points_ahead
 from scenario_gen.logs.quality import VehicleQuality
 from scenario_gen.logs.raw import Observations
 from scenario_gen.logs.smoothing import (
@@ -30,18 +23,34 @@ from scenario_gen.logs.smoothing import (
 from scenario_gen.numerics import Bools, Floats, runs
 from scenario_gen.types import CAR, OTHER, VEHICLE_TYPES
 
-TURNED = np.radians(
-    120.0
-)  # a vehicle whose course changes by more in a stop has reversed, or turned on the spot
-MOST_TICKS = 100_000  # of a piece: smoothing takes 3 kB for each
-SHARPEST = 0.4  # 1/m: no car turns sharper, noise included
-NOISY = 1.6  # times as sharp as others can turn, if that is sharper
-BACKWARDS = np.radians(
-    150.0
-)  # headings further off the path are those of a vehicle that drives backwards
-REVERSES_MPS = 5.0  # the fastest that cars are driven backwards; above, the axes are mirrored (`remarks_on_units`)
-CONTRADICTS = 1.2  # times the highest speed of its type, from which on it is of another one
-LEVER_M = 3.0  # m over which the course before and after a stop is measured
+
+@dataclass(frozen=True)
+class PieceLimits:
+    """Bounds on the motion within one piece.
+
+    Attributes:
+        min_reversal_rad: change of course in a stop above which the vehicle has reversed, or
+            turned on the spot.
+        max_tick_count: ticks of a piece; smoothing needs 3 kB for each.
+        max_car_curvature_per_m: no car turns more sharply, including noise.
+        curvature_factor: the same for other types, over the sharpest turn of the type.
+        min_backward_rad: recorded headings farther off the path are of a vehicle in reverse.
+        max_backward_mps: cars are not driven backwards faster; above, the axes are mirrored.
+        max_speed_factor: over the highest speed of its type; a faster vehicle has another type.
+        course_length_m: length over which the course before and after a stop is measured.
+    """
+
+    min_reversal_rad: float = float(np.radians(120.0))
+    max_tick_count: int = 100_000
+    max_car_curvature_per_m: float = 0.4
+    curvature_factor: float = 1.6
+    min_backward_rad: float = float(np.radians(150.0))
+    max_backward_mps: float = 5.0
+    max_speed_factor: float = 1.2
+    course_length_m: float = 3.0
+
+
+_LIMITS = PieceLimits()
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,8 +75,27 @@ class Piece:
         return self.smooth.position[first - self.first : last - self.first]
 
     def speed(self, first: int, last: int) -> Floats:
-        """Return speeds (T,) [m/s], likewise."""
+        """Return speeds (T,) [m/s] from tick `first` to before tick `last`."""
         return self.smooth.speed[first - self.first : last - self.first]
+
+
+@dataclass(frozen=True, eq=False)
+class _Cuts:
+    """Where a track is cut (F-1,): at gaps, at reversals, or to bound the memory.
+
+    Attributes:
+        seconds: (F-1,) times between fixes.
+        gaps: too long, or too far to drive.
+        reversals: stops in which the vehicle reverses.
+        any: all cuts.
+        bridged: gaps that are filled.
+    """
+
+    seconds: Floats
+    gaps: Bools
+    reversals: Bools
+    any: Bools
+    bridged: Bools
 
 
 def pieces_of(
@@ -75,32 +103,59 @@ def pieces_of(
 ) -> tuple[list[Piece], VehicleQuality]:
     """Cut a track at gaps, relocations and reversals, and smooth each piece.
 
-    Gaps of up to two and a half of the source's own periods are bridged, so that a source of 1 Hz is not cut at every fix.
+    Gaps of up to two and a half periods of the source are bridged, so that a source of 1 Hz is not
+    cut at every fix.
     """
-    seconds = np.diff(track.fix_ns) * 1e-9
-    usual = float(np.median(seconds))
-    longest = longest_bridge(seconds, config)
-    gaps = (seconds > longest) | abrupt(seconds, np.hypot(*np.diff(track.fix, axis=0).T))
-    back = (
-        np.zeros_like(gaps) if VEHICLE_TYPES[track.kind or CAR].walks else reversals(track, config)
-    )
-    cuts = gaps | back | laps(track, config)
-    bridged = (seconds > 1.5 * max(usual, config.period)) & ~gaps
-    whole = parts(track, cuts)
+    cuts = _find_cuts(track, config)
+    parts = _split(track, cuts.any)
     smoothed: list[tuple[Observations, Smooth | None]] = []
-    lost = 0.0
-    for part in whole:
+    lost_s = 0.0
+    for part in parts:
         try:
-            smoothed += steered(part, origin_ns, config)
+            smoothed += _steerable(part, origin_ns, config)
         except UnreconciledError:
             smoothed.append((part, None))
-            lost += float(part.fix_ns[-1] - part.fix_ns[0]) * 1e-9
-    ahead = ahead_of_point(config) * track.length
+            lost_s += float(part.fix_ns[-1] - part.fix_ns[0]) * 1e-9
+    ahead = points_ahead(config) * track.length
     pieces = [
-        Piece(part, moved_ahead(smooth, ahead) if ahead else smooth)
+        Piece(part, _moved_ahead(smooth, ahead) if ahead else smooth)
         for part, smooth in smoothed
         if smooth is not None
     ]
+    extra_reversals = len(smoothed) - len(parts)
+    return pieces, _vehicle_quality(track, pieces, cuts, extra_reversals, lost_s, config)
+
+
+def _find_cuts(track: Observations, config: LogConfig) -> _Cuts:
+    """Return where a track is cut."""
+    seconds = np.diff(track.fix_ns) * 1e-9
+    distance = np.hypot(*np.diff(track.fix, axis=0).T)
+    gaps = (seconds > longest_bridge(seconds, config)) | _is_relocation(seconds, distance)
+    reversals = np.zeros_like(gaps)
+    if not VEHICLE_TYPES[track.kind or CAR].walks:
+        reversals = _reversals(track, config)
+    section = (track.fix_ns - track.fix_ns[0]) // round(
+        _LIMITS.max_tick_count * config.period * 1e9
+    )
+    usual = float(np.median(seconds))
+    return _Cuts(
+        seconds=seconds,
+        gaps=gaps,
+        reversals=reversals,
+        any=gaps | reversals | (np.diff(section) > 0),
+        bridged=(seconds > 1.5 * max(usual, config.period)) & ~gaps,
+    )
+
+
+def _vehicle_quality(
+    track: Observations,
+    pieces: Sequence[Piece],
+    cuts: _Cuts,
+    extra_reversals: int,
+    lost_s: float,
+    config: LogConfig,
+) -> VehicleQuality:
+    """Return how well a vehicle was recorded."""
     smooths = [piece.smooth for piece in pieces]
 
     def joined(name: str) -> Floats:
@@ -110,188 +165,187 @@ def pieces_of(
         values = joined(name)
         return float(np.sqrt(np.square(values).mean())) if len(values) else 0.0
 
-    turned, used = np.abs(joined("turned")), joined("headings")
-    quality = VehicleQuality(
+    turned = np.abs(joined("turned"))
+    used_headings = joined("headings")
+    n_steps = sum(piece.last - piece.first - 1 for piece in pieces)
+    return VehicleQuality(
         id=track.id,
         fixes=len(track.fix_ns),
-        seconds=sum(int(piece.last - piece.first - 1) for piece in pieces) * config.period,
+        seconds=n_steps * config.period,
         pieces=len(pieces),
-        bridged=int(bridged.sum()),
-        longest_bridged=float(seconds[bridged].max(initial=0.0)),
-        cut=int(gaps.sum()),
-        longest_cut=float(seconds[gaps].max(initial=0.0)),
-        reversals=int((back & ~gaps).sum()) + len(smoothed) - len(whole),
+        bridged=int(cuts.bridged.sum()),
+        longest_bridged=float(cuts.seconds[cuts.bridged].max(initial=0.0)),
+        cut=int(cuts.gaps.sum()),
+        longest_cut=float(cuts.seconds[cuts.gaps].max(initial=0.0)),
+        reversals=int((cuts.reversals & ~cuts.gaps).sum()) + extra_reversals,
         speed_before=rms("before"),
         speed_after=rms("after"),
         changed=rms("changed"),
         moved=rms("moved"),
-        moved_most=max((float(smooth.moved.max()) for smooth in smooths), default=0.0),
+        moved_most=float(joined("moved").max(initial=0.0)),
         noise=max((smooth.noise for smooth in smooths), default=np.nan),
         turned=float(np.median(turned)) if len(turned) else np.nan,
-        headings=float(used.mean()) if len(used) else np.nan,
-        lost=lost,
+        headings=float(used_headings.mean()) if len(used_headings) else np.nan,
+        lost=lost_s,
     )
-    return pieces, quality
 
 
-def plausible(pieces: Sequence[Piece], config: LogConfig) -> tuple[list[Piece], tuple[str, ...]]:
-    """Return the pieces that are driven forwards, of types that suit their motion; and notes on what was doubtful."""
-    typed, contradictions = of_types(pieces)
-    kept, backwards = driven_forwards(typed, config)
-    return kept, (*contradictions, *backwards)
+def plausible(pieces: Sequence[Piece], config: LogConfig) -> tuple[list[Piece], list[str]]:
+    """Return the pieces driven forwards, with types that suit their motion; and notes."""
+    pieces, type_notes = _with_plausible_types(pieces)
+    pieces, backward_notes = _driven_forwards(pieces, config)
+    return pieces, type_notes + backward_notes
 
 
-def of_types(pieces: Sequence[Piece]) -> tuple[list[Piece], tuple[str, ...]]:
-    """Return the pieces; a vehicle that is much faster than its type is of type `other`, and a note says so."""
-    fastest: dict[tuple[str, str], float] = {}
+def _with_plausible_types(pieces: Sequence[Piece]) -> tuple[list[Piece], list[str]]:
+    """Return the pieces; a vehicle that is too fast for its type becomes `other`, with a note."""
+    top_speed: dict[tuple[str, str], float] = {}
     for piece in pieces:
         key = piece.track.id, piece.track.kind
-        fastest[key] = max(fastest.get(key, 0.0), float(piece.smooth.speed.max()))
-    wrong = {
-        key: speed
-        for key, speed in fastest.items()
-        if key[1] and speed > CONTRADICTS * VEHICLE_TYPES[key[1]].dynamics.max_speed
-    }
-    notes = tuple(
-        f"vehicle {vehicle} is a {name} by the log and as fast as {speed:.1f} m/s: it is read as of type {OTHER}"
-        for (vehicle, name), speed in wrong.items()
-    )
-    others = {vehicle for vehicle, _ in wrong}
-    return [
+        top_speed[key] = max(top_speed.get(key, 0.0), float(piece.smooth.speed.max()))
+    too_fast: set[str] = set()
+    notes = []
+    for (vehicle, kind), speed in top_speed.items():
+        if not kind:
+            continue
+        if speed > _LIMITS.max_speed_factor * VEHICLE_TYPES[kind].dynamics.max_speed:
+            too_fast.add(vehicle)
+            notes.append(
+                f"vehicle {vehicle} is a {kind} in the log but drives {speed:.1f} m/s: "
+                f"its type becomes {OTHER}"
+            )
+    typed = [
         replace(piece, track=replace(piece.track, kind=OTHER))
-        if piece.track.id in others
+        if piece.track.id in too_fast
         else piece
         for piece in pieces
-    ], notes
+    ]
+    return typed, notes
 
 
-def driven_forwards(
-    pieces: Sequence[Piece], config: LogConfig
-) -> tuple[list[Piece], tuple[str, ...]]:
-    """Return the pieces without those whose recorded headings are opposite to the path, and a note on each of these.
+def _driven_forwards(pieces: Sequence[Piece], config: LogConfig) -> tuple[list[Piece], list[str]]:
+    """Return the pieces without those whose headings are opposite to the path, and notes.
 
-    Where most are, these are no headings of cars, and all pieces stay.
+    If most are opposite, the recorded headings are not those of cars, and all pieces stay.
     """
     known = [piece for piece in pieces if len(piece.smooth.turned)]
-    opposite = [
+    backward = [
         piece
         for piece in known
-        if np.median(np.abs(piece.smooth.turned)) > BACKWARDS
-        and piece.smooth.speed.max() <= REVERSES_MPS
+        if np.median(np.abs(piece.smooth.turned)) > _LIMITS.min_backward_rad
+        and piece.smooth.speed.max() <= _LIMITS.max_backward_mps
     ]
-    if 2 * len(opposite) > len(known):
-        return list(pieces), ()
-    notes = tuple(
-        f"vehicle {piece.track.id} drives backwards for {(piece.last - piece.first) * config.period:.1f} s, by its recorded "
-        "headings; that is left out, for only driving forwards is generated"
-        for piece in opposite
-    )
-    return [piece for piece in pieces if piece not in opposite], notes
+    if 2 * len(backward) > len(known):
+        return list(pieces), []
+    notes = [
+        f"vehicle {piece.track.id} drives backwards for "
+        f"{(piece.last - piece.first) * config.period:.1f} s, by its recorded headings; this part "
+        "is left out, since scenarios only drive forwards"
+        for piece in backward
+    ]
+    return [piece for piece in pieces if piece not in backward], notes
 
 
-def moved_ahead(smooth: Smooth, metres: float) -> Smooth:
-    """Return the motion of a point so far ahead; a vehicle of unknown heading faces east."""
+def _moved_ahead(smooth: Smooth, distance: float) -> Smooth:
+    """Return the motion of a point `distance` [m] ahead; a vehicle of unknown heading faces east."""
     heading = np.nan_to_num(smooth.heading)
-    return replace(
-        smooth,
-        position=smooth.position + metres * np.stack([np.cos(heading), np.sin(heading)], axis=-1),
-    )
+    forward = np.stack([np.cos(heading), np.sin(heading)], axis=-1)
+    return replace(smooth, position=smooth.position + distance * forward)
 
 
-def steered(
+def _steerable(
     part: Observations, origin_ns: int, config: LogConfig
 ) -> list[tuple[Observations, Smooth | None]]:
-    """Smooth a part of a track, cut wherever its path then turns sharper than a car can.
+    """Smooth a part of a track, cut wherever its path turns more sharply than a car can.
 
-    A car cannot turn on the spot: where its path does, it reversed in a stop too short for the fixes.
+    A car cannot turn on the spot: it reversed in a stop that was too short for the fixes.
+
+    Raises:
+        UnreconciledError: no motion fits the part.
     """
     smooth = smooth_piece(part, origin_ns, config)
-    if smooth is None:
-        return [(part, None)]
     kind = VEHICLE_TYPES[part.kind or CAR]
-    if kind.walks:  # turns on the spot
+    if smooth is None or kind.walks:
         return [(part, smooth)]
-    sharpest = max(SHARPEST, NOISY * kind.dynamics.sharpest)
-    turn = np.abs(np.diff(smooth.heading)) - sharpest * np.hypot(
-        *np.diff(smooth.position, axis=0).T
+    max_curvature = max(
+        _LIMITS.max_car_curvature_per_m, _LIMITS.curvature_factor * kind.dynamics.sharpest
     )
-    if not (turn > 1e-6).any():
+    distance = np.hypot(*np.diff(smooth.position, axis=0).T)
+    excess = np.abs(np.diff(smooth.heading)) - max_curvature * distance
+    if not (excess > 1e-6).any():
         return [(part, smooth)]
-    at = origin_ns + round((smooth.first + int(np.argmax(turn)) + 0.5) * config.period * 1e9)
+    tick = smooth.first + int(np.argmax(excess)) + 0.5
+    fix = np.searchsorted(part.fix_ns, origin_ns + round(tick * config.period * 1e9))
     cuts = np.zeros(len(part.fix_ns) - 1, dtype=bool)
-    cuts[np.clip(np.searchsorted(part.fix_ns, at), 1, len(cuts)) - 1] = True
-    return [leaf for half in parts(part, cuts) for leaf in steered(half, origin_ns, config)]
+    cuts[np.clip(fix, 1, len(cuts)) - 1] = True
+    pieces = []
+    for half in _split(part, cuts):
+        pieces += _steerable(half, origin_ns, config)
+    return pieces
 
 
-def abrupt(seconds: Floats, step: Floats) -> Bools:
-    """Return which steps (F-1,) [m] no vehicle drives, or none that is as fast as this one is just before and after.
+def _is_relocation(seconds: Floats, distance: Floats) -> Bools:
+    """Return which steps (F-1,) no vehicle drives, at least not one as fast as just before and after.
 
     Args:
-        seconds: (F-1,) that each step takes.
-        step: (F-1,) [m].
+        seconds: (F-1,) duration of each step.
+        distance: (F-1,) its length [m].
     """
-    rate = np.pad(step / seconds, 2, mode="edge")
-    around = (
-        np.max([rate[:-4], rate[1:-3], rate[3:-1], rate[4:]], axis=0)
-        if len(step) >= RELOCATED
-        else np.full(len(step), np.inf)
-    )
-    far: Bools = (
-        step
-        > TELEPORT_SLACK_M + np.minimum(1.5 * around + TELEPORT_SLACK_MPS, FASTEST_MPS) * seconds
-    )
-    return far
-
-
-def laps(track: Observations, config: LogConfig) -> Bools:
-    """Return where (F-1,) a track of hours is cut, so that the memory of smoothing does not grow with it."""
-    lap = (track.fix_ns - track.fix_ns[0]) // round(MOST_TICKS * config.period * 1e9)
-    new: Bools = np.diff(lap) > 0
-    return new
+    reach = np.full(len(distance), CLEANING.max_speed_mps)
+    if len(distance) >= CLEANING.relocation_count:
+        rate = np.pad(distance / seconds, 2, mode="edge")
+        fastest_near = np.max([rate[:-4], rate[1:-3], rate[3:-1], rate[4:]], axis=0)
+        reach = np.minimum(1.5 * fastest_near + CLEANING.jump_slack_mps, reach)
+    too_far: Bools = distance > CLEANING.jump_slack_m + reach * seconds
+    return too_far
 
 
 def longest_bridge(seconds: Floats, config: LogConfig) -> float:
-    """Return the longest gap [s] that is bridged in a track whose fixes are `seconds` (F-1,) apart."""
-    return max(config.longest_gap, 2.5 * min(float(np.median(seconds)), SLOWEST_S)) + 1e-6
+    """Return the longest bridged gap [s] in a track whose fixes are `seconds` (F-1,) apart."""
+    period = min(float(np.median(seconds)), CLEANING.max_period_s)
+    return max(config.longest_gap, 2.5 * period) + 1e-6
 
 
-def reversals(track: Observations, config: LogConfig) -> Bools:
-    """Return where (F-1,) to cut because the vehicle reverses after a stop: its heading would jump."""
-    seconds = (track.fix_ns - track.fix_ns[0]).astype(np.float64) * 1e-9
-    speed_t = (track.speed_ns - track.fix_ns[0]).astype(np.float64) * 1e-9
+def _reversals(track: Observations, config: LogConfig) -> Bools:
+    """Return where (F-1,) the vehicle reverses after a stop: its heading would jump."""
+    start_ns = track.fix_ns[0]
+    seconds = (track.fix_ns - start_ns).astype(np.float64) * 1e-9
+    speed_s = (track.speed_ns - start_ns).astype(np.float64) * 1e-9
     speed = track.speed
     if not len(speed):
-        speed_t, speed = seconds, speed_of_fixes(seconds, track.fix)
-    ticks = config.period * np.arange(
-        max(int(seconds[-1] / config.period), 1) + 1, dtype=np.float64
-    )
+        speed_s = seconds
+        speed = speed_of_fixes(seconds, track.fix)
+    n_ticks = max(int(seconds[-1] / config.period), 1) + 1
+    ticks = config.period * np.arange(n_ticks, dtype=np.float64)
     cuts = np.zeros(len(seconds) - 1, dtype=bool)
-    for begin, end in runs(standing(ticks, seconds, track.fix, speed_t, speed)):
+    for begin, end in runs(standing(ticks, seconds, track.fix, speed_s, speed)):
         first, last = np.searchsorted(seconds, (ticks[begin], ticks[end - 1])).tolist()
-        before = departure(track.fix[first::-1])
-        after = departure(track.fix[last:])
-        if before is not None and after is not None and float(before @ after) > -np.cos(TURNED):
+        before = _course(track.fix[first::-1])
+        after = _course(track.fix[last:])
+        if before is None or after is None:
+            continue
+        if float(before @ after) > -np.cos(_LIMITS.min_reversal_rad):
             cuts[min((first + last) // 2, len(cuts) - 1)] = True
     return cuts
 
 
-def departure(fix: Floats) -> Floats | None:
-    """Return the unit vector (2,) from the first fix (F, 2) [m] to the first one `LEVER` away, None if there is none."""
+def _course(fix: Floats) -> Floats | None:
+    """Return the unit vector (2,) from the first fix (F, 2) [m] to the next distant one, or None."""
     offset = fix - fix[0]
-    away = np.hypot(offset[:, 0], offset[:, 1])
-    far = np.flatnonzero(away > LEVER_M)
-    return offset[far[0]] / away[far[0]] if len(far) else None
+    distance = np.hypot(offset[:, 0], offset[:, 1])
+    far = np.flatnonzero(distance > _LIMITS.course_length_m)
+    return offset[far[0]] / distance[far[0]] if len(far) else None
 
 
-def parts(track: Observations, cuts: Bools) -> list[Observations]:
-    """Split a track after each True of `cuts` (F-1,); parts of one fix are left out."""
+def _split(track: Observations, cuts: Bools) -> list[Observations]:
+    """Split a track after each True of `cuts` (F-1,); parts of one fix are dropped."""
     edges = [0, *(np.flatnonzero(cuts) + 1).tolist(), len(track.fix_ns)]
-    pieces = []
+    parts = []
     for begin, end in pairwise(edges):
         if end - begin < 2:
             continue
-        during = (track.speed_ns >= track.fix_ns[begin]) & (
+        speeds = (track.speed_ns >= track.fix_ns[begin]) & (
             track.speed_ns <= track.fix_ns[end - 1]
         )
-        pieces.append(select(track, np.arange(begin, end), during))
-    return pieces
+        parts.append(select(track, np.arange(begin, end), speeds))
+    return parts

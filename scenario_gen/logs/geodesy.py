@@ -19,7 +19,7 @@ from scenario_gen.base.errors import InputError
 from scenario_gen.numerics import Floats, Ints, wrap_angle
 from scenario_gen.types import Encounter
 
-EARTH_M = 6_371_000.0  # mean radius
+EARTH_RADIUS_M = 6_371_000.0  # mean radius
 SITE_M = 10_000.0  # places nearer to each other than this are of one site, and so are those that a chain of such places joins
 OWN_FRAME_M = 1000.0  # from the middle of its site at which an encounter has a frame of its own
 LEVER_M = 100.0  # ahead of a vehicle, a point that tells how its heading turns from frame to frame
@@ -95,7 +95,7 @@ def on_sphere(degrees: Floats) -> Floats:
     """Return places (F, 3) [m] about the middle of a spherical earth, of latitudes and longitudes (F, 2) [degrees]."""
     latitude, longitude = np.radians(degrees).T
     around = np.cos(latitude)
-    return EARTH_M * np.column_stack(
+    return EARTH_RADIUS_M * np.column_stack(
         [around * np.cos(longitude), around * np.sin(longitude), np.sin(latitude)]
     )
 

@@ -4,6 +4,7 @@
 """What logs call the types of road users, and which of them are read."""
 
 from collections import Counter
+from collections.abc import Mapping
 from dataclasses import replace
 from functools import cache
 import re
@@ -84,13 +85,14 @@ def typed(log: RawLog, config: LogConfig) -> RawLog:
             continue
         unknown[seen.kind] += called is None
         kept.append(replace(seen, kind=called or ""))
-    notes = [f"left out: {_counted(left_out)}"] if left_out else []
-    if unknown := +unknown:
-        notes.append(f"types that are not known, read by size: {_counted(unknown)}")
-    return replace(log, vehicles=tuple(kept), notes=(*log.notes, *notes))
+    notes = log.notes
+    if +unknown:
+        notes = (*notes, f"types that are not known, read by size: {counted(+unknown)}")
+    return replace(log, vehicles=tuple(kept), notes=notes, excluded=left_out)
 
 
-def _counted(counts: Counter[str]) -> str:
+def counted(counts: Mapping[str, int]) -> str:
+    """Return the numbers by type as a text."""
     return ", ".join(
         f"{count} × {kind or 'without a type'}" for kind, count in sorted(counts.items())
     )

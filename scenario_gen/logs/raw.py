@@ -4,7 +4,7 @@
 """Raw logs, the result of every reader: observations per vehicle, with the places they came from, within bounds."""
 
 from bisect import bisect_right
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -16,11 +16,9 @@ from scenario_gen.logs.config import LogConfig
 from scenario_gen.numerics import Floats, Ints
 from scenario_gen.types import Encounter
 
-LONGEST_HEADER = 65_536  # characters of a table's first line
-
 
 class UnknownFormatError(InputError):
-    """A file is of no format of logs, or has not the columns of one."""
+    """A file is in no known log format, or lacks the columns of its format."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,15 +29,15 @@ class Observations:
         id: the vehicle's name in the log.
         fix_ns: (F,) stamps of the positions, nanoseconds.
         fix: (F, 2) latitude and longitude in degrees, or x and y in metres (see `RawLog.geographic`).
-        fix_row: (F,) rows of the log (`RawLog.where` names them).
+        fix_row: (F,) rows of the log; see `RawLog.where`.
         heading: (F,) rad, counter-clockwise from east; NaN where it is not recorded.
         speed_ns: (S,) stamps of the speeds, nanoseconds.
         speed: (S,) m/s.
         speed_row: (S,) rows of the log.
         length: metres, NaN if it is not recorded.
         width: metres, NaN if it is not recorded.
-        kind: what the log calls its type of road user, "" if nothing; `kinds.typed` makes it a type.
-        origin: latitude and longitude [degrees] of the frame into which `fix` was projected, if it was.
+        kind: the log's word for its type of road user, or ""; `kinds.typed` turns it into a type.
+        origin: latitude and longitude [degrees] of the frame of a projected `fix`.
     """
 
     id: str
@@ -67,28 +65,36 @@ class Observations:
         kind: str = "",
         measured: bool = True,
     ) -> "Observations":
-        """Return the observations of a log each of whose rows is a fix and, if it was `measured`, a speed.
+        """Return the observations of a log in which each row has a fix and maybe a speed.
 
         Args:
             name: the vehicle.
             stamps: (F,) nanoseconds.
-            states: (F, 4) position (two columns), heading and speed, as above.
+            states: (F, 4) position (two columns), heading and speed.
             rows: (F,) rows of the log.
             size: length and width, metres or NaN.
-            kind: what the log calls its type of road user, "" if nothing.
+            kind: the log's word for its type of road user, or "".
             measured: whether the log has speeds.
         """
         n_speeds = len(rows) if measured else 0
-        fixes, speeds = (
-            (states[:, :2], rows, states[:, 2]),
-            (stamps[:n_speeds], states[:n_speeds, 3], rows[:n_speeds]),
+        return cls(
+            id=name,
+            fix_ns=stamps,
+            fix=states[:, :2],
+            fix_row=rows,
+            heading=states[:, 2],
+            speed_ns=stamps[:n_speeds],
+            speed=states[:n_speeds, 3],
+            speed_row=rows[:n_speeds],
+            length=size[0],
+            width=size[1],
+            kind=kind,
         )
-        return cls(name, stamps, *fixes, *speeds, *size, kind)
 
 
 @dataclass
 class Rows:
-    """Messages of one vehicle in the order of arrival: (stamp [ns], row, values…); values as in `Observations`."""
+    """Messages of one vehicle as they arrive: (stamp [ns], row, values…), as in `Observations`."""
 
     fixes: list[tuple[int, int, float, float, float]] = field(default_factory=list)
     speeds: list[tuple[int, int, float]] = field(default_factory=list)
@@ -110,7 +116,7 @@ class Rows:
 
 @dataclass(frozen=True)
 class Segment:
-    """Rows from `first` on come from `label`, where they are called `unit` and numbered from `number` on."""
+    """The rows from `first` on are from `label`, called `unit` there and numbered from `number`."""
 
     first: int
     label: str
@@ -125,12 +131,13 @@ class RawLog:
     Attributes:
         name: the log's name, for people.
         geographic: positions are latitude and longitude, not metres.
-        vehicles: observations, one per vehicle, in the order of first appearance.
+        vehicles: observations of each vehicle, by first appearance.
         rows: number of rows read.
         segments: where the rows come from, in order.
         notes: for people, on how it was read.
-        dropped: rows that the reader itself left out: (reason, row).
-        encounters: those of a recorded `tracks` topic, used as they are; then there are no vehicles.
+        dropped: rows that the reader left out: (cause, row).
+        excluded: number of road users left out, by what the log calls their type.
+        encounters: those of a recorded `tracks` topic, used unchanged; then without vehicles.
     """
 
     name: str
@@ -141,6 +148,7 @@ class RawLog:
     notes: tuple[str, ...] = ()
     dropped: tuple[tuple[str, int], ...] = ()
     encounters: tuple[Encounter, ...] = ()
+    excluded: Mapping[str, int] = field(default_factory=dict)
 
     def segment(self, row: int) -> Segment:
         """Return where a row comes from."""
@@ -158,50 +166,51 @@ def natural(name: str) -> tuple[int, int, str]:
 
 
 def only_file(paths: Sequence[Path], config: LogConfig) -> Path:
-    """Return the one path of a format whose files have clocks of their own.
+    """Return the only path of a log whose format allows one file: each has its own clock.
 
     Raises:
         InputError: there are several, or the file is too large.
     """
     if len(paths) != 1:
         raise InputError(
-            f"{paths[0]} and {len(paths) - 1} more: they have clocks of their own; give one at a time"
+            f"{paths[0]} and {len(paths) - 1} more: each has its own clock; read one at a time"
         )
     check_size(str(paths[0]), paths[0].stat().st_size, 0, config)
     return paths[0]
 
 
 def check_size(where: str, size: int, rows: int, config: LogConfig) -> None:
-    """Refuse a log of more than `size_limit` or `row_limit`.
+    """Check a log against `size_limit` and `row_limit`.
 
     Args:
         where: the file; begins the message.
         size: bytes, decompressed.
         rows: rows or messages.
-        config: holds the limits.
+        config: names the limits.
 
     Raises:
-        InputError: it is too large.
+        InputError: the log is too large.
     """
     if size > config.size_limit << 20:
         raise InputError(
-            f"{where} holds {size / 2**20:.1f} MiB (decompressed, as far as it was read); at most {config.size_limit} MiB are "
-            "read: cut the log, or raise --set log.size_limit=…"
+            f"{where} has at least {size / 2**20:.1f} MiB after decompression (limit "
+            f"{config.size_limit} MiB): cut the log, or raise --set log.size_limit=…"
         )
     if rows > config.row_limit:
         raise InputError(
-            f"{where} holds {rows} rows or more; at most {config.row_limit} are read: cut the log, or raise --set log.row_limit=…"
+            f"{where} has at least {rows} rows (limit {config.row_limit}): cut the log, or raise "
+            "--set log.row_limit=…"
         )
 
 
 def check_vehicles(where: str, count: int, config: LogConfig) -> None:
-    """Refuse a log of more than `vehicle_limit` vehicles.
+    """Check a log against `vehicle_limit`.
 
     Raises:
-        InputError: there are too many.
+        InputError: it has too many vehicles.
     """
     if count > config.vehicle_limit:
         raise InputError(
-            f"{where}: {count} vehicles, at most {config.vehicle_limit} are read; check --set log.columns=vehicle=…, "
-            "or raise --set log.vehicle_limit=…"
+            f"{where}: {count} vehicles (limit {config.vehicle_limit}); check "
+            "--set log.columns=vehicle=…, or raise --set log.vehicle_limit=…"
         )

@@ -13,7 +13,7 @@ from dataclasses import replace
 import numpy as np
 
 from scenario_gen.base.errors import InputError
-from scenario_gen.logs.cleaning import clean, RELOCATED
+from scenario_gen.logs.cleaning import clean, CLEANING
 from scenario_gen.logs.config import LogConfig
 from scenario_gen.logs.encounters import longest_bridge
 from scenario_gen.logs.raw import natural, Observations, RawLog, Rows, Segment
@@ -70,7 +70,7 @@ class Streams:
             self._n_strange = 0
             return False
         self._n_strange += 1
-        return self._n_strange >= RELOCATED
+        return self._n_strange >= CLEANING.relocation_count
 
     def put_fix(self, vehicle: str, stamp_ns: int, latitude: float, longitude: float) -> None:
         """Take a position in [degrees]; NaN where there is no fix."""

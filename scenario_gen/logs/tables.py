@@ -14,7 +14,7 @@ import pandas as pd
 
 from scenario_gen.base.documents import shown
 from scenario_gen.base.errors import guarded, InputError, needs
-from scenario_gen.logs.cleaning import LONGEST_M
+from scenario_gen.logs.cleaning import CLEANING
 from scenario_gen.logs.columns import Column, find_columns, notes_on, SHOWN, UNITS
 from scenario_gen.logs.config import LogConfig
 from scenario_gen.logs.raw import check_size, check_vehicles, Observations, RawLog, Segment
@@ -415,7 +415,7 @@ def observations(name: str, group: pd.DataFrame, position: tuple[str, str]) -> O
     def median(quantity: str) -> float:
         values = column(quantity)
         values = values[np.isfinite(values)]
-        usual = values[(values > 0.0) & (values < LONGEST_M)]
+        usual = values[(values > 0.0) & (values < CLEANING.max_length_m)]
         values = usual if len(usual) else values  # what is no size is replaced later, and said
         return float(np.median(values)) if len(values) else math.nan
 

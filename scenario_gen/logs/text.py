@@ -1,25 +1,35 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""How a table in text is written: its encoding, what separates its fields, and its decimal sign."""
+"""The layout of a text table: encoding, separator, decimal sign, lines above the header."""
 
 import codecs
 from dataclasses import dataclass
 from pathlib import Path
 import re
 
-from scenario_gen.logs.raw import LONGEST_HEADER, UnknownFormatError
+from scenario_gen.logs.raw import UnknownFormatError
 
-NUMBER = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?")
-WITH_COMMA = re.compile(r"[-+]?\d*,\d+")
-LOOKED_AT = 20  # lines after the header in which a decimal comma is looked for
-SEPARATORS = ",;\t|"
-EXAMPLE = "t,id,x,y,speed"
+_MAX_HEADER_BYTES = 65_536
+_SAMPLE_LINE_COUNT = 20  # lines below the header that may show a decimal comma
+_SEPARATORS = ",;\t|"
+_WHITE_SPACE = r"\s+"
+_COMMENTS = ("#", "//", "%", "sep=")
+_NUMBER = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?")
+_NUMBER_WITH_COMMA = re.compile(r"[-+]?\d*,\d+")
 
 
 @dataclass(frozen=True)
 class Layout:
-    """How a table is written, and how many lines stand above its header; `notes` says what is unusual about it."""
+    """How a table is written.
+
+    Attributes:
+        encoding: of its text.
+        separator: between fields.
+        decimal: sign before decimals.
+        above: number of lines above the header.
+        notes: on what is unusual.
+    """
 
     encoding: str = "utf-8-sig"
     separator: str = ","
@@ -29,47 +39,55 @@ class Layout:
 
 
 def layout_of(path: Path) -> Layout:
-    """Return how a table in text is written.
+    """Return the layout of a text table.
 
     Raises:
-        InputError: it is no text, its first line is too long, or has no names of columns.
+        UnknownFormatError: it is not text, its first line is too long, or has no column names.
     """
     with path.open("rb") as file:
-        start = file.read(4 * LONGEST_HEADER)
+        start = file.read(4 * _MAX_HEADER_BYTES)
     is_utf16 = start.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE))
     if not is_utf16 and b"\0" in start:
         raise UnknownFormatError(
-            f"{path} is not a text file (or UTF-16 without a byte order mark); save the table as UTF-8 text"
+            f"{path} is not a text file (or UTF-16 without a byte order mark); save the table as "
+            "UTF-8 text"
         )
     encoding = "utf-16" if is_utf16 else "utf-8-sig"
-    text = start.decode(encoding, errors="replace").splitlines()
-    said = (line.strip().strip('"').lower() for line in text)
-    above = next(
-        (
-            k
-            for k, line in enumerate(said)
-            if line and not line.startswith(("#", "//", "%", "sep="))
-        ),
-        0,
-    )
-    header, *lines = text[above : above + LOOKED_AT + 1] or [""]
-    if len(header) >= LONGEST_HEADER:
+    lines = start.decode(encoding, errors="replace").splitlines()
+    above = next((k for k, line in enumerate(lines) if not _is_comment(line)), 0)
+    header, *rows = lines[above : above + _SAMPLE_LINE_COUNT + 1] or [""]
+    if len(header) >= _MAX_HEADER_BYTES:
         raise UnknownFormatError(
-            f"{path} is no table: its first line has {LONGEST_HEADER} characters or more"
+            f"{path} is not a table: its first line has {_MAX_HEADER_BYTES} characters or more"
         )
-    separator = max(SEPARATORS, key=header.count)
+    separator = max(_SEPARATORS, key=header.count)
     if separator not in header and len(header.split()) > 1:
-        separator = r"\s+"
-    names = re.split(separator if separator == r"\s+" else re.escape(separator), header.strip())
-    if len([name for name in names if NUMBER.fullmatch(name.strip())]) > len(names) / 2:
-        raise UnknownFormatError(
-            f"{path}: line {above + 1} has numbers instead of column names; put a line such as {EXAMPLE} above it"
-        )
-    has_comma = separator != "," and any(
-        WITH_COMMA.fullmatch(field.strip())
-        for line in lines
-        for field in re.split(separator.replace("|", r"\|"), line)
-    )
+        separator = _WHITE_SPACE
+    pattern = separator if separator == _WHITE_SPACE else re.escape(separator)
+    _check_names(re.split(pattern, header.strip()), path, above + 1)
+
+    fields = [field.strip() for row in rows for field in re.split(pattern, row)]
+    has_comma = separator != "," and any(map(_NUMBER_WITH_COMMA.fullmatch, fields))
     notes = ["the file is UTF-16"] if is_utf16 else []
     notes += ["its numbers have a decimal comma"] if has_comma else []
     return Layout(encoding, separator, "," if has_comma else ".", above, tuple(notes))
+
+
+def _is_comment(line: str) -> bool:
+    """Return whether a line above the header is empty or a comment."""
+    text = line.strip().strip('"').lower()
+    return not text or text.startswith(_COMMENTS)
+
+
+def _check_names(names: list[str], path: Path, line: int) -> None:
+    """Check that most fields of a header are names.
+
+    Raises:
+        UnknownFormatError: they are numbers.
+    """
+    numbers = [name for name in names if _NUMBER.fullmatch(name.strip())]
+    if len(numbers) > len(names) / 2:
+        raise UnknownFormatError(
+            f"{path}: line {line} has numbers instead of column names; insert a line such as "
+            "t,id,x,y,speed above it"
+        )

@@ -54,7 +54,7 @@ def test_a_log_without_an_encounter_is_a_result_and_not_read_again(tmp_path, mon
     made = mine([logs], tmp_path / "corpus")
     assert made.encounters == 1 and not made.failed
     assert {one["name"] for one in made.refused} == {"alone", "apart", "labels", "notes"}
-    assert "--set log.proximity=510 takes two" in [
+    assert "--set log.proximity=510 accepts two" in [
         one["why"].rpartition("; ")[2] for one in made.refused
     ]
     monkeypatch.setattr(

@@ -110,7 +110,7 @@ def test_who_is_of_no_known_type_is_counted_and_some_can_be_left_out(tmp_path):
     assert [vehicle.type for vehicle in cars.encounters[0].vehicles] == ["car", "car"]
     assert "left out: 1 × hovercraft, 1 × pedestrian/bicycle, 1 × tram" in cars.quality.notes
     with pytest.raises(
-        InputError, match=r"log\.types: there is no type 'cars'; choose of car, van"
+        InputError, match=r"log\.types: there is no type 'cars'; choose one of car, van"
     ):
         read_log(folder, LogConfig(types="cars"))
 
@@ -126,7 +126,7 @@ def test_a_type_that_contradicts_its_motion_is_said(tmp_path):
         "pedestrian",
     ]
     assert any(
-        "vehicle 7 is a pedestrian by the log and as fast as 8" in note
+        "vehicle 7 is a pedestrian in the log but drives 8" in note
         for note in result.quality.notes
     )
 

@@ -123,7 +123,7 @@ def test_a_slow_source_is_not_cut_to_bits(tmp_path):
     [
         (
             lambda rows: rows.assign(x_m=np.nan),
-            r"log\.csv holds no usable position.*242 × position is not a number, first at .*line 2",
+            r"log\.csv: no usable position.*242 × position is not a number, first at .*line 2",
         ),
         (lambda rows: rows[rows["vehicle_id"] == "a"], r"log\.csv: only vehicle a"),
         (
@@ -166,7 +166,7 @@ def test_what_cannot_be_used_is_refused(tmp_path, damage, words):
         (LogConfig(start=100.0), "only 12.0 s long"),
         (LogConfig(start=5.0, end=4.0), "must be after start"),
         (LogConfig(start=8.0, end=9.0), "no two vehicles"),
-        (LogConfig(proximity=2.0), r"--set log\.proximity=\d+ takes two"),
+        (LogConfig(proximity=2.0), r"--set log\.proximity=\d+ accepts two"),
     ],
 )
 def test_parameters_that_leave_nothing(tmp_path, config, words):
@@ -227,14 +227,14 @@ def test_whatever_the_damage_no_nan_leaves(tmp_path, seed, noise, lost, repeated
 @pytest.mark.parametrize(
     ("config", "words"),
     [
-        (LogConfig(proximity=2.0), r"come closest, to 12 m; --set log\.proximity=\d+ takes two"),
+        (LogConfig(proximity=2.0), r"come closest, to 12 m; --set log\.proximity=\d+ accepts two"),
         (
             LogConfig(min_duration=30.0),
-            r"are within 100 m for \d+\.\d s and come as near as 12 m; --set log\.min_duration=[\d.]+ takes",
+            r"are within 100 m for \d+\.\d s and come as near as 12 m; --set log\.min_duration=[\d.]+ accepts",
         ),
         (
             LogConfig(travel=1000.0),
-            r"the faster one drives \d+\.\d m; --set log\.travel=\d+ takes them",
+            r"the faster one drives \d+\.\d m; --set log\.travel=\d+ accepts them",
         ),
     ],
     ids=["never near", "too short", "hardly driven"],

@@ -125,8 +125,8 @@ READ = {  # name: what is changed, columns, what is said (None: nothing), how th
         "",
     ),
     "spaces": (lambda rows: rows.rename(columns={"x_m": "Pos X [m]", "y_m": "Pos Y [m]"}), "", ""),
-    "feet": (lambda rows: sized(rows, 15.0, 6.0), "", "in feet"),
-    "zero": (lambda rows: sized(rows, 0.0, 0.0), "", "0 m long"),
+    "feet": (lambda rows: sized(rows, 15.0, 6.0), "", "like feet"),
+    "zero": (lambda rows: sized(rows, 0.0, 0.0), "", "0 m × 0 m"),
     "length and width swapped": (lambda rows: sized(rows, 1.8, 4.5), "", "it looks swapped"),
     "lat and lon swapped": (swapped, "lat=lon_deg,lon=lat_deg", ""),
     "degrees and minutes": (nmea, "lat=lat_deg:ddmm,lon=lon_deg:ddmm", ""),
@@ -249,13 +249,13 @@ def test_a_clock_set_back_cuts(tmp_path, back, rate):
         len(result.encounters) == 2
         and max(encounter.speed.max() for encounter in result.encounters) < 8.2
     )
-    assert "the clock starts anew" in " ".join(result.quality.notes)
+    assert "the clock steps" in " ".join(result.quality.notes)
 
 
 def test_runs_that_begin_anew_are_apart(tmp_path):
     again = crossing().assign(x_m=lambda own: own.x_m + 50.0)
     found = read_log(save(pd.concat([crossing(), again]), tmp_path))
-    assert len(found.encounters) == 2 and "the clock starts anew" in " ".join(found.quality.notes)
+    assert len(found.encounters) == 2 and "the clock steps" in " ".join(found.quality.notes)
 
 
 def test_a_jump_without_speeds_is_not_driven(tmp_path):
@@ -316,7 +316,7 @@ def test_packed_logs(tmp_path, ending):
     (plain,) = read_log(save(crossing(), tmp_path, "plain.csv")).encounters
     path = tmp_path / f"log.csv.{ending}"
     np.testing.assert_array_equal(read_log(path).encounters[0].position, plain.position)
-    with pytest.raises(InputError, match=rf"log\.csv\.{ending}.* at most 100 are read"):
+    with pytest.raises(InputError, match=rf"log\.csv\.{ending}.*limit 100\)"):
         read_log(path, LogConfig(row_limit=100))
     path.write_bytes(path.read_bytes()[:200])
     with pytest.raises(InputError, match=rf"log\.csv\.{ending} cannot be unpacked"):
@@ -369,7 +369,7 @@ REFUSED = {  # name: what is changed, what is said, how the file is written
     ),
     "no header": (
         plain,
-        "line 1 has numbers instead of column names; put a line such as t,id,x,y,speed",
+        "line 1 has numbers instead of column names; insert a line such as t,id,x,y,speed",
         {"header": False},
     ),
     "another name for the vehicle": (

@@ -150,7 +150,7 @@ def test_paths_that_are_no_logs(tmp_path):
     (tmp_path / "empty.csv").touch()
     for path, words in (
         ("nothing.csv", "does not exist"),
-        ("notes.md", "not a log that can be read"),
+        ("notes.md", "not in a known log format"),
         ("folder", "empty folder"),
         ("empty.csv", "is empty"),
     ):
