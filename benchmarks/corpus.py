@@ -35,7 +35,7 @@ from scenario_gen.corpus.config import CorpusConfig
 from scenario_gen.corpus.encounters import encounter_of, tables_of
 from scenario_gen.corpus.mine import mine
 from scenario_gen.corpus.tables import rows_of
-from scenario_gen.logs.tables import COLUMNS
+from scenario_gen.logs.tables import SPMD_COLUMNS
 
 DATA = Path(
     os.environ.get("SCENARIO_GEN_DATA", Path(__file__).resolve().parents[2] / "shared" / "data")
@@ -120,7 +120,7 @@ def _peer(archive: Path, place: Path) -> float:
 
     wanted = {"TxDevice", "Gentime", "DSecond", "Latitude", "Longitude", "Speed", "Heading"}
     columns = ", ".join(
-        f"'{name}': '{'DOUBLE' if name in wanted else 'VARCHAR'}'" for name in COLUMNS
+        f"'{name}': '{'DOUBLE' if name in wanted else 'VARCHAR'}'" for name in SPMD_COLUMNS
     )
     with duckdb.connect() as base:
         base.execute("SET threads = 1")

@@ -33,7 +33,7 @@ from scenario_gen.logs import (
     space_time_gap,
     UnknownFormatError,
 )
-from scenario_gen.logs.tables import EPOCH_NS
+from scenario_gen.logs.tables import SPMD_EPOCH_NS
 from scenario_gen.method.evaluation import at_period, criticality, EvaluationConfig
 from scenario_gen.situation import Situation
 from scenario_gen.types import Encounter
@@ -131,7 +131,7 @@ def _raw(found: Found, by_device: Mapping[int, Any]) -> RawLog:
     for device in found.devices:
         own = by_device[device]
         own = own[(own["t"] >= found.start - MARGIN) & (own["t"] <= found.end + MARGIN)]
-        stamps = own["t"].to_numpy(np.int64) * 1000 + EPOCH_NS
+        stamps = own["t"].to_numpy(np.int64) * 1000 + SPMD_EPOCH_NS
         numbers = np.arange(begin, begin + len(own))
         speed = own["speed"].to_numpy(np.float64)
         heading = np.pi / 2.0 - own["heading"].to_numpy(np.float64) * (np.pi / 180.0)

@@ -20,7 +20,7 @@ from scenario_gen.base.errors import guarded, needs
 from scenario_gen.base.folders import scratch, write_text
 from scenario_gen.base.stores import download, Part, Place, Remote, size_of, workplace
 from scenario_gen.corpus.tasks import arriving
-from scenario_gen.logs.tables import COLUMNS
+from scenario_gen.logs.tables import SPMD_COLUMNS
 
 HOUR = 3_600_000_000  # µs
 MOST_WRONG = 0.5  # of a file's rows whose clocks differ: beyond, the second clock is something else and is not used
@@ -167,7 +167,7 @@ def _extract(path: Path, begin: int, end: int, target: Path) -> Path:
 def _parse(base: Any, names: dict[str, str], target: Path) -> dict[str, Any]:
     """Parse files (read name -> true name) into one table, as messages.sql says; return the account."""
     files, true = list(names), list(names.values())
-    columns = {name: TYPES.get(name, "VARCHAR") for name in COLUMNS}
+    columns = {name: TYPES.get(name, "VARCHAR") for name in SPMD_COLUMNS}
     for name, value in (
         ("files", files),
         ("columns", columns),

@@ -74,7 +74,7 @@ def typed(log: RawLog, config: LogConfig) -> RawLog:
             known = VEHICLE_TYPES.names()
             near = did_you_mean(name, known)
             raise InputError(
-                f"parameter log.types: there is no type {name!r}; choose of {', '.join(known)}{near}"
+                f"parameter log.types: there is no type {name!r}; choose one of {', '.join(known)}{near}"
             )
     left_out, unknown = Counter[str](), Counter[str]()
     kept: list[Observations] = []

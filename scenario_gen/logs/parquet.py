@@ -1,12 +1,10 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Parquet through Arrow: only needed columns are read, and every kind of column is accepted or refused by name.
-
-The metadata of pandas in a file is ignored.
-"""
+"""Parquet tables: only needed columns are read; pandas' metadata in a file is ignored."""
 
 from collections import Counter
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -21,162 +19,155 @@ from scenario_gen.logs.columns import Column, find_columns, UNITS
 from scenario_gen.logs.config import LogConfig
 from scenario_gen.logs.raw import check_size
 
-BATCH = 1 << 16  # rows
+_BATCH_ROW_COUNT = 1 << 16
 
 
 def read_columns(
-    path: Path, before: int, config: LogConfig
+    path: Path, rows_before: int, config: LogConfig
 ) -> tuple[pd.DataFrame, dict[str, Column], list[str]]:
-    """Read the columns that are needed; `before` rows were read from other files.
+    """Read the needed columns; `rows_before` rows were read from other files.
 
     Returns:
-        A table of numbers and texts, and the columns with the factors to our units, those of times by the type in Arrow; and
-        the names of all columns.
+        The table; its columns by quantity, times with the unit of their Arrow type; the header.
 
     Raises:
-        InputError: the file is damaged or too large, or a column is of no kind that its quantity can have.
+        InputError: the file is damaged or too large, or a column does not suit its quantity.
     """
-    schema = read_schema(path)
-    columns = find_columns(list(schema.names), path, config.columns)
+    schema = _read_schema(path)
+    header = list(schema.names)
+    columns = find_columns(header, path, config.columns)
     for quantity, column in list(columns.items()):
-        kind = schema.field(column.name).type
-        if quantity == "kind" and not is_text(
-            kind.value_type if pa.types.is_dictionary(kind) else kind
-        ):
-            del columns[quantity]  # numbers whose meaning is not known
+        kind = _value_type(schema.field(column.name).type)
+        if quantity == "kind" and not _is_text(kind):
+            del columns[quantity]  # numbers of unknown meaning
             continue
-        check_kind(kind, quantity, column, path)
-        if quantity == "time" and (factor := unit_of(kind)) is not None:
-            columns[quantity] = replace(column, factor=factor)
-    return (
-        read_table(path, sorted({column.name for column in columns.values()}), before, config),
-        columns,
-        list(schema.names),
-    )
+        unit_s = _time_unit_s(kind)
+        is_time = quantity == "time" and unit_s is not None
+        if not (is_time or _is_text(kind) or _is_number(kind)):
+            raise InputError(
+                f"{path}, column {column.name!r} ({quantity}): a {kind} is not a {quantity}; "
+                "name another column"
+            )
+        if quantity == "time" and unit_s is not None:
+            columns[quantity] = replace(column, factor=unit_s)
+    names = sorted({column.name for column in columns.values()})
+    return read_table(path, names, rows_before, config), columns, header
 
 
-def read_schema(path: Path) -> pa.Schema:
-    """Return the names and types of the columns, each of another name.
+def _read_schema(path: Path) -> pa.Schema:
+    """Return the names and types of the columns.
 
     Raises:
-        InputError: the file is damaged, or two columns have one name.
+        InputError: the file is damaged, or two columns have the same name.
     """
     with guarded(f"{path} cannot be read as a Parquet table"):
         schema = parquet.read_schema(path)
-        names = list(schema.names)
-    for name, count in Counter(names).items():
+        counts = Counter(schema.names)
+    for name, count in counts.items():
         if count > 1:
-            raise InputError(f"{path} has more than one column {name!r}; rename all but one")
+            raise InputError(f"{path} has several columns {name!r}; rename all but one")
     return schema
 
 
-def read_table(path: Path, names: list[str], before: int, config: LogConfig) -> pd.DataFrame:
-    """Read some columns as they stand; `before` rows were read from other files; a column that is missing is left out.
+def read_table(
+    path: Path, names: Sequence[str], rows_before: int, config: LogConfig
+) -> pd.DataFrame:
+    """Read some columns unchanged; missing ones are omitted.
 
     Raises:
         InputError: the file is damaged or too large.
     """
-    schema = read_schema(path)
+    schema = _read_schema(path)
     present = [name for name in names if name in schema.names]
-    batches = read_batches(path, schema, present, before, config)
+    batches = _read_batches(path, schema, present, rows_before, config)
     frame = {}
     for name in present:
         with guarded(f"{path}, column {name!r} cannot be read"):
-            frame[name] = to_series(pa.chunked_array([batch.column(name) for batch in batches]))
+            frame[name] = _to_series(pa.chunked_array([batch.column(name) for batch in batches]))
     return pd.DataFrame(frame)
 
 
-def read_batches(
-    path: Path, schema: pa.Schema, names: list[str], before: int, config: LogConfig
+def _read_batches(
+    path: Path, schema: pa.Schema, names: Sequence[str], rows_before: int, config: LogConfig
 ) -> list[Any]:
-    """Read some columns batch by batch; texts as dictionaries, so that repeated ones are stored once.
+    """Read some columns in batches; texts as dictionaries, so that repeated ones are stored once.
 
     Raises:
         InputError: the file is damaged or too large.
     """
-    texts = [name for name in names if is_text(schema.field(name).type)]
+    texts = [name for name in names if _is_text(schema.field(name).type)]
     with guarded(f"{path} cannot be read as a Parquet table"):
         file = parquet.ParquetFile(path, read_dictionary=texts)
-        groups = [file.metadata.row_group(k) for k in range(file.metadata.num_row_groups)]
-        parts = [group.column(k) for group in groups for k in range(group.num_columns)]
-        declared = sum(
-            max(part.total_uncompressed_size, 0)
-            for part in parts
-            if part.path_in_schema.split(".")[0] in names
-        )
-        rows, source = (
-            file.metadata.num_rows,
-            file.iter_batches(BATCH, columns=names, use_threads=False),
-        )
-    check_size(str(path), declared, before + rows, config)
+        declared_bytes = _declared_bytes(file.metadata, names)
+        declared_rows = file.metadata.num_rows
+        source = file.iter_batches(_BATCH_ROW_COUNT, columns=list(names), use_threads=False)
+    check_size(str(path), declared_bytes, rows_before + declared_rows, config)
     batches: list[Any] = []
-    rows = size = 0
+    n_rows = 0
+    n_bytes = 0
     while True:
-        with guarded(f"{path} cannot be read as a Parquet table, after row {rows}"):
+        with guarded(f"{path} cannot be read as a Parquet table, after row {n_rows}"):
             batch = next(source, None)
             if batch is None:
                 break
-            rows, size = rows + batch.num_rows, size + batch.nbytes
-        check_size(str(path), size, before + rows, config)
+            n_rows += batch.num_rows
+            n_bytes += batch.nbytes
+        check_size(str(path), n_bytes, rows_before + n_rows, config)
         batches.append(batch)
-    if not rows:
+    if not n_rows:
         raise InputError(f"{path} has a header but no rows")
     return batches
 
 
-def is_text(kind: pa.DataType) -> bool:
-    """Return whether a type of Arrow is text."""
-    return bool(
-        pa.types.is_string(kind) or pa.types.is_large_string(kind) or pa.types.is_string_view(kind)
-    )
+def _declared_bytes(metadata: Any, names: Sequence[str]) -> int:
+    """Return the declared size of some columns after decompression."""
+    total = 0
+    for k in range(metadata.num_row_groups):
+        group = metadata.row_group(k)
+        for column in map(group.column, range(group.num_columns)):
+            if column.path_in_schema.split(".")[0] in names:
+                total += max(column.total_uncompressed_size, 0)
+    return total
 
 
-def unit_of(kind: pa.DataType) -> float | None:
-    """Return the seconds of a date's or timestamp's unit, None for other types."""
+def _value_type(kind: pa.DataType) -> pa.DataType:
+    """Return the type of the values of a dictionary; of others the type itself."""
+    return kind.value_type if pa.types.is_dictionary(kind) else kind
+
+
+def _is_text(kind: pa.DataType) -> bool:
+    is_text = pa.types.is_string(kind) or pa.types.is_large_string(kind)
+    return bool(is_text or pa.types.is_string_view(kind))
+
+
+def _is_number(kind: pa.DataType) -> bool:
+    is_number = pa.types.is_integer(kind) or pa.types.is_floating(kind)
+    return bool(is_number or pa.types.is_decimal(kind) or pa.types.is_null(kind))
+
+
+def _time_unit_s(kind: pa.DataType) -> float | None:
+    """Return the unit of dates and timestamps in seconds, None for other types."""
     if pa.types.is_timestamp(kind):
         return UNITS["time"][kind.unit]
-    if pa.types.is_date(kind):
-        return 86400.0 if pa.types.is_date32(kind) else UNITS["time"]["ms"]
-    return None
+    if pa.types.is_date32(kind):
+        return UNITS["time"]["d"]
+    return UNITS["time"]["ms"] if pa.types.is_date(kind) else None
 
 
-def check_kind(kind: pa.DataType, quantity: str, column: Column, path: Path) -> None:
-    """Refuse a column that holds neither numbers nor texts, nor times where those are wanted.
-
-    Raises:
-        InputError: it does; names the column and its type.
-    """
-    kind = kind.value_type if pa.types.is_dictionary(kind) else kind
-    sound = is_text(kind) or any(
-        is_kind(kind)
-        for is_kind in (
-            pa.types.is_integer,
-            pa.types.is_floating,
-            pa.types.is_decimal,
-            pa.types.is_null,
-        )
-    )
-    if not (sound or (quantity == "time" and unit_of(kind) is not None)):
-        raise InputError(
-            f"{path}, column {column.name!r} ({quantity}): a {kind} is no {quantity}; name another column"
-        )
-
-
-def to_series(values: pa.ChunkedArray) -> "pd.Series[Any]":
-    """Return numbers (integers stay exact, and may be missing) or texts; times as integers of their unit."""
+def _to_series(values: pa.ChunkedArray) -> "pd.Series[Any]":
+    """Return exact integers (some may be missing), numbers or texts; times as integers."""
     if pa.types.is_dictionary(values.type):
-        if is_text(values.type.value_type):
+        if _is_text(values.type.value_type):
             return values.to_pandas().astype(object)
         values = compute.cast(values, values.type.value_type)
     if pa.types.is_null(values.type):
         return pd.Series(np.full(len(values), np.nan))
-    if is_text(values.type):
+    if _is_text(values.type):
         return values.to_pandas()
     if pa.types.is_date32(values.type):
         values = values.cast(pa.int32())
-    if not (unit_of(values.type) or pa.types.is_integer(values.type)):
+    if _time_unit_s(values.type) is None and not pa.types.is_integer(values.type):
         return values.cast(pa.float64(), safe=False).to_pandas()
-    whole = pa.uint64() if pa.types.is_uint64(values.type) else pa.int64()
-    return values.cast(whole).to_pandas(
-        types_mapper={pa.int64(): pd.Int64Dtype(), pa.uint64(): pd.UInt64Dtype()}.get
-    )
+    integer = pa.uint64() if pa.types.is_uint64(values.type) else pa.int64()
+    nullable = {pa.int64(): pd.Int64Dtype(), pa.uint64(): pd.UInt64Dtype()}
+    return values.cast(integer).to_pandas(types_mapper=nullable.get)

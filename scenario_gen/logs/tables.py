@@ -1,7 +1,10 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Tables: CSV or Parquet with named columns, and the headerless files of the Safety Pilot Model Deployment (SPMD)."""
+"""Tables: CSV or Parquet with named columns, and headerless SPMD files.
+
+SPMD is the Safety Pilot Model Deployment.
+"""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -15,43 +18,39 @@ import pandas as pd
 from scenario_gen.base.documents import shown
 from scenario_gen.base.errors import guarded, InputError, needs
 from scenario_gen.logs.cleaning import CLEANING
-from scenario_gen.logs.columns import Column, find_columns, notes_on, SHOWN, UNITS
+from scenario_gen.logs.columns import (
+    Column,
+    column_notes,
+    find_columns,
+    MAX_LISTED_COUNT,
+    UNITS,
+)
 from scenario_gen.logs.config import LogConfig
 from scenario_gen.logs.raw import check_size, check_vehicles, Observations, RawLog, Segment
-from scenario_gen.logs.text import layout_of
-from scenario_gen.numerics import Floats, Ints
+from scenario_gen.logs.text import Layout, layout_of
+from scenario_gen.numerics import Floats
 
-PARQUET = (".parquet", ".pq")
-LATEST_S = 9e9  # s from 1970 that a stamp in 64 bits of nanoseconds can be
-NOW = 3e8, 4e9  # s since 1970: from 1979 to 2096
-FEW_ROWS = 10  # of which each may be of a vehicle of its own
-STILL_M = 0.05  # that no vehicle of an encounter drives
-LONGEST_NUMBER = 300  # characters
-EPOCH_NS = (
-    1_072_915_200 * 10**9
-)  # 2004-01-01 UTC in Unix time; Gentime of SPMD counts microseconds from there
-COLUMNS = (  # of a basic safety message in the files of the Safety Pilot Model Deployment
-    *(
-        "RxDevice",
-        "FileId",
-        "TxDevice",
-        "Gentime",
-        "TxRandom",
-        "MsgCount",
-        "DSecond",
-        "Latitude",
-        "Longitude",
-        "Elevation",
-    ),
-    *("Speed", "Heading", "Ax", "Ay", "Az", "Yawrate", "PathCount", "RadiusOfCurve", "Confidence"),
-)
-QUANTITIES = {
+MAX_STAMP_S = 9e9
+"""Latest stamp since 1970 in 64 bits of nanoseconds."""
+
+SPMD_EPOCH_NS = 1_072_915_200 * 10**9
+"""2004-01-01 UTC in Unix time, from which Gentime of SPMD counts microseconds."""
+
+SPMD_COLUMNS = ["RxDevice", "FileId", "TxDevice", "Gentime", "TxRandom", "MsgCount", "DSecond", "Latitude", "Longitude", "Elevation", "Speed", "Heading", "Ax", "Ay", "Az", "Yawrate", "PathCount", "RadiusOfCurve", "Confidence"]
+
+_SPMD_QUANTITIES = {
     "vehicle": Column("TxDevice"),
     "lat": Column("Latitude"),
     "lon": Column("Longitude"),
     "speed": Column("Speed"),
     "heading": Column("Heading", math.pi / 180.0, clockwise=True),
 }
+_MAX_SPMD_STAMP_US = 8e15
+_PARQUET_SUFFIXES = (".parquet", ".pq")
+_UNIX_TIME_S = (3e8, 4e9)  # from 1979 to 2096
+_FEW_ROW_COUNT = 10  # each of them may belong to another vehicle
+_STANDING_M = 0.05  # no vehicle of an encounter drives less
+_MAX_NUMBER_LENGTH_COUNT = 300  # characters; pandas fails on a number beyond float64
 
 
 def read(paths: Sequence[Path], config: LogConfig, *, spmd: bool = False) -> RawLog:
@@ -60,217 +59,236 @@ def read(paths: Sequence[Path], config: LogConfig, *, spmd: bool = False) -> Raw
     Args:
         paths: one or more files.
         config: names columns, and bounds sizes.
-        spmd: they are SPMD files, without a header; otherwise the header, or `config`, names the columns.
+        spmd: they are SPMD files without a header.
 
     Raises:
-        InputError: a file is damaged or too large, or a column is missing or of no kind that its quantity can have.
+        InputError: a file is damaged or too large, or a column is missing or unsuitable.
     """
-    frames, segments, row, size = [], [], 0, 0
+    frames: list[pd.DataFrame] = []
+    segments = []
     notes: list[str] = []
+    n_rows = 0
+    n_bytes = 0
     for path in paths:
-        size += path.stat().st_size
-        check_size(str(path), size, row, config)
-        frames.append(
-            read_messages(path, row, config) if spmd else read_columns(path, row, config, notes)
-        )
-        if "vehicle" not in frames[-1]:
-            frames[-1]["vehicle"] = "0" if len(paths) == 1 else path.stem
-        segments.append(
-            segment_of(path, row, header=0 if spmd else 1 + frames[-1].attrs.get("above", 0))
-        )
-        row += len(frames[-1])
+        n_bytes += path.stat().st_size
+        check_size(str(path), n_bytes, n_rows, config)
+        if spmd:
+            frame = _read_spmd(path, n_rows, config)
+            header_lines = 0
+        else:
+            frame, lines_above = _read_named(path, n_rows, config, notes)
+            header_lines = lines_above + 1
+        if "vehicle" not in frame:
+            frame["vehicle"] = "0" if len(paths) == 1 else path.stem
+        frames.append(frame)
+        segments.append(segment_of(path, n_rows, header_lines))
+        n_rows += len(frame)
     if len({"lat" in frame for frame in frames}) > 1:
         raise InputError(
-            f"{paths[0]} and the files beside it mix latitude/longitude and x/y; read them one by one"
+            f"{paths[0]} and the other files mix latitude/longitude and x/y; read them separately"
         )
     log = from_frame(pd.concat(frames, ignore_index=True), paths, tuple(segments), config)
     return replace(log, notes=(*dict.fromkeys(notes), *log.notes))
 
 
-def read_columns(path: Path, before: int, config: LogConfig, notes: list[str]) -> pd.DataFrame:
-    """Read the needed columns of one table in our units.
+def _read_named(
+    path: Path, rows_before: int, config: LogConfig, notes: list[str]
+) -> tuple[pd.DataFrame, int]:
+    """Read the needed columns of one table in our units; return also the lines above its header.
 
     Args:
         path: the table.
-        before: rows that were read from other files.
-        config: as of `read`.
-        notes: how the table was read is added here.
+        rows_before: number of rows from other files.
+        config: names columns, and bounds sizes.
+        notes: notes on the table are appended.
 
     Raises:
-        InputError: as `read`, or stamps repeat and no column says which vehicle a row is of.
+        InputError: as `read`, or stamps repeat and no column names the vehicle.
     """
-    if path.suffix.lower() in PARQUET:
+    layout = Layout()
+    if path.suffix.lower() in _PARQUET_SUFFIXES:
         needs("parquet", "pyarrow")
         from scenario_gen.logs import parquet
 
-        above = 0
-        frame, columns, header = parquet.read_columns(path, before, config)
+        frame, columns, header = parquet.read_columns(path, rows_before, config)
     else:
         layout = layout_of(path)
         notes += layout.notes
-        form = {
-            "encoding": layout.encoding,
-            "sep": layout.separator,
-            "decimal": layout.decimal,
-            "skiprows": layout.above,
-        }
-        header = [str(name) for name in read_text(path, before, config, **form, nrows=0).columns]
-        columns = find_columns(header, path, config.columns)
-        texts = {
-            columns[quantity].name: object
-            for quantity in ("vehicle", "kind")
-            if quantity in columns
-        }
-        frame = read_text(
-            path, before, config, **form, dtype=texts
-        )  # a number of 64 bits, or in hexadecimal, is no float64
-        above = layout.above
-    if (
-        "kind" in columns
-        and not columns["kind"].types
-        and len(kinds := reals(frame[columns["kind"].name]).dropna().unique())
-    ):
-        name, some = (
-            columns.pop("kind").name,
-            ", ".join(f"{kind:g}" for kind in sorted(kinds)[:SHOWN]),
-        )
-        notes.append(
-            f"column {name} has numbers ({some}), whose meaning is not known: all are read by their sizes; name it with, say, "
-            f"--set log.columns=kind={name}:car1+truck2"
-        )
-    notes += notes_on(columns, config.columns, header)
+        frame, columns, header = _read_text_columns(path, layout, rows_before, config)
+    _ignore_unknown_numbers(frame, columns, notes)
+    notes += column_notes(columns, config.columns, header)
     numbers = to_numbers(frame, columns, path)
     if "vehicle=none" not in config.columns.replace(" ", ""):
-        check_ids(frame, columns, numbers, path)
-    check_degrees(numbers, columns, path)
-    numbers.attrs["above"] = above
-    return numbers
+        _check_vehicle_column(frame, columns, numbers, path)
+    _check_metres(numbers, columns, path)
+    return numbers, layout.above
 
 
-def check_ids(
+def _read_text_columns(
+    path: Path, layout: Layout, rows_before: int, config: LogConfig
+) -> tuple[pd.DataFrame, dict[str, Column], list[str]]:
+    """Return a text table, its columns by quantity, and its header."""
+    options = {
+        "encoding": layout.encoding,
+        "sep": layout.separator,
+        "decimal": layout.decimal,
+        "skiprows": layout.above,
+    }
+    header = [str(name) for name in read_text(path, rows_before, config, **options, nrows=0)]
+    columns = find_columns(header, path, config.columns)
+    # Numbers of 64 bits, or in hexadecimal, are not float64.
+    names = [columns[quantity].name for quantity in ("vehicle", "kind") if quantity in columns]
+    frame = read_text(path, rows_before, config, **options, dtype=dict.fromkeys(names, object))
+    return frame, columns, header
+
+
+def _ignore_unknown_numbers(
+    frame: pd.DataFrame, columns: dict[str, Column], notes: list[str]
+) -> None:
+    """Remove the column of kinds if it has numbers of unknown meaning, with a note."""
+    if "kind" not in columns or columns["kind"].types:
+        return
+    name = columns["kind"].name
+    kinds = sorted(reals(frame[name]).dropna().unique())
+    if kinds:
+        del columns["kind"]
+        examples = ", ".join(f"{kind:g}" for kind in kinds[:MAX_LISTED_COUNT])
+        notes.append(
+            f"column {name} has numbers ({examples}) of unknown meaning: types are guessed from "
+            f"the sizes; name them with, say, --set log.columns=kind={name}:car1+truck2"
+        )
+
+
+def _check_vehicle_column(
     frame: pd.DataFrame, columns: dict[str, Column], numbers: pd.DataFrame, path: Path
 ) -> None:
-    """Check that a table without a column for the vehicle is of one vehicle, and that such a column does not number the rows.
+    """Check that the column for the vehicle does not number the rows, and is not missing.
 
     Raises:
-        InputError: most stamps are there more than once, or each row is another vehicle's; names the columns that could be meant.
+        InputError: most stamps repeat, or each row has another vehicle; names possible columns.
     """
     time = numbers["time"]
     if "vehicle" not in columns:
-        sound, fault = (
-            time.nunique() > len(time) / 2 + 1,
-            "several rows have the same time, and no column names the vehicle",
-        )
+        is_plausible = time.nunique() > len(time) / 2 + 1
+        fault = "several rows have the same time, and no column names the vehicle"
     else:
-        sound = len(time) < FEW_ROWS or numbers["vehicle"].nunique() < len(time)
-        fault = (
-            f"the column {columns['vehicle'].name!r} is another one in each row, and so no vehicle"
-        )
-    if sound:
+        is_plausible = len(time) < _FEW_ROW_COUNT or numbers["vehicle"].nunique() < len(time)
+        name = columns["vehicle"].name
+        fault = f"column {name!r} differs in each row, so it does not name the vehicle"
+    if is_plausible:
         return
-    unused = [
-        name for name in frame.columns if name not in {column.name for column in columns.values()}
-    ]
-    could = [
+    used = {column.name for column in columns.values()}
+    candidates = [
         str(name)
-        for name in unused
-        if 2 <= frame[name].nunique() <= len(frame) / 2
-        and not pd.DataFrame({"t": time, "v": frame[name]}).duplicated().any()
+        for name in frame.columns
+        if name not in used and _may_name_vehicles(frame[name], time)
     ]
-    remedy = (
-        f"it could be {' or '.join(could)}: --set log.columns=vehicle={could[0]}"
-        if could
-        else "add a column `id`"
-    )
+    remedy = "add a column `id`"
+    if candidates:
+        remedy = (
+            f"it could be {' or '.join(candidates)}: --set log.columns=vehicle={candidates[0]}"
+        )
     raise InputError(f"{path}: {fault}; {remedy}")
 
 
-def segment_of(path: Path, row: int, *, header: int = 1) -> Segment:
-    """Return the place of a file's rows, the first of which is `row` of the log, after so many lines of text."""
-    return (
-        Segment(row, str(path), "row", 1)
-        if path.suffix.lower() in PARQUET
-        else Segment(row, str(path), "line", 1 + header)
-    )
+def _may_name_vehicles(values: "pd.Series[Any]", time: "pd.Series[int]") -> bool:
+    """Return whether values repeat, but never twice at one time."""
+    if not 2 <= values.nunique() <= len(values) / 2:
+        return False
+    return not pd.DataFrame({"time": time, "vehicle": values}).duplicated().any()
 
 
-def read_text(path: Path, before: int, config: LogConfig, **options: Any) -> pd.DataFrame:
-    """Read a table in text with pandas, whose options say how it is written; `before` rows were read from other files.
+def segment_of(path: Path, first_row: int, header_lines: int = 1) -> Segment:
+    """Return the place of a file's rows, the first of which is `first_row` of the log."""
+    if path.suffix.lower() in _PARQUET_SUFFIXES:
+        return Segment(first_row, str(path), "row", 1)
+    return Segment(first_row, str(path), "line", 1 + header_lines)
+
+
+def read_text(path: Path, rows_before: int, config: LogConfig, **options: Any) -> pd.DataFrame:
+    """Read a text table with pandas.
+
+    Args:
+        path: the table.
+        rows_before: number of rows from other files.
+        config: bounds the number of rows.
+        options: those of `pandas.read_csv`.
 
     Raises:
-        InputError: it is no table, or too large.
+        InputError: it is not a table, or too large.
     """
-    options = {"encoding": "utf-8-sig"} | options
+    options = {"encoding": "utf-8-sig", "nrows": config.row_limit - rows_before + 1, **options}
     with guarded(f"{path} cannot be read as a table"):
         try:
             frame = pd.read_csv(
-                path,
-                skipinitialspace=True,
-                skip_blank_lines=False,
-                compression=None,
-                **{"nrows": config.row_limit - before + 1} | options,
+                path, skipinitialspace=True, skip_blank_lines=False, compression=None, **options
             )
         except UnicodeDecodeError as error:
             raise InputError(
                 f"{path} is not UTF-8 text (byte {error.start}); save it as UTF-8"
             ) from error
-    check_size(str(path), 0, before + len(frame), config)
-    if frame.empty and options.get("nrows") != 0:
+    check_size(str(path), 0, rows_before + len(frame), config)
+    if frame.empty and options["nrows"]:
         raise InputError(f"{path} has a header but no rows")
     if not isinstance(frame.index, pd.RangeIndex):
         raise InputError(
-            f"{path}: the rows have more fields than the header; name every column, and write 0.5, not 0,5"
+            f"{path}: the rows have more fields than the header; name every column, and write "
+            "0.5, not 0,5"
         )
     return frame
 
 
 def to_numbers(frame: pd.DataFrame, columns: dict[str, Column], path: Path) -> pd.DataFrame:
-    """Return the needed columns in our units; texts that are no numbers become NaN. Stamps become integer nanoseconds.
+    """Return the columns in our units, stamps in nanoseconds; texts that are not numbers are NaN.
 
     Raises:
-        InputError: a column is of no kind that the quantity can have.
+        InputError: a column does not suit its quantity.
     """
-    out = pd.DataFrame(index=frame.index)
+    numbers = pd.DataFrame(index=frame.index)
     for quantity, column in columns.items():
         values = frame[column.name]
         if isinstance(values, pd.DataFrame):
-            raise InputError(
-                f"{path} has more than one column {column.name!r}; rename all but one"
-            )
+            raise InputError(f"{path} has several columns {column.name!r}; rename all but one")
         if quantity == "vehicle":
-            out["vehicle"] = vehicle_names(values)
+            numbers["vehicle"] = vehicle_names(values)
         elif quantity == "kind":
-            words = values.astype(str)
-            out["kind"] = (
-                reals(values).map(dict(column.types)).fillna("unnamed " + words)
-                if column.types
-                else words
-            )
+            numbers["kind"] = _kind_names(values, column)
         elif pd.api.types.is_bool_dtype(values):
             raise InputError(
-                f"{path}, column {column.name!r} ({quantity}): true or false is no {quantity}; name another column"
+                f"{path}, column {column.name!r} ({quantity}): true or false is not a {quantity}; "
+                "name another column"
             )
         elif quantity == "time":
-            out["time"], out["time_ok"] = nanoseconds(values, column.factor)
-            check_stamps(values, out["time"], out["time_ok"], column, path)
+            numbers["time"], numbers["time_ok"] = _nanoseconds(values, column.factor)
+            _check_stamps(values, numbers, column, path)
         else:
-            numbers = reals(values)
-            if column.minutes:
-                degrees = np.trunc(numbers / 100.0)
-                numbers = degrees + (numbers - 100.0 * degrees) / 60.0
-            numbers = numbers * abs(column.factor)
-            out[quantity] = math.copysign(1.0, column.factor) * (
-                (math.pi / 2.0 - numbers) if column.clockwise else numbers
-            )
-    return out
+            numbers[quantity] = _in_our_unit(reals(values), column)
+    return numbers
+
+
+def _kind_names(values: "pd.Series[Any]", column: Column) -> "pd.Series[Any]":
+    """Return what a table calls the types of its road users."""
+    words = values.astype(str)
+    if not column.types:
+        return words
+    return reals(values).map(dict(column.types)).fillna("unnamed " + words)
+
+
+def _in_our_unit(values: "pd.Series[float]", column: Column) -> "pd.Series[float]":
+    """Return values in metres, m/s, degrees (lat, lon), or radians counter-clockwise from east."""
+    if column.minutes:
+        degrees = np.trunc(values / 100.0)
+        values = degrees + (values - 100.0 * degrees) / 60.0
+    values = values * abs(column.factor)
+    if column.clockwise:
+        values = math.pi / 2.0 - values
+    return math.copysign(1.0, column.factor) * values
 
 
 def reals(values: "pd.Series[Any]") -> "pd.Series[float]":
-    """Return numbers, or texts that are numbers, as float64; NaN where they are none."""
+    """Return numbers, or texts that are numbers, as float64; NaN for others."""
     if not pd.api.types.is_numeric_dtype(values):
-        values = values.where(
-            values.astype(str).str.len() < LONGEST_NUMBER
-        )  # pandas fails on a number beyond float64
+        values = values.where(values.astype(str).str.len() < _MAX_NUMBER_LENGTH_COUNT)
     return pd.to_numeric(values, errors="coerce").astype(float)
 
 
@@ -284,166 +302,162 @@ def vehicle_name(value: Any) -> str:
 
 
 def vehicle_names(values: "pd.Series[Any]") -> "pd.Series[Any]":
-    """Return vehicles' names; in a column of texts that are all whole numbers, 017 and 17.0 are 17 too."""
+    """Return vehicles' names; if all are whole numbers, 017 and 17.0 are 17, too."""
     names = values.map(vehicle_name).astype(object)
-    known = pd.Series(names.unique(), dtype=object)
-    whole = known.str.fullmatch(r"\d{1,300}(\.0*)?") | (known == "")
-    return (
-        names.map({name: name and str(int(name.partition(".")[0])) for name in known})
-        if whole.all()
-        else names
-    )
+    unique = pd.Series(names.unique(), dtype=object)
+    is_whole = unique.str.fullmatch(r"\d{1,300}(\.0*)?") | (unique == "")
+    if not is_whole.all():
+        return names
+    return names.map({name: name and str(int(name.partition(".")[0])) for name in unique})
 
 
-def check_stamps(
-    values: "pd.Series[Any]",
-    time: "pd.Series[int]",
-    known: "pd.Series[bool]",
-    column: Column,
-    path: Path,
+def _check_stamps(
+    values: "pd.Series[Any]", numbers: pd.DataFrame, column: Column, path: Path
 ) -> None:
-    """Refuse a column of which no value is a stamp, or most are beyond all times: it is in another unit.
+    """Check that a column has stamps, and a plausible unit.
 
     Raises:
-        InputError: the message shows a value, and says what it looks like.
+        InputError: it has not; the message shows a value, and what it looks like.
     """
     first = shown(next(iter(values.dropna()), ""))
     place = f"{path}, column {column.name!r} (time)"
-    if not known.any():
+    if not numbers["time_ok"].any():
         raise InputError(
-            f"{place}: a stamp is not a number, nor a date such as 2022-08-31T12:00:00.5, but {first!r}"
+            f"{place}: {first!r} is neither a number nor a date such as 2022-08-31T12:00:00.5"
         )
-    if (time.abs() >= round(LATEST_S * 1e9)).mean() > 0.5:
-        middle = float(reals(values).abs().median())
-        since = [
-            unit
-            for unit, factor in (("ms", 1e-3), ("us", 1e-6), ("ns", 1e-9))
-            if NOW[0] < middle * factor < NOW[1]
-        ]
-        if since and column.factor == 1.0:
+    is_out_of_range = numbers["time"].abs() >= round(MAX_STAMP_S * 1e9)
+    if is_out_of_range.mean() <= 0.5 or column.factor != 1.0:
+        return
+    median = float(reals(values).abs().median())
+    for unit in ("ms", "us", "ns"):
+        if _UNIX_TIME_S[0] < median * UNITS["time"][unit] < _UNIX_TIME_S[1]:
             raise InputError(
-                f"{place}: {first} looks like {since[0]} since 1970: --set log.columns=time={column.name}:{since[0]}"
+                f"{place}: {first} looks like {unit} since 1970: "
+                f"--set log.columns=time={column.name}:{unit}"
             )
 
 
-def check_degrees(frame: pd.DataFrame, columns: dict[str, Column], path: Path) -> None:
-    """Refuse x and y that are degrees: no vehicle moves in them, were they metres, although its speeds say so or it has digits.
+def _check_metres(frame: pd.DataFrame, columns: dict[str, Column], path: Path) -> None:
+    """Check that x and y are not degrees: as metres, no vehicle would move.
 
     Raises:
         InputError: they are.
     """
-    if "x" not in frame or not (
-        frame["x"].abs().max() <= 180.0 and frame["y"].abs().max() <= 90.0
-    ):
+    if "x" not in frame:
         return
-    spread = float(
-        frame.groupby("vehicle" if "vehicle" in frame else frame.index * 0)[["x", "y"]]
-        .agg(np.ptp)
-        .max()
-        .max()
-    )
-    if (
-        0.0 < spread < STILL_M
-        and frame[["x", "y"]].abs().max().max() > 1.0
-        and not ("speed" in frame and frame["speed"].max() < 1.0)
-    ):
-        x, y = columns["x"].name, columns["y"].name
+    limits = frame[["x", "y"]].abs().max()
+    if not (limits["x"] <= 180.0 and limits["y"] <= 90.0 and limits.max() > 1.0):
+        return
+    if "speed" in frame and frame["speed"].max() < 1.0:
+        return  # nobody moves
+    vehicle = frame["vehicle"] if "vehicle" in frame else frame.index * 0
+    spread = float(frame.groupby(vehicle)[["x", "y"]].agg(np.ptp).max().max())
+    if 0.0 < spread < _STANDING_M:
         raise InputError(
-            f"{path}: no vehicle drives farther than {spread:.2g} m by its x and y; they look like degrees of longitude and "
-            f"latitude: --set log.columns=lon={x},lat={y}"
+            f"{path}: no vehicle drives farther than {spread:.2g} m by its x and y; they look "
+            f"like degrees of longitude and latitude: "
+            f"--set log.columns=lon={columns['x'].name},lat={columns['y'].name}"
         )
 
 
-def nanoseconds(
+def _nanoseconds(
     values: "pd.Series[Any]", factor: float
 ) -> tuple["pd.Series[int]", "pd.Series[bool]"]:
-    """Return stamps as integer nanoseconds, `LONGEST` where they are beyond it, and which of them are numbers (or dates) at all.
+    """Return stamps as integer nanoseconds within `MAX_STAMP_S`, and which of them are valid.
 
     Args:
         values: numbers, or texts that are numbers or dates.
         factor: of their unit to seconds.
     """
     if pd.api.types.is_integer_dtype(values):
-        inside = (values.astype(float).abs() * factor < LATEST_S).astype(bool)
-        return values.where(inside, int(LATEST_S / factor)).astype(np.int64) * round(
-            factor * 1e9
-        ), values.notna().astype(bool)
+        is_inside = (values.astype(float).abs() * factor < MAX_STAMP_S).astype(bool)
+        bounded = values.where(is_inside, int(MAX_STAMP_S / factor)).astype(np.int64)
+        return bounded * round(factor * 1e9), values.notna().astype(bool)
     numbers = reals(values)
     if numbers.isna().all():
         dates = pd.to_datetime(values, errors="coerce", utc=True, format="ISO8601")
         ticks = dates.fillna(pd.Timestamp(0, tz="UTC")).astype(np.int64)
-        return nanoseconds(ticks, UNITS["time"][dates.dt.unit])[0], dates.notna()
-    inside = numbers.abs() * factor < LATEST_S
-    return (numbers.where(inside, LATEST_S / factor) * (factor * 1e9)).round().astype(
-        np.int64
-    ), numbers.notna()
+        stamps, _ = _nanoseconds(ticks, UNITS["time"][dates.dt.unit])
+        return stamps, dates.notna()
+    is_inside = numbers.abs() * factor < MAX_STAMP_S
+    bounded = numbers.where(is_inside, MAX_STAMP_S / factor)
+    return (bounded * (factor * 1e9)).round().astype(np.int64), numbers.notna()
 
 
 def from_frame(
     frame: pd.DataFrame, paths: Sequence[Path], segments: tuple[Segment, ...], config: LogConfig
 ) -> RawLog:
-    """Group a table in our units by vehicle.
+    """Return a table in our units as a log, grouped by vehicle.
 
     Raises:
         InputError: there are too many vehicles.
     """
     check_vehicles(str(paths[0]), frame["vehicle"].nunique(), config)
-    geographic = "lat" in frame
-    usable = frame["time_ok"].to_numpy() & (frame["vehicle"] != "").to_numpy()
-    rows = frame["row"].to_numpy() if "row" in frame else np.arange(len(frame))
-    reason = np.where(frame["time_ok"].to_numpy(), "no vehicle", "stamp is not a number")
-    dropped = tuple(
-        (str(why), int(row)) for why, row in zip(reason[~usable], rows[~usable], strict=True)
+    if "row" not in frame:
+        frame = frame.assign(row=np.arange(len(frame)))
+    cause = np.where(frame["time_ok"], "no vehicle", "stamp is not a number")
+    is_usable = frame["time_ok"] & (frame["vehicle"] != "")
+    unusable = zip(cause[~is_usable], frame["row"][~is_usable], strict=True)
+    position = ("lat", "lon") if "lat" in frame else ("x", "y")
+    vehicles = tuple(
+        _observations(str(name), group, position)
+        for name, group in frame[is_usable].groupby("vehicle", sort=False)
     )
-    position = ("lat", "lon") if geographic else ("x", "y")
-    vehicles = []
-    frame = frame.assign(row=rows)[usable]
-    for name, group in frame.groupby("vehicle", sort=False):
-        vehicles.append(observations(str(name), group, position))
-    name = paths[0].stem if len(paths) == 1 else paths[0].parent.name
-    return RawLog(name, geographic, tuple(vehicles), len(rows), segments, (), dropped)
+    return RawLog(
+        name=paths[0].stem if len(paths) == 1 else paths[0].parent.name,
+        geographic="lat" in frame,
+        vehicles=vehicles,
+        rows=len(frame),
+        segments=segments,
+        dropped=tuple((str(why), int(row)) for why, row in unusable),
+    )
 
 
-def observations(name: str, group: pd.DataFrame, position: tuple[str, str]) -> Observations:
-    """Return one vehicle's rows as observations; a row is both a fix and a speed."""
+def _observations(name: str, group: pd.DataFrame, position: tuple[str, str]) -> Observations:
+    """Return the rows of one vehicle as observations."""
 
     def column(quantity: str) -> Floats:
-        return (
-            group[quantity].to_numpy(float) if quantity in group else np.full(len(group), np.nan)
-        )
+        if quantity not in group:
+            return np.full(len(group), np.nan)
+        return group[quantity].to_numpy(float)
 
-    def median(quantity: str) -> float:
-        values = column(quantity)
-        values = values[np.isfinite(values)]
-        usual = values[(values > 0.0) & (values < CLEANING.max_length_m)]
-        values = usual if len(usual) else values  # what is no size is replaced later, and said
-        return float(np.median(values)) if len(values) else math.nan
-
-    states = np.column_stack([column(quantity) for quantity in (*position, "heading", "speed")])
-    stamps: Ints = group["time"].to_numpy(np.int64)
-    rows: Ints = group["row"].to_numpy(np.int64)
-    size = median("length"), median("width")
-    kind = str(group["kind"].mode().iloc[0]) if "kind" in group else ""
     return Observations.of_rows(
-        name, stamps, states, rows, size, kind=kind, measured="speed" in group
+        name,
+        group["time"].to_numpy(np.int64),
+        np.column_stack([column(quantity) for quantity in (*position, "heading", "speed")]),
+        group["row"].to_numpy(np.int64),
+        (_typical_size(column("length")), _typical_size(column("width"))),
+        kind=str(group["kind"].mode().iloc[0]) if "kind" in group else "",
+        measured="speed" in group,
     )
 
 
-def read_messages(path: Path, before: int, config: LogConfig) -> pd.DataFrame:
-    """Read one file into the columns of the table reader: time [ns], vehicle, lat, lon, speed, heading (ours).
+def _typical_size(values: Floats) -> float:
+    """Return the median of possible sizes [m]; of all if none is possible; NaN if none is known."""
+    values = values[np.isfinite(values)]
+    possible = values[(values > 0.0) & (values < CLEANING.max_length_m)]
+    if len(possible):
+        return float(np.median(possible))
+    return float(np.median(values)) if len(values) else math.nan
+
+
+def _read_spmd(path: Path, rows_before: int, config: LogConfig) -> pd.DataFrame:
+    """Read one SPMD file in our units.
 
     Raises:
-        InputError: the file is empty or a line has not 19 fields.
+        InputError: the file is empty, or its first line does not have 19 fields.
     """
-    raw = read_text(path, before, config, sep=",", header=None, dtype=str)
-    if raw.shape[1] != len(COLUMNS):
+    raw = read_text(path, rows_before, config, sep=",", header=None, dtype=str)
+    if raw.shape[1] != len(SPMD_COLUMNS):
         raise InputError(
-            f"{path} has {raw.shape[1]} columns on line 1; basic safety messages have {len(COLUMNS)}: {', '.join(COLUMNS)}"
+            f"{path} has {raw.shape[1]} columns on line 1; basic safety messages have "
+            f"{len(SPMD_COLUMNS)}: {', '.join(SPMD_COLUMNS)}"
         )
-    raw.columns = pd.Index(COLUMNS)
+    raw.columns = pd.Index(SPMD_COLUMNS)
     raw["TxDevice"] = reals(raw["TxDevice"])
-    frame = to_numbers(raw, QUANTITIES, path)
-    stamps = reals(raw["Gentime"])  # microseconds stay exact in float64 until the year 2289
-    frame["time_ok"] = stamps.notna() & (stamps.abs() < 8e15)
-    frame["time"] = stamps.where(frame["time_ok"], 0.0).round().astype(np.int64) * 1000 + EPOCH_NS
+    frame = to_numbers(raw, _SPMD_QUANTITIES, path)
+    stamps_us = reals(raw["Gentime"])  # exact in float64 until the year 2289
+    frame["time_ok"] = stamps_us.notna() & (stamps_us.abs() < _MAX_SPMD_STAMP_US)
+    valid_us = stamps_us.where(frame["time_ok"], 0.0).round().astype(np.int64)
+    frame["time"] = valid_us * 1000 + SPMD_EPOCH_NS
     return frame

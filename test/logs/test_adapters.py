@@ -30,7 +30,7 @@ from scenario_gen.logs import LogConfig, read_log, read_raw
 def test_whose_trailer_it_is_is_said(tmp_path):
     found = read_raw([osi(tmp_path)[0]], LogConfig())
     assert (
-        "trailer 7 belongs to 8: read as a road user by itself" in found.notes
+        "trailer 7 belongs to 8: read as a separate road user" in found.notes
         and len(found.vehicles) == 3
     )
 
@@ -77,7 +77,7 @@ def test_what_was_written_is_read(tmp_path, name):
 def test_what_is_missing_is_named(tmp_path):
     path, _ = ind(tmp_path)
     (tmp_path / "00_recordingMeta.csv").unlink()
-    with pytest.raises(InputError, match=r"00_recordingMeta\.csv beside it, which is not there"):
+    with pytest.raises(InputError, match=r"00_recordingMeta\.csv in the same folder"):
         read_log(path)
     with pytest.raises(InputError, match=r"lacks columns of INTERACTION: agent_type"):
         read_log(path, LogConfig(format="interaction"))
@@ -89,7 +89,7 @@ def test_a_repeated_column_is_named(tmp_path, column):
     table = parquet.read_table(path)
     parquet.write_table(table.append_column(column, table.column(column)), path)
     with pytest.raises(
-        InputError, match=rf"scenario_s1\.parquet has more than one column '{column}'"
+        InputError, match=rf"scenario_s1\.parquet has several columns '{column}'"
     ):
         read_log(path)
 
@@ -136,7 +136,7 @@ def test_two_recordings_are_refused(tmp_path):
     (tmp_path / "vehicle_tracks_001.csv").write_bytes(
         (tmp_path / "vehicle_tracks_000.csv").read_bytes()
     )
-    with pytest.raises(InputError, match="give one at a time"):
+    with pytest.raises(InputError, match="one recording at a time"):
         read_log(tmp_path)
 
 
@@ -175,9 +175,9 @@ def test_the_unit_of_headings_of_a_scene_is_told_from_its_velocities(tmp_path):
         ),
         (
             lambda scene: scene["objects"][1]["position"].__setitem__(0, {"x": "a", "y": 0}),
-            "object 2: .*no list of numbers",
+            "object 2: .*not a list with a number",
         ),
-        (lambda scene: scene.update(objects=[1] * 20), "`objects` is no list of objects"),
+        (lambda scene: scene.update(objects=[1] * 20), "`objects` is not a list of objects"),
     ],
     ids=["key", "length", "numbers", "vehicles"],
 )
@@ -189,5 +189,5 @@ def test_a_broken_scene_is_named_with_its_object(tmp_path, change, said):
     with pytest.raises(InputError, match=f"scene.json.*{said}"):
         read_log(path)
     path.write_text(path.read_text()[:-20])
-    with pytest.raises(InputError, match=r"scene\.json is no JSON"):
+    with pytest.raises(InputError, match=r"scene\.json is not JSON"):
         read_log(path)

@@ -215,7 +215,7 @@ SAID = {  # what is read, but looks otherwise
     ),
     "kinds without a meaning": (
         lambda rows: rows.assign(type=1),
-        "column type has numbers (1), whose meaning is not known",
+        "column type has numbers (1) of unknown meaning",
     ),
     "y down": (
         lambda rows: mirrored(rows).assign(yaw_deg=np.where(rows.vehicle_id == "a", 0.0, 90.0)),
@@ -339,7 +339,7 @@ REFUSED = {  # name: what is changed, what is said, how the file is written
     ),
     "dates of another order": (
         lambda rows: rows.assign(t_s="31.08.2022 12:00"),
-        "nor a date such as 2022-08-31T12:00:00.5, but '31.08.2022 12:00'",
+        "'31.08.2022 12:00' is neither a number nor a date",
     ),
     "x, y in degrees": (
         lambda rows: geographic(rows).rename(columns={"lat_deg": "Y", "lon_deg": "X"}),

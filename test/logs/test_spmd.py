@@ -9,7 +9,7 @@ from support.log_builders import crossing, geographic
 
 from scenario_gen.base.errors import InputError
 from scenario_gen.logs import LogConfig, read_log
-from scenario_gen.logs.tables import COLUMNS, EPOCH_NS
+from scenario_gen.logs.tables import SPMD_COLUMNS, SPMD_EPOCH_NS
 
 FIRST = 270_000_000_000_000  # Gentime: microseconds since 2004-01-01, in July 2012
 
@@ -20,7 +20,7 @@ def messages(rows):
     lines = []
     for number, row in enumerate(out.itertuples()):
         heading = 90.0 if row.vehicle_id == "a" else 0.0  # degrees clockwise from north
-        fields = dict.fromkeys(COLUMNS, "0") | {
+        fields = dict.fromkeys(SPMD_COLUMNS, "0") | {
             "RxDevice": "7",
             "FileId": "1",
             "TxDevice": "11" if row.vehicle_id == "a" else "12",
@@ -32,7 +32,7 @@ def messages(rows):
             "Heading": f"{heading}",
             "Confidence": "100",
         }
-        lines.append(",".join(fields[name] for name in COLUMNS))
+        lines.append(",".join(fields[name] for name in SPMD_COLUMNS))
     return lines
 
 
@@ -41,7 +41,7 @@ def test_one_received_file(tmp_path):
     path.write_text("\n".join(messages(crossing())) + "\n")
     (encounter,) = read_log(path).encounters
     assert [vehicle.id for vehicle in encounter.vehicles] == ["11", "12"]
-    assert encounter.start_ns == EPOCH_NS + FIRST * 1000
+    assert encounter.start_ns == SPMD_EPOCH_NS + FIRST * 1000
     np.testing.assert_allclose(encounter.heading[0], 0.0, atol=0.02)
     np.testing.assert_allclose(encounter.heading[1], np.pi / 2.0, atol=0.02)
     np.testing.assert_allclose(encounter.speed[0], 8.0, atol=0.1)
@@ -60,7 +60,7 @@ def test_a_folder_of_transmitted_files(tmp_path):
 
 def test_with_a_header_it_is_a_table(tmp_path):
     path = tmp_path / "log.csv"
-    path.write_text("\n".join([",".join(COLUMNS), *messages(crossing())]) + "\n")
+    path.write_text("\n".join([",".join(SPMD_COLUMNS), *messages(crossing())]) + "\n")
     (encounter,) = read_log(path).encounters
     np.testing.assert_allclose(encounter.heading[1], np.pi / 2.0, atol=0.02)
     assert [vehicle.id for vehicle in encounter.vehicles] == ["11", "12"]

@@ -27,7 +27,7 @@ from scenario_gen.base.errors import ScenarioGenError
 from scenario_gen.logs import encounters_of, LogConfig, read_log, Streams
 from scenario_gen.logs.bag import read_streams, read_tracked, read_tracks, Topic, USED
 from scenario_gen.logs.synthetic import bundled
-from scenario_gen.logs.tables import COLUMNS
+from scenario_gen.logs.tables import SPMD_COLUMNS
 from scenario_gen.types.encounter import Encounter
 from scenario_gen.types.scenario import Scenario
 from support.harness import Target
@@ -111,7 +111,7 @@ def parquets(_folder: Path) -> list[bytes]:
 def safety_messages(_folder: Path) -> list[bytes]:
     """Basic safety messages of two units."""
     rows = on_globe(cars())
-    table = pd.DataFrame(0, index=rows.index, columns=list(COLUMNS)).astype(object)
+    table = pd.DataFrame(0, index=rows.index, columns=list(SPMD_COLUMNS)).astype(object)
     table["TxDevice"], table["Gentime"] = (
         rows["id"],
         300_000_000_000_000 + (cars()["t_s"] * 1e6).round().astype(np.int64),

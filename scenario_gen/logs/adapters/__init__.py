@@ -1,4 +1,4 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Public recordings and perception bags: one table of columns and units per format, with the source of its definition."""
+"""Readers of public recordings and perception bags, each with the source of its definition."""

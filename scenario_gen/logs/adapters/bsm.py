@@ -1,20 +1,23 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Basic safety messages (SAE J2735) in JSON, as the ODE of the US DOT and the pilots of Wyoming, Tampa and New York publish them.
+"""Basic safety messages (SAE J2735) in JSON, as published by the US DOT's ODE and pilots.
 
 | quantity | Wyoming, ODE | Tampa, newer ODE | New York (events) |
 |---|---|---|---|
-| time | metadata.recordGeneratedAt; coreData.secMark, ms of the minute | likewise | T_s, s from the event |
-| vehicle | coreData.id | likewise | likewise |
+| time | metadata.recordGeneratedAt; coreData.secMark, ms of the minute | the same | T_s, s |
+| vehicle | coreData.id | the same | the same |
 | position | position.latitude, longitude, degrees | lat, long, 1e-7 degrees | X_m east, Y_m north |
 | speed | speed, m/s | speed, 0.02 m/s; 8191: unknown | speed_mps |
-| heading, clockwise from north | heading, degrees | heading, 0.0125 degrees; 28800: unknown | heading_deg |
-| length, width | size, cm | likewise | likewise |
+| heading | heading, degrees | heading, 0.0125 degrees; 28800: unknown | heading_deg |
+| length, width | size, cm | the same | the same |
 
-The tables of Wyoming and Tampa on data.transportation.gov have the same values, in columns such as coreData_position_lat.
-Source: the samples and data dictionaries of the ITS JPO's sandbox. Messages stand one a line, in a list, or one after the other;
-each event of New York has a clock and a frame of its own, and is read as `EVENT_S` later than the one before.
+Headings are clockwise from north. The tables of Wyoming and Tampa on data.transportation.gov have
+the same values, in columns such as coreData_position_lat. A file has one message a line, a list,
+or messages one after the other. Each event of New York has its own clock and frame, and is read
+100 s later than the previous one.
+
+Source: the samples and data dictionaries of the ITS JPO's sandbox.
 """
 
 from collections.abc import Iterator, Sequence
@@ -31,10 +34,17 @@ import pandas as pd
 from scenario_gen.base.errors import guarded, InputError
 from scenario_gen.logs.config import LogConfig
 from scenario_gen.logs.raw import check_size, RawLog, Segment
-from scenario_gen.logs.tables import from_frame, LATEST_S
+from scenario_gen.logs.tables import from_frame, MAX_STAMP_S
 
-EVENT_S = 100.0  # from the beginning of an event of New York to that of the next
-MINUTE_MS = 60_000
+_EVENT_INTERVAL_S = 100.0  # between the starts of two events of New York
+_MINUTE_MS = 60_000
+_MAX_SECOND_MARK_MS = 61_000  # a leap second
+_NEXT_DOCUMENT = re.compile(r"[^\s,]")
+_UNKNOWN_SPEED = 8191
+_UNKNOWN_HEADING = 28800
+_SPEED_UNIT_MPS = 0.02
+_HEADING_UNIT_DEG = 0.0125
+
 Row = dict[str, Any]
 
 
@@ -42,7 +52,7 @@ def read(paths: Sequence[Path], config: LogConfig) -> RawLog:
     """Read files of messages that share a clock.
 
     Raises:
-        InputError: a file is broken or too large, or a message lacks what is needed; names file and message.
+        InputError: a file is damaged or too large, or a message is incomplete; names the message.
     """
     rows: list[Row] = []
     segments = []
@@ -50,125 +60,122 @@ def read(paths: Sequence[Path], config: LogConfig) -> RawLog:
         check_size(str(path), path.stat().st_size, len(rows), config)
         segments.append(Segment(len(rows), str(path), "message", 1))
         for number, record in enumerate(_records(path)):
-            with guarded(
-                f"{path}, record {number + 1} is no basic safety message that is known",
-                KeyError,
-                TypeError,
-                ValueError,
-            ):
+            problem = f"{path}, record {number + 1} is not a known basic safety message"
+            with guarded(problem, KeyError, TypeError, ValueError):
                 rows += _rows_of(record, number)
             check_size(str(path), 0, len(rows), config)
     if not rows:
-        raise InputError(f"{paths[0]} holds no messages")
+        raise InputError(f"{paths[0]} has no messages")
     frame = pd.DataFrame(rows)
     if {"lat", "x"} <= set(frame.columns):
-        raise InputError(f"{paths[0]} mixes latitude/longitude and x/y; read the files one by one")
+        raise InputError(f"{paths[0]} mixes latitude/longitude and x/y; read the files separately")
     return from_frame(frame, paths, tuple(segments), config)
 
 
 def _records(path: Path) -> Iterator[Any]:
-    """Yield the documents of a file: one, several one after the other, or the entries of a list; or the rows of a table."""
+    """Yield the documents in a file, or the rows of a table as documents."""
     if path.suffix.lower() == ".csv":
         with path.open(encoding="utf-8-sig", errors="replace", newline="") as file:
-            yield from map(_of_table, csv.DictReader(file))
+            yield from map(_document, csv.DictReader(file))
         return
     text = path.read_text(encoding="utf-8-sig", errors="replace")
-    decoder, at = json.JSONDecoder(), 0
-    while match := re.compile(r"[^\s,]").search(text, at):
+    decoder = json.JSONDecoder()
+    match = _NEXT_DOCUMENT.search(text)
+    while match:
         try:
-            found, at = decoder.raw_decode(text, match.start())
+            document, end = decoder.raw_decode(text, match.start())
         except (ValueError, RecursionError) as error:
-            raise InputError(f"{path} is no JSON: {str(error)[:200]}; copy it again") from None
-        yield from found if isinstance(found, list) else [found]
+            raise InputError(f"{path} is not JSON: {str(error)[:200]}; copy it again") from None
+        yield from document if isinstance(document, list) else [document]
+        match = _NEXT_DOCUMENT.search(text, end)
 
 
-def _of_table(row: dict[str, str]) -> Row:
-    """Return a row of a table as the document that it was made of."""
-    found = {
+def _document(row: dict[str, str]) -> Row:
+    """Return a row of a table as the message from which it was made."""
+    fields = {
         name.strip().lower(): text or None for name, text in row.items() if isinstance(name, str)
     }
-    core: Row = {name: found.get(f"coredata_{name}") for name in ("id", "speed", "heading")}
-    size, mark = found.get("coredata_size"), found.get("coredata_secmark")
-    core |= {
+    size = fields.get("coredata_size")
+    mark = fields.get("coredata_secmark")
+    latitude = float(fields.get("coredata_position_lat") or math.nan)
+    longitude = float(fields.get("coredata_position_long") or math.nan)
+    core: Row = {
+        "id": fields.get("coredata_id"),
+        "speed": fields.get("coredata_speed"),
+        "heading": fields.get("coredata_heading"),
         "size": json.loads(size) if size else {},
         "secMark": None if mark is None else float(mark),
     }
-    lat, long = (
-        float(found.get(f"coredata_position_{name}") or math.nan) for name in ("lat", "long")
-    )
-    if abs(lat) > 90.0:  # in the units of the messages
-        core |= {
-            "lat": lat,
-            "long": long,
-            "speed": core["speed"] or 8191,
-            "heading": core["heading"] or 28800,
-        }
+    if abs(latitude) > 90.0:  # in the units of the messages
+        core["lat"] = latitude
+        core["long"] = longitude
+        core["speed"] = core["speed"] or _UNKNOWN_SPEED
+        core["heading"] = core["heading"] or _UNKNOWN_HEADING
     else:
-        core["position"] = {"latitude": lat, "longitude": long}
+        core["position"] = {"latitude": latitude, "longitude": longitude}
     return {
-        "metadata": {"recordGeneratedAt": found["metadata_generatedat"]},
+        "metadata": {"recordGeneratedAt": fields["metadata_generatedat"]},
         "payload": {"data": {"coreData": core}},
     }
 
 
 def _rows_of(record: Any, number: int) -> list[Row]:
-    """Return the rows of a document: a message, or the messages of an event."""
+    """Return the rows of a message, or of all messages of an event."""
     if "bsmList" in record:
         cores = [entry["bsmRecord"]["bsmMsg"]["coreData"] for entry in record["bsmList"]]
-        return [
-            _row(
-                core,
-                core["T_s"] + number * EVENT_S,
-                {"x": core["X_m"], "y": core["Y_m"]},
-                core["speed_mps"],
-                core["heading_deg"],
-            )
-            for core in cores
-        ]
+        return [_event_row(core, number) for core in cores]
     data = record["payload"]["data"]
     core = (data.get("value", {}).get("BasicSafetyMessage") or data)["coreData"]
     seconds = _seconds(str(record["metadata"]["recordGeneratedAt"]), core.get("secMark"))
-    if "lat" in core:
-        speed, heading = float(core["speed"]), float(core["heading"])
-        place = {"lat": float(core["lat"]) * 1e-7, "lon": float(core["long"]) * 1e-7}
-        speed, heading = (
-            math.nan if speed == 8191 else speed * 0.02,
-            math.nan if heading == 28800 else heading * 0.0125,
-        )
-        return [_row(core, seconds, place, speed, heading)]
-    place = {"lat": core["position"]["latitude"], "lon": core["position"]["longitude"]}
-    return [_row(core, seconds, place, core.get("speed"), core.get("heading"))]
+    if "lat" not in core:
+        position = core["position"]
+        row = {"lat": position["latitude"], "lon": position["longitude"]}
+        row |= {"speed": core.get("speed"), "heading": core.get("heading")}
+        return [_row(core, seconds, row)]
+    speed = float(core["speed"])
+    heading = float(core["heading"])
+    row = {
+        "lat": float(core["lat"]) * 1e-7,
+        "lon": float(core["long"]) * 1e-7,
+        "speed": None if speed == _UNKNOWN_SPEED else speed * _SPEED_UNIT_MPS,
+        "heading": None if heading == _UNKNOWN_HEADING else heading * _HEADING_UNIT_DEG,
+    }
+    return [_row(core, seconds, row)]
 
 
-def _row(core: Any, seconds: float, place: Row, speed: Any, heading: Any) -> Row:
+def _event_row(core: Any, number: int) -> Row:
+    """Return the row of a message in an event of New York."""
+    row = {
+        "x": core["X_m"],
+        "y": core["Y_m"],
+        "speed": core["speed_mps"],
+        "heading": core["heading_deg"],
+    }
+    return _row(core, core["T_s"] + number * _EVENT_INTERVAL_S, row)
+
+
+def _row(core: Any, seconds: float, state: Row) -> Row:
+    """Return the row of a message in our units; None and a size of 0 become NaN."""
     size = core.get("size") or {}
-    values = {
-        **place,
-        "speed": speed,
-        "heading": heading,
-        "length": size.get("length"),
-        "width": size.get("width"),
-    }
-    row: Row = {
-        name: math.nan if value is None else float(value) for name, value in values.items()
-    }
+    row: Row = {name: math.nan if value is None else float(value) for name, value in state.items()}
     row["heading"] = math.pi / 2.0 - math.radians(row["heading"])
-    row |= {name: row[name] * 0.01 or math.nan for name in ("length", "width")}  # 0: unknown
-    known = math.isfinite(seconds) and abs(seconds) < LATEST_S
-    return row | {
-        "time": np.int64(round(seconds * 1e9)) if known else np.int64(0),
-        "time_ok": known,
-        "vehicle": str(core["id"]),
-    }
+    for name in ("length", "width"):
+        row[name] = float(size.get(name) or math.nan) * 0.01
+    is_valid = math.isfinite(seconds) and abs(seconds) < MAX_STAMP_S
+    row["time"] = np.int64(round(seconds * 1e9) if is_valid else 0)
+    row["time_ok"] = is_valid
+    row["vehicle"] = str(core["id"])
+    return row
 
 
-def _seconds(generated: str, mark: Any) -> float:
-    """Return the stamp [s since 1970] of a message whose record bears a date, perhaps of another zone, and ms of the minute."""
+def _seconds(generated: str, second_mark: Any) -> float:
+    """Return the stamp [s since 1970] by the date of a record and the milliseconds of the minute."""
     date = pd.to_datetime(re.sub(r"\s*\[.*", "", generated), utc=True, errors="coerce")
     if pd.isna(date):
         return math.nan
     milliseconds = int(date.value) // 1_000_000
-    if mark is not None and 0 <= int(mark) < 61_000:
-        off = (int(mark) - milliseconds) % MINUTE_MS
-        milliseconds += off - MINUTE_MS * (off > MINUTE_MS / 2)
+    if second_mark is not None and 0 <= int(second_mark) < _MAX_SECOND_MARK_MS:
+        half_minute = _MINUTE_MS // 2
+        lead = (int(second_mark) - milliseconds + half_minute) % _MINUTE_MS - half_minute
+        milliseconds += lead
     return milliseconds / 1000.0

@@ -1,24 +1,27 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Scenarios of the Waymo Open Motion Dataset as Nocturne and GPUDrive take them (JSON).
+"""Scenarios of the Waymo Open Motion Dataset for Nocturne and GPUDrive (JSON).
 
 | quantity | key of an object | unit |
 |---|---|---|
-| vehicle | id; without it the object's place in the list | |
+| vehicle | id, or else its index in the list | |
 | class | type: vehicle, pedestrian, cyclist | |
 | length, width | length, width | m |
-| time | place in the lists, times 0.1 s | |
-| there | valid | |
-| position | position: x, y; the footprint's middle | m |
-| heading | heading | degrees (Nocturne) or rad (GPUDrive), counter-clockwise from +x |
+| time | index in the lists, times 0.1 s | |
+| presence | valid | |
+| position | position: x, y; the centre of the footprint | m |
+| heading | heading, counter-clockwise from +x | degrees (Nocturne) or rad (GPUDrive) |
 | speed | velocity: x, y | m/s |
 
-Source: the documentation of Nocturne's and of GPUDrive's scenes. Which unit headings have is told from the velocities.
+The unit of the headings is determined from the velocities.
+
+Source: the documentation of Nocturne's and of GPUDrive's scenes.
 """
 
 from collections.abc import Mapping, Sequence
 import json
+import math
 from pathlib import Path
 from typing import Any
 
@@ -36,108 +39,128 @@ from scenario_gen.logs.raw import (
 )
 from scenario_gen.numerics import Floats
 
-STEP_NS = 100_000_000
-MOVES = 2.0  # m/s from which on a velocity has the vehicle's direction
-PER_OBJECT = 1000.0  # m/s, m: beyond, a value is a mark of absence
+_STEP_NS = 100_000_000
+_MOVING_MPS = 2.0  # a faster vehicle has the direction of its velocity
+_MAX_SPEED_MPS = 1000.0  # higher values mark absence
 
 
 def read(paths: Sequence[Path], config: LogConfig) -> RawLog:
     """Read the vehicles of one scenario.
 
     Raises:
-        InputError: it is broken, has no vehicles, or an object lacks what is needed; names file and object.
+        InputError: the file is damaged, has no objects, or an object lacks a key; names the
+            object.
     """
     path = only_file(paths, config)
+    objects = _objects(path)
+    check_vehicles(str(path), len(objects), config)
+    names = [str(item.get("id", k)) for k, item in enumerate(objects)]
+    if len(set(names)) < len(names):
+        names = [str(k) for k in range(len(objects))]
+    states = []
+    n_rows = 0
+    for k, item in enumerate(objects):
+        states.append(_states(f"{path}, object {k + 1}", item))
+        n_rows += len(states[-1])
+        check_size(str(path), 0, n_rows, config)
+
+    are_degrees = _are_headings_degrees(np.concatenate(states))
+    vehicles = []
+    first_row = 0
+    for name, item, state in zip(names, objects, states, strict=True):
+        vehicles.append(_observations(name, item, state, first_row, are_degrees))
+        first_row += len(state)
+    unit = "degrees" if are_degrees else "rad"
+    notes = (f"read as a scene of Nocturne or GPUDrive, headings in {unit}",)
+    segment = Segment(0, str(path), "state", 1)
+    return RawLog(path.stem, False, tuple(vehicles), n_rows, (segment,), notes)
+
+
+def _objects(path: Path) -> list[dict[str, Any]]:
+    """Return the objects of a scene.
+
+    Raises:
+        InputError: the file is not JSON, or has no objects.
+    """
     try:
         scene = json.loads(path.read_bytes())
     except (ValueError, RecursionError) as error:
-        raise InputError(f"{path} is no JSON: {str(error)[:200]}; copy it again") from None
+        raise InputError(f"{path} is not JSON: {str(error)[:200]}; copy it again") from None
     objects = scene.get("objects") if isinstance(scene, dict) else None
-    if not isinstance(objects, list) or not all(isinstance(one, dict) for one in objects):
-        raise InputError(f"{path}: `objects` is no list of objects")
-    check_vehicles(str(path), len(objects), config)
-    found = list(enumerate(objects))
-    if not found:
-        raise InputError(f"{path}: no object in it")
-    names = [str(one.get("id", k)) for k, one in found]
-    if len(set(names)) < len(names):
-        names = [str(k) for k, _ in found]
-    states, rows = [], 0
-    for k, one in found:
-        states.append(_states(f"{path}, object {k + 1}", one))
-        rows += len(states[-1])
-        check_size(str(path), 0, rows, config)
-    degrees = _in_degrees(np.concatenate(states))
-    vehicles, row = [], 0
-    for name, (_, one), own in zip(names, found, states, strict=True):
-        there = np.flatnonzero(own[:, 5] > 0.0)
-        heading = np.radians(own[:, 2]) if degrees else own[:, 2]
-        values = np.column_stack([own[:, :2], heading, np.hypot(own[:, 3], own[:, 4])])[there]
-        size = (_number(one, "length"), _number(one, "width"))
-        vehicles.append(
-            Observations.of_rows(
-                name,
-                there.astype(np.int64) * STEP_NS,
-                values,
-                there + row,
-                size,
-                kind=str(one.get("type", "")),
-            )
-        )
-        row += len(own)
-    unit = "degrees" if degrees else "rad"
-    notes = (f"read as a scene of Nocturne or GPUDrive, headings in {unit}",)
-    return RawLog(
-        path.stem, False, tuple(vehicles), rows, (Segment(0, str(path), "state", 1),), notes
+    if not isinstance(objects, list) or not all(isinstance(item, dict) for item in objects):
+        raise InputError(f"{path}: `objects` is not a list of objects")
+    if not objects:
+        raise InputError(f"{path}: it has no object")
+    return objects
+
+
+def _observations(
+    name: str, item: Mapping[str, Any], states: Floats, first_row: int, are_degrees: bool
+) -> Observations:
+    """Return the states of an object at the steps at which it is present."""
+    steps = np.flatnonzero(states[:, 5] > 0.0)
+    heading = np.radians(states[:, 2]) if are_degrees else states[:, 2]
+    speed = np.hypot(states[:, 3], states[:, 4])
+    columns = np.column_stack([states[:, :2], heading, speed])
+    return Observations.of_rows(
+        name,
+        steps * _STEP_NS,
+        columns[steps],
+        first_row + steps,
+        (_positive(item, "length"), _positive(item, "width")),
+        kind=str(item.get("type", "")),
     )
 
 
-def _states(place: str, one: Mapping[str, Any]) -> Floats:
-    """Return x, y [m], heading (of either unit), velocity x, y [m/s] and whether it is there, (T, 6).
+def _states(place: str, item: Mapping[str, Any]) -> Floats:
+    """Return x, y [m], heading (of either unit), velocity x, y [m/s], presence (T, 6).
 
     Raises:
-        InputError: a list is missing, is no list of numbers, or has another length than `valid`.
+        InputError: a list is missing, is not numeric, or differs in length from `valid`.
     """
     try:
-        valid = np.array([bool(there) for there in one["valid"]], dtype=float)
-        position = np.array(
-            [(step["x"], step["y"]) for step in one["position"]], dtype=float
-        ).reshape(-1, 2)
-        velocity = np.array(
-            [(step["x"], step["y"]) for step in one["velocity"]], dtype=float
-        ).reshape(-1, 2)
-        heading = np.array(list(one["heading"]), dtype=float).reshape(-1)
+        valid = np.array([bool(flag) for flag in item["valid"]], dtype=float)
+        position = _vectors(item["position"])
+        velocity = _vectors(item["velocity"])
+        heading = np.array(list(item["heading"]), dtype=float).reshape(-1)
     except KeyError as error:
         raise InputError(f"{place} has no {error.args[0]!r}") from None
     except (TypeError, ValueError, IndexError, OverflowError):
         raise InputError(
-            f"{place}: position, velocity, heading or valid is no list of numbers, one for each step"
+            f"{place}: position, velocity, heading or valid is not a list with a number for each "
+            "step"
         ) from None
     lengths = {len(valid), len(position), len(velocity), len(heading)}
     if len(lengths) > 1:
         raise InputError(
-            f"{place}: position, velocity, heading and valid have {sorted(lengths)} entries; one for each step is needed"
+            f"{place}: position, velocity, heading and valid have {sorted(lengths)} entries; one "
+            "for each step is needed"
         )
     return np.column_stack([position, heading, velocity, valid])
 
 
-def _in_degrees(states: Floats) -> bool:
-    """Return whether headings agree better with the velocities if they are taken for degrees."""
-    heading, velocity = states[:, 2], states[:, 3:5]
-    speed = np.hypot(velocity[:, 0], velocity[:, 1])
-    moves = (states[:, 5] > 0.0) & (speed > MOVES) & (speed < PER_OBJECT) & np.isfinite(heading)
-    if not moves.any():
-        there = states[states[:, 5] > 0.0, 2]
-        return bool((np.abs(there) > 2.0 * np.pi).any())
-    course = np.arctan2(velocity[moves, 1], velocity[moves, 0])
-    agree = [
-        float(np.cos(course - taken).mean())
-        for taken in (np.radians(heading[moves]), heading[moves])
-    ]
-    return agree[0] > agree[1]
+def _vectors(entries: Any) -> Floats:
+    """Return vectors (T, 2) of a list of objects with x and y."""
+    vectors = [(entry["x"], entry["y"]) for entry in entries]
+    return np.array(vectors, dtype=float).reshape(-1, 2)
 
 
-def _number(one: Mapping[str, Any], key: str) -> float:
-    """Return a number of an object, NaN if it is missing or none."""
-    value = one.get(key)
-    return float(value) if isinstance(value, (int, float)) and value > 0.0 else float("nan")
+def _are_headings_degrees(states: Floats) -> bool:
+    """Return whether headings agree better with the velocities as degrees than as radians."""
+    is_present = states[:, 5] > 0.0
+    heading = states[:, 2]
+    speed = np.hypot(states[:, 3], states[:, 4])
+    is_moving = (speed > _MOVING_MPS) & (speed < _MAX_SPEED_MPS)
+    rows = is_present & is_moving & np.isfinite(heading)
+    if not rows.any():
+        return bool((np.abs(heading[is_present]) > 2.0 * np.pi).any())
+    course = np.arctan2(states[rows, 4], states[rows, 3])
+    as_degrees = float(np.cos(course - np.radians(heading[rows])).mean())
+    as_radians = float(np.cos(course - heading[rows]).mean())
+    return as_degrees > as_radians
+
+
+def _positive(item: Mapping[str, Any], key: str) -> float:
+    """Return a positive number of an object, NaN if it has none."""
+    value = item.get(key)
+    return float(value) if isinstance(value, (int, float)) and value > 0.0 else math.nan

@@ -6,14 +6,14 @@
 | quantity | element | unit |
 |---|---|---|
 | vehicle | Entities/ScenarioObject: attribute name | |
-| class | Vehicle: vehicleCategory; Pedestrian: pedestrianCategory; in our own files the name | |
+| class | Vehicle: vehicleCategory; Pedestrian: pedestrianCategory; in our files the name | |
 | length, width | BoundingBox/Dimensions | m |
-| time | Polyline/Vertex: time, by Timing: scale, offset; relative ones from when the event's trigger fires | s |
-| position | Vertex/Position/WorldPosition: x, y of the rear axle, from which BoundingBox/Center says where the middle is | m |
-| heading | WorldPosition: h, counter-clockwise from +x; that of the path where it is missing | rad |
-| speed | our own files' property `speed_mps` | m/s |
+| time | Polyline/Vertex: time, with Timing: scale, offset; if relative, from the trigger | s |
+| position | Vertex/Position/WorldPosition: x, y of the rear axle; BoundingBox/Center | m |
+| heading | WorldPosition: h, counter-clockwise from +x; if missing, that of the path | rad |
+| speed | property `speed_mps` of our files | m/s |
 
-Without a time reference the first speed of the vehicle, else the vertices' times, count.
+Without a time reference the vehicle's first speed counts, or else the times of the vertices.
 
 Source: ASAM OpenSCENARIO XML 1.2.
 """
@@ -21,6 +21,7 @@ Source: ASAM OpenSCENARIO XML 1.2.
 from collections.abc import Iterator, Sequence
 import math
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
@@ -41,15 +42,30 @@ from scenario_gen.numerics.plane import edge_lengths, place
 from scenario_gen.types import VEHICLE_TYPES
 
 OPENSCENARIO_SPEEDS = "speed_mps"
-"""Name of a vehicle's property that holds its speed at each vertex, for which the format has no place."""
-_FOLLOWS = "PrivateAction/RoutingAction/FollowTrajectoryAction"
+"""Name of a vehicle's property with its speed at each vertex, which the format cannot express."""
+
+_PRIVATE_ACTIONS = "Storyboard/Init/Actions/Private"
+_FOLLOW_ACTION = "PrivateAction/RoutingAction/FollowTrajectoryAction"
+_SPEED_TARGET = (
+    "PrivateAction/LongitudinalAction/SpeedAction/SpeedActionTarget/AbsoluteTargetSpeed"
+)
+_TIME_CONDITION = "StartTrigger/ConditionGroup/Condition/ByValueCondition/SimulationTimeCondition"
+
+
+class _Follower(NamedTuple):
+    """A vehicle that follows a trajectory from a time [s] on."""
+
+    vehicle: str
+    action: Element
+    start_s: float
 
 
 def read(paths: Sequence[Path], config: LogConfig) -> RawLog:
     """Read the trajectories of one scenario.
 
     Raises:
-        InputError: it is broken, or no vehicle follows a trajectory that can be read; names file and line.
+        InputError: the file is damaged, or no vehicle follows a readable trajectory; names the
+            line.
     """
     path = only_file(paths, config)
     root = read_xml(path, str(path))
@@ -59,162 +75,183 @@ def read(paths: Sequence[Path], config: LogConfig) -> RawLog:
     notes = ["read as OpenSCENARIO"]
     vehicles = _vehicles(root, notes)
     check_vehicles(str(path), len(vehicles), config)
-    speeds = {
-        private.attribute("entityRef"): target.number("value")
-        for private in root.findall("Storyboard/Init/Actions/Private")
-        for target in private.findall(
-            "PrivateAction/LongitudinalAction/SpeedAction/SpeedActionTarget/AbsoluteTargetSpeed"
-        )
-    }
-    seen: dict[str, Observations] = {}
-    rows = 0
-    for name, follow, start in _followers(root):
-        if name not in vehicles or name in seen:
+    speeds = _first_speeds(root)
+
+    observations: dict[str, Observations] = {}
+    n_rows = 0
+    for follower in _followers(root):
+        name = follower.vehicle
+        if name not in vehicles or name in observations:
             continue
         try:
-            seen[name] = _observations(
-                follow, name, vehicles[name], start, (speeds.get(name, 0.0), rows)
-            )
+            observed = _observations(follower, vehicles[name], speeds.get(name, 0.0), n_rows)
         except InputError as error:
             notes.append(f"{name} left out: {error}")
             del vehicles[name]
             continue
-        rows += len(seen[name].fix)
-        check_size(str(path), 0, rows, config)
-        if follow.find("TimeReference/Timing") is None:
+        observations[name] = observed
+        n_rows += len(observed.fix)
+        check_size(str(path), 0, n_rows, config)
+        if follower.action.find("TimeReference/Timing") is None:
             notes.append(
-                f"{name} follows its trajectory without a time reference: its first speed, or its vertices' times count"
+                f"{name} follows its trajectory without a time reference: its first speed, or the "
+                "times of its vertices are used"
             )
     notes += [
-        f"{name} left out: it follows no trajectory" for name in vehicles if name not in seen
+        f"{name} left out: it follows no trajectory"
+        for name in vehicles
+        if name not in observations
     ]
-    if not seen:
-        raise InputError(f"{path}: no vehicle with a trajectory in it; {'; '.join(notes[1:])}")
-    return RawLog(
-        path.stem,
-        False,
-        tuple(seen.values()),
-        rows,
-        (Segment(0, str(path), "vertex", 1),),
-        tuple(notes),
-    )
+    if not observations:
+        raise InputError(f"{path}: no vehicle has a trajectory; {'; '.join(notes[1:])}")
+    segment = Segment(0, str(path), "vertex", 1)
+    return RawLog(path.stem, False, tuple(observations.values()), n_rows, (segment,), tuple(notes))
 
 
 def _vehicles(root: Element, notes: list[str]) -> dict[str, Element]:
-    """Return the vehicles by name; who is none that is read is noted."""
+    """Return the vehicles by name; notes on others are appended."""
     vehicles: dict[str, Element] = {}
     for entity in root.findall("Entities/ScenarioObject"):
-        name, vehicle = entity.attribute("name"), entity.first_of("Vehicle", "Pedestrian")
+        name = entity.attribute("name")
+        vehicle = entity.first_of("Vehicle", "Pedestrian")
         if vehicle is None or vehicle.find("BoundingBox") is None:
             notes.append(
-                f"{name} left out: it is no road user with a bounding box in this file or its catalogs"
+                f"{name} left out: it is not a road user with a bounding box, in this file or its "
+                "catalogs"
             )
-        else:
-            vehicles[name] = vehicle
-            notes += [
-                f"trailer {one.attribute('name')} of {name} left out: it is part of it"
-                for one in vehicle.findall("Trailer/Trailer")
-            ]
-            parts = vehicle.findall("Trailer/TrailerRef")
-            notes += [
-                f"trailer {one.attribute('entityRef')} belongs to {name}: read as a road user by itself"
-                for one in parts
-            ]
+            continue
+        vehicles[name] = vehicle
+        notes += [
+            f"trailer {trailer.attribute('name')} left out: it is part of {name}"
+            for trailer in vehicle.findall("Trailer/Trailer")
+        ]
+        notes += [
+            f"trailer {trailer.attribute('entityRef')} belongs to {name}: read as a separate "
+            "road user"
+            for trailer in vehicle.findall("Trailer/TrailerRef")
+        ]
     return vehicles
 
 
+def _first_speeds(root: Element) -> dict[str, float]:
+    """Return the first speeds [m/s] by vehicle."""
+    return {
+        private.attribute("entityRef"): target.number("value")
+        for private in root.findall(_PRIVATE_ACTIONS)
+        for target in private.findall(_SPEED_TARGET)
+    }
+
+
 def _category(entity: Element) -> str:
-    """Return what a file calls the type of a road user: its name where that is a type of the category, as in our own files."""
-    named = entity.get("name", "")
-    key = {"Vehicle": "vehicleCategory", "Pedestrian": "pedestrianCategory"}[entity.tag]
+    """Return the type of a road user in the file.
+
+    Our own files have a more precise type as the name, if it suits the category.
+    """
+    key = "vehicleCategory" if entity.tag == "Vehicle" else "pedestrianCategory"
     category = str(entity.get(key, entity.tag))
-    return (
-        named
-        if named in VEHICLE_TYPES and VEHICLE_TYPES[named].openscenario == category
-        else category
-    )
+    name = str(entity.get("name", ""))
+    if name in VEHICLE_TYPES and VEHICLE_TYPES[name].openscenario == category:
+        return name
+    return category
 
 
-def _followers(root: Element) -> Iterator[tuple[str, Element, float]]:
-    """Yield who follows a trajectory, the action, and the second at which it begins; 0 where that is no matter of time."""
-    for private in root.findall("Storyboard/Init/Actions/Private"):
-        yield from (
-            (private.attribute("entityRef"), follow, 0.0) for follow in private.findall(_FOLLOWS)
-        )
+def _followers(root: Element) -> Iterator[_Follower]:
+    """Yield the vehicles that follow trajectories."""
+    for private in root.findall(_PRIVATE_ACTIONS):
+        for action in private.findall(_FOLLOW_ACTION):
+            yield _Follower(private.attribute("entityRef"), action, 0.0)
     for group in root.findall("Storyboard/Story/Act/ManeuverGroup"):
         for event in group.findall("Maneuver/Event"):
-            conditions = event.findall(
-                "StartTrigger/ConditionGroup/Condition/ByValueCondition/SimulationTimeCondition"
-            )
-            start = conditions[0].number("value") if conditions else 0.0
-            for follow in event.findall(f"Action/{_FOLLOWS}"):
-                yield from (
-                    (actor.attribute("entityRef"), follow, start)
-                    for actor in group.findall("Actors/EntityRef")
-                )
+            conditions = event.findall(_TIME_CONDITION)
+            start_s = conditions[0].number("value") if conditions else 0.0
+            for action in event.findall(f"Action/{_FOLLOW_ACTION}"):
+                for actor in group.findall("Actors/EntityRef"):
+                    yield _Follower(actor.attribute("entityRef"), action, start_s)
 
 
 def _observations(
-    follow: Element, name: str, vehicle: Element, start: float, given: tuple[float, int]
+    follower: _Follower, vehicle: Element, first_speed: float, first_row: int
 ) -> Observations:
-    """Return where a vehicle is that follows a trajectory.
+    """Return the motion of a vehicle that follows a trajectory.
 
     Args:
-        follow: the action.
-        name: of the vehicle.
-        vehicle: with its bounding box.
-        start: seconds at which the action begins.
-        given: its first speed [m/s], 0 if it has none; the row of its first vertex.
+        follower: the vehicle's name, and the action.
+        vehicle: has the bounding box.
+        first_speed: [m/s]; 0 if unknown.
+        first_row: of its vertices.
+
+    Raises:
+        InputError: an element is missing, or the vertices have no times.
     """
-    trajectory = follow.find("TrajectoryRef/Trajectory")
+    action = follower.action
+    trajectory = action.find("TrajectoryRef/Trajectory")
     if trajectory is None:  # OpenSCENARIO 1.0
-        trajectory = follow.child("Trajectory")
-    rows = []
-    for vertex in trajectory.child("Shape/Polyline").findall("Vertex"):
-        world = vertex.child("Position/WorldPosition")
-        rows.append(
-            (
-                vertex.number("time", math.nan),
-                world.number("x"),
-                world.number("y"),
-                world.number("h", math.nan),
-            )
-        )
-    if len(rows) < 2:
+        trajectory = action.child("Trajectory")
+    vertices = np.array(
+        [_vertex(vertex) for vertex in trajectory.child("Shape/Polyline").findall("Vertex")]
+    )
+    if len(vertices) < 2:
         raise InputError(
-            f"{follow.place}: its polyline has {len(rows)} vertices; at least 2 are needed"
+            f"{action.place}: its polyline has {len(vertices)} vertices; at least 2 are needed"
         )
-    (time, x, y, heading), (speed, first) = np.array(rows).T, given
-    xy, timing = np.column_stack((x, y)), follow.find("TimeReference/Timing")
+    xy = vertices[:, 1:3]
+    step = np.gradient(xy, axis=0)
+    course = np.arctan2(step[:, 1], step[:, 0])
+    heading = np.where(np.isnan(vertices[:, 3]), course, vertices[:, 3])
+    seconds = _times(follower, vertices[:, 0], xy, first_speed)
+
+    box = vehicle.child("BoundingBox")
+    center = box.child("Center")
+    size = box.child("Dimensions")
+    poses = np.column_stack((xy, heading))
+    position = place(poses, center.number("x"), center.number("y"))
+    speeds = _recorded_speeds(vehicle, len(vertices))
+    known_speeds = np.zeros(len(vertices)) if speeds is None else speeds
+    return Observations.of_rows(
+        follower.vehicle,
+        np.round(seconds * 1e9).astype(np.int64),
+        np.column_stack((position, heading, known_speeds)),
+        np.arange(first_row, first_row + len(vertices)),
+        (size.number("length"), size.number("width")),
+        kind=_category(vehicle),
+        measured=speeds is not None,
+    )
+
+
+def _vertex(vertex: Element) -> tuple[float, float, float, float]:
+    """Return time, x, y and heading of a vertex; NaN for an unknown time or heading."""
+    world = vertex.child("Position/WorldPosition")
+    time = vertex.number("time", math.nan)
+    return time, world.number("x"), world.number("y"), world.number("h", math.nan)
+
+
+def _times(follower: _Follower, time: Floats, xy: Floats, first_speed: float) -> Floats:
+    """Return the times [s] of vertices (K,), by the time reference or the first speed.
+
+    Raises:
+        InputError: they are unknown.
+    """
+    timing = follower.action.find("TimeReference/Timing")
     if timing is not None:
-        from_start = start if timing.attribute("domainAbsoluteRelative") == "relative" else 0.0
-        time = time * timing.number("scale") + timing.number("offset") + from_start
-    elif speed > 0.0:
-        time = start + np.concatenate(([0.0], np.cumsum(edge_lengths(xy)))) / speed
+        is_relative = timing.attribute("domainAbsoluteRelative") == "relative"
+        origin = timing.number("offset") + (follower.start_s if is_relative else 0.0)
+        time = time * timing.number("scale") + origin
+    elif first_speed > 0.0:
+        distance = np.concatenate(([0.0], np.cumsum(edge_lengths(xy))))
+        time = follower.start_s + distance / first_speed
     if not np.isfinite(time).all():
         raise InputError(
-            f"{follow.place}: its vertices have no times, and the vehicle has no first speed"
+            f"{follower.action.place}: its vertices have no times, and the vehicle no first speed"
         )
-    step = np.gradient(xy, axis=0)
-    heading = np.where(np.isnan(heading), np.arctan2(step[:, 1], step[:, 0]), heading)
-    center, size = vehicle.child("BoundingBox/Center"), vehicle.child("BoundingBox/Dimensions")
-    middle = place(np.column_stack((xy, heading)), center.number("x"), center.number("y"))
-    speeds = _own_speeds(vehicle, len(rows))
-    states = np.column_stack(
-        (middle, heading, speeds if speeds is not None else np.zeros(len(rows)))
-    )
-    return Observations.of_rows(
-        name, np.round(time * 1e9).astype(np.int64), states, np.arange(first, first + len(rows)),
-        (size.number("length"), size.number("width")), kind=_category(vehicle), measured=speeds is not None,
-    )  # fmt: skip
+    return time
 
 
-def _own_speeds(vehicle: Element, count: int) -> Floats | None:
-    """Return the speeds (K,) [m/s] that a file of ours has as a property; None if it has none, damaged ones or not so many."""
-    for own in vehicle.findall("Properties/Property"):
-        if own.get("name") == OPENSCENARIO_SPEEDS:
+def _recorded_speeds(vehicle: Element, count: int) -> Floats | None:
+    """Return the speeds (K,) [m/s] in a property of our files; None if missing or damaged."""
+    for entry in vehicle.findall("Properties/Property"):
+        if entry.get("name") == OPENSCENARIO_SPEEDS:
             try:
-                speeds = np.array(own.attribute("value").split(), dtype=np.float64)
+                speeds = np.array(entry.attribute("value").split(), dtype=np.float64)
             except ValueError:
                 return None
             return speeds if len(speeds) == count and np.isfinite(speeds).all() else None

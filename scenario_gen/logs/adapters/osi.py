@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Traces of ASAM OSI in MCAP files, as omega-prime writes them: the moving objects of type vehicle of GroundTruth messages.
+"""Traces of ASAM OSI in MCAP files, as omega-prime writes them: moving objects of GroundTruth.
 
 | quantity | field | unit |
 |---|---|---|
@@ -13,8 +13,10 @@
 | heading | base.orientation.yaw | rad, counter-clockwise from +x |
 | speed | base.velocity.x, y | m/s |
 
-Source: OSI 3.8, osi_groundtruth.proto and osi_object.proto. Coordinates are read as they stand: `proj_string` is not applied. The
-messages become the columns of omega-prime's table, and are read as it is (`data_sets.DATA_SETS`).
+Coordinates are not projected: `proj_string` is not applied. The messages become omega-prime's
+table, which is read as in `data_sets.DATA_SETS`.
+
+Source: OSI 3.8, osi_groundtruth.proto and osi_object.proto.
 """
 
 from collections.abc import Iterator, Sequence
@@ -37,66 +39,54 @@ from scenario_gen.logs.config import listed, LogConfig
 from scenario_gen.logs.raw import check_size, RawLog
 
 _MESSAGE_TYPES = ("osi3.GroundTruth", "GroundTruth")
-LATEST = 9_000_000_000  # seconds that a stamp in 64 bits of nanoseconds can be
-COLUMNS = (
-    "total_nanos",
-    "idx",
-    "x",
-    "y",
-    "vel_x",
-    "vel_y",
-    "yaw",
-    "length",
-    "width",
-    "type",
-    "subtype",
-)
+_MAX_STAMP_S = 9_000_000_000  # in 64 bits of nanoseconds
+_COLUMNS = ["total_nanos", "idx", "x", "y", "vel_x", "vel_y", "yaw", "length", "width", "type", "subtype"]
 Row = tuple[int, str, float, float, float, float, float, float, float, int, int]
 
 
 def read(paths: Sequence[Path], config: LogConfig) -> RawLog:
-    """Read the vehicles of one trace.
+    """Read the moving objects of one trace.
 
     Raises:
-        InputError: it is damaged or too large, has no GroundTruth messages, or an object lacks its number or its position; names
-            the file, and the message.
+        InputError: the file is damaged or too large, has no GroundTruth messages, or an object
+            has no id or position; names the message.
     """
     trailers: dict[str, str] = {}
     log = tracks.read(paths, config, name="omega_prime", load=partial(_table, trailers))
     notes = (
-        f"trailer {one} belongs to {owner}: read as a road user by itself"
-        for one, owner in trailers.items()
+        f"trailer {trailer} belongs to {owner}: read as a separate road user"
+        for trailer, owner in trailers.items()
     )
     return replace(log, notes=(*log.notes, *notes))
 
 
 def _table(
-    trailers: dict[str, str], path: Path, _: DataSet, before: int, config: LogConfig
+    trailers: dict[str, str], path: Path, _: DataSet, rows_before: int, config: LogConfig
 ) -> pd.DataFrame:
-    """Return the moving objects of all messages as omega-prime's table; without velocities where no object has any.
+    """Return the moving objects as omega-prime's table; without velocities if none has any.
 
-    Whose `trailers` there are, by their numbers, is written.
+    The owners of `trailers` are added, by their ids.
     """
     rows: list[Row] = []
-    offset: Any = None
-    for k, message in enumerate(_messages(path, config)):
-        place = f"{path}, message {k + 1}"
-        offset = _offset(message) if k == 0 else offset
-        if _offset(message) != offset:
+    first_offset: Any = None
+    for number, message in enumerate(_messages(path, config), 1):
+        place = f"{path}, message {number}"
+        offset = _frame_offset(message)
+        first_offset = offset if number == 1 else first_offset
+        if offset != first_offset:
             raise InputError(
-                f"{place}: its proj_frame_offset is another than before; coordinates of one frame are read"
+                f"{place}: its proj_frame_offset differs from that of the first message; only one "
+                "frame can be read"
             )
         rows += _rows(message, place)
-        pulling = ((thing, thing.vehicle_classification) for thing in message.moving_object)
-        trailers |= {
-            str(kind.trailer_id.value): str(thing.id.value)
-            for thing, kind in pulling
-            if kind is not None and kind.trailer_id
-        }
-        check_size(str(path), 0, before + len(rows), config)
+        for moving in message.moving_object:
+            kind = moving.vehicle_classification
+            if kind is not None and kind.trailer_id:
+                trailers[str(kind.trailer_id.value)] = str(moving.id.value)
+        check_size(str(path), 0, rows_before + len(rows), config)
     if not rows:
-        raise InputError(f"{path}: no moving object in any of its messages")
-    frame = pd.DataFrame(rows, columns=pd.Index(COLUMNS))
+        raise InputError(f"{path}: none of its messages has a moving object")
+    frame = pd.DataFrame(rows, columns=pd.Index(_COLUMNS))
     return frame.drop(columns=["vel_x", "vel_y"]) if frame["vel_x"].isna().all() else frame
 
 
@@ -136,42 +126,52 @@ def _channel(file: McapFile, path: Path, config: LogConfig) -> int:
     raise InputError(f"{path} has {listing or 'no topics'}; {remedy}")
 
 
-def _offset(message: Any) -> tuple[float, float, float] | None:
-    """Return x, y [m] and yaw [rad] of a message's frame in its projection; None if they are not stated."""
+def _frame_offset(message: Any) -> tuple[float, float, float] | None:
+    """Return x, y [m] and yaw [rad] of a message's frame in its projection; None if unknown."""
     offset = message.proj_frame_offset
     if offset is None:
         return None
-    place = offset.position
-    return (0.0, 0.0, offset.yaw) if place is None else (place.x, place.y, offset.yaw)
+    position = offset.position
+    if position is None:
+        return 0.0, 0.0, offset.yaw
+    return position.x, position.y, offset.yaw
 
 
 def _rows(message: Any, place: str) -> Iterator[Row]:
     """Yield a row for each moving object of a message.
 
     Raises:
-        InputError: the message has no stamp, or one that is beyond all times; an object has no number or no position.
+        InputError: the message has no valid stamp, or an object has no id or position.
     """
     stamp = message.timestamp
-    if stamp is None or not 0 <= stamp.seconds < LATEST:
-        raise InputError(
-            f"{place}: {'no timestamp' if stamp is None else f'a timestamp of {stamp.seconds} s'}; 0 to 9e9 s is read"
-        )
-    nanos = stamp.seconds * 1_000_000_000 + stamp.nanos
-    for n, thing in enumerate(message.moving_object):
-        base = thing.base
-        if thing.id is None or base is None or base.position is None:
-            lack = "id" if thing.id is None else "base.position"
-            raise InputError(f"{place}: moving object {n + 1} has no {lack}")
-        kind = thing.vehicle_classification
+    if stamp is None or not 0 <= stamp.seconds < _MAX_STAMP_S:
+        found = "no timestamp" if stamp is None else f"a timestamp of {stamp.seconds} s"
+        raise InputError(f"{place}: {found}; 0 to 9e9 s can be read")
+    nanoseconds = stamp.seconds * 1_000_000_000 + stamp.nanos
+    for number, moving in enumerate(message.moving_object, 1):
+        base = moving.base
+        if moving.id is None or base is None or base.position is None:
+            missing = "id" if moving.id is None else "base.position"
+            raise InputError(f"{place}: moving object {number} has no {missing}")
+        kind = moving.vehicle_classification
+        velocity_x, velocity_y = _fields(base.velocity, "x", "y")
+        (yaw,) = _fields(base.orientation, "yaw")
+        length, width = _fields(base.dimension, "length", "width")
         yield (
-            *(nanos, str(thing.id.value), base.position.x, base.position.y),
-            *_of(base.velocity, "x", "y"),
-            *_of(base.orientation, "yaw"),
-            *_of(base.dimension, "length", "width"),
-            *(int(thing.type), 0 if kind is None else int(kind.type)),
+            nanoseconds,
+            str(moving.id.value),
+            base.position.x,
+            base.position.y,
+            velocity_x,
+            velocity_y,
+            yaw,
+            length,
+            width,
+            int(moving.type),
+            0 if kind is None else int(kind.type),
         )
 
 
-def _of(part: Any, *names: str) -> tuple[float, ...]:
-    """Return fields of a part of an object; NaN if there is no such part."""
+def _fields(part: Any, *names: str) -> tuple[float, ...]:
+    """Return fields of a part of an object; NaN if the part is missing."""
     return tuple(math.nan if part is None else getattr(part, name) for name in names)

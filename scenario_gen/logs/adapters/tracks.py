@@ -13,7 +13,7 @@ import numpy as np
 import pandas as pd
 
 from scenario_gen.base.errors import guarded, InputError, needs
-from scenario_gen.logs.adapters.data_sets import DATA_SETS, DataSet
+from scenario_gen.logs.adapters.data_sets import Companions, DATA_SETS, DataSet
 from scenario_gen.logs.config import LogConfig
 from scenario_gen.logs.raw import check_size, RawLog
 from scenario_gen.logs.tables import (
@@ -25,6 +25,11 @@ from scenario_gen.logs.tables import (
     vehicle_name,
 )
 
+_INTERACTION = "interaction"
+_PEDESTRIAN_COLUMNS = {"track_id", "timestamp_ms", "agent_type"}
+_MAX_COMPANION_ROW_COUNT = 1_000_000
+_MIN_HEADING_MPS = 0.1  # a slower vehicle has no direction of travel
+
 Load = Callable[[Path, DataSet, int, LogConfig], pd.DataFrame]
 
 
@@ -34,190 +39,212 @@ def read(
     """Read one recording of a data set.
 
     Args:
-        paths: its file, or the folder's files, of which one holds the tracks.
+        paths: its files, one of which has the tracks.
         config: bounds sizes.
-        name: of the format, a key of `DATA_SETS`.
-        load: returns the columns of a file as they stand, of which so many rows were read before; by default of a table.
+        name: key of `DATA_SETS`.
+        load: returns the unchanged columns of a file, given the number of rows before it; by
+            default, the file is a table.
 
     Raises:
-        InputError: a file is damaged or missing, has not the format's columns, or there are several recordings.
+        InputError: a file is damaged or missing, lacks a column, or there are several recordings.
     """
-    known = DATA_SETS[name]
-    tracks = [path for path in paths if not _companion_ending(path, known)]
-    tracks.sort(key=lambda path: _is_of_pedestrians(path, name))
-    main = [path for path in tracks if not _is_of_pedestrians(path, name)]
+    data_set = DATA_SETS[name]
+    companions = data_set.companions
+    tracks = [path for path in paths if not companions or not _is_companion(path, companions)]
+    pedestrians = [path for path in tracks if _has_pedestrians(path, name)]
+    main = [path for path in tracks if path not in pedestrians]
     if len(main) != 1:
         names = ", ".join(path.name for path in main) or "none"
         raise InputError(
-            f"{paths[0]}: one recording of {known.title} has one file of tracks, here are {names}; give one at a time"
+            f"{paths[0]}: a recording of {data_set.title} has one file of tracks, found: {names}; "
+            "read one recording at a time"
         )
-    frames, segments, row = [], [], 0
-    for path in tracks:
-        table = (load or _read_table)(path, known, row, config)
-        frames.append(
-            _convert(table, path, known).assign(
-                kind=_kinds(path, known, table), row=range(row, row + len(table))
-            )
-        )
-        segments.append(segment_of(path, row))
-        row += len(table)
+    frames = []
+    segments = []
+    n_rows = 0
+    for path in (*main, *pedestrians):
+        table = (load or _read_table)(path, data_set, n_rows, config)
+        frame = _convert(table, path, data_set)
+        frame["kind"] = _kinds(path, data_set, table)
+        frame["row"] = range(n_rows, n_rows + len(table))
+        frames.append(frame)
+        segments.append(segment_of(path, n_rows))
+        n_rows += len(table)
     frame = pd.concat(frames, ignore_index=True)
-    without = (
-        () if "speed" in frame else ("there are no speeds: they are derived from the positions",)
-    )
-    notes = (f"read as {known.title}", *without)
-    return replace(from_frame(frame, main, tuple(segments), config), rows=row, notes=notes)
+    notes = [f"read as {data_set.title}"]
+    if "speed" not in frame:
+        notes.append("no speeds: they are derived from the positions")
+    log = from_frame(frame, main, tuple(segments), config)
+    return replace(log, rows=n_rows, notes=tuple(notes))
 
 
 def recognised(path: Path) -> str:
-    """Return the name of the format that a file's header is of, "" if of none; of a companion, that of its tracks."""
-    if path.suffix.lower() == ".parquet":
+    """Return the name of the data set of a file, or of its tracks; "" if unknown."""
+    suffix = path.suffix.lower()
+    if suffix == ".parquet":
         needs("parquet", "pyarrow")
         from pyarrow import parquet
 
         try:
             names = set(parquet.read_schema(path).names)
-        except Exception:  # the reader of tables reports what is wrong with it
+        except Exception:  # the reader of tables reports the damage
             return ""
-    elif path.suffix.lower() == ".csv":
-        for known in DATA_SETS.values():
-            if known.companions and (ending := _companion_ending(path, known)):
-                main = path.with_name(path.name.removesuffix(ending) + known.companions[0])
-                return recognised(main) if main.is_file() else ""
+    elif suffix == ".csv":
+        for data_set in DATA_SETS.values():
+            if data_set.companions and _is_companion(path, data_set.companions):
+                tracks = _companion(path, data_set.companions, data_set.companions.tracks)
+                return recognised(tracks) if tracks.is_file() else ""
         with path.open(encoding="utf-8-sig", errors="replace") as file:
             names = {field.strip() for field in file.readline().split(",")}
-        if (
-            path.name.startswith("pedestrian_tracks")
-            and {"track_id", "timestamp_ms", "agent_type"} <= names
-        ):
-            return "interaction"
+        if _has_pedestrians(path, _INTERACTION) and names >= _PEDESTRIAN_COLUMNS:
+            return _INTERACTION
     else:
         return ""
     return next((name for name, known in DATA_SETS.items() if known.needed <= names), "")
 
 
-def _companion_ending(path: Path, known: DataSet) -> str:
-    """Return the ending by which a file belongs to another one of tracks, "" if it does not."""
-    return next(
-        (ending for ending in (known.companions or ())[1:] if path.name.endswith(ending)), ""
-    )
+def _is_companion(path: Path, companions: Companions) -> bool:
+    """Return whether a file belongs to a file of tracks."""
+    return path.name.endswith((companions.classes, companions.frame_rate))
 
 
-def _is_of_pedestrians(path: Path, name: str) -> bool:
-    """Return whether a file holds pedestrians alone, who have files of their own in INTERACTION."""
-    return name == "interaction" and path.name.startswith("pedestrian")
+def _companion(path: Path, companions: Companions, suffix: str) -> Path:
+    """Return the file of the same recording with another suffix."""
+    name = path.name
+    for known in (companions.tracks, companions.classes, companions.frame_rate):
+        name = name.removesuffix(known)
+    return path.with_name(name + suffix)
 
 
-def _read_table(path: Path, known: DataSet, before: int, config: LogConfig) -> pd.DataFrame:
-    """Return the columns of a file as they stand; `before` rows were read from other files."""
-    check_size(str(path), path.stat().st_size, before, config)
+def _has_pedestrians(path: Path, name: str) -> bool:
+    """Return whether a file has pedestrians only, which have separate files in INTERACTION."""
+    return name == _INTERACTION and path.name.startswith("pedestrian_tracks")
+
+
+def _read_table(
+    path: Path, data_set: DataSet, rows_before: int, config: LogConfig
+) -> pd.DataFrame:
+    """Return the columns of a table unchanged.
+
+    Raises:
+        InputError: it is damaged or too large, or a column is missing.
+    """
+    check_size(str(path), path.stat().st_size, rows_before, config)
     if path.suffix.lower() == ".parquet":
         needs("parquet", "pyarrow")
         from scenario_gen.logs.parquet import read_table
 
-        table = read_table(path, sorted(known.useful), before, config)
+        table = read_table(path, sorted(data_set.useful), rows_before, config)
     else:
-        table = read_text(path, before, config, sep=",")
+        table = read_text(path, rows_before, config, sep=",")
     table.columns = pd.Index([str(column).strip() for column in table.columns])
-    missing = sorted(known.needed - set(table.columns))
-    if missing and not (
-        known is DATA_SETS["interaction"] and _is_of_pedestrians(path, "interaction")
-    ):
+    missing = sorted(data_set.needed - set(table.columns))
+    has_pedestrians = data_set is DATA_SETS[_INTERACTION] and _has_pedestrians(path, _INTERACTION)
+    if missing and not has_pedestrians:
         raise InputError(
-            f"{path} lacks columns of {known.title}: {', '.join(missing)}; it has {', '.join(table.columns)}"
+            f"{path} lacks columns of {data_set.title}: {', '.join(missing)}; "
+            f"it has {', '.join(table.columns)}"
         )
     return table
 
 
 def _read_companion(
-    path: Path, known: DataSet, which: int, columns: tuple[str, ...]
+    path: Path, data_set: DataSet, suffix: str, columns: Sequence[str]
 ) -> pd.DataFrame:
-    """Return a companion of a file of tracks.
+    """Return another file of the recording of a file of tracks.
 
     Raises:
-        InputError: it is not there, or lacks a column.
+        InputError: it does not exist, or lacks a column.
     """
-    assert known.companions is not None
-    ending = known.companions[0]
-    file = path.with_name(path.name.removesuffix(ending) + known.companions[which])
-    if not path.name.endswith(ending) or not file.is_file():
+    assert data_set.companions is not None
+    file = _companion(path, data_set.companions, suffix)
+    if not path.name.endswith(data_set.companions.tracks) or not file.is_file():
         raise InputError(
-            f"{path}: {known.title} has {file.name} beside it, which is not there; put it there under its own name"
+            f"{path}: {data_set.title} also needs {file.name} in the same folder; copy it there"
         )
     with guarded(f"{file} cannot be read as a table"):
-        frame = pd.read_csv(file, nrows=1_000_000)
+        frame = pd.read_csv(file, nrows=_MAX_COMPANION_ROW_COUNT)
     missing = [column for column in columns if column not in frame.columns]
     if missing or frame.empty:
         raise InputError(
-            f"{file} lacks {', '.join(missing) or 'rows'}; it has {', '.join(map(str, frame.columns))}"
+            f"{file} lacks {', '.join(missing) or 'rows'}; "
+            f"it has {', '.join(map(str, frame.columns))}"
         )
     return frame
 
 
-def _kinds(path: Path, known: DataSet, table: pd.DataFrame) -> "pd.Series[Any]":
-    """Return the class of every row, in small letters."""
-    if known.names:
-        return _named(known, table)
-    if "kind" in known.columns:
-        column = known.columns["kind"].name
-        kinds = table[column] if column in table else pd.Series("pedestrian", index=table.index)
-        return kinds.astype(str).str.strip().str.lower()
-    column = known.columns["vehicle"].name
-    meta = _read_companion(path, known, 1, (column, "class"))
-    classes = dict(
-        zip(
-            meta[column].map(vehicle_name),
-            meta["class"].astype(str).str.strip().str.lower(),
-            strict=True,
-        )
+def _kinds(path: Path, data_set: DataSet, table: pd.DataFrame) -> "pd.Series[Any]":
+    """Return the class of every row, in lower case."""
+    if data_set.names:
+        return _numbered_kinds(data_set, table)
+    if "kind" in data_set.columns:
+        column = data_set.columns["kind"].name
+        if column not in table:
+            return pd.Series("pedestrian", index=table.index)
+        return _lower(table[column])
+    assert data_set.companions is not None
+    column = data_set.columns["vehicle"].name
+    classes = _read_companion(path, data_set, data_set.companions.classes, (column, "class"))
+    by_vehicle = dict(
+        zip(classes[column].map(vehicle_name), _lower(classes["class"]), strict=True)
     )
-    return table[column].map(vehicle_name).map(lambda name: classes.get(name, "without a class"))
+    vehicles = table[column].map(vehicle_name)
+    return vehicles.map(lambda name: by_vehicle.get(name, "without a class"))
 
 
-def _named(known: DataSet, table: pd.DataFrame) -> "pd.Series[Any]":
-    """Return the class of every row, by the numbers in its columns."""
-
-    def named(quantity: str) -> "pd.Series[Any]":
-        names = known.names[quantity]
-        return (
-            table[known.columns[quantity].name]
-            .map(vehicle_name)
-            .map(lambda number: names.get(number, f"type {number}"))
-        )
-
-    kinds = named("kind")
-    return (
-        kinds.where(kinds != "vehicle", named("subkind"))
-        if known.columns["subkind"].name in table
-        else kinds
-    )
+def _lower(values: "pd.Series[Any]") -> "pd.Series[Any]":
+    return values.astype(str).str.strip().str.lower()
 
 
-def _convert(table: pd.DataFrame, path: Path, known: DataSet) -> pd.DataFrame:
+def _numbered_kinds(data_set: DataSet, table: pd.DataFrame) -> "pd.Series[Any]":
+    """Return the class of every row by the numbers in its columns."""
+
+    def names(quantity: str) -> "pd.Series[Any]":
+        known = data_set.names[quantity]
+        numbers = table[data_set.columns[quantity].name].map(vehicle_name)
+        return numbers.map(lambda number: known.get(number, f"type {number}"))
+
+    kinds = names("kind")
+    if data_set.columns["subkind"].name not in table:
+        return kinds
+    return kinds.where(kinds != "vehicle", names("subkind"))
+
+
+def _convert(table: pd.DataFrame, path: Path, data_set: DataSet) -> pd.DataFrame:
     """Return the table in our quantities and units."""
     columns = {
         quantity: column
-        for quantity, column in known.columns.items()
+        for quantity, column in data_set.columns.items()
         if quantity not in ("kind", "subkind") and column.name in table
     }
-    if known.companions:
-        rate = float(reals(_read_companion(path, known, 2, ("frameRate",))["frameRate"]).iloc[0])
-        if not 0.1 <= rate <= 1000.0:
-            raise InputError(
-                f"{path}: the recordingMeta beside it says {rate:g} frames per second; 0.1 to 1000 are read"
-            )
-        columns["time"] = replace(columns["time"], factor=1.0 / rate)
-    out = to_numbers(table, columns, path)
-    if known.image:
-        out["x"], out["y"], out["vy"] = (
-            out["x"] + out["length"] / 2.0,
-            -(out["y"] + out["width"] / 2.0),
-            -out["vy"],
+    if data_set.companions:
+        columns["time"] = replace(columns["time"], factor=_frame_period(path, data_set))
+    frame = to_numbers(table, columns, path)
+    if data_set.is_image_frame:
+        frame["x"] = frame["x"] + frame["length"] / 2.0
+        frame["y"] = -(frame["y"] + frame["width"] / 2.0)
+        frame["vy"] = -frame["vy"]
+    if not {"vx", "vy"} <= set(frame):
+        return frame
+    frame["speed"] = np.hypot(frame["vx"], frame["vy"])
+    if "heading" not in frame:
+        course = np.arctan2(frame["vy"], frame["vx"])
+        frame["heading"] = course.where(frame["speed"] > _MIN_HEADING_MPS, math.nan)
+    return frame
+
+
+def _frame_period(path: Path, data_set: DataSet) -> float:
+    """Return the seconds between two frames of a recording.
+
+    Raises:
+        InputError: its frame rate is missing or implausible.
+    """
+    assert data_set.companions is not None
+    meta = _read_companion(path, data_set, data_set.companions.frame_rate, ("frameRate",))
+    frame_rate = float(reals(meta["frameRate"]).iloc[0])
+    if not 0.1 <= frame_rate <= 1000.0:
+        raise InputError(
+            f"{path}: its recordingMeta has {frame_rate:g} frames per second; 0.1 to 1000 can be "
+            "read"
         )
-    if not {"vx", "vy"} <= set(out):
-        return out
-    vx, vy = out["vx"].to_numpy(float), out["vy"].to_numpy(float)
-    out["speed"] = np.hypot(vx, vy)
-    if "heading" not in out:
-        out["heading"] = np.where(out["speed"] > 0.1, np.arctan2(vy, vx), math.nan)
-    return out
+    return 1.0 / frame_rate
