@@ -20,8 +20,8 @@ from scenario_gen.logs.geodesy import (
 )
 from scenario_gen.logs.groups import OUT_OF_RANGE_S, shortest, ticks, windows
 from scenario_gen.logs.growing import Growth, Meeting
-from scenario_gen.logs.raw import Observations, RawLog, Rows, Segment, UnknownFormatError
 from scenario_gen.logs.no_encounter import NoEncounterError
+from scenario_gen.logs.raw import Observations, RawLog, Rows, Segment, UnknownFormatError
 from scenario_gen.logs.read import encounters_of, LogResult, read_log
 from scenario_gen.logs.streams import Streams
 from scenario_gen.logs.synthetic import bundled, CASES

@@ -36,7 +36,27 @@ MAX_STAMP_S = 9e9
 SPMD_EPOCH_NS = 1_072_915_200 * 10**9
 """2004-01-01 UTC in Unix time, from which Gentime of SPMD counts microseconds."""
 
-SPMD_COLUMNS = ["RxDevice", "FileId", "TxDevice", "Gentime", "TxRandom", "MsgCount", "DSecond", "Latitude", "Longitude", "Elevation", "Speed", "Heading", "Ax", "Ay", "Az", "Yawrate", "PathCount", "RadiusOfCurve", "Confidence"]
+SPMD_COLUMNS = [
+    "RxDevice",
+    "FileId",
+    "TxDevice",
+    "Gentime",
+    "TxRandom",
+    "MsgCount",
+    "DSecond",
+    "Latitude",
+    "Longitude",
+    "Elevation",
+    "Speed",
+    "Heading",
+    "Ax",
+    "Ay",
+    "Az",
+    "Yawrate",
+    "PathCount",
+    "RadiusOfCurve",
+    "Confidence",
+]
 
 _SPMD_QUANTITIES = {
     "vehicle": Column("TxDevice"),
@@ -419,7 +439,8 @@ def _observations(name: str, group: pd.DataFrame, position: tuple[str, str]) -> 
     def column(quantity: str) -> Floats:
         if quantity not in group:
             return np.full(len(group), np.nan)
-        return group[quantity].to_numpy(float)
+        values: Floats = group[quantity].to_numpy(float)
+        return values
 
     return Observations.of_rows(
         name,

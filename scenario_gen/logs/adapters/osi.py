@@ -40,7 +40,19 @@ from scenario_gen.logs.raw import check_size, RawLog
 
 _MESSAGE_TYPES = ("osi3.GroundTruth", "GroundTruth")
 _MAX_STAMP_S = 9_000_000_000  # in 64 bits of nanoseconds
-_COLUMNS = ["total_nanos", "idx", "x", "y", "vel_x", "vel_y", "yaw", "length", "width", "type", "subtype"]
+_COLUMNS = [
+    "total_nanos",
+    "idx",
+    "x",
+    "y",
+    "vel_x",
+    "vel_y",
+    "yaw",
+    "length",
+    "width",
+    "type",
+    "subtype",
+]
 Row = tuple[int, str, float, float, float, float, float, float, float, int, int]
 
 
