@@ -12,7 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from scenario_gen.numerics import Floats, runs
-from scenario_gen.situation import conflict_of, departure, lane_gaps, Motion, passing, time_gaps
+from scenario_gen.situation import conflict_of, departure, lane_gaps, passing, time_gaps
+from scenario_gen.situation.conflicts import Motion
 from scenario_gen.types import Reaction
 
 EARLY, _ROUNDED = (

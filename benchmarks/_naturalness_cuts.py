@@ -18,8 +18,7 @@ import sys
 import numpy as np
 
 from scenario_gen.base.errors import InputError
-from scenario_gen.logs import LogConfig, read_log
-from scenario_gen.logs import read_raw
+from scenario_gen.logs import LogConfig, read_log, read_raw
 
 TABLE = Path(__file__).with_suffix(".json")
 SEED = 2016

@@ -23,9 +23,14 @@ from scenario_gen.method.segmentation import segment
 from scenario_gen.method.validity import Checker
 from scenario_gen.numerics.arrays import Floats
 from scenario_gen.roads import build_road
-from scenario_gen.situation import Situation
-from scenario_gen.situation.gaps import conflict_of, conflicts_in
-from scenario_gen.situation.interaction import Conflict, find_waits, Wait
+from scenario_gen.situation import (
+    Conflict,
+    conflict_of,
+    find_conflicts,
+    find_waits,
+    Situation,
+    Wait,
+)
 from scenario_gen.types.encounter import Encounter
 from scenario_gen.types.fit import Fit
 from scenario_gen.types.road import Road
@@ -95,7 +100,7 @@ def prepared(encounter: Encounter, road_name: str, name: str) -> Prepared:
         ScenarioGenError: that is not possible.
     """
     segmentation = segment(encounter)
-    conflicts = conflicts_in(encounter)
+    conflicts = find_conflicts(encounter)
     road = build_road(road_name, encounter)
     fit = fit_template(encounter, segmentation, road)
     return Prepared(

@@ -23,9 +23,8 @@ from benchmarks.row import higher, lower, Row
 from scenario_gen.method.sampling import draw_scenarios, Plan, SamplingConfig
 from scenario_gen.method.validity import Checker
 from scenario_gen.numerics.arrays import Floats
-from scenario_gen.situation import Situation
-from scenario_gen.situation.interaction import find_conflicts
-from scenario_gen.types import Encounter, Vehicle
+from scenario_gen.situation import find_conflicts, Situation
+from scenario_gen.types import Encounter, Motion, Vehicle
 from scenario_gen.types.road import Road
 from scenario_gen.types.route import Route
 from scenario_gen.types.scenario import BoundaryStates
@@ -158,7 +157,12 @@ def _seconds(vehicles: int, duration: float, count: int) -> float:
         for k in (0, -1)
     ]
     asked = BoundaryStates(states[0], states[1])
-    checker = Checker(road, asked, find_conflicts(names, time, position, heading), ())
+    checker = Checker(
+        road,
+        asked,
+        find_conflicts(Motion(names, time, position, heading, np.zeros_like(heading))),
+        (),
+    )
     started = process_time()
     found = draw_scenarios(
         Plan(Situation.of(encounter), segmentation, road, routes, asked, ()),

@@ -13,8 +13,8 @@ from benchmarks._size import sized
 from benchmarks.row import higher, lower, Row
 from scenario_gen.method.validity import Checker
 from scenario_gen.numerics.arrays import Floats
-from scenario_gen.situation.interaction import find_conflicts, Wait
-from scenario_gen.types import Vehicle
+from scenario_gen.situation import find_conflicts, Wait
+from scenario_gen.types import Motion, Vehicle
 from scenario_gen.types.road import Road
 from scenario_gen.types.scenario import BoundaryStates, Scenario
 
@@ -43,7 +43,9 @@ def run(count: int = sized(1000, quick=4)) -> list[Row]:
     rows.append(lower("cost of four times the vehicles (two platoons of four)", more, "×", 16.0))
     time, position, heading = _motion(PLATOONS[::2], 401)
     vehicles = tuple(Vehicle(str(i)) for i in range(4))
-    conflict = _seconds(lambda: find_conflicts(vehicles, time, position, heading))
+    conflict = _seconds(
+        lambda: find_conflicts(Motion(vehicles, time, position, heading, np.zeros_like(heading)))
+    )
     rows.append(lower("find_conflicts, four vehicles, T = 401", 1e3 * conflict, "ms", 10.0))
     return rows + _rechecked(count)
 
@@ -107,7 +109,7 @@ def _seconds_per_check(drives: tuple[Drive, ...], samples: int) -> float:
     checker = Checker(
         _t_intersection(),
         BoundaryStates(start, end),
-        find_conflicts(vehicles, time, position, heading),
+        find_conflicts(Motion(vehicles, time, position, heading, np.zeros_like(heading))),
         waits,
     )
     (verdict,) = checker.check([scenario])

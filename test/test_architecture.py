@@ -56,7 +56,7 @@ CONCEPTS = {
     "growing of groups": ("logs/growing.py", r"class Growth\b|def \w*grow_groups?\("),
     "least squares of a placement": (
         "situation/placement_lsq.py",
-        r"def \w*(?:least_squares|solve_starts)\(",
+        r"def \w*(?:least_squares|solve_placement)\(",
     ),
     "RRT*-Connect": (
         "method/routing/search/rrt_star_connect.py",

@@ -355,7 +355,8 @@ def _pet(drive: Drive) -> float:
         part, pair = slice(span[0], span[-1] + 1), [ego, i]
         vehicles = (motion.vehicles[ego], motion.vehicles[i])
         position, heading = motion.position[pair][:, part], motion.heading[pair][:, part]
-        conflicts = find_conflicts(vehicles, motion.time[part], position, heading)
+        speed = motion.speed[pair][:, part]
+        conflicts = find_conflicts(Motion(vehicles, motion.dt, position, heading, speed))
         found += [one.encroachment for one in conflicts if not one.following]
     return min(found, default=math.nan)
 

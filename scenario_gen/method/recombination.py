@@ -317,7 +317,7 @@ def _on_path(pair: Pair) -> Floats:
         pair.situation.tracks[pair.conflict.first],
     )
     station, aside = curve.project(pair.encounter.position[pair.conflict.first])
-    on = track.there & (station > 0.0) & (station < curve.length) & (np.abs(aside) < _ASIDE_M)
+    on = track.is_present & (station > 0.0) & (station < curve.length) & (np.abs(aside) < _ASIDE_M)
     if not on.any():
         raise RefusedError("the first one is never on the second one's path")
     return np.asarray(track.progress + np.median((station - track.progress)[on]))

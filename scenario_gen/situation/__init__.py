@@ -1,119 +1,59 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""What is about the recorded encounter on its own ground: tracks, path coordinates, stops, conflicts."""
+"""The situation: everything that is derived from a recorded encounter, without a road."""
 
-from scenario_gen.situation.frenet import FrenetTracks, main_line, MainLine, to_frenet
-from scenario_gen.situation.gaps import (
+from scenario_gen.situation.conflicts import (
+    closest_crossing,
+    Conflict,
     conflict_of,
     conflicts_by_pair,
-    conflicts_in,
+    find_conflicts,
+    PairConflicts,
+    required_orders,
+    track_conflicts,
+)
+from scenario_gen.situation.frenet import FrenetTracks, main_line, MainLine, to_frenet
+from scenario_gen.situation.gaps import (
     departure,
     lag_behind,
     lane_gaps,
     LaneGaps,
-    Meetings,
-    meetings,
-    Motion,
     passing,
     time_gaps,
 )
-from scenario_gen.situation.interaction import (
-    closest_crossing,
-    Conflict,
-    find_conflicts,
-    find_waits,
-    required_orders,
-    STAND_SPEED,
-    Wait,
-    WAIT_SPEED,
-)
 from scenario_gen.situation.kind import EncounterKind, kind_of
 from scenario_gen.situation.manoeuvre import (
-    in_words,
-    keeps,
+    describe_turn,
+    is_same_turn,
     manoeuvre_of,
-    MOST_CHANGE,
+    MAX_TURN_CHANGE_RAD,
     sharpness_of,
     turn_of,
     turns_to_keep,
 )
 from scenario_gen.situation.path_crossing import pair_crossings, path_crossing
-from scenario_gen.situation.placement_lsq import Equation, solve_starts
-from scenario_gen.situation.reactions import find_reactions
-from scenario_gen.situation.separation import (
-    least_gaps,
-    separate,
-    separate_recorded,
-    smallest_gaps,
-)
+from scenario_gen.situation.placement_lsq import Equation, solve_placement
+from scenario_gen.situation.separation import separate, smallest_gaps
 from scenario_gen.situation.situation import Situation
 from scenario_gen.situation.size import (
-    MOST_SAMPLES,
-    MOST_VEHICLES,
+    MAX_SAMPLES,
+    MAX_VEHICLES,
     refuse_reversing,
     refuse_too_large,
 )
-from scenario_gen.situation.tracks import (
-    clean_tracks,
-    driver_rows,
-    drivers_of,
-    Track,
-)
+from scenario_gen.situation.tracks import clean_tracks, driver_rows, drivers_of, Track
 from scenario_gen.situation.traffic_side import mirrored, traffic_side
+from scenario_gen.situation.waits import find_waits, STANDSTILL_SPEED_MPS, Wait, WAIT_SPEED_MPS
 
 __all__ = [
-    "MOST_CHANGE",
-    "MOST_SAMPLES",
-    "MOST_VEHICLES",
-    "STAND_SPEED",
-    "WAIT_SPEED",
-    "Conflict",
-    "EncounterKind",
-    "Equation",
-    "FrenetTracks",
-    "LaneGaps",
-    "MainLine",
-    "Meetings",
-    "Motion",
-    "Situation",
-    "Track",
-    "Wait",
-    "clean_tracks",
-    "closest_crossing",
-    "conflict_of",
-    "conflicts_by_pair",
-    "conflicts_in",
-    "departure",
-    "driver_rows",
-    "drivers_of",
-    "find_conflicts",
-    "find_reactions",
-    "find_waits",
-    "in_words",
-    "keeps",
-    "kind_of",
-    "lag_behind",
-    "lane_gaps",
-    "least_gaps",
-    "main_line",
-    "manoeuvre_of",
-    "meetings",
-    "mirrored",
-    "pair_crossings",
-    "passing",
-    "path_crossing",
-    "refuse_reversing",
-    "refuse_too_large",
-    "required_orders",
-    "separate",
-    "separate_recorded",
-    "sharpness_of",
-    "smallest_gaps",
-    "solve_starts",
-    "time_gaps",
-    "to_frenet",
-    "traffic_side",
-    "turn_of",
-    "turns_to_keep",
+    "MAX_SAMPLES", "MAX_TURN_CHANGE_RAD", "MAX_VEHICLES", "STANDSTILL_SPEED_MPS",
+    "WAIT_SPEED_MPS", "Conflict", "EncounterKind", "Equation", "FrenetTracks", "LaneGaps",
+    "MainLine", "PairConflicts", "Situation", "Track", "Wait", "clean_tracks",
+    "closest_crossing", "conflict_of", "conflicts_by_pair", "departure", "describe_turn",
+    "driver_rows", "drivers_of", "find_conflicts", "find_waits", "is_same_turn", "kind_of",
+    "lag_behind", "lane_gaps", "main_line", "manoeuvre_of", "mirrored", "pair_crossings",
+    "passing", "path_crossing", "refuse_reversing", "refuse_too_large", "required_orders",
+    "separate", "sharpness_of", "smallest_gaps", "solve_placement", "time_gaps", "to_frenet",
+    "track_conflicts", "traffic_side", "turn_of", "turns_to_keep",
 ]  # fmt: skip

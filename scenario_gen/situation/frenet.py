@@ -252,7 +252,7 @@ def _lanes(
         (change < 0.5, (change >= 0.5) | ~changes[:, None]), axis=1
     )  # when each is in its first, in its last lane
     there &= (
-        np.stack([track.there for track in tracks])[:, None]
+        np.stack([track.is_present for track in tracks])[:, None]
         & (np.abs(swerve) < _SWERVE / 2.0)[:, None]
     )
     lane = np.zeros((len(tracks), 2), dtype=np.int64)

@@ -1,202 +1,155 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""How a reaction shows in a motion, recorded or generated: when one passes behind another, how near one drives behind another."""
+"""Gaps in time and space that show how drivers react, in recorded and in generated motions."""
 
-from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import replace
+from collections.abc import Mapping
 from itertools import permutations
-from typing import Protocol
 
 import numpy as np
 from scipy.spatial import distance
 
-from scenario_gen.numerics import Bools, Floats, Ints, wrap_angle
+from scenario_gen.numerics import Bools, Floats, wrap_angle
 from scenario_gen.numerics.boxes import footprint_gaps
 from scenario_gen.numerics.plane import ahead_and_left
-from scenario_gen.situation.interaction import Conflict, find_conflicts
-from scenario_gen.situation.tracks import Track
-from scenario_gen.types import together, Vehicle
+from scenario_gen.situation.conflicts import Conflict, Motion
+from scenario_gen.types import together
 
-FAR = 60.0  # m, within which one follows
-LANE = 2.2  # m, to the side of the other's path
-ALIKE = 0.5  # rad, of two headings on one way
-_LEFT = 0.5  # m, by which one that merges keeps away from the place that the other one leaves
-SLOWEST = 2.0  # m/s, below which a time gap says nothing
-
+MAX_FOLLOWING_M = 60.0  # a leader is nearer
+HALF_LANE_M = 2.2  # a follower is nearer to its leader's path
+MAX_HEADING_DIFFERENCE_RAD = 0.5  # between a follower and its leader
+PATH_SAMPLE_PERIOD_S = 0.5
+MERGE_CLEARANCE_M = 0.5  # between a merging vehicle and the place that the other one leaves
+MIN_HEADWAY_SPEED_MPS = 2.0  # below it, a time gap has no meaning
 
 LaneGaps = Mapping[tuple[int, int], tuple[Floats, Floats]]  # see `lane_gaps`
-Meetings = Mapping[tuple[int, int], Conflict]  # by vehicles, the lower index first
 
 
-class Motion(Protocol):
-    """What encounters and scenarios have in common."""
+def departure(motion: Motion, n: int, entry: float) -> float:
+    """Return when [s] a vehicle departs before it enters an area at `entry` [s].
 
-    @property
-    def vehicles(self) -> tuple[Vehicle, ...]:
-        """N identities and footprints."""
-
-    @property
-    def time(self) -> Floats:
-        """(T,) seconds."""
-
-    @property
-    def position(self) -> Floats:
-        """(N, T, 2) metres."""
-
-    @property
-    def heading(self) -> Floats:
-        """(N, T) rad."""
-
-    @property
-    def speed(self) -> Floats:
-        """(N, T) m/s."""
-
-    @property
-    def present(self) -> Ints:
-        """(N, 2) first and last sample of each."""
-
-
-def conflict_of(motion: Motion, a: int, b: int) -> Conflict | None:
-    """Return the conflict between two vehicles of a motion; None if they have none.
-
-    For more than one pair `conflicts_in` is faster.
+    This is when its speed last rises above 0.5 m/s (on foot 0.2 m/s), or, if it is never so slow,
+    when it is slowest. A vehicle that stands at the edge of the area, or inside, departs when that
+    standstill ends.
     """
-    pair = [min(a, b), max(a, b)]
-    vehicles = (motion.vehicles[pair[0]], motion.vehicles[pair[1]])
-    conflicts = find_conflicts(
-        vehicles,
-        motion.time,
-        motion.position[pair],
-        motion.heading[pair],
-        motion.present[pair],
-    )
-    if not conflicts:
-        return None
-    (conflict,) = conflicts
-    return replace(conflict, first=pair[conflict.first], second=pair[conflict.second])
-
-
-def conflicts_in(motion: Motion) -> tuple[Conflict, ...]:
-    """Return the conflicts of a motion, as `find_conflicts` does."""
-    return find_conflicts(
-        motion.vehicles, motion.time, motion.position, motion.heading, motion.present
-    )
-
-
-def conflicts_by_pair(conflicts: Iterable[Conflict]) -> dict[tuple[int, int], Conflict]:
-    """Return conflicts by their vehicles, the lower index first."""
-    return {conflict.pair: conflict for conflict in conflicts}
-
-
-def meetings(tracks: Sequence[Track]) -> Meetings:
-    """Return the conflicts of some tracks by their vehicles, the lower index first."""
-    poses = np.stack([track.poses for track in tracks])
-    present = np.stack([track.present for track in tracks])
-    time = np.arange(poses.shape[1], dtype=np.float64) * tracks[0].dt
-    vehicles = tuple(track.vehicle for track in tracks)
-    return conflicts_by_pair(
-        find_conflicts(vehicles, time, poses[..., :2], poses[..., 2], present)
-    )
-
-
-def departure(motion: Motion, who: int, entry: float) -> float:
-    """Return when [s] a vehicle leaves before it enters somewhere at `entry` [s].
-
-    That is when its speed rises above 0.5 m/s (on foot 0.2 m/s) and stays there, or, if it never is so slow, when it is slowest.
-    A vehicle that is faster throughout and slowest at once is one that nothing is seen of: it left when it came. Who stands at
-    the very place, or in it, leaves when that stand ends.
-    """
-    first, least = int(motion.present[who, 0]), motion.vehicles[who].kind.waits_below
+    threshold = motion.vehicles[n].kind.waits_below
+    first, present_until = motion.present[n].tolist()
     last = max(int(np.searchsorted(motion.time, entry + 1e-9)), first + 1)
-    later = motion.speed[who, last : int(motion.present[who, 1]) + 1]
-    if motion.speed[who, last - 1] < least and len(later):  # it stands where the area begins
-        last += int(np.argmax(later >= least)) + 1 if (later >= least).any() else len(later)
-    speed, time = motion.speed[who, first:last], motion.time[first:last]
-    slow = np.flatnonzero(speed < least)
+    later = motion.speed[n, last : present_until + 1]
+    if motion.speed[n, last - 1] < threshold and len(later):
+        moves = later >= threshold
+        last += int(np.argmax(moves)) + 1 if moves.any() else len(later)
+
+    speed, time = motion.speed[n, first:last], motion.time[first:last]
+    slow = np.flatnonzero(speed < threshold)
     if len(slow) == 0:
         return float(time[int(np.argmin(speed))])
     k = int(slow[-1])
     if k + 1 == len(speed):
         return float(time[k])
-    share = (least - speed[k]) / (speed[k + 1] - speed[k])
+    share = (threshold - speed[k]) / (speed[k + 1] - speed[k])
     return float(time[k] + share * (time[k + 1] - time[k]))
 
 
 def lag_behind(motion: Motion, conflict: Conflict) -> float:
-    """Return by how much [s] the second one of a conflict leaves later than the first one has cleared the shared area."""
+    """Return the time [s] from the exit of the first vehicle to the departure of the second."""
     return departure(motion, conflict.second, conflict.entry_second) - conflict.exit_first
 
 
 def passing(motion: Motion, conflict: Conflict, *, merges: bool) -> tuple[float, float]:
-    """Return when [s] the first one of a conflict clears, and when the second one enters.
+    """Return when [s] the first vehicle clears the shared area, and when the second one enters.
 
-    What they share is what both sweep; of one that merges the place where it enters, for the other one goes on before it.
+    If the second one merges, it shares only the place where it enters, since the first one drives
+    on in front of it.
     """
     enters = conflict.entry_second
     if not merges:
         return conflict.exit_first, enters
     first, second = conflict.first, conflict.second
-    poses, place = (
-        np.column_stack([motion.position[n], motion.heading[n]]) for n in (first, second)
-    )
-    place = np.repeat(
-        [[np.interp(enters, motion.time, column) for column in place.T]], len(poses), axis=0
-    )
+    poses = np.column_stack([motion.position[first], motion.heading[first]])
+    columns = (*motion.position[second].T, motion.heading[second])
+    place = np.array([np.interp(enters, motion.time, column) for column in columns])
     gap, _ = footprint_gaps(
-        motion.vehicles[first].half, poses, motion.vehicles[second].half, place
+        motion.vehicles[first].half,
+        poses,
+        motion.vehicles[second].half,
+        np.tile(place, (len(poses), 1)),
     )
-    came, goes = motion.present[first].tolist()
-    near = came + np.flatnonzero(
-        gap[came : goes + 1] < max(_LEFT, float(gap[came : goes + 1].min()) + 1e-9)
-    )
-    k, last = int(near[-1]), min(int(near[-1]) + 1, goes)
-    share = (_LEFT - gap[k]) / (gap[last] - gap[k]) if gap[last] > _LEFT > gap[k] else 0.0
-    return float(motion.time[k] + share * (motion.time[last] - motion.time[k])), enters
+    begin, end = motion.present[first].tolist()
+    present_gap = gap[begin : end + 1]
+    is_near = present_gap < max(MERGE_CLEARANCE_M, float(present_gap.min()) + 1e-9)
+    k = begin + int(np.flatnonzero(is_near)[-1])
+    after = min(k + 1, end)
+    share = 0.0
+    if gap[after] > MERGE_CLEARANCE_M > gap[k]:
+        share = (MERGE_CLEARANCE_M - gap[k]) / (gap[after] - gap[k])
+    return float(motion.time[k] + share * (motion.time[after] - motion.time[k])), enters
 
 
-def is_behind(motion: Motion, who: int, whom: int) -> Bools:
-    """(T,) whether one drives behind the other on the same way, within 60 m: where that one was, or straight behind it."""
-    a, b = motion.position[who], motion.position[whom]
-    yaw_a, yaw_b = motion.heading[who], motion.heading[whom]
-    both = np.zeros(len(a), dtype=np.bool_)
-    both[together(motion.present, who, whom)] = True
-    between = b - a
-    along, across = ahead_and_left(between, yaw_a)
-    alike = np.abs(wrap_angle(yaw_b - yaw_a)) < ALIKE
-    behind = (along > 0.0) & (np.abs(across) < LANE) & alike
-    step = max(round(0.5 / float(motion.time[1] - motion.time[0])), 1)
-    now = np.arange(len(a))
-    for mine, yaw, path, path_yaw, sign in ((a, yaw_a, b, yaw_b, -1), (b, yaw_b, a, yaw_a, 1)):
-        rows = np.arange(0, len(path), step)  # where the other was before; where this one will be
-        square = distance.cdist(mine, path[rows], "sqeuclidean")
-        nearest = np.argmin(square, axis=1)
-        near = (np.sqrt(square[now, nearest]) < LANE) & (
-            np.abs(wrap_angle(path_yaw[rows[nearest]] - yaw)) < ALIKE
-        )
-        behind = behind | (near & (sign * (rows[nearest] - now) > step))
-    return np.asarray(behind & both & (np.sqrt(np.square(between).sum(axis=1)) < FAR))
+def is_behind(motion: Motion, follower: int, leader: int) -> Bools:
+    """(T,) whether a vehicle drives behind another one on the same way, within 60 m.
+
+    It is straight behind the other one, drives where that one was before, or the other one is
+    where it will be.
+    """
+    position, heading = motion.position[follower], motion.heading[follower]
+    leader_position, leader_heading = motion.position[leader], motion.heading[leader]
+    between = leader_position - position
+    along, across = ahead_and_left(between, heading)
+    alike = np.abs(wrap_angle(leader_heading - heading)) < MAX_HEADING_DIFFERENCE_RAD
+    behind = (along > 0.0) & (np.abs(across) < HALF_LANE_M) & alike
+
+    step = max(round(PATH_SAMPLE_PERIOD_S / float(motion.time[1] - motion.time[0])), 1)
+    leads_by, is_on = _steps_ahead(leader_position, leader_heading, position, heading, step)
+    behind |= is_on & (-leads_by > step)
+    leads_by, is_on = _steps_ahead(position, heading, leader_position, leader_heading, step)
+    behind |= is_on & (leads_by > step)
+
+    both = np.zeros(len(position), dtype=np.bool_)
+    both[together(motion.present, follower, leader)] = True
+    is_near = np.sqrt(np.square(between).sum(axis=1)) < MAX_FOLLOWING_M
+    return np.asarray(behind & both & is_near)
 
 
-def bumper_gaps(motion: Motion, who: int, whom: int) -> Floats:
-    """(T,) metres from the front bumper of one to the rear one of another that it drives behind."""
-    apart = np.sqrt(np.square(motion.position[whom] - motion.position[who]).sum(axis=1))
-    return np.asarray(apart - 0.5 * (motion.vehicles[who].length + motion.vehicles[whom].length))
+def _steps_ahead(
+    path: Floats, path_heading: Floats, position: Floats, heading: Floats, step: int
+) -> tuple[Floats, Bools]:
+    """How many samples later the nearest place of a path is driven, and whether it is near, (T,) each.
+
+    The path (T, 2) is compared at every `step`-th sample.
+    """
+    rows = np.arange(0, len(path), step)
+    squares = distance.cdist(position, path[rows], "sqeuclidean")
+    nearest = np.argmin(squares, axis=1)
+    samples = np.arange(len(position))
+    turned = np.abs(wrap_angle(path_heading[rows[nearest]] - heading))
+    is_near = np.sqrt(squares[samples, nearest]) < HALF_LANE_M
+    return rows[nearest] - samples, is_near & (turned < MAX_HEADING_DIFFERENCE_RAD)
+
+
+def bumper_gaps(motion: Motion, follower: int, leader: int) -> Floats:
+    """(T,) metres from the front bumper of a vehicle to the rear bumper of another one ahead."""
+    between = motion.position[leader] - motion.position[follower]
+    lengths = motion.vehicles[follower].length + motion.vehicles[leader].length
+    return np.asarray(np.sqrt(np.square(between).sum(axis=1)) - 0.5 * lengths)
 
 
 def lane_gaps(motion: Motion) -> LaneGaps:
-    """Return (who, whom): speeds (k,) [m/s] and gaps (k,) [m], bumper to bumper, of all who drive behind another one."""
-    found = {}
-    for who, whom in permutations(range(len(motion.vehicles)), 2):
-        alike = np.abs(wrap_angle(motion.heading[who] - motion.heading[whom])) < ALIKE
-        at = alike & is_behind(motion, who, whom) if alike.any() else alike
-        if at.any():
-            found[who, whom] = motion.speed[who, at], bumper_gaps(motion, who, whom)[at]
-    return found
+    """Return speeds (k,) [m/s] and bumper-to-bumper gaps (k,) [m] per (follower, leader)."""
+    gaps = {}
+    for follower, leader in permutations(range(len(motion.vehicles)), 2):
+        turned = np.abs(wrap_angle(motion.heading[follower] - motion.heading[leader]))
+        rows = turned < MAX_HEADING_DIFFERENCE_RAD
+        if rows.any():
+            rows = rows & is_behind(motion, follower, leader)
+        if rows.any():
+            speed = motion.speed[follower, rows]
+            gaps[follower, leader] = speed, bumper_gaps(motion, follower, leader)[rows]
+    return gaps
 
 
-def time_gaps(gaps: LaneGaps, who: int, whom: int) -> Floats:
-    """Return the time gaps (k,) [s], bumper to bumper, of a vehicle that drives (2 m/s or more) behind another one."""
-    speed, gap = gaps.get((who, whom), (np.zeros(0), np.zeros(0)))
-    drives = speed > SLOWEST
+def time_gaps(gaps: LaneGaps, follower: int, leader: int) -> Floats:
+    """Return the time gaps (k,) [s], bumper to bumper, at speeds of 2 m/s or more."""
+    speed, gap = gaps.get((follower, leader), (np.zeros(0), np.zeros(0)))
+    drives = speed > MIN_HEADWAY_SPEED_MPS
     return np.asarray(gap[drives] / speed[drives])

@@ -32,7 +32,7 @@ from scenario_gen.numerics.plane import (
     meeting_shares,
     unit,
 )
-from scenario_gen.situation.gaps import Motion
+from scenario_gen.situation.conflicts import Motion
 from scenario_gen.types import together
 
 

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""What a vehicle does on its way: how far it turns, which manoeuvre that is, how sharply it bends; what keeps it."""
+"""Manoeuvres: how far a vehicle turns, which manoeuvre this is, and how sharply it bends."""
 
 from typing import Final
 
@@ -10,19 +10,17 @@ import numpy as np
 from scenario_gen.numerics.plane import angle_between
 from scenario_gen.situation.tracks import Track
 
-MOST_CHANGE: Final = np.radians(
-    25.0
-)  # a manoeuvre is kept if its turn differs by no more, and it has the same name
-_STRAIGHT, _ROUND = np.radians(30.0), np.radians(150.0)
-_DOUBT: Final = np.radians(
-    15.0
-)  # turns that differ by less are the same manoeuvre, on whichever side of a threshold they lie
-_WINDOW = 8.0  # metres over which a bend's curvature is taken
-_GENTLEST, _TIGHTEST = 0.005, 0.17  # 1/m
+MAX_TURN_CHANGE_RAD: Final = np.radians(25.0)  # between turns that are the same manoeuvre
+SURELY_SAME_TURN_RAD: Final = np.radians(15.0)  # even if their names differ
+MIN_NAMED_TURN_RAD = np.radians(30.0)
+MIN_NAMED_U_TURN_RAD = np.radians(150.0)
+BEND_WINDOW_M = 8.0
+MIN_CURVATURE_PER_M = 0.005
+MAX_CURVATURE_PER_M = 0.17
 
 
 def turn_of(track: Track) -> float:
-    """How far [rad, left positive] a track's heading turns from its first to its last sample; 0 for one that stands."""
+    """How far [rad, left positive] a track turns; 0 for a vehicle that stands."""
     if track.still:
         return 0.0
     start, end = track.curve.at(track.progress[[0, -1]])[:, 2]
@@ -30,44 +28,46 @@ def turn_of(track: Track) -> float:
 
 
 def manoeuvre_of(turn: float) -> str:
-    """The name of a manoeuvre that turns by `turn` [rad]: "straight", "left", "right" or "U-turn"."""
-    if abs(turn) < _STRAIGHT:
+    """The name of a manoeuvre with this turn [rad]: "straight", "left", "right" or "U-turn"."""
+    if abs(turn) < MIN_NAMED_TURN_RAD:
         return "straight"
-    if abs(turn) > _ROUND:
+    if abs(turn) > MIN_NAMED_U_TURN_RAD:
         return "U-turn"
     return "left" if turn > 0.0 else "right"
 
 
-def keeps(template: float, road: float) -> bool:
-    """Whether a turn on a road [rad] is that of the template [rad]: at most 25° different, and of the same name."""
-    change = abs(angle_between(road, template))
-    return change <= _DOUBT or (
-        change <= MOST_CHANGE and manoeuvre_of(template) == manoeuvre_of(road)
-    )
+def is_same_turn(recorded: float, turn: float) -> bool:
+    """Whether a turn [rad] is that of the recording: at most 25° different, with the same name."""
+    change = abs(angle_between(turn, recorded))
+    if change <= SURELY_SAME_TURN_RAD:
+        return True
+    return change <= MAX_TURN_CHANGE_RAD and manoeuvre_of(recorded) == manoeuvre_of(turn)
 
 
 def turns_to_keep(track: Track) -> list[float]:
-    """How far [rad] a template's track turns: by its path, and by its recorded heading unless that contradicts the path.
+    """How far [rad] a track turns: by its path, and by its recorded heading unless they disagree.
 
     A path is smoothed, and turns less at its ends than the vehicle did.
     """
-    own, recorded = turn_of(track), track.recorded_turn
-    return [own, recorded] if keeps(recorded, own) else [own]
+    turn, recorded = turn_of(track), track.recorded_turn
+    return [turn, recorded] if is_same_turn(recorded, turn) else [turn]
 
 
 def sharpness_of(track: Track) -> float:
-    """The curvature [1/m] of a track's sharpest bend, over 8 m of path; within what cars drive."""
-    bend = abs(track.turning(_WINDOW)) / min(_WINDOW, max(track.curve.length, 1.0))
-    return float(np.clip(bend, _GENTLEST, _TIGHTEST))
+    """The curvature [1/m] of the sharpest bend over 8 m, within the range of cars."""
+    window = min(BEND_WINDOW_M, max(track.curve.length, 1.0))
+    bend = abs(track.turning(BEND_WINDOW_M)) / window
+    return float(np.clip(bend, MIN_CURVATURE_PER_M, MAX_CURVATURE_PER_M))
 
 
-def in_words(turn: float) -> str:
-    """A turn [rad] as a person says it: "turns left by 68°", "goes straight on (4° to the right)"."""
+def describe_turn(turn: float) -> str:
+    """A turn [rad] in words: "turns left by 68°", "goes straight on (4° to the right)"."""
     side = "left" if turn > 0.0 else "right"
+    degrees = abs(np.degrees(turn))
     if manoeuvre_of(turn) != "straight":
-        return f"turns {side} by {abs(np.degrees(turn)):.0f}°"
+        return f"turns {side} by {degrees:.0f}°"
     return (
-        "goes straight on"
-        if abs(turn) < np.radians(1.0)
-        else f"goes straight on ({abs(np.degrees(turn)):.0f}° to the {side})"
+        f"goes straight on ({degrees:.0f}° to the {side})"
+        if degrees >= 1.0
+        else "goes straight on"
     )

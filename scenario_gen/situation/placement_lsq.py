@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Where on their ways the vehicles of a template begin, from what is known of these places: weighted least squares."""
+"""Where vehicles start on their paths: weighted least squares."""
 
 from collections.abc import Iterable, Sequence
 from typing import NamedTuple
@@ -10,20 +10,27 @@ import numpy as np
 
 
 class Equation(NamedTuple):
-    """Σ factor · start of a vehicle = value [m], with a weight; the terms are (vehicle, factor)."""
+    """Σ factor · start of a vehicle = value [m], with a weight.
+
+    Attributes:
+        terms: (vehicle, factor).
+        value: metres.
+        weight: weight of the equation.
+    """
 
     terms: tuple[tuple[int, float], ...]
     value: float
     weight: float
 
 
-def solve_starts(vehicles: Sequence[int], equations: Iterable[Equation]) -> dict[int, float]:
-    """Return the arc lengths [m] at which the vehicles of these equations begin; the shortest solution, if there are several."""
+def solve_placement(vehicles: Sequence[int], equations: Iterable[Equation]) -> dict[int, float]:
+    """Return the arc lengths [m] at which vehicles start; of several solutions the shortest."""
     rows = list(equations)
     factors = np.zeros((len(rows), len(vehicles)))
     for row, equation in enumerate(rows):
         for vehicle, factor in equation.terms:
             factors[row, vehicles.index(vehicle)] += factor
-    values, weights = (np.array([equation[k] for equation in rows]) for k in (1, 2))
+    values = np.array([equation.value for equation in rows])
+    weights = np.array([equation.weight for equation in rows])
     solution, *_ = np.linalg.lstsq(weights[:, None] * factors, weights * values, rcond=None)
     return dict(zip(vehicles, solution.tolist(), strict=True))

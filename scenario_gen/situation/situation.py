@@ -9,13 +9,14 @@ from functools import cached_property
 import numpy as np
 
 from scenario_gen.numerics import Floats
-from scenario_gen.situation.gaps import conflicts_in, lane_gaps, LaneGaps
-from scenario_gen.situation.interaction import Conflict, find_waits, Wait
+from scenario_gen.situation.conflicts import Conflict, find_conflicts
+from scenario_gen.situation.gaps import lane_gaps, LaneGaps
 from scenario_gen.situation.kind import EncounterKind, kind_of
 from scenario_gen.situation.reactions import find_reactions
 from scenario_gen.situation.separation import least_gaps, separate_recorded, Separation
 from scenario_gen.situation.tracks import clean_tracks, drivers_of, Track
 from scenario_gen.situation.traffic_side import traffic_side
+from scenario_gen.situation.waits import find_waits, Wait
 from scenario_gen.types import Encounter, ReactionGraph, Segmentation
 
 
@@ -56,7 +57,7 @@ class Situation:
     @cached_property
     def conflicts(self) -> tuple[Conflict, ...]:
         """One conflict per pair of vehicles whose swept footprints intersect, ordered by pair."""
-        return conflicts_in(self.encounter)
+        return find_conflicts(self.encounter)
 
     def conflict(self, a: int, b: int) -> Conflict | None:
         """Return the conflict between two vehicles; None if they have none."""

@@ -1,19 +1,22 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The template's own motion, cleaned: one smooth, drivable path per vehicle, and the progress along it.
+"""The recorded motion, cleaned: one smooth, drivable path per vehicle, and the progress along it.
 
-Positions carry noise (GPS staircases of a metre, kinks of a video tracker), speeds far less of it. So the position is
-smoothed as a function of the distance u = ∫ v dt that the speed claims: a penalised spline f(u) that minimises
-∫ |f(u) − p|² du + λ ∫ |f''|² du (Eilers & Marx 1996). The least λ is taken at which the lateral acceleration can be
-driven, or the one that weighs that least badly against a path far from the record; bends that are too sharp are then eased,
-and turn as far as before. Standing
-phases collapse to a point, time enters only through u(t), and no sample turns back.
+Positions are noisy (GPS staircases of a metre, kinks from a video tracker), speeds much less. So the
+position is smoothed as a function of the distance u = ∫ v dt that the speed claims: a penalised
+spline f(u) that minimises ∫ |f(u) - p|² du + λ ∫ |f''|² du (Eilers & Marx 1996). The smallest λ is
+used for which the lateral acceleration is drivable, or the one with the smallest violation of this
+and of the deviation from the recording. Bends that are too sharp are then eased; they turn as far
+as before. Standing phases collapse to a point, time enters only through u(t), and no sample moves
+backwards.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 import math
+from typing import NamedTuple
 
 import numpy as np
 from scipy import linalg
@@ -24,42 +27,38 @@ from scenario_gen.numerics.curve import Curve
 from scenario_gen.numerics.plane import polyline_of, unit
 from scenario_gen.types import Encounter, mask, ON_THE_SPOT, Vehicle
 
-_WAVELENGTHS = (
-    8.0,
-    12.0,
-    16.0,
-    24.0,
-    32.0,
-    48.0,
-    64.0,
-    96.0,
-    128.0,
-)  # metres at which the filter halves an oscillation
-_SHARE_OF_CURVATURE = (
-    0.8  # of the sharpest curve of its type; of a car 0.2 1/m, its tightest turn but for a little
+# wavelengths that the smoothing halves
+WAVELENGTHS_M = (8.0, 12.0, 16.0, 24.0, 32.0, 48.0, 64.0, 96.0, 128.0)
+CURVATURE_SHARE = (
+    0.8  # of the sharpest curve of a type; for a car 0.2 1/m, nearly its tightest turn
 )
-_SHARE_OF_LATERAL = 2.0 / 3.0  # of its type's lateral acceleration; of a car 4 m/s²
-_MAX_DEVIATION = 0.6  # metres from the record
-_TURN = math.radians(45.0)
-_U_TURN = math.radians(140.0)
-_STILL = 0.5  # metres: less path than this in a whole log is no path
+LATERAL_SHARE = 2.0 / 3.0  # of a type's lateral acceleration; for a car 4 m/s²
+MAX_DEVIATION_M = 0.6  # from the recording
+TURN_RAD = math.radians(45.0)
+TURN_WINDOW_M = 30.0  # a bend of a road turns less within it
+U_TURN_RAD = math.radians(140.0)
+U_TURN_WINDOW_M = 45.0
+MIN_PATH_M = 0.5  # a vehicle with a shorter path stands
+PATH_STEP_M = 0.5
+EASING_SHARE = 0.95  # of the allowed curvature, to which bends are eased
+MAX_EASING_STEPS = 2000
 
 
 @dataclass(frozen=True, eq=False)
 class Track:
-    """One vehicle's cleaned motion.
+    """The cleaned motion of one vehicle.
 
     Attributes:
         vehicle: identity and footprint.
-        curve: its path; for a vehicle that stands throughout a metre of it, through its place.
-        progress: (T,) arc length [m] on the path at each of the template's samples, non-decreasing.
+        curve: its path; if it always stands, one metre through its place.
+        progress: (T,) arc length [m] on the path at each sample, non-decreasing.
         speed: (T,) m/s, as recorded.
-        still: True if it stands throughout.
+        still: whether it always stands.
         deviation: largest distance [m] from a recorded position to the cleaned one.
-        present: (2,) first and last sample at which it is there; before and after, progress and speed are those at these.
-        recorded_turn: how far [rad, left positive] the recorded heading turns from start to end; NaN for one that stands.
+        present: (2,) first and last sample; before and after, progress and speed are constant.
+        recorded_turn: how far [rad, left positive] the recorded heading turns; NaN if it stands.
         dt: seconds between samples.
-        lane: the middle of the lanes that it drives on a road, before and beyond its path too; None: they are not known.
+        lane: the centre line of its lanes on a road, before and beyond its path too; None: unknown.
     """
 
     vehicle: Vehicle
@@ -74,158 +73,170 @@ class Track:
     lane: Curve | None = None
 
     @cached_property
-    def there(self) -> Bools:
-        """(T,) whether it is there at each sample."""
+    def is_present(self) -> Bools:
+        """(T,) whether it is present at each sample."""
         return np.asarray(mask(self.present[None], len(self.progress))[0])
 
     @property
     def travelled(self) -> float:
-        """Metres driven in all."""
+        """Total distance driven [m]."""
         return float(self.progress[-1])
 
     @property
     def poses(self) -> Floats:
-        """(T, 3) cleaned poses at the template's samples."""
+        """(T, 3) cleaned poses at the samples."""
         return self.curve.at(self.progress)
 
     def turning(self, window: float) -> float:
-        """The largest change of heading [rad, signed] over `window` metres of path."""
-        s = np.arange(0.0, max(self.curve.length - 1.0, 0.0) + 1e-9, 0.5)
-        yaw = self.curve.at(s)[:, 2]
-        reach = int(window / 0.5)
-        best = 0.0
-        for lag in range(2, min(reach, len(s) - 1) + 1, 2):
+        """Return the largest change of heading [rad, signed] over `window` metres of path."""
+        stations = np.arange(0.0, max(self.curve.length - 1.0, 0.0) + 1e-9, PATH_STEP_M)
+        yaw = self.curve.at(stations)[:, 2]
+        largest = 0.0
+        for lag in range(2, min(int(window / PATH_STEP_M), len(yaw) - 1) + 1, 2):
             change = yaw[lag:] - yaw[:-lag]
             peak = float(change[np.argmax(np.abs(change))])
-            best = peak if abs(peak) > abs(best) else best
-        return best
+            if abs(peak) > abs(largest):
+                largest = peak
+        return largest
 
     @property
     def makes_u_turn(self) -> bool:
-        """True if it turns round within 45 m of path."""
-        return abs(self.turning(45.0)) > _U_TURN
+        """Whether it turns round within 45 m of path."""
+        return abs(self.turning(U_TURN_WINDOW_M)) > U_TURN_RAD
 
     @property
     def turns(self) -> bool:
-        """True if it turns as at a junction: by more than 45° within 30 m (a bend of the road is gentler)."""
-        return abs(self.turning(30.0)) > _TURN
+        """Whether it turns as at a junction: by more than 45° within 30 m."""
+        return abs(self.turning(TURN_WINDOW_M)) > TURN_RAD
+
+
+class _Record(NamedTuple):
+    """Positions (T, 2), headings and speeds (T,) of a vehicle, and the distance (T,) it claims."""
+
+    position: Floats
+    heading: Floats
+    speed: Floats
+    distance: Floats
+
+
+class _Path(NamedTuple):
+    """A path, the progress (T,) [m] on it, and the largest deviation [m] from the recording."""
+
+    curve: Curve
+    progress: Floats
+    deviation: float
 
 
 def clean_tracks(encounter: Encounter) -> tuple[Track, ...]:
     """Return one cleaned track per vehicle."""
-    return tuple(_clean(encounter, i) for i in range(len(encounter.vehicles)))
+    return tuple(_clean(encounter, n) for n in range(len(encounter.vehicles)))
 
 
-def drivers_of(tracks: tuple[Track, ...]) -> tuple[Track, ...]:
-    """Return those who drive, whom lanes are for; everybody, where nobody does."""
-    return tuple(track for track in tracks if not track.vehicle.kind.walks) or tracks
+def drivers_of(tracks: Sequence[Track]) -> tuple[Track, ...]:
+    """Return the tracks without pedestrians; all tracks if everybody walks."""
+    drivers = [track for track in tracks if not track.vehicle.kind.walks]
+    return tuple(drivers or tracks)
 
 
 def driver_rows(encounter: Encounter) -> dict[int, int]:
-    """Return the rows of those who drive, or of everybody where nobody does: among `drivers_of`, by that in the encounter."""
-    drive = [n for n, vehicle in enumerate(encounter.vehicles) if not vehicle.kind.walks] or range(
-        len(encounter.vehicles)
-    )
-    return {n: k for k, n in enumerate(drive)}
+    """Return the rows among `drivers_of` by the rows in the encounter."""
+    drivers = [n for n, vehicle in enumerate(encounter.vehicles) if not vehicle.kind.walks]
+    rows = drivers or range(len(encounter.vehicles))
+    return {n: k for k, n in enumerate(rows)}
 
 
-def _clean(encounter: Encounter, i: int) -> Track:
-    """Clean one vehicle's motion while it is there."""
-    first, last = encounter.present[i].tolist()
-    there = slice(first, last + 1)
-    heading, speed = encounter.heading[i, there], encounter.speed[i, there]
-    claimed = np.concatenate(([0.0], np.cumsum((speed[1:] + speed[:-1]) / 2.0 * encounter.dt)))
-    spread = float(np.hypot(*np.ptp(encounter.position[i, there], axis=0)))
-    still = bool(claimed[-1] < _STILL or spread < _STILL)
-    cleaned = _standing if still else _smoothed
-    dynamics = encounter.vehicles[i].kind.dynamics
-    limits = (
-        min(_SHARE_OF_CURVATURE * dynamics.sharpest, ON_THE_SPOT),
-        _SHARE_OF_LATERAL * dynamics.max_lateral_acceleration,
+def _clean(encounter: Encounter, n: int) -> Track:
+    """Clean the motion of one vehicle while it is present."""
+    first, last = encounter.present[n].tolist()
+    rows = slice(first, last + 1)
+    speed = encounter.speed[n, rows]
+    steps = (speed[1:] + speed[:-1]) / 2.0 * encounter.dt
+    record = _Record(
+        encounter.position[n, rows],
+        encounter.heading[n, rows],
+        speed,
+        np.concatenate(([0.0], np.cumsum(steps))),
     )
-    curve, progress, deviation = cleaned(
-        encounter.position[i, there], heading, speed, claimed, limits
-    )
+    extent = float(np.hypot(*np.ptp(record.position, axis=0)))
+    still = bool(record.distance[-1] < MIN_PATH_M or extent < MIN_PATH_M)
+    dynamics = encounter.vehicles[n].kind.dynamics
+    max_curvature = min(CURVATURE_SHARE * dynamics.sharpest, ON_THE_SPOT)
+    max_lateral = LATERAL_SHARE * dynamics.max_lateral_acceleration
+    path = _standing(record) if still else _smoothed(record, max_curvature, max_lateral)
+    padding = (first, encounter.speed.shape[1] - 1 - last)
     return Track(
-        vehicle=encounter.vehicles[i],
-        curve=curve,
-        progress=frozen(
-            np.pad(progress, (first, encounter.speed.shape[1] - 1 - last), mode="edge")
-        ),
-        speed=encounter.speed[i],
+        vehicle=encounter.vehicles[n],
+        curve=path.curve,
+        progress=frozen(np.pad(path.progress, padding, mode="edge")),
+        speed=encounter.speed[n],
         still=still,
-        deviation=deviation,
+        deviation=path.deviation,
         present=frozen_ints([first, last]),
-        recorded_turn=math.nan if still else float(heading[-1] - heading[0]),
+        recorded_turn=math.nan if still else float(record.heading[-1] - record.heading[0]),
         dt=encounter.dt,
     )
 
 
-def _standing(
-    position: Floats,
-    heading: Floats,
-    speed: Floats,
-    _claimed: Floats,
-    _limits: tuple[float, float],
-) -> tuple[Curve, Floats, float]:
-    """The path of a vehicle that stands, its progress, and how far its positions lie from it."""
-    centre = position.mean(axis=0)
-    yaw = float(np.arctan2(np.sin(heading).mean(), np.cos(heading).mean()))
+def _standing(record: _Record) -> _Path:
+    """The path of a vehicle that stands."""
+    centre = record.position.mean(axis=0)
+    sine, cosine = np.sin(record.heading).mean(), np.cos(record.heading).mean()
+    yaw = float(np.arctan2(sine, cosine))
     curve = Curve(np.array([[*centre, yaw], [*(centre + unit(yaw)), yaw]]))
-    return curve, np.zeros(len(speed)), float(np.hypot(*(position - centre).T).max())
+    deviation = float(np.hypot(*(record.position - centre).T).max())
+    return _Path(curve, np.zeros(len(record.speed)), deviation)
 
 
-def _smoothed(
-    position: Floats, heading: Floats, speed: Floats, claimed: Floats, limits: tuple[float, float]
-) -> tuple[Curve, Floats, float]:
-    """The drivable path of positions (T, 2) at distances (T,) that the speed claims, the progress, and the largest deviation.
-
-    The limits are of curvature [1/m] and of lateral acceleration [m/s²].
-    """
-    max_curvature, max_lateral = limits
-    best: tuple[float, Curve, Floats, float] | None = None
-    for wavelength in _WAVELENGTHS:
+def _smoothed(record: _Record, max_curvature: float, max_lateral: float) -> _Path:
+    """The drivable path of a record; the limits are in 1/m and m/s²."""
+    smallest = math.inf
+    for wavelength in WAVELENGTHS_M:
         stop_if_cancelled()
-        grid, smooth = smoothing_spline(claimed, position, wavelength)
+        grid, smooth = smoothing_spline(record.distance, record.position, wavelength)
         curve = Curve.through(smooth)
-        progress = np.interp(claimed, grid, curve.station)
-        deviation = float(np.hypot(*(curve.at(progress)[:, :2] - position).T).max())
-        curvature = np.abs(np.diff(curve.points[:, 2])) / np.diff(curve.station)
-        lateral = curvature * np.square(
-            np.interp((grid[1:] + grid[:-1]) / 2.0, *_increasing(claimed, speed))
-        )
-        excess = (
-            float(lateral.max()) / max_lateral,
-            deviation / _MAX_DEVIATION,
-        )  # what is too sharp is eased below
-        badness = math.fsum(max(e - 1.0, 0.0) for e in excess)
-        if best is None or badness < best[0]:
-            best = (badness, curve, progress, deviation)
-        if badness == 0.0:
+        progress = np.interp(record.distance, grid, curve.station)
+        candidate = _Path(curve, progress, _deviation(curve, progress, record))
+        middle = (grid[1:] + grid[:-1]) / 2.0
+        speed = np.interp(middle, *_increasing(record.distance, record.speed))
+        lateral = float((_curvature(curve) * np.square(speed)).max())
+        excess = (lateral / max_lateral, candidate.deviation / MAX_DEVIATION_M)
+        violation = math.fsum(max(ratio - 1.0, 0.0) for ratio in excess)
+        if violation < smallest:
+            smallest, path = violation, candidate
+        if violation == 0.0:
             break
-    assert best is not None
-    _, curve, progress, deviation = best
-    if (np.abs(np.diff(curve.points[:, 2])) / np.diff(curve.station)).max() > max_curvature:
+    curve, progress = path.curve, path.progress
+    if _curvature(curve).max() > max_curvature:
         share = progress / curve.length
         curve = _eased(curve, max_curvature)
         progress = share * curve.length
-        deviation = float(np.hypot(*(curve.at(progress)[:, :2] - position).T).max())
-    return _aligned(curve, heading, speed, progress), progress, deviation
+        path = _Path(curve, progress, _deviation(curve, progress, record))
+    return path._replace(curve=_aligned(path, record))
+
+
+def _curvature(curve: Curve) -> Floats:
+    """The curvature [1/m] of each edge of a curve."""
+    return np.asarray(np.abs(np.diff(curve.points[:, 2])) / np.diff(curve.station))
+
+
+def _deviation(curve: Curve, progress: Floats, record: _Record) -> float:
+    """The largest distance [m] from the recording."""
+    return float(np.hypot(*(curve.at(progress)[:, :2] - record.position).T).max())
 
 
 def _eased(curve: Curve, max_curvature: float) -> Curve:
-    """The curve with its sharpest bends spread out until no curvature is above the limit.
+    """The curve with its sharpest bends spread out until no curvature exceeds the limit.
 
-    What a bend has too much is handed on to its neighbours, so it turns as far as before, over a longer way; the path is
-    then integrated anew and put where it is nearest to the old one on average.
+    The excess of a bend passes to its neighbours, so that it turns as far as before, over a longer
+    distance. The path is then integrated again and placed nearest to the old one on average.
     """
-    count = max(round(curve.length / 0.5), 1)
+    count = max(round(curve.length / PATH_STEP_M), 1)
     step = curve.length / count
     even = curve.at(np.linspace(0.0, curve.length, count + 1))
     bend = np.diff(even[:, 2])
-    most = 0.95 * max_curvature * step
-    for _ in range(2000):
-        excess = np.sign(bend) * np.maximum(np.abs(bend) - most, 0.0)
+    limit = EASING_SHARE * max_curvature * step
+    for _ in range(MAX_EASING_STEPS):
+        excess = np.sign(bend) * np.maximum(np.abs(bend) - limit, 0.0)
         if not excess.any():
             break
         bend = bend - excess
@@ -237,38 +248,43 @@ def _eased(curve: Curve, max_curvature: float) -> Curve:
     return Curve(np.column_stack((xy, yaw)))
 
 
-def _aligned(curve: Curve, heading: Floats, speed: Floats, progress: Floats) -> Curve:
-    """Shift the yaw by whole turns so that it is near the recorded heading where the vehicle is fastest."""
-    fastest = int(np.argmax(speed))
-    off = float(heading[fastest] - curve.at(progress[fastest])[2])
+def _aligned(path: _Path, record: _Record) -> Curve:
+    """Shift the yaw by whole turns to the recorded heading where the vehicle is fastest."""
+    fastest = int(np.argmax(record.speed))
+    off = float(record.heading[fastest] - path.curve.at(path.progress[fastest])[2])
     turns = np.round((off - float(wrap_angle(np.array(off)))) / (2.0 * np.pi))
-    return Curve(curve.points + np.array([0.0, 0.0, 2.0 * np.pi * turns]))
+    return Curve(path.curve.points + np.array([0.0, 0.0, 2.0 * np.pi * turns]))
 
 
 def _increasing(u: Floats, values: Floats) -> tuple[Floats, Floats]:
-    keep = np.concatenate(([True], np.diff(u) > 1e-9))
-    return u[keep], values[keep]
+    """The values at strictly increasing u."""
+    rows = np.concatenate(([True], np.diff(u) > 1e-9))
+    return u[rows], values[rows]
 
 
 def smoothing_spline(u: Floats, values: Floats, wavelength: float) -> tuple[Floats, Floats]:
-    """The penalised spline f at equal steps of u.
+    """Return the penalised spline f at equal steps of u.
+
+    Source: Eilers & Marx 1996.
 
     Args:
         u: (T,) metres, non-decreasing from 0.
         values: (T, D).
-        wavelength: metres of an oscillation that is halved.
+        wavelength: metres; an oscillation of this length is halved.
 
     Returns:
         The grid (G,) and f on it (G, D).
     """
-    count = max(int(np.ceil(u[-1] / 0.5)), 6) + 1
+    count = max(int(np.ceil(u[-1] / PATH_STEP_M)), 6) + 1
     grid = np.linspace(0.0, u[-1], count)
     step = grid[1]
     weight = np.gradient(u) + 1e-3 * step
     cell = np.minimum((u / step).astype(np.int64), count - 2)
     right = u / step - cell
     left = 1.0 - right
-    bands = np.zeros((3, count))  # diagonals 0, 1, 2 below and on the normal matrix's
+    bands = np.zeros(
+        (3, count)
+    )  # diagonals 0, 1, 2 on and below the diagonal of the normal matrix
     rhs = np.zeros((count, values.shape[1]))
     np.add.at(bands[0], cell, weight * np.square(left))
     np.add.at(bands[0], cell + 1, weight * np.square(right))
@@ -276,8 +292,8 @@ def smoothing_spline(u: Floats, values: Floats, wavelength: float) -> tuple[Floa
     np.add.at(rhs, cell, (weight * left)[:, None] * values)
     np.add.at(rhs, cell + 1, (weight * right)[:, None] * values)
     penalty = (wavelength / (2.0 * np.pi)) ** 4 / step**3
-    for k, (a, b) in enumerate(((0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (0, 2))):
-        factor = penalty * (1.0, 4.0, 1.0, -2.0, -2.0, 1.0)[k]
-        columns = np.arange(count - 2) + a
-        bands[b - a, columns] += factor
+    difference = (1.0, -2.0, 1.0)  # of second order
+    for a in range(3):
+        for b in range(a, 3):
+            bands[b - a, a : count - 2 + a] += penalty * difference[a] * difference[b]
     return grid, linalg.solveh_banded(bands, rhs, lower=True)

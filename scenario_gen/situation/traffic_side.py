@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""On which side of the road a template drives, and its mirror image."""
+"""The side of the road on which an encounter drives, and its mirror image."""
 
 from dataclasses import replace
 
@@ -11,36 +11,35 @@ from scenario_gen.numerics import wrap_angle
 from scenario_gen.numerics.plane import ahead_and_left
 from scenario_gen.types import Encounter
 
-_OPPOSITE = np.radians(150.0)  # between headings, at least
-_ABREAST = 6.0  # m ahead or behind
-_BESIDE = (1.5, 8.0)  # m sideways
-_MOVES = 2.0  # m/s
+ONCOMING_RAD = np.radians(150.0)  # least difference of headings
+MAX_AHEAD_M = 6.0  # of two vehicles that pass each other
+MIN_SIDEWAYS_M = 1.5
+MAX_SIDEWAYS_M = 8.0
+MIN_PASSING_SPEED_MPS = 2.0
 
 
 def traffic_side(encounter: Encounter) -> str:
-    """Return "right" or "left", on which oncoming vehicles pass each other; "" where none do.
+    """Return "right" or "left" for the side of traffic; "" if no oncoming vehicles pass.
 
     In right-hand traffic an oncoming vehicle passes on one's left.
     """
     votes = 0
-    for a in range(len(encounter.vehicles)):
-        both = (
-            encounter.is_present[a]
-            & encounter.is_present
-            & (encounter.speed[a] > _MOVES)
-            & (encounter.speed > _MOVES)
+    moves = encounter.is_present & (encounter.speed > MIN_PASSING_SPEED_MPS)
+    for n in range(len(encounter.vehicles)):
+        heading = encounter.heading[n]
+        ahead, left = ahead_and_left(encounter.position - encounter.position[n], heading)
+        passes = (
+            moves[n]
+            & moves
+            & (np.abs(wrap_angle(encounter.heading - heading)) > ONCOMING_RAD)
+            & (np.abs(ahead) < MAX_AHEAD_M)
+            & (np.abs(left) > MIN_SIDEWAYS_M)
+            & (np.abs(left) < MAX_SIDEWAYS_M)
         )
-        ahead, left = ahead_and_left(
-            encounter.position - encounter.position[a], encounter.heading[a]
-        )
-        passing = (
-            both
-            & (np.abs(wrap_angle(encounter.heading - encounter.heading[a])) > _OPPOSITE)
-            & (np.abs(ahead) < _ABREAST)
-        )
-        passing &= (np.abs(left) > _BESIDE[0]) & (np.abs(left) < _BESIDE[1])
-        votes += int(np.sign(left[passing]).sum())
-    return "right" if votes > 0 else "left" if votes < 0 else ""
+        votes += int(np.sign(left[passes]).sum())
+    if votes == 0:
+        return ""
+    return "right" if votes > 0 else "left"
 
 
 def mirrored(encounter: Encounter) -> Encounter:

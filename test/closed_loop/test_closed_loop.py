@@ -18,7 +18,7 @@ from scenario_gen.closed_loop.config import ClosedLoopConfig
 from scenario_gen.closed_loop.ego import Command, EgoState, move, Pose
 from scenario_gen.closed_loop.simulation import ClosedLoop
 from scenario_gen.closed_loop.verdict import judge
-from scenario_gen.situation.gaps import conflict_of
+from scenario_gen.situation import conflict_of
 from scenario_gen.types import (
     Dynamics,
     Facts,

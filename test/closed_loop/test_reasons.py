@@ -14,7 +14,7 @@ from scenario_gen.closed_loop.reasons import safe_gap
 from scenario_gen.closed_loop.simulation import ClosedLoop
 from scenario_gen.closed_loop.verdict import judge
 from scenario_gen.numerics.curve import Curve
-from scenario_gen.situation import conflicts_in
+from scenario_gen.situation import find_conflicts
 
 STEPS = 160
 TIME = np.arange(STEPS) * PERIOD
@@ -260,7 +260,7 @@ def judged(situation, seed):
     )
     proven = judge(loop, loop.drive(Plays(witness)))
     assert proven.passed, (
-        f"{situation.__name__} {seed}: {proven.sentence()}; {conflicts_in(loop.scenario)}"
+        f"{situation.__name__} {seed}: {proven.sentence()}; {find_conflicts(loop.scenario)}"
     )
     return judge(loop, loop.drive(Plays(ego)))
 

@@ -88,9 +88,7 @@ def test_a_repeated_column_is_named(tmp_path, column):
     path, _ = argoverse2(tmp_path)
     table = parquet.read_table(path)
     parquet.write_table(table.append_column(column, table.column(column)), path)
-    with pytest.raises(
-        InputError, match=rf"scenario_s1\.parquet has several columns '{column}'"
-    ):
+    with pytest.raises(InputError, match=rf"scenario_s1\.parquet has several columns '{column}'"):
         read_log(path)
 
 

@@ -9,7 +9,7 @@ import pytest
 from support.lengths import VEHICLES
 
 from scenario_gen.logs import LogConfig, read_log
-from scenario_gen.situation.interaction import find_waits
+from scenario_gen.situation import find_waits
 
 
 def test_the_list_is_complete(data):

@@ -12,7 +12,7 @@ from support.synthetic_cases import main, make_case, ORIGIN, START_NS
 
 from scenario_gen.logs import LogConfig, read_log
 from scenario_gen.logs.synthetic import bundled, CASES
-from scenario_gen.situation.interaction import find_waits
+from scenario_gen.situation import find_waits
 
 
 @pytest.fixture(params=CASES)

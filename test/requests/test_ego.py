@@ -17,8 +17,7 @@ from scenario_gen.method.chain import Chain
 from scenario_gen.method.segmentation import segment
 from scenario_gen.method.validity import Checker
 from scenario_gen.roads import build_road
-from scenario_gen.situation import Situation
-from scenario_gen.situation.interaction import find_conflicts
+from scenario_gen.situation import find_conflicts, Situation
 from scenario_gen.types import Vehicle
 from scenario_gen.types.ego import join_ego, with_witness
 from scenario_gen.types.request import Request
@@ -105,10 +104,7 @@ def test_the_others_stay_valid_among_themselves(data, ego):
     outcome = answer(chain, Request(ego=encounter.vehicles[ego].id), count=3)
     kept = [n for n in range(len(encounter.vehicles)) if n != ego]
     assert len(outcome.generated.scenarios) == 3
-    vehicles = tuple(encounter.vehicles[n] for n in kept)
-    conflicts = find_conflicts(
-        vehicles, encounter.time, encounter.position[kept], encounter.heading[kept]
-    )
+    conflicts = find_conflicts(encounter.select(kept))
     kept_waits = Situation.of(chain.encounter).waits_to_keep(chain.segmentation)
     waits = [
         replace(wait, vehicle=kept.index(wait.vehicle))

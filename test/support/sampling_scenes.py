@@ -8,7 +8,7 @@ from functools import cache
 import numpy as np
 
 from benchmarks._paper_speed_profile import SpeedProfile
-from scenario_gen.situation.interaction import Wait
+from scenario_gen.situation import Wait
 from scenario_gen.types import Encounter, Vehicle
 from scenario_gen.types.road import Road
 from scenario_gen.types.route import Route

@@ -10,7 +10,7 @@ import numpy as np
 
 from scenario_gen.method.evaluation.geometry import footprint_distance, time_to_collision
 from scenario_gen.method.evaluation.motion import Motion
-from scenario_gen.situation import conflicts_in
+from scenario_gen.situation import find_conflicts
 
 
 @dataclass(frozen=True)
@@ -49,7 +49,7 @@ def criticality(motion: Motion, horizon: float) -> Criticality:
         (a, b, motion.together(a, b)) for a, b in combinations(range(len(motion.vehicles)), 2)
     ]
     pairs = [(a, b, both) for a, b, both in pairs if both.stop > both.start]
-    conflicts = conflicts_in(motion)
+    conflicts = find_conflicts(motion)
     encroachments = [c.encroachment for c in conflicts if not c.following]
     return Criticality(
         min_distance=min(

@@ -7,7 +7,7 @@ They are taken on the published samples (0.1 s). Of a pair a, b:
 
 - `pet`: post-encroachment time [s] (Allen, Shin & Cooper 1978): from the first one's exit of the area that both footprints sweep
   to the second one's entry; negative if both were inside at once. Of crossing and merging pairs only, see
-  `scenario_gen.situation.interaction`.
+  `scenario_gen.situation.conflicts`.
 - `arrival_gap` [s]: from the first one's entry into that area to the second one's. Of a named pair [a,b] it has a sign:
   negative if b is first. Of crossing and merging pairs only.
 - `ttc` [s]: least time to collision while both keep their velocities (Hayward 1972), of the footprints; infinite if they are

@@ -19,7 +19,7 @@ from scenario_gen.method.evaluation.criticality import criticality
 from scenario_gen.method.evaluation.distributions import compare, QUANTITIES, values_of
 from scenario_gen.method.evaluation.samples import Samples, Template
 from scenario_gen.numerics import Floats
-from scenario_gen.situation import keeps
+from scenario_gen.situation import is_same_turn
 from scenario_gen.types import Cause, Interval, Metric
 
 LIMIT_CAUSES = (
@@ -144,7 +144,10 @@ def _turn_kept(samples: Samples) -> Floats:
     """Share (S,) of vehicles that turn from start to end as the template's do."""
     turns = samples.template.motion.heading[:, -1] - samples.template.motion.heading[:, 0]
     kept = [
-        [keeps(a, b) for a, b in zip(turns, m.heading[:, -1] - m.heading[:, 0], strict=True)]
+        [
+            is_same_turn(a, b)
+            for a, b in zip(turns, m.heading[:, -1] - m.heading[:, 0], strict=True)
+        ]
         for m in samples.motions
     ]
     return np.array([np.mean(row) for row in kept])

@@ -29,8 +29,8 @@ from scenario_gen.numerics import Bools, Floats, Ints
 from scenario_gen.situation import (
     Conflict,
     conflicts_by_pair,
-    conflicts_in,
     EncounterKind,
+    find_conflicts,
     kind_of,
 )
 from scenario_gen.types import (
@@ -238,7 +238,7 @@ def member_of(
     """
     whole = at_period(motion, PERIOD)
     figures = {own.pair: own for own in figures_of(motion) if pair in (None, own.pair)}
-    met = conflicts_by_pair(conflicts_in(whole))
+    met = conflicts_by_pair(find_conflicts(whole))
     conflicts: dict[Pair, Conflict] = {own: met[own] for own in met if own in figures}
     if not conflicts:
         return Member(None, np.zeros(len(FEATURES)), recording, template, pair)

@@ -11,8 +11,14 @@ import numpy as np
 from scenario_gen.base.errors import InputError, RefusedError
 from scenario_gen.numerics import Bools, Floats, Ints, wrap_angle
 from scenario_gen.numerics.plane import ahead_and_left
-from scenario_gen.situation import in_words, keeps, Track, turn_of, turns_to_keep
-from scenario_gen.situation.gaps import meetings
+from scenario_gen.situation import (
+    describe_turn,
+    is_same_turn,
+    Track,
+    track_conflicts,
+    turn_of,
+    turns_to_keep,
+)
 from scenario_gen.types import LaneNetwork, Loss
 
 LOSABLE = {
@@ -124,17 +130,17 @@ def find_losses(tracks: tuple[Track, ...], placed: tuple[Track, ...]) -> tuple[L
 def _lost_turns(tracks: tuple[Track, ...], placed: tuple[Track, ...]) -> Iterator[Loss]:
     for track, other in zip(tracks, placed, strict=True):
         there, name = turn_of(other), track.vehicle.id
-        lost = next((turn for turn in turns_to_keep(track) if not keeps(turn, there)), None)
+        lost = next((turn for turn in turns_to_keep(track) if not is_same_turn(turn, there)), None)
         if lost is not None:
             yield Loss(
                 "turn",
                 (name,),
-                f"vehicle {name} {in_words(lost)} in the recording, {in_words(there)} on this road",
+                f"vehicle {name} {describe_turn(lost)} in the recording, {describe_turn(there)} on this road",
             )
 
 
 def _lost_conflicts(tracks: tuple[Track, ...], placed: tuple[Track, ...]) -> Iterator[Loss]:
-    before, after = meetings(tracks), meetings(placed)
+    before, after = track_conflicts(tracks), track_conflicts(placed)
     for pair in sorted(before.keys() | after.keys()):
         a, b = (tracks[k].vehicle.id for k in pair)
         if pair not in after:
@@ -255,7 +261,7 @@ def _lost_passings(tracks: tuple[Track, ...], placed: tuple[Track, ...]) -> Iter
 
 def _passes(track: Track, other: Track, farthest: float) -> int:
     """On which side a vehicle passes another one that drives the same way, or stands: 1 left, -1 right, 0 it does not."""
-    both = track.there & other.there
+    both = track.is_present & other.is_present
     if track.still or not both.any():
         return 0
     poses, others = track.poses[both], other.poses[both]
@@ -277,7 +283,9 @@ def _lost_neighbours(tracks: tuple[Track, ...], placed: tuple[Track, ...]) -> It
     for i, j in combinations(range(len(tracks)), 2):
         reach = (tracks[i].vehicle.length + tracks[j].vehicle.length) / 2.0
         before = np.where(
-            tracks[i].there & tracks[j].there, _side(tracks[i].poses, tracks[j].poses, reach), 0
+            tracks[i].is_present & tracks[j].is_present,
+            _side(tracks[i].poses, tracks[j].poses, reach),
+            0,
         )
         for side, word in ((1, "left"), (-1, "right")):
             there: Bools = before == side

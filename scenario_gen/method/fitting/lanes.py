@@ -23,7 +23,14 @@ from scenario_gen.numerics import frozen
 from scenario_gen.numerics.curve import Curve
 from scenario_gen.numerics.plane import ahead_and_left, place
 from scenario_gen.roads import Course, placements, tracks_on, users_of, ways_through
-from scenario_gen.situation import drivers_of, in_words, MOST_CHANGE, to_frenet, Track, turn_of
+from scenario_gen.situation import (
+    describe_turn,
+    drivers_of,
+    MAX_TURN_CHANGE_RAD,
+    to_frenet,
+    Track,
+    turn_of,
+)
 from scenario_gen.types import (
     LaneNetwork,
     lanes_for,
@@ -127,9 +134,9 @@ def _refuse_turns(tracks: tuple[Track, ...], road: Road) -> None:
     left = max(float((yaw - np.minimum.accumulate(yaw)).max()) for yaw in yaws)
     right = max(float((np.maximum.accumulate(yaw) - yaw).max()) for yaw in yaws)
     for track in tracks:
-        if not -right - MOST_CHANGE <= turn_of(track) <= left + MOST_CHANGE:
+        if not -right - MAX_TURN_CHANGE_RAD <= turn_of(track) <= left + MAX_TURN_CHANGE_RAD:
             raise RefusedError(
-                f"vehicle {track.vehicle.id} {in_words(turn_of(track))}: road {road.name} has no lanes for that"
+                f"vehicle {track.vehicle.id} {describe_turn(turn_of(track))}: road {road.name} has no lanes for that"
             )
 
 

@@ -30,7 +30,7 @@ from scenario_gen.roads import drives_against, ground_for, RuleCheck
 from scenario_gen.situation import (
     Conflict,
     conflicts_by_pair,
-    conflicts_in,
+    find_conflicts,
     lane_gaps,
     LaneGaps,
     required_orders,
@@ -174,7 +174,7 @@ class Checker:
         unusable = _unusable_value(scenario)
         if unusable is not None:
             return Verdict((unusable,), not_applicable=len(recorded))
-        met = conflicts_in(scenario)
+        met = find_conflicts(scenario)
         by_pair = conflicts_by_pair(met)
         conflicts = [by_pair.get(conflict.pair) for conflict in recorded]
         gaps = lane_gaps(scenario)

@@ -20,16 +20,16 @@ from scenario_gen.numerics.curve import crossings, Curve
 from scenario_gen.numerics.plane import angle_between, edge_lengths
 from scenario_gen.roads.vector.search import Spot
 from scenario_gen.situation import (
+    describe_turn,
     Equation,
-    in_words,
     pair_crossings,
-    solve_starts,
+    PairConflicts,
+    solve_placement,
     Track,
     turn_of,
     turns_to_keep,
-    WAIT_SPEED,
+    WAIT_SPEED_MPS,
 )
-from scenario_gen.situation.gaps import Meetings
 from scenario_gen.types import CARS, LaneNetwork, RuleKind
 
 NEAR = 8.0  # metres: a chain begins on a lane that passes a vehicle's start at most so far away
@@ -240,7 +240,7 @@ def middle(points: Floats) -> Curve:
 def match(
     chains: Chains,
     tracks: Sequence[Track],
-    met: Meetings,
+    met: PairConflicts,
     spot: Spot,
     scale: float = 1.0,
     ends: Sequence[tuple[str, str]] = (),
@@ -254,7 +254,7 @@ def match(
     Args:
         chains: of the map or the part of it.
         tracks: the template.
-        met: its conflicts by their vehicles, see `meetings`.
+        met: its conflicts by their vehicles, see `track_conflicts`.
         spot: where it lies.
         scale: s of eq 9, of the distances driven.
         ends: by vehicle, the ids of the lanes by which it comes and goes, "" where any may be; (): any for all.
@@ -407,7 +407,7 @@ def _tied(
     network: LaneNetwork,
     courses: list[Course],
     tracks: Sequence[Track],
-    met: Meetings,
+    met: PairConflicts,
     scale: float,
     begins: Sequence[float | None],
 ) -> list[Course]:
@@ -462,7 +462,7 @@ def _tied(
             Equation(((i, 1.0),), start, _STOPPED)
             for start in _starts_to_stop(network, course, track, scale)
         ]
-    starts = solve_starts(range(len(courses)), known)
+    starts = solve_placement(range(len(courses)), known)
     return [replace(course, start=starts[i]) for i, course in enumerate(courses)]
 
 
@@ -476,7 +476,7 @@ def _starts_to_stop(
         if rule.kind == RuleKind.STOP and set(rule.lanes) & set(course.lanes)
     ]
     first = (
-        [a for a, _ in runs((track.speed < WAIT_SPEED) & track.there)]
+        [a for a, _ in runs((track.speed < WAIT_SPEED_MPS) & track.is_present)]
         if rules and not track.still
         else []
     )
@@ -528,10 +528,10 @@ def judged(
                 reason or f"the lanes of vehicle {track.vehicle.id} end {short:.1f} m too soon"
             )
         if abs(course.turn - turn_of(track)) > _TURN:
-            there = in_words(course.turn)
+            there = describe_turn(course.turn)
             reason = (
                 reason
-                or f"vehicle {track.vehicle.id} {in_words(turn_of(track))} in the recording, {there} there"
+                or f"vehicle {track.vehicle.id} {describe_turn(turn_of(track))} in the recording, {there} there"
             )
         poses = _placed(track, spot)
         fitted = course.curve.at(np.linspace(course.start, course.end, len(poses)))

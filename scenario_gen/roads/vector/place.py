@@ -20,8 +20,7 @@ from scenario_gen.roads.vector.match import Chains, Match, match
 from scenario_gen.roads.vector.rules import RuleCheck
 from scenario_gen.roads.vector.search import crossing_spots, find_spots, Spot, spot_at
 from scenario_gen.roads.vector.street import along_streets
-from scenario_gen.situation import conflicts_in, separate, Track
-from scenario_gen.situation.gaps import Meetings, meetings
+from scenario_gen.situation import find_conflicts, PairConflicts, separate, Track, track_conflicts
 from scenario_gen.types import (
     LaneNetwork,
     lanes_for,
@@ -82,7 +81,7 @@ def placements(
     """
     chains = chains_of(network)
     home = spot_at(network, tracks, np.zeros(3))
-    met = meetings(tracks)
+    met = track_conflicts(tracks)
     judged = _Judged(network, tracks, met)
     drawn_for = network.drawn_for
     sized = (
@@ -137,7 +136,7 @@ class _Search:
 
     Attributes:
         chains, tracks, scales: as of `placements`.
-        met: conflicts of the tracks by their vehicles, see `meetings`.
+        met: conflicts of the tracks by their vehicles, see `track_conflicts`.
         judged: whether a placement keeps the rules.
         sized: where the road was drawn for the template, None if it was not.
         ends: the lanes that it was drawn with, for each vehicle.
@@ -146,7 +145,7 @@ class _Search:
 
     chains: Chains
     tracks: tuple[Track, ...]
-    met: Meetings
+    met: PairConflicts
     scales: Sequence[float]
     judged: "_Judged"
     sized: Spot | None
@@ -208,7 +207,9 @@ class _Search:
 class _Judged:
     """Whether placements keep the traffic rules of a network, and lie on one level where vehicles meet."""
 
-    def __init__(self, network: LaneNetwork, tracks: tuple[Track, ...], met: Meetings) -> None:
+    def __init__(
+        self, network: LaneNetwork, tracks: tuple[Track, ...], met: PairConflicts
+    ) -> None:
         self._network = network
         self._check = RuleCheck(network)
         self._tracks = tracks
@@ -221,7 +222,7 @@ class _Judged:
         if not self._check.rules:
             return ""
         motion = _laid(placement, self._tracks)
-        breach = next(iter(self._check.breaches(motion, conflicts_in(motion))), None)
+        breach = next(iter(self._check.breaches(motion, find_conflicts(motion))), None)
         if breach is None:
             return ""
         return f"vehicle {motion.vehicles[breach.vehicles[0]].id} {breach.message}; road.traffic_rules=ignored allows it"
@@ -250,7 +251,7 @@ class _Judged:
         if not self._met and not self._check.rules:
             return 0, True
         motion = _laid(placement, self._tracks)
-        conflicts = conflicts_in(motion)
+        conflicts = find_conflicts(motion)
         lost = self._met - {met.pair for met in conflicts}
         return len(lost), not self._check.kept_orders(motion, conflicts)
 

@@ -17,7 +17,7 @@ from scenario_gen.base.errors import InputError
 from scenario_gen.base.parameters import parameter, Parameters
 from scenario_gen.logs import LogConfig, RawLog, Streams
 from scenario_gen.ros.common.topics import adapted_quality
-from scenario_gen.situation import MOST_VEHICLES
+from scenario_gen.situation import MAX_VEHICLES
 from scenario_gen.types import Sample, token
 
 CHECK_S = 0.2  # seconds between two checks for new streams, and for silence
@@ -100,11 +100,11 @@ class LiveStreams:
                 if (
                     name
                     not in list(dict.fromkeys(vehicle for vehicle, _ in self._topics.values()))[
-                        :MOST_VEHICLES
+                        :MAX_VEHICLES
                     ]
                 ):
                     raise InputError(
-                        f"{topic} is left out: {MOST_VEHICLES} others are in use; choose vehicles with log.vehicles"
+                        f"{topic} is left out: {MAX_VEHICLES} others are in use; choose vehicles with log.vehicles"
                     )
                 if publishers[0].topic_type != kind_type:
                     raise InputError(

@@ -30,11 +30,11 @@ from scenario_gen.base.worker import Job, Worker
 from scenario_gen.ros.common.diagnostics import NodeDiagnostics
 from scenario_gen.ros.common.ros_parameters import ConfigParameters
 from scenario_gen.ros.common.topics import create_subscription, Outputs
-from scenario_gen.situation import MOST_SAMPLES, refuse_too_large
+from scenario_gen.situation import MAX_SAMPLES, refuse_too_large
 from scenario_gen.types import Encounter, Quality
 
 MOST_BYTES = (
-    200 * MOST_SAMPLES
+    200 * MAX_SAMPLES
 )  # of tracks: a sample of a vehicle takes 176 at most, and an instant 36
 
 

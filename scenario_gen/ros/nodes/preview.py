@@ -23,7 +23,7 @@ from scenario_gen.base.parameters import parameter, Parameters
 from scenario_gen.numerics import Floats
 from scenario_gen.ros.common.stage_node import StageNode
 from scenario_gen.ros.common.topics import create_frames_publisher
-from scenario_gen.situation import conflicts_in
+from scenario_gen.situation import find_conflicts
 from scenario_gen.types import Scenario, tokens
 
 HIGH = 1.2  # metres of a letter
@@ -143,7 +143,7 @@ def conflicts_of(scenario: Scenario) -> tuple[tuple[tuple[float, float, float], 
     """Return where paths meet, and who goes first there."""
     time, names = scenario.time, tokens(vehicle.id for vehicle in scenario.vehicles)
     found = []
-    for conflict in conflicts_in(scenario):
+    for conflict in find_conflicts(scenario):
         n = conflict.second
         x, y, yaw = (
             float(np.interp(conflict.entry_second, time, row))

@@ -13,8 +13,8 @@ from scenario_gen.method.fitting import fit_template, FittingConfig
 from scenario_gen.numerics.curve import Curve
 from scenario_gen.roads import build_road, RoadConfig
 from scenario_gen.roads.clearance import footprint_fits
-from scenario_gen.situation.interaction import find_conflicts
-from scenario_gen.types import Encounter, Vehicle
+from scenario_gen.situation import find_conflicts
+from scenario_gen.types import Encounter, Motion, Vehicle
 from scenario_gen.types.road import Road
 from scenario_gen.types.segmentation import Segmentation
 
@@ -183,12 +183,16 @@ def test_the_template_is_replayed_without_overlap_in_its_order_and_speed(recorde
             poses = np.stack([f.anchors for f in fit.fitted])
             heading = np.unwrap(poses[..., 2], axis=1)
             found = find_conflicts(
-                fit.vehicles, encounter.time[fit.anchor_index], poses[..., :2], heading
+                Motion(
+                    fit.vehicles,
+                    encounter.time[fit.anchor_index],
+                    poses[..., :2],
+                    heading,
+                    np.zeros_like(heading),
+                )
             )
             order = {frozenset((c.first, c.second)): c.first for c in found}
-            template = find_conflicts(
-                encounter.vehicles, encounter.time, encounter.position, encounter.heading
-            )
+            template = find_conflicts(encounter)
             for conflict in template:
                 pair = frozenset((conflict.first, conflict.second))
                 assert order.get(pair, conflict.first) == conflict.first, (name, road_name)

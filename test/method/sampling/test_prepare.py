@@ -17,8 +17,7 @@ from scenario_gen.method.sampling.plan import Plan
 from scenario_gen.method.sampling.prepare import prepare
 from scenario_gen.method.segmentation import segment
 from scenario_gen.roads import build_road
-from scenario_gen.situation import Situation
-from scenario_gen.situation.interaction import find_waits
+from scenario_gen.situation import find_waits, Situation
 from scenario_gen.types import Encounter, NoteKind, Vehicle
 
 DT = 0.1

@@ -15,8 +15,13 @@ from scenario_gen.method.sampling import draw_scenarios, Plan, regenerate, Sampl
 from scenario_gen.method.segmentation import segment
 from scenario_gen.method.validity import Checker
 from scenario_gen.roads import build_road
-from scenario_gen.situation import Situation
-from scenario_gen.situation.interaction import find_conflicts, find_waits, STAND_SPEED, WAIT_SPEED
+from scenario_gen.situation import (
+    find_conflicts,
+    find_waits,
+    Situation,
+    STANDSTILL_SPEED_MPS,
+    WAIT_SPEED_MPS,
+)
 
 CASES = (
     "ngsim_commonroad/encounter_b_left_turn_vs_opposite_Lanker-2_13_2839_21019.csv",
@@ -39,9 +44,7 @@ def test_recorded_encounter(data, case, ablation):
     road = build_road("corridor", encounter)
     fit = fit_template(encounter, segmentation, road)
     routes = plan_routes(road, fit)
-    conflicts = find_conflicts(
-        encounter.vehicles, encounter.time, encounter.position, encounter.heading
-    )
+    conflicts = find_conflicts(encounter)
     checker, config = (
         Checker(road, fit.requested, conflicts, waits),
         SamplingConfig(variety="narrow"),
@@ -60,9 +63,13 @@ def test_recorded_encounter(data, case, ablation):
         )
         for wait in waits:
             inside = (encounter.time >= wait.start) & (encounter.time <= wait.end)
-            stood = (encounter.speed[wait.vehicle, inside] <= STAND_SPEED).sum() * encounter.dt
+            stood = (
+                encounter.speed[wait.vehicle, inside] <= STANDSTILL_SPEED_MPS
+            ).sum() * encounter.dt
             assert (s.speed[wait.vehicle] == 0.0).sum() * 0.1 > 0.7 * stood
-            assert (s.speed[wait.vehicle] < WAIT_SPEED).sum() * 0.1 > 0.7 * (wait.end - wait.start)
+            assert (s.speed[wait.vehicle] < WAIT_SPEED_MPS).sum() * 0.1 > 0.7 * (
+                wait.end - wait.start
+            )
     again = regenerate(plan, config, seed=2, index=found.scenarios[-1].index)
     np.testing.assert_allclose(again.position, found.scenarios[-1].position, atol=1e-9)
     np.testing.assert_allclose(again.speed, found.scenarios[-1].speed, atol=1e-9)

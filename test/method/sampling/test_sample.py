@@ -24,8 +24,7 @@ from scenario_gen.method.sampling.prepare import prepare
 from scenario_gen.method.sampling.sampler import LEVEL_SIZE
 from scenario_gen.method.validity import Checker
 from scenario_gen.numerics.arrays import wrap_angle
-from scenario_gen.situation import Situation
-from scenario_gen.situation.interaction import find_waits, Wait
+from scenario_gen.situation import find_waits, Situation, Wait
 from scenario_gen.types import NoteKind
 from scenario_gen.types.road import Road
 from scenario_gen.types.scenario import BoundaryStates, Cause, Verdict, Violation

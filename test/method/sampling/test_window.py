@@ -13,7 +13,7 @@ from support.textbook_motions import labelled
 from scenario_gen import generate, PipelineConfig
 from scenario_gen.method.sampling import SamplingConfig
 from scenario_gen.method.sampling.window import AFTER_S, Window, window_of
-from scenario_gen.situation import conflict_of, conflicts_in, Situation
+from scenario_gen.situation import conflict_of, find_conflicts, Situation
 from scenario_gen.types import Request
 
 FREE = np.zeros(2, dtype=np.bool_)
@@ -57,7 +57,7 @@ def test_where_an_ego_slot_keeps_its_states_nothing_is_left_out(encounter):
 
 
 def test_what_stays_is_the_conflict_and_a_second(encounter):
-    (conflict,) = conflicts_in(encounter)
+    (conflict,) = find_conflicts(encounter)
     window = window_of(Situation.of(encounter), 0.5, FREE)
     assert window.between[0] == min(conflict.entry_first, conflict.entry_second)
     assert window.between[1] >= max(conflict.entry_second, conflict.exit_first) + AFTER_S

@@ -13,8 +13,7 @@ from scenario_gen.base.errors import InputError
 from scenario_gen.method.validity import Checker, containment, dynamics, Limits
 from scenario_gen.method.validity.collision import ExtendedMotion
 from scenario_gen.method.validity.dynamics import LARGEST_VALUE_RATIO
-from scenario_gen.situation import Situation
-from scenario_gen.situation.interaction import Conflict, find_waits, Wait
+from scenario_gen.situation import Conflict, find_waits, Situation, Wait
 from scenario_gen.types import Encounter, Vehicle
 from scenario_gen.types.scenario import BoundaryStates, Cause
 

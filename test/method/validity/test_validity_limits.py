@@ -12,8 +12,7 @@ from support.motions import arc, open_road, scenario_of, straight
 from scenario_gen.base.errors import InputError
 from scenario_gen.base.road_users import Dynamics
 from scenario_gen.method.validity import Checker, Limits
-from scenario_gen.situation import Situation
-from scenario_gen.situation.interaction import Conflict, find_conflicts, Wait
+from scenario_gen.situation import Conflict, find_conflicts, Situation, Wait
 from scenario_gen.types import Encounter, Vehicle
 from scenario_gen.types.scenario import BoundaryStates, Cause
 
@@ -185,7 +184,7 @@ CROSSING = (straight(-90, 0, 0, 9, TIME), straight(0, -60, np.pi / 2, 7, TIME))
 
 def test_passing_order_is_that_of_the_template():
     scenario = scenario_of(CROSSING, TIME)
-    kept = find_conflicts(scenario.vehicles, scenario.time, scenario.position, scenario.heading)
+    kept = find_conflicts(scenario)
     assert causes(scenario, conflicts=kept) == []
     reverse = (Conflict(kept[0].second, kept[0].first, False, 0.0, 1.0, 2.0),)
     assert causes(scenario, conflicts=reverse) == [Cause.PASSING_ORDER]

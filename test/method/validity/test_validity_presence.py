@@ -17,7 +17,7 @@ from support.oracle import boxes_beyond, overlapping
 
 from scenario_gen.base.road_users import Dynamics
 from scenario_gen.method.validity import Checker, collision
-from scenario_gen.situation.interaction import Wait
+from scenario_gen.situation import Wait
 from scenario_gen.types import Vehicle
 from scenario_gen.types.lanes import Lane, LaneNetwork
 from scenario_gen.types.scenario import BoundaryStates, Cause, Scenario

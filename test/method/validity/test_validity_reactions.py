@@ -11,9 +11,8 @@ from support.reaction_scenes import answering, crossing, lane_encounter, wander
 from support.textbook_motions import labelled, REACTIONS
 
 from scenario_gen.method.validity import Checker, Limits
-from scenario_gen.situation import Situation
+from scenario_gen.situation import find_conflicts, Situation
 from scenario_gen.situation.gaps import lane_gaps
-from scenario_gen.situation.interaction import find_conflicts
 from scenario_gen.types.scenario import Cause, Scenario
 
 
@@ -29,9 +28,7 @@ def as_scenario(encounter):
 
 
 def refusals(scenario, template, limits=None):
-    conflicts = find_conflicts(
-        template.vehicles, template.time, template.position, template.heading
-    )
+    conflicts = find_conflicts(template)
     checker = Checker(
         None,
         None,

@@ -12,7 +12,7 @@ from support.map_builders import FORMATS, write
 from scenario_gen.logs import read_log
 from scenario_gen.roads import placements, read_network, tracks_on
 from scenario_gen.situation import clean_tracks, find_conflicts
-from scenario_gen.types import Encounter, Vehicle
+from scenario_gen.types import Encounter, Motion, Vehicle
 
 STEPS, DT = 100, 0.1
 
@@ -37,10 +37,13 @@ def meet(tracks):
     poses = np.stack([track.poses for track in tracks])
     return bool(
         find_conflicts(
-            tuple(t.vehicle for t in tracks),
-            np.arange(poses.shape[1]) * DT,
-            poses[..., :2],
-            poses[..., 2],
+            Motion.sampled(
+                tuple(t.vehicle for t in tracks),
+                DT,
+                poses[..., :2],
+                poses[..., 2],
+                np.zeros(poses.shape[:2]),
+            )
         )
     )
 

@@ -61,9 +61,7 @@ def network_with(folder, suffix, signs):
 
 
 def broken(network, motion):
-    return RuleCheck(network).breaches(
-        motion, find_conflicts(motion.vehicles, motion.time, motion.position, motion.heading)
-    )
+    return RuleCheck(network).breaches(motion, find_conflicts(motion))
 
 
 def arm_of(point):

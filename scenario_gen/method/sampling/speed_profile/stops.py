@@ -10,7 +10,7 @@ import numpy as np
 
 from scenario_gen.method.sampling.time_warp import SHORTEST_SHARE
 from scenario_gen.numerics import Bools, Floats, runs
-from scenario_gen.situation import STAND_SPEED, Wait
+from scenario_gen.situation import STANDSTILL_SPEED_MPS, Wait
 from scenario_gen.types import Encounter
 
 SHORTEST_WAIT = 1.25  # s; shorter waits are lengthened to it, so that they are still waits on the published grid
@@ -23,7 +23,7 @@ def standing_part(encounter: Encounter, wait: Wait) -> Wait:
     A wait begins below 0.5 m/s, so a vehicle that brakes gently still rolls for a while.
     """
     inside = (encounter.time >= wait.start) & (encounter.time <= wait.end)
-    stands = encounter.time[inside & (encounter.speed[wait.vehicle] <= STAND_SPEED)]
+    stands = encounter.time[inside & (encounter.speed[wait.vehicle] <= STANDSTILL_SPEED_MPS)]
     if wait.moves_slowly or len(stands) == 0:
         return wait
     start = wait.start if wait.start <= encounter.time[0] else float(stands[0])
@@ -53,10 +53,10 @@ def standing_within(
     stands_kept, left = list(stands), dwells.copy()
     for a, b in runs(dwells):
         inside = (time >= times[a]) & (time <= times[b])
-        still = time[inside & (speed <= STAND_SPEED)]
+        still = time[inside & (speed <= STANDSTILL_SPEED_MPS)]
         if len(still):
-            start = times[a] if a == 0 and speed[0] <= STAND_SPEED else still[0]
-            end = times[b] if b == len(dwells) and speed[-1] <= STAND_SPEED else still[-1]
+            start = times[a] if a == 0 and speed[0] <= STANDSTILL_SPEED_MPS else still[0]
+            end = times[b] if b == len(dwells) and speed[-1] <= STANDSTILL_SPEED_MPS else still[-1]
             stands_kept.append((float(start), float(end)))
             left[a:b] = False
     return stands_kept, left

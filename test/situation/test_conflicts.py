@@ -12,8 +12,8 @@ import pytest
 import shapely
 
 from scenario_gen.logs import read_log
-from scenario_gen.situation.interaction import find_conflicts, find_waits, Wait
-from scenario_gen.types import Encounter, Vehicle
+from scenario_gen.situation import find_conflicts, find_waits, Wait
+from scenario_gen.types import Encounter, Motion, Vehicle
 
 CARS = (Vehicle("a"), Vehicle("b"))
 TIME = np.arange(101) * 0.1
@@ -25,9 +25,13 @@ def straight(x, y, yaw, speed, time=TIME):
     return np.stack([x + s * np.cos(yaw), y + s * np.sin(yaw)], -1), np.full(time.size, yaw)
 
 
+def moving(vehicles, time, position, heading, **present):
+    return Motion(vehicles, time, position, heading, np.zeros_like(heading), **present)
+
+
 def conflicts(*tracks, vehicles=CARS, time=TIME):
     position, heading = (np.array(a) for a in zip(*tracks, strict=True))
-    return find_conflicts(vehicles, time, position, heading)
+    return find_conflicts(moving(vehicles, time, position, heading))
 
 
 def encounter(speed):
@@ -209,7 +213,7 @@ def test_recorded_left_turner_yields_to_the_oncoming_car(data):
     for pattern, count in (("encounter_b_left_turn_*", 1), ("encounter_c_opposite_*", 0)):
         (path,) = (data / "trajectories" / "ngsim_commonroad").glob(pattern)
         (log,) = read_log(path).encounters
-        found = find_conflicts(log.vehicles, log.time, log.position, log.heading)
+        found = find_conflicts(log)
         assert len(found) == count and all(one.exit_first < one.entry_second for one in found)
 
 
@@ -217,9 +221,11 @@ def test_who_is_there_only_for_a_time_enters_then():
     """Vehicle b stands in a's way from its arrival on; before it arrives it is in nobody's way."""
     tracks = straight(-30, 0, 0, 5), straight(-10, 0, 0, 0)
     position, heading = (np.array(a) for a in zip(*tracks, strict=True))
-    (found,) = find_conflicts(CARS, TIME, position, heading, np.array([[0, 100], [70, 100]]))
+    (found,) = find_conflicts(
+        moving(CARS, TIME, position, heading, present=np.array([[0, 100], [70, 100]]))
+    )
     assert (found.first, found.entry_second) == (0, 7.0)
-    (found,) = find_conflicts(CARS, TIME, position, heading)
+    (found,) = find_conflicts(moving(CARS, TIME, position, heading))
     assert (found.first, found.entry_first) == (1, 0.0)
 
 

@@ -1,0 +1,417 @@
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""Conflicts: the swept footprints of two vehicles intersect; the order is that of first entry.
+
+The shared area of vehicles a and b is the intersection of their swept footprints. A footprint of a
+lies in the sweep of a, so a is inside the shared area exactly while its footprint meets the sweep
+of b. Therefore two box tests replace polygon clipping.
+"""
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import combinations
+from typing import NamedTuple, Protocol
+
+import numpy as np
+
+from scenario_gen.base.errors import RefusedError
+from scenario_gen.numerics import Floats, Ints
+from scenario_gen.numerics.boxes import Box, box_gap
+from scenario_gen.numerics.kernels import F1, F2, kernel, OUT1
+from scenario_gen.situation.tracks import Track
+from scenario_gen.types import Motion as RecordedMotion
+from scenario_gen.types import together, Vehicle
+
+POSE_STEP_M = 1.0  # longest distance between two neighbouring poses of a sweep
+POSE_TURN_RAD = 0.1  # largest turn between them
+STANDSTILL_STEP_M = 0.01  # samples that move less add nothing to a sweep
+BLOCK_POSES = 16  # poses that share one bounding circle
+CONTACT_DEPTH = 1e-6  # metres; footprints that meet less deeply only touch
+BISECTION_STEPS = 10  # to find when a footprint enters the shared area
+SAME_WAY_RAD = 0.5  # largest difference of headings on a shared path
+FOLLOWING_LENGTHS = 3.0  # vehicle lengths of shared path from which on a conflict is following
+
+HalfSize = tuple[float, float]  # half length, half width [m] of a footprint
+
+
+class Motion(Protocol):
+    """What encounters and scenarios have in common."""
+
+    @property
+    def vehicles(self) -> tuple[Vehicle, ...]:
+        """N identities and footprints."""
+
+    @property
+    def time(self) -> Floats:
+        """(T,) seconds."""
+
+    @property
+    def position(self) -> Floats:
+        """(N, T, 2) metres."""
+
+    @property
+    def heading(self) -> Floats:
+        """(N, T) rad."""
+
+    @property
+    def speed(self) -> Floats:
+        """(N, T) m/s."""
+
+    @property
+    def present(self) -> Ints:
+        """(N, 2) first and last sample of each."""
+
+
+@dataclass(frozen=True)
+class Conflict:
+    """The swept footprints of two vehicles intersect: crossing, merging or following.
+
+    Attributes:
+        first: index of the vehicle that enters the shared area first; of followers the leader.
+        second: index of the other vehicle.
+        following: whether they share a long part of their paths.
+        entry_first: when [s] the first one enters the shared area.
+        exit_first: when [s] the first one has left it.
+        entry_second: when [s] the second one enters.
+    """
+
+    first: int
+    second: int
+    following: bool
+    entry_first: float
+    exit_first: float
+    entry_second: float
+
+    @property
+    def pair(self) -> tuple[int, int]:
+        """Its vehicles, the lower index first."""
+        return min(self.first, self.second), max(self.first, self.second)
+
+    @property
+    def encroachment(self) -> float:
+        """Post-encroachment time [s]: from the exit of the first to the entry of the second."""
+        return self.entry_second - self.exit_first
+
+    @property
+    def arrival_gap(self) -> float:
+        """From the entry of the first to the entry of the second [s]."""
+        return self.entry_second - self.entry_first
+
+
+PairConflicts = Mapping[tuple[int, int], Conflict]  # by vehicles, the lower index first
+
+
+class _Sweep(NamedTuple):
+    """Poses (M, 5), circles (B, 3) as from `_swept`, and the size (2,) [m] of a vehicle."""
+
+    poses: Floats
+    circles: Floats
+    size: Floats
+
+
+def find_conflicts(motion: Motion) -> tuple[Conflict, ...]:
+    """Return one conflict per pair of vehicles whose swept footprints intersect, ordered by pair.
+
+    Between samples position and heading are linear. If two vehicles enter at the same instant
+    (both are inside from the start), the order along the shared path counts, else the index.
+    """
+    sweeps = [_sweep_of(motion, n) for n in range(len(motion.vehicles))]
+    conflicts = [
+        _pair_conflict(a, b, sweeps[a], sweeps[b]) for a, b in combinations(range(len(sweeps)), 2)
+    ]
+    return tuple(conflict for conflict in conflicts if conflict is not None)
+
+
+def conflict_of(motion: Motion, a: int, b: int) -> Conflict | None:
+    """Return the conflict between two vehicles of a motion; None if they have none."""
+    low, high = min(a, b), max(a, b)
+    return _pair_conflict(low, high, _sweep_of(motion, low), _sweep_of(motion, high))
+
+
+def conflicts_by_pair(conflicts: Iterable[Conflict]) -> PairConflicts:
+    """Return conflicts by their vehicles, the lower index first."""
+    return {conflict.pair: conflict for conflict in conflicts}
+
+
+def track_conflicts(tracks: Sequence[Track]) -> PairConflicts:
+    """Return the conflicts between tracks by their vehicles, the lower index first."""
+    poses = np.stack([track.poses for track in tracks])
+    motion = RecordedMotion.sampled(
+        tuple(track.vehicle for track in tracks),
+        tracks[0].dt,
+        poses[..., :2],
+        poses[..., 2],
+        np.stack([track.speed for track in tracks]),
+        present=np.stack([track.present for track in tracks]),
+    )
+    return conflicts_by_pair(find_conflicts(motion))
+
+
+def required_orders(conflicts: Sequence[Conflict], order: str) -> tuple[int | None, ...]:
+    """Return which vehicle must go first at each conflict of the recording; None where any may.
+
+    Args:
+        conflicts: of the recording.
+        order: "keep": as recorded; "free": any; "swap": the other one at the closest crossing or
+            merging (least post-encroachment time), any at others; followers still follow.
+
+    Raises:
+        RefusedError: "swap" is requested and no paths cross or merge.
+    """
+    if order == "keep":
+        return tuple(conflict.first for conflict in conflicts)
+    if order == "free":
+        return (None,) * len(conflicts)
+    closest = closest_crossing(conflicts)
+    if closest is None:
+        raise RefusedError(
+            "order: no recorded vehicle crosses another one's path or merges into it,"
+            " so no order can be swapped"
+        )
+    following = [conflict.first if conflict.following else None for conflict in conflicts]
+    return tuple(
+        closest.second if conflict is closest else first
+        for conflict, first in zip(conflicts, following, strict=True)
+    )
+
+
+def closest_crossing(conflicts: Sequence[Conflict]) -> Conflict | None:
+    """Return the crossing or merging with the least post-encroachment time; None without one."""
+    crossing = [conflict for conflict in conflicts if not conflict.following]
+    return min(crossing, key=lambda conflict: conflict.encroachment, default=None)
+
+
+def _sweep_of(motion: Motion, n: int) -> _Sweep:
+    rows = together(motion.present, n, n)
+    poses, circles = _swept(motion.time[rows], motion.position[n, rows], motion.heading[n, rows])
+    vehicle = motion.vehicles[n]
+    return _Sweep(poses, circles, np.array((vehicle.length, vehicle.width)))
+
+
+def _pair_conflict(a: int, b: int, sweep_a: _Sweep, sweep_b: _Sweep) -> Conflict | None:
+    """Return the conflict of vehicles a < b; None if their sweeps do not intersect."""
+    out = np.empty(7)
+    _conflict(*sweep_a, *sweep_b, out)
+    exists, a_first, following, *times = out.tolist()
+    if not exists:
+        return None
+    entry_a, exit_a, entry_b, exit_b = times
+    if a_first:
+        return Conflict(a, b, bool(following), entry_a, exit_a, entry_b)
+    return Conflict(b, a, bool(following), entry_b, exit_b, entry_a)
+
+
+@kernel(inline=True)
+def _step_counts(position: Floats, heading: Floats) -> Ints:
+    """(T,) into how many steps the motion from the last used sample to each sample is divided.
+
+    0: the sample is not used, since the vehicle stands around it.
+    """
+    count = position.shape[0]
+    steps = np.ones(count, dtype=np.int64)
+    last = 0
+    for k in range(1, count):
+        moved = np.hypot(position[k, 0] - position[last, 0], position[k, 1] - position[last, 1])
+        turned = abs(heading[k] - heading[last])
+        if k < count - 1:
+            next_moved = np.hypot(
+                position[k + 1, 0] - position[last, 0], position[k + 1, 1] - position[last, 1]
+            )
+            next_turned = abs(heading[k + 1] - heading[last])
+            if max(moved, next_moved, turned, next_turned) < STANDSTILL_STEP_M:
+                steps[k] = 0
+                continue
+        steps[k] = max(1, int(np.ceil(max(moved / POSE_STEP_M, turned / POSE_TURN_RAD))))
+        last = k
+    return steps
+
+
+@kernel(inline=True)
+def _sweep_poses(time: Floats, position: Floats, heading: Floats) -> Floats:
+    """Poses (M, 5) t, x, y, cos, sin of a sweep."""
+    steps = _step_counts(position, heading)
+    poses = np.empty((steps.sum(), 5))
+    m, last = 0, 0
+    for k in range(time.shape[0]):
+        for s in range(1, steps[k] + 1):
+            w = s / steps[k]
+            yaw = (1.0 - w) * heading[last] + w * heading[k]
+            poses[m, 0] = (1.0 - w) * time[last] + w * time[k]
+            poses[m, 1] = (1.0 - w) * position[last, 0] + w * position[k, 0]
+            poses[m, 2] = (1.0 - w) * position[last, 1] + w * position[k, 1]
+            poses[m, 3] = np.cos(yaw)
+            poses[m, 4] = np.sin(yaw)
+            m += 1
+        if steps[k]:
+            last = k
+    return poses
+
+
+@kernel(inline=True)
+def _block_circles(poses: Floats) -> Floats:
+    """Circles (B, 3) x, y, r around the centres of each block of poses."""
+    count = poses.shape[0]
+    n = (count + BLOCK_POSES - 1) // BLOCK_POSES
+    circles = np.empty((n, 3))
+    for b in range(n):
+        first, last = b * BLOCK_POSES, min(count, (b + 1) * BLOCK_POSES)
+        x = 0.5 * (poses[first, 1] + poses[last - 1, 1])
+        y = 0.5 * (poses[first, 2] + poses[last - 1, 2])
+        radius = 0.0
+        for i in range(first, last):
+            radius = max(radius, np.hypot(poses[i, 1] - x, poses[i, 2] - y))
+        circles[b, 0] = x
+        circles[b, 1] = y
+        circles[b, 2] = radius
+    return circles
+
+
+@kernel(inline=True)
+def _boxes_meet(a: Floats, half_a: HalfSize, b: Floats, half_b: HalfSize) -> bool:
+    """True if two boxes at poses (t, x, y, cos, sin) overlap by more than CONTACT_DEPTH."""
+    box_a = Box(a[1], a[2], a[3], a[4], half_a[0], half_a[1])
+    box_b = Box(b[1], b[2], b[3], b[4], half_b[0], half_b[1])
+    return box_gap(box_a, box_b) < -CONTACT_DEPTH
+
+
+@kernel(inline=True)
+def _meets_sweep(
+    pose: Floats, half: HalfSize, poses: Floats, circles: Floats, other: HalfSize
+) -> bool:
+    """True if the box at `pose` (t, x, y, cos, sin) meets any box of the sweep `poses`."""
+    x, y = pose[1], pose[2]
+    reach = np.hypot(half[0], half[1]) + np.hypot(other[0], other[1])
+    for b in range(circles.shape[0]):
+        dx, dy, r = circles[b, 0] - x, circles[b, 1] - y, circles[b, 2] + reach
+        if dx * dx + dy * dy >= r * r:
+            continue
+        for i in range(b * BLOCK_POSES, min(poses.shape[0], (b + 1) * BLOCK_POSES)):
+            dx, dy = poses[i, 1] - x, poses[i, 2] - y
+            if dx * dx + dy * dy < reach * reach and _boxes_meet(pose, half, poses[i], other):
+                return True
+    return False
+
+
+@kernel(inline=True)
+def _crossing_time(
+    outer: Floats,
+    inner: Floats,
+    half: HalfSize,
+    poses: Floats,
+    circles: Floats,
+    other: HalfSize,
+) -> float:
+    """When the box begins or ceases to meet the sweep, between two poses, by bisection."""
+    outside, inside, pose = 0.0, 1.0, np.empty(5)
+    for _ in range(BISECTION_STEPS):
+        w = 0.5 * (outside + inside)
+        for i in range(5):
+            pose[i] = (1.0 - w) * outer[i] + w * inner[i]
+        norm = np.hypot(pose[3], pose[4])
+        pose[3], pose[4] = pose[3] / norm, pose[4] / norm
+        if _meets_sweep(pose, half, poses, circles, other):
+            inside = w
+        else:
+            outside = w
+    return float((1.0 - inside) * outer[0] + inside * inner[0])
+
+
+@kernel(inline=True)
+def _occupancy(
+    vehicle: Floats, half: HalfSize, poses: Floats, circles: Floats, other: HalfSize
+) -> tuple[float, float]:
+    """(first entry, last exit) [s] of a vehicle's poses into a sweep; entry inf if they never meet."""
+    count = vehicle.shape[0]
+    first = 0
+    while first < count and not _meets_sweep(vehicle[first], half, poses, circles, other):
+        first += 1
+    if first == count:
+        return np.inf, -np.inf
+    last = count - 1
+    while not _meets_sweep(vehicle[last], half, poses, circles, other):
+        last -= 1
+    entry, leave = vehicle[first, 0], vehicle[last, 0]
+    if first > 0:
+        entry = _crossing_time(vehicle[first - 1], vehicle[first], half, poses, circles, other)
+    if last < count - 1:
+        leave = _crossing_time(vehicle[last + 1], vehicle[last], half, poses, circles, other)
+    return entry, leave
+
+
+@kernel(inline=True)
+def _nearest_pose(pose: Floats, poses: Floats, circles: Floats, guess: int, reach: float) -> int:
+    """Index of the pose nearest to another one within `reach` [m]; -1 if there is none.
+
+    A good `guess` leaves few blocks to search.
+    """
+    nearest, index = reach * reach, -1
+    distance = (poses[guess, 1] - pose[1]) ** 2 + (poses[guess, 2] - pose[2]) ** 2
+    if distance < nearest:
+        nearest, index = distance, guess
+    for b in range(circles.shape[0]):
+        dx, dy = circles[b, 0] - pose[1], circles[b, 1] - pose[2]
+        if dx * dx + dy * dy >= (circles[b, 2] + np.sqrt(nearest)) ** 2:
+            continue
+        for j in range(b * BLOCK_POSES, min(poses.shape[0], (b + 1) * BLOCK_POSES)):
+            distance = (poses[j, 1] - pose[1]) ** 2 + (poses[j, 2] - pose[2]) ** 2
+            if distance < nearest:
+                nearest, index = distance, j
+    return index
+
+
+@kernel(inline=True)
+def _shared_path(
+    a: Floats, b: Floats, circles_b: Floats, half_a: HalfSize, half_b: HalfSize
+) -> tuple[float, float]:
+    """(metres of a's path shared with b, the part on which a came first minus the other part)."""
+    shared, lead, last = 0.0, 0.0, 0
+    reach = np.hypot(half_a[0] + half_b[0], half_a[1] + half_b[1])
+    for i in range(1, a.shape[0]):
+        step = np.hypot(a[i, 1] - a[i - 1, 1], a[i, 2] - a[i - 1, 2])
+        if step == 0.0:
+            continue
+        near = _nearest_pose(a[i], b, circles_b, last, reach)
+        last = max(near, 0)
+        if near < 0 or a[i, 3] * b[near, 3] + a[i, 4] * b[near, 4] < np.cos(SAME_WAY_RAD):
+            continue
+        if _boxes_meet(a[i], half_a, b[near], half_b):
+            shared += step
+            lead += step * np.sign(b[near, 0] - a[i, 0])
+    return shared, lead
+
+
+@kernel(F1, F2, F1)
+def _swept(time: Floats, position: Floats, heading: Floats) -> tuple[Floats, Floats]:
+    """Return the poses (M, 5) of a sweep, and the circles (B, 3) around its blocks."""
+    poses = _sweep_poses(time, position, heading)
+    return poses, _block_circles(poses)
+
+
+@kernel(F2, F2, F1, F2, F2, F1, OUT1)
+def _conflict(
+    a: Floats,
+    circles_a: Floats,
+    size_a: Floats,
+    b: Floats,
+    circles_b: Floats,
+    size_b: Floats,
+    out: Floats,
+) -> None:
+    """Fill `out` (7,): exists, a first, following, entry and exit of a, entry and exit of b."""
+    out[0] = 0.0
+    half_a = (0.5 * size_a[0], 0.5 * size_a[1])
+    half_b = (0.5 * size_b[0], 0.5 * size_b[1])
+    entry_a, exit_a = _occupancy(a, half_a, b, circles_b, half_b)
+    entry_b, exit_b = _occupancy(b, half_b, a, circles_a, half_a)
+    if not (np.isfinite(entry_a) and np.isfinite(entry_b)):
+        return
+    shared, lead = _shared_path(a, b, circles_b, half_a, half_b)
+    following = shared >= FOLLOWING_LENGTHS * max(size_a[0], size_b[0])
+    a_first = entry_a <= entry_b
+    if (following or entry_a == entry_b) and lead != 0.0:
+        a_first = lead > 0.0
+    out[0] = 1.0
+    out[1] = 1.0 if a_first else 0.0
+    out[2] = 1.0 if following else 0.0
+    out[3], out[4], out[5], out[6] = entry_a, exit_a, entry_b, exit_b
