@@ -18,7 +18,7 @@ from scenario_gen.method.chain import Chain
 from scenario_gen.method.config import PipelineConfig
 from scenario_gen.method.evaluation import footprint_distance, Motion
 from scenario_gen.method.evaluation.nearness import time_apart
-from scenario_gen.method.sampling import checker_of, NaturalScenarios, plan_of
+from scenario_gen.method.sampling import checker_of, NaturalScenarios, Plan
 from scenario_gen.method.segmentation import segment
 from scenario_gen.numerics import Floats
 from scenario_gen.roads import road_and_template
@@ -40,7 +40,7 @@ def natural_scenarios() -> NaturalScenarios:
         config,
         seed=SEED,
     )
-    plan = plan_of(attempt.plan(), config.sampling, config.limits, Request())
+    plan = Plan.of(attempt.plan(), config.sampling, config.limits, Request())
     checker = checker_of(plan, config.sampling, config.limits, Request())
     return NaturalScenarios.of(plan, checker.check, config.sampling, SEED)
 

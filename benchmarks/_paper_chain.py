@@ -12,12 +12,13 @@ from itertools import product
 
 import numpy as np
 
+from benchmarks._paper_speed_knots import speed_knots
 from benchmarks._paper_speed_profile import knots_on, SpeedBounds, SpeedProfile, SpeedProfileQP
 from scenario_gen.base.errors import InputError, RefusedError
 from scenario_gen.method.evaluation import without_changepoints
 from scenario_gen.method.fitting import fit_template, FittingConfig
 from scenario_gen.method.routing import PAPER, plan_routes, PlanningConfig
-from scenario_gen.method.sampling import Features, Observations, Posterior, Regression, speed_knots
+from scenario_gen.method.sampling import Features, Observations, Posterior, Regression
 from scenario_gen.numerics import Bools, Floats, wrap_angle
 from scenario_gen.roads import build_road, draw, layout_for, RoadConfig
 from scenario_gen.situation import clean_tracks, find_waits, Wait

@@ -23,7 +23,7 @@ import daqp
 import numpy as np
 import numpy.typing as npt
 
-from scenario_gen.method.sampling import SpeedKnots
+from benchmarks._paper_speed_knots import SpeedKnots
 from scenario_gen.numerics import Bools, Floats, frozen, Ints
 from scenario_gen.numerics.kernels import F1, F2, I1, kernel, OUT2, OUT3
 from scenario_gen.types import Dynamics

@@ -23,12 +23,12 @@ from scenario_gen.logs.synthetic import bundled
 from scenario_gen.method import reference_sets
 from scenario_gen.method.evaluation import EvaluationConfig, MEASURED
 from scenario_gen.method.evaluation.evaluate import measured
-from scenario_gen.method.sampling import Plan, regenerate, sample, sampler
+from scenario_gen.method.sampling import draw, Plan, regenerate, sampler
 from scenario_gen.method.sampling.sampler import (
-    BLOCK,
-    DIRECTED,
+    BLOCK_CANDIDATES,
+    DIRECTED_SLOT,
     index_of,
-    LEVEL_SIZE,
+    LEVEL_CANDIDATES,
     LEVELS,
     place_of,
 )
@@ -60,7 +60,7 @@ def same(one, other):
 
 def test_drawn_again_are_the_same_bits(chain, monkeypatch):
     kept = made(chain, 70)
-    monkeypatch.setattr(sample, "KEPT", 20)
+    monkeypatch.setattr(draw, "MAX_STORED_SCENARIOS", 20)
     again = made(chain, 70)
     assert isinstance(kept.scenarios, tuple) and not isinstance(again.scenarios, tuple)
     assert (again.requested, again.candidates, again.refused) == (
@@ -83,19 +83,19 @@ def test_an_index_is_wide_enough_for_any_candidate(level, candidate):
 
 
 def test_an_index_of_no_candidate_is_refused():
-    for index in (-1, (DIRECTED + 1) * LEVEL_SIZE):
+    for index in (-1, (DIRECTED_SLOT + 1) * LEVEL_CANDIDATES):
         with pytest.raises(InputError, match="scenarios/info"):
             place_of(index)
 
 
 def test_a_level_does_not_run_out_of_candidates(chain, monkeypatch):
-    """Beyond LEVEL_SIZE candidates numbering goes on behind the last level, and each one can be had again."""
+    """Beyond LEVEL_CANDIDATES candidates numbering goes on behind the last level, and each one can be had again."""
     plain = made(chain, 200)
-    monkeypatch.setattr(sampler, "LEVEL_SIZE", 2 * BLOCK)
+    monkeypatch.setattr(sampler, "LEVEL_CANDIDATES", 2 * BLOCK_CANDIDATES)
     beyond = made(chain, 200)
     assert len(beyond.scenarios) == 200
     assert len({s.index for s in beyond.scenarios}) == 200
-    assert max(s.index for s in beyond.scenarios) >= sampler.LEVEL_SLOTS * 2 * BLOCK
+    assert max(s.index for s in beyond.scenarios) >= sampler.INDEX_LEVELS * 2 * BLOCK_CANDIDATES
     assert all(
         a.position.tobytes() == b.position.tobytes()
         for a, b in zip(plain.scenarios, beyond.scenarios, strict=True)
@@ -129,7 +129,7 @@ def test_of_a_large_set_evenly_spaced_runs_are_measured(size):
 
 def test_memory_does_not_grow_with_the_number_of_scenarios(chain, monkeypatch, tmp_path):
     """Sampled, checked and written: scenarios of some 15 kB each raise the peak by less than a tenth of that (short: a third)."""
-    monkeypatch.setattr(sample, "KEPT", 100 if LONG else 40)
+    monkeypatch.setattr(draw, "MAX_STORED_SCENARIOS", 100 if LONG else 40)
 
     def peak(count):
         tracemalloc.reset_peak()

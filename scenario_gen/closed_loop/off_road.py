@@ -14,8 +14,9 @@ import numpy as np
 from scipy.interpolate import CubicHermiteSpline
 
 from scenario_gen.closed_loop.simulation import Drive
-from scenario_gen.method.validity import control_points, first_exits, Ground, Proof
+from scenario_gen.method.validity import first_exits, Ground, Proof
 from scenario_gen.numerics import Bools, Floats, sealed
+from scenario_gen.numerics.hermite import control_points
 from scenario_gen.numerics.kernels import B2, F1, F2, kernel, OUT2
 from scenario_gen.numerics.plane import edge_lengths, unit
 from scenario_gen.roads import clearance_in_cells, distance_transform, footprint_fits, to_cells

@@ -14,8 +14,9 @@ from scenario_gen.closed_loop.reasons import CutIn, Reason, reason_of, Runner, S
 from scenario_gen.closed_loop.score import not_behind, Terms, terms
 from scenario_gen.closed_loop.simulation import ClosedLoop, Drive
 from scenario_gen.method.evaluation import footprint_distance, Motion, time_to_collision
-from scenario_gen.method.validity import control_points, first_contacts, Proof
+from scenario_gen.method.validity import first_contacts, Proof
 from scenario_gen.numerics import Floats
+from scenario_gen.numerics.hermite import control_points
 from scenario_gen.numerics.plane import unit
 from scenario_gen.situation import find_conflicts
 from scenario_gen.types import Scenario

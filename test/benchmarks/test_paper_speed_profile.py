@@ -8,8 +8,8 @@ from hypothesis import strategies as st
 import numpy as np
 import pytest
 
+from benchmarks._paper_speed_knots import best_knot, speed_knots
 from benchmarks._paper_speed_profile import SpeedProfile, SpeedProfileQP
-from scenario_gen.method.sampling.speed_profile.knots import best_knot, speed_knots
 from scenario_gen.types import Dynamics
 
 TIME = np.arange(201) * 0.1

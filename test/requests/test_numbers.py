@@ -12,7 +12,7 @@ from support.lengths import LONG
 
 from scenario_gen.logs import read_log
 from scenario_gen.method.sampling import SamplingConfig
-from scenario_gen.method.sampling.sampler import LEVEL_SIZE
+from scenario_gen.method.sampling.sampler import LEVEL_CANDIDATES
 from scenario_gen.method.segmentation import segment
 from scenario_gen.method.validity import Limits
 from scenario_gen.roads import build_road
@@ -83,7 +83,7 @@ def test_variance_adapts_where_validity_is_hard(tight):
     made = answer(tight, Request(), count=30).generated
     assert len(made.scenarios) == 30
     assert NoteKind.LESS_VARIATION in {note.kind for note in made.adaptations}
-    assert max(s.index for s in made.scenarios) >= LEVEL_SIZE, (
+    assert max(s.index for s in made.scenarios) >= LEVEL_CANDIDATES, (
         "candidates of another level are among them"
     )
     assert made.candidates == len(made.scenarios) + made.refused.total()

@@ -19,7 +19,7 @@ from scenario_gen.method.evaluation.measures import (
     most_critical,
 )
 from scenario_gen.method.sampling import SamplingConfig
-from scenario_gen.method.sampling.directed import TargetError
+from scenario_gen.method.sampling.importance_sampling import TargetError
 from scenario_gen.output.results import provenance_of
 from scenario_gen.output.review.regenerate import regenerate_scenario
 from scenario_gen.output.review.validation import validate_bag

@@ -30,7 +30,7 @@ from scenario_gen.closed_loop.search.objective import AT_FAULT, COLLISION, Objec
 from scenario_gen.closed_loop.search.problem import DrivenScenarios
 from scenario_gen.closed_loop.trials import find_planner, named_vehicle, Rate, trial_runner
 from scenario_gen.method.evaluation import measures_in, wilson
-from scenario_gen.method.sampling import checker_of, NaturalScenarios, plan_of, SamplingConfig
+from scenario_gen.method.sampling import checker_of, NaturalScenarios, Plan, SamplingConfig
 from scenario_gen.method.validity import Limits
 from scenario_gen.output.report.html import render_page
 from scenario_gen.types import (
@@ -225,7 +225,7 @@ def search_failures(
     config, ego = request.drive_config(), request.ego_id()
     identity = request.identity()
     plain = replace(request.request, target="")
-    plan = plan_of(request.planned, request.sampling, request.limits, plain)
+    plan = Plan.of(request.planned, request.sampling, request.limits, plain)
     check = checker_of(plan, request.sampling, request.limits, request.request).check
     measures = measures_in(request.sampling.variety, plan.encounter)
     natural = NaturalScenarios.of(plan, check, request.sampling, request.planned.seed, measures)

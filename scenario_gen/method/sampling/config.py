@@ -9,38 +9,39 @@ from dataclasses import dataclass, replace
 from scenario_gen.base.parameters import parameter, Parameters
 from scenario_gen.types import VehicleType
 
-POPULATION = {
+POPULATION_LEAST = {
     "arrival_sigma": 2.0,
     "pace_sigma": 0.18,
     "wait_sigma": 2.0,
     "end_speed_sigma": 1.2,
     "leave_out": 0.9,
 }
-"""What `population` frees, at least: as wide as encounters differ; which scenarios remain, the population decides."""
+"""Least values with `population`: as wide as encounters differ; the population selects."""
 
 
 @dataclass(frozen=True)
 class SamplingConfig(Parameters):
-    """What varies from scenario to scenario, and by how much; the limits of motion are `TypeLimits`.
+    """What varies from scenario to scenario, and by how much.
 
-    Source: σ_f and l of eq 14, σ_ω of eq 13; the others are ours.
+    Source: σ_f and l are those of eq 14, σ_ω that of eq 13; the others are not in the paper.
     """
 
     variety: str = parameter(
         "wide",
-        "what is free: `narrow` keeps one clock, sizes, start and end states; `wide` frees them, each by its parameter; "
-        "`population` frees them more, and keeps what is usual among recorded encounters of the kind",
+        "`narrow` keeps one clock, sizes, start and end states; `wide` varies them, each by its "
+        "parameter; `population` varies them more, and keeps scenarios that are usual among "
+        "recorded encounters of the kind",
         choices=("narrow", "wide", "population"),
     )
     arrival_sigma: float = parameter(
         1.5,
-        "wide: standard deviation of each vehicle's own shift in time against the others",
+        "wide: standard deviation of each vehicle's shift in time relative to the others",
         unit="s",
         low=0.0,
         high=10.0,
     )
     pace_sigma: float = parameter(
-        0.06, "wide: standard deviation of each vehicle's own pace, as a share", low=0.0, high=0.2
+        0.06, "wide: standard deviation of each vehicle's pace, as a share", low=0.0, high=0.2
     )
     wait_sigma: float = parameter(
         1.0, "wide: standard deviation of the length of each wait", unit="s", low=0.0, high=10.0
@@ -50,7 +51,8 @@ class SamplingConfig(Parameters):
     )
     leave_out: float = parameter(
         0.0,
-        "wide: share of the time before the first conflict, and of that after the last, that a scenario leaves out at most",
+        "wide: largest share of the time before the first conflict, and after the last one, that "
+        "a scenario leaves out",
         low=0.0,
         high=1.0,
     )
@@ -59,21 +61,23 @@ class SamplingConfig(Parameters):
     )
     sizes: str = parameter(
         "catalogue",
-        "wide: sizes of cars, from the catalogue of eight or as recorded",
+        "wide: sizes of cars, from a catalogue of eight or as recorded",
         choices=("catalogue", "recorded"),
     )
     ego: str = parameter(
         "keep",
-        "wide: start and end states of the vehicle that is left out; `keep`: as recorded, `free`: free as those of the others",
+        "wide: start and end states of the vehicle that is left out; `keep`: as recorded, `free`: "
+        "varied like those of the others",
         choices=("keep", "free"),
     )
     reactions: str = parameter(
         "keep",
-        "wide: `keep`: followers and yielders of the recording react in the scenarios, too; `none`: nobody does",
+        "wide: `keep`: followers and yielders of the recording react in the scenarios, too; "
+        "`none`: no vehicle reacts",
         choices=("keep", "none"),
     )
     freedom: float = parameter(
-        2.5, "wide: standard deviations at which all that is free is cut", low=0.5, high=4.0
+        2.5, "wide: standard deviations at which variations are truncated", low=0.5, high=4.0
     )
     lateral_sigma: float = parameter(
         0.3,
@@ -83,7 +87,7 @@ class SamplingConfig(Parameters):
         high=10.0,
     )
     lateral_length: float = parameter(
-        40.0, "l: distance along the route over which it varies", unit="m", low=1.0, high=1000.0
+        40.0, "l: length scale of the deviation along the route", unit="m", low=1.0, high=1000.0
     )
     observation_sigma: float = parameter(
         1.0,
@@ -94,19 +98,19 @@ class SamplingConfig(Parameters):
     )
     steering: float = parameter(
         1.0,
-        "how much a driver corrects to the side, over what the recording's does",
+        "lateral corrections of a driver, over those in the recording",
         low=0.0,
         high=10.0,
     )
     longitudinal_sigma: float = parameter(
         1.2,
-        "σ_s: standard deviation along the route, at the same time of the recording",
+        "σ_s: standard deviation along the route, at the same time as in the recording",
         unit="m",
         low=0.0,
         high=10.0,
     )
     longitudinal_time: float = parameter(
-        4.0, "time over which displacements along the route vary", unit="s", low=0.1, high=1000.0
+        4.0, "time scale of displacements along the route", unit="s", low=0.1, high=1000.0
     )
     time_sigma: float = parameter(
         1.0,
@@ -128,14 +132,16 @@ class SamplingConfig(Parameters):
     )
     bend_acceleration: float = parameter(
         0.0,
-        "lateral acceleration above which the pace is lowered ahead of bends; 0: 1.2 times the recording's, 2 m/s² at least",
+        "lateral acceleration above which the clock is slowed before bends; 0: 1.2 times the "
+        "recording's, 2 m/s² at least",
         unit="m/s²",
         low=0.0,
         high=10.0,
     )
     max_stretch: float = parameter(
         0.2,
-        "share by which the clock may be longer than the recording's, where bends or lengths need it",
+        "share by which the clock may be longer than the recording's, where bends or lengths "
+        "need it",
         low=0.0,
         high=1.0,
     )
@@ -144,16 +150,14 @@ class SamplingConfig(Parameters):
     )
 
     @property
-    def drawn(self) -> "SamplingConfig":
-        """The parameters that candidates are drawn with: for `population` those of a `wide` that is wider."""
-        return (
-            replace(self, variety="wide").at_least(POPULATION)
-            if self.variety == "population"
-            else self
-        )
+    def effective(self) -> "SamplingConfig":
+        """The parameters with which candidates are drawn: `population` is a wider `wide`."""
+        if self.variety != "population":
+            return self
+        return replace(self, variety="wide").at_least(POPULATION_LEAST)
 
     def of(self, kind: VehicleType) -> "SamplingConfig":
-        """Return the parameters for one of a type, whose speeds and places vary less than a car's if it is slow."""
+        """Return the parameters for a vehicle type: slow types vary less than cars."""
         share = kind.varies
         return replace(
             self,
@@ -162,7 +166,6 @@ class SamplingConfig(Parameters):
         )
 
     def at_least(self, least: Mapping[str, float]) -> "SamplingConfig":
-        """Return the parameters with those named at least so large."""
-        return replace(
-            self, **{name: max(value, getattr(self, name)) for name, value in least.items()}
-        )
+        """Return the parameters, with some of them raised to at least these values."""
+        raised = {name: max(value, getattr(self, name)) for name, value in least.items()}
+        return replace(self, **raised)

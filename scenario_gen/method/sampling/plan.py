@@ -1,16 +1,20 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""What scenarios are drawn from, and whom the sampler calls while it draws."""
+"""The input of the sampler: a template planned on a road, and the callbacks of its caller."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
+from scenario_gen.method.sampling.config import SamplingConfig
+from scenario_gen.method.sampling.variation import relaxed_states
 from scenario_gen.situation import Situation, Wait
 from scenario_gen.types import (
     BoundaryStates,
     EgoSlot,
     Encounter,
+    GenerationResult,
+    Request,
     Road,
     Route,
     Scenario,
@@ -18,13 +22,11 @@ from scenario_gen.types import (
     TypeLimits,
 )
 
-Progress = Callable[
-    [int, int, int], None
-]  # of scenarios so far, scenarios wanted, candidates so far
+Progress = Callable[[int, int, int], None]
+"""Takes the scenarios so far, the scenarios wanted, and the candidates so far."""
 Cancelled = Callable[[], bool]
-OnValid = Callable[
-    [Scenario, BoundaryStates, EgoSlot | None], None
-]  # a valid one, the states requested, what the ego is given
+OnValid = Callable[[Scenario, BoundaryStates, EgoSlot | None], None]
+"""Takes a valid scenario, the requested states, and the slot of the ego."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,7 +34,7 @@ class Plan:
     """A template planned on a road.
 
     Attributes:
-        situation: of the template.
+        situation: the template's.
         segmentation: its changepoints.
         road: the target road, for the room it leaves.
         routes: one per vehicle, with an anchor at start, changepoints and end.
@@ -49,6 +51,36 @@ class Plan:
     waits: Sequence[Wait]
     limits: TypeLimits = TypeLimits()
 
+    @classmethod
+    def of(
+        cls,
+        planned: GenerationResult,
+        config: SamplingConfig,
+        limits: TypeLimits,
+        request: Request,
+        waits: tuple[Wait, ...] | None = None,
+        situation: Situation | None = None,
+    ) -> "Plan":
+        """Return the plan of a request, whose states are relaxed where preset `wide` may.
+
+        Args:
+            planned: with road, fit and routes.
+            config: the sampler's parameters.
+            limits: of motion.
+            request: what is requested.
+            waits: that are kept; the template's if None.
+            situation: the template's, if it is known.
+
+        Raises:
+            InputError: road or fit are not known.
+        """
+        situation = situation or Situation.of(planned.encounter)
+        road, fit = planned.road_and_fit()
+        states = relaxed_states(fit.requested, situation, config, request)
+        if waits is None:
+            waits = situation.waits_to_keep(planned.segmentation)
+        return cls(situation, planned.segmentation, road, planned.routes, states, waits, limits)
+
     @property
     def encounter(self) -> Encounter:
         """The template."""
@@ -60,10 +92,10 @@ class Callbacks:
     """Functions that the sampler calls while it draws.
 
     Attributes:
-        progress: called with (valid so far, count, candidates so far).
+        progress: takes (valid so far, count, candidates so far).
         cancelled: called before each candidate; if True, the set so far is returned.
-        accepts: asked of each valid scenario; one that it does not accept is left out of the set.
-        found: called with each valid scenario as it is drawn, in the set's order; of a chosen set, when it is chosen.
+        accepts: called with each valid scenario; a scenario that it refuses is left out.
+        found: called with each scenario of the set as it is drawn, in the set's order.
     """
 
     progress: Progress = lambda *_: None

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""One vehicle on its route: what its speed must keep to, and the mean speed on a clock."""
+"""One vehicle on its route: the conditions of its speed, and the mean speed on a clock."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
@@ -11,54 +11,70 @@ from scipy import ndimage
 
 from scenario_gen.method.sampling.config import SamplingConfig
 from scenario_gen.method.sampling.deviations import Steering
-from scenario_gen.method.sampling.path import BasePath, MIN_NODES, NODE_SPACING
+from scenario_gen.method.sampling.path import BasePath, MIN_NODES_COUNT, NODE_SPACING_M
 from scenario_gen.method.sampling.plan import Plan
-from scenario_gen.method.sampling.speed_profile.knots import speed_knots, SpeedKnots, STAND
+from scenario_gen.method.sampling.speed_profile.knots import (
+    lengthened_waits,
+    MIN_WAIT_S,
+    speed_knots,
+    SpeedKnots,
+    STANDING_MPS,
+    standing_within,
+)
 from scenario_gen.method.sampling.speed_profile.mean import (
     Bounds,
     mean_speed,
+    MeanSpeed,
     Motion,
     rounded_lines,
     Target,
 )
 from scenario_gen.method.sampling.speed_profile.spline import SpeedSpline
-from scenario_gen.method.sampling.speed_profile.stops import (
-    lengthened,
-    SHORTEST_WAIT,
-    standing_within,
-)
 from scenario_gen.method.sampling.time_warp import Clock
 from scenario_gen.numerics import Floats
-from scenario_gen.situation import Situation, Track, Wait
-from scenario_gen.types import Dynamics, Vehicle
+from scenario_gen.situation import Track, Wait
+from scenario_gen.types import Dynamics, Encounter, Vehicle
 
-_MOST_SCALE = (
-    4.0  # largest factor on the template's speeds; a longer route only has the mean speed raised
-)
-_SLOW_WAIT = (
-    0.9  # of the speed below which its type waits: fastest while a wait is kept by moving slowly
-)
-_RAMP = 1.5  # m/s², acceleration from the template's speed to a requested end speed
-_CURVE_REACH = 2.0  # m, to either side of a position, over which the sharpest curvature counts
-_CURVE_MARGIN = (
-    0.85  # share of the lateral limit that the mean may use; the rest is for deviations
-)
-_OWN_MARGIN = 0.95  # the same where the template itself takes bends that fast
-_BOUND_ROUNDS = 4  # times that speeds are bounded by the bends where the mean then is
-_JERK_SHARE, _LEAST_JERK = 1.2, 1.0  # of the template's largest jerk; at least, m/s³
-_BEND_SHARE, _LEAST_BEND = (
-    1.2,
-    2.0,
-)  # of the template's largest lateral acceleration; at least, m/s²
-_SMOOTH = 0.5  # s, over which that acceleration is averaged
-_EARLY = 0.3  # s, by which a vehicle moves before its speed lines do: these are rounded
-_LEAST_REST = (
-    SHORTEST_WAIT - 0.2
-)  # s; the checker still counts the slow start after it as standing
+_NO_LIMIT_RATIO = 1e6  # of a limit in SI units that is lifted
 
-MeanSpeed = tuple[
-    Floats, Motion, Bounds
-]  # coefficients of a mean speed, with its motion and bounds
+
+@dataclass(frozen=True)
+class _Tuning:
+    """Choices without a source in the paper.
+
+    Attributes:
+        max_scale: largest factor on the template's speeds; on a longer route only the mean is
+            raised.
+        creeping_share: of the speed below which a type waits: fastest in a slow wait.
+        end_ramp: m/s² from the template's speed to a requested end speed.
+        curve_reach: m to either side of a position, over which the sharpest curvature counts.
+        curve_share: of the lateral limit that the mean may use; the rest is for deviations.
+        recorded_curve_share: the same where the template takes bends that fast.
+        bend_rounds: times that speeds are bounded by the bends where the mean then is.
+        jerk_factor, min_jerk: bound of the jerk over the template's largest one; at least, m/s³.
+        bend_factor, min_bend: the same of the lateral acceleration; at least, m/s².
+        averaging: s over which the template's lateral acceleration is averaged.
+        early_start: s by which a vehicle moves before its speed lines do, which are rounded.
+        min_rest: s of zero speed in a wait; the checker counts the slow start as standing, too.
+    """
+
+    max_scale: float = 4.0
+    creeping_share: float = 0.9
+    end_ramp: float = 1.5
+    curve_reach: float = 2.0
+    curve_share: float = 0.85
+    recorded_curve_share: float = 0.95
+    bend_rounds: int = 4
+    jerk_factor: float = 1.2
+    min_jerk: float = 1.0
+    bend_factor: float = 1.2
+    min_bend: float = 2.0
+    averaging: float = 0.5
+    early_start: float = 0.3
+    min_rest: float = MIN_WAIT_S - 0.2
+
+
+_TUNING = _Tuning()
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,265 +84,262 @@ class RoutedVehicle:
     Attributes:
         vehicle: identity and footprint.
         path: the route.
-        knots: the template's speed as lines between changepoints, scaled to the route.
+        knots: of the straight lines that fit the template's speed, with its waits.
+        lines: (M,) m/s at the knots, scaled to the route.
         spline: the basis of its speed.
-        times: (K + 2,) its arrival, the changepoints while it is there, and when it leaves [s].
+        times: (K + 2,) its arrival, the changepoints while it is present, and its departure [s].
         anchor: (K + 2,) arc lengths [m] of their anchors.
-        time: (T,) the template's samples while it is there [s].
-        speed: (T,) its speeds [m/s] there, scaled to the route.
+        recorded_time: (T,) the template's samples while it is present [s].
+        recorded_speed: (T,) its speeds [m/s] there, scaled to the route.
         ends: requested speeds [m/s] at start and end.
-        recorded: the template's speeds there, scaled to the route.
+        recorded_ends: the template's speeds there, scaled to the route.
         jerk: largest jerk [m/s³].
-        bend: lateral acceleration [m/s²] above which the pace is lowered.
-        sideways: (T,) lateral acceleration [m/s²] of the template at `time`, which is allowed again.
+        bend: lateral acceleration [m/s²] above which the clock is slowed.
+        lateral: (T,) lateral acceleration [m/s²] of the template, which is allowed again.
         steering: the small corrections of its driver.
         rests: begin and end [s] of the stands in which its speed is zero.
+        limits: of its motion.
     """
 
     vehicle: Vehicle
     path: BasePath
     knots: SpeedKnots
+    lines: Floats
     spline: SpeedSpline
     times: Floats
     anchor: Floats
-    time: Floats
-    speed: Floats
+    recorded_time: Floats
+    recorded_speed: Floats
     ends: tuple[float, float]
-    recorded: tuple[float, float]
+    recorded_ends: tuple[float, float]
     jerk: float
     bend: float
-    sideways: Floats
+    lateral: Floats
     steering: Steering
     rests: list[tuple[float, float]]
     limits: Dynamics
 
-    def target(self, clock: Clock) -> Target:
-        """The speeds and places that its mean should be near, on this clock."""
-        grid = clock.grid[
-            (clock.grid >= self.times[0] - 1e-9) & (clock.grid <= self.times[-1] + 1e-9)
-        ]
-        line = np.interp(grid, self.knots.knot, self.knots.lines)
-        rates = clock.at(self.times[[0, -1]])[1]
-        ends = (self.ends[0] * float(rates[0]), self.ends[1] * float(rates[1]))
-        for end, since in ((0, grid - grid[0]), (-1, grid[-1] - grid)):
-            off = ends[end] - self.recorded[end]
-            line = line + off * np.square(
-                np.maximum(1.0 - since / max(2.0 * abs(off) / _RAMP, 1.0), 0.0)
-            )
-        inner = 1 + np.flatnonzero(np.diff(self.anchor[:-1]) != 0.0)
-        return Target(
-            grid,
-            np.maximum(line, 0.0),
-            self.times[inner],
-            self.anchor[inner],
-            ends,
-            self.path.length,
-        )
+    @property
+    def present_time(self) -> float:
+        """Seconds for which it is present in the template."""
+        return float(self.times[-1] - self.times[0])
 
     @property
     def without_bends(self) -> "RoutedVehicle":
-        """The vehicle as one that takes bends at any speed, which is enough to know where it is when."""
-        return replace(self, limits=replace(self.limits, max_lateral_acceleration=1e6))
+        """The vehicle without a lateral limit, which suffices to know where it is when."""
+        return self._without_limit("max_lateral_acceleration")
+
+    def _without_limit(self, name: str) -> "RoutedVehicle":
+        return replace(self, limits=replace(self.limits, **{name: _NO_LIMIT_RATIO}))
+
+    def target(self, clock: Clock) -> Target:
+        """Return the speeds and places that the mean should be near, on this clock."""
+        grid = clock.grid
+        grid = grid[(grid >= self.times[0] - 1e-9) & (grid <= self.times[-1] + 1e-9)]
+        line = np.interp(grid, self.knots.knot, self.lines)
+        rates = clock.at(self.times[[0, -1]])[1]
+        ends = (self.ends[0] * float(rates[0]), self.ends[1] * float(rates[1]))
+        for end, since in ((0, grid - grid[0]), (-1, grid[-1] - grid)):
+            change = ends[end] - self.recorded_ends[end]
+            ramp = max(2.0 * abs(change) / _TUNING.end_ramp, 1.0)
+            line = line + change * np.square(np.maximum(1.0 - since / ramp, 0.0))
+        inner = 1 + np.flatnonzero(np.diff(self.anchor[:-1]) != 0.0)
+        places = (self.times[inner], self.anchor[inner])
+        return Target(grid, np.maximum(line, 0.0), *places, ends, self.path.length)
 
     def mean(self, clock: Clock) -> MeanSpeed | str:
-        """The mean's coefficients on this clock, with motion and bounds; or why there are none."""
-        spline, rate = self.spline, clock.at(self.spline.stations)[1:]
-        motion, target = Motion.of(spline, *rate), self.target(clock)
+        """Return the mean speed on this clock; or why there is none."""
+        spline, limits = self.spline, self.limits
+        motion, target = Motion.of(spline, *clock.at(spline.stations)[1:]), self.target(clock)
         at, pace = spline.middle, clock.at(spline.middle)[1]
-        top, slow = self.limits.max_speed * pace, _SLOW_WAIT * self.vehicle.kind.waits_below
-        for a, b in self.knots.stretches(self.knots.creeping):
-            margin = float(spline.breaks[1] - spline.breaks[0])
-            top = np.where(
-                (at > a - margin) & (at < b + margin), np.minimum(top, slow * pace), top
-            )
-        most, limit = top, ""
-        for _ in range(_BOUND_ROUNDS):
-            bounds = Bounds(
-                most, self.limits.max_acceleration, self.limits.max_deceleration, self.jerk
-            )
+        top = limits.max_speed * pace
+        creeping = _TUNING.creeping_share * self.vehicle.kind.waits_below * pace
+        margin = float(spline.breaks[1] - spline.breaks[0])
+        for begin, end in self.knots.spans(self.knots.creeping):
+            inside = (at > begin - margin) & (at < end + margin)
+            top = np.where(inside, np.minimum(top, creeping), top)
+
+        recorded = self._recorded_lateral(at) / limits.max_lateral_acceleration
+        share = np.clip(recorded, _TUNING.curve_share, _TUNING.recorded_curve_share)
+        lateral = share * limits.max_lateral_acceleration
+        through_curves = ""
+        for _ in range(_TUNING.bend_rounds):
+            bounds = Bounds(top, limits.max_acceleration, limits.max_deceleration, self.jerk)
             mean = mean_speed(spline, target, motion, bounds)
             if mean is None:
-                longest = f"{clock.time[-1]:.1f} s"
                 return (
-                    f"cannot drive {self.path.length:.1f} m{limit} in {longest} within the limits"
+                    f"cannot drive {self.path.length:.1f} m{through_curves} "
+                    f"in {clock.time[-1]:.1f} s within the limits"
                 )
-            sideways = np.clip(
-                self._own_sideways(at) / self.limits.max_lateral_acceleration,
-                _CURVE_MARGIN,
-                _OWN_MARGIN,
-            )
-            allowed = self._bend_speed(
-                spline.driven(at) @ mean, sideways * self.limits.max_lateral_acceleration
-            )
+            allowed = self._bend_speed(spline.driven(at) @ mean, lateral)
             if (mean <= allowed * pace * 1.01 + 1e-6)[1:-1].all():
-                return mean, motion, bounds
-            most, limit = np.minimum(most, allowed * pace), " through its curves"
-        most_aside = self.limits.max_lateral_acceleration
-        return f"cannot drive its curves within {most_aside:g} m/s² sideways in {clock.time[-1]:.1f} s"
-
-    def blamed(self, clock: Clock) -> str:
-        """Return which of its limits, were it alone not there, would leave it a mean speed on this clock; "" if none would."""
-        names = (entry.name for entry in fields(self.limits))
-        freed = (
-            (name, replace(self, limits=replace(self.limits, **{name: 1e6}))) for name in names
+                return MeanSpeed(mean, motion, bounds)
+            top, through_curves = np.minimum(top, allowed * pace), " through its curves"
+        return (
+            f"cannot drive its curves within {limits.max_lateral_acceleration:g} m/s² sideways "
+            f"in {clock.time[-1]:.1f} s"
         )
-        found = [
-            f"limits.{self.vehicle.type}.{name}"
-            for name, routed in freed
-            if not isinstance(routed.mean(clock), str)
+
+    def limiting_parameters(self, clock: Clock) -> str:
+        """Return the limits that, lifted alone, would allow a mean speed; "" if none would."""
+        limiting = [
+            f"limits.{self.vehicle.type}.{entry.name}"
+            for entry in fields(self.limits)
+            if not isinstance(self._without_limit(entry.name).mean(clock), str)
         ]
-        return f" (more of {' or of '.join(found)} would do)" if found else ""
+        return f" (more of {' or of '.join(limiting)} would do)" if limiting else ""
 
     def largest_shift(self, mean: Floats) -> float:
-        """Return the largest distance [m] of the mean (d,) from a changepoint's place when it is due."""
-        if len(self.path.node) == 1:
+        """Return the largest distance [m] of the mean (n,) from a changepoint when it is due."""
+        if self.path.stands:
             return 0.0
         return float(np.abs(self.spline.driven(self.times) @ mean - self.anchor).max())
 
     def slowdown(self, mean: Floats, grid: Floats) -> Floats:
-        """By how much the clock must be slowed at template times (G,) [s], so that bends are driven comfortably."""
-        if len(self.path.node) == 1:
-            return np.ones(len(grid))
-        there = (grid >= self.times[0]) & (grid <= self.times[-1])
-        s, v = (
-            (rows @ mean)
-            for rows in (self.spline.driven(grid[there]), self.spline.design(grid[there]))
-        )
+        """Return the factors (G,) by which the clock must be slowed for comfort in bends.
+
+        Args:
+            mean: (n,) coefficients of the mean speed [m/s].
+            grid: (G,) template times [s].
+        """
         slowdown = np.ones(len(grid))
-        slowdown[there] = v / self._bend_speed(
-            s, np.maximum(self._own_sideways(grid[there]), self.bend)
-        )
+        if not self.path.stands:
+            present = (grid >= self.times[0]) & (grid <= self.times[-1])
+            at = grid[present]
+            limit = np.maximum(self._recorded_lateral(at), self.bend)
+            allowed = self._bend_speed(self.spline.driven(at) @ mean, limit)
+            slowdown[present] = self.spline.design(at) @ mean / allowed
         return slowdown
 
-    def _own_sideways(self, at: Floats) -> Floats:
-        """Lateral acceleration [m/s²] that the template drives at template times (q,) [s], and a little more."""
-        return np.asarray(_BEND_SHARE * np.interp(at, self.time, self.sideways))
+    def _recorded_lateral(self, at: Floats) -> Floats:
+        """Return a little more than the template's lateral acceleration [m/s²] at times (q,) [s]."""
+        lateral = np.interp(at, self.recorded_time, self.lateral)
+        return np.asarray(_TUNING.bend_factor * lateral)
 
-    def _bend_speed(self, s: Floats, limit: Floats) -> Floats:
-        """Speed [m/s] that the route's bends allow at arc lengths (q,) [m], by limits (q,) [m/s²]."""
-        if len(self.path.node) == 1:
-            return np.full(len(s), np.inf)
-        return np.asarray(
-            np.sqrt(limit / np.maximum(np.interp(s, self.path.arc, _bends(self.path)), 1e-6))
-        )
+    def _bend_speed(self, arc: Floats, limit: Floats) -> Floats:
+        """Return speeds (q,) [m/s] that the bends allow.
+
+        Args:
+            arc: (q,) arc lengths [m].
+            limit: (q,) lateral accelerations [m/s²].
+        """
+        if self.path.stands:
+            return np.full(len(arc), np.inf)
+        bends = np.interp(arc, self.path.arc, sharpest_curvature(self.path))
+        return np.asarray(np.sqrt(limit / np.maximum(bends, 1e-6)))
 
 
-def routed_vehicle(
+def route_vehicle(
     n: int, plan: Plan, times: Floats, waits: Sequence[Wait], config: SamplingConfig
 ) -> RoutedVehicle:
-    """Return vehicle n on its route, with changepoints at times (K,) [s]; one without length stands, whatever is requested."""
-    encounter, route, requested = plan.encounter, plan.routes[n], plan.requested
-    vehicle = encounter.vehicles[n]
+    """Return vehicle n on its route; one without length stands, whatever is requested.
+
+    Args:
+        n: its index.
+        plan: the template on its road.
+        times: (K + 2,) start, changepoints and end [s].
+        waits: that are kept, standing parts only.
+        config: the bounds of jerk and lateral acceleration.
+    """
+    encounter, route = plan.encounter, plan.routes[n]
+    vehicle, path = encounter.vehicles[n], BasePath.of(route)
     limits = plan.limits.of(vehicle.type).planned
     first, last = encounter.present[n].tolist()
-    here = slice(first, last + 1)
-    time, speed = encounter.time[here], encounter.speed[n, here]
-    own = np.concatenate(
-        [
-            [0],
-            1 + np.flatnonzero((times[1:-1] > time[0]) & (times[1:-1] < time[-1])),
-            [len(times) - 1],
-        ]
-    )
-    anchor, times = route.anchor[own], np.concatenate([time[:1], times[own[1:-1]], time[-1:]])
-    dwells = anchor[:-1] == anchor[1:]
-    path = BasePath.of(route)
-    stands, moves_slowly = (
-        lengthened(n, waits, creeping=False),
-        lengthened(n, waits, creeping=True),
-    )
-    ends = (float(requested.start[n, 3]), float(requested.end[n, 3]))
+    span = slice(first, last + 1)
+    time, speed = encounter.time[span], encounter.speed[n, span]
+    driven = float(0.5 * encounter.dt * (speed[1:] + speed[:-1]).sum())
+    scale = min(path.length / driven, _TUNING.max_scale) if driven > 1e-3 else 1.0
+
+    inner = 1 + np.flatnonzero((times[1:-1] > time[0]) & (times[1:-1] < time[-1]))
+    known = np.concatenate([[0], inner, [len(times) - 1]])
+    times = np.concatenate([time[:1], times[inner], time[-1:]])
+    dwells = np.diff(route.anchor[known]) == 0
+    ends = (float(plan.requested.start[n, 3]), float(plan.requested.end[n, 3]))
+    stands = lengthened_waits(n, waits, creeping=False)
     if dwells.all():
         ends = (0.0, 0.0)
-    driven = float(0.5 * encounter.dt * (speed[1:] + speed[:-1]).sum())
-    scale = min(path.length / driven, _MOST_SCALE) if driven > 1e-3 else 1.0
-    if not dwells.all():
+    else:
         stands, dwells = standing_within(times, dwells, stands, time, speed)
-    knots = speed_knots(times, dwells, stands, time, speed, ends, 0.0, moves_slowly)
-    standing = [
-        v if v > STAND or not still else 0.0
-        for v, still in zip(ends, knots.still[[0, -1]], strict=True)
-    ]
-    rests = _at_rest(knots, times)
+    creeping = lengthened_waits(n, waits, creeping=True)
+    knots = speed_knots(times, dwells, stands, ends, creeping)
+    still = knots.still[[0, -1]]
+    ends = _unless(still & (np.array(ends) <= STANDING_MPS), ends)
+    recorded = _unless(still, scale * speed[[0, -1]])
+
+    rests = _rests(knots, times)
     spline = SpeedSpline.over(float(times[0]), float(times[-1]), rests)
-    recorded = [
-        0.0 if still else scale * float(speed[k])
-        for k, still in zip((0, -1), knots.still[[0, -1]], strict=True)
-    ]
-    lines = rounded_lines(spline, knots, time, scale * speed, (recorded[0], recorded[1]))
-    jerk, sideways = (
-        _largest_jerk(scale * speed, encounter.dt),
-        _largest_sideways(plan.situation, n),
-    )
+    lines = rounded_lines(spline, knots, time, scale * speed, recorded)
     track = plan.situation.tracks[n]
+    jerk = _largest_jerk(scale * speed, encounter.dt)
+    lateral = _largest_lateral(encounter, track, n)
+    bend = config.bend_acceleration or max(_TUNING.bend_factor * lateral, _TUNING.min_bend)
+    yaw = np.unwrap(encounter.heading[n, span])
     return RoutedVehicle(
         vehicle,
         path,
-        replace(knots, lines=lines),
+        knots,
+        lines,
         spline,
         times,
-        path.anchor[own],
+        path.anchor[known],
         time,
         scale * speed,
-        (standing[0], standing[1]),
-        (recorded[0], recorded[1]),
-        config.max_jerk or max(_JERK_SHARE * jerk, _LEAST_JERK),
-        min(
-            config.bend_acceleration or max(_BEND_SHARE * sideways, _LEAST_BEND),
-            _CURVE_MARGIN * limits.max_lateral_acceleration,
-        ),
-        _sideways(track, encounter.speed[n])[here],
-        Steering.of(
-            time, np.unwrap(encounter.heading[n, here]), encounter.speed[n, here], path.length
-        ),
+        ends,
+        recorded,
+        config.max_jerk or max(_TUNING.jerk_factor * jerk, _TUNING.min_jerk),
+        min(bend, _TUNING.curve_share * limits.max_lateral_acceleration),
+        _lateral(track, encounter.speed[n])[span],
+        Steering.of(time, yaw, speed, path.length),
         rests,
         limits,
     )
 
 
-def _at_rest(knots: SpeedKnots, times: Floats) -> list[tuple[float, float]]:
-    """The parts of stands in which the speed is zero: the rounded lines begin to rise a little earlier."""
-    rest = []
-    for a, b in knots.stretches(knots.still):
-        moves = (a > times[0], b < times[-1])
-        room = max(min(_EARLY, (b - a - _LEAST_REST) / max(int(moves[0]) + int(moves[1]), 1)), 0.0)
-        rest.append((a + room if moves[0] else a, b - room if moves[1] else b))
-    return rest
+def _unless(zero: Floats, speeds: Sequence[float] | Floats) -> tuple[float, float]:
+    """Return two end speeds [m/s], 0 where `zero` (2,) is true."""
+    start, end = np.where(zero, 0.0, speeds).tolist()
+    return start, end
 
 
-def _bends(path: BasePath) -> Floats:
-    """(G,) the sharpest curvature [1/m] near each node."""
-    reach = 2 * int(np.ceil(_CURVE_REACH / path.spacing)) + 1
-    return np.asarray(
-        ndimage.maximum_filter1d(
-            ndimage.uniform_filter1d(np.abs(path.curvature), 3, mode="nearest"),
-            reach,
-            mode="nearest",
-        )
-    )
+def _rests(knots: SpeedKnots, times: Floats) -> list[tuple[float, float]]:
+    """Return the parts of stands with zero speed; rounded lines rise a little earlier."""
+    rests = []
+    for begin, end in knots.spans(knots.still):
+        arrives, departs = bool(begin > times[0]), bool(end < times[-1])
+        spare = (end - begin - _TUNING.min_rest) / max(arrives + departs, 1)
+        room = max(min(_TUNING.early_start, spare), 0.0)
+        rests.append((begin + room * arrives, end - room * departs))
+    return rests
+
+
+def sharpest_curvature(path: BasePath) -> Floats:
+    """Return the sharpest curvature (G,) [1/m] near each node."""
+    reach = 2 * int(np.ceil(_TUNING.curve_reach / path.spacing)) + 1
+    smooth = ndimage.uniform_filter1d(np.abs(path.curvature), 3, mode="nearest")
+    return np.asarray(ndimage.maximum_filter1d(smooth, reach, mode="nearest"))
 
 
 def _largest_jerk(speed: Floats, dt: float) -> float:
-    """Largest second difference of speeds (T,) [m/s] over time, m/s³."""
+    """Return the largest second difference of speeds (T,) [m/s] over time [m/s³]."""
     return float(np.abs(np.diff(speed, 2)).max(initial=0.0)) / (dt * dt)
 
 
-def _largest_sideways(situation: Situation, n: int) -> float:
-    """Largest lateral acceleration [m/s²] of the template's vehicle n, over half a second."""
-    encounter = situation.encounter
+def _largest_lateral(encounter: Encounter, track: Track, n: int) -> float:
+    """Return the largest lateral acceleration [m/s²] of vehicle n, averaged over half a second."""
     first, last = encounter.present[n].tolist()
-    yaw = situation.tracks[n].poses[first : last + 1, 2]
-    width = 2 * round(0.5 * _SMOOTH / encounter.dt) + 1
-    sideways = np.gradient(yaw, encounter.dt) * encounter.speed[n, first : last + 1]
-    return float(np.abs(ndimage.uniform_filter1d(sideways, width, mode="nearest")).max())
+    span = slice(first, last + 1)
+    width = 2 * round(0.5 * _TUNING.averaging / encounter.dt) + 1
+    lateral = np.gradient(track.poses[span, 2], encounter.dt) * encounter.speed[n, span]
+    return float(np.abs(ndimage.uniform_filter1d(lateral, width, mode="nearest")).max())
 
 
-def _sideways(track: Track, speed: Floats) -> Floats:
-    """Lateral acceleration (T,) [m/s²] of a template's vehicle with speeds (T,) [m/s]; curvature as on a route."""
-    if track.still:
+def _lateral(track: Track, speed: Floats) -> Floats:
+    """Return lateral accelerations (T,) [m/s²] at speeds (T,) [m/s], with curvature as on a route."""
+    driven = np.zeros(0)
+    if not track.still:
+        driven = np.arange(track.progress[0], track.progress[-1], NODE_SPACING_M)
+    if len(driven) < MIN_NODES_COUNT:
         return np.zeros(len(speed))
-    driven = np.arange(track.progress[0], track.progress[-1], NODE_SPACING)
-    if len(driven) < MIN_NODES:
-        return np.zeros(len(speed))
-    path = BasePath(track.curve.at(driven), NODE_SPACING, driven[:0])
-    return np.asarray(np.interp(track.progress, driven, _bends(path)) * np.square(speed))
+    path = BasePath(track.curve.at(driven), NODE_SPACING_M, driven[:0])
+    bends = np.interp(track.progress, driven, sharpest_curvature(path))
+    return np.asarray(bends * np.square(speed))

@@ -1,59 +1,54 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""One candidate by its index, the same whatever was drawn before: of a level of standard deviations, or of a proposal."""
+"""One candidate by its index: seed and index give the same candidate, whatever was drawn before."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 import hashlib
-from typing import overload
+import itertools
+from typing import NamedTuple, overload
 
 import numpy as np
 
 from scenario_gen.base.errors import InputError
-from scenario_gen.method.sampling.candidates import Scale
-from scenario_gen.method.sampling.directed import Proposal
-from scenario_gen.method.sampling.model import CandidateModel
+from scenario_gen.method.sampling.candidates import CandidateModel
+from scenario_gen.method.sampling.importance_sampling import Proposal
+from scenario_gen.method.sampling.vehicle_model import NoiseScale
 from scenario_gen.numerics import Floats, Ints
-from scenario_gen.types import (
-    Facts,
-    Scenario,
-    with_witness,
-)
+from scenario_gen.types import Facts, Scenario, with_witness
 
 Label = Callable[[Scenario], Facts]
 
 LEVELS = (
-    Scale(),
-    Scale(lateral=0.5, own=0.5),
-    Scale(lateral=0.5, longitudinal=0.5, own=0.25),
-    Scale(lateral=0.25, longitudinal=0.25, time=0.5, own=0.1),
-    Scale(lateral=0.1, longitudinal=0.1, time=0.25, own=0.03),
+    NoiseScale(),
+    NoiseScale(lateral=0.5, vehicle_clock=0.5),
+    NoiseScale(lateral=0.5, longitudinal=0.5, vehicle_clock=0.25),
+    NoiseScale(lateral=0.25, longitudinal=0.25, time=0.5, vehicle_clock=0.1),
+    NoiseScale(lateral=0.1, longitudinal=0.1, time=0.25, vehicle_clock=0.03),
 )
-LEVEL_SIZE = 1 << 20  # candidates of one level whose indices follow each other
-LEVEL_SLOTS = 8  # levels that an index has room for; after them come the next LEVEL_SIZE candidates of the first
-BLOCK = 32  # candidates whose random numbers are drawn together
-DIRECTED, STAGED = 5, 6  # slots of the candidates of a proposal, and of those by which it is found
-SEARCHED = 7  # slot of scenarios whose numbers a search chose
-ENOUGH = {
-    "narrow": 0.3,
-    "wide": 0.1,
-}  # share of valid candidates below which the next level is tried
+"""The levels of standard deviations, tried in this order."""
+LEVEL_CANDIDATES = 1 << 20  # of one level whose indices are consecutive
+INDEX_LEVELS = 8  # slots of an index; the next candidates of the first level follow the last slot
+BLOCK_CANDIDATES = 32  # whose random numbers are drawn together
+DIRECTED_SLOT, STAGE_SLOT = 5, 6  # of a proposal's candidates, and of those that find it
+SEARCH_SLOT = 7  # of scenarios whose numbers a search selected
 
 
 def index_of(level: int, candidate: int) -> int:
-    """Return the index of a level's candidate: level * LEVEL_SIZE + candidate while that suffices, and unique beyond."""
-    page, within = divmod(candidate, LEVEL_SIZE)
-    return (page * LEVEL_SLOTS + level) * LEVEL_SIZE + within
+    """Return the index of a level's candidate."""
+    page, within = divmod(candidate, LEVEL_CANDIDATES)
+    return (page * INDEX_LEVELS + level) * LEVEL_CANDIDATES + within
 
 
 def searched_index(numbers: Floats) -> int:
-    """Return the index of a scenario whose numbers (d,) a search chose: made of their SHA-256, to a millionth as on any CPU."""
+    """Return the index of a scenario whose numbers (d,) a search selected.
+
+    It follows from the SHA-256 of the numbers, rounded to a millionth so that any CPU agrees.
+    """
     rounded = np.round(numbers * 1e6).astype(np.int64)
-    page, within = divmod(
-        int.from_bytes(hashlib.sha256(rounded.tobytes()).digest()[:5]), LEVEL_SIZE
-    )
-    return (page * LEVEL_SLOTS + SEARCHED) * LEVEL_SIZE + within
+    digest = hashlib.sha256(rounded.tobytes()).digest()[:5]
+    return index_of(SEARCH_SLOT, int.from_bytes(digest))
 
 
 def place_of(index: int) -> tuple[int, int]:
@@ -62,57 +57,83 @@ def place_of(index: int) -> tuple[int, int]:
     Raises:
         InputError: no candidate has it.
     """
-    slot, within = divmod(index, LEVEL_SIZE)
-    page, level = divmod(slot, LEVEL_SLOTS)
-    if index < 0 or level > DIRECTED:
-        raise InputError(f"no candidate has the index {index}; take one of `scenarios/info`")
-    return level, page * LEVEL_SIZE + within
+    slot, within = divmod(index, LEVEL_CANDIDATES)
+    page, level = divmod(slot, INDEX_LEVELS)
+    if index < 0 or level > DIRECTED_SLOT:
+        raise InputError(f"no candidate has the index {index}; use one from `scenarios/info`")
+    return level, page * LEVEL_CANDIDATES + within
+
+
+class Block(NamedTuple):
+    """Candidates that are drawn together; None for one without a speed profile."""
+
+    index: list[int]
+    scenarios: list[Scenario | None]
 
 
 @dataclass(frozen=True, eq=False)
 class Sampler:
-    """Draws candidates by their index: the same seed and index give the same candidate, whatever was drawn before."""
+    """Draws candidates by their index.
+
+    Attributes:
+        model: of the candidates.
+        seed: of all randomness.
+        frame_id: the road's frame.
+        ego: the vehicle that is left out of published scenarios and becomes the reference drive.
+        base: the level whose standard deviations a proposal's candidates have.
+        proposal: of the numbers; None for independent standard normal numbers.
+        label: returns the facts of a candidate of all vehicles.
+    """
 
     model: CandidateModel
     seed: int
     frame_id: str
-    ego: int | None = (
-        None  # of the vehicle that is left out of what is published, and is its witness
-    )
-    base: int = 0  # level whose standard deviations the candidates of a proposal have
+    ego: int | None = None
+    base: int = 0
     proposal: Proposal | None = None
-    label: Label = lambda _: Facts()  # facts of a candidate of all vehicles
+    label: Label = lambda _: Facts()
 
-    def block(self, level: int, number: int) -> tuple[list[int], list[Scenario | None]]:
-        """The indices of candidates number·BLOCK … of a level, and these; None for one without a speed profile."""
-        first = index_of(level, number * BLOCK)
-        index = list(range(first, first + BLOCK))
-        drawn = self.model.draw(self.numbers(level, number), self._scale(level))
-        return index, drawn.scenarios(self.seed, index, self.frame_id)
+    def block(self, level: int, number: int) -> Block:
+        """Return a block of a level's candidates."""
+        first = index_of(level, number * BLOCK_CANDIDATES)
+        index = list(range(first, first + BLOCK_CANDIDATES))
+        batch = self.model.draw(self.numbers(level, number), self._scale(level))
+        return Block(index, batch.scenarios(self.seed, index, self.frame_id))
+
+    def blocks(self, level: int, first: int = 0) -> Iterator[Block]:
+        """Yield the blocks of a level, from a number on."""
+        for number in itertools.count(first):
+            yield self.block(level, number)
 
     def scenario(self, index: int) -> Scenario | None:
-        """The candidate with this index, to rounding as in a whole set; None if it has no speed profile."""
+        """Return the published candidate with this index; None if it has no speed profile.
+
+        It is the same as in a whole set, to rounding.
+        """
         level, candidate = place_of(index)
-        number, row = divmod(candidate, BLOCK)
-        batch = self.model.draw(self.numbers(level, number)[row : row + 1], self._scale(level))
+        number, row = divmod(candidate, BLOCK_CANDIDATES)
+        numbers = self.numbers(level, number)[row : row + 1]
+        batch = self.model.draw(numbers, self._scale(level))
         (whole,) = batch.scenarios(self.seed, [index], self.frame_id)
         return None if whole is None else self.published(whole)
 
     @property
-    def free(self) -> bool:
-        """Whether vehicles have clocks of their own."""
-        return any(vehicle.freedom is not None for vehicle in self.model.vehicles)
+    def varies(self) -> bool:
+        """Whether vehicles have clocks, places, end speeds or sizes that vary."""
+        return any(vehicle.variation is not None for vehicle in self.model.vehicles)
 
     def undisturbed(self) -> Scenario | None:
-        """The drive without deviations; None where nothing is free and nobody reacts, or it has no speed profile."""
-        if not self.free and not self.model.reactions.edges:
+        """Return the drive without deviations.
+
+        None where nothing varies and nobody reacts, or where it has no speed profile.
+        """
+        if not self.varies and not self.model.reactions.edges:
             return None
-        return self.model.draw(np.zeros((1, self.model.size)), LEVELS[0]).scenarios(
-            self.seed, [0], self.frame_id
-        )[0]
+        batch = self.model.draw(np.zeros((1, self.model.size)), LEVELS[0])
+        return batch.scenarios(self.seed, [0], self.frame_id)[0]
 
     def published(self, whole: Scenario) -> Scenario:
-        """A candidate of all vehicles as it is published: with its facts, the ego's motion apart, as witness."""
+        """Return a candidate of all vehicles as it is published, with its facts."""
         facts = self.label(whole)
         if self.proposal is not None:
             facts = replace(facts, weight=self.weight(whole.index))
@@ -120,34 +141,34 @@ class Sampler:
         return named if self.ego is None else with_witness(named, self.ego)
 
     def weight(self, index: int) -> float:
-        """The importance weight of the candidate with this index against natural ones; 1 where there is no proposal."""
+        """Return the importance weight of a candidate; 1 where there is no proposal."""
         level, candidate = place_of(index)
-        if self.proposal is None or level != DIRECTED:
+        if self.proposal is None or level != DIRECTED_SLOT:
             return 1.0
-        number, row = divmod(candidate, BLOCK)
-        return float(self.proposal.weights(self.numbers(level, number)[row : row + 1])[0])
+        number, row = divmod(candidate, BLOCK_CANDIDATES)
+        numbers = self.numbers(level, number)[row : row + 1]
+        return float(self.proposal.weights(numbers)[0])
 
     def numbers(self, level: int, number: int) -> Floats:
-        """The numbers (S, size) of a block of S = BLOCK candidates: standard normal ones, of a proposal moved by it."""
-        if self.proposal is None or level < DIRECTED:
+        """Return the numbers (S, size) of a block, those of a proposal transformed by it."""
+        if self.proposal is None or level < DIRECTED_SLOT:
             return self._normal(level, number, self.model.size)
         z = self._normal(level, number, self.model.size + 1)
-        return self.proposal.moved(z[:, :-1], z[:, -1])
+        return self.proposal.transform(z[:, :-1], z[:, -1])
 
-    def _scale(self, level: int) -> Scale:
-        return LEVELS[level if level < DIRECTED else self.base]
+    def _scale(self, level: int) -> NoiseScale:
+        return LEVELS[level if level < DIRECTED_SLOT else self.base]
 
     def _normal(self, level: int, number: int, size: int) -> Floats:
-        """Standard normal numbers (BLOCK, size), every other row the mirror image of the one before.
+        """Return standard normal numbers (S, size), every other row mirrors the one before.
 
-        The mean of a set is then the drive without deviations, to first order, however few samples the set has (antithetic
-        variates, Hammersley and Morton 1956).
+        So the mean of a set is the drive without deviations, to first order, however few samples
+        it has (antithetic variates, Hammersley and Morton 1956).
         """
-        generator = np.random.Generator(
-            np.random.PCG64(np.random.SeedSequence([self.seed, level, number]))
-        )
-        z = generator.standard_normal((BLOCK // 2, size))
-        return np.stack([z, -z], axis=1).reshape(BLOCK, -1)
+        seed = np.random.SeedSequence([self.seed, level, number])
+        generator = np.random.Generator(np.random.PCG64(seed))
+        z = generator.standard_normal((BLOCK_CANDIDATES // 2, size))
+        return np.stack([z, -z], axis=1).reshape(BLOCK_CANDIDATES, -1)
 
 
 @dataclass(frozen=True, eq=False)
@@ -156,7 +177,7 @@ class RedrawnScenarios(Sequence[Scenario]):
 
     Attributes:
         sampler: draws them.
-        index: (S,) indices of candidates that are known to be valid.
+        index: (S,) indices of valid candidates.
     """
 
     sampler: Sampler

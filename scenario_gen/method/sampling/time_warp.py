@@ -1,14 +1,16 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The joint time warp: how fast the template's clock runs in a sample, for all vehicles alike, so that who goes first survives.
+"""The time warp that all vehicles of a sample share, so that the order of passing survives.
 
-A sample's clock is t(τ) = t₀(τ) + δ(τ). The nominal clock t₀ is the template's, slowed where a vehicle's route bends more than
-its speed allows. δ is a Gaussian process over τ with δ = 0 at the start and slope zero at both ends, where speeds are given.
-Between the points of a grid the clock is a cubic: rate and its slope are those of the clock that is published.
+The clock of a sample is t(τ) = t₀(τ) + δ(τ). The nominal clock t₀ is the template's, slowed where
+a route bends more than the speed allows. δ is a Gaussian process over τ with δ = 0 at the start
+and slope zero at both ends, where speeds are given. Between the points of its grid a clock is the
+cubic of its times and rates, so its rate is that of the published clock.
 """
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from scipy import special
@@ -16,17 +18,17 @@ from scipy import special
 from scenario_gen.method.sampling.config import SamplingConfig
 from scenario_gen.method.sampling.gp import Features, Observations, principal, Regression
 from scenario_gen.numerics import Floats, Ints
-from scenario_gen.numerics.kernels import F1, F2, I1, kernel, OUT2
+from scenario_gen.numerics.kernels import F1, F2, I1, kernel, named, OUT2
 
-DT = 0.1  # s, the grid of published scenarios
-LONGEST_SHARE, SHORTEST_SHARE = (
-    1.35,
-    0.75,
-)  # slowest and fastest that a clock may run, as a share of the nominal one
-_LENGTH_SHARE = 0.75
-"""Length scale of the warp's deviation as a share of the encounter's duration: a sample is quicker or slower as a whole.
-With slope zero at both ends a longer one leaves nothing to draw; a shorter one squeezes single primitives, whose speeds then are
-nobody's."""
+SAMPLE_PERIOD_S = 0.1  # of published scenarios
+MAX_RATE_RATIO = 1.35  # of a clock over the nominal one: drivers vary by about a third
+MIN_RATE_RATIO = 0.75
+_WARP_LENGTH_RATIO = 0.75
+"""Length scale over the encounter's duration. A sample is quicker or slower as a whole: with slope
+zero at both ends a longer scale leaves nothing to draw, and a shorter one squeezes single
+primitives to speeds that no driver had."""
+_NEWTON_STEPS = 4
+_ROUNDING_STEPS = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,153 +36,189 @@ class Clock:
     """A clock on a grid of the template's time.
 
     Attributes:
-        grid: (G,) seconds of the template.
-        time: (G,) or (S, G) seconds of the scenario there.
-        rate: the same shape, their rate dt/dτ.
+        grid: (G,) seconds of the template, evenly spaced.
+        time: (G,) or (S, G) seconds of the scenario.
+        rate: the rate dt/dτ, of the same shape.
     """
 
     grid: Floats
     time: Floats
     rate: Floats
 
+    @property
+    def step(self) -> float:
+        """Seconds between the points of the grid."""
+        return float(self.grid[1] - self.grid[0])
+
+    def nearest(self, tau: Floats) -> Ints:
+        """Return the indices (k,) of the grid that are nearest to template times (k,) [s]."""
+        cell = np.round(tau / self.step).astype(np.int64)
+        return np.asarray(np.clip(cell, 0, len(self.grid) - 1))
+
+    def times_at(self, tau: Floats) -> Floats:
+        """Return the scenario times (S, k) [s] of S clocks nearest to template times (k,) [s]."""
+        return self.time[:, self.nearest(tau)]
+
     def at(self, tau: Floats) -> tuple[Floats, Floats, Floats, Floats]:
-        """Time [s], rate, and its first two derivatives [1/s, 1/s²] at template times (q,) [s] of a single clock."""
+        """Return time [s], rate and the rate's two derivatives [1/s, 1/s²] of a single clock.
+
+        Args:
+            tau: (q,) template times [s].
+        """
         cell = np.clip(np.searchsorted(self.grid, tau, side="right") - 1, 0, len(self.grid) - 2)
-        h = self.grid[1] - self.grid[0]
+        h = self.step
         x = (tau - self.grid[cell]) / h
-        a, b = self.time[cell], self.time[cell + 1]
-        p, q = h * self.rate[cell], h * self.rate[cell + 1]
-        two, three = 3.0 * (b - a) - 2.0 * p - q, 2.0 * (a - b) + p + q
-        value = a + x * (p + x * (two + x * three))
-        rate, slope = (
-            (p + x * (2.0 * two + 3.0 * three * x)) / h,
-            (2.0 * two + 6.0 * three * x) / (h * h),
-        )
-        return value, rate, slope, 6.0 * three / (h * h * h)
+        start, end = self.time[cell], self.time[cell + 1]
+        c1, q = h * self.rate[cell], h * self.rate[cell + 1]
+        c2 = 3.0 * (end - start) - 2.0 * c1 - q
+        c3 = 2.0 * (start - end) + c1 + q
+        value = start + x * (c1 + x * (c2 + x * c3))
+        rate = (c1 + x * (2.0 * c2 + 3.0 * c3 * x)) / h
+        slope = (2.0 * c2 + 6.0 * c3 * x) / (h * h)
+        return value, rate, slope, 6.0 * c3 / (h * h * h)
 
 
 class TimeWarp:
-    """Samples clocks.
+    """Draws clocks.
 
-    The end's deviation is drawn first, from its Gaussian truncated to the duration tolerance, the rest given the end.
+    The deviation of the end is drawn first, from its Gaussian truncated to the duration tolerance;
+    the rest follows given the end.
     """
 
     def __init__(
         self, nominal: Clock, config: SamplingConfig, least_share: Floats | None = None
     ) -> None:
-        """Prepare.
+        """Prepare the process.
 
         Args:
             nominal: the clock without deviation.
             config: σ_t and the tolerance of the duration.
-            least_share: (G,) slowest rate that a sample may have, as a share of the nominal one.
+            least_share: (G,) slowest rate of a sample over the nominal one.
         """
         self.nominal = nominal
         grid = nominal.grid
-        self._least_share = (
-            np.full(len(grid), SHORTEST_SHARE) if least_share is None else least_share
-        )
-        start, end = float(grid[0]), float(nominal.time[-1])
-        self._shortest = np.ceil(end * (1.0 - config.duration_tolerance) / DT - 1e-6)
-        self._longest = np.floor(end * (1.0 + config.duration_tolerance) / DT + 1e-6)
+        default = np.full(len(grid), MIN_RATE_RATIO)
+        self._least_share = default if least_share is None else least_share
+        duration = float(nominal.time[-1]) / SAMPLE_PERIOD_S
+        tolerance = config.duration_tolerance
+        self._shortest = np.ceil(duration * (1.0 - tolerance) - _ROUNDING_STEPS)
+        self._longest = np.floor(duration * (1.0 + tolerance) + _ROUNDING_STEPS)
         if config.fixed_duration or self._shortest > self._longest:
-            self._shortest = self._longest = float(round(end / DT))
-        sigma, length = config.time_sigma or 1.0, _LENGTH_SHARE * float(grid[-1] - start)
-        features = Features(start, float(grid[-1]), sigma, length)
-        x = np.array([start, start, grid[-1], grid[-1]])
-        none = np.zeros(4)
-        free = Regression(features, Observations(x[:3], none[:3], none[:3], (0, 1, 1))).predict(
-            grid[-1:]
-        )
-        regression = Regression(
-            features, Observations(x, np.array([0.0, 0.0, 0.0, 1.0]), none, (0, 1, 1, 0))
-        )
+            self._shortest = self._longest = float(round(duration))
+
+        start, end = float(grid[0]), float(grid[-1])
+        length = _WARP_LENGTH_RATIO * (end - start)
+        features = Features(start, end, config.time_sigma or 1.0, length)
+        x, none = np.array([start, start, end, end]), np.zeros(4)
+        given_end = np.array([0.0, 0.0, 0.0, 1.0])
+        regression = Regression(features, Observations(x, given_end, none, (0, 1, 1, 0)))
         value, slope = regression.predict(grid), regression.predict(grid, 1)
         self._share, self._share_rate = value.mean, slope.mean
-        if config.time_sigma == 0.0:
-            self._end_sigma, self._factor, self._rates = (
-                0.0,
-                np.zeros((len(grid), 0)),
-                np.zeros((len(grid), 0)),
-            )
-            return
-        self._end_sigma = float(np.sqrt(np.square(free.factor).sum()))
-        both = principal(np.vstack([value.factor, slope.factor]), 1e-9)
-        self._factor, self._rates = both[: len(grid)], both[len(grid) :]
+
+        self._end_sigma = 0.0
+        self._factor = self._rates = np.zeros((len(grid), 0))
+        if config.time_sigma > 0.0:
+            free = Observations(x[:3], none[:3], none[:3], (0, 1, 1))
+            at_end = Regression(features, free).predict(grid[-1:])
+            self._end_sigma = float(np.sqrt(np.square(at_end.factor).sum()))
+            both = principal(np.vstack([value.factor, slope.factor]), 1e-9)
+            self._factor, self._rates = both[: len(grid)], both[len(grid) :]
 
     @property
-    def size(self) -> int:
-        """Standard normal numbers needed per sample."""
+    def count(self) -> int:
+        """Standard normal numbers per sample."""
         return 1 + self._factor.shape[1]
 
     def sample(self, z: Floats, scale: float) -> Clock:
-        """Clocks from numbers z (S, size), deviations multiplied by `scale`; they end on the published grid."""
+        """Return S clocks, which end on the published grid.
+
+        Args:
+            z: (S, count) standard normal numbers.
+            scale: factor on the deviations.
+        """
         nominal = self.nominal
-        end = scale * self._end(z[:, 0])[:, None]
+        end = scale * self._end_deviation(z[:, 0])[:, None]
         delta = end * self._share + scale * (z[:, 1:] @ self._factor.T)
         rate = end * self._share_rate + scale * (z[:, 1:] @ self._rates.T)
-        room = np.where(rate < 0.0, 1.0 - self._least_share, LONGEST_SHARE - 1.0) * nominal.rate
-        damped = np.minimum(1.0, (room / np.maximum(np.abs(rate), 1e-9)).min(axis=1))[:, None]
-        ends = nominal.time[-1] + damped[:, 0] * delta[:, -1]
-        missing = (np.clip(np.round(ends / DT), self._shortest, self._longest) * DT - ends)[
-            :, None
-        ]
-        time = nominal.time + damped * delta + missing * self._share
-        time[:, -1] = np.round(time[:, -1] / DT) * DT
-        return Clock(nominal.grid, time, nominal.rate + damped * rate + missing * self._share_rate)
 
-    def _end(self, z: Floats) -> Floats:
-        """Truncated Gaussian deviations of the end [s] from standard normal ones."""
-        low, high = (
-            self._shortest * DT - self.nominal.time[-1],
-            self._longest * DT - self.nominal.time[-1],
+        slowest = 1.0 - self._least_share
+        room = np.where(rate < 0.0, slowest, MAX_RATE_RATIO - 1.0) * nominal.rate
+        damping = np.minimum(1.0, (room / np.maximum(np.abs(rate), 1e-9)).min(axis=1))[:, None]
+
+        ends = nominal.time[-1] + damping[:, 0] * delta[:, -1]
+        steps = np.clip(np.round(ends / SAMPLE_PERIOD_S), self._shortest, self._longest)
+        missing = (steps * SAMPLE_PERIOD_S - ends)[:, None]
+        time = nominal.time + damping * delta + missing * self._share
+        time[:, -1] = np.round(time[:, -1] / SAMPLE_PERIOD_S) * SAMPLE_PERIOD_S
+        return Clock(
+            nominal.grid, time, nominal.rate + damping * rate + missing * self._share_rate
         )
+
+    def _end_deviation(self, z: Floats) -> Floats:
+        """Truncated Gaussian deviations of the end (S,) [s] from standard normal numbers (S,)."""
+        end = self.nominal.time[-1]
+        low = self._shortest * SAMPLE_PERIOD_S - end
+        high = self._longest * SAMPLE_PERIOD_S - end
         if self._end_sigma < 1e-9 or high - low < 1e-9:
             return np.zeros_like(z)
         a, b = special.ndtr(low / self._end_sigma), special.ndtr(high / self._end_sigma)
         return np.asarray(self._end_sigma * special.ndtri(a + (b - a) * special.ndtr(z)))
 
 
-@kernel(F1, F2, F2, F2, I1, OUT2, OUT2, OUT2)
+class ClockSamples(NamedTuple):
+    """The clocks of S samples at up to T instants.
+
+    Attributes:
+        tau: (S, T) template times [s], ascending.
+        pace: (S, T) rate dt/dτ of the clock.
+        slope: (S, T) 1/s, derivative d²t/dτ² of the rate.
+        counts: (S,) number of instants that are filled.
+    """
+
+    tau: Floats
+    pace: Floats
+    slope: Floats
+    counts: Ints
+
+    @classmethod
+    def of(cls, clock: Clock, at: Floats, counts: Ints) -> "ClockSamples":
+        """Evaluate S clocks at scenario times (S, T) [s], the first `counts` (S,) of them."""
+        samples = cls(np.zeros(at.shape), np.ones(at.shape), np.zeros(at.shape), counts)
+        template_times(clock.grid, clock.time, clock.rate, at, samples)
+        return samples
+
+
+@kernel(F1, F2, F2, F2, named(ClockSamples, OUT2, OUT2, OUT2, I1))
 def template_times(
-    grid: Floats,
-    time: Floats,
-    rate: Floats,
-    at: Floats,
-    count: Ints,
-    tau: Floats,
-    pace: Floats,
-    slope: Floats,
+    grid: Floats, time: Floats, rate: Floats, at: Floats, out: ClockSamples
 ) -> None:
-    """Template times of scenario times, with the clock's rate and its slope there.
+    """Invert S clocks.
 
     Args:
         grid: (G,) seconds of the template, evenly spaced.
-        time: (S, G) seconds of the clocks, see `Clock`.
+        time: (S, G) seconds of the clocks.
         rate: (S, G) their rates.
         at: (S, T) scenario times [s], ascending.
-        count: (S,) how many of them are asked for.
-        tau: (S, T) filled with template times [s].
-        pace: (S, T) filled with dt/dτ.
-        slope: (S, T) filled with d²t/dτ² [1/s].
+        out: filled.
     """
     h = grid[1] - grid[0]
     for s in range(time.shape[0]):
         j = 0
-        for k in range(count[s]):
+        for k in range(out.counts[s]):
             t = min(max(at[s, k], time[s, 0]), time[s, -1])
             while j < len(grid) - 2 and t > time[s, j + 1]:
                 j += 1
             while j > 0 and t < time[s, j]:
                 j -= 1
-            a, b, p, q = time[s, j], time[s, j + 1], h * rate[s, j], h * rate[s, j + 1]
-            two, three = 3.0 * (b - a) - 2.0 * p - q, 2.0 * (a - b) + p + q
-            x = (t - a) / (b - a)
-            for _ in range(4):
-                x -= (a + x * (p + x * (two + x * three)) - t) / (
-                    p + x * (2.0 * two + 3.0 * three * x)
-                )
+            start, end = time[s, j], time[s, j + 1]
+            c1, q = h * rate[s, j], h * rate[s, j + 1]
+            c2 = 3.0 * (end - start) - 2.0 * c1 - q
+            c3 = 2.0 * (start - end) + c1 + q
+            x = (t - start) / (end - start)
+            for _ in range(_NEWTON_STEPS):
+                value = start + x * (c1 + x * (c2 + x * c3))
+                x -= (value - t) / (c1 + x * (2.0 * c2 + 3.0 * c3 * x))
             x = min(max(x, 0.0), 1.0)
-            tau[s, k] = grid[j] + h * x
-            pace[s, k] = (p + x * (2.0 * two + 3.0 * three * x)) / h
-            slope[s, k] = (2.0 * two + 6.0 * three * x) / (h * h)
+            out.tau[s, k] = grid[j] + h * x
+            out.pace[s, k] = (c1 + x * (2.0 * c2 + 3.0 * c3 * x)) / h
+            out.slope[s, k] = (2.0 * c2 + 6.0 * c3 * x) / (h * h)

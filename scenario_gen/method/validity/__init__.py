@@ -6,7 +6,7 @@
 from scenario_gen.method.validity.checker import Checker
 from scenario_gen.method.validity.collision import first_contacts
 from scenario_gen.method.validity.containment import first_exits, Ground
-from scenario_gen.method.validity.cubic import control_points, Proof
+from scenario_gen.method.validity.cubic import Proof
 from scenario_gen.method.validity.limits import Limits
 
 __all__ = [
@@ -14,7 +14,6 @@ __all__ = [
     "Ground",
     "Limits",
     "Proof",
-    "control_points",
     "first_contacts",
     "first_exits",
 ]

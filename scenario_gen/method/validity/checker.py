@@ -11,7 +11,6 @@ import numpy as np
 from scenario_gen.base.errors import InputError
 from scenario_gen.method.validity.collision import contact_violations
 from scenario_gen.method.validity.containment import exit_violations, Ground
-from scenario_gen.method.validity.cubic import control_points
 from scenario_gen.method.validity.dynamics import (
     is_motion,
     LARGEST_VALUE_RATIO,
@@ -26,6 +25,7 @@ from scenario_gen.method.validity.template_checks import (
     wait_violations,
 )
 from scenario_gen.numerics import Bools
+from scenario_gen.numerics.hermite import control_points
 from scenario_gen.roads import drives_against, ground_for, RuleCheck
 from scenario_gen.situation import (
     Conflict,

@@ -31,7 +31,7 @@ from scenario_gen.method.config import PipelineConfig
 from scenario_gen.method.evaluation import MEASURES
 from scenario_gen.method.fitting import FittingConfig
 from scenario_gen.method.routing import PlanningConfig
-from scenario_gen.method.sampling import checker_of, plan_of, regenerate, SamplingConfig
+from scenario_gen.method.sampling import checker_of, Plan, regenerate, SamplingConfig
 from scenario_gen.method.segmentation import segment, SegmentationConfig
 from scenario_gen.method.validity import Limits
 from scenario_gen.situation import mirrored, Situation
@@ -106,7 +106,7 @@ def _regenerate(found: "_Found", what: str, log: Path | None) -> Regenerated:
     values, seed, index = found.summary.values, found.entry.seed, found.entry.index
     known = _replan(found, what, log)
     encounter, requested, sampling = known.planned.encounter, known.request, known.sampling
-    plan = plan_of(known.planned, sampling, known.limits, requested)
+    plan = Plan.of(known.planned, sampling, known.limits, requested)
     check = None
     if requested.target or requested.order == "swap":  # a proposal is found again with them
         check = checker_of(plan, sampling, known.limits, requested).check

@@ -17,7 +17,7 @@ from scenario_gen.method.evaluation.population import FEATURES, member_of
 from scenario_gen.method.sampling import (
     checker_of,
     NaturalScenarios,
-    plan_of,
+    Plan,
     regenerate,
     SamplingConfig,
 )
@@ -145,7 +145,7 @@ def test_the_same_seed_gives_the_same_and_an_index_one_alone(sets, encounters):
     made = sets[0]
     again = generate(encounters, "corridor", POPULATION, count=5, seed=5)
     assert [one.index for one in again] == [one.index for one in made][:5]
-    plan = plan_of(again, POPULATION.sampling, POPULATION.limits, Request())
+    plan = Plan.of(again, POPULATION.sampling, POPULATION.limits, Request())
     alone = regenerate(plan, POPULATION.sampling, seed=5, index=again[4].index)
     np.testing.assert_allclose(alone.position, made[4].position, atol=1e-9)
 
@@ -163,7 +163,7 @@ def test_an_unusual_template_keeps_its_least_rare_ones_and_says_so(encounters):
 
 def test_natural_scenarios_of_a_population_are_usual_too(sets, encounters):
     plan, sampling = (
-        plan_of(sets[0], POPULATION.sampling, POPULATION.limits, Request()),
+        Plan.of(sets[0], POPULATION.sampling, POPULATION.limits, Request()),
         POPULATION.sampling,
     )
     measures = measures_in("population", encounters[0], encounters)
@@ -173,7 +173,10 @@ def test_natural_scenarios_of_a_population_are_usual_too(sets, encounters):
     )
     numbers = np.random.default_rng(0).standard_normal((40, natural.size))
     usual, valid = natural.scenarios(numbers), any_of_them.scenarios(numbers)
-    kept = [one is not None and measures.rarity(one) <= natural.usual.most for one in valid]
+    kept = [
+        one is not None and measures.rarity(one) <= natural.filters.rarity.max_rarity
+        for one in valid
+    ]
     assert [one is not None for one in usual] == kept and sum(kept) < sum(
         one is not None for one in valid
     )

@@ -10,19 +10,20 @@ import pytest
 from scipy.interpolate import BSpline
 from scipy.optimize import minimize
 
-from scenario_gen.method.sampling.pace import clock_of, REACH, slowed_clock
+from benchmarks._paper_speed_knots import speed_knots
+from scenario_gen.method.sampling.nominal_clock import clock_from_rate, slowed_clock, SLOWING_S
 from scenario_gen.method.sampling.speed_profile import mean as mean_module
-from scenario_gen.method.sampling.speed_profile.knots import speed_knots
 from scenario_gen.method.sampling.speed_profile.mean import (
     Bounds,
     fixed_coefficients,
     mean_speed,
+    MeanSpeed,
     Motion,
     rounded_lines,
     Target,
 )
-from scenario_gen.method.sampling.speed_profile.model import kernel_root, speed_model
-from scenario_gen.method.sampling.speed_profile.spline import KNOT_SPACING, SpeedSpline
+from scenario_gen.method.sampling.speed_profile.model import kernel_root, SpeedModel
+from scenario_gen.method.sampling.speed_profile.spline import KNOT_SPACING_S, SpeedSpline
 
 TIME = np.arange(201) * 0.1
 CLOCK = np.array([0.0, 6.0, 9.0, 14.0, 20.0])
@@ -40,9 +41,9 @@ def plain(basis):
 
 def loose(basis, **changes):
     given = {
-        "most": np.full(basis.size, 40.0),
-        "speeding": 4.5,
-        "braking": 8.0,
+        "speed": np.full(basis.size, 40.0),
+        "acceleration": 4.5,
+        "deceleration": 8.0,
         "jerk": 3.0,
     } | changes
     return Bounds(**given)
@@ -86,7 +87,7 @@ def test_a_stand_is_exactly_zero_and_the_rest_is_not():
     inside = np.linspace(*STANDS[0], 300)
     assert (basis.design(inside) @ c == 0.0).all()
     assert basis.design(np.array([5.5, 14.5])) @ c == pytest.approx([1.0, 1.0])
-    assert np.diff(basis.breaks).min() > 0.75 * KNOT_SPACING
+    assert np.diff(basis.breaks).min() > 0.75 * KNOT_SPACING_S
 
 
 def test_mean_keeps_what_must_hold_and_is_the_minimum():
@@ -113,7 +114,7 @@ def test_mean_keeps_what_must_hold_and_is_the_minimum():
     line = np.interp(fine, TIME, speed)
 
     def cost(c):
-        off = np.square(rows @ c - line) + mean_module.SMOOTHING**4 * np.square(bends @ c)
+        off = np.square(rows @ c - line) + mean_module.SMOOTHING_S**4 * np.square(bends @ c)
         return (
             np.trapezoid(off, fine)
             + mean_module.ANCHOR_WEIGHT * np.square(reach @ c - wanted.anchor).sum()
@@ -154,8 +155,8 @@ def drawn(count=4000, sigma=0.8, jerk=3.0):
     ends = (speed[0], speed[-1])
     bounds = loose(basis, jerk=jerk)
     mean = mean_speed(basis, target(speed), plain(basis), bounds)
-    model = speed_model(basis, mean, plain(basis), bounds, TIME, speed, sigma, 4.0)
-    z = np.random.default_rng(3).standard_normal((count, model.size))
+    model = SpeedModel.of(basis, MeanSpeed(mean, plain(basis), bounds), TIME, speed, sigma, 4.0)
+    z = np.random.default_rng(3).standard_normal((count, model.count))
     longer = np.linspace(-0.2, 0.2, count)
     pace, same = np.ones((count, len(model.time))), np.ones((count, 2))
     return model, ends, longer, model.draw(z, longer, pace, same, 0.0 * same)
@@ -177,7 +178,7 @@ def test_a_speed_that_is_given_holds_on_any_clock():
     model, ends, _, _ = drawn(1)
     pace = np.array([[0.9, 1.2]])
     c, _ = model.draw(
-        np.zeros((1, model.size)),
+        np.zeros((1, model.count)),
         np.zeros(1),
         np.ones((1, len(model.time))),
         pace,
@@ -212,7 +213,7 @@ def test_the_clock_is_slow_where_it_must_be_and_known_before(need, at, width):
     clock = slowed_clock(grid, [np.ones(201), needs], 2.0)
     assert (clock.rate >= needs - 1e-9).all()
     assert clock.rate.max() <= need + 1e-9
-    far = np.abs(grid - at) > 0.5 * width + 2.5 * REACH
+    far = np.abs(grid - at) > 0.5 * width + 2.5 * SLOWING_S
     assert clock.rate[far] == pytest.approx(1.0)
     assert np.abs(np.diff(clock.rate, 2)).max() < 0.02
     assert clock.time[-1] == pytest.approx(np.trapezoid(clock.rate, grid))
@@ -222,7 +223,7 @@ def test_the_clock_is_slow_where_it_must_be_and_known_before(need, at, width):
 def test_motion_on_a_slowed_clock_is_the_chain_rule():
     basis = spline([])
     grid = np.linspace(0.0, 20.0, 2001)
-    clock = clock_of(grid, 1.0 + 0.2 * np.sin(0.5 * grid) ** 2)
+    clock = clock_from_rate(grid, 1.0 + 0.2 * np.sin(0.5 * grid) ** 2)
     c = 8.0 + np.random.default_rng(5).normal(size=basis.size)
     tau = basis.breaks[5:-5]
     motion = Motion.of(basis, *clock.at(basis.stations)[1:])

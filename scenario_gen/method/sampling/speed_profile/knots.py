@@ -1,218 +1,160 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Where the knots of the speed profile lie, and what the template says about the speeds between them.
+"""The knots of a speed profile, and the waits that it keeps.
 
-A primitive tells of the template what a speed profile can drive: the straight lines, joined at changepoints, at interior
-knots and at the ends of stands, that fit its speed best in the least-squares sense. The interior knot lies where the template
-bends.
+Knots lie at changepoints, and where a stand or a slow wait begins or ends.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
 
-from scenario_gen.numerics import Bools, Floats, frozen, Ints, runs
+from scenario_gen.method.sampling.time_warp import MIN_RATE_RATIO
+from scenario_gen.numerics import Bools, Floats, runs
+from scenario_gen.situation import STANDSTILL_SPEED_MPS, Wait
+from scenario_gen.types import Encounter
 
-STAND = 0.05  # m/s; an asked speed below this is met by standing
-SHORTEST = 0.2  # s, between two knots in the template
-KNOT_DISTANCE = 0.25  # s, of a primitive's knot from its ends where there is room: at most one knot between two samples
-_RAMP = 1.5  # m/s², by which a vehicle that is asked to roll comes to a stand
+Spans = list[tuple[float, float]]
+"""Begin and end of intervals [s]."""
+
+STANDING_MPS = 0.05  # a lower requested speed is met by standing
+MIN_WAIT_S = 1.25  # shorter waits are lengthened, so that they remain waits on the published grid
+_MIN_WARPED_WAIT_S = 1.15  # to which a fast clock may shorten one
+_MIN_KNOT_DISTANCE_S = 0.2
+_ROLLING_MPS2 = 1.5  # by which a vehicle that is requested to roll comes to a stand
+_WAIT_MARGIN_S = 1.0  # around a wait, in which the clock keeps it
 
 
 @dataclass(frozen=True, eq=False)
 class SpeedKnots:
-    """The knots of one vehicle on the template's clock, and what the template's speed says about each interval.
+    """The knots of one vehicle on the template's clock.
 
     Attributes:
         knot: (M,) seconds.
-        piece: (M - 1,) primitive of each interval.
-        still: (M - 1,) True where the vehicle stands.
-        creeping: (M - 1,) True where it waits, but rolls on slowly.
-        group: (M - 1,) length constraint each moving interval belongs to, -1 where it stands.
-        bounds: (G, 2) anchors at which each length constraint begins and ends.
-        lines: (M,) m/s, v̂ at the knots: the straight lines that fit the template's speed best.
-        interior: numbers of the knots inside primitives.
-        unknown: (M,) number of each knot's unknown speed, -1 where it is given.
-        given: (M,) m/s, the speed where it is given.
+        still: (M - 1,) whether the vehicle stands between two knots.
+        creeping: (M - 1,) whether it waits there, but rolls slowly.
     """
 
     knot: Floats
-    piece: Ints
     still: Bools
     creeping: Bools
-    group: Ints
-    bounds: Ints
-    lines: Floats
-    interior: Ints
-    unknown: Ints
-    given: Floats
 
-    @property
-    def moments(self) -> Floats:
-        """(M - 1, 2) ∫ (1 - ξ) v̂ dξ and ∫ ξ v̂ dξ over each interval, ξ from 0 to 1 [m/s]."""
-        a, b = self.lines[:-1], self.lines[1:]
-        return np.column_stack([a / 3.0 + b / 6.0, a / 6.0 + b / 3.0])
-
-    def stretches(self, marked: Bools) -> list[tuple[float, float]]:
-        """Begin and end [s] of the longest runs of marked intervals (M - 1,)."""
+    def spans(self, marked: Bools) -> Spans:
+        """Return the longest runs of marked intervals (M - 1,)."""
         return [(float(self.knot[a]), float(self.knot[b])) for a, b in runs(marked)]
-
-    @property
-    def size(self) -> int:
-        """Number of unknown speeds."""
-        return int(self.unknown.max(initial=-1)) + 1
 
 
 def speed_knots(
-    clock: Floats,
-    dwells: Bools,
-    waits: list[tuple[float, float]],
-    time: Floats,
-    speed: Floats,
-    ends: tuple[float, float],
-    knot_share: float | None = None,
-    moves_slowly: Sequence[tuple[float, float]] = (),
+    clock: Floats, dwells: Bools, stands: Spans, ends: tuple[float, float], creeping: Spans
 ) -> SpeedKnots:
     """Place the knots of one vehicle.
 
-    Source: paper IV-B, constant acceleration within a primitive, with one knot more.
-
     Args:
         clock: (K + 2,) template times [s] of start, changepoints and end.
-        dwells: (K + 1,) True for primitives in which the route does not move.
-        waits: begin and end [s] of the vehicle's waits.
+        dwells: (K + 1,) whether the route does not move in a primitive.
+        stands: begin and end [s] of the vehicle's stands.
+        ends: requested speeds [m/s] at start and end.
+        creeping: begin and end [s] of the waits in which it moves slowly.
+    """
+    if dwells.all():
+        still = np.ones(len(dwells), dtype=np.bool_)
+        return SpeedKnots(clock, still, np.zeros_like(still))
+
+    def stands_at(time: float) -> bool:
+        k = min(max(int(np.searchsorted(clock, time, side="right")) - 1, 0), len(dwells) - 1)
+        return bool(dwells[k]) or _contains(stands, time)
+
+    # a vehicle that stands in the template rolls where it is requested to move
+    start, end = float(clock[0]), float(clock[-1])
+    margin = 0.5 * _MIN_KNOT_DISTANCE_S
+    if stands_at(start + margin) and ends[0] > STANDING_MPS:
+        start += max(_MIN_KNOT_DISTANCE_S, ends[0] / _ROLLING_MPS2)
+    if stands_at(end - margin) and ends[1] > STANDING_MPS:
+        end -= max(_MIN_KNOT_DISTANCE_S, ends[1] / _ROLLING_MPS2)
+
+    knots = clock.tolist()
+    for time in (start, end, *(each for span in (*stands, *creeping) for each in span)):
+        distance = min(abs(time - knot) for knot in knots)
+        if clock[0] < time < clock[-1] and distance >= _MIN_KNOT_DISTANCE_S - 1e-9:
+            knots.append(float(time))
+    knots.sort()
+    middles = [0.5 * (a + b) for a, b in pairwise(knots)]
+    still = np.array([start < time < end and stands_at(time) for time in middles])
+    slow = np.array([_contains(creeping, time) for time in middles])
+    return SpeedKnots(np.array(knots), still, slow & ~still)
+
+
+def _contains(spans: Spans, time: float) -> bool:
+    """Return whether a time [s] lies in one of some intervals."""
+    return any(begin <= time <= end for begin, end in spans)
+
+
+def standing_part(encounter: Encounter, wait: Wait) -> Wait:
+    """Return the part of a wait in which the vehicle stands; a slow wait unchanged.
+
+    A wait begins below 0.5 m/s, so a vehicle that brakes gently still rolls for a while.
+    """
+    inside = (encounter.time >= wait.start) & (encounter.time <= wait.end)
+    stands = encounter.time[inside & (encounter.speed[wait.vehicle] <= STANDSTILL_SPEED_MPS)]
+    if wait.moves_slowly or len(stands) == 0:
+        return wait
+    start = wait.start if wait.start <= encounter.time[0] else float(stands[0])
+    end = wait.end if wait.end >= encounter.time[-1] else float(stands[-1])
+    return replace(wait, start=start, end=end)
+
+
+def standing_within(
+    times: Floats, dwells: Bools, stands: Spans, time: Floats, speed: Floats
+) -> tuple[Spans, Bools]:
+    """Replace dwells by the parts in which the template stands: a primitive may begin rolling.
+
+    Args:
+        times: (K + 2,) of start, changepoints and end [s].
+        dwells: (K + 1,) primitives in which the route does not move.
+        stands: begin and end [s] of the vehicle's stands.
         time: (T,) the template's samples [s].
         speed: (T,) its speeds [m/s].
-        ends: asked speeds [m/s] at start and end.
-        knot_share: where in each primitive a knot lies, as a share of its duration; 0 for none, None for where the template
-            bends.
-        moves_slowly: begin and end [s] of the waits in which it moves slowly; they become knots.
+
+    Returns:
+        The stands with those in dwells, and the dwells (K + 1,) in which it never stands.
     """
-    cuts, still = _cuts(clock, dwells, waits, ends, moves_slowly)
-    knots, stands, interior = [cuts[0]], [], []
-    for a, b, stand in zip(cuts[:-1], cuts[1:], still, strict=True):
-        if not stand and knot_share != 0.0:
-            at = best_knot(time, speed, a, b) if knot_share is None else a + knot_share * (b - a)
-            distance = min(KNOT_DISTANCE, 0.5 * (b - a))
-            interior.append(len(knots))
-            knots.append(min(max(at, a + distance), b - distance))
-            stands.append(False)
-        knots.append(b)
-        stands.append(stand)
-    knot, standing = np.array(knots), np.array(stands)
-    middle = 0.5 * (knot[:-1] + knot[1:])
-    piece = np.clip(np.searchsorted(clock, middle, side="right") - 1, 0, len(clock) - 2)
-    slow = ~standing & np.array([any(a < t < b for a, b in moves_slowly) for t in middle.tolist()])
-    group, bounds = _groups(piece, standing, dwells)
-    given = np.full(len(knot), np.nan)
-    given[[0, -1]] = ends
-    given[:-1][standing] = 0.0
-    given[1:][standing] = 0.0
-    unknown = np.where(np.isnan(given), np.cumsum(np.isnan(given)) - 1, -1)
-    fitted = _joined_lines(time, speed, knot, standing)
-    inner = np.array(interior, dtype=np.int64)
-    return SpeedKnots(
-        knot,
-        piece,
-        standing,
-        slow,
-        group,
-        bounds,
-        frozen(fitted),
-        inner,
-        unknown,
-        np.nan_to_num(given),
-    )
+    stands, left = list(stands), dwells.copy()
+    for a, b in runs(dwells):
+        inside = (time >= times[a]) & (time <= times[b])
+        still = time[inside & (speed <= STANDSTILL_SPEED_MPS)]
+        if len(still):
+            at_start = a == 0 and speed[0] <= STANDSTILL_SPEED_MPS
+            at_end = b == len(dwells) and speed[-1] <= STANDSTILL_SPEED_MPS
+            start = times[a] if at_start else still[0]
+            end = times[b] if at_end else still[-1]
+            stands.append((float(start), float(end)))
+            left[a:b] = False
+    return stands, left
 
 
-def _stands(t: float, clock: Floats, dwells: Bools, waits: list[tuple[float, float]]) -> bool:
-    """Whether the template has the vehicle stand at time t."""
-    k = min(max(int(np.searchsorted(clock, t, side="right")) - 1, 0), len(dwells) - 1)
-    return bool(dwells[k]) or any(a <= t <= b for a, b in waits)
+def least_shares(grid: Floats, waits: Sequence[Wait]) -> Floats:
+    """Return the slowest rates (G,) of a clock, over the nominal one, at which waits remain waits.
 
-
-def _ramps(
-    clock: Floats, dwells: Bools, waits: list[tuple[float, float]], ends: tuple[float, float]
-) -> tuple[float, float]:
-    """Time until which, and from which on, a vehicle rolls that stands in the template but is asked to move at that end."""
-    inside = 0.5 * SHORTEST
-    stands_there = [
-        _stands(t, clock, dwells, waits) for t in (clock[0] + inside, clock[-1] - inside)
-    ]
-    rolls = [
-        max(SHORTEST, v / _RAMP) if stands and v > STAND else 0.0
-        for stands, v in zip(stands_there, ends, strict=True)
-    ]
-    return float(clock[0] + rolls[0]), float(clock[-1] - rolls[1])
-
-
-def _cuts(
-    clock: Floats,
-    dwells: Bools,
-    waits: list[tuple[float, float]],
-    ends: tuple[float, float],
-    moves_slowly: Sequence[tuple[float, float]],
-) -> tuple[list[float], list[bool]]:
-    """Times at which a primitive, a wait or a roll begins or ends, none nearer than `SHORTEST`; where the vehicle stands."""
-    cuts = [float(t) for t in clock]
-    if dwells.all():
-        return cuts, [True] * len(dwells)
-    rolls = _ramps(clock, dwells, waits, ends)
-    for t in [*rolls, *(t for wait in (*waits, *moves_slowly) for t in wait)]:
-        if clock[0] < t < clock[-1] and min(abs(t - c) for c in cuts) >= SHORTEST - 1e-9:
-            cuts.append(float(t))
-    cuts.sort()
-    middle = [0.5 * (a + b) for a, b in pairwise(cuts)]
-    return cuts, [rolls[0] < t < rolls[1] and _stands(t, clock, dwells, waits) for t in middle]
-
-
-def _groups(piece: Ints, still: Bools, dwells: Bools) -> tuple[Ints, Ints]:
-    """Length constraints: one per primitive that moves.
-
-    What cannot be driven within its own primitive (a route that moves while the vehicle stands, a vehicle that still
-    rolls while the route dwells) is driven in the next primitive that moves, or the last one.
+    Args:
+        grid: (G,) template times [s].
+        waits: that are kept.
     """
-    moving = np.array([bool((~still[piece == k]).any()) for k in range(len(dwells))])
-    own = np.flatnonzero(moving & ~dwells)
-    if len(own) == 0:
-        own = np.flatnonzero(moving)[-1:]
-    group = np.full(len(piece), -1, dtype=np.int64)
-    if len(own) == 0:
-        return group, np.zeros((0, 2), dtype=np.int64)
-    home = np.minimum(np.searchsorted(own, piece), len(own) - 1)
-    group[~still] = home[~still]
-    last = np.append(own[:-1] + 1, len(dwells))
-    return group, np.column_stack([np.append(0, last[:-1]), last])
+    shares = np.full(len(grid), MIN_RATE_RATIO)
+    for wait in waits:
+        inside = (grid > wait.start - _WAIT_MARGIN_S) & (grid < wait.end + _WAIT_MARGIN_S)
+        least = _MIN_WARPED_WAIT_S / max(wait.end - wait.start, MIN_WAIT_S)
+        shares[inside] = np.maximum(shares[inside], least)
+    return shares
 
 
-def _joined_lines(time: Floats, speed: Floats, knot: Floats, still: Bools) -> Floats:
-    """Speeds (M,) [m/s] at `knot` (M,): straight lines between them fit `speed` (T,) best; zero where a stand begins or ends."""
-    at = np.clip(np.searchsorted(knot, time, side="right") - 1, 0, len(still) - 1)
-    share = (time - knot[at]) / np.diff(knot)[at]
-    hats, rows = np.zeros((len(time), len(knot))), np.arange(len(time))
-    hats[rows, at], hats[rows, at + 1] = 1.0 - share, share
-    free = ~(np.append(still, False) | np.append(False, still))
-    lines = np.where(free, np.interp(knot, time, speed), 0.0)
-    moving = ~still[at]
-    if free.any():  # changes to the speeds met at the knots: none where no sample says anything
-        lines[free] += np.linalg.lstsq(
-            hats[np.ix_(moving, free)], (speed - hats @ lines)[moving], rcond=None
-        )[0]
-    return np.asarray(np.maximum(lines, 0.0))
-
-
-def best_knot(time: Floats, speed: Floats, a: float, b: float) -> float:
-    """Time in (a, b) [s] at which two joined straight lines fit speeds (T,) [m/s] at times (T,) [s] best, by least squares."""
-    inside = (time >= a) & (time <= b)
-    t, v = time[inside], speed[inside]
-    candidates = t[(t > a + 0.2 * (b - a)) & (t < b - 0.2 * (b - a))]
-    if len(t) < 6 or len(candidates) < 2:
-        return 0.5 * (a + b)
-    cost = []
-    for knot in candidates:
-        basis = np.column_stack([np.ones_like(t), t - a, np.maximum(t - knot, 0.0)])
-        cost.append(float(np.square(v - basis @ np.linalg.lstsq(basis, v, rcond=None)[0]).sum()))
-    return float(candidates[int(np.argmin(np.round(cost, 9)))])
+def lengthened_waits(n: int, waits: Sequence[Wait], *, creeping: bool) -> Spans:
+    """Return vehicle n's stands, or slow waits, with short ones lengthened."""
+    spans = []
+    for wait in waits:
+        if wait.vehicle == n and wait.moves_slowly == creeping:
+            pad = max(0.0, 0.5 * (MIN_WAIT_S - (wait.end - wait.start)))
+            spans.append((wait.start - pad, wait.end + pad))
+    return spans

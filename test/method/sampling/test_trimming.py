@@ -12,7 +12,7 @@ from support.textbook_motions import labelled
 
 from scenario_gen import generate, PipelineConfig
 from scenario_gen.method.sampling import SamplingConfig
-from scenario_gen.method.sampling.window import AFTER_S, Window, window_of
+from scenario_gen.method.sampling.trimming import AFTER_CONFLICT_S, Trimming, trimming_of
 from scenario_gen.situation import conflict_of, find_conflicts, Situation
 from scenario_gen.types import Request
 
@@ -58,25 +58,25 @@ def test_where_an_ego_slot_keeps_its_states_nothing_is_left_out(encounter):
 
 def test_what_stays_is_the_conflict_and_a_second(encounter):
     (conflict,) = find_conflicts(encounter)
-    window = window_of(Situation.of(encounter), 0.5, FREE)
-    assert window.between[0] == min(conflict.entry_first, conflict.entry_second)
-    assert window.between[1] >= max(conflict.entry_second, conflict.exit_first) + AFTER_S
+    window = trimming_of(Situation.of(encounter), 0.5, FREE)
+    assert window.core[0] == min(conflict.entry_first, conflict.entry_second)
+    assert window.core[1] >= max(conflict.entry_second, conflict.exit_first) + AFTER_CONFLICT_S
     assert (
-        window_of(Situation.of(encounter), 0.0, FREE) is None
-        and window_of(Situation.of(encounter), 0.5, ~FREE) is None
+        trimming_of(Situation.of(encounter), 0.0, FREE) is None
+        and trimming_of(Situation.of(encounter), 0.5, ~FREE) is None
     )
     position = encounter.position.copy()
     position[0] += 1000.0
-    assert window_of(Situation.of(replace(encounter, position=position)), 0.5, FREE) is None
+    assert trimming_of(Situation.of(replace(encounter, position=position)), 0.5, FREE) is None
 
 
 def test_the_largest_numbers_leave_out_the_whole_share_and_no_room_is_not_widened():
-    window = Window(np.array([4.0, 8.0]), np.array([0.5, 1.0]))
+    window = Trimming(np.array([4.0, 8.0]), np.array([0.5, 1.0]))
     kept, span = np.array([[4.0, 8.0], [1.0, 9.0]]), np.array([[0.0, 10.0], [2.0, 8.0]])
     np.testing.assert_allclose(
-        window.cut(np.full((2, 2), 9.0), kept, span), [[2.0, 8.0], [2.0, 8.0]]
+        window.apply(np.full((2, 2), 9.0), kept, span), [[2.0, 8.0], [2.0, 8.0]]
     )
-    np.testing.assert_allclose(window.cut(np.full((2, 2), -9.0), kept, span), span, atol=1e-9)
+    np.testing.assert_allclose(window.apply(np.full((2, 2), -9.0), kept, span), span, atol=1e-9)
 
 
 @pytest.mark.parametrize(("kind", "seed"), [("crossing, stops", 3), ("crossing, rolls", 2)])

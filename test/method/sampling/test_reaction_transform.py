@@ -4,7 +4,6 @@
 """One joint model: roots are as free as before, the others answer, up to a residual, in the numbers and in what is published."""
 
 from dataclasses import replace
-from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -14,10 +13,10 @@ from support.textbook_motions import labelled
 from benchmarks._interaction_measures import following, yielding
 from scenario_gen.method.chain import Chain
 from scenario_gen.method.evaluation.measures import figures_of
-from scenario_gen.method.sampling import kept_reactions, Plan, plan_of, regenerate, SamplingConfig
-from scenario_gen.method.sampling.candidates import Scale
-from scenario_gen.method.sampling.joint import advance, lateness, Mixing
-from scenario_gen.method.sampling.prepare import prepare
+from scenario_gen.method.sampling import kept_reactions, Plan, regenerate, SamplingConfig
+from scenario_gen.method.sampling.build_model import build_model
+from scenario_gen.method.sampling.reaction_transform import advance, lateness, ReactionTransform
+from scenario_gen.method.sampling.vehicle_model import NoiseScale
 from scenario_gen.method.segmentation import segment
 from scenario_gen.pipeline import PipelineConfig
 from scenario_gen.roads import build_road
@@ -57,38 +56,42 @@ def model_of(encounter, result):
         result.fit.requested,
         waits,
     )
-    return prepare(plan, CONFIG.sampling).model
+    return build_model(plan, CONFIG.sampling).model
 
 
 def test_roots_keep_their_numbers_and_the_others_are_gaussian_with_the_stated_residual(case):
     encounter, _, made, _ = case
     model = model_of(encounter, made)
     (edge,) = kept_reactions(Situation.of(encounter), CONFIG.sampling).edges
-    first = np.cumsum([model.warp.size] + [v.size for v in model.vehicles]).tolist()
-    mixing = Mixing.of(model.vehicles, first, model.warp.nominal, model.reactions, Scale())
+    transform = ReactionTransform.of(
+        model.vehicles, model.numbers, model.warp.nominal, model.reactions, NoiseScale()
+    )
     eps = np.random.default_rng(0).standard_normal((20_000, model.size))
-    z = mixing.mixed(eps)
-    parts = [slice(a, b) for a, b in pairwise(first)]
+    z = transform.apply(eps)
+    parts = model.numbers.vehicles
     assert np.array_equal(z[:, parts[edge.whom]], eps[:, parts[edge.whom]])
-    assert np.array_equal(z[:, : first[0]], eps[:, : first[0]])
+    assert np.array_equal(z[:, model.numbers.clock], eps[:, model.numbers.clock])
     assert np.allclose(z.mean(axis=0), 0.0, atol=0.06)
     who, whom = model.vehicles[edge.who], model.vehicles[edge.whom]
     own, other = z[:, parts[edge.who]], z[:, parts[edge.whom]].copy()
-    begin, clock = whom.lateral_root.shape[1] + whom.speed.size, whom.freedom.clock
-    other[:, begin : begin + clock.size] = clock.effective(
-        other[:, begin : begin + clock.size], 1.0
-    )  # what is cut off is nobody's
+    part = whom.numbers.clock
+    other[:, part] = whom.variation.clock.effective(
+        other[:, part], 1.0
+    )  # nobody reacts to the rest
     if edge.kind == FOLLOW:
         at = np.linspace(edge.since + 4.0, edge.until - 4.0, 7)
-        late = own @ lateness(who, at, model.warp.nominal, Scale()).T
-        late -= other @ lateness(whom, at - edge.lag, model.warp.nominal, Scale()).T
-        ahead = own @ advance(who, at, Scale()).T - other @ advance(whom, at - edge.lag, Scale()).T
+        late = own @ lateness(who, at, model.warp.nominal, NoiseScale()).T
+        late -= other @ lateness(whom, at - edge.lag, model.warp.nominal, NoiseScale()).T
+        ahead = (
+            own @ advance(who, at, NoiseScale()).T
+            - other @ advance(whom, at - edge.lag, NoiseScale()).T
+        )
         assert late.std() < edge.residual / 8.0
         assert 0.0 < ahead.std() < 1.1 * edge.residual
     else:
-        leaves = own @ lateness(who, np.array([edge.until]), model.warp.nominal, Scale()).T
-        free = other @ lateness(whom, np.array([edge.clears]), model.warp.nominal, Scale()).T
-        free -= other @ advance(whom, np.array([edge.clears]), Scale()).T / 8.0
+        leaves = own @ lateness(who, np.array([edge.until]), model.warp.nominal, NoiseScale()).T
+        free = other @ lateness(whom, np.array([edge.clears]), model.warp.nominal, NoiseScale()).T
+        free -= other @ advance(whom, np.array([edge.clears]), NoiseScale()).T / 8.0
         assert (leaves - free).std() == pytest.approx(0.6, abs=0.15)
         assert free.std() > 1.2
 
@@ -96,12 +99,17 @@ def test_roots_keep_their_numbers_and_the_others_are_gaussian_with_the_stated_re
 def test_a_mixing_is_linear_so_mirror_images_stay_mirror_images(case):
     encounter, _, made, _ = case
     model = model_of(encounter, made)
-    first = np.cumsum([model.warp.size] + [v.size for v in model.vehicles]).tolist()
-    mixing = Mixing.of(model.vehicles, first, model.warp.nominal, model.reactions, Scale(own=0.25))
+    transform = ReactionTransform.of(
+        model.vehicles,
+        model.numbers,
+        model.warp.nominal,
+        model.reactions,
+        NoiseScale(vehicle_clock=0.25),
+    )
     eps = np.random.default_rng(0).standard_normal((4, model.size))
-    np.testing.assert_allclose(mixing.mixed(-eps), -mixing.mixed(eps), atol=1e-12)
+    np.testing.assert_allclose(transform.apply(-eps), -transform.apply(eps), atol=1e-12)
     np.testing.assert_allclose(
-        mixing.mixed(eps)[1:2], mixing.mixed(eps[1:2]), atol=1e-12
+        transform.apply(eps)[1:2], transform.apply(eps[1:2]), atol=1e-12
     )  # alone as among others
 
 
@@ -164,7 +172,7 @@ def test_who_gives_way_is_slow_when_the_other_one_passes():
 def test_a_scenario_comes_again_by_its_index(case):
     _, _, made, _ = case
     for scenario in made.generated.scenarios[3:6]:
-        plan = plan_of(made, CONFIG.sampling, CONFIG.limits, Request())
+        plan = Plan.of(made, CONFIG.sampling, CONFIG.limits, Request())
         again = regenerate(plan, CONFIG.sampling, seed=1, index=scenario.index)
         np.testing.assert_allclose(again.position, scenario.position, atol=1e-9)
         np.testing.assert_allclose(again.speed, scenario.speed, atol=1e-9)

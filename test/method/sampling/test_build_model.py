@@ -12,9 +12,9 @@ from scenario_gen.method.chain import Chain
 from scenario_gen.method.config import PipelineConfig
 from scenario_gen.method.evaluation import uniform_changepoints
 from scenario_gen.method.routing.distance import distances_to_line
-from scenario_gen.method.sampling.candidates import Scale
+from scenario_gen.method.sampling.build_model import build_model
 from scenario_gen.method.sampling.plan import Plan
-from scenario_gen.method.sampling.prepare import prepare
+from scenario_gen.method.sampling.vehicle_model import NoiseScale
 from scenario_gen.method.segmentation import segment
 from scenario_gen.roads import build_road
 from scenario_gen.situation import find_waits, Situation
@@ -79,7 +79,7 @@ def undisturbed(encounter, segmentation):
     """The drive without deviations on the own road, and what was adapted."""
     road = build_road("corridor", encounter, CONFIG.road)
     planned = Chain(Situation.of(encounter), segmentation, road, CONFIG).plan()
-    done = prepare(
+    done = build_model(
         Plan(
             Situation.of(encounter),
             segmentation,
@@ -91,8 +91,8 @@ def undisturbed(encounter, segmentation):
         NARROW,
     )
     return (
-        done.model.draw(np.zeros((1, done.model.size)), Scale()).scenarios(0, [0], "map")[0],
-        done.adaptations,
+        done.model.draw(np.zeros((1, done.model.size)), NoiseScale()).scenarios(0, [0], "map")[0],
+        done.notes,
         planned,
     )
 

@@ -19,9 +19,9 @@ from scenario_gen.method.sampling import (
     regenerate,
     SamplingConfig,
 )
-from scenario_gen.method.sampling.candidates import Scale
-from scenario_gen.method.sampling.prepare import prepare
-from scenario_gen.method.sampling.sampler import LEVEL_SIZE
+from scenario_gen.method.sampling.build_model import build_model
+from scenario_gen.method.sampling.sampler import LEVEL_CANDIDATES
+from scenario_gen.method.sampling.vehicle_model import NoiseScale
 from scenario_gen.method.validity import Checker
 from scenario_gen.numerics.arrays import wrap_angle
 from scenario_gen.situation import find_waits, Situation, Wait
@@ -49,12 +49,12 @@ def drawn(count=50, check=all_valid, config=None, seed=5):
 
 def batch(samples=200, scale=None, **changes):
     *head, waits = scene(120.0)
-    model = prepare(
+    model = build_model(
         Plan(Situation.of(head[0]), *head[1:], waits),
         SamplingConfig(variety="narrow", bend_acceleration=5.0, **changes),
     ).model
     return model, model.draw(
-        np.random.default_rng(1).standard_normal((samples, model.size)), scale or Scale()
+        np.random.default_rng(1).standard_normal((samples, model.size)), scale or NoiseScale()
     )
 
 
@@ -156,17 +156,19 @@ def test_state_at_any_time_agrees_with_the_published_samples():
         between = some.states(np.linspace(0.0, s.time[-1], 5001))[:, k]
         for n in range(2):
             travelled = np.hypot(*np.diff(between[n, :, :2], axis=0).T).sum()
-            assert travelled == pytest.approx(some.drawn[n].arc[k, -1], abs=2e-3)
+            assert travelled == pytest.approx(some.samples[n].paths.arc[k, -1], abs=2e-3)
 
 
 def spread_across(b):
     """Mean standard deviation [m] of y on the straight."""
-    return float(b.drawn[0].curve[:, :, 1].std(axis=0).mean())
+    return float(b.samples[0].paths.curve[:, :, 1].std(axis=0).mean())
 
 
 def roughness(b):
     """Mean standard deviation of the slope of the lateral deviation on the straight."""
-    return float((b.drawn[0].curve[:, :, 3] / b.drawn[0].curve[:, :, 2]).std(axis=0).mean())
+    return float(
+        (b.samples[0].paths.curve[:, :, 3] / b.samples[0].paths.curve[:, :, 2]).std(axis=0).mean()
+    )
 
 
 @pytest.mark.parametrize(
@@ -187,7 +189,7 @@ def test_each_parameter_has_its_monotone_effect(name, values, measure, sign):
 
 def warped(b):
     """Times (S, K + 2) [s] of start, changepoints and end."""
-    return b.drawn[0].clock.time[:, np.searchsorted(b.drawn[0].clock.grid, CLOCK - 1e-9)]
+    return b.samples[0].clock.time[:, np.searchsorted(b.samples[0].clock.grid, CLOCK - 1e-9)]
 
 
 def stops(b):
@@ -199,19 +201,20 @@ def stops(b):
 def test_deviations_have_the_stated_standard_deviation():
     model, some = batch(4000, lateral_sigma=0.4, observation_sigma=10.0)
     middle = len(model.vehicles[0].path.node) // 2
-    assert some.drawn[0].curve[:, middle, 1].std() == pytest.approx(
+    assert some.samples[0].paths.curve[:, middle, 1].std() == pytest.approx(
         0.36, rel=0.05
     )  # tied down at both ends
 
 
 def test_clocks_are_monotone_and_shared_and_end_on_the_grid():
     _, some = batch(500, time_sigma=3.0)
-    rate = some.drawn[0].clock.rate
+    rate = some.samples[0].clock.rate
     assert rate.min() > 0.7
     assert rate.max() < 1.4
     assert (
         np.abs(
-            some.drawn[0].clock.time[:, -1] / 0.1 - np.round(some.drawn[0].clock.time[:, -1] / 0.1)
+            some.samples[0].clock.time[:, -1] / 0.1
+            - np.round(some.samples[0].clock.time[:, -1] / 0.1)
         ).max()
         < 1e-9
     )
@@ -223,15 +226,15 @@ def test_lateral_deviation_leaves_room_on_a_narrow_road():
     lane = np.zeros(road.drivable.shape, dtype=bool)
     lane[57:63] = True  # 1.5 m to either side of y = 0
     narrow = Road("lane", lane, 0.5, road.origin, [], [])
-    done = prepare(
+    done = build_model(
         Plan(Situation.of(encounter), segmentation, narrow, routes, asked, waits),
         SamplingConfig(variety="narrow"),
     )
     some = done.model.draw(
-        np.random.default_rng(0).standard_normal((500, done.model.size)), Scale()
+        np.random.default_rng(0).standard_normal((500, done.model.size)), NoiseScale()
     )
-    assert np.abs(some.drawn[0].curve[..., 1]).max() < 1.5 - 0.5 * 1.9
-    assert NoteKind.NARROW in {note.kind for note in done.adaptations}
+    assert np.abs(some.samples[0].paths.curve[..., 1]).max() < 1.5 - 0.5 * 1.9
+    assert NoteKind.NARROW in {note.kind for note in done.notes}
 
 
 def test_refusals_are_counted_by_cause_and_levels_are_tried():
@@ -246,7 +249,7 @@ def test_refusals_are_counted_by_cause_and_levels_are_tried():
     assert found.candidates == 50 + found.refused.total()
     assert set(found.refused) == {Cause.OFF_ROAD}
     assert NoteKind.LESS_VARIATION in {note.kind for note in found.adaptations}
-    assert max(s.index for s in found.scenarios) >= LEVEL_SIZE
+    assert max(s.index for s in found.scenarios) >= LEVEL_CANDIDATES
     *head, waits = scene()
     last = found.scenarios[-1]
     again = regenerate(
@@ -290,7 +293,7 @@ def test_nothing_is_given_out_after_a_cancellation():
 def test_a_wait_stands_where_the_vehicle_does_not_where_it_creeps():
     *head, _ = scene()
     speed = (
-        prepare(
+        build_model(
             Plan(Situation.of(head[0]), *head[1:], (Wait(1, 6.8, 13.2),)),
             SamplingConfig(variety="narrow"),
         )
@@ -345,9 +348,9 @@ def test_stretched_clock_is_said():
         waits,
         TypeLimits(car=Dynamics(max_speed=6.75)),
     )
-    done = prepare(plan, PLAIN)
+    done = build_model(plan, PLAIN)
     assert done.model is not None
-    assert NoteKind.STRETCHED in {note.kind for note in done.adaptations}
+    assert NoteKind.STRETCHED in {note.kind for note in done.notes}
     slowest = replace(plan, limits=TypeLimits(car=Dynamics(max_speed=3.375)))
     impossible = draw_scenarios(slowest, all_valid, PLAIN, count=5)
     assert impossible.refused[Cause.SPEED_PROFILE] == 1

@@ -12,25 +12,22 @@ import pytest
 from support.sampling_scenes import scene
 
 from scenario_gen.method.sampling import draw_scenarios, Plan, relaxed_states, SamplingConfig
-from scenario_gen.method.sampling.candidates import Scale
-from scenario_gen.method.sampling.freedom import (
-    CATALOGUE,
-    cut,
-    FADES,
-    freedom_of,
-    onward,
-    OwnClock,
-    seconds_onward,
+from scenario_gen.method.sampling.build_model import build_model
+from scenario_gen.method.sampling.extrapolation import (
+    ACCELERATION_DECAY_S,
+    extrapolate,
+    extrapolation_time,
 )
-from scenario_gen.method.sampling.pace import clock_of
-from scenario_gen.method.sampling.prepare import prepare
+from scenario_gen.method.sampling.nominal_clock import clock_from_rate
+from scenario_gen.method.sampling.variation import CAR_SIZES, truncate, Variation, VehicleClock
+from scenario_gen.method.sampling.vehicle_model import NoiseScale
 from scenario_gen.method.validity import Checker
 from scenario_gen.situation import Situation
 from scenario_gen.types import Vehicle
 from scenario_gen.types.request import Request
 
 GRID = 0.1 * np.arange(201)
-NOMINAL = clock_of(GRID, np.ones(201))
+NOMINAL = clock_from_rate(GRID, np.ones(201))
 
 
 def normal(count, size, seed=0):
@@ -41,21 +38,21 @@ def batch(count=300, request=Request(), **parameters):
     encounter, segmentation, road, routes, asked, waits = scene()
     config = replace(SamplingConfig(), **parameters)
     states = relaxed_states(asked, Situation.of(encounter), config, request)
-    model = prepare(
+    model = build_model(
         Plan(Situation.of(encounter), segmentation, road, routes, states, waits), config
     ).model
-    return model, model.draw(normal(count, model.size), Scale())
+    return model, model.draw(normal(count, model.size), NoiseScale())
 
 
 def arrivals(b):
     """Own time [s] of each vehicle (S, N) at the middle of its route, less the mean over vehicles."""
-    middle = np.stack([one.clock.time[:, 50] for one in b.drawn], axis=1)
+    middle = np.stack([one.clock.time[:, 50] for one in b.samples], axis=1)
     return middle - middle.mean(axis=1, keepdims=True)
 
 
 def stand(b):
     """How long vehicle 1 waits [s]."""
-    time = b.drawn[1].clock.time
+    time = b.samples[1].clock.time
     return time[:, 130] - time[:, 70]
 
 
@@ -63,10 +60,10 @@ def stand(b):
     ("name", "measure"),
     [
         ("arrival_sigma", lambda b: arrivals(b).std()),
-        ("pace_sigma", lambda b: (b.drawn[0].clock.rate / b.drawn[1].clock.rate)[:, 20].std()),
+        ("pace_sigma", lambda b: (b.samples[0].clock.rate / b.samples[1].clock.rate)[:, 20].std()),
         ("wait_sigma", lambda b: stand(b).std()),
-        ("end_speed_sigma", lambda b: b.at_ends[0, :, 0, 3].std()),
-        ("place_sigma", lambda b: b.drawn[0].curve[:, 0, 1].std()),
+        ("end_speed_sigma", lambda b: b.extension.states[0, :, 0, 3].std()),
+        ("place_sigma", lambda b: b.samples[0].paths.curve[:, 0, 1].std()),
     ],
 )
 def test_each_freedom_has_its_monotone_effect(name, measure):
@@ -101,7 +98,7 @@ def test_own_clocks_run_forward_within_their_bounds_and_agree_where_states_are_a
     z, start, end, shift, pace
 ):
     config = replace(SamplingConfig(), arrival_sigma=shift, pace_sigma=pace)
-    own = OwnClock.of(NOMINAL, [(7.0, 13.0)], (start, end), config)
+    own = VehicleClock.of(NOMINAL, [(7.0, 13.0)], (start, end), config)
     clock = own.sample(
         np.array([z]),
         1.0,
@@ -174,25 +171,23 @@ def test_a_start_off_its_bounds_is_refused():
 )
 def test_who_stands_close_to_another_one_hardly_becomes_longer(gap, longest):
     car, arc, none = Vehicle("1", 4.0, 1.8), np.arange(20.0), np.zeros(2)
-    clock = OwnClock.of(NOMINAL, [], (False, False), SamplingConfig())
-    made = freedom_of(
-        car, arc, clock, np.ones((2, 2)), none.astype(np.bool_), none, gap, SamplingConfig()
-    )
+    clock = VehicleClock.of(NOMINAL, [], (False, False), SamplingConfig())
+    made = Variation.of(car, arc, clock, np.ones((2, 2)), none, gap, SamplingConfig())
     assert made.sizes[:, 0].max() == longest
 
 
 def test_sizes_are_those_of_the_catalogue():
     model, some = batch(200)
-    sizes = {(one.length, one.width) for one in some.drawn[0].vehicles}
+    sizes = {(one.length, one.width) for one in some.samples[0].vehicles}
     assert (
         sizes
-        == {tuple(size) for size in model.vehicles[0].freedom.sizes.tolist()}
-        <= set(CATALOGUE)
+        == {tuple(size) for size in model.vehicles[0].variation.sizes.tolist()}
+        <= {tuple(size) for size in CAR_SIZES.tolist()}
     )
     assert len(sizes) > 4
-    assert {one.id for one in some.drawn[0].vehicles} == {"a"}
+    assert {one.id for one in some.samples[0].vehicles} == {"a"}
     _, same = batch(20, sizes="recorded")
-    assert {(one.length, one.width) for one in same.drawn[0].vehicles} == {
+    assert {(one.length, one.width) for one in same.samples[0].vehicles} == {
         (model.vehicles[0].vehicle.length, model.vehicles[0].vehicle.width)
     }
 
@@ -206,11 +201,11 @@ def test_sizes_are_those_of_the_catalogue():
 )
 def test_who_drives_on_does_so_smoothly(speed, acceleration, bend, sign):
     state = np.array([[3.0, -2.0, 0.7, speed, acceleration]])
-    if seconds_onward(state, 100.0, sign)[0] == 0.0:
+    if extrapolation_time(state, 100.0, sign)[0] == 0.0:
         assert sign * acceleration < 0.0  # it would stand
         return
     since = np.linspace(0.0, 3.0, 601)[None]
-    found = onward(state, np.array([bend]), since, sign)[0]
+    found = extrapolate(state, np.array([bend]), since, sign)[0]
     assert found[0] == pytest.approx(state[0], abs=1e-9)
     assert (found[:, 3] > 0.0).all()
     step = np.hypot(*np.diff(found[:, :2], axis=0).T)
@@ -221,13 +216,13 @@ def test_who_drives_on_does_so_smoothly(speed, acceleration, bend, sign):
     heading = np.arctan2(*(sign * np.diff(found[:, :2], axis=0))[:, ::-1].T)
     assert np.abs(np.angle(np.exp(1j * (heading - found[1:, 2])))).max() < 0.02
     assert abs(found[1, 4] - found[0, 4]) < 1e-3 * abs(acceleration) + 1e-9  # no jolt
-    assert np.abs(found[-1, 4]) < abs(acceleration) * np.exp(-2.0 / FADES) + 1e-9
+    assert np.abs(found[-1, 4]) < abs(acceleration) * np.exp(-2.0 / ACCELERATION_DECAY_S) + 1e-9
 
 
 def test_cut_numbers_are_truncated_normal():
-    values = cut(normal(20_000, 1)[:, 0], 2.0)
+    values = truncate(normal(20_000, 1)[:, 0], 2.0)
     assert np.abs(values).max() <= 2.0
     assert values.std() == pytest.approx(
         0.8796, rel=0.02
     )  # of the standard normal truncated at two standard deviations
-    assert (np.diff(cut(np.linspace(-5.0, 5.0, 101), 2.0)) > 0.0).all()
+    assert (np.diff(truncate(np.linspace(-5.0, 5.0, 101), 2.0)) > 0.0).all()

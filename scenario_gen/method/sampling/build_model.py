@@ -1,0 +1,320 @@
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""From a planned template to a model of candidates: nominal clock, mean speeds, variation."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import NamedTuple
+
+import numpy as np
+
+from scenario_gen.base.errors import InputError
+from scenario_gen.method.sampling.candidates import CandidateModel
+from scenario_gen.method.sampling.config import SamplingConfig
+from scenario_gen.method.sampling.deviations import (
+    lateral_covariance_root,
+    lateral_room,
+    MAX_ROOM_SIGMAS,
+    road_ahead,
+    ROOM_SIGMAS,
+)
+from scenario_gen.method.sampling.extrapolation import (
+    ACCELERATION_DECAY_S,
+    MAX_EXTRAPOLATION_S,
+)
+from scenario_gen.method.sampling.nominal_clock import (
+    clock_from_rate,
+    slowed_clock,
+    template_grid,
+)
+from scenario_gen.method.sampling.plan import Plan
+from scenario_gen.method.sampling.routed_vehicle import (
+    MeanSpeed,
+    route_vehicle,
+    RoutedVehicle,
+)
+from scenario_gen.method.sampling.speed_profile.knots import least_shares, standing_part
+from scenario_gen.method.sampling.speed_profile.model import SpeedModel
+from scenario_gen.method.sampling.time_warp import Clock, TimeWarp
+from scenario_gen.method.sampling.trimming import trimming_of
+from scenario_gen.method.sampling.variation import Variation, VehicleClock
+from scenario_gen.method.sampling.vehicle_model import VehicleModel
+from scenario_gen.numerics import Bools, Floats
+from scenario_gen.roads import ground_for
+from scenario_gen.situation import Situation, Wait
+from scenario_gen.types import FOLLOW, Note, NoteKind, ReactionGraph, Road
+
+
+@dataclass(frozen=True)
+class _Tuning:
+    """Choices without a source in the paper.
+
+    Attributes:
+        stretches: of the clock that are tried, evenly spaced.
+        free_shift: m by which changepoints may move before the clock is stretched further.
+        length_share: longest length scale of displacements over the duration: between given ends a
+            slower process hardly varies.
+        reacting_bound: truncation bound of a reacting vehicle's clock over that of a free one: the
+            other vehicle's deviation adds to its own.
+        halting_speed: m/s; a vehicle that is slower at an end of the template halts there.
+        noted_slowing, noted_shift, noted_jerk: share, m and m/s³ from which changes are noted.
+    """
+
+    stretches: int = 9
+    free_shift: float = 1.5
+    length_share: float = 1.0 / 3.0
+    reacting_bound: float = 1.4
+    halting_speed: float = 0.3
+    noted_slowing: float = 0.02
+    noted_shift: float = 0.3
+    noted_jerk: float = 0.2
+
+
+_TUNING = _Tuning()
+
+
+@dataclass(frozen=True, eq=False)
+class BuiltModel:
+    """A model of candidates, or the reason why there is none.
+
+    Attributes:
+        model: draws candidates; None if no speed exists even for the undisturbed routes.
+        notes: what was adapted.
+        refusal: why there is no model, "" if there is one.
+    """
+
+    model: CandidateModel | None
+    notes: tuple[Note, ...] = ()
+    refusal: str = ""
+
+
+def build_model(plan: Plan, config: SamplingConfig, order: str = "keep") -> BuiltModel:
+    """Build the model of candidates.
+
+    Raises:
+        InputError: routes, segmentation and encounter disagree in their numbers.
+    """
+    config = config.effective
+    routed, waits = _route_vehicles(plan, config)
+    clock = _nominal_clock(routed, template_grid(plan.encounter), config)
+    stretch = _feasible_stretch(routed, clock.clock, config)
+    if stretch.means is None:
+        return BuiltModel(None, refusal=stretch.refusal)
+    vehicles = [
+        _vehicle_model(each, plan.road, mean, config)
+        for each, mean in zip(routed, stretch.means, strict=True)
+    ]
+    nominal = stretch.clock
+    warp = TimeWarp(nominal, config, least_shares(nominal.grid, waits))
+    notes = [*clock.notes, *stretch.notes]
+    for vehicle in vehicles:
+        notes += vehicle.notes
+    models = [vehicle.model for vehicle in vehicles]
+    reactions, trimming = kept_reactions(plan.situation, config, order), None
+    if config.variety == "wide":
+        fixed = (plan.requested.relaxed[..., 0] == 0.0).any(axis=0)
+        reacting = {edge.who for edge in reactions.edges}
+        models = [
+            replace(
+                model,
+                variation=_variation(n, each, plan, nominal, fixed, n in reacting, config),
+            )
+            for n, (model, each) in enumerate(zip(models, routed, strict=True))
+        ]
+        trimming = trimming_of(plan.situation, config.leave_out, fixed)
+    return BuiltModel(CandidateModel(tuple(models), warp, reactions, trimming), tuple(notes))
+
+
+def kept_reactions(
+    situation: Situation, config: SamplingConfig, order: str = "keep"
+) -> ReactionGraph:
+    """Return the template's reactions that scenarios keep.
+
+    If another order than the template's is requested, no vehicle has to wait for another one.
+    """
+    graph = situation.reactions
+    edges = [edge for edge in graph.edges if order == "keep" or edge.kind == FOLLOW]
+    return replace(graph, edges=tuple(edges) if config.reactions == "keep" else ())
+
+
+def _route_vehicles(plan: Plan, config: SamplingConfig) -> tuple[list[RoutedVehicle], list[Wait]]:
+    """Return each vehicle on its route, and the standing parts of the waits."""
+    encounter, changes = plan.encounter, plan.segmentation.changepoints
+    samples = np.concatenate([[0], changes, [encounter.speed.shape[1] - 1]]).astype(np.int64)
+    times = encounter.time[samples]
+    anchors = {len(route.anchor) for route in plan.routes}
+    if len(plan.routes) != len(encounter.vehicles) or anchors != {len(times)}:
+        raise InputError(
+            f"{len(plan.routes)} routes do not suit {len(encounter.vehicles)} vehicles "
+            f"with {len(times)} anchors each"
+        )
+    waits = [standing_part(encounter, wait) for wait in plan.waits]
+    vehicles = range(len(encounter.vehicles))
+    return [route_vehicle(n, plan, times, waits, config) for n in vehicles], waits
+
+
+class _NotedClock(NamedTuple):
+    """A clock with the notes on it."""
+
+    clock: Clock
+    notes: list[Note]
+
+
+def _nominal_clock(
+    routed: Sequence[RoutedVehicle], grid: Floats, config: SamplingConfig
+) -> _NotedClock:
+    """Return the nominal clock on template times (G,) [s], slowed before bends."""
+    plain = clock_from_rate(grid, np.ones(len(grid)))
+    slowdowns = []
+    for vehicle in routed:
+        mean = vehicle.without_bends.mean(plain)
+        infeasible = isinstance(mean, str)
+        slowdowns.append(
+            np.ones(len(grid)) if infeasible else vehicle.slowdown(mean.coefficients, grid)
+        )
+    clock = slowed_clock(grid, slowdowns, 1.0 + config.max_stretch)
+    slowest = float(clock.rate.max())
+    if slowest < 1.0 + _TUNING.noted_slowing:
+        return _NotedClock(plain, [])
+    n, k = np.unravel_index(np.argmax(slowdowns), (len(routed), len(grid)))
+    note = Note.of(
+        NoteKind.SLOWED,
+        percent=100.0 * (1.0 - 1.0 / slowest),
+        vehicle=routed[n].vehicle.id,
+        time=grid[k],
+        delay=clock.time[-1] - grid[-1],
+    )
+    return _NotedClock(clock, [note])
+
+
+class _Stretch(NamedTuple):
+    """A stretched clock with the mean speeds on it; None and a reason if there are none."""
+
+    clock: Clock
+    means: list[MeanSpeed] | None
+    notes: list[Note]
+    refusal: str
+
+
+def _feasible_stretch(
+    routed: Sequence[RoutedVehicle], clock: Clock, config: SamplingConfig
+) -> _Stretch:
+    """Return the least stretch of a clock on which all vehicles have a mean speed.
+
+    A longer one is used only if the changepoints then are clearly nearer to their places.
+    """
+    longest = (1.0 + config.max_stretch) * float(clock.grid[-1] / clock.time[-1])
+    count = _TUNING.stretches if longest > 1.0 else 1
+    best, least_shift, best_stretch = None, np.inf, 1.0
+    failed: list[MeanSpeed | str] = []
+    for stretch in np.linspace(1.0, max(longest, 1.0), count).tolist():
+        stretched = clock_from_rate(clock.grid, stretch * clock.rate)
+        means = [vehicle.mean(stretched) for vehicle in routed]
+        feasible = [mean for mean in means if not isinstance(mean, str)]
+        if len(feasible) < len(means):
+            failed = means
+            continue
+        shift = max(
+            vehicle.largest_shift(mean.coefficients)
+            for vehicle, mean in zip(routed, feasible, strict=True)
+        )
+        if best is None or shift < least_shift - _TUNING.free_shift:
+            best, least_shift, best_stretch = feasible, shift, stretch
+        if shift <= _TUNING.free_shift:
+            break
+    notes = []
+    if best_stretch > 1.0:
+        notes.append(Note.of(NoteKind.STRETCHED, percent=100.0 * (best_stretch - 1.0)))
+    stretched = clock_from_rate(clock.grid, best_stretch * clock.rate)
+    refusal = _refusal(routed, failed, clock) if best is None else ""
+    return _Stretch(stretched, best, notes, refusal)
+
+
+def _refusal(
+    routed: Sequence[RoutedVehicle], means: Sequence[MeanSpeed | str], clock: Clock
+) -> str:
+    """Return why vehicles have no mean speed, and which limit would help."""
+    return "; ".join(
+        f"vehicle {vehicle.vehicle.id} {mean}{vehicle.limiting_parameters(clock)}"
+        for vehicle, mean in zip(routed, means, strict=True)
+        if isinstance(mean, str)
+    )
+
+
+class _NotedVehicle(NamedTuple):
+    """A vehicle's model with the notes on it."""
+
+    model: VehicleModel
+    notes: list[Note]
+
+
+def _vehicle_model(
+    routed: RoutedVehicle, road: Road, mean: MeanSpeed, config: SamplingConfig
+) -> _NotedVehicle:
+    """Return the model of a vehicle, without variation."""
+    label, path, notes = routed.vehicle.id, routed.path, []
+    shift = routed.largest_shift(mean.coefficients)
+    if shift > _TUNING.noted_shift:
+        notes.append(Note.of(NoteKind.CHANGEPOINTS_SHIFTED, vehicle=label, distance=shift))
+    jerk, smooth = float(np.abs(mean.motion.jerk @ mean.coefficients).max()), mean.bounds.jerk
+    if jerk > smooth + _TUNING.noted_jerk:
+        notes.append(Note.of(NoteKind.JERKY, vehicle=label, jerk=jerk, smooth=smooth))
+    ground = ground_for(road, routed.vehicle)
+    room = lateral_room(path, routed.vehicle, ground, MAX_ROOM_SIGMAS * config.lateral_sigma)
+    narrow = room < ROOM_SIGMAS * config.lateral_sigma
+    if narrow.any() and config.lateral_sigma > 0.0 and path.length > 0.0:
+        percent = 100.0 * float(narrow.mean())
+        notes.append(Note.of(NoteKind.NARROW, vehicle=label, percent=percent))
+    speed = SpeedModel.of(
+        routed.spline,
+        mean,
+        routed.recorded_time,
+        routed.recorded_speed,
+        config.of(routed.vehicle.kind).longitudinal_sigma,
+        min(config.longitudinal_time, _TUNING.length_share * routed.present_time),
+    )
+    root = lateral_covariance_root(path, room, config, routed.steering)
+    return _NotedVehicle(VehicleModel(routed.vehicle, path, root, room, speed), notes)
+
+
+def _variation(
+    n: int,
+    routed: RoutedVehicle,
+    plan: Plan,
+    nominal: Clock,
+    fixed: Bools,
+    reacts: bool,
+    config: SamplingConfig,
+) -> Variation:
+    """Return what preset `wide` varies of vehicle n.
+
+    Args:
+        n: its index.
+        routed: the vehicle on its route.
+        plan: the template on its road.
+        nominal: the clock without deviation.
+        fixed: (2,) whether start and end states are requested of any vehicle.
+        reacts: whether it reacts to another vehicle.
+        config: the standard deviations.
+    """
+    config = config.of(routed.vehicle.kind)
+    speed = routed.recorded_speed[[0, -1]]
+    fastest = speed + config.freedom * config.end_speed_sigma
+    fastest = fastest + 2.0 * routed.limits.max_acceleration * ACCELERATION_DECAY_S
+    ground = ground_for(plan.road, routed.vehicle)
+    ahead = road_ahead(routed.path, routed.vehicle, ground, MAX_EXTRAPOLATION_S * fastest)
+    clock = VehicleClock.of(nominal, routed.rests, fixed.tolist(), config)
+    if reacts:
+        clock = replace(clock, bound=_TUNING.reacting_bound * clock.bound)
+    relaxed = plan.requested.relaxed[n].copy()
+    relaxed[speed <= _TUNING.halting_speed, 1] = 0.0
+    return Variation.of(
+        routed.vehicle,
+        routed.path.arc,
+        clock,
+        relaxed,
+        np.where(fixed, 0.0, ahead),
+        float(plan.situation.least_gaps[n]),
+        config,
+    )

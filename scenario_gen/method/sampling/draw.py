@@ -1,0 +1,403 @@
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""Draw candidates, filter them, and keep valid ones: candidates → valid → kept."""
+
+from array import array
+from collections import Counter
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass, field, replace
+import itertools
+from typing import Any
+
+import numpy as np
+
+from scenario_gen.base.errors import InputError, RefusedError
+from scenario_gen.method.sampling.build_model import build_model
+from scenario_gen.method.sampling.config import SamplingConfig
+from scenario_gen.method.sampling.cross_entropy import find_proposal, STAGE_BLOCKS_COUNT
+from scenario_gen.method.sampling.filters import (
+    Candidate,
+    Check,
+    Filters,
+    MIN_RARITY_SCENARIOS,
+    PILOT_CANDIDATES,
+    RarityFilter,
+    ValidityFilter,
+)
+from scenario_gen.method.sampling.importance_sampling import (
+    estimated_share,
+    TargetError,
+    TargetSet,
+)
+from scenario_gen.method.sampling.plan import Callbacks, Plan
+from scenario_gen.method.sampling.sampler import (
+    BLOCK_CANDIDATES,
+    DIRECTED_SLOT,
+    Label,
+    LEVELS,
+    place_of,
+    RedrawnScenarios,
+    Sampler,
+)
+from scenario_gen.situation import Conflict, conflict_of, Situation
+from scenario_gen.types import (
+    Cause,
+    EgoSlot,
+    Facts,
+    Measures,
+    Note,
+    NoteKind,
+    OrderChange,
+    PassingOrder,
+    Reached,
+    Reaction,
+    Request,
+    Scenario,
+    ScenarioSet,
+    token,
+)
+
+MAX_STORED_SCENARIOS = 1000  # a larger set keeps indices only
+_MIN_COUNT_FACTOR = 20  # scenarios for which to draw, where clocks vary: levels need candidates
+_DIRECTED_BUDGET_FACTOR = 10  # of a request with a target
+_HOPELESS_CANDIDATES = 20 * BLOCK_CANDIDATES  # of a proposal without any hit
+ENOUGH_SHARE = {"narrow": 0.3, "wide": 0.1}
+"""Share of valid candidates below which the next level is tried."""
+
+
+def draw_scenarios(
+    plan: Plan,
+    check: Check,
+    config: SamplingConfig = SamplingConfig(),
+    *,
+    count: int,
+    seed: int = 0,
+    request: Request = Request(),
+    callbacks: Callbacks = Callbacks(),
+    measures: Measures | None = None,
+) -> ScenarioSet:
+    """Draw candidates until `count` are valid or the budget is spent.
+
+    Source: paper III-C.
+
+    Args:
+        plan: the template on its road.
+        check: the validity checker of all vehicles, the ego included; its verdicts decide.
+        config: the standard deviations and limits.
+        count: valid scenarios wanted.
+        seed: of all randomness; with a scenario's index it gives that scenario again.
+        request: the vehicle that is left out, requested states, target and order.
+        callbacks: called on progress and with valid scenarios.
+        measures: measures scenarios for a target; `check` knows the requested order.
+
+    Returns:
+        At most `count` scenarios; fewer if the budget did not suffice, which the account
+        (`refused`) explains. A set of more than MAX_STORED_SCENARIOS keeps indices only, so its
+        memory hardly grows with its size.
+
+    Raises:
+        InputError: routes, segmentation and encounter disagree, or the ego does not exist.
+        RefusedError: states or a target were requested, and no candidate that meets them is valid.
+    """
+    slot = _ego_slot(plan, request)
+    built = build_model(plan, config, request.order)
+    if built.model is None:
+        refused = Counter({Cause.SPEED_PROFILE: 1})
+        notes: tuple[Note, ...] = (Note.of(NoteKind.NOT_DRIVABLE, reasons=built.refusal),)
+        drawn = ScenarioSet(count, (), 1, refused, notes, slot)
+    else:
+        target = TargetSet.of(plan.situation, request, measures)
+        label = label_of(plan.situation, request, target, measures)
+        ego = request.ego_of(plan.encounter)
+        sampler = Sampler(built.model, seed, plan.road.frame_id, ego, label=label)
+        validity = ValidityFilter.of(sampler, check, enough_share(config, request))
+        rarity = rarity_filter(sampler, validity, measures)
+        kept = tuple(
+            edge
+            for edge in built.model.reactions.edges
+            if (edge.who, edge.whom) not in validity.lost
+        )
+        label = label_of(plan.situation, request, target, measures, kept, validity.lost)
+        run = _Run(
+            Filters(validity, target, rarity),
+            count,
+            callbacks,
+            replace(sampler, label=label),
+            lambda scenario: callbacks.found(scenario, plan.requested, slot),
+        )
+        reached = run.draw(config.attempts * rarity.valid_per_kept)
+        lost = [Note.of(NoteKind.REACTION_LOST, message=each) for each in validity.lost.values()]
+        notes = (*built.notes, *lost, *rarity.notes(), *run.notes)
+        drawn = ScenarioSet(
+            count, run.scenarios(), run.candidates, run.refused, notes, slot, reached, kept
+        )
+    if request.moves and not drawn.scenarios and not callbacks.cancelled():
+        causes = (f"{number} × {cause.value}" for cause, number in drawn.refused.most_common())
+        reasons = "; ".join((", ".join(causes), *map(str, drawn.adaptations)))
+        raise RefusedError(
+            f"none of {drawn.candidates} candidate(s) with the requested states is valid ({reasons})"
+        )
+    return drawn
+
+
+def regenerate(
+    plan: Plan,
+    config: SamplingConfig = SamplingConfig(),
+    *,
+    seed: int,
+    index: int,
+    request: Request = Request(),
+    check: Check | None = None,
+    measures: Measures | None = None,
+) -> Scenario | None:
+    """Return the scenario with this seed and index, to rounding, without the others.
+
+    The arguments are those of `draw_scenarios`. A scenario of a proposal needs `check` and
+    `measures`, with which the proposal is found again.
+
+    Raises:
+        InputError: no candidate has this index, or the target is not known.
+    """
+    built = build_model(plan, config, request.order)
+    if built.model is None:
+        return None
+    target = TargetSet.of(plan.situation, request, measures)
+    label = label_of(plan.situation, request, target, measures)
+    ego = request.ego_of(plan.encounter)
+    sampler = Sampler(built.model, seed, plan.road.frame_id, ego, label=label)
+    if place_of(index)[0] == DIRECTED_SLOT:
+        if target is None or check is None:
+            raise InputError(f"index {index} is from a proposal, but no target was requested")
+        validity = ValidityFilter.of(sampler, check, enough_share(config, request))
+        sampler = find_proposal(sampler, validity, target, lambda: False).sampler
+    return sampler.scenario(index)
+
+
+def enough_share(config: SamplingConfig, request: Request = Request()) -> float:
+    """Return the share of valid candidates from which a level is used.
+
+    It is 0 for a swapped order, which makes most candidates invalid at any level.
+    """
+    return 0.0 if request.order == "swap" else ENOUGH_SHARE[config.effective.variety]
+
+
+def rarity_filter(
+    sampler: Sampler, validity: ValidityFilter, measures: Measures | None
+) -> RarityFilter:
+    """Return the filter with the bound that the first valid candidates give."""
+    if measures is None or measures.rarity is None:
+        return RarityFilter()
+    return RarityFilter.of(measures.rarity, validity.pilot(sampler, MIN_RARITY_SCENARIOS)[1])
+
+
+def _ego_slot(plan: Plan, request: Request) -> EgoSlot | None:
+    """Return the slot of the vehicle that is left out, if any."""
+    ego = request.ego_of(plan.encounter)
+    if ego is None:
+        return None
+    states = plan.requested
+    return EgoSlot(plan.encounter.vehicles[ego], states.start[ego], states.end[ego])
+
+
+@dataclass
+class _Run:
+    """The set so far, and the account of all candidates.
+
+    Attributes:
+        filters: of the request.
+        count: scenarios wanted.
+        callbacks: of the caller.
+        sampler: draws the candidates.
+        found: called with each scenario of the set.
+        index: of all scenarios of the set.
+        stored: the first MAX_STORED_SCENARIOS of them.
+        refused: number of refused candidates by cause.
+        candidates: number of candidates.
+        notes: on what was adapted.
+    """
+
+    filters: Filters
+    count: int
+    callbacks: Callbacks
+    sampler: Sampler
+    found: Callable[[Scenario], None]
+    index: Any = field(default_factory=lambda: array("q"))
+    stored: list[Scenario] = field(default_factory=list)
+    refused: Counter[Cause] = field(default_factory=Counter)
+    candidates: int = 0
+    notes: list[Note] = field(default_factory=list)
+
+    def draw(self, attempts: int) -> Reached | None:
+        """Draw the set with so many candidates per scenario; return what a target came to.
+
+        Raises:
+            TargetError: no valid candidate in the range was found; the message states which range
+                can be reached.
+        """
+        if self.filters.target is None:
+            minimum = _MIN_COUNT_FACTOR if self.sampler.varies else 1
+            self._draw_levels(attempts * max(self.count, minimum))
+            return None
+        budget = _DIRECTED_BUDGET_FACTOR * attempts * self.count
+        return self._draw_directed(self.filters.target, budget)
+
+    def scenarios(self) -> Sequence[Scenario]:
+        """Return the set; a large one is redrawn at each access."""
+        if len(self.index) <= MAX_STORED_SCENARIOS:
+            return tuple(self.stored)
+        return RedrawnScenarios(self.sampler, np.array(self.index, dtype=np.int64))
+
+    def _draw_levels(self, budget: int) -> None:
+        """Judge the levels by pilots, then stay with the first one that is enough, or the best."""
+        judged = [self.filters.judged(self.sampler.blocks(level)) for level in range(len(LEVELS))]
+        shares: list[float] = []
+        for candidates in judged:
+            shares.append(self._take(candidates, min(PILOT_CANDIDATES, budget - self.candidates)))
+            if self._is_done(budget) or shares[-1] >= self.filters.validity.enough:
+                break
+        best = int(np.argmax(shares))
+        self._take(judged[best], budget - self.candidates)
+        self._note_level(best, len(shares))
+
+    def _draw_directed(self, target: TargetSet, budget: int) -> Reached | None:
+        """Find a proposal, then draw from it."""
+        search = find_proposal(
+            self.sampler, self.filters.validity, target, self.callbacks.cancelled
+        )
+        self.sampler = search.sampler
+        if search.evaluations.hits:
+            judged = self._directed(search.pilot)
+            while not self._is_done(budget) and not self._is_hopeless():
+                self._take(judged, min(BLOCK_CANDIDATES, budget - self.candidates))
+        reached = None
+        if self.candidates:
+            weights = np.array([self.sampler.weight(index) for index in self.index])
+            share, low, high = estimated_share(weights, self.candidates)
+            directed = self.sampler.proposal is not None
+            reached = Reached(
+                target.targets, search.stages, search.candidates, share, low, high, directed
+            )
+            self.notes.append(reached.note())
+            if self.sampler.base:
+                self._note_level(self.sampler.base, 2)
+        if len(self.index) < self.count and not self.callbacks.cancelled():
+            missed = Note.of(
+                NoteKind.TARGET_MISSED,
+                target="; ".join(map(str, target.targets)),
+                found=len(self.index),
+                drawn=search.candidates + self.candidates,
+                reachable=search.evaluations.reachable(),
+            )
+            if not self.index:
+                raise TargetError(str(missed))
+            self.notes.append(missed)
+        return reached
+
+    def _directed(self, pilot: Iterable[Candidate]) -> Iterator[Candidate]:
+        """Return the candidates of the proposal, or the pilot and further natural candidates."""
+        if self.sampler.proposal is not None:
+            return self.filters.judged(self.sampler.blocks(DIRECTED_SLOT))
+        further = self.sampler.blocks(self.sampler.base, STAGE_BLOCKS_COUNT)
+        return itertools.chain(self.filters.rejudged(pilot), self.filters.judged(further))
+
+    def _take(self, candidates: Iterator[Candidate], most: int) -> float:
+        """Take up to `most` candidates; return the share of them that is valid."""
+        taken = valid = 0
+        while taken < most and not self._is_complete():
+            candidate = next(candidates)
+            taken += 1
+            valid += candidate.is_valid
+            self.candidates += 1
+            self._add(candidate)
+            if taken % BLOCK_CANDIDATES == 0 or taken == most or self._is_complete():
+                self.callbacks.progress(len(self.index), self.count, self.candidates)
+        return valid / taken if taken else 0.0
+
+    def _add(self, candidate: Candidate) -> None:
+        """Add a candidate to the set, or to the account of refused ones."""
+        if candidate.cause is not None:
+            self.refused[candidate.cause] += 1
+        elif candidate.scenario is not None and self.callbacks.accepts(candidate.scenario):
+            published = self.sampler.published(candidate.scenario)
+            self.index.append(candidate.index)
+            if len(self.stored) < MAX_STORED_SCENARIOS:
+                self.stored.append(published)
+            self.found(published)
+
+    def _is_complete(self) -> bool:
+        return len(self.index) >= self.count or self.callbacks.cancelled()
+
+    def _is_done(self, budget: int) -> bool:
+        return self.candidates >= budget or self._is_complete()
+
+    def _is_hopeless(self) -> bool:
+        return not self.index and self.candidates >= _HOPELESS_CANDIDATES
+
+    def _note_level(self, best: int, tried: int) -> None:
+        """Note which of the tried levels is used."""
+        if tried > 1 and best == 0:
+            self.notes.append(Note.of(NoteKind.FEW_VALID))
+        elif tried > 1:
+            scale, varies = LEVELS[best], self.sampler.varies
+            note = Note.of(
+                NoteKind.LESS_VARIATION_EACH if varies else NoteKind.LESS_VARIATION,
+                lateral=scale.lateral,
+                longitudinal=scale.longitudinal,
+                time=scale.time,
+                vehicle=scale.vehicle_clock,
+            )
+            self.notes.append(note)
+        if self.callbacks.cancelled():
+            self.notes.append(Note.of(NoteKind.CANCELLED))
+
+
+def label_of(
+    situation: Situation,
+    request: Request,
+    target: TargetSet | None,
+    measures: Measures | None,
+    reactions: Sequence[Reaction] = (),
+    lost: Iterable[tuple[int, ...]] = (),
+) -> Label:
+    """Return the function that gives a scenario's facts.
+
+    Args:
+        situation: the template's.
+        request: its order is named if it is not kept.
+        target: its figures are named.
+        measures: give the nearness of vehicles.
+        reactions: that scenarios keep.
+        lost: pairs whose reaction or smallest gap scenarios need not keep on this road.
+    """
+    names = [token(vehicle.id) for vehicle in situation.encounter.vehicles]
+    kept = tuple(edge.named(names) for edge in reactions)
+    lost_names = tuple((names[pair[0]], names[pair[1]]) for pair in lost)
+    conflicts = () if request.order == "keep" else situation.conflicts
+
+    def label(whole: Scenario) -> Facts:
+        figures: dict[str, float] = {}
+        if target is not None:
+            labels = [each.label for each in target.targets]
+            figures = dict(zip(labels, map(float, target.values(whole)), strict=True))
+        return replace(
+            Facts() if measures is None else measures.facts(whole),
+            targets=figures,
+            order=request.order,
+            passing_order=tuple(_passing_order(names, each, whole) for each in conflicts),
+            reactions=kept,
+            lost_reactions=lost_names,
+        )
+
+    return label
+
+
+def _passing_order(names: Sequence[str], recorded: Conflict, whole: Scenario) -> PassingOrder:
+    """Return who passes one of the template's conflicts first in a scenario."""
+    conflict = conflict_of(whole, *recorded.pair)
+    change = OrderChange.NONE
+    if conflict is None:
+        change = OrderChange.NO_CONFLICT
+    elif conflict.first != recorded.first:
+        change = OrderChange.SWAPPED
+    return PassingOrder(names[recorded.first], names[recorded.second], change)

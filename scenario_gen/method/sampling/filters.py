@@ -1,0 +1,218 @@
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""The filters of candidates: target, validity, rarity. Each refusal has a cause."""
+
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+import math
+from typing import NamedTuple
+
+from scenario_gen.method.sampling.importance_sampling import TargetSet
+from scenario_gen.method.sampling.sampler import Block, BLOCK_CANDIDATES, LEVELS, Sampler
+from scenario_gen.types import Cause, Note, NoteKind, Scenario, Verdict
+
+Check = Callable[[Sequence[Scenario]], list[Verdict]]
+
+NO_LIMIT_COUNT = 1 << 30  # with one clock for all vehicles, conflicts depend on the road alone
+PILOT_CANDIDATES = 2 * BLOCK_CANDIDATES  # by which a level is judged
+MIN_RARITY_SCENARIOS = 20  # valid ones from which a bound is taken
+_LARGE_PILOT_FACTOR = 5  # over a pilot that has too few valid candidates
+_KEPT_SHARE = 0.4  # of the valid candidates that are kept at least
+
+
+class Candidate(NamedTuple):
+    """A candidate with its verdict.
+
+    Attributes:
+        index: of the candidate.
+        scenario: all its vehicles; None without a speed profile.
+        cause: why it is refused; None if it is kept.
+    """
+
+    index: int
+    scenario: Scenario | None
+    cause: Cause | None
+
+    @property
+    def is_valid(self) -> bool:
+        """Whether the checker accepts it, however rare it is."""
+        return self.cause in (None, Cause.UNUSUAL)
+
+
+@dataclass(frozen=True, eq=False)
+class ValidityFilter:
+    """Refuses candidates that are not valid.
+
+    Attributes:
+        check: the validity checker.
+        max_absent: conflicts of the template that candidates may lose: as many as the undisturbed
+            drive, or, where that loses some, as the best quarter of the first candidates.
+        enough: share of valid candidates from which a level of standard deviations is used.
+        lost: reactions of the template, by their vehicles, that cannot be kept on this road, each
+            with a message: neither the undisturbed drive nor those candidates keep them. No
+            candidate is refused for them.
+    """
+
+    check: Check
+    max_absent: int
+    enough: float
+    lost: Mapping[tuple[int, ...], str] = field(default_factory=dict)
+
+    @classmethod
+    def of(cls, sampler: Sampler, check: Check, enough: float) -> "ValidityFilter":
+        """Find what the drive without deviations loses."""
+        undisturbed = sampler.undisturbed()
+        if undisturbed is None:
+            return cls(check, NO_LIMIT_COUNT, enough)
+        (verdict,) = check([undisturbed])
+        lost, absent = _lost_reactions(verdict), verdict.not_applicable
+        if not sampler.varies:
+            return cls(check, NO_LIMIT_COUNT, enough, lost)
+        first = _scenarios([sampler.block(0, 0)]) if absent else []
+        if first:
+            verdicts = sorted(check(first), key=lambda verdict: verdict.not_applicable)
+            absent = min(absent, verdicts[len(verdicts) // 4].not_applicable)
+            for verdict in verdicts:
+                if verdict.not_applicable <= absent:
+                    also_lost = _lost_reactions(verdict)
+                    lost = {pair: lost[pair] for pair in lost if pair in also_lost}
+        return cls(check, absent, enough, lost)
+
+    def __call__(self, scenarios: Sequence[Scenario]) -> list[Cause | None]:
+        """Return the first cause for which each scenario is refused, None for a valid one."""
+        return [self._cause(verdict) for verdict in self.check(scenarios)] if scenarios else []
+
+    def _cause(self, verdict: Verdict) -> Cause | None:
+        for violation in verdict.violations:
+            if violation.cause != Cause.REACTION or violation.vehicles not in self.lost:
+                return violation.cause
+        return Cause.CONFLICT_LOST if verdict.not_applicable > self.max_absent else None
+
+    def valid(self, blocks: Iterable[Block]) -> list[Scenario]:
+        """Return the valid candidates of some blocks."""
+        drawn = _scenarios(blocks)
+        return [
+            scenario for scenario, cause in zip(drawn, self(drawn), strict=True) if cause is None
+        ]
+
+    def pilot(self, sampler: Sampler, minimum: int = 0) -> tuple[int, list[Scenario]]:
+        """Return the level to use, and its first valid candidates.
+
+        The level is the first with enough valid candidates, or the best. Where it has fewer than
+        `minimum` valid candidates, five times as many are drawn.
+        """
+        count = PILOT_CANDIDATES // BLOCK_CANDIDATES
+        valid: list[list[Scenario]] = []
+        for level in range(len(LEVELS)):
+            valid.append(self.valid(sampler.block(level, k) for k in range(count)))
+            if len(valid[level]) >= self.enough * PILOT_CANDIDATES:
+                break
+        best = max(range(len(valid)), key=lambda level: len(valid[level]))
+        if len(valid[best]) < minimum:
+            more = range(count, _LARGE_PILOT_FACTOR * count)
+            valid[best] += self.valid(sampler.block(best, k) for k in more)
+        return best, valid[best]
+
+
+def _scenarios(blocks: Iterable[Block]) -> list[Scenario]:
+    """Return the candidates with a speed profile."""
+    return [each for block in blocks for each in block.scenarios if each is not None]
+
+
+def _lost_reactions(verdict: Verdict) -> dict[tuple[int, ...], str]:
+    """Return the reactions that a drive does not keep, by their vehicles, with their messages."""
+    return {
+        violation.vehicles: violation.message
+        for violation in verdict.violations
+        if violation.cause == Cause.REACTION
+    }
+
+
+@dataclass(frozen=True, eq=False)
+class RarityFilter:
+    """Refuses valid candidates that are rare among recorded encounters of their kind.
+
+    A template may be rare itself, and then so is everything generated from it. So candidates with
+    a rarity of at most 1 are kept, or the two fifths of the valid candidates that are least rare.
+    The bound is found with the first candidates, and is the same for all.
+
+    Attributes:
+        rarity: returns the rarity of a scenario; None: all are kept.
+        max_rarity: the greatest rarity that is kept.
+    """
+
+    rarity: Callable[[Scenario], float] | None = None
+    max_rarity: float = math.inf
+
+    @classmethod
+    def of(
+        cls, rarity: Callable[[Scenario], float] | None, valid: Sequence[Scenario]
+    ) -> "RarityFilter":
+        """Find the bound from the first valid candidates."""
+        if rarity is None or not valid:
+            return cls(rarity)
+        rarities = sorted(map(rarity, valid))
+        return cls(rarity, max(1.0, rarities[int(_KEPT_SHARE * len(rarities))]))
+
+    def __call__(self, scenario: Scenario) -> bool:
+        """Return whether a valid candidate is kept."""
+        return self.rarity is None or self.rarity(scenario) <= self.max_rarity
+
+    @property
+    def valid_per_kept(self) -> int:
+        """Valid candidates per candidate that is kept, in the worst case."""
+        return 1 if self.rarity is None else math.ceil(1.0 / _KEPT_SHARE)
+
+    def notes(self) -> tuple[Note, ...]:
+        """Return a note on the bound, unless only usual candidates are kept."""
+        if self.rarity is None or self.max_rarity <= 1.0:
+            return ()
+        if math.isinf(self.max_rarity):
+            return (Note.of(NoteKind.NO_SHARED_AREA),)
+        return (Note.of(NoteKind.UNUSUAL, rarity=self.max_rarity),)
+
+
+@dataclass(frozen=True, eq=False)
+class Filters:
+    """All filters of a request: speed profile, target, validity, rarity, in this order."""
+
+    validity: ValidityFilter
+    target: TargetSet | None = None
+    rarity: RarityFilter = RarityFilter()
+
+    def judged(self, blocks: Iterable[Block]) -> Iterator[Candidate]:
+        """Yield the candidates of blocks, each with the cause for which it is refused."""
+        for block in blocks:
+            in_range = [each is not None and self._in_range(each) for each in block.scenarios]
+            checked = [
+                each
+                for each, reaches in zip(block.scenarios, in_range, strict=True)
+                if each is not None and reaches
+            ]
+            causes = iter(self.validity(checked))
+            for index, scenario, reaches in zip(*block, in_range, strict=True):
+                if scenario is None:
+                    yield Candidate(index, None, Cause.SPEED_PROFILE)
+                elif not reaches:
+                    yield Candidate(index, scenario, Cause.OUT_OF_RANGE)
+                else:
+                    yield self._with_rarity(Candidate(index, scenario, next(causes)))
+
+    def rejudged(self, candidates: Iterable[Candidate]) -> Iterator[Candidate]:
+        """Yield checked candidates, those out of range or rare with that cause."""
+        for candidate in candidates:
+            scenario, cause = candidate.scenario, candidate.cause
+            if scenario is not None and cause is None and not self._in_range(scenario):
+                yield candidate._replace(cause=Cause.OUT_OF_RANGE)
+            else:
+                yield self._with_rarity(candidate)
+
+    def _in_range(self, scenario: Scenario) -> bool:
+        return self.target is None or self.target.holds(self.target.values(scenario))
+
+    def _with_rarity(self, candidate: Candidate) -> Candidate:
+        scenario = candidate.scenario
+        if scenario is None or candidate.cause is not None or self.rarity(scenario):
+            return candidate
+        return candidate._replace(cause=Cause.UNUSUAL)

@@ -1,0 +1,81 @@
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""The layout of the vector z of standard normal numbers from which a candidate is computed.
+
+    z = (shared clock, vehicle 0, vehicle 1, …, trimming)
+    vehicle = (lateral, speed, clock (shift, pace, waits), place, end speeds, size)
+
+Everybody who reads a number asks for its slice by name.
+"""
+
+from collections.abc import Iterable
+from itertools import accumulate, pairwise
+from typing import NamedTuple
+
+
+def consecutive(counts: Iterable[int]) -> list[slice]:
+    """Return slices of these lengths, one behind the other from 0 on."""
+    return [slice(begin, end) for begin, end in pairwise(accumulate(counts, initial=0))]
+
+
+class VehicleNumbers(NamedTuple):
+    """The numbers of one vehicle.
+
+    Attributes:
+        lateral: deviations across the route.
+        speed: deviations along the route.
+        clock: of the vehicle's clock: shift, pace, and one for each wait.
+        place: in the lane.
+        end_speeds: at the start and at the end.
+        size: of the vehicle.
+    """
+
+    lateral: slice
+    speed: slice
+    clock: slice
+    place: slice
+    end_speeds: slice
+    size: slice
+
+    @classmethod
+    def of(cls, lateral: int, speed: int, clock: int | None) -> "VehicleNumbers":
+        """Lay out the numbers of a vehicle.
+
+        Args:
+            lateral: how many there are for deviations across the route.
+            speed: how many for those along it.
+            clock: how many for its clock; None if nothing but the deviations is free.
+        """
+        free = (0, 0, 0, 0) if clock is None else (clock, 1, 2, 1)
+        return cls(*consecutive((lateral, speed, *free)))
+
+    @property
+    def count(self) -> int:
+        """How many there are."""
+        return int(max(part.stop for part in self))
+
+
+class ModelNumbers(NamedTuple):
+    """The numbers of a candidate.
+
+    Attributes:
+        clock: of the clock that all vehicles share.
+        vehicles: of each vehicle, laid out as `VehicleNumbers`.
+        trimming: of the scenario's begin and end.
+    """
+
+    clock: slice
+    vehicles: tuple[slice, ...]
+    trimming: slice
+
+    @classmethod
+    def of(cls, clock: int, vehicles: Iterable[VehicleNumbers], trimming: int) -> "ModelNumbers":
+        """Lay out the numbers of a candidate."""
+        parts = consecutive((clock, *(numbers.count for numbers in vehicles), trimming))
+        return cls(parts[0], tuple(parts[1:-1]), parts[-1])
+
+    @property
+    def count(self) -> int:
+        """How many there are."""
+        return int(self.trimming.stop)

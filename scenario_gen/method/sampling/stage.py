@@ -1,0 +1,79 @@
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""The sampling stage: from a fitted and planned template to scenarios that are proven valid."""
+
+from dataclasses import replace
+
+from scenario_gen.method.sampling.build_model import kept_reactions
+from scenario_gen.method.sampling.config import SamplingConfig
+from scenario_gen.method.sampling.draw import draw_scenarios
+from scenario_gen.method.sampling.plan import Callbacks, Plan
+from scenario_gen.method.validity import Checker, Limits
+from scenario_gen.situation import Situation, Wait
+from scenario_gen.types import GenerationResult, Measures, NoteKind, Request
+
+
+def sample_scenarios(
+    planned: GenerationResult,
+    sampling: SamplingConfig = SamplingConfig(),
+    limits: Limits = Limits(),
+    request: Request = Request(),
+    *,
+    count: int,
+    waits: tuple[Wait, ...] | None = None,
+    situation: Situation | None = None,
+    callbacks: Callbacks = Callbacks(),
+    measures: Measures | None = None,
+) -> GenerationResult:
+    """Add scenarios to a fitted and planned template; every candidate is checked.
+
+    Source: paper III-C.
+
+    Args:
+        planned: with road, fit, routes and seed.
+        sampling: the sampler's parameters.
+        limits: of motion, and the checker's.
+        request: what is requested.
+        count: valid scenarios wanted.
+        waits: that are kept; the template's unless given.
+        situation: the template's, if it is known.
+        callbacks: called on progress and with valid scenarios.
+        measures: measures scenarios for a target.
+
+    Raises:
+        InputError: road or fit are not known.
+        RefusedError: as `draw_scenarios`.
+    """
+    plan = Plan.of(planned, sampling, limits, request, waits, situation)
+    generated = draw_scenarios(
+        plan,
+        checker_of(plan, sampling, limits, request).check,
+        sampling,
+        count=count,
+        seed=planned.seed,
+        request=request,
+        callbacks=callbacks,
+        measures=measures,
+    )
+    road, fit = planned.road_and_fit()
+    notes = road.lanes.notes if road.lanes is not None else ()
+    mirrored = [note for note in notes if note.kind is NoteKind.MIRRORED]
+    generated = replace(
+        generated,
+        adaptations=(*mirrored, *generated.adaptations),
+        graph=plan.situation.reactions,
+    )
+    return replace(planned, fit=replace(fit, requested=plan.requested), generated=generated)
+
+
+def checker_of(plan: Plan, sampling: SamplingConfig, limits: Limits, request: Request) -> Checker:
+    """Return the checker for a request's scenarios.
+
+    Raises:
+        RefusedError: an order is to be swapped, and there is none.
+    """
+    edges = kept_reactions(plan.situation, sampling, request.order).edges
+    return Checker.of_template(
+        plan.situation, plan.road, plan.requested, plan.waits, limits, request.order, edges
+    )

@@ -1,0 +1,88 @@
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""The layout of the standard normal numbers: each slice moves what its name says, and only that."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from support.sampling_scenes import scene
+
+from scenario_gen.method.sampling import Plan, relaxed_states, SamplingConfig
+from scenario_gen.method.sampling.build_model import build_model
+from scenario_gen.method.sampling.candidates import CandidateModel
+from scenario_gen.method.sampling.numbers import ModelNumbers, VehicleNumbers
+from scenario_gen.method.sampling.reaction_transform import advance, lateness
+from scenario_gen.method.sampling.vehicle_model import NoiseScale
+from scenario_gen.situation import Situation
+from scenario_gen.types import FOLLOW, Reaction, ReactionGraph, Request
+
+EDGE = Reaction(FOLLOW, 1, 0, 1.0, 0.8, 0.5, 1.0, 2.0, 18.0, (1.0, 1.5, 2.0))
+
+
+@pytest.fixture(scope="module")
+def model():
+    """Vehicle 1 follows vehicle 0; all that preset `wide` varies is free."""
+    encounter, segmentation, road, routes, asked, waits = scene()
+    situation, config = Situation.of(encounter), SamplingConfig()
+    states = relaxed_states(asked, situation, config, Request())
+    built = build_model(Plan(situation, segmentation, road, routes, states, waits), config).model
+    return CandidateModel(built.vehicles, built.warp, ReactionGraph((EDGE,), (0, 1, 2)))
+
+
+def test_the_slices_are_consecutive_and_complete():
+    vehicle = VehicleNumbers.of(3, 5, 2)
+    assert [part.stop - part.start for part in vehicle] == [3, 5, 2, 1, 2, 1]
+    assert [part.start for part in vehicle[1:]] == [part.stop for part in vehicle[:-1]]
+    assert vehicle.count == 14 and VehicleNumbers.of(3, 5, None).count == 8
+    whole = ModelNumbers.of(4, [vehicle, vehicle], 2)
+    assert whole.vehicles == (slice(4, 18), slice(18, 32)) and whole.count == 34
+
+
+@pytest.mark.parametrize("name", VehicleNumbers._fields)
+def test_each_slice_moves_what_it_is_named_after(model, name):
+    vehicle, nominal = model.vehicles[0], model.warp.nominal
+    z = np.zeros((2, vehicle.numbers.count))
+    z[1, getattr(vehicle.numbers, name)] = 1.5
+    shared = model.warp.sample(np.zeros((2, model.warp.count)), 1.0)
+    samples = vehicle.sample(z, NoiseScale(), shared, nominal)
+    moved = {
+        "clock": np.ptp(samples.clock.time, axis=0).max() > 1e-6,
+        "path": np.ptp(samples.paths.curve, axis=0).max() > 1e-6,
+        "speed": np.ptp(samples.speeds.coefficients, axis=0).max() > 1e-6,
+        "size": samples.vehicles[0] != samples.vehicles[1],
+    }
+    expected = {"lateral": "path", "place": "path", "end_speeds": "speed"}.get(name, name)
+    assert moved[expected] and not any(
+        value for key, value in moved.items() if key not in (expected, "speed")
+    )
+
+
+def test_reactions_read_the_slices_that_move_time_and_place(model):
+    vehicle, at = model.vehicles[0], np.array([5.0, 10.0])
+    late = lateness(vehicle, at, model.warp.nominal, NoiseScale())
+    ahead = advance(vehicle, at, NoiseScale())
+    time, place = np.flatnonzero(late.any(axis=0)), np.flatnonzero(ahead.any(axis=0))
+    numbers = vehicle.numbers
+    everything = np.arange(numbers.count)
+    assert set(time) == set(everything[numbers.clock])
+    assert set(place) <= set(everything[numbers.speed]) | set(everything[numbers.end_speeds])
+    assert set(place) & set(everything[numbers.end_speeds])
+
+
+def test_a_further_number_changes_no_reaction(model):
+    """An unused lateral number in front of all others: the same candidate, one number longer."""
+    longer = [
+        replace(vehicle, lateral_root=np.pad(vehicle.lateral_root, ((0, 0), (1, 0))))
+        for vehicle in model.vehicles
+    ]
+    other = CandidateModel(tuple(longer), model.warp, model.reactions)
+    assert other.size == model.size + len(longer)
+    eps = np.random.default_rng(0).standard_normal((4, model.size))
+    first = [part.start for part in model.numbers.vehicles]
+    states = [
+        each.draw(numbers, NoiseScale()).states(np.arange(0.0, 10.0, 0.5))
+        for each, numbers in ((model, eps), (other, np.insert(eps, first, 1.0, axis=1)))
+    ]
+    np.testing.assert_allclose(states[0], states[1], atol=1e-9)
