@@ -16,7 +16,7 @@ from scenario_gen.logs import read_log
 from scenario_gen.logs.synthetic import bundled
 from scenario_gen.method.chain import Chain
 from scenario_gen.method.config import PipelineConfig
-from scenario_gen.method.evaluation import footprint_distance, Motion
+from scenario_gen.method.evaluation import footprint_distance
 from scenario_gen.method.evaluation.nearness import time_apart
 from scenario_gen.method.sampling import checker_of, NaturalScenarios, Plan
 from scenario_gen.method.segmentation import segment
@@ -47,19 +47,16 @@ def natural_scenarios() -> NaturalScenarios:
 
 def late_by(scenario: Scenario, late: float, ego: int = 0) -> Scenario:
     """Return the scenario with the ego where it should have been some seconds before."""
-    time, position, heading = scenario.time, scenario.position.copy(), scenario.heading.copy()
-    then = np.clip(time - late, time[0], time[-1])
-    for axis in range(2):
-        position[ego, :, axis] = np.interp(then, time, scenario.position[ego, :, axis])
-    heading[ego] = np.interp(then, time, scenario.heading[ego])
+    position, heading = scenario.position.copy(), scenario.heading.copy()
+    earlier = scenario.at(scenario.time - late)
+    position[ego], heading[ego] = earlier.position[ego], earlier.heading[ego]
     return replace(scenario, position=position, heading=heading)
 
 
 def touches(scenario: Scenario, ego: int = 0) -> bool:
     """Return whether the ego touches another at an instant."""
-    motion = Motion(scenario.vehicles, 0.1, scenario.position, scenario.heading, scenario.speed)
     others = (i for i in range(len(scenario.vehicles)) if i != ego)
-    return any(bool((footprint_distance(motion, ego, i) <= 0.0).any()) for i in others)
+    return any(bool((footprint_distance(scenario, ego, i) <= 0.0).any()) for i in others)
 
 
 @dataclass

@@ -15,7 +15,6 @@ from scenario_gen.base.errors import ScenarioGenError
 from scenario_gen.logs import read_log
 from scenario_gen.method.evaluation import replay
 from scenario_gen.method.evaluation.distributions import compare, QUANTITIES, values_of
-from scenario_gen.method.evaluation.motion import at_count, at_period
 from scenario_gen.method.fitting import fit_template
 from scenario_gen.method.routing import plan_routes
 from scenario_gen.method.sampling import draw_scenarios, Plan, SamplingConfig
@@ -118,7 +117,7 @@ def prepared(encounter: Encounter, road_name: str, name: str) -> Prepared:
 
 def displacement(scenarios: Sequence[Scenario]) -> float:
     """Mean distance [m] between the same vehicle at the same share of the duration in two samples, without the clock's part."""
-    return _apart(np.stack([at_count(s, 101).position for s in scenarios]))
+    return _apart(np.stack([s.with_samples(101).position for s in scenarios]))
 
 
 def displacement_at_instants(scenarios: Sequence[Scenario]) -> float:
@@ -149,8 +148,8 @@ def arrival_spread(case: Prepared, scenarios: Sequence[Scenario]) -> float:
 def divergences(case: Prepared, scenarios: Sequence[Scenario]) -> dict[str, float]:
     """Jensen-Shannon divergence [bit] of each quantity between the samples and the fitted template."""
     period = case.encounter.dt
-    template = values_of(at_period(replay(case.encounter, case.fit), period))
-    samples = [values_of(at_period(s, period)) for s in scenarios]
+    template = values_of(replay(case.encounter, case.fit).resampled(period))
+    samples = [values_of(s.resampled(period)) for s in scenarios]
     ones: Floats = np.ones((1, len(scenarios)))
     return {
         q.id: float(

@@ -18,6 +18,7 @@ import numpy as np
 from scenario_gen.base.errors import InputError
 from scenario_gen.numerics import Bools, Floats, frozen
 from scenario_gen.numerics.boxes import boxes_meet, fill_box
+from scenario_gen.numerics.hermite import cubic, interval_at
 from scenario_gen.numerics.kernels import B1, F, F1, F2, F3, I, kernel, named, OUT2, OUT3
 from scenario_gen.numerics.plane import unit
 from scenario_gen.situation import conflict_of, passing
@@ -150,27 +151,15 @@ def _keep_waiting(scenario: Scenario, who: int, whom: int, order: Floats) -> Non
 def pose_at(time: Floats, motion: Floats, clock: float, out: Floats) -> None:
     """Write x, y, yaw, speed, acceleration of one vehicle's motion (T, 6) at a clock [s] into `out` (5,).
 
-    Position is the cubic of `Scenario`, heading and speed are linear between two instants; beyond the ends it stays there.
+    The motion between two samples is that of `Motion`; beyond the ends it stays there.
     """
-    last = time.shape[0] - 1
-    t = min(max(clock, 0.0), time[last])
-    low, high = 0, last
-    guess = int(t / time[last] * last)  # most clocks are even
-    if guess < last and time[guess] <= t <= time[guess + 1]:
-        low, high = guess, guess + 1
-    while high - low > 1:
-        middle = (low + high) // 2
-        if time[middle] <= t:
-            low = middle
-        else:
-            high = middle
-    h = time[high] - time[low]
-    u = (t - time[low]) / h
-    w = 1.0 - u
-    a, b = motion[low], motion[high]
-    blend = u * u * (3.0 - 2.0 * u)
-    out[0] = a[0] + blend * (b[0] - a[0]) + h * u * w * (w * a[4] - u * b[4])
-    out[1] = a[1] + blend * (b[1] - a[1]) + h * u * w * (w * a[5] - u * b[5])
+    t = min(max(clock, 0.0), time[time.shape[0] - 1])
+    k = interval_at(time, t)
+    h = time[k + 1] - time[k]
+    u = (t - time[k]) / h
+    a, b = motion[k], motion[k + 1]
+    out[0] = cubic(a[0], a[4], b[0], b[4], h, u)
+    out[1] = cubic(a[1], a[5], b[1], b[5], h, u)
     out[2] = a[2] + u * (b[2] - a[2])
     out[3] = a[3] + u * (b[3] - a[3])
     out[4] = (b[3] - a[3]) / h

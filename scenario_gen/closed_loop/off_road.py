@@ -11,16 +11,15 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from scipy.interpolate import CubicHermiteSpline
 
 from scenario_gen.closed_loop.simulation import Drive
 from scenario_gen.method.validity import first_exits, Ground, Proof
 from scenario_gen.numerics import Bools, Floats, sealed
 from scenario_gen.numerics.hermite import control_points
 from scenario_gen.numerics.kernels import B2, F1, F2, kernel, OUT2
-from scenario_gen.numerics.plane import edge_lengths, unit
+from scenario_gen.numerics.plane import edge_lengths
 from scenario_gen.roads import clearance_in_cells, distance_transform, footprint_fits, to_cells
-from scenario_gen.types import once_per_object, Road, Scenario
+from scenario_gen.types import Motion, once_per_object, Road
 
 FARTHEST = 10.0  # metres; margins and depths beyond are told as this
 APART = (
@@ -91,17 +90,13 @@ def is_off_road(road: Road, pose: Floats, half: tuple[float, float], limit: floa
     return bool(_measured(road, pose[None], half, outside=True)[0, 0] >= limit)
 
 
-def poses_in(motion: Scenario, rows: list[int], k: int, u: Floats) -> Floats:
-    """Return x, y [m], yaw [rad] (R, U, 3) of vehicles at parts `u` (U,) of step k, as `Scenario` says."""
-    time, position, heading, speed = (
-        motion.time[k : k + 2], *(each[rows, k : k + 2] for each in (motion.position, motion.heading, motion.speed))
-    )  # fmt: skip
-    spline = CubicHermiteSpline(time, position, speed[..., None] * unit(heading), axis=1)
-    yaw = heading[:, :1] + u * np.diff(heading, axis=1)
-    return np.concatenate([spline(time[0] + u * (time[1] - time[0])), yaw[..., None]], axis=2)
+def poses_in(motion: Motion, rows: list[int], k: int, u: Floats) -> Floats:
+    """Return x, y [m], yaw [rad] (R, U, 3) of vehicles at parts `u` (U,) of step k."""
+    start, end = motion.time[k : k + 2]
+    return motion.select(rows).at(start + u * (end - start)).poses
 
 
-def _parts(motion: Scenario, ego: int, k: int) -> int:
+def _parts(motion: Motion, ego: int, k: int) -> int:
     """Return into how many parts step k is cut."""
     way = float(edge_lengths(motion.position[ego, k : k + 2])[0])
     way = max(

@@ -70,12 +70,9 @@ def origins_of(trials: Sequence[Trial]) -> list[Origin]:
 def _shape(scenario: Scenario, ego: int) -> Floats:
     """Return where all are, seen from the ego's start, at some instants, and when that is [s]: two roads give one shape."""
     when = np.linspace(0.0, float(scenario.time[-1]), INSTANTS)
-    away = ahead_and_left(
-        scenario.position - scenario.position[ego, 0], float(scenario.heading[ego, 0])
-    )
-    return np.concatenate(
-        [*(np.interp(when, scenario.time, each) for part in away for each in part), when]
-    )
+    offset = scenario.at(when).position - scenario.position[ego, 0]
+    ahead, left = ahead_and_left(offset, float(scenario.heading[ego, 0]))
+    return np.concatenate([ahead.ravel(), left.ravel(), when])
 
 
 def digest_of(scenario: Scenario, ego: int) -> str:

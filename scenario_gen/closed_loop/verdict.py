@@ -9,11 +9,11 @@ from typing import Any
 
 import numpy as np
 
-from scenario_gen.closed_loop.off_road import PARTS, poses_in, RESOLUTION, road_use
+from scenario_gen.closed_loop.off_road import PARTS, RESOLUTION, road_use
 from scenario_gen.closed_loop.reasons import CutIn, Reason, reason_of, Runner, STANDS, state_at
 from scenario_gen.closed_loop.score import not_behind, Terms, terms
 from scenario_gen.closed_loop.simulation import ClosedLoop, Drive
-from scenario_gen.method.evaluation import footprint_distance, Motion, time_to_collision
+from scenario_gen.method.evaluation import distance_and_ttc, footprint_distance
 from scenario_gen.method.validity import first_contacts, Proof
 from scenario_gen.numerics import Floats
 from scenario_gen.numerics.hermite import control_points
@@ -211,18 +211,13 @@ def judge(loop: ClosedLoop, drive: Drive) -> DriveVerdict:
     hits = [(contacts[max(ego, i), min(ego, i)], i) for i in others]
     first, who = min(((at, i) for at, i in hits if at is not None), default=(math.nan, -1))
     goal = _goal_time(loop, drive)
-    driven = Motion(motion.vehicles, config.step, motion.position, motion.heading, motion.speed)
-    to_contact = {
-        i: np.where(drive.here[i], time_to_collision(driven, ego, i), np.inf) for i in others
-    }
-    ttc = [float(each.min()) for each in to_contact.values()]
-    close = [
-        float(np.where(not_behind(drive, i), each, np.inf).min()) for i, each in to_contact.items()
-    ]
-    gap = [
-        float(np.where(drive.here[i], footprint_distance(driven, ego, i), np.inf).min())
-        for i in others
-    ]
+    gap, ttc, close = [], [], []
+    for i in others:
+        distance, to_contact = distance_and_ttc(motion, ego, i)
+        to_contact = np.where(drive.here[i], to_contact, np.inf)
+        gap.append(float(np.where(drive.here[i], distance, np.inf).min()))
+        ttc.append(float(to_contact.min()))
+        close.append(float(np.where(not_behind(drive, i), to_contact, np.inf).min()))
     braking = np.maximum(-drive.accelerations, 0.0)
     way = known.cells[ego, :, 7]
     reached = float(np.interp(drive.clock[ego, -1], np.arange(len(way)) * known.cell, way))
@@ -290,16 +285,8 @@ def _contact_in(motion: Scenario, pair: list[int], span: slice) -> float | None:
     """Return the time [s] of the first contact of two vehicles in a span of instants, None if they do not touch in it."""
     vehicles = (motion.vehicles[pair[0]], motion.vehicles[pair[1]])
     if span.stop - span.start < 2:
-        there = Motion(
-            vehicles,
-            1.0,
-            motion.position[pair][:, span],
-            motion.heading[pair][:, span],
-            motion.speed[pair][:, span],
-        )
-        return (
-            float(motion.time[span.start]) if footprint_distance(there, 0, 1)[0] <= 0.0 else None
-        )
+        touches = footprint_distance(motion, *pair)[span.start] <= 0.0
+        return float(motion.time[span.start]) if touches else None
     time, position = motion.time[span], motion.position[pair][:, span]
     heading, speed = motion.heading[pair][:, span], motion.speed[pair][:, span]
     control, out = np.empty((2, len(time) - 1, 4, 2)), np.empty((1, 3))
@@ -312,8 +299,7 @@ def _contact_in(motion: Scenario, pair: list[int], span: slice) -> float | None:
     k = min(int(found / step + 1e-9), len(motion.time) - 2)
     start = float(motion.time[k])
     u = np.linspace(0.0, max(found - start, 0.0) / step, PARTS + 1)
-    poses = poses_in(motion, pair, k, u)
-    fine = Motion(vehicles, step / PARTS, poses[..., :2], poses[..., 2], np.zeros(poses.shape[:2]))
+    fine = motion.select(pair).at_times(start + u * step)
     touch = footprint_distance(fine, 0, 1) <= 0.0  # from when on, to a PART of the step
     return start + float(u[np.argmax(touch)]) * step if touch.any() else found
 

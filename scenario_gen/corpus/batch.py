@@ -33,7 +33,7 @@ from scenario_gen.corpus.tables import rows_at, rows_of, write_table
 from scenario_gen.corpus.tasks import agree, arriving, check_out, held, spread, undone, Workers
 from scenario_gen.method.chain import Chain
 from scenario_gen.method.config import PipelineConfig
-from scenario_gen.method.evaluation import at_period, criticality
+from scenario_gen.method.evaluation import criticality
 from scenario_gen.method.fitting import LostEncounterError
 from scenario_gen.method.segmentation import segment
 from scenario_gen.roads import build_road, road_and_template
@@ -297,7 +297,7 @@ def _scenario_rows(
     """A row for each scenario of a case."""
     rows = []
     for scenario in result.generated.scenarios:
-        motion = at_period(scenario, task.request.config.evaluation.period)
+        motion = scenario.resampled(task.request.config.evaluation.period)
         measures = criticality(motion, task.request.config.evaluation.ttc_horizon)
         rows.append({
             "template": case["template"], "kind": case["kind"], "vehicles": case["vehicles"], "namespace": case["namespace"],

@@ -34,7 +34,7 @@ from scenario_gen.logs import (
     UnknownFormatError,
 )
 from scenario_gen.logs.tables import SPMD_EPOCH_NS
-from scenario_gen.method.evaluation import at_period, criticality, EvaluationConfig
+from scenario_gen.method.evaluation import criticality, EvaluationConfig
 from scenario_gen.situation import Situation
 from scenario_gen.types import Encounter
 
@@ -187,7 +187,7 @@ def row_of(encounter: Encounter, source: str, config: CorpusConfig) -> dict[str,
         )
         pairs.append((gap, i, j, situation.kind(i, j)))
     pairs.sort()
-    measures = criticality(at_period(encounter, encounter.dt), EvaluationConfig().ttc_horizon)
+    measures = criticality(encounter, EvaluationConfig().ttc_horizon)
     latitude, longitude = encounter.origin or (None, None)
     return {
         "name": encounter.name,

@@ -10,6 +10,7 @@ from typing import Any, NamedTuple, Self, TYPE_CHECKING
 
 import numpy as np
 
+from scenario_gen.base.errors import InputError
 from scenario_gen.numerics import Bools, canonical_heading, Floats, freeze, frozen, Ints
 from scenario_gen.numerics.boxes import corners
 from scenario_gen.numerics.hermite import fill_states
@@ -155,9 +156,21 @@ class Motion:
         return States(out[..., :2], out[..., 2], out[..., 3], is_present)
 
     def resampled(self, dt: float) -> Self:
-        """Return the motion every `dt` [s] from its start on; a last part shorter than dt is dropped."""
+        """Return the motion every `dt` [s] from its start on; a last part shorter than dt is dropped.
+
+        Raises:
+            InputError: the motion is shorter than dt.
+        """
         count = int(np.floor(self.duration / dt + 1e-6)) + 1
+        if count < 2:
+            raise InputError(
+                f"{self.title} lasts {self.duration:g} s, shorter than the sampling period of {dt:g} s"
+            )
         return self.at_times(np.minimum(self.time[0] + np.arange(count) * dt, self.time[-1]))
+
+    def with_samples(self, count: int) -> Self:
+        """Return the motion at `count` times spread evenly from its start to its end."""
+        return self.at_times(np.linspace(self.time[0], self.time[-1], count))
 
     def at_times(self, time: Floats) -> Self:
         """Return the motion sampled at other times (M,) [s] within it; M >= 2.

@@ -24,7 +24,7 @@ from scenario_gen.corpus.encounters import encounter_of, tables_of
 from scenario_gen.corpus.find import coverage_lines, export_hits, find, make_again
 from scenario_gen.corpus.tables import rows_of
 from scenario_gen.corpus.tasks import Workers
-from scenario_gen.method.evaluation import at_period, criticality
+from scenario_gen.method.evaluation import criticality
 from scenario_gen.method.fitting import LostEncounterError
 
 pytestmark = pytest.mark.xdist_group("corpus")
@@ -120,7 +120,7 @@ def test_recorded_encounters_are_found_by_their_figures(corpus):
         coverage_lines(found, corpus[0])
     )
     for row in found.rows:
-        measures = criticality(at_period(encounters[row["template"]], 0.1), 10.0)
+        measures = criticality(encounters[row["template"]], 10.0)
         assert row["pet"] == pytest.approx(measures.pet, abs=1e-6) and row["ttc"] == pytest.approx(
             measures.min_ttc, abs=1e-6
         )

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 import shapely
 
-from scenario_gen.method.evaluation import footprint_distance, Motion
+from scenario_gen.method.evaluation import footprint_distance
 from scenario_gen.numerics.boxes import corners, footprint_gaps
-from scenario_gen.types import Vehicle
+from scenario_gen.types import Motion, Vehicle
 
 NUMBER = st.floats(-100.0, 100.0)
 NEAR = st.floats(-6.0, 6.0)
@@ -42,5 +42,5 @@ def test_gaps_and_distances_are_those_of_polygons(x, y, yaw, other_yaw):
     assert (gap[0] < 0.0) == (true == 0.0) or abs(gap[0]) < 1e-9
     assert gap[0] <= true + 1e-9 and np.hypot(*axis[0]) == pytest.approx(1.0)
     twice = poses[:, None].repeat(2, axis=1)
-    motion = Motion(cars, 0.1, twice[..., :2], twice[..., 2], np.zeros((2, 2)))
+    motion = Motion.sampled(cars, 0.1, twice[..., :2], twice[..., 2], np.zeros((2, 2)))
     assert footprint_distance(motion, 0, 1)[0] == pytest.approx(true, abs=1e-9)

@@ -20,11 +20,14 @@ from scenario_gen.method.evaluation.coverage import coverage_of
 from scenario_gen.method.evaluation.criticality import criticality
 from scenario_gen.method.evaluation.dtw import dtw_distance, feature_matrix, mean_feature
 from scenario_gen.method.evaluation.evaluate import evaluate, evaluate_scenarios, MEASURED
-from scenario_gen.method.evaluation.geometry import footprint_distance, time_to_collision
+from scenario_gen.method.evaluation.geometry import (
+    distance_and_ttc,
+    footprint_distance,
+    time_to_collision,
+)
 from scenario_gen.method.evaluation.law import measures_in
 from scenario_gen.method.evaluation.measures import MEASURES
 from scenario_gen.method.evaluation.metrics import MetricGroup
-from scenario_gen.method.evaluation.motion import at_common, at_count, at_period, Motion
 from scenario_gen.method.evaluation.nearness import time_apart
 from scenario_gen.method.evaluation.non_reactive import (
     BRAKING,
@@ -35,7 +38,7 @@ from scenario_gen.method.evaluation.non_reactive import (
 )
 from scenario_gen.method.evaluation.references import uniform_changepoints, without_changepoints
 from scenario_gen.method.evaluation.replay import replay
-from scenario_gen.method.evaluation.samples import Samples, Template
+from scenario_gen.method.evaluation.samples import common_motion, Samples, Template
 from scenario_gen.method.evaluation.similarity import (
     mean_correlation,
     mean_error,
@@ -44,9 +47,9 @@ from scenario_gen.method.evaluation.similarity import (
 
 __all__ = [
     "BRAKING", "MEASURED", "MEASURES", "PULLS_AWAY", "STANDS", "Bootstrap", "Difference",
-    "EvaluationConfig", "MetricGroup", "Motion", "Samples",
-    "Template", "at_common", "at_count", "at_period", "clustered_wilson", "compare", "comparison_table", "coverage_of",
-    "criticality", "dtw_distance", "evaluate", "evaluate_scenarios", "feature_matrix", "footprint_distance", "free_acceleration",
+    "EvaluationConfig", "MetricGroup", "Samples",
+    "Template", "clustered_wilson", "common_motion", "compare", "comparison_table", "coverage_of",
+    "criticality", "distance_and_ttc", "dtw_distance", "evaluate", "evaluate_scenarios", "feature_matrix", "footprint_distance", "free_acceleration",
     "mean_correlation", "mean_error", "mean_feature", "measures_in", "pair_similarities", "paired_difference",
     "read_evaluations", "replay", "time_apart", "time_to_collision", "uniform_changepoints", "wanted_speeds", "wilson",
     "without_changepoints",

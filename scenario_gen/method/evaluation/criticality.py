@@ -5,12 +5,13 @@
 
 from dataclasses import dataclass
 from itertools import combinations
+import math
 
 import numpy as np
 
-from scenario_gen.method.evaluation.geometry import footprint_distance, time_to_collision
-from scenario_gen.method.evaluation.motion import Motion
+from scenario_gen.method.evaluation.geometry import distance_and_ttc
 from scenario_gen.situation import find_conflicts
+from scenario_gen.types import Motion
 
 
 @dataclass(frozen=True)
@@ -36,7 +37,7 @@ class Criticality:
         """Return the share of the template's conflicts that exist here too and have the same first; NaN if none exists."""
         mine = dict(self.order)
         same = [mine[pair] == first for pair, first in template.order if pair in mine]
-        return float(np.mean(same)) if same else float("nan")
+        return float(np.mean(same)) if same else math.nan
 
     def vanished_of(self, template: "Criticality") -> int:
         """Return how many of the template's conflicts do not exist here; the order says nothing of those."""
@@ -45,25 +46,18 @@ class Criticality:
 
 def criticality(motion: Motion, horizon: float) -> Criticality:
     """Measure one motion; a time to collision above `horizon` [s] counts as the horizon."""
-    pairs = [
-        (a, b, motion.together(a, b)) for a, b in combinations(range(len(motion.vehicles)), 2)
-    ]
-    pairs = [(a, b, both) for a, b, both in pairs if both.stop > both.start]
+    distances, times = [], [horizon]
+    for a, b in combinations(range(len(motion.vehicles)), 2):
+        both = motion.present_slice(a, b)
+        if both.stop > both.start:
+            distance, ttc = distance_and_ttc(motion, a, b)
+            distances.append(float(distance[both].min()))
+            times.append(float(ttc[both].min()))
     conflicts = find_conflicts(motion)
-    encroachments = [c.encroachment for c in conflicts if not c.following]
+    encroachments = [conflict.encroachment for conflict in conflicts if not conflict.following]
     return Criticality(
-        min_distance=min(
-            (float(footprint_distance(motion, a, b)[both].min()) for a, b, both in pairs),
-            default=float("nan"),
-        ),
-        min_ttc=min(
-            (
-                horizon,
-                *(float(time_to_collision(motion, a, b)[both].min()) for a, b, both in pairs),
-            )
-        )
-        if pairs
-        else float("nan"),
-        pet=min(encroachments, default=float("nan")),
-        order=tuple((c.pair, c.first) for c in conflicts),
+        min_distance=min(distances, default=math.nan),
+        min_ttc=min(times) if distances else math.nan,
+        pet=min(encroachments, default=math.nan),
+        order=tuple((conflict.pair, conflict.first) for conflict in conflicts),
     )

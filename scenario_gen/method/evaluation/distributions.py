@@ -12,8 +12,8 @@ from scipy import special
 
 from scenario_gen.base.errors import InputError
 from scenario_gen.method.evaluation.geometry import footprint_distance
-from scenario_gen.method.evaluation.motion import Motion
 from scenario_gen.numerics import Floats, Ints
+from scenario_gen.types import Motion
 
 SMOOTHING = 0.5
 """Seconds over which acceleration is averaged before it is differentiated to jerk."""
@@ -52,7 +52,7 @@ def values_of(motion: Motion) -> dict[str, Floats]:
     width = max(1, round(SMOOTHING / motion.dt))
     samples: dict[str, list[Floats]] = {quantity.id: [np.zeros(0)] for quantity in QUANTITIES}
     for n in range(len(motion.vehicles)):
-        own = motion.own(n)
+        own = motion.present_slice(n)
         speed, heading = motion.speed[n, own], motion.heading[n, own]
         acceleration = np.gradient(speed, motion.dt)
         sums = np.concatenate([np.zeros(1), np.cumsum(acceleration)])
@@ -62,7 +62,7 @@ def values_of(motion: Motion) -> dict[str, Floats]:
         samples["jerk"].append(np.diff(smooth) / motion.dt)
         samples["yaw_rate"].append(np.gradient(heading, motion.dt))
     for a, b in combinations(range(len(motion.vehicles)), 2):
-        samples["gap"].append(footprint_distance(motion, a, b)[motion.together(a, b)])
+        samples["gap"].append(footprint_distance(motion, a, b)[motion.present_slice(a, b)])
     return {name: np.concatenate(values) for name, values in samples.items()}
 
 

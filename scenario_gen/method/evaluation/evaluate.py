@@ -12,8 +12,7 @@ import numpy as np
 from scenario_gen.base.errors import InputError
 from scenario_gen.method.evaluation.config import EvaluationConfig
 from scenario_gen.method.evaluation.metrics import catalogue, METRICS, VALIDITY
-from scenario_gen.method.evaluation.motion import COMMON
-from scenario_gen.method.evaluation.samples import Samples, Template
+from scenario_gen.method.evaluation.samples import MIN_COMMON_S, Samples, Template
 from scenario_gen.types import (
     CheckCounts,
     Encounter,
@@ -205,7 +204,7 @@ def _notes(size: int, values: Mapping[str, Interval], samples: Samples) -> tuple
         samples.template.config.enough,
     )
     if apart := vehicles * (vehicles - 1) // 2 - len(samples.pairs):
-        notes.append(Note.of(NoteKind.PAIRS_LEFT_OUT, count=apart, time=COMMON))
+        notes.append(Note.of(NoteKind.PAIRS_LEFT_OUT, count=apart, time=MIN_COMMON_S))
     if measured < size:
         notes.append(Note.of(NoteKind.SUBSET_MEASURED, measured=measured, total=size, runs=RUNS))
     if 1 < measured < enough:

@@ -7,17 +7,16 @@ from typing import NamedTuple
 
 import numpy as np
 
-from scenario_gen.method.evaluation.motion import Motion
 from scenario_gen.numerics import Floats
 from scenario_gen.numerics.boxes import Box, box_distance, time_to_touch
 from scenario_gen.numerics.kernels import F, F1, F2, kernel, named, OUT1
 from scenario_gen.numerics.plane import unit
-from scenario_gen.types import once_per_object
+from scenario_gen.types import Motion
 
 
 def footprint_distance(motion: Motion, a: int, b: int) -> Floats:
     """Return the distance (T,) in metres between the footprints of vehicles a and b; 0 where they overlap."""
-    return _nearness(motion, a, b)[0]
+    return distance_and_ttc(motion, a, b)[0]
 
 
 def time_to_collision(motion: Motion, a: int, b: int) -> Floats:
@@ -25,12 +24,11 @@ def time_to_collision(motion: Motion, a: int, b: int) -> Floats:
 
     Source: Hayward 1972.
     """
-    return _nearness(motion, a, b)[1]
+    return distance_and_ttc(motion, a, b)[1]
 
 
-@once_per_object
-def _nearness(motion: Motion, a: int, b: int) -> tuple[Floats, Floats]:
-    """Distance [m] and time to collision [s], (T,) each."""
+def distance_and_ttc(motion: Motion, a: int, b: int) -> tuple[Floats, Floats]:
+    """Return the distance [m] of two footprints and the time to collision [s], (T,) each."""
     ahead = unit(motion.heading)
     one, other = (
         _Driven(motion.position[n], ahead[n], motion.speed[n], *motion.vehicles[n].half)

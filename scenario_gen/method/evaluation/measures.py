@@ -29,11 +29,10 @@ import math
 import numpy as np
 
 from scenario_gen.method.evaluation.geometry import footprint_distance, time_to_collision
-from scenario_gen.method.evaluation.motion import at_period, Motion
 from scenario_gen.method.evaluation.non_reactive import baseline_margin
 from scenario_gen.numerics.plane import unit
 from scenario_gen.situation import Conflict, conflict_of
-from scenario_gen.types import Encounter, Measures, Pair, Scenario
+from scenario_gen.types import Measures, Motion, Pair
 
 PERIOD = 0.1  # s
 
@@ -51,7 +50,7 @@ class PairFigures:
     closing_speed: float
 
 
-def measure(scenario: Scenario | Encounter, name: str, pair: Pair | None = None) -> float:
+def measure(scenario: Motion, name: str, pair: Pair | None = None) -> float:
     """Return one figure of a pair, or the most critical of all pairs; NaN where no pair has it.
 
     Args:
@@ -59,7 +58,7 @@ def measure(scenario: Scenario | Encounter, name: str, pair: Pair | None = None)
         name: of the figure, see above.
         pair: indices of two vehicles, the sign of `arrival_gap` follows their order; of one: its most critical pair.
     """
-    motion = at_period(scenario, PERIOD)
+    motion = scenario.resampled(PERIOD)
     ordered = permutations(range(len(motion.vehicles)), 2)
     chosen, directed = pair or (), name == "baseline_margin"
     pairs = [
@@ -73,12 +72,12 @@ def measure(scenario: Scenario | Encounter, name: str, pair: Pair | None = None)
     return (max if name == "closing_speed" else min)(values, default=math.nan)
 
 
-def figures_of(scenario: Scenario | Encounter) -> tuple[PairFigures, ...]:
+def figures_of(scenario: Motion) -> tuple[PairFigures, ...]:
     """Return all figures of every pair of vehicles that are there together; `arrival_gap` without sign."""
-    motion = at_period(scenario, PERIOD)
+    motion = scenario.resampled(PERIOD)
     figures = []
     for a, b in combinations(range(len(motion.vehicles)), 2):
-        both = motion.together(a, b)
+        both = motion.present_slice(a, b)
         if both.stop - both.start < 2:
             continue
         conflict = _crossing(motion, a, b)
@@ -116,7 +115,7 @@ def _crossing(motion: Motion, a: int, b: int) -> Conflict | None:
 
 
 def _figure(motion: Motion, name: str, a: int, b: int) -> float:
-    both = motion.together(a, b)
+    both = motion.present_slice(a, b)
     if both.stop - both.start < 2:
         return math.nan
     if name == "baseline_margin":
@@ -137,7 +136,7 @@ def _figure(motion: Motion, name: str, a: int, b: int) -> float:
 
 def _closing_speed(motion: Motion, a: int, b: int, conflict: Conflict | None) -> float:
     """The rate [m/s] at which the distance of two centres shrinks, at the conflict's first entry, or else the greatest."""
-    both = motion.together(a, b)
+    both = motion.present_slice(a, b)
     if conflict is not None:  # at the sample nearest to it at which both are there
         at = min(max(round(conflict.entry_first / motion.dt), both.start), both.stop - 1)
         both = slice(at, at + 1)

@@ -10,17 +10,16 @@ each other in their lanes are always near, and never meet.
 
 import numpy as np
 
-from scenario_gen.method.evaluation.motion import Motion
 from scenario_gen.numerics import Bools, Floats
 from scenario_gen.numerics.boxes import boxes_meet, fill_box
 from scenario_gen.numerics.kernels import F2, kernel, OUT1
-from scenario_gen.types import Scenario, Vehicle
+from scenario_gen.types import Motion, Vehicle
 
 FINER = 4  # instants of the other vehicle for one of the ego
 APART = 5.0  # s, at most: what is farther apart, or never meets, is all the same
 
 
-def time_apart(motion: Scenario, here: Bools, ego: int, other: int) -> float:
+def time_apart(motion: Motion, here: Bools, ego: int, other: int) -> float:
     """Return the time [s] by which a vehicle would have to be shifted to meet another; 0 if they do, at most APART.
 
     Args:
@@ -30,9 +29,7 @@ def time_apart(motion: Scenario, here: Bools, ego: int, other: int) -> float:
         other: index.
     """
     mine = np.flatnonzero(here[ego])
-    poses = np.column_stack(
-        [motion.time[mine], motion.position[ego][mine], motion.heading[ego][mine]]
-    )
+    poses = np.column_stack([motion.time[mine], motion.poses[ego, mine]])
     return least_shift(
         poses,
         timed_poses(motion, here[other], other),
@@ -40,17 +37,13 @@ def time_apart(motion: Scenario, here: Bools, ego: int, other: int) -> float:
     )
 
 
-def timed_poses(motion: Scenario | Motion, here: Bools, n: int) -> Floats:
+def timed_poses(motion: Motion, here: Bools, n: int) -> Floats:
     """Return (R, 4) time [s], x, y [m], yaw [rad] of a vehicle while it is here (T,), FINER times as dense as the motion."""
     its = np.flatnonzero(here)
     if len(its) < 2:
         return np.empty((0, 4))
-    time = motion.time
-    fine = np.linspace(time[its[0]], time[its[-1]], FINER * (len(its) - 1) + 1)
-    columns = (*motion.position[n].T, motion.heading[n])
-    return np.column_stack(
-        [fine, *(np.interp(fine, time[its], column[its]) for column in columns)]
-    )
+    fine = np.linspace(motion.time[its[0]], motion.time[its[-1]], FINER * (len(its) - 1) + 1)
+    return np.column_stack([fine, motion.select([n]).at(fine).poses[0]])
 
 
 def least_shift(a: Floats, b: Floats, vehicles: tuple[Vehicle, Vehicle]) -> float:

@@ -8,11 +8,11 @@ Planners are compared with it; the figure `baseline_margin` is the time by which
 
 import numpy as np
 
-from scenario_gen.method.evaluation.motion import Motion
 from scenario_gen.method.evaluation.nearness import APART, least_shift, timed_poses
 from scenario_gen.numerics import Floats
 from scenario_gen.numerics.curve import Curve
 from scenario_gen.numerics.plane import edge_lengths
+from scenario_gen.types import Motion
 
 PULLS_AWAY, BRAKING, LATERAL = (
     2.5,
@@ -49,7 +49,7 @@ def baseline_margin(motion: Motion, a: int, b: int) -> float:
 
     0: it would meet b. At most APART.
     """
-    own = motion.own(a)
+    own = motion.present_slice(a)
     position, speed = motion.position[a, own], motion.speed[a, own]
     position = position[np.concatenate([[True], edge_lengths(position) > 1e-3])]
     if len(position) < 3:

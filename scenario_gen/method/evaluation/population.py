@@ -24,7 +24,6 @@ from scipy.spatial import distance
 from scenario_gen.base.errors import InputError
 from scenario_gen.method.evaluation.geometry import footprint_distance
 from scenario_gen.method.evaluation.measures import figures_of, PERIOD
-from scenario_gen.method.evaluation.motion import at_period, Motion
 from scenario_gen.numerics import Bools, Floats, Ints
 from scenario_gen.situation import (
     Conflict,
@@ -38,6 +37,7 @@ from scenario_gen.types import (
     GenerationResult,
     Interval,
     join_ego,
+    Motion,
     Pair,
     Recombined,
     Scenario,
@@ -236,7 +236,7 @@ def member_of(
     That is, of the pairs that cross or merge the one with the least PET, and where there are none the followers nearest to each
     other. The kind is None where the pair, or every pair, shares no area.
     """
-    whole = at_period(motion, PERIOD)
+    whole = motion.resampled(PERIOD)
     figures = {own.pair: own for own in figures_of(motion) if pair in (None, own.pair)}
     met = conflicts_by_pair(find_conflicts(whole))
     conflicts: dict[Pair, Conflict] = {own: met[own] for own in met if own in figures}
@@ -252,7 +252,7 @@ def member_of(
     chosen = min(conflicts, key=closeness)
     conflict, most = conflicts[chosen], figures[chosen]
     first, second = conflict.first, conflict.second
-    both = whole.together(first, second)
+    both = whole.present_slice(first, second)
     gap = _headway(whole, conflict) if conflict.following else conflict.encroachment
     common = [
         np.clip(gap, -LONGEST_S, LONGEST_S),
@@ -284,7 +284,7 @@ def generated_member(scenario: Scenario, template: Member, encounter: Encounter)
 
 def _headway(motion: Motion, conflict: Conflict) -> float:
     """The median time [s] that the follower needs for the gap to its leader, while it moves."""
-    both = motion.together(conflict.first, conflict.second)
+    both = motion.present_slice(conflict.first, conflict.second)
     speed = motion.speed[conflict.second, both]
     moves = speed > STANDS_MPS
     gap = footprint_distance(motion, conflict.first, conflict.second)[both]
@@ -293,7 +293,7 @@ def _headway(motion: Motion, conflict: Conflict) -> float:
 
 def _driving(motion: Motion, n: int, entry: float) -> list[float]:
     """How one vehicle drives: EACH."""
-    own = motion.own(n)
+    own = motion.present_slice(n)
     speed = motion.speed[n, own]
     at = int(np.clip(round(entry / motion.dt) - own.start, 0, len(speed) - 1))
     change = (speed[SECOND:] - speed[:-SECOND]) if len(speed) > SECOND else np.zeros(1)

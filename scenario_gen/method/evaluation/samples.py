@@ -15,19 +15,12 @@ from scenario_gen.method.evaluation.config import EvaluationConfig
 from scenario_gen.method.evaluation.criticality import Criticality, criticality
 from scenario_gen.method.evaluation.distributions import values_of
 from scenario_gen.method.evaluation.dtw import Distance
-from scenario_gen.method.evaluation.motion import (
-    at_common,
-    at_count,
-    at_period,
-    Motion,
-    of_vehicles,
-    stacked,
-)
 from scenario_gen.method.evaluation.similarity import pair_similarity, PairSimilarity
 from scenario_gen.numerics import Bools, Floats, Ints
-from scenario_gen.types import CheckCounts, Encounter, Scenario
+from scenario_gen.types import CheckCounts, Encounter, Motion, Scenario
 
 MOST_UNITS = 128  # of a bootstrap of E
+MIN_COMMON_S = 1.0  # two vehicles that are present together for less are not compared
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,11 +45,11 @@ class Template:
 
     def even(self, source: Encounter | Scenario) -> Motion:
         """Return the motion of these vehicles at T instants spread evenly over the duration."""
-        return chosen(at_count(source, self.steps), self.ids)
+        return chosen(source.with_samples(self.steps), self.ids)
 
     def periodic(self, source: Encounter | Scenario) -> Motion:
         """Return the motion of these vehicles on the clock of distributions and criticality (`period`)."""
-        return chosen(at_period(source, self.config.period), self.ids)
+        return chosen(source.resampled(self.config.period), self.ids)
 
     @cached_property
     def motion(self) -> Motion:
@@ -130,9 +123,9 @@ class Samples:
 
     @cached_property
     def pairs(self) -> tuple["VehiclePair", ...]:
-        """The pairs of vehicles that are there together, for COMMON s, in the template and in all samples."""
+        """The pairs of vehicles that are present together for MIN_COMMON_S in the template and in all samples."""
         template, steps = self.template.motion, self.template.steps
-        throughout = all(motion.always for motion in (template, *self.motions))
+        throughout = all(motion.all_present for motion in (template, *self.motions))
         whole = stacked(self.motions)
         pairs = []
         for a, b in combinations(range(len(template.vehicles)), 2):
@@ -146,7 +139,7 @@ class Samples:
             common = [
                 motion
                 for source in sources
-                if (motion := at_common(source, names, steps)) is not None
+                if (motion := common_motion(source, names, steps)) is not None
             ]
             if len(common) == len(sources):
                 own = common[0].position, common[0].speed, common[0].heading
@@ -180,7 +173,31 @@ class VehiclePair:
 def chosen(motion: Motion, ids: Sequence[str]) -> Motion:
     """Return the motion of the vehicles with these ids, in their order."""
     own = [vehicle.id for vehicle in motion.vehicles]
-    return of_vehicles(motion, [own.index(known) for known in ids])
+    rows = [own.index(known) for known in ids]
+    return motion if rows == list(range(len(own))) else motion.select(rows)
+
+
+def common_motion(motion: Motion, ids: tuple[str, str], samples: int) -> Motion | None:
+    """Return two vehicles, by their ids, at `samples` times spread evenly while both are present.
+
+    None if that is for less than MIN_COMMON_S.
+    """
+    known = [vehicle.id for vehicle in motion.vehicles]
+    i, j = (known.index(name) for name in ids)
+    both = motion.present_slice(i, j)
+    if both.stop - both.start < 2:
+        return None
+    common = motion.pair(i, j)
+    return None if common.duration < MIN_COMMON_S else common.with_samples(samples)
+
+
+def stacked(motions: Sequence[Motion]) -> tuple[Floats, Floats, Floats]:
+    """Stack S motions of equal T: positions (S, N, T, 2) [m], speeds [m/s] and headings [rad], both (S, N, T)."""
+    return (
+        np.stack([motion.position for motion in motions]),
+        np.stack([motion.speed for motion in motions]),
+        np.stack([motion.heading for motion in motions]),
+    )
 
 
 def antithetic_pairs(scenarios: Sequence[Scenario]) -> Ints:

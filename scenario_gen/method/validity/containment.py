@@ -262,7 +262,6 @@ def exit_violations(
         fault = "leaves drivable space"
         if status != Proof.VIOLATED:
             fault = "cannot be proven inside drivable space"
-        x = float(np.interp(time, scenario.time, scenario.position[i, :, 0]))
-        y = float(np.interp(time, scenario.time, scenario.position[i, :, 1]))
+        x, y = scenario.at(time).position[i].tolist()
         message = f"vehicle {i}: footprint {fault} at {time:.3f} s near ({x:.2f}, {y:.2f})"
         yield Violation(Cause.OFF_ROAD, time, (i,), message)

@@ -20,7 +20,7 @@ from scenario_gen.numerics.curve import Curve
 from scenario_gen.output.exchange.cases import Case, Exported
 from scenario_gen.output.exchange.config import ExportConfig
 from scenario_gen.output.exchange.lanes import LaneMap, SIGN_IDS
-from scenario_gen.output.exchange.motion import at_even_steps, even_step
+from scenario_gen.output.exchange.motion import even_step
 from scenario_gen.output.exchange.xml import add, comment, date_of, Element, number, serialized
 from scenario_gen.types import DRIVERS, Lane, LaneNetwork, Scenario
 
@@ -118,7 +118,7 @@ def write_commonroad(
 def _even(scenario: Scenario, export: ExportConfig) -> tuple[Scenario, tuple[str, ...]]:
     if even_step(scenario) is not None:
         return scenario, ()
-    result = at_even_steps(scenario, export.step)
+    result = scenario.resampled(export.step)
     lost = float(scenario.time[-1] - result.time[-1])
     return result, (
         f"its uneven instants were resampled at {export.step:g} s; its last {lost:.3f} s are left out",

@@ -21,7 +21,7 @@ from scenario_gen.numerics.plane import edge_lengths, unit
 from scenario_gen.output.exchange.cases import Case, Exported
 from scenario_gen.output.exchange.config import ExportConfig
 from scenario_gen.output.exchange.lanes import LaneMap
-from scenario_gen.output.exchange.motion import at_even_steps, even_step
+from scenario_gen.output.exchange.motion import even_step
 from scenario_gen.types import DRIVERS, height, Scenario, Vehicle
 
 VERSION = "MetaDrive v0.4.3"  # the description's, not the simulator's
@@ -43,7 +43,9 @@ def description(case: Case, exported: Exported, export: ExportConfig) -> dict[st
         exported: the scenario.
         export: `step` is the time step where the scenario has uneven ones.
     """
-    motion = at_even_steps(exported.everybody, even_step(exported.everybody) or export.step)
+    motion = exported.everybody
+    if even_step(motion) is None:
+        motion = motion.resampled(export.step)
     tracks = {vehicle.id: _track(motion, n, vehicle) for n, vehicle in enumerate(motion.vehicles)}
     ego = exported.ego.vehicles[0].id if exported.ego is not None else motion.vehicles[0].id
     steps = len(motion.time)

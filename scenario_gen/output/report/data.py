@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from scenario_gen.method.evaluation import at_common, at_count, mean_feature
+from scenario_gen.method.evaluation import common_motion, mean_feature
 from scenario_gen.numerics import Bools, Floats
 from scenario_gen.roads import cells_of
 from scenario_gen.types import (
@@ -172,10 +172,8 @@ def _turn(encounter: Encounter, fit: Fit | None) -> float:
 
 def states(source: Encounter | Scenario, frames: int) -> Floats:
     """Return (N, frames, 4) x, y [m], yaw [rad], speed [m/s] at instants spread evenly from start to end."""
-    motion = at_count(source, frames)
-    return np.concatenate(
-        [motion.position, motion.heading[..., None], motion.speed[..., None]], axis=-1
-    )
+    at = source.at(np.linspace(0.0, source.time[-1], frames))
+    return np.concatenate([at.poses, at.speed[..., None]], axis=-1)
 
 
 def _trajectories(
@@ -234,10 +232,9 @@ def _over_time(source: Encounter | Scenario, n: int) -> dict[str, Any]:
     first, last = source.time[source.present[n]].tolist()
     frames = min(MAX_MOTION_FRAMES, max(3, round((last - first) / MOTION_PERIOD) + 1))
     time = np.linspace(first, last, frames)
-    speed, heading = (
-        np.interp(time, source.time, values[n]) for values in (source.speed, source.heading)
-    )
-    rates = np.gradient(np.stack([speed, heading]), time, axis=1)
+    states = source.at(time)
+    speed = states.speed[n]
+    rates = np.gradient(np.stack([speed, states.heading[n]]), time, axis=1)
     return {
         "from": _short(first),
         "to": _short(last),
@@ -307,7 +304,7 @@ def _features(
         names = encounter.vehicles[pair[0]].id, encounter.vehicles[pair[1]].id
         entry: dict[str, Any] = {"pair": list(pair), "position": {}, "speed": {}}
         for name, group in groups.items():
-            common = [at_common(source, names, MATRIX_SIZE) for source in group]
+            common = [common_motion(source, names, MATRIX_SIZE) for source in group]
             motions = [motion for motion in common if motion is not None]
             if not motions:
                 continue

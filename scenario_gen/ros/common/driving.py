@@ -217,9 +217,7 @@ def encode_predictions(loop: ClosedLoop, states: Sequence[State]) -> bytes:
     paths = []
     for i in others:
         at = np.minimum(state.clock[i] + state.rate[i] * ahead, known.spans[i, 1])
-        paths.append(
-            np.column_stack([np.interp(at, known.time, known.motion[i, :, c]) for c in range(3)])
-        )
+        paths.append(loop.scenario.at(at).poses[i])
     objects = [loop.scenario.vehicles[i] for i in others]
     return encode_predicted_objects(
         objects, _rates(loop, states)[others], paths, loop.scenario.frame_id, stamp_of(state)

@@ -141,14 +141,11 @@ class Preview(StageNode):
 
 def conflicts_of(scenario: Scenario) -> tuple[tuple[tuple[float, float, float], str], ...]:
     """Return where paths meet, and who goes first there."""
-    time, names = scenario.time, tokens(vehicle.id for vehicle in scenario.vehicles)
+    names = tokens(vehicle.id for vehicle in scenario.vehicles)
     found = []
     for conflict in find_conflicts(scenario):
         n = conflict.second
-        x, y, yaw = (
-            float(np.interp(conflict.entry_second, time, row))
-            for row in (*scenario.position[n].T, scenario.heading[n])
-        )
+        x, y, yaw = scenario.at(conflict.entry_second).poses[n].tolist()
         first, second = names[conflict.first], names[n]
         words = (
             f"{second} behind {first}"
@@ -160,11 +157,7 @@ def conflicts_of(scenario: Scenario) -> tuple[tuple[tuple[float, float, float], 
 
 
 def states_at(scenario: Scenario, time: float) -> tuple[list[int], Floats, Floats]:
-    """Return who is there at a time [s], their poses (M, 3) x, y [m], yaw [rad], and speeds (M,) [m/s], linearly."""
-    ends = scenario.time[scenario.present]
-    here = np.flatnonzero((ends[:, 0] <= time) & (time <= ends[:, 1])).tolist()
-    rows = [(*scenario.position[n].T, scenario.heading[n], scenario.speed[n]) for n in here]
-    values = np.array(
-        [[np.interp(time, scenario.time, row) for row in own] for own in rows]
-    ).reshape(-1, 4)
-    return here, values[:, :3], values[:, 3]
+    """Return who is present at a time [s], their poses (M, 3) x, y [m], yaw [rad], and speeds (M,) [m/s]."""
+    states = scenario.at(time)
+    present = np.flatnonzero(states.is_present)
+    return present.tolist(), states.poses[present], states.speed[present]

@@ -24,8 +24,7 @@ from scenario_gen.method.evaluation.distributions import (
 )
 from scenario_gen.method.evaluation.dtw import feature_matrix
 from scenario_gen.method.evaluation.geometry import footprint_distance, time_to_collision
-from scenario_gen.method.evaluation.motion import at_count, at_period, Motion
-from scenario_gen.types import Vehicle
+from scenario_gen.types import Motion, Vehicle
 
 ONCE = np.ones((1, 1))
 
@@ -37,7 +36,7 @@ def still(xy, yaw, sizes=((4.0, 2.0), (4.0, 2.0)), speed=(0.0, 0.0)):
         np.array(yaw, float)[:, None],
         np.array(speed, float)[:, None],
     )
-    return Motion(vehicles, 0.1, position, heading, pace)
+    return Motion.sampled(vehicles, 0.1, position, heading, pace)
 
 
 def test_footprint_distance_by_hand():
@@ -80,7 +79,7 @@ def test_footprints_touch_at_the_time_to_collision(place, yaws, speeds):
     way = np.stack([np.cos(motion.heading), np.sin(motion.heading)], -1) * motion.speed[..., None]
 
     def distance(t):
-        moved = Motion(
+        moved = Motion.sampled(
             motion.vehicles, 0.1, motion.position + t * way, motion.heading, motion.speed
         )
         return footprint_distance(moved, 0, 1)[0]
@@ -96,13 +95,13 @@ def test_footprints_touch_at_the_time_to_collision(place, yaws, speeds):
 
 
 def test_criticality_of_the_crossing():
-    found = criticality(at_period(crossing(lag=2.0), 0.1), 10.0)
+    found = criticality(crossing(lag=2.0), 10.0)
     assert found.order == (((0, 1), 0),)
     # car 0 (10 m/s, 4 m long) has left the 2 m wide track of car 1 at 5.3 s; car 1 comes in when its front is 1 m away
     north = crossing(lag=2.0).position[1, :, 1]
     entry = np.interp(-3.0, north, crossing().time)
     assert found.pet == pytest.approx(entry - 5.3, abs=0.02)
-    other = criticality(at_period(crossing(lag=-2.0), 0.1), 10.0)
+    other = criticality(crossing(lag=-2.0), 10.0)
     assert other.order == (((0, 1), 1),)
     assert other.keeps_order_of(found) == 0.0 and found.keeps_order_of(found) == 1.0
 
@@ -110,7 +109,7 @@ def test_criticality_of_the_crossing():
 def test_values_by_hand():
     time = np.arange(31) * 0.1
     speed = np.stack([2.0 + time**2, 5.0 + 0.0 * time])  # acceleration 2t, jerk 2
-    motion = Motion(
+    motion = Motion.sampled(
         CARS,
         0.1,
         np.broadcast_to([[[0.0, 0.0]], [[10.0, 0.0]]], (2, 31, 2)),
@@ -153,8 +152,8 @@ def test_comparison_of_one_quantity():
 
 
 def test_error_and_correlation_are_those_of_the_mean_matrix():
-    template = at_count(crossing(), 60)
-    motions = [at_count(scenario, 60) for scenario in samples(crossing(), 7)]
+    template = crossing().with_samples(60)
+    motions = [scenario.with_samples(60) for scenario in samples(crossing(), 7)]
     position = np.stack([motion.position for motion in motions])
     pairs = similarity.pair_similarities(template.position, position, "euclidean")
     target = feature_matrix(*template.position)
@@ -248,10 +247,10 @@ def test_wilson_equals_scipy(count, total):
 
 def test_motion_on_another_clock():
     encounter = crossing()
-    assert at_period(encounter, 0.1).position is encounter.position
-    coarse = at_period(replayed(encounter), 0.25)
+    assert encounter.resampled(0.1).position is encounter.position
+    coarse = replayed(encounter).resampled(0.25)
     assert coarse.speed.shape[1] == 49 and coarse.position[0, -1, 0] == pytest.approx(70.0)
-    even = at_count(encounter, 7)
+    even = encounter.with_samples(7)
     np.testing.assert_allclose(even.position[0, :, 0], np.linspace(-50, 70, 7), atol=1e-6)
 
 

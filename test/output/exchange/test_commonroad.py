@@ -14,7 +14,6 @@ from scenario_gen.base.errors import RefusedError
 from scenario_gen.output.exchange.commonroad import write_commonroad
 from scenario_gen.output.exchange.config import ExportConfig
 from scenario_gen.output.exchange.lanes import LaneMap
-from scenario_gen.output.exchange.motion import at_times
 from scenario_gen.roads import read_network
 from scenario_gen.types import Lane, LaneNetwork, RuleKind, TrafficRule
 
@@ -124,8 +123,8 @@ def test_without_an_ego_the_placeholder_says_so_and_is_in_nobodys_way(tmp_path):
 
 def test_uneven_steps_are_resampled_and_that_is_said(tmp_path):
     fine = crossing()
-    uneven = at_times(
-        fine, np.concatenate([np.linspace(0.0, 3.0, 31), np.linspace(3.08, 5.96, 37)])
+    uneven = fine.at_times(
+        np.concatenate([np.linspace(0.0, 3.0, 31), np.linspace(3.08, 5.96, 37)])
     )
     path, _, notes = written(tmp_path, uneven)
     assert "resampled at 0.1 s" in notes[0] and "0.060 s are left out" in notes[0]

@@ -20,7 +20,6 @@ from support.evaluation_worlds import cross_road, report_case
 
 from scenario_gen.bags.recordings.read import read_recording
 from scenario_gen.method.evaluation import coverage_of, feature_matrix
-from scenario_gen.method.evaluation.motion import at_count
 from scenario_gen.output.report.data import case_data, MATRIX_SIZE, pack, runs
 from scenario_gen.output.report.page import render, ReportInput, write_report
 from scenario_gen.output.report.summary import summary
@@ -102,7 +101,7 @@ def test_matrices_are_the_mean_feature():
         )
         / 255
     )
-    motions = [at_count(scenario, MATRIX_SIZE) for scenario in case.generated.scenarios]
+    motions = [scenario.with_samples(MATRIX_SIZE) for scenario in case.generated.scenarios]
     np.testing.assert_allclose(
         found, np.mean([feature_matrix(*m.position) for m in motions], axis=0), atol=0.003
     )
