@@ -339,11 +339,7 @@ def _pet(drive: Drive) -> float:
         span = np.flatnonzero(drive.here[i])
         if i == ego or len(span) < 2:
             continue
-        part, pair = slice(span[0], span[-1] + 1), [ego, i]
-        vehicles = (motion.vehicles[ego], motion.vehicles[i])
-        position, heading = motion.position[pair][:, part], motion.heading[pair][:, part]
-        speed = motion.speed[pair][:, part]
-        conflicts = find_conflicts(Motion(vehicles, motion.dt, position, heading, speed))
+        conflicts = find_conflicts(motion.select([ego, i], int(span[0]), int(span[-1])))
         found += [one.encroachment for one in conflicts if not one.following]
     return min(found, default=math.nan)
 
