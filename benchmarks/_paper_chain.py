@@ -20,7 +20,7 @@ from scenario_gen.method.fitting import fit_template, FittingConfig
 from scenario_gen.method.routing import PAPER, plan_routes, PlanningConfig
 from scenario_gen.method.sampling import Features, Observations, Posterior, Regression
 from scenario_gen.numerics import Bools, Floats, wrap_angle
-from scenario_gen.roads import build_road, draw, layout_for, RoadConfig
+from scenario_gen.roads import build_road, draw_layout, layout_for, RoadConfig
 from scenario_gen.situation import clean_tracks, find_waits, Wait
 from scenario_gen.types import Dynamics, Encounter, Fit, Road, Route, Segmentation
 
@@ -76,7 +76,7 @@ def place(encounter: Encounter, segmentation: Segmentation) -> tuple[Road, Float
     reasons = []
     for name in ROADS:
         try:
-            metric = draw(
+            metric = draw_layout(
                 name, layout_for(name, clean_tracks(encounter), RoadConfig()), RoadConfig()
             )
             fit = fit_template(

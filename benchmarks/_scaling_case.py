@@ -25,7 +25,7 @@ from scenario_gen.method.config import PipelineConfig
 from scenario_gen.method.evaluation import EvaluationConfig
 from scenario_gen.method.routing.search.car_planner import PoseRrtStarConnect
 from scenario_gen.method.routing.search.planner import Budget, PoseQuery
-from scenario_gen.roads import build_road, clearance_in_cells, RoadConfig
+from scenario_gen.roads import build_road, RoadConfig
 from scenario_gen.types import Encounter, Vehicle
 
 ROAD, MOST = "four_way", 100_000_000
@@ -98,7 +98,7 @@ def planned(cells: int) -> dict[str, float]:
     times = [process_time()]
     road = build_road(street, None, config)
     times.append(process_time())
-    clearance_in_cells(road)
+    _ = road.clearance_cells
     times.append(process_time())
     start, goal = (
         np.array([middle - far, middle, 0.0]),

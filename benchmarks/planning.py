@@ -51,8 +51,8 @@ from scenario_gen.method.routing.search.planner import (
     Query,
 )
 from scenario_gen.numerics.arrays import Floats
-from scenario_gen.roads.clearance import clearance_in_cells, distance_transform
-from scenario_gen.roads.connectivity import common_component, component_at, components
+from scenario_gen.numerics.distance_field import distance_transform
+from scenario_gen.roads.connectivity import FreeSpace
 from scenario_gen.types import Vehicle
 from scenario_gen.types.fit import Fit, FittedVehicle
 from scenario_gen.types.road import Road
@@ -116,7 +116,7 @@ def _ompl(
     def stop(_: int) -> bool:
         return process_time() - started > seconds
 
-    field = clearance_in_cells(road)
+    field = road.clearance_cells
     information = _plane_by_states(field) if states else exact_plane(field, 0.0)
     return solve(information, ends, name, stop, step=step, simplify=not first)[0]
 
@@ -270,7 +270,7 @@ def _growth_of_ompl(road: Road, ends: Floats) -> str:
         for iterations in (FEW, MORE):
             started = process_time()
             until = partial(lt, iterations)  # so many have been made
-            information = exact_plane(clearance_in_cells(road), 0.0)
+            information = exact_plane(road.clearance_cells, 0.0)
             solve(information, ends, name, until, step=5.0, simplify=False)
             cost.append((process_time() - started) / iterations)
         told.append(f"{PLANNERS[name]} {cost[1] / cost[0] / (np.log(MORE) / np.log(FEW)):.2f}")
@@ -311,15 +311,16 @@ def _recorded(queries: int = QUERIES_OF_A_MAP) -> list[Row]:
     for road in recorded_maps(DATA / "maps" / "occupancy_grids")[:MAPS] if DATA.is_dir() else ():
         for radius in (0.0, 1.25):
             rng = np.random.default_rng(5)
-            cells = np.argwhere(components(road, radius) > 0)
+            space = FreeSpace(road, radius)
+            cells = np.argwhere(space.labels > 0)
             times, ways, failed = [], 0, 0
-            component_at(road, np.zeros(2), radius)
+            space.component_at(np.zeros(2))
             for seed in range(queries):
                 start, goal = (
                     road.origin
                     + (cells[rng.integers(len(cells), size=2)][:, ::-1] + 0.5) * road.resolution
                 )
-                if common_component(road, start, goal, radius) is None:
+                if space.common_component(start, goal) is None:
                     continue
                 ways += 1
                 started = process_time()
@@ -428,7 +429,7 @@ def _obstructed() -> list[Row]:
         seed += 1
         if case is None:
             continue
-        clearance_in_cells(case.road)
+        _ = case.road.clearance_cells
         found, (path, took) = first_path(case, WITHIN, 0), rrt_connect(case, WITHIN)
         if not is_drivable(case):
             unsure.append((found is not None, len(path) > 0))

@@ -66,7 +66,7 @@ CONCEPTS = {
     "latitude and longitude": ("logs/geodesy.py", r"(?:import|from) pyproj|6_?378_?137|6_?371_?0"),
     "folders that replace others": ("base/folders/", r"renameat2|RENAME_EXCHANGE"),
     "object stores": ("base/stores.py", r"(?:import|from) fsspec"),
-    "cells of a polygon": ("roads/vector/raster.py", r"rasteri[sz]e\(|np\.add\.at\(winding"),
+    "cells of a polygon": ("numerics/polygons.py", r"rasteri[sz]e\(|np\.add\.at\(winding"),
     "lanes of a road that is drawn": (
         "roads/drawn.py",
         r"LaneNetwork\([^()]*(?:\([^()]*\)[^()]*)*drawn=True, drawn_for",

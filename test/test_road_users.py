@@ -24,7 +24,7 @@ from scenario_gen.method.validity import Limits
 from scenario_gen.numerics.boxes import footprint_gaps
 from scenario_gen.output.report.summary import summary
 from scenario_gen.output.results import write_results
-from scenario_gen.roads import build_road, cells_of, RoadConfig
+from scenario_gen.roads import build_road, RoadConfig
 from scenario_gen.situation import Situation
 from scenario_gen.types import Dynamics, VEHICLE_TYPES
 
@@ -248,7 +248,7 @@ def test_a_corridor_has_its_crossing_across_the_road_and_no_cycle_lane():
     assert walk.crossing and np.hypot(*(walk.centre[-1] - walk.centre[0])) == pytest.approx(
         width, abs=0.5
     )
-    with pytest.raises(RefusedError, match="road corridor is drawn without cycle lanes"):
+    with pytest.raises(RefusedError, match="road corridor has no cycle lanes"):
         build_road("corridor", encounter, RoadConfig(cycle_lane=1.5))
 
 
@@ -275,7 +275,7 @@ def test_a_bicycle_is_on_the_cycle_lane_where_there_is_one(tmp_path, road, table
         encounter, road, PipelineConfig(road=RoadConfig(cycle_lane=1.8)), count=3, seed=1
     )
     (n,) = (n for n, vehicle in enumerate(made.encounter.vehicles) if vehicle.type == "bicycle")
-    own = cells_of(made.road, made.road.lanes.others)
+    own = made.road.cells_in(made.road.lanes.others)
     row, column, _ = made.road.cells(
         np.concatenate([scenario.position[n] for scenario in made.generated.scenarios])
     )

@@ -15,10 +15,11 @@ import numpy as np
 from scenario_gen.closed_loop.simulation import Drive
 from scenario_gen.method.validity import first_exits, Ground, Proof
 from scenario_gen.numerics import Bools, Floats, sealed
+from scenario_gen.numerics.distance_field import distance_transform
 from scenario_gen.numerics.hermite import control_points
 from scenario_gen.numerics.kernels import B2, F1, F2, kernel, OUT2
 from scenario_gen.numerics.plane import edge_lengths
-from scenario_gen.roads import clearance_in_cells, distance_transform, footprint_fits, to_cells
+from scenario_gen.roads import footprint_fits, to_cells
 from scenario_gen.types import Motion, once_per_object, Road
 
 FARTHEST = 10.0  # metres; margins and depths beyond are told as this
@@ -129,7 +130,7 @@ def _measured(road: Road, poses: Floats, half: tuple[float, float], *, outside: 
     else:
         measure(
             road.drivable,
-            clearance_in_cells(road),
+            road.clearance_cells,
             grid,
             points,
             np.array((FARTHEST / res, 0.0, -1.0)),

@@ -13,13 +13,9 @@ from scenario_gen.roads.build import (
     ROADS,
     ROUNDABOUT,
 )
-from scenario_gen.roads.builtin import draw, layout_for
+from scenario_gen.roads.builtin import draw_layout, layout_for
 from scenario_gen.roads.clearance import (
-    blocked_before,
-    clearance_field,
-    clearance_in_cells,
-    CONTACT,
-    distance_transform,
+    CONTACT_CELLS,
     footprint_fits,
     free_length,
     nearest_pose_with_room,
@@ -29,19 +25,20 @@ from scenario_gen.roads.clearance import (
     to_metres,
 )
 from scenario_gen.roads.config import RoadConfig
-from scenario_gen.roads.connectivity import common_component, component_cells
-from scenario_gen.roads.drawn import Arm, draw_plan, Driven, Plan, ways_through
+from scenario_gen.roads.connectivity import FreeSpace
+from scenario_gen.roads.drawn import draw_plan
 from scenario_gen.roads.junctions import drives_about_ring
 from scenario_gen.roads.obstacles import read_obstacles
-from scenario_gen.roads.pavement import drivable_beside
+from scenario_gen.roads.pavement import drivable_width
+from scenario_gen.roads.plan import Arm, Connection, Driven, Plan, ways_through
 from scenario_gen.roads.vector.ground import (
     along_lanes,
-    cells_of,
     drives_against,
     ground_for,
-    own_ground,
+    own_side,
 )
-from scenario_gen.roads.vector.match import Course
+from scenario_gen.roads.vector.lane_graph import lane_graph, LaneGraph
+from scenario_gen.roads.vector.match import LanePath
 from scenario_gen.roads.vector.place import (
     NoPlaceError,
     Place,
@@ -55,11 +52,52 @@ from scenario_gen.roads.vector.rules import RuleCheck
 from scenario_gen.roads.ways import draw_route
 
 __all__ = [
-    "BUILT_IN", "CONTACT", "CORRIDOR", "ROADS", "ROUNDABOUT", "Arm", "Course", "DrawRoad", "Driven", "NoPlaceError",
-    "Place", "Plan", "RoadConfig", "RuleCheck", "along_lanes", "blocked_before", "build_road", "cells_of", "clearance_field",
-    "clearance_in_cells", "common_component", "component_cells", "distance_transform", "draw", "draw_plan", "draw_route",
-    "drivable_beside", "drives_about_ring", "drives_against", "footprint_fits", "free_length", "ground_for", "is_vector_map",
-    "lane_along", "layout_for", "nearest_pose_with_room", "own_ground", "placements", "places", "read_network",
-    "read_obstacles", "road_and_template", "segment_free", "segments_free", "sharing_lanes", "split", "to_cells", "to_metres",
-    "tracks_on", "users_of", "ways_through",
-]  # fmt: skip
+    "BUILT_IN",
+    "CONTACT_CELLS",
+    "CORRIDOR",
+    "ROADS",
+    "ROUNDABOUT",
+    "Arm",
+    "Connection",
+    "DrawRoad",
+    "Driven",
+    "FreeSpace",
+    "LaneGraph",
+    "LanePath",
+    "NoPlaceError",
+    "Place",
+    "Plan",
+    "RoadConfig",
+    "RuleCheck",
+    "along_lanes",
+    "build_road",
+    "draw_layout",
+    "draw_plan",
+    "draw_route",
+    "drivable_width",
+    "drives_about_ring",
+    "drives_against",
+    "footprint_fits",
+    "free_length",
+    "ground_for",
+    "is_vector_map",
+    "lane_along",
+    "lane_graph",
+    "layout_for",
+    "nearest_pose_with_room",
+    "own_side",
+    "placements",
+    "places",
+    "read_network",
+    "read_obstacles",
+    "road_and_template",
+    "segment_free",
+    "segments_free",
+    "sharing_lanes",
+    "split",
+    "to_cells",
+    "to_metres",
+    "tracks_on",
+    "users_of",
+    "ways_through",
+]

@@ -3,6 +3,8 @@
 
 """Maps of nav2's map_server: a YAML file and an image."""
 
+from collections.abc import Iterator
+from dataclasses import dataclass
 import math
 from pathlib import Path
 from typing import Any
@@ -19,36 +21,45 @@ from scenario_gen.roads.openings import find_openings
 from scenario_gen.types import COARSEST, FARTHEST, FINEST, Road
 
 _MODES = ("trinary", "scale", "raw")
-_FORMATS = ("PPM", "PNG", "BMP", "JPEG")  # by Pillow's names; PPM is PGM, PBM and PPM
-_FORMAT_NAMES = "PGM, PPM, PBM, PNG, BMP or JPEG"
-_BLOCK = (
-    1 << 20
-)  # pixels worked on at a time, so that a large map takes little more memory than its cells
+_PILLOW_FORMATS = ("PPM", "PNG", "BMP", "JPEG")  # PPM stands for PGM, PBM and PPM
+_CHUNK_PX = 1 << 20  # converted at a time, so that a large map needs little more than its cells
+
+
+@dataclass(frozen=True)
+class _Image:
+    """The image of a map and how its pixels are read, as in nav2's map_io."""
+
+    path: Path
+    mode: str
+    negate: bool
+    free_threshold: float
 
 
 def read_map(path: Path, config: RoadConfig) -> Road:
-    """Read a map_server YAML and its image; what is free there is drivable, what is occupied or unknown is not.
+    """Read the YAML file of a map and its image; free cells are drivable.
 
-    Source: map_io of nav2_map_server, whose modes and thresholds these are.
+    Occupied and unknown cells are not drivable.
+
+    Source: map_io of nav2_map_server, with its modes and thresholds.
 
     Raises:
-        InputError: a file is missing, broken or too large, a key is missing or has a value that cannot be used, or the image
-            lies outside the folder of the YAML file.
+        InputError: a file is missing, broken or too large, a key is missing or has a value that
+            cannot be used, or the image lies outside the folder of the YAML file.
     """
     content = read_yaml(path, f"map {path}")
     if not isinstance(content, dict):
         raise InputError(
-            f"map {path}: expected keys image, resolution, origin, negate, occupied_thresh, free_thresh"
+            f"map {path}: expected keys image, resolution, origin, negate, occupied_thresh, "
+            "free_thresh"
         )
-    resolution = _number(path, content, "resolution", FINEST, COARSEST)
+    resolution = float(np.float32(_number(path, content, "resolution", FINEST, COARSEST)))
     origin = _origin(path, content)
     mode = content.get("mode", "trinary")
     if mode not in _MODES:
-        raise InputError(
-            f"map {path}: key mode is {shown(mode)!r}; choose one of {', '.join(_MODES)}"
-        )
+        modes = ", ".join(_MODES)
+        raise InputError(f"map {path}: key mode is {shown(mode)!r}; choose one of {modes}")
     negate = content.get("negate", 0)
-    if negate not in (0, 1):  # True and False too
+    if negate not in (0, 1):  # True and False, too
         raise InputError(f"map {path}: key negate is {shown(negate)}; it must be 0 or 1")
     occupied = _number(path, content, "occupied_thresh", 0.0, 1.0, default=0.65)
     free = _number(path, content, "free_thresh", 0.0, 1.0, default=0.25)
@@ -56,13 +67,13 @@ def read_map(path: Path, config: RoadConfig) -> Road:
         raise InputError(
             f"map {path}: key free_thresh ({free}) must be below occupied_thresh ({occupied})"
         )
-    image = _image_file(path, content.get("image"), config)
-    drivable = _free_cells(path, image, mode, bool(negate), free, config.max_cells)
+    file = _image_file(path, content.get("image"), config)
+    drivable = _free_cells(path, _Image(file, mode, bool(negate), free), config.max_cells)
     if not drivable.any():
         raise InputError(
-            f"map {path}: no cell of {image.name} is free with free_thresh {free} and negate {negate}"
+            f"map {path}: no cell of {file.name} is free with free_thresh {free} and negate "
+            f"{negate}"
         )
-    resolution = float(np.float32(resolution))
     entries, exits = find_openings(drivable, resolution, origin, config)
     return Road(path.stem, drivable, resolution, origin, entries, exits)
 
@@ -91,17 +102,16 @@ def _number(
 
 def _origin(path: Path, content: dict[Any, Any]) -> Floats:
     value = content.get("origin")
+    where = f"map {path}: key origin"
     if not (isinstance(value, list) and len(value) in (2, 3) and all(map(_is_number, value))):
-        raise InputError(
-            f"map {path}: key origin is {shown(value)}; a list of x, y and yaw is needed"
-        )
+        raise InputError(f"{where} is {shown(value)}; a list of x, y and yaw is needed")
     if max(abs(v) for v in value) > FARTHEST:
         raise InputError(
-            f"map {path}: key origin is {shown(value)}; at most {FARTHEST:g} m from the frame's origin are read"
+            f"{where} is {shown(value)}; at most {FARTHEST:g} m from the frame's origin are read"
         )
     if len(value) == 3 and value[2] != 0.0:
         raise InputError(
-            f"map {path}: key origin has yaw {value[2]}; rotated maps are not supported, export it with yaw 0"
+            f"{where} has yaw {value[2]}; rotated maps are not supported, export it with yaw 0"
         )
     return np.array(value[:2], dtype=np.float64)
 
@@ -110,77 +120,76 @@ def _image_file(path: Path, name: Any, config: RoadConfig) -> Path:
     """Return the image that the key `image` names.
 
     Raises:
-        InputError: the key is no file name, there is no such file, or it lies outside the YAML's folder without being allowed to.
+        InputError: the key is not a file name, there is no such file, or it lies outside the
+            folder of the YAML file and this is not allowed.
     """
     if not isinstance(name, str) or not name.strip() or "\0" in name:
         raise InputError(f"map {path}: key image is missing or not a file name")
     image = path.parent / name
     where = f"map {path}: key image is {shown(name)!r}"
-    with guarded(where, OSError, RuntimeError):  # a name that is too long; links in a circle
+    with guarded(where, OSError, RuntimeError):  # a name that is too long, or circular links
         real = image.resolve()
-        inside = any(
-            real.is_relative_to(folder.resolve())
-            for folder in (path.parent, path.resolve().parent)
-        )
+        folders = (path.parent.resolve(), path.resolve().parent)
+        is_inside = any(real.is_relative_to(folder) for folder in folders)
         is_file = real.is_file()
-    lexical = Path(name).is_absolute() or ".." in Path(name).parts
-    if (lexical or not inside) and not config.image_outside_folder:
+    leaves_folder = Path(name).is_absolute() or ".." in Path(name).parts
+    if (leaves_folder or not is_inside) and not config.image_outside_folder:
         raise InputError(
-            f"{where}, outside the folder of the map; put it there, or set road.image_outside_folder=true"
+            f"{where}, outside the folder of the map; move it there, or set "
+            "road.image_outside_folder=true"
         )
     if not is_file:
-        raise InputError(f"{where}, which is not there or no file")
+        raise InputError(f"{where}, which does not exist or is not a file")
     return image
 
 
-def _free_cells(
-    path: Path, image_path: Path, mode: str, negate: bool, free: float, max_cells: int
-) -> Bools:
-    """(H, W) free cells, row 0 the lowest y; as map_server's map_io reads them.
+def _free_cells(path: Path, image: _Image, max_cells: int) -> Bools:
+    """Return (H, W) the free cells; row 0 is the lowest y.
 
     Raises:
-        InputError: the image cannot be read, is of another format, or has more pixels than `max_cells`.
+        InputError: the image cannot be read, has another format, or has more than `max_cells`
+            pixels.
     """
-    where = f"map {path}: image {image_path.name} cannot be read"
+    where = f"map {path}: image {image.path.name} cannot be read"
     with warnings.catch_warnings():
-        warnings.simplefilter(
-            "ignore"
-        )  # Pillow's, of large or odd images: what is too large is refused here
-        with guarded(where, remedy=f"give {_FORMAT_NAMES}"):
-            opened = Image.open(image_path, formats=_FORMATS)
-        with opened as image:
-            width, height = image.size
+        warnings.simplefilter("ignore")  # from Pillow, on large or odd images
+        with guarded(where, remedy="give PGM, PPM, PBM, PNG, BMP or JPEG"):
+            opened = Image.open(image.path, formats=_PILLOW_FORMATS)
+        with opened:
+            width, height = opened.size
             if width * height > max_cells:
                 raise InputError(
-                    f"map {path}: image {image_path.name} has {width} x {height} pixels, more than road.max_cells ({max_cells}); "
-                    "crop it or make it coarser, or set road.max_cells"
+                    f"map {path}: image {image.path.name} has {width} x {height} pixels, more than "
+                    f"road.max_cells ({max_cells}); crop it or make it coarser, or set "
+                    "road.max_cells"
                 )
             with guarded(where):
-                image.load()
-            bands = image.getbands()
-            transparent = "A" in bands or "transparency" in image.info
-            rows = max(1, _BLOCK // width)
-            blocks = []
-            for top in range(0, height, rows):
-                with guarded(where):
-                    block = image.crop((0, top, width, min(top + rows, height))).convert(
-                        "RGBA" if transparent else "RGB"
-                    )
-                    pixels = np.asarray(block, dtype=np.float64)
-                blocks.append(_free(pixels, mode, negate, free, transparent=transparent))
-    return np.ascontiguousarray(np.concatenate(blocks)[::-1])
+                opened.load()
+                rows = np.concatenate([_is_free(chunk, image) for chunk in _chunks(opened)])
+    return np.ascontiguousarray(rows[::-1])
 
 
-def _free(pixels: Floats, mode: str, negate: bool, free: float, *, transparent: bool) -> Bools:
-    """(H, W) free cells of pixels (H, W, 3 or 4), 0 to 255."""
+def _chunks(opened: Image.Image) -> Iterator[Floats]:
+    """Yield the pixels (H, W, 3 or 4), 0 to 255, of some rows of an image at a time."""
+    width, height = opened.size
+    transparent = "A" in opened.getbands() or "transparency" in opened.info
+    rows = max(1, _CHUNK_PX // width)
+    for top in range(0, height, rows):
+        part = opened.crop((0, top, width, min(top + rows, height)))
+        yield np.asarray(part.convert("RGBA" if transparent else "RGB"), dtype=np.float64)
+
+
+def _is_free(pixels: Floats, image: _Image) -> Bools:
+    """Return (H, W) the free cells of pixels (H, W, 3 or 4), 0 to 255."""
+    transparent = pixels.shape[-1] == 4
     colour = pixels[..., :3].mean(axis=-1)
-    if mode == "raw":
-        value = 255.0 - colour if negate else colour
-        return np.asarray((value <= 100.0) & (value < 100.0 * free))
-    if transparent and mode == "trinary":  # map_server averages alpha in
+    if image.mode == "raw":
+        value = 255.0 - colour if image.negate else colour
+        return np.asarray((value <= 100.0) & (value < 100.0 * image.free_threshold))
+    if transparent and image.mode == "trinary":  # map_server averages alpha, too
         colour = pixels.mean(axis=-1)
-    occupancy = colour / 255.0 if negate else 1.0 - colour / 255.0
-    cells = occupancy < free
-    if transparent and mode == "scale":
-        cells &= pixels[..., 3] > 0.0
-    return np.asarray(cells)
+    occupancy = colour / 255.0 if image.negate else 1.0 - colour / 255.0
+    free = occupancy < image.free_threshold
+    if transparent and image.mode == "scale":
+        free &= pixels[..., 3] > 0.0
+    return np.asarray(free)

@@ -1,7 +1,10 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Where traffic enters and leaves a map: the openings of drivable space at the border."""
+"""Where traffic enters and leaves a grid: the openings of drivable space at its border."""
+
+from collections.abc import Iterator
+from typing import NamedTuple
 
 import numpy as np
 
@@ -9,57 +12,79 @@ from scenario_gen.base.errors import InputError
 from scenario_gen.numerics import Bools, Floats, runs
 from scenario_gen.roads.config import RoadConfig
 
-_MIN_WIDTH = 2.5  # metres: narrower gaps are no way in for a car
-_MOST_LANES = 1000  # at the whole border: 3.5 km of openings
+_MIN_OPENING_M = 2.5  # for a car
+_MAX_LANES_COUNT = 1000  # at the whole border: 3.5 km of openings
+
+
+class _Edge(NamedTuple):
+    """An edge of a grid.
+
+    Attributes:
+        cells: along it.
+        begin: (2,) [m] the corner with its first cell.
+        along: (2,) unit vector from there.
+        outward: [rad] the direction out of the grid.
+        right: 1 if a driver who leaves has the edge's end on the right, else -1.
+    """
+
+    cells: Bools
+    begin: Floats
+    along: Floats
+    outward: float
+    right: int
+
+
+def _edges(drivable: Bools, low: Floats, high: Floats) -> Iterator[_Edge]:
+    """Yield the edges of a grid between its corners (2,) [m]: south, east, north, west."""
+    east, north = np.eye(2)
+    yield _Edge(drivable[0], low, east, -np.pi / 2.0, -1)
+    yield _Edge(drivable[:, -1], np.array([high[0], low[1]]), north, 0.0, -1)
+    yield _Edge(drivable[-1], np.array([low[0], high[1]]), east, np.pi / 2.0, 1)
+    yield _Edge(drivable[:, 0], low, north, np.pi, 1)
 
 
 def find_openings(
     drivable: Bools, resolution: float, origin: Floats, config: RoadConfig
 ) -> tuple[Floats, Floats]:
-    """Return entries (E, 3) and exits (X, 3) of a grid.
+    """Return entries (E, 3) and exits (X, 3) x, y [m], yaw [rad] of a grid.
 
-    Every run of drivable cells on the grid's edge that a car can pass is an opening. It is divided into lanes of about
-    `lane_width`: traffic keeps to its side, and a lane in the middle serves both ways.
+    Every run of drivable cells on the grid's edge that is wide enough for a car is an opening. It
+    is divided into lanes of about `lane_width`. Traffic keeps to its side; a lane in the middle
+    is used both ways.
 
     Raises:
         InputError: there are more lanes than any road has.
     """
     height, width = drivable.shape
-    low, high = np.asarray(origin), np.asarray(origin) + np.array([width, height]) * resolution
+    low = np.asarray(origin)
+    high = low + np.array([width, height]) * resolution
+    keeps_right = 1 if config.traffic_side == "right" else -1
     entries: list[list[float]] = []
     exits: list[list[float]] = []
-    edges = (
-        (
-            drivable[0],
-            0,
-            low[1],
-            -np.pi / 2.0,
-            -1,
-        ),  # the last: is the right of who leaves the lower or the higher coordinate
-        (drivable[:, -1], 1, high[0], 0.0, -1),
-        (drivable[-1], 0, high[1], np.pi / 2.0, 1),
-        (drivable[:, 0], 1, low[0], np.pi, 1),
-    )
     total = 0
-    keep_right = 1 if config.traffic_side == "right" else -1
-    for cells, axis, fixed, outward, right in edges:
-        for first, last in runs(cells):
-            size = (last - first) * resolution
-            if size < _MIN_WIDTH:
-                continue
+    for edge in _edges(drivable, low, high):
+        for first, size in _openings(edge.cells, resolution):
             lanes = max(round(size / config.lane_width), 1)
             total += lanes
-            if total > _MOST_LANES:
+            if total > _MAX_LANES_COUNT:
                 raise InputError(
-                    f"the openings at the map's border have room for more than {_MOST_LANES} lanes of {config.lane_width:g} m at "
-                    f"{resolution:g} m per cell; check the resolution, or crop the map to a road"
+                    f"the openings at the map's border have room for more than {_MAX_LANES_COUNT} "
+                    f"lanes of {config.lane_width:g} m at {resolution:g} m per cell; check the "
+                    "resolution, or crop the map to a road"
                 )
             for k in range(lanes):
-                along = low[axis] + first * resolution + (k + 0.5) * size / lanes
-                at = [along, fixed] if axis == 0 else [fixed, along]
-                side = (2 * k + 1 - lanes) * right * keep_right
+                place = edge.begin + (first + (k + 0.5) * size / lanes) * edge.along
+                side = (2 * k + 1 - lanes) * edge.right * keeps_right
                 if side >= 0:
-                    exits.append([*at, outward])
+                    exits.append([*place, edge.outward])
                 if side <= 0:
-                    entries.append([*at, outward + np.pi])
+                    entries.append([*place, edge.outward + np.pi])
     return np.array(entries).reshape(-1, 3), np.array(exits).reshape(-1, 3)
+
+
+def _openings(cells: Bools, resolution: float) -> Iterator[tuple[float, float]]:
+    """Yield the begins and sizes [m] of runs of drivable cells with room for a car."""
+    for first, last in runs(cells):
+        size = (last - first) * resolution
+        if size >= _MIN_OPENING_M:
+            yield first * resolution, size

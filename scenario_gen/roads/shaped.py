@@ -1,21 +1,29 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Roads shaped to a template that drives along one road: with its bends, side arms in their middle, or a ramp that joins.
+"""Roads along the main line of a recording: with its bends, side arms in the middle, or a ramp.
 
-Nobody turns as at a junction and nobody crosses, so the main road follows the template's own main line.
+They are for recordings without crossings and turns at a junction.
 """
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from scenario_gen.base.errors import RefusedError
+from scenario_gen.numerics import Floats
 from scenario_gen.numerics.curve import Curve
 from scenario_gen.numerics.plane import unit
 from scenario_gen.roads.config import RoadConfig
-from scenario_gen.roads.drawn import aligned, Arm, draw_plan, Driven, Plan
-from scenario_gen.roads.pavement import ARM_COUNT, ROOM, SHORTEST, SIDE_ARMS, SLACK
+from scenario_gen.roads.drawn import draw_plan
+from scenario_gen.roads.pavement import (
+    ARM_COUNT,
+    END_ROOM_M,
+    JUNCTION_SLACK_M,
+    MIN_ARM_M,
+    SIDE_ARM_YAWS_RAD,
+)
+from scenario_gen.roads.plan import aligned, Arm, Connection, Driven, Plan
 from scenario_gen.roads.ways import draw_route, extended
 from scenario_gen.situation import (
     driver_rows,
@@ -28,147 +36,214 @@ from scenario_gen.situation import (
 )
 from scenario_gen.types import Encounter, Road, YIELD
 
-_RAMP_ANGLE = np.radians(12.0)
-_RAMP_LATERAL = 2.5  # m/s² across, at the most, for who joins as fast as in the template
-_BEND = np.radians(20.0)  # of a curve whose template does not bend
-_BESIDE = 0.4  # metres on each side of the widest vehicle in its lane
+_RAMP_ANGLE_RAD = np.radians(12.0)
+_MAX_RAMP_LATERAL_MPS2 = 2.5  # at the recorded speed
+_MIN_CURVE_RAD = np.radians(20.0)  # of the road `curve`
+_LANE_MARGIN_M = 0.4  # on each side of the widest vehicle
 
-PLAIN_LINE = MainLine(
+STRAIGHT_LINE = MainLine(
     Curve(np.array([[0.0, 0.0, 0.0], [120.0, 0.0, 0.0]])),
     np.array([0.0, 120.0]),
     np.array([0.0, 120.0]),
 )
-"""What `curve` is drawn along where there is no template."""
+"""The main line of `curve` without a recording."""
 
 
 def fitting_width(tracks: tuple[Track, ...], config: RoadConfig) -> RoadConfig:
-    """The configuration with lanes at least as wide as the template's widest vehicle needs."""
-    widest = max(track.vehicle.width for track in tracks) + 2.0 * _BESIDE
-    return replace(
-        config, lane_width=max(config.lane_width, float(np.ceil(widest * 10.0 - 1e-6) / 10.0))
-    )
+    """Return the configuration with lanes that are wide enough for the widest vehicle."""
+    needed = max(track.vehicle.width for track in tracks) + 2.0 * _LANE_MARGIN_M
+    rounded_up = float(np.ceil(needed * 10.0 - 1e-6) / 10.0)
+    return replace(config, lane_width=max(config.lane_width, rounded_up))
 
 
 def bends(name: str, main: MainLine) -> bool:
-    """Whether the road `name` for a template along `main` is one that bends."""
+    """Return whether a road along a main line bends."""
     return name == "curve" or (name != "straight" and not main.straight)
 
 
 def draw_along(name: str, main: MainLine, lanes: int, config: RoadConfig) -> Road:
-    """Draw the road `name` along a main line, with so many lanes in each direction and side arms in the middle.
+    """Draw a road along a main line, with side arms in the middle.
+
+    Args:
+        name: of a built-in road.
+        main: the main line.
+        lanes: per direction of the main road.
+        config: how it is drawn.
 
     Raises:
         RefusedError: it has more cells than are allowed.
     """
     line = main_axis(name, main, config)
+    turned_back = np.array([0.0, 0.0, np.pi])
     arms = [
-        Arm(line.points[k] + np.array([0.0, 0.0, np.pi if k == 0 else 0.0]), lanes, lanes)
-        for k in (0, -1)
+        Arm(line.points[0] + turned_back, lanes, lanes),
+        Arm(line.points[-1], lanes, lanes),
     ]
-    reach = lanes * config.lane_width + (config.arm_length or SHORTEST)
-    across = float(line.at(line.length / 2.0)[2])
-    arms += [
-        Arm.towards(across + side, reach, config.lanes or 1)
-        for side in SIDE_ARMS[: ARM_COUNT[name] - 2]
-    ]
+    reach = lanes * config.lane_width + (config.arm_length or MIN_ARM_M)
+    yaw = float(line.at(line.length / 2.0)[2])
+    sides = SIDE_ARM_YAWS_RAD[: ARM_COUNT[name] - 2]
+    arms += [Arm.towards(yaw + side, reach, config.lanes or 1) for side in sides]
     return draw_plan(Plan(arms, line), name, config)
 
 
 def main_axis(name: str, main: MainLine, config: RoadConfig) -> Curve:
-    """The dividing line of the main road, its middle at the origin: straight on at both ends for its arms; a curve bends."""
-    run = max(config.arm_length - main.shape.length / 2.0, ROOM) if config.arm_length else ROOM
-    own = float(main.shape.points[-1, 2] - main.shape.points[0, 2])
-    extra = float(np.copysign(_BEND, own)) - own if name == "curve" and abs(own) < _BEND else 0.0
+    """Return the dividing line of the main road with its middle at the origin.
+
+    It goes straight on at both ends for its arms. `curve` bends at least a little.
+    """
+    run = END_ROOM_M
+    if config.arm_length:
+        run = max(config.arm_length - main.shape.length / 2.0, END_ROOM_M)
+    turn = float(main.shape.points[-1, 2] - main.shape.points[0, 2])
+    extra = 0.0
+    if name == "curve" and abs(turn) < _MIN_CURVE_RAD:
+        extra = float(np.copysign(_MIN_CURVE_RAD, turn)) - turn
     line = extended(main.shape, extra, run)
     return Curve(line.points - np.array([*line.at(line.length / 2.0)[:2], 0.0]))
 
 
+@dataclass(frozen=True, eq=False)
+class MergeLayout:
+    """The layout of a main road and a ramp; lengths in metres.
+
+                        before_m                        after_m
+        |--------------------------------------|-------------------------|
+        ------------------------------------------------------------------
+        main road                                                    lanes
+        ---------------------------------------*--------------------------
+                                     /    /     join
+                        ramp    /    /    approach_m, to the ramp's end
+                           /    /
+
+    Attributes:
+        lanes: of the main road per direction.
+        before_m: from the beginning of the main road to the join.
+        after_m: from the join to the end of the main road.
+        approach_m: of the ramp.
+        curvature_per_m: of the bend from the ramp into the main road.
+        yields: whether vehicles on the ramp give way.
+        merging: the recorded vehicles on the ramp.
+        join: (3,) x, y [m], yaw [rad] of the join in the recording's frame.
+    """
+
+    lanes: int
+    before_m: float = 2.0 * MIN_ARM_M
+    after_m: float = 2.0 * MIN_ARM_M
+    approach_m: float = 2.0 * MIN_ARM_M
+    curvature_per_m: float = 0.02
+    yields: bool = True
+    merging: tuple[int, ...] = ()
+    join: Floats | None = None
+
+    @classmethod
+    def of(cls, situation: Situation, config: RoadConfig) -> "MergeLayout":
+        """Return the layout for a recording, in which a vehicle leaves the outermost lane.
+
+        Raises:
+            RefusedError: no vehicle does, others stay in it, or the recording needs a junction.
+        """
+        tracks = situation.drivers
+        frenet = to_frenet(tracks)
+        merging = _merging_vehicles(tracks, frenet)
+        on_main_road = frenet.lane[[i for i in range(len(tracks)) if i not in merging]]
+        lanes = max(int(on_main_road.max(initial=0)), int(frenet.lane[merging, 1].max())) + 1
+
+        # Stations in the direction of the merging vehicles.
+        sign = float(frenet.direction[merging[0]])
+        low, high = sorted(sign * end for end in frenet.span(tracks))
+        samples = {i: int(np.argmax(frenet.change[i] >= 0.5)) for i in merging}
+        join = float(np.median([sign * frenet.station[i][k] for i, k in samples.items()]))
+        first = min(
+            sign * float(frenet.station[i][0]) - tracks[i].vehicle.length / 2.0 for i in merging
+        )
+        fastest = max(float(tracks[i].speed[k]) for i, k in samples.items())
+        sharpest = max(sharpness_of(tracks[i]) for i in merging)
+        offset = float(np.mean(frenet.offset[merging, -1]))
+        pose = frenet.line.beside(np.array(sign * join), offset)
+        pose[2] += 0.0 if sign > 0.0 else np.pi
+        rows = driver_rows(situation.encounter)
+        yields = [
+            rows.get(reaction.who)
+            for reaction in situation.reactions.edges
+            if reaction.kind == YIELD
+        ]
+        return cls(
+            lanes=max(lanes, config.lanes),
+            before_m=join - low,
+            after_m=high - join,
+            approach_m=join - first,
+            curvature_per_m=min(sharpest, _MAX_RAMP_LATERAL_MPS2 / max(fastest, 1.0) ** 2),
+            yields=not set(merging).isdisjoint(yields),
+            merging=tuple(merging),
+            join=pose,
+        )
+
+    def plan(self, tracks: tuple[Track, ...], config: RoadConfig) -> Plan:
+        """Return the plan of the road for the tracks of a recording."""
+        west, east, ramp = (
+            config.arm_length or max(length + END_ROOM_M + JUNCTION_SLACK_M, MIN_ARM_M)
+            for length in (self.before_m, self.after_m, self.approach_m)
+        )
+        outermost = self.lanes - 1
+        # The side of the dividing line on which traffic to the east drives.
+        side = -1.0 if config.traffic_side == "right" else 1.0
+        join = np.array([0.0, side * (outermost + 0.5) * config.lane_width])
+        out = np.pi - side * _RAMP_ANGLE_RAD
+        entry = np.array([*(join + ramp * unit(out)), out + np.pi])
+        arms = [
+            Arm.towards(np.pi, west, self.lanes),
+            Arm.towards(0.0, east, self.lanes),
+            Arm.ramp(entry, config),
+        ]
+        goal = arms[1].lane(outermost, config, inward=False)
+        route = draw_route(entry, goal, sharpness=self.curvature_per_m)
+        driven = []
+        if route is not None:
+            driven.append(Driven(Connection(2, 0, 1, outermost), route, 1.0, config.lane_width))
+        lane_of = {(i, True): (2, 0) for i in self.merging}
+        lane_of |= {(i, False): (1, outermost) for i in self.merging}
+        recorded_join = np.zeros(3) if self.join is None else self.join
+        return Plan(
+            arms,
+            Curve(np.array([[-west, 0.0, 0.0], [east, 0.0, 0.0]])),
+            driven,
+            yielding=(2,) if self.yields else (),
+            drawn_for=aligned(tracks, lane_of, recorded_join, np.array([*join, 0.0])),
+        )
+
+
 def draw_merge(name: str, encounter: Encounter | None, config: RoadConfig) -> Road:
-    """Draw a straight main road and a ramp that joins it from the side of its outermost lane, where the template changes to it.
+    """Draw a straight main road and a ramp that joins its outermost lane, as recorded.
 
     Raises:
-        RefusedError: nobody in the template changes from the outermost lane of its direction to the next, or others keep to it,
-            or the template needs a junction.
+        RefusedError: no recorded vehicle changes from the outermost lane of its direction to the
+            next, others stay in it, or the recording needs a junction.
     """
-    lanes, before, after, approach, yields = (
-        max(config.lanes, 1),
-        2.0 * SHORTEST,
-        2.0 * SHORTEST,
-        2.0 * SHORTEST,
-        True,
-    )
-    sharpness = 0.02
-    tracks: tuple[Track, ...] = ()
-    who, joins = list[int](), np.zeros(3)  # where the template's vehicles join, heading as they do
-    if encounter is not None:
-        situation = Situation.of(encounter)
-        tracks = situation.drivers
-        config = fitting_width(tracks, config)
-        frenet = to_frenet(tracks)
-        who = _merging(tracks, frenet)
-        others = frenet.lane[[i for i in range(len(tracks)) if i not in who]]
-        lanes = max(
-            int(others.max(initial=0)) + 1, int(frenet.lane[who, 1].max()) + 1, config.lanes
-        )
-        along = float(frenet.direction[who[0]])
-        low, high = sorted(along * end for end in frenet.span(tracks))
-        joining = [int(np.argmax(frenet.change[i] >= 0.5)) for i in who]
-        join = float(
-            np.median([along * frenet.station[i][at] for i, at in zip(who, joining, strict=True)])
-        )
-        before, after = join - low, high - join
-        approach = join - min(
-            along * float(frenet.station[i][0]) - tracks[i].vehicle.length / 2.0 for i in who
-        )
-        fastest = max(float(tracks[i].speed[at]) for i, at in zip(who, joining, strict=True))
-        sharpness = min(
-            max(sharpness_of(tracks[i]) for i in who), _RAMP_LATERAL / max(fastest, 1.0) ** 2
-        )
-        rows = driver_rows(encounter)
-        yields = any(
-            edge.kind == YIELD and rows.get(edge.who) in who for edge in situation.reactions.edges
-        )
-        joins = frenet.line.beside(np.array(along * join), float(np.mean(frenet.offset[who, -1])))
-        joins[2] += 0.0 if along > 0.0 else np.pi
-    reach = [
-        config.arm_length or max(size + ROOM + SLACK, SHORTEST)
-        for size in (before, after, approach)
-    ]
-    width = config.lane_width
-    side = (
-        -1.0 if config.traffic_side == "right" else 1.0
-    )  # of the dividing line on which the traffic to the east drives
-    arms = [
-        Arm.towards(yaw, length, lanes) for yaw, length in ((np.pi, reach[0]), (0.0, reach[1]))
-    ]
-    yaw = np.pi - side * _RAMP_ANGLE  # out along the ramp
-    joined = np.array([0.0, side * (lanes - 0.5) * width])
-    ramp = np.array([*(joined + reach[2] * unit(yaw)), yaw + np.pi])
-    axis = Curve(np.array([[-reach[0], 0.0, 0.0], [reach[1], 0.0, 0.0]]))
-    way = draw_route(ramp, arms[1].lane(lanes - 1, config, inward=False), sharpness=sharpness)
-    driven = () if way is None else (Driven((2, 0, 1, lanes - 1), way, 1.0, width),)
-    lane_of = {
-        (i, inward): (2, 0) if inward else (1, lanes - 1) for i in who for inward in (True, False)
-    }
-    aim = aligned(tracks, lane_of, joins, np.array([*joined, 0.0]))
-    plan = Plan(
-        [*arms, Arm.ramp(ramp, config)],
-        axis,
-        driven,
-        yielding=(2,) if yields else (),
-        drawn_for=aim,
-    )
-    return draw_plan(plan, name, config)
+    if encounter is None:
+        layout = MergeLayout(max(config.lanes, 1))
+        return draw_plan(layout.plan((), config), name, config)
+    situation = Situation.of(encounter)
+    config = fitting_width(situation.drivers, config)
+    layout = MergeLayout.of(situation, config)
+    return draw_plan(layout.plan(situation.drivers, config), name, config)
 
 
-def _merging(tracks: tuple[Track, ...], frenet: FrenetTracks) -> list[int]:
-    """The vehicles that come from the outermost lane of their direction and leave it for the next."""
+def _merging_vehicles(tracks: tuple[Track, ...], frenet: FrenetTracks) -> list[int]:
+    """Return the vehicles that leave the outermost lane of their direction for the next one.
+
+    Raises:
+        RefusedError: there is none, or others stay in the outermost lane.
+    """
     for sign in (1, -1):
-        own = [i for i in range(len(tracks)) if frenet.direction[i] == sign]
-        outermost = max((int(frenet.lane[i].max()) for i in own), default=0)
-        who = [i for i in own if frenet.lane[i, 0] == outermost and frenet.lane[i, 1] < outermost]
-        if who and all(outermost not in frenet.lane[i] for i in own if i not in who):
-            return who
+        vehicles = [i for i in range(len(tracks)) if frenet.direction[i] == sign]
+        outermost = max((int(frenet.lane[i].max()) for i in vehicles), default=0)
+        merging = [
+            i for i in vehicles if frenet.lane[i, 0] == outermost and frenet.lane[i, 1] < outermost
+        ]
+        others = [i for i in vehicles if i not in merging]
+        if merging and all(outermost not in frenet.lane[i] for i in others):
+            return merging
     raise RefusedError(
-        "road merge: no recorded vehicle leaves the outermost lane of its direction for the next one, so none would use the ramp"
+        "road merge: no recorded vehicle changes from the outermost lane of its direction to the "
+        "next one, so none would use the ramp"
     )

@@ -3,7 +3,7 @@
 
 """The lanes of a road: their borders, what follows what, where one may change, how fast."""
 
-from collections.abc import Sequence
+from collections.abc import Sequence, Set
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
 from functools import cached_property
@@ -15,7 +15,6 @@ from scenario_gen.base.errors import InputError
 from scenario_gen.base.road_users import CAR, LANE_USERS
 from scenario_gen.numerics import Floats, freeze, frozen
 from scenario_gen.numerics.plane import edge_yaws
-from scenario_gen.types.derived import once_per_object
 from scenario_gen.types.notes import Note
 
 LEVEL = 2.5  # metres between the heights of two lanes of which one lies above the other
@@ -80,9 +79,9 @@ class Lane:
         if not (np.isfinite(self.left).all() and np.isfinite(self.right).all()):
             raise InputError(f"lane {self.id}: a border is not finite")
 
-    def open_to(self, users: frozenset[str]) -> bool:
+    def open_to(self, users: Set[str]) -> bool:
         """Return whether one of some users may use it."""
-        return not users.isdisjoint(self.users or DRIVERS)
+        return not (self.users or DRIVERS).isdisjoint(users)
 
     @cached_property
     def centre(self) -> Floats:
@@ -246,6 +245,15 @@ class LaneNetwork:
             of_all=(),
         )
 
+    def for_users(self, users: frozenset[str]) -> "LaneNetwork":
+        """Return the lanes of cars, the same ones first, and those that some users may use."""
+        return self.open_to(users | CARS) if self.of_all else self
+
+    @cached_property
+    def users_of_car_lanes(self) -> frozenset[str]:
+        """The users who may use all lanes of cars, and no others."""
+        return frozenset(user for user in LANE_USERS if self.open_to(frozenset((user,))) is self)
+
     def moved(self, by: Floats) -> "LaneNetwork":
         """The same lanes (2,) [m] farther."""
         lanes = [
@@ -312,12 +320,6 @@ class LaneNetwork:
         """(2, 2) metres: lowest and highest x, y of all borders."""
         points = np.concatenate([lane.outline for lane in self.lanes])
         return frozen(np.stack((points.min(axis=0), points.max(axis=0))))
-
-
-@once_per_object
-def lanes_for(network: LaneNetwork, users: frozenset[str]) -> LaneNetwork:
-    """Return a network with the lanes of cars, the same ones first, and those that one of some users may use."""
-    return network.open_to(users | CARS) if network.of_all else network
 
 
 def _chosen(lanes: Sequence[Lane], kept: Sequence[int]) -> tuple[Lane, ...]:

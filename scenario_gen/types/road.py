@@ -3,25 +3,38 @@
 
 """A target road: what is drivable, and where traffic comes in and goes out."""
 
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
+import numpy.typing as npt
 
 from scenario_gen.base.errors import InputError
+from scenario_gen.base.road_users import LANE_USERS
 from scenario_gen.numerics import (
     Bools,
     canonical_poses,
+    Counts,
     Floats,
     freeze,
     frozen,
     frozen_bools,
     Ints,
+    sealed,
+    wrap_angle,
 )
-from scenario_gen.types.lanes import LaneNetwork
+from scenario_gen.numerics.distance_field import distance_field
+from scenario_gen.numerics.polygons import fill_slits, polygon_cells
+from scenario_gen.types.lanes import Lane, LaneNetwork
 
 FINEST, COARSEST = 0.001, 10.0  # metres of a cell: nothing is seen of a vehicle in larger ones
 FARTHEST = 1e8  # metres from the frame's origin: more than any geodetic grid has
+
+DIRECTION_COUNT = 16
+"""The directions that `Road.lane_directions` tells apart."""
+_AGAINST_RAD = np.pi / 2.0 + np.pi / DIRECTION_COUNT  # half a direction's width stays open
+_CHUNK_CELLS = 4096
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,6 +99,95 @@ class Road:
         if self.obstructed is None:
             return self
         return replace(self, drivable=self.drivable | self.obstructed, obstructed=None)
+
+    @cached_property
+    def clearance_cells(self) -> Floats:
+        """(H, W) [cells] from each cell's centre to the nearest closed square; closed cells are 0.
+
+        Everything outside the grid is closed.
+        """
+        return distance_field(self.drivable)
+
+    @cached_property
+    def clearance(self) -> Floats:
+        """(H, W) [m]: `clearance_cells` in metres."""
+        return sealed(self.clearance_cells * self.resolution)
+
+    @cached_property
+    def closed_before(self) -> Counts:
+        """(H, W + 1): how many cells left of each column are closed, so that any run can be counted."""
+        closed = np.cumsum(~self.drivable, axis=1, dtype=np.int32)
+        return sealed(np.pad(closed, ((0, 0), (1, 0))))
+
+    @cached_property
+    def walkable(self) -> "Road":
+        """The road for pedestrians: all cells but those of obstacles are drivable; it has no lanes."""
+        return replace(self, drivable=~self._obstacle_cells, lanes=None)
+
+    @cached_property
+    def grounds(self) -> Mapping[str, "Road"]:
+        """The road of each lane user who may not use exactly the car lanes, with their lanes only.
+
+        A user to whom all lanes are closed is missing.
+        """
+        if self.lanes is None:
+            return {}
+        grounds = {}
+        for user in sorted(LANE_USERS - self.lanes.users_of_car_lanes):
+            network = self.lanes.open_to(frozenset((user,)))
+            if network.lanes:
+                closed = [lane for lane in self.lanes.lanes if not lane.open_to({user})]
+                cells = (self.drivable & ~self.cells_in(closed)) | self.cells_in(network.lanes)
+                drivable = fill_slits(cells) & ~self._obstacle_cells
+                grounds[user] = replace(self, drivable=drivable, lanes=network)
+        return grounds
+
+    @cached_property
+    def lane_directions(self) -> npt.NDArray[np.uint16]:
+        """(H, W): bit k of a cell is set if traffic may drive there in direction k of 16.
+
+        All bits are set where no lane of a map lies. A cell may lie in several lanes, as in a
+        junction; each lane allows the directions that differ from its own by at most 90°.
+        """
+        directions = np.zeros(self.drivable.shape, dtype=np.uint16)
+        for lane in self.map_lanes.lanes if self.map_lanes is not None else ():
+            rows, columns = self._cells_of_lane(lane)
+            directions[rows, columns] |= self._directions_in(lane, rows, columns)
+        directions[directions == 0] = np.iinfo(np.uint16).max
+        return sealed(directions)
+
+    @property
+    def _obstacle_cells(self) -> Bools:
+        if self.obstructed is None:
+            return np.zeros(self.drivable.shape, dtype=np.bool_)
+        return self.obstructed
+
+    def _cells_of_lane(self, lane: Lane) -> tuple[Ints, Ints]:
+        """Return the rows and columns (C,) of the cells whose centres lie in a lane."""
+        first = np.round(self.origin / self.resolution).astype(np.int64)
+        corner, inside = polygon_cells(lane.outline, self.resolution, first, self.drivable.shape)
+        rows, columns = np.nonzero(inside)
+        return rows + corner[1], columns + corner[0]
+
+    def _directions_in(self, lane: Lane, rows: Ints, columns: Ints) -> npt.NDArray[np.uint16]:
+        """Return the bits (C,) that a lane sets in its cells, from the section nearest to each."""
+        bits = np.arange(DIRECTION_COUNT)
+        turn = wrap_angle(2.0 * np.pi * bits / DIRECTION_COUNT - lane.yaw[:, None])
+        allowed = ((np.abs(turn) <= _AGAINST_RAD) * (1 << bits)).sum(axis=1).astype(np.uint16)
+        centres = self.origin + (np.column_stack((columns, rows)) + 0.5) * self.resolution
+        nearest = np.empty(len(centres), dtype=np.int64)
+        for start in range(0, len(centres), _CHUNK_CELLS):
+            chunk = centres[start : start + _CHUNK_CELLS, None]
+            squared = np.square(chunk - lane.middle).sum(axis=2)
+            nearest[start : start + _CHUNK_CELLS] = np.argmin(squared, axis=1)
+        return np.asarray(allowed[nearest])
+
+    def cells_in(self, lanes: Iterable[Lane]) -> Bools:
+        """Return (H, W): which cells have their centre in one of the lanes."""
+        cells = np.zeros(self.drivable.shape, dtype=np.bool_)
+        for lane in lanes:
+            cells[self._cells_of_lane(lane)] = True
+        return cells
 
     def cells(self, points: Floats) -> tuple[Ints, Ints, Bools]:
         """Return rows and columns (...) of the cells nearest to points (..., 2) [m], and whether the points lie on the grid."""

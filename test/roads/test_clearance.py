@@ -12,12 +12,11 @@ from shapely.geometry import box, LineString, Point
 from shapely.ops import unary_union
 
 from scenario_gen.roads.clearance import (
-    clearance_field,
     footprint_fits,
     nearest_pose_with_room,
     segments_free,
 )
-from scenario_gen.roads.connectivity import common_component, component_at, components
+from scenario_gen.roads.connectivity import FreeSpace
 from scenario_gen.types.road import Road
 
 
@@ -66,7 +65,7 @@ def test_field_is_the_distance_to_the_nearest_blocked_square(seed, density):
             for i in range(road.drivable.shape[0])
         ]
     )
-    np.testing.assert_allclose(clearance_field(road), expected, atol=1e-12)
+    np.testing.assert_allclose(road.clearance, expected, atol=1e-12)
 
 
 @pytest.mark.parametrize("radius", [0.0, 0.3, 0.9])
@@ -129,11 +128,11 @@ def test_components_need_the_width():
     drivable[4, 10] = True  # a gap one cell wide
     road = road_of(drivable)
     left, right = np.array([4.5, 4.5]), np.array([15.5, 4.5])
-    assert common_component(road, left, right, 0.0) is not None
-    assert common_component(road, left, right, 0.49) is not None
-    assert common_component(road, left, right, 0.51) is None
-    assert component_at(road, np.array([10.5, 0.5]), 0.0) == 0
-    assert components(road, 0.51).max() == 2
+    assert FreeSpace(road, 0.0).common_component(left, right) is not None
+    assert FreeSpace(road, 0.49).common_component(left, right) is not None
+    assert FreeSpace(road, 0.51).common_component(left, right) is None
+    assert FreeSpace(road, 0.0).component_at(np.array([10.5, 0.5])) == 0
+    assert FreeSpace(road, 0.51).labels.max() == 2
 
 
 def test_the_common_component_is_one_that_both_ends_reach():
@@ -141,11 +140,17 @@ def test_the_common_component_is_one_that_both_ends_reach():
     drivable[:, 10] = False
     road = road_of(drivable)
     left, right = np.array([2.5, 2.5]), np.array([18.5, 2.5])
-    assert common_component(road, left, left + 3.0, 0.0) == component_at(road, left, 0.0) == 1
-    assert common_component(road, left, right, 0.0) is None
-    assert common_component(road, right, right, 0.0) == 2
+    assert (
+        FreeSpace(road, 0.0).common_component(left, left + 3.0)
+        == FreeSpace(road, 0.0).component_at(left)
+        == 1
+    )
+    assert FreeSpace(road, 0.0).common_component(left, right) is None
+    assert FreeSpace(road, 0.0).common_component(right, right) == 2
     narrow = road_of(np.ones((1, 9)))  # a lane where no centre has room for the disc
-    assert common_component(narrow, np.array([1.5, 0.5]), np.array([7.5, 0.5]), 0.6) is None
+    assert (
+        FreeSpace(narrow, 0.6).common_component(np.array([1.5, 0.5]), np.array([7.5, 0.5])) is None
+    )
 
 
 @settings(max_examples=60)

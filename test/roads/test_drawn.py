@@ -146,10 +146,10 @@ def test_zebra_crossings_reach_from_kerb_to_kerb_before_the_stop_lines(name, sid
 def test_roads_that_have_no_cycle_lanes_refuse_them():
     for name in ("merge", "roundabout"):
         with pytest.raises(
-            RefusedError, match=f"road {name} is drawn without cycle lanes; unset road.cycle_lane"
+            RefusedError, match=f"road {name} has no cycle lanes; unset road.cycle_lane"
         ):
             build_road(name, None, RoadConfig(cycle_lane=1.5))
-    with pytest.raises(InputError, match=r"road\.cycle_lane 0\.5 m; 0 or 1 m and more"):
+    with pytest.raises(InputError, match=r"road\.cycle_lane 0\.5 m; choose 0 or at least 1 m"):
         RoadConfig(cycle_lane=0.5)
-    with pytest.raises(InputError, match=r"road\.paper: .* no road\.crossing"):
+    with pytest.raises(InputError, match=r"road\.paper: .* no crossings and no cycle lanes"):
         RoadConfig(paper=True, crossing="zebra")

@@ -8,7 +8,7 @@ import pytest
 
 from msg_conventions.lanes import decode_lanes, encode_lanes
 from scenario_gen.base.errors import InputError
-from scenario_gen.types import Lane, LaneNetwork, lanes_for, RuleKind, TrafficRule, VEHICLE_TYPES
+from scenario_gen.types import Lane, LaneNetwork, RuleKind, TrafficRule, VEHICLE_TYPES
 
 BUS, BICYCLE = (VEHICLE_TYPES[name].lane_user for name in ("bus", "bicycle"))
 
@@ -41,11 +41,8 @@ def test_lanes_of_cars_stand_first_and_lead_into_no_others():
     assert [lane.id for lane in network.others] == ["cycle", "bus", "walk"] and len(
         network.whole.lanes
     ) == 5
-    assert led(lanes_for(network, BUS)) == {"in": ["bus", "motorway"], "motorway": [], "bus": []}
-    assert (
-        lanes_for(network, BUS) is lanes_for(network, BUS)
-        and network.open_to(frozenset(("car",))) is network
-    )
+    assert led(network.for_users(BUS)) == {"in": ["bus", "motorway"], "motorway": [], "bus": []}
+    assert network.open_to(frozenset(("car",))) is network
 
 
 def test_a_bicycle_has_other_lanes_than_a_car_and_the_rules_of_those_it_shares():

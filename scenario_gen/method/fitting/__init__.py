@@ -5,7 +5,7 @@
 
 from scenario_gen.method.fitting.config import FittingConfig
 from scenario_gen.method.fitting.fit import fit_template
-from scenario_gen.method.fitting.kept import LostEncounterError
+from scenario_gen.method.fitting.losses import LostEncounterError
 
 __all__ = [
     "FittingConfig", "LostEncounterError", "fit_template",

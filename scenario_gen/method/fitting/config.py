@@ -1,12 +1,12 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""How a template is placed on a road."""
+"""The parameters of the fitting."""
 
 from dataclasses import dataclass
 
 from scenario_gen.base.parameters import parameter, Parameters
-from scenario_gen.method.fitting.kept import allowed_losses, LOSABLE
+from scenario_gen.method.fitting.losses import allowed_losses, LOSABLE
 
 
 @dataclass(frozen=True)
@@ -15,28 +15,29 @@ class FittingConfig(Parameters):
 
     placement: str = parameter(
         "auto",
-        "how the recording is placed: in its own frame, on the road's lanes, or searched for on the grid",
+        "how the recording is placed: in its own frame, on the road's lanes, or anywhere on the "
+        "grid",
         choices=("auto", "identity", "lanes", "search"),
     )
     allow: str = parameter(
         "",
-        "what a fit may lose, with commas between: "
-        + ", ".join(f"lost_{kind} ({what})" for kind, what in LOSABLE.items()),
+        "losses that a fit may have, separated by commas: "
+        + ", ".join(f"lost_{kind} ({meaning})" for kind, meaning in LOSABLE.items()),
     )
-    scale_low: float = parameter(
-        0.8, "smallest scale s of eq 9 that is accepted", low=0.01, high=1.0
-    )
-    scale_high: float = parameter(
-        1.25, "largest scale s of eq 9 that is accepted", low=1.0, high=1000.0
-    )
+    scale_low: float = parameter(0.8, "smallest accepted scale s of eq 9", low=0.01, high=1.0)
+    scale_high: float = parameter(1.25, "largest accepted scale s of eq 9", low=1.0, high=1000.0)
     max_move: float = parameter(
-        3.0, "farthest that an anchor or a path may be moved", unit="m", low=0.0, high=100.0
+        3.0, "farthest move of an anchor or a path", unit="m", low=0.0, high=100.0
     )
     clearance: float = parameter(
-        0.5, "gap kept between the footprints of fitted vehicles", unit="m", low=0.0, high=5.0
+        0.5, "gap between the footprints of fitted vehicles", unit="m", low=0.0, high=5.0
     )
     margin: float = parameter(
-        0.3, "room beside a footprint that the placement looks for", unit="m", low=0.0, high=5.0
+        0.3,
+        "room on each side of a footprint that the search wants",
+        unit="m",
+        low=0.0,
+        high=5.0,
     )
 
     def __post_init__(self) -> None:

@@ -1,27 +1,33 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""One door to the fitting: which way of placing a template is tried on which road."""
+"""The fitting: how a recording is placed on a road."""
 
 from functools import lru_cache
 
 import numpy as np
 
 from scenario_gen.base.errors import RefusedError
+from scenario_gen.method.fitting.assemble_fit import assemble_fit
 from scenario_gen.method.fitting.config import FittingConfig
-from scenario_gen.method.fitting.finish import finish
-from scenario_gen.method.fitting.given import place_given, place_in_own_frame, share_at_home
-from scenario_gen.method.fitting.kept import refuse_lost
 from scenario_gen.method.fitting.lanes import place_on_lanes
+from scenario_gen.method.fitting.losses import refuse_lost
 from scenario_gen.method.fitting.placement import Placement
-from scenario_gen.method.fitting.requested import refuse_impossible, refuse_misfits
 from scenario_gen.method.fitting.search import place_by_search
+from scenario_gen.method.fitting.similarity_fit import (
+    place_given,
+    place_in_own_frame,
+    share_at_home,
+)
+from scenario_gen.method.fitting.state_check import refuse_impossible, refuse_misfits
 from scenario_gen.numerics import Floats
 from scenario_gen.situation import refuse_reversing, Situation
 from scenario_gen.types import Encounter, Fit, Request, Road, Segmentation, TypeLimits
 
-_AT_HOME = 0.98  # share of footprints with room at which any road is taken for the template's own
-_NEAR_HOME = 0.5  # the same for a map without lanes to go by: recorded cars leave recorded maps here and there
+# The share of footprints with room in the recording's own frame, with which it is placed there;
+# recorded cars leave recorded maps now and then.
+_MIN_ROOM_AT_HOME_SHARE = 0.98
+_MIN_ROOM_WITHOUT_LANES_SHARE = 0.5
 
 
 def fit_template(
@@ -35,34 +41,46 @@ def fit_template(
     request: Request = Request(),
     limits: TypeLimits = TypeLimits(),
 ) -> Fit:
-    """Place a template on a road (paper III-A, eqs 7-9 put right).
+    """Place a recording on a road (paper III-A, eqs 7-9 corrected).
 
     Args:
-        encounter: the template, or its situation, if that is known.
-        segmentation: its changepoints; they decide which anchors are reported, never where start and end are.
+        encounter: the recording, or its situation.
+        segmentation: its changepoints; they decide which anchors are reported, and never the
+            start and the end.
         road: the target.
-        config: which way, and how far things may be scaled and moved.
-        starts: (N, 3) or (N, 4) given start poses x [m], y [m], yaw [rad], and speeds [m/s] of all vehicles; with `goals`.
-        goals: likewise the end.
-        request: the start and end states that are requested, of some vehicles; the others are the road's own placement.
-        limits: of motion; no requested state may exceed a speed that is planned.
+        config: how the recording is placed, and how far it may be scaled and moved.
+        starts: (N, 3) or (N, 4) start poses x [m], y [m], yaw [rad], and speeds [m/s] of all
+            vehicles; with `goals`.
+        goals: likewise, at the end.
+        request: the start and end states that are requested for some vehicles.
+        limits: of motion; no requested state may exceed a planned speed.
 
     Raises:
-        LostEncounterError: the best place on the road loses something of the encounter that `config.allow` does not name.
-        RefusedError: it does not fit, or a requested state cannot be had; the message says why, with figures.
-        InputError: `starts` and `goals` disagree with the encounter, or a vehicle that is named does not exist.
+        LostEncounterError: the best place on the road has a loss that `config.allow` does not
+            name.
+        RefusedError: the recording does not fit, or a requested state is impossible.
+        InputError: `starts` and `goals` disagree with the encounter, or a named vehicle does not
+            exist.
+
+    Examples:
+        >>> import scenario_gen as sg
+        >>> (encounter,) = sg.read_log("examples/my_log.csv").encounters
+        >>> road = sg.build_road("four_way", encounter)
+        >>> fit = sg.fit_template(encounter, sg.segment(encounter), road)
+        >>> fit.losses
+        ()
     """
     situation = Situation.of(encounter)
     encounter = situation.encounter
     refuse_reversing(encounter)
-    request.ego_of(encounter)  # no such vehicle: refused before anything is placed
+    request.ego_of(encounter)  # refuses an unknown vehicle
     if request.moves:
         return _fit_request(situation, segmentation, road, config, request, limits)
     if starts is not None or goals is not None:
         placement, given = place_given(situation, road, config, starts, goals)
-        return finish(situation, segmentation, road, placement, config, given)
+        return assemble_fit(situation, segmentation, road, placement, config, given)
     placement = _place(situation, road.cleared, config)
-    fit = finish(situation, segmentation, road, placement, config)
+    fit = assemble_fit(situation, segmentation, road, placement, config)
     if not placement.at_home:
         refuse_lost(fit.losses, config.allow, road.name)
     return fit
@@ -76,49 +94,50 @@ def _fit_request(
     request: Request,
     limits: TypeLimits,
 ) -> Fit:
+    """Return the fit with requested states; lanes are as requested, so only conflicts count."""
     encounter = situation.encounter
     starts, goals = (request.rows(end, encounter) for end in ("starts", "goals"))
     refuse_impossible(encounter, road, starts, goals, limits)
-    base = (
-        _place(situation, road.cleared, config)
-        if np.isnan(starts).any() or np.isnan(goals).any()
-        else None
-    )
+    base = None
+    if np.isnan(starts).any() or np.isnan(goals).any():
+        base = _place(situation, road.cleared, config)
     placement, given = place_given(situation, road, config, starts, goals, base)
-    fit = finish(situation, segmentation, road, placement, config, given)
+    fit = assemble_fit(situation, segmentation, road, placement, config, given)
     refuse_misfits(fit, starts, goals)
-    refuse_lost(
-        (loss for loss in fit.losses if loss.kind == "conflict"), config.allow, road.name
-    )  # lanes are as requested
+    conflicts = [loss for loss in fit.losses if loss.kind == "conflict"]
+    refuse_lost(conflicts, config.allow, road.name)
     return fit
 
 
-@lru_cache(maxsize=1)  # changepoints have no part in it: the references have the same
+@lru_cache(maxsize=1)  # the references have the same placement with other changepoints
 def _place(situation: Situation, road: Road, config: FittingConfig) -> Placement:
     tracks = situation.tracks
     if config.placement == "search":
         return place_by_search(tracks, road, config)
-    if config.placement == "lanes" or (config.placement == "auto" and road.map_lanes is not None):
+    if config.placement == "identity":
+        return place_in_own_frame(situation, road, config)
+    if config.placement == "lanes" or road.map_lanes is not None:
         return place_on_lanes(tracks, road, config)
+
     share = share_at_home(tracks, road)
-    reason, own = "", None
+    home_refusal = ""
     try:
-        own = place_in_own_frame(situation, road, config)
+        at_home = place_in_own_frame(situation, road, config)
     except RefusedError as error:
-        reason = f"where it was recorded, {error}"
-        if config.placement == "identity":
-            raise
-    if own is not None and (
-        config.placement == "identity" or share >= (_NEAR_HOME if road.lanes is None else _AT_HOME)
-    ):
-        return own
+        home_refusal = str(error)
+    else:
+        enough = _MIN_ROOM_AT_HOME_SHARE
+        if road.lanes is None:
+            enough = _MIN_ROOM_WITHOUT_LANES_SHARE
+        if share >= enough:
+            return at_home
     try:
-        return (
-            place_by_search(tracks, road, config)
-            if road.lanes is None
-            else place_on_lanes(tracks, road, config)
-        )
+        if road.lanes is None:
+            return place_by_search(tracks, road, config)
+        return place_on_lanes(tracks, road, config)
     except RefusedError as error:
-        if share < _NEAR_HOME or not reason:
+        if share < _MIN_ROOM_WITHOUT_LANES_SHARE or not home_refusal:
             raise
-        raise RefusedError(f"{reason}; elsewhere on road {road.name}, {error}") from error
+        raise RefusedError(
+            f"where it was recorded, {home_refusal}; elsewhere on road {road.name}, {error}"
+        ) from error

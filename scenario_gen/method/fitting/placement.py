@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""A placement of a template on a road: its motion there, its scale, and whether all have room."""
+"""The placement of a recording on a road: its motion there, its scale, and the room that it has."""
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
@@ -15,23 +15,26 @@ from scenario_gen.roads import footprint_fits, ground_for, nearest_pose_with_roo
 from scenario_gen.situation import separate, smallest_gaps, Track
 from scenario_gen.types import Loss, Note, Road, Vehicle
 
-SCALES = (1.0, 0.9, 1.1, 0.8, 1.2)  # that are tried, the best first
-_LOOKED = 12.0  # metres within which a pose with room is looked for, to say how far it is
-_LEAST_CLEARANCE = 0.1  # metres between fitted footprints, where the template's own are as near
-_RELUCTANTLY = 0.1  # how readily a vehicle leaves the middle of its lane, where setting it forward or back does not do
+SCALES = (1.0, 0.9, 1.1, 0.8, 1.2)
+"""The scales that are tried, the best first."""
+STANDING_SPEED_MPS = 0.3
+"""A slower vehicle stands."""
+_MAX_REPORTED_DISTANCE_M = 12.0  # to a pose with room
+_MIN_CLEARANCE_M = 0.1  # between fitted footprints, if the recorded ones are as near
+_SIDEWAYS_SHARE = 0.1  # of a shift, if moving vehicles along their lanes is not enough
 
 
 @dataclass(frozen=True, eq=False)
 class Placement:
-    """N vehicles' motion on the road. It knows nothing of changepoints, so the ends do not depend on them.
+    """The motion of N vehicles on the road. It has no changepoints, so its ends are independent.
 
     Attributes:
-        tracks: paths on the road, and the progress along them at each of the template's samples.
+        tracks: paths on the road, and the progress along them at each recorded sample.
         scale: (N,) s of eq 9.
-        moved: (N,) metres by which whole paths were shifted to keep vehicles apart.
-        notes: what was decided.
-        unused: arms of the road that nobody uses.
-        at_home: the template is in its own frame, on the road that it was recorded on.
+        moved: (N,) [m] by which whole paths were shifted to separate vehicles.
+        notes: on decisions.
+        unused: arms of the road without vehicles.
+        at_home: whether it is in the recording's own frame.
     """
 
     tracks: tuple[Track, ...]
@@ -43,50 +46,54 @@ class Placement:
 
     @classmethod
     def of(cls, tracks: tuple[Track, ...], scale: float, notes: Iterable[Note]) -> "Placement":
-        """Return the placement of tracks on the road that all have one scale s of eq 9, none of them shifted."""
-        return cls(
-            tracks,
-            frozen(np.full(len(tracks), scale)),
-            frozen(np.zeros(len(tracks))),
-            tuple(notes),
-        )
+        """Return the placement of tracks with one scale s of eq 9, none of them shifted."""
+        scales = frozen(np.full(len(tracks), scale))
+        return cls(tracks, scales, frozen(np.zeros(len(tracks))), tuple(notes))
 
 
-def check_scale(scale: float, what: str, config: FittingConfig) -> None:
+def check_scale(scale: float, subject: str, config: FittingConfig) -> None:
     """Raise RefusedError if a scale is too far from one.
 
     Source: s of eq 9.
     """
     if not config.accepts(scale):
         raise RefusedError(
-            f"{what} would need scale {scale:.2f}; accepted is {config.scale_low:g} to {config.scale_high:g} "
-            f"(scale shrinks gaps but not cars)"
+            f"{subject} would need scale {scale:.2f}; accepted is {config.scale_low:g} to "
+            f"{config.scale_high:g} (scale shrinks gaps but not cars)"
         )
 
 
 def separated(
-    placement: Placement, config: FittingConfig, *, sideways: float, own: Sequence[Track] = ()
+    placement: Placement,
+    config: FittingConfig,
+    *,
+    sideways: float,
+    recorded: Sequence[Track] = (),
 ) -> Placement:
-    """Shift vehicles that come too close on this road, as little as possible.
+    """Shift vehicles that are too near to each other on this road, as little as possible.
 
     Args:
         placement: where they are.
-        config: how far apart they should be, and how far they may be moved.
-        sideways: how readily a path is shifted across itself, 0 to 1.
-        own: the template's tracks; where they are nearer to each other than `clearance`, so may these be.
+        config: the clearance, and how far vehicles may be moved.
+        sideways: the share of a shift that may be across a path, 0 to 1.
+        recorded: the recorded tracks; if these are nearer to each other than `clearance`, so may
+            the placed ones be.
 
     Raises:
-        RefusedError: no shift up to `max_move` does it.
+        RefusedError: no shift up to `max_move` suffices.
     """
     clearance = config.clearance
-    if own:
-        clearance = min(clearance, max(float(smallest_gaps(own).min()), _LEAST_CLEARANCE))
+    if recorded:
+        gap = float(smallest_gaps(recorded).min())
+        clearance = min(clearance, max(gap, _MIN_CLEARANCE_M))
     try:
         separation = separate(placement.tracks, clearance, config.max_move, sideways=sideways)
     except RefusedError:
         if sideways > 0.0:
             raise
-        separation = separate(placement.tracks, clearance, config.max_move, sideways=_RELUCTANTLY)
+        separation = separate(
+            placement.tracks, clearance, config.max_move, sideways=_SIDEWAYS_SHARE
+        )
     return replace(
         placement,
         tracks=separation.tracks,
@@ -96,64 +103,79 @@ def separated(
 
 
 def has_room(road: Road, vehicle: Vehicle, poses: Floats) -> bool:
-    """Whether a vehicle's footprint has room at all poses (M, 3)."""
-    return bool(
-        footprint_fits(ground_for(road, vehicle), poses, vehicle.length, vehicle.width).all()
-    )
+    """Return whether a vehicle's footprint has room at all poses (M, 3)."""
+    ground = ground_for(road, vehicle)
+    return bool(footprint_fits(ground, poses, vehicle.length, vehicle.width).all())
 
 
-def share_with_room(road: Road, track: Track, every: int = 5) -> Floats:
-    """Share (scalar array), 0 to 1, of the track's samples (every n-th and the last) at which its footprint has room."""
+def share_with_room(road: Road, track: Track, every: int = 5) -> float:
+    """Return the share of a track's samples at which its footprint has room.
+
+    Every n-th sample and the last one are looked at.
+    """
     poses = np.concatenate((track.poses[:-1:every], track.poses[-1:]))
-    return np.asarray(
-        footprint_fits(
-            ground_for(road, track.vehicle), poses, track.vehicle.length, track.vehicle.width
-        ).mean()
-    )
+    vehicle = track.vehicle
+    fits = footprint_fits(ground_for(road, vehicle), poses, vehicle.length, vehicle.width)
+    return float(fits.mean())
 
 
 def max_repair(tracks: Sequence[Track], road: Road, max_move: float) -> float:
-    """How far [m] the worst sampled footprint (twice a second while it is there, and the ends) is from a pose with room.
+    """Return how far [m] the worst sampled footprint is from a pose with room.
+
+    Twice a second and both ends are looked at.
 
     Raises:
-        RefusedError: one is farther than `max_move`; the message names every such vehicle with time, place and distance, and what
-            can be done.
+        RefusedError: one is farther than `max_move`; the message has every such vehicle with
+            sample, place and distance, and a remedy.
     """
     farthest = 0.0
-    astray: dict[str, str] = {}
+    off_road: dict[str, str] = {}
     for track in tracks:
-        first, last = track.present.tolist()
-        poses, ground = track.poses, ground_for(road, track.vehicle)
-        worst, at = 0.0, first
-        for t in sorted({first, last, *range(first, last + 1, 5)}):
-            answer = nearest_pose_with_room(
-                ground, poses[t], track.vehicle.length, track.vehicle.width, max_move
-            )
-            if answer is None:
-                answer = nearest_pose_with_room(
-                    ground, poses[t], track.vehicle.length, track.vehicle.width, _LOOKED
-                )
-            away = np.inf if answer is None else answer[1]
-            if away > worst:
-                worst, at = away, t
-            if worst > _LOOKED:
-                break
-        farthest = max(farthest, worst)
-        if worst > max_move:
-            far = f"{worst:.1f} m" if worst <= _LOOKED else f"more than {_LOOKED:g} m"
-            x, y = poses[at, :2]
-            astray[track.vehicle.id] = (
-                f"vehicle {track.vehicle.id} is {far} from any pose with room at sample {at} "
+        distance, sample = _worst_sample(track, road, max_move)
+        farthest = max(farthest, distance)
+        if distance > max_move:
+            text = f"{distance:.1f} m"
+            if distance > _MAX_REPORTED_DISTANCE_M:
+                text = f"more than {_MAX_REPORTED_DISTANCE_M:g} m"
+            x, y = track.poses[sample, :2]
+            off_road[track.vehicle.id] = (
+                f"vehicle {track.vehicle.id} is {text} from any pose with room at sample {sample} "
                 f"(x {x:.1f}, y {y:.1f})"
             )
-    if astray:
-        ids = ", ".join(astray)
-        remedy = (
-            "the map is another one, or lies elsewhere"
-            if len(astray) == len(tracks) > 1
-            else f"set fitting.max_move to more, mend the map there, or leave {ids} out (log.vehicles names who is kept)"
-        )
+    if off_road:
+        remedy = "the map is another one, or has another origin"
+        if len(off_road) < len(tracks) or len(tracks) == 1:
+            remedy = (
+                "increase fitting.max_move, correct the map there, or leave out "
+                f"{', '.join(off_road)} (log.vehicles names the others)"
+            )
         raise RefusedError(
-            f"on road {road.name} {'; '.join(astray.values())}; at most {max_move:g} m is bridged; {remedy}"
+            f"on road {road.name} {'; '.join(off_road.values())}; fitting.max_move accepts "
+            f"{max_move:g} m; {remedy}"
         )
     return farthest
+
+
+def _worst_sample(track: Track, road: Road, max_move: float) -> tuple[float, int]:
+    """Return the largest distance [m] of a footprint from a pose with room, and its sample.
+
+    It is infinite beyond `_MAX_REPORTED_DISTANCE_M`.
+    """
+    vehicle, poses = track.vehicle, track.poses
+    ground = ground_for(road, vehicle)
+    first, last = track.present.tolist()
+    worst, worst_sample = 0.0, first
+    for sample in sorted({first, last, *range(first, last + 1, 5)}):
+        distance = np.inf
+        for reach in (max_move, _MAX_REPORTED_DISTANCE_M):
+            nearest = nearest_pose_with_room(
+                ground, poses[sample], vehicle.length, vehicle.width, reach
+            )
+            if nearest is not None:
+                distance = nearest[1]
+                break
+        if distance > worst:
+            worst, worst_sample = distance, sample
+        if worst > _MAX_REPORTED_DISTANCE_M:
+            break
+    return worst, worst_sample

@@ -28,7 +28,6 @@ from scenario_gen.method.routing.search.planner import (
 from scenario_gen.method.routing.task import VehicleTask
 from scenario_gen.numerics import Floats
 from scenario_gen.numerics.plane import unit_left
-from scenario_gen.roads import clearance_field
 
 GUIDE_STEPS = 10  # every tenth pose of the direct curve
 ONCOMING_FACTOR = 3.0  # of the cost of leaving the direct curve, towards oncoming traffic
@@ -85,7 +84,7 @@ def search_disc_path(task: VehicleTask, leg: Leg) -> Floats:
     """
     ends = np.stack((leg.start, leg.end))[:, :2]
     row, column, _ = task.road.cells(ends)
-    room = float(clearance_field(task.road)[row, column].min()) - task.road.resolution
+    room = float(task.road.clearance[row, column].min()) - task.road.resolution
     radius = max(min(0.5 * task.vehicle.width + task.config.margin, room), 0.0)
     query = Query(*ends, radius)
     seed = task.seed + leg.first

@@ -22,7 +22,7 @@ from scenario_gen.method.routing.task import VehicleTask
 from scenario_gen.method.routing.waypoints import anchor_weights, choose_waypoints
 from scenario_gen.numerics import Floats
 from scenario_gen.numerics.plane import edge_lengths, edge_yaws
-from scenario_gen.roads import footprint_fits, ground_for, own_ground
+from scenario_gen.roads import footprint_fits, ground_for, own_side
 from scenario_gen.types import Fit, FittedVehicle, Road, Route, TypeLimits
 
 MIN_ROUTE_M = 0.05  # between start and end, else the vehicle has no path
@@ -95,7 +95,7 @@ def _route_on_lanes(task: VehicleTask) -> Route:
 
     The whole road is also used if an obstacle blocks these lanes.
     """
-    ground = own_ground(task.road, task.fitted.path, task.vehicle)
+    ground = own_side(task.road, task.fitted.path, task.vehicle)
     if ground is not task.road:
         try:
             return _route(replace(task, road=ground))

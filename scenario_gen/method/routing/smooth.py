@@ -22,7 +22,6 @@ from scenario_gen.method.routing.search.sweep import sweep_is_free
 from scenario_gen.method.routing.task import VehicleTask
 from scenario_gen.numerics import Floats, wrap_angle
 from scenario_gen.numerics.plane import edge_lengths, unit
-from scenario_gen.roads import clearance_field
 
 ROUND_STEPS = 8  # of the band, before it is resampled
 CHECK_ROUNDS = 4  # after so many the spline is verified
@@ -142,7 +141,7 @@ def _band(task: VehicleTask, weights: Floats, guess: Guess, points: Floats, disc
     spacing = path_length(points) / (len(points) - 1)
     anchor, pull = _anchors_of(points, task.anchors[weights > 0.0, :2], weights[weights > 0.0])
     return Band(
-        field=clearance_field(road),
+        field=road.clearance,
         resolution=road.resolution,
         guess=guess.points - road.origin,
         hold=guess.hold,
@@ -163,14 +162,14 @@ def _clearance_along(task: VehicleTask, points: Floats, disc: Floats) -> Floats:
     tangent /= np.maximum(np.hypot(*tangent.T), 1e-9)[:, None]
     centres = points[:, None] + disc[None, :, None] * tangent[:, None]
     row, column, inside = task.road.cells(centres)
-    return np.where(inside, clearance_field(task.road)[row, column], 0.0)
+    return np.where(inside, task.road.clearance[row, column], 0.0)
 
 
 def _wanted_clearance(
     task: VehicleTask, disc: Floats, wish: float, spacing: float, count: int
 ) -> Floats:
     """Return the wanted clearance (count,) [m]: at the ends what there is, rising to `wish`."""
-    field = clearance_field(task.road)
+    field = task.road.clearance
     distance = np.arange(count) * spacing
     wanted = np.full(count, wish)
     for pose, from_pose in ((task.anchors[0], distance), (task.anchors[-1], distance[::-1])):

@@ -20,7 +20,6 @@ from scenario_gen.method.validity.cubic import Proof, split_cubic
 from scenario_gen.method.validity.dynamics import vehicle_groups
 from scenario_gen.numerics import Counts, Floats
 from scenario_gen.numerics.kernels import F, F1, F2, F4, kernel, N2, named, OUT2
-from scenario_gen.roads import blocked_before, clearance_in_cells
 from scenario_gen.types import Cause, Road, Scenario, Vehicle, Violation
 
 _CONTACT_CELLS = 1e-9  # a smaller overlap is a mere contact
@@ -31,7 +30,7 @@ class Ground(NamedTuple):
 
     Attributes:
         clearance: (H, W) distance [cells] from each centre to the nearest cell that is blocked.
-        blocked: (H, W + 1) number of blocked cells to the left, see `blocked_before`.
+        blocked: (H, W + 1) number of blocked cells to the left, see `Road.closed_before`.
         x, y: lower-left corner of the grid [m].
         size: of a cell [m].
     """
@@ -46,7 +45,7 @@ class Ground(NamedTuple):
     def of(cls, road: Road) -> "Ground":
         """Return the cells of a road."""
         x, y = road.origin
-        return cls(clearance_in_cells(road), blocked_before(road), x, y, road.resolution)
+        return cls(road.clearance_cells, road.closed_before, x, y, road.resolution)
 
 
 class _Rectangle(NamedTuple):

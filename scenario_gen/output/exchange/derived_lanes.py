@@ -14,7 +14,7 @@ from scenario_gen.numerics import Floats, frozen
 from scenario_gen.numerics.boxes import corners
 from scenario_gen.numerics.curve import Curve
 from scenario_gen.output.exchange.lanes import LaneMap, with_run_out
-from scenario_gen.roads import drivable_beside, lane_along, sharing_lanes
+from scenario_gen.roads import drivable_width, lane_along, sharing_lanes
 from scenario_gen.types import Lane, LaneNetwork, Road, Scenario, together
 
 STEP = 1.0  # metres between points of a lane
@@ -219,5 +219,5 @@ def _room(reference: Curve, sign: float, road: Road | None, most: float, run_out
     return np.where(
         on_run_out,
         most,
-        drivable_beside(road.drivable_at, reference, sign, most, road.resolution / 2.0),
+        drivable_width(road.drivable_at, reference, sign, most, road.resolution / 2.0),
     )

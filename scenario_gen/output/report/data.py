@@ -12,7 +12,6 @@ import numpy as np
 
 from scenario_gen.method.evaluation import common_motion, mean_feature
 from scenario_gen.numerics import Bools, Floats
-from scenario_gen.roads import cells_of
 from scenario_gen.types import (
     DRIVERS,
     Encounter,
@@ -126,8 +125,7 @@ def road_data(road: Road) -> dict[str, Any]:
     factor = max(1, -(-max(road.drivable.shape) // MAX_CELLS))
     height, width = (-(-side // factor) for side in road.drivable.shape)
     padded = np.zeros((height * factor, width * factor))
-    others = cells_of(
-        road,
+    others = road.cells_in(
         (lane for lane in road.lanes.others if lane.open_to(DRIVERS))
         if road.lanes is not None
         else (),

@@ -1,13 +1,14 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""CommonRoad maps, XML of versions 2018b and 2020a; its obstacles and planning problems are passed over.
+"""CommonRoad maps: XML of versions 2018b and 2020a, without obstacles and planning problems.
 
 Source: CommonRoad's documentation of the XML format, 2018b and 2020a.
 """
 
 from collections.abc import Iterator
-from dataclasses import replace
+from dataclasses import dataclass
+from functools import cached_property
 import math
 
 import numpy as np
@@ -16,7 +17,7 @@ from scenario_gen.base.documents import shown
 from scenario_gen.base.errors import InputError
 from scenario_gen.base.xml_reader import Element
 from scenario_gen.numerics import Floats
-from scenario_gen.roads.vector.network import (
+from scenario_gen.roads.vector.drafts import (
     by_id,
     Draft,
     Faults,
@@ -25,29 +26,188 @@ from scenario_gen.roads.vector.network import (
     speed_of,
 )
 from scenario_gen.roads.vector.signs import DraftRule, kind_of_sign
-from scenario_gen.types import (
-    CARS,
-    DRIVERS,
-    LANE_USERS,
-    Note,
-    NoteKind,
-    RuleKind,
-)
+from scenario_gen.types import CARS, DRIVERS, LANE_USERS, Note, NoteKind, RuleKind
 
-_BY_TYPE = {  # of a lanelet: who may use it, whatever users it names
-    "sidewalk": frozenset(("pedestrian",)), "crosswalk": frozenset(("pedestrian",)), "bicycleLane": frozenset(("bicycle",)),
+_USERS_BY_TYPE = {
+    "sidewalk": frozenset(("pedestrian",)),
+    "crosswalk": frozenset(("pedestrian",)),
+    "bicycleLane": frozenset(("bicycle",)),
     "busLane": frozenset(("bus",)),
     **dict.fromkeys(("shoulder", "parking", "border", "railway", "restricted"), frozenset[str]()),
-}  # fmt: skip
-_USERS = {
+}
+"""Of lanelets, whatever users they name."""
+_USERS_BY_NAME = {
     "vehicle": DRIVERS,
     "car": DRIVERS,
     **{name: frozenset((name,)) for name in LANE_USERS - CARS},
 }
-_MOTORWAYS = frozenset(
-    ("interstate", "highway")
-)  # types of lanelets on which nobody rides a bicycle
-_MAX_SPEED = ("274", "274.1", "R2-1", "maxSpeed")  # names and national numbers of the sign
+_MOTORWAY_TYPES = frozenset(("interstate", "highway"))
+_SPEED_LIMIT_SIGNS = frozenset(("274", "274.1", "R2-1", "maxSpeed"))
+
+
+@dataclass(frozen=True)
+class _Map:
+    """A CommonRoad map.
+
+    Attributes:
+        root: of the file.
+        lanelets: by id.
+        faults: the elements that are left out.
+    """
+
+    root: Element
+    lanelets: dict[str, Element]
+    faults: Faults
+
+    @classmethod
+    def of(cls, root: Element) -> "_Map":
+        """Read the lanelets of a map.
+
+        Raises:
+            TooLargeError: there are too many.
+        """
+        faults = Faults()
+        lanelets = by_id(root.findall("lanelet"), faults)
+        refuse_too_many_lanes(len(lanelets), root.file)
+        return cls(root, lanelets, faults)
+
+    @cached_property
+    def users(self) -> dict[str, frozenset[str]]:
+        """The users of each lanelet that has some."""
+        users = {name: _users(lanelet) for name, lanelet in self.lanelets.items()}
+        return {name: allowed for name, allowed in users.items() if allowed}
+
+    @cached_property
+    def reverse_users(self) -> dict[str, frozenset[str]]:
+        """The drivers who may use a lanelet against its direction, if there are some."""
+        reverse = {}
+        for name, users in self.users.items():
+            named = _named_users(_texts(self.lanelets[name], "userBidirectional"))
+            if allowed := users & named & DRIVERS:
+                reverse[name] = allowed
+        return reverse
+
+    @cached_property
+    def speed_limits(self) -> dict[str, float]:
+        """Speed limits [m/s] by the id of their sign."""
+        limits = {}
+        for sign in self.root.findall("trafficSign"):
+            for element in sign.findall("trafficSignElement"):
+                with self.faults.leaving_out("speed sign", sign.get("id", "?")):
+                    limit = _speed_limit_of_sign(element)
+                    if not math.isnan(limit):
+                        limits[sign.attribute("id")] = limit
+        return limits
+
+    @cached_property
+    def junctions(self) -> dict[str, str]:
+        """The intersection of each lanelet that follows one of its incoming lanelets."""
+        junctions: dict[str, str] = {}
+        tags = ("successorsLeft", "successorsRight", "successorsStraight")
+        links = [
+            (intersection, link)
+            for intersection in self.root.findall("intersection")
+            for incoming in intersection.findall("incoming")
+            for link in incoming
+            if link.tag in tags
+        ]
+        for intersection, link in links:
+            with self.faults.leaving_out("link of an intersection", link.get("ref", "?")):
+                name = link.attribute("ref")
+                if name not in self.lanelets:
+                    raise InputError(f"{link.place}: lanelet {name} is not in the map")
+                junctions[name] = intersection.attribute("id")
+        return junctions
+
+    def drafts(self) -> Iterator[Draft]:
+        """Yield the lanes, and those for both ways once more against their direction."""
+        for name in self.users:
+            with self.faults.leaving_out("lanelet", name):
+                yield from self._drafts_of(name)
+
+    def _drafts_of(self, name: str) -> Iterator[Draft]:
+        lanelet = self.lanelets[name]
+        left, right = (_points(lanelet.child(tag)) for tag in ("leftBound", "rightBound"))
+        successors = tuple(link.attribute("ref") for link in lanelet.findall("successor"))
+        for other in successors:
+            if other not in self.lanelets:
+                reason = f"{lanelet.place}: successor {other} of lanelet {name} is not in the map"
+                self.faults.add("link", f"{name} to {other}", reason)
+        neighbours = [
+            link.attribute("ref")
+            for tag in ("adjacentLeft", "adjacentRight")
+            for link in lanelet.findall(tag)
+            if link.get("drivingDir") == "same"
+        ]
+        draft = Draft(
+            id=name,
+            left=left,
+            right=right,
+            successors=successors,
+            neighbours=tuple(neighbours),
+            speed_limit=self._speed_limit(lanelet),
+            junction=self.junctions.get(name, ""),
+            place=lanelet.place,
+            users=self.users[name],
+            crossing="crosswalk" in _texts(lanelet, "laneletType"),
+        )
+        yield draft
+        if name in self.reverse_users:
+            before = [link.attribute("ref") for link in lanelet.findall("predecessor")]
+            yield Draft(
+                id=f"{name}r",
+                left=right[::-1],
+                right=left[::-1],
+                successors=tuple(f"{other}r" for other in before if other in self.reverse_users),
+                speed_limit=draft.speed_limit,
+                junction=draft.junction,
+                place=lanelet.place,
+                users=self.reverse_users[name],
+            )
+
+    def _speed_limit(self, lanelet: Element) -> float:
+        """Return the speed limit [m/s] of a lanelet, NaN if none is given."""
+        limit = lanelet.find("speedLimit")
+        if limit is not None:
+            return limit.value()
+        signs = [link.get("ref") for link in lanelet.findall("trafficSignRef")]
+        limits = [self.speed_limits[sign] for sign in signs if sign in self.speed_limits]
+        return min(limits, default=math.nan)
+
+    def rules(self) -> Iterator[DraftRule]:
+        """Yield a rule for each sign and light to which a lanelet for cars refers."""
+        kinds: dict[tuple[str, str], RuleKind] = {}
+        for sign in self.root.findall("trafficSign"):
+            known = [kind for kind in map(kind_of_sign, _sign_names(sign)) if kind is not None]
+            if known:
+                kinds["trafficSignRef", sign.get("id", "?")] = known[0]
+        for light in self.root.findall("trafficLight"):
+            kinds["trafficLightRef", light.get("id", "?")] = RuleKind.TRAFFIC_LIGHT
+        tags = dict.fromkeys(tag for tag, _ in kinds)
+        for name, users in self.users.items():
+            if not users & CARS:
+                continue
+            with self.faults.leaving_out("stop line", name):
+                lanelet = self.lanelets[name]
+                line = _stop_line(lanelet)
+                refs = [
+                    (tag, link.attribute("ref"))
+                    for tag in tags
+                    for path in (tag, f"stopLine/{tag}")
+                    for link in lanelet.findall(path)
+                ]
+                for ref in dict.fromkeys(refs):
+                    if ref in kinds:
+                        yield DraftRule(ref[1], kinds[ref], (name,), line=line)
+
+    def notes(self) -> Iterator[Note]:
+        """Yield the notes on the file."""
+        version = self.root.get("commonRoadVersion", "?")
+        yield Note.of(NoteKind.COORDINATES, format=f"CommonRoad {version}")
+        reference = self.root.find("location/geoTransformation/geoReference")
+        if reference is not None:
+            text = " ".join(reference.content.split())
+            yield Note.of(NoteKind.GEOREFERENCE_IGNORED, reference=text)
 
 
 def lanes_of(root: Element) -> MapLanes:
@@ -56,97 +216,42 @@ def lanes_of(root: Element) -> MapLanes:
     Raises:
         InputError: it is broken; names file and line.
     """
-    faults = Faults()
-    lanelets = by_id(root.findall("lanelet"), faults)
-    refuse_too_many_lanes(len(lanelets), root.file)
-    limits = _speed_signs(root, faults)
-    junctions = _junctions(root, set(lanelets), faults)
-    users = {name: own for name, lanelet in lanelets.items() if (own := _users(lanelet))}
-    back = {
-        name: own & _named(_texts(lanelets[name], "userBidirectional")) & DRIVERS
-        for name, own in users.items()
-    }
-    both_ways = {name for name, own in back.items() if own}
-    drafts = []
-    for name, lanelet in ((name, lanelets[name]) for name in users):
-        with faults.leaving_out("lanelet", name):
-            left, right = (_points(lanelet.child(tag)) for tag in ("leftBound", "rightBound"))
-            successors = tuple(after.attribute("ref") for after in lanelet.findall("successor"))
-            for unknown in (after for after in successors if after not in lanelets):
-                reason = f"{lanelet.place}: lanelet {name} leads to lanelet {unknown}, which is not there"
-                faults.found.append(("link", f"{name} to {unknown}", reason))
-            beside = tuple(
-                side.attribute("ref")
-                for tag in ("adjacentLeft", "adjacentRight")
-                for side in lanelet.findall(tag)
-                if side.get("drivingDir") == "same"
-            )
-            limit, junction = _speed_limit(lanelet, limits), junctions.get(name, "")
-            draft = Draft(
-                name,
-                left,
-                right,
-                successors,
-                beside,
-                limit,
-                junction,
-                lanelet.place,
-                users=users[name],
-            )
-            drafts.append(replace(draft, crossing="crosswalk" in _texts(lanelet, "laneletType")))
-            if name in both_ways:
-                before = tuple(
-                    f"{other.attribute('ref')}r"
-                    for other in lanelet.findall("predecessor")
-                    if other.attribute("ref") in both_ways
-                )
-                borders = right[::-1], left[::-1]
-                drafts.append(
-                    Draft(
-                        f"{name}r",
-                        *borders,
-                        before,
-                        (),
-                        limit,
-                        junction,
-                        lanelet.place,
-                        users=back[name],
-                    )
-                )
-    version = root.get("commonRoadVersion", "?")
-    coordinates = Note.of(NoteKind.COORDINATES, format=f"CommonRoad {version}")
-    notes = (coordinates, *_georeference(root))
-    rules = list(
-        _rules(root, {name: lanelets[name] for name, own in users.items() if own & CARS}, faults)
+    commonroad = _Map.of(root)
+    signs = root.findall("trafficSign")
+    return MapLanes(
+        list(commonroad.drafts()),
+        tuple(commonroad.notes()),
+        unsupported=len(commonroad.lanelets) - len(commonroad.users),
+        faults=commonroad.faults,
+        rules=list(commonroad.rules()),
+        other_signs=sum(not any(map(_is_known_sign, _sign_names(sign))) for sign in signs),
     )
-    others = [
-        sign for sign in root.findall("trafficSign") if not any(map(_means, _sign_names(sign)))
-    ]
-    return MapLanes(drafts, notes, len(lanelets) - len(users), faults, rules, len(others))
 
 
 def _texts(lanelet: Element, tag: str) -> set[str]:
     return {child.content for child in lanelet.findall(tag)}
 
 
-def _named(names: set[str]) -> frozenset[str]:
-    """Who may use a lanelet whose users have some names; `car` opens it to all that drive, unless others are named."""
-    alone = "car" in names and names & {"truck", "bus", "motorcycle"}
-    own, others = (frozenset((*CARS, "van")), names - CARS) if alone else (frozenset[str](), names)
-    return own.union(*(_USERS.get(name, frozenset()) for name in others))
+def _named_users(names: set[str]) -> frozenset[str]:
+    """Return the users with some names; `car` means all drivers, unless others are named, too."""
+    users = frozenset[str]()
+    if "car" in names and names & {"truck", "bus", "motorcycle"}:
+        users, names = frozenset((*CARS, "van")), names - CARS
+    return users.union(*(_USERS_BY_NAME.get(name, frozenset()) for name in names))
 
 
 def _users(lanelet: Element) -> frozenset[str]:
-    """Who may use a lanelet: as its type says, else who is named; all that drive where nobody is, or only who has priority."""
-    kinds, names = (
-        _texts(lanelet, "laneletType"),
-        _texts(lanelet, "userOneWay") | _texts(lanelet, "userBidirectional"),
-    )
-    typed = [_BY_TYPE[kind] for kind in kinds if kind in _BY_TYPE]
-    if typed:
-        return frozenset.intersection(*typed)
-    users = _named(names) if names - {"priorityVehicle"} else DRIVERS
-    return users - {"bicycle"} if kinds & _MOTORWAYS else users
+    """Return the users of a lanelet by its type, or those that it names.
+
+    All drivers may use it if it names nobody, or only priority vehicles.
+    """
+    types = _texts(lanelet, "laneletType")
+    by_type = [_USERS_BY_TYPE[name] for name in types if name in _USERS_BY_TYPE]
+    if by_type:
+        return frozenset.intersection(*by_type)
+    names = _texts(lanelet, "userOneWay") | _texts(lanelet, "userBidirectional")
+    users = _named_users(names) if names - {"priorityVehicle"} else DRIVERS
+    return users - {"bicycle"} if types & _MOTORWAY_TYPES else users
 
 
 def _sign_names(sign: Element) -> list[str]:
@@ -154,100 +259,40 @@ def _sign_names(sign: Element) -> list[str]:
     return [element.content for element in ids if element is not None]
 
 
-def _means(name: str) -> bool:
-    """Whether a sign is read."""
-    return name in _MAX_SPEED or kind_of_sign(name) is not None
+def _is_known_sign(name: str) -> bool:
+    return name in _SPEED_LIMIT_SIGNS or kind_of_sign(name) is not None
 
 
-def _rules(root: Element, lanelets: dict[str, Element], faults: Faults) -> Iterator[DraftRule]:
-    """Yield the rules of the signs and lights to which lanelets refer, one for each lanelet."""
-    kinds: dict[tuple[str, str], RuleKind] = {}
-    for sign in root.findall("trafficSign"):
-        known = [kind for kind in map(kind_of_sign, _sign_names(sign)) if kind is not None]
-        if known:
-            kinds["trafficSignRef", sign.get("id", "?")] = known[0]
-    for light in root.findall("trafficLight"):
-        kinds["trafficLightRef", light.get("id", "?")] = RuleKind.TRAFFIC_LIGHT
-    for name, lanelet in lanelets.items():
-        with faults.leaving_out("stop line", name):
-            stop = lanelet.find("stopLine")
-            holders = [lanelet] if stop is None else [lanelet, stop]
-            line = (
-                _points(stop)[:, :2]
-                if stop is not None and len(stop.findall("point")) > 1
-                else np.zeros((0, 2))
-            )
-            refs = dict.fromkeys(
-                (tag, ref.attribute("ref"))
-                for tag, _ in kinds
-                for holder in holders
-                for ref in holder.findall(tag)
-            )
-            for ref in refs:
-                if ref in kinds:
-                    yield DraftRule(ref[1], kinds[ref], (name,), line=line)
+def _speed_limit_of_sign(element: Element) -> float:
+    """Return the limit [m/s] of an element of a traffic sign, NaN if it is another sign.
+
+    Signs from converters of data sets may have a unit, as in `50kmh`.
+
+    Raises:
+        InputError: its value is not a speed.
+    """
+    kind, value = element.find("trafficSignID"), element.find("additionalValue")
+    if kind is None or value is None or kind.content not in _SPEED_LIMIT_SIGNS:
+        return math.nan
+    limit = speed_of(value.content, "m/s")
+    if math.isnan(limit):
+        raise InputError(f"{value.place}: {shown(value.content, 40)!r} is not a speed")
+    return limit
 
 
-def _georeference(root: Element) -> list[Note]:
-    reference = root.find("location/geoTransformation/geoReference")
-    if reference is None:
-        return []
-    text = " ".join(reference.content.split())
-    return [Note.of(NoteKind.GEOREFERENCE_IGNORED, reference=text)]
+def _stop_line(lanelet: Element) -> Floats:
+    """Return the stop line (K, 2) [m] of a lanelet, (0, 2) without one."""
+    stop = lanelet.find("stopLine")
+    if stop is None or len(stop.findall("point")) < 2:
+        return np.zeros((0, 2))
+    return _points(stop)[:, :2]
 
 
 def _points(bound: Element) -> Floats:
-    """Points (P, 3) [m] of a bound or a line, with their height, NaN where it is not given."""
-    heights = [(point, point.find("z")) for point in bound.findall("point")]
-    points = [
-        (p.child("x").value(), p.child("y").value(), math.nan if z is None else z.value())
-        for p, z in heights
-    ]
+    """Return the points (P, 3) [m] of a bound or a line, with NaN for unknown heights."""
+    points = []
+    for point in bound.findall("point"):
+        height = point.find("z")
+        z = math.nan if height is None else height.value()
+        points.append((point.child("x").value(), point.child("y").value(), z))
     return np.array(points, dtype=np.float64).reshape(-1, 3)
-
-
-def _speed_signs(root: Element, faults: Faults) -> dict[str, float]:
-    """Speed limits [m/s] by the id of their sign; those of converters of data sets may have a unit: `50kmh`."""
-    limits = {}
-    for sign in root.findall("trafficSign"):
-        for element in sign.findall("trafficSignElement"):
-            kind, value = element.find("trafficSignID"), element.find("additionalValue")
-            if kind is not None and value is not None and kind.content in _MAX_SPEED:
-                with faults.leaving_out("speed sign", sign.get("id", "?")):
-                    limit = speed_of(value.content, "m/s")
-                    if math.isnan(limit):
-                        raise InputError(
-                            f"{value.place}: {shown(value.content, 40)!r} is no speed"
-                        )
-                    limits[sign.attribute("id")] = limit
-    return limits
-
-
-def _speed_limit(lanelet: Element, signs: dict[str, float]) -> float:
-    own = lanelet.find("speedLimit")
-    if own is not None:
-        return own.value()
-    return min(
-        (
-            signs[ref.attribute("ref")]
-            for ref in lanelet.findall("trafficSignRef")
-            if ref.get("ref") in signs
-        ),
-        default=math.nan,
-    )
-
-
-def _junctions(root: Element, known: set[str], faults: Faults) -> dict[str, str]:
-    """The intersection of each lanelet that lies in one: those that follow its incoming lanelets."""
-    junctions: dict[str, str] = {}
-    for intersection in root.findall("intersection"):
-        for incoming in intersection.findall("incoming"):
-            for tag in ("successorsLeft", "successorsRight", "successorsStraight"):
-                for ref in incoming.findall(tag):
-                    with faults.leaving_out("link of an intersection", ref.get("ref", "?")):
-                        if ref.attribute("ref") not in known:
-                            raise InputError(
-                                f"{ref.place}: lanelet {ref.attribute('ref')} is not there"
-                            )
-                        junctions[ref.attribute("ref")] = intersection.attribute("id")
-    return junctions

@@ -1,26 +1,26 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Lanelet2 maps (.osm), of Lanelet2 itself and in Autoware's dialect.
+"""Lanelet2 maps (.osm), in the original format and in Autoware's dialect.
 
-Source: Lanelet2's documents on primitives, tagging and the routing graph (LaneletAndAreaTagging, LinestringTagging), and
-Autoware's on `local_x`, `local_y`, `turn_direction` and `intersection_area`.
+Source: Lanelet2's documents on primitives, tagging and the routing graph (LaneletAndAreaTagging,
+LinestringTagging), and Autoware's on `local_x`, `local_y`, `turn_direction` and
+`intersection_area`.
 """
 
 from collections import defaultdict
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from itertools import chain
+from functools import cached_property
 import math
 import re
 
 import numpy as np
 
 from scenario_gen.base.errors import InputError
-from scenario_gen.base.xml_reader import Element, to_number
-from scenario_gen.logs import local_frame, middle_of
+from scenario_gen.base.xml_reader import Element
 from scenario_gen.numerics import Floats
-from scenario_gen.roads.vector.network import (
+from scenario_gen.roads.vector.drafts import (
     by_id,
     Draft,
     Faults,
@@ -29,471 +29,444 @@ from scenario_gen.roads.vector.network import (
     refuse_too_many_lanes,
     speed_of,
 )
+from scenario_gen.roads.vector.osm_positions import Positions, positions_of
+from scenario_gen.roads.vector.osm_tags import tags_of, users_of_tags, value_of_first
 from scenario_gen.roads.vector.signs import DraftRule, kind_of_sign
-from scenario_gen.types import (
-    CARS,
-    DRIVERS,
-    LANE_USERS,
-    Note,
-    NoteKind,
-    RuleKind,
-)
+from scenario_gen.types import CARS, DRIVERS, RuleKind
 
-_BY_SUBTYPE = {  # who may use a lanelet, if no participant is named
-    "road": DRIVERS, "play_street": LANE_USERS, "exit": LANE_USERS, "highway": DRIVERS - {"bicycle"},
-    "bus_lane": frozenset(("bus",)), "bicycle_lane": frozenset(("bicycle",)), "walkway": frozenset(("pedestrian",)),
-    "shared_walkway": frozenset(("bicycle", "pedestrian")), "crosswalk": frozenset(("pedestrian",)),
-    "stairs": frozenset(("pedestrian",)),
-}  # fmt: skip
-_KMH = 1.0 / 3.6
-_LIMITS = {  # m/s by subtype and location, where no sign says: Lanelet2's German traffic rules
-    ("road", "urban"): 50.0 * _KMH,
-    ("road", "nonurban"): 100.0 * _KMH,
-    ("highway", "urban"): 130.0 * _KMH,
-    ("highway", "nonurban"): 130.0 * _KMH,
-    ("play_street", "urban"): 7.0 * _KMH,
+_MPS_PER_KMH = 1.0 / 3.6
+_DEFAULT_LIMITS_KMH = {
+    ("road", "urban"): 50.0,
+    ("road", "nonurban"): 100.0,
+    ("highway", "urban"): 130.0,
+    ("highway", "nonurban"): 130.0,
+    ("play_street", "urban"): 7.0,
 }
-_FARTHEST = 50_000.0  # metres from the middle of a map in latitude and longitude, as far as the local frame is exact
-_CHANGE = {
+"""By subtype and location: Lanelet2's German traffic rules."""
+_CHANGES_BY_SUBTYPE = {
     "dashed": (True, True),
     "dashed_solid": (True, False),
     "solid_dashed": (False, True),
-}  # from its left, from its right
+}
+"""Whether traffic may cross a line from its left, and from its right."""
 
 
 @dataclass(frozen=True, eq=False)
 class _Border:
-    """A way of the map, in the direction in which a lanelet has it."""
+    """A way of the map, in the direction in which a lanelet uses it."""
 
     way: Element
     nodes: tuple[str, ...]
     points: Floats
-    forth: bool = True
+    forward: bool = True
 
     @property
     def key(self) -> tuple[str, bool]:
         """Its way and the direction."""
-        return self.way.attribute("id"), self.forth
+        return self.way.attribute("id"), self.forward
 
     def turned(self) -> "_Border":
         return replace(
-            self, nodes=self.nodes[::-1], points=self.points[::-1], forth=not self.forth
+            self, nodes=self.nodes[::-1], points=self.points[::-1], forward=not self.forward
         )
+
+    def may_change(self, *, to_right: bool) -> bool:
+        """Return whether traffic may cross it, to the right or to the left."""
+        tags = tags_of(self.way)
+        side = "right" if to_right else "left"
+        explicit = value_of_first(tags, (f"lane_change:{side}", "lane_change"))
+        if explicit is not None:
+            return explicit in ("yes", "true")
+        if tags.get("type") not in ("line_thin", "line_thick"):
+            return False
+        from_left, from_right = _CHANGES_BY_SUBTYPE.get(tags.get("subtype", ""), (False, False))
+        return from_left if to_right == self.forward else from_right
+
+
+class _Relation:
+    """A relation of the map with its tags."""
+
+    def __init__(self, element: Element) -> None:
+        self.element = element
+        self.id = element.attribute("id")
+        self.tags = tags_of(element)
+
+    @property
+    def is_lanelet(self) -> bool:
+        return self.tags.get("type") == "lanelet"
+
+    @cached_property
+    def users(self) -> frozenset[str]:
+        """The users of a lanelet."""
+        return users_of_tags(self.tags)
+
+    @property
+    def both_ways(self) -> bool:
+        """Whether drivers may use a lanelet in both directions."""
+        kinds = ("vehicle:car", "vehicle") if self.users & CARS else ("bicycle",)
+        keys = [*(f"one_way:{kind}" for kind in kinds), "one_way"]
+        one_way = value_of_first(self.tags, keys)
+        return bool(self.users & DRIVERS) and one_way in ("no", "false")
+
+    def members(self, role: str) -> list[str]:
+        """Return the ids of its members with a role."""
+        members = self.element.findall("member")
+        return [member.get("ref", "") for member in members if member.get("role") == role]
 
 
 @dataclass(frozen=True, eq=False)
 class _Lanelet:
+    """A lanelet, in the direction in which it is driven."""
+
     name: str
-    relation: Element
-    tags: dict[str, str]
+    relation: _Relation
     left: _Border
     right: _Border
 
+    @classmethod
+    def of(cls, relation: _Relation, left: _Border, right: _Border) -> "_Lanelet":
+        """Return a lanelet whose borders both have its direction.
+
+        In a file they may have either one. They are turned so that their begins are next to each
+        other, and that left is on the left.
+        """
+        a, b = left.points[[0, -1], :2]
+        c, d = right.points[[0, -1], :2]
+        straight = float(np.hypot(*(a - c)) + np.hypot(*(b - d)))
+        crossed = float(np.hypot(*(a - d)) + np.hypot(*(b - c)))
+        if crossed < straight:
+            right = right.turned()
+        x, y = np.concatenate((left.points, right.points[::-1]))[:, :2].T
+        doubled_area = float((x * np.roll(y, -1) - np.roll(x, -1) * y).sum())
+        if doubled_area > 0.0:  # counter-clockwise: left is on the right
+            left, right = left.turned(), right.turned()
+        return cls(relation.id, relation, left, right)
+
     def turned(self) -> "_Lanelet":
-        """The same lanelet driven the other way."""
+        """Return the same lanelet driven the other way."""
         return replace(
             self, name=f"{self.name}r", left=self.right.turned(), right=self.left.turned()
         )
 
 
-def lanes_of(root: Element) -> MapLanes:
-    """Return the lanes of a Lanelet2 map.
+@dataclass(frozen=True)
+class _Regulation:
+    """The rule of a regulatory element, without its line, and the ways that may be its lines."""
 
-    Positions are those of the tags `local_x` and `local_y` if all nodes of lanelets have them, else those of latitude and
-    longitude in the local frame (`geodesy`) about their middle.
+    rule: DraftRule
+    ways: tuple[str, ...]
 
-    Raises:
-        InputError: it is broken, has no usable coordinates, or no lanelet for cars; names file and line.
+
+@dataclass(frozen=True)
+class LaneletMap:
+    """The elements of a map that no editor has marked as deleted.
+
+    Attributes:
+        file: for messages.
+        nodes: by id.
+        ways: by id.
+        relations: with their tags.
+        faults: the elements that are left out.
     """
-    faults = Faults()
-    nodes, ways, relations = (  # without what editors have marked as deleted
-        by_id(
-            (element for element in root.findall(tag) if element.get("action") != "delete"),
-            faults,
+
+    file: str
+    nodes: dict[str, Element]
+    ways: dict[str, Element]
+    relations: list[_Relation]
+    faults: Faults
+
+    @classmethod
+    def parse(cls, root: Element) -> "LaneletMap":
+        """Return the elements of a map.
+
+        Raises:
+            InputError: it has no lanelet for cars, or too many lanelets.
+        """
+        faults = Faults()
+        nodes, ways, relations = (
+            by_id((each for each in root.findall(tag) if each.get("action") != "delete"), faults)
+            for tag in ("node", "way", "relation")
         )
-        for tag in ("node", "way", "relation")
-    )
-    tagged = [(relation, _tags(relation)) for relation in relations.values()]
-    lanelets = [(relation, tags) for relation, tags in tagged if tags.get("type") == "lanelet"]
-    used_by = [(relation, tags) for relation, tags in lanelets if _users(tags)]
-    for_cars = [(relation, tags) for relation, tags in used_by if _users(tags) & CARS]
-    if not for_cars:
-        raise InputError(f"{root.file}: none of its {len(lanelets)} lanelets is for cars")
-    refuse_too_many_lanes(len(used_by), root.file)
-    sides: dict[str, list[str]] = {}
-    for relation, _ in used_by:
-        with faults.leaving_out("lanelet", relation.attribute("id")):
-            refs = _refs(relation, ways)
-            for ref in refs:
-                _nodes(ways[ref], nodes)
-            sides[relation.attribute("id")] = refs
-    used = [ref for refs in sides.values() for ref in refs]
-    refuse_too_long(sum(len(ways[ref]) for ref in used), root.file)
-    names = {ref: _nodes(ways[ref], nodes) for ref in used}
-    signed, lines = list(_regulations(tagged, for_cars, ways)), {}
-    for ref in dict.fromkeys(chain(*(refs for _, refs in signed))):
-        with faults.leaving_out("stop line", ref):
-            lines[ref] = _nodes(ways[ref], nodes)
-    of_cars = {ref for relation, _ in for_cars for ref in sides.get(relation.attribute("id"), ())}
-    about = dict.fromkeys(
-        chain(*(own for ref, own in names.items() if ref in of_cars), *lines.values())
-    )
-    all_names = about | dict.fromkeys(chain(*names.values()))
-    positions, note, origin = _positions(
-        [nodes[name] for name in all_names], len(about), root.file, faults
-    )
-    drawn = []
-    for relation, tags in used_by:
-        if relation.attribute("id") not in sides:
-            continue
-        with faults.leaving_out("lanelet", relation.attribute("id")):
-            borders = [
-                _border(ways[ref], names[ref], positions)
-                for ref in sides[relation.attribute("id")]
-            ]
-            lanelet = _lanelet(relation, tags, borders)
-            drawn.append(lanelet)
-            if _is_for_both_ways(tags):
-                drawn.append(lanelet.turned())
-    limits = {
-        relation.attribute("id"): _sign_limit(relation, tags, ways) for relation, tags in tagged
-    }
-    at = {
-        ref: np.array([positions[name][:2] for name in own])
-        for ref, own in lines.items()
-        if all(name in positions for name in own)
-    }
-    rules = [
-        replace(rule, line=line)
-        for rule, refs in signed
-        for line in [at[ref] for ref in refs if ref in at] or [rule.line]
-    ]
-    elements = [
-        (relation, tags) for relation, tags in tagged if tags.get("type") == "regulatory_element"
-    ]
-    others = [
-        relation
-        for relation, tags in elements
-        if tags.get("subtype") != "speed_limit" and not _kind(relation, tags, ways)
-    ]
-    left_out = len(lanelets) - len(used_by)
-    return MapLanes(
-        list(_drafts(drawn, limits)),
-        (note,),
-        left_out,
-        faults,
-        rules,
-        len(others),
-        origin,
-    )
-
-
-def _regulations(
-    relations: Sequence[tuple[Element, dict[str, str]]],
-    lanelets: Sequence[tuple[Element, dict[str, str]]],
-    ways: dict[str, Element],
-) -> Iterator[tuple[DraftRule, list[str]]]:
-    """Yield the rules of regulatory elements, without their lines, and the ways that are these."""
-    under: dict[str, list[str]] = defaultdict(list)
-    for lanelet, _ in lanelets:
-        for ref in _members(lanelet, "regulatory_element"):
-            under[ref].append(lanelet.attribute("id"))
-    for relation, tags in relations:
-        name, kind = relation.get("id", "?"), _kind(relation, tags, ways)
-        if kind is None:
-            continue
-        lanes = tuple(_members(relation, "yield")) or tuple(under[name])
-        role = "refers" if tags.get("subtype") == "road_marking" else "ref_line"
-        lines = [ref for ref in _members(relation, role) if ref in ways]
-        yield DraftRule(name, kind, lanes, tuple(_members(relation, "right_of_way"))), lines
-
-
-def _members(relation: Element, role: str) -> list[str]:
-    members = (member.attrib for member in relation.findall("member"))
-    return [own.get("ref", "") for own in members if own.get("role") == role]
-
-
-def _kind(relation: Element, tags: dict[str, str], ways: dict[str, Element]) -> RuleKind | None:
-    """What a regulatory element means for traffic; None if it is none that is known."""
-    if tags.get("type") != "regulatory_element":
-        return None
-    referred = [_tags(ways[ref]) for ref in _members(relation, "refers") if ref in ways]
-    signs = [own.get("subtype", "") for own in referred]
-    kinds = [
-        kind for kind in map(kind_of_sign, (tags.get("sign_type", ""), *signs)) if kind is not None
-    ]
-    match tags.get("subtype"):
-        case "traffic_light":
-            return RuleKind.TRAFFIC_LIGHT
-        case "all_way_stop":
-            return RuleKind.STOP
-        case "right_of_way":
-            return RuleKind.STOP if RuleKind.STOP in kinds else RuleKind.GIVE_WAY
-        case "traffic_sign":
-            return kinds[0] if kinds else None
-        case "road_marking" if any(
-            own.get("type") == "stop_line" for own in referred
-        ):  # Autoware's
-            return RuleKind.STOP
-    return None
-
-
-def _border(way: Element, names: Sequence[str], positions: Mapping[str, Floats]) -> _Border:
-    """A way as a border.
-
-    Raises:
-        InputError: the position of one of its nodes is not known.
-    """
-    for name in names:
-        if name not in positions:
+        parsed = cls(root.file, nodes, ways, [*map(_Relation, relations.values())], faults)
+        if not any(lanelet.users & CARS for lanelet in parsed.lanelets):
             raise InputError(
-                f"{way.place}: way {way.attribute('id')} goes through node {name}, whose position is faulty"
+                f"{root.file}: none of its {parsed.lanelet_count} lanelets is for cars"
             )
-    return _Border(way, tuple(names), np.array([positions[name] for name in names]))
+        refuse_too_many_lanes(len(parsed.lanelets), root.file)
+        return parsed
 
+    @cached_property
+    def lanelet_count(self) -> int:
+        """How many lanelets the file has, with or without users."""
+        return sum(relation.is_lanelet for relation in self.relations)
 
-def _tags(element: Element) -> dict[str, str]:
-    return {tag.attribute("k"): tag.attribute("v") for tag in element.findall("tag")}
+    @cached_property
+    def lanelets(self) -> list[_Relation]:
+        """The lanelets with users."""
+        return [each for each in self.relations if each.is_lanelet and each.users]
 
+    @cached_property
+    def borders(self) -> dict[str, tuple[str, str]]:
+        """The ways of the left and the right border of each lanelet, without faulty ones."""
+        borders = {}
+        for lanelet in self.lanelets:
+            with self.faults.leaving_out("lanelet", lanelet.id):
+                left, right = self._way_of(lanelet, "left"), self._way_of(lanelet, "right")
+                self._nodes_of(left)
+                self._nodes_of(right)
+                borders[lanelet.id] = left, right
+        return borders
 
-def _first(tags: dict[str, str], keys: Sequence[str]) -> str | None:
-    """The value of the first of some tags that is there."""
-    return next((tags[key] for key in keys if key in tags), None)
+    @cached_property
+    def regulations(self) -> list[_Regulation]:
+        """The rules for lanelets that cars use."""
+        lanelets_of: dict[str, list[str]] = defaultdict(list)
+        for lanelet in self.lanelets:
+            if lanelet.users & CARS:
+                for ref in lanelet.members("regulatory_element"):
+                    lanelets_of[ref].append(lanelet.id)
+        regulations = []
+        for element in self.relations:
+            kind = self._rule_kind(element)
+            if kind is not None:
+                lanes = element.members("yield") or lanelets_of[element.id]
+                over = tuple(element.members("right_of_way"))
+                role = "refers" if element.tags.get("subtype") == "road_marking" else "ref_line"
+                ways = [ref for ref in element.members(role) if ref in self.ways]
+                rule = DraftRule(element.id, kind, tuple(lanes), over)
+                regulations.append(_Regulation(rule, tuple(ways)))
+        return regulations
 
+    @cached_property
+    def stop_lines(self) -> dict[str, list[str]]:
+        """The nodes of the ways that may be stop lines, without faulty ones."""
+        lines = {}
+        for regulation in self.regulations:
+            for ref in regulation.ways:
+                if ref not in lines:
+                    with self.faults.leaving_out("stop line", ref):
+                        lines[ref] = self._nodes_of(ref)
+        return lines
 
-def _users(tags: dict[str, str]) -> frozenset[str]:
-    """Who may use a lanelet: its participants, or else those of its subtype.
+    @cached_property
+    def positions(self) -> Positions:
+        """The positions of all nodes of borders and stop lines.
 
-    Where vehicles are named and bicycles are not, as in Autoware's maps, these follow the subtype.
-    """
-    usual = _BY_SUBTYPE.get(tags.get("subtype", "road"), frozenset())
-    if not any(key.startswith("participant:") for key in tags):
-        return usual
-    keys: dict[str, tuple[str, ...]] = {
-        user: (f"participant:vehicle:{'car' if user == 'van' else user}", "participant:vehicle")
-        for user in DRIVERS
-    }
-    keys["bicycle"] = (
-        "participant:bicycle",
-        *(("participant:vehicle",) if "bicycle" in usual else ()),
-    )
-    keys["pedestrian"] = ("participant:pedestrian",)
-    return frozenset(user for user, own in keys.items() if _first(tags, own) in ("yes", "true"))
+        Raises:
+            InputError: they have none, or the borders are too long.
+        """
+        refs = [ref for pair in self.borders.values() for ref in pair]
+        refuse_too_long(sum(len(self.ways[ref]) for ref in refs), self.file)
+        for_cars = {
+            ref
+            for lanelet in self.lanelets
+            if lanelet.users & CARS
+            for ref in self.borders.get(lanelet.id, ())
+        }
+        nodes_of = {ref: self._nodes_of(ref) for ref in refs}
+        central: dict[str, None] = {}  # in the order of the file
+        for ref, nodes in nodes_of.items():
+            if ref in for_cars:
+                central |= dict.fromkeys(nodes)
+        for nodes in self.stop_lines.values():
+            central |= dict.fromkeys(nodes)
+        used = dict(central)
+        for nodes in nodes_of.values():
+            used |= dict.fromkeys(nodes)
+        elements = [self.nodes[name] for name in used]
+        return positions_of(elements, len(central), self.file, self.faults)
 
+    def drafts(self) -> Iterator[Draft]:
+        """Yield the lanes, and those for both ways once for each."""
+        directed = []
+        for relation in self.lanelets:
+            if relation.id in self.borders:
+                with self.faults.leaving_out("lanelet", relation.id):
+                    left, right = map(self._border, self.borders[relation.id])
+                    lanelet = _Lanelet.of(relation, left, right)
+                    directed.append(lanelet)
+                    if relation.both_ways:
+                        directed.append(lanelet.turned())
+        limits = {relation.id: self._sign_limit(relation) for relation in self.relations}
+        return _drafts(directed, limits)
 
-def _is_for_both_ways(tags: dict[str, str]) -> bool:
-    """Whether those who drive may use a lanelet in both directions."""
-    kinds = ("vehicle:car", "vehicle") if _users(tags) & CARS else ("bicycle",)
-    one_way = _first(tags, (*(f"one_way:{kind}" for kind in kinds), "one_way"))
-    return bool(_users(tags) & DRIVERS) and one_way in ("no", "false")
+    def rules(self) -> Iterator[DraftRule]:
+        """Yield the rules with their lines."""
+        known = self.positions.metres
+        for regulation in self.regulations:
+            lines = [self.stop_lines[ref] for ref in regulation.ways if ref in self.stop_lines]
+            lines = [nodes for nodes in lines if known.keys() >= set(nodes)]
+            for nodes in lines:
+                points = np.array([known[name][:2] for name in nodes])
+                yield replace(regulation.rule, line=points)
+            if not lines:
+                yield regulation.rule
 
+    def other_signs(self) -> int:
+        """Return how many regulatory elements have another meaning."""
+        return sum(
+            relation.tags.get("type") == "regulatory_element"
+            and relation.tags.get("subtype") != "speed_limit"
+            and self._rule_kind(relation) is None
+            for relation in self.relations
+        )
 
-def _refs(relation: Element, ways: dict[str, Element]) -> list[str]:
-    """The ways of the left and the right border.
+    def _way_of(self, lanelet: _Relation, role: str) -> str:
+        """Return the way of a lanelet's border.
 
-    Raises:
-        InputError: there is not one of each, or it is not in the map.
-    """
-    refs = []
-    for role in ("left", "right"):
-        members = [member for member in relation.findall("member") if member.get("role") == role]
+        Raises:
+            InputError: there is not exactly one, or it is not in the map.
+        """
+        members = [
+            member for member in lanelet.element.findall("member") if member.get("role") == role
+        ]
         if len(members) != 1:
             raise InputError(
-                f"{relation.place}: lanelet {relation.attribute('id')} has {len(members)} members with role {role}; one is needed"
+                f"{lanelet.element.place}: lanelet {lanelet.id} has {len(members)} members with "
+                f"role {role}; one is needed"
             )
         ref = members[0].attribute("ref")
-        if ref not in ways:
+        if ref not in self.ways:
             raise InputError(f"{members[0].place}: way {ref} is not in the map")
-        refs.append(ref)
-    return refs
+        return ref
 
+    def _nodes_of(self, ref: str) -> list[str]:
+        """Return the nodes of a way.
 
-def _nodes(way: Element, nodes: dict[str, Element]) -> list[str]:
-    refs = [nd.attribute("ref") for nd in way.findall("nd")]
-    for ref in refs:
-        if ref not in nodes:
-            raise InputError(
-                f"{way.place}: way {way.attribute('id')} goes through node {ref}, which is not in the map"
-            )
-    if len(refs) < 2:
-        raise InputError(
-            f"{way.place}: way {way.attribute('id')} has {len(refs)} node(s); two are needed"
-        )
-    return refs
+        Raises:
+            InputError: one is not in the map, or there are less than two.
+        """
+        way = self.ways[ref]
+        nodes = [nd.attribute("ref") for nd in way.findall("nd")]
+        for name in nodes:
+            if name not in self.nodes:
+                raise InputError(f"{way.place}: node {name} of way {ref} is not in the map")
+        if len(nodes) < 2:
+            raise InputError(f"{way.place}: way {ref} has {len(nodes)} node(s); two are needed")
+        return nodes
 
+    def _border(self, ref: str) -> _Border:
+        """Return a way as a border.
 
-def _positions(
-    nodes: list[Element], count: int, file: str, faults: Faults
-) -> tuple[dict[str, Floats], Note, tuple[float, ...]]:
-    """Metres (3,) of each node by its id, x, y and its height; a note on how they were found; the origin in degrees.
-
-    Local coordinates are taken if most of the first `count` nodes have them, about whose middle the local frame lies else; nodes
-    of the other frame are faulty.
-
-    Raises:
-        InputError: no node has a position, or the nodes are far apart.
-    """
-    ids, tags = [node.attribute("id") for node in nodes], [_tags(node) for node in nodes]
-    has_local = [{"local_x", "local_y"} <= own.keys() for own in tags]
-    local = has_local[:count].count(True) * 2 > count
-    found: dict[str, Floats] = {}
-    for node, name, own, has in zip(nodes, ids, tags, has_local, strict=True):
-        with faults.leaving_out("node", name):
-            if local and not has:
+        Raises:
+            InputError: the position of one of its nodes is not known.
+        """
+        way, nodes = self.ways[ref], self._nodes_of(ref)
+        metres = self.positions.metres
+        for name in nodes:
+            if name not in metres:
                 raise InputError(
-                    f"{node.place}: node {name} has no tags local_x and local_y, but {has_local.count(True)} of {len(nodes)} "
-                    "have; two frames cannot be mixed"
+                    f"{way.place}: the position of node {name} in way {ref} is faulty"
                 )
-            if local:
-                place = [
-                    to_number(own[key], f"{node.place}, tag {key}")
-                    for key in ("local_x", "local_y")
-                ]
-            else:
-                place = [
-                    _degrees(node, key, most) for key, most in (("lat", 90.0), ("lon", 180.0))
-                ]
-            found[name] = np.array([*place, _height(own)])
-    if not found:
-        raise InputError(
-            faults.found[0][2] if faults.found else f"{file}: no lanelet for cars has borders"
-        )
-    if local:
-        return found, Note.of(NoteKind.LOCAL_TAGS), ()
-    degrees = np.array(list(found.values()))
-    about = np.isin(list(found), ids[:count])
-    latitude, longitude = middle_of(degrees[about, :2] if about.any() else degrees[:, :2])
-    metres = local_frame(degrees[:, 0], degrees[:, 1], (latitude, longitude))
-    size = float(np.hypot(metres[:, 0], metres[:, 1]).max())
-    if not size <= _FARTHEST:
-        if faults.found:  # degrees that are none: most likely metres
-            raise InputError(faults.found[0][2])
-        raise InputError(
-            f"{file}: its nodes are up to {size / 1000.0:.0f} km from their middle; at most {_FARTHEST / 1000.0:g} are read"
-        )
-    note = Note.of(NoteKind.PROJECTED, latitude=latitude, longitude=longitude)
-    return (
-        dict(zip(found, np.column_stack((metres, degrees[:, 2])), strict=True)),
-        note,
-        (latitude, longitude),
-    )
+        return _Border(way, tuple(nodes), np.array([metres[name] for name in nodes]))
 
+    def _rule_kind(self, relation: _Relation) -> RuleKind | None:
+        """Return the meaning of a regulatory element; None if it is not known."""
+        tags = relation.tags
+        if tags.get("type") != "regulatory_element":
+            return None
+        refs = relation.members("refers")
+        referred = [tags_of(self.ways[ref]) for ref in refs if ref in self.ways]
+        signs = [tags.get("sign_type", ""), *(each.get("subtype", "") for each in referred)]
+        kinds = [kind for kind in map(kind_of_sign, signs) if kind is not None]
+        is_stop_line = any(each.get("type") == "stop_line" for each in referred)
+        match tags.get("subtype"):
+            case "traffic_light":
+                return RuleKind.TRAFFIC_LIGHT
+            case "all_way_stop":
+                return RuleKind.STOP
+            case "right_of_way":
+                return RuleKind.STOP if RuleKind.STOP in kinds else RuleKind.GIVE_WAY
+            case "traffic_sign":
+                return next(iter(kinds), None)
+            case "road_marking" if is_stop_line:  # Autoware's
+                return RuleKind.STOP
+        return None
 
-def _height(tags: dict[str, str]) -> float:
-    """The height [m] that a node's tag `ele` says, NaN if it does not."""
-    try:
-        return float(tags.get("ele", "nan"))
-    except ValueError:
+    def _sign_limit(self, relation: _Relation) -> float:
+        """Return the limit [m/s] that a regulatory element sets, NaN if none.
+
+        It is given by its `sign_type`, or by the subtypes of its signs (de274-50).
+        """
+        tags = relation.tags
+        if tags.get("type") != "regulatory_element" or tags.get("subtype") != "speed_limit":
+            return math.nan
+        refs = [member.get("ref") for member in relation.element.findall("member")]
+        signs = [tags_of(self.ways[ref]) for ref in refs if ref in self.ways]
+        texts = [tags.get("sign_type", ""), tags.get("speed_limit", "")]
+        for text in (*texts, *(sign.get("subtype", "") for sign in signs)):
+            sign_name = re.fullmatch(r"(?:de)?274(?:\.1)?-([0-9]+)", text)
+            limit = float(sign_name[1]) * _MPS_PER_KMH if sign_name else speed_of(text, "km/h")
+            if not math.isnan(limit):
+                return limit
         return math.nan
 
 
-def _degrees(node: Element, key: str, most: float) -> float:
-    """A node's latitude or longitude."""
-    if not node.get(key, ""):
-        raise InputError(
-            f"{node.place}: node {node.attribute('id')} has neither tags local_x and local_y nor lat and lon"
-        )
-    value = node.number(key)
-    if abs(value) > most:
-        raise InputError(
-            f"{node.place}: {key} is {value:g}; degrees up to {most:g} are needed. A map in metres gives them in tags local_x "
-            "and local_y"
-        )
-    return value
+def lanes_of(root: Element) -> MapLanes:
+    """Return the lanes of a Lanelet2 map.
 
+    Positions are the tags `local_x` and `local_y` if most nodes of lanelets have them; otherwise
+    latitude and longitude are projected to the local frame about their middle.
 
-def _lanelet(relation: Element, tags: dict[str, str], borders: Sequence[_Border]) -> _Lanelet:
-    """A lanelet whose borders both go its way.
-
-    A file may have them either way round: they are turned so that begin lies at begin, and left is on the left.
+    Raises:
+        InputError: it is broken, has no usable coordinates, or no lanelet for cars; names file
+            and line.
     """
-    left, right = borders
-    a, b, c, d = left.points[0, :2], left.points[-1, :2], right.points[0, :2], right.points[-1, :2]
-    straight = float(np.hypot(*(a - c)) + np.hypot(*(b - d)))
-    if float(np.hypot(*(a - d)) + np.hypot(*(b - c))) < straight:
-        right = right.turned()
-    ring = np.concatenate((left.points, right.points[::-1]))
-    after = np.roll(ring, -1, axis=0)
-    if (
-        float((ring[:, 0] * after[:, 1] - ring[:, 1] * after[:, 0]).sum()) > 0.0
-    ):  # counter-clockwise: left lies on the right
-        left, right = left.turned(), right.turned()
-    return _Lanelet(relation.attribute("id"), relation, tags, left, right)
+    lanelet_map = LaneletMap.parse(root)
+    positions = lanelet_map.positions
+    return MapLanes(
+        list(lanelet_map.drafts()),
+        (positions.note,),
+        unsupported=lanelet_map.lanelet_count - len(lanelet_map.lanelets),
+        faults=lanelet_map.faults,
+        rules=list(lanelet_map.rules()),
+        other_signs=lanelet_map.other_signs(),
+        origin=positions.origin,
+    )
 
 
-def _drafts(lanelets: list[_Lanelet], limits: dict[str, float]) -> Iterator[Draft]:
-    """Lanelets with what the routing graph says: a lane follows where both borders go on, from the same two nodes."""
-    begins: dict[tuple[str, str], list[str]] = defaultdict(list)
-    on_left: dict[tuple[str, bool], list[str]] = defaultdict(
-        list
-    )  # border -> lanelets that have it on their left
-    on_right: dict[tuple[str, bool], list[str]] = defaultdict(list)
+def _drafts(lanelets: Sequence[_Lanelet], limits: dict[str, float]) -> Iterator[Draft]:
+    """Yield lanelets with the links of the routing graph.
+
+    A lane follows another if both of its borders begin at the nodes where the other's end.
+    """
+    by_first_nodes: dict[tuple[str, str], list[_Lanelet]] = defaultdict(list)
+    by_left: dict[tuple[str, bool], list[str]] = defaultdict(list)
+    by_right: dict[tuple[str, bool], list[str]] = defaultdict(list)
     for lanelet in lanelets:
-        begins[lanelet.left.nodes[0], lanelet.right.nodes[0]].append(lanelet.name)
-        on_left[lanelet.left.key].append(lanelet.name)
-        on_right[lanelet.right.key].append(lanelet.name)
+        by_first_nodes[lanelet.left.nodes[0], lanelet.right.nodes[0]].append(lanelet)
+        by_left[lanelet.left.key].append(lanelet.name)
+        by_right[lanelet.right.key].append(lanelet.name)
     for lanelet in lanelets:
         left, right = lanelet.left, lanelet.right
-        beside = []
-        if _may_change(right, to_right=True):
-            beside += on_left[right.key]
-        if _may_change(left, to_right=False):
-            beside += on_right[left.key]
-        after = begins[left.nodes[-1], right.nodes[-1]]
-        own = lanelet.name.removesuffix("r")
+        following = by_first_nodes[left.nodes[-1], right.nodes[-1]]
+        neighbours = []
+        if right.may_change(to_right=True):
+            neighbours += by_left[right.key]
+        if left.may_change(to_right=False):
+            neighbours += by_right[left.key]
+        relation = lanelet.relation
         yield Draft(
             id=lanelet.name,
             left=left.points,
             right=right.points,
-            successors=tuple(name for name in after if name.removesuffix("r") != own),
-            beside=tuple(beside),
-            speed_limit=_speed_limit(lanelet, limits),
-            junction=lanelet.tags.get("intersection_area", ""),
-            place=lanelet.relation.place,
-            users=_users(lanelet.tags),
-            crossing=lanelet.tags.get("subtype") == "crosswalk",
+            successors=tuple(other.name for other in following if other.relation is not relation),
+            neighbours=tuple(neighbours),
+            speed_limit=_speed_limit(relation, limits),
+            junction=relation.tags.get("intersection_area", ""),
+            place=relation.element.place,
+            users=relation.users,
+            crossing=relation.tags.get("subtype") == "crosswalk",
         )
 
 
-def _may_change(border: _Border, *, to_right: bool) -> bool:
-    """Whether traffic may cross a border, which its lane has on the side to which it goes."""
-    tags = _tags(border.way)
-    for key in (f"lane_change:{'right' if to_right else 'left'}", "lane_change"):
-        if key in tags:
-            return tags[key] in ("yes", "true")
-    if tags.get("type") not in ("line_thin", "line_thick"):
-        return False
-    from_left, from_right = _CHANGE.get(tags.get("subtype", ""), (False, False))
-    if not border.forth:
-        from_left, from_right = from_right, from_left
-    return from_left if to_right else from_right
-
-
-def _sign_limit(relation: Element, tags: dict[str, str], ways: dict[str, Element]) -> float:
-    """The limit [m/s] that a regulatory element sets, by its `sign_type` or its signs' subtypes (de274-50), NaN if none."""
-    if tags.get("type") != "regulatory_element" or tags.get("subtype") != "speed_limit":
-        return math.nan
-    texts = [tags.get("sign_type", ""), tags.get("speed_limit", "")]
-    signs = [
-        ways[member.attribute("ref")]
-        for member in relation.findall("member")
-        if member.get("ref") in ways
-    ]
-    for text in (*texts, *(_tags(sign).get("subtype", "") for sign in signs)):
-        sign = re.fullmatch(r"(?:de)?274(?:\.1)?-([0-9]+)", text)
-        speed = float(sign[1]) * _KMH if sign else speed_of(text, "km/h")
-        if not math.isnan(speed):
-            return speed
-    return math.nan
-
-
-def _speed_limit(lanelet: _Lanelet, limits: dict[str, float]) -> float:
-    own = speed_of(lanelet.tags.get("speed_limit", ""), "km/h")
-    if not math.isnan(own):
-        return own
-    members = [member.get("ref", "") for member in lanelet.relation.findall("member")]
-    signed = [limits[ref] for ref in members if not math.isnan(limits.get(ref, math.nan))]
-    usual = _LIMITS.get(
-        (lanelet.tags.get("subtype", "road"), lanelet.tags.get("location", "urban")), math.nan
-    )
-    return min(signed, default=usual)
+def _speed_limit(lanelet: _Relation, limits: dict[str, float]) -> float:
+    """Return the speed limit [m/s] of a lanelet: its tag, its signs, or the default; NaN if none."""
+    limit = speed_of(lanelet.tags.get("speed_limit", ""), "km/h")
+    if not math.isnan(limit):
+        return limit
+    refs = [member.get("ref", "") for member in lanelet.element.findall("member")]
+    signed = [limits[ref] for ref in refs if not math.isnan(limits.get(ref, math.nan))]
+    place = lanelet.tags.get("subtype", "road"), lanelet.tags.get("location", "urban")
+    default = _DEFAULT_LIMITS_KMH.get(place, math.nan) * _MPS_PER_KMH
+    return min(signed, default=default)

@@ -1,24 +1,27 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""A template on the lanes of a map: which chain of lanes each vehicle drives, and where on it the template begins.
+"""A recording on the lanes of a map: which lanes each vehicle follows, and where on them it starts.
 
-A placement as one piece (`search`) says about where; then each vehicle gets the chain of lanes that its path lies nearest to, in
-their direction, with at most one change of lanes where the map allows one. Along the chains the template keeps its distances
-to crossings and between vehicles on one lane (least squares, weighted).
+A rigid placement (`search`) says about where the recording lies. Each vehicle then gets the chain
+of lanes that its path is nearest to, with at most one lane change where the map allows it. A least
+squares problem moves the starts along the chains, so that distances to crossings and gaps between
+vehicles in one lane stay as recorded.
 """
 
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import islice, product
 import math
+from typing import NamedTuple
 
 import numpy as np
 
-from scenario_gen.numerics import Floats, runs, wrap_angle
+from scenario_gen.numerics import Floats, runs
 from scenario_gen.numerics.curve import crossings, Curve
-from scenario_gen.numerics.plane import angle_between, edge_lengths
-from scenario_gen.roads.vector.search import Spot
+from scenario_gen.numerics.plane import angle_between
+from scenario_gen.roads.vector.lane_graph import LaneChain, LaneGraph, LEAD_M
+from scenario_gen.roads.vector.search import RigidPlacement
 from scenario_gen.situation import (
     describe_turn,
     Equation,
@@ -30,83 +33,84 @@ from scenario_gen.situation import (
     turns_to_keep,
     WAIT_SPEED_MPS,
 )
-from scenario_gen.types import CARS, LaneNetwork, RuleKind
+from scenario_gen.types import LaneNetwork, RuleKind, TrafficRule
 
-NEAR = 8.0  # metres: a chain begins on a lane that passes a vehicle's start at most so far away
-_HEADING = math.radians(60.0)  # and is turned from it by this at most
-_MOST_CHAINS = 48  # from one lane, and
-_MOST_TRIED = 96  # of one vehicle: on recorded maps it has 15 at most
-_STEP = 0.5  # metres between a chain's points
-_SMOOTHED = 3  # points to either side of which a point is the mean: polylines have corners
-_SAMPLES = 24  # of a path that are compared with a chain
-_CAPPED = 100.0  # m²
-_YAW = 20.0  # m² per unit of 1 - cos
-_OWN_TURN = 40.0  # m² per rad²
-_ANY = ("", "")  # of lanes
-_OWN_LANE = 25.0  # m² by which a lane that is not for cars, but for a vehicle's type, is preferred
-_CHANGING = 4  # chains, the most alike, between which a change of lanes is looked for
-_PRIOR, _CROSSED, _MET, _BEYOND, _FOLLOWED = (
-    0.5,
-    1.0,
-    3.0,
-    0.25,
-    2.0,
-)  # weights: the place; crossings driven, or beyond the ends; gaps
-_STOPPED, _TURNED = (
-    4.0,
-    20.0,
-)  # weights of a stop before a line, and of a begin from which a vehicle turns as it does
-_OTHERWISE = math.radians(
-    12.0
-)  # that a vehicle turns more or less on a course, for which another begin is looked for
-_BEFORE, _PASSED = (
-    0.7,
-    6.0,
-)  # metres before a stop line where one stops; beyond it, where a stop is taken for one at it
-_WORTH = 1.5  # m² that a change of lanes must gain
-_TURN = math.radians(
-    40.0
-)  # a chain may turn by this much more or less than the vehicle in the template
-_CROSS = math.radians(15.0)  # least angle of a crossing
-_SAME = 2.0  # metres sideways within which two vehicles follow each other
-_ROOM = 1.0  # metres between a footprint and the end of the lanes
-_BLEND = 5.7735  # largest second derivative of x³(10 − 15x + 6x²)
-_SHIFT = 0.02  # 1/m, curvature of a change of lanes
-_FORTH = 25.0  # metres of lanes before and after what is driven
-_LOST, _LOST_DRIVEN = (
-    6.0,
-    18.0,
-)  # m² of a crossing that is none on the lanes: beyond the recorded ends; one that is driven
-_SPEEDING = 0.1  # m² per (m/s)² beyond the speed limit
-_BRAKED, _PULLED = (
-    4.0,
-    2.5,
-)  # m/s² with which a vehicle slows down for a bend, and speeds up after it
-_ASIDE = 3.0  # m/s² across, beyond which a bend counts against a place,
-_BENDING = 1.0  # m² per m/s² beyond, and
-_MOST_ASIDE = 10.0  # the most that counts
-_NO_GRIP = 9.0  # m/s² across that no car can drive
+
+@dataclass(frozen=True)
+class MatchCosts:
+    """The costs of differences between a recording and its lanes."""
+
+    max_squared_distance_m2: float = 100.0  # so that one far pose does not decide
+    yaw_m2: float = 20.0  # per unit of 1 - cos: 60° count as 3 m
+    turn_m2_per_rad2: float = 40.0  # of the turn from start to end
+    not_reserved_m2: float = 25.0  # for a bicycle beside its cycle lane
+    lost_crossing_m2: float = 6.0  # paths that would cross beyond their recorded ends
+    lost_driven_crossing_m2: float = 18.0
+    speeding_m2_per_mps2: float = 0.1  # (m/s)² above the speed limit
+    lateral_m2_per_mps2: float = 1.0  # m/s² above `comfortable_lateral_mps2`
+    comfortable_lateral_mps2: float = 3.0
+    max_lateral_excess_mps2: float = 10.0  # that costs
+    lane_change_gain_m2: float = 1.5  # that justifies a lane change
+
+
+@dataclass(frozen=True)
+class StartWeights:
+    """The weights of the equations for the starts, in units of 1/m."""
+
+    placement: float = 0.5  # stay where the rigid placement puts the vehicle
+    beyond_crossing: float = 0.25  # keep the distance to a crossing beyond the recorded ends
+    driven_crossing: float = 1.0
+    met_crossing: float = 3.0  # a crossing at which the two vehicles meet
+    gap: float = 2.0  # keep the gap to a vehicle in the same lane
+    stop_line: float = 4.0  # stop before the line
+    turn: float = 20.0  # turn as far as recorded
+
+
+@dataclass(frozen=True)
+class MatchLimits:
+    """Where two things count as the same, and what cars can drive."""
+
+    samples: int = 24  # of a path that are compared with a chain
+    chains: int = 96  # tried for a vehicle: recorded maps have at most 15
+    changing_chains: int = 4  # the best, between which lane changes are tried
+    turn_error_rad: float = math.radians(40.0)  # of a chain: more is another manoeuvre
+    noticeable_turn_error_rad: float = math.radians(12.0)  # from which another start is tried
+    crossing_angle_rad: float = math.radians(15.0)  # less is a merge
+    same_lane_m: float = 2.0  # sideways
+    end_room_m: float = 1.0  # between a footprint and the end of the lanes
+    before_stop_line_m: float = 0.7
+    past_stop_line_m: float = 6.0  # a stop within this distance is a stop at the line
+    lane_change_curvature_per_m: float = 0.02
+    braking_mps2: float = 4.0  # before a bend
+    accelerating_mps2: float = 2.5  # after a bend
+    grip_mps2: float = 9.0  # more lateral acceleration is impossible for cars
+
+
+COSTS = MatchCosts()
+WEIGHTS = StartWeights()
+LIMITS = MatchLimits()
+_STEP_M = 0.5
 
 
 @dataclass(frozen=True, eq=False)
-class Course:
-    """What one vehicle drives.
+class LanePath:
+    """The path of one vehicle along lanes.
 
     Attributes:
         lanes: the chain of lanes.
-        curve: their middle, around what is driven.
-        start: arc length [m] on the curve at which the template begins.
-        progress: (T,) metres from there at each of the template's samples.
+        curve: their centre line around the driven part.
+        start: arc length [m] on the curve at which the recording begins.
+        progress: (T,) [m] from there at each recorded sample.
     """
 
-    lanes: tuple[int, ...]
+    lanes: LaneChain
     curve: Curve
     start: float
     progress: Floats
 
     @property
     def end(self) -> float:
-        """Arc length [m] on the curve at which the template ends."""
+        """Arc length [m] on the curve at which the recording ends."""
         return self.start + float(self.progress[-1])
 
     @property
@@ -118,478 +122,466 @@ class Course:
 
 @dataclass(frozen=True, eq=False)
 class Match:
-    """A course for every vehicle.
+    """A lane path for every vehicle.
 
     Attributes:
-        courses: one for each vehicle; () where there is none for somebody.
-        cost: m², how badly they resemble the template.
-        reason: why it cannot be had, or "".
-        aside: m/s² of lateral acceleration that the template's speeds at the ends leave no way around (`pressed_aside`).
-        off_own: m², by which places count as worse where somebody does not drive on lanes of its own.
+        paths: one for each vehicle; () if a vehicle has none.
+        cost: [m²] how badly they resemble the recording.
+        reason: why it cannot be used, or "".
+        forced_lateral: [m/s²] the largest lateral acceleration that the recorded speeds at the
+            ends force (`lateral_acceleration`).
+        off_reserved_cost: [m²] the extra cost of vehicles that leave their reserved lanes.
     """
 
-    courses: tuple[Course, ...]
+    paths: tuple[LanePath, ...]
     cost: float
     reason: str
-    aside: float = 0.0
-    off_own: float = 0.0
+    forced_lateral: float = 0.0
+    off_reserved_cost: float = 0.0
 
 
-class Chains:
-    """The chains of lanes of one network, and their middles, each computed once."""
+class LateralAcceleration(NamedTuple):
+    """The largest lateral acceleration [m/s²], v² times curvature, of a vehicle on its lane path.
 
-    def __init__(self, network: LaneNetwork) -> None:
-        self.network = network
-        self.length = [float(edge_lengths(lane.centre).sum()) for lane in network.lanes]
-        self.points = np.concatenate([lane.centre[:-1] for lane in network.lanes])
-        self.yaws = np.concatenate([lane.yaw for lane in network.lanes])
-        self.height = np.concatenate([lane.height[:-1] for lane in network.lanes])
-        self.owner = np.repeat(
-            np.arange(len(network.lanes)), [len(lane.yaw) for lane in network.lanes]
-        )
-        self._curves: dict[tuple[int, ...], Curve] = {}
-        self._by_users: dict[frozenset[str], tuple[frozenset[int], frozenset[int]]] = {}
+    Attributes:
+        recorded: at the recorded speeds.
+        forced: at the lowest speeds that the recorded ones at both ends allow. A bend may be
+            driven more slowly than recorded, the ends may not.
+    """
 
-    def curve(self, chain: tuple[int, ...]) -> Curve:
-        """The middle of a chain."""
-        if chain not in self._curves:
-            self._curves[chain] = middle(
-                np.concatenate([self.network.lanes[k].centre for k in chain])
-            )
-        return self._curves[chain]
-
-    def after(self, chain: Sequence[int]) -> list[int]:
-        """The lanes that follow a chain and are not in it."""
-        return [k for k in self.network.lanes[chain[-1]].successors if k not in chain]
-
-    def closed_to(self, track: Track) -> frozenset[int]:
-        """The lanes that a vehicle may not use."""
-        return self._closed_and_own(track.vehicle.kind.lane_user)[0]
-
-    def own_of(self, track: Track) -> frozenset[int]:
-        """The lanes of a vehicle's own: those that it may use, and cars may not."""
-        return self._closed_and_own(track.vehicle.kind.lane_user)[1]
-
-    def _closed_and_own(self, users: frozenset[str]) -> tuple[frozenset[int], frozenset[int]]:
-        if users not in self._by_users:
-            closed = frozenset(
-                k for k, lane in enumerate(self.network.lanes) if not lane.open_to(users)
-            )
-            not_for_cars = frozenset(
-                k for k, lane in enumerate(self.network.lanes) if not lane.open_to(CARS)
-            )
-            self._by_users[users] = closed, not_for_cars - closed
-        return self._by_users[users]
-
-    def off_own(self, courses: Sequence[Course], tracks: Sequence[Track]) -> float:
-        """What it counts [m²] that vehicles do not drive on lanes of their own."""
-        own = map(self.own_of, tracks)
-        off = [
-            bool(lanes) and lanes.isdisjoint(course.lanes)
-            for lanes, course in zip(own, courses, strict=True)
-        ]
-        return _OWN_LANE * sum(off) / len(tracks)
-
-    def near(self, pose: Floats) -> list[int]:
-        """Lanes that pass a pose (3,) x, y [m], yaw [rad] nearby, about its way; the nearest first."""
-        away = np.hypot(self.points[:, 0] - pose[0], self.points[:, 1] - pose[1])
-        fits = (away <= NEAR) & (np.abs(wrap_angle(self.yaws - pose[2])) <= _HEADING)
-        nearest: dict[int, float] = {}
-        for k in np.flatnonzero(fits).tolist():
-            owner = int(self.owner[k])
-            nearest[owner] = min(nearest.get(owner, math.inf), round(float(away[k]), 6))
-        return sorted(nearest, key=lambda lane: (nearest[lane], lane))
-
-    def from_lane(
-        self, first: int, travelled: float, closed: Collection[int] = ()
-    ) -> Iterator[tuple[int, ...]]:
-        """Chains that begin before a lane and go on for what is travelled from it, or until the lanes that are not closed end."""
-        before: tuple[int, ...] = ()
-        reach, lane = 0.0, first
-        while reach < _FORTH and (
-            back := [k for k in self.network.predecessors[lane] if k not in closed]
-        ):
-            lane = back[0]
-            if lane in before or lane == first:
-                break
-            before, reach = (lane, *before), reach + self.length[lane]
-        open_chains: list[tuple[tuple[int, ...], float]] = [((first,), self.length[first])]
-        for _ in range(_MOST_CHAINS):
-            if not open_chains:
-                break
-            chain, length = open_chains.pop(0)
-            after = [k for k in self.after(chain) if k not in closed]
-            if not after or length > travelled + self.length[first] + _FORTH:
-                yield tuple(k for k in before if k not in chain) + chain
-            else:
-                open_chains += [((*chain, k), length + self.length[k]) for k in after]
+    recorded: float
+    forced: float
 
 
-def middle(points: Floats) -> Curve:
-    """A curve through the means of neighbouring points of a polyline (M, 2) [m]; its ends stay where they are."""
-    rough = Curve.through(points)
-    even = rough.cut(0.0, rough.length, _STEP).points[:, :2]
-    index = np.arange(len(even))
-    room = np.minimum(index, index[::-1])[
-        :, None
-    ]  # at the ends the window shrinks, on both sides alike
-    offset = np.arange(-_SMOOTHED, _SMOOTHED + 1)
-    return Curve.through(even[index[:, None] + np.clip(offset, -room, room)].mean(axis=1))
+class _Candidate(NamedTuple):
+    """A chain of lanes for one vehicle: its cost [m²], curve, and costs (K,) [m²] of the poses."""
+
+    chain: LaneChain
+    cost: float
+    curve: Curve
+    pose_costs: Floats
 
 
 def match(
-    chains: Chains,
+    graph: LaneGraph,
     tracks: Sequence[Track],
     met: PairConflicts,
-    spot: Spot,
+    placement: RigidPlacement,
     scale: float = 1.0,
     ends: Sequence[tuple[str, str]] = (),
     *,
-    own: bool = False,
+    prefer_reserved: bool = False,
 ) -> Iterator[Match]:
-    """Give every vehicle its course near a placement of the template as one piece.
+    """Yield lane paths for all vehicles near a rigid placement.
 
-    Yields one match, and where somebody turns otherwise there, another, in which it turns as it does: it may leave a crossing.
+    There is one match; if a vehicle would turn otherwise than recorded, there is a second one in
+    which it turns as recorded, and may leave a crossing.
 
     Args:
-        chains: of the map or the part of it.
-        tracks: the template.
-        met: its conflicts by their vehicles, see `track_conflicts`.
-        spot: where it lies.
+        graph: of the map or a part of it.
+        tracks: the recording.
+        met: its conflicts.
+        placement: where it lies.
         scale: s of eq 9, of the distances driven.
-        ends: by vehicle, the ids of the lanes by which it comes and goes, "" where any may be; (): any for all.
-        own: whether vehicles that have lanes of their own are laid on these, wherever there are some nearby.
+        ends: ids of the lanes by which each vehicle comes and goes, "" for any; (): any for all.
+        prefer_reserved: whether vehicles with reserved lanes are put onto these if some are near.
     """
-    courses = []
-    for track, named in zip(tracks, ends or [_ANY] * len(tracks), strict=True):
-        by = (
-            _ANY if own and chains.own_of(track) else named
-        )  # other lanes than those by which cars come and go
-        course = _course(chains, track, _placed(track, spot), scale, by, own=own)
-        if course is None:
-            yield Match(
-                (),
-                math.inf,
-                f"no lanes lead along the path of vehicle {track.vehicle.id}, from its start to its end",
+    paths = []
+    for track, named in zip(tracks, ends or [("", "")] * len(tracks), strict=True):
+        is_free = prefer_reserved and graph.reserved_for(track)  # the named lanes are for cars
+        path = _lane_path(
+            graph,
+            track,
+            _placed_poses(track, placement),
+            scale,
+            ("", "") if is_free else named,
+            prefer_reserved=prefer_reserved,
+        )
+        if path is None:
+            reason = (
+                f"no lanes lead along the path of vehicle {track.vehicle.id} from start to end"
             )
+            yield Match((), math.inf, reason)
             return
-        courses.append(course)
-    yield judged(
-        chains,
-        _tied(chains.network, courses, tracks, met, scale, [None] * len(courses)),
-        tracks,
-        spot,
+        paths.append(path)
+    yield _judged(
+        graph, _moved_starts(graph.network, paths, tracks, met, scale, []), tracks, placement
     )
-    begins = [_start_to_turn(course, track) for course, track in zip(courses, tracks, strict=True)]
-    if any(begin is not None for begin in begins):
-        yield judged(
-            chains, _tied(chains.network, courses, tracks, met, scale, begins), tracks, spot
+    turning = [
+        Equation(((i, 1.0),), start, WEIGHTS.turn)
+        for i, (path, track) in enumerate(zip(paths, tracks, strict=True))
+        if (start := _start_to_turn(path, track)) is not None
+    ]
+    if turning:
+        yield _judged(
+            graph,
+            _moved_starts(graph.network, paths, tracks, met, scale, turning),
+            tracks,
+            placement,
         )
 
 
-def _placed(track: Track, spot: Spot) -> Floats:
-    """Poses (K, 3) along a template's path, on the map."""
-    poses = track.curve.at(np.linspace(0.0, track.travelled, 1 if track.still else _SAMPLES))
-    return np.column_stack((spot.moved(poses[:, :2]), poses[:, 2] + spot.yaw))
+def _placed_poses(track: Track, placement: RigidPlacement) -> Floats:
+    """Return poses (K, 3) along a recorded path, on the map."""
+    count = 1 if track.still else LIMITS.samples
+    poses = track.curve.at(np.linspace(0.0, track.travelled, count))
+    return np.column_stack((placement.apply(poses[:, :2]), poses[:, 2] + placement.yaw))
 
 
-def _course(
-    chains: Chains, track: Track, poses: Floats, scale: float, ends: tuple[str, str], *, own: bool
-) -> Course | None:
-    """The chain of lanes that resembles a vehicle's path (K, 3) most, of those that come and go by lanes that are named."""
-    lanes, closed, favoured = (
-        chains.network.lanes,
-        chains.closed_to(track),
-        chains.own_of(track) if own else frozenset[int](),
-    )
-    exits = {k for k, lane in enumerate(lanes) if not ends[1] or lane.id == ends[1]}
-    firsts = [k for k, lane in enumerate(lanes) if lane.id == ends[0]] or [
-        k for k in chains.near(poses[0]) if k not in closed
-    ]
+def _lane_path(
+    graph: LaneGraph,
+    track: Track,
+    poses: Floats,
+    scale: float,
+    ends: tuple[str, str],
+    *,
+    prefer_reserved: bool,
+) -> LanePath | None:
+    """Return the path along lanes that resembles a vehicle's poses (K, 3) most, if there is any."""
+    reserved = graph.reserved_for(track) if prefer_reserved else frozenset[int]()
+    length = graph.length
     driven = scale * track.travelled
-    tried: dict[tuple[int, ...], tuple[float, Curve, Floats]] = {}
-    candidates = (
-        chain
-        for first in firsts
-        for chain in chains.from_lane(first, driven, closed)
-        if exits.intersection(chain)
-    )
-    for chain in dict.fromkeys(islice(candidates, _MOST_TRIED)):
-        curve = _around(chains.curve(chain), poses, driven)
-        misses = _misses(curve, poses)
-        tried[chain] = (float(misses.mean()) + _turn_cost(curve, poses), curve, misses)
-    length = chains.length
-    on_own = {
-        used: sum(length[k] for k in used if k in favoured) / sum(length[k] for k in used)
-        for used in tried
-    }
-    ranked = sorted(
-        tried, key=lambda chain: (round(tried[chain][0] - _OWN_LANE * on_own[chain], 6), chain)
-    )
+
+    def reserved_share(candidate: _Candidate) -> float:
+        whole = sum(length[k] for k in candidate.chain)
+        return sum(length[k] for k in candidate.chain if k in reserved) / whole
+
+    def rank(candidate: _Candidate) -> tuple[float, LaneChain]:
+        bonus = COSTS.not_reserved_m2 * reserved_share(candidate)
+        return round(candidate.cost - bonus, 6), candidate.chain
+
+    ranked = sorted(_candidates(graph, track, poses, driven, ends), key=rank)
     if not ranked:
         return None
-    cost, curve, _ = tried[ranked[0]]
-    used = ranked[0]
-    for before, after in (
-        product(ranked[:_CHANGING], repeat=2) if not track.still and not on_own[used] else ()
-    ):
-        change = _change(tried[before][2], tried[after][2])
-        if (
-            change is not None
-            and change[1] < cost - _WORTH
-            and _beside(chains.network, before, after)
-        ):
-            changed = changed_curve(tried[before][1], tried[after][1], poses[change[0], :2])
-            if changed is not None:
-                cost, curve, used = change[1], changed, tuple(dict.fromkeys((*before, *after)))
-    station, _ = curve.project(poses[:, :2])
+    best = ranked[0]
+    if not track.still and not reserved_share(best):
+        best = _best_lane_change(graph.network, ranked[: LIMITS.changing_chains], poses)
+    station, _ = best.curve.project(poses[:, :2])
     start = float(np.median(station - np.linspace(0.0, driven, len(station))))
-    return Course(used, curve, start, scale * track.progress)
+    return LanePath(best.chain, best.curve, start, scale * track.progress)
 
 
-def _around(curve: Curve, poses: Floats, driven: float) -> Curve:
-    """The part of a chain around a path (K, 3), with what lies before and after it."""
-    station, _ = curve.project(poses[:1, :2])
-    low, high = (
-        max(float(station[0]) - _FORTH, 0.0),
-        min(float(station[0]) + 1.1 * driven + 2.0 * _FORTH, curve.length),
+def _candidates(
+    graph: LaneGraph, track: Track, poses: Floats, driven: float, ends: tuple[str, str]
+) -> Iterator[_Candidate]:
+    """Yield the chains from lanes near the first pose, or from the lane with the id `ends[0]`."""
+    lanes, closed = graph.network.lanes, graph.closed_to(track)
+    exits = {k for k, lane in enumerate(lanes) if not ends[1] or lane.id == ends[1]}
+    firsts = [k for k, lane in enumerate(lanes) if lane.id == ends[0]]
+    if not firsts:
+        firsts = [k for k in graph.near(poses[0]) if k not in closed]
+    chains = (
+        chain
+        for first in firsts
+        for chain in graph.chains_from(first, driven, closed)
+        if exits.intersection(chain)
     )
-    return curve.cut(low, high) if high - low > _STEP else curve
+    for chain in dict.fromkeys(islice(chains, LIMITS.chains)):
+        curve = _part_around(graph.curve(chain), poses, driven)
+        costs = _pose_costs(curve, poses)
+        yield _Candidate(chain, float(costs.mean()) + _turn_cost(curve, poses), curve, costs)
+
+
+def _part_around(curve: Curve, poses: Floats, driven: float) -> Curve:
+    """Return the part of a lane path around poses (K, 3), with some of it before and after."""
+    station, _ = curve.project(poses[:1, :2])
+    low = max(float(station[0]) - LEAD_M, 0.0)
+    high = min(float(station[0]) + 1.1 * driven + 2.0 * LEAD_M, curve.length)
+    return curve.cut(low, high) if high - low > _STEP_M else curve
 
 
 def _turn_cost(curve: Curve, poses: Floats) -> float:
-    """How differently [m²] a chain turns over a path."""
+    """Return the cost [m²] of a lane path that turns otherwise than the poses (K, 3)."""
     station, _ = curve.project(poses[[0, -1], :2])
     yaw = curve.at(np.clip(station, 0.0, curve.length))[:, 2]
-    return float(_OWN_TURN * np.square((yaw[1] - yaw[0]) - (poses[-1, 2] - poses[0, 2])))
+    error = (yaw[1] - yaw[0]) - (poses[-1, 2] - poses[0, 2])
+    return float(COSTS.turn_m2_per_rad2 * np.square(error))
 
 
-def _misses(curve: Curve, poses: Floats) -> Floats:
-    """How badly (K,) [m²] poses agree with a curve."""
+def _pose_costs(curve: Curve, poses: Floats) -> Floats:
+    """Return how badly (K,) [m²] poses (K, 3) agree with a curve."""
     station, offset = curve.project(poses[:, :2])
-    off = poses[:, 2] - curve.at(station)[:, 2]
+    turn = poses[:, 2] - curve.at(station)[:, 2]
     beyond = np.maximum(-station, 0.0) + np.maximum(station - curve.length, 0.0)
-    return np.asarray(
-        np.minimum(np.square(offset) + np.square(beyond), _CAPPED) + _YAW * (1.0 - np.cos(off))
-    )
+    squared = np.square(offset) + np.square(beyond)
+    capped = np.minimum(squared, COSTS.max_squared_distance_m2)
+    return np.asarray(capped + COSTS.yaw_m2 * (1.0 - np.cos(turn)))
 
 
-def _change(before: Floats, after: Floats) -> tuple[int, float] | None:
-    """At which sample (not the first or last) to change from one chain to another, and the mean miss then [m²]."""
-    forth = np.cumsum(before)[:-1] + (after.sum() - np.cumsum(after))[:-1]
-    k = int(np.argmin(forth))
-    return (k, float(forth[k]) / len(before)) if 2 <= k < len(before) - 3 else None
+def _best_lane_change(
+    network: LaneNetwork, ranked: Sequence[_Candidate], poses: Floats
+) -> _Candidate:
+    """Return the best candidate, or a change between two of them that is sufficiently better."""
+    best = ranked[0]
+    for before, after in product(ranked, repeat=2):
+        k, cost = _change_sample(before.pose_costs, after.pose_costs)
+        worth = cost < best.cost - COSTS.lane_change_gain_m2
+        if worth and _may_change(network, before.chain, after.chain):
+            curve = lane_change_curve(before.curve, after.curve, poses[k, :2])
+            if curve is not None:
+                chain = tuple(dict.fromkeys((*before.chain, *after.chain)))
+                best = _Candidate(chain, cost, curve, before.pose_costs)
+    return best
 
 
-def _beside(network: LaneNetwork, chain: tuple[int, ...], other: tuple[int, ...]) -> bool:
-    """Whether traffic may change from a chain to another."""
+def _change_sample(before: Floats, after: Floats) -> tuple[int, float]:
+    """Return the sample at which to change between two chains, and the mean cost [m²].
+
+    The cost is infinite if the sample is one of the first two or the last three.
+    """
+    total = np.cumsum(before)[:-1] + (after.sum() - np.cumsum(after))[:-1]
+    k = int(np.argmin(total))
+    inner = 2 <= k < len(before) - 3
+    return k, float(total[k]) / len(before) if inner else math.inf
+
+
+def _may_change(network: LaneNetwork, chain: LaneChain, other: LaneChain) -> bool:
+    """Return whether traffic may change from a chain to another."""
     return any(k in network.lanes[lane].beside for lane in chain for k in other)
 
 
-def changed_curve(first: Curve, second: Curve, at: Floats) -> Curve | None:
-    """A curve that changes smoothly (x³(10 − 15x + 6x²)) from one curve to another around a place (2,) [m]."""
+def lane_change_curve(first: Curve, second: Curve, at: Floats) -> Curve | None:
+    """Return a smooth change from one curve to another around a place (2,) [m].
+
+    The blend is x³(10 - 15x + 6x²), whose largest second derivative is 5.7735.
+    """
     station = float(first.project(at[None])[0][0])
     _, offset = second.project(first.at(np.array([station]))[:, :2])
     width = abs(float(offset[0]))
-    reach = math.sqrt(max(width, 0.1) * _BLEND / _SHIFT)
-    s = np.arange(0.0, first.length + 1e-9, _STEP)
-    here = first.at(s)
-    there, _ = second.project(here[:, :2])
+    reach = math.sqrt(max(width, 0.1) * 5.7735 / LIMITS.lane_change_curvature_per_m)
+    s = np.arange(0.0, first.length + 1e-9, _STEP_M)
+    points = first.at(s)[:, :2]
+    station_on_second, _ = second.project(points)
     x = np.clip((s - station) / reach + 0.5, 0.0, 1.0)
     share = x**3 * (10.0 - 15.0 * x + 6.0 * np.square(x))
-    target = second.at(there)[:, :2]
-    kept = (s < station) | ((there > 0.0) & (there < second.length))
-    mixed = (here[:, :2] + share[:, None] * (target - here[:, :2]))[kept]
-    return Curve.through(mixed) if len(mixed) > 3 else None
+    target = second.at(station_on_second)[:, :2]
+    on_second = (station_on_second > 0.0) & (station_on_second < second.length)
+    blended = (points + share[:, None] * (target - points))[(s < station) | on_second]
+    return Curve.through(blended) if len(blended) > 3 else None
 
 
-def _tied(
+def _moved_starts(
     network: LaneNetwork,
-    courses: list[Course],
+    paths: list[LanePath],
     tracks: Sequence[Track],
     met: PairConflicts,
     scale: float,
-    begins: Sequence[float | None],
-) -> list[Course]:
-    """Shift the beginnings so that crossings and gaps on one lane are as far along as in the template (least squares).
-
-    `begins` [m] are those from which vehicles turn as far as in the template, if any; they may leave a crossing behind.
-    Who stops a little beyond a stop line in the template stops before it.
-    """
-    known = [Equation(((i, 1.0),), course.start, _PRIOR) for i, course in enumerate(courses)]
+    turning: Sequence[Equation],
+) -> list[LanePath]:
+    """Move the starts so that crossings and gaps are as far along as recorded (least squares)."""
+    known = [Equation(((i, 1.0),), path.start, WEIGHTS.placement) for i, path in enumerate(paths)]
     crossing_of = {(a, b): crossing for a, b, crossing in pair_crossings(tracks)}
     for a in range(len(tracks)):
         for b in range(a):
-            crossing = crossing_of.get((a, b))
-            crossing_points = (
-                crossings(courses[a].curve, courses[b].curve, _CROSS) if crossing else ()
-            )
-            if crossing and len(crossing_points):
+            if crossing := crossing_of.get((a, b)):
                 along = scale * np.array([crossing.first, crossing.second])
-                target = np.array([courses[a].start, courses[b].start]) + along
-                at = (
-                    crossing_points[int(np.argmin(np.abs(crossing_points - target).sum(axis=1)))]
-                    - along
-                )
-                weight = (
-                    _CROSSED
-                    if crossing.driven
-                    else _MET
-                    if (b, a) in met and not met[b, a].following
-                    else _BEYOND
-                )
-                known += [
-                    Equation(((i, 1.0),), float(station), weight)
-                    for i, station in zip((a, b), at, strict=True)
-                ]
-            for first, second in ((a, b), (b, a)):
-                gap = _follows(tracks[first], tracks[second])
-                if gap is None:
-                    continue
-                station, offset = courses[second].curve.project(
-                    courses[first].curve.at(np.array([courses[first].start]))[:, :2]
-                )
-                if (
-                    abs(float(offset[0])) < _SAME
-                ):  # of `first`, its start lies so far along the course of `second`
-                    shift = float(station[0]) - courses[first].start
-                    known.append(
-                        Equation(((first, 1.0), (second, -1.0)), scale * gap - shift, _FOLLOWED)
-                    )
-    for i, (course, track, begin) in enumerate(zip(courses, tracks, begins, strict=True)):
-        known += [] if begin is None else [Equation(((i, 1.0),), begin, _TURNED)]
+                meeting = met.get((b, a))
+                weight = WEIGHTS.beyond_crossing
+                if crossing.driven:
+                    weight = WEIGHTS.driven_crossing
+                elif meeting is not None and not meeting.following:
+                    weight = WEIGHTS.met_crossing
+                known += _crossing_equations(paths, (a, b), along, weight)
+            known += _gap_equations(paths, tracks, (a, b), scale)
+            known += _gap_equations(paths, tracks, (b, a), scale)
+    turning_of = {equation.terms[0][0]: equation for equation in turning}
+    for i, (path, track) in enumerate(zip(paths, tracks, strict=True)):
+        known += [turning_of[i]] if i in turning_of else []
         known += [
-            Equation(((i, 1.0),), start, _STOPPED)
-            for start in _starts_to_stop(network, course, track, scale)
+            Equation(((i, 1.0),), start, WEIGHTS.stop_line)
+            for start in _starts_to_stop(network, path, track, scale)
         ]
-    starts = solve_placement(range(len(courses)), known)
-    return [replace(course, start=starts[i]) for i, course in enumerate(courses)]
+    starts = solve_placement(range(len(paths)), known)
+    return [replace(path, start=starts[i]) for i, path in enumerate(paths)]
+
+
+def _crossing_equations(
+    paths: list[LanePath], pair: tuple[int, int], along: Floats, weight: float
+) -> list[Equation]:
+    """Return the equations that keep the distances `along` (2,) [m] to a crossing, if it is left."""
+    first, second = (paths[k] for k in pair)
+    stations = crossings(first.curve, second.curve, LIMITS.crossing_angle_rad)
+    if not len(stations):
+        return []
+    expected = np.array([first.start, second.start]) + along
+    nearest = stations[int(np.argmin(np.abs(stations - expected).sum(axis=1)))]
+    starts = (nearest - along).tolist()
+    return [Equation(((i, 1.0),), start, weight) for i, start in zip(pair, starts, strict=True)]
+
+
+def _gap_equations(
+    paths: list[LanePath], tracks: Sequence[Track], pair: tuple[int, int], scale: float
+) -> list[Equation]:
+    """Return the equation that keeps the gap of a follower to its leader, if it is one."""
+    follower, leader = pair
+    gap = _recorded_gap(tracks[follower], tracks[leader])
+    if gap is None:
+        return []
+    start = paths[follower].curve.at(np.array([paths[follower].start]))[:, :2]
+    station, offset = paths[leader].curve.project(start)
+    if abs(float(offset[0])) >= LIMITS.same_lane_m:
+        return []
+    shift = float(station[0]) - paths[follower].start
+    return [Equation(((follower, 1.0), (leader, -1.0)), scale * gap - shift, WEIGHTS.gap)]
+
+
+def _recorded_gap(track: Track, leader: Track) -> float | None:
+    """Return how far [m] along the leader's path the track's path begins, if it begins on it."""
+    start = track.curve.at(0.0)
+    station, offset = leader.curve.project(start[None, :2])
+    turn = abs(angle_between(leader.curve.at(float(station[0]))[2], start[2]))
+    in_lane = abs(float(offset[0])) < LIMITS.same_lane_m and turn < math.radians(30.0)
+    return float(station[0]) if in_lane and 0.0 <= station[0] <= leader.travelled else None
 
 
 def _starts_to_stop(
-    network: LaneNetwork, course: Course, track: Track, scale: float
+    network: LaneNetwork, path: LanePath, track: Track, scale: float
 ) -> Iterator[float]:
-    """Begins [m] of a course from which a vehicle stops before a stop line that it passes a little before it stops."""
+    """Yield the starts [m] with which a vehicle stops before a line instead of just past it."""
+    if track.still:
+        return
     rules = [
         rule
         for rule in network.rules
-        if rule.kind == RuleKind.STOP and set(rule.lanes) & set(course.lanes)
+        if rule.kind == RuleKind.STOP and not set(rule.lanes).isdisjoint(path.lanes)
     ]
-    first = (
-        [a for a, _ in runs((track.speed < WAIT_SPEED_MPS) & track.is_present)]
-        if rules and not track.still
+    stops = (
+        [first for first, _ in runs((track.speed < WAIT_SPEED_MPS) & track.is_present)]
+        if rules
         else []
     )
     for rule in rules:
-        station, offset = course.curve.project(rule.line.mean(axis=0)[None])
-        if abs(float(offset[0])) > _SAME:
+        station = _station_of_line(path, rule)
+        if station is None:
             continue
-        for k in first:
-            ahead = scale * float(track.progress[k]) + track.vehicle.length / 2.0
-            beyond = course.start + ahead - float(station[0])
-            if -_BEFORE < beyond < _PASSED:
-                yield float(station[0]) - ahead - _BEFORE
+        for k in stops:
+            front = scale * float(track.progress[k]) + track.vehicle.length / 2.0
+            past = path.start + front - station
+            if -LIMITS.before_stop_line_m < past < LIMITS.past_stop_line_m:
+                yield station - front - LIMITS.before_stop_line_m
 
 
-def _start_to_turn(course: Course, track: Track) -> float | None:
-    """The begin [m] nearest to a course's own from which it turns as the vehicle does; None if it does anyway, or from none."""
-    turn, driven = float(np.mean(turns_to_keep(track))), float(course.progress[-1])
-    if track.still or abs(course.turn - turn) < _OTHERWISE:
-        return None
-    starts = np.arange(0.0, max(course.curve.length - driven, 0.0), _STEP)
-    more = course.curve.at(starts + driven)[:, 2] - course.curve.at(starts)[:, 2] - turn
-    alike = starts[np.abs(more) < _OTHERWISE / 2.0]
-    return float(alike[np.argmin(np.abs(alike - course.start))]) if len(alike) else None
+def _station_of_line(path: LanePath, rule: TrafficRule) -> float | None:
+    """Return the arc length [m] at which a path meets a stop line, if it does."""
+    station, offset = path.curve.project(rule.line.mean(axis=0)[None])
+    return float(station[0]) if abs(float(offset[0])) <= LIMITS.same_lane_m else None
 
 
-def _follows(track: Track, leader: Track) -> float | None:
-    """How far along the leader's path the track's path begins, if it begins on it."""
-    start = track.curve.at(0.0)
-    station, offset = leader.curve.project(start[None, :2])
-    turned = abs(angle_between(leader.curve.at(float(station[0]))[2], start[2]))
-    on = (
-        abs(float(offset[0])) < _SAME
-        and turned < math.radians(30.0)
-        and 0.0 <= station[0] <= leader.travelled
-    )
-    return float(station[0]) if on else None
+def _start_to_turn(path: LanePath, track: Track) -> float | None:
+    """Return the nearest start [m] from which the vehicle turns as recorded.
 
-
-def judged(
-    chains: Chains, courses: Sequence[Course], tracks: Sequence[Track], spot: Spot
-) -> Match:
-    """Say how well courses resemble the template, and what is lost."""
-    cost, reason = 0.0, ""
-    for course, track in zip(courses, tracks, strict=True):
-        half = track.vehicle.length / 2.0 + _ROOM
-        short = max(half - course.start, course.end + half - course.curve.length)
-        if short > 0.0:
-            reason = (
-                reason or f"the lanes of vehicle {track.vehicle.id} end {short:.1f} m too soon"
-            )
-        if abs(course.turn - turn_of(track)) > _TURN:
-            there = describe_turn(course.turn)
-            reason = (
-                reason
-                or f"vehicle {track.vehicle.id} {describe_turn(turn_of(track))} in the recording, {there} there"
-            )
-        poses = _placed(track, spot)
-        fitted = course.curve.at(np.linspace(course.start, course.end, len(poses)))
-        miss = np.minimum(
-            np.square(fitted[:, 0] - poses[:, 0]) + np.square(fitted[:, 1] - poses[:, 1]), _CAPPED
-        )
-        turned = 1.0 - np.cos(fitted[:, 2] - poses[:, 2])
-        cost += float(miss.mean() + _YAW * turned.mean()) / len(tracks)
-    for a, b, crossing in pair_crossings(tracks):
-        if not len(crossings(courses[a].curve, courses[b].curve, _CROSS)):
-            cost += _LOST_DRIVEN if crossing.driven else _LOST
-    aside = [pressed_aside(course, track) for course, track in zip(courses, tracks, strict=True)]
-    for (_, forced), track in zip(aside, tracks, strict=True):
-        if forced > _NO_GRIP:
-            reason = (
-                reason or f"the lanes bend too sharply for the speed of vehicle {track.vehicle.id}"
-            )
-    cost += speeding(chains.network, courses, tracks) + bending([usual for usual, _ in aside])
-    return Match(
-        tuple(courses),
-        cost,
-        reason,
-        max(forced for _, forced in aside),
-        chains.off_own(courses, tracks),
-    )
-
-
-def pressed_aside(course: Course, track: Track) -> tuple[float, float]:
-    """Return the largest lateral acceleration [m/s²], v² times curvature, that a vehicle has on a course.
-
-    The first is that with the template's speeds; the second that with the least speeds which those at both ends allow, at
-    `_BRAKED` from the first on and `_PULLED` up to the last: a bend may be driven more slowly than the template drives there,
-    the ends may not.
+    It is None if the vehicle does so already, or from no start.
     """
-    driven = float(course.progress[-1])
-    if track.still or driven < _STEP:
-        return 0.0, 0.0
+    turn, driven = float(np.mean(turns_to_keep(track))), float(path.progress[-1])
+    if track.still or abs(path.turn - turn) < LIMITS.noticeable_turn_error_rad:
+        return None
+    starts = np.arange(0.0, max(path.curve.length - driven, 0.0), _STEP_M)
+    error = path.curve.at(starts + driven)[:, 2] - path.curve.at(starts)[:, 2] - turn
+    alike = starts[np.abs(error) < LIMITS.noticeable_turn_error_rad / 2.0]
+    return float(alike[np.argmin(np.abs(alike - path.start))]) if len(alike) else None
+
+
+def _judged(
+    graph: LaneGraph,
+    paths: Sequence[LanePath],
+    tracks: Sequence[Track],
+    placement: RigidPlacement,
+) -> Match:
+    """Return the match of lane paths, with its cost and the reason against it."""
+    driven = list(zip(paths, tracks, strict=True))
+    cost = 0.0
+    for path, track in driven:
+        cost += _resemblance_cost(path, _placed_poses(track, placement)) / len(tracks)
+    for a, b, crossing in pair_crossings(tracks):
+        if not len(crossings(paths[a].curve, paths[b].curve, LIMITS.crossing_angle_rad)):
+            lost = COSTS.lost_driven_crossing_m2 if crossing.driven else COSTS.lost_crossing_m2
+            cost += lost
+    lateral = [lateral_acceleration(path, track) for path, track in driven]
+    cost += speeding_cost(graph.network, paths, tracks) + bend_cost(lateral)
+    reasons = [reason for path, track in driven for reason in _misfits(path, track)]
+    reasons += [
+        f"the lanes bend too sharply for the speed of vehicle {track.vehicle.id}"
+        for each, track in zip(lateral, tracks, strict=True)
+        if each.forced > LIMITS.grip_mps2
+    ]
+    return Match(
+        tuple(paths),
+        cost,
+        next(iter(reasons), ""),
+        max(each.forced for each in lateral),
+        off_reserved_cost(graph, paths, tracks),
+    )
+
+
+def _misfits(path: LanePath, track: Track) -> Iterator[str]:
+    """Yield the reasons against the lane path of a vehicle."""
+    vehicle = track.vehicle
+    half = vehicle.length / 2.0 + LIMITS.end_room_m
+    short = max(half - path.start, path.end + half - path.curve.length)
+    if short > 0.0:
+        yield f"the lanes of vehicle {vehicle.id} are {short:.1f} m too short"
+    recorded = turn_of(track)
+    if abs(path.turn - recorded) > LIMITS.turn_error_rad:
+        yield (
+            f"vehicle {vehicle.id} {describe_turn(recorded)} in the recording, "
+            f"{describe_turn(path.turn)} on these lanes"
+        )
+
+
+def _resemblance_cost(path: LanePath, poses: Floats) -> float:
+    """Return the mean cost [m²] of the driven part of a path that differs from poses (K, 3)."""
+    driven = path.curve.at(np.linspace(path.start, path.end, len(poses)))
+    squared = np.square(driven[:, 0] - poses[:, 0]) + np.square(driven[:, 1] - poses[:, 1])
+    capped = np.minimum(squared, COSTS.max_squared_distance_m2)
+    turned = 1.0 - np.cos(driven[:, 2] - poses[:, 2])
+    return float(capped.mean() + COSTS.yaw_m2 * turned.mean())
+
+
+def off_reserved_cost(
+    graph: LaneGraph, paths: Sequence[LanePath], tracks: Sequence[Track]
+) -> float:
+    """Return the cost [m²] of vehicles with reserved lanes that do not follow them."""
+    off = 0
+    for path, track in zip(paths, tracks, strict=True):
+        reserved = graph.reserved_for(track)
+        off += bool(reserved) and reserved.isdisjoint(path.lanes)
+    return COSTS.not_reserved_m2 * off / len(tracks)
+
+
+def lateral_acceleration(path: LanePath, track: Track) -> LateralAcceleration:
+    """Return the largest lateral accelerations [m/s²] of a vehicle on its lane path."""
+    driven = float(path.progress[-1])
+    if track.still or driven < _STEP_M:
+        return LateralAcceleration(0.0, 0.0)
     at = np.linspace(0.0, driven, max(math.ceil(driven), 1) + 1)
-    turned = np.abs(np.diff(course.curve.at(course.start + at)[:, 2]))
-    curvature, middle_at = turned / np.diff(at), (at[1:] + at[:-1]) / 2.0
+    turned = np.abs(np.diff(path.curve.at(path.start + at)[:, 2]))
+    curvature = turned / np.diff(at)
+    middle = (at[1:] + at[:-1]) / 2.0
     speed = track.speed * (driven / float(track.progress[-1]))
-    squared = np.square(np.interp(middle_at, course.progress, speed))
+    recorded = np.square(np.interp(middle, path.progress, speed))
     first, last = float(np.square(speed[0])), float(np.square(speed[-1]))
-    least = np.maximum(
-        first - 2.0 * _BRAKED * middle_at, last - 2.0 * _PULLED * (driven - middle_at)
+    lowest = np.maximum(
+        first - 2.0 * LIMITS.braking_mps2 * middle,
+        last - 2.0 * LIMITS.accelerating_mps2 * (driven - middle),
     ).clip(min=0.0)
-    return float((curvature * squared).max()), float((curvature * least).max())
+    return LateralAcceleration(
+        float((curvature * recorded).max()), float((curvature * lowest).max())
+    )
 
 
-def bending(aside: Sequence[float]) -> float:
-    """What it counts [m²] that bends would be driven faster than is comfortable; `aside` [m/s²] as of `pressed_aside`."""
-    return _BENDING * float(np.mean(np.clip(np.array(aside) - _ASIDE, 0.0, _MOST_ASIDE)))
+def bend_cost(lateral: Sequence[LateralAcceleration]) -> float:
+    """Return the cost [m²] of bends that the recorded speeds make uncomfortable."""
+    excess = np.array([each.recorded for each in lateral]) - COSTS.comfortable_lateral_mps2
+    capped = np.clip(excess, 0.0, COSTS.max_lateral_excess_mps2)
+    return COSTS.lateral_m2_per_mps2 * float(np.mean(capped))
 
 
-def speeding(network: LaneNetwork, courses: Sequence[Course], tracks: Sequence[Track]) -> float:
-    """What it counts [m²] that vehicles would drive faster than the highest limit of their lanes."""
-    over = []
-    for course, track in zip(courses, tracks, strict=True):
-        limit = max((network.lanes[k].speed_limit for k in course.lanes), default=math.nan)
-        over.append(max(float(track.speed.max()) - limit, 0.0) if limit > 0.0 else 0.0)
-    return _SPEEDING * float(np.mean(np.square(over)))
+def speeding_cost(
+    network: LaneNetwork, paths: Sequence[LanePath], tracks: Sequence[Track]
+) -> float:
+    """Return the cost [m²] of vehicles that are faster than the highest limit of their lanes."""
+    excess = []
+    for path, track in zip(paths, tracks, strict=True):
+        limit = max((network.lanes[k].speed_limit for k in path.lanes), default=math.nan)
+        excess.append(max(float(track.speed.max()) - limit, 0.0) if limit > 0.0 else 0.0)
+    return COSTS.speeding_m2_per_mps2 * float(np.mean(np.square(excess)))

@@ -1,67 +1,50 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""OpenDRIVE maps (.xodr), 1.4 to 1.8: lanes along reference lines, linked from road to road and through junctions.
+"""OpenDRIVE maps (.xodr), versions 1.4 to 1.8: lanes along reference lines, linked to each other.
 
-A lane is named road.section.lane, e.g. 5.0.-1. The road is seen from above; its elevation says which lanes can meet.
+A lane is named road.section.lane, e.g. 5.0.-1. The road is seen from above; its elevation tells
+which lanes can meet.
+
 Source: ASAM OpenDRIVE 1.8, chapters "Roads", "Lanes" and "Junctions".
 """
 
 from collections import defaultdict
 from collections.abc import Iterator
 import math
-import re
+from typing import NamedTuple
 
 import numpy as np
 
 from scenario_gen.base.errors import InputError
 from scenario_gen.base.xml_reader import Element
-from scenario_gen.numerics import Floats
 from scenario_gen.roads.vector.crosswalks import crosswalks
-from scenario_gen.roads.vector.network import (
+from scenario_gen.roads.vector.drafts import (
     by_id,
     Draft,
     Faults,
     MapLanes,
-    MOST_LINKS,
-    MOST_SECTIONS,
+    MAX_LINKS_COUNT,
+    MAX_SECTIONS_COUNT,
     refuse_too_long,
     refuse_too_many_lanes,
     TooLargeError,
 )
+from scenario_gen.roads.vector.opendrive_signals import other_signals, priorities, signal_rules
 from scenario_gen.roads.vector.plan_view import reference_line
 from scenario_gen.roads.vector.sections import (
-    FOR_CARS,
+    CROSS_SECTION_STEP_M,
     Key,
     LaneSection,
     OpenDriveRoad,
     road_of_sections,
     SectionLane,
-    STEP,
 )
-from scenario_gen.roads.vector.signs import DraftRule, is_speed_limit, kind_of_sign
-from scenario_gen.types import (
-    DRIVERS,
-    Note,
-    NoteKind,
-    RuleKind,
-)
+from scenario_gen.types import DRIVERS, Note, NoteKind
 
-_SPEEDS = {"m/s": 1.0, "km/h": 1.0 / 3.6, "mph": 0.44704}
-_LINKED = 3.0  # metres between the ends of lanes that are linked, at most
-_READ = ("1000002", "1000003")  # lights and crossings of pedestrians
-_STOP_LINE = "294"  # type of a signal that is a line on the ground
-_LIGHTS = ("1000001", "1000009", "1000010", "1000011", "1000012")  # for vehicles
-_SIGNED = 15.0  # metres between a sign and its stop line, at most
-_MARKED = (
-    "solid",
-    "solid solid",
-    "curb",
-    "grass",
-    "botts dots",
-)  # road marks that are not crossed
-
-End = tuple[Key, int]  # a lane and 0 for its end at lower s, 1 for that at higher s
+_MPS_PER_UNIT = {"m/s": 1.0, "km/h": 1.0 / 3.6, "mph": 0.44704}
+_MAX_LINK_GAP_M = 3.0  # between the ends of linked lanes
+_UNCROSSED_MARKS = frozenset(("solid", "solid solid", "curb", "grass", "botts dots"))
 
 
 def lanes_of(root: Element) -> MapLanes:
@@ -70,358 +53,225 @@ def lanes_of(root: Element) -> MapLanes:
     Raises:
         InputError: it is broken or has no road; names file and line.
     """
-    header = root.child("header")
-    version = ".".join(header.get(name, "?") for name in ("revMajor", "revMinor"))
-    roads: dict[str, OpenDriveRoad] = {}
-    total, lanes, points = 0.0, 0, 0
     faults = Faults()
+    roads = _roads(root, faults)
+    if not roads:
+        raise InputError(faults.first_reason or f"{root.file}: no <road>")
+    links = LaneLinks(roads, faults)
+    for road in roads.values():
+        links.add_road(road)
+    for connection in root.findall("junction/connection"):
+        with faults.leaving_out("connection", connection.get("id", "?")):
+            links.add_connection(connection)
+
+    drafts = [*_drafts(roads, links)]
+    for road in roads.values():
+        drafts += crosswalks(road, faults)
+    refuse_too_many_lanes(len(drafts), root.file)
+    lanes = [lane for road in roads.values() for lane in road.lanes]
+    return MapLanes(
+        drafts,
+        (*_coordinate_notes(root.child("header")), *links.notes()),
+        unsupported=sum(lane.is_car_lane and not lane.users for lane in lanes),
+        faults=faults,
+        rules=[*signal_rules(roads, faults), *priorities(root, roads)],
+        other_signs=other_signals(roads),
+    )
+
+
+def _roads(root: Element, faults: Faults) -> dict[str, OpenDriveRoad]:
+    """Return the roads of a map by their ids, without the faulty ones.
+
+    Raises:
+        TooLargeError: they are too many or too long.
+    """
+    roads: dict[str, OpenDriveRoad] = {}
+    length, lane_count, point_count = 0.0, 0, 0
+    max_length = MAX_SECTIONS_COUNT * CROSS_SECTION_STEP_M
     for name, element in by_id(root.findall("road"), faults).items():
         with faults.leaving_out("road", name):
             line = reference_line(element)
-            total += line.length
-            if total > MOST_SECTIONS * STEP:
-                raise TooLargeError(
-                    f"{element.place}: roads of more than {MOST_SECTIONS * STEP / 1000.0:g} km; cut the map"
-                )
-            roads[name] = road_of_sections(element, name, line)
-        if name not in roads:
-            continue
-        lanes += sum(len(section.lanes) for section in roads[name].sections)
-        refuse_too_many_lanes(lanes, root.file)
-        points += sum(
-            len(lane.s) for section in roads[name].sections for lane in section.lanes.values()
-        )
-        refuse_too_long(points, root.file)
-    if not roads:
-        raise InputError(faults.found[0][2] if faults.found else f"{root.file}: no <road>")
-    joints = _Joints(roads, faults)
-    for road in roads.values():
-        joints.along(road)
-    for junction in root.findall("junction"):
-        joints.through(junction)
-    notes = (*_coordinate_notes(header, version), *joints.notes())
-    rules = [*_signal_rules(roads, faults), *_priorities(root, roads)]
-    signals = [
-        signal
-        for road in roads.values()
-        for group in road.element.findall("signals")
-        for signal in group.findall("signal")
-    ]
-    others = [signal for signal in signals if not (_is_read(signal) or _kind_of_signal(signal))]
-    lanes_found = [
-        lane
-        for road in roads.values()
-        for section in road.sections
-        for lane in section.lanes.values()
-    ]
-    barred = [lane for lane in lanes_found if lane.kind in FOR_CARS and not lane.users]
-    drafts = [
-        *_drafts(roads, joints),
-        *(draft for road in roads.values() for draft in crosswalks(road, faults)),
-    ]
-    refuse_too_many_lanes(len(drafts), root.file)
-    return MapLanes(drafts, notes, len(barred), faults, rules, len(others))
+            length += line.length
+            if length > max_length:
+                km = max_length / 1000.0
+                raise TooLargeError(f"{element.place}: more than {km:g} km of roads; cut the map")
+            road = road_of_sections(element, name, line)
+            lane_count += sum(1 for _ in road.lanes)
+            refuse_too_many_lanes(lane_count, root.file)
+            point_count += sum(len(lane.s) for lane in road.lanes)
+            refuse_too_long(point_count, root.file)
+            roads[name] = road
+    return roads
 
 
-def _signal_rules(roads: dict[str, OpenDriveRoad], faults: Faults) -> Iterator[DraftRule]:
-    """Yield the rules of signals: where they stand, and where roads refer to them."""
-    kinds: dict[str, RuleKind] = {}
-    placed: list[tuple[OpenDriveRoad, Element]] = []
-    for road in roads.values():
-        for group in road.element.findall("signals"):
-            placed += [
-                (road, element)
-                for tag in ("signal", "signalReference")
-                for element in group.findall(tag)
-            ]
-    for _, signal in placed:
-        kind = _kind_of_signal(signal)
-        if signal.tag == "signal" and kind is not None:
-            kinds[signal.get("id", "?")] = kind
-    stop_lines = [(road, element) for road, element in placed if _is_stop_line(element)]
-    for road in roads.values():
-        objects = (
-            element
-            for group in road.element.findall("objects")
-            for element in group.findall("object")
-        )
-        stop_lines += [(road, element) for element in objects if _is_stop_line(element)]
-    for road, element in placed:
-        name = element.get("id", "?")
-        if name not in kinds:
-            continue
-        with faults.leaving_out("signal", name):
-            s = element.number("s")
-            lines = [
-                other.number("s")
-                for own, other in stop_lines
-                if own is road and _same_way(element, other)
-            ]
-            nearest = min(lines, key=lambda at: abs(at - s), default=math.inf)
-            if abs(nearest - s) <= _SIGNED:
-                s = nearest
-            for lane in _lanes_under(road, element, s):
-                yield DraftRule(name, kinds[name], (lane.name,), line=_across(lane, s))
-
-
-def _kind_of_signal(signal: Element) -> RuleKind | None:
-    if signal.get("dynamic") == "yes":
-        return RuleKind.TRAFFIC_LIGHT if signal.get("type") in _LIGHTS else None
-    return kind_of_sign(*_sign(signal))
-
-
-def _sign(signal: Element) -> tuple[str, str, str]:
-    """The number of a signal's sign, the subtype behind it, and the country whose number it is."""
-    number, subtype, country = (signal.get(name, "") for name in ("type", "subtype", "country"))
-    return number, subtype, country
-
-
-def _is_stop_line(element: Element) -> bool:
-    """Whether a signal or an object is a line at which one stops; some tools give it no type but a name."""
-    name = re.sub("[^a-z]", "", element.get("name", "").lower())
-    return element.get("type") == _STOP_LINE or name.startswith("stopline")
-
-
-def _is_read(signal: Element) -> bool:
-    """Whether a signal is read that is no rule: a line, a speed limit, what is for pedestrians."""
-    return signal.get("type") in _READ or _is_stop_line(signal) or is_speed_limit(*_sign(signal))
-
-
-def _same_way(a: Element, b: Element) -> bool:
-    """Whether two signals are for traffic of the same direction."""
-    return (
-        "none" in (ways := {signal.get("orientation", "none") for signal in (a, b)})
-        or len(ways) == 1
-    )
-
-
-def _lanes_under(road: OpenDriveRoad, signal: Element, s: float) -> Iterator[SectionLane]:
-    """The lanes for whose traffic a signal is, of the section at s."""
-    first: dict[bool, int] = {}  # section at s, by side
-    bounds = [
-        (int(v.number("fromLane")), int(v.number("toLane"))) for v in signal.findall("validity")
-    ]
-    way = signal.get("orientation", "none")
-    for lane in (lane for section in road.sections for lane in section.lanes.values()):
-        _, section, number = lane.key
-        if (
-            not lane.s[0] - 1e-6 <= s <= lane.s[-1] + 1e-6
-            or first.setdefault(number > 0, section) != section
-        ):
-            continue
-        valid = not bounds or any(min(pair) <= number <= max(pair) for pair in bounds)
-        if valid and lane.kind in FOR_CARS and (way == "none" or lane.forth == (way == "+")):
-            yield lane
-
-
-def _across(lane: SectionLane, s: float) -> Floats:
-    """(2, 2) [m] the cross-section of a lane at s."""
-    return np.array(
-        [
-            [np.interp(s, lane.s, border[:, axis]) for axis in (0, 1)]
-            for border in (lane.inner, lane.outer)
-        ]
-    )
-
-
-def _priorities(root: Element, roads: dict[str, OpenDriveRoad]) -> Iterator[DraftRule]:
-    """Yield the priorities of junctions between roads: traffic of the low one gives way."""
-    for junction in root.findall("junction"):
-        for priority in junction.findall("priority"):
-            high, low = (roads.get(priority.get(name, "")) for name in ("high", "low"))
-            if high is not None and low is not None:
-                first, last = (
-                    tuple(
-                        lane.name for section in road.sections for lane in section.lanes.values()
-                    )
-                    for road in (high, low)
-                )
-                yield DraftRule(
-                    f"junction {junction.get('id', '?')}",
-                    RuleKind.GIVE_WAY,
-                    last,
-                    first,
-                )
-
-
-def _coordinate_notes(header: Element, version: str) -> list[Note]:
-    """Return notes on the coordinates of a map, and on the parts of its header that are ignored."""
-    notes = [Note.of(NoteKind.COORDINATES, format=f"OpenDRIVE {version}")]
+def _coordinate_notes(header: Element) -> Iterator[Note]:
+    """Yield notes on the coordinates of a map, and on ignored parts of its header."""
+    version = ".".join(header.get(name, "?") for name in ("revMajor", "revMinor"))
+    yield Note.of(NoteKind.COORDINATES, format=f"OpenDRIVE {version}")
     reference = header.find("geoReference")
     text = " ".join(reference.content.split()) if reference is not None else ""
     if text:
-        notes.append(Note.of(NoteKind.GEOREFERENCE_IGNORED, reference=text))
+        yield Note.of(NoteKind.GEOREFERENCE_IGNORED, reference=text)
     offset = header.find("offset")
     if offset is not None:
-        x, y = (offset.number(axis, 0.0) for axis in "xy")
-        notes.append(Note.of(NoteKind.OFFSET_IGNORED, x=x, y=y))
-    return notes
+        x, y = offset.number("x", 0.0), offset.number("y", 0.0)
+        yield Note.of(NoteKind.OFFSET_IGNORED, x=x, y=y)
 
 
-class _Joints:
-    """Which ends of lanes are joined: by links between sections and roads, and by the connections of junctions."""
+class LaneEnd(NamedTuple):
+    """A lane and its end: 0 at lower s, 1 at higher s."""
+
+    key: Key
+    at: int
+
+
+class LaneLinks:
+    """The links between the ends of lanes: within roads, between roads and through junctions."""
 
     def __init__(self, roads: dict[str, OpenDriveRoad], faults: Faults) -> None:
-        self.roads = roads
         self.faults = faults
-        self.of: dict[End, list[End]] = defaultdict(list)
-        self.apart: list[str] = []  # places of links that join lanes whose ends are apart
+        self._roads = roads
+        self._linked: dict[LaneEnd, list[LaneEnd]] = defaultdict(list)
+        self._gaps: list[str] = []  # places of links between ends that are far apart
 
     def notes(self) -> list[Note]:
-        """Return a note on links that were left out."""
-        if not self.apart:
+        """Return a note on the links that were left out."""
+        if not self._gaps:
             return []
+        count, first = len(self._gaps), self._gaps[0]
         return [
-            Note.of(
-                NoteKind.LINKS_LEFT_OUT,
-                count=len(self.apart),
-                distance=_LINKED,
-                place=self.apart[0],
-            )
+            Note.of(NoteKind.LINKS_LEFT_OUT, count=count, distance=_MAX_LINK_GAP_M, place=first)
         ]
 
     def lane(self, key: Key) -> SectionLane | None:
-        """The lane of a key; None if there is none."""
+        """Return the lane with a key, if there is one."""
         road, section, lane = key
-        return self.roads[road].sections[section].lanes.get(lane)
+        return self._roads[road].sections[section].lanes.get(lane)
 
-    def join(self, a: End, b: End, place: str) -> None:
-        """Join two ends, if they are there and near each other."""
-        first, second = self.lane(a[0]), self.lane(b[0])
-        if first is None or second is None:
+    def linked_to(self, end: LaneEnd) -> Iterator[tuple[SectionLane, int]]:
+        """Yield the lanes that are linked to an end, and which of their ends."""
+        for key, at in self._linked[end]:
+            lane = self.lane(key)
+            assert lane is not None
+            yield lane, at
+
+    def add_road(self, road: OpenDriveRoad) -> None:
+        """Link a road's sections to each other, and the road to those before and after it."""
+        for lane in road.lanes:
+            for tag in ("predecessor", "successor"):
+                for link in lane.element.findall(f"link/{tag}"):
+                    with self.faults.leaving_out("link", f"{tag} of lane {lane.name}"):
+                        self._add_link(road, lane, link)
+
+    def _add_link(self, road: OpenDriveRoad, lane: SectionLane, link: Element) -> None:
+        """Link a lane to the one that its predecessor or successor element names."""
+        at = 1 if link.tag == "successor" else 0
+        _, section, number = lane.key
+        other = int(link.number("id"))
+        end = LaneEnd(lane.key, at)
+        next_section = road.next_section(section, 1 if at else -1, number)
+        if next_section is not None:
+            self._join(end, LaneEnd((road.id, next_section, other), 1 - at), link.place)
             return
-        if float(np.hypot(*(first.middle(a[1]) - second.middle(b[1])))) > _LINKED:
-            self.apart.append(place)
-            return
-        for lane, end, other in ((first, a, b), (second, b, a)):
-            if other not in self.of[end]:
-                self.of[end].append(other)
-                if len(self.of[end]) > MOST_LINKS:
-                    raise TooLargeError(
-                        f"{place}: more than {MOST_LINKS} lanes are joined to lane {lane.name}"
-                    )
+        road_link = road.element.find(f"link/{link.tag}")
+        if road_link is not None and road_link.get("elementType") == "road":
+            target = self._road(road_link, "elementId")
+            contact = road_link.get("contactPoint", "start")
+            self._join(end, _lane_end(target, contact, other), road_link.place)
 
-    def along(self, road: OpenDriveRoad) -> None:
-        """Join a road's sections, and it to the roads before and after it."""
-        for k, section in enumerate(road.sections):
-            for lane in section.lanes.values():
-                for tag, at in (("predecessor", 0), ("successor", 1)):
-                    beyond = road.beyond(k, 1 if at else -1, lane.key[2])
-                    for link in [
-                        child
-                        for group in lane.element.findall("link")
-                        for child in group.findall(tag)
-                    ]:
-                        with self.faults.leaving_out("link", f"{tag} of lane {lane.name}"):
-                            other = int(link.number("id"))
-                            if beyond is not None:
-                                self.join(
-                                    (lane.key, at), ((road.id, beyond, other), 1 - at), link.place
-                                )
-                            else:
-                                self._to_road(road, (lane.key, at), tag, other)
-
-    def _to_road(self, road: OpenDriveRoad, end: End, tag: str, lane: int) -> None:
-        link = road.element.find(f"link/{tag}")
-        if link is None or link.get("elementType") != "road":
-            return
-        other = self.road(link, "elementId")
-        self.join(end, self.end_of(other, link.get("contactPoint", "start"), lane), link.place)
-
-    def road(self, link: Element, name: str) -> OpenDriveRoad:
-        """The road that an attribute names.
-
-        Raises:
-            InputError: there is none of that id.
-        """
-        if link.attribute(name) not in self.roads:
-            raise InputError(f"{link.place}: road {link.attribute(name)[:40]!r} is not in the map")
-        return self.roads[link.attribute(name)]
-
-    @staticmethod
-    def end_of(road: OpenDriveRoad, contact: str, lane: int) -> End:
-        """The end of a lane at a road's start or end."""
-        at = 1 if contact == "end" else 0
-        section = road.beyond(len(road.sections), -1, lane) if at else road.beyond(-1, 1, lane)
-        return (road.id, section or 0, lane), at
-
-    def through(self, junction: Element) -> None:
-        """Join incoming lanes to those of the connecting roads."""
-        for connection in junction.findall("connection"):
-            with self.faults.leaving_out("connection", connection.get("id", "?")):
-                self._through(connection)
-
-    def _through(self, connection: Element) -> None:
+    def add_connection(self, connection: Element) -> None:
+        """Link the lanes of an incoming road of a junction to those of a connecting road."""
         name = "connectingRoad" if "connectingRoad" in connection.attrib else "linkedRoad"
         if "incomingRoad" not in connection.attrib or name not in connection.attrib:
             return  # a virtual connection
-        incoming, connecting = self.road(connection, "incomingRoad"), self.road(connection, name)
+        incoming = self._road(connection, "incomingRoad")
+        connecting = self._road(connection, name)
         contact = connection.get("contactPoint", "start")
         for link in connection.findall("laneLink"):
-            target = self.end_of(connecting, contact, int(link.number("to")))
-            goal = self.lane(target[0])
-            if goal is None:
-                continue
-            distance = {}  # the incoming road may touch the junction with either end
-            for side in ("start", "end"):
-                source = self.end_of(incoming, side, int(link.number("from")))
-                lane = self.lane(source[0])
-                if lane is not None:
-                    distance[source] = float(
-                        np.hypot(*(lane.middle(source[1]) - goal.middle(target[1])))
+            target = _lane_end(connecting, contact, int(link.number("to")))
+            # The incoming road may touch the junction with either end.
+            number = int(link.number("from"))
+            sources = [_lane_end(incoming, side, number) for side in ("start", "end")]
+            known = [source for source in sources if self.lane(source.key) is not None]
+            if known and self.lane(target.key) is not None:
+                source = min(known, key=lambda source: self._gap(source, target))
+                self._join(source, target, link.place)
+
+    def _road(self, link: Element, name: str) -> OpenDriveRoad:
+        """Return the road that an attribute names.
+
+        Raises:
+            InputError: there is no such road.
+        """
+        road = link.attribute(name)
+        if road not in self._roads:
+            raise InputError(f"{link.place}: road {road[:40]!r} is not in the map")
+        return self._roads[road]
+
+    def _gap(self, a: LaneEnd, b: LaneEnd) -> float:
+        """Return the distance [m] between two ends of lanes that exist."""
+        first, second = self.lane(a.key), self.lane(b.key)
+        assert first is not None and second is not None
+        return float(np.hypot(*(first.centre(a.at) - second.centre(b.at))))
+
+    def _join(self, a: LaneEnd, b: LaneEnd, place: str) -> None:
+        """Link two ends if they exist and are near each other."""
+        if self.lane(a.key) is None or self.lane(b.key) is None:
+            return
+        if self._gap(a, b) > _MAX_LINK_GAP_M:
+            self._gaps.append(place)
+            return
+        for end, other in ((a, b), (b, a)):
+            if other not in self._linked[end]:
+                self._linked[end].append(other)
+                if len(self._linked[end]) > MAX_LINKS_COUNT:
+                    name = ".".join(map(str, end.key))
+                    raise TooLargeError(
+                        f"{place}: more than {MAX_LINKS_COUNT} lanes are linked to lane {name}"
                     )
-            if distance:
-                self.join(min(distance, key=distance.__getitem__), target, link.place)
 
 
-def _drafts(roads: dict[str, OpenDriveRoad], joints: _Joints) -> Iterator[Draft]:
+def _lane_end(road: OpenDriveRoad, contact: str, lane: int) -> LaneEnd:
+    """Return the end of a lane at a road's start or end."""
+    if contact == "end":
+        section = road.next_section(len(road.sections), -1, lane)
+        return LaneEnd((road.id, section or 0, lane), 1)
+    section = road.next_section(-1, 1, lane)
+    return LaneEnd((road.id, section or 0, lane), 0)
+
+
+def _drafts(roads: dict[str, OpenDriveRoad], links: LaneLinks) -> Iterator[Draft]:
+    """Yield all lanes with users, and lanes for both ways once for each."""
     for road in roads.values():
-        for section in road.sections:
-            for lane in section.lanes.values():
-                wide = float(np.hypot(*(lane.outer - lane.inner).T).max()) >= 0.1
-                if not lane.users or not wide:
-                    continue
-                yield _draft(road, section, lane, joints, along=lane.forth)
+        for lane in road.lanes:
+            width = float(np.hypot(*(lane.outer - lane.inner).T).max())
+            if lane.users and width >= 0.1:
+                yield _draft(road, lane, links, along_s=lane.forward)
                 if lane.both_ways and lane.users & DRIVERS:
-                    yield _draft(road, section, lane, joints, along=not lane.forth)
+                    yield _draft(road, lane, links, along_s=not lane.forward)
 
 
-def _draft(
-    road: OpenDriveRoad, section: LaneSection, lane: SectionLane, joints: _Joints, *, along: bool
-) -> Draft:
-    """A lane driven along s or against it; against its own direction its name ends with "r"."""
-    number = lane.key[2]
+def _draft(road: OpenDriveRoad, lane: SectionLane, links: LaneLinks, *, along_s: bool) -> Draft:
+    """Return a lane driven along s or against it; against its own direction its name ends in "r"."""
     height = road.elevation.at(lane.s, float(lane.s[-1]))
     inner, outer = (np.column_stack((border, height)) for border in (lane.inner, lane.outer))
-    left, right = (inner, outer) if number < 0 else (outer, inner)
-    if not along:
+    left, right = (inner, outer) if lane.key[2] < 0 else (outer, inner)
+    if not along_s:
         left, right = right[::-1], left[::-1]
-    after = []
-    for key, at in joints.of[lane.key, 1 if along else 0]:
-        target = joints.lane(key)
-        assert target is not None
-        enters = target.forth == (at == 0)
+    successors = []
+    for target, at in links.linked_to(LaneEnd(lane.key, 1 if along_s else 0)):
+        enters = target.forward == (at == 0)
         if enters or target.both_ways:
-            after.append(target.name + ("" if enters else "r"))
-    beside = []
-    for other in (number - 1, number + 1):
-        neighbour = section.lanes.get(other)
-        outwards = abs(other) > abs(number)
-        if (
-            neighbour is not None
-            and neighbour.forth == along
-            and _may_cross(lane if outwards else neighbour, outwards=outwards)
-        ):
-            beside.append(neighbour.name)
+            successors.append(target.name + ("" if enters else "r"))
     limit = math.nan
-    with joints.faults.leaving_out("speed limit", lane.name):
+    with links.faults.leaving_out("speed limit", lane.name):
         limit = _speed_limit(road, lane.element, float(lane.s[0]))
     return Draft(
-        id=lane.name + ("" if along == lane.forth else "r"),
+        id=lane.name + ("" if along_s == lane.forward else "r"),
         left=left,
         right=right,
-        successors=tuple(after),
-        beside=tuple(beside),
+        successors=tuple(successors),
+        neighbours=tuple(_neighbours(road.sections[lane.key[1]], lane, along_s=along_s)),
         speed_limit=limit,
         junction=road.junction,
         place=lane.element.place,
@@ -430,22 +280,31 @@ def _draft(
     )
 
 
+def _neighbours(section: LaneSection, lane: SectionLane, *, along_s: bool) -> Iterator[str]:
+    """Yield the names of lanes with the same direction to which traffic may change."""
+    number = lane.key[2]
+    for other in (number - 1, number + 1):
+        neighbour = section.lanes.get(other)
+        if neighbour is not None and neighbour.forward == along_s:
+            outwards = abs(other) > abs(number)
+            if _may_cross(lane if outwards else neighbour, outwards=outwards):
+                yield neighbour.name
+
+
 def _may_cross(lane: SectionLane, *, outwards: bool) -> bool:
-    """Whether traffic may cross a lane's outer mark, from the lane outwards or into it."""
-    against = "decrease" if outwards == (lane.key[2] > 0) else "increase"
-    not_crossed = (
-        *_MARKED,
-        "solid broken" if outwards else "broken solid",
-    )  # its inner line is named first
-    marks = [mark.attrib for mark in lane.element.findall("roadMark")]
-    return not any(
-        mark.get("laneChange") in ("none", against) or mark.get("type") in not_crossed
-        for mark in marks
-    )
+    """Return whether traffic may cross a lane's outer mark, out of the lane or into it."""
+    forbidden_change = "decrease" if outwards == (lane.key[2] > 0) else "increase"
+    one_sided = "solid broken" if outwards else "broken solid"  # the inner line is named first
+    for mark in lane.element.findall("roadMark"):
+        if mark.get("laneChange") in ("none", forbidden_change):
+            return False
+        if mark.get("type") == one_sided or mark.get("type") in _UNCROSSED_MARKS:
+            return False
+    return True
 
 
 def _speed_limit(road: OpenDriveRoad, lane: Element, s: float) -> float:
-    """m/s: the lane's own first limit, else that of the road's type at s."""
+    """Return [m/s] the lane's own first limit, or that of the road's type at s; NaN if none."""
     records = lane.findall("speed")
     if not records:
         types = [
@@ -455,9 +314,8 @@ def _speed_limit(road: OpenDriveRoad, lane: Element, s: float) -> float:
     if not records or records[0].get("max") in ("no limit", "undefined", None):
         return math.nan
     unit = records[0].get("unit", "m/s")
-    if unit not in _SPEEDS:
-        raise InputError(
-            f"{records[0].place}: unit {unit[:20]!r}; one of {', '.join(_SPEEDS)} is needed"
-        )
+    if unit not in _MPS_PER_UNIT:
+        units = ", ".join(_MPS_PER_UNIT)
+        raise InputError(f"{records[0].place}: unit {unit[:20]!r}; choose one of {units}")
     limit = records[0].number("max")
-    return limit * _SPEEDS[unit] if limit > 0.0 else math.nan
+    return limit * _MPS_PER_UNIT[unit] if limit > 0.0 else math.nan

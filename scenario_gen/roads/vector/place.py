@@ -1,12 +1,12 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Where on a map a template goes: all ways of laying it on lanes, the best first, and the part of the map around one."""
+"""All ways of placing a recording on the lanes of a map, the best first, and the map around one."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
-from functools import lru_cache
-from itertools import chain, combinations, islice
+from functools import cached_property
+from itertools import combinations, islice
 import math
 
 import numpy as np
@@ -16,289 +16,313 @@ from scipy.spatial.distance import cdist
 from scenario_gen.base.cancelling import stop_if_cancelled
 from scenario_gen.base.errors import RefusedError
 from scenario_gen.numerics import Floats, frozen
-from scenario_gen.roads.vector.match import Chains, Match, match
+from scenario_gen.roads.vector.lane_graph import lane_graph, LaneGraph
+from scenario_gen.roads.vector.match import LanePath, Match, match
 from scenario_gen.roads.vector.rules import RuleCheck
-from scenario_gen.roads.vector.search import crossing_spots, find_spots, Spot, spot_at
-from scenario_gen.roads.vector.street import along_streets
-from scenario_gen.situation import find_conflicts, PairConflicts, separate, Track, track_conflicts
-from scenario_gen.types import (
-    LaneNetwork,
-    lanes_for,
-    LEVEL,
-    Note,
-    NoteKind,
-    once_per_object,
-    Scenario,
+from scenario_gen.roads.vector.search import (
+    crossing_placements,
+    placement_at,
+    rigid_placements,
+    RigidPlacement,
 )
+from scenario_gen.roads.vector.street import street_matches
+from scenario_gen.situation import (
+    Conflict,
+    find_conflicts,
+    PairConflicts,
+    separate,
+    Track,
+    track_conflicts,
+)
+from scenario_gen.types import LaneNetwork, LEVEL, Motion, Note, NoteKind
 
-_HOME = 1.0  # m²: where lanes of its directions lie so near the recorded paths, the template is at home
-_SPOTS = 15  # placements as one piece, and
-_STREETS = 8  # stretches of road that are looked at closely
-_SCALES = (1.0, 0.9, 1.1)
-_WORST = 40.0  # m²: what resembles the template less is no place for it
-_PRESSED = 4.2  # m/s² across, a little less than scenarios may have: where more is forced, another scale is tried first
-_BESIDE = 12.0  # metres of the map around what is driven, and
-_FORTH = 20.0  # metres of the lanes before and after it
-_LOOK, _OVER = (
-    2.0,
-    5.0,
-)  # metres between places at which heights are compared; between two of which one may lie above the other
-_SHIFT = 3.0  # metres by which paths may be shifted to be clear of each other
+SCALES = (1.0, 0.9, 1.1)
+MATCHED_PLACEMENTS_COUNT = 15
+"""Rigid placements that are matched with lanes at a time."""
+_MATCHED_STREETS_COUNT = 8
+_HOME_COST_M2 = 1.0  # of a rigid placement that is where the recording was made
+_MAX_COST_M2 = 40.0  # of a match
+_MAX_FORCED_LATERAL_MPS2 = (
+    4.2  # a little less than scenarios may have; else other scales are tried
+)
+_BOX_MARGIN_M = 12.0  # around the driven paths
+_BOX_LEAD_M = 20.0  # along the lanes before and after the driven paths
+_OVERLAP_M = 5.0  # between two vehicles of which one may be above the other
 
 
 class NoPlaceError(RefusedError):
-    """A map has no place for a template."""
-
-
-@lru_cache(
-    maxsize=4
-)  # `once_per_object` would keep a network for good, for its chains refer to it
-def chains_of(network: LaneNetwork) -> Chains:
-    """Return the chains of a network, the same for the same network."""
-    return Chains(network)
+    """A map has no place for a recording."""
 
 
 def placements(
-    network: LaneNetwork,
+    graph: LaneGraph,
     tracks: tuple[Track, ...],
     lanes: Sequence[int] | None = None,
-    scales: Sequence[float] = _SCALES,
+    scales: Sequence[float] = SCALES,
 ) -> Iterator[tuple[Match, float]]:
-    """Yield the ways of laying a template on lanes, with their scales: at home first, then those that resemble it most.
+    """Yield the ways of placing a recording on lanes, with their scales.
 
-    Those come first on which all whose paths cross or merge meet; of these, where the map has rights of way, those on which
-    somebody gives way who has to. Those that break a rule are left out, if the network's rules are kept. Those come last whose
-    bends cannot be driven at the template's first and last speeds: smaller, it is slower too.
+    The place where it was recorded comes first, then those that resemble it most. Places come
+    earlier where all vehicles whose paths cross or merge meet and, if the map has rights of way,
+    where a vehicle that must give way does so. Places that break a rule are left out if the
+    network's rules are kept. Last come the places with bends that cannot be driven at the first
+    and last recorded speeds; at a smaller scale, the recording is slower, too.
 
     Args:
-        network: a map or a part of it.
-        tracks: of the template, all vehicles.
-        lanes: a vehicle is laid onto one of these; None: anywhere.
-        scales: s of eq 9, tried in this order where none before could be had.
+        graph: of a map or a part of it.
+        tracks: of all recorded vehicles.
+        lanes: a vehicle is put onto one of these; None: onto any lane.
+        scales: s of eq 9; the first one with a place is used.
 
     Raises:
-        NoPlaceError: there is none; says what stands against the template where it was recorded, else where it came farthest.
+        NoPlaceError: there is none. The message has the reason where it was recorded, and the
+            reason at the place that is nearest to being usable.
     """
-    chains = chains_of(network)
-    home = spot_at(network, tracks, np.zeros(3))
-    met = track_conflicts(tracks)
-    judged = _Judged(network, tracks, met)
-    drawn_for = network.drawn_for
-    sized = (
-        None
-        if drawn_for is None or len(drawn_for.lanes) != len(tracks)
-        else spot_at(network, tracks, drawn_for.frame)
-    )
-    search = _Search(
-        chains,
-        tracks,
-        met,
-        scales,
-        judged,
-        sized,
-        drawn_for.lanes if drawn_for is not None else (),
-    )
-    found, recorded = False, ""
-    owns = any(
-        map(chains.own_of, tracks)
-    )  # who has lanes of its own on a drawn road is not at home on those of cars
-    if lanes is None and home.cost <= _HOME and not (network.drawn and owns):
-        own = next(match(chains, tracks, met, home))
-        broken = own.reason or judged.broken(own)
-        if not broken:
-            found = True
-            yield own, 1.0
-        recorded = f"where it was recorded, {broken}; elsewhere, " if broken else ""
-    spots = find_spots(network, tracks, lanes)
-    crossed = crossing_spots(network, tracks) if lanes is None else []
-    streets = along_streets(chains, tracks, lanes)
-    for k in range(
-        0, max(len(spots), len(crossed), 1), _SPOTS
-    ):  # where nobody takes the first ones, the next are looked at
-        if k and not found:
-            break
-        first = [sized] if sized is not None and k == 0 else []
-        some = [*first, *spots[k : k + _SPOTS], *crossed[k : k + _SPOTS]]
-        for placed in search.near(some, list(islice(streets, _STREETS))):
-            found = True
+    search = _Search(graph, tracks, scales)
+    home = search.at_home() if lanes is None else None
+    if home is not None and not home.refusal:
+        yield home.match, 1.0
+    has_place = home is not None and not home.refusal
+
+    rigid = rigid_placements(graph, tracks, lanes)
+    crossed = crossing_placements(graph, tracks) if lanes is None else []
+    streets = street_matches(graph, tracks, lanes)
+    batch = MATCHED_PLACEMENTS_COUNT
+    for first in range(0, max(len(rigid), len(crossed), 1), batch):
+        if first and not has_place:
+            break  # worse ones are not looked at
+        candidates = [*rigid[first : first + batch], *crossed[first : first + batch]]
+        if search.drawn_place is not None and first == 0:
+            candidates.insert(0, search.drawn_place)
+        for placed in search.near(candidates, list(islice(streets, _MATCHED_STREETS_COUNT))):
+            has_place = True
             yield placed
-    if not found:
-        what, why = ("road", network.notes) if network.drawn else ("map", ())
-        *_, reason = min(search.failures, default=("it has no lanes of its directions",))
-        raise NoPlaceError(
-            f"the recording fits no place on {what} {network.name}: {'; '.join((recorded + reason, *map(str, why)))}"
+    if not has_place:
+        raise NoPlaceError(_refusal(search, home.refusal if home is not None else ""))
+
+
+def _refusal(search: "_Search", at_home: str) -> str:
+    """Return the message for a recording without a place."""
+    network = search.graph.network
+    _, _, reason = min(search.failures, default=(True, 0.0, "no lanes have its directions"))
+    reasons = [f"where it was recorded, {at_home}; elsewhere, {reason}" if at_home else reason]
+    kind = "road" if network.drawn else "map"
+    if network.drawn:
+        reasons += map(str, network.notes)
+    return f"the recording does not fit {kind} {network.name}: {'; '.join(reasons)}"
+
+
+@dataclass(frozen=True, eq=False)
+class _JudgedMatch:
+    """A match with the motion that it gives, its conflicts and the rules that it breaks."""
+
+    match: Match
+    search: "_Search"
+
+    @cached_property
+    def motion(self) -> Motion:
+        """The recorded motion on the lanes, unchecked."""
+        placed = tracks_on(self.match, self.search.tracks)
+        poses = np.stack([track.poses for track in placed])
+        return Motion(
+            vehicles=tuple(track.vehicle for track in placed),
+            time=frozen(np.arange(poses.shape[1]) * placed[0].dt),
+            position=poses[..., :2],
+            heading=poses[..., 2],
+            speed=np.stack([track.speed for track in placed]),
+            present=np.stack([track.present for track in placed]),
         )
+
+    @cached_property
+    def conflicts(self) -> tuple[Conflict, ...]:
+        """The conflicts in this motion."""
+        return find_conflicts(self.motion)
+
+    @cached_property
+    def refusal(self) -> str:
+        """Why it cannot be used; "" if it can."""
+        if self.match.reason:
+            return self.match.reason
+        if self.search.graph.network.has_levels and (above := self._stacked_vehicles()):
+            return above
+        check = self.search.check
+        if not check.rules:
+            return ""
+        breach = next(iter(check.breaches(self.motion, self.conflicts)), None)
+        if breach is None:
+            return ""
+        vehicle = self.motion.vehicles[breach.vehicles[0]].id
+        return f"vehicle {vehicle} {breach.message}; road.traffic_rules=ignored allows it"
+
+    @cached_property
+    def lost_meetings(self) -> int:
+        """How many pairs meet in the recording, but not on the lanes."""
+        if not self.search.crossing_pairs:
+            return 0
+        return len(self.search.crossing_pairs - {conflict.pair for conflict in self.conflicts})
+
+    @cached_property
+    def yields(self) -> bool:
+        """Whether a vehicle gives way that has to by the rules."""
+        check = self.search.check
+        return bool(check.rules) and bool(check.kept_orders(self.motion, self.conflicts))
+
+    @property
+    def is_comfortable(self) -> bool:
+        """Whether the bends can be driven at the first and last recorded speeds."""
+        return self.match.forced_lateral <= _MAX_FORCED_LATERAL_MPS2
+
+    @property
+    def rank(self) -> tuple[float, ...]:
+        """Order by lost meetings, reserved lanes (on drawn roads), right of way and resemblance."""
+        off_reserved = self.search.graph.network.drawn and self.match.off_reserved_cost > 0.0
+        cost = round(self.match.cost + self.match.off_reserved_cost, 3)
+        return self.lost_meetings, off_reserved, not self.yields, cost
+
+    def _stacked_vehicles(self) -> str:
+        """Return which two vehicles would be above each other, as on a bridge; "" if none."""
+        lanes = self.search.graph.network.lanes
+        driven = []
+        for path in self.match.paths:
+            count = max(math.ceil((path.end - path.start) / 2.0), 1) + 1  # every two metres
+            places = path.curve.at(np.linspace(path.start, path.end, count))[:, :2]
+            centres = KDTree(np.concatenate([lanes[k].centre for k in path.lanes]))
+            heights = np.concatenate([lanes[k].height for k in path.lanes])
+            driven.append((places, heights[centres.query(places)[1]]))
+        for i, j in combinations(range(len(driven)), 2):
+            (places, height), (other_places, other_height) = driven[i], driven[j]
+            on_two_levels = np.abs(height[:, None] - other_height) > LEVEL
+            if (on_two_levels & (cdist(places, other_places) < _OVERLAP_M)).any():
+                first, second = (self.search.tracks[n].vehicle.id for n in (i, j))
+                return (
+                    f"vehicles {first} and {second} would be above each other, as on a bridge, "
+                    "and not meet"
+                )
+        return ""
 
 
 @dataclass(frozen=True, eq=False)
 class _Search:
-    """What is laid where.
+    """The search for places.
 
     Attributes:
-        chains, tracks, scales: as of `placements`.
-        met: conflicts of the tracks by their vehicles, see `track_conflicts`.
-        judged: whether a placement keeps the rules.
-        sized: where the road was drawn for the template, None if it was not.
-        ends: the lanes that it was drawn with, for each vehicle.
-        failures: whether it is no match at all, its cost, and the reason.
+        graph, tracks, scales: as in `placements`.
+        failures: of each match that cannot be used: whether it is none, its cost, and the reason.
     """
 
-    chains: Chains
+    graph: LaneGraph
     tracks: tuple[Track, ...]
-    met: PairConflicts
     scales: Sequence[float]
-    judged: "_Judged"
-    sized: Spot | None
-    ends: tuple[tuple[str, str], ...]
     failures: list[tuple[bool, float, str]] = field(default_factory=list)
 
-    def near(self, spots: Sequence[Spot], along: Sequence[Match]) -> Iterator[tuple[Match, float]]:
-        """Yield the placements near some spots and along some stretches of road, the best first, with their scales."""
-        others: list[tuple[Match, float]] = []
+    @cached_property
+    def check(self) -> RuleCheck:
+        """The traffic rules."""
+        return RuleCheck(self.graph.network)
+
+    @cached_property
+    def met(self) -> PairConflicts:
+        """The recorded conflicts."""
+        return track_conflicts(self.tracks)
+
+    @cached_property
+    def crossing_pairs(self) -> set[tuple[int, int]]:
+        """The pairs that cross or merge in the recording."""
+        return {pair for pair, conflict in self.met.items() if not conflict.following}
+
+    @cached_property
+    def has_reserved(self) -> bool:
+        """Whether a vehicle has lanes that are closed to cars."""
+        return any(map(self.graph.reserved_for, self.tracks))
+
+    @cached_property
+    def drawn_place(self) -> RigidPlacement | None:
+        """Where the road was drawn for the recording; None if it was not."""
+        drawn_for = self.graph.network.drawn_for
+        if drawn_for is None or len(drawn_for.lanes) != len(self.tracks):
+            return None
+        return placement_at(self.graph, self.tracks, drawn_for.frame)
+
+    def at_home(self) -> _JudgedMatch | None:
+        """Return the match where the recording was made, if lanes of its directions are there."""
+        home = placement_at(self.graph, self.tracks, np.zeros(3))
+        if home.cost > _HOME_COST_M2 or (self.graph.network.drawn and self.has_reserved):
+            return None
+        return _JudgedMatch(next(match(self.graph, self.tracks, self.met, home)), self)
+
+    def near(
+        self, rigid: Sequence[RigidPlacement], streets: Sequence[Match]
+    ) -> Iterator[tuple[Match, float]]:
+        """Yield the usable matches near rigid placements and on streets, with their scales."""
+        others: list[tuple[_JudgedMatch, float]] = []
         for scale in self.scales:
-            matches = list(along) if scale == 1.0 else []
-            for spot in spots:
+            matches = list(streets) if scale == 1.0 else []
+            for placement in rigid:
                 stop_if_cancelled()
-                ends, owns = (
-                    self.ends if spot is self.sized else (),
-                    any(map(self.chains.own_of, self.tracks)),
-                )
-                variants = (
-                    match(self.chains, self.tracks, self.met, spot, scale, ends, own=own)
-                    for own in (True, False)[not owns :]
-                )
-                for placement in chain.from_iterable(variants):
-                    far = placement.cost > _WORST and spot is not self.sized
-                    if placement.reason or far:
-                        reason = (
-                            placement.reason or "vehicles would be too far from where they are"
-                        )
-                        self.failures.append((True, placement.cost, reason))
-                    else:
-                        matches.append(placement)
-            broken_by = [self.judged.broken(placement) for placement in matches]
-            self.failures.extend(
-                (False, p.cost, broken)
-                for p, broken in zip(matches, broken_by, strict=True)
-                if broken
-            )
-            matches = [
-                placement
-                for placement, broken in zip(matches, broken_by, strict=True)
-                if not broken
-            ]
-            matches.sort(key=self._order)
-            placed = [p for p in matches if p.aside <= _PRESSED and self.judged.rank(p)[0] == 0]
-            others += [(p, scale) for p in matches if p not in placed]
-            yield from ((placement, scale) for placement in placed)
-            if placed:
+                matches += self._matches_near(placement, scale)
+            usable = sorted(self._usable(matches), key=lambda judged: judged.rank)
+            good = [each for each in usable if each.is_comfortable and not each.lost_meetings]
+            others += [(each, scale) for each in usable if each not in good]
+            yield from ((each.match, scale) for each in good)
+            if good:
                 break
-        yield from sorted(
-            others, key=lambda other: (other[0].aside > _PRESSED, self.judged.rank(other[0])[0])
-        )
+        others.sort(key=lambda other: (not other[0].is_comfortable, other[0].lost_meetings))
+        yield from ((each.match, scale) for each, scale in others)
 
-    def _order(self, placement: Match) -> tuple[float, ...]:
-        """What comes first: meetings kept, on a drawn road lanes of one's own, right of way given, resemblance."""
-        lost, unkept = self.judged.rank(placement)
-        off_own = self.chains.network.drawn and placement.off_own > 0.0
-        return lost, off_own, unkept, round(placement.cost + placement.off_own, 3)
+    def _matches_near(self, placement: RigidPlacement, scale: float) -> Iterator[Match]:
+        """Yield the matches that resemble a rigid placement; the others become failures."""
+        is_drawn_place = placement is self.drawn_place
+        drawn_for = self.graph.network.drawn_for
+        ends = drawn_for.lanes if is_drawn_place and drawn_for is not None else ()
+        for prefer_reserved in (True, False) if self.has_reserved else (False,):
+            for each in match(
+                self.graph,
+                self.tracks,
+                self.met,
+                placement,
+                scale,
+                ends,
+                prefer_reserved=prefer_reserved,
+            ):
+                reason = each.reason
+                if not reason and each.cost > _MAX_COST_M2 and not is_drawn_place:
+                    reason = "the vehicles would be too far from their recorded positions"
+                if reason:
+                    self.failures.append((True, each.cost, reason))
+                else:
+                    yield each
 
-
-class _Judged:
-    """Whether placements keep the traffic rules of a network, and lie on one level where vehicles meet."""
-
-    def __init__(
-        self, network: LaneNetwork, tracks: tuple[Track, ...], met: PairConflicts
-    ) -> None:
-        self._network = network
-        self._check = RuleCheck(network)
-        self._tracks = tracks
-        self._met = {pair for pair, conflict in met.items() if not conflict.following}
-
-    def broken(self, placement: Match) -> str:
-        """Return what a placement breaks; "" if nothing."""
-        if self._network.has_levels and (above := self._above(placement)):
-            return above
-        if not self._check.rules:
-            return ""
-        motion = _laid(placement, self._tracks)
-        breach = next(iter(self._check.breaches(motion, find_conflicts(motion))), None)
-        if breach is None:
-            return ""
-        return f"vehicle {motion.vehicles[breach.vehicles[0]].id} {breach.message}; road.traffic_rules=ignored allows it"
-
-    def _above(self, placement: Match) -> str:
-        """Say which two vehicles a placement lays above each other, as on a bridge and under it; "" if none."""
-        lanes = self._network.lanes
-        driven = []
-        for course in placement.courses:
-            count = max(math.ceil((course.end - course.start) / _LOOK), 1) + 1
-            places = course.curve.at(np.linspace(course.start, course.end, count))[:, :2]
-            middles = KDTree(np.concatenate([lanes[k].centre for k in course.lanes]))
-            height = np.concatenate([lanes[k].height for k in course.lanes])[
-                middles.query(places)[1]
-            ]
-            driven.append((places, height))
-        for (i, (one, low)), (j, (other, high)) in combinations(enumerate(driven), 2):
-            apart = np.abs(low[:, None] - high) > LEVEL
-            if (apart & (cdist(one, other) < _OVER)).any():
-                first, second = (self._tracks[n].vehicle.id for n in (i, j))
-                return f"vehicles {first} and {second} would be above each other, as on a bridge, and not meet"
-        return ""
-
-    def rank(self, placement: Match) -> tuple[int, bool]:
-        """Return how many that meet in the template do not, and whether nobody gives way who has to."""
-        if not self._met and not self._check.rules:
-            return 0, True
-        motion = _laid(placement, self._tracks)
-        conflicts = find_conflicts(motion)
-        lost = self._met - {met.pair for met in conflicts}
-        return len(lost), not self._check.kept_orders(motion, conflicts)
+    def _usable(self, matches: Sequence[Match]) -> Iterator[_JudgedMatch]:
+        """Yield the matches that break no rule; the others become failures."""
+        for each in matches:
+            judged = _JudgedMatch(each, self)
+            if judged.refusal:
+                self.failures.append((False, each.cost, judged.refusal))
+            else:
+                yield judged
 
 
-@once_per_object
-def _laid(placement: Match, tracks: tuple[Track, ...]) -> Scenario:
-    """The motion of a template at a placement, as it is, unchecked."""
-    laid = tracks_on(placement, tracks)
-    poses = np.stack([track.poses for track in laid])
-    return Scenario(
-        vehicles=tuple(track.vehicle for track in laid),
-        time=frozen(np.arange(poses.shape[1]) * laid[0].dt),
-        position=poses[..., :2],
-        heading=poses[..., 2],
-        speed=np.stack([track.speed for track in laid]),
-        acceleration=np.zeros(poses.shape[:2]),
-        present=np.stack([track.present for track in laid]),
-    )
-
-
-def tracks_on(placement: Match, tracks: Sequence[Track]) -> tuple[Track, ...]:
-    """The template's tracks on their courses."""
+def tracks_on(match: Match, tracks: Sequence[Track]) -> tuple[Track, ...]:
+    """Return the recorded tracks on their lane paths."""
     placed = []
-    for course, track in zip(placement.courses, tracks, strict=True):
-        driven = float(course.progress[-1])
-        curve = course.curve.cut(course.start, course.start + max(driven, 1.0), 0.25)
-        progress = course.progress * (curve.length / driven if driven > 1.0 else 1.0)
-        placed.append(
-            replace(
-                track,
-                curve=curve,
-                progress=frozen(np.minimum(progress, curve.length)),
-                lane=course.curve,
-            )
-        )
+    for path, track in zip(match.paths, tracks, strict=True):
+        driven = float(path.progress[-1])
+        curve = path.curve.cut(path.start, path.start + max(driven, 1.0), 0.25)
+        progress = path.progress * (curve.length / driven if driven > 1.0 else 1.0)
+        on_curve = frozen(np.minimum(progress, curve.length))
+        placed.append(replace(track, curve=curve, progress=on_curve, lane=path.curve))
     return tuple(placed)
 
 
 @dataclass(frozen=True, eq=False)
 class Place:
-    """Where a template fits on a map.
+    """A place for a recording on a map.
 
     Attributes:
         box: (2, 2) [m] lowest and highest x, y of the part of the map around it.
         where: the junctions or the lane there.
-        cost: [m²] how little it resembles the template; 0 is at home.
-        paths: of each vehicle, (M, 2) [m] its way along the lanes.
+        cost: [m²] 0 where it was recorded, more where it resembles the recording less.
+        paths: of each vehicle, (M, 2) [m] along the lanes.
     """
 
     box: Floats
@@ -308,58 +332,61 @@ class Place:
 
     @property
     def part(self) -> str:
-        """The part of the map, to be put behind its name."""
+        """The part of the map, to be appended to its name."""
         return f"#box={','.join(f'{value:g}' for value in self.box.ravel())}"
 
 
 def places(
     network: LaneNetwork, tracks: tuple[Track, ...], lanes: Sequence[int] | None = None
 ) -> Iterator[Place]:
-    """Yield the places of a template on a map, the best first; arguments as of `placements`.
+    """Yield the places for a recording on a map, the best first; see `placements`.
 
     Raises:
         NoPlaceError: there is none.
     """
-    network = lanes_for(network, users_of(tracks))
-    reason, found = "", False
-    for placement, _ in placements(network, tracks, lanes):
+    graph = lane_graph(network, users_of(tracks))
+    reason, has_place = "", False
+    for each, _ in placements(graph, tracks, lanes):
         try:
-            separate(tracks_on(placement, tracks), 0.0, _SHIFT, sideways=0.0)
+            separate(tracks_on(each, tracks), 0.0, 3.0, sideways=0.0)
         except RefusedError as error:
             reason = reason or str(error)
             continue
-        found = True
-        paths = tuple(
-            c.curve.at(np.linspace(c.start - _FORTH, c.end + _FORTH, 200))[:, :2]
-            for c in placement.courses
-        )
-        points = np.concatenate(paths)
-        box = np.round(np.stack((points.min(axis=0) - _BESIDE, points.max(axis=0) + _BESIDE)))
-        names = dict.fromkeys(
-            network.lanes[k].junction for course in placement.courses for k in course.lanes
-        )
-        first = network.lanes[placement.courses[0].lanes[0]]
-        where = ", ".join(f"junction {name}" for name in names if name) or f"lane {first.id}"
-        yield Place(frozen(box), where, placement.cost, paths)
-    if not found:
-        raise NoPlaceError(f"the recording fits no place on map {network.name}: {reason}")
+        has_place = True
+        yield _place_of(graph.network, each)
+    if not has_place:
+        raise NoPlaceError(f"the recording does not fit map {network.name}: {reason}")
+
+
+def _place_of(network: LaneNetwork, match: Match) -> Place:
+    paths = tuple(_with_lead(path) for path in match.paths)
+    points = np.concatenate(paths)
+    low, high = points.min(axis=0) - _BOX_MARGIN_M, points.max(axis=0) + _BOX_MARGIN_M
+    lanes = [network.lanes[k] for path in match.paths for k in path.lanes]
+    junctions = dict.fromkeys(lane.junction for lane in lanes if lane.junction)
+    where = ", ".join(f"junction {name}" for name in junctions) or f"lane {lanes[0].id}"
+    return Place(frozen(np.round(np.stack((low, high)))), where, match.cost, paths)
+
+
+def _with_lead(path: LanePath) -> Floats:
+    """Return points (200, 2) [m] along a lane path, from before its start to beyond its end."""
+    stations = np.linspace(path.start - _BOX_LEAD_M, path.end + _BOX_LEAD_M, 200)
+    return path.curve.at(stations)[:, :2]
 
 
 def users_of(tracks: Sequence[Track]) -> frozenset[str]:
-    """Return as what the vehicles of a template may use lanes."""
+    """Return the kinds of lane users among the recorded vehicles."""
     return frozenset().union(*(track.vehicle.kind.lane_user for track in tracks))
 
 
 def best_part(
     network: LaneNetwork, tracks: tuple[Track, ...], lanes: Sequence[int] | None = None
 ) -> tuple[Floats, Note]:
-    """Return the box (2, 2) [m] around the best place of a template on a map, and a note on it.
+    """Return the box (2, 2) [m] around the best place for a recording, and a note on it.
 
     Raises:
         NoPlaceError: there is no place for it.
     """
     best = next(places(network, tracks, lanes))
-    return (
-        best.box,
-        Note.of(NoteKind.BEST_PLACE, place=best.where, part=best.part, cost=best.cost),
-    )
+    note = Note.of(NoteKind.BEST_PLACE, place=best.where, part=best.part, cost=best.cost)
+    return best.box, note

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""One door to vector maps: `map.osm`, `map.xodr` or `map.xml`, and which part of it, behind a `#`."""
+"""Vector maps, `map.osm`, `map.xodr` or `map.xml`, and the part of them behind a `#`."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -17,7 +17,8 @@ from scenario_gen.base.xml_reader import Element, read_xml, to_number
 from scenario_gen.numerics import Floats, frozen
 from scenario_gen.roads.config import RoadConfig
 from scenario_gen.roads.vector import commonroad, lanelet2, opendrive
-from scenario_gen.roads.vector.network import extent, MapLanes, network_of, part_of
+from scenario_gen.roads.vector.drafts import MapLanes
+from scenario_gen.roads.vector.network import extent, network_of, part_of
 from scenario_gen.roads.vector.place import best_part
 from scenario_gen.roads.vector.raster import road_of
 from scenario_gen.situation import Track
@@ -31,7 +32,7 @@ class MapFormat:
     Attributes:
         name: of a file in it, with its article.
         root: the name of its root element.
-        lanes_of: finds the lanes below the root.
+        lanes_of: returns the lanes below the root.
     """
 
     name: str
@@ -44,14 +45,13 @@ FORMATS = {
     ".xodr": MapFormat("an OpenDRIVE map", "OpenDRIVE", opendrive.lanes_of),
     ".xml": MapFormat("a CommonRoad file", "commonRoad", commonroad.lanes_of),
 }
-"""By the ending of a file's name."""
-PARTS = ("lanelet", "junction", "box")
-_AROUND = 40.0  # metres around lanes that are requested
-_NAMED = 12  # ids that a message lists
+"""By the suffix of a file's name."""
+PART_KINDS = ("lanelet", "junction", "box")
+_MARGIN_M = 40.0  # around requested lanes
 
 
 def split(name: str) -> tuple[Path, str]:
-    """Return the path and the part of `path#part`; a file whose name has a # stands for itself."""
+    """Return the path and the part of `path#part`; the name of a file itself may have a #."""
     path, mark, part = name.rpartition("#")
     if not mark or Path(name).suffix.lower() in FORMATS:
         return Path(name), ""
@@ -64,118 +64,111 @@ def is_vector_map(name: str) -> bool:
 
 
 def read_network(path: Path) -> LaneNetwork:
-    """Return the lanes of a whole map; of a file that has not changed since, what was read before.
+    """Return the lanes of a whole map; the last two maps are not read again unless they changed.
 
     Raises:
         InputError: it is missing, broken or empty.
     """
     try:
         status = local(path, "a map").stat()
-    except (OSError, ValueError) as error:
-        raise (
-            of_system(error, path)
-            if isinstance(error, OSError)
-            else InputError(f"map {shown(str(path))!r}: {error}")
-        ) from error
+    except OSError as error:
+        raise of_system(error, path) from error
+    except ValueError as error:
+        raise InputError(f"map {shown(str(path))!r}: {error}") from error
     return _read(path, status.st_mtime_ns, status.st_size)
 
 
 @lru_cache(maxsize=2)
 def _read(path: Path, _changed: int, _size: int) -> LaneNetwork:
-    form = FORMATS[path.suffix.lower()]
+    map_format = FORMATS[path.suffix.lower()]
     with reading(path):
         root = read_xml(path, f"map {path}")
-        if root.tag != form.root:
-            raise InputError(f"{root.place}: the root of {form.name} is <{form.root}>")
-        return network_of(path.stem, form.lanes_of(root))
+        if root.tag != map_format.root:
+            raise InputError(f"{root.place}: the root of {map_format.name} is <{map_format.root}>")
+        return network_of(path.stem, map_format.lanes_of(root))
 
 
 def chosen_lanes(network: LaneNetwork, part: str) -> tuple[int, ...]:
-    """Return the lanes that `lanelet=ID` or `junction=ID` names; several ids are separated by commas.
+    """Return the lanes that `lanelet=ID` or `junction=ID` names; commas separate several ids.
 
     Raises:
         InputError: an id is not in the map.
     """
-    kind, _, ids = part.partition("=")
+    kind, _, names = part.partition("=")
+    ids = [lane.id if kind == "lanelet" else lane.junction for lane in network.lanes]
     chosen: list[int] = []
-    for name in (piece.strip() for piece in ids.split(",")):
-        own = [lane.id if kind == "lanelet" else lane.junction for lane in network.lanes]
-        rows = [k for k, known in enumerate(own) if known and known == name]
+    for name in (piece.strip() for piece in names.split(",")):
+        rows = [k for k, known in enumerate(ids) if known and known == name]
         if not rows:
-            known = list(dict.fromkeys(value for value in own if value))
-            listed = ", ".join(known[:_NAMED]) + (
-                f" and {len(known) - _NAMED} more" if len(known) > _NAMED else ""
-            )
-            faulty = "".join(f"; {note}" for note in network.notes if note.kind is NoteKind.FAULTY)
-            raise InputError(
-                f"map {network.name} has no {kind} {shown(name, 40)!r} that cars may use; it has {listed or 'none'}{faulty}"
-            )
+            raise InputError(_unknown_id(network, kind, name, ids))
         chosen += rows
     return tuple(dict.fromkeys(chosen))
+
+
+def _unknown_id(network: LaneNetwork, kind: str, name: str, ids: list[str]) -> str:
+    """Return the message for an id that is not in a map."""
+    known = list(dict.fromkeys(each for each in ids if each))
+    listed = ", ".join(known[:12]) or "none"
+    if len(known) > 12:
+        listed += f" and {len(known) - 12} more"
+    faulty = [str(note) for note in network.notes if note.kind is NoteKind.FAULTY]
+    message = f"map {network.name} has no {kind} {shown(name, 40)!r} for cars; it has {listed}"
+    return "; ".join((message, *faulty))
 
 
 def box_of(network: LaneNetwork, part: str) -> Floats:
     """Return the box (2, 2) [m], lowest and highest x, y, of `box=x0,y0,x1,y1`.
 
     Raises:
-        InputError: these are not four numbers.
+        InputError: it has not four numbers.
     """
     numbers = part.partition("=")[2].split(",")
     if len(numbers) != 4:
         raise InputError(
             f"map {network.name}: {shown(part, 60)!r}; box=x0,y0,x1,y1 in metres is needed"
         )
-    corners = np.array(
-        [to_number(number.strip(), f"map {network.name}, {part[:60]}") for number in numbers]
-    ).reshape(2, 2)
+    where = f"map {network.name}, {part[:60]}"
+    corners = np.array([to_number(number.strip(), where) for number in numbers]).reshape(2, 2)
     box = frozen(np.stack((corners.min(axis=0), corners.max(axis=0))))
     if (box[1] - box[0] < 1.0).any():
         raise InputError(
-            f"map {network.name}: the box {shown(part, 60)!r} is less than 1 m wide; {extent(network)}"
+            f"map {network.name}: the box {shown(part, 60)!r} is less than 1 m wide; "
+            f"{extent(network)}"
         )
     return box
 
 
-def refuse_unknown_part(name: str, part: str) -> None:
-    """Refuse what is no part.
-
-    Raises:
-        InputError: it begins with none of `PARTS`.
-    """
-    if part and part.partition("=")[0] not in PARTS:
-        raise InputError(
-            f"map {name}: part {shown(part, 40)!r}; choose one of {', '.join(f'#{kind}=…' for kind in PARTS)}"
-        )
-
-
 def vector_road(name: str, tracks: tuple[Track, ...] | None, config: RoadConfig) -> Road:
-    """Return the road of a vector map, or of the requested part of it, or else that suits the template best.
+    """Return the road of a vector map, of a part of it, or of the best place for a recording.
 
     Args:
-        name: the path, and behind a `#` box=x0,y0,x1,y1, lanelet=ID or junction=ID (several with commas).
-        tracks: of the template; None: the whole map, or what lies around the requested lanes.
+        name: the path, and behind a `#` box=x0,y0,x1,y1, lanelet=ID or junction=ID; commas
+            separate several ids.
+        tracks: of the recording; None: the whole map, or the surroundings of requested lanes.
         config: cell size, and the most cells.
 
     Raises:
         InputError: the map cannot be read, or has no such part.
-        RefusedError: it is too large to be drawn whole, or has no place for the template.
+        RefusedError: it is too large to be drawn as a whole, or has no place for the recording.
     """
     path, part = split(name)
-    refuse_unknown_part(path.name, part)
+    kind = part.partition("=")[0]
+    if part and kind not in PART_KINDS:
+        kinds = ", ".join(f"#{each}=…" for each in PART_KINDS)
+        raise InputError(f"map {path.name}: part {shown(part, 40)!r}; choose one of {kinds}")
     network = read_network(path)
     if config.traffic_rules == "ignored":
         network = replace(network, rules_kept=False)
-    lanes = chosen_lanes(network, part) if part and not part.startswith("box=") else None
-    if part.startswith("box="):
-        box, note = box_of(network, part), Note.of(NoteKind.MAP_PART, part=part)
-    elif tracks is not None:
+    if kind == "box":
+        box = box_of(network, part)
+        return road_of(part_of(network, box, Note.of(NoteKind.MAP_PART, part=part)), box, config)
+    lanes = chosen_lanes(network, part) if part else None
+    if tracks is not None:
         box, note = best_part(network, tracks, lanes)
-    elif lanes:
-        points = np.concatenate([network.lanes[k].outline for k in lanes])
-        box, note = (
-            np.stack((points.min(axis=0) - _AROUND, points.max(axis=0) + _AROUND)),
-            Note.of(NoteKind.MAP_AROUND, distance=_AROUND, part=part),
-        )
-    else:
+        return road_of(part_of(network, box, note), box, config)
+    if lanes is None:
         return road_of(network, None, config)
+    points = np.concatenate([network.lanes[k].outline for k in lanes])
+    box = np.stack((points.min(axis=0) - _MARGIN_M, points.max(axis=0) + _MARGIN_M))
+    note = Note.of(NoteKind.MAP_AROUND, distance=_MARGIN_M, part=part)
     return road_of(part_of(network, box, note), box, config)

@@ -1,12 +1,14 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Do vehicles keep the traffic rules of a map? Who stops at a stop line, and who gives way to whom.
+"""Whether vehicles obey the traffic rules of a map: stop lines and rights of way.
 
-- A vehicle runs a stop line if its front crosses it, on a lane with a stop sign, without having stopped in the last metres.
-- A vehicle takes another one's right of way if it comes from a lane that gives way to the other one's, goes first where their
-  paths meet, and hinders the other one: that one follows closely, or waits.
-- Traffic lights have no state. Signs hold, as where lights are off.
+- A vehicle runs a stop line if its front crosses the line on a lane with a stop sign, and it has
+  not stopped in the last metres.
+- A vehicle violates the right of way of another one if it comes from a lane that gives way to the
+  other's lane, goes first where their paths meet, and hinders the other one, which follows closely
+  or waits.
+- Traffic lights have no state. Signs apply as if lights were off.
 """
 
 from collections.abc import Iterator, Sequence
@@ -18,18 +20,26 @@ import numpy as np
 from scenario_gen.numerics import Bools, Floats
 from scenario_gen.numerics.plane import edge_lengths, meeting_shares, unit
 from scenario_gen.roads.vector.ground import on_lane
+from scenario_gen.roads.vector.signs import YIELDING_KINDS
 from scenario_gen.situation import Conflict
-from scenario_gen.types import LaneNetwork, RuleKind, Scenario, TrafficRule
+from scenario_gen.types import LaneNetwork, Motion, RuleKind, TrafficRule
 
-_SUBJECT = (RuleKind.STOP, RuleKind.GIVE_WAY)
-_REACH = 50.0  # metres driven between a lane with a rule and the conflict that it concerns
-_HINDERED = 2.0  # s: who has the right of way comes this much later, or more, if not hindered
-_NEAR = 10.0  # metres before the conflict where waiting is for the other one
-_APPROACH = 8.0  # metres before a stop line where one stops, at most
-_STOPPED = 0.5  # m/s
-_PULLS_AWAY = 2.5  # m/s²
-_SAME_WAY = 0.5  # cosine between a vehicle's direction and its lane's
-_MET = 5.0  # s between two vehicles that meet
+
+@dataclass(frozen=True)
+class _Limits:
+    """The bounds of obeying a rule."""
+
+    lane_to_conflict_m: float = 50.0  # driven between a lane with a rule and the conflict
+    hindered_gap_s: float = 2.0  # a vehicle that follows later is not hindered
+    waiting_distance_m: float = 10.0  # before the conflict
+    stop_distance_m: float = 8.0  # before a stop line
+    stopped_mps: float = 0.5
+    acceleration_mps2: float = 2.5  # from an unrecorded stop
+    direction_cosine: float = 0.5  # between a vehicle and its lane
+    meeting_gap_s: float = 5.0
+
+
+_LIMITS = _Limits()
 
 
 @dataclass(frozen=True)
@@ -37,8 +47,8 @@ class Breach:
     """A rule that a vehicle breaks.
 
     Attributes:
-        time: s.
-        vehicles: indices: who breaks it, and whose right of way it is.
+        time: [s].
+        vehicles: indices of the vehicle that breaks it and, if any, of the one that it hinders.
         message: what happens, with the rule's name in the map.
     """
 
@@ -51,6 +61,7 @@ class RuleCheck:
     """Checks motions against the rules of a network.
 
     Attributes:
+        network: its lanes and rules.
         rules: those that can be broken; none if the network's are not kept.
     """
 
@@ -58,134 +69,144 @@ class RuleCheck:
         self.network = network
         rules = network.rules if network.rules_kept else ()
         self._stops = [rule for rule in rules if rule.kind == RuleKind.STOP and len(rule.line)]
-        self._ways = [rule for rule in rules if rule.kind in _SUBJECT and rule.over]
-        self.rules = (*self._stops, *self._ways)
-        self._subject = sorted({k for rule in self._ways for k in rule.lanes})
-        self._first = sorted({k for rule in self._ways for k in rule.over})
+        self._rights = [rule for rule in rules if rule.kind in YIELDING_KINDS and rule.over]
+        self.rules = (*self._stops, *self._rights)
+        self._yielding = sorted({k for rule in self._rights for k in rule.lanes})
+        going_first = {k for rule in self._rights for k in rule.over}
+        self._involved = sorted(going_first.union(self._yielding))
 
-    def breaches(self, scenario: Scenario, conflicts: Sequence[Conflict]) -> list[Breach]:
-        """Return what breaks a rule.
+    def breaches(self, motion: Motion, conflicts: Sequence[Conflict]) -> list[Breach]:
+        """Return the breaches of rules.
 
         Args:
-            scenario: in the map's frame.
-            conflicts: where the paths of two of its vehicles meet; all of them (`find_conflicts`).
+            motion: in the map's frame.
+            conflicts: all of them (`find_conflicts`).
         """
-        drives = [
-            n for n, vehicle in enumerate(scenario.vehicles) if not vehicle.kind.walks
-        ]  # the others know no such rules
-        stops = [breach for n in drives for breach in self._runs(scenario, n)]
-        met = [one for one in conflicts if {one.first, one.second} <= set(drives)]
-        return [*stops, *(breach for one in met for breach in self._taken(scenario, one))]
+        drivers = {n for n, vehicle in enumerate(motion.vehicles) if not vehicle.kind.walks}
+        breaches = [breach for n in sorted(drivers) for breach in self._run_lines(motion, n)]
+        for conflict in conflicts:
+            if drivers.issuperset((conflict.first, conflict.second)):
+                breaches += self._violated_right(motion, conflict)
+        return breaches
 
-    def kept_orders(self, scenario: Scenario, conflicts: Sequence[Conflict]) -> int:
-        """Return at how many conflicts, where two meet within 5 s, the one who goes second has to give way."""
-        met = [c for c in conflicts if c.encroachment < _MET]
-        return len(
-            [
-                c
-                for c in met
-                if self._over(scenario, c.second, c.entry_second, c.first, c.entry_first)
-            ]
-        )
+    def kept_orders(self, motion: Motion, conflicts: Sequence[Conflict]) -> int:
+        """Return at how many conflicts the vehicle that goes second gives way by a rule.
 
-    def _runs(self, scenario: Scenario, n: int) -> Iterator[Breach]:
-        """Stop lines that vehicle n crosses without a stop."""
-        there = scenario.is_present[n]
+        Only conflicts within a few seconds count.
+        """
+        kept = 0
+        for met in conflicts:
+            if met.encroachment < _LIMITS.meeting_gap_s:
+                second, first = (met.second, met.entry_second), (met.first, met.entry_first)
+                kept += self._rule_between(motion, second, first) is not None
+        return kept
+
+    def _run_lines(self, motion: Motion, n: int) -> Iterator[Breach]:
+        """Yield the stop lines that vehicle n crosses without a stop."""
+        there = motion.is_present[n]
         if not self._stops or there.sum() < 2:
             return
-        heading, speed = scenario.heading[n, there], scenario.speed[n, there]
-        front = scenario.position[n, there] + 0.5 * scenario.vehicles[n].length * unit(heading)
-        driven = np.concatenate(([0.0], np.cumsum(edge_lengths(front))))
+        heading, speed = motion.heading[n, there], motion.speed[n, there]
+        half_length = 0.5 * motion.vehicles[n].length
+        front = motion.position[n, there] + half_length * unit(heading)
+        driven = _driven(front)
         for rule in self._stops:
-            at = self._crossing(rule, front, heading)
-            if at is None:
+            k = self._crossing_step(rule, front, heading)
+            if k is None:
                 continue
-            before = (driven <= driven[at + 1]) & (driven >= driven[at] - _APPROACH)
-            unseen = max(
-                _APPROACH - float(driven[at]), 0.0
-            )  # a stop there can have been before it came
-            slowest = float(speed[before].min())
-            if slowest > max(_STOPPED, math.sqrt(2.0 * _PULLS_AWAY * unseen)):
-                message = f"crosses the stop line of {rule.id}; its minimum speed before it is {slowest:.1f} m/s"
-                yield Breach(float(scenario.time[there][at]), (n,), message)
+            approach = (driven <= driven[k + 1]) & (driven >= driven[k] - _LIMITS.stop_distance_m)
+            # The vehicle can have stopped before the record begins.
+            unrecorded = max(_LIMITS.stop_distance_m - float(driven[k]), 0.0)
+            after_stop = math.sqrt(2.0 * _LIMITS.acceleration_mps2 * unrecorded)
+            slowest = float(speed[approach].min())
+            if slowest > max(_LIMITS.stopped_mps, after_stop):
+                message = (
+                    f"crosses the stop line of {rule.id}; its minimum speed before it is "
+                    f"{slowest:.1f} m/s"
+                )
+                yield Breach(float(motion.time[there][k]), (n,), message)
 
-    def _crossing(self, rule: TrafficRule, front: Floats, heading: Floats) -> int | None:
-        """The step in which a front (T, 2) [m] crosses a rule's line in the direction of one of its lanes."""
+    def _crossing_step(self, rule: TrafficRule, front: Floats, heading: Floats) -> int | None:
+        """Return the step in which a front (T, 2) [m] crosses a rule's line along its lanes."""
         low, high = rule.line.min(axis=0), rule.line.max(axis=0)
         if (front.max(axis=0) < low).any() or (front.min(axis=0) > high).any():
             return None
-        p, u = front[:-1, None], np.diff(front, axis=0)[:, None]
-        t, s, _ = meeting_shares(p, u, rule.line[None, :-1], np.diff(rule.line, axis=0)[None])
+        steps, edges = np.diff(front, axis=0)[:, None], np.diff(rule.line, axis=0)[None]
+        t, s, _ = meeting_shares(front[:-1, None], steps, rule.line[None, :-1], edges)
         with np.errstate(invalid="ignore"):
-            steps = np.flatnonzero(((t >= 0.0) & (t < 1.0) & (s >= 0.0) & (s <= 1.0)).any(axis=1))
-        for step in steps.tolist():
-            if any(_same_way(self.network, k, front[step], heading[step]) for k in rule.lanes):
-                return int(step)
+            crosses = ((t >= 0.0) & (t < 1.0) & (s >= 0.0) & (s <= 1.0)).any(axis=1)
+        for k in np.flatnonzero(crosses).tolist():
+            if any(self._drives_along(lane, front[k], heading[k]) for lane in rule.lanes):
+                return int(k)
         return None
 
-    def _taken(self, scenario: Scenario, met: Conflict) -> Iterator[Breach]:
-        """The right of way that the first one at a conflict takes from the second one."""
-        rule = (
-            self._over(scenario, met.first, met.entry_first, met.second, met.entry_second)
-            if self._ways
-            else None
-        )
+    def _drives_along(self, lane: int, place: Floats, heading: float) -> bool:
+        """Return whether a vehicle at a place (2,) [m] drives in about the direction of a lane."""
+        distance = np.square(self.network.lanes[lane].middle - place).sum(axis=1)
+        yaw = self.network.lanes[lane].yaw[int(np.argmin(distance))]
+        return float(np.cos(yaw - heading)) > _LIMITS.direction_cosine
+
+    def _violated_right(self, motion: Motion, met: Conflict) -> Iterator[Breach]:
+        """Yield the right of way of the second vehicle that the first one at a conflict violates."""
+        if not self._rights:
+            return
+        first, second = (met.first, met.entry_first), (met.second, met.entry_second)
+        rule = self._rule_between(motion, first, second)
         if rule is None:
             return
         gap = met.arrival_gap if met.following else met.encroachment
-        waits = _waits_before(scenario, met)
-        if gap < _HINDERED or waits:
-            how = "which waits for it" if waits else f"which follows after {gap:.1f} s"
-            first, second = (scenario.vehicles[n].id for n in (met.first, met.second))
+        waits = _waits_before(motion, met)
+        if waits or gap < _LIMITS.hindered_gap_s:
+            hindered = "which waits for it" if waits else f"which follows after {gap:.1f} s"
+            ids = [motion.vehicles[n].id for n in (met.first, met.second)]
             message = (
-                f"goes before vehicle {second}, {how}; by rule {rule.id} vehicle {first} gives way"
+                f"goes before vehicle {ids[1]}, {hindered}; by rule {rule.id} vehicle {ids[0]} "
+                "gives way"
             )
             yield Breach(met.entry_first, (met.first, met.second), message)
 
-    def _over(
-        self, scenario: Scenario, who: int, entry: float, whom: int, other_entry: float
+    def _rule_between(
+        self, motion: Motion, yielding: tuple[int, float], other: tuple[int, float]
     ) -> TrafficRule | None:
-        """The rule by which a vehicle gives way to another one, at a conflict that they enter at these times [s]."""
-        own = self._lanes_before(scenario, who, entry, self._subject)
-        others = (
-            self._lanes_before(scenario, whom, other_entry, sorted({*self._first, *self._subject}))
-            if own
-            else set()
-        )
-        for rule in self._ways:
-            if own & set(rule.lanes) and others & set(rule.over) and not others & set(rule.lanes):
+        """Return the rule by which a vehicle gives way to another one at a conflict.
+
+        Each is given by its index and the time [s] at which it enters the conflict area.
+        """
+        lanes = self._lanes_before(motion, *yielding, self._yielding)
+        if not lanes:
+            return None
+        other_lanes = self._lanes_before(motion, *other, self._involved)
+        for rule in self._rights:
+            goes_first = other_lanes & set(rule.over) and not other_lanes & set(rule.lanes)
+            if lanes & set(rule.lanes) and goes_first:
                 return rule
         return None
 
     def _lanes_before(
-        self, scenario: Scenario, n: int, entry: float, lanes: Sequence[int]
+        self, motion: Motion, n: int, entry: float, lanes: Sequence[int]
     ) -> set[int]:
-        """Those of some lanes on which a vehicle drives in the last metres before a time [s]."""
-        steps = np.concatenate(([0.0], np.cumsum(edge_lengths(scenario.position[n]))))
-        at = scenario.is_present[n] & (scenario.time <= entry + 1e-9)
-        if not at.any():
+        """Return which lanes a vehicle drives on in the last metres before a time [s]."""
+        before = motion.is_present[n] & (motion.time <= entry + 1e-9)
+        if not before.any():
             return set()
-        at &= steps >= steps[at][-1] - _REACH
-        poses = np.column_stack((scenario.position[n, at], scenario.heading[n, at]))
+        driven = _driven(motion.position[n])
+        before &= driven >= driven[before][-1] - _LIMITS.lane_to_conflict_m
+        poses = np.column_stack((motion.position[n, before], motion.heading[n, before]))
         return {k for k in lanes if on_lane(self.network.lanes[k], poses)}
 
 
-def _same_way(network: LaneNetwork, lane: int, place: Floats, heading: float) -> bool:
-    """Whether a vehicle at a place (2,) [m] drives about the way of a lane there."""
-    away = np.square(network.lanes[lane].middle - place).sum(axis=1)
-    return float(np.cos(network.lanes[lane].yaw[int(np.argmin(away))] - heading)) > _SAME_WAY
+def _driven(positions: Floats) -> Floats:
+    """Return the distance (T,) [m] driven until each of some positions (T, 2) [m]."""
+    return np.concatenate(([0.0], np.cumsum(edge_lengths(positions))))
 
 
-def _waits_before(scenario: Scenario, met: Conflict) -> bool:
-    """Whether the second one at a conflict stands before it while the first one passes."""
-    n, time = met.second, scenario.time
-    passes: Bools = (
-        scenario.is_present[n]
-        & (time >= met.entry_first)
-        & (time <= min(met.exit_first, met.entry_second))
-    )
-    if not passes.any():
+def _waits_before(motion: Motion, met: Conflict) -> bool:
+    """Return whether the second vehicle stands before a conflict while the first one passes."""
+    n, time = met.second, motion.time
+    last = min(met.exit_first, met.entry_second)
+    passing: Bools = motion.is_present[n] & (time >= met.entry_first) & (time <= last)
+    if not passing.any():
         return False
-    steps = np.concatenate(([0.0], np.cumsum(edge_lengths(scenario.position[n]))))
-    near = steps >= float(np.interp(met.entry_second, time, steps)) - _NEAR
-    return bool((scenario.speed[n, passes & near] < _STOPPED).any())
+    driven = _driven(motion.position[n])
+    near = driven >= np.interp(met.entry_second, time, driven) - _LIMITS.waiting_distance_m
+    return bool((motion.speed[n, passing & near] < _LIMITS.stopped_mps).any())

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The lane sections of an OpenDRIVE road: the borders of its lanes, cross-section by cross-section.
+"""The lane sections of an OpenDRIVE road: the borders of its lanes as cross-sections.
 
 Source: ASAM OpenDRIVE 1.8, chapter "Lanes".
 """
@@ -18,43 +18,36 @@ from scenario_gen.base.errors import InputError
 from scenario_gen.base.xml_reader import Element
 from scenario_gen.numerics import Floats
 from scenario_gen.numerics.plane import unit_left
-from scenario_gen.roads.vector.network import refuse_too_long, refuse_too_many_lanes
+from scenario_gen.roads.vector.drafts import refuse_too_long, refuse_too_many_lanes
 from scenario_gen.roads.vector.plan_view import Cubics, cubics, ReferenceLine
 from scenario_gen.types import CARS, DRIVERS, LANE_USERS
 
-FOR_CARS = frozenset(
-    (
-        "driving",
-        "entry",
-        "exit",
-        "onRamp",
-        "offRamp",
-        "connectingRamp",
-        "slipLane",
-        "bidirectional",
-        "mwyEntry",
-        "mwyExit",
-        "HOV",
-    )
-)
-_BY_KIND = {
-    **dict.fromkeys(FOR_CARS, DRIVERS), "biking": frozenset(("bicycle",)), "bus": frozenset(("bus",)),
-    "sidewalk": frozenset(("pedestrian",)), "walking": frozenset(("pedestrian",)), "shared": frozenset(("bicycle", "pedestrian")),
-}  # fmt: skip
-_MOTORWAYS = frozenset(
+CROSS_SECTION_STEP_M = 0.5
+_MOTORWAY_TYPES = frozenset(
     ("entry", "exit", "onRamp", "offRamp", "connectingRamp", "mwyEntry", "mwyExit", "HOV")
 )
-STEP = 0.5  # metres between cross-sections
-_SIDES = (("left", 1), ("right", -1))  # and the sign of their lanes' ids
-_ANYBODY = frozenset(
-    ("none", "simulator", "autonomousTraffic", "throughTraffic")
-)  # restrictions that name no type
-_RESTRICTED = {  # whom a restriction of access names
-    "passengerCar": frozenset(("car", "van")), "delivery": frozenset(("van",)), "trucks": frozenset(("truck",)),
+CAR_LANE_TYPES = _MOTORWAY_TYPES | {"driving", "slipLane", "bidirectional"}
+_USERS_BY_TYPE = {
+    **dict.fromkeys(CAR_LANE_TYPES, DRIVERS),
+    **dict.fromkeys(_MOTORWAY_TYPES, DRIVERS - {"bicycle"}),
+    "biking": frozenset(("bicycle",)),
+    "bus": frozenset(("bus",)),
+    "sidewalk": frozenset(("pedestrian",)),
+    "walking": frozenset(("pedestrian",)),
+    "shared": frozenset(("bicycle", "pedestrian")),
+}
+_SIDES = {1: "left", -1: "right"}
+"""By the sign of their lanes' ids."""
+_UNSPECIFIC_RESTRICTIONS = frozenset(("none", "simulator", "autonomousTraffic", "throughTraffic"))
+_USERS_BY_RESTRICTION = {
+    "passengerCar": frozenset(("car", "van")),
+    "delivery": frozenset(("van",)),
+    "trucks": frozenset(("truck",)),
     **{name: frozenset((name,)) for name in LANE_USERS - CARS - {"van"}},
-}  # fmt: skip
+}
 
-Key = tuple[str, int, int]  # road, section, lane
+Key = tuple[str, int, int]
+"""Road, section, lane."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,8 +59,8 @@ class SectionLane:
         element: of the file.
         s: (M,) [m] of its cross-sections.
         inner: (M, 2) [m] its border towards the centre lane, in the order of s.
-        outer: (M, 2) [m] the other one.
-        forth: whether it is driven in the direction of growing s.
+        outer: (M, 2) [m] its other border.
+        forward: whether it is driven in the direction of growing s.
     """
 
     key: Key
@@ -75,7 +68,7 @@ class SectionLane:
     s: Floats
     inner: Floats
     outer: Floats
-    forth: bool
+    forward: bool
 
     @property
     def name(self) -> str:
@@ -83,53 +76,52 @@ class SectionLane:
         return ".".join(map(str, self.key))
 
     @property
-    def kind(self) -> str:
-        """Its type."""
+    def type(self) -> str:
+        """Its type in the file."""
         return str(self.element.get("type", "none"))
+
+    @property
+    def is_car_lane(self) -> bool:
+        """Whether its type is one for cars."""
+        return self.type in CAR_LANE_TYPES
 
     @property
     def both_ways(self) -> bool:
         """Whether it is driven in both directions."""
-        return self.kind == "bidirectional" or self.element.get("direction") == "both"
+        return self.type == "bidirectional" or self.element.get("direction") == "both"
 
     @cached_property
     def users(self) -> frozenset[str]:
-        """Who may use all of it, by its type and its records of access."""
-        users = _BY_KIND.get(self.kind, frozenset()) - (
-            frozenset(("bicycle",)) if self.kind in _MOTORWAYS else frozenset()
-        )
-        records: dict[tuple[str, str], set[str]] = defaultdict(
-            set
-        )  # who may, or may not, from some sOffset on
+        """The users who may use all of it, by its type and its records of access."""
+        users = _USERS_BY_TYPE.get(self.type, frozenset())
+        # Records with the same offset and rule belong together.
+        records: dict[tuple[str, str], set[str]] = defaultdict(set)
         for access in self.element.findall("access"):
-            names = [
-                access.get("restriction"),
-                *(own.get("type") for own in access),
-            ]  # before, in 1.8
-            records[access.get("sOffset", "0"), access.get("rule", "deny")].update(
-                filter(None, names)
-            )
-        for (_, rule), restricted in records.items():
-            named = frozenset[str]().union(
-                *(_RESTRICTED.get(name, frozenset()) for name in restricted)
-            )
-            users = (
-                users - named
-                if rule == "deny"
-                else users
-                if restricted & _ANYBODY
-                else users & named
-            )
+            key = access.get("sOffset", "0"), access.get("rule", "deny")
+            nested = [child.get("type") for child in access]  # since version 1.8
+            records[key].update(filter(None, [access.get("restriction"), *nested]))
+        for (_, rule), restrictions in records.items():
+            named = [_USERS_BY_RESTRICTION.get(name, frozenset()) for name in restrictions]
+            named_users = frozenset[str]().union(*named)
+            if rule == "deny":
+                users -= named_users
+            elif not restrictions & _UNSPECIFIC_RESTRICTIONS:
+                users &= named_users
         return users
 
-    def middle(self, at: int) -> Floats:
-        """(2,) [m] its middle at lower s (0) or at higher s (1)."""
+    def centre(self, at: int) -> Floats:
+        """Return its centre (2,) [m] at lower s (0) or at higher s (1)."""
         return np.asarray((self.outer[-at] + self.inner[-at]) / 2.0)
 
 
 @dataclass(frozen=True, eq=False)
 class LaneSection:
-    """A lane section: its lanes by id, and the signs of the sides whose lanes it lists: both, or one (`singleSide`)."""
+    """A lane section.
+
+    Attributes:
+        lanes: its lanes by id.
+        signs: of the sides whose lanes it lists: both, or one (`singleSide`).
+    """
 
     lanes: dict[int, SectionLane]
     signs: tuple[int, ...]
@@ -137,13 +129,13 @@ class LaneSection:
 
 @dataclass(frozen=True, eq=False)
 class _Stations:
-    """Where a section has its cross-sections.
+    """The cross-sections of a lane section.
 
     Attributes:
         s: (M,) [m] along the road.
-        end: metres at which the section ends.
+        end: [m] where the section ends.
         poses: (M, 3) of the reference line.
-        centre: (M,) [m] to its left, where the centre lane lies.
+        centre: (M,) [m] the centre lane's offset to the left.
     """
 
     s: Floats
@@ -151,10 +143,25 @@ class _Stations:
     poses: Floats
     centre: Floats
 
+    def values(self, records: list[Element]) -> Floats:
+        """Return the values (M,) [m] of records that begin at `sOffset` in the section."""
+        begin = float(self.s[0])
+        return cubics(records, "sOffset").at(self.s - begin, self.end - begin)
+
 
 @dataclass(frozen=True, eq=False)
 class OpenDriveRoad:
-    """A road: its element, id, line and junction, the side on which one drives, its height along s, its lane sections."""
+    """A road of an OpenDRIVE map.
+
+    Attributes:
+        element: of the file.
+        id: its id.
+        line: its reference line.
+        junction: its junction, "" if none.
+        left_hand: whether its traffic keeps left.
+        elevation: along s [m].
+        sections: its lane sections.
+    """
 
     element: Element
     id: str
@@ -164,8 +171,16 @@ class OpenDriveRoad:
     elevation: Cubics
     sections: list[LaneSection] = field(default_factory=list)
 
-    def beyond(self, section: int, step: int, lane: int) -> int | None:
-        """The next section after (step 1) or before (-1) one that lists the lanes of a lane's side; None: the road ends."""
+    @property
+    def lanes(self) -> Iterator[SectionLane]:
+        """All its lanes, section by section."""
+        return (lane for section in self.sections for lane in section.lanes.values())
+
+    def next_section(self, section: int, step: int, lane: int) -> int | None:
+        """Return the next section after (step 1) or before (-1) one, which lists a lane's side.
+
+        It is None where the road ends.
+        """
         k = section + step
         while 0 <= k < len(self.sections):
             if math.copysign(1, lane) in self.sections[k].signs:
@@ -181,93 +196,90 @@ def road_of_sections(element: Element, name: str, line: ReferenceLine) -> OpenDr
         InputError: it is broken; names file and line.
     """
     junction = element.get("junction", "-1")
-    elevation = element.find("elevationProfile")
     road = OpenDriveRoad(
         element,
         name,
         line,
         "" if junction == "-1" else junction,
         element.get("rule", "RHT") == "LHT",
-        cubics(elevation.findall("elevation") if elevation is not None else [], "s"),
+        cubics(element.findall("elevationProfile/elevation"), "s"),
     )
     lanes = element.child("lanes")
-    offset = cubics(lanes.findall("laneOffset"), "s")
+    centre = cubics(lanes.findall("laneOffset"), "s")
     sections = sorted(lanes.findall("laneSection"), key=lambda section: section.number("s"))
     if not sections:
         raise InputError(f"{lanes.place} has no <laneSection>")
     refuse_too_many_lanes(len(sections), element.file)
     begins = [min(max(section.number("s"), 0.0), line.length) for section in sections]
     road.sections.extend(LaneSection({}, _signs(section)) for section in sections)
-    for k, (section, begin) in enumerate(zip(sections, begins, strict=True)):
-        after = {sign: road.beyond(k, 1, sign) for sign in road.sections[k].signs}
-        ends = {
-            sign: line.length if other is None else begins[other] for sign, other in after.items()
-        }
-        for end in dict.fromkeys(ends.values()):
-            breaks = line.begin[
-                np.searchsorted(line.begin, begin, side="right") : np.searchsorted(line.begin, end)
-            ]
-            even = np.linspace(
-                begin, max(end, begin + 1e-3), max(math.ceil((end - begin) / STEP), 1) + 1
-            )
-            s = np.unique(np.concatenate((even, breaks)))
-            stations = _Stations(s, end, line.at(s, end), offset.at(s, end))
-            for sign in (sign for sign in ends if ends[sign] == end):
-                road.sections[k].lanes.update(_lanes(road, k, section, sign, stations))
+    for k, section in enumerate(sections):
+        signs_by_end: dict[float, list[int]] = defaultdict(list)
+        for sign in road.sections[k].signs:
+            following = road.next_section(k, 1, sign)
+            signs_by_end[line.length if following is None else begins[following]].append(sign)
+        for end, signs in signs_by_end.items():
+            s = _stations(line, begins[k], end)
+            stations = _Stations(s, end, line.at(s, end), centre.at(s, end))
+            for sign in signs:
+                lanes_of_side = _lanes_of_side(road, k, section, sign, stations)
+                road.sections[k].lanes.update(lanes_of_side)
     return road
 
 
+def _stations(line: ReferenceLine, begin: float, end: float) -> Floats:
+    """Return the arc lengths (M,) [m] of cross-sections, among them the begins of geometries."""
+    first = np.searchsorted(line.begin, begin, side="right")
+    last = np.searchsorted(line.begin, end)
+    count = max(math.ceil((end - begin) / CROSS_SECTION_STEP_M), 1) + 1
+    even = np.linspace(begin, max(end, begin + 1e-3), count)
+    return np.unique(np.concatenate((even, line.begin[first:last])))
+
+
 def _signs(section: Element) -> tuple[int, ...]:
-    """The signs of the sides whose lanes a section lists: those that it has if it is for a single side, else both."""
+    """Return the signs of the sides whose lanes a section lists."""
     single = section.get("singleSide") in ("true", "1")
-    return tuple(sign for side, sign in _SIDES if not single or section.find(side) is not None)
+    return tuple(
+        sign for sign, side in _SIDES.items() if not single or section.find(side) is not None
+    )
 
 
-def _lanes(
+def _lanes_of_side(
     road: OpenDriveRoad, number: int, section: Element, sign: int, stations: _Stations
 ) -> Iterator[tuple[int, SectionLane]]:
-    """The lanes of one side of a section, with the section's number in the road, by id."""
-    s, begin, end = stations.s, float(stations.s[0]), stations.end
-    normal, across = unit_left(stations.poses[:, 2]), stations.centre
-    inner = stations.poses[:, :2] + across[:, None] * normal
-    elements = [
-        lane
-        for side, own in _SIDES
-        if own == sign
-        for group in section.findall(side)[:1]
-        for lane in group.findall("lane")
-    ]
+    """Yield the lanes on one side of the road's section with a number, by id."""
+    side = section.find(_SIDES[sign])
+    elements = [] if side is None else side.findall("lane")
     refuse_too_many_lanes(len(elements), section.file)
-    refuse_too_long(len(elements) * len(s), section.file)
-    for count, lane in enumerate(
-        sorted(elements, key=lambda lane: sign * _lane_id(lane, sign)), 1
-    ):
+    refuse_too_long(len(elements) * len(stations.s), section.file)
+
+    normal = unit_left(stations.poses[:, 2])
+    offset = stations.centre
+    inner = stations.poses[:, :2] + offset[:, None] * normal
+    elements.sort(key=lambda lane: sign * _lane_id(lane, sign))
+    for count, lane in enumerate(elements, start=1):
         name = _lane_id(lane, sign)
         if name != sign * count:
             raise InputError(
-                f"{lane.place}: lane {name} is there twice, or those between it and the centre are missing"
+                f"{lane.place}: a second lane {name}, or one nearer to the centre is missing"
             )
-        if lane.findall("width"):
-            width = cubics(lane.findall("width"), "sOffset").at(s - begin, end - begin)
-            across = across + sign * np.maximum(width, 0.0)
-        elif lane.findall("border"):
-            across = (
-                cubics(lane.findall("border"), "sOffset").at(s - begin, end - begin)
-                + stations.centre
-            )
-        outer = stations.poses[:, :2] + across[:, None] * normal
-        forth = ((name < 0) != road.left_hand) != (lane.get("direction") == "reversed")
-        yield name, SectionLane((road.id, number, name), lane, s, inner, outer, forth)
+        if widths := lane.findall("width"):
+            offset = offset + sign * np.maximum(stations.values(widths), 0.0)
+        elif borders := lane.findall("border"):
+            offset = stations.values(borders) + stations.centre
+        outer = stations.poses[:, :2] + offset[:, None] * normal
+        forward = ((name < 0) != road.left_hand) != (lane.get("direction") == "reversed")
+        yield name, SectionLane((road.id, number, name), lane, stations.s, inner, outer, forward)
         inner = outer
 
 
 def _lane_id(lane: Element, sign: int) -> int:
+    """Return the id of a lane on the side with a sign."""
+    text = lane.attribute("id")
     try:
-        number = int(lane.attribute("id"))
+        number = int(text)
     except ValueError:
         number = 0
     if number * sign <= 0:
-        raise InputError(
-            f"{lane.place}: id {lane.attribute('id')[:20]!r}; whole numbers {'above' if sign > 0 else 'below'} 0 are needed here"
-        )
+        side = "above" if sign > 0 else "below"
+        raise InputError(f"{lane.place}: id {text[:20]!r}; whole numbers {side} 0 are needed here")
     return number

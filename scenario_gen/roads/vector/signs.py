@@ -1,12 +1,13 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Signs, lights and rights of way of a map, as rules for the traffic of its lanes.
+"""Signs, lights and rights of way of a map as rules for the traffic of its lanes.
 
-Source: the numbers of signs in CommonRoad's traffic sign ids, in Lanelet2's `LinestringTagging`, and in ASAM OpenDRIVE 1.8,
-"Signals", with the sign catalogues of Germany, the USA and Spain.
+Source: the numbers of signs in CommonRoad's traffic sign ids, in Lanelet2's `LinestringTagging`
+and in ASAM OpenDRIVE 1.8, "Signals", with the sign catalogues of Germany, the USA and Spain.
 """
 
+from collections import defaultdict
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 import re
@@ -14,15 +15,10 @@ import re
 import numpy as np
 
 from scenario_gen.numerics import Floats
-from scenario_gen.types import (
-    LaneNetwork,
-    Note,
-    NoteKind,
-    RuleKind,
-    TrafficRule,
-)
+from scenario_gen.types import LaneNetwork, Note, NoteKind, RuleKind, TrafficRule
 
-_SIGNS = {
+YIELDING_KINDS = (RuleKind.STOP, RuleKind.GIVE_WAY)
+_SIGNS_BY_COUNTRY = {
     "de": {
         "206": RuleKind.STOP,
         "205": RuleKind.GIVE_WAY,
@@ -32,31 +28,28 @@ _SIGNS = {
     "us": {"r1-1": RuleKind.STOP, "r1-2": RuleKind.GIVE_WAY},
     "es": {"r2": RuleKind.STOP, "r1": RuleKind.GIVE_WAY, "r3": RuleKind.PRIORITY},
 }
-_NAMED = {
+_SIGNS_BY_NAME = {
     "stop": RuleKind.STOP,
     "stop_sign": RuleKind.STOP,
     "yield": RuleKind.GIVE_WAY,
     "yield_sign": RuleKind.GIVE_WAY,
     "give_way": RuleKind.GIVE_WAY,
 }
-_COUNTRIES = {
-    "deu": "de",
-    "germany": "de",
-    "usa": "us",
-    "esp": "es",
-    "spain": "es",
-}  # other names of those with a list
-_SPEED_LIMITS = ("274", "274.1", "r2-1", "maxspeed")
-_SUBJECT = (RuleKind.STOP, RuleKind.GIVE_WAY)
-_LEADS = 6  # lanes between a sign and its junction at most
+_COUNTRY_CODES = {"deu": "de", "germany": "de", "usa": "us", "esp": "es", "spain": "es"}
+_SPEED_LIMIT_SIGNS = ("274", "274.1", "r2-1", "maxspeed")
+_MAX_LANES_TO_JUNCTION_COUNT = 6  # from a sign
 
 
 @dataclass(frozen=True, eq=False)
 class DraftRule:
-    """A rule as a reader finds it; fields as of `TrafficRule`, with the names of lanes, also of those that are not for cars.
+    """A rule as a reader returns it, with the names of lanes; see `TrafficRule`.
 
     Attributes:
-        line: (K, 2) metres.
+        id: its name.
+        kind: what its traffic has to do.
+        lanes: whose traffic it applies to, including lanes that are closed to cars.
+        over: whose traffic goes first.
+        line: (K, 2) [m] the stop line.
     """
 
     id: str
@@ -67,118 +60,122 @@ class DraftRule:
 
 
 def kind_of_sign(name: str, subtype: str = "", country: str = "") -> RuleKind | None:
-    """Return what a sign means; None: another sign.
+    """Return the meaning of a sign; None if it is not known.
 
     Args:
         name: its number or name, with or without its country (206, de206, usR1-1).
-        subtype: what the number goes on with (R1 and 1: R1-1), "" or -1 if it does not.
-        country: whose number it is, in two or three letters; a country without a list of signs may have those of any.
+        subtype: the second part of the number (R1 and 1: R1-1); "" or -1 if there is none.
+        country: of the number, in two or three letters; a country without a list of signs may
+            have those of any.
     """
-    numbers, own = _numbers(name, subtype, country)
-    tables = [_SIGNS[own]] if own in _SIGNS else list(_SIGNS.values())
-    return next(
-        (table[number] for number in numbers for table in (*tables, _NAMED) if number in table),
-        None,
-    )
+    numbers, code = _numbers(name, subtype, country)
+    tables = list(_SIGNS_BY_COUNTRY.values())
+    if code in _SIGNS_BY_COUNTRY:
+        tables = [_SIGNS_BY_COUNTRY[code]]
+    for number in numbers:
+        for table in (*tables, _SIGNS_BY_NAME):
+            if number in table:
+                return table[number]
+    return None
 
 
 def is_speed_limit(name: str, subtype: str = "", country: str = "") -> bool:
-    """Return whether a sign sets a speed limit; arguments as of `kind_of_sign`."""
-    return any(number in _SPEED_LIMITS for number in _numbers(name, subtype, country)[0])
+    """Return whether a sign sets a speed limit; arguments as in `kind_of_sign`."""
+    numbers, _ = _numbers(name, subtype, country)
+    return any(number in _SPEED_LIMIT_SIGNS for number in numbers)
 
 
 def _numbers(name: str, subtype: str, country: str) -> tuple[list[str], str]:
-    """The numbers, in lower case, by which a sign may be listed, and the country's two letters."""
-    text, own = name.strip().lower(), country.strip().lower()
+    """Return the numbers, in lower case, by which a sign may be listed, and the country's code."""
+    text, code = name.strip().lower(), country.strip().lower()
     prefix = re.match(r"[a-z]{2}(?=[r0-9])", text)
     if prefix:
-        text, own = text[2:], prefix[0]
-    if subtype.strip().lower() in ("", "-1", "none"):
-        return [text], _COUNTRIES.get(own, own)
-    whole = f"{text}-{subtype.strip().lower()}"
-    return [whole, text] if text.isdigit() else [whole], _COUNTRIES.get(own, own)
+        text, code = text[2:], prefix[0]
+    code = _COUNTRY_CODES.get(code, code)
+    subtype = subtype.strip().lower()
+    if subtype in ("", "-1", "none"):
+        return [text], code
+    numbers = [f"{text}-{subtype}"]
+    if text.isdigit():
+        numbers.append(text)
+    return numbers, code
 
 
 def with_rules(network: LaneNetwork, drafts: Sequence[DraftRule]) -> LaneNetwork:
     """Return a network with its rules, whose lanes are found by name.
 
-    A stop sign without a line gets the end of each lane as its line. A stop or give-way sign whose map does not say who goes
-    first gets the lanes that lead into the same junction and have no such sign.
+    A stop sign without a line gets the end of each lane as its line. If a map does not tell who
+    goes before a stop or give-way sign, traffic from the lanes that lead into the same junction
+    and have no such sign does.
     """
     index = {lane.id: k for k, lane in enumerate(network.lanes)}
-    rules: list[TrafficRule] = []
-    for draft in drafts:
-        lanes, over = (
-            tuple(dict.fromkeys(index[name] for name in names if name in index))
-            for names in (draft.lanes, draft.over)
-        )
-        if not lanes:
-            continue
-        if draft.kind == RuleKind.STOP and not len(draft.line):
-            ends = (
-                (k, np.stack((network.lanes[k].left[-1], network.lanes[k].right[-1])))
-                for k in lanes
-            )
-            rules += (TrafficRule(draft.id, draft.kind, (k,), over, line) for k, line in ends)
-        else:
-            rules.append(TrafficRule(draft.id, draft.kind, lanes, over, draft.line))
-    known = tuple(_over_others(network, rules))
-    notes = network.notes
-    if known:
-        counts = {kind: len({rule.id for rule in known if rule.kind == kind}) for kind in RuleKind}
-        words = ", ".join(
-            f"{count} {kind.replace('_', ' ')}" for kind, count in counts.items() if count
-        )
-        notes += (Note.of(NoteKind.TRAFFIC_RULES, rules=words),)
-        if counts[RuleKind.TRAFFIC_LIGHT]:
-            notes += (Note.of(NoteKind.LIGHTS_OFF),)
-    return replace(network, rules=known, notes=notes)
+    rules = [rule for draft in drafts for rule in _rules_of(draft, index, network)]
+    rules = [*_with_going_first(network, rules)]
+    if not rules:
+        return network
+    counts = {kind: len({rule.id for rule in rules if rule.kind == kind}) for kind in RuleKind}
+    listed = [f"{count} {kind.replace('_', ' ')}" for kind, count in counts.items() if count]
+    notes = [*network.notes, Note.of(NoteKind.TRAFFIC_RULES, rules=", ".join(listed))]
+    if counts[RuleKind.TRAFFIC_LIGHT]:
+        notes.append(Note.of(NoteKind.LIGHTS_OFF))
+    return replace(network, rules=tuple(rules), notes=tuple(notes))
 
 
-def _over_others(network: LaneNetwork, rules: Sequence[TrafficRule]) -> Iterator[TrafficRule]:
-    """Yield the rules, those without `over` with the lanes into the same junction that no stop or give-way sign concerns."""
-    subject = {
-        lane
+def _rules_of(
+    draft: DraftRule, index: Mapping[str, int], network: LaneNetwork
+) -> Iterator[TrafficRule]:
+    """Yield the rule of a draft, or a rule for each of its lanes if it lacks a stop line."""
+    lanes = tuple(dict.fromkeys(index[name] for name in draft.lanes if name in index))
+    over = tuple(dict.fromkeys(index[name] for name in draft.over if name in index))
+    if draft.kind == RuleKind.STOP and not len(draft.line):
+        for k in lanes:
+            line = np.stack((network.lanes[k].left[-1], network.lanes[k].right[-1]))
+            yield TrafficRule(draft.id, draft.kind, (k,), over, line)
+    elif lanes:
+        yield TrafficRule(draft.id, draft.kind, lanes, over, draft.line)
+
+
+def _with_going_first(network: LaneNetwork, rules: Sequence[TrafficRule]) -> Iterator[TrafficRule]:
+    """Yield the rules; those without `over` get the lanes without a sign into the same junction."""
+    yielding = {
+        mouth
         for rule in rules
-        if rule.kind in _SUBJECT
+        if rule.kind in YIELDING_KINDS
         for k in rule.lanes
-        for lane in _mouths(network, k)
+        for mouth in _mouths(network, k)
     }
-    into: dict[str, list[int]] = {}
+    into: dict[str, list[int]] = defaultdict(list)
     for k, lane in enumerate(network.lanes):
-        for name in dict.fromkeys(network.lanes[after].junction for after in lane.successors):
-            if name and name != lane.junction:
-                into.setdefault(name, []).append(k)
+        for name in _junctions_after(network, k):
+            if name != lane.junction:
+                into[name].append(k)
     for rule in rules:
-        if rule.kind not in _SUBJECT or rule.over:
+        if rule.kind not in YIELDING_KINDS or rule.over:
             yield rule
             continue
         mouths = [mouth for k in rule.lanes for mouth in _mouths(network, k)]
-        names = dict.fromkeys(
-            network.lanes[after].junction
-            for mouth in mouths
-            for after in network.lanes[mouth].successors
-        )
-        over = dict.fromkeys(k for name in names for k in into.get(name, ()) if k not in subject)
+        names = dict.fromkeys(name for k in mouths for name in _junctions_after(network, k))
+        over = dict.fromkeys(k for name in names for k in into[name] if k not in yielding)
         yield replace(rule, over=tuple(over))
 
 
+def _junctions_after(network: LaneNetwork, lane: int) -> list[str]:
+    """Return the names of the junctions that a lane's successors belong to."""
+    names = [network.lanes[k].junction for k in network.lanes[lane].successors]
+    return list(dict.fromkeys(name for name in names if name))
+
+
 def _mouths(network: LaneNetwork, first: int) -> list[int]:
-    """Return the lanes by which traffic of a lane comes into the next junction."""
+    """Return the lanes by which traffic from a lane enters the next junction."""
     mouths: list[int] = []
     level = [first]
-    for _ in range(_LEADS):
-        mouths += [
-            k
-            for k in level
-            if any(network.lanes[after].junction for after in network.lanes[k].successors)
-        ]
+    for _ in range(_MAX_LANES_TO_JUNCTION_COUNT):
+        mouths += [k for k in level if _junctions_after(network, k)]
         level = [
-            after
+            following
             for k in level
             if k not in mouths
-            for after in network.lanes[k].successors
-            if not network.lanes[after].junction
+            for following in network.lanes[k].successors
         ]
     return list(dict.fromkeys(mouths))
 
@@ -186,15 +183,15 @@ def _mouths(network: LaneNetwork, first: int) -> list[int]:
 def rules_of_pieces(
     rules: Sequence[TrafficRule], pieces: Mapping[int, Sequence[int]]
 ) -> tuple[TrafficRule, ...]:
-    """Return the rules of a part of a network.
+    """Return the rules for a part of a network.
 
     Args:
         rules: of the whole.
-        pieces: of each lane of which something is left, the lanes of the part.
+        pieces: the lanes of the part by the lane of the whole that they are pieces of.
     """
 
-    def kept(lanes: Sequence[int]) -> tuple[int, ...]:
+    def pieces_of(lanes: Sequence[int]) -> tuple[int, ...]:
         return tuple(piece for k in lanes for piece in pieces.get(k, ()))
 
-    parts = (replace(rule, lanes=kept(rule.lanes), over=kept(rule.over)) for rule in rules)
-    return tuple(rule for rule in parts if rule.lanes)
+    cut = [replace(rule, lanes=pieces_of(rule.lanes), over=pieces_of(rule.over)) for rule in rules]
+    return tuple(rule for rule in cut if rule.lanes)

@@ -380,7 +380,7 @@ def test_anchors_without_room_are_moved_and_said_and_far_ones_refused():
     far = Road("far", drivable, 0.2, np.zeros(2), np.zeros((0, 3)), np.zeros((0, 3)))
     with pytest.raises(
         RefusedError,
-        match=r"vehicle 0 is 5\.\d m from any pose with room at sample 0 .*at most 3 m is bridged; set fitting.max_move",
+        match=r"vehicle 0 is 5\.\d m from any pose with room at sample 0 .*fitting.max_move accepts 3 m; increase fitting.max_move",
     ):
         fit_template(encounter, every(encounter), far, FittingConfig(placement="identity"))
 

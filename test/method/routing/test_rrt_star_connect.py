@@ -34,7 +34,7 @@ from scenario_gen.method.routing.search.planner import (
     Query,
 )
 from scenario_gen.roads.clearance import segments_free
-from scenario_gen.roads.connectivity import common_component
+from scenario_gen.roads.connectivity import FreeSpace
 
 SMALL = 24
 QUERIES = 300 if LONG else 90
@@ -78,11 +78,11 @@ def test_cost_is_near_the_optimum_and_never_below(seed, density):
         plan = planner.plan(road, Query(*ends), Budget(1500), 3)
     except BudgetSpentError:  # a maze: patience must find the way that the components promise
         plan = planner.plan(road, Query(*ends), Budget(500_000, first=True), 3)
-        assert common_component(road, *ends, 0.0) is not None
+        assert FreeSpace(road, 0.0).common_component(*ends) is not None
         assert plan.cost >= optimum(road, ends) - 1e-9
         return
     except RefusedError:
-        assert common_component(road, *ends, 0.0) is None
+        assert FreeSpace(road, 0.0).common_component(*ends) is None
         return
     best = optimum(
         road, ends
@@ -126,7 +126,7 @@ def small():
 
 def grown(road, ends, config, iterations):
     """The search after some iterations, and the nodes of both trees."""
-    search = RrtStarConnect(config).search(road, Query(*ends), 1, 2)
+    search = RrtStarConnect(config).search(FreeSpace(road, 0.0), Query(*ends), 1, 2)
     search.grow(iterations)
     while search.iteration < iterations:
         search.grow(iterations - search.iteration)

@@ -10,7 +10,7 @@ import pytest
 from support.map_builders import FORMATS, write
 
 from scenario_gen.logs import read_log
-from scenario_gen.roads import placements, read_network, tracks_on
+from scenario_gen.roads import lane_graph, placements, read_network, tracks_on
 from scenario_gen.situation import clean_tracks, find_conflicts
 from scenario_gen.types import Encounter, Motion, Vehicle
 
@@ -53,7 +53,7 @@ def meet(tracks):
 def test_a_left_turn_crosses_the_oncoming_lane(tmp_path, suffix, median, start):
     tracks = clean_tracks(left_turn(median, start))
     assert meet(tracks)
-    placed = list(islice(placements(read_network(write(tmp_path, suffix)), tracks), 2))
+    placed = list(islice(placements(lane_graph(read_network(write(tmp_path, suffix))), tracks), 2))
     assert placed
     for match, _ in placed:
         assert meet(tracks_on(match, tracks))
@@ -68,6 +68,8 @@ def test_a_recorded_left_turn_crosses_the_oncoming_lane(recorded, name):
     log = next((recorded / "trajectories" / "ngsim_commonroad").glob("encounter_b_left_turn*.csv"))
     tracks = clean_tracks(read_log(log).encounters[0])
     match, _ = next(
-        placements(read_network(recorded / "maps" / "opendrive" / f"{name}.xodr"), tracks)
+        placements(
+            lane_graph(read_network(recorded / "maps" / "opendrive" / f"{name}.xodr")), tracks
+        )
     )
     assert meet(tracks_on(match, tracks))

@@ -11,8 +11,8 @@ from test_reported_maps import lane, read, road, section
 from scenario_gen.base.errors import RefusedError
 from scenario_gen.roads import (
     build_road,
-    cells_of,
     ground_for,
+    lane_graph,
     placements,
     read_network,
     RoadConfig,
@@ -22,7 +22,6 @@ from scenario_gen.roads.obstacles import read_obstacles, with_obstacles
 from scenario_gen.situation import clean_tracks
 from scenario_gen.types import (
     Encounter,
-    lanes_for,
     NoteKind,
     Vehicle,
     VEHICLE_TYPES,
@@ -177,9 +176,9 @@ def test_who_drives_is_placed_where_its_type_may_and_kept_there(tmp_path, kind, 
     encounter = beside(kind)
     built = build_road(street(tmp_path, lanes) + "#box=0,-12,100,2", encounter)
     tracks = clean_tracks(encounter)
-    network = lanes_for(built.lanes, users_of(tracks))
-    placement, _ = next(placements(network, tracks))
-    assert [[network.lanes[k].id for k in course.lanes] for course in placement.courses] == [
+    graph = lane_graph(built.lanes, users_of(tracks))
+    match, _ = next(placements(graph, tracks))
+    assert [[graph.network.lanes[k].id for k in path.lanes] for path in match.paths] == [
         ["1.0.-1"],
         [f"1.0.{placed}"],
     ]
@@ -195,7 +194,7 @@ def test_an_obstacle_on_a_cycle_lane_is_in_the_way_of_bicycles(tmp_path):
     )
     plain = build_road(street(tmp_path, "biking"))
     assert with_obstacles(
-        plain, read_obstacles("50 -5.25 0 2 1"), cells_of(plain, plain.lanes.others)
+        plain, read_obstacles("50 -5.25 0 2 1"), plain.cells_in(plain.lanes.others)
     ).obstructed.any()
 
 

@@ -161,9 +161,7 @@ def test_a_part_that_is_not_there_is_refused(tmp_path, part, said):
     "name", ["t_intersection#box=0,0,9,9", "depot.yaml#junction=1", "a.osm#box=0,0,9,9#lanelet=1"]
 )
 def test_a_part_of_what_has_none_is_refused(name):
-    with pytest.raises(
-        InputError, match="one part behind one # can be named of a vector map alone"
-    ):
+    with pytest.raises(InputError, match="only a vector map has parts, one behind one #"):
         build_road(name)
 
 
@@ -186,7 +184,7 @@ BROKEN = [  # suffix, text, what is said, with its place
     (".osm", "<OpenDRIVE/>", "the root of a Lanelet2 map is <osm>"),
     (".xodr", "<osm/>", "the root of an OpenDRIVE map is <OpenDRIVE>"),
     (".xml", "<osm/>", "the root of a CommonRoad file is <commonRoad>"),
-    (".xml", "<commonRoad/>", "no lane that cars may use"),
+    (".xml", "<commonRoad/>", "no lane for cars"),
     (".xodr", "<OpenDRIVE><header/></OpenDRIVE>", "no <road>"),
     (
         ".osm",
@@ -208,7 +206,7 @@ ODD = [  # one odd element: suffix, text, the note with its reason
     (
         ".osm",
         lanelet2().replace('<nd ref="1"/>', '<nd ref="77777"/>', 1),
-        "goes through node 77777, which is not in the map",
+        "node 77777 of way 1000 is not in the map",
     ),
     (
         ".osm",
@@ -217,7 +215,11 @@ ODD = [  # one odd element: suffix, text, the note with its reason
     ),
     (".osm", lanelet2().replace('ref="1000"', 'ref="4000"'), "way 4000 is not in the map"),
     (".osm", lanelet2().replace('v="60.0"', 'v="nan"', 1), "is not a number"),
-    (".osm", lanelet2().replace('<node id="2"', '<node id="1"', 1), "node 1 is there twice"),
+    (
+        ".osm",
+        lanelet2().replace('<node id="2"', '<node id="1"', 1),
+        "second node 1, first on line 1",
+    ),
     (".xodr", opendrive().replace('curvature="0.125"', 'curvature="1e9"', 1), "curvature"),
     (".xodr", opendrive().replace("<line/>", "<helix/>", 1), "holds none of line, arc, spiral"),
     (".xodr", opendrive().replace('a="3.5"', 'a="inf"', 1), "is not a number"),
@@ -232,7 +234,7 @@ ODD = [  # one odd element: suffix, text, the note with its reason
     (
         ".xml",
         FORMATS[".xml"]().replace('<successor ref="102"/>', '<successor ref="9999"/>', 1),
-        "leads to lanelet 9999, which is not there",
+        "successor 9999 of lanelet 100 is not in the map",
     ),
     (
         ".xml",
@@ -250,12 +252,12 @@ ODD = [  # one odd element: suffix, text, the note with its reason
     (
         ".xml",
         FORMATS[".xml"]().replace("8.333333333333334", "fast"),
-        "faulty speed sign left out .*'fast' is no speed",
+        "faulty speed sign left out .*'fast' is not a speed",
     ),
     (
         ".xodr",
         opendrive().replace('id="1" junction', 'id="0" junction', 1),
-        "road 0 is there twice",
+        "second road 0, first on line 1",
     ),
 ]
 
@@ -336,22 +338,27 @@ def across(count, length):
 @pytest.mark.parametrize(
     ("suffix", "text", "limit", "said"),
     [
-        (".osm", lanelet2(), ("MOST_LANES", 10), "more than 10 lanes"),
-        (".xml", FORMATS[".xml"](), ("MOST_LANES", 10), "more than 10 lanes"),
-        (".xodr", opendrive(), ("MOST_LANES", 10), "more than 10 lanes"),
-        (".xodr", opendrive(), ("MOST_SECTIONS", 300), "lanes of more than 300 points"),
-        (".osm", lanelet2(), ("MOST_SECTIONS", 50), "lanes of more than 50 points"),
+        (".osm", lanelet2(), ("drafts.MAX_LANES_COUNT", 10), "more than 10 lanes"),
+        (".xml", FORMATS[".xml"](), ("drafts.MAX_LANES_COUNT", 10), "more than 10 lanes"),
+        (".xodr", opendrive(), ("drafts.MAX_LANES_COUNT", 10), "more than 10 lanes"),
+        (
+            ".xodr",
+            opendrive(),
+            ("drafts.MAX_SECTIONS_COUNT", 300),
+            "lanes with more than 300 points",
+        ),
+        (".osm", lanelet2(), ("drafts.MAX_SECTIONS_COUNT", 50), "lanes with more than 50 points"),
         (
             ".osm",
             STACKED,
-            ("MOST_LINKS", 100),
-            "lane 0: 149 lanes follow it; at most 100 are read",
+            ("drafts.MAX_LINKS_COUNT", 100),
+            "lane 0 has 149 successors; at most 100 are read",
         ),
         (
             ".xml",
             across(30, 40.0),
-            ("_MOST_COMPARED", 100),
-            "lie upon each other in more than 100 places, as at lane 0",
+            ("network._MAX_COMPARED_COUNT", 100),
+            "more than 100 pairs of lanes overlap, as at lane 0",
         ),
         (".xodr", opendrive().replace('d="0"', 'd="9e7"'), None, "km; check the coordinates"),
     ],
@@ -361,7 +368,7 @@ def test_what_would_take_too_much_time_or_memory_is_refused(
     tmp_path, monkeypatch, suffix, text, limit, said
 ):
     if limit:
-        monkeypatch.setattr(f"scenario_gen.roads.vector.network.{limit[0]}", limit[1])
+        monkeypatch.setattr(f"scenario_gen.roads.vector.{limit[0]}", limit[1])
     with pytest.raises(InputError, match=said) as error:
         read_network(write(tmp_path, suffix, text))
     assert "map" in str(error.value)
@@ -373,7 +380,7 @@ def test_lanes_that_cross_are_one_junction_however_long_they_are(tmp_path):
 
 
 def test_a_whole_map_that_is_too_long_to_be_searched_is_refused(tmp_path, monkeypatch):
-    monkeypatch.setattr("scenario_gen.roads.vector.search._MOST_SEARCHED", 100)
+    monkeypatch.setattr("scenario_gen.roads.vector.lane_graph._MAX_SECTIONS_COUNT", 100)
     (encounter,) = read_log([bundled("b")]).encounters
     with pytest.raises(RefusedError, match=r"choose a part with #box=x0,y0,x1,y1"):
         build_road(str(write(tmp_path, ".osm")), encounter)

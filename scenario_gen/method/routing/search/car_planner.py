@@ -33,10 +33,8 @@ from scenario_gen.method.routing.search.sweep import car_scene, poses_in_cells
 from scenario_gen.numerics import Floats, Ints, wrap_angle
 from scenario_gen.numerics.plane import edge_lengths, edge_yaws
 from scenario_gen.roads import (
-    clearance_in_cells,
-    common_component,
-    component_cells,
     footprint_fits,
+    FreeSpace,
     to_cells,
     to_metres,
 )
@@ -169,7 +167,7 @@ class PoseRrtStarConnect:
         line, radius = _disc_path(road, query, DISC_MARGINS_M[attempt % len(DISC_MARGINS_M)], seed)
         cells = _reachable_cells(road, query, radius)
         taut = string_pulled(
-            clearance_in_cells(road), to_cells(road, line), radius / road.resolution, 1
+            road.clearance_cells, to_cells(road, line), radius / road.resolution, 1
         )
         samples = query.preferences.samples
         if not len(samples):
@@ -224,8 +222,9 @@ def _disc_path(road: Road, query: PoseQuery, margin: float, seed: int) -> tuple[
 
 def _reachable_cells(road: Road, query: PoseQuery, radius: float) -> Ints:
     """Return the flat indices of the cells that a disc can reach; all drivable ones if unknown."""
-    label = common_component(road, query.start[:2], query.goal[:2], radius) or 0
-    cells, _ = component_cells(road, radius, label)
+    space = FreeSpace(road, radius)
+    label = space.common_component(query.start[:2], query.goal[:2]) or 0
+    cells, _ = space.cells(label)
     return cells if label and len(cells) else np.flatnonzero(road.drivable)
 
 

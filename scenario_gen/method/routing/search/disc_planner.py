@@ -12,7 +12,7 @@ from scenario_gen.base.parameters import parameter, Parameters
 from scenario_gen.method.routing.search.dubins import Pose
 from scenario_gen.method.routing.search.planner import (
     Budget,
-    check_query,
+    joining_component,
     NO_POSES,
     path_length,
     Plan,
@@ -23,7 +23,7 @@ from scenario_gen.method.routing.search.search import Search
 from scenario_gen.method.routing.search.shortcuts import string_pulled
 from scenario_gen.method.routing.search.sweep import disc_scene
 from scenario_gen.numerics import Floats
-from scenario_gen.roads import component_cells, to_cells
+from scenario_gen.roads import FreeSpace, to_cells
 from scenario_gen.types import Road
 
 MAX_ROUND_ITERATIONS = 512  # between two checks of the budget
@@ -77,11 +77,11 @@ class RrtStarConnect:
     def __init__(self, config: RrtStarConnectConfig = RrtStarConnectConfig()) -> None:
         self.config = config
 
-    def search(self, road: Road, query: Query, label: int, seed: int) -> Search:
+    def search(self, space: FreeSpace, query: Query, label: int, seed: int) -> Search:
         """Return the search of a query before it grows; it samples from a component's cells."""
-        config = self.config
+        config, road = self.config, space.road
         ends = to_cells(road, np.array((query.start, query.goal))).tolist()
-        cells, _ = component_cells(road, query.radius, label)
+        cells, _ = space.cells(label)
         least_gamma = 2.0 * math.sqrt(1.5 * max(len(cells), 1) / math.pi)  # of eq 10, d = 2
         rules = Rules(
             cells=cells,
@@ -105,12 +105,13 @@ class RrtStarConnect:
         Raises:
             BudgetSpentError: no path was found within the budget.
         """
-        label = check_query(road, query)
-        search = self.search(road, query, label, seed)
+        space = FreeSpace(road, query.radius)
+        label = joining_component(space, query)
+        search = self.search(space, query, label, seed)
         for improved in search.rounds(budget, MAX_ROUND_ITERATIONS):
             if improved:
                 if search.path is None:
-                    corners = _corner_poses(road, query.radius, label)
+                    corners = _corner_poses(space, label)
                     search.rules = search.rules._replace(near=corners)
                 path = straight_path(search)
                 if self.config.pull:
@@ -128,8 +129,8 @@ def straight_path(search: Search) -> Floats:
     return np.concatenate((first, second[-2::-1]))[:, :2]
 
 
-def _corner_poses(road: Road, radius: float, label: int) -> Floats:
+def _corner_poses(space: FreeSpace, label: int) -> Floats:
     """Return poses (c, 3) [cells] in front of convex corners of obstacles, where paths bend."""
-    _, corners = component_cells(road, radius, label)
-    row, column = np.divmod(corners, road.drivable.shape[1])
+    _, corners = space.cells(label)
+    row, column = np.divmod(corners, space.road.drivable.shape[1])
     return np.column_stack((column + 0.5, row + 0.5, np.zeros(len(corners))))

@@ -13,7 +13,7 @@ import numpy as np
 from scenario_gen.base.errors import RefusedError
 from scenario_gen.numerics import Floats, frozen, sealed
 from scenario_gen.numerics.plane import edge_lengths
-from scenario_gen.roads import common_component, segments_free
+from scenario_gen.roads import FreeSpace, segments_free
 from scenario_gen.types import Road
 
 NO_POSES = sealed(np.empty((0, 3)))
@@ -162,14 +162,21 @@ def plan_with_retry(
         return planner.plan(road, query, Budget(RETRY_FACTOR * iterations, first=True), seed)
 
 
-def check_query(road: Road, query: Query) -> int:
-    """Raise BlockedError or NoWayError if no search could succeed.
+def check_query(road: Road, query: Query) -> None:
+    """Raise BlockedError or NoWayError if no search could succeed."""
+    joining_component(FreeSpace(road, query.radius), query)
 
-    Returns:
-        The label of the component that joins start and goal (see `roads.connectivity`);
-        0: only the straight line joins them.
+
+def joining_component(space: FreeSpace, query: Query) -> int:
+    """Return the label of the component that joins start and goal.
+
+    It is 0 if only the straight line joins them.
+
+    Raises:
+        BlockedError, NoWayError: no search could succeed.
     """
-    label = common_component(road, query.start, query.goal, query.radius)
+    road = space.road
+    label = space.common_component(query.start, query.goal)
     if label:  # both ends can move to one of its cells
         return label
     ends = np.stack((query.start, query.goal))

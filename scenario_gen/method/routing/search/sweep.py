@@ -16,7 +16,7 @@ from scenario_gen.method.routing.search.dubins import Curve, part_of, Pose, TURN
 from scenario_gen.method.routing.search.planner import PoseQuery
 from scenario_gen.numerics import Counts, Floats, sealed, wrap_angle
 from scenario_gen.numerics.kernels import F, F2, kernel, N2, named, OUT2
-from scenario_gen.roads import blocked_before, clearance_in_cells, CONTACT, to_cells
+from scenario_gen.roads import CONTACT_CELLS, to_cells
 from scenario_gen.types import Road
 
 SWEEP_M = 0.2  # between two poses whose hull is compared with the grid
@@ -58,7 +58,7 @@ class Scene(NamedTuple):
 
     Attributes:
         clearance: (H, W).
-        blocked: (H, W + 1) from `blocked_before`; unused by a disc.
+        blocked: (H, W + 1) from `Road.closed_before`; unused by a disc.
         guide: (G, 3) poses of the line to stay near; may be empty.
         body: what moves.
         costs: extra costs.
@@ -144,15 +144,15 @@ def _hull_is_free(a: _Frame, b: _Frame, margin: float, scene: Scene) -> bool:
     length, width = scene.body.half_length + margin, scene.body.half_width + margin
     reach_a = length * abs(a.sin) + width * abs(a.cos)
     reach_b = length * abs(b.sin) + width * abs(b.cos)
-    first = int(np.floor(min(a.y - reach_a, b.y - reach_b) + CONTACT))
-    last = int(np.ceil(max(a.y + reach_a, b.y + reach_b) - CONTACT)) - 1
+    first = int(np.floor(min(a.y - reach_a, b.y - reach_b) + CONTACT_CELLS))
+    last = int(np.ceil(max(a.y + reach_a, b.y + reach_b) - CONTACT_CELLS)) - 1
     if first < 0 or last >= blocked.shape[0]:
         return False
     rows = scene.rows[:, : last - first + 1]
     _hull_extents(a, b, length, width, first, rows)
     for k in range(rows.shape[1]):
-        begin = int(np.floor(rows[0, k] + CONTACT))
-        end = int(np.ceil(rows[1, k] - CONTACT))
+        begin = int(np.floor(rows[0, k] + CONTACT_CELLS))
+        end = int(np.ceil(rows[1, k] - CONTACT_CELLS))
         if begin < 0 or end >= blocked.shape[1]:
             return False
         if end > begin and blocked[first + k, end] != blocked[first + k, begin]:
@@ -332,8 +332,8 @@ def car_scene(road: Road, query: PoseQuery) -> Scene:
     )
     rows = int(2.0 * np.hypot(half_length, half_width) + MAX_STEP_CELLS) + 8
     return Scene(
-        clearance_in_cells(road),
-        blocked_before(road),
+        road.clearance_cells,
+        road.closed_before,
         poses_in_cells(road, wanted.guide),
         body,
         costs,
@@ -347,7 +347,7 @@ def disc_scene(road: Road, radius: float) -> Scene:
     nothing = np.empty((0, 3))
     no_costs = Costs(0.0, 0.0, 0.0, 0.0, np.inf, np.inf)
     body = Body(0.0, cells, cells, 1.0)
-    return Scene(clearance_in_cells(road), NO_GRID, nothing, body, no_costs, nothing)
+    return Scene(road.clearance_cells, NO_GRID, nothing, body, no_costs, nothing)
 
 
 def poses_in_cells(road: Road, poses: Floats) -> Floats:

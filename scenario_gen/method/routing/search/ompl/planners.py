@@ -28,7 +28,7 @@ from scenario_gen.method.routing.search.planner import (
     Query,
 )
 from scenario_gen.numerics import Floats
-from scenario_gen.roads import clearance_in_cells, to_cells, to_metres
+from scenario_gen.roads import to_cells, to_metres
 from scenario_gen.types import Road
 
 POLL_S = 0.05  # between two checks of the child and of the caller's `cancelled`
@@ -80,7 +80,7 @@ class OmplPlanner:
             target=solve_in_child,
             args=(
                 sender,
-                clearance_in_cells(road),
+                road.clearance_cells,
                 to_cells(road, np.stack((query.start, query.goal))),
                 query.radius / road.resolution,
                 self.name,

@@ -14,7 +14,7 @@ from scenario_gen.base.errors import InputError
 from scenario_gen.method.chain import Chain
 from scenario_gen.method.config import PipelineConfig
 from scenario_gen.method.fitting import fit, fit_template, FittingConfig, LostEncounterError
-from scenario_gen.method.fitting.kept import find_losses, LOSABLE
+from scenario_gen.method.fitting.losses import find_losses, LOSABLE
 from scenario_gen.method.fitting.placement import Placement
 from scenario_gen.method.nearest import suggest_nearest
 from scenario_gen.method.segmentation import segment
@@ -153,7 +153,8 @@ def test_what_is_lost_is_refused_by_name_and_taken_by_name(place):
     beside = replace(second, curve=Curve(second.curve.points + np.array([0.0, 8.0, 0.0])))
     place(Placement((first, beside), np.ones(2), np.zeros(2), ()))
     with pytest.raises(
-        LostEncounterError, match=r"drive in one lane .* fitting\.allow=lost_following takes it"
+        LostEncounterError,
+        match=r"drive in one lane .* fitting\.allow=lost_following accepts this",
     ):
         fit_template(encounter, segment(encounter), OPEN)
     taken = fit_template(

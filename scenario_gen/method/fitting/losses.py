@@ -1,0 +1,322 @@
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""What a fit loses of the recorded encounter: turns, conflicts and their order, lanes, passings."""
+
+from collections.abc import Iterable, Iterator
+from itertools import combinations, permutations
+
+import numpy as np
+
+from scenario_gen.base.errors import InputError, RefusedError
+from scenario_gen.numerics import Bools, Floats, Ints, wrap_angle
+from scenario_gen.numerics.plane import ahead_and_left
+from scenario_gen.situation import (
+    describe_turn,
+    is_same_turn,
+    Track,
+    track_conflicts,
+    turn_of,
+    turns_to_keep,
+)
+from scenario_gen.types import LaneNetwork, Loss
+
+LOSABLE = {
+    "conflict": "vehicles whose paths cross or merge do not meet",
+    "order": "another vehicle goes first",
+    "following": "a vehicle does not follow its leader",
+    "merge": "a vehicle does not enter another one's lane",
+    "lane_change": "a vehicle does not leave another one's lane, or two lanes become one",
+    "overtaking": "a vehicle does not pass another one",
+    "stand": "a vehicle does not pass a stationary one on the same side",
+    "turn": "a vehicle turns otherwise",
+}
+"""Losses for which a fit is refused unless `fitting.allow` names them, as lost_KIND.
+
+Other losses are only reported.
+"""
+
+Tracks = tuple[Track, ...]
+
+_MIN_SIDE_BY_SIDE_S = 1.0
+_MIN_KEPT_SHARE = 0.5  # of the time side by side
+_MIN_SIDE_OFFSET_M = 1.0  # between centres of vehicles side by side,
+_MAX_SIDE_OFFSET_M = 6.0
+_LANE_WIDTH_DIFFERENCE_M = 1.5  # between recorded lanes and those of the road
+_SAME_DIRECTION_RAD = np.radians(30.0)
+_IN_LANE_M = 1.4  # offset up to which a vehicle is in another one's lane,
+_IN_LANE_ON_ROAD_M = 2.0
+_NEXT_LANE_M = 2.3  # and from which it is in another lane
+_MAX_EXTRAPOLATION_M = 30.0  # beyond the ends of a path, straight on,
+_MAX_DRIFT_M = 1.0  # if this leaves the lane by less
+_PASSING_DISTANCE_M = 2.0  # by which a passing vehicle is behind, and later ahead
+
+
+class LostEncounterError(RefusedError):
+    """The recording fits the road, but a part of its encounter would be lost there."""
+
+
+def allowed_losses(allow: str) -> frozenset[str]:
+    """Return the kinds of losses that `fitting.allow` names.
+
+    Raises:
+        InputError: it has another name.
+    """
+    known = {f"lost_{kind}": kind for kind in LOSABLE}
+    names = [name.strip() for name in allow.split(",") if name.strip()]
+    for name in names:
+        if name not in known:
+            raise InputError(
+                f"parameter allow has {name!r}; choose from {', '.join(known)}, separated by commas"
+            )
+    return frozenset(known[name] for name in names)
+
+
+def refused_losses(losses: Iterable[Loss], allow: str) -> list[Loss]:
+    """Return the losses for which a fit is refused."""
+    allowed = allowed_losses(allow)
+    return [loss for loss in losses if loss.kind in LOSABLE and loss.kind not in allowed]
+
+
+def refuse_lost(losses: Iterable[Loss], allow: str, road: str) -> None:
+    """Refuse a fit with losses that `allow` does not name.
+
+    Raises:
+        LostEncounterError: it has some; the message names the vehicles and the parameter.
+    """
+    refused = refused_losses(losses, allow)
+    if refused:
+        kinds = sorted(allowed_losses(allow) | {loss.kind for loss in refused})
+        names = ",".join(f"lost_{kind}" for kind in kinds)
+        reasons = "; ".join(loss.message for loss in refused)
+        raise LostEncounterError(
+            f"road {road} has nowhere this encounter fits unchanged: {reasons}; "
+            f"fitting.allow={names} accepts this"
+        )
+
+
+def find_unused(network: LaneNetwork, used: Iterable[int]) -> tuple[Loss, ...]:
+    """Return the loss of arms of a drawn junction without vehicles, given the used lanes."""
+    arms = network.arms
+    arm_of = {k: arm for arm, lanes in arms.items() for k in lanes}
+    unused = len(arms) - len({arm_of[k] for k in used if k in arm_of})
+    if len(arms) < 3 or not unused:
+        return ()
+    are = "is" if unused == 1 else "are"
+    message = (
+        f"{unused} of the {len(arms)} arms of road {network.name} {are} unused: no recorded "
+        "vehicle enters or leaves there"
+    )
+    return (Loss("arm", (), message),)
+
+
+def find_losses(tracks: Tracks, placed: Tracks) -> tuple[Loss, ...]:
+    """Return what the placed tracks lose of the recorded ones; one loss for each set of vehicles."""
+    losses = [
+        *_lost_turns(tracks, placed),
+        *_lost_passings(tracks, placed),
+        *_lost_lanes(tracks, placed),
+        *_lost_conflicts(tracks, placed),
+        *_lost_neighbours(tracks, placed),
+    ]
+    by_vehicles: dict[frozenset[str], Loss] = {}
+    for loss in losses:
+        by_vehicles.setdefault(frozenset(loss.vehicles), loss)
+    return tuple(by_vehicles.values())
+
+
+def _lost_turns(tracks: Tracks, placed: Tracks) -> Iterator[Loss]:
+    for track, placed_track in zip(tracks, placed, strict=True):
+        turn, name = turn_of(placed_track), track.vehicle.id
+        lost = next((each for each in turns_to_keep(track) if not is_same_turn(each, turn)), None)
+        if lost is not None:
+            message = f"vehicle {name} {describe_turn(lost)} in the recording, {describe_turn(turn)} on this road"
+            yield Loss("turn", (name,), message)
+
+
+def _lost_conflicts(tracks: Tracks, placed: Tracks) -> Iterator[Loss]:
+    before, after = track_conflicts(tracks), track_conflicts(placed)
+    for pair in sorted(before.keys() | after.keys()):
+        a, b = (tracks[k].vehicle.id for k in pair)
+        if pair not in after:
+            loss = _lost_meeting(tracks, pair, following=before[pair].following)
+            if loss is not None:
+                yield loss
+        elif pair not in before:
+            message = f"vehicles {a} and {b} come into conflict on this road, not in the recording"
+            yield Loss("new conflict", (a, b), message)
+        elif before[pair].first != after[pair].first and not before[pair].following:
+            first, delay = tracks[before[pair].first].vehicle.id, abs(after[pair].arrival_gap)
+            message = (
+                f"vehicle {first} goes first in the recording, but would arrive {delay:.1f} s "
+                "later than the other on this road"
+            )
+            yield Loss("order", (a, b), message)
+
+
+def _lost_meeting(tracks: Tracks, pair: tuple[int, int], *, following: bool) -> Loss | None:
+    """Return the loss of a conflict; None if a pedestrian merely follows."""
+    first, second = (tracks[k] for k in pair)
+    a, b = first.vehicle.id, second.vehicle.id
+    if not following:
+        message = f"vehicles {a} and {b} have crossing or merging paths in the recording, and do not meet on this road"
+        return Loss("conflict", (a, b), message)
+    if first.vehicle.kind.walks or second.vehicle.kind.walks:
+        return None
+    if _in_two_lanes(first, second):
+        message = (
+            f"vehicles {a} and {b} drive side by side less than a lane apart in the recording, in "
+            "two lanes on this road"
+        )
+        return Loss("beside", (a, b), message)
+    message = (
+        f"vehicles {a} and {b} follow each other in the recording, and do not meet on this road"
+    )
+    return Loss("following", (a, b), message)
+
+
+def _in_two_lanes(track: Track, other: Track) -> bool:
+    """Return whether two vehicles are side by side at both ends; they may overlap in a record."""
+    offsets = np.abs(
+        [
+            _offset_at_end(first, second, end)
+            for first, second in ((track, other), (other, track))
+            for end in (0, 1)
+        ]
+    )
+    return bool((offsets > _IN_LANE_M).any() and not (offsets <= _IN_LANE_M).any())
+
+
+def _lost_lanes(tracks: Tracks, placed: Tracks) -> Iterator[Loss]:
+    """Yield the vehicles that share a lane at the start or the end, and do so no more."""
+    drivers = [n for n, track in enumerate(tracks) if not track.vehicle.kind.walks]
+    for i, j in permutations(drivers, 2):
+        before = [_offset_at_end(tracks[i], tracks[j], end) for end in (0, 1)]
+        after = [_offset_at_end(placed[i], placed[j], end) for end in (0, 1)]
+        in_lane = [abs(offset) < _IN_LANE_M for offset in before]
+        max_offset = np.inf if any(in_lane) else _MAX_SIDE_OFFSET_M
+        if any(
+            _changes_lane(recorded, on_road, max_offset)
+            for recorded, on_road in zip(before, after, strict=True)
+        ):
+            known = [
+                inside
+                for inside, offset in zip(in_lane, before, strict=True)
+                if not np.isnan(offset)
+            ]
+            kind, message = _lane_loss(tracks[i].vehicle.id, tracks[j].vehicle.id, known)
+            yield Loss(kind, (tracks[i].vehicle.id, tracks[j].vehicle.id), message)
+
+
+def _lane_loss(a: str, b: str, in_lane: list[bool]) -> tuple[str, str]:
+    """Return the kind and the message for a vehicle b that was in the lane of a at some ends."""
+    if all(in_lane):
+        message = f"vehicles {a} and {b} drive in one lane in the recording, not on this road"
+        return "following", message
+    if in_lane[-1]:
+        return "merge", f"vehicle {b} enters the lane of {a} in the recording, not on this road"
+    if in_lane[0]:
+        message = f"vehicle {b} leaves the lane of {a} in the recording, not on this road"
+        return "lane_change", message
+    message = f"vehicles {a} and {b} drive in two lanes in the recording, otherwise on this road"
+    return "lane_change", message
+
+
+def _changes_lane(recorded: float, on_road: float, max_offset: float) -> bool:
+    """Return whether a vehicle with an offset [m] from another one's lane is elsewhere on the road.
+
+    Recorded offsets beyond `max_offset` [m] are not compared.
+    """
+    if abs(recorded) < _IN_LANE_M:
+        return bool(np.isnan(on_road)) or abs(on_road) > _IN_LANE_ON_ROAD_M
+    is_beside = _NEXT_LANE_M < abs(recorded) < max_offset
+    return is_beside and (recorded * on_road < 0.0 or abs(on_road) < _IN_LANE_M)
+
+
+def _offset_at_end(track: Track, other: Track, end: int) -> float:
+    """Return the offset [m, left positive] of another vehicle from a path, at its start or end.
+
+    `end` is 0 for its start, 1 for its end. NaN: the path does not lead there.
+    """
+    pose = other.curve.at(other.progress[other.present[end]])
+    lane = track.lane or track.curve
+    length = lane.length if track.lane else track.travelled
+    station, offset = lane.project(pose[None, :2])
+    beyond = max(-float(station[0]), float(station[0]) - length)
+    turn = abs(float(wrap_angle(lane.at(station)[0, 2] - pose[2])))
+    if track.still or other.still:
+        return np.nan
+    if beyond <= 0.0:
+        leads_there = turn < _SAME_DIRECTION_RAD
+    else:
+        leads_there = beyond < _MAX_EXTRAPOLATION_M and turn * beyond < _MAX_DRIFT_M
+    return float(offset[0]) if leads_there else np.nan
+
+
+def _lost_passings(tracks: Tracks, placed: Tracks) -> Iterator[Loss]:
+    for i, j in permutations(range(len(tracks)), 2):
+        side = _passing_side(tracks[i], tracks[j], _MAX_SIDE_OFFSET_M)
+        max_offset = _MAX_SIDE_OFFSET_M + _LANE_WIDTH_DIFFERENCE_M
+        if side and _passing_side(placed[i], placed[j], max_offset) != side:
+            a, b = tracks[i].vehicle.id, tracks[j].vehicle.id
+            word = "left" if side > 0 else "right"
+            kind = "stand" if tracks[j].still else "overtaking"
+            passed = f"the stationary vehicle {b}" if tracks[j].still else b
+            message = (
+                f"vehicle {a} passes {passed} on its {word} in the recording, not on this road"
+            )
+            yield Loss(kind, (a, b), message)
+
+
+def _passing_side(track: Track, other: Track, max_offset: float) -> int:
+    """Return on which side a vehicle passes another one in its direction, or a stationary one.
+
+    It is 1 for left and -1 for right, 0 if it does not pass.
+    """
+    both = track.is_present & other.is_present
+    if track.still or not both.any():
+        return 0
+    poses, others = track.poses[both], other.poses[both]
+    ahead, left = ahead_and_left((others - poses)[:, :2], poses[:, 2])
+    alike = np.abs(wrap_angle(others[:, 2] - poses[:, 2])) < _SAME_DIRECTION_RAD
+    near = (np.abs(left) < max_offset) & (other.still | alike)
+    before = np.flatnonzero(near & (ahead > _PASSING_DISTANCE_M))
+    after = np.flatnonzero(near & (ahead < -_PASSING_DISTANCE_M))
+    if not len(before) or not len(after) or before[0] > after[-1]:
+        return 0
+    offset = float(left[np.argmin(np.where(near, np.abs(ahead), np.inf))])
+    return -int(np.sign(offset)) if abs(offset) > _MIN_SIDE_OFFSET_M else 0
+
+
+def _lost_neighbours(tracks: Tracks, placed: Tracks) -> Iterator[Loss]:
+    for i, j in combinations(range(len(tracks)), 2):
+        reach = (tracks[i].vehicle.length + tracks[j].vehicle.length) / 2.0
+        both = tracks[i].is_present & tracks[j].is_present
+        recorded = _side(tracks[i].poses, tracks[j].poses, reach, _MAX_SIDE_OFFSET_M)
+        max_offset = _MAX_SIDE_OFFSET_M + _LANE_WIDTH_DIFFERENCE_M
+        on_road = _side(placed[i].poses, placed[j].poses, reach, max_offset)
+        for side, word in ((1, "left"), (-1, "right")):
+            side_by_side: Bools = both & (recorded == side)
+            seconds = float(side_by_side.sum()) * tracks[0].dt
+            if seconds < _MIN_SIDE_BY_SIDE_S:
+                continue
+            kept = float((on_road[side_by_side] == side).mean())
+            if kept < _MIN_KEPT_SHARE:
+                a, b = tracks[i].vehicle.id, tracks[j].vehicle.id
+                message = (
+                    f"vehicle {b} is to the {word} of {a} for {seconds:.1f} s in the recording, "
+                    f"for {kept * seconds:.1f} s of these on this road"
+                )
+                yield Loss("beside", (a, b), message)
+
+
+def _side(path: Floats, other: Floats, reach: float, max_offset: float) -> Ints:
+    """Return (T,) on which side of poses (T, 3) others (T, 3) are side by side, in one direction.
+
+    It is 1 for left and -1 for right, 0 where they are not side by side.
+    """
+    ahead, left = ahead_and_left((other - path)[:, :2], path[:, 2])
+    alike = np.abs(wrap_angle(other[:, 2] - path[:, 2])) < _SAME_DIRECTION_RAD
+    offset = np.abs(left)
+    near = (np.abs(ahead) < reach) & (offset > _MIN_SIDE_OFFSET_M) & (offset < max_offset)
+    return np.where(alike & near, np.sign(left), 0.0).astype(np.int64)

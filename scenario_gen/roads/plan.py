@@ -1,0 +1,160 @@
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""The plan of a drawn road: its arms, and the routes that it is drawn for."""
+
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from scenario_gen.numerics import Floats
+from scenario_gen.numerics.curve import Curve
+from scenario_gen.numerics.plane import place, unit, unit_left
+from scenario_gen.roads.config import RoadConfig
+from scenario_gen.roads.ways import reverse
+from scenario_gen.situation import Track
+from scenario_gen.types import DrawnFor, Note, Road
+
+
+class Connection(NamedTuple):
+    """The arms and lanes that a route joins; lanes count from the dividing line."""
+
+    from_arm: int
+    from_lane: int
+    to_arm: int
+    to_lane: int
+
+
+@dataclass(frozen=True, eq=False)
+class Arm:
+    """An arm of a road.
+
+    Attributes:
+        pose: (3,) x, y [m], yaw [rad] of the end of its dividing line, heading out of the road.
+        inward: its number of lanes towards the junction.
+        outward: its number of lanes away from it.
+    """
+
+    pose: Floats
+    inward: int
+    outward: int
+
+    @classmethod
+    def towards(cls, yaw: float, reach: float, lanes: int, offset: float = 0.0) -> "Arm":
+        """Return an arm from the origin in a direction [rad] with a length [m].
+
+        Its dividing line is `offset` [m] to the left of the origin.
+        """
+        return cls(np.array([*(reach * unit(yaw) + offset * unit_left(yaw)), yaw]), lanes, lanes)
+
+    @classmethod
+    def ramp(cls, entry: Floats, config: RoadConfig) -> "Arm":
+        """Return an arm with one lane, in only, whose traffic enters at a pose (3,)."""
+        out = reverse(entry)
+        offset = 0.5 * config.lane_width * (1.0 if config.traffic_side == "right" else -1.0)
+        return cls(np.array([*(out[:2] - offset * unit_left(out[2])), out[2]]), 1, 0)
+
+    def lane(self, k: int, config: RoadConfig, *, inward: bool) -> Floats:
+        """Return the pose (3,) x, y [m], yaw [rad] of lane k, in the direction of its traffic."""
+        is_left = inward == (config.traffic_side == "right")
+        left = (k + 0.5) * config.lane_width * (1.0 if is_left else -1.0)
+        yaw = self.pose[2]
+        return np.array([*(self.pose[:2] + left * unit_left(yaw)), yaw + np.pi if inward else yaw])
+
+
+@dataclass(frozen=True, eq=False)
+class Driven:
+    """A route that a road is drawn for.
+
+    Attributes:
+        connection: the arms and lanes that it joins.
+        curve: from the end of one lane to that of the other.
+        length: [m] of the vehicle that drives it.
+        width: [m] that the vehicle needs.
+    """
+
+    connection: Connection
+    curve: Curve
+    length: float
+    width: float
+
+
+@dataclass(frozen=True, eq=False)
+class Plan:
+    """The plan of a road; its arms lead away from the origin.
+
+    Attributes:
+        arms: its arms; an arm without lanes outward is a ramp.
+        axis: the dividing line from the end of the first arm to that of the second; None: these
+            arms are like the others.
+        driven: routes through the junction.
+        ring: radius [m] of a roundabout's lane about the origin; 0: there is none.
+        yielding: the arms that give way if priorities are shown.
+        drawn_for: where the recording lies that the road is drawn for.
+        notes: on decisions.
+    """
+
+    arms: Sequence[Arm]
+    axis: Curve | None = None
+    driven: Sequence[Driven] = ()
+    ring: float = 0.0
+    yielding: Collection[int] = ()
+    drawn_for: DrawnFor | None = None
+    notes: tuple[Note, ...] = ()
+
+    @property
+    def has_junction(self) -> bool:
+        """Whether it is more than one road from its first arm to the second."""
+        return len(self.arms) > 2 or self.axis is None or len(self.driven) > 0
+
+    @property
+    def has_ramp(self) -> bool:
+        """Whether one of its arms is a ramp."""
+        return not all(arm.outward for arm in self.arms)
+
+
+def lane_id(arm: int, lane: int, *, inward: bool) -> str:
+    """Return the id of a lane of an arm; lanes count from the dividing line."""
+    return f"{arm + 1}.{-lane - 1 if inward else lane + 1}"
+
+
+def aligned(
+    tracks: Sequence[Track],
+    lane_of: Mapping[tuple[int, bool], tuple[int, int]],
+    pose: Floats,
+    pose_on_road: Floats,
+) -> DrawnFor | None:
+    """Return where a recording lies on the road that is drawn for it; None without a recording.
+
+    Args:
+        tracks: of the recording.
+        lane_of: arm and lane of the ends of its tracks, as far as they are known, by vehicle and
+            whether it is the start.
+        pose: (3,) x, y [m], yaw [rad] in the recording's frame.
+        pose_on_road: the same on the road, about the plan's origin.
+    """
+    if not tracks:
+        return None
+    turn = pose_on_road[2] - pose[2]
+    ids = {key: lane_id(*arm_and_lane, inward=key[1]) for key, arm_and_lane in lane_of.items()}
+    lanes = tuple((ids.get((i, True), ""), ids.get((i, False), "")) for i in range(len(tracks)))
+    moved = place(np.array([*pose_on_road[:2], turn]), -pose[0], -pose[1])
+    return DrawnFor(np.array([*moved, turn]), lanes)
+
+
+def ways_through(road: Road) -> dict[tuple[int, int], Curve]:
+    """Return the routes through a drawn road, by the indices of its entry and its exit.
+
+    They lead from the end of the entry's lane to that of the exit's lane.
+    """
+    if road.lanes is None or not road.lanes.drawn:
+        return {}
+    network, ways = road.lanes, {}
+    for entry, first in enumerate(network.entries):
+        for way in network.lanes[first].successors:
+            (last,) = network.lanes[way].successors
+            line = np.concatenate([network.lanes[k].centre for k in (first, way, last)])
+            ways[entry, network.exits.index(last)] = Curve.through(line)
+    return ways

@@ -1,0 +1,262 @@
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""The lanes of a map prepared for placing recordings: lane paths, nearby lanes, distances."""
+
+from collections.abc import Collection, Iterator, Sequence
+from dataclasses import dataclass
+from functools import cached_property, lru_cache
+import math
+
+import numpy as np
+
+from scenario_gen.base.errors import RefusedError
+from scenario_gen.numerics import Counts, Floats, Ints, wrap_angle
+from scenario_gen.numerics.curve import crossings, Curve
+from scenario_gen.numerics.plane import edge_lengths
+from scenario_gen.roads.vector.network import crossing_lanes
+from scenario_gen.situation import Track
+from scenario_gen.types import CARS, Lane, LaneNetwork
+
+LEAD_M = 25.0
+"""Of lanes before and after the driven part of a lane path."""
+LaneChain = tuple[int, ...]
+"""Indices of lanes, each a successor of the one before."""
+
+_MAX_START_DISTANCE_M = 8.0  # between a vehicle's start and the lane on which its chain begins
+_MAX_START_TURN_RAD = math.radians(60.0)
+_MAX_CHAINS_FROM_LANE_COUNT = 48
+_POINT_SPACING_M = 0.5  # of a lane path
+_SMOOTHING_POINTS = 3  # to each side of a point that is averaged: polylines have corners
+_MIN_CROSSING_ANGLE_RAD = math.radians(15.0)
+
+_FIELD_CELL_M = 1.0
+_MAX_FIELD_CELLS = 30_000_000  # of a map; a larger one gets larger cells
+_MAX_SECTIONS_COUNT = 300_000  # a metre of lane each, of a map that is searched as a whole
+_CHUNK_ROWS = 20_000  # sections that are rasterised at once
+_MAX_FIELD_DISTANCE_M = 4.0  # beyond which a pose counts as off the road
+_DIRECTION_COUNT = 16
+_MAX_LANE_TURN_RAD = math.radians(35.0)  # between a pose and its lane
+_NUDGE_CELLS = 1e-6  # puts a pose on the edge of two cells into the same one on every CPU
+
+
+class LaneGraph:
+    """The lanes of a network: how they are connected, and where they are.
+
+    Attributes:
+        network: the lanes.
+        length: [m] of each lane.
+        points: (P, 2) [m] on the centre lines of all lanes.
+        yaws: (P,) [rad] directions of the lanes at these points.
+        height: (P,) [m], NaN where it is not known.
+        lane_of: (P,) the lane that each point is on.
+    """
+
+    def __init__(self, network: LaneNetwork) -> None:
+        lanes = network.lanes
+        self.network = network
+        self.length = [float(edge_lengths(lane.centre).sum()) for lane in lanes]
+        self.points = np.concatenate([lane.centre[:-1] for lane in lanes])
+        self.yaws = np.concatenate([lane.yaw for lane in lanes])
+        self.height = np.concatenate([lane.height[:-1] for lane in lanes])
+        self.lane_of = np.repeat(np.arange(len(lanes)), [len(lane.yaw) for lane in lanes])
+        self._curves: dict[LaneChain, Curve] = {}
+        self._closed: dict[frozenset[str], frozenset[int]] = {}
+
+    @cached_property
+    def field(self) -> "LaneField":
+        """The distance of every pose on the map from the nearest lane of its direction."""
+        return LaneField.of(self.network)
+
+    @cached_property
+    def crossings(self) -> tuple[Floats, Floats]:
+        """Points (C, 2) [m] where two lanes cross, and the directions (C, 2) [rad] of both lanes.
+
+        Each crossing is listed in both orders of its lanes.
+        """
+        points, yaws = [np.zeros((0, 2))], [np.zeros((0, 2))]
+        pairs = {(min(pair), max(pair)) for pair in crossing_lanes(self.network)}
+        for pair in sorted(pairs):
+            curve, other = (Curve.through(self.network.lanes[k].centre) for k in pair)
+            for station, on_other in crossings(curve, other, _MIN_CROSSING_ANGLE_RAD).tolist():
+                first, second = curve.at(station), other.at(on_other)
+                points += [first[None, :2], first[None, :2]]
+                yaws += [np.array([[first[2], second[2]]]), np.array([[second[2], first[2]]])]
+        return np.concatenate(points), np.concatenate(yaws)
+
+    def curve(self, chain: LaneChain) -> Curve:
+        """Return the smoothed centre line of a chain of lanes."""
+        if chain not in self._curves:
+            centres = [self.network.lanes[k].centre for k in chain]
+            self._curves[chain] = _smooth_curve(np.concatenate(centres))
+        return self._curves[chain]
+
+    def successors(self, chain: Sequence[int]) -> list[int]:
+        """Return the lanes that follow a chain and are not part of it."""
+        return [k for k in self.network.lanes[chain[-1]].successors if k not in chain]
+
+    def closed_to(self, track: Track) -> frozenset[int]:
+        """Return the lanes that a vehicle may not use."""
+        users = track.vehicle.kind.lane_user
+        if users not in self._closed:
+            self._closed[users] = self._lanes_closed_to(users)
+        return self._closed[users]
+
+    def reserved_for(self, track: Track) -> frozenset[int]:
+        """Return the lanes that a vehicle may use and cars may not."""
+        if CARS not in self._closed:
+            self._closed[CARS] = self._lanes_closed_to(CARS)
+        return self._closed[CARS] - self.closed_to(track)
+
+    def _lanes_closed_to(self, users: frozenset[str]) -> frozenset[int]:
+        lanes = enumerate(self.network.lanes)
+        return frozenset(k for k, lane in lanes if not lane.open_to(users))
+
+    def near(self, pose: Floats) -> list[int]:
+        """Return the lanes that pass a pose (3,) x, y [m], yaw [rad] in about its direction.
+
+        The nearest lane is first.
+        """
+        distance = np.hypot(self.points[:, 0] - pose[0], self.points[:, 1] - pose[1])
+        turn = np.abs(wrap_angle(self.yaws - pose[2]))
+        fits = (distance <= _MAX_START_DISTANCE_M) & (turn <= _MAX_START_TURN_RAD)
+        nearest: dict[int, float] = {}
+        for k in np.flatnonzero(fits).tolist():
+            lane = int(self.lane_of[k])
+            nearest[lane] = min(nearest.get(lane, math.inf), round(float(distance[k]), 6))
+        return sorted(nearest, key=lambda lane: (nearest[lane], lane))
+
+    def chains_from(
+        self, first: int, travelled: float, closed: Collection[int] = ()
+    ) -> Iterator[LaneChain]:
+        """Yield the chains of open lanes through a lane.
+
+        Each begins `LEAD_M` before the lane, if lanes lead there, and goes on until its end or for
+        what is travelled [m] and `LEAD_M`.
+        """
+        lead = self._lead_to(first, closed)
+        enough = travelled + self.length[first] + LEAD_M
+        unfinished: list[tuple[LaneChain, float]] = [((first,), self.length[first])]
+        for _ in range(_MAX_CHAINS_FROM_LANE_COUNT):
+            if not unfinished:
+                break
+            chain, length = unfinished.pop(0)
+            following = [k for k in self.successors(chain) if k not in closed]
+            if not following or length > enough:
+                yield tuple(k for k in lead if k not in chain) + chain
+            else:
+                unfinished += [((*chain, k), length + self.length[k]) for k in following]
+
+    def _lead_to(self, first: int, closed: Collection[int]) -> LaneChain:
+        """Return the open lanes of about `LEAD_M` that lead to a lane."""
+        lead: LaneChain = ()
+        length, lane = 0.0, first
+        while length < LEAD_M:
+            before = [k for k in self.network.predecessors[lane] if k not in closed]
+            if not before or before[0] in lead or before[0] == first:
+                break
+            lane = before[0]
+            lead = (lane, *lead)
+            length += self.length[lane]
+        return lead
+
+
+@lru_cache(maxsize=4)
+def lane_graph(network: LaneNetwork, users: frozenset[str] = CARS) -> LaneGraph:
+    """Return the graph of the lanes that cars or some users may use; the last four are kept."""
+    return LaneGraph(network.for_users(users))
+
+
+def _smooth_curve(points: Floats) -> Curve:
+    """Return the curve through moving averages of a polyline (M, 2) [m]; its ends do not move."""
+    polyline = Curve.through(points)
+    even = polyline.cut(0.0, polyline.length, _POINT_SPACING_M).points[:, :2]
+    index = np.arange(len(even))
+    # Towards the ends the window shrinks on both sides.
+    room = np.minimum(index, index[::-1])[:, None]
+    offset = np.arange(-_SMOOTHING_POINTS, _SMOOTHING_POINTS + 1)
+    return Curve.through(even[index[:, None] + np.clip(offset, -room, room)].mean(axis=1))
+
+
+def lane_sections(lanes: Sequence[Lane], every: int = 1) -> tuple[Floats, Floats]:
+    """Return the middles (P, 2) [m] and directions (P,) [rad] of every n-th section of lanes."""
+    middles = np.concatenate([lane.middle[::every] for lane in lanes])
+    return middles, np.concatenate([lane.yaw[::every] for lane in lanes])
+
+
+@dataclass(frozen=True, eq=False)
+class LaneField:
+    """The distance of every cell of a map from the nearest lane of each direction.
+
+    Attributes:
+        low: (2,) [m] the lower-left corner of the grid.
+        size: (2,) its columns and rows.
+        cell: [m] size of its cells.
+        rows: (size,) the row of `distance` of each cell, by flat index.
+        distance: (C + 1, 16) [m], at most `_MAX_FIELD_DISTANCE_M`; the last row is the off-road one.
+    """
+
+    low: Floats
+    size: Ints
+    cell: float
+    rows: Counts
+    distance: Floats
+
+    @classmethod
+    def of(cls, network: LaneNetwork) -> "LaneField":
+        """Return the field of a network.
+
+        Raises:
+            RefusedError: the map is too large.
+        """
+        points, yaws = lane_sections(network.lanes)
+        if len(points) > _MAX_SECTIONS_COUNT:
+            raise RefusedError(
+                f"map {network.name} has {len(points)} sections of lanes; at most "
+                f"{_MAX_SECTIONS_COUNT} are searched for a place: choose a part with "
+                "#box=x0,y0,x1,y1"
+            )
+        low = points.min(axis=0) - _MAX_FIELD_DISTANCE_M
+        high = points.max(axis=0) + _MAX_FIELD_DISTANCE_M
+        cell = max(_FIELD_CELL_M, math.sqrt(float(np.prod(high - low)) / _MAX_FIELD_CELLS))
+        size = np.ceil((high - low) / cell).astype(np.int64) + 1
+        chunks = [slice(k, k + _CHUNK_ROWS) for k in range(0, len(points), _CHUNK_ROWS)]
+
+        near_lanes = np.zeros(int(size[0] * size[1]), dtype=np.bool_)
+        for chunk in chunks:
+            near_lanes[_cells_around(points[chunk], low, cell, size)[1]] = True
+        known = np.flatnonzero(near_lanes)
+        rows = np.full(len(near_lanes), len(known), dtype=np.int32)
+        rows[known] = np.arange(len(known))
+
+        table = np.full((len(known) + 1, _DIRECTION_COUNT), _MAX_FIELD_DISTANCE_M)
+        for chunk in chunks:
+            distance, flat = _cells_around(points[chunk], low, cell, size)
+            row = rows[flat]
+            for k in range(_DIRECTION_COUNT):
+                turn = np.abs(wrap_angle(yaws[chunk] - 2.0 * np.pi * k / _DIRECTION_COUNT))
+                alike = turn <= _MAX_LANE_TURN_RAD
+                np.minimum.at(table[:, k], row[alike].ravel(), distance[alike].ravel())
+        return cls(low, size, cell, rows, table)
+
+    def squared(self, points: Floats, yaws: Floats) -> Floats:
+        """Return the squared distances [m²] of poses (..., 2), (...) from the nearest lanes."""
+        cell = np.floor((points - self.low) / self.cell + _NUDGE_CELLS).astype(np.int64)
+        inside = ((cell >= 0) & (cell < self.size)).all(axis=-1)
+        flat = np.where(inside, cell[..., 1] * self.size[0] + cell[..., 0], 0)
+        row = np.where(inside, self.rows[flat], len(self.distance) - 1)
+        sector = np.round(yaws / (2.0 * np.pi / _DIRECTION_COUNT) + _NUDGE_CELLS)
+        column: Ints = sector.astype(np.int64) % _DIRECTION_COUNT
+        return np.asarray(np.square(self.distance[row, column]))
+
+
+def _cells_around(points: Floats, low: Floats, cell: float, size: Ints) -> tuple[Floats, Ints]:
+    """Return the distances [m] and flat indices (P, O) of the cells around points (P, 2) [m]."""
+    reach = math.ceil(_MAX_FIELD_DISTANCE_M / cell)
+    steps = np.arange(-reach, reach + 1)
+    offsets = np.stack(np.meshgrid(steps, steps), axis=-1).reshape(-1, 2)
+    at = np.floor((points - low) / cell).astype(np.int64)
+    cells = np.clip(at[:, None] + offsets, 0, size - 1)
+    centres = low + (cells + 0.5) * cell
+    distance = np.hypot(centres[..., 0] - points[:, None, 0], centres[..., 1] - points[:, None, 1])
+    return distance, cells[..., 1] * size[0] + cells[..., 0]

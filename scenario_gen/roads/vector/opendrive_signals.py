@@ -1,0 +1,142 @@
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""The traffic rules of an OpenDRIVE map: signals, stop lines and priorities at junctions.
+
+Source: ASAM OpenDRIVE 1.8, chapters "Signals" and "Junctions".
+"""
+
+from collections.abc import Iterator
+import math
+import re
+
+import numpy as np
+
+from scenario_gen.base.xml_reader import Element
+from scenario_gen.numerics import Floats
+from scenario_gen.roads.vector.drafts import Faults
+from scenario_gen.roads.vector.sections import OpenDriveRoad, SectionLane
+from scenario_gen.roads.vector.signs import DraftRule, is_speed_limit, kind_of_sign
+from scenario_gen.types import RuleKind
+
+# Types in the catalogue of OpenDRIVE.
+_STOP_LINE_TYPE = "294"
+_PEDESTRIAN_TYPES = ("1000002", "1000003")  # light, crossing
+_LIGHT_TYPES = ("1000001", "1000009", "1000010", "1000011", "1000012")  # for vehicles
+_MAX_STOP_LINE_DISTANCE_M = 15.0  # from its sign
+
+
+def signal_rules(roads: dict[str, OpenDriveRoad], faults: Faults) -> Iterator[DraftRule]:
+    """Yield the rules of signals where they are placed and where roads refer to them."""
+    signals: list[tuple[OpenDriveRoad, Element]] = []
+    for road in roads.values():
+        for tag in ("signal", "signalReference"):
+            signals += [(road, signal) for signal in road.element.findall(f"signals/{tag}")]
+    stop_lines = [(road, signal) for road, signal in signals if _is_stop_line(signal)]
+    for road in roads.values():
+        objects = road.element.findall("objects/object")
+        stop_lines += [(road, line) for line in objects if _is_stop_line(line)]
+    kinds: dict[str, RuleKind] = {}
+    for _, signal in signals:
+        kind = _kind_of_signal(signal)
+        if signal.tag == "signal" and kind is not None:
+            kinds[signal.get("id", "?")] = kind
+
+    for road, signal in signals:
+        name = signal.get("id", "?")
+        if name not in kinds:
+            continue
+        with faults.leaving_out("signal", name):
+            lines = [
+                line.number("s")
+                for line_road, line in stop_lines
+                if line_road is road and _share_direction(signal, line)
+            ]
+            s = _station_of_stop(signal.number("s"), lines)
+            for lane in _lanes_at(road, signal, s):
+                yield DraftRule(name, kinds[name], (lane.name,), line=_cross_section(lane, s))
+
+
+def other_signals(roads: dict[str, OpenDriveRoad]) -> int:
+    """Return how many signals have a meaning that is not read."""
+    signals = [
+        signal for road in roads.values() for signal in road.element.findall("signals/signal")
+    ]
+    return sum(not _is_known(signal) for signal in signals)
+
+
+def priorities(root: Element, roads: dict[str, OpenDriveRoad]) -> Iterator[DraftRule]:
+    """Yield the priorities at junctions: traffic of the low road gives way to the high road."""
+    for junction in root.findall("junction"):
+        name = f"junction {junction.get('id', '?')}"
+        for priority in junction.findall("priority"):
+            high, low = (roads.get(priority.get(name, "")) for name in ("high", "low"))
+            if high is not None and low is not None:
+                giving_way = tuple(lane.name for lane in low.lanes)
+                going_first = tuple(lane.name for lane in high.lanes)
+                yield DraftRule(name, RuleKind.GIVE_WAY, giving_way, going_first)
+
+
+def _kind_of_signal(signal: Element) -> RuleKind | None:
+    if signal.get("dynamic") == "yes":
+        return RuleKind.TRAFFIC_LIGHT if signal.get("type") in _LIGHT_TYPES else None
+    return kind_of_sign(*_sign(signal))
+
+
+def _sign(signal: Element) -> tuple[str, str, str]:
+    """Return the number of a signal's sign, its subtype, and the country of the number."""
+    return signal.get("type", ""), signal.get("subtype", ""), signal.get("country", "")
+
+
+def _is_stop_line(element: Element) -> bool:
+    """Return whether a signal or an object is a stop line; some tools give it a name, but no type."""
+    name = re.sub("[^a-z]", "", element.get("name", "").lower())
+    return element.get("type") == _STOP_LINE_TYPE or name.startswith("stopline")
+
+
+def _is_known(signal: Element) -> bool:
+    """Return whether the meaning of a signal is known, whether or not it is a rule."""
+    return (
+        signal.get("type") in _PEDESTRIAN_TYPES
+        or _is_stop_line(signal)
+        or is_speed_limit(*_sign(signal))
+        or _kind_of_signal(signal) is not None
+    )
+
+
+def _share_direction(a: Element, b: Element) -> bool:
+    """Return whether two signals are for traffic in the same direction."""
+    directions = {signal.get("orientation", "none") for signal in (a, b)}
+    return "none" in directions or len(directions) == 1
+
+
+def _station_of_stop(s: float, lines: list[float]) -> float:
+    """Return the arc length [m] of the stop line near a sign at s, or that of the sign."""
+    nearest = min(lines, key=lambda line: abs(line - s), default=math.inf)
+    return nearest if abs(nearest - s) <= _MAX_STOP_LINE_DISTANCE_M else s
+
+
+def _lanes_at(road: OpenDriveRoad, signal: Element, s: float) -> Iterator[SectionLane]:
+    """Yield the lanes of the section at s to whose traffic a signal applies."""
+    section_at_s: dict[bool, int] = {}  # by side
+    ranges = [
+        sorted((int(record.number("fromLane")), int(record.number("toLane"))))
+        for record in signal.findall("validity")
+    ]
+    direction = signal.get("orientation", "none")
+    for lane in road.lanes:
+        _, section, number = lane.key
+        if not lane.s[0] - 1e-6 <= s <= lane.s[-1] + 1e-6:
+            continue
+        if section_at_s.setdefault(number > 0, section) != section:
+            continue
+        valid = not ranges or any(low <= number <= high for low, high in ranges)
+        applies = direction == "none" or lane.forward == (direction == "+")
+        if valid and applies and lane.is_car_lane:
+            yield lane
+
+
+def _cross_section(lane: SectionLane, s: float) -> Floats:
+    """Return the cross-section (2, 2) [m] of a lane at s."""
+    borders = (lane.inner, lane.outer)
+    return np.array([[np.interp(s, lane.s, column) for column in border.T] for border in borders])
