@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The whole method on one screen: an encounter and a road in, valid new scenarios and their evaluation out."""
+"""The whole method on one screen: from an encounter and a road to valid, evaluated scenarios."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
@@ -9,11 +9,12 @@ from functools import partial
 
 from scenario_gen.base.errors import RefusedError
 from scenario_gen.base.provenance import what_makes_it_again
-from scenario_gen.method.chain import Chain
 from scenario_gen.method.config import PipelineConfig
-from scenario_gen.method.evaluation import coverage_of, evaluate, replay
+from scenario_gen.method.evaluation import coverage_of, evaluate, measures_in, replay
+from scenario_gen.method.fitting import fit_template
 from scenario_gen.method.reference_sets import with_references
-from scenario_gen.method.sampling import Callbacks, Progress
+from scenario_gen.method.routing import plan_routes
+from scenario_gen.method.sampling import Callbacks, Progress, sample_scenarios
 from scenario_gen.method.segmentation import segment
 from scenario_gen.method.suitable_roads import AUTO, on_first_suitable_road
 from scenario_gen.roads import road_and_template
@@ -47,26 +48,36 @@ def generate(
     """Segment, fit, plan, sample (every candidate is checked) and evaluate.
 
     Args:
-        encounter: the template. In a list others follow it, which say how encounters differ: `sampling.variety=population` keeps
-            what is usual among them.
-        road: the target, of `build_road`, the name or path that this takes, or "auto": the first built-in road that suits. A
-            template of right-hand traffic is mirrored on a map of left-hand traffic, and the other way round.
-        config: the parameters of every stage; with `evaluation.compare` further sets are drawn to compare with.
+        encounter: the template. Further encounters in a list show how encounters differ:
+            `sampling.variety=population` keeps scenarios that are usual among them.
+        road: the target: a road, a name or path for `build_road`, or "auto": the first built-in
+            road that is suitable. A template is mirrored on a map with the other side of traffic.
+        config: the parameters of every stage; `evaluation.compare` adds sets to compare with.
         count: valid scenarios wanted.
         seed: of all randomness.
-        request: a vehicle to be left out for a planner under test, start and end states, a target, a choice, an order.
-        progress: called with scenarios so far, scenarios wanted, candidates so far.
-        accepts: asked of each valid scenario of all vehicles on its road; one that it does not accept is left out of the set.
+        request: a vehicle to leave out for a planner under test, start and end states, a target,
+            an order.
+        progress: takes scenarios so far, scenarios wanted, candidates so far.
+        accepts: takes the road and a valid scenario of all vehicles; a scenario that it refuses is
+            left out of the set.
 
     Raises:
         InputError: a vehicle of the request does not exist.
-        RefusedError: the encounter is too large, the template does not fit the road, there is no route, what the request asks
-            cannot be had, or no candidate is valid; the message says why.
+        RefusedError: the encounter is too large, it does not fit the road, there is no route, the
+            request is impossible, or no candidate is valid; the message has the reason.
+
+    Examples:
+        >>> import scenario_gen as sg
+        >>> encounter = sg.read_log("my_log.csv").encounters[0]
+        >>> result = sg.generate(encounter, "four_way", count=5)
+        >>> len(result)
+        5
     """
     encounter, *population = [encounter] if isinstance(encounter, Encounter) else encounter
     if road == AUTO:
-        again = partial(
+        on_road = partial(
             generate,
+            [encounter, *population],
             config=config,
             count=count,
             seed=seed,
@@ -74,28 +85,50 @@ def generate(
             progress=progress,
             accepts=accepts,
         )
-        return on_first_suitable_road(
-            partial(again, [encounter, *population]), encounter, config, seed
-        )
+        return on_first_suitable_road(on_road, encounter, config, seed)
     road, encounter = road_and_template(road, encounter, config.road)
+
     situation = Situation.of(encounter)
     segmentation = segment(encounter, config.segmentation, seed)
-    chain = Chain(
-        situation, segmentation, road, config, request, count, seed, population=population
+    fit = fit_template(
+        situation, segmentation, road, config.fitting, request=request, limits=config.limits
     )
-    planned = replace(chain.plan(), provenance=what_makes_it_again(config, request))
-    result = chain.sample(planned, Callbacks(progress, accepts=partial(accepts, road)))
-    if not result.generated.scenarios:
-        causes = ", ".join(
-            f"{count} × {cause}" for cause, count in causes_in_words(result.generated.refused)
-        )
-        notes = map(str, result.generated.adaptations)
-        why = "; ".join((causes or "none was drawn", *notes))
-        raise RefusedError(f"none of {result.generated.candidates} candidates is valid: {why}")
+    routes = plan_routes(road, fit, config.planning, seed, config.limits)
+    planned = GenerationResult(encounter, segmentation, road, fit, routes, seed=seed)
+    result = sample_scenarios(
+        planned,
+        config.sampling,
+        config.limits,
+        request,
+        count=count,
+        situation=situation,
+        callbacks=Callbacks(progress, accepts=partial(accepts, road)),
+        measures=measures_in(config.sampling.variety, encounter, population),
+    )
+    _refuse_empty(result)
+
     if isinstance(encounter.source, Recombined):
         result = result.noted(Note.of(NoteKind.RECOMBINED, **vars(encounter.source)))
     if config.evaluation.compare:
         result = with_references(result, situation, config, request, population)
-    result = replace(result, replay=replay(encounter, result.road_and_fit()[1], road.frame_id))
-    coverage = coverage_of(encounter, result.generated.scenarios)
-    return replace(result, evaluation=evaluate(result, config.evaluation), coverage=coverage)
+    result = replace(result, replay=replay(encounter, fit, road.frame_id))
+    return replace(
+        result,
+        evaluation=evaluate(result, config.evaluation),
+        coverage=coverage_of(encounter, result.generated.scenarios),
+        provenance=what_makes_it_again(config, request),
+    )
+
+
+def _refuse_empty(result: GenerationResult) -> None:
+    """Refuse a result without scenarios.
+
+    Raises:
+        RefusedError: the causes of all refusals, and the notes.
+    """
+    generated = result.generated
+    if not generated.scenarios:
+        refused = causes_in_words(generated.refused)
+        causes = ", ".join(f"{count} × {cause}" for cause, count in refused)
+        reasons = "; ".join((causes or "none was drawn", *map(str, generated.adaptations)))
+        raise RefusedError(f"none of {generated.candidates} candidates is valid: {reasons}")

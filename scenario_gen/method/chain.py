@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Fit, plan and sample: the one chain of the stages between the segmentation and the evaluation."""
+"""Fit, plan and sample: the stages between segmentation and evaluation, to repeat with changes."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -17,18 +17,19 @@ from scenario_gen.types import Encounter, GenerationResult, Request, Road, Segme
 
 @dataclass(frozen=True, eq=False)
 class Chain:
-    """What the stages after the segmentation take.
+    """The input of the stages after the segmentation.
 
     Attributes:
-        situation: of the template.
-        segmentation: its changepoints, found or given.
+        situation: the template's.
+        segmentation: its changepoints.
         road: the target.
         config: the parameters of every stage.
         request: what is requested.
         count: valid scenarios wanted.
         seed: of all randomness.
         waits: that scenarios keep; the template's if None.
-        population: recorded encounters that say, with `sampling.variety=population`, how encounters differ.
+        population: recorded encounters that show how encounters differ, for
+            `sampling.variety=population`.
     """
 
     situation: Situation
@@ -47,17 +48,21 @@ class Chain:
         return self.situation.encounter
 
     def plan(self) -> GenerationResult:
-        """Fit and plan: the template on its road, with no scenarios yet.
+        """Fit and plan; the result has no scenarios yet.
 
         Raises:
             InputError, RefusedError: as the stages.
         """
-        config = self.config
+        config, limits = self.config, self.config.limits
         fit = fit_template(
-            self.situation, self.segmentation, self.road, config.fitting,
-            request=self.request, limits=config.limits,
-        )  # fmt: skip
-        routes = plan_routes(self.road, fit, config.planning, self.seed, config.limits)
+            self.situation,
+            self.segmentation,
+            self.road,
+            config.fitting,
+            request=self.request,
+            limits=limits,
+        )
+        routes = plan_routes(self.road, fit, config.planning, self.seed, limits)
         return GenerationResult(
             self.encounter, self.segmentation, self.road, fit, routes, seed=self.seed
         )
@@ -65,16 +70,23 @@ class Chain:
     def sample(
         self, planned: GenerationResult, callbacks: Callbacks = Callbacks()
     ) -> GenerationResult:
-        """Sample what was planned; every candidate is checked.
+        """Add scenarios to a planned template.
 
         Raises:
             InputError, RefusedError: as `sample_scenarios`.
         """
+        config = self.config
         return sample_scenarios(
-            planned, self.config.sampling, self.config.limits, self.request,
-            count=self.count, waits=self.waits, situation=self.situation, callbacks=callbacks,
-            measures=measures_in(self.config.sampling.variety, self.encounter, self.population),
-        )  # fmt: skip
+            planned,
+            config.sampling,
+            config.limits,
+            self.request,
+            count=self.count,
+            waits=self.waits,
+            situation=self.situation,
+            callbacks=callbacks,
+            measures=measures_in(config.sampling.variety, self.encounter, self.population),
+        )
 
     def run(self, callbacks: Callbacks = Callbacks()) -> GenerationResult:
         """Fit, plan and sample.
