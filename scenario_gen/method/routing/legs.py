@@ -66,7 +66,7 @@ def join_waypoints(task: VehicleTask, waypoints: list[int], curvature: float) ->
                 raise
             place = _ease_or_drop(task, kept, inner, eased, poses)
             del guesses[place - 1 :]  # the legs to and from this waypoint
-    searched = sum(guess.hold[0] == SEARCHED_WEIGHT for guess in guesses)
+    searched = sum(bool(guess.hold[0] == SEARCHED_WEIGHT) for guess in guesses)
     left_out = tuple(w for w in waypoints if w not in kept)
     return Legs(Guess.joined(guesses), kept, left_out, len(guesses) - searched, searched)
 
