@@ -1,20 +1,20 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""New encounters out of recorded ones: how one drove, met by how somebody else drove elsewhere.
+"""New encounters from recorded ones: one driver meets another driver, who was recorded elsewhere.
 
-In two encounters of one kind somebody goes first and somebody second. A new encounter has the first of the one and the second of
-the other:
+A new encounter has the first vehicle of one encounter and the second vehicle of another encounter
+of the same kind:
 
-- One that crosses, turns or merges keeps its way and its speeds, and is moved: in space such that both firsts take the same pose
-  where the paths meet, in time such that they clear it at the same instant, which is what the second waits for.
-- One that follows keeps how it follows (Newell 2002): it is where its leader was a time gap τ before, less a distance,
-  s(t) = s_leader(t − τ) − δ(t), with τ and δ as behind its own leader. In time it is moved to where the leaders' speeds are most
-  alike.
+- A vehicle that crosses, turns or merges keeps its path and its speeds, and is moved: in space so
+  that both first vehicles have the same pose where the paths meet, in time so that they clear this
+  place at the same instant.
+- A follower keeps its way of following (Newell 2002): s(t) = s_leader(t - τ) - δ(t), with τ and δ
+  as behind its own leader. In time it is moved to where the speeds of the leaders are most alike.
 
-Nothing is made up in between, so joints are as smooth as the recordings. What comes out must be of the same kind, each driver
-reacting as in its own recording, without an overlap, within the limits of its type, and hardly more unusual (`evaluation.law`)
-than the recorded ones. It is a template like any other: what is generated from it is checked as always.
+Nothing is invented in between, so the motions are as smooth as the recordings. The result must be
+of the same kind, each driver must react as in its own recording, without overlap and within the
+limits of its type, and it must not be much more unusual (`evaluation.law`) than the recordings.
 """
 
 from collections import Counter
@@ -29,34 +29,31 @@ from scenario_gen.method.evaluation.law import Law
 from scenario_gen.method.evaluation.population import DISTANCE, member_of
 from scenario_gen.numerics import Floats
 from scenario_gen.numerics.plane import ahead_and_left, place
-from scenario_gen.situation import Conflict, EncounterKind, Situation, time_gaps
+from scenario_gen.situation import Conflict, EncounterKind, Situation, time_gaps, Track
 from scenario_gen.types import Encounter, FOLLOW, Reaction, Recombined, YIELD
 
-LEAST_S = 5.0  # that a new encounter lasts
-TRIES = 40  # pairs that are looked at for each encounter wanted
-RARER = 1.2  # times as far from the middle of the law of the kind as the rarer of the two, at most
-_GAPS_S = (
-    0.5,
-    1.2,
-    2.5,
-)  # least time gap τ, that of who never drives in the leader's lane, and greatest
-_OVERLAP_S, _OVERLAP_COST = (
-    8.0,
-    1.5,
-)  # that recordings of leaders overlap, if they are so long; m/s that none of it is worth
-_STEP = 2  # samples by which one is moved against the other
-_ASIDE_M = 2.2  # of the follower's path, within which the leader is on it
-_BACKWARDS = -0.5  # m/s: who would drive backwards faster than this does not follow
+MIN_DURATION_S = 5.0
+ATTEMPTS_PER_ENCOUNTER_COUNT = 40
+MAX_RARITY_RATIO = 1.2  # of the distance from the mean, to that of the rarer recording
+MIN_TIME_GAP_S = 0.5
+USUAL_TIME_GAP_S = 1.2  # of a follower that was never recorded in its leader's lane
+MAX_TIME_GAP_S = 2.5
+MIN_OVERLAP_S = 8.0  # of the recordings of two leaders, unless one is shorter
+NO_OVERLAP_COST = 1.5  # in m/s, for recordings that do not overlap
+SHIFT_STEPS = 2  # samples between the shifts that are tried
+ON_PATH_M = 2.2  # from the follower's path, within which its leader is on it
+MAX_REVERSE_MPS = 0.5  # a follower that drives backwards faster is refused
 
 
 @dataclass(frozen=True, eq=False)
-class Pair:
-    """The two of an encounter that have most to do with each other.
+class InteractingPair:
+    """The two vehicles of an encounter that interact most.
 
     Attributes:
         situation: of the encounter, with all its vehicles.
-        kind: of `scenario_gen.method.evaluation.population`; `features` (F,), too.
-        conflict: of the two.
+        kind: what they do.
+        features: (F,) as in `evaluation.population`.
+        conflict: between the two.
         reactions: of one of them to the other.
     """
 
@@ -73,75 +70,78 @@ class Pair:
 
     @property
     def graph(self) -> frozenset[tuple[bool, str]]:
-        """Who reacts, the second one or not, and how."""
+        """The reactions: whether the second vehicle reacts, and how."""
         return frozenset((edge.who == self.conflict.second, edge.kind) for edge in self.reactions)
 
     @property
     def follows(self) -> bool:
-        """Whether the second drives behind the first, and reacts to that or to nothing."""
+        """Whether the second vehicle drives behind the first, and has no other reaction."""
         return self.conflict.following and (not self.reactions or (True, FOLLOW) in self.graph)
 
     @property
     def clears(self) -> float:
-        """When [s] the first one has cleared what the second one waits for; of a follower when the first one comes there."""
-        given = [
-            edge.clears
-            for edge in self.reactions
-            if edge.kind == YIELD and math.isfinite(edge.gap)
-        ]
-        return (
-            given[0]
-            if given
-            else self.conflict.entry_first
-            if self.conflict.following
-            else self.conflict.exit_first
-        )
+        """When [s] the first vehicle has cleared the place that the second one waits for.
+
+        If the second one follows, when the first one arrives there.
+        """
+        for edge in self.reactions:
+            if edge.kind == YIELD and math.isfinite(edge.gap):
+                return edge.clears
+        conflict = self.conflict
+        return conflict.entry_first if conflict.following else conflict.exit_first
 
     @property
-    def meeting(self) -> Floats:
-        """(3,) the first one's pose where the paths meet."""
-        own, end = self.conflict, self.encounter.duration
-        at = (
-            own.entry_first
-            if own.following
-            else (own.entry_first + min(own.exit_first, end)) / 2.0
-        )
-        return self.motion(own.first, np.array([at]))[0, :3]
+    def meeting_pose(self) -> Floats:
+        """(3,) the pose of the first vehicle where the paths meet."""
+        conflict = self.conflict
+        time = conflict.entry_first
+        if not conflict.following:
+            time = (time + min(conflict.exit_first, self.encounter.duration)) / 2.0
+        return self.states(conflict.first, np.array([time]))[0, :3]
 
-    def motion(self, n: int, at: Floats) -> Floats:
-        """(T, 4) pose and speed of a vehicle at times (T,) [s]."""
-        own = self.encounter
-        columns = (*own.position[n].T, own.heading[n], own.speed[n])
-        return np.column_stack([np.interp(at, own.time, column) for column in columns])
+    @property
+    def tracks(self) -> tuple[Track, Track]:
+        """The tracks of the first and of the second vehicle."""
+        tracks = self.situation.tracks
+        return tracks[self.conflict.first], tracks[self.conflict.second]
 
-    def there(self, n: int) -> Floats:
-        """(2,) when [s] a vehicle comes and goes."""
-        return np.asarray(self.encounter.present[n] * self.encounter.dt)
+    def states(self, n: int, time: Floats) -> Floats:
+        """Return pose and speed (T, 4) of a vehicle at times (T,) [s]."""
+        states = self.encounter.at(time)
+        return np.column_stack([states.position[n], states.heading[n], states.speed[n]])
+
+    def presence(self, n: int) -> Floats:
+        """Return when [s] a vehicle appears and disappears, (2,)."""
+        return np.asarray(self.encounter.time[self.encounter.present[n]])
 
 
-def pair_of(encounter: Encounter) -> Pair | None:
-    """Return the pair of an encounter; None if no two of it share an area."""
+def pair_of(encounter: Encounter) -> InteractingPair | None:
+    """Return the pair of an encounter; None if no two vehicles share an area."""
     situation = Situation.of(encounter)
     member = member_of(encounter, "", 0)
-    if (
-        member.kind is None
-        or member.pair is None
-        or (conflict := situation.conflict(*member.pair)) is None
-    ):
+    conflict = None if member.pair is None else situation.conflict(*member.pair)
+    if member.kind is None or conflict is None:
         return None
-    edges = tuple(
-        edge for edge in situation.reactions.edges if {edge.who, edge.whom} == set(member.pair)
-    )
-    return Pair(situation, member.kind, member.features, conflict, edges)
+    edges = situation.reactions.edges
+    reactions = tuple(edge for edge in edges if {edge.who, edge.whom} == set(conflict.pair))
+    return InteractingPair(situation, member.kind, member.features, conflict, reactions)
 
 
 def recombined(one: Encounter, other: Encounter) -> Encounter:
-    """Return the first vehicle of one encounter with the second vehicle of another, on the clock and in the frame of `one`.
+    """Return the first vehicle of one encounter with the second vehicle of another.
 
-    Of more than two vehicles the two that have most to do with each other count.
+    The clock and the frame are those of `one`. Of more than two vehicles, those that interact most
+    are used.
 
     Raises:
-        RefusedError: they are not of one kind, or what comes out is not, or reacts differently; the message says why.
+        RefusedError: they are of different kinds, or the result is of another kind, overlaps,
+            reacts differently or is too unusual; the message says which.
+
+    Example:
+        >>> from scenario_gen import read_log, recombined
+        >>> first, second = read_log("crossings.csv").encounters
+        >>> recombined(first, second).source.name
+        'crossings-1 + crossings-2'
     """
     a, b = pair_of(one), pair_of(other)
     if a is None or b is None or a.kind != b.kind:
@@ -149,175 +149,187 @@ def recombined(one: Encounter, other: Encounter) -> Encounter:
     return _combined(a, b)
 
 
-def _combined(a: Pair, b: Pair) -> Encounter:
-    """Return the first vehicle of one pair with the second vehicle of another of its kind."""
-    one, other = a.encounter, b.encounter
-    begin, motion = _following(a, b) if b.follows else _meeting(a, b)
-    first, second = one.vehicles[a.conflict.first], other.vehicles[b.conflict.second]
-    second = replace(second, id=f"{second.id}_2") if second.id == first.id else second
-    rows = np.stack([a.motion(a.conflict.first, begin + one.time[: len(motion)]), motion])
-    start = one.start_ns + round(begin / one.dt) * one.dt_ns
-    source = Recombined(one.name, other.name)
-    made = Encounter.sampled(
-        (first, second),
-        one.dt,
-        rows[..., :2],
-        rows[..., 2],
-        rows[..., 3],
-        source.name,
-        start,
-        source=source,
-    )
-    found, change = pair_of(made), np.diff(made.speed[1]) / made.dt
-    if found is None or found.kind != a.kind or found.conflict.second != 1:
-        raise RefusedError("together they are of another kind")
-    if found.graph != {own for own in a.graph if not own[0]} | {own for own in b.graph if own[0]}:
-        raise RefusedError("together they react differently")
-    if found.features[DISTANCE] <= 0.0:
-        raise RefusedError("together they overlap")
-    law = Law.of(a.kind, [a.features, b.features])
-    if law.distance(found.features) > RARER * max(
-        law.distance(a.features), law.distance(b.features)
-    ):
-        raise RefusedError("together they are more unusual than each of the recorded")
-    if (
-        change.max() > second.kind.dynamics.max_acceleration
-        or -change.min() > second.kind.dynamics.max_deceleration
-    ):
-        raise RefusedError("the second one would brake or accelerate too hard")
-    return made
-
-
 def recombinations(
     encounters: Sequence[Encounter], most: int, seed: int = 0
 ) -> tuple[list[Encounter], Counter[str]]:
-    """Return new encounters of pairs of recorded ones that are of one kind and not the same, and why pairs gave none.
+    """Return new encounters from pairs of recorded ones, and how often pairs were refused, by reason.
 
-    Pairs of all are tried in a random order, forty for each encounter wanted at most.
+    Pairs of the same kind are tried in random order, up to forty for each requested encounter.
 
     Args:
-        encounters: recorded ones.
-        most: new ones wanted.
+        encounters: recorded encounters.
+        most: largest number of new encounters.
         seed: of the order.
     """
-    count, made, refused = len(encounters), list[Encounter](), Counter[str]()
+    created: list[Encounter] = []
+    refused: Counter[str] = Counter()
     pairs = [pair_of(encounter) for encounter in encounters]
-    for number in (
-        np.random.default_rng(seed)
-        .choice(count**2, min(count**2, TRIES * most), replace=False)
-        .tolist()
-    ):
-        a, b = (pairs[k] for k in divmod(number, count))
-        if (
-            not (a and b)
-            or a.kind != b.kind
-            or np.array_equal(a.features, b.features)
-            or len(made) == most
-        ):
+    count = len(pairs) ** 2
+    attempts = min(count, ATTEMPTS_PER_ENCOUNTER_COUNT * most)
+    rng = np.random.default_rng(seed)
+    for number in rng.choice(count, attempts, replace=False).tolist():
+        a, b = (pairs[k] for k in divmod(number, len(pairs)))
+        if len(created) == most:
+            break
+        if a is None or b is None or a.kind != b.kind or np.array_equal(a.features, b.features):
             continue
         try:
-            made.append(_combined(a, b))
+            created.append(_combined(a, b))
         except RefusedError as error:
             refused[str(error)] += 1
-    return made, refused
+    return created, refused
 
 
-def _meeting(a: Pair, b: Pair) -> tuple[float, Floats]:
-    """When the two begin [s], and the motion (T, 4) of the second of `b`, moved to the first of `a`."""
-    second, later = b.conflict.second, a.clears - b.clears
-    at = _common(a, a.there(a.conflict.first), b.there(second) + later)
-    motion = b.motion(second, at - later)
-    here, there = a.meeting, b.meeting
-    ahead, left = ahead_and_left(motion[:, :2] - there[:2], there[2])
-    motion[:, :2] = place(here[None], ahead, left)[:, :2]
-    motion[:, 2] += here[2] - there[2]
-    return float(at[0]), motion
+def _combined(a: InteractingPair, b: InteractingPair) -> Encounter:
+    """Return the first vehicle of one pair with the second vehicle of another of its kind."""
+    recording = a.encounter
+    begin, second_states = _following(a, b) if b.follows else _meeting(a, b)
+    first = recording.vehicles[a.conflict.first]
+    second = b.encounter.vehicles[b.conflict.second]
+    if second.id == first.id:
+        second = replace(second, id=f"{second.id}_2")
+    first_states = a.states(a.conflict.first, begin + recording.time[: len(second_states)])
+    states = np.stack([first_states, second_states])
+    source = Recombined(recording.name, b.encounter.name)
+    created = Encounter.sampled(
+        (first, second),
+        recording.dt,
+        states[..., :2],
+        states[..., 2],
+        states[..., 3],
+        source.name,
+        recording.start_ns + round(begin / recording.dt) * recording.dt_ns,
+        source=source,
+    )
+    _refuse_unlike(created, a, b)
+    return created
 
 
-def _following(a: Pair, b: Pair) -> tuple[float, Floats]:
-    """When the two begin [s], and the motion (T, 4) of the second of `b` behind the first of `a`."""
+def _refuse_unlike(created: Encounter, a: InteractingPair, b: InteractingPair) -> None:
+    """Refuse a new encounter that differs too much from its recordings.
+
+    Raises:
+        RefusedError: it does; the message says how.
+    """
+    pair = pair_of(created)
+    if pair is None or pair.kind != a.kind or pair.conflict.second != 1:
+        raise RefusedError("together they are of another kind")
+    reactions = {edge for edge in a.graph if not edge[0]} | {edge for edge in b.graph if edge[0]}
+    if pair.graph != reactions:
+        raise RefusedError("together they react differently")
+    if pair.features[DISTANCE] <= 0.0:
+        raise RefusedError("together they overlap")
+    law = Law.of(a.kind, [a.features, b.features])
+    rarer = max(law.distance(a.features), law.distance(b.features))
+    if law.distance(pair.features) > MAX_RARITY_RATIO * rarer:
+        raise RefusedError("together they are more unusual than each of the recorded")
+    acceleration = np.diff(created.speed[1]) / created.dt
+    dynamics = created.vehicles[1].kind.dynamics
+    too_strong = acceleration.max() > dynamics.max_acceleration
+    if too_strong or -acceleration.min() > dynamics.max_deceleration:
+        raise RefusedError("the second one would brake or accelerate too hard")
+
+
+def _meeting(a: InteractingPair, b: InteractingPair) -> tuple[float, Floats]:
+    """Return the begin [s], and the states (T, 4) of b's second vehicle, moved to a's first one."""
+    second, delay = b.conflict.second, a.clears - b.clears
+    time = _common_times(a, a.presence(a.conflict.first), b.presence(second) + delay)
+    states = b.states(second, time - delay)
+    target, source = a.meeting_pose, b.meeting_pose
+    ahead, left = ahead_and_left(states[:, :2] - source[:2], source[2])
+    states[:, :2] = place(target[None], ahead, left)[:, :2]
+    states[:, 2] += target[2] - source[2]
+    return float(time[0]), states
+
+
+def _following(a: InteractingPair, b: InteractingPair) -> tuple[float, Floats]:
+    """Return the begin [s], and the states (T, 4) of b's second vehicle behind a's first one."""
     gaps = time_gaps(b.situation.lane_gaps, b.conflict.second, b.conflict.first)
-    least, usual, most = _GAPS_S
-    tau = min(max(float(np.median(gaps)) if len(gaps) else usual, least), most)
-    later = _alike(a, b)
-    own, led = b.there(b.conflict.second) + later, b.there(b.conflict.first) + later + tau
-    span = np.array([max(own[0], led[0]), min(own[1], led[1])])
-    at = _common(a, a.there(a.conflict.first) + np.array([tau, 0.0]), span)
-    leader, follower = (
-        b.situation.tracks[b.conflict.first],
-        b.situation.tracks[b.conflict.second],
-    )
-    track = a.situation.tracks[a.conflict.first]
-    theirs, ours = b.encounter.time, a.encounter.time
-    speed = np.interp(at - tau, ours, track.speed) - np.interp(
-        at - later - tau, theirs, leader.speed
-    )
-    speed += np.interp(at - later, theirs, follower.speed)
-    if speed.min() < _BACKWARDS:
+    usual = float(np.median(gaps)) if len(gaps) else USUAL_TIME_GAP_S
+    tau = min(max(usual, MIN_TIME_GAP_S), MAX_TIME_GAP_S)
+    delay = _alignment(a, b)
+    follower_span = b.presence(b.conflict.second) + delay
+    leader_span = b.presence(b.conflict.first) + delay + tau
+    begin, end = max(follower_span[0], leader_span[0]), min(follower_span[1], leader_span[1])
+    presence = a.presence(a.conflict.first) + np.array([tau, 0.0])
+    time = _common_times(a, presence, np.array([begin, end]))
+
+    (new_leader, _), (leader, follower) = a.tracks, b.tracks
+    recorded, new = b.encounter.time, a.encounter.time
+    led = time - delay - tau  # on the clock of b, when the leader's motion counts
+    speed = np.interp(time - tau, new, new_leader.speed) - np.interp(led, recorded, leader.speed)
+    speed += np.interp(time - delay, recorded, follower.speed)
+    if speed.min() < -MAX_REVERSE_MPS:
         raise RefusedError("the second one would drive backwards")
-    behind = np.interp(at - later - tau, theirs, _on_path(b)) - np.interp(
-        at - later, theirs, follower.progress
-    )
-    driven = np.maximum.accumulate(np.interp(at - tau, ours, _on_path(a)) - behind)
-    return float(at[0]), np.column_stack([_way(a, driven), np.maximum(speed, 0.0)])
+    distance = np.interp(led, recorded, _leader_stations(b))
+    distance -= np.interp(time - delay, recorded, follower.progress)
+    station = np.interp(time - tau, new, _leader_stations(a)) - distance
+    poses = _poses_behind(a, np.maximum.accumulate(station))
+    return float(time[0]), np.column_stack([poses, np.maximum(speed, 0.0)])
 
 
-def _common(a: Pair, own: Floats, moved: Floats) -> Floats:
-    """(T,) the instants of a's clock between the later begin and the earlier end of two spans (2,) [s]."""
+def _common_times(a: InteractingPair, span: Floats, other: Floats) -> Floats:
+    """(T,) the samples of a's clock within two spans (2,) [s].
+
+    Raises:
+        RefusedError: they are too few.
+    """
     dt = a.encounter.dt
-    first, last = (
-        math.ceil(max(own[0], moved[0]) / dt - 1e-6),
-        math.floor(min(own[1], moved[1]) / dt + 1e-6),
-    )
-    if (last - first) * dt < LEAST_S:
-        raise RefusedError(f"together they last less than {LEAST_S:g} s")
+    first = math.ceil(max(span[0], other[0]) / dt - 1e-6)
+    last = math.floor(min(span[1], other[1]) / dt + 1e-6)
+    if (last - first) * dt < MIN_DURATION_S:
+        raise RefusedError(f"together they last less than {MIN_DURATION_S:g} s")
     return np.arange(first, last + 1) * dt
 
 
-def _alike(a: Pair, b: Pair) -> float:
-    """By how much [s] b's clock is moved, such that the leaders' speeds are most alike for a long time."""
+def _alignment(a: InteractingPair, b: InteractingPair) -> float:
+    """The shift [s] of b's clock for which the speeds of the leaders are most alike."""
     dt = a.encounter.dt
-    ours, theirs = (_led(pair, dt) for pair in (a, b))
-    shorter = min(len(ours), len(theirs))
-    least = min(round(_OVERLAP_S / dt), shorter)
-    best = (math.inf, 0)
-    for move in range(least - len(theirs), len(ours) - least + 1, _STEP):
-        begin, end = max(0, move), min(len(ours), len(theirs) + move)
-        off = float(np.sqrt(np.square(ours[begin:end] - theirs[begin - move : end - move]).mean()))
-        best = min(
-            best, (round(off + _OVERLAP_COST * (1.0 - (end - begin) / shorter), 6), move)
-        )  # ties on any CPU
-    return best[1] * dt + float(a.there(a.conflict.first)[0] - b.there(b.conflict.first)[0])
+    speed, other = _leader_speed(a, dt), _leader_speed(b, dt)
+    shorter = min(len(speed), len(other))
+    least = min(round(MIN_OVERLAP_S / dt), shorter)
+    smallest, best = math.inf, 0
+    for shift in range(least - len(other), len(speed) - least + 1, SHIFT_STEPS):
+        begin, end = max(0, shift), min(len(speed), len(other) + shift)
+        difference = speed[begin:end] - other[begin - shift : end - shift]
+        missing = 1.0 - (end - begin) / shorter
+        cost = float(np.sqrt(np.square(difference).mean())) + NO_OVERLAP_COST * missing
+        cost = round(cost, 6)  # ties are the same on any processor
+        if cost < smallest:
+            smallest, best = cost, shift
+    start, other_start = (pair.presence(pair.conflict.first)[0] for pair in (a, b))
+    return best * dt + float(start - other_start)
 
 
-def _led(pair: Pair, dt: float) -> Floats:
-    """(T,) the speeds [m/s] of the first one, every dt [s] from when it comes until it goes."""
-    comes, goes = pair.there(pair.conflict.first).tolist()
-    return pair.motion(
-        pair.conflict.first, comes + dt * np.arange(int((goes - comes) / dt + 1e-6) + 1)
-    )[:, 3]
+def _leader_speed(pair: InteractingPair, dt: float) -> Floats:
+    """(T,) the speeds [m/s] of the first vehicle, every dt [s] while it is present."""
+    first, last = pair.presence(pair.conflict.first).tolist()
+    time = first + dt * np.arange(int((last - first) / dt + 1e-6) + 1)
+    return pair.states(pair.conflict.first, time)[:, 3]
 
 
-def _way(pair: Pair, station: Floats) -> Floats:
-    """(T, 3) the poses at distances (T,) on the path of the second one, beyond its end beside that of the first."""
-    ahead, own = (
-        pair.situation.tracks[n].curve for n in (pair.conflict.first, pair.conflict.second)
-    )
-    poses, over = own.at(station), station - own.length
-    join, aside = (float(value[0]) for value in ahead.project(own.points[-1:, :2]))
-    beyond = (over > 0.0) & (abs(aside) < _ASIDE_M)
-    poses[beyond] = ahead.beside(join + over[beyond], aside)
+def _poses_behind(pair: InteractingPair, station: Floats) -> Floats:
+    """(T, 3) poses at stations (T,) of the second vehicle's path, which the first one's continues."""
+    leader, follower = (track.curve for track in pair.tracks)
+    poses, beyond = follower.at(station), station - follower.length
+    join, left = (float(value[0]) for value in leader.project(follower.points[-1:, :2]))
+    if abs(left) < ON_PATH_M:
+        rows = beyond > 0.0
+        poses[rows] = leader.beside(join + beyond[rows], left)
     return poses
 
 
-def _on_path(pair: Pair) -> Floats:
-    """(T,) how far [m] the first one is on the path of the second, at the samples of their encounter."""
-    curve, track = (
-        pair.situation.tracks[pair.conflict.second].curve,
-        pair.situation.tracks[pair.conflict.first],
-    )
-    station, aside = curve.project(pair.encounter.position[pair.conflict.first])
-    on = track.is_present & (station > 0.0) & (station < curve.length) & (np.abs(aside) < _ASIDE_M)
-    if not on.any():
+def _leader_stations(pair: InteractingPair) -> Floats:
+    """(T,) stations [m] of the first vehicle on the path of the second one.
+
+    Raises:
+        RefusedError: it is never on that path.
+    """
+    leader, follower = pair.tracks
+    curve = follower.curve
+    station, left = curve.project(pair.encounter.position[pair.conflict.first])
+    inside = (station > 0.0) & (station < curve.length) & (np.abs(left) < ON_PATH_M)
+    rows = leader.is_present & inside
+    if not rows.any():
         raise RefusedError("the first one is never on the second one's path")
-    return np.asarray(track.progress + np.median((station - track.progress)[on]))
+    return np.asarray(leader.progress + np.median((station - leader.progress)[rows]))

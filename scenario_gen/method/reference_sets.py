@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The sets that a result is compared with, drawn by the same chain; `evaluation.compare` requests them."""
+"""Reference sets: what `evaluation.compare` compares a result with."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -21,11 +21,11 @@ def with_references(
     request: Request = Request(),
     population: Sequence[Encounter] = (),
 ) -> GenerationResult:
-    """Add what a result is measured against: sets without changepoints and with uniform ones.
+    """Add sets without changepoints, with uniform ones, and with the preset `narrow`.
 
-    They are drawn as the result is, with the same parameters and seed; beside any preset but `narrow` there is a set of that.
-    A reference keeps no waits of the template: the ends of a wait would be two more changepoints. It has no target or
-    order either, and a result that has one is not compared. A reference has only as many scenarios as are measured.
+    They have the parameters and the seed of the result. They keep no recorded waits, since the
+    ends of a wait would be two more changepoints, and have no target and order; a result with one
+    of these is not compared. A set has only as many scenarios as are measured.
 
     Raises:
         InputError: road or fit of the result are not known.
@@ -63,9 +63,8 @@ def with_references(
         for name in ("target", "order")
         if getattr(request, name) != getattr(request.plain, name)
     ]
-    not_compared = (
-        f"only the delivered set was drawn with {' and '.join(requested)} as requested"
-        if requested
-        else ""
-    )
+    not_compared = ""
+    if requested:
+        names = " and ".join(requested)
+        not_compared = f"only the delivered set was drawn with {names} as requested"
     return replace(result, references=references, refusals=refusals, not_compared=not_compared)
