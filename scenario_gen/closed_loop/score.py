@@ -23,7 +23,7 @@ import numpy as np
 from scipy.signal import savgol_filter
 import shapely
 
-from scenario_gen.closed_loop.reasons import At, state_at
+from scenario_gen.closed_loop.fault import state_at, VehicleState
 from scenario_gen.closed_loop.simulation import Drive
 from scenario_gen.numerics import Floats
 from scenario_gen.numerics.boxes import corners
@@ -130,7 +130,7 @@ def _at_fault(drive: Drive, who: int, time: float, *, off_road: bool) -> bool:
     return off_road and bool(not_behind(drive, who)[k])
 
 
-def _touches_front(ego: At, own: Vehicle, other: At, its: Vehicle) -> bool:
+def _touches_front(ego: VehicleState, own: Vehicle, other: VehicleState, its: Vehicle) -> bool:
     """Whether another touches the ego's front bumper."""
     front, _, _, right = corners(np.array([ego]), own.length, own.width)[0]
     body = shapely.Polygon(corners(np.array([other]), its.length, its.width)[0])

@@ -9,8 +9,15 @@ from typing import Any
 
 import numpy as np
 
+from scenario_gen.closed_loop.fault import (
+    Contact,
+    CutIn,
+    Reason,
+    reason_of,
+    Runner,
+    STANDSTILL_MPS,
+)
 from scenario_gen.closed_loop.off_road import PARTS, RESOLUTION, road_use
-from scenario_gen.closed_loop.reasons import CutIn, Reason, reason_of, Runner, STANDS, state_at
 from scenario_gen.closed_loop.score import not_behind, Terms, terms
 from scenario_gen.closed_loop.simulation import ClosedLoop, Drive
 from scenario_gen.method.evaluation import distance_and_ttc, footprint_distance
@@ -265,7 +272,7 @@ def judge(loop: ClosedLoop, drive: Drive) -> DriveVerdict:
 
 def _stood(speed: Floats, step: float) -> float:
     """Return for how long [s] a vehicle stood at the end."""
-    moved = np.flatnonzero(speed >= STANDS)
+    moved = np.flatnonzero(speed >= STANDSTILL_MPS)
     return round((len(speed) - 1 - (int(moved[-1]) if len(moved) else 0)) * step, 9)
 
 
@@ -306,21 +313,24 @@ def _contact_in(motion: Scenario, pair: list[int], span: slice) -> float | None:
 
 def _collision(loop: ClosedLoop, drive: Drive, at: float, who: int) -> Collision:
     """Say how fast they met, who closed the gap, by both speeds along the line of their centres, and why."""
-    ego, other = (state_at(drive, i, at) for i in (drive.ego, who))
-    velocity, its_velocity = ego.speed * unit(ego.yaw), other.speed * unit(other.yaw)
-    away = np.subtract(other[:2], ego[:2])
-    towards = away / max(math.hypot(*away), 1e-9)
-    mine, its = float(velocity @ towards), float(-its_velocity @ towards)
-    ran = (
-        Runner.EGO
-        if mine > 2.0 * max(its, 0.0)
-        else Runner.OTHER
-        if its > 2.0 * max(mine, 0.0)
-        else Runner.BOTH
-    )
-    speed = math.hypot(*(velocity - its_velocity))
+    contact = Contact(loop, drive, who, at)
+    ego, other = contact.ego_state, contact.other_state
+    velocity, other_velocity = ego.speed * unit(ego.yaw), other.speed * unit(other.yaw)
+    offset = np.subtract(other[:2], ego[:2])
+    direction = offset / max(math.hypot(*offset), 1e-9)
+    closing, other_closing = float(velocity @ direction), float(-other_velocity @ direction)
+    runner = Runner.BOTH
+    if closing > 2.0 * max(other_closing, 0.0):
+        runner = Runner.EGO
+    elif other_closing > 2.0 * max(closing, 0.0):
+        runner = Runner.OTHER
     return Collision(
-        at, drive.motion.vehicles[who].id, speed, ran, *reason_of(loop, drive, who, at)
+        time=at,
+        vehicle=drive.motion.vehicles[who].id,
+        speed=math.hypot(*(velocity - other_velocity)),
+        ran=runner,
+        reason=reason_of(contact),
+        cut_in=contact.cut_in,
     )
 
 

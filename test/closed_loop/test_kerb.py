@@ -15,7 +15,7 @@ from support.lengths import LONG
 from benchmarks._driving_worlds import Anything, as_scenario, draw_scenario, PERIOD, Witness
 from scenario_gen.closed_loop.config import ClosedLoopConfig
 from scenario_gen.closed_loop.ego import Command, Pose
-from scenario_gen.closed_loop.reasons import Reason
+from scenario_gen.closed_loop.fault import Reason
 from scenario_gen.closed_loop.simulation import ClosedLoop
 from scenario_gen.closed_loop.verdict import judge
 from scenario_gen.types import Vehicle

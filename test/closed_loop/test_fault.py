@@ -10,7 +10,7 @@ from support.lengths import LONG
 from benchmarks._driving_worlds import as_scenario, PERIOD
 from scenario_gen.closed_loop.config import ClosedLoopConfig
 from scenario_gen.closed_loop.ego import Pose
-from scenario_gen.closed_loop.reasons import safe_gap
+from scenario_gen.closed_loop.fault import safe_gap
 from scenario_gen.closed_loop.simulation import ClosedLoop
 from scenario_gen.closed_loop.verdict import judge
 from scenario_gen.numerics.curve import Curve
