@@ -1,7 +1,10 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Long work off the executor's thread: jobs in order, a newer job replaces a waiting one of its name."""
+"""Long work off the executor's thread: named jobs in order; a new job replaces a waiting one with its name.
+
+`concurrent.futures` replaces no waiting job, cancels no running one, and waits at the end for all.
+"""
 
 from collections import OrderedDict
 from collections.abc import Callable
@@ -13,26 +16,27 @@ from scenario_gen.base.cancelling import cancellable, CancelledError
 from scenario_gen.base.errors import RefusedError
 
 Job = Callable[[Callable[[], bool]], object]
-MOST_WAITING = 1000  # jobs, as many as requests of one service that ROS keeps
-_own = threading.local()  # whose thread this is
+MAX_WAITING_COUNT = 1000  # jobs: as many as a service's queue of requests
+_this_thread = threading.local()
 
 
 def stop_if_abandoned() -> None:
-    """End the job of this thread here if its worker has been closed; nothing happens on other threads.
+    """End this thread's job if its worker has been closed; does nothing on other threads.
 
     Raises:
-        CancelledError: it has.
+        CancelledError: the worker has been closed.
     """
-    worker = getattr(_own, "worker", None)
+    worker = getattr(_this_thread, "worker", None)
     if worker is not None and worker.closed:
         raise CancelledError("cancelled: the node is not active any more")
 
 
 class Worker:
-    """Runs jobs in the order in which they came; each gets a function that says whether it has been cancelled.
+    """Runs jobs in the order of their submission.
 
-    A job that is cancelled before its turn still runs, at once, so that it can answer whoever waits for it: it looks first. So
-    does one that comes when too many wait. A job that takes long asks `stop_if_cancelled` now and then.
+    Each job gets a function that returns whether it has been cancelled; a long job calls
+    `stop_if_cancelled` repeatedly. A job that is cancelled before its turn, or that exceeds the
+    limit of waiting jobs, still runs at once, so that it can answer a caller.
     """
 
     def __init__(
@@ -42,17 +46,18 @@ class Worker:
         done: Callable[[str], None] = lambda _: None,
         threads: int = 1,
     ) -> None:
-        """Start the threads, one for each job at a time.
+        """Start the threads.
 
         Args:
-            failed: gets a job's name and what it raised.
-            owner: after whom the threads are named.
-            done: gets the name of a job that has ended well.
-            threads: how many jobs run at a time; never two of one name.
+            failed: called with a job's name and its error.
+            owner: part of the threads' names.
+            done: called with the name of a job that has succeeded.
+            threads: jobs that run at a time; two jobs with one name never do.
         """
-        self._failed, self._done = failed, done
+        self._failed = failed
+        self._done = done
         self._waiting: OrderedDict[str, tuple[Job, threading.Event]] = OrderedDict()
-        self._running: dict[str, tuple[threading.Event, float]] = {}  # since when
+        self._running: dict[str, tuple[threading.Event, float]] = {}  # cancelled, start time [s]
         self._changed = threading.Condition()
         self.closed = False
         self._threads = [
@@ -63,56 +68,51 @@ class Worker:
             thread.start()
 
     def submit(self, name: str, job: Job) -> None:
-        """Queue a job; one of the same name that still waits is replaced, one that runs is cancelled."""
+        """Queue a job; a waiting one with its name is replaced, a running one is cancelled."""
         with self._changed:
             self._waiting.pop(name, None)
-            full = len(self._waiting) >= MOST_WAITING
-            if not full:
+            is_full = len(self._waiting) >= MAX_WAITING_COUNT
+            if not is_full:
                 self._waiting[name] = (job, threading.Event())
                 if name in self._running:
                     self._running[name][0].set()
                 self._changed.notify()
-        if full:
-            self._failed(
-                name,
-                RefusedError(f"{MOST_WAITING} jobs wait already; ask again when some are done"),
-            )
-            self._do(name, job, lambda: True)
+        if is_full:
+            message = f"{MAX_WAITING_COUNT} jobs wait already; ask again when some are done"
+            self._failed(name, RefusedError(message))
+            self._execute(name, job, lambda: True)
 
     def cancel(self, only: str | None = None) -> list[str]:
-        """Cancel the running jobs and the waiting ones, or those of one name; return their names, the running ones first.
+        """Cancel all jobs, or those with one name; return their names, the running ones first.
 
-        Those that wait answer at once, on this thread, and not only when it would be their turn.
+        Waiting jobs run at once on this thread, so that they can answer.
         """
         with self._changed:
             running = [name for name in self._running if only in (None, name)]
             for name in running:
                 self._running[name][0].set()
-            waiting = [
-                (name, self._waiting.pop(name)[0])
-                for name in list(self._waiting)
-                if only in (None, name)
-            ]
-        for name, job in waiting:
-            self._do(name, job, lambda: True)
-        return running + [name for name, _ in waiting]
+            names = [name for name in self._waiting if only in (None, name)]
+            waiting = {name: self._waiting.pop(name)[0] for name in names}
+        for name, job in waiting.items():
+            self._execute(name, job, lambda: True)
+        return running + names
 
-    def account(self) -> dict[str, str]:
-        """Return what runs, for how many seconds (the longest), and how many jobs wait; nothing if none does."""
+    def status(self) -> dict[str, str]:
+        """Return the running jobs, the longest time [s] and the count of waiting jobs; {} when idle."""
         with self._changed:
             if not self._running:
                 return {}
-            began = min(since for _, since in self._running.values())
+            start = min(start for _, start in self._running.values())
             return {
                 "job": ", ".join(self._running),
-                "seconds": f"{monotonic() - began:.0f}",
+                "seconds": f"{monotonic() - start:.0f}",
                 "waiting": str(len(self._waiting)),
             }
 
     def close(self, timeout: float = 0.5) -> None:
-        """Cancel everything and end the threads; a job that does not listen is abandoned after `timeout` seconds.
+        """Cancel everything and end the threads; a job that continues after `timeout` seconds is abandoned.
 
-        What it still does has no effect: see `stop_if_abandoned`.
+        An abandoned job has no further effect: see `stop_if_abandoned`.
         """
         self.cancel()
         with self._changed:
@@ -123,11 +123,11 @@ class Worker:
             thread.join(max(0.0, deadline - monotonic()))
 
     def _next(self) -> str | None:
-        """Return the name of the first job that waits, and of whose name none runs."""
+        """Return the name of the first waiting job that no running one shares."""
         return next((name for name in self._waiting if name not in self._running), None)
 
     def _run(self) -> None:
-        _own.worker = self
+        _this_thread.worker = self
         while True:
             with self._changed:
                 self._changed.wait_for(lambda: self.closed or self._next() is not None)
@@ -136,13 +136,13 @@ class Worker:
                     return
                 job, cancelled = self._waiting.pop(name)
                 self._running[name] = (cancelled, monotonic())
-            self._do(name, job, cancelled.is_set)
+            self._execute(name, job, cancelled.is_set)
             with self._changed:
                 del self._running[name]
                 self._changed.notify()
 
-    def _do(self, name: str, job: Job, cancelled: Callable[[], bool]) -> None:
-        with suppress(CancelledError):  # nobody waits for it
+    def _execute(self, name: str, job: Job, cancelled: Callable[[], bool]) -> None:
+        with suppress(CancelledError):  # nobody waits for its result
             try:
                 with cancellable(cancelled):
                     job(cancelled)

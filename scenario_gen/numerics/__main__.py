@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""`python -m scenario_gen.numerics [PACKAGE ...]` compiles the kernels of the packages that are named, or all."""
+"""`python -m scenario_gen.numerics [PACKAGE ...]` compiles the kernels of the named packages, or all."""
 
 import importlib
 import os
@@ -9,44 +9,48 @@ import shutil
 import sys
 from time import monotonic, time
 
-from scenario_gen.numerics.compiling import make_ready, ONLY, words
+from scenario_gen.numerics.compiling import make_ready, next_name, QUEUE, words
 from scenario_gen.numerics.kernel_cache import root
 from scenario_gen.numerics.kernels import import_all, registered
 
-UNUSED_S = 60.0 * 86400.0  # after which kernels of another version are removed
+MAX_UNUSED_S = 60.0 * 86400.0  # after which kernels of other versions are removed
 
 
-def _work(names: list[str]) -> None:
-    """Compile these kernels, as long as somebody waits for them."""
+def _compile_queued() -> None:
+    """Compile the kernels in the queue on standard input while the parent process lives."""
     parent = os.getppid()
-    for name in names:
-        if os.getppid() == parent:
-            module, _, function = name.partition(":")
-            getattr(importlib.import_module(module), function).compile()
+    while (name := next_name()) and os.getppid() == parent:
+        module, _, function = name.partition(":")
+        getattr(importlib.import_module(module), function).compile()
+
+
+def _remove_unused() -> None:
+    """Remove the kernels of versions that were not used for long."""
+    for kernel in registered():
+        kernel.mark.parent.touch()
+    for folder in root().glob("kernels-*"):
+        if time() - folder.stat().st_mtime > MAX_UNUSED_S:
+            shutil.rmtree(folder, ignore_errors=True)
 
 
 def main() -> None:
-    """Compile the kernels of the packages that are named, or all; remove those of versions that were not used for long."""
-    if ONLY in sys.argv:
-        _work(sys.argv[2:])
+    """Compile the kernels of the named packages, or all."""
+    if QUEUE in sys.argv:
+        _compile_queued()
         return
     started = monotonic()
     import_all(sys.argv[1:])
-    end, last = "\r" if sys.stdout.isatty() else "\n", ""
+    is_terminal = sys.stdout.isatty()
+    last_done = -1
 
     def show(done: int, needed: int, seconds: float) -> None:
-        nonlocal last
-        text = words(done, needed, seconds)
-        if sys.stdout.isatty() or text[:16] != last[:16]:
-            print(text, end=end, flush=True)
-        last = text
+        nonlocal last_done
+        if is_terminal or done != last_done:
+            print(words(done, needed, seconds), end="\r" if is_terminal else "\n", flush=True)
+        last_done = done
 
     count = make_ready(registered(), show)
-    for each in registered():
-        each.mark.parent.touch()
-    for old in root().glob("kernels-*"):
-        if time() - old.stat().st_mtime > UNUSED_S:
-            shutil.rmtree(old, ignore_errors=True)
+    _remove_unused()
     print(f"{count} kernels ready after {monotonic() - started:.1f} s", flush=True)
 
 

@@ -14,29 +14,27 @@ Bools = npt.NDArray[np.bool_]
 Counts = npt.NDArray[np.int32]
 Array = TypeVar("Array", bound=npt.NDArray[Any])
 
-LARGEST_ANGLE = (
-    3.141592653  # the last whole nanoradian inside (-pi, pi); rounding must not step over the cut
-)
+MAX_ANGLE_RAD = 3.141592653  # the last whole nanoradian below pi, so that rounding stays inside
 
 
 def sealed(array: Array) -> Array:
-    """Make an array of our own read-only, without a copy."""
+    """Make an array read-only in place, and return it."""
     array.setflags(write=False)
     return array
 
 
 def frozen(values: npt.ArrayLike) -> Floats:
-    """Return `values` as a C-contiguous, read-only float64 array of any shape (a copy if it was writable)."""
+    """Return a C-contiguous, read-only float64 copy of `values`, any shape."""
     return sealed(np.array(values, dtype=np.float64, order="C"))
 
 
 def frozen_ints(values: npt.ArrayLike) -> Ints:
-    """Return `values` as a C-contiguous, read-only int64 array of any shape (a copy if it was writable)."""
+    """Return a C-contiguous, read-only int64 copy of `values`, any shape."""
     return sealed(np.array(values, dtype=np.int64, order="C"))
 
 
 def frozen_bools(values: npt.ArrayLike) -> Bools:
-    """Return `values` as a C-contiguous, read-only array of truth values of any shape (a copy if it was writable)."""
+    """Return a C-contiguous, read-only boolean copy of `values`, any shape."""
     return sealed(np.array(values, dtype=np.bool_, order="C"))
 
 
@@ -54,38 +52,37 @@ def wrap_angle(angle: Floats) -> Floats:
 def canonical_angle(angle: npt.ArrayLike) -> Floats:
     """Wrap angles [rad] to [-pi, pi) and round them to a nanoradian, any shape.
 
-    A quaternion on the wire gives an angle back to 1e-16; rounded, it is the very same number, so a value that went
-    through a message equals one that did not, bit for bit.
+    A quaternion in a message changes an angle by about 1e-16 rad. The rounded angle is the same
+    number before and after, so values from messages equal the original ones bit for bit.
     """
-    rounded = (
-        np.round(wrap_angle(np.asarray(angle, dtype=np.float64)), 9) + 0.0
-    )  # no -0, which other bytes than 0 would mean
-    return frozen(
-        np.minimum(np.maximum(rounded, -LARGEST_ANGLE), LARGEST_ANGLE)
-    )  # a third of the time of np.clip
+    rounded = np.round(wrap_angle(np.asarray(angle, dtype=np.float64)), 9) + 0.0  # no -0.0
+    # np.clip would take three times as long.
+    return frozen(np.minimum(np.maximum(rounded, -MAX_ANGLE_RAD), MAX_ANGLE_RAD))
 
 
 def canonical_heading(heading: npt.ArrayLike) -> Floats:
-    """Canonical angles (..., T) [rad] made continuous along the last axis (time or path)."""
+    """Return canonical angles (..., T) [rad], continuous along the last axis (time or path)."""
     angle = canonical_angle(heading)
-    jumps = (np.abs(angle[..., 1:] - angle[..., :-1]) > np.pi).any()
-    return (
-        sealed(np.unwrap(angle, axis=-1)) if jumps else angle
-    )  # most have none, and unwrapping costs ten times as much
+    jumps = np.abs(angle[..., 1:] - angle[..., :-1]) > np.pi
+    # Most headings have no jump, and np.unwrap costs ten times as much as this test.
+    return sealed(np.unwrap(angle, axis=-1)) if jumps.any() else angle
 
 
 def canonical_poses(poses: npt.ArrayLike, *, continuous: bool = False) -> Floats:
-    """Poses (..., 3+) of x, y, yaw, ... with the yaw canonical; `continuous` unwraps it along the first axis."""
+    """Return poses (..., 3+) x, y, yaw, ... with canonical yaw; `continuous` unwraps it along the first axis."""
     array = np.array(poses, dtype=np.float64, order="C")
-    array[..., 2] = (
-        canonical_heading(array[..., 2]) if continuous else canonical_angle(array[..., 2])
-    )
+    canonical = canonical_heading if continuous else canonical_angle
+    array[..., 2] = canonical(array[..., 2])
     return frozen(array)
 
 
 def runs(flags: Bools, bridge: int = 0) -> list[tuple[int, int]]:
-    """Return begin and end (exclusive) of each run of True in `flags` (T,), joined over at most `bridge` False."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], flags, [False]]).astype(np.int8)))
+    """Return begin and end (exclusive) of each run of True in `flags` (T,).
+
+    Runs with at most `bridge` False between them are joined.
+    """
+    padded = np.concatenate([[False], flags, [False]]).astype(np.int8)
+    edges = np.flatnonzero(np.diff(padded))
     joined: list[tuple[int, int]] = []
     for begin, end in edges.reshape(-1, 2).tolist():
         if joined and begin - joined[-1][1] <= bridge:

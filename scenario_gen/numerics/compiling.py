@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Kernels that are not in the cache are compiled once: by several processes, under a lock, and the user is told."""
+"""Compile kernels that are not in the cache: once, by several processes, under a lock."""
 
 from collections.abc import Callable, Sequence
 from contextlib import suppress
@@ -10,23 +10,22 @@ import os
 from pathlib import Path
 import subprocess
 import sys
-from time import monotonic
+from time import monotonic, sleep
 from typing import Protocol
 
 from filelock import FileLock, Timeout
 
 from scenario_gen.numerics.kernel_cache import is_lasting, root
 
-WORKERS = max(1, min(4, os.cpu_count() or 1))
+MAX_WORKERS_COUNT = max(1, min(4, os.cpu_count() or 1))
 POLL_S = 0.5
-ONLY = "--only"
-Progress = Callable[
-    [int, int, float], None
-]  # kernels that are there, kernels that are needed, seconds
+QUEUE = "--queue"
+NAME_BYTES = 256  # a record of the queue: a kernel's name with spaces, read and written at once
+Progress = Callable[[int, int, float], None]  # compiled kernels, needed kernels, seconds
 
 
 class Compilable(Protocol):
-    """A kernel: what tells it from all others, the file that says that it is in the cache, and how long it takes, about."""
+    """A kernel: its unique name, the file that exists once it is cached, and its code's size [bytes]."""
 
     @property
     def name(self) -> str: ...  # noqa: D102
@@ -40,17 +39,15 @@ _workers: list["subprocess.Popen[bytes]"] = []
 
 
 def words(done: int, needed: int, seconds: float) -> str:
-    """Say how far it is."""
-    often = (
-        "once for this installation"
-        if is_lasting()
-        else "at every start: set NUMBA_CACHE_DIR to a folder that can be written to"
-    )
-    return f"kernels: {done} of {needed} compiled, {seconds:.0f} s; {often}"
+    """Describe the progress."""
+    how_often = "once for this installation"
+    if not is_lasting():
+        how_often = "at every start: set NUMBA_CACHE_DIR to a folder that can be written to"
+    return f"kernels: {done} of {needed} compiled, {seconds:.0f} s; {how_often}"
 
 
 def _log(done: int, needed: int, seconds: float) -> None:
-    """Say once that it begins; a program without logging of its own has it on the standard error."""
+    """Log the start; without logging of its own a program prints it on standard error."""
     if seconds < POLL_S:
         logging.getLogger("scenario_gen").warning(
             "%s; this takes a minute or two", words(done, needed, seconds)
@@ -58,56 +55,62 @@ def _log(done: int, needed: int, seconds: float) -> None:
 
 
 def make_ready(needed: Sequence[Compilable], report: Progress = _log) -> int:
-    """Compile what is not in the cache of the kernels that are needed; return their number.
+    """Compile the needed kernels that are not in the cache; return the number of needed ones.
 
-    Of several processes one has them compiled; the others wait.
+    Of several processes that need kernels one compiles them, and the others wait.
 
     Args:
-        needed: the kernels, of modules that have been imported.
-        report: called now and then while something is not there.
+        needed: kernels of modules that have been imported.
+        report: called repeatedly while a kernel is missing.
     """
     started = monotonic()
 
-    def show(absent: int) -> None:
-        report(len(needed) - absent, len(needed), monotonic() - started)
+    def show(missing_count: int) -> None:
+        report(len(needed) - missing_count, len(needed), monotonic() - started)
 
-    while absent := len(_missing(needed)):
-        show(absent)
+    while missing := _missing(needed):
+        show(len(missing))
         with suppress(Timeout), FileLock(root() / "compiling.lock").acquire(timeout=POLL_S):
             _compile(_missing(needed), lambda: show(len(_missing(needed))))
-            break  # what does not compile says why where it is called
+            break  # a kernel that does not compile raises its error when it is called
     return len(needed)
 
 
 def _missing(kernels: Sequence[Compilable]) -> list[Compilable]:
-    """Those that are not in the cache."""
-    return [each for each in kernels if not each.mark.exists()]
+    """Return the kernels that are not in the cache."""
+    return [kernel for kernel in kernels if not kernel.mark.exists()]
 
 
-def _compile(absent: Sequence[Compilable], show: Callable[[], None]) -> None:
-    """Have kernels compiled by processes, each its share of them."""
+def _compile(missing: Sequence[Compilable], show: Callable[[], None]) -> None:
+    """Let processes compile kernels from a shared queue, the largest and so slowest first."""
     environment = os.environ | {"NUMBA_CACHE_DIR": str(root())}
-    names = [each.name for each in sorted(absent, key=lambda each: each.size, reverse=True)]
-    command = [sys.executable, "-m", "scenario_gen.numerics", ONLY]
+    command = [sys.executable, "-m", "scenario_gen.numerics", QUEUE]
+    queue, writer = os.pipe()
     try:
-        for k in range(
-            min(WORKERS, len(names))
-        ):  # in a session of its own: not the terminal's Ctrl-C
-            share = names[k::WORKERS]
+        # A session of their own keeps the terminal's Ctrl-C from them.
+        for _ in range(min(MAX_WORKERS_COUNT, len(missing))):
             _workers.append(
-                subprocess.Popen([*command, *share], env=environment, start_new_session=True)
+                subprocess.Popen(command, stdin=queue, env=environment, start_new_session=True)
             )
-        for worker in _workers:
-            while worker.poll() is None:
-                with suppress(subprocess.TimeoutExpired):
-                    worker.wait(POLL_S)
-                show()
+        os.close(queue)
+        with suppress(BrokenPipeError):  # all workers have ended
+            for kernel in sorted(missing, key=lambda each: each.size, reverse=True):
+                os.write(writer, kernel.name.encode().ljust(NAME_BYTES))
+        os.close(writer)
+        while any(worker.poll() is None for worker in list(_workers)):
+            sleep(POLL_S)
+            show()
     finally:
         end_workers()
 
 
+def next_name() -> str:
+    """Return the next kernel's name from the queue on standard input, "" at its end."""
+    return os.read(sys.stdin.fileno(), NAME_BYTES).decode().strip()
+
+
 def end_workers() -> None:
-    """End the processes that compile for this one; what they have compiled stays."""
+    """End the processes that compile for this one; the kernels that they have compiled stay."""
     while _workers:
         worker = _workers.pop()
         worker.kill()

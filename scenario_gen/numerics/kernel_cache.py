@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Where compiled kernels are kept: in numba's own cache, in one folder per version of a source file."""
+"""The cache of compiled kernels: numba's own, in one folder per version of a source file."""
 
 from functools import cache
 from hashlib import sha256
@@ -66,8 +66,9 @@ def root() -> Path:
 def folder(source: Path) -> Path:
     """Return the folder for the compiled kernels of one source file.
 
-    Its name is a hash of the file and of the files with kernels that it imports, as numba tells them apart (path, time,
-    size), and of the versions of Python and numba. A kernel is compiled again when a file that it calls has changed.
+    Its name is a hash of the versions of Python and numba, and of path, time and size of the file
+    and of the files with kernels that it imports. So a kernel is compiled again when a file that
+    it calls has changed.
     """
     stamps = [
         (str(file), file.stat().st_mtime_ns, file.stat().st_size) for file in _with_imports(source)
@@ -81,10 +82,10 @@ def folder(source: Path) -> Path:
 
 @cache
 def _temporary() -> tempfile.TemporaryDirectory[str]:
-    """A folder that goes with this process."""
+    """Return a folder that is removed with this process."""
     return tempfile.TemporaryDirectory(prefix="scenario_gen-kernels-")
 
 
 def is_lasting() -> bool:
-    """Say whether other processes will find the kernels that this one compiles."""
+    """Return whether other processes will find the kernels that this one compiles."""
     return _temporary.cache_info().currsize == 0

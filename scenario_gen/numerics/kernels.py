@@ -1,10 +1,10 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Compiled kernels: `numba.njit` with declared types, compiled at the first call and kept by numba's own cache.
+"""Compiled kernels: `numba.njit` with declared types, compiled at the first call and cached by numba.
 
-Inputs are `F1`, `I2`, …, which the kernel only reads; outputs are `OUT1`, `OUTI2`, …. `kernel_cache.py` says where
-numba's cache lies; `compiling.py` compiles several kernels at once.
+Inputs are `F1`, `I2`, …, which the kernel only reads; outputs are `OUT1`, `OUTI2`, ….
+`kernel_cache.py` chooses the folder of the cache; `compiling.py` compiles kernels in parallel.
 """
 
 from collections.abc import Callable, Sequence
@@ -47,26 +47,29 @@ _kernels: list["Kernel"] = []
 
 
 def named(of: type[Any], *fields: Any) -> Any:
-    """Return the type of an argument that is a NamedTuple, from the types of its fields."""
+    """Return the numba type of a NamedTuple from the types of its fields."""
     return types.BaseTuple.from_types(fields, of)
 
 
 def _compiler(function: Callable[..., Any], **options: Any) -> Any:
-    """`numba.njit`, with its cache in our folder; the setting is the user's again afterwards."""
-    user = numba.config.CACHE_DIR
+    """Apply `numba.njit` with the cache in our folder, and restore the user's setting."""
+    user_folder = numba.config.CACHE_DIR
     numba.config.CACHE_DIR = str(folder(Path(function.__code__.co_filename)))
     try:
         return numba.njit(**OPTIONS, **options)(function)
     finally:
-        numba.config.CACHE_DIR = user
+        numba.config.CACHE_DIR = user_folder
 
 
 def _reader(declared: Any) -> Callable[[Any], Any]:
-    """What makes an argument the declared one: inputs contiguous and of their type; outputs stay (a copy would be lost)."""
+    """Return a function that converts an argument to its declared type.
+
+    Inputs become contiguous arrays. Outputs are not converted, because a copy would be lost.
+    """
     if isinstance(declared, types.BaseTuple):
         return _record_reader(declared)
     if not isinstance(declared, types.Array) or declared.mutable:
-        return _same
+        return lambda value: value
     dtype = np.dtype(str(declared.dtype))
 
     def read(value: Any) -> Any:
@@ -77,28 +80,27 @@ def _reader(declared: Any) -> Callable[[Any], Any]:
 
 
 def _record_reader(declared: Any) -> Callable[[Any], Any]:
-    """The same for a NamedTuple. numba converts nothing inside of one: inputs are read-only, numbers have their type.
+    """Return a converter of NamedTuples, whose fields numba does not convert.
 
-    The same one as the last time is not looked at anew.
+    The last record is remembered: kernels are called many times with the same one.
     """
-    seen: list[tuple[Any, Any]] = [(None, None)]
     readers = [_field_reader(kind) for kind in declared.types]
+    last: tuple[Any, Any] = (None, None)  # record, converted record
 
-    def read_record(value: Any) -> Any:
-        last = seen[0]  # one look: other threads have tuples of their own
-        if last[0] is not value:
-            last = (
-                value,
-                type(value)(*[read(each) for read, each in zip(readers, value, strict=True)]),
-            )
-            seen[0] = last
-        return last[1]
+    def read_record(record: Any) -> Any:
+        nonlocal last
+        source, converted = last  # read once, because other threads may assign it
+        if source is not record:
+            fields = [read(field) for read, field in zip(readers, record, strict=True)]
+            converted = type(record)(*fields)
+            last = (record, converted)
+        return converted
 
     return read_record
 
 
 def _field_reader(declared: Any) -> Callable[[Any], Any]:
-    """The same for a field of one."""
+    """Return a converter of one field of a NamedTuple: arrays read-only, numbers of their type."""
     if not isinstance(declared, types.Array) or declared.mutable:
         return {F: float, I: int, B: bool}.get(declared) or _reader(declared)
     read_array = _reader(declared)
@@ -110,36 +112,34 @@ def _field_reader(declared: Any) -> Callable[[Any], Any]:
     return read
 
 
-def _same(value: Any) -> Any:
-    return value
-
-
 class Kernel:
     """A function that numba compiles for its declared types, for Python and for the kernels that call it."""
 
     def __init__(self, function: Callable[..., Any], declared: Sequence[Any]) -> None:
-        """Declare it; it is compiled, or loaded, when it is called."""
+        """Declare the kernel; its first call compiles or loads it."""
         update_wrapper(self, function)
-        self.declared, self.dispatcher = tuple(declared), _compiler(function, cache=True)
-        self._readers, self._is_ready = [_reader(kind) for kind in declared], False
+        self.declared = tuple(declared)
+        self.dispatcher = _compiler(function, cache=True)
+        self._readers = [_reader(kind) for kind in declared]
+        self._is_ready = False
 
     @property
     def name(self) -> str:
-        """What tells it from all others: its module and its name."""
+        """Its module and function name, which no other kernel has."""
         return f"{self.__module__}:{self.__name__}"  # type: ignore[attr-defined]
 
     @property
     def size(self) -> int:
-        """Bytes of its own code: about how long it takes to be compiled."""
+        """Bytes of its bytecode, a measure of its compile time."""
         return len(self.dispatcher.py_func.__code__.co_code)
 
     @property
     def mark(self) -> Path:
-        """The empty file that says that it is in the cache."""
+        """The empty file that exists once the kernel is cached."""
         return folder(Path(self.dispatcher.py_func.__code__.co_filename)) / f"{self.name}.ready"
 
     def compile(self) -> Any:
-        """Make or load the compiled form, once, and return numba's function."""
+        """Compile or load it, once, and return numba's function."""
         with _one_at_a_time:
             if not self._is_ready:
                 self.dispatcher.compile(self.declared)
@@ -149,19 +149,18 @@ class Kernel:
         return self.dispatcher
 
     def __call__(self, *values: Any) -> Any:
-        """Call the compiled form."""
+        """Call the compiled function."""
         if not self._is_ready:
             if not self.mark.exists():
                 make_ready(registered())
             self.compile()
-        return self.dispatcher(
-            *[read(value) for read, value in zip(self._readers, values, strict=True)]
-        )
+        arguments = [read(value) for read, value in zip(self._readers, values, strict=True)]
+        return self.dispatcher(*arguments)
 
 
 @typeof_impl.register(Kernel)  # type: ignore[untyped-decorator]
 def _typeof_kernel(kernel: Kernel, context: Any) -> Any:
-    """To numba a kernel is the function that it compiled."""
+    """Let numba see a kernel as its compiled function."""
     return typeof_impl(kernel.compile(), context)
 
 
@@ -172,8 +171,8 @@ def kernel(
 
     Args:
         declared: numba types of the positional arguments, e.g. `kernel(F2, I, OUT1)`.
-        inline: a small helper called only from kernels; it takes its types from them and is compiled, and kept, with them.
-        forced: it becomes part of its caller however large it is: else a call counts the references of the arrays it is given.
+        inline: a helper that only kernels call; it gets its types from them and is compiled with them.
+        forced: the caller includes the helper whatever its size; a call would count the references of its array arguments.
     """
 
     def decorate(function: Function) -> Function:
@@ -193,7 +192,7 @@ def registered() -> list[Kernel]:
 
 
 def import_all(packages: Sequence[str] = ()) -> None:
-    """Import every module that has kernels, or those of some packages; one whose extra is not installed cannot be called."""
+    """Import the modules with kernels, of all or some packages; skip those whose extra is missing."""
     for file in sources():
         parts = file.relative_to(PACKAGE.parent).with_suffix("").parts
         if not packages or parts[1] in packages:

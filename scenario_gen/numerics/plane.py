@@ -19,20 +19,28 @@ def unit_left(yaw: Floats | float) -> Floats:
 
 
 def angle_between(angle: float, other: float) -> float:
-    """Return by how much [rad] an angle is larger than another one, in [-pi, pi)."""
+    """Return the difference `angle` - `other` [rad], wrapped to [-pi, pi)."""
     return float(wrap_angle(np.asarray(angle - other)))
 
 
 def ahead_and_left(offset: Floats, yaw: Floats | float) -> tuple[Floats, Floats]:
-    """Return how far [m] offsets (..., 2) [m] reach ahead (...) and to the left (...) of headings (...) [rad]."""
-    x, y, cos, sin = offset[..., 0], offset[..., 1], np.cos(yaw), np.sin(yaw)
+    """Return the longitudinal and lateral components (...) [m] of offsets (..., 2) [m].
+
+    Args:
+        offset: in the frame of the plane.
+        yaw: (...) the headings [rad] of the frames with x ahead and y to the left.
+    """
+    x, y = offset[..., 0], offset[..., 1]
+    cos, sin = np.cos(yaw), np.sin(yaw)
     return x * cos + y * sin, y * cos - x * sin
 
 
 def place(poses: Floats, ahead: Floats | float, left: Floats | float) -> Floats:
-    """Return the points (..., 2) that lie ahead (...) and to the left (...) [m] of poses (..., 3) x, y [m], yaw [rad]."""
-    x, y, cos, sin = poses[..., 0], poses[..., 1], np.cos(poses[..., 2]), np.sin(poses[..., 2])
-    return np.stack((x + ahead * cos - left * sin, y + ahead * sin + left * cos), axis=-1)
+    """Return the points (..., 2) [m] at offsets `ahead` and `left` (...) [m] in the frames of poses (..., 3)."""
+    cos, sin = np.cos(poses[..., 2]), np.sin(poses[..., 2])
+    x = poses[..., 0] + ahead * cos - left * sin
+    y = poses[..., 1] + ahead * sin + left * cos
+    return np.stack((x, y), axis=-1)
 
 
 def edge_lengths(points: Floats) -> Floats:
@@ -48,7 +56,11 @@ def edge_yaws(points: Floats) -> Floats:
 
 
 def meeting_shares(p: Floats, u: Floats, q: Floats, v: Floats) -> tuple[Floats, Floats, Floats]:
-    """Return where lines p + t u and q + s v (..., 2) [m] meet: t and s (...), not finite if parallel, and u x v [m²]."""
+    """Intersect lines p + t u and q + s v (..., 2) [m].
+
+    Returns:
+        t and s (...), not finite where the lines are parallel, and the cross product u x v (...) [m²].
+    """
     w = q - p
     cross = u[..., 0] * v[..., 1] - u[..., 1] * v[..., 0]
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
@@ -58,7 +70,12 @@ def meeting_shares(p: Floats, u: Floats, q: Floats, v: Floats) -> tuple[Floats, 
 
 
 def polyline_of(yaw: Floats, step: Floats | float) -> Floats:
-    """Return the points (M, 2) [m] of a path from the origin, whose heading is `yaw` (M,) [rad] at the ends of its steps [m]."""
-    middle = (yaw[1:] + yaw[:-1]) / 2.0
+    """Integrate a heading: return the points (M, 2) [m] of a path from the origin.
+
+    Args:
+        yaw: (M,) headings [rad] at the points.
+        step: distance [m] between two points, one for all or (M - 1,).
+    """
+    mean_yaw = (yaw[1:] + yaw[:-1]) / 2.0
     lengths = np.reshape(step, (-1, 1))
-    return np.vstack((np.zeros((1, 2)), np.cumsum(lengths * unit(middle), axis=0)))
+    return np.vstack((np.zeros((1, 2)), np.cumsum(lengths * unit(mean_yaw), axis=0)))

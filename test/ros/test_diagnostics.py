@@ -10,7 +10,13 @@ import pytest
 from support.suite_processes import Client
 
 from msg_conventions.diagnostics import decode_diagnostics, Level, Status, template_of
-from scenario_gen.ros.common.diagnostics import bounded, family, HOLD_S, LARGEST, MAX_STATUSES
+from scenario_gen.ros.common.diagnostics import (
+    bounded,
+    family,
+    MAX_STATUSES_COUNT,
+    MAX_VALUES_CHARACTERS,
+    MIN_SHOWN_S,
+)
 
 pytestmark = pytest.mark.dds
 NODE = "/reporter"
@@ -101,7 +107,7 @@ def test_what_is_over_goes_back_to_ok_when_it_was_seen(reporter: Reporter):
         for stamp, statuses in reporter.heard()
         if "tracks" in statuses and statuses["tracks"].level is Level.OK
     )
-    assert over - reported >= 0.99e9 * HOLD_S, "whoever looks once a second sees it"
+    assert over - reported >= 0.99e9 * MIN_SHOWN_S, "whoever looks once a second sees it"
     assert reporter.newest()["tracks"].message == "over: ValueError: no quaternion"
     reporter.diagnostics.failed("plan 7", ValueError("once"))
     reporter.diagnostics.failed("plan 8", ValueError("again"))
@@ -134,16 +140,16 @@ def test_a_report_takes_the_place_of_the_one_before(reporter: Reporter):
 
 def test_of_a_storm_few_messages_are_published_and_what_is_wrong_is_kept(reporter: Reporter):
     count = len(reporter.heard())
-    for k in range(2 * MAX_STATUSES):
+    for k in range(2 * MAX_STATUSES_COUNT):
         reporter.diagnostics.status(Level.ERROR, f"finding {k}", "tracks", {}, log=False)
         reporter.diagnostics.status(Level.OK, "", f"thing_{k}", {}, log=False)
     reporter.until(lambda: "tracks" in reporter.newest(), "the finding")
-    assert len(reporter.heard()) - count < MAX_STATUSES // 4
+    assert len(reporter.heard()) - count < MAX_STATUSES_COUNT // 4
     found = reporter.newest()
     assert found["tracks"].message.startswith(f"finding {k}; finding {k - 1}; ") and found[
         "tracks"
-    ].values["times"] == str(2 * MAX_STATUSES)
-    assert len(found) <= MAX_STATUSES
+    ].values["times"] == str(2 * MAX_STATUSES_COUNT)
+    assert len(found) <= MAX_STATUSES_COUNT
 
 
 def test_a_status_is_bounded():
@@ -151,6 +157,6 @@ def test_a_status_is_bounded():
         Status("n: x", Level.WARN, "\x1b" * 10_000, {str(k): "v" * 1000 for k in range(1000)})
     )
     assert len(large.message) < 9_000 and "\x1b" not in large.message
-    assert sum(map(len, large.values.values())) < LARGEST + 100
+    assert sum(map(len, large.values.values())) < MAX_VALUES_CHARACTERS + 100
     assert large.values["left_out"].startswith("935 values")
     assert family("/a/planner: fit of 7") == family("/a/planner: fit") == "/a/planner: fit"

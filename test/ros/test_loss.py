@@ -92,7 +92,7 @@ def test_a_hanging_subscriber_is_waited_for_no_longer_than_patience(domain, clie
     from scenario_gen.ros.common.topics import Pace
 
     publisher, told = client.node.create_publisher(String, "/hang", 5), []
-    pace = Pace(publisher, 5, 0.2, told.append)
+    pace = Pace(publisher, 0.2, told.append)
     hanging = subprocess.Popen(
         [sys.executable, "-c", HANGING], env=os.environ | {"ROS_DOMAIN_ID": str(domain)}
     )

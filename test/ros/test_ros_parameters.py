@@ -12,7 +12,7 @@ import yaml
 
 from scenario_gen.base.errors import InputError
 from scenario_gen.base.parameters import flatten
-from scenario_gen.ros.common.ros_parameters import meant, with_values
+from scenario_gen.ros.common.ros_parameters import converted, with_values
 from scenario_gen.ros.nodes.gp_sampler import Config
 
 DECLARED = {name: entry for name, (entry, _) in flatten(Config()).items()}
@@ -27,9 +27,9 @@ def test_a_number_is_taken_for_an_id(number):
 @given(strategies.floats(allow_nan=False, allow_infinity=False))
 def test_a_real_number_is_taken_as_any_tool_writes_it(number):
     entry = DECLARED["limits.time_resolution"]
-    assert meant(entry, str(number)) == number
-    assert meant(entry, yaml.safe_load(yaml.safe_dump(number))) == number
-    assert type(meant(entry, int(number))) is float
+    assert converted(entry, str(number)) == number
+    assert converted(entry, yaml.safe_load(yaml.safe_dump(number))) == number
+    assert type(converted(entry, int(number))) is float
 
 
 @pytest.mark.parametrize(

@@ -13,7 +13,7 @@ from support.suite_processes import Client, RESOURCES
 from msg_conventions.diagnostics import encode_diagnostics, Level, Status
 from msg_conventions.tracks import encode_tracks
 from scenario_gen.base.errors import RefusedError
-from scenario_gen.base.worker import MOST_WAITING, Worker
+from scenario_gen.base.worker import MAX_WAITING_COUNT, Worker
 from scenario_gen.logs import read_log
 
 pytestmark = pytest.mark.dds
@@ -143,11 +143,11 @@ def test_of_too_many_jobs_the_newest_is_answered_at_once():
     started, gate, answers = threading.Event(), threading.Event(), []
     worker.submit("long", lambda _: (started.set(), gate.wait(180.0)))
     assert started.wait(180.0)
-    for k in range(MOST_WAITING + 1):
+    for k in range(MAX_WAITING_COUNT + 1):
         worker.submit(f"request {k}", lambda cancelled, k=k: answers.append((k, cancelled())))
-    assert answers == [(MOST_WAITING, True)]
+    assert answers == [(MAX_WAITING_COUNT, True)]
     (error,) = failures
     assert isinstance(error, RefusedError) and "1000 jobs wait already" in str(error)
     gate.set()
     worker.close(180.0)
-    assert len(answers) == MOST_WAITING + 1
+    assert len(answers) == MAX_WAITING_COUNT + 1

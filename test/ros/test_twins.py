@@ -29,11 +29,11 @@ def test_two_road_servers_in_one_namespace_name_each_other(start, client):
     client.until(lambda: {"/one", "/two"} <= set(twins_of(client)), "both to warn")
     found = twins_of(client)
     assert (
-        "/map is published by /two, too" in found["/one"].message
+        "/map is also published by /two" in found["/one"].message
         and found["/one"].level is Level.WARN
     )
     assert (
-        "/map is published by /one, too" in found["/two"].message
+        "/map is also published by /one" in found["/two"].message
         and "another namespace" in found["/two"].message
     )
     second.terminate()

@@ -1,12 +1,12 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""What a node reports of itself on /diagnostics: its statuses by name, all of them every second, and soon when one changes.
+"""A node's statuses on /diagnostics: all of them every second, and sooner after a change.
 
-That is how diagnostic_updater does it, so that diagnostic_aggregator takes no status for stale, and who comes late has all of
-them within a second. Nothing is latched: an error of an hour ago would reach a late aggregator as news.
-
-A finding that is over goes back to OK, but not before it could be seen: aggregators look once a second.
+diagnostic_updater does the same, so diagnostic_aggregator considers no status stale, and late
+subscribers have all statuses within a second. Nothing is latched, because an old error would look
+new to a late aggregator. A finding that is over becomes OK, but not before aggregators, which
+look once a second, could see it.
 """
 
 from collections.abc import Callable, Mapping
@@ -21,18 +21,23 @@ from rclpy.node import Node
 from msg_conventions.diagnostics import encode_diagnostics, Level, of_template, Status
 from scenario_gen.base.errors import LONGEST_REFUSAL, presentable, ScenarioGenError
 from scenario_gen.base.worker import stop_if_abandoned
-from scenario_gen.ros.common.topics import create_publisher, others_on, own_topics, publish
+from scenario_gen.ros.common.topics import (
+    create_publisher,
+    other_publishers,
+    own_topics,
+    publish,
+)
 
-TICK_S = 0.25  # seconds of real time after which what has changed is published
-TICKS = 4  # after so many all is published, changed or not
-HOLD_S = 3.0  # seconds for which a finding is shown at least
-MAX_STATUSES = 100  # statuses of a node
-LARGEST = 65_536  # characters of the values of one status
+TICK_S = 0.25  # real time after which changes are published
+FULL_PERIOD_STEPS = 4  # ticks after which all is published, changed or not
+MIN_SHOWN_S = 3.0  # for which a finding is shown at least
+MAX_STATUSES_COUNT = 100  # of a node
+MAX_VALUES_CHARACTERS = 65_536  # of one status
 
 
 @dataclass(frozen=True)
 class _Entry:
-    """A status, when it was reported, how often a finding was reported in a row, and whether it is over."""
+    """A status, when it was reported [s], how often in a row as a finding, and whether it is over."""
 
     status: Status
     since: float
@@ -40,58 +45,64 @@ class _Entry:
     over: bool = False
 
     @property
-    def bad(self) -> bool:
+    def is_finding(self) -> bool:
         return self.status.level is not Level.OK
 
 
 class NodeDiagnostics:
-    """The statuses of one node, from any thread; its executor publishes them."""
+    """The statuses of one node. Any thread may report; the node's executor publishes."""
 
     def __init__(
         self, node: Node, update: Callable[[], None] = lambda: None, *, enabled: bool = True
     ) -> None:
-        """Report from now on; `update` is called each second, to bring what goes on up to date, `enabled` see `enable`."""
-        self._node, self._update, self._enabled = node, update, enabled
+        """Report from now on.
+
+        Args:
+            node: whose statuses these are.
+            update: called each second, to report the progress.
+            enabled: see `enable`.
+        """
+        self._node = node
+        self._update = update
+        self._enabled = enabled
         self._entries: dict[str, _Entry] = {}
         self._lock = threading.RLock()
-        self._state: Status | None = None  # of nodes that have any
+        self._state: Status | None = None  # lifecycle nodes have one
         self._changed = False
-        self._fresh: set[str] = set()  # findings that no message has held yet, by name
+        self._unpublished: set[str] = set()  # names of findings that no message contains yet
         self._ticks = 0
-        self._twins: dict[str, list[str]] = {}  # nodes that publish the same topics, by topic
+        self._twins: dict[str, list[str]] = {}  # topic -> other nodes that publish it
         self._publisher = create_publisher(node, "/diagnostics")
         node.create_timer(TICK_S, self._tick, clock=Clock(clock_type=ClockType.STEADY_TIME))
 
     def enable(self, enabled: bool) -> None:
-        """Take in what the node's work reports, or forget what it reported and take in no more, but the node's state."""
+        """Accept reports about the node's work, or drop them and all that were accepted."""
         with self._lock:
             self._enabled = enabled
             self._entries.clear()
 
     def state(self, message: str, **values: str) -> None:
-        """Report in which state the node is; values that only tell how far something is wait for the next second."""
+        """Report the node's state; changed values alone are published with the next full message."""
         with self._lock:
-            old, self._state = self._state, self._status("state", Level.OK, message, values)
+            old = self._state
+            self._state = self._status("state", Level.OK, message, values)
             self._changed |= old is None or old.message != message
 
     def report(self, *statuses: Status, stamp_ns: int = 0) -> None:
-        """Keep statuses, and forget those of an earlier report about the same: names that begin with the same word.
+        """Report statuses in place of all earlier ones of the same families.
 
         Raises:
-            CancelledError: on the thread of a job that was abandoned.
+            CancelledError: on the thread of an abandoned job.
         """
         with self._lock:
             stop_if_abandoned()
-            names, families = (
-                {status.name for status in statuses},
-                {family(status.name) for status in statuses},
-            )
-            for name in [
-                name for name in self._entries if family(name) in families and name not in names
-            ]:
-                self._entries.pop(name)
+            names = {status.name for status in statuses}
+            families = {family(status.name) for status in statuses}
+            for name in list(self._entries):
+                if family(name) in families and name not in names:
+                    self._entries.pop(name)
             for status in statuses:
-                self._keep(of_template(status, stamp_ns) if stamp_ns else status)
+                self._add(of_template(status, stamp_ns) if stamp_ns else status)
 
     def status(
         self,
@@ -103,155 +114,150 @@ class NodeDiagnostics:
         *,
         log: bool = True,
     ) -> None:
-        """Keep one status and log it; an abandoned job ends here, before it is logged.
+        """Report one status and log it.
 
         Raises:
-            CancelledError: on the thread of a job that was abandoned.
+            CancelledError: on the thread of an abandoned job.
         """
         with self._lock:
             stop_if_abandoned()
             status = self._status(subject, level, message, values)
-            self._keep(of_template(status, stamp_ns) if stamp_ns else status)
+            self._add(of_template(status, stamp_ns) if stamp_ns else status)
         if not log:
             return
-        if (
-            level is Level.OK
-        ):  # a call of its own for each severity: rclpy refuses to change it between calls from one line
-            self._node.get_logger().info(message)
+        logger = self._node.get_logger()
+        # rclpy refuses different severities from one line.
+        if level is Level.OK:
+            logger.info(message)
         elif level is Level.WARN:
-            self._node.get_logger().warning(message)
+            logger.warning(message)
         else:
-            self._node.get_logger().error(message)
+            logger.error(message)
 
     def failed(self, name: str, error: BaseException) -> None:
-        """Report that something went wrong; of a numbered job, `get_plan 7`, the subject is `get_plan`. The node lives on."""
+        """Report an error; the node continues. For a numbered job such as `get_plan 7` the subject is `get_plan`."""
         if not self._node.context.ok():
             return
-        kind, (subject, _, job) = type(error).__name__, name.partition(" ")
+        kind = type(error).__name__
         message = str(error)
         if not isinstance(error, ScenarioGenError):
             self._node.get_logger().error("".join(traceback.format_exception(error)))
             message = f"{kind}: {error}"
-        self.status(Level.ERROR, message, subject, {"error": kind} | ({"job": job} if job else {}))
+        subject, _, job = name.partition(" ")
+        values = {"error": kind, "job": job} if job else {"error": kind}
+        self.status(Level.ERROR, message, subject, values)
 
     def resolve(self, name: str) -> None:
-        """Mark what was wrong with something as over: good input has come, or a job of that name has been done."""
+        """Mark a finding as over: valid input has arrived, or a job of that name has succeeded."""
         subject = f"{self._node.get_fully_qualified_name()}: {name.partition(' ')[0]}"
         with self._lock:
-            if (entry := self._entries.get(subject)) is not None and entry.bad:
+            entry = self._entries.get(subject)
+            if entry is not None and entry.is_finding:
                 self._entries[subject] = replace(entry, over=True)
 
     def publish(self) -> None:
-        """Publish all that is known now."""
+        """Publish all statuses now."""
         with self._lock:
-            statuses = [
-                *([self._state] if self._state else []),
-                *(entry.status for entry in self._entries.values()),
-            ]
+            statuses = [entry.status for entry in self._entries.values()]
+            if self._state:
+                statuses.insert(0, self._state)
             self._changed = False
-            self._fresh.clear()
-        publish(
-            self._node,
-            self._publisher,
-            encode_diagnostics(statuses, self._node.get_clock().now().nanoseconds),
-        )
+            self._unpublished.clear()
+        now_ns = self._node.get_clock().now().nanoseconds
+        publish(self._node, self._publisher, encode_diagnostics(statuses, now_ns))
 
     def _status(
         self, subject: str, level: Level, message: str, values: Mapping[str, str]
     ) -> Status:
-        return Status(
-            f"{self._node.get_fully_qualified_name()}: {subject}", level, message, values
-        )
+        name = f"{self._node.get_fully_qualified_name()}: {subject}"
+        return Status(name, level, message, values)
 
-    def _keep(self, status: Status) -> None:
-        """Take a status in."""
+    def _add(self, status: Status) -> None:
         if not self._enabled:
             return
-        old, times = self._entries.get(status.name), 1
+        old = self._entries.get(status.name)
+        times = 1
         if status.level is Level.OK:
             self._changed |= old is None or old.status != bounded(status)
         else:
             self._changed = True
-            if old is not None and old.bad:
+            if old is not None and old.is_finding:
                 times = old.times + 1
-                status = replace(status, values={**status.values, "times": str(times)})
-                if status.name in self._fresh:
-                    known = status.message in old.status.message
-                    status = replace(
-                        status,
-                        message=old.status.message
-                        if known
-                        else f"{status.message}; {old.status.message}",
-                    )
-            self._fresh.add(status.name)
+                status = self._repeated(status, old.status, times)
+            self._unpublished.add(status.name)
         self._entries[status.name] = _Entry(bounded(status), monotonic(), times)
-        while len(self._entries) > MAX_STATUSES:  # at first what is well
-            first = next(iter(self._entries))
-            self._entries.pop(
-                next((name for name, entry in self._entries.items() if not entry.bad), first)
-            )
+        self._drop_excess()
+
+    def _repeated(self, status: Status, old: Status, times: int) -> Status:
+        """Return a finding with its count; it keeps the old message if no message contains that yet."""
+        message = status.message
+        if status.name in self._unpublished:
+            message = old.message if message in old.message else f"{message}; {old.message}"
+        return replace(status, message=message, values={**status.values, "times": str(times)})
+
+    def _drop_excess(self) -> None:
+        """Drop the oldest statuses above the limit, those that are OK first."""
+        while len(self._entries) > MAX_STATUSES_COUNT:
+            oldest = next(iter(self._entries))
+            fine = (name for name, entry in self._entries.items() if not entry.is_finding)
+            self._entries.pop(next(fine, oldest))
 
     def _tick(self) -> None:
-        """Every second bring all up to date, end what is over and was shown long enough, and publish; between, what changed."""
+        """Publish changes, and every second all statuses after an update."""
         self._ticks += 1
-        if self._ticks % TICKS == 0:
+        is_full = self._ticks % FULL_PERIOD_STEPS == 0
+        if is_full:
             self._update()
-            self._look_for_twins()
-            with self._lock:
-                for name, entry in self._entries.items():
-                    if entry.over and monotonic() - entry.since >= HOLD_S:
-                        values = {
-                            key: value
-                            for key, value in entry.status.values.items()
-                            if key != "error"
-                        }
-                        status = Status(name, Level.OK, f"over: {entry.status.message}", values)
-                        self._entries[name] = _Entry(status, monotonic())
-        if self._changed or self._ticks % TICKS == 0:
+            self._check_twins()
+            self._end_findings()
+        if self._changed or is_full:
             self.publish()
 
-    def _look_for_twins(self) -> None:
-        """Warn of other nodes that publish the node's own topics: who listens hears both and cannot tell them apart."""
-        found = {
-            topic: who for topic in own_topics(self._node) if (who := others_on(self._node, topic))
-        }
-        if found == self._twins:
+    def _end_findings(self) -> None:
+        """Set findings to OK that are over and were shown long enough."""
+        with self._lock:
+            for name, entry in self._entries.items():
+                if not entry.over or monotonic() - entry.since < MIN_SHOWN_S:
+                    continue
+                values = dict(entry.status.values)
+                values.pop("error", None)
+                status = Status(name, Level.OK, f"over: {entry.status.message}", values)
+                self._entries[name] = _Entry(status, monotonic())
+
+    def _check_twins(self) -> None:
+        """Warn of other nodes that publish the node's topics: subscribers cannot tell their messages apart."""
+        twins = {topic: other_publishers(self._node, topic) for topic in own_topics(self._node)}
+        twins = {topic: nodes for topic, nodes in twins.items() if nodes}
+        if twins == self._twins:
             return
-        self._twins = found
-        if not found:
+        self._twins = twins
+        if not twins:
             self.resolve("twins")
             return
-        said = "; ".join(
-            f"{topic} is published by {' and '.join(who)}, too" for topic, who in found.items()
+        causes = "; ".join(
+            f"{topic} is also published by {' and '.join(nodes)}" for topic, nodes in twins.items()
         )
-        remedy = "who listens hears both: end one of the nodes, or give it another namespace"
-        self.status(
-            Level.WARN,
-            f"{said}; {remedy}",
-            "twins",
-            {topic: " ".join(who) for topic, who in found.items()},
-        )
+        message = f"{causes}; end one of the nodes, or give it another namespace"
+        values = {topic: " ".join(nodes) for topic, nodes in twins.items()}
+        self.status(Level.WARN, message, "twins", values)
 
 
 def family(name: str) -> str:
-    """Return node and first word of a status's name: `/planner: fit` of `/planner: fit of 7`."""
+    """Return the node and the first word of a status's subject: `/planner: fit` of `/planner: fit of 7`."""
     node, _, subject = name.partition(": ")
     return f"{node}: {subject.partition(' ')[0]}"
 
 
 def bounded(status: Status) -> Status:
-    """Return a status of bounded size, all of which prints; values that are too many are counted."""
-    left, values = LARGEST, dict[str, str]()
+    """Return a status of bounded size with printable texts; values that do not fit are counted."""
+    room = MAX_VALUES_CHARACTERS
+    values: dict[str, str] = {}
     for key, value in status.values.items():
-        left -= len(key) + len(value)
-        if left < 0:
+        room -= len(key) + len(value)
+        if room < 0:
             break
         values[key] = value
     if missing := len(status.values) - len(values):
         values["left_out"] = f"{missing} values, which would make the message too long"
-    return Status(
-        status.name[:LONGEST_REFUSAL],
-        status.level,
-        presentable(status.message, LONGEST_REFUSAL),
-        values,
-    )
+    message = presentable(status.message, LONGEST_REFUSAL)
+    return Status(status.name[:LONGEST_REFUSAL], status.level, message, values)

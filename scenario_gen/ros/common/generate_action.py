@@ -1,10 +1,11 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The action `~/generate_scenarios`: a request with feedback, cancel and result, where scenario_gen_interfaces is built.
+"""The action `~/generate_scenarios`: a request with feedback, cancellation and result.
 
-No action of Jazzy's own packages has a goal of named values and a result of counts, hence the small package. Without it the
-sampler has the service `~/generate` only.
+It needs the package scenario_gen_interfaces, because no action in Jazzy's packages has named
+values as its goal and counts as its result. Without the package the sampler has the service
+`~/generate` only.
 """
 
 from dataclasses import dataclass, replace
@@ -23,17 +24,17 @@ from scenario_gen.ros.common.requests import Code, OpenRequest, OpenRequests, Ou
 from scenario_gen.ros.common.services import REQUESTS
 
 NAME = "~/generate_scenarios"
-FEEDBACK_S = 0.1  # seconds between two feedbacks
-KEPT_S = 900  # seconds for which a result can be fetched
+FEEDBACK_PERIOD_S = 0.1
+RESULT_TIMEOUT_S = 900  # for which a result can be fetched
 
 
 @dataclass
 class Goal:
-    """A goal at work: its handle, its request once that is open, and what its client was told last."""
+    """A goal in progress: its handle, its request once that is open, and its last feedback."""
 
     handle: ServerGoalHandle
     request: OpenRequest | None = None
-    told: Any = None
+    feedback: Any = None
 
 
 class Goals:
@@ -41,7 +42,8 @@ class Goals:
 
     def __init__(self, node: Any, requests: OpenRequests, action: Any) -> None:
         """Offer the action, whose type is `action`."""
-        self._requests, self._action = requests, action
+        self._requests = requests
+        self._action = action
         self._goals: dict[bytes, Goal] = {}
         self._server = ActionServer(
             node,
@@ -53,11 +55,10 @@ class Goals:
             result_service_qos_profile=REQUESTS,
             cancel_service_qos_profile=REQUESTS,
             feedback_pub_qos_profile=QoSProfile(depth=100),
-            result_timeout=KEPT_S,
+            result_timeout=RESULT_TIMEOUT_S,
         )
-        self._timer = node.create_timer(
-            FEEDBACK_S, self._tell, clock=Clock(clock_type=ClockType.STEADY_TIME)
-        )
+        steady = Clock(clock_type=ClockType.STEADY_TIME)
+        self._timer = node.create_timer(FEEDBACK_PERIOD_S, self._send_feedback, clock=steady)
 
     def destroy(self) -> None:
         """Withdraw the action."""
@@ -68,16 +69,15 @@ class Goals:
         key = bytes(handle.goal_id.uuid)
         goal = self._goals[key] = Goal(handle)
         self._timer.reset()
-        asked = handle.request
         try:
             outcome = await self._requests.answer(
-                asked.parameters, asked.wait, partial(setattr, goal, "request")
+                handle.request.parameters, handle.request.wait, partial(setattr, goal, "request")
             )
         finally:
             del self._goals[key]
         if outcome.code is Code.OK:
             handle.succeed()
-        elif handle.is_cancel_requested:  # also where it was refused, or failed, by then
+        elif handle.is_cancel_requested:  # even if it was refused or failed meanwhile
             outcome = replace(outcome, code=Code.CANCELLED)
             handle.canceled()
         else:
@@ -85,66 +85,56 @@ class Goals:
         return self._result(outcome, goal.request)
 
     def _cancel(self, handle: ServerGoalHandle) -> CancelResponse:
-        """End the goal's request; one that has not begun is ended here, and answers at once."""
+        """Cancel the goal's request; a request that waits answers at once."""
         goal = self._goals.get(bytes(handle.goal_id.uuid))
-        if goal is None or goal.request is None:
+        if goal is None or goal.request is None or not self._requests.cancel(goal.request):
             return CancelResponse.REJECT  # it has ended
-        return (
-            CancelResponse.ACCEPT
-            if self._requests.cancelled(goal.request)
-            else CancelResponse.REJECT
-        )
+        return CancelResponse.ACCEPT
 
-    def _tell(self) -> None:
-        """Tell each client how far its goal is, if that has changed."""
+    def _send_feedback(self) -> None:
+        """Send each client the progress of its goal, if that has changed."""
         if not self._goals:
             self._timer.cancel()
         for goal in list(self._goals.values()):
             request = goal.request
             if request is None:
                 continue
-            waiting = list(request.waiting_for)
-            counts = {
-                "wanted": request.n_requested,
-                "found": request.accepted,
-                "candidates": request.candidates,
-            }
             feedback = self._action.Feedback(
-                waiting_for=waiting, position=self._requests.position(request), **counts
+                waiting_for=list(request.waiting_for),
+                position=self._requests.position(request),
+                wanted=request.n_requested,
+                found=request.accepted,
+                candidates=request.candidates,
             )
-            if feedback != goal.told:
+            if feedback != goal.feedback:
                 goal.handle.publish_feedback(feedback)
-                goal.told = feedback
+                goal.feedback = feedback
 
     def _result(self, outcome: Outcome, request: OpenRequest | None) -> Any:
         """Return the result of a goal."""
         result = self._action.Result(
             code=int(outcome.code), reason=outcome.reason, request=outcome.request
         )
-        if request:
-            result.requested, result.published = (
-                request.n_requested,
-                request.accepted,
-            )  # what a cancelled one has sent stays
+        if request:  # scenarios of a cancelled request stay published
+            result.requested = request.n_requested
+            result.published = request.accepted
         if outcome.answer:
             sampled, summary = outcome.answer
-            published = [scenario.index for scenario in sampled.generated.scenarios]
-            result.published = len(published)
-            result.first_index, result.last_index = (
-                (min(published), max(published)) if published else (0, 0)
-            )
-            counts = {
-                key: text
+            indices = [scenario.index for scenario in sampled.generated.scenarios]
+            result.published = len(indices)
+            result.first_index = min(indices, default=0)
+            result.last_index = max(indices, default=0)
+            result.account = [
+                KeyValue(key=key, value=text)
                 for key, text in summary.values.items()
                 if key == "candidates" or key.startswith(REFUSED)
-            }
-            result.account = [KeyValue(key=key, value=text) for key, text in counts.items()]
+            ]
         return result
 
 
 def action_type() -> Any:
-    """Return the type of the action; None where scenario_gen_interfaces is not built, or not sourced."""
+    """Return the type of the action, None where scenario_gen_interfaces is not built or not sourced."""
     try:
         return importlib.import_module("scenario_gen_interfaces.action").Generate
-    except (ImportError, AttributeError):  # a checkout holds a folder of that name
+    except (ImportError, AttributeError):  # a checkout has a folder with that name
         return None

@@ -1,9 +1,10 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The sampler's requests: its parameters, the open requests and their services, and how a request is answered.
+"""The sampler's requests: its parameters, the open requests with their services, and their answers.
 
-A request comes by the service `~/generate`, or by the action `~/generate_scenarios` (generate_action.py).
+A request arrives by the service `~/generate` or the action `~/generate_scenarios`
+(generate_action.py).
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -22,7 +23,7 @@ from rclpy.parameter import Parameter
 from rclpy.task import Future
 from std_srvs.srv import Trigger
 
-from msg_conventions.diagnostics import Level
+from msg_conventions.diagnostics import Level, Subject
 from msg_conventions.hashes import template_hashes
 from msg_conventions.request_messages import RequestMessages
 from msg_conventions.scenario_info import request_summary, RequestSummary
@@ -43,18 +44,17 @@ from scenario_gen.ros.common.services import offer_trigger, REQUESTS
 from scenario_gen.situation import Situation
 from scenario_gen.types import BoundaryStates, EgoSlot, GenerationResult, Request, Scenario
 
-SHOWN = 20  # waiting requests that are named
-LOG_S = 5.0  # seconds between two lines on the terminal that say how far a request is
-POLL_S = 0.1  # seconds between two looks whether those that wait can be served
+MAX_NAMED_COUNT = 20  # waiting requests in a message
+LOG_PERIOD_S = 5.0  # between two progress lines on the terminal
+POLL_S = 0.1  # between two checks whether waiting requests can be served
 NAME = re.compile(r"[A-Za-z][A-Za-z0-9_.-]{0,63}")
-Answer = tuple[
-    GenerationResult, RequestSummary
-]  # the result of a request, whose scenarios are published by then
+Answer = tuple[GenerationResult, RequestSummary]
+"""The result of a request, whose scenarios have been published."""
 
 
 @dataclass(frozen=True)
 class Config(Request, SamplerParameters):
-    """The sampler's parameters; `fitting` and `planning` are used for requests with start or end states."""
+    """The sampler's parameters; `fitting` and `planning` apply to requests with start or end states."""
 
     fitting: FittingConfig = field(default_factory=FittingConfig)
     planning: PlanningConfig = field(default_factory=PlanningConfig)
@@ -63,7 +63,7 @@ class Config(Request, SamplerParameters):
 
 
 class Code(IntEnum):
-    """How a request ended, as scenario_gen_interfaces/action/Generate has it."""
+    """How a request ended, as in scenario_gen_interfaces/action/Generate."""
 
     OK = 0
     INVALID = 1
@@ -75,7 +75,7 @@ class Code(IntEnum):
 
 @dataclass(frozen=True)
 class Outcome:
-    """How a request ended, in words, too; `answer` if it came to its end."""
+    """How a request ended, with the reason; `answer` is set if it was completed."""
 
     code: Code
     reason: str
@@ -85,29 +85,31 @@ class Outcome:
 
 @dataclass
 class OpenRequest:
-    """An open request: its name, its job, and its progress."""
+    """An open request: its name, its job, and its progress; times are on the steady clock [s]."""
 
     name: str
     job: str
     n_requested: int
-    waiting_for: list[str] = field(default_factory=list)  # topics that are missing
+    waiting_for: list[str] = field(default_factory=list)  # missing topics
     cancelled: bool = False  # while it waits for them
-    began: float | None = None
+    started_at: float | None = None
     accepted: int = 0
     candidates: int = 0
     stamp_ns: int = 0
-    logged: float = 0.0  # when the last line was written on the terminal
+    logged_at: float = 0.0
 
     def progress(self, accepted: int, candidates: int, stamp_ns: int) -> None:
         """Set the progress."""
-        self.accepted, self.candidates, self.stamp_ns = accepted, candidates, stamp_ns
+        self.accepted = accepted
+        self.candidates = candidates
+        self.stamp_ns = stamp_ns
 
     def seconds(self) -> float:
-        """Seconds since its job began."""
-        return 0.0 if self.began is None else monotonic() - self.began
+        """Return the seconds since the job started."""
+        return 0.0 if self.started_at is None else monotonic() - self.started_at
 
     def values(self) -> dict[str, str]:
-        """What /diagnostics reports of it."""
+        """Return the values for /diagnostics."""
         return {
             "request": self.name,
             "requested": str(self.n_requested),
@@ -118,56 +120,52 @@ class OpenRequest:
 
 
 class OpenRequests:
-    """The open requests of a sampler, which its statuses `progress` and `generate` report, and its services."""
+    """The open requests of a sampler, its services, and its statuses `progress` and `generate`."""
 
     def __init__(self, node: Any) -> None:
-        """Offer the services. `node`: the sampler; it generates, and returns the topics still missing."""
+        """Offer the services of `node`, the sampler."""
         self._node = node
         self._open: dict[str, OpenRequest] = {}
         self._numbers = count(1)
         self._lock = threading.Lock()
         self._waiters: list[tuple[Future, Callable[[], bool]]] = []
-        self._timer = node.create_timer(
-            POLL_S, self.look, clock=Clock(clock_type=ClockType.STEADY_TIME)
-        )
-        node.create_service(
-            SetParametersAtomically, "~/generate", self._generate, qos_profile=REQUESTS
-        )
-        node.create_service(
-            Trigger, "~/wait_until_ready", self._wait_until_ready, qos_profile=REQUESTS
-        )
-        node.create_service(
-            SetParametersAtomically, "~/cancel_request", self._cancel_request, qos_profile=REQUESTS
-        )
+        steady = Clock(clock_type=ClockType.STEADY_TIME)
+        self._timer = node.create_timer(POLL_S, self.check_waiting, clock=steady)
+        for kind, name, answer in (
+            (SetParametersAtomically, "~/generate", self._generate),
+            (Trigger, "~/wait_until_ready", self._wait_until_ready),
+            (SetParametersAtomically, "~/cancel_request", self._cancel_request),
+        ):
+            node.create_service(kind, name, answer, qos_profile=REQUESTS)
         offer_trigger(node, "~/cancel", self._cancel_all)
 
-    def add(self, given: str = "", job: str = "", n_requested: int = 0) -> OpenRequest:
-        """Open a request; without a name of its own, or a job's, it has the next number.
+    def add(self, name: str = "", job: str = "", n_requested: int = 0) -> OpenRequest:
+        """Open a request; by default its name is the next number.
 
         Raises:
-            InputError: the name is none, or that of an open request.
+            InputError: the name is invalid, or an open request has it.
         """
         with self._lock:
-            if given and not NAME.fullmatch(given):
+            if name and not NAME.fullmatch(name):
                 raise InputError(
-                    f"request is {given!r}; a letter and up to 63 letters, digits, `_`, `-` or `.` are a name"
+                    f"request is {name!r}; a letter and up to 63 letters, digits, `_`, `-` or `.` are a name"
                 )
-            if given in self._open:
+            if name in self._open:
                 raise InputError(
-                    f"request {given!r} is open already; give another name, or wait for its answer"
+                    f"request {name!r} is open already; give another name, or wait for its answer"
                 )
-            name = given or str(next(self._numbers))
+            name = name or str(next(self._numbers))
             self._open[name] = OpenRequest(name, job or f"request {name}", n_requested)
             return self._open[name]
 
     def begin(self, request: OpenRequest) -> None:
         """Start the clock of a request whose job begins."""
-        request.began = monotonic()
-        request.logged = request.began
+        request.started_at = monotonic()
+        request.logged_at = request.started_at
         self.report()
 
     def end(self, request: OpenRequest, level: Level, message: str, **more: str) -> None:
-        """Close a request that is done, cancelled or refused; `more` is reported on /diagnostics beside how far it came."""
+        """Close a request, and report its progress with the values `more`."""
         with self._lock:
             self._open.pop(request.name, None)
         self._node.status(
@@ -181,63 +179,60 @@ class OpenRequests:
         self._node.diagnostics.resolve("generate")
         self.report()
 
-    def cancel(self, name: str) -> str:
-        """Cancel one of them; return what to answer.
+    def cancel_named(self, name: str) -> str:
+        """Cancel the request with a name; return the answer to the caller.
 
         Raises:
-            InputError: none has that name.
+            InputError: no open request has that name.
         """
         with self._lock:
-            request, known = self._open.get(name), ", ".join(list(self._open)[:SHOWN])
-        if request is None or not self.cancelled(request):
-            raise InputError(f"no request {name!r} is open; open: {known or 'none'}")
+            request = self._open.get(name)
+            names = ", ".join(list(self._open)[:MAX_NAMED_COUNT])
+        if request is None or not self.cancel(request):
+            raise InputError(f"no request {name!r} is open; open: {names or 'none'}")
         return f"request {name} is cancelled, {request.accepted} of {request.n_requested} scenarios were found"
 
-    def cancelled(self, request: OpenRequest) -> bool:
-        """Cancel a request; False if it has ended."""
+    def cancel(self, request: OpenRequest) -> bool:
+        """Cancel a request; return False if it has ended."""
         if request.waiting_for:
             request.cancelled = True
-            self.look()
+            self.check_waiting()
             return True
         return bool(self._node.cancel(request.job))
 
     def report(self) -> None:
-        """Report on /diagnostics how far the request at work is, and now and then on the terminal."""
+        """Report the progress of the running request on /diagnostics, and now and then on the terminal."""
         with self._lock:
-            running = next(
-                (request for request in self._open.values() if request.began is not None), None
-            )
-            waiting = [request for request in self._open.values() if request.began is None]
+            requests = list(self._open.values())
+        running = next((each for each in requests if each.started_at is not None), None)
         if running is None:
-            self._node.diagnostics.status(
-                Level.OK, "no request is at work", "progress", {}, log=False
-            )
+            message = "no request is at work"
+            self._node.diagnostics.status(Level.OK, message, Subject.PROGRESS, {}, log=False)
             return
-        values = running.values() | {
-            "at_work": str(len(self._open) - len(waiting)),
-            "waiting": str(len(waiting)),
-        }
-        values |= {
-            f"waiting.{request.name}": f"{request.n_requested} scenarios"
-            for request in waiting[:SHOWN]
-        }
-        found = f"{running.accepted} of {running.n_requested} scenarios from {running.candidates} candidates"
-        message = f"request {running.name}: {found}, {running.seconds():.0f} s"
-        if log := monotonic() - running.logged >= LOG_S:
-            running.logged = monotonic()
+        waiting = [each for each in requests if each.started_at is None]
+        values = running.values()
+        values["at_work"] = str(len(requests) - len(waiting))
+        values["waiting"] = str(len(waiting))
+        for request in waiting[:MAX_NAMED_COUNT]:
+            values[f"waiting.{request.name}"] = f"{request.n_requested} scenarios"
+        message = (
+            f"request {running.name}: {running.accepted} of {running.n_requested} scenarios "
+            f"from {running.candidates} candidates, {running.seconds():.0f} s"
+        )
+        log = monotonic() - running.logged_at >= LOG_PERIOD_S
+        if log:
+            running.logged_at = monotonic()
         self._node.diagnostics.status(
-            Level.OK, message, "progress", values, running.stamp_ns, log=log
+            Level.OK, message, Subject.PROGRESS, values, running.stamp_ns, log=log
         )
 
     async def _generate(
         self, request: SetParametersAtomically.Request, response: SetParametersAtomically.Response
     ) -> SetParametersAtomically.Response:
-        """Generate with the caller's parameters; the answer comes when the set is done."""
+        """Generate with the caller's parameters; answer when the set is complete."""
         outcome = await self.answer(request.parameters)
-        response.result.successful, response.result.reason = (
-            outcome.code is Code.OK,
-            outcome.reason,
-        )
+        response.result.successful = outcome.code is Code.OK
+        response.result.reason = outcome.reason
         return response
 
     async def answer(
@@ -246,16 +241,16 @@ class OpenRequests:
         wait: float = 0.0,
         opened: Callable[[OpenRequest], None] = lambda _: None,
     ) -> Outcome:
-        """Serve a request, on the executor's thread, to its end.
+        """Serve a request to its end, on the executor's thread.
 
         Args:
-            parameters: the sampler's, as messages of rcl_interfaces, valid for this request; `request` is its name.
+            parameters: messages of rcl_interfaces, valid for this request; `request` is its name.
             wait: seconds to wait for the sampler's inputs.
             opened: called with the request as soon as it is open.
         """
         node = self._node
         try:
-            requested, name = _named(parameters)
+            name = _request_name(parameters)
             request = self.add(name)
         except ScenarioGenError as error:
             node.diagnostics.failed("generate", error)
@@ -263,94 +258,97 @@ class OpenRequests:
             return Outcome(Code.INVALID, str(error))
         opened(request)
         try:
-            config = values_of_call(node.config, requested)
+            given = [parameter for parameter in parameters if parameter.name != "request"]
+            config = values_of_call(node.config, given)
             request.n_requested = config.count
-            code, reason = await self._ready(request, config, wait)
+            code, reason = await self._wait_for_inputs(request, config, wait)
         except ScenarioGenError as error:
             self.end(request, Level.ERROR, str(error), error=type(error).__name__)
             return Outcome(Code.INVALID, f"request {request.name}: {error}", request.name)
         if code is not Code.OK:
             self.end(request, Level.WARN, reason)
             return Outcome(code, f"request {request.name}: {reason}", request.name)
+        return await self._run(request, config)
+
+    async def _run(self, request: OpenRequest, config: Any) -> Outcome:
+        """Generate off the executor's thread."""
+        node = self._node
         messages = node.messages()
 
-        def job(cancelled: Callable[[], bool]) -> tuple[Code, str, Answer | None]:
+        def outcome(code: Code, reason: str, answer: Answer | None = None) -> Outcome:
+            return Outcome(code, f"request {request.name}: {reason}", request.name, answer)
+
+        def job(cancelled: Callable[[], bool]) -> Outcome:
             try:
                 result: Answer | None = node.generate(messages, request, config, cancelled)
-            except ScenarioGenError as error:  # which has been reported
-                return (
-                    Code.INVALID if isinstance(error, InputError) else Code.IMPOSSIBLE,
-                    str(error),
-                    None,
-                )
+            except InputError as error:  # reported by the node
+                return outcome(Code.INVALID, str(error))
+            except ScenarioGenError as error:
+                return outcome(Code.IMPOSSIBLE, str(error))
             if result is None:
-                return Code.CANCELLED, node.given_up(messages, lambda: True), None
-            return (
-                Code.OK if result[0].generated.scenarios else Code.IMPOSSIBLE,
-                result[1].status.message,
-                result,
-            )
+                return outcome(Code.CANCELLED, node.stop_reason(messages, lambda: True))
+            code = Code.OK if result[0].generated.scenarios else Code.IMPOSSIBLE
+            return outcome(code, result[1].status.message, result)
 
-        def failed(error: BaseException) -> tuple[Code, str, Answer | None]:
+        def failed(error: BaseException) -> Outcome:
             if isinstance(error, CancelledError):
-                return Code.CANCELLED, node.given_up(messages, lambda: True), None
-            return Code.FAILED, f"{type(error).__name__}: {error}", None
+                return outcome(Code.CANCELLED, node.stop_reason(messages, lambda: True))
+            return outcome(Code.FAILED, f"{type(error).__name__}: {error}")
 
-        code, reason, result = await node.result_of(request.job, job, failed)
-        return Outcome(code, f"request {request.name}: {reason}", request.name, result)
+        ended: Outcome = await node.result_of(request.job, job, failed)
+        return ended
 
-    async def _ready(self, request: OpenRequest, config: Any, wait: float) -> tuple[Code, str]:
-        """Wait until the sampler is active and has its inputs; then the request is the last one in the queue."""
-        until = monotonic() + wait
+    async def _wait_for_inputs(
+        self, request: OpenRequest, config: Any, wait: float
+    ) -> tuple[Code, str]:
+        """Wait until the sampler is active and has its inputs; then append the request to the queue."""
+        deadline = monotonic() + wait
 
-        def ready() -> bool:
+        def is_over() -> bool:
             request.waiting_for = self.missing(config)
-            return request.cancelled or not request.waiting_for or monotonic() >= until
+            return request.cancelled or not request.waiting_for or monotonic() >= deadline
 
-        await self._until(ready)
+        await self._until(is_over)
         if request.cancelled:
             return Code.CANCELLED, "cancelled"
         if not self._node.active:
             return Code.NOT_READY, "the node is not active; activate it first"
         if request.waiting_for:
-            return (
-                Code.NOT_READY,
-                f"nothing to generate from yet: waiting for {', '.join(request.waiting_for)}",
-            )
+            topics = ", ".join(request.waiting_for)
+            return Code.NOT_READY, f"nothing to generate from yet: waiting for {topics}"
         with self._lock:
             self._open[request.name] = self._open.pop(request.name)
         return Code.OK, ""
 
-    async def _until(self, ready: Callable[[], bool]) -> None:
-        """Wait until `ready` says so; it is asked ten times a second, and when an input has come."""
-        if ready():
+    async def _until(self, is_over: Callable[[], bool]) -> None:
+        """Wait until `is_over` returns True; it is called ten times a second, and for every input."""
+        if is_over():
             return
         arrived = Future()
-        self._waiters.append((arrived, ready))
+        self._waiters.append((arrived, is_over))
         self._timer.reset()
         await arrived
-        self._node.executor.create_task(
-            self.look
-        )  # when this one stands in the queue, it is the next one's turn
+        # The next waiter's turn comes when this request is in the queue.
+        self._node.executor.create_task(self.check_waiting)
 
     def missing(self, config: Any) -> list[str]:
-        """The topics that a request waits for; `activation` while the node is not active."""
+        """Return the topics that a request waits for; `activation` while the node is not active."""
         missing: list[str] = self._node.missing(config) if self._node.active else ["activation"]
         return missing
 
     def position(self, request: OpenRequest) -> int:
-        """How many requests are served before this one; 0 if it is at work, or waits for its inputs."""
+        """Return how many requests are served before this one; 0 if it runs or waits for its inputs."""
         with self._lock:
-            served = [name for name, other in self._open.items() if not other.waiting_for]
-        return (
-            served.index(request.name) if request.began is None and request.name in served else 0
-        )
+            queue = [name for name, other in self._open.items() if not other.waiting_for]
+        if request.started_at is not None or request.name not in queue:
+            return 0
+        return queue.index(request.name)
 
-    def look(self) -> None:
-        """Let the first one go on that waits for inputs and need not any more; called when an input has come."""
+    def check_waiting(self) -> None:
+        """Resume the first request whose wait is over; called when an input has arrived."""
         for waiter in list(self._waiters):
-            arrived, done = waiter
-            if done():
+            arrived, is_over = waiter
+            if is_over():
                 self._waiters.remove(waiter)
                 arrived.set_result(None)
                 break
@@ -360,17 +358,17 @@ class OpenRequests:
     async def _wait_until_ready(
         self, _request: Trigger.Request, response: Trigger.Response
     ) -> Trigger.Response:
-        """Answer once a request with the node's own parameters can be served, however long that takes."""
-        node = self._node
-        await self._until(lambda: not self.missing(node.config))
-        response.success, response.message = True, "ready"
+        """Answer once a request with the node's parameters can be served, however long that takes."""
+        await self._until(lambda: not self.missing(self._node.config))
+        response.success = True
+        response.message = "ready"
         return response
 
     def _cancel_request(
         self, request: SetParametersAtomically.Request, response: SetParametersAtomically.Response
     ) -> SetParametersAtomically.Response:
         try:
-            response.result.reason = self.cancel(_named(request.parameters)[1])
+            response.result.reason = self.cancel_named(_request_name(request.parameters))
             response.result.successful = True
         except ScenarioGenError as error:
             response.result.reason = str(error)
@@ -382,16 +380,12 @@ class OpenRequests:
         raise InputError("nothing is running")
 
 
-def _named(parameters: Sequence[Any]) -> tuple[list[Any], str]:
-    """Return a caller's parameters but `request`, and what that is, "" if there is none; the tools of ROS make 7 of '7'."""
-    names = [
-        Parameter.from_parameter_msg(parameter).value
-        for parameter in parameters
-        if parameter.name == "request"
-    ]
-    return [parameter for parameter in parameters if parameter.name != "request"], str(
-        names[0]
-    ) if names else ""
+def _request_name(parameters: Sequence[Any]) -> str:
+    """Return the value of the parameter `request`, "" without one; ROS tools turn '7' into 7."""
+    for parameter in parameters:
+        if parameter.name == "request":
+            return str(Parameter.from_parameter_msg(parameter).value)
+    return ""
 
 
 def answer_request(
@@ -403,19 +397,19 @@ def answer_request(
     send: Send,
     turn: AbstractContextManager[object],
 ) -> Answer:
-    """Sample, check and publish; fit and plan anew if start or end states are requested.
+    """Sample, check and publish; fit and plan again if start or end states are requested.
 
     Args:
         messages: of the template, by topic.
         config: the values of this request.
-        request: what is told how far it is.
+        request: gets the progress.
         node: the node's full name.
-        cancelled: whether to stop early; what was published by then stays, and the summary says so.
-        send: called with topic and CDR bytes of every message, scenarios as they are drawn.
-        turn: held while a scenario's messages, or those of the end, are sent, so that requests at the same time do not mix them.
+        cancelled: returns whether to stop early; published scenarios stay, and the summary says so.
+        send: called with topic and CDR bytes of every message, as scenarios are drawn.
+        turn: held while the messages of a scenario, or of the end, are sent, so that parallel requests do not mix them.
 
     Raises:
-        InputError: a message is damaged, or a vehicle that is named does not exist.
+        InputError: a message is damaged, or a named vehicle does not exist.
         RefusedError: the request is impossible; the message says why, and which similar request is possible.
     """
     template = decode_template(messages)

@@ -1,10 +1,11 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""ROS parameters from the configuration dataclasses: same names, types, ranges and meanings as on the command line.
+"""ROS parameters from configuration dataclasses: same names, types, ranges and meanings as on the command line.
 
-The tools of ROS guess a value's type from its text, each by rules of its own: `-p ego:=21202` is an integer, and `param load`
-makes a text of the 1e-06 that `param dump` wrote. The declaration says what was meant, so values are brought to its type.
+ROS tools guess a value's type from its text, each in its own way: `-p ego:=21202` is an integer,
+and `param load` reads the 1e-06 that `param dump` wrote as a text. So values are converted to the
+declared type.
 """
 
 from collections.abc import Sequence
@@ -28,16 +29,15 @@ from scenario_gen.base.errors import InputError
 from scenario_gen.base.parameters import flatten, updated
 
 Config = TypeVar("Config")
-INT64 = 2**63 - 1
+MAX_INT64_COUNT = 2**63 - 1
+MAX_FLOAT_FACTOR = 1e300  # bound of a range without one
 USAGE = "usage: {name} [--namespace NAME]... [--ros-args -p PARAMETER:=VALUE ...]"
-STATES = (
-    "starts",
-    "goals",
-)  # `1: 10.5 -1.75` would be a mapping to `param load`, so it is kept as `1:10.5 -1.75`
+# `param load` would read `1: 10.5 -1.75` as a mapping, so it is stored as `1:10.5 -1.75`.
+STATE_PARAMETERS = ("starts", "goals")
 
 
 def descriptor(entry: "Field[Any]") -> ParameterDescriptor:
-    """Return the descriptor of one declared parameter; what is no real number or text may become one (see `meant`)."""
+    """Return the descriptor of a declared parameter, dynamically typed if `converted` may change the type."""
     meta = entry.metadata
     result = ParameterDescriptor(
         description=meta["meaning"] + _unit(entry),
@@ -46,49 +46,44 @@ def descriptor(entry: "Field[Any]") -> ParameterDescriptor:
     if meta["choices"]:
         result.additional_constraints = "one of " + ", ".join(meta["choices"])
     low, high = meta["low"], meta["high"]
-    if (low, high) == (None, None):
+    if low is None and high is None:
         return result
+    bound = MAX_FLOAT_FACTOR if isinstance(entry.default, float) else MAX_INT64_COUNT
+    low = -bound if low is None else low
+    high = bound if high is None else high
     if isinstance(entry.default, float):
-        low, high = float(-1e300 if low is None else low), float(1e300 if high is None else high)
-        result.floating_point_range = [FloatingPointRange(from_value=low, to_value=high)]
+        value_range = FloatingPointRange(from_value=float(low), to_value=float(high))
+        result.floating_point_range = [value_range]
     else:
-        low, high = -INT64 if low is None else int(low), INT64 if high is None else int(high)
-        result.integer_range = [IntegerRange(from_value=low, to_value=high)]
+        result.integer_range = [IntegerRange(from_value=int(low), to_value=int(high))]
     return result
 
 
-def meant(entry: "Field[Any]", value: Any) -> Any:
-    """Return a value as the type that `entry` declares, if it can be meant so, else as it is."""
-    if (
-        isinstance(entry.default, str)
-        and isinstance(value, int | float)
-        and not isinstance(value, bool)
-    ):
+def converted(entry: "Field[Any]", value: Any) -> Any:
+    """Return a value as the declared type of `entry`, unchanged where it has no such form."""
+    if isinstance(value, bool):
+        return value
+    if isinstance(entry.default, str) and isinstance(value, int | float):
         return str(value)
-    if (
-        isinstance(entry.default, float)
-        and isinstance(value, int | str)
-        and not isinstance(value, bool)
-    ):
+    if isinstance(entry.default, float) and isinstance(value, int | str):
         with suppress(ValueError):
             return float(value)
     return value
 
 
 def with_values(config: Config, parameters: Sequence[Parameter]) -> Config:
-    """Return `config` with those of the parameters that belong to it.
+    """Return `config` with the values of parameters; those that are not its own are ignored.
 
     Raises:
         InputError: a value has the wrong type or is out of range.
     """
     known = flatten(config)
-    return updated(
-        config, {p.name: meant(known[p.name][0], p.value) for p in parameters if p.name in known}
-    )
+    values = {p.name: converted(known[p.name][0], p.value) for p in parameters if p.name in known}
+    return updated(config, values)
 
 
 def values_of_call(config: Config, messages: Sequence[Any]) -> Config:
-    """Return `config` with the rcl_interfaces/Parameter messages of a caller.
+    """Return `config` with the values in a caller's rcl_interfaces/Parameter messages.
 
     Raises:
         InputError: one is unknown, has the wrong type or is out of range.
@@ -100,10 +95,10 @@ def values_of_call(config: Config, messages: Sequence[Any]) -> Config:
 
 
 class ConfigParameters:
-    """Keeps a configuration and the ROS parameters of a node the same."""
+    """Keeps a configuration and the ROS parameters of a node equal."""
 
     def __init__(self, node: Node, config: Any) -> None:
-        """Declare every parameter of `config`, and log the values in effect; overrides of the command line or a file are taken.
+        """Declare every parameter of `config`, apply overrides, and log the values in effect.
 
         Raises:
             InputError: an override has the wrong type or is out of range.
@@ -118,46 +113,49 @@ class ConfigParameters:
                 raise InputError(
                     f"{node.get_fully_qualified_name()}: parameter {name}: {error}"
                 ) from error
-        given = [node.get_parameter(name) for name in self._declared]
-        self.config = with_values(config, given)
-        node.set_parameters([kept for old in given if (kept := self._kept(old)) is not old])
+        overrides = [node.get_parameter(name) for name in self._declared]
+        self.config = with_values(config, overrides)
+        stored = [self._stored(parameter) for parameter in overrides]
+        node.set_parameters(
+            [new for new, old in zip(stored, overrides, strict=True) if new is not old]
+        )
         self.config = with_values(config, [node.get_parameter(name) for name in self._declared])
-        node.add_pre_set_parameters_callback(self._keep)
+        node.add_pre_set_parameters_callback(self._prepare)
         node.add_on_set_parameters_callback(self._check)
-        node.add_post_set_parameters_callback(self._take)
-        # a parameter file keyed to another node would be ignored in silence
+        node.add_post_set_parameters_callback(self._apply)
+        # ROS ignores a parameter file for another node silently; the log shows it.
         values = ", ".join(
             f"{name}={value!r}" for name, (_, value) in flatten(self.config).items()
         )
         node.get_logger().info(f"effective parameters: {values}")
 
-    def _keep(self, parameters: list[Parameter]) -> list[Parameter]:
-        """Return what is to be set: values of the declared types, and nothing that is read-only and in effect already."""
+    def _prepare(self, parameters: list[Parameter]) -> list[Parameter]:
+        """Convert values to the declared types, and drop read-only parameters that do not change.
+
+        `param load` also sets read-only parameters, one by one, and rclpy refuses to set none.
+        """
         changes = [
-            self._kept(parameter) for parameter in parameters if not self._repeats(parameter)
+            self._stored(parameter)
+            for parameter in parameters
+            if not self._is_unchanged_read_only(parameter)
         ]
-        # `param load` sets what was dumped one by one, read-only ones too, and rclpy refuses to set nothing
         return changes or [self._node.get_parameter(next(iter(self._declared)))]
 
-    def _kept(self, parameter: Parameter) -> Parameter:
-        """Return the parameter as it is kept; itself, if nothing is to be changed."""
+    def _stored(self, parameter: Parameter) -> Parameter:
+        """Return the parameter in its stored form, the same object if it has that form."""
         name, old = parameter.name, parameter.value
         if name not in self._declared:
             return parameter
-        new = meant(self._declared[name], old)
-        if name in STATES and isinstance(new, str):
+        new = converted(self._declared[name], old)
+        if name in STATE_PARAMETERS and isinstance(new, str):
             new = re.sub(r":\s+", ":", new)
         return parameter if type(new) is type(old) and new == old else Parameter(name, value=new)
 
-    def _repeats(self, parameter: Parameter) -> bool:
-        """Say whether a read-only parameter is given the value that it has."""
-        node = self._node
-        if (
-            not node.has_parameter(parameter.name)
-            or not node.describe_parameter(parameter.name).read_only
-        ):
+    def _is_unchanged_read_only(self, parameter: Parameter) -> bool:
+        node, name = self._node, parameter.name
+        if not node.has_parameter(name) or not node.describe_parameter(name).read_only:
             return False
-        return bool(node.get_parameter(parameter.name).value == parameter.value)
+        return bool(node.get_parameter(name).value == parameter.value)
 
     def _check(self, parameters: list[Parameter]) -> SetParametersResult:
         try:
@@ -166,17 +164,17 @@ class ConfigParameters:
             return SetParametersResult(successful=False, reason=str(error))
         return SetParametersResult(successful=True)
 
-    def _take(self, parameters: list[Parameter]) -> None:
+    def _apply(self, parameters: list[Parameter]) -> None:
         self.config = with_values(self.config, parameters)
 
 
 def config_of(node: Any) -> Any:
-    """Return the default configuration of a node's class: the `Config` of its module."""
+    """Return the default configuration of a node's class: `Config` in its module."""
     return sys.modules[node.__module__].Config()
 
 
 def help_of(name: str, nodes: Sequence[Any]) -> str:
-    """Return the usage of an executable, and every parameter of its nodes: default value, unit, meaning, choices."""
+    """Return the usage of an executable, and its nodes' parameters: default, unit, meaning, choices."""
     lines = [USAGE.format(name=name)]
     for node in nodes:
         module = sys.modules[node.__module__]

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Services without arguments: what an action says, or why it is refused, is the answer."""
+"""Services without arguments: the answer is the result of an action, or the reason of its refusal."""
 
 from collections.abc import Callable
 import traceback
@@ -12,17 +12,16 @@ from std_srvs.srv import Trigger
 
 from scenario_gen.base.errors import describe, ScenarioGenError
 
-REQUESTS = QoSProfile(
-    depth=1000
-)  # ROS's own 10 would drop the oldest of many requests that come at once
+REQUESTS = QoSProfile(depth=1000)  # the default depth of 10 would drop simultaneous requests
 
 
 def offer_trigger(node: Node, name: str, action: Callable[[], str]) -> None:
-    """Offer a std_srvs/Trigger; whatever goes wrong in `action`, the caller gets an answer and the node lives on."""
+    """Offer a std_srvs/Trigger service; after any error in `action` the caller gets an answer."""
 
     def answer(_request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
         try:
-            response.message, response.success = action(), True
+            response.message = action()
+            response.success = True
         except ScenarioGenError as error:
             response.message = str(error)
         except Exception as error:

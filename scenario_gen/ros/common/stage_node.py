@@ -1,9 +1,10 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""What all nodes with a stage have in common: lifecycle, parameters, raw topics, a worker, diagnostics, a clean end.
+"""The base of all nodes with a stage: lifecycle, parameters, raw topics, a worker, diagnostics.
 
-Their latched inputs belong together: complete once all bear the same stamp and `road/info` and `fit/info` agree.
+The latched inputs of a node are complete once all have the same stamp, and the hashes in
+`road/info` and `fit/info` match.
 """
 
 from collections.abc import Callable, Iterable, Mapping
@@ -33,22 +34,21 @@ from scenario_gen.ros.common.topics import create_subscription, Outputs
 from scenario_gen.situation import MAX_SAMPLES, refuse_too_large
 from scenario_gen.types import Encounter, Quality
 
-MOST_BYTES = (
-    200 * MAX_SAMPLES
-)  # of tracks: a sample of a vehicle takes 176 at most, and an instant 36
+# A sample of a vehicle has at most 176 bytes in a `tracks` message, an instant 36.
+MAX_TRACKS_BYTES = 200 * MAX_SAMPLES
 
 
-def take_tracks(data: bytes) -> Encounter:
-    """Return the encounter of a `tracks` message that a node can work on; what is too large is refused before it is read.
+def decode_checked_tracks(data: bytes) -> Encounter:
+    """Return the encounter of a `tracks` message, if a node can process it.
 
     Raises:
         InputError: it is too large, damaged, or no encounter.
-        RefusedError: it is too large, or its vehicles are not where they can be.
+        RefusedError: it is too large, or its vehicles are too far apart.
     """
-    if len(data) > MOST_BYTES:
+    if len(data) > MAX_TRACKS_BYTES:
         raise InputError(
-            f"tracks: the message has {len(data)} bytes, at most {MOST_BYTES} are read; cut the encounter, or resample it "
-            "(10 Hz is usual)"
+            f"tracks: the message has {len(data)} bytes, at most {MAX_TRACKS_BYTES} are read; "
+            "cut the encounter, or resample it (10 Hz is usual)"
         )
     encounter = decode_tracks(data)
     refuse_too_large(encounter)
@@ -56,8 +56,8 @@ def take_tracks(data: bytes) -> Encounter:
 
 
 DECODERS: dict[str, Callable[[bytes, str], object]] = {
-    "tracks": lambda data, _: take_tracks(data),
-    "map": lambda data, what: decode_map(data, name=what),
+    "tracks": lambda data, _: decode_checked_tracks(data),
+    "map": lambda data, topic: decode_map(data, name=topic),
     "road/entries": decode_poses,
     "road/exits": decode_poses,
     LANES: decode_lanes,
@@ -69,7 +69,7 @@ DECODERS: dict[str, Callable[[bytes, str], object]] = {
 
 
 def refuse_damaged(topic: str, data: bytes) -> None:
-    """Read a latched input as it arrives, so that what is damaged is named and does not take the place of what was there.
+    """Decode a latched input when it arrives, so that a damaged one replaces no valid one.
 
     Raises:
         InputError, RefusedError: it is damaged, or too large.
@@ -80,33 +80,33 @@ def refuse_damaged(topic: str, data: bytes) -> None:
 
 @dataclass(frozen=True)
 class _Message:
-    """A message with its stamp and hash; if it is an info, the hashes of those that belong together, by topic."""
+    """A message with its stamp and hash, and the hashes that it lists by topic if it is an info."""
 
     data: bytes
     stamp: int
     hash: str
-    together: Mapping[str, str]
+    listed: Mapping[str, str]
 
 
 class Inputs:
     """The newest message of each topic.
 
     Args:
-        paired: topics that must bear the same stamp.
-        unpaired: topics whose newest message counts, whatever its stamp.
-        if_named: topics that count only where an info names them, and are waited for there.
+        paired: topics that must have the same stamp.
+        unpaired: topics with any stamp.
+        optional: topics that are needed only if an info lists them.
     """
 
     def __init__(
-        self, paired: Iterable[str], unpaired: Iterable[str] = (), if_named: Iterable[str] = ()
+        self, paired: Iterable[str], unpaired: Iterable[str] = (), optional: Iterable[str] = ()
     ) -> None:
         self._paired = set(paired)
         self._unpaired = set(unpaired)
-        self._if_named = set(if_named)
+        self._optional = set(optional)
         self._newest: dict[str, _Message] = {}
 
     def expect(self, topics: Iterable[str]) -> None:
-        """Add topics to the paired ones, e.g. the routes of the vehicles of the tracks."""
+        """Add topics to the paired ones, e.g. the routes of the vehicles in the tracks."""
         self._paired |= set(topics)
 
     def forget(self, topics: Iterable[str]) -> None:
@@ -116,63 +116,68 @@ class Inputs:
             self._newest.pop(topic, None)
 
     def clear(self) -> None:
-        """Forget all messages."""
+        """Remove all messages."""
         self._newest.clear()
 
     def put(self, topic: str, data: bytes) -> None:
-        """Take a message in.
+        """Store a message.
 
         Raises:
-            InputError: it is damaged; what was there stays.
+            InputError: it is damaged; the previous message stays.
         """
-        together = decode_hashes(data, topic) if topic in INFOS else {}
-        self._newest[topic] = _Message(data, stamp_of(data, topic), hash_of(topic, data), together)
+        listed = decode_hashes(data, topic) if topic in INFOS else {}
+        self._newest[topic] = _Message(data, stamp_of(data, topic), hash_of(topic, data), listed)
 
     def get(self, topic: str) -> bytes | None:
         """Return the newest message of a topic."""
         message = self._newest.get(topic)
         return message.data if message else None
 
-    def named(self, info: str, topic: str) -> bool:
-        """Say whether an info names a message of the topic as one that belongs to the others."""
-        return info in self._newest and topic in self._newest[info].together
+    def is_listed(self, info: str, topic: str) -> bool:
+        """Return whether an info lists a message of the topic."""
+        return info in self._newest and topic in self._newest[info].listed
 
     def replaced(self, messages: Mapping[str, bytes]) -> bool:
-        """Say whether one of these messages is no longer the newest of its topic."""
+        """Return whether one of these messages is no longer the newest of its topic."""
         return any(self.get(topic) != data for topic, data in messages.items())
 
     def missing(self) -> list[str]:
-        """Return the topics from which nothing came yet, or nothing that belongs to the newest template and road."""
-        silent = [
-            topic for topic in sorted(self._paired | self._unpaired) if topic not in self._newest
-        ]
-        held = dict(self._newest)
-        stamps = {topic: held[topic].stamp for topic in self._paired if topic in held}
+        """Return the topics without a message, or without one for the newest template and road."""
+        silent = sorted((self._paired | self._unpaired) - set(self._newest))
+        return silent + self._outdated() + self._unmatched()
+
+    def _outdated(self) -> list[str]:
+        """Return the paired topics whose stamp is not that of the tracks, or else the newest one."""
+        stamps = {topic: self._newest[topic].stamp for topic in self._paired & set(self._newest)}
         newest = stamps.get("tracks", max(stamps.values(), default=0))
-        old = sorted(topic for topic, stamp in stamps.items() if stamp != newest)
-        others = [
-            f"{info} of this {topic}"
-            for info in INFOS
-            for topic, named in (held[info].together.items() if info in held else ())
-            if (topic in held and held[topic].hash != named)
-            or (topic in self._if_named and topic not in held)
-        ]
-        if not any(
-            info in held for info in INFOS
-        ):  # it may name them: what is done without would be done again
-            others += [
-                f"road/info of this {topic}" for topic in sorted(self._if_named & set(held))
-            ]
-        return silent + old + others
+        return sorted(topic for topic, stamp in stamps.items() if stamp != newest)
+
+    def _unmatched(self) -> list[str]:
+        """Return the infos that do not list the newest messages, as "road/info of this map"."""
+        infos = [info for info in INFOS if info in self._newest]
+        if not infos:  # an info may list them: work without it would have to be repeated
+            known = sorted(self._optional & set(self._newest))
+            return [f"road/info of this {topic}" for topic in known]
+        unmatched = []
+        for info in infos:
+            for topic, listed_hash in self._newest[info].listed.items():
+                message = self._newest.get(topic)
+                if message is None:
+                    matches = topic not in self._optional
+                else:
+                    matches = message.hash == listed_hash
+                if not matches:
+                    unmatched.append(f"{info} of this {topic}")
+        return unmatched
 
     def complete(self) -> dict[str, bytes] | None:
-        """Return all messages if none is missing and all belong together."""
+        """Return all messages that belong together, or None if one is missing."""
         if self.missing():
             return None
         return {
             topic: message.data
             for topic, message in self._newest.items()
-            if topic not in self._if_named or any(self.named(info, topic) for info in INFOS)
+            if topic not in self._optional or any(self.is_listed(info, topic) for info in INFOS)
         }
 
 
@@ -182,26 +187,29 @@ Result = TypeVar("Result")
 class StageNode(LifecycleNode):  # type: ignore[misc]
     """A lifecycle node around a stage.
 
-    A subclass names its inputs in `INPUTS` and takes them in `received`; it does its work in jobs given to `work`. Inputs
-    are subscribed while the node is active; being latched, they come again after a deactivation or a restart.
+    A subclass lists its inputs in `INPUTS` and receives them in `received`; it works in jobs given
+    to `work`. Inputs are subscribed while the node is active. They are latched, so they arrive
+    again after a deactivation or a restart.
+
+    Attributes:
+        INPUTS: topics.
+        OUTPUTS: topics that are advertised while configuring, before the first message.
+        THREADS: jobs that run at a time.
+        STAGES: packages of scenario_gen whose kernels are compiled before the node is configured.
     """
 
     INPUTS: tuple[str, ...] = ()
-    OUTPUTS: tuple[
-        str, ...
-    ] = ()  # advertised while configuring, so that listeners are there before the first message
-    THREADS = 1  # jobs that run at a time
-    STAGES: tuple[
-        str, ...
-    ] = ()  # packages of scenario_gen whose kernels are compiled before it is configured
+    OUTPUTS: tuple[str, ...] = ()
+    THREADS = 1
+    STAGES: tuple[str, ...] = ()
 
     def __init__(self, name: str, config: Any, namespace: str | None = None) -> None:
-        self._together = ReentrantCallbackGroup()
+        self._callback_group = ReentrantCallbackGroup()
         super().__init__(name, namespace=namespace)
         self.outputs = Outputs(self)
         self.diagnostics = NodeDiagnostics(self, self.update_diagnostics, enabled=False)
         self.diagnostics.state("unconfigured")
-        self._listening: dict[str, Any] = {}
+        self._subscribed: dict[str, Any] = {}
         self._latched: dict[str, tuple[bytes, Any]] = {}
         self._worker: Worker | None = None
         self.parameters = ConfigParameters(self, config)
@@ -209,8 +217,8 @@ class StageNode(LifecycleNode):  # type: ignore[misc]
 
     @property
     def default_callback_group(self) -> ReentrantCallbackGroup:
-        """Reentrant: in rclpy's own, a service that awaits its answer keeps all other callbacks of the node from running."""
-        return self._together
+        """A reentrant one: in rclpy's default group a service that awaits its answer blocks all other callbacks."""
+        return self._callback_group
 
     @property
     def config(self) -> Any:
@@ -230,34 +238,34 @@ class StageNode(LifecycleNode):  # type: ignore[misc]
         ):
             self.trigger_activate()
 
-    # --- for subclasses ---------------------------------------------------------------------------------------
+    # --- for subclasses ------------------------------------------------------------------------
 
     def received(self, topic: str, data: bytes) -> None:
-        """Take an input in; called on the executor's thread, so anything long goes to `work`."""
+        """Process an input, on the executor's thread; long work belongs into `work`."""
 
     def started(self) -> None:
-        """Begin what needs no input; called at activation."""
+        """Start work that needs no input; called at activation."""
 
     def stopped(self) -> None:
-        """End what was begun and forget what was received; called at deactivation, when no work runs any more."""
+        """Forget the inputs; called at deactivation, when no job runs any more."""
 
     def listen(self, topic: str, quality: Quality | None = None) -> None:
-        """Subscribe to a topic of the suite, raw; `received` gets its messages. `quality`: another one than the suite's."""
-        if topic not in self._listening:
-            take = self._receive_latched if topic_entry(topic)[1] == LATCHED else self._receive
-            self._listening[topic] = create_subscription(
-                self, topic, lambda data: take(topic, data), quality
+        """Subscribe `received` to one of the suite's topics, raw, with the declared or another quality."""
+        if topic not in self._subscribed:
+            receive = self._receive_latched if topic_entry(topic)[1] == LATCHED else self._receive
+            self._subscribed[topic] = create_subscription(
+                self, topic, lambda data: receive(topic, data), quality
             )
 
     def ignore(self, topic: str) -> None:
         """End a subscription."""
-        if topic in self._listening:
-            self.destroy_subscription(self._listening.pop(topic))
+        if topic in self._subscribed:
+            self.destroy_subscription(self._subscribed.pop(topic))
             self._latched.pop(topic, None)
             self.diagnostics.resolve(topic)
 
     def work(self, name: str, job: Job) -> None:
-        """Run a job off the executor's thread; a waiting one of the same name is replaced, a running one cancelled."""
+        """Run a job off the executor's thread; a waiting one with its name is replaced, a running one cancelled."""
         if self._worker is not None:
             self._worker.submit(name, lambda cancelled: None if cancelled() else job(cancelled))
 
@@ -267,19 +275,20 @@ class StageNode(LifecycleNode):  # type: ignore[misc]
         job: Callable[[Callable[[], bool]], Result],
         failed: Callable[[BaseException], Result],
     ) -> Result:
-        """Run a job off the executor's thread for a service, also if it is cancelled before its turn; return its result.
+        """Run a job off the executor's thread for a service, also a job cancelled before its turn; return its result.
 
         Args:
             name: of the job.
-            job: called with a function that says whether it has been cancelled.
-            failed: returns the result of a job that raises; the error is reported on /diagnostics all the same.
+            job: called with a function that returns whether it has been cancelled.
+            failed: returns the result of a job that raises; the error is also reported on /diagnostics.
         """
-        answer, executor = Future(), self.executor
+        answer = Future()
+        executor = self.executor
 
         def run(cancelled: Callable[[], bool]) -> None:
             try:
                 answer.set_result(job(cancelled))
-            except BaseException as error:  # CancelledError, too: somebody waits
+            except BaseException as error:  # also CancelledError: the caller waits
                 answer.set_result(failed(error))
                 raise
             finally:
@@ -291,7 +300,7 @@ class StageNode(LifecycleNode):  # type: ignore[misc]
         return result
 
     def cancel(self, only: str | None = None) -> list[str]:
-        """Cancel all jobs, or those of one name; return their names."""
+        """Cancel all jobs, or those with one name; return their names."""
         return self._worker.cancel(only) if self._worker is not None else []
 
     def status(
@@ -301,14 +310,14 @@ class StageNode(LifecycleNode):  # type: ignore[misc]
         self.diagnostics.status(level, message, subject, values, stamp_ns)
 
     def update_diagnostics(self) -> None:
-        """Bring up to date, each second, what /diagnostics reports of the work that goes on."""
+        """Report the progress of the work; called each second."""
         if self._worker is not None:
-            self.diagnostics.state("active", **self._worker.account())
+            self.diagnostics.state("active", **self._worker.status())
 
-    # --- lifecycle --------------------------------------------------------------------------------------------
+    # --- lifecycle -----------------------------------------------------------------------------
 
     def on_configure(self, state: LifecycleState) -> TransitionCallbackReturn:
-        """Advertise the outputs; the kernels are ready by then."""
+        """Advertise the outputs."""
         for topic in self.OUTPUTS:
             self.outputs.advertise(topic)
         self.diagnostics.state("inactive")
@@ -328,12 +337,12 @@ class StageNode(LifecycleNode):  # type: ignore[misc]
         return super().on_activate(state)
 
     def on_deactivate(self, state: LifecycleState) -> TransitionCallbackReturn:
-        """Cancel the work and forget the inputs; what was published stays for late joiners."""
+        """Cancel the work and forget the inputs; published messages stay for late subscribers."""
         self._stop()
         return super().on_deactivate(state)
 
     def on_cleanup(self, state: LifecycleState) -> TransitionCallbackReturn:
-        """Withdraw what was published."""
+        """Destroy the publishers."""
         self.outputs.destroy()
         self.diagnostics.state("unconfigured")
         return super().on_cleanup(state)
@@ -346,7 +355,7 @@ class StageNode(LifecycleNode):  # type: ignore[misc]
     def _stop(self) -> None:
         self.outputs.deactivate()
         self.diagnostics.enable(False)
-        for topic in list(self._listening):
+        for topic in list(self._subscribed):
             self.ignore(topic)
         if self._worker is not None:
             self._worker.close()
@@ -360,13 +369,13 @@ class StageNode(LifecycleNode):  # type: ignore[misc]
         super().destroy_node()
 
     def _receive_latched(self, topic: str, data: bytes) -> None:
-        """Take an input in, unless it is the last one word for word and the parameters are, too: then its node was restarted."""
+        """Ignore a repetition of the last message (its publisher restarted), unless the parameters changed."""
         if self._latched.get(topic) != (data, self.config):
             self._latched[topic] = (data, self.config)
             self._receive(topic, data)
 
     def _receive(self, topic: str, data: bytes) -> None:
-        """Take an input in; whatever is wrong with it, the node lives on."""
+        """Process an input; the node survives any error."""
         try:
             refuse_damaged(topic, data)
             self.received(topic, data)

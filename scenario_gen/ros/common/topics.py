@@ -3,9 +3,10 @@
 
 """Topics: message classes by name, qualities of service, and a node's publishers with their pace.
 
-A publisher remembers as many messages as its depth says; what it forgets before a subscriber has it is lost, in silence. A reader
-that keeps all acknowledges a message only where it has room for it (Fast DDS: 5000 of a topic), so whoever waits for
-acknowledgements goes no faster than its subscribers.
+A publisher stores as many messages as its depth. A message that it drops before a subscriber has
+it is lost silently. A subscriber that keeps all messages acknowledges one only when it has room
+(Fast DDS: 5000 messages a topic), so a publisher that waits for acknowledgements adapts to its
+slowest subscriber.
 """
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -34,8 +35,8 @@ OVERRIDABLE = (
     QoSPolicyKind.RELIABILITY,
     QoSPolicyKind.DURABILITY,
 )
-OWN_QUALITY = ("/diagnostics", "/tf")  # as others expect them
-SHARED = (
+FIXED_QUALITY = ("/diagnostics", "/tf")  # as other packages expect them
+SHARED_SUFFIXES = (
     "/diagnostics",
     "/rosout",
     "/parameter_events",
@@ -45,10 +46,12 @@ SHARED = (
     "/footprint",
     "/transition_event",
 )
-"""How the names of topics end that many nodes publish."""
-DEPTH = 1000  # messages that a subscription holds at least
-POLL_S = 0.002  # seconds between two looks for acknowledgements
-PER_MESSAGE_S = 0.001  # seconds for each message while a subscriber is not waited for: for the sake of the others
+"""Ends of the names of topics that many nodes publish."""
+TRACKS_PARTNERS = {"log_player": "segmenter", "segmenter": "log_player"}
+"""Both publish `tracks`: one from a log, the other from streams."""
+MIN_SUBSCRIPTION_DEPTH = 1000
+POLL_S = 0.002  # between two checks for acknowledgements
+UNPACED_PERIOD_S = 0.001  # per message to subscribers that are not waited for, for the others
 
 
 def message_class(kind: str) -> Any:
@@ -60,14 +63,14 @@ def message_class(kind: str) -> Any:
     package, _, name = kind.partition("/msg/")
     try:
         return getattr(importlib.import_module(f"{package}.msg"), name)
-    except (ImportError, AttributeError, ValueError, TypeError):  # TypeError: a topic of no type
+    except (ImportError, AttributeError, ValueError, TypeError):  # TypeError: an empty type
         raise InputError(
             f"message type {kind} is not installed; source the workspace that has {package or 'it'}"
         ) from None
 
 
 def qos(quality: Quality) -> QoSProfile:
-    """Return the profile of a topic."""
+    """Return the QoS profile of a quality."""
     return QoSProfile(
         history=HistoryPolicy.KEEP_ALL if quality.keep_all else HistoryPolicy.KEEP_LAST,
         depth=quality.depth,
@@ -81,39 +84,43 @@ def qos(quality: Quality) -> QoSProfile:
 
 
 def adapted_quality(topic: str, offers: Sequence[QoSProfile]) -> tuple[Quality, Quality]:
-    """Return the quality to subscribe with, which suits every publisher, and the one to offer at replay.
+    """Return the quality for a subscription that suits every publisher, and the one for a replay.
 
-    Of the suite's own topics all is kept (DDS holds 5000 messages), so that publishers that pace themselves wait for the
-    recorder; other messages may be of any size, and the newest are kept.
-
-    Discovery does not always tell a publisher's depth; then it is that of the topic's kind.
+    A subscription to the suite's own topics keeps all messages (DDS holds 5000), so that paced
+    publishers wait for the recorder. Other messages may be large, so only the newest are kept.
+    Discovery does not always report a publisher's depth; then the depth of the topic counts.
     """
     reliable = all(offer.reliability == ReliabilityPolicy.RELIABLE for offer in offers)
     transient_local = all(offer.durability == DurabilityPolicy.TRANSIENT_LOCAL for offer in offers)
-    offered = max(offer.depth for offer in offers)
-    own = None
+    offered_depth = max(offer.depth for offer in offers)
+    declared = None
     with suppress(KeyError):
-        own = topic_entry(topic)[1]
+        declared = topic_entry(topic)[1]
     subscribed = Quality(
-        max(DEPTH, offered), reliable, transient_local, keep_all=reliable and own is not None
+        max(MIN_SUBSCRIPTION_DEPTH, offered_depth),
+        reliable,
+        transient_local,
+        keep_all=reliable and declared is not None,
     )
-    return subscribed, Quality(offered or (own.depth if own else 1), reliable, transient_local)
+    replay_depth = offered_depth or (declared.depth if declared else 1)
+    return subscribed, Quality(replay_depth, reliable, transient_local)
 
 
-def create_publisher(node: Node, topic: str, name: str = "") -> Any:
-    """Return a publisher of a topic of the suite, as `name` if that is another.
+def create_publisher(node: Node, topic: str) -> Any:
+    """Return a publisher of one of the suite's topics.
 
-    Its quality can be overridden: `qos_overrides./topic.publisher.reliability`, `durability`, `depth`, `history`.
+    Parameters can override its quality: `qos_overrides./topic.publisher.reliability`,
+    `durability`, `depth`, `history`.
     """
     kind, quality = topic_entry(topic)
-    options = None if topic in OWN_QUALITY else QoSOverridingOptions(OVERRIDABLE)
+    options = None if topic in FIXED_QUALITY else QoSOverridingOptions(OVERRIDABLE)
     return node.create_publisher(
-        message_class(kind), name or topic, qos(quality), qos_overriding_options=options
+        message_class(kind), topic, qos(quality), qos_overriding_options=options
     )
 
 
 def create_frames_publisher(node: Node) -> Any:
-    """Return a publisher of /tf; None, which is said once, where tf2_msgs is not installed."""
+    """Return a publisher of /tf, or None with a warning if tf2_msgs is not installed."""
     try:
         return create_publisher(node, "/tf")
     except InputError as error:
@@ -124,21 +131,21 @@ def create_frames_publisher(node: Node) -> Any:
 def create_subscription(
     node: Node, topic: str, callback: Callable[..., None], quality: Quality | None = None
 ) -> Any:
-    """Subscribe, raw, to a topic of the suite, with its own quality of service or another."""
-    kind, own = topic_entry(topic)
+    """Subscribe, raw, to one of the suite's topics, with its declared quality or another one."""
+    kind, declared = topic_entry(topic)
     return node.create_subscription(
-        message_class(kind), topic, callback, qos(quality or own), raw=True
+        message_class(kind), topic, callback, qos(quality or declared), raw=True
     )
 
 
 def publish(node: Node, publisher: Any, data: bytes) -> None:
-    """Publish CDR bytes from any thread, if there is a publisher; no error if a signal has ended the node or its context."""
+    """Publish CDR bytes from any thread, unless the publisher is None or the node has ended."""
     try:
         if publisher is not None and node.context.ok():
             publisher.publish(data)
     except InvalidHandle:
         return  # the publisher was destroyed meanwhile
-    except RuntimeError:  # of rcl
+    except RuntimeError:  # rcl's
         if node.context.ok():
             raise
 
@@ -146,7 +153,7 @@ def publish(node: Node, publisher: Any, data: bytes) -> None:
 class Outputs:
     """The publishers of one node, which publish while it is active.
 
-    A message is published whole or not at all: once `deactivate` has returned nothing more is, whatever still runs.
+    Nothing is published after `deactivate` has returned, even by jobs that still run.
     """
 
     def __init__(self, node: Node) -> None:
@@ -155,7 +162,7 @@ class Outputs:
         self._lock = threading.RLock()
         self._active = False
         self._paces: dict[str, Pace] = {}
-        self._pacing = 0  # threads that do
+        self._pacing_count = 0  # threads inside `paced`
 
     def activate(self) -> None:
         """Publish from now on."""
@@ -167,10 +174,10 @@ class Outputs:
             self._active = False
 
     def advertise(self, topic: str) -> None:
-        """Offer a topic of the suite.
+        """Create the publisher of one of the suite's topics.
 
         Raises:
-            CancelledError: on the thread of a job that was abandoned.
+            CancelledError: on the thread of an abandoned job.
         """
         with self._lock:
             stop_if_abandoned()
@@ -178,10 +185,10 @@ class Outputs:
                 self._publishers[topic] = create_publisher(self._node, topic)
 
     def send(self, topic: str, data: bytes) -> None:
-        """Publish the CDR bytes of a topic of the suite, if the node is active.
+        """Publish CDR bytes on one of the suite's topics, if the node is active.
 
         Raises:
-            CancelledError: on the thread of a job that was abandoned.
+            CancelledError: on the thread of an abandoned job.
         """
         with self._lock:
             stop_if_abandoned()
@@ -190,10 +197,10 @@ class Outputs:
                 publish(self._node, self._publishers[topic], data)
 
     def publish(self, publisher: Any, data: bytes) -> None:
-        """Publish the CDR bytes of any other publisher of the node, if it is active.
+        """Publish CDR bytes with another publisher of the node, if the node is active.
 
         Raises:
-            CancelledError: on the thread of a job that was abandoned.
+            CancelledError: on the thread of an abandoned job.
         """
         with self._lock:
             stop_if_abandoned()
@@ -204,160 +211,155 @@ class Outputs:
     def paced(
         self, topics: Iterable[str], patience: float, report: Callable[[str, int], None]
     ) -> Iterator[None]:
-        """Let `send_paced` pace these topics inside; `report` is called with the topic and what its `Pace` reports.
+        """Let `send_paced` pace these topics inside; `report` gets the topic and the report of its `Pace`.
 
-        Several threads may pace the same topics, by one pace for each topic: that of the first one.
+        Several threads may pace the same topics; they share the paces of the first thread.
         """
         topics = tuple(topics)
         with self._lock:
             for topic in topics:
                 self.advertise(topic)
-                publisher = self._publishers[topic]
                 if topic not in self._paces:
-                    self._paces[topic] = Pace(
-                        publisher, publisher.qos_profile.depth, patience, partial(report, topic)
-                    )
-            self._pacing += 1
+                    publisher = self._publishers[topic]
+                    self._paces[topic] = Pace(publisher, patience, partial(report, topic))
+            self._pacing_count += 1
         try:
             yield
         finally:
             with self._lock:
-                self._pacing -= 1
-                for topic in topics if self._pacing == 0 else ():
+                self._pacing_count -= 1
+                for topic in topics if self._pacing_count == 0 else ():
                     self._paces.pop(topic).end()
 
     def send_paced(self, topic: str, data: bytes, stop: Callable[[], bool]) -> None:
-        """Publish as `send` does; on a topic that is paced, once its subscribers have room, or `stop` says so.
+        """Publish as `send` does; on a paced topic once its subscribers have room, or `stop` returns True.
 
-        Topics that are paced together take turns: on the last of them nodes of the same process are let take, too.
-        Not to be called on the executor's thread.
+        After the last of the topics that are paced together, the executor gets a turn, so that
+        nodes in this process can receive. Must not be called on the executor's thread.
 
         Raises:
-            CancelledError: on the thread of a job that was abandoned.
+            CancelledError: on the thread of an abandoned job.
         """
         if topic in self._paces:
             self._paces[topic].wait(lambda: stop() or not self._active)
             if topic == next(reversed(self._paces)):
-                let_others_take(self._node.executor, lambda: stop() or not self._active)
+                yield_to_executor(self._node.executor, lambda: stop() or not self._active)
         self.send(topic, data)
 
     def destroy(self) -> None:
-        """Destroy all publishers, and with them what late joiners would have got."""
+        """Destroy all publishers with their latched messages."""
         with self._lock:
             for topic in list(self._publishers):
                 self._node.destroy_publisher(self._publishers.pop(topic))
 
 
 class Pace:
-    """Counts what one publisher's subscribers may not have acknowledged yet."""
+    """Limits the messages of one publisher that its subscribers may not have acknowledged yet."""
 
-    def __init__(
-        self, publisher: Any, depth: int, patience: float, report: Callable[[int], None]
-    ) -> None:
-        """Begin.
+    def __init__(self, publisher: Any, patience: float, report: Callable[[int], None]) -> None:
+        """Start with everything acknowledged.
 
         Args:
             publisher: of rclpy.
-            depth: messages that it remembers.
             patience: seconds without acknowledgement after which its subscribers are not waited for; 0: always wait.
-            report: called when that happens with 0, and when all is acknowledged again, or at `end`, with the number of
+            report: called with 0 when that happens, and when all is acknowledged again, or at `end`, with the number of
                 messages that were published meanwhile.
         """
-        self._publisher, self._patience, self._report = publisher, patience, report
-        self._most = max(1, depth * 9 // 10)
-        self._open = 0  # messages since everything was acknowledged, or was waited for in vain
-        self._left = patience  # seconds that the next wait may take
-        self._alone = False  # a subscriber is not waited for
+        self._publisher = publisher
+        self._patience = patience
+        self._report = report
+        self._max_pending = max(1, publisher.qos_profile.depth * 9 // 10)
+        self._pending = 0  # messages since the last acknowledgement, or the last vain wait
+        self._next_wait_s = patience
+        self._ignoring = False  # whether a subscriber is not waited for
         self._unacknowledged = 0
 
     def wait(self, stop: Callable[[], bool]) -> None:
-        """Wait until one message more overwrites none that is on its way, or `stop` says so."""
-        if 8 * self._open >= self._most and self._acknowledged():
-            self._done()
-        deadline = monotonic() + self._left
-        while self._open >= self._most and not stop():
-            if self._acknowledged():
-                self._done()
+        """Wait until one more message overwrites no pending one, or `stop` returns True."""
+        if 8 * self._pending >= self._max_pending and self._is_acknowledged():
+            self._restart()
+        deadline = monotonic() + self._next_wait_s
+        while self._pending >= self._max_pending and not stop():
+            if self._is_acknowledged():
+                self._restart()
             elif self._patience and monotonic() >= deadline:
-                self._go_on()
+                self._stop_waiting()
             else:
                 sleep(POLL_S)
-        if self._alone:
+        if self._ignoring:
             self._unacknowledged += 1
-            sleep(PER_MESSAGE_S)
-        self._open += 1
+            sleep(UNPACED_PERIOD_S)
+        self._pending += 1
 
     def end(self) -> None:
-        """Say what is still unacknowledged of what was not waited for."""
-        if self._alone:
-            self._done()
+        """Report messages that are still unacknowledged."""
+        if self._ignoring:
+            self._restart()
 
-    def _go_on(self) -> None:
-        """Wait no more for now, and half as long the next time: twice `patience` in all."""
-        self._open, self._left = 0, 0.5 * self._left
-        if not self._alone:
-            self._alone = True
+    def _stop_waiting(self) -> None:
+        """Stop this wait, and halve the next one: all waits together take twice the patience."""
+        self._pending = 0
+        self._next_wait_s *= 0.5
+        if not self._ignoring:
+            self._ignoring = True
             self._report(0)
 
-    def _done(self) -> None:
-        unacknowledged, alone = self._unacknowledged, self._alone
-        self._open, self._unacknowledged, self._alone, self._left = 0, 0, False, self._patience
-        if alone:
+    def _restart(self) -> None:
+        unacknowledged = self._unacknowledged if self._ignoring else None
+        self._pending = 0
+        self._unacknowledged = 0
+        self._ignoring = False
+        self._next_wait_s = self._patience
+        if unacknowledged is not None:
             self._report(unacknowledged)
 
-    def _acknowledged(self) -> bool:
+    def _is_acknowledged(self) -> bool:
         with suppress(InvalidHandle):  # it was destroyed meanwhile
             return bool(self._publisher.wait_for_all_acked(Duration()))
         return True
 
 
 def own_topics(node: Node) -> list[str]:
-    """Return the full names of the topics that a node publishes and that are meant for one publisher."""
+    """Return the full names of a node's topics that only one node should publish."""
     names = {publisher.topic_name for publisher in list(node.publishers)}
-    return sorted(name for name in names if not name.endswith(SHARED))
+    return sorted(name for name in names if not name.endswith(SHARED_SUFFIXES))
 
 
-def others_on(node: Node, topic: str) -> list[str]:
-    """Return the full names of other nodes that publish a topic; the node's own if there is another one of that name.
-
-    The log player and the segmenter share `tracks`: one plays a log, the other publishes what streams have brought.
-    """
+def other_publishers(node: Node, topic: str) -> list[str]:
+    """Return the full names of other nodes that publish a topic, also of another node with the same name."""
     names = [
         f"{info.node_namespace.rstrip('/')}/{info.node_name}"
         for info in node.get_publishers_info_by_topic(topic)
     ]
-    own = node.get_fully_qualified_name()
-    if own in names:
-        names.remove(own)
-    partner = {"log_player": "segmenter", "segmenter": "log_player"}.get(node.get_name())
-    return sorted(
-        name
-        for name in names
-        if not (topic.endswith("/tracks") and name.rpartition("/")[2] == partner)
-    )
+    with suppress(ValueError):
+        names.remove(node.get_fully_qualified_name())
+    if topic.endswith("/tracks"):
+        partner = TRACKS_PARTNERS.get(node.get_name())
+        names = [name for name in names if name.rpartition("/")[2] != partner]
+    return sorted(names)
 
 
-def let_others_take(executor: Executor | None, stop: Callable[[], bool]) -> None:
-    """Wait until the executor has gone round once, where it serves other nodes, too: each subscription takes a message then.
+def yield_to_executor(executor: Executor | None, stop: Callable[[], bool]) -> None:
+    """Wait until an executor with several nodes has completed one round, in which each subscription receives.
 
-    In one process the worker would else outrun the executor's thread without end. Never called on that thread.
+    Otherwise the calling worker could outrun the executor's thread without end.
     """
     if executor is None or len(executor.get_nodes()) < 2:
         return
-    turned = threading.Event()
-    executor.create_task(turned.set)
-    while not turned.wait(POLL_S) and not stop():
+    completed = threading.Event()
+    executor.create_task(completed.set)
+    while not completed.wait(POLL_S) and not stop():
         pass
 
 
-def unacknowledged(node: Node, topic: str, count: int) -> str:
-    """Say in a sentence what `Pace` reported: that a topic's subscribers are not waited for any more, or what they may lack."""
+def acknowledgement_warning(node: Node, topic: str, count: int) -> str:
+    """Return the warning for a report of `Pace`: a subscriber is not waited for, or may lack `count` messages."""
     name = node.resolve_topic_name(topic)
     message = f"a subscriber of {name} acknowledges nothing; it is not waited for any more"
     if count:
         message = f"{count} messages of {name} were published without acknowledgement, a subscriber may lack them"
-    who = (
-        ", ".join(sorted({info.node_name for info in node.get_subscriptions_info_by_topic(name)}))
-        or "none any more"
+    subscribers = sorted({info.node_name for info in node.get_subscriptions_info_by_topic(name)})
+    return (
+        f"{message} (subscribers: {', '.join(subscribers) or 'none any more'}); end the subscriber "
+        "that hangs, or raise patience; a new subscriber gets the last 1000"
     )
-    return f"{message} (subscribers: {who}); see which one hangs, or raise patience; who joins anew gets the last 1000"

@@ -1,11 +1,12 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""gp_sampler: road, tracks, changepoints, fit and routes of one template in; checked `scenarios` and their `scenarios/info` out.
+"""gp_sampler: road, tracks, changepoints, fit and routes of one template in; checked `scenarios` and `scenarios/info` out.
 
-It generates when the inputs are complete, on the action `~/generate_scenarios`, and on the service `~/generate`. Their parameters
-are the node's own, valid for that request only, and `request`, the caller's name for it. /diagnostics says how far it is;
-`~/cancel_request` ends one, `~/cancel` all.
+It generates when the inputs are complete, for the action `~/generate_scenarios`, and for the
+service `~/generate`. Their parameters are the node's own, valid for that request only, and
+`request`, the caller's name for it. /diagnostics has the progress; `~/cancel_request` cancels one
+request, `~/cancel` all.
 """
 
 from collections.abc import Mapping
@@ -27,10 +28,10 @@ from scenario_gen.ros.common.requests import (
     OpenRequests,
 )
 from scenario_gen.ros.common.stage_node import Inputs, StageNode
-from scenario_gen.ros.common.topics import unacknowledged
+from scenario_gen.ros.common.topics import acknowledgement_warning
 from scenario_gen.types import tokens
 
-ENDS = ("road/entries", "road/exits")  # needed only for requests with start or end states
+ENDS = ("road/entries", "road/exits")  # only requests with start or end states need them
 
 
 class GpSampler(StageNode):
@@ -46,18 +47,14 @@ class GpSampler(StageNode):
         "method.validity",
     )
     OUTPUTS = ("scenarios", "scenarios/info", "markers")
-    THREADS = min(2, os.cpu_count() or 1)  # so that a small request need not wait for a large one
+    THREADS = min(2, os.cpu_count() or 1)  # a small request need not wait for a large one
 
     def __init__(self, namespace: str | None = None) -> None:
         super().__init__("gp_sampler", Config(), namespace)
-        paired = (
-            "tracks",
-            "changepoints",
-            "fit",
-            "fit/info",
-            *(("map",) if self.config.pair_map else ()),
-        )
-        self.inputs = Inputs(paired, () if self.config.pair_map else ("map",), (LANES,))
+        paired = ["tracks", "changepoints", "fit", "fit/info"]
+        unpaired = []
+        (paired if self.config.pair_map else unpaired).append("map")
+        self.inputs = Inputs(paired, unpaired, (LANES,))
         self._routes: set[str] = set()
         self._turn = threading.Lock()
         self._requests = OpenRequests(self)
@@ -65,81 +62,72 @@ class GpSampler(StageNode):
         self._goals = Goals(self, self._requests, action) if action else None
 
     def stopped(self) -> None:
-        """Forget the inputs: being latched, they come again."""
+        """Forget the inputs, which are latched and arrive again."""
         self.inputs.clear()
 
     def destroy_node(self) -> None:
-        """Withdraw the action, too."""
+        """Withdraw the action, then end the node."""
         if self._goals:
             self._goals.destroy()
         super().destroy_node()
 
     def update_diagnostics(self) -> None:
-        """Report how far the request at work is."""
+        """Report the progress of the running request."""
         super().update_diagnostics()
         self._requests.report()
 
     def received(self, topic: str, data: bytes) -> None:
-        """Generate when everything is there."""
+        """Generate when all inputs have arrived."""
         self.inputs.put(topic, data)
         if topic == "tracks":
             self._follow(data)
-        self._requests.look()
+        self._requests.check_waiting()
         config = self.config
-        if (
-            config.generate_on_input
-            and (topic not in ENDS or config.moves)
-            and not self.missing(config)
-        ):
+        if not config.generate_on_input or (topic in ENDS and not config.moves):
+            return
+        if not self.missing(config):
             messages = self.messages()
             self.work(
                 "inputs", lambda cancelled: self._generate_on_input(messages, config, cancelled)
             )
 
     def missing(self, config: Config) -> list[str]:
-        """The topics that a request still waits for."""
+        """Return the topics that a request waits for."""
         ends = ENDS if config.moves and config.pair_map else ()
         return self.inputs.missing() or [topic for topic in ends if topic not in self.messages()]
 
     def messages(self) -> dict[str, bytes]:
-        """The template's messages; entries, exits and lanes only if the fit was made with them."""
+        """Return the template's messages; entries, exits and lanes only if the fit was made with them."""
         messages = self.inputs.complete() or {}
         return {
-            t: data
-            for t, data in messages.items()
-            if t not in (*ENDS, LANES) or self.inputs.named("fit/info", t)
+            topic: data
+            for topic, data in messages.items()
+            if topic not in (*ENDS, LANES) or self.inputs.is_listed("fit/info", topic)
         }
 
     def _follow(self, tracks: bytes) -> None:
-        """Listen to the routes of the vehicles in the tracks, and no longer to those of others."""
-        wanted = {
-            vehicle_topic(name, "route")
-            for name in tokens(v.id for v in decode_tracks(tracks).vehicles)
-        }
-        self.inputs.forget(self._routes - wanted)
-        for topic in sorted(self._routes - wanted):
+        """Subscribe to the routes of the vehicles in the tracks, and no longer to others."""
+        names = tokens(vehicle.id for vehicle in decode_tracks(tracks).vehicles)
+        routes = {vehicle_topic(name, "route") for name in names}
+        self.inputs.forget(self._routes - routes)
+        for topic in sorted(self._routes - routes):
             self.ignore(topic)
-        self.inputs.expect(wanted)
-        self._routes = wanted
-        for topic in sorted(wanted):
+        self.inputs.expect(routes)
+        self._routes = routes
+        for topic in sorted(routes):
             self.listen(topic)
 
     def _generate_on_input(
         self, messages: Mapping[str, bytes], config: Config, cancelled: Cancelled
     ) -> None:
-        self.generate(
-            messages, self._requests.add(job="inputs", n_requested=config.count), config, cancelled
-        )
+        request = self._requests.add(job="inputs", n_requested=config.count)
+        self.generate(messages, request, config, cancelled)
 
-    def given_up(self, messages: Mapping[str, bytes], cancelled: Cancelled) -> str:
-        """Return why a request is given up; "" if it is not."""
-        return (
-            "given up: its inputs were replaced"
-            if self.inputs.replaced(messages)
-            else "cancelled"
-            if cancelled()
-            else ""
-        )
+    def stop_reason(self, messages: Mapping[str, bytes], cancelled: Cancelled) -> str:
+        """Return why a request has to stop, "" if it need not."""
+        if self.inputs.replaced(messages):
+            return "given up: its inputs were replaced"
+        return "cancelled" if cancelled() else ""
 
     def generate(
         self,
@@ -148,47 +136,45 @@ class GpSampler(StageNode):
         config: Config,
         cancelled: Cancelled,
     ) -> Answer | None:
-        """Sample, check and publish; the request's summary closes `scenarios/info`. None if it was given up before its end."""
+        """Sample, check and publish; the request's summary closes `scenarios/info`. None if it was stopped early."""
 
-        def stop() -> (
-            bool
-        ):  # also within a set, so that no scenario of an old map follows a new one
-            return bool(self.given_up(messages, cancelled))
+        def stop() -> bool:  # also within a set: no scenario on an old map follows a new map
+            return bool(self.stop_reason(messages, cancelled))
 
-        level, words, more = Level.WARN, "", dict[str, str]()
+        level = Level.WARN
+        message = ""
+        values: dict[str, str] = {}
         try:
             if stop():
                 return None
             self._requests.begin(request)
-            node, send = (
-                self.get_fully_qualified_name(),
-                partial(self.outputs.send_paced, stop=stop),
-            )
-            with self.outputs.paced(
-                self.OUTPUTS[:2], config.patience, partial(self._report_pace, request.name)
-            ):
+            report = partial(self._report_pace, request.name)
+            send = partial(self.outputs.send_paced, stop=stop)
+            with self.outputs.paced(self.OUTPUTS[:2], config.patience, report):
+                node = self.get_fully_qualified_name()
                 result, summary = answer_request(
                     messages, config, request, node, stop, send, self._turn
                 )
-            words = summary.status.message
+            message = summary.status.message
             if summary.cancelled:
-                words = f"{self.given_up(messages, cancelled)}: {words}"
+                message = f"{self.stop_reason(messages, cancelled)}: {message}"
                 return None
             level = summary.status.level
             return result, summary
         except Exception as error:
             if not stop():
-                level, words, more = Level.ERROR, str(error), {"error": type(error).__name__}
+                level = Level.ERROR
+                message = str(error)
+                values = {"error": type(error).__name__}
             raise
         finally:
-            self._requests.end(
-                request, level, words or self.given_up(messages, cancelled) or "cancelled", **more
-            )
+            message = message or self.stop_reason(messages, cancelled) or "cancelled"
+            self._requests.end(request, level, message, **values)
 
     def _report_pace(self, request: str, topic: str, count: int) -> None:
         self.status(
             Level.WARN,
-            unacknowledged(self, topic, count),
+            acknowledgement_warning(self, topic, count),
             f"pace of {topic}",
             request=request,
             count=str(count),

@@ -36,12 +36,12 @@ from scenario_gen.ros.common.diagnostics import NodeDiagnostics
 from scenario_gen.ros.common.ros_parameters import ConfigParameters
 from scenario_gen.ros.common.services import offer_trigger
 from scenario_gen.ros.common.topics import (
+    acknowledgement_warning,
     message_class,
     OVERRIDABLE,
     Pace,
     publish,
     qos,
-    unacknowledged,
 )
 
 STREAMED = BagConfig(
@@ -202,7 +202,7 @@ class Player(Node):  # type: ignore[misc]
     def _report_pace(self, topic: str, count: int) -> None:
         self.diagnostics.status(
             Level.WARN,
-            unacknowledged(self, topic, count),
+            acknowledgement_warning(self, topic, count),
             f"pace of {topic}",
             {"count": str(count)},
         )
