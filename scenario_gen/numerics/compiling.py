@@ -88,10 +88,10 @@ def _compile(missing: Sequence[Compilable], show: Callable[[], None]) -> None:
     queue, writer = os.pipe()
     try:
         # A session of their own keeps the terminal's Ctrl-C from them.
-        for _ in range(min(MAX_WORKERS_COUNT, len(missing))):
-            _workers.append(
-                subprocess.Popen(command, stdin=queue, env=environment, start_new_session=True)
-            )
+        _workers.extend(
+            subprocess.Popen(command, stdin=queue, env=environment, start_new_session=True)
+            for _ in range(min(MAX_WORKERS_COUNT, len(missing)))
+        )
         os.close(queue)
         with suppress(BrokenPipeError):  # all workers have ended
             for kernel in sorted(missing, key=lambda each: each.size, reverse=True):

@@ -69,10 +69,9 @@ class Curve:
         ends = self.at(np.array([-EXTENSION_M, self.length + EXTENSION_M]))
         line = np.vstack((ends[:1], self.points, ends[1:]))[:, :2]
         station = np.concatenate(([-EXTENSION_M], self.station, [self.length + EXTENSION_M]))
-        results = [np.zeros((2, 0))]
-        for first in range(0, len(xy), BATCH_POINTS):
-            results.append(_project(xy[first : first + BATCH_POINTS], line, station))
-        stations, offsets = np.concatenate(results, axis=1)
+        batches = (xy[first : first + BATCH_POINTS] for first in range(0, len(xy), BATCH_POINTS))
+        results = [_project(batch, line, station) for batch in batches]
+        stations, offsets = np.concatenate([np.zeros((2, 0)), *results], axis=1)
         return stations, offsets
 
     def reversed(self) -> "Curve":

@@ -51,10 +51,11 @@ class GpSampler(StageNode):
 
     def __init__(self, namespace: str | None = None) -> None:
         super().__init__("gp_sampler", Config(), namespace)
-        paired = ["tracks", "changepoints", "fit", "fit/info"]
-        unpaired = []
-        (paired if self.config.pair_map else unpaired).append("map")
-        self.inputs = Inputs(paired, unpaired, (LANES,))
+        paired = ("tracks", "changepoints", "fit", "fit/info")
+        if self.config.pair_map:
+            self.inputs = Inputs((*paired, "map"), optional=(LANES,))
+        else:
+            self.inputs = Inputs(paired, unpaired=("map",), optional=(LANES,))
         self._routes: set[str] = set()
         self._turn = threading.Lock()
         self._requests = OpenRequests(self)

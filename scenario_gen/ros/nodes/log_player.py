@@ -3,10 +3,11 @@
 
 """log_player: a log in, one of its encounters out as latched `tracks`; `~/play` reads it again.
 
-With `stream`, the encounter comes as every vehicle's own `vehicle_<id>/fix` and `vehicle_<id>/speed`, and `/clock`, instead.
+With `stream`, the encounter is published as `vehicle_<id>/fix` and `vehicle_<id>/speed` of each
+vehicle, and `/clock`, instead.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 import time
@@ -26,7 +27,9 @@ from scenario_gen.ros.common.services import offer_trigger
 from scenario_gen.ros.common.stage_node import StageNode
 from scenario_gen.types import Encounter, tokens
 
-HEAD_START_S = 1.0  # seconds in which listeners find the streams, which are not latched
+DISCOVERY_S = 1.0  # for subscribers to find the streams, which are not latched
+SUBSCRIBER_POLL_S = 0.05
+MAX_SLEEP_S = 0.1  # between two checks for cancellation
 
 
 @dataclass(frozen=True)
@@ -37,7 +40,7 @@ class Config(LogPlayerParameters):
 
 
 class LogPlayer(StageNode):
-    """Reads a log and publishes the encounter named by the parameters."""
+    """Publishes one encounter of a log."""
 
     OUTPUTS = ("tracks",)
 
@@ -46,7 +49,7 @@ class LogPlayer(StageNode):
         offer_trigger(self, "~/play", self._play_again)
 
     def started(self) -> None:
-        """Read the log, if one is named."""
+        """Read the log, if the parameters name one."""
         if self.config.log_path:
             self.work("play", self._play)
 
@@ -73,45 +76,46 @@ class LogPlayer(StageNode):
             self._stream(encounter, config, cancelled)
 
     def _stream(self, encounter: Encounter, config: Config, cancelled: Callable[[], bool]) -> None:
-        """Publish sample after sample, at the rate, until the end or until cancelled; the clock runs ahead of none."""
-        names, places = (
-            tokens(vehicle.id for vehicle in encounter.vehicles),
-            latitude_longitude(encounter),
-        )
+        """Publish sample after sample, each after its /clock, until the end or a cancellation."""
+        names = tokens(vehicle.id for vehicle in encounter.vehicles)
+        positions = latitude_longitude(encounter)
         clock = self.create_publisher(Clock, "/clock", 10)
-        topics = [vehicle_topic(name, kind) for name in names for kind in ("fix", "speed")]
-        for topic in topics:
-            self.outputs.advertise(topic)
-        while (
-            min(map(self.count_subscribers, topics)) < config.wait_matching_subscriptions
-            and not cancelled()
-        ):
-            time.sleep(0.05)
-        started = time.monotonic() + HEAD_START_S
+        self._wait_for_subscribers(names, config.wait_matching_subscriptions, cancelled)
+        started = time.monotonic() + DISCOVERY_S
         for k in range(encounter.speed.shape[1]):
-            while (
-                ahead := started + k * encounter.dt / config.rate - time.monotonic()
-            ) > 0.0 and not cancelled():
-                time.sleep(min(ahead, 0.1))
+            _sleep_until(started + k * encounter.dt / config.rate, cancelled)
             if cancelled() or not self.context.ok():
                 break
             stamp = encounter.start_ns + k * encounter.dt_ns
             self.outputs.publish(clock, encode_clock(stamp))
             for i, name in enumerate(names):
-                frame, (latitude, longitude) = f"vehicle_{name}", places[i, k].tolist()
-                self.outputs.send(
-                    vehicle_topic(name, "fix"), encode_fix(latitude, longitude, stamp, frame)
-                )
-                self.outputs.send(
-                    vehicle_topic(name, "speed"),
-                    encode_speed(float(encounter.speed[i, k]), stamp, frame),
-                )
+                frame = f"vehicle_{name}"
+                fix = encode_fix(*positions[i, k].tolist(), stamp, frame)
+                self.outputs.send(vehicle_topic(name, "fix"), fix)
+                speed = encode_speed(float(encounter.speed[i, k]), stamp, frame)
+                self.outputs.send(vehicle_topic(name, "speed"), speed)
         else:
             self.status(Level.OK, f"{encounter.name}: streamed", "stream", encounter.start_ns)
         self.destroy_publisher(clock)
+
+    def _wait_for_subscribers(
+        self, names: Sequence[str], count: int, cancelled: Callable[[], bool]
+    ) -> None:
+        """Advertise all streams, and wait until each has `count` subscribers."""
+        topics = [vehicle_topic(name, kind) for name in names for kind in ("fix", "speed")]
+        for topic in topics:
+            self.outputs.advertise(topic)
+        while min(map(self.count_subscribers, topics)) < count and not cancelled():
+            time.sleep(SUBSCRIBER_POLL_S)
 
     def _play_again(self) -> str:
         if not (self.active and self.config.log_path):
             raise InputError("parameter log_path is empty, or the node is not active")
         self.started()
         return "started"
+
+
+def _sleep_until(due: float, cancelled: Callable[[], bool]) -> None:
+    """Sleep until a time [s] on the monotonic clock, or a cancellation."""
+    while (remaining := due - time.monotonic()) > 0.0 and not cancelled():
+        time.sleep(min(remaining, MAX_SLEEP_S))

@@ -1,9 +1,10 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""planner: `map`, `tracks` and `changepoints` of one template in; `fit`, a `vehicle_<id>/route` each, and `fit/info` out.
+"""planner: `map`, `tracks` and `changepoints` of one template in; `fit`, each `vehicle_<id>/route` and `fit/info` out.
 
-`~/get_plan` (nav_msgs/GetPlan) plans on the newest map for anyone; a plan that cannot be is empty, and /diagnostics says why.
+`~/get_plan` (nav_msgs/GetPlan) plans on the newest map. An impossible plan is empty, and
+/diagnostics has the reason.
 """
 
 from collections.abc import Callable
@@ -40,7 +41,7 @@ from scenario_gen.ros.common.stage_node import Inputs, StageNode
 from scenario_gen.situation import Situation
 from scenario_gen.types import Road, tokens
 
-ROAD = ("map", "road/entries", "road/exits")
+ROAD_TOPICS = ("map", "road/entries", "road/exits")
 
 
 @dataclass(frozen=True)
@@ -62,33 +63,31 @@ class Config(Parameters):
 class Planner(StageNode):
     """Fits each template to the road and plans every vehicle's route between its changepoints."""
 
-    INPUTS = (*ROAD, LANES, "road/info", "tracks", "changepoints")
+    INPUTS = (*ROAD_TOPICS, LANES, "road/info", "tracks", "changepoints")
     STAGES = ("situation", "roads", "method.fitting", "method.routing")
     OUTPUTS = ("fit", "fit/info")
 
     def __init__(self, namespace: str | None = None) -> None:
         super().__init__("planner", Config(), namespace)
         self.create_service(GetPlan, "~/get_plan", self._get_plan, qos_profile=REQUESTS)
-        paired = self.config.pair_map
-        self._requests = 0
-        self.inputs = Inputs(
-            ("tracks", "changepoints", *(ROAD if paired else ())),
-            () if paired else ("map",),
-            (LANES,),
-        )
+        self._request_count = 0
+        paired = ("tracks", "changepoints")
+        if self.config.pair_map:
+            self.inputs = Inputs((*paired, *ROAD_TOPICS), optional=(LANES,))
+        else:
+            self.inputs = Inputs(paired, unpaired=("map",), optional=(LANES,))
 
     def stopped(self) -> None:
-        """Forget the inputs: being latched, they come again."""
+        """Forget the inputs, which are latched and arrive again."""
         self.inputs.clear()
 
     def received(self, topic: str, data: bytes) -> None:
-        """Plan when road, tracks and changepoints are those of one template."""
+        """Plan when road, tracks and changepoints of one template have arrived."""
         if topic in ("road/info", LANES) and not self.config.pair_map:
-            return  # a map server of the user's own does not say what belongs to its map
+            return  # another map server does not list the messages for its map
         self.inputs.put(topic, data)
-        messages = (
-            self.inputs.complete()
-        )  # if not all is there, the work on what was there is cancelled all the same
+        messages = self.inputs.complete()
+        # Incomplete inputs also replace, and so cancel, the work on the previous ones.
         self.work("plan", lambda _: self._plan(messages) if messages else None)
 
     def _plan(self, messages: dict[str, bytes]) -> None:
@@ -132,8 +131,8 @@ class Planner(StageNode):
         """Plan for a caller, off the executor's thread."""
         grid = self.inputs.get("map")
         stamp = Time.from_msg(request.start.header.stamp).nanoseconds
-        self._requests += 1
-        name = f"get_plan {self._requests}"
+        self._request_count += 1
+        name = f"get_plan {self._request_count}"
 
         def job(cancelled: Callable[[], bool]) -> bytes:
             try:
@@ -171,7 +170,7 @@ def query_of(request: Any, frame_id: str, radius: float) -> Query:
     """
     if not (math.isfinite(request.tolerance) and request.tolerance >= 0.0):
         raise InputError(f"tolerance is {request.tolerance}; it must be at least 0 m")
-    ends = []
+    points = []
     for name, stamped in (("start", request.start), ("goal", request.goal)):
         position = stamped.pose.position
         if stamped.header.frame_id not in ("", frame_id):
@@ -180,17 +179,17 @@ def query_of(request: Any, frame_id: str, radius: float) -> Query:
             )
         if not (math.isfinite(position.x) and math.isfinite(position.y)):
             raise InputError(f"{name} is not finite ({position.x}, {position.y})")
-        ends.append(np.array([position.x, position.y]))
-    return Query(ends[0], ends[1], radius)
+        points.append(np.array([position.x, position.y]))
+    return Query(*points, radius)
 
 
 def plan_poses(road: Road, query: Query, config: PlanningConfig, seed: int) -> Floats:
-    """Return (M, 3) x, y, yaw along the path found; the heading is that of the piece ahead.
+    """Return (M, 3) x [m], y [m], yaw [rad] along the planned path; each yaw is that of the next edge.
 
     Raises:
         RefusedError: the start or goal is blocked, there is no route, or the budget is spent.
     """
     path = plan_with_retry(make_planner(config), road, query, config.iterations, seed).path
-    ahead = np.diff(path, axis=0) if len(path) > 1 else np.zeros((1, 2))
-    heading = np.arctan2(ahead[:, 1], ahead[:, 0])
+    edges = np.diff(path, axis=0) if len(path) > 1 else np.zeros((1, 2))
+    heading = np.arctan2(edges[:, 1], edges[:, 0])
     return np.column_stack([path, np.append(heading, heading[-1])[: len(path)]])

@@ -3,10 +3,11 @@
 
 """player: a bag's messages as they were recorded, raw; `~/pause` and `~/resume`; any rosbag2 bag, MCAP or SQLite.
 
-Each topic is offered with the quality of service it was recorded with, or as `qos_overrides./topic.publisher.reliability` and the
-like say. With an offset, what latched topics had said before it is published first. With `clock`, the bag's time is published on
-/clock, so that nodes with `use_sim_time` follow it, in place of the bag's own /clock. When all is played and acknowledged the
-player ends, unless it is to `loop`, or to `stay` for who comes late to latched topics.
+Each topic has the quality of service of its recording, or the one that the parameters
+`qos_overrides./topic.publisher.reliability` and its siblings set. With an offset, the earlier
+messages of latched topics are published first. With `clock`, /clock has the bag's time for nodes
+with `use_sim_time`, in place of the bag's own /clock. The player ends when all is played and
+acknowledged, unless it is to `loop`, or to `stay` for late subscribers of latched topics.
 """
 
 from collections import deque
@@ -30,6 +31,7 @@ from msg_conventions.diagnostics import Level
 from msg_conventions.driving import encode_clock
 from scenario_gen.bags.storage.bag import bag_topics, BagMessage, read_messages
 from scenario_gen.bags.storage.config import BagConfig
+from scenario_gen.bags.storage.mcap import BagTopic
 from scenario_gen.base.errors import InputError, ScenarioGenError
 from scenario_gen.base.parameters import parameter, Parameters
 from scenario_gen.ros.common.diagnostics import NodeDiagnostics
@@ -44,11 +46,9 @@ from scenario_gen.ros.common.topics import (
     qos,
 )
 
-STREAMED = BagConfig(
-    most_bytes=2**62
-)  # a message is published and forgotten, so a bag may be of any size
-PATIENCE_S = 5.0  # seconds in which listeners have to take the last messages
-TICK_S = 0.01  # seconds between two clock messages
+UNBOUNDED = BagConfig(most_bytes=2**62)  # messages are published and dropped: any size will do
+END_PATIENCE_S = 5.0  # for subscribers to receive the last messages
+TICK_S = 0.01  # between two clock messages
 
 
 @dataclass(frozen=True)
@@ -60,19 +60,28 @@ class Config(Parameters):
     rate: float = parameter(
         1.0, "how many times as fast as it was recorded", low=0.01, high=1000.0
     )
-    start_offset: float = parameter(0.0, "begin so far into the bag", unit="s", low=0.0)
+    start_offset: float = parameter(0.0, "time in the bag at which to begin", unit="s", low=0.0)
     loop: bool = parameter(False, "begin again at the end")
     stay: bool = parameter(
-        False, "stay when all is played, so that latched topics reach who comes later, too"
+        False, "keep running at the end, so that late subscribers get latched topics"
     )
     paused: bool = parameter(False, "wait for ~/resume before the first message")
     clock: bool = parameter(False, "publish /clock")
     patience: float = parameter(
         60.0,
-        "wait so long for subscribers that acknowledge nothing, then go on and warn; 0: for ever",
+        "time without acknowledgement after which a subscriber is no longer waited for; 0: wait for ever",
         unit="s",
         low=0.0,
     )
+
+
+@dataclass(frozen=True)
+class Offered:
+    """A topic of the bag that is played: its publisher, and that publisher's pace."""
+
+    topic: BagTopic
+    publisher: Any
+    pace: Pace
 
 
 class Player(Node):  # type: ignore[misc]
@@ -82,17 +91,16 @@ class Player(Node):  # type: ignore[misc]
         super().__init__("player", namespace=namespace)
         self.parameters = ConfigParameters(self, Config())
         self.diagnostics = NodeDiagnostics(self, self._report_progress)
-        self._at: float | None = None  # seconds of the bag that have been played, while it is
+        self._elapsed: float | None = None  # seconds of the bag that have been played, while it is
         self.done = False
         self.exit_code = 0
         self._running = threading.Event()
         self._ended = threading.Event()
-        self._player: threading.Thread | None = None
-        self._offered: dict[str, tuple[Any, bool, int]] = {}
-        self._paces: dict[str, Pace] = {}
-        self._clock_publisher = (
-            self.create_publisher(Clock, "/clock", 10) if self.parameters.config.clock else None
-        )
+        self._thread: threading.Thread | None = None
+        self._offered: dict[str, Offered] = {}
+        self._clock_publisher = None
+        if self.parameters.config.clock:
+            self._clock_publisher = self.create_publisher(Clock, "/clock", 10)
         offer_trigger(self, "~/pause", partial(self._set_running, running=False))
         offer_trigger(self, "~/resume", partial(self._set_running, running=True))
 
@@ -105,44 +113,37 @@ class Player(Node):  # type: ignore[misc]
         config: Config = self.parameters.config
         if not config.bag:
             raise InputError("parameter bag is empty; name the bag to play")
-        for topic in bag_topics(Path(config.bag), STREAMED):
+        for topic in bag_topics(Path(config.bag), UNBOUNDED):
             name = topic.name if topic.name.startswith("/") else f"/{topic.name}"
-            if not re.fullmatch(config.topics, name) or (config.clock and name == "/clock"):
-                continue
-            try:
-                kind, quality = message_class(topic.type), qos(topic.quality)
-                publisher = self.create_publisher(
-                    kind, name, quality, qos_overriding_options=QoSOverridingOptions(OVERRIDABLE)
-                )
-                self._offered[topic.name] = (
-                    publisher,
-                    topic.quality.transient_local,
-                    topic.quality.depth,
-                )
-                self._paces[topic.name] = Pace(
-                    publisher,
-                    publisher.qos_profile.depth,
-                    config.patience,
-                    partial(self._report_pace, name),
-                )
-            except InputError as error:
-                self.diagnostics.status(
-                    Level.ERROR,
-                    f"{name} is not played: {error}",
-                    "topics",
-                    {"error": "InputError"},
-                )
+            if re.fullmatch(config.topics, name) and not (config.clock and name == "/clock"):
+                self._offer(topic, name, config.patience)
         if not self._offered:
             raise InputError(
                 f"{config.bag}: none of its topics can be played; see the messages above and the parameter topics"
             )
         if not config.paused:
             self._running.set()
-        self._player = threading.Thread(target=self._play, args=(config,), daemon=True)
-        self._player.start()
+        self._thread = threading.Thread(target=self._play, args=(config,), daemon=True)
+        self._thread.start()
+
+    def _offer(self, topic: BagTopic, name: str, patience: float) -> None:
+        """Create the publisher of a topic; an unknown type is reported."""
+        try:
+            publisher = self.create_publisher(
+                message_class(topic.type),
+                name,
+                qos(topic.quality),
+                qos_overriding_options=QoSOverridingOptions(OVERRIDABLE),
+            )
+        except InputError as error:
+            message = f"{name} is not played: {error}"
+            self.diagnostics.status(Level.ERROR, message, "topics", {"error": "InputError"})
+            return
+        pace = Pace(publisher, patience, partial(self._report_pace, name))
+        self._offered[topic.name] = Offered(topic, publisher, pace)
 
     def _play(self, config: Config) -> None:
-        self._at = config.start_offset
+        self._elapsed = config.start_offset
         try:
             while not self._ended.is_set():
                 self._play_once(config)
@@ -150,54 +151,49 @@ class Player(Node):  # type: ignore[misc]
                     break
             if self._ended.is_set():
                 return
-            self._at = None
+            self._elapsed = None
             self.diagnostics.status(Level.OK, f"{config.bag}: played", "playing", {})
         except ScenarioGenError as error:
-            self._at = None
-            self.diagnostics.status(
-                Level.ERROR, str(error), "playing", {"error": type(error).__name__}
-            )
+            self._elapsed = None
             self.exit_code = error.exit_code
+            values = {"error": type(error).__name__}
+            self.diagnostics.status(Level.ERROR, str(error), "playing", values)
         if not config.stay and not self._ended.is_set():
-            self._leave()
+            self._end_when_acknowledged()
 
-    def _leave(self) -> None:
-        """Let `run_nodes` end the node, once who listens has everything."""
-        for pace in self._paces.values():
-            pace.end()
-        deadline = monotonic() + PATIENCE_S
-        with suppress(InvalidHandle):  # the node is being ended already
-            for publisher, _, _ in self._offered.values():
-                while (
-                    not publisher.wait_for_all_acked(Duration())
-                    and monotonic() < deadline
-                    and not self._ended.wait(TICK_S)
-                ):
-                    pass
-        self.executor.create_task(
-            self._finish
-        )  # to wake the executor alone would not make it look
+    def _end_when_acknowledged(self) -> None:
+        """Let `run_nodes` end the node once the subscribers have all messages."""
+        for offered in self._offered.values():
+            offered.pace.end()
+        deadline = monotonic() + END_PATIENCE_S
+        with suppress(InvalidHandle):  # the node is ending already
+            for offered in self._offered.values():
+                while not offered.publisher.wait_for_all_acked(Duration()):
+                    if monotonic() >= deadline or self._ended.wait(TICK_S):
+                        break
+        self.executor.create_task(self._finish)  # waking the executor alone has no effect
 
     def _finish(self) -> None:
-        self.diagnostics.publish()  # how it went
+        self.diagnostics.publish()  # the result
         self.done = True
 
     def _play_once(self, config: Config) -> None:
-        first: int | None = None
+        first_ns: int | None = None
         elapsed = config.start_offset  # seconds of the bag that have been played
         for message in self._from_offset(config):
-            first = message.stamp_ns if first is None else first
-            elapsed = self._wait_until(
-                (message.stamp_ns - first) * 1e-9 + config.start_offset, elapsed, config, first
-            )
+            if first_ns is None:
+                first_ns = message.stamp_ns
+            due = (message.stamp_ns - first_ns) * 1e-9 + config.start_offset
+            elapsed = self._wait_until(due, elapsed, config, first_ns)
             if self._ended.is_set():
                 return
             self._publish(message.topic, message.data)
 
     def _publish(self, topic: str, data: bytes) -> None:
-        """Publish, once it overwrites nothing that is on its way; a replay may take longer than the recording for that."""
-        self._paces[topic].wait(self._ended.is_set)
-        publish(self, self._offered[topic][0], data)
+        """Publish once no pending message is overwritten; this may slow the replay down."""
+        offered = self._offered[topic]
+        offered.pace.wait(self._ended.is_set)
+        publish(self, offered.publisher, data)
 
     def _report_pace(self, topic: str, count: int) -> None:
         self.diagnostics.status(
@@ -208,17 +204,19 @@ class Player(Node):  # type: ignore[misc]
         )
 
     def _from_offset(self, config: Config) -> Iterator[BagMessage]:
-        """Yield the messages from the offset on; before the first, publish what latched topics hold by then."""
+        """Yield the messages after the offset; publish the last ones of latched topics before it first."""
         latched: dict[str, deque[bytes]] = {}
-        begin: int | None = None
+        begin_ns: int | None = None
         for message in read_messages(
-            Path(config.bag), lambda topic: topic in self._offered, STREAMED
+            Path(config.bag), lambda topic: topic in self._offered, UNBOUNDED
         ):
-            begin = message.stamp_ns if begin is None else begin
-            if message.stamp_ns - begin < config.start_offset * 1e9:
-                if self._offered[message.topic][1]:
-                    depth = self._offered[message.topic][2]
-                    latched.setdefault(message.topic, deque(maxlen=depth)).append(message.data)
+            if begin_ns is None:
+                begin_ns = message.stamp_ns
+            if message.stamp_ns - begin_ns < config.start_offset * 1e9:
+                quality = self._offered[message.topic].topic.quality
+                if quality.transient_local:
+                    kept = latched.setdefault(message.topic, deque(maxlen=quality.depth))
+                    kept.append(message.data)
                 continue
             for topic in list(latched):
                 for data in latched.pop(topic):
@@ -226,9 +224,9 @@ class Player(Node):  # type: ignore[misc]
             yield message
 
     def _wait_until(self, due: float, elapsed: float, config: Config, first_ns: int) -> float:
-        """Let the bag's time run, at `rate` and unless paused, from `elapsed` to `due` [s]; return where it stands."""
+        """Let the bag's time run from `elapsed` to `due` [s], at `rate` and unless paused; return the time reached."""
         while elapsed < due and not self._ended.is_set():
-            self._at = elapsed
+            self._elapsed = elapsed
             self._running.wait(TICK_S)
             started = monotonic()
             if self._running.is_set():
@@ -239,14 +237,14 @@ class Player(Node):  # type: ignore[misc]
         return max(elapsed, due) if elapsed < due + 1.0 else due
 
     def _report_progress(self) -> None:
-        """Say how far into the bag it is, each second."""
-        if (at := self._at) is not None:
-            message = f"{self.parameters.config.bag}: {at:.1f} s played" + (
-                "" if self._running.is_set() else ", paused"
-            )
-            self.diagnostics.status(
-                Level.OK, message, "playing", {"seconds": f"{at:.1f}"}, log=False
-            )
+        """Report the time in the bag, each second."""
+        elapsed = self._elapsed
+        if elapsed is None:
+            return
+        paused = "" if self._running.is_set() else ", paused"
+        message = f"{self.parameters.config.bag}: {elapsed:.1f} s played{paused}"
+        values = {"seconds": f"{elapsed:.1f}"}
+        self.diagnostics.status(Level.OK, message, "playing", values, log=False)
 
     def _publish_clock(self, stamp_ns: int) -> None:
         if self._clock_publisher is not None:
@@ -255,13 +253,16 @@ class Player(Node):  # type: ignore[misc]
     def _set_running(self, *, running: bool) -> str:
         if running == self._running.is_set():
             raise InputError("it is so already")
-        (self._running.set if running else self._running.clear)()
-        return "playing" if running else "paused"
+        if running:
+            self._running.set()
+            return "playing"
+        self._running.clear()
+        return "paused"
 
     def destroy_node(self) -> None:
         """End playing, then the node."""
         self._ended.set()
         self._running.set()
-        if self._player is not None:
-            self._player.join(PATIENCE_S)  # what it still says needs the node
+        if self._thread is not None:
+            self._thread.join(END_PATIENCE_S)  # its last reports need the node
         super().destroy_node()

@@ -3,9 +3,9 @@
 
 """segmenter: `tracks`, or the vehicles' streams, in; `changepoints` and `posterior` out; `~/segment` repeats it.
 
-While `vehicle_<id>/fix` and `vehicle_<id>/speed` come in, changepoints are published on `changepoints/live` as they are
-confirmed. At the end of the streams, or on `~/segment`, what was buffered is read as a log is, and published as `tracks`: for
-this node as for all others.
+While `vehicle_<id>/fix` and `vehicle_<id>/speed` arrive, confirmed changepoints are published on
+`changepoints/live`. At the end of the streams, or on `~/segment`, the buffered messages are read
+like a log and published as `tracks`, for this node and all others.
 """
 
 from collections.abc import Callable
@@ -37,7 +37,7 @@ from scenario_gen.types import Sample
 
 @dataclass(frozen=True)
 class Config(Parameters):
-    """The segmenter's parameters; `live`, `log` and `online` are for streams and take effect at the next activation."""
+    """The segmenter's parameters; `live`, `log` and `online` concern streams and apply from the next activation."""
 
     segmentation: SegmentationConfig = field(default_factory=SegmentationConfig)
     seed: int = parameter(0, "seed of the sampler", low=0)
@@ -47,7 +47,7 @@ class Config(Parameters):
 
 
 class Segmenter(StageNode):
-    """Finds the driving primitives of every encounter that it receives."""
+    """Segments every received encounter into driving primitives."""
 
     INPUTS = ("tracks",)
     STAGES = ("method.segmentation",)
@@ -57,24 +57,24 @@ class Segmenter(StageNode):
         super().__init__("segmenter", Config(), namespace)
         self._tracks: bytes | None = None
         self._live: LiveStreams | None = None
-        self._encounters = 0
+        self._encounter_count = 0
         offer_trigger(self, "~/segment", self._segment_again)
 
     def started(self) -> None:
-        """Look for streams."""
+        """Start to look for streams."""
         config = self.config
         if config.live.listen:
             self._online = LiveSegmenter(round(config.log.period * 1e9), config.online)
             self._live = LiveStreams(self, config.live, config.log, self._sampled, self._ended)
 
     def stopped(self) -> None:
-        """Look for streams no more."""
+        """Stop looking for streams."""
         if self._live is not None:
             self._live.close()
             self._live = None
 
     def received(self, topic: str, data: bytes) -> None:
-        """Segment the newest encounter, or go on with the one that comes in."""
+        """Segment an encounter, or add a message to its stream."""
         if topic == "tracks":
             self._tracks = data
             self.work("segment", lambda _: self._segment(data))
@@ -87,19 +87,19 @@ class Segmenter(StageNode):
         stop_if_cancelled()
         self.outputs.send("changepoints", encode_changepoints(encounter, segmentation))
         self.outputs.send("posterior", encode_posterior(encounter, segmentation))
-        status = segmentation_status(
-            segmentation, self.get_fully_qualified_name(), encounter.duration
-        )
+        node = self.get_fully_qualified_name()
+        status = segmentation_status(segmentation, node, encounter.duration)
         self.get_logger().info(status.message)
         self.diagnostics.report(status, stamp_ns=encounter.start_ns)
 
     def _sampled(self, sample: Sample) -> None:
-        if (found := self._online.push(sample)) is not None:
-            self.outputs.send("changepoints/live", encode_live_changepoints(found))
+        changepoints = self._online.push(sample)
+        if changepoints is not None:
+            self.outputs.send("changepoints/live", encode_live_changepoints(changepoints))
 
     def _ended(self, log: RawLog, config: LogConfig) -> None:
         """Read the buffered log as encounters, off the executor's thread."""
-        self._encounters += 1
+        self._encounter_count += 1
 
         def job(_: Callable[[], bool]) -> None:
             result = encounters_of(log, config)
@@ -110,11 +110,11 @@ class Segmenter(StageNode):
             self.status(Level.OK, message, "encounter", encounter.start_ns, **notes)
             self.outputs.send("tracks", encode_tracks(encounter))
 
-        self.work(f"encounter {self._encounters}", job)
+        self.work(f"encounter {self._encounter_count}", job)
 
     def _segment_again(self) -> str:
         if self._live is not None and self._live.end():
-            return "started with what the streams have brought so far"
+            return "started with the messages of the streams so far"
         if self._tracks is None or not self.active:
             raise InputError("no tracks yet, or the node is not active")
         self.received("tracks", self._tracks)
