@@ -31,7 +31,7 @@ from scenario_gen.closed_loop.tracking import of_twist
 from scenario_gen.closed_loop.trials import read_trials
 from scenario_gen.closed_loop.verdict import judge
 from scenario_gen.ros.common import planner_trials
-from scenario_gen.ros.common.driving import decode_command, FIRST_STAMP
+from scenario_gen.ros.common.driving import decode_command, FIRST_STAMP_NS
 from scenario_gen.types.ego import with_witness
 from scenario_gen.types.names import token
 from scenario_gen.types.scenario import EgoSlot
@@ -192,7 +192,8 @@ def test_whatever_is_wrong_with_the_ego_is_said_and_the_node_lives(traffic, clie
 
 
 @pytest.mark.parametrize(
-    ("stamp", "step"), [(0, 7), (FIRST_STAMP, 0), (FIRST_STAMP + 300_000_000, 3), (10**18, 7)]
+    ("stamp", "step"),
+    [(0, 7), (FIRST_STAMP_NS, 0), (FIRST_STAMP_NS + 300_000_000, 3), (10**18, 7)],
 )
 def test_a_stamp_of_the_drive_names_the_state_that_a_command_answers(stamp, step):
     run = hand_made_run()
@@ -231,7 +232,7 @@ def test_two_egos_and_a_late_one_are_said(traffic, client):
         other.destroy_node()
     ahead = (3.0, 0.0, 0.0, 0.0, 0.0, 0.0)
     stale = encode(
-        VELOCITY_STAMPED, stamp=FIRST_STAMP, frame_id="base_link", twist=ahead
+        VELOCITY_STAMPED, stamp=FIRST_STAMP_NS, frame_id="base_link", twist=ahead
     )  # of the drive's begin
     for _ in range(12):
         client.say("ego/cmd_vel_stamped", stale)
@@ -352,7 +353,7 @@ def test_a_planner_that_is_a_node_gets_the_verdicts_that_it_gets_in_process(
         for out in ("over_dds", "in_process")
     )
     assert over_dds["drives"] == in_process["drives"] and len(in_process["drives"]) == 2
-    monkeypatch.setattr(planner_trials, "SILENT_S", 1.0)
+    monkeypatch.setattr(planner_trials, "SILENCE_TIMEOUT_S", 1.0)
     for planner, more, said in (
         (f"{sys.executable} -c 'print(7)'", (), "ended with code 0; its last output: 7"),
         ("no_such_program", (), "No such"),

@@ -1,9 +1,10 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""doctor: what this suite misses in an environment; `ros2 doctor` looks at the network, the middleware and the QoS of topics.
+"""doctor: find what an environment lacks for this suite; `ros2 doctor` examines network, middleware and QoS.
 
-Only the standard library is imported, so `python -m scenario_gen.ros.common.doctor` also runs where the command cannot start.
+It imports only the standard library, so `python -m scenario_gen.ros.common.doctor` also runs
+where the command cannot start.
 """
 
 from collections.abc import Iterator, Mapping
@@ -16,38 +17,20 @@ import sys
 OK, WARNING, ERROR = "ok", "warning", "error"
 PYTHONS = ((3, 11), (3, 13))
 MODULES = (
-    *(
-        "numpy",
-        "scipy",
-        "numba",
-        "ompl",
-        "daqp",
-        "clarabel",
-        "mcap",
-        "rosbags",
-        "pandas",
-        "pyarrow",
-    ),
-    *("shapely", "PIL", "yaml", "jinja2", "typer", "rich"),
-)
+    "numpy", "scipy", "numba", "ompl", "daqp", "clarabel", "mcap", "rosbags", "pandas", "pyarrow",
+    "shapely", "PIL", "yaml", "jinja2", "typer", "rich",
+)  # fmt: skip
 INTERFACES = (
-    *(
-        "builtin_interfaces",
-        "diagnostic_msgs",
-        "geometry_msgs",
-        "lifecycle_msgs",
-        "nav_msgs",
-        "rcl_interfaces",
-        "rosgraph_msgs",
-    ),
-    *("sensor_msgs", "std_msgs", "std_srvs", "trajectory_msgs", "visualization_msgs"),
-)
-NODE = "import rclpy; rclpy.init(); rclpy.create_node('doctor'); print(rclpy.get_rmw_implementation_identifier())"
+    "builtin_interfaces", "diagnostic_msgs", "geometry_msgs", "lifecycle_msgs", "nav_msgs",
+    "rcl_interfaces", "rosgraph_msgs", "sensor_msgs", "std_msgs", "std_srvs", "trajectory_msgs",
+    "visualization_msgs",
+)  # fmt: skip
+NODE_PROGRAM = "import rclpy; rclpy.init(); rclpy.create_node('doctor'); print(rclpy.get_rmw_implementation_identifier())"
 
 
 @dataclass(frozen=True)
 class Finding:
-    """One thing looked at: `level` is "ok", "warning" or "error"; the message says what to do."""
+    """The result of one check: `level` is "ok", "warning" or "error"; the message has the remedy."""
 
     level: str
     subject: str
@@ -59,12 +42,15 @@ class Finding:
 
 
 def examine(environment: Mapping[str, str] | None = None) -> Iterator[Finding]:
-    """Yield the findings; variables are those of `environment`, this process's if None."""
+    """Yield the findings for an environment's variables, by default this process's."""
     environment = os.environ if environment is None else environment
     yield python(sys.version_info[:2])
     yield packages("packages", MODULES, "`make install`")
     if importlib.util.find_spec("rclpy") is None:
-        advice = "not here: everything works but the nodes and `demo --ros`. Source a Jazzy installation, or `make install`"
+        advice = (
+            "not here: everything works but the nodes and `demo --ros`. Source a Jazzy "
+            "installation, or `make install`"
+        )
         yield Finding(WARNING, "ROS 2", advice)
         return
     yield packages(
@@ -73,33 +59,32 @@ def examine(environment: Mapping[str, str] | None = None) -> Iterator[Finding]:
         "install ros-jazzy-common-interfaces, or source a Jazzy installation",
     )
     action = importlib.util.find_spec("scenario_gen_interfaces")
-    missing = "scenario_gen_interfaces is not built: gp_sampler has the service generate, and no action generate_scenarios"
-    yield Finding(
-        OK, "action", "scenario_gen_interfaces is here" if action and action.origin else missing
-    )
+    message = "scenario_gen_interfaces is here"
+    if not (action and action.origin):
+        message = "scenario_gen_interfaces is not built: gp_sampler has no action generate_scenarios, only the service"
+    yield Finding(OK, "action", message)
     run = subprocess.run(
-        [sys.executable, "-c", NODE],
+        [sys.executable, "-c", NODE_PROGRAM],
         capture_output=True,
         text=True,
         check=False,
         env=dict(environment),
     )
     if run.returncode:
-        why = next(
-            (line for line in reversed(run.stderr.splitlines()) if line.strip()),
-            "it does not say why",
-        )
-        yield Finding(ERROR, "ROS 2", f"no node starts: {why.strip()}")
+        lines = [line.strip() for line in run.stderr.splitlines() if line.strip()]
+        cause = lines[-1] if lines else "without an error message"
+        yield Finding(ERROR, "ROS 2", f"no node starts: {cause}")
     else:
         domain = environment.get("ROS_DOMAIN_ID") or "0"
-        further = "for the network and QoS see `ros2 doctor --report` and `ros2 doctor hello`"
-        yield Finding(
-            OK, "ROS 2", f"a node starts: {run.stdout.strip()}, domain {domain}; {further}"
+        message = (
+            f"a node starts: {run.stdout.strip()}, domain {domain}; for the network and QoS see "
+            "`ros2 doctor --report` and `ros2 doctor hello`"
         )
+        yield Finding(OK, "ROS 2", message)
 
 
 def python(version: tuple[int, ...]) -> Finding:
-    """Judge the version of Python."""
+    """Check the version of Python."""
     low, high, text = (".".join(map(str, numbers)) for numbers in (*PYTHONS, version))
     if PYTHONS[0] <= tuple(version) <= PYTHONS[1]:
         return Finding(OK, "Python", f"{text} in {sys.prefix}")
@@ -107,7 +92,7 @@ def python(version: tuple[int, ...]) -> Finding:
 
 
 def packages(subject: str, modules: tuple[str, ...], remedy: str) -> Finding:
-    """Say which modules cannot be found."""
+    """Check which modules are missing."""
     missing = [name for name in modules if importlib.util.find_spec(name) is None]
     if missing:
         return Finding(ERROR, subject, f"missing: {', '.join(missing)}; {remedy}")

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Between traffic and a planner under test: commands to the ego, arriving trials, messages of a drive."""
+"""Messages between traffic and a planner under test: commands to the ego, live trials, states of a drive."""
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
@@ -38,10 +38,10 @@ from scenario_gen.numerics import Floats
 from scenario_gen.types import Road
 
 INPUTS = ("ego/cmd_vel", "ego/cmd_vel_stamped", "ego/trajectory", "ego/path", "ego/odom")
-WAYS = ("ego/trajectory", "ego/path")  # their times say for when they are; they may be old
-FIRST_STAMP = (
-    1_000_000_000  # ns of a drive's clock at its start: a time of 0 means that none is known
-)
+TIMED_INPUTS = ("ego/trajectory", "ego/path")  # their points have times, so they may be old
+FIRST_STAMP_NS = 1_000_000_000  # a drive's clock at its start; ROS regards a time of 0 as unknown
+MAP_PERIOD_S = 0.2  # time of the drive between two local maps
+MAX_FAULTS_COUNT = 5  # in a verdict message
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,11 +49,11 @@ class EgoCommand:
     """A message that commands the ego.
 
     Attributes:
-        topic: where it came from.
-        step: of the state that it answers: by its stamp, on the drive's clock, else the last one when it came.
-        stamp_ns: its stamp [ns]; 0 if it has none.
+        topic: one of `INPUTS`.
+        step: the step of the state that it answers, by its stamp, or the last one at its arrival.
+        stamp_ns: its stamp on the drive's clock [ns]; 0 without one.
         at: returns the command for a state.
-        fault: why it does not count; "" if it does.
+        fault: why it is ignored, "" if it is not.
     """
 
     topic: str
@@ -63,28 +63,28 @@ class EgoCommand:
     fault: str = ""
 
     def fault_at(self, state: State, period: float, silence: float) -> str:
-        """Return why it does not count now, "" if it does: its fault, or that it is older than `silence` [s].
+        """Return why it is ignored in a state, "" if it is not: its fault, or its age.
 
         Args:
             state: the drive's last state.
-            period: seconds of a step.
-            silence: seconds after which a command is none.
+            period: duration of a step [s].
+            silence: largest age of a command [s].
         """
-        if self.fault or self.topic in WAYS:
+        if self.fault or self.topic in TIMED_INPUTS:
             return self.fault
-        old = (state.step - self.step) * period
+        age = (state.step - self.step) * period
         if self.stamp_ns:
-            old = max(old, stamp_of(state) * 1e-9 - self.stamp_ns * 1e-9)
-        return f"{self.topic}: the last command is {old:.1f} s old" if old > silence else ""
+            age = max(age, stamp_of(state) * 1e-9 - self.stamp_ns * 1e-9)
+        return f"{self.topic}: the last command is {age:.1f} s old" if age > silence else ""
 
 
 def stamp_of(state: State) -> int:
     """Return a state's time on the drive's clock [ns]."""
-    return FIRST_STAMP + round(state.time * 1e9)
+    return FIRST_STAMP_NS + round(state.time * 1e9)
 
 
 def decode_command(topic: str, data: bytes, loop: ClosedLoop, child: str, step: int) -> EgoCommand:
-    """Return the command of a message; a message that is damaged, or in another frame, has none, and a fault.
+    """Return the command in a message; a damaged message, or one in another frame, has a fault instead.
 
     Args:
         topic: one of `INPUTS`.
@@ -94,60 +94,70 @@ def decode_command(topic: str, data: bytes, loop: ClosedLoop, child: str, step: 
         step: the drive's last step.
     """
     try:
-        return _decoded(topic, data, loop, child, step)
+        if topic.startswith("ego/cmd_vel"):
+            return _decode_twist(topic, data, loop, child, step)
+        return _decode_motion(topic, data, loop, step)
     except ScenarioGenError as error:
         return EgoCommand(topic, step, 0, lambda _: None, str(error))
 
 
-def _decoded(topic: str, data: bytes, loop: ClosedLoop, child: str, step: int) -> EgoCommand:
-    period, frame, own = loop.config.step, loop.scenario.frame_id, (child, "base_link", "")
+def _answered_step(stamp_ns: int, step: int, period: float) -> int:
+    """Return the step that a stamp refers to, at most the last one; `step` without a stamp."""
+    if stamp_ns < FIRST_STAMP_NS:
+        return step
+    return min(step, round((stamp_ns - FIRST_STAMP_NS) * 1e-9 / period))
 
-    def answered(stamp_ns: int) -> int:
-        return (
-            min(step, round((stamp_ns - FIRST_STAMP) * 1e-9 / period))
-            if stamp_ns >= FIRST_STAMP
-            else step
-        )
 
-    if topic.startswith("ego/cmd_vel"):
-        stamp, given_frame, speed, rate = driving.decode_twist(
-            data, topic, stamped=topic.endswith("stamped")
-        )
-        if given_frame not in own and given_frame != frame:
-            raise InputError(
-                f"{topic}: frame {given_frame!r} is not the ego's; {', '.join(map(repr, own[:2]))} are"
-            )
-        return EgoCommand(
-            topic, answered(stamp), stamp, lambda state: of_twist(state.ego, speed, rate, period)
-        )
-    if topic in WAYS:
-        decode = (
-            driving.decode_trajectory if topic == "ego/trajectory" else driving.decode_timed_path
-        )
-        way = decode(data, topic)
-        stamp, given_frame = 0, way.frame_id
-        track = Track.of((way.time_ns - FIRST_STAMP) * 1e-9, way.poses)
+def _decode_twist(topic: str, data: bytes, loop: ClosedLoop, child: str, step: int) -> EgoCommand:
+    """Decode a Twist in the ego's frame or in that of the scenario."""
+    period = loop.config.step
+    stamped = topic == "ego/cmd_vel_stamped"
+    stamp, frame, speed, rate = driving.decode_twist(data, topic, stamped=stamped)
+    if frame not in (child, "base_link", "", loop.scenario.frame_id):
+        raise InputError(f"{topic}: frame {frame!r} is not the ego's; {child!r}, 'base_link' are")
+    return EgoCommand(
+        topic,
+        _answered_step(stamp, step, period),
+        stamp,
+        lambda state: of_twist(state.ego, speed, rate, period),
+    )
+
+
+def _decode_motion(topic: str, data: bytes, loop: ClosedLoop, step: int) -> EgoCommand:
+    """Decode timed poses, or the ego's pose, in the frame of the scenario."""
+    period = loop.config.step
+    stamp = 0
+    command: Callable[[State], Command | Pose | None]
+    if topic in TIMED_INPUTS:
+        decode = driving.decode_timed_path
+        if topic == "ego/trajectory":
+            decode = driving.decode_trajectory
+        motion = decode(data, topic)
+        frame = motion.frame_id
+        track = Track.of((motion.time_ns - FIRST_STAMP_NS) * 1e-9, motion.poses)
 
         def command(state: State) -> Command | Pose | None:
             return track.command(state.ego, state.time, period)
 
     else:
-        stamp, given_frame, _, state = decode_odometry(data, topic)
-        pose = Pose(*state[:4].tolist())
+        stamp, frame, _, values = decode_odometry(data, topic)
+        pose = Pose(*values[:4].tolist())
 
         def command(state: State) -> Command | Pose | None:
             return pose
 
-    if given_frame != frame:
-        raise InputError(f"{topic}: frame {given_frame!r} is not that of the scenario, {frame!r}")
-    return EgoCommand(topic, answered(stamp), stamp, command)
+    if frame != loop.scenario.frame_id:
+        raise InputError(
+            f"{topic}: frame {frame!r} is not that of the scenario, {loop.scenario.frame_id!r}"
+        )
+    return EgoCommand(topic, _answered_step(stamp, step, period), stamp, command)
 
 
 class ArrivingTrials:
-    """Makes trials of scenarios that arrive live, each on the road that its entry names."""
+    """Makes trials from live scenarios, each on the road that its entry names."""
 
     def __init__(self) -> None:
-        self._roads: dict[str, Road] = {}  # by the hash of their map
+        self._roads: dict[str, Road] = {}  # by the hashes of their maps
         self._scenarios = ArrivingScenarios()
 
     @property
@@ -155,8 +165,13 @@ class ArrivingTrials:
         """The number of messages that wait for their entry."""
         return self._scenarios.unmatched
 
-    def take(self, topic: str, data: bytes, ego: str) -> Iterator[Trial]:
-        """Take a map, or a message of a scenario; yield the trials that are complete by it, driven in the place of `ego`.
+    def receive(self, topic: str, data: bytes, ego: str) -> Iterator[Trial]:
+        """Receive a map, or a message of a scenario; yield the trials that it completes.
+
+        Args:
+            topic: of the message.
+            data: its CDR bytes.
+            ego: id of the vehicle that the ego replaces.
 
         Raises:
             ScenarioGenError: the message is damaged, or the scenario has no such vehicle.
@@ -165,95 +180,88 @@ class ArrivingTrials:
             self._roads[hash_of("map", data)] = decode_map(data)[1]
             return
         for entry, _, scenario in self._scenarios.take(topic, data):
-            name, road = f"{entry.request} {entry.index}", self._roads.get(entry.map_hash or "")
+            name = f"{entry.request} {entry.index}"
+            road = self._roads.get(entry.map_hash or "")
             yield trial_of(name, scenario, entry, road, ego, f"scenario {name}")
 
 
 def task_messages(loop: ClosedLoop, child: str) -> Iterator[tuple[str, bytes]]:
-    """Yield the ego's goal and route as CDR bytes, by topic; `child` is the ego's own frame."""
-    task, frame = loop.task(), loop.scenario.frame_id
-    stamps = np.full(len(task.route), FIRST_STAMP, dtype=np.int64)
-    yield "ego/goal", encode_state(task.goal, child, frame, FIRST_STAMP)
-    yield "ego/route", encode_path(task.route, stamps, frame, FIRST_STAMP)
-
-
-GRID_EVERY = 0.2  # seconds of the drive between two local maps
+    """Yield the ego's goal and route as CDR bytes, by topic; `child` is the ego's frame."""
+    task = loop.task()
+    frame = loop.scenario.frame_id
+    stamps = np.full(len(task.route), FIRST_STAMP_NS, dtype=np.int64)
+    yield "ego/goal", encode_state(task.goal, child, frame, FIRST_STAMP_NS)
+    yield "ego/route", encode_path(task.route, stamps, frame, FIRST_STAMP_NS)
 
 
 def encode_odometries(
     states: Sequence[State], children: Sequence[str], period: float, frame: str
 ) -> Iterator[tuple[int, bytes]]:
-    """Yield index and CDR bytes of the odometry of each vehicle that is there.
+    """Yield index and CDR bytes of the odometry of each present vehicle.
 
     Args:
         states: the drive's last two, or its first alone.
-        children: the vehicles' own frames.
-        period: seconds between the two states.
+        children: the vehicles' frames.
+        period: time between the two states [s].
         frame: of the scenario.
     """
     before, state = states[0], states[-1]
-    turned = (state.vehicles[:, 2] - before.vehicles[:, 2]) / period
+    yaw_rate = (state.vehicles[:, 2] - before.vehicles[:, 2]) / period
+    stamp = stamp_of(state)
     for i in np.flatnonzero(state.here).tolist():
-        yield (
-            i,
-            encode_odometry(
-                state.vehicles[i], float(turned[i]), children[i], frame, stamp_of(state)
-            ),
-        )
+        rate = float(yaw_rate[i])
+        yield i, encode_odometry(state.vehicles[i], rate, children[i], frame, stamp)
 
 
 def encode_predictions(loop: ClosedLoop, states: Sequence[State]) -> bytes:
-    """Return the others that are there as the CDR bytes of PredictedObjects.
+    """Return the present other vehicles as the CDR bytes of PredictedObjects.
 
-    Each one's predicted path is what it does if nothing changes: on its certified path, its clock at its present rate.
+    A predicted path continues the certified path with the clock at its present rate.
 
     Args:
         loop: the drive.
         states: its last two, or its first alone.
     """
-    state, known = states[-1], loop.world
+    state = states[-1]
+    world = loop.world
     others = [i for i in np.flatnonzero(state.here).tolist() if i != loop.ego]
-    ahead = np.arange(0.0, HORIZON_NS + 1.0, STEP_NS) * 1e-9
+    horizon = np.arange(0.0, HORIZON_NS + 1.0, STEP_NS) * 1e-9
     paths = []
     for i in others:
-        at = np.minimum(state.clock[i] + state.rate[i] * ahead, known.spans[i, 1])
-        paths.append(loop.scenario.at(at).poses[i])
+        time = np.minimum(state.clock[i] + state.rate[i] * horizon, world.spans[i, 1])
+        paths.append(loop.scenario.at(time).poses[i])
     objects = [loop.scenario.vehicles[i] for i in others]
+    values = _with_rates(loop, states)[others]
     return encode_predicted_objects(
-        objects, _rates(loop, states)[others], paths, loop.scenario.frame_id, stamp_of(state)
+        objects, values, paths, loop.scenario.frame_id, stamp_of(state)
     )
 
 
 def encode_ego(loop: ClosedLoop, states: Sequence[State]) -> bytes:
-    """Return the CDR bytes of the ego's Odometry as Autoware takes it, at its rear axle; arguments as above."""
+    """Return the CDR bytes of the ego's Odometry for Autoware, at its rear axle; arguments as above."""
     vehicle = loop.scenario.vehicles[loop.ego]
-    return encode_kinematic_state(
-        vehicle, _rates(loop, states)[loop.ego], loop.scenario.frame_id, stamp_of(states[-1])
-    )
+    values = _with_rates(loop, states)[loop.ego]
+    return encode_kinematic_state(vehicle, values, loop.scenario.frame_id, stamp_of(states[-1]))
 
 
-def _rates(loop: ClosedLoop, states: Sequence[State]) -> Floats:
-    """Return (N, 6) x, y [m], yaw [rad], speed [m/s], acceleration [m/s²], yaw rate [rad/s] of all."""
-    before, now = states[0].vehicles, states[-1].vehicles
-    return np.column_stack(
-        [
-            now,
-            (now[:, 3] - before[:, 3]) / loop.config.step,
-            (now[:, 2] - before[:, 2]) / loop.config.step,
-        ]
-    )
+def _with_rates(loop: ClosedLoop, states: Sequence[State]) -> Floats:
+    """Return (N, 6) x, y [m], yaw [rad], speed [m/s], acceleration [m/s²], yaw rate [rad/s] of all vehicles."""
+    before = states[0].vehicles
+    now = states[-1].vehicles
+    acceleration = (now[:, 3] - before[:, 3]) / loop.config.step
+    yaw_rate = (now[:, 2] - before[:, 2]) / loop.config.step
+    return np.column_stack([now, acceleration, yaw_rate])
 
 
 def encode_verdict(node: str, outcome: Outcome, stamp_ns: int) -> bytes:
-    """Return the CDR bytes of a verdict, with the first things that were wrong with the ego."""
+    """Return the CDR bytes of a verdict with the ego's first faults."""
     verdict = outcome.verdict
     values = {key: json.dumps(value) for key, value in verdict.document().items()}
     if outcome.drive.faults:
-        values["first_faults"] = json.dumps(outcome.drive.faults[:5])
+        values["first_faults"] = json.dumps(outcome.drive.faults[:MAX_FAULTS_COUNT])
     level = Level.OK if verdict.passed else Level.ERROR
-    return encode_diagnostics(
-        [Status(f"{node}: scenario {outcome.name}", level, verdict.sentence(), values)], stamp_ns
-    )
+    status = Status(f"{node}: scenario {outcome.name}", level, verdict.sentence(), values)
+    return encode_diagnostics([status], stamp_ns)
 
 
 def surroundings(
@@ -261,44 +269,45 @@ def surroundings(
     states: Sequence[State],
     names: Sequence[str],
     autoware: Sequence[str],
-    heard: Callable[[str], bool],
+    has_subscribers: Callable[[str], bool],
 ) -> Iterator[tuple[str, bytes]]:
     """Yield the messages of the last state, by topic; the ego's odometry comes last.
 
     Args:
         loop: the drive.
-        states: the last state, and the one before it if there is one.
+        states: the last state, and the previous one if there is one.
         names: tokens of the vehicles.
         autoware: Autoware's topics to publish.
-        heard: whether a topic has subscribers.
+        has_subscribers: returns whether a topic has any.
     """
-    state, frame = states[-1], loop.scenario.frame_id
-    stamp, children = stamp_of(state), tuple(f"vehicle_{name}" for name in names)
+    state = states[-1]
+    frame = loop.scenario.frame_id
+    stamp = stamp_of(state)
+    children = tuple(f"vehicle_{name}" for name in names)
     yield "/clock", driving.encode_clock(stamp)
+
     odometries = dict(encode_odometries(states, children, loop.config.step, frame))
-    own = odometries.pop(loop.ego)
+    ego_odometry = odometries.pop(loop.ego)
     for i, data in odometries.items():
         yield vehicle_topic(names[i], "odom"), data
-    here = np.flatnonzero(state.here)
-    yield (
-        "/tf",
-        encode_frames(
-            state.vehicles[here, :3], [children[i] for i in here.tolist()], frame, stamp
-        ),
-    )
-    if heard("traffic/markers"):
+
+    present = np.flatnonzero(state.here)
+    frames = [children[i] for i in present.tolist()]
+    yield "/tf", encode_frames(state.vehicles[present, :3], frames, frame, stamp)
+
+    if has_subscribers("traffic/markers"):
         vehicles = loop.scenario.vehicles
-        yield (
-            "traffic/markers",
-            vehicle_markers(vehicles, state.vehicles, state.here, loop.ego, frame, stamp),
-        )
-    every = max(round(GRID_EVERY / loop.config.step), 1)
-    if state.step % every == 0 and loop.road is not None and heard("traffic/local_map"):
+        markers = vehicle_markers(vehicles, state.vehicles, state.here, loop.ego, frame, stamp)
+        yield "traffic/markers", markers
+
+    map_steps = max(round(MAP_PERIOD_S / loop.config.step), 1)
+    is_due = state.step % map_steps == 0 and loop.road is not None
+    if is_due and has_subscribers("traffic/local_map"):
         grid = local_map(loop, state)
-        yield (
-            "traffic/local_map",
-            driving.encode_local_map(grid.blocked, grid.resolution, grid.origin, frame, stamp),
-        )
+        data = driving.encode_local_map(grid.blocked, grid.resolution, grid.origin, frame, stamp)
+        yield "traffic/local_map", data
+
     for topic in autoware:
-        yield topic, (encode_predictions if topic == OBJECTS else encode_ego)(loop, states)
-    yield vehicle_topic(names[loop.ego], "odom"), own
+        encode = encode_predictions if topic == OBJECTS else encode_ego
+        yield topic, encode(loop, states)
+    yield vehicle_topic(names[loop.ego], "odom"), ego_odometry

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""traffic for `scenario-gen drive --ros`: the node drives trial after trial in lock-step with a planner that is a node, too."""
+"""traffic for `scenario-gen drive --ros`: drives all trials in lock-step with a planner that is a node."""
 
 from collections.abc import Callable, Sequence
 from time import monotonic
@@ -19,64 +19,69 @@ from scenario_gen.ros.common.driving import INPUTS
 from scenario_gen.ros.common.node_parameters import TrafficParameters
 from scenario_gen.ros.nodes.traffic import Traffic
 
-START_S = 60.0  # seconds that a planner's node may take until it publishes commands
-SETTLE_S = 1.0  # seconds from its first publisher until it has found the topics that it listens to
-LAST_REPLY_S = 1.0  # to wait for a reply to a drive's last state, which would else count as a reply to the next drive's first
-SILENT_S = 30.0  # seconds without a command after which a planner's node hangs
-SEND_AGAIN_S = 2.0  # seconds without a reply after which a drive's first state is sent again, for a planner that started late
+START_TIMEOUT_S = 60.0  # until a planner's node publishes commands
+DISCOVERY_S = 1.0  # from its first publisher until it has found the topics that it subscribes to
+LAST_REPLY_S = (
+    1.0  # to wait for a reply to a drive's last state, which must not reach the next drive
+)
+SILENCE_TIMEOUT_S = 30.0  # without a command, after which a planner's node hangs
+REPEAT_PERIOD_S = 2.0  # without a reply, after which a drive's first state is sent again
+POLL_S = 0.05
 Progress = Callable[[int, int], None]
 
 
-class TrafficOfTrials(Traffic):
-    """Drives trials one after the other for `scenario-gen drive --ros`; each step waits for the planner's reply."""
+class TrialTraffic(Traffic):
+    """Drives trials one after the other; each step waits for the planner's reply."""
 
     def __init__(
         self, trials: Sequence[Trial], config: ClosedLoopConfig, progress: Progress
     ) -> None:
         super().__init__(config=TrafficParameters(lock_step=True, follow_on=False, drive=config))
-        self._trials, self._progress = list(trials), progress
-        self._sent: State | None = (
-            None  # the state that was published last, when [s], and how many times
-        )
-        self._sent_at, self._times_sent = 0.0, 0
+        self._trials = list(trials)
+        self._progress = progress
+        self._sent: State | None = None  # the last published state
+        self._sent_at = 0.0  # when it was published, on the steady clock [s]
+        self._sent_count = 0
 
     def _publish_state(self) -> None:
-        """Publish the last state; again only after `AGAIN`, because the planner may reply to each copy."""
-        now, state = monotonic(), self._states[-1]
+        """Publish the last state, the same one again only after a while, because the planner may reply to each copy."""
+        now = monotonic()
+        state = self._states[-1]
         if state is not self._sent:
-            self._sent, self._times_sent = state, 0
-        elif now < self._sent_at + SEND_AGAIN_S:
+            self._sent = state
+            self._sent_count = 0
+        elif now < self._sent_at + REPEAT_PERIOD_S:
             return
-        self._sent_at, self._times_sent = now, self._times_sent + 1
+        self._sent_at = now
+        self._sent_count += 1
         super()._publish_state()
 
     async def drive_all(self) -> None:
         """Drive all trials."""
         for number in range(len(self._trials)):
             self._load(number)
-            loop, began = self._loop, monotonic()
+            loop = self._loop
+            start = monotonic()
             await self._wait_for_command(self._states[-1], self.config.patience)
-            if self._times_sent > 1:
-                until = (
-                    monotonic() + LAST_REPLY_S
-                )  # each copy may get a reply, of which the last one counts
-                while monotonic() < until:
-                    await self._next_command(until)
+            if self._sent_count > 1:  # each copy may get a reply, of which the last one counts
+                deadline = monotonic() + LAST_REPLY_S
+                while monotonic() < deadline:
+                    await self._next_command(deadline)
             while loop is not None and not self._verdict:
                 await self._step_once(loop)
-                self._refuse_hanging(self._trials[number], began)
+                self._check_time(self._trials[number], start)
             self._progress(number + 1, len(self._trials))
             await self._wait_for_command(self._states[-1], LAST_REPLY_S)
 
-    def _refuse_hanging(self, trial: Trial, began: float) -> None:
-        """Raise InputError if a drive that `began` then takes too long, or nothing has come of the planner for too long."""
+    def _check_time(self, trial: Trial, start: float) -> None:
+        """Raise InputError if a drive with that start [s] takes too long, or the planner is silent for too long."""
         now = monotonic()
-        if now - began > self.config.drive.drive_time:
+        if now - start > self.config.drive.drive_time:
             raise too_long(trial, self.config.drive)
-        if now - max(began, self._heard_at) > SILENT_S:
+        if now - max(start, self._last_reply_at) > SILENCE_TIMEOUT_S:
             raise InputError(
-                f"scenario {trial.name}: the planner's node has sent no command for {SILENT_S:.0f} s: it hangs, or does not "
-                "answer each odometry of the ego with one command"
+                f"scenario {trial.name}: the planner's node has sent no command for {SILENCE_TIMEOUT_S:.0f} s: it hangs, "
+                "or does not answer each odometry of the ego with one command"
             )
 
 
@@ -87,7 +92,7 @@ def drive_trials(
     planner: str,
     check: Callable[[], None],
 ) -> list[Outcome]:
-    """Drive a planner that is a node through every trial, in lock-step; return the outcomes in the trials' order.
+    """Drive a planner's node through every trial, in lock-step; return the outcomes in the trials' order.
 
     Args:
         trials: scenarios, each with an ego and a road.
@@ -101,28 +106,17 @@ def drive_trials(
     """
     rclpy.init(args=[], signal_handler_options=SignalHandlerOptions.NO)
     try:
-        node, executor = TrafficOfTrials(trials, config, progress), SingleThreadedExecutor()
+        node = TrialTraffic(trials, config, progress)
+        executor = SingleThreadedExecutor()
         executor.add_node(node)
         try:
-            until = monotonic() + START_S
-            while not node.commanding():
-                check()
-                if monotonic() > until:
-                    raise InputError(
-                        f"--planner {planner}: no command from it in {START_S:.0f} s; it must publish one of {', '.join(INPUTS)} "
-                        "(docs/closed_loop.md)"
-                    )
-                executor.spin_once(timeout_sec=0.05)
-            until = monotonic() + SETTLE_S
-            while monotonic() < until:
-                executor.spin_once(timeout_sec=0.05)
+            _wait_for_planner(node, executor, planner, check)
             with saying_what_was_before(node.outcomes):
                 task = executor.create_task(node.drive_all)
                 while not task.done():
                     check()
-                    executor.spin_once(
-                        timeout_sec=1.0
-                    )  # spin_until_future_complete of rclpy 7.1 leaves a task for each look
+                    # rclpy's spin_until_future_complete (7.1) leaves a task behind at each call.
+                    executor.spin_once(timeout_sec=1.0)
                 task.result()
             return node.outcomes
         finally:
@@ -130,3 +124,24 @@ def drive_trials(
             executor.shutdown(timeout_sec=1.0)
     finally:
         rclpy.try_shutdown()
+
+
+def _wait_for_planner(
+    node: TrialTraffic,
+    executor: SingleThreadedExecutor,
+    planner: str,
+    check: Callable[[], None],
+) -> None:
+    """Wait until the planner publishes commands and has found the topics that it subscribes to."""
+    deadline = monotonic() + START_TIMEOUT_S
+    while not node.commanding_nodes():
+        check()
+        if monotonic() > deadline:
+            raise InputError(
+                f"--planner {planner}: no command from it in {START_TIMEOUT_S:.0f} s; it must publish one of "
+                f"{', '.join(INPUTS)} (docs/closed_loop.md)"
+            )
+        executor.spin_once(timeout_sec=POLL_S)
+    deadline = monotonic() + DISCOVERY_S
+    while monotonic() < deadline:
+        executor.spin_once(timeout_sec=POLL_S)

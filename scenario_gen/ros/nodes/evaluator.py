@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""evaluator: `tracks`, `changepoints` and the `scenarios` of a request in; its figures out as `report`."""
+"""evaluator: `tracks`, `changepoints` and the `scenarios` of a request in; its metrics out as `report`."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -20,45 +20,39 @@ from scenario_gen.base.errors import InputError
 from scenario_gen.base.parameters import parameter, Parameters
 from scenario_gen.method.evaluation import evaluate_scenarios, EvaluationConfig
 from scenario_gen.ros.common.stage_node import StageNode
-from scenario_gen.types import (
-    Note,
-    NoteKind,
-    WITH,
-)
+from scenario_gen.types import Evaluation, Row, WITH
 
-Entries = Sequence[
-    tuple[bytes, ScenarioEntry]
-]  # scenarios, each with its entry of `scenarios/info`
+Entries = Sequence[tuple[bytes, ScenarioEntry]]
+"""Scenarios with their entries in `scenarios/info`."""
 SCENARIOS = ("scenarios", INFO)
-SETTLED_S = (
-    5.0  # seconds without messages after which a closed request's missing messages are reported
-)
+QUIET_S = 5.0  # without messages, after which a closed request's missing ones are reported
+REPORT_CHECK_S = 1.0
 
 
 @dataclass(frozen=True)
 class Config(Parameters):
     """The evaluator's parameters."""
 
-    seed: int = parameter(0, "seed of the bootstrap, and of the choice of what is measured", low=0)
+    seed: int = parameter(0, "seed of the bootstrap, and of the choice of scenarios", low=0)
     measured: int = parameter(
         1000,
-        "scenarios of a request that are measured, chosen by the seed where it has more",
+        "scenarios of a request that are measured; of more the seed chooses these",
         low=1,
         high=1000,
     )
     keep: int = parameter(
         3000,
-        "scenarios kept of requests that are not whole yet; the oldest requests are given up",
+        "scenarios stored for incomplete requests; the oldest requests are dropped",
         low=1,
     )
     wait: int = parameter(
-        100, "closed requests that wait for scenarios on their way; older ones are given up", low=1
+        100, "closed requests that wait for missing scenarios; older ones are dropped", low=1
     )
     evaluation: EvaluationConfig = field(default_factory=EvaluationConfig)
 
 
 class Evaluator(StageNode):
-    """Measures every request's scenarios against their template once the request is closed."""
+    """Measures each closed request's scenarios against their template."""
 
     INPUTS = ("tracks", "changepoints")
     STAGES = ("situation", "method.evaluation")
@@ -68,17 +62,17 @@ class Evaluator(StageNode):
         super().__init__("evaluator", Config(), namespace)
         self._newest: dict[str, bytes] = {}
         self._requests = RequestTracker()
-        self._news = math.inf  # when something of scenarios came last
-        self.create_timer(1.0, self._report_missing)
+        self._last_message = math.inf  # time of the last message [s]
+        self.create_timer(REPORT_CHECK_S, self._report_missing)
 
     def started(self) -> None:
-        """Listen to scenarios so that who paces them waits for this node."""
+        """Subscribe to scenarios with a quality for which paced publishers wait."""
         self._requests = RequestTracker(self.config.keep)
         for topic in SCENARIOS:
             self.listen(topic, MANY_HEARD)
 
     def received(self, topic: str, data: bytes) -> None:
-        """Keep what comes, and evaluate a request when all of it is there."""
+        """Store a message, and evaluate each request that is complete."""
         if topic == "scenarios":
             self._keep(self._requests.add_scenario(digest(data), data))
         elif topic == INFO:
@@ -86,8 +80,8 @@ class Evaluator(StageNode):
                 self._keep(self._requests.add_info(info))
         else:
             self._newest[topic] = data
-        self._news = monotonic()
-        self._give_up()
+        self._last_message = monotonic()
+        self._drop_excess()
         if not {"tracks", "changepoints"} <= set(self._newest):
             return
         for name, request in list(self._requests.open.items()):
@@ -100,20 +94,20 @@ class Evaluator(StageNode):
             request, entry, data = match
             request.keep(entry, data, self.config.seed, self.config.measured)
 
-    def _give_up(self) -> None:
-        """Forget the oldest requests while more of them wait, or more scenarios of them are there, than are kept."""
+    def _drop_excess(self) -> None:
+        """Drop the oldest requests above the limits of closed requests and of stored scenarios."""
         requests = self._requests.open
         closed = [name for name, request in requests.items() if request.summary]
         for name in closed[: max(0, len(closed) - self.config.wait)]:
-            self._forget(name)
-        while (
-            len(requests) > 1
-            and sum(len(request.kept) for request in requests.values()) > self.config.keep
-        ):
-            self._forget(next(iter(requests)))
+            self._drop(name)
+        while len(requests) > 1:
+            stored = sum(len(request.kept) for request in requests.values())
+            if stored <= self.config.keep:
+                break
+            self._drop(next(iter(requests)))
 
-    def _forget(self, request: str) -> None:
-        """Give up a request, and report its missing messages."""
+    def _drop(self, request: str) -> None:
+        """Drop a request, and report its missing messages."""
         message = self._requests.open[request].sentence()
         self._requests.forget(request)
         self.status(
@@ -124,21 +118,17 @@ class Evaluator(StageNode):
         )
 
     def _report_missing(self) -> None:
-        """Say what has not come of closed requests, once all is quiet."""
-        if monotonic() - self._news < SETTLED_S or not self.active:
+        """Report the missing messages of closed requests, once no more arrive."""
+        if monotonic() - self._last_message < QUIET_S or not self.active:
             return
-        self._news = math.inf
+        self._last_message = math.inf
         for request in self._requests.incomplete(closed=True):
-            why = "they were lost, or published before this node listened; it is not evaluated without them"
-            self.status(
-                Level.WARN,
-                f"{request.sentence()}: {why}",
-                "requests",
-                missing=str(request.missing),
-            )
+            message = f"{request.sentence()}: they were lost, or published before this node listened; it is not evaluated"
+            self.status(Level.WARN, message, "requests", missing=str(request.missing))
 
     def _submit(self, messages: Mapping[str, bytes], request: TrackedRequest) -> None:
-        name, summary = f"request {request.request}", request.summary
+        name = f"request {request.request}"
+        summary = request.summary
         if summary is None or summary.cancelled:
             return
         scenarios = request.in_order()
@@ -158,48 +148,39 @@ class Evaluator(StageNode):
             raise InputError(
                 f"request {summary.request}: its scenarios are not those of the newest tracks"
             )
-        found = summary.result(tuple(scenario for _, scenario in decoded))
+        result = summary.result(tuple(scenario for _, scenario in decoded))
         evaluation = evaluate_scenarios(
             encounter,
-            {WITH: found},
+            {WITH: result},
             changepoints=len(segmentation.changepoints),
             config=self.config.evaluation,
             seed=self.config.seed,
         )
         stop_if_cancelled()
-        statuses = []
-        chosen = Note.of(
-            NoteKind.RANDOM_SUBSET,
-            measured=len(decoded),
-            total=summary.published,
-            seed=self.config.seed,
-        )
-        for row in evaluation.rows:
-            figures = {
-                key: repr(entry.value)
-                for key, entry in row.values.items()
-                if math.isfinite(entry.value)
-            }
-            k = str(evaluation.changepoints)  # beside E always: more changepoints always lower it
-            values = {
-                "request": summary.request,
-                "samples": str(row.samples),
-                "changepoints": k,
-                **figures,
-            }
-            notes = (
-                (*row.notes, chosen)
-                if row.name == WITH and len(decoded) < summary.published
-                else row.notes
-            )
-            statuses.append(
-                Status(
-                    f"{self.get_fully_qualified_name()}: {row.name}",
-                    Level.OK,
-                    "; ".join(map(str, notes)),
-                    values,
-                )
-            )
+        statuses = [
+            self._row_status(row, evaluation, summary, len(decoded)) for row in evaluation.rows
+        ]
         self.outputs.send("report", encode_diagnostics(statuses, encounter.start_ns))
         self.diagnostics.resolve("requests")
         self.get_logger().info(f"request {summary.request} evaluated: {len(decoded)} scenarios")
+
+    def _row_status(
+        self, row: Row, evaluation: Evaluation, summary: RequestSummary, measured: int
+    ) -> Status:
+        """Return the status for one row of the evaluation."""
+        values = {
+            "request": summary.request,
+            "samples": str(row.samples),
+            # beside E, which more changepoints always lower
+            "changepoints": str(evaluation.changepoints),
+        }
+        for key, entry in row.values.items():
+            if math.isfinite(entry.value):
+                values[key] = repr(entry.value)
+        notes = list(row.notes)
+        if row.name == WITH and measured < summary.published:
+            notes.append(
+                f"measured on {measured} of {summary.published} scenarios, chosen by seed {self.config.seed}"
+            )
+        name = f"{self.get_fully_qualified_name()}: {row.name}"
+        return Status(name, Level.OK, "; ".join(notes), values)

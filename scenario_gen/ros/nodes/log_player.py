@@ -90,7 +90,8 @@ class LogPlayer(StageNode):
             self.outputs.publish(clock, encode_clock(stamp))
             for i, name in enumerate(names):
                 frame = f"vehicle_{name}"
-                fix = encode_fix(*positions[i, k].tolist(), stamp, frame)
+                latitude, longitude = positions[i, k].tolist()
+                fix = encode_fix(latitude, longitude, stamp, frame)
                 self.outputs.send(vehicle_topic(name, "fix"), fix)
                 speed = encode_speed(float(encounter.speed[i, k]), stamp, frame)
                 self.outputs.send(vehicle_topic(name, "speed"), speed)

@@ -180,7 +180,7 @@ def query_of(request: Any, frame_id: str, radius: float) -> Query:
         if not (math.isfinite(position.x) and math.isfinite(position.y)):
             raise InputError(f"{name} is not finite ({position.x}, {position.y})")
         points.append(np.array([position.x, position.y]))
-    return Query(*points, radius)
+    return Query(points[0], points[1], radius)
 
 
 def plan_poses(road: Road, query: Query, config: PlanningConfig, seed: int) -> Floats:

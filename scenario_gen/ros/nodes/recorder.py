@@ -1,21 +1,21 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""recorder: any topics of any type, as raw CDR, to a bag; `~/start` and `~/stop` begin and end one.
+"""recorder: topics of any type, as raw CDR, to a bag; `~/start` and `~/stop` begin and end one.
 
-What a publisher offers decides how it is subscribed, so latched topics are recorded from late on too. Messages are logged at the
-time they arrive. The bag is closed on `~/stop`, on Ctrl-C and on SIGTERM; a killed recorder loses what came in its last seconds.
-What is not recorded is said: on the terminal, on /diagnostics and in metadata.yaml. What is at the bag's place already is never
-touched. Where the disk is full recording ends with an error on /diagnostics; what was written stays, for `scenario-gen reindex`.
+Subscriptions adopt the publishers' quality of service, so latched messages are recorded late, too.
+A message's log time is its arrival. `~/stop`, Ctrl-C and SIGTERM close the bag; a killed recorder
+loses the messages of its last seconds. Messages that are not recorded are reported on the
+terminal, on /diagnostics and in metadata.yaml. Existing files are never overwritten. On a full
+disk the recording ends with an error on /diagnostics, and the written part stays for
+`scenario-gen reindex`.
 """
 
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
-from functools import partial
 from pathlib import Path
 import re
-import sys
 from time import monotonic
 from typing import Any
 
@@ -23,7 +23,7 @@ from rclpy.event_handler import SubscriptionEventCallbacks
 from rclpy.node import Node
 from rclpy.time import Time
 
-from msg_conventions.diagnostics import Level
+from msg_conventions.diagnostics import Level, Subject
 from scenario_gen.bags.recordings.losses import Losses, remedy
 from scenario_gen.bags.storage.metadata import qos_yaml
 from scenario_gen.bags.storage.writer import BagWriter, Split
@@ -34,11 +34,12 @@ from scenario_gen.ros.common.ros_parameters import ConfigParameters
 from scenario_gen.ros.common.services import offer_trigger
 from scenario_gen.ros.common.topics import adapted_quality, message_class, qos
 
-REST_S = 30.0  # seconds that are taken at most, at the end, for what has arrived
-AT_ONCE = 50  # messages of a topic, before others have their turn
-HELD_S = 4.0  # seconds after which what came is written, whole chunk or not
-OF_ALL = r"diagnostics|clock|tf|tf_static"  # of a whole ROS domain, whatever the namespace
-OF_A_SUITE = (
+DRAIN_S = 30.0  # at most, at the end, for messages that have arrived
+BATCH_MESSAGES = 50  # of one topic, before others have their turn
+FLUSH_PERIOD_S = 4.0  # after which an incomplete chunk is written
+LOOK_PERIOD_S = 0.1  # between two looks for new topics
+DOMAIN_TOPICS = r"diagnostics|clock|tf|tf_static"  # of a whole ROS domain, in any namespace
+SUITE_TOPICS = (
     r"map|road/(entries|exits|info|lanes|markings)|"
     r"tracks|changepoints(/live)?|posterior|fit(/info)?|vehicle_\w+/(route|footprint|fix|speed)"
     r"|ego/(start|goal|witness)|scenarios(/info)?|markers|report"
@@ -46,8 +47,9 @@ OF_A_SUITE = (
 
 
 def default_topics(namespace: str) -> str:
-    """Return the regular expression of the topics of the suites in a namespace, and of what they share with all."""
-    return rf"{re.escape(namespace.rstrip('/'))}(/.*)?/({OF_A_SUITE}|{OF_ALL})|/({OF_ALL})"
+    """Return the regular expression of the suites' topics in a namespace and of the domain's topics."""
+    prefix = re.escape(namespace.rstrip("/"))
+    return rf"{prefix}(/.*)?/({SUITE_TOPICS}|{DOMAIN_TOPICS})|/({DOMAIN_TOPICS})"
 
 
 @dataclass(frozen=True)
@@ -64,9 +66,9 @@ class Config(RecorderParameters):
 
 @contextmanager
 def _disk_errors(
-    advice: str = "; `scenario-gen reindex` saves what is whole in the bag",
+    advice: str = "; `scenario-gen reindex` saves the intact part of the bag",
 ) -> Iterator[None]:
-    """Turn the system's errors into ours."""
+    """Turn OSErrors into InputErrors."""
     try:
         yield
     except OSError as error:
@@ -74,9 +76,9 @@ def _disk_errors(
 
 
 class Recorder(Node):  # type: ignore[misc]
-    """Records what matches."""
+    """Records the topics that match a parameter."""
 
-    END_S = REST_S + 5.0  # it writes what has arrived
+    END_S = DRAIN_S + 5.0
 
     def __init__(self, namespace: str | None = None) -> None:
         super().__init__("recorder", namespace=namespace)
@@ -86,15 +88,15 @@ class Recorder(Node):  # type: ignore[misc]
         self._refused: set[str] = set()
         offer_trigger(self, "~/start", self._start_now)
         offer_trigger(self, "~/stop", self._stop_now)
-        self.create_timer(0.1, self._look_around)
-        self.create_timer(HELD_S, self._let_go)
+        self.create_timer(LOOK_PERIOD_S, self._subscribe_to_new)
+        self.create_timer(FLUSH_PERIOD_S, self._flush)
         self._losses = Losses(self.count_publishers)
         self._warned: dict[str, str] = {}
         self.diagnostics = NodeDiagnostics(self, self._report_counts)
         self._report(Level.OK, "nothing is being recorded")
 
     def autostart(self) -> None:
-        """Begin the bag that the parameter names."""
+        """Begin the bag named by the parameter."""
         if self.parameters.config.bag:
             self._start(Path(self.parameters.config.bag))
 
@@ -110,16 +112,16 @@ class Recorder(Node):  # type: ignore[misc]
         self._report(Level.OK, f"recording to {folder}")
         self._refused.clear()
         self.diagnostics.resolve("topics")
-        self._look_around()
+        self._subscribe_to_new()
 
-    def stop(self, *, rest: bool = True) -> str:
-        """Close the bag, if one is open, with the `rest` that has arrived; return its folder.
+    def stop(self, *, drain: bool = True) -> str:
+        """Close the bag, if one is open, after arrived messages unless `drain` is false; return its folder.
 
         Raises:
             InputError: the disk is full, or fails.
         """
-        if rest:
-            self._take_rest()
+        if drain:
+            self._drain()
         for topic in list(self._listening):
             self.destroy_subscription(self._listening.pop(topic))
         bag, self._bag = self._bag, None
@@ -137,16 +139,19 @@ class Recorder(Node):  # type: ignore[misc]
     ) -> None:
         self.diagnostics.status(level, message, subject, values)
 
-    def _take_rest(self) -> None:
-        """Record what has arrived and waits to be taken; publishers believe that the recorder has it."""
-        deadline = monotonic() + REST_S
+    def _drain(self) -> None:
+        """Record all messages that have arrived; their publishers consider them received."""
+        deadline = monotonic() + DRAIN_S
         for topic in list(self._listening):
-            while monotonic() < deadline and self._take_more(topic):
+            while monotonic() < deadline and self._record_batch(topic):
                 pass
 
-    def _take_more(self, topic: str) -> bool:
-        """Record AT_ONCE messages that have arrived, cheaper than one a round of the executor; say whether there may be more."""
-        for _ in range(AT_ONCE):
+    def _record_batch(self, topic: str) -> bool:
+        """Record a batch of arrived messages; return whether there may be more.
+
+        One message per round of the executor would take longer.
+        """
+        for _ in range(BATCH_MESSAGES):
             subscription = self._listening.get(topic)
             if subscription is None or self._bag is None:
                 return False
@@ -158,12 +163,12 @@ class Recorder(Node):  # type: ignore[misc]
         return True
 
     def close(self) -> None:
-        """Close the bag; what else has to be done at the end may fail."""
+        """Close the bag, before the node is destroyed."""
         self.stop()
         self.diagnostics.publish()
 
-    def _look_around(self) -> None:
-        """Subscribe to topics that have come up since."""
+    def _subscribe_to_new(self) -> None:
+        """Subscribe to topics that are new."""
         if self._bag is None:
             return
         wanted = re.compile(self.parameters.config.topics or default_topics(self.get_namespace()))
@@ -176,37 +181,35 @@ class Recorder(Node):  # type: ignore[misc]
                 self._listen(topic, kinds[0])
 
     def _report_counts(self) -> None:
-        """Say on /diagnostics how many messages of each topic are in the bag."""
-        if self._bag is not None:
-            counts = {topic.name: str(topic.count) for topic in self._bag.info.topics}
-            self.diagnostics.status(Level.OK, str(self._bag.folder), "recorded", counts, log=False)
-            lost = self._losses.summary()
-            if lost:
-                message = "; ".join(self._blamed(topic, text) for topic, text in lost.items())
-                self.diagnostics.status(Level.WARN, message, "losses", lost, log=False)
-            self._warn(lost)
+        """Report the recorded messages of each topic, and losses."""
+        if self._bag is None:
+            return
+        counts = {topic.name: str(topic.count) for topic in self._bag.info.topics}
+        folder = str(self._bag.folder)
+        self.diagnostics.status(Level.OK, folder, Subject.RECORDED, counts, log=False)
+        lost = self._losses.summary()
+        if lost:
+            message = "; ".join(self._loss_message(topic, text) for topic, text in lost.items())
+            self.diagnostics.status(Level.WARN, message, "losses", lost, log=False)
+        self._warn(lost)
 
-    def _blamed(self, topic: str, text: str) -> str:
-        """Return what of a topic is not recorded, and what can be done: of two publishers one is to be ended."""
-        infos = self.get_publishers_info_by_topic(topic) if self.context.ok() else []
-        who = sorted(f"{info.node_namespace.rstrip('/')}/{info.node_name}" for info in infos)
-        if len(who) > 1:
-            return f"{topic}: {text}; {' and '.join(who)} publish it: end one of them, or give it another namespace"
+    def _loss_message(self, topic: str, text: str) -> str:
+        """Return the loss of a topic's messages with a remedy; two publishers of one topic cause losses."""
+        infos = self.get_publishers_info_by_topic(topic)
+        nodes = sorted(f"{info.node_namespace.rstrip('/')}/{info.node_name}" for info in infos)
+        if len(nodes) > 1:
+            return f"{topic}: {text}; {' and '.join(nodes)} publish it: end one of them, or give it another namespace"
         return f"{topic}: {text}; {remedy(text)}"
 
     def _warn(self, lost: Mapping[str, str]) -> None:
-        """Say on the terminal what is new of what is not recorded."""
-        for topic in lost:
-            if lost[topic] != self._warned.get(topic):
-                message = self._blamed(topic, lost[topic])
-                if self.context.ok():
-                    self.get_logger().warning(message)
-                else:  # ended by a signal; /rosout is gone
-                    print(f"[WARN] [{self.get_name()}]: {message}", file=sys.stderr, flush=True)
+        """Log new losses."""
+        for topic, text in lost.items():
+            if text != self._warned.get(topic):
+                self.get_logger().warning(self._loss_message(topic, text))
         self._warned = dict(lost)
 
-    def _let_go(self) -> None:
-        """Write what came in the last seconds."""
+    def _flush(self) -> None:
+        """Write the messages of the last seconds."""
         if self._bag is not None:
             with self._guarded():
                 self._bag.flush()
@@ -229,18 +232,18 @@ class Recorder(Node):  # type: ignore[misc]
                 Level.ERROR, f"{topic} is not recorded: {error}", "topics", error="InputError"
             )
             return
-        take, losses = partial(self._write, topic), self._losses
+        losses = self._losses
         losses.begin(topic, recorded)
-        lost = SubscriptionEventCallbacks(
+        on_loss = SubscriptionEventCallbacks(
             message_lost=lambda event: losses.count_by_dds(topic, event.total_count)
         )
 
-        def received(data: bytes, about: dict[str, Any]) -> None:  # rclpy counts the arguments
-            take(data, about["publication_sequence_number"])
-            self._take_more(topic)
+        def received(data: bytes, info: dict[str, Any]) -> None:  # rclpy counts the arguments
+            self._write(topic, data, info["publication_sequence_number"])
+            self._record_batch(topic)
 
         self._listening[topic] = self.create_subscription(
-            message, topic, received, qos(quality), raw=True, event_callbacks=lost
+            message, topic, received, qos(quality), raw=True, event_callbacks=on_loss
         )
 
     def _write(self, topic: str, data: bytes, number: int | None) -> None:
@@ -252,7 +255,7 @@ class Recorder(Node):  # type: ignore[misc]
 
     @contextmanager
     def _guarded(self) -> Iterator[None]:
-        """End the recording where the disk fails."""
+        """End the recording if the disk fails."""
         try:
             with _disk_errors():
                 yield
@@ -260,8 +263,8 @@ class Recorder(Node):  # type: ignore[misc]
             self._give_up(error)
 
     def _give_up(self, error: InputError) -> None:
-        """Say what is wrong and record no more; the node, and others in its process, live on."""
-        self.stop(rest=False)  # nothing more is written to such a bag
+        """Report an error and stop recording; the node and others in its process continue."""
+        self.stop(drain=False)  # nothing more is written to such a bag
         self._report(Level.ERROR, str(error), error="InputError")
 
     def _start_now(self) -> str:

@@ -3,8 +3,9 @@
 
 """road_server: `map`, `road/entries`, `road/exits`; `~/get_map`, and `~/load_map` for another road.
 
-Built-in roads are sized to the template, so the node listens to `tracks` and publishes the road for each encounter it hears, with
-its stamp. Without tracks it publishes the road in its plain size, stamp 0 (`corridor` waits for tracks).
+Built-in roads are sized to the template: the node publishes the road for each encounter on
+`tracks`, with its stamp. Without tracks it publishes the road in its default size with stamp 0
+(`corridor` waits for tracks).
 """
 
 from collections.abc import Callable
@@ -79,15 +80,13 @@ class RoadServer(StageNode):
         self._tracks: bytes | None = None
         self._name = self.config.road_name
         self._grid: bytes | None = None
-        self._with_lanes = (
-            False  # whether the last road had lanes: an empty message then replaces them
-        )
+        self._had_lanes = False  # whether the last road had lanes, which an empty message replaces
         self.create_service(GetMap, "~/get_map", self._get_map, qos_profile=REQUESTS)
-        self._requests = 0
+        self._request_count = 0
         self.create_service(LoadMap, "~/load_map", self._load_map, qos_profile=REQUESTS)
 
     def started(self) -> None:
-        """Publish the plain road until tracks come."""
+        """Publish the road in its default size until tracks arrive."""
         if not self.config.wait_for_tracks and self.config.road_name != "corridor":
             self.work("road", lambda _: self._publish(self._name))
 
@@ -106,15 +105,12 @@ class RoadServer(StageNode):
             "road/exits": encode_poses(road.exits, road.frame_id, stamp_ns),
             "map": encode_map(road, stamp_ns),
         }
-        if road.lanes is not None:
-            messages = {
-                LANES: encode_lanes(road.lanes, road.frame_id, stamp_ns),
-                **messages,
-            }  # published before their map
+        if road.lanes is not None:  # lanes are published before their map
+            messages = {LANES: encode_lanes(road.lanes, road.frame_id, stamp_ns), **messages}
         stop_if_cancelled()
-        if self._with_lanes and road.lanes is None:
+        if self._had_lanes and road.lanes is None:
             self.outputs.send(LANES, encode_lanes(None, road.frame_id, stamp_ns))
-        self._with_lanes = road.lanes is not None
+        self._had_lanes = road.lanes is not None
         for topic, data in messages.items():
             self.outputs.send(topic, data)
         template = {"tracks": tracks} if tracks else {}
@@ -141,9 +137,9 @@ class RoadServer(StageNode):
     async def _load_map(
         self, request: LoadMap.Request, response: LoadMap.Response
     ) -> LoadMap.Response:
-        """Load another road, off the executor's thread; it stays until the next request or restart."""
+        """Load another road, off the executor's thread, until the next request or restart."""
         codes = LoadMap.Response
-        self._requests += 1
+        self._request_count += 1
 
         def job(cancelled: Callable[[], bool]) -> int:
             if cancelled():
@@ -168,7 +164,9 @@ class RoadServer(StageNode):
         response.result = codes.RESULT_UNDEFINED_FAILURE
         if self.active:
             response.result = await self.result_of(
-                f"load_map {self._requests}", job, lambda _: int(codes.RESULT_UNDEFINED_FAILURE)
+                f"load_map {self._request_count}",
+                job,
+                lambda _: int(codes.RESULT_UNDEFINED_FAILURE),
             )
             if response.result == codes.RESULT_SUCCESS:
                 self._get_map(request, response)
