@@ -128,7 +128,7 @@ def encode_kinematic_state(vehicle: Vehicle, state: Floats, frame_id: str, stamp
 
 
 def _object(vehicle: Vehicle, state: Floats) -> dict[str, Any]:
-    """Return what both messages say of a vehicle; `state` (6,) as in `encode_kinematic_state`."""
+    """Return source both messages say of a vehicle; `state` (6,) as in `encode_kinematic_state`."""
     _, _, _, speed, acceleration, rate = state.tolist()
     return {
         "id": np.frombuffer(uuid_of(vehicle), dtype=np.uint8),

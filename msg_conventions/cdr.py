@@ -1,11 +1,11 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Plain CDR (XCDR1, little-endian), the bytes of a ROS 2 message, written and read without any ROS library.
+"""Plain CDR (XCDR1, little-endian), the bytes of a ROS 2 message, without any ROS library.
 
-Most messages go through `encode` and `decode`, by their tables in layouts.py; paths and trajectories are laid out at once.
-
-Padding bytes are zero. (Fast CDR leaves them uninitialised, so two runs of rclpy disagree there; rosbags writes zeros too.)
+`encode` and `decode` process most messages by their tables in layouts.py. Paths and trajectories
+are arrays of structures. Padding bytes are zero, as rosbags writes them; Fast CDR leaves them
+uninitialised.
 """
 
 from collections.abc import Mapping
@@ -30,11 +30,11 @@ def _dtype(kind: str) -> np.dtype[Any]:
 
 
 def encode(layout: Layout, **values: Any) -> bytes:
-    """Return a message as CDR bytes; fields that are not given are zero or empty.
+    """Return a message as CDR bytes; missing fields are zero or empty.
 
     Args:
         layout: one of `layouts`.
-        values: by field; a table's are a mapping, a sequence's anything with a length.
+        values: by field: a mapping for a table, a sized collection for a sequence.
 
     Raises:
         InputError: a number or a stamp is out of range.
@@ -42,28 +42,28 @@ def encode(layout: Layout, **values: Any) -> bytes:
     return CdrWriter().fields(layout, values).finish()
 
 
-def decode(layout: Layout, data: bytes, what: str, *, framed: bool = False) -> SimpleNamespace:
+def decode(layout: Layout, data: bytes, source: str, *, framed: bool = False) -> SimpleNamespace:
     """Return the fields of a message.
 
     Args:
         layout: one of `layouts`.
         data: CDR bytes.
-        what: names the message in errors.
-        framed: it has positions, so that its frame may not be empty.
+        source: names the message in errors.
+        framed: whether its frame must not be empty, because it has positions.
 
     Raises:
         InputError: it is damaged.
     """
-    return CdrReader(data, what).fields(layout, framed=framed)
+    return CdrReader(data, source).fields(layout, framed=framed)
 
 
-def stamp_of(data: bytes, what: str) -> int:
+def stamp_of(data: bytes, source: str) -> int:
     """Return the stamp [ns] of a message that begins with a header.
 
     Raises:
-        InputError: naming `what`, it is damaged.
+        InputError: naming `source`, it is damaged.
     """
-    return CdrReader(data, what).stamp()
+    return CdrReader(data, source).stamp()
 
 
 class CdrWriter:
@@ -73,7 +73,7 @@ class CdrWriter:
         self.body = bytearray()
 
     def fields(self, layout: Layout, values: Mapping[str, Any]) -> "CdrWriter":
-        """Append the fields of a table; those that are not among the values are zero or empty.
+        """Append the fields of a table; missing ones are zero or empty.
 
         Raises:
             InputError: a number or a stamp is out of range.
@@ -94,13 +94,13 @@ class CdrWriter:
             self._count(len(data))
             self.body += data
         elif kind == "time":
-            seconds, rest = divmod(value or 0, NANOSECONDS)
+            seconds, nanoseconds = divmod(value or 0, NANOSECONDS)
             if not -(2**31) <= seconds < 2**31:
                 raise InputError(
                     f"stamp {value} ns does not fit a ROS time (32-bit seconds, until 2038)"
                 )
             self._count(seconds % 2**32)
-            self._count(rest)
+            self._count(nanoseconds)
         elif isinstance(kind, str):
             self._numbers(kind, np.zeros(_dtype(kind).shape) if value is None else value)
         elif isinstance(kind[0], dict) or kind[0] == "string":
@@ -125,47 +125,47 @@ class CdrWriter:
 
 
 class CdrReader:
-    """Reads what CdrWriter (or rclpy, or rosbags) wrote; `place` is the byte after the last one read.
+    """Reads CDR; `place` is the position after the last byte read.
 
     Raises:
-        InputError: from every method, naming `what`, where the data ends too early or is not little-endian CDR.
+        InputError: from every method, naming `source`: the data ends too early or is not little-endian CDR.
     """
 
-    def __init__(self, data: bytes, what: str) -> None:
+    def __init__(self, data: bytes, source: str) -> None:
         if len(data) < 4 or bytes(data[:2]) != HEADER[:2]:
-            raise InputError(f"{what}: not a little-endian CDR message ({len(data)} bytes)")
+            raise InputError(f"{source}: not a little-endian CDR message ({len(data)} bytes)")
         self._data = memoryview(data)[4:]
         self.place = 0
-        self._what = what
+        self._source = source
 
-    def _take(self, size: int, alignment: int) -> memoryview:
+    def _read(self, size: int, alignment: int) -> memoryview:
         start = self.place + -self.place % alignment
         if size < 0 or start + size > len(self._data):
             raise InputError(
-                f"{self._what}: the message ends at byte {len(self._data)}, {start + size} are needed"
+                f"{self._source}: the message ends at byte {len(self._data)}, {start + size} are needed"
             )
         self.place = start + size
         return self._data[start : start + size]
 
     def count(self, size: int = 1) -> int:
-        """Read the length of a sequence whose items take at least `size` bytes each.
+        """Read the length of a sequence whose items have at least `size` bytes each.
 
         Raises:
-            InputError: less than that is left.
+            InputError: fewer bytes are left.
         """
-        count, left = int.from_bytes(self._take(4, 4), "little"), len(self._data) - self.place
+        count = int.from_bytes(self._read(4, 4), "little")
+        left = len(self._data) - self.place
         if count * size > left:
             raise InputError(
-                f"{self._what}: {count} items are announced where {left} bytes are left"
+                f"{self._source}: {count} items are announced where {left} bytes are left"
             )
         return count
 
     def array(self, dtype: npt.DTypeLike, count: int, alignment: int) -> npt.NDArray[Any]:
-        """Read `count` items (n,) of a numpy type, the first one aligned; nothing (no padding either) if `count` is 0."""
+        """Read `count` items (n,) of a numpy type, the first one aligned; without items no padding either."""
         kind = np.dtype(dtype)
-        return np.frombuffer(
-            self._take(kind.itemsize * count, alignment) if count else b"", dtype=kind, count=count
-        )
+        data = self._read(kind.itemsize * count, alignment) if count else b""
+        return np.frombuffer(data, dtype=kind, count=count)
 
     def string(self) -> str:
         """Read a string.
@@ -173,45 +173,47 @@ class CdrReader:
         Raises:
             InputError: it is not UTF-8, or the message ends before it.
         """
-        data = bytes(self._take(self.count(), 1))
+        data = bytes(self._read(self.count(), 1))
         try:
             return data[:-1].decode()
         except UnicodeDecodeError:
-            raise InputError(f"{self._what}: a text in the message is not UTF-8") from None
+            raise InputError(f"{self._source}: a text in the message is not UTF-8") from None
 
     def stamp(self) -> int:
         """Read a Time or Duration in nanoseconds."""
-        seconds, rest = struct.unpack("<iI", self._take(8, 4))
-        return int(seconds) * NANOSECONDS + int(rest)
+        seconds, nanoseconds = struct.unpack("<iI", self._read(8, 4))
+        return int(seconds) * NANOSECONDS + int(nanoseconds)
 
     def aligned(self, dtype: npt.DTypeLike, count: int) -> npt.NDArray[Any] | None:
-        """Read `count` structures (n,) that each end at a multiple of 8 bytes; None, and nothing read, if less is left.
+        """Read `count` structures (n,) that end at multiples of 8 bytes; read nothing and return None if fewer bytes are left.
 
-        The type begins with 4 bytes and a padding to 8, which the first structure does without where it begins amid 8.
+        The type begins with 4 bytes and 4 bytes of padding. A first structure that begins at an odd
+        multiple of 4 lacks this padding.
         """
-        kind, start = np.dtype(dtype), self.place + -self.place % 4
-        amid = start % 8 == 4
-        end = start + kind.itemsize * count - 4 * amid
+        kind = np.dtype(dtype)
+        start = self.place + -self.place % 4
+        lacks_padding = start % 8 == 4
+        end = start + kind.itemsize * count - 4 * lacks_padding
         if not count or end > len(self._data):
             return None
         self.place = end
-        body = self._data[start:end]
-        return np.frombuffer(
-            b"".join((body[:4], bytes(4), body[4:])) if amid else body, dtype=kind
-        )
+        body: Any = self._data[start:end]
+        if lacks_padding:
+            body = b"".join((body[:4], bytes(4), body[4:]))
+        return np.frombuffer(body, dtype=kind)
 
     def fields(self, layout: Layout, *, framed: bool = False) -> SimpleNamespace:
         """Read the fields of a table: numbers, arrays, texts, stamps [ns], lists and namespaces; `framed` as in `decode`.
 
         Raises:
-            InputError: the frame may not be empty, but is.
+            InputError: the frame is empty and must not be.
         """
-        found = SimpleNamespace(**{name: self._value(kind) for name, kind in layout.items()})
-        if framed and not found.frame_id:
+        values = SimpleNamespace(**{name: self._value(kind) for name, kind in layout.items()})
+        if framed and not values.frame_id:
             raise InputError(
-                f"{self._what}: header.frame_id is empty; name the frame that the positions are in"
+                f"{self._source}: header.frame_id is empty; name the frame of the positions"
             )
-        return found
+        return values
 
     def _value(self, kind: Any) -> Any:
         if isinstance(kind, dict):
@@ -222,8 +224,8 @@ class CdrReader:
             return self.stamp()
         if isinstance(kind, str):
             dtype = _dtype(kind)
-            found = self.array(dtype, 1, dtype.base.itemsize)[0]
-            return found if dtype.shape else found.item()
+            value = self.array(dtype, 1, dtype.base.itemsize)[0]
+            return value if dtype.shape else value.item()
         if isinstance(kind[0], dict) or kind[0] == "string":
             return [self._value(kind[0]) for _ in range(self.count())]
         dtype = _dtype(kind[0])

@@ -56,7 +56,7 @@ def encode_live_changepoints(found: LiveChangepoints) -> bytes:
 
 
 def decode_changepoints(
-    data: bytes, encounter: Encounter, what: str = "changepoints"
+    data: bytes, encounter: Encounter, source: str = "changepoints"
 ) -> Segmentation:
     """Return the segmentation that the message and its tracks describe: a primitive of its own for every segment.
 
@@ -65,16 +65,16 @@ def decode_changepoints(
     Raises:
         InputError: the message is damaged, bears another stamp, or has a changepoint off the template's clock.
     """
-    message = trajectory.decode(data, what)
+    message = trajectory.decode(data, source)
     if message.stamp_ns != encounter.start_ns:
         raise InputError(
-            f"{what}: stamp {message.stamp_ns} ns is not that of the tracks ({encounter.start_ns} ns)"
+            f"{source}: stamp {message.stamp_ns} ns is not that of the tracks ({encounter.start_ns} ns)"
         )
     index, rest = np.divmod(message.time_ns, encounter.dt_ns)
     samples = encounter.speed.shape[1]
     if rest.any() or (np.diff(index) <= 0).any() or (index < 1).any() or (index >= samples).any():
         raise InputError(
-            f"{what}: times must increase and be those of samples 1 to {samples - 1} of the tracks"
+            f"{source}: times must increase and be those of samples 1 to {samples - 1} of the tracks"
         )
     marks = np.zeros(samples)
     marks[index] = 1.0
@@ -110,14 +110,14 @@ def encode_posterior(encounter: Encounter, segmentation: Segmentation) -> bytes:
 
 
 def decode_posterior(
-    data: bytes, descriptions: tuple[str, ...] = (), what: str = "posterior"
+    data: bytes, descriptions: tuple[str, ...] = (), source: str = "posterior"
 ) -> Segmentation:
     """Return the segmentation; its sentences for people travel on the diagnostics.
 
     Raises:
         InputError: the message is damaged or not of this convention.
     """
-    found = decode(CLOUD, data, what)
+    found = decode(CLOUD, data, source)
     n, samples = found.size.tolist()
     size, names = n * samples * POINT.itemsize, tuple(field.name for field in found.fields)
     if (
@@ -127,7 +127,7 @@ def decode_posterior(
         or size == 0
     ):
         raise InputError(
-            f"{what}: expected a cloud of vehicles by samples with the fields {', '.join(POINT.names or ())}"
+            f"{source}: expected a cloud of vehicles by samples with the fields {', '.join(POINT.names or ())}"
         )
     cloud = found.data.view(POINT).reshape(n, samples)
     labels = cloud["primitive"][0].astype(np.int64)

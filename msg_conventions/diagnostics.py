@@ -71,13 +71,13 @@ def encode_diagnostics(statuses: Sequence[Status], stamp_ns: int) -> bytes:
     return encode(DIAGNOSTICS, stamp=stamp_ns, statuses=fields)
 
 
-def decode_diagnostics(data: bytes, what: str = "diagnostics") -> tuple[int, tuple[Status, ...]]:
+def decode_diagnostics(data: bytes, source: str = "diagnostics") -> tuple[int, tuple[Status, ...]]:
     """Return stamp [ns] and statuses.
 
     Raises:
         InputError: the message is damaged.
     """
-    message = decode(DIAGNOSTICS, data, what)
+    message = decode(DIAGNOSTICS, data, source)
     statuses = (
         Status(
             status.name,

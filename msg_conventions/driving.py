@@ -1,23 +1,26 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""A run in closed loop ⇄ messages: the states that the node `traffic` publishes, and the commands to the ego.
+"""A drive in closed loop ⇄ messages: the states from the node `traffic`, and the commands to the ego.
 
-Out, at every step; stamp: the run's time (that of /clock), frame: the road's:
+Outputs at every step, with the drive's time (that of /clock) as their stamp, in the road's frame:
 
-- `vehicle_<id>/odom` (nav_msgs/Odometry): child frame `vehicle_<id>`, the centre of the footprint, x ahead; twist in that frame,
-  linear.x the speed [m/s], angular.z the yaw rate [rad/s]. All vehicles, the ego too. QoS: reliable, volatile, depth 100.
-- `traffic/markers` (visualization_msgs/MarkerArray): a box for each, which replaces the one before; the ego's is black.
-- `traffic/local_map` (nav_msgs/OccupancyGrid): the drivable cells around the ego, with the other vehicles as obstacles. Depth 1.
-- /clock (rosgraph_msgs/Clock), /tf (frames.py), `verdicts` (diagnostic_msgs/DiagnosticArray), `ego/goal`, `ego/route`.
+- `vehicle_<id>/odom` (nav_msgs/Odometry) of all vehicles with the ego: child frame `vehicle_<id>`,
+  the centre of the footprint, x ahead; twist in that frame, linear.x the speed [m/s], angular.z the
+  yaw rate [rad/s]. QoS: reliable, volatile, depth 100.
+- `traffic/markers` (visualization_msgs/MarkerArray): a box for each vehicle, black for the ego.
+- `traffic/local_map` (nav_msgs/OccupancyGrid): the drivable cells around the ego; other vehicles
+  are obstacles. Depth 1.
+- /clock (rosgraph_msgs/Clock), /tf (frames.py), `verdicts` (diagnostic_msgs/DiagnosticArray),
+  `ego/goal`, `ego/route`.
 
-In, for the ego; a stamp of 0 is "now":
+Inputs for the ego; a stamp of 0 means "now":
 
-- `ego/cmd_vel` (geometry_msgs/Twist), `ego/cmd_vel_stamped` (TwistStamped): linear.x [m/s] to be reached as fast as the body can,
-  angular.z [rad/s].
-- `ego/trajectory` (trajectory_msgs/MultiDOFJointTrajectory, conventions: trajectory.py), `ego/path` (nav_msgs/Path, the stamp of
-  each pose is its time): the poses that the ego's body tracks.
-- `ego/odom` (nav_msgs/Odometry): where the ego is, by another simulator.
+- `ego/cmd_vel` (geometry_msgs/Twist), `ego/cmd_vel_stamped` (TwistStamped): the target speed
+  linear.x [m/s], reached as fast as the vehicle can, and angular.z [rad/s].
+- `ego/trajectory` (trajectory_msgs/MultiDOFJointTrajectory, conventions: trajectory.py), `ego/path`
+  (nav_msgs/Path with the time of each pose as its stamp): the poses that the ego tracks.
+- `ego/odom` (nav_msgs/Odometry): the ego's state in another simulator.
 """
 
 from dataclasses import dataclass
@@ -29,7 +32,7 @@ from msg_conventions.cdr import decode, encode
 from msg_conventions.layouts import CLOCK, VELOCITY, VELOCITY_STAMPED
 from msg_conventions.paths import read_path
 from msg_conventions.poses import poses_of
-from msg_conventions.roads import encode_grid, OCCUPIED
+from msg_conventions.roads import encode_grid, OCCUPIED_CODE
 from scenario_gen.base.errors import InputError
 from scenario_gen.numerics import Bools, Floats
 
@@ -37,8 +40,8 @@ TWIST_TYPE, CLOCK_TYPE = "geometry_msgs/msg/Twist", "rosgraph_msgs/msg/Clock"
 
 
 @dataclass(frozen=True, eq=False)
-class Way:
-    """Poses for the ego to track: (T,) nanoseconds on the run's clock, (T, 3) x, y [m], yaw [rad] in `frame_id`."""
+class TimedPath:
+    """Poses for the ego to track: (T,) times [ns] on the drive's clock, (T, 3) x, y [m], yaw [rad] in `frame_id`."""
 
     time_ns: Floats
     poses: Floats
@@ -56,49 +59,52 @@ def encode_twist(speed: float, yaw_rate: float) -> bytes:
 
 
 def decode_twist(
-    data: bytes, what: str = "ego/cmd_vel", *, stamped: bool = False
+    data: bytes, source: str = "ego/cmd_vel", *, stamped: bool = False
 ) -> tuple[int, str, float, float]:
     """Return stamp [ns] and frame (0 and "" if not `stamped`), linear.x [m/s] and angular.z [rad/s], finite or not.
 
     Raises:
         InputError: the message is damaged.
     """
-    found = decode(VELOCITY_STAMPED if stamped else VELOCITY, data, what)
-    speed, _, _, _, _, yaw_rate = found.twist.tolist()
-    return (found.stamp, found.frame_id, speed, yaw_rate) if stamped else (0, "", speed, yaw_rate)
+    message = decode(VELOCITY_STAMPED if stamped else VELOCITY, data, source)
+    speed, yaw_rate = message.twist[[0, 5]].tolist()
+    if not stamped:
+        return 0, "", speed, yaw_rate
+    return message.stamp, message.frame_id, speed, yaw_rate
 
 
-def decode_trajectory(data: bytes, what: str = "ego/trajectory") -> Way:
-    """Return the first vehicle's way of a MultiDOFJointTrajectory.
+def decode_trajectory(data: bytes, source: str = "ego/trajectory") -> TimedPath:
+    """Return the first vehicle's path in a MultiDOFJointTrajectory.
 
     Raises:
         InputError: the message is damaged, empty, or holds a value that is not finite.
     """
-    found = trajectory.decode(data, what)
-    if not len(found.time_ns):
-        raise InputError(f"{what} is empty")
-    poses = np.column_stack([found.position[0], found.heading[0]])
-    return Way((found.stamp_ns + found.time_ns).astype(np.float64), poses, found.frame_id)
+    message = trajectory.decode(data, source)
+    if not len(message.time_ns):
+        raise InputError(f"{source} is empty")
+    poses = np.column_stack([message.position[0], message.heading[0]])
+    time_ns = (message.stamp_ns + message.time_ns).astype(np.float64)
+    return TimedPath(time_ns, poses, message.frame_id)
 
 
-def decode_timed_path(data: bytes, what: str = "ego/path") -> Way:
-    """Return the way of a Path whose poses bear the times at which they are to be reached.
+def decode_timed_path(data: bytes, source: str = "ego/path") -> TimedPath:
+    """Return the path in a Path whose stamps are the times of its poses.
 
     Raises:
         InputError: the message is damaged or empty, a value is not finite, or the stamps do not ascend.
     """
-    _, frame_id, stamps, _, rows = read_path(data, what)
+    _, frame_id, stamps, _, rows = read_path(data, source)
     if not len(rows):
-        raise InputError(f"{what} is empty")
+        raise InputError(f"{source} is empty")
     if (np.diff(stamps) <= 0).any():
         raise InputError(
-            f"{what}: the poses' stamps must ascend: they say when each pose is to be reached"
+            f"{source}: the poses' stamps must ascend: they are the times of the poses"
         )
-    return Way(stamps.astype(np.float64), poses_of(rows, what), frame_id)
+    return TimedPath(stamps.astype(np.float64), poses_of(rows, source), frame_id)
 
 
 def encode_local_map(
     blocked: Bools, resolution: float, origin: Floats, frame_id: str, stamp_ns: int
 ) -> bytes:
-    """Return cells (H, W) that are not free, with their size and the lower-left corner (2,) [m], as an OccupancyGrid."""
-    return encode_grid(np.where(blocked, OCCUPIED, 0), resolution, origin, frame_id, stamp_ns)
+    """Return blocked cells (H, W), their size [m] and the lower-left corner (2,) [m] as an OccupancyGrid."""
+    return encode_grid(np.where(blocked, OCCUPIED_CODE, 0), resolution, origin, frame_id, stamp_ns)

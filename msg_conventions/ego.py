@@ -3,12 +3,15 @@
 
 """The ego slot ⇄ `ego/start`, `ego/goal` (nav_msgs/Odometry) and `ego/witness` (conventions: trajectory.py; one vehicle).
 
-Start and goal belong to the request whose `scenarios/info` names the vehicle as its `ego`; being latched, they are those of the
-last such request. Frame: the road's. Stamp: the template's, also for the goal (when it is reached stands in the witness).
-Odometry: `child_frame_id` is `vehicle_<id>`, `pose.pose` the centre of the footprint, z = 0, yaw as a quaternion,
-`twist.twist.linear.x` the speed along the heading, m/s. Covariances and all else are 0. QoS: reliable, transient_local, depth 1.
-`ego/witness` is one message per scenario, before the scenario: a trajectory of the ego on the scenario's clock, which proves the
-scenario valid. `ego_witness` of its `scenarios/info` is the SHA-256 of the message. QoS as that of `scenarios`.
+Start and goal belong to the last request whose `scenarios/info` names the vehicle as its `ego`.
+Frame: the road's. Stamp: the template's, also for the goal. Odometry: `child_frame_id` is
+`vehicle_<id>`, `pose.pose` the centre of the footprint with z = 0 and the yaw as a quaternion,
+`twist.twist.linear.x` the speed along the heading [m/s]. All else is 0. QoS: reliable,
+transient_local, depth 1.
+
+`ego/witness` has one message per scenario, before the scenario: a trajectory of the ego on the
+scenario's clock, which proves the scenario valid. `ego_witness` in `scenarios/info` is the SHA-256
+of the message. QoS as for `scenarios`.
 """
 
 from collections.abc import Iterator
@@ -35,13 +38,13 @@ def encode_state(state: Floats, child_frame_id: str, frame_id: str, stamp_ns: in
     return encode_odometry(state, 0.0, child_frame_id, frame_id, stamp_ns)
 
 
-def decode_state(data: bytes, what: str = "state") -> tuple[int, str, str, Floats]:
+def decode_state(data: bytes, source: str = "state") -> tuple[int, str, str, Floats]:
     """Return stamp [ns], frame, child frame and the state (4,).
 
     Raises:
         InputError: the message is damaged, or a value is not finite.
     """
-    stamp_ns, frame_id, child, state = decode_odometry(data, what, framed=True)
+    stamp_ns, frame_id, child, state = decode_odometry(data, source, framed=True)
     return stamp_ns, frame_id, child, state[:4]
 
 
@@ -53,7 +56,7 @@ def ego_messages(slot: EgoSlot, frame_id: str, stamp_ns: int) -> Iterator[tuple[
 
 
 def ego_values(slot: EgoSlot | None) -> dict[str, str]:
-    """Return the values of `scenarios/info` about the ego: its id, start and goal; none if there is no ego."""
+    """Return the ego's id, start and goal for `scenarios/info`; none without an ego."""
     if slot is None:
         return {}
     start, goal = (

@@ -46,15 +46,17 @@ def encode_fit(encounter: Encounter, fit: Fit, frame_id: str) -> bytes:
     )
 
 
-def decode_fit(data: bytes, what: str = "fit") -> tuple[int, str, BoundaryStates, Floats]:
+def decode_fit(data: bytes, source: str = "fit") -> tuple[int, str, BoundaryStates, Floats]:
     """Return stamp [ns], frame, the requested states, and the anchors (N, K + 2, 3) x, y, yaw.
 
     Raises:
         InputError: the message is damaged or has no start and end.
     """
-    message = trajectory.decode(data, what)
+    message = trajectory.decode(data, source)
     if len(message.time_ns) < 2:
-        raise InputError(f"{what}: {len(message.time_ns)} point(s); a start and an end are needed")
+        raise InputError(
+            f"{source}: {len(message.time_ns)} point(s); a start and an end are needed"
+        )
     state = np.concatenate(
         [message.position, message.heading[..., None], message.speed[..., None]], axis=-1
     )

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Coordinate frames ⇄ tf2_msgs/TFMessage: `/tf`, of the vehicles of a scenario in motion.
+"""Coordinate frames ⇄ tf2_msgs/TFMessage: `/tf` for the vehicles of a scenario in motion.
 
 Parent: the road's frame. Child: `vehicle_<id>`, at the footprint's centre, x ahead. QoS: reliable, volatile, depth 100.
 """
@@ -25,13 +25,13 @@ def encode_frames(poses: Floats, children: Sequence[str], parent: str, stamp_ns:
     )
 
 
-def decode_frames(data: bytes, what: str = "tf") -> list[tuple[int, str, str, Floats]]:
-    """Return stamp [ns], parent, child and pose (3,) of each transform; z and what is no turn about it are left out.
+def decode_frames(data: bytes, source: str = "tf") -> list[tuple[int, str, str, Floats]]:
+    """Return stamp [ns], parent, child and planar pose (3,) of each transform.
 
     Raises:
         InputError: the message is damaged, or a pose is none.
     """
-    found = decode(TRANSFORMS, data, what).transforms
     return [
-        (one.stamp, one.frame_id, one.child, poses_of(one.pose[None], what)[0]) for one in found
+        (each.stamp, each.frame_id, each.child, poses_of(each.pose[None], source)[0])
+        for each in decode(TRANSFORMS, data, source).transforms
     ]

@@ -1,10 +1,9 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Hashes of messages ⇄ `road/info` and `fit/info` (diagnostic_msgs/DiagnosticArray): which messages belong together, by topic.
+"""Hashes of messages that belong together, by topic ⇄ `road/info` and `fit/info` (diagnostic_msgs/DiagnosticArray).
 
-Most types have no field for it, and frames must stay those that tf knows. Stamp: the template's.
-QoS: reliable, transient_local, depth 1.
+Most types have no field for them. Stamp: the template's. QoS: reliable, transient_local, depth 1.
 """
 
 from collections.abc import Mapping
@@ -16,30 +15,33 @@ from msg_conventions.diagnostics import decode_diagnostics, encode_diagnostics, 
 from scenario_gen.base.errors import InputError
 
 INFOS = ("road/info", "fit/info")
-DIGITS = 12
-TEMPLATE_HASH, MAP_HASH = "template_hash", "map_hash"
+HASH_DIGITS = 12
+TEMPLATE_HASH = "template_hash"
+MAP_HASH = "map_hash"
 
 
 def hash_of(topic: str, data: bytes) -> str:
-    """Return the first 12 hexadecimal digits of the SHA-256 of a message's CDR bytes; of a map's without its two stamps.
+    """Return the first 12 hexadecimal digits of the SHA-256 of a message's CDR bytes.
 
-    So the same geometry has the same hash, whatever its template.
+    The stamps of a map are excluded, so that equal maps for different templates have one hash.
     """
     if topic == lanes.TOPIC:
-        data = data[: len(data) - (len(data) - lanes.TAIL) % 4]  # without the padding of DDS
-    return hashlib.sha256(_timeless(data) if topic == "map" else data).hexdigest()[:DIGITS]
+        data = data[: len(data) - (len(data) - lanes.TAIL_BYTES) % 4]  # without DDS's padding
+    if topic == "map":
+        data = _without_stamps(data)
+    return hashlib.sha256(data).hexdigest()[:HASH_DIGITS]
 
 
-def _timeless(grid: bytes) -> bytes:
-    """Return the bytes of a map without stamp, load time, and the bytes behind its cells; of a damaged one, some of its bytes.
+def _without_stamps(grid: bytes) -> bytes:
+    """Return the bytes of a map without stamp, load time and padding; some of the bytes of a damaged map.
 
-    DDS fills small messages up to a multiple of 4 bytes. All others that are named by a hash end at one, but for `road/lanes`.
+    DDS pads small messages to a multiple of 4 bytes. All other hashed messages end at one, except
+    `road/lanes`.
     """
-    load_time = 16 + int.from_bytes(grid[12:16], "little")  # behind the frame, at a multiple of 4
+    load_time = 16 + int.from_bytes(grid[12:16], "little")  # after the frame, aligned to 4
     load_time += -load_time % 4
-    origin = (
-        load_time + 20
-    )  # behind resolution, width and height, at a multiple of 8 from the encapsulation on
+    # After resolution, width and height, aligned to 8 from the end of the encapsulation header.
+    origin = load_time + 20
     origin += -(origin - 4) % 8
     cells = origin + 60
     end = cells + int.from_bytes(grid[cells - 4 : cells], "little")
@@ -47,7 +49,7 @@ def _timeless(grid: bytes) -> bytes:
 
 
 def template_hashes(messages: Mapping[str, bytes]) -> dict[str, str]:
-    """Return the key-values that name the template (its `tracks`) and the map in diagnostics and `scenarios/info`."""
+    """Return the hashes of the template (its `tracks`) and the map, for diagnostics and `scenarios/info`."""
     keys = {"tracks": TEMPLATE_HASH, "map": MAP_HASH}
     return {
         key: hash_of(topic, messages[topic]) for topic, key in keys.items() if topic in messages
@@ -55,7 +57,7 @@ def template_hashes(messages: Mapping[str, bytes]) -> dict[str, str]:
 
 
 def encode_hashes(name: str, messages: Mapping[str, bytes], stamp_ns: int) -> bytes:
-    """Return as CDR bytes that these messages (by topic) belong together; `name` names their subject."""
+    """Return the hashes of messages (by topic) as CDR bytes; `name` is the subject of the status."""
     hashes = {
         topic: hash_of(topic, data)
         for topic, data in sorted(messages.items())
@@ -64,18 +66,18 @@ def encode_hashes(name: str, messages: Mapping[str, bytes], stamp_ns: int) -> by
     return encode_diagnostics([Status(name, Level.OK, "these belong together", hashes)], stamp_ns)
 
 
-def decode_hashes(data: bytes, what: str) -> dict[str, str]:
+def decode_hashes(data: bytes, source: str) -> dict[str, str]:
     """Return the hashes by topic.
 
     Raises:
-        InputError: the message is damaged, or holds no hashes.
+        InputError: the message is damaged, or has no hashes.
     """
-    _, statuses = decode_diagnostics(data, what)
+    _, statuses = decode_diagnostics(data, source)
     hashes = {topic: text for status in statuses for topic, text in status.values.items()}
     if not hashes or not all(
-        re.fullmatch(rf"[0-9a-f]{{{DIGITS}}}", text) for text in hashes.values()
+        re.fullmatch(rf"[0-9a-f]{{{HASH_DIGITS}}}", text) for text in hashes.values()
     ):
         raise InputError(
-            f"{what}: it must say by topic which messages belong together, {DIGITS} hexadecimal digits of each"
+            f"{source}: it must list by topic a hash of {HASH_DIGITS} hexadecimal digits of each message"
         )
     return hashes

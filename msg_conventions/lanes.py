@@ -1,17 +1,24 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""LaneNetwork ⇄ `road/lanes` (visualization_msgs/Marker): the lanes of a road beside its grid.
+"""LaneNetwork ⇄ `road/lanes` (visualization_msgs/Marker): the lanes of a road, published with its grid.
 
-One LINE_LIST draws all borders, the left one of a lane before its right one, lane after lane, each as pairs of neighbouring
-points. `text` is a JSON object: `name`, `notes`, and of every lane its `id`, the number of `points` of a border, `successors` and
-`beside` (places in the list), `speed_limit` [m/s, null: unknown] and `junction`. Where the map has traffic rules there are also
-`rules`, of each its `id`, `kind`, `lanes`, `over` (places in the list of lanes) and `line` (points of the stop line), and
-`rules_kept`. Lanes that are not for all that drive name their `users`, and crossings have `crossing` true; those that are closed
-to cars come last. Where lanes lie above others each has `height` [m] of its points. `origin` is the latitude and longitude of the
-frame's origin, where the map has it. Lanes that were drawn with a built-in road have `drawn` true, and those that were drawn
-for a template `drawn_for`: the `frame` of the template (x, y [m], yaw [rad] on the road) and of every vehicle the ids of the
-`lanes` by which it comes and goes. Action 2 (delete) means that the road has no lanes. Stamp and frame: the map's. QoS: reliable,
+A LINE_LIST has all borders as pairs of neighbouring points: lane after lane, the left border before
+the right one. `text` is a JSON object with these members:
+
+- `name`, `notes`, `note_kinds`
+- `lanes`, each with its `id`, the number of `points` of a border, `successors` and `beside` (indices
+  of lanes), `speed_limit` [m/s, null: unknown], `junction`; also `users` if it is not for all
+  vehicles, `crossing` true for crossings, and `height` [m] of its points if lanes lie above others.
+  Lanes closed to cars come last.
+- `rules`, if the map has traffic rules, each with `id`, `kind`, `lanes`, `over` (indices of lanes)
+  and `line` (points of the stop line), and `rules_kept`
+- `origin`: latitude and longitude of the frame's origin, if the map has it
+- `drawn` true for lanes of a built-in road, and `drawn_for` for those drawn for a template: the
+  `frame` of the template (x, y [m], yaw [rad] on the road), and the ids of the `lanes` by which each
+  vehicle arrives and leaves
+
+Action 2 (delete) means that the road has no lanes. Stamp and frame: the map's. QoS: reliable,
 transient_local, depth 1.
 """
 
@@ -24,8 +31,8 @@ import numpy as np
 
 from msg_conventions.cdr import decode, encode
 from msg_conventions.layouts import MARKER
-from msg_conventions.markers import ADD, DELETE, LINE_LIST, Marker
-from msg_conventions.trajectory import FARTHEST
+from msg_conventions.markers import Action, Kind, Marker
+from msg_conventions.trajectory import MAX_COORDINATE_M
 from scenario_gen.base.errors import InputError
 from scenario_gen.numerics import Floats
 from scenario_gen.types import (
@@ -39,11 +46,11 @@ from scenario_gen.types import (
 )
 
 TOPIC = "road/lanes"
-TAIL = 1  # bytes by which the message ends behind a multiple of 4
+TAIL_BYTES = 1  # after the last multiple of 4 in a message
 
 
 def encode_lanes(network: LaneNetwork | None, frame_id: str, stamp_ns: int) -> bytes:
-    """Return the lanes as CDR bytes; None: the road has none."""
+    """Return the lanes as CDR bytes, or a deletion for a road without lanes."""
     lanes = () if network is None else network.every_lane
     pairs = [
         border[np.repeat(np.arange(len(border)), 2)[1:-1]]
@@ -54,8 +61,8 @@ def encode_lanes(network: LaneNetwork | None, frame_id: str, stamp_ns: int) -> b
     text = "" if network is None else json.dumps(_document(network), ensure_ascii=False)
     marker = Marker(
         "lanes",
-        LINE_LIST,
-        ADD if lanes else DELETE,
+        Kind.LINE_LIST,
+        Action.ADD if lanes else Action.DELETE,
         colour=(1.0, 1.0, 1.0, 0.7),
         points=points,
         text=text,
@@ -109,27 +116,27 @@ def _document(network: LaneNetwork) -> dict[str, Any]:
     )
 
 
-def decode_lanes(data: bytes, what: str = TOPIC) -> tuple[str, LaneNetwork | None]:
+def decode_lanes(data: bytes, source: str = TOPIC) -> tuple[str, LaneNetwork | None]:
     """Return the frame and the lanes, None if the road has none.
 
     Raises:
         InputError: the message is damaged, or its lanes contradict their borders.
     """
-    found = decode(MARKER, data, what, framed=True)
+    found = decode(MARKER, data, source, framed=True)
     frame_id, points = found.frame_id, found.points[:, :2]
-    if found.action == DELETE:
+    if found.action == Action.DELETE:
         return frame_id, None
-    if (found.kind, found.action) != (LINE_LIST, ADD):
+    if (found.kind, found.action) != (Kind.LINE_LIST, Action.ADD):
         raise InputError(
-            f"{what}: a marker of type {found.kind}, action {found.action}; a line list (5) that is added (0) is needed"
+            f"{source}: a marker of type {found.kind}, action {found.action}; a line list (5) that is added (0) is needed"
         )
-    if not (np.abs(points) <= FARTHEST).all():
+    if not (np.abs(points) <= MAX_COORDINATE_M).all():
         raise InputError(
-            f"{what}: a border has a point that is not finite or more than {FARTHEST:g} m away"
+            f"{source}: a border has a point that is not finite or more than {MAX_COORDINATE_M:g} m away"
         )
     try:
         document = json.loads(found.text)
-        lanes = tuple(_lanes(document["lanes"], points, what))
+        lanes = tuple(_lanes(document["lanes"], points, source))
         notes = recorded_notes(map(str, document["notes"]), str(document.get("note_kinds", "")))
         rules = tuple(map(_rule, document.get("rules", ())))
         kept, drawn = (
@@ -142,7 +149,7 @@ def decode_lanes(data: bytes, what: str = TOPIC) -> tuple[str, LaneNetwork | Non
         return frame_id, network.with_lanes(lanes)
     except (KeyError, TypeError, ValueError, OverflowError, RecursionError) as error:
         raise InputError(
-            f"{what}: its text does not say what its lanes are: {type(error).__name__}: {error}"
+            f"{source}: its text does not describe lanes: {type(error).__name__}: {error}"
         ) from None
 
 
@@ -159,14 +166,14 @@ def _rule(document: dict[str, Any]) -> TrafficRule:
     return TrafficRule(str(document["id"]), RuleKind(document["kind"]), lanes, over, line)
 
 
-def _lanes(documents: list[dict[str, Any]], points: Floats, what: str) -> Iterator[Lane]:
+def _lanes(documents: list[dict[str, Any]], points: Floats, source: str) -> Iterator[Lane]:
     """Yield the lanes of their documents, with borders out of pairs of points (P, 2) [m]."""
     at = 0
     for document in documents:
         pairs = 2 * (int(document["points"]) - 1)
         if pairs < 2 or at + 2 * pairs > len(points):
             raise InputError(
-                f"{what}: lane {document['id']!r} has borders of {document['points']} points, and {len(points) - at} are left"
+                f"{source}: lane {document['id']!r} has borders of {document['points']} points, and {len(points) - at} are left"
             )
         borders = [points[start : start + pairs] for start in (at, at + pairs)]
         left, right = (np.concatenate((border[:1], border[1::2])) for border in borders)
@@ -181,4 +188,4 @@ def _lanes(documents: list[dict[str, Any]], points: Floats, what: str) -> Iterat
         yield Lane(name, left, right, after, beside, limit, junction, height, users, crossing)
         at += 2 * pairs
     if at != len(points):
-        raise InputError(f"{what}: {len(points) - at} points belong to no lane")
+        raise InputError(f"{source}: {len(points) - at} points belong to no lane")

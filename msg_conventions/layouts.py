@@ -1,12 +1,12 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The fields of every message in the order of the wire; `cdr.encode` and `cdr.decode` work from these tables.
+"""The fields of every message in the order of the wire, as tables for `cdr.encode` and `cdr.decode`.
 
-A field is a number ("f4"), several ("7f8"), a "string", a "time" (or duration, in nanoseconds), another table, or a sequence: a
-list with one of these. Fields of ROS that are neighbours and of one type are written together: `pose` is x, y, z [m] and the
-quaternion x, y, z, w; `twist` is linear x, y, z [m/s] and angular x, y, z [rad/s]; covariances have 36 entries. What the
-conventions leave out is zero or empty.
+A field is a number ("f4"), several numbers ("7f8"), a "string", a "time" (or duration) in
+nanoseconds, another table, or a sequence: a list with one of these. Neighbouring ROS fields of one
+type form one field: `pose` is x, y, z [m] and the quaternion x, y, z, w; `twist` is linear x, y, z
+[m/s] and angular x, y, z [rad/s]; covariances have 36 entries. Unused fields are zero or empty.
 """
 
 from typing import Any
@@ -59,7 +59,7 @@ POINT: Layout = {
     "accelerations": [TWIST],
     "time": "time",
 }
-TRAJECTORY = HEADER | {"names": ["string"], "count": "u4"}  # then as many points
+TRAJECTORY = HEADER | {"names": ["string"], "count": "u4"}  # followed by the points
 
 CLOUD_FIELD: Layout = {"name": "string", "offset": "u4", "datatype": "u1", "count": "u4"}
 CLOUD = HEADER | {

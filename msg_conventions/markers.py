@@ -1,9 +1,10 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""visualization_msgs/Marker, lines, boxes and texts that RViz and Foxglove draw."""
+"""visualization_msgs/Marker: lines, boxes and texts for RViz and Foxglove."""
 
 from dataclasses import dataclass, field
+from enum import IntEnum
 from typing import Any
 
 import numpy as np
@@ -13,14 +14,24 @@ from scenario_gen.numerics import Floats
 
 TYPE = "visualization_msgs/msg/Marker"
 ARRAY_TYPE = "visualization_msgs/msg/MarkerArray"
-CUBE, CYLINDER, LINE_STRIP, LINE_LIST, TEXT = (
-    1,
-    3,
-    4,
-    5,
-    9,
-)  # types; a text faces who looks, its scale ends in its height
-ADD, DELETE, DELETE_ALL = 0, 2, 3  # actions
+
+
+class Kind(IntEnum):
+    """Types of markers; a text faces the viewer, and the last number of its scale is its height."""
+
+    CUBE = 1
+    CYLINDER = 3
+    LINE_STRIP = 4
+    LINE_LIST = 5
+    TEXT = 9
+
+
+class Action(IntEnum):
+    """Actions of markers."""
+
+    ADD = 0
+    DELETE = 2
+    DELETE_ALL = 3
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,18 +40,18 @@ class Marker:
 
     Attributes:
         name: namespace.
-        kind: type.
-        action: what to do with it.
+        kind: its type.
+        action: whether it is added or deleted.
         pose: x [m], y [m], yaw [rad].
         scale: length, width, height of a box, or the width of a line first [m].
         colour: red, green, blue, alpha, from 0 to 1.
         points: (P, 2) [m] of lines.
-        text: of a text; of others for programs.
+        text: shown by a text marker; data for programs in others.
     """
 
     name: str
-    kind: int
-    action: int = ADD
+    kind: Kind
+    action: Action = Action.ADD
     pose: tuple[float, float, float] = (0.0, 0.0, 0.0)
     scale: tuple[float, float, float] = (0.1, 0.0, 0.0)
     colour: tuple[float, float, float, float] = (1.0, 1.0, 1.0, 1.0)
@@ -48,7 +59,7 @@ class Marker:
     text: str = ""
 
     def fields(self, frame_id: str, stamp_ns: int) -> dict[str, Any]:
-        """Return the marker's fields, as `layouts.MARKER` has them."""
+        """Return the fields of `layouts.MARKER`."""
         points = np.column_stack((self.points, np.zeros(len(self.points))))
         given = {
             "stamp": stamp_ns,

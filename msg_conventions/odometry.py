@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The state of one vehicle ⇄ nav_msgs/Odometry: pose in the header's frame, twist in the vehicle's own; covariances are 0.
+"""The state of one vehicle ⇄ nav_msgs/Odometry: pose in the header's frame, twist in the vehicle's frame; covariances are 0.
 
 Speed: twist.linear.x, m/s; yaw rate: twist.angular.z, rad/s.
 """
@@ -26,20 +26,20 @@ def encode_odometry(
 
 
 def decode_odometry(
-    data: bytes, what: str = "odom", *, framed: bool = False
+    data: bytes, source: str = "odom", *, framed: bool = False
 ) -> tuple[int, str, str, Floats]:
     """Return stamp [ns], frame, child frame and (5,) x [m], y [m], yaw [rad], speed [m/s], yaw rate [rad/s].
 
     Args:
         data: CDR bytes.
-        what: names the message in errors.
-        framed: its frame may not be empty.
+        source: names the message in errors.
+        framed: whether its frame must not be empty.
 
     Raises:
         InputError: the message is damaged, or a value is not finite.
     """
-    found = decode(ODOMETRY, data, what, framed=framed)
-    if not np.isfinite(found.twist).all():
-        raise InputError(f"{what}: the twist holds a value that is not finite")
-    state = np.append(poses_of(found.pose[None], what)[0], found.twist[[0, 5]])
-    return found.stamp, found.frame_id, found.child, state
+    message = decode(ODOMETRY, data, source, framed=framed)
+    if not np.isfinite(message.twist).all():
+        raise InputError(f"{source}: the twist holds a value that is not finite")
+    state = np.append(poses_of(message.pose[None], source)[0], message.twist[[0, 5]])
+    return message.stamp, message.frame_id, message.child, state

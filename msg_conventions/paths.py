@@ -75,28 +75,28 @@ def _pose_type(size: int) -> np.dtype[np.void]:
     )
 
 
-def decode_path(data: bytes, what: str = "path") -> tuple[int, str, Floats, Ints]:
+def decode_path(data: bytes, source: str = "path") -> tuple[int, str, Floats, Ints]:
     """Return stamp [ns], frame, poses (M, 3) and their stamps (M,) [ns].
 
     Raises:
         InputError: the message is damaged, or a pose is in another frame than the path.
     """
-    stamp_ns, frame_id, stamps, frames, rows = read_path(data, what, framed=True)
+    stamp_ns, frame_id, stamps, frames, rows = read_path(data, source, framed=True)
     for k, frame in enumerate(frames):
         if frame not in (frame_id, ""):
-            raise InputError(f"{what}: pose {k} is in frame {frame!r}, the path in {frame_id!r}")
-    return stamp_ns, frame_id, poses_of(rows, what), stamps
+            raise InputError(f"{source}: pose {k} is in frame {frame!r}, the path in {frame_id!r}")
+    return stamp_ns, frame_id, poses_of(rows, source), stamps
 
 
 def read_path(
-    data: bytes, what: str, *, framed: bool = False
+    data: bytes, source: str, *, framed: bool = False
 ) -> tuple[int, str, Ints, list[str], Floats]:
     """Return stamp [ns] and frame, and of each pose its stamp [ns], frame and row (7,) as on the wire; `framed` as in `decode`.
 
     Raises:
         InputError: the message is damaged.
     """
-    reader = CdrReader(data, what)
+    reader = CdrReader(data, source)
     head = reader.fields(layouts.HEADER, framed=framed)
     count = reader.count(68)
     rows, stamps, frames = np.zeros((count, 7)), np.zeros(count, dtype=np.int64), []
@@ -136,30 +136,32 @@ def encode_route(route: Route, anchors_ns: Sequence[int], frame_id: str) -> byte
     )
 
 
-def decode_route(data: bytes, anchors_ns: Sequence[int], what: str = "route") -> tuple[str, Route]:
+def decode_route(
+    data: bytes, anchors_ns: Sequence[int], source: str = "route"
+) -> tuple[str, Route]:
     """Return the frame and the route.
 
     Raises:
         InputError: the message is damaged, bears another stamp, or has no pose at an anchor's stamp.
     """
-    stamp_ns, frame_id, poses, stamps = decode_path(data, what)
+    stamp_ns, frame_id, poses, stamps = decode_path(data, source)
     if stamp_ns != anchors_ns[0]:
         raise InputError(
-            f"{what}: stamp {stamp_ns} ns is not that of the recording ({anchors_ns[0]} ns)"
+            f"{source}: stamp {stamp_ns} ns is not that of the recording ({anchors_ns[0]} ns)"
         )
     if len(poses) == 0:
-        raise InputError(f"{what}: the path holds no poses")
+        raise InputError(f"{source}: the path holds no poses")
     if (np.diff(stamps) < 0).any():
         bad = int(np.argmax(np.diff(stamps) < 0))
         raise InputError(
-            f"{what}: pose {bad + 1} bears an earlier stamp than pose {bad}; planned times must not decrease"
+            f"{source}: pose {bad + 1} bears an earlier stamp than pose {bad}; planned times must not decrease"
         )
     moved = np.concatenate([[True], (np.diff(poses, axis=0) != 0.0).any(axis=1)])
     at = np.searchsorted(stamps, anchors_ns)
     missing = (at >= len(stamps)) | (stamps[np.minimum(at, len(stamps) - 1)] != anchors_ns)
     if missing.any():
         raise InputError(
-            f"{what}: no pose bears the stamp of changepoint {int(np.argmax(missing))}; every changepoint needs one"
+            f"{source}: no pose bears the stamp of changepoint {int(np.argmax(missing))}; every changepoint needs one"
         )
     points = poses[moved]
     return frame_id, Route(

@@ -3,7 +3,7 @@
 
 """Pictures for RViz and Foxglove: footprints (geometry_msgs/PolygonStamped) and markers (visualization_msgs/MarkerArray).
 
-Only footprints are read back. Frame: that of the vehicles drawn. QoS: reliable, transient_local.
+Frame: that of the vehicles. QoS: reliable, transient_local.
 """
 
 from collections.abc import Sequence
@@ -12,7 +12,7 @@ import numpy as np
 
 from msg_conventions.cdr import encode
 from msg_conventions.layouts import MARKERS, POLYGON
-from msg_conventions.markers import CUBE, CYLINDER, DELETE_ALL, LINE_LIST, LINE_STRIP, Marker
+from msg_conventions.markers import Action, Kind, Marker
 from scenario_gen.numerics import Bools, Floats
 from scenario_gen.numerics.curve import Curve
 from scenario_gen.types import LaneNetwork, Scenario, tokens, Vehicle
@@ -28,10 +28,8 @@ COLOURS = (
     (0.55, 0.34, 0.29),
 )
 EGO_COLOUR = (0.06, 0.09, 0.16)
-EXPOSED_COLOUR, NARROW = (
-    (1.0, 0.84, 0.0),
-    1.0,
-)  # of those that are usually narrower than so many metres
+EXPOSED_COLOUR = (1.0, 0.84, 0.0)  # for types narrower than this
+MAX_EXPOSED_WIDTH_M = 1.0
 PAINT = {
     Marking.EDGE: (0.15,),
     Marking.LANE: (0.12, 3.0, 4.5),
@@ -41,11 +39,11 @@ PAINT = {
     Marking.ARROW: (0.12,),
     Marking.ZEBRA: (0.5,),
 }
-"""How wide a marking is, and of how many metres its dashes and gaps are."""
+"""The width of a marking, and the lengths of its dashes and gaps [m]."""
 
 
 def encode_footprint(vehicle: Vehicle, stamp_ns: int, frame_id: str) -> bytes:
-    """Return the footprint in the vehicle's own frame: four corners, counter-clockwise from front left, metres, float32."""
+    """Return the footprint in the vehicle's frame: four corners, counter-clockwise from the front left [m]."""
     x, y = 0.5 * vehicle.length, 0.5 * vehicle.width
     corners = ((x, y, 0.0), (-x, y, 0.0), (-x, -y, 0.0), (x, -y, 0.0))
     return encode(POLYGON, stamp=stamp_ns, frame_id=frame_id, points=corners)
@@ -58,35 +56,33 @@ def body(
     colour: tuple[float, ...],
     alpha: float,
 ) -> Marker:
-    """Return a vehicle at a pose [m, rad], as high as its type: a box, or a cylinder of who walks; yellow if it is exposed."""
-    kind, shown = (
-        vehicle.kind,
-        colour if vehicle.kind.width >= NARROW or colour == EGO_COLOUR else EXPOSED_COLOUR,
-    )
-    size = (vehicle.length, vehicle.width, kind.height)
-    red, green, blue = shown
+    """Return a box for a vehicle at a pose [m, rad], a cylinder for a pedestrian; exposed road users are yellow."""
+    kind = vehicle.kind
+    if kind.width < MAX_EXPOSED_WIDTH_M and colour != EGO_COLOUR:
+        colour = EXPOSED_COLOUR
+    red, green, blue = colour
     return Marker(
         f"box_{name}",
-        CYLINDER if kind.walks else CUBE,
+        Kind.CYLINDER if kind.walks else Kind.CUBE,
         pose=pose,
-        scale=size,
+        scale=(vehicle.length, vehicle.width, kind.height),
         colour=(red, green, blue, alpha),
     )
 
 
 def scenario_markers(scenario: Scenario, stamp_ns: int) -> bytes:
-    """Return one scenario as a MarkerArray that replaces the one before: a line along each path, its vehicle where it begins."""
-    markers = [Marker("", 0, DELETE_ALL)]
-    for k, (name, vehicle) in enumerate(
-        zip(tokens(v.id for v in scenario.vehicles), scenario.vehicles, strict=True)
-    ):
+    """Return a scenario as a MarkerArray that replaces the previous one: each path with its vehicle at the start."""
+    markers = [_delete_all()]
+    names = tokens(vehicle.id for vehicle in scenario.vehicles)
+    for k, (name, vehicle) in enumerate(zip(names, scenario.vehicles, strict=True)):
         first, last = scenario.present[k].tolist()
-        colour, path = COLOURS[k % len(COLOURS)], scenario.position[k, first : last + 1]
+        colour = COLOURS[k % len(COLOURS)]
+        path = scenario.position[k, first : last + 1]
         x, y = path[0].tolist()
         markers.append(
             Marker(
                 f"path_{name}",
-                LINE_STRIP,
+                Kind.LINE_STRIP,
                 scale=(0.15, 0.0, 0.0),
                 colour=(*colour, 0.6),
                 points=path,
@@ -99,55 +95,52 @@ def scenario_markers(scenario: Scenario, stamp_ns: int) -> bytes:
 def vehicle_markers(
     vehicles: Sequence[Vehicle],
     states: Floats,
-    here: Bools,
+    present: Bools,
     ego: int,
     frame_id: str,
     stamp_ns: int,
 ) -> bytes:
-    """Return each vehicle that is there, states (N, 3+) x, y [m], yaw [rad], in place of all boxes before."""
+    """Return the present vehicles, states (N, 3+) x, y [m], yaw [rad], in place of all previous boxes."""
     names = tokens(vehicle.id for vehicle in vehicles)
-    markers = [Marker("", CUBE, DELETE_ALL, scale=(1.0, 1.0, 1.0))]
-    for k in np.flatnonzero(here).tolist():
+    markers = [_delete_all()]
+    for k in np.flatnonzero(present).tolist():
         x, y, yaw = states[k, :3].tolist()
-        markers.append(
-            body(
-                names[k],
-                vehicles[k],
-                (x, y, yaw),
-                EGO_COLOUR if k == ego else COLOURS[k % len(COLOURS)],
-                0.9,
-            )
-        )
+        colour = EGO_COLOUR if k == ego else COLOURS[k % len(COLOURS)]
+        markers.append(body(names[k], vehicles[k], (x, y, yaw), colour, 0.9))
     return encode_markers(markers, frame_id, stamp_ns)
 
 
 def road_markers(network: LaneNetwork | None, frame_id: str, stamp_ns: int) -> bytes:
-    """Return what is painted on a road's lanes as a MarkerArray that replaces the one before; without lanes nothing."""
-    markers = [Marker("", 0, DELETE_ALL)]
+    """Return the markings of a road's lanes as a MarkerArray that replaces the previous one."""
+    markers = [_delete_all()]
     for kind, lines in (markings(network) if network is not None else {}).items():
         width, *dashes = PAINT[kind]
-        points = [_pairs(line, *dashes) for line in lines]
+        points = [_segments(line, *dashes) for line in lines]
         if points:
-            paint = Marker(
+            marker = Marker(
                 kind,
-                LINE_LIST,
+                Kind.LINE_LIST,
                 scale=(width, 0.0, 0.0),
                 colour=(1.0, 1.0, 1.0, 0.9),
                 points=np.concatenate(points),
             )
-            markers.append(paint)
+            markers.append(marker)
     return encode_markers(markers, frame_id, stamp_ns)
 
 
-def _pairs(line: Floats, dash: float = 0.0, gap: float = 0.0) -> Floats:
-    """(2K, 2) [m] the begin and the end of each piece of a line (M, 2), or of each dash."""
+def _delete_all() -> Marker:
+    """Return a marker that deletes all previous ones of its topic."""
+    return Marker("", Kind.CUBE, Action.DELETE_ALL, scale=(1.0, 1.0, 1.0))
+
+
+def _segments(line: Floats, dash: float = 0.0, gap: float = 0.0) -> Floats:
+    """Return the ends (2K, 2) [m] of each edge of a line (M, 2), or of each dash along it."""
     if not dash:
         return line[np.repeat(np.arange(len(line)), 2)[1:-1]]
     curve = Curve.through(line)
     begin = np.arange(0.0, curve.length, dash + gap)
-    return curve.at(np.column_stack((begin, np.minimum(begin + dash, curve.length))).ravel())[
-        :, :2
-    ]
+    end = np.minimum(begin + dash, curve.length)
+    return curve.at(np.column_stack((begin, end)).ravel())[:, :2]
 
 
 def encode_markers(markers: Sequence[Marker], frame_id: str, stamp_ns: int) -> bytes:

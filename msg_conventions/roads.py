@@ -3,12 +3,14 @@
 
 """Road ⇄ `map` (nav_msgs/OccupancyGrid) and `road/entries`, `road/exits` (geometry_msgs/PoseArray).
 
-Map: 0 free, 100 occupied, 99 occupied by an obstacle on the road, -1 unknown; a cell is drivable if it is
-known and below 65 (nav2's occupied threshold).
-`info.origin` is the lower-left corner of cell (0, 0), not rotated; row 0 is the lowest y. Entries head into the road, exits out
-of it. Stamp: that of the template of the road, or 0 if it suits any. QoS: reliable, transient_local, depth 1.
-The road's name is not in the messages: nothing is computed from it.
+Map: 0 free, 100 occupied, 99 occupied by an obstacle on the road, -1 unknown; a known cell below 65
+(nav2's occupied threshold) is drivable. `info.origin` is the lower-left corner of cell (0, 0), not
+rotated; row 0 has the lowest y. Entries head into the road, exits out of it. Stamp: that of the
+road's template, or 0 for any template. QoS: reliable, transient_local, depth 1. The road's name is
+not in the messages, because nothing is computed from it.
 """
+
+from types import SimpleNamespace
 
 import numpy as np
 
@@ -17,7 +19,7 @@ from msg_conventions.lanes import decode_lanes
 from msg_conventions.lanes import TOPIC as LANES
 from msg_conventions.layouts import MAP, POSES
 from msg_conventions.poses import pose_rows, poses_of
-from msg_conventions.trajectory import FARTHEST
+from msg_conventions.trajectory import MAX_COORDINATE_M
 from msg_conventions.yaw import check_quaternions, yaw
 from scenario_gen.base.errors import InputError
 from scenario_gen.numerics import Floats, Ints
@@ -25,32 +27,32 @@ from scenario_gen.types import Road
 
 MAP_TYPE = "nav_msgs/msg/OccupancyGrid"
 POSES_TYPE = "geometry_msgs/msg/PoseArray"
-OCCUPIED, OBSTRUCTED = 100, 99
-OCCUPIED_FROM = 65
-ENDS = ("road/entries", "road/exits")
+OCCUPIED_CODE = 100
+OBSTACLE_CODE = 99
+OCCUPIED_THRESHOLD_PERCENT = 65
 
 
 def encode_map(road: Road, stamp_ns: int) -> bytes:
     """Return the grid as CDR bytes."""
-    cells = np.where(road.drivable, 0, OCCUPIED)
+    cells = np.where(road.drivable, 0, OCCUPIED_CODE)
     if road.obstructed is not None:
-        cells[road.obstructed] = OBSTRUCTED
+        cells[road.obstructed] = OBSTACLE_CODE
     return encode_grid(cells, road.resolution, road.origin, road.frame_id, stamp_ns)
 
 
 def encode_grid(
     cells: Ints, resolution: float, origin: Floats, frame_id: str, stamp_ns: int
 ) -> bytes:
-    """Return cells (H, W) of 0 to 100 or -1, with their size and the lower-left corner (2,) [m], as an OccupancyGrid."""
+    """Return cells (H, W) from 0 to 100 or -1, their size [m] and the lower-left corner (2,) [m] as an OccupancyGrid."""
     height, width = cells.shape
-    corner, size = (*origin, 0.0, 0.0, 0.0, 0.0, 1.0), (width, height)
-    head = {"stamp": stamp_ns, "frame_id": frame_id, "load_time": stamp_ns}
     return encode(
         MAP,
-        **head,
+        stamp=stamp_ns,
+        frame_id=frame_id,
+        load_time=stamp_ns,
         resolution=resolution,
-        size=size,
-        origin=corner,
+        size=(width, height),
+        origin=(*origin, 0.0, 0.0, 0.0, 0.0, 1.0),
         cells=cells.astype(np.int8).reshape(-1),
     )
 
@@ -60,14 +62,14 @@ def encode_poses(poses: Floats, frame_id: str, stamp_ns: int) -> bytes:
     return encode(POSES, stamp=stamp_ns, frame_id=frame_id, poses=pose_rows(poses))
 
 
-def decode_poses(data: bytes, what: str = "poses") -> tuple[int, str, Floats]:
+def decode_poses(data: bytes, source: str = "poses") -> tuple[int, str, Floats]:
     """Return stamp [ns], frame and (M, 3) x, y, yaw.
 
     Raises:
         InputError: the message is damaged.
     """
-    found = decode(POSES, data, what, framed=True)
-    return found.stamp, found.frame_id, poses_of(found.poses, what)
+    message = decode(POSES, data, source, framed=True)
+    return message.stamp, message.frame_id, poses_of(message.poses, source)
 
 
 def decode_map(
@@ -77,49 +79,70 @@ def decode_map(
     lanes: bytes | None = None,
     name: str = "map",
 ) -> tuple[int, Road]:
-    """Return the stamp [ns] and the road; without entries, exits and lanes it has none (a plain map server sends none).
+    """Return the stamp [ns] and the road, which may lack entries, exits and lanes: a plain map server sends none.
 
     Raises:
         InputError: the message is damaged, the map is rotated or empty, or the frames disagree.
     """
-    found = decode(MAP, data, name, framed=True)
-    (width, height), origin, cells, frame_id = (
-        found.size.tolist(),
-        found.origin,
-        found.cells,
-        found.frame_id,
-    )
-    check_quaternions(origin[3:], f"{name}: info.origin")
-    if width * height != len(cells):
-        raise InputError(f"{name}: {width} x {height} cells are announced, {len(cells)} are there")
-    if not np.isfinite(origin).all() or abs(float(yaw(origin[3:]))) > 1e-9:
-        raise InputError(f"{name}: info.origin must be finite and not rotated")
-    if (np.abs(origin[:3]) > FARTHEST).any():
-        raise InputError(
-            f"{name}: info.origin is {np.abs(origin[:3]).max():g} m away; at most {FARTHEST:g} is read"
-        )
-    none = (frame_id, np.zeros((0, 3)))
-    ends = [
-        none if end is None else decode_poses(end, topic)[1:]
-        for topic, end in zip(ENDS, (entries, exits), strict=True)
-    ]
-    network = (frame_id, None) if lanes is None else decode_lanes(lanes)
-    for what, (frame, _) in zip((*ENDS, LANES), (*ends, network), strict=True):
-        if frame != frame_id:
-            raise InputError(f"{what}: frame {frame!r} is not the map's ({frame_id!r})")
-    drivable = ((cells >= 0) & (cells < OCCUPIED_FROM)).reshape(height, width)
-    obstructed = (
-        (cells == OBSTRUCTED).reshape(height, width) if (cells == OBSTRUCTED).any() else None
-    )
-    (_, inward), (_, outward) = ends
-    return found.stamp, Road(
+    message = decode(MAP, data, name, framed=True)
+    _check_grid(message, name)
+    frame_id = message.frame_id
+    width, height = message.size.tolist()
+    cells = message.cells.reshape(height, width)
+
+    inward = _ends(entries, "road/entries", frame_id)
+    outward = _ends(exits, "road/exits", frame_id)
+    network = None
+    if lanes is not None:
+        lanes_frame, network = decode_lanes(lanes)
+        _check_frame(LANES, lanes_frame, frame_id)
+
+    drivable = (cells >= 0) & (cells < OCCUPIED_THRESHOLD_PERCENT)
+    obstructed = cells == OBSTACLE_CODE
+    return message.stamp, Road(
         name,
         drivable,
-        found.resolution,
-        origin[:2],
+        message.resolution,
+        message.origin[:2],
         inward,
         outward,
         frame_id,
-        network[1],
-        obstructed,
+        network,
+        obstructed if obstructed.any() else None,
     )
+
+
+def _check_grid(message: SimpleNamespace, name: str) -> None:
+    """Raise InputError if the cells do not match their size, or the origin cannot be used."""
+    origin = message.origin
+    width, height = message.size.tolist()
+    check_quaternions(origin[3:], f"{name}: info.origin")
+    if width * height != len(message.cells):
+        raise InputError(
+            f"{name}: {width} x {height} cells are announced, {len(message.cells)} are there"
+        )
+    if not np.isfinite(origin).all() or abs(float(yaw(origin[3:]))) > 1e-9:
+        raise InputError(f"{name}: info.origin must be finite and not rotated")
+    distance = float(np.abs(origin[:3]).max())
+    if distance > MAX_COORDINATE_M:
+        raise InputError(
+            f"{name}: info.origin is {distance:g} m away; at most {MAX_COORDINATE_M:g} is read"
+        )
+
+
+def _ends(data: bytes | None, topic: str, frame_id: str) -> Floats:
+    """Return entries or exits (M, 3), none without a message.
+
+    Raises:
+        InputError: the message is damaged, or in another frame than the map.
+    """
+    if data is None:
+        return np.zeros((0, 3))
+    _, frame, poses = decode_poses(data, topic)
+    _check_frame(topic, frame, frame_id)
+    return poses
+
+
+def _check_frame(topic: str, frame: str, map_frame: str) -> None:
+    if frame != map_frame:
+        raise InputError(f"{topic}: frame {frame!r} is not the map's ({map_frame!r})")

@@ -98,18 +98,18 @@ class ScenarioEntry:
         """
         return decode_facts(self.status.values, f"{INFO}: {self.status.message}")
 
-    def asked(self, what: str = INFO, *, witness: bool = False) -> BoundaryStates | None:
+    def asked(self, source: str = INFO, *, witness: bool = False) -> BoundaryStates | None:
         """Return the requested start and end states (N, 4), None where they are not there.
 
         Args:
-            what: names the topic in messages.
+            source: names the topic in messages.
             witness: add those of the ego in a last row.
 
         Raises:
-            InputError: naming `what`, they are damaged.
+            InputError: naming `source`, they are damaged.
         """
         keys = (("asked_start", "ego_start"), ("asked_end", "ego_goal"))
-        values, where = self.status.values, f"{what}: the asked states of {self.status.message}"
+        values, where = self.status.values, f"{source}: the asked states of {self.status.message}"
         if any(key not in values for pair in keys for key in pair[: 1 + witness]):
             return None
         start, end = (_states(values[key], where) for key, _ in keys)
@@ -143,7 +143,7 @@ class RequestSummary:
     Attributes:
         request: its id.
         published: how many scenarios of it were published.
-        status: all of it: counts, adaptations, `ego…`, and what is needed to make it again (parameters, versions, logs).
+        status: all of it: counts, adaptations, `ego…`, and source is needed to make it again (parameters, versions, logs).
     """
 
     request: str
@@ -191,20 +191,20 @@ class RequestSummary:
         Raises:
             InputError: a count is missing or no number.
         """
-        what = f"{INFO}: {self.status.name!r} is no summary of a request"
+        source = f"{INFO}: {self.status.name!r} is no summary of a request"
         causes = [key.removeprefix(REFUSED) for key in self.values if key.startswith(REFUSED)]
         try:
             refused = {
-                Cause(cause): _count(self.values, REFUSED + cause, what) for cause in causes
+                Cause(cause): _count(self.values, REFUSED + cause, source) for cause in causes
             }
         except ValueError as error:
             raise InputError(
-                f"{what} ({error}); it is of another version: generate its scenarios anew"
+                f"{source} ({error}); it is of another version: generate its scenarios anew"
             ) from None
         return ScenarioSet(
-            requested=_count(self.values, "requested", what),
+            requested=_count(self.values, "requested", source),
             scenarios=scenarios,
-            candidates=_count(self.values, "candidates", what),
+            candidates=_count(self.values, "candidates", source),
             refused=Counter(refused),
             adaptations=recorded_notes(
                 (
@@ -223,12 +223,14 @@ class RequestSummary:
         Raises:
             InputError: they are damaged.
         """
-        what, found = f"{INFO}: {REACTION} of {self.status.message}", []
+        source, found = f"{INFO}: {REACTION} of {self.status.message}", []
         for key, text in self.values.items():
             if key.startswith(REACTION):
                 found.append(
                     parse_json(
-                        text, what, {"type": "object", "required": ["words", "lag", "confidence"]}
+                        text,
+                        source,
+                        {"type": "object", "required": ["words", "lag", "confidence"]},
                     )
                 )
         return tuple(found)
@@ -268,15 +270,15 @@ def encode_info(info: Info, stamp_ns: int) -> bytes:
     return encode_diagnostics([info.status], stamp_ns)
 
 
-def decode_info(data: bytes, what: str = INFO) -> tuple[Info, ...]:
+def decode_info(data: bytes, source: str = INFO) -> tuple[Info, ...]:
     """Return the entries and summaries of a message; statuses that are neither are left out.
 
     Raises:
-        InputError: naming `what`, the message is damaged, or a key that every entry or summary has is missing.
+        InputError: naming `source`, the message is damaged, or a key that every entry or summary has is missing.
     """
     found: list[Info] = []
-    for status in decode_diagnostics(data, what)[1]:
-        values, where = status.values, f"{what}: {status.name!r}"
+    for status in decode_diagnostics(data, source)[1]:
+        values, where = status.values, f"{source}: {status.name!r}"
         if not {"published", "sha256"} & values.keys():
             continue
         if "request" not in values:
@@ -442,18 +444,20 @@ def _states_text(scenario: Scenario, at: int) -> str:
     )
 
 
-def _states(text: str, what: str) -> Floats:
+def _states(text: str, source: str) -> Floats:
     """Return the (N, 4) x, y, yaw, speed of such a list."""
-    with guarded(f"{what}: no rows of numbers"):
+    with guarded(f"{source}: no rows of numbers"):
         rows = np.array(json.loads(text), dtype=np.float64)
     if rows.ndim != 2 or rows.shape[1] != 4 or not np.isfinite(rows).all():
-        raise InputError(f"{what}: {len(text)} characters that are no rows of four finite numbers")
+        raise InputError(
+            f"{source}: {len(text)} characters that are no rows of four finite numbers"
+        )
     return rows
 
 
-def _count(values: Values, key: str, what: str) -> int:
+def _count(values: Values, key: str, source: str) -> int:
     """Return a whole number of at most 63 bits."""
     text = values.get(key, "")
     if not (text.isascii() and text.isdecimal() and len(text) < 20 and int(text) < 2**63):
-        raise InputError(f"{what}: {key} is {text!r}; a whole number is needed")
+        raise InputError(f"{source}: {key} is {text!r}; a whole number is needed")
     return int(text)

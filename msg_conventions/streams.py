@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""One vehicle's state at one instant ⇄ `vehicle_<id>/fix` (NavSatFix) and `vehicle_<id>/speed` (TwistStamped).
+"""A vehicle's state at one instant ⇄ `vehicle_<id>/fix` (NavSatFix) and `vehicle_<id>/speed` (TwistStamped).
 
 Stamp: the sample's, on the template's clock. Frame: `vehicle_<id>`. Speed: linear.x, m/s, of the body frame.
 QoS: reliable, volatile, depth 1000.
@@ -14,13 +14,16 @@ import numpy as np
 from msg_conventions.cdr import decode, encode
 from msg_conventions.layouts import FIX, VELOCITY_STAMPED
 
-FIXED, GPS = 0, 1  # of NavSatStatus
+FIX_CODE = 0  # NavSatStatus.STATUS_FIX
+GPS_CODE = 1  # NavSatStatus.SERVICE_GPS
 
 
 def encode_fix(latitude: float, longitude: float, stamp_ns: int, frame_id: str) -> bytes:
     """Return a NavSatFix of degrees as CDR bytes."""
     place = (latitude, longitude, 0.0)
-    return encode(FIX, stamp=stamp_ns, frame_id=frame_id, status=FIXED, service=GPS, place=place)
+    return encode(
+        FIX, stamp=stamp_ns, frame_id=frame_id, status=FIX_CODE, service=GPS_CODE, place=place
+    )
 
 
 def encode_speed(speed: float, stamp_ns: int, frame_id: str) -> bytes:
@@ -30,29 +33,29 @@ def encode_speed(speed: float, stamp_ns: int, frame_id: str) -> bytes:
     )
 
 
-def decode_fix(data: bytes, what: str = "fix") -> tuple[int, float, float]:
-    """Return stamp [ns], latitude and longitude [degrees] of a NavSatFix; NaN where there is no fix (status below 0).
+def decode_fix(data: bytes, source: str = "fix") -> tuple[int, float, float]:
+    """Return stamp [ns], latitude and longitude [degrees] of a NavSatFix, NaN without a fix (status below 0).
 
     Raises:
         InputError: the message is damaged.
     """
-    found = decode(FIX, data, what)
-    latitude, longitude, _altitude = (
-        found.place.tolist() if found.status >= FIXED else [math.nan] * 3
-    )
-    return found.stamp, latitude, longitude
+    message = decode(FIX, data, source)
+    if message.status < FIX_CODE:
+        return message.stamp, math.nan, math.nan
+    latitude, longitude, _ = message.place.tolist()
+    return message.stamp, latitude, longitude
 
 
-def decode_speed(data: bytes, what: str = "speed") -> tuple[int, float]:
+def decode_speed(data: bytes, source: str = "speed") -> tuple[int, float]:
     """Return stamp [ns] and speed [m/s] of a TwistStamped.
 
     Raises:
         InputError: the message is damaged.
     """
-    found = decode(VELOCITY_STAMPED, data, what)
-    return found.stamp, speed_of(*found.twist[:2].tolist())
+    message = decode(VELOCITY_STAMPED, data, source)
+    return message.stamp, speed_of(*message.twist[:2].tolist())
 
 
 def speed_of(x: float, y: float) -> float:
-    """Return the speed [m/s] of a twist: linear.x of the body frame, or the length of the horizontal vector."""
+    """Return the speed [m/s] of a twist: linear.x in the body frame, or the length of the horizontal vector."""
     return x if y == 0.0 else np.hypot(x, y)

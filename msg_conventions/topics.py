@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Every topic of the suite: its type and its quality of service, in one table (in words: docs/interfaces.md)."""
+"""The suite's topics with their types and qualities of service; docs/interfaces.md describes them."""
 
 from functools import lru_cache
 import re
@@ -28,9 +28,8 @@ TWIST_TYPE = "geometry_msgs/msg/TwistStamped"
 
 LATCHED = Quality()
 MANY = Quality(depth=1000)
-MANY_HEARD = Quality(
-    depth=1000, keep_all=True
-)  # for subscribers that must not lose any: paced publishers then wait for them
+LOSSLESS = Quality(depth=1000, keep_all=True)
+"""For subscribers that must not lose a message of `MANY`: paced publishers wait for them."""
 STREAM = Quality(depth=1000, transient_local=False)
 LIVE = Quality(depth=100, transient_local=False)
 NEWEST = Quality(depth=1, transient_local=False)
@@ -61,31 +60,26 @@ _TABLE: tuple[tuple[str, Quality, str], ...] = (
     (frames.TYPE, LIVE, "tf"),
     (diagnostics.TYPE, LATCHED, "road/info fit/info report"),
     (diagnostics.TYPE, MANY, "scenarios/info verdicts"),
-    (
-        diagnostics.TYPE,
-        Quality(depth=100),
-        "diagnostics",
-    ),  # in a bag written without nodes: one message, which is latched
-    (diagnostics.TYPE, LIVE, "/diagnostics"),  # all is repeated every second
+    (diagnostics.TYPE, Quality(depth=100), "diagnostics"),  # one message in a bag without nodes
+    (diagnostics.TYPE, LIVE, "/diagnostics"),  # repeated every second
 )
 TOPICS = {topic: (kind, quality) for kind, quality, topics in _TABLE for topic in topics.split()}
 
 
 def vehicle_topic(token: str, name: str) -> str:
-    """Return the topic of one vehicle, e.g. `vehicle_7/route`."""
+    """Return a vehicle's topic, e.g. `vehicle_7/route`."""
     return f"vehicle_{token}/{name}"
 
 
 @lru_cache(maxsize=1024)
 def topic_entry(topic: str) -> tuple[str, Quality]:
-    """Return type and quality of a topic of the suite, with or without namespace before it; the longest name that fits counts.
+    """Return type and quality of one of the suite's topics, with or without a namespace; the longest match counts.
 
     Raises:
         KeyError: it is no topic of the suite.
     """
     for pattern in sorted(TOPICS, key=len, reverse=True):
-        if re.search(
-            rf"(^|/){re.escape(pattern).replace(re.escape('*'), '[0-9A-Za-z_]+')}$", topic
-        ):
+        name = re.escape(pattern).replace(re.escape("*"), "[0-9A-Za-z_]+")
+        if re.search(rf"(^|/){name}$", topic):
             return TOPICS[pattern]
     raise KeyError(topic)

@@ -4,8 +4,8 @@
 """Encounter ⇄ `tracks`: a whole template in one message (conventions: trajectory.py).
 
 Frame `local_enu`: metres east and north of the log's origin. QoS: reliable, transient_local, depth 1.
-A vehicle that arrives late or leaves early is far below the ground meanwhile (trajectory.py).
-Accelerations are the central differences of the speeds; they are not read back.
+An absent vehicle is far below the ground (trajectory.py). Accelerations are the central differences
+of the speeds; `decode_tracks` ignores them.
 The encounter's name and geodetic origin are not in the message: nothing is computed from them.
 """
 
@@ -18,7 +18,8 @@ from scenario_gen.numerics import Bools, Ints, runs
 from scenario_gen.types import ALWAYS, Encounter, Vehicle
 
 FRAME = "local_enu"
-SHORTEST_STEP_NS, LONGEST_STEP_NS = 1_000_000, 10_000_000_000
+MIN_STEP_NS = 1_000_000
+MAX_STEP_NS = 10_000_000_000
 
 
 def encode_tracks(encounter: Encounter) -> bytes:
@@ -35,7 +36,7 @@ def encode_samples(encounter: Encounter, at: Ints) -> bytes:
         encounter.speed[:, at],
         acceleration[:, at],
     )
-    there = None if encounter.all_present else encounter.is_present[:, at]
+    present = None if encounter.all_present else encounter.is_present[:, at]
     return trajectory.encode(
         Trajectory(
             encounter.start_ns,
@@ -43,7 +44,7 @@ def encode_samples(encounter: Encounter, at: Ints) -> bytes:
             encounter.vehicles,
             at * encounter.dt_ns,
             *states,
-            there=there,
+            present=present,
         )
     )
 
@@ -67,19 +68,21 @@ def decode_tracks(data: bytes, name: str = "tracks") -> Encounter:
     if (uneven := (steps <= 0) | (steps != steps[0])).any():
         at = int(np.argmax(uneven))
         raise InputError(
-            f"{name}: sample {at + 1} comes {steps[at] * 1e-9:g} s after the one before, sample 1 {steps[0] * 1e-9:g} s; "
+            f"{name}: sample {at + 1} comes {steps[at] * 1e-9:g} s after the previous one, sample 1 {steps[0] * 1e-9:g} s; "
             "time_from_start must count in even steps; resample the tracks (10 Hz is usual)"
         )
     if (
-        not SHORTEST_STEP_NS <= steps[0] <= LONGEST_STEP_NS
-        or message.time_ns[-1] > trajectory.LONGEST_NS
+        not MIN_STEP_NS <= steps[0] <= MAX_STEP_NS
+        or message.time_ns[-1] > trajectory.MAX_DURATION_NS
     ):
         raise InputError(
             f"{name}: {len(steps)} steps of {steps[0] * 1e-9:g} s; steps of 0.001 to 10 s and at most "
-            f"{trajectory.LONGEST_NS * 1e-9:g} s in all are read"
+            f"{trajectory.MAX_DURATION_NS * 1e-9:g} s in all are read"
         )
     states = (message.position, message.heading, message.speed)
-    present = ALWAYS if message.there is None else _spans(message.there, message.vehicles, name)
+    present = (
+        ALWAYS if message.present is None else _spans(message.present, message.vehicles, name)
+    )
     return Encounter.sampled(
         message.vehicles,
         int(steps[0]) * 1e-9,
@@ -90,16 +93,19 @@ def decode_tracks(data: bytes, name: str = "tracks") -> Encounter:
     )
 
 
-def _spans(there: Bools, vehicles: tuple[Vehicle, ...], name: str) -> Ints:
-    """Return the first and last sample (N, 2) at which each vehicle is there, of (N, T) flags.
+def _spans(present: Bools, vehicles: tuple[Vehicle, ...], name: str) -> Ints:
+    """Return the first and last sample (N, 2) at which each vehicle is present, from flags (N, T).
 
     Raises:
-        InputError: a vehicle is never there, or comes back.
+        InputError: a vehicle is never present, or returns.
     """
-    found = [runs(row) for row in there]
-    for vehicle, own in zip(vehicles, found, strict=True):
-        if len(own) != 1:
+    spans = []
+    for vehicle, row in zip(vehicles, present, strict=True):
+        intervals = runs(row)
+        if len(intervals) != 1:
             raise InputError(
-                f"{name}: vehicle {vehicle.id} is there {len(own)} times (z tells); a vehicle comes and goes once"
+                f"{name}: vehicle {vehicle.id} is present {len(intervals)} times (by its z); it must arrive and leave once"
             )
-    return np.array([(begin, end - 1) for ((begin, end),) in found], dtype=np.int64)
+        begin, end = intervals[0]
+        spans.append((begin, end - 1))
+    return np.array(spans, dtype=np.int64)

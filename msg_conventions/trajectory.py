@@ -1,20 +1,26 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""trajectory_msgs/MultiDOFJointTrajectory, the one message for tracks, changepoints, fits and scenarios.
+"""trajectory_msgs/MultiDOFJointTrajectory, the message for tracks, changepoints, fits and scenarios.
 
-Frame: `header.frame_id`. `header.stamp`: the template's first sample; what derives from a template repeats it.
-`joint_names[i]`: `<id>:<length>x<width>`, metres (a bare `<id>` is read as a default car), then `:<type>` of who is neither a car
-shorter than 7 m nor a truck from 7 m on.
-`points[k].time_from_start`: time since `header.stamp`. `points[k].transforms[i]`: pose of the footprint's centre,
-z = 0 (`ABSENT` where the vehicle is not there: far below the ground; x, y and yaw are then those of its first or last instant),
-yaw as a quaternion. `velocities[i].linear.x`: speed along the heading, m/s. `accelerations[i].linear.x`: likewise,
-m/s². All other components are zero; nothing is NaN. In `scenarios` no vehicle is ever absent: see scenarios.py.
+- `header.frame_id`: the frame of the positions.
+- `header.stamp`: the template's first sample, repeated in messages derived from the template.
+- `joint_names[i]`: `<id>:<length>x<width>` in metres, then `:<type>` unless the vehicle is a car
+  shorter than 7 m or a truck from 7 m on. A bare `<id>` is a default car.
+- `points[k].time_from_start`: time since `header.stamp`.
+- `points[k].transforms[i]`: pose of the footprint's centre with z = 0 and the yaw as a quaternion.
+  z is `ABSENT_Z_M`, far below the ground, where the vehicle is absent; x, y and yaw are then those
+  of its first or last instant.
+- `velocities[i].linear.x`: speed along the heading [m/s].
+- `accelerations[i].linear.x`: acceleration along the heading [m/s²].
+
+All other components are zero; no value is NaN. In `scenarios` no vehicle is absent (scenarios.py).
 """
 
 from collections.abc import Sequence
 from dataclasses import dataclass
 import re
+from typing import Any
 
 import numpy as np
 
@@ -27,17 +33,16 @@ from scenario_gen.numerics import Bools, Floats, Ints
 from scenario_gen.types import tokens, usual_type, Vehicle
 
 TYPE = "trajectory_msgs/msg/MultiDOFJointTrajectory"
-FARTHEST = 1e8  # m from the frame's origin: more than any geodetic grid has
-FASTEST = 1e4  # m/s: no vehicle is faster, and sums of squares stay finite
-MANY = 10_000  # vehicles: beyond, a message is not laid out as one table
-LONGEST_NS = 7200 * NANOSECONDS  # of an encounter or a scenario
-SEQUENCES = {
-    "transforms": 7,
-    "velocities": 6,
-    "accelerations": 6,
-}  # of a point, and the numbers of an entry
-SMALLEST, LARGEST = 0.01, 1000.0  # metres of a footprint
-ABSENT = -1000.0  # m: z of a vehicle that is not there
+MAX_COORDINATE_M = 1e8  # more than any geodetic grid has
+MAX_SPEED_MPS = 1e4  # no vehicle is faster, and sums of squares stay finite
+MAX_COMPONENT_RATIO = 2.0  # of a quaternion
+MAX_TABLE_VEHICLES = 10_000  # in a message that is decoded as one array
+MAX_DURATION_NS = 7200 * NANOSECONDS  # of an encounter or a scenario
+MIN_SIZE_M = 0.01  # of a footprint
+MAX_SIZE_M = 1000.0
+ABSENT_Z_M = -1000.0  # z of an absent vehicle
+SEQUENCES = {"transforms": 7, "velocities": 6, "accelerations": 6}
+"""The sequences of a point, and how many numbers an entry has."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,11 +50,15 @@ class Trajectory:
     """The content of the message: N vehicles at T instants.
 
     Attributes:
-        stamp_ns: header stamp; frame_id: header frame.
-        vehicles: N identities and footprints.
-        time_ns: (T,) nanoseconds from start.
-        position: (N, T, 2) m; heading: (N, T) rad; speed: (N, T) m/s; acceleration: (N, T) m/s².
-        there: (N, T) whether each vehicle is there; None: all of them are.
+        stamp_ns: header stamp.
+        frame_id: header frame.
+        vehicles: (N,) identities and footprints.
+        time_ns: (T,) time from start [ns].
+        position: (N, T, 2) [m].
+        heading: (N, T) [rad].
+        speed: (N, T) [m/s].
+        acceleration: (N, T) [m/s²].
+        present: (N, T) whether each vehicle is present; None: all are.
     """
 
     stamp_ns: int
@@ -60,27 +69,24 @@ class Trajectory:
     heading: Floats
     speed: Floats
     acceleration: Floats
-    there: Bools | None = None
+    present: Bools | None = None
 
 
 def joint_names(vehicles: Sequence[Vehicle]) -> tuple[str, ...]:
-    """Return `<token>:<length>x<width>:<type>` of each vehicle, metres, so that no second message is needed for these.
-
-    The type is left out where it is the usual one of the length, as of all vehicles of older bags.
-    """
-    names = tokens(vehicle.id for vehicle in vehicles)
-    types = ("" if one.type == usual_type(one.length) else f":{one.type}" for one in vehicles)
-    return tuple(
-        f"{name}:{one.length!r}x{one.width!r}{kind}"
-        for name, one, kind in zip(names, vehicles, types, strict=True)
-    )
+    """Return `<token>:<length>x<width>:<type>` of each vehicle [m]; the type is omitted if it is usual for the length."""
+    names = []
+    ids = tokens(vehicle.id for vehicle in vehicles)
+    for name, vehicle in zip(ids, vehicles, strict=True):
+        kind = "" if vehicle.type == usual_type(vehicle.length) else f":{vehicle.type}"
+        names.append(f"{name}:{vehicle.length!r}x{vehicle.width!r}{kind}")
+    return tuple(names)
 
 
 def vehicle_of(joint_name: str) -> Vehicle:
-    """Return the vehicle of a joint name; one without a footprint gets the default size of a car.
+    """Return the vehicle of a joint name; without a footprint it is a car of default size.
 
     Raises:
-        InputError: the footprint is not two lengths of a vehicle, or the type is not known.
+        InputError: the footprint is not two possible lengths, or the type is unknown.
     """
     name, colon, rest = joint_name.partition(":")
     size, _, kind = rest.partition(":")
@@ -91,22 +97,20 @@ def vehicle_of(joint_name: str) -> Vehicle:
         length, width = (float(value) for value in match.groups()) if match else (0.0, 0.0)
     except ValueError:
         length = width = 0.0
-    if not (SMALLEST <= length <= LARGEST and SMALLEST <= width <= LARGEST):
+    if not all(MIN_SIZE_M <= side <= MAX_SIZE_M for side in (length, width)):
         raise InputError(
-            f"joint name {joint_name!r}: expected <id>:<length>x<width> (and :<type>), {SMALLEST:g} to {LARGEST:g} m each, "
-            "e.g. car:4.8x1.9"
+            f"joint name {joint_name!r}: expected <id>:<length>x<width> (and :<type>), {MIN_SIZE_M:g} to "
+            f"{MAX_SIZE_M:g} m each, e.g. car:4.8x1.9"
         )
     return Vehicle(name, length, width, kind)
 
 
 def _point_type(n: int) -> np.dtype[np.void]:
-    """Wire layout of a point of `n` vehicles that begins at a multiple of 8 bytes; it also ends at one."""
-    sequences = [
-        entry
-        for name, width in SEQUENCES.items()
-        for entry in (("n_" + name, "<u4"), ("pad_" + name, "<u4"), (name, "<f8", (n, width)))
-    ]
-    return np.dtype([*sequences, ("sec", "<i4"), ("nanosec", "<u4")])
+    """Return the wire layout of a point with `n` vehicles that begins and ends at a multiple of 8 bytes."""
+    fields: list[Any] = []
+    for name, width in SEQUENCES.items():
+        fields += [("n_" + name, "<u4"), ("pad_" + name, "<u4"), (name, "<f8", (n, width))]
+    return np.dtype([*fields, ("sec", "<i4"), ("nanosec", "<u4")])
 
 
 def encode(trajectory: Trajectory) -> bytes:
@@ -119,107 +123,112 @@ def encode(trajectory: Trajectory) -> bytes:
     values = (trajectory.position, trajectory.heading, trajectory.speed, trajectory.acceleration)
     if not all(np.isfinite(value).all() for value in values):
         raise InputError("a trajectory with a value that is not finite cannot be sent")
-    stamp, frame, names = (
-        trajectory.stamp_ns,
-        trajectory.frame_id,
-        joint_names(trajectory.vehicles),
-    )
     begin = encode_fields(
-        layouts.TRAJECTORY, stamp=stamp, frame_id=frame, names=names, count=count
+        layouts.TRAJECTORY,
+        stamp=trajectory.stamp_ns,
+        frame_id=trajectory.frame_id,
+        names=joint_names(trajectory.vehicles),
+        count=count,
     )
     points = np.zeros(count, dtype=_point_type(n))
     for name in SEQUENCES:
         points["n_" + name] = n
     points["transforms"][..., :2] = trajectory.position.swapaxes(0, 1)
-    if trajectory.there is not None:
-        points["transforms"][..., 2] = np.where(trajectory.there, 0.0, ABSENT).T
+    if trajectory.present is not None:
+        points["transforms"][..., 2] = np.where(trajectory.present, 0.0, ABSENT_Z_M).T
     points["transforms"][..., 3:] = quaternion(trajectory.heading).swapaxes(0, 1)
     points["velocities"][..., 0] = trajectory.speed.T
     points["accelerations"][..., 0] = trajectory.acceleration.T
     points["sec"], points["nanosec"] = np.divmod(trajectory.time_ns, NANOSECONDS)
     body = points.tobytes()
-    # Behind an odd multiple of four the first point's length itself fills up to the boundary: no padding after it.
-    return begin + (body if (len(begin) - len(HEADER)) % 8 == 0 else body[:4] + body[8:])
+    # At an odd multiple of 4 the first point needs no padding after its first length.
+    if (len(begin) - len(HEADER)) % 8:
+        body = body[:4] + body[8:]
+    return begin + body
 
 
-def decode(data: bytes, what: str) -> Trajectory:
-    """Return the content of the message; velocities or accelerations that were left out are read as zero.
+def decode(data: bytes, source: str) -> Trajectory:
+    """Return the content of the message; missing velocities or accelerations are zero.
 
     Raises:
-        InputError: naming `what`, where the message is damaged, lacks poses, or holds a value that is not finite or no vehicle's.
+        InputError: naming `source`, the message is damaged, lacks poses, or has an impossible value.
     """
-    return decode_first(data, what)[0]
+    return decode_first(data, source)[0]
 
 
-def decode_first(data: bytes, what: str) -> tuple[Trajectory, int]:
-    """Return the content of the first message, and how many bytes it takes; others may follow.
+def decode_first(data: bytes, source: str) -> tuple[Trajectory, int]:
+    """Return the content of the first message, and its size [bytes]; others may follow.
 
     Raises:
         InputError: as `decode`.
     """
-    reader = CdrReader(data, what)
+    reader = CdrReader(data, source)
     head = reader.fields(layouts.TRAJECTORY, framed=True)
     vehicles = tuple(map(vehicle_of, head.names))
-    n, count = len(vehicles), head.count
+    n = len(vehicles)
     if not n:
-        raise InputError(f"{what}: joint_names is empty; at least one vehicle is needed")
-    time_ns, pose, velocity, acceleration = _uniform(reader, n, count) or _one_by_one(
-        reader, what, n, count
+        raise InputError(f"{source}: joint_names is empty; at least one vehicle is needed")
+    points = _read_table(reader, n, head.count) or _read_points(reader, source, n, head.count)
+    _check_points(points, source)
+    time_ns, pose, velocity, acceleration = points
+    present = pose[..., 2].T > 0.5 * ABSENT_Z_M
+    trajectory = Trajectory(
+        stamp_ns=head.stamp,
+        frame_id=head.frame_id,
+        vehicles=vehicles,
+        time_ns=time_ns,
+        position=pose[..., :2].swapaxes(0, 1),
+        heading=yaw(pose[..., 3:]).T,
+        speed=velocity[..., 0].T,
+        acceleration=acceleration[..., 0].T,
+        present=None if present.all() else present,
     )
+    return trajectory, len(HEADER) + reader.place
+
+
+Points = tuple[Ints, Floats, Floats, Floats]
+"""Times (T,) [ns], poses (T, N, 7), velocities and accelerations (T, N, 6)."""
+
+
+def _check_points(points: Points, source: str) -> None:
+    """Raise InputError naming `source` if a value is not finite, too large or no rotation."""
+    _, pose, velocity, acceleration = points
     if not all(np.isfinite(value).all() for value in (pose, velocity, acceleration)):
-        raise InputError(f"{what}: the message holds a value that is not finite")
+        raise InputError(f"{source}: the message holds a value that is not finite")
     bounds = (
-        ("position", pose[..., :2], FARTHEST),
-        ("speed", velocity, FASTEST),
-        ("quaternion", pose[..., 3:], 2.0),
+        ("position", pose[..., :2], MAX_COORDINATE_M),
+        ("speed", velocity, MAX_SPEED_MPS),
+        ("quaternion", pose[..., 3:], MAX_COMPONENT_RATIO),
     )
-    for name, values, most in bounds:
-        if (np.abs(values) > most).any():
+    for name, values, bound in bounds:
+        if (np.abs(values) > bound).any():
             raise InputError(
-                f"{what}: a {name} is {np.abs(values).max():g}; at most {most:g} is read"
+                f"{source}: a {name} is {np.abs(values).max():g}; at most {bound:g} is read"
             )
-    check_quaternions(pose[..., 3:], what)
-    there = pose[..., 2].T > 0.5 * ABSENT
-    states = (
-        pose[..., :2].swapaxes(0, 1),
-        yaw(pose[..., 3:]).T,
-        velocity[..., 0].T,
-        acceleration[..., 0].T,
-    )
-    found = Trajectory(
-        head.stamp, head.frame_id, vehicles, time_ns, *states, there=None if there.all() else there
-    )
-    return found, len(HEADER) + reader.place
+    check_quaternions(pose[..., 3:], source)
 
 
-Points = tuple[
-    Ints, Floats, Floats, Floats
-]  # times (T,) [ns], poses (T, N, 7), velocities and accelerations (T, N, 6)
-
-
-def _uniform(reader: CdrReader, n: int, count: int) -> Points | None:
-    """Return the points as one table if each has all its sequences; otherwise None, and nothing is read."""
+def _read_table(reader: CdrReader, n: int, count: int) -> Points | None:
+    """Return the points from one array if each has all sequences; otherwise read nothing and return None."""
     place = reader.place
-    points = reader.aligned(_point_type(n), count) if n <= MANY else None
+    if n > MAX_TABLE_VEHICLES:
+        return None
+    points = reader.aligned(_point_type(n), count)
     if points is None:
         return None
     if not all((points["n_" + name] == n).all() for name in SEQUENCES):
         reader.place = place
         return None
     pose, velocity, acceleration = (np.ascontiguousarray(points[name]) for name in SEQUENCES)
-    return (
-        points["sec"].astype(np.int64) * NANOSECONDS + points["nanosec"],
-        pose,
-        velocity,
-        acceleration,
-    )
+    time_ns = points["sec"].astype(np.int64) * NANOSECONDS + points["nanosec"]
+    return time_ns, pose, velocity, acceleration
 
 
-def _one_by_one(reader: CdrReader, what: str, n: int, count: int) -> Points:
-    """Return the points, read one after the other; velocities or accelerations that were left out are zero.
+def _read_points(reader: CdrReader, source: str, n: int, count: int) -> Points:
+    """Return the points, read one after the other; missing velocities or accelerations are zero.
 
     Raises:
-        InputError: naming `what`, where the message is damaged or lacks poses.
+        InputError: naming `source`, the message is damaged or lacks poses.
     """
     points = [reader.fields(layouts.POINT) for _ in range(count)]
     blocks = []
@@ -227,7 +236,7 @@ def _one_by_one(reader: CdrReader, what: str, n: int, count: int) -> Points:
         rows = [getattr(point, name) for point in points]
         for k, row in enumerate(rows):
             if len(row) != n and (len(row) or width == 7):
-                raise InputError(f"{what}: point {k} has {len(row)} entries for {n} joint names")
+                raise InputError(f"{source}: point {k} has {len(row)} entries for {n} joint names")
         block = [row if len(row) else np.zeros((n, width)) for row in rows]
         blocks.append(np.array(block).reshape(count, n, width))
     pose, velocity, acceleration = blocks

@@ -9,15 +9,17 @@ from scenario_gen.base.errors import InputError
 from scenario_gen.numerics import Floats
 
 TWO_PI = 2.0 * np.pi
-SHORTEST, LARGEST = 0.5, 2.0  # length, and part, of a quaternion, which should have length 1
+MIN_LENGTH_RATIO = 0.5  # of a quaternion, whose length should be 1
+MAX_COMPONENT_RATIO = 2.0
 
 
 def half_angle(heading: Floats) -> tuple[Floats, Floats]:
-    """Return sine and cosine of half the canonical headings [rad], any shape, unwrapped or not: z and w of the quaternion.
+    """Return sine and cosine of half of canonical headings [rad], any shape: z and w of the quaternion.
 
-    A canonical angle is a multiple of a nanoradian plus turns and keeps off ±pi, so that taking back the turns is exact enough.
+    A canonical angle is a multiple of a nanoradian plus full turns, and is not near ±pi, so that
+    removing the turns is exact enough.
     """
-    if heading.size and max(heading.max(), -heading.min()) > np.pi:  # rarely
+    if heading.size and max(heading.max(), -heading.min()) > np.pi:
         heading = heading - TWO_PI * np.rint(heading / TWO_PI)
     half = 0.5 * heading
     return np.sin(half), np.cos(half)
@@ -30,24 +32,26 @@ def quaternion(heading: Floats) -> Floats:
     return result
 
 
-def check_quaternions(quaternions: Floats, what: str) -> None:
-    """Refuse quaternions (..., 4) that are no rotation; lengths near 1 are left to rounding.
+def check_quaternions(quaternions: Floats, source: str) -> None:
+    """Refuse quaternions (..., 4) that are no rotation; lengths near 1 may come from rounding.
 
     Raises:
-        InputError: naming `what`, one is shorter than a half (as a rule all zeros, because it was not set), or far too long.
+        InputError: naming `source`, a quaternion is too short (usually it was not set) or too long.
     """
-    squared = np.square(np.clip(quaternions, -2.0 * LARGEST, 2.0 * LARGEST)).sum(axis=-1)
-    wrong = (squared < SHORTEST * SHORTEST) | (np.abs(quaternions) > LARGEST).any(axis=-1)
+    bound = 2.0 * MAX_COMPONENT_RATIO
+    squared = np.square(np.clip(quaternions, -bound, bound)).sum(axis=-1)
+    too_short = squared < MIN_LENGTH_RATIO * MIN_LENGTH_RATIO
+    wrong = too_short | (np.abs(quaternions) > MAX_COMPONENT_RATIO).any(axis=-1)
     if wrong.any():
         row = int(np.argmax(wrong.reshape(-1)))
         x, y, z, w = quaternions.reshape(-1, 4)[row]
         raise InputError(
-            f"{what}: quaternion {row} is ({x:g}, {y:g}, {z:g}, {w:g}), which is no rotation; (0, 0, 0, 1) means a heading of 0"
+            f"{source}: quaternion {row} is ({x:g}, {y:g}, {z:g}, {w:g}), which is no rotation; (0, 0, 0, 1) means a heading of 0"
         )
 
 
 def yaw(quaternions: Floats) -> Floats:
-    """Return the rotation about z [rad] of quaternions (..., 4) x, y, z, w, such that the canonical angle is the one sent."""
+    """Return the rotation about z [rad] of quaternions (..., 4) x, y, z, w; its canonical angle is the encoded one."""
     x, y, z, w = np.moveaxis(quaternions, -1, 0)
     angle: Floats = np.where(
         (x == 0.0) & (y == 0.0),

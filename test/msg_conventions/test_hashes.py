@@ -38,5 +38,5 @@ def test_what_belongs_together_is_read_again_and_anything_else_refused():
         topic: hash_of(topic, messages[topic]) for topic in ("fit", "map")
     }
     for values in ({}, {"map": "no hash"}, {"map": "0" * 13}):
-        with pytest.raises(InputError, match="fit/info: it must say"):
+        with pytest.raises(InputError, match="fit/info: it must list"):
             decode_hashes(encode_diagnostics([Status("fit", Level.OK, "", values)], 5), "fit/info")

@@ -87,7 +87,7 @@ def test_a_message_alone_that_begins_late_is_no_scenario():
     late = messages_of(encode_scenario(scenario([(0, 40), (5, 40)]), 5))[1]
     with pytest.raises(InputError, match=r"begins at 0.5 s.*arrives late"):
         decode_scenario(late)
-    _, alone = decode_scenario(late, late=True)  # as the track of an ego
+    _, alone = decode_scenario(late, may_start_late=True)  # as the track of an ego
     assert alone.present.tolist() == [[1, 36]]
 
 
@@ -133,7 +133,7 @@ def test_tracks_come_back_and_show_nobody_on_the_ground_who_is_not_there():
     for name in ("position", "heading", "speed", "present"):
         assert getattr(again, name).tobytes() == getattr(encounter, name).tobytes()
     assert encode_tracks(again) == data
-    assert (decode(data, "tracks").there == encounter.is_present).all()
+    assert (decode(data, "tracks").present == encounter.is_present).all()
 
 
 def test_tracks_in_which_a_vehicle_comes_back_are_refused():
@@ -141,8 +141,8 @@ def test_tracks_in_which_a_vehicle_comes_back_are_refused():
     heard = decode(encode_scenario(made, 5), "scenarios")
     there = made.is_present.copy()
     there[1, 10:20] = False
-    with pytest.raises(InputError, match="vehicle v1 is there 2 times"):
-        decode_tracks(encode(replace(heard, there=there)))
+    with pytest.raises(InputError, match="vehicle v1 is present 2 times"):
+        decode_tracks(encode(replace(heard, present=there)))
 
 
 def test_scenarios_and_entries_are_joined_as_the_documentation_says():

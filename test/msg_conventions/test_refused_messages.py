@@ -49,7 +49,7 @@ def test_tracks_of_nobody_or_of_an_instant(vehicles, samples, words):
     ("time_ns", "words"),
     [
         ((5, 6, 7), "begins at 5e-09 s"),
-        ((0, 5, 5), "a point is not later than the one before"),
+        ((0, 5, 5), "a point is not later than the previous one"),
         ((0,), r"1 point\(s\); at least 2"),
     ],
 )
@@ -111,7 +111,7 @@ def test_empty_frames_and_quaternions_of_zeros(kind):
 def test_points_that_are_not_alike_are_read_one_by_one_to_the_same_values(frame, monkeypatch):
     data = trajectory.encode(_moving(frame))
     at_once = trajectory.decode(data, "tracks")
-    monkeypatch.setattr(trajectory, "MANY", 0)
+    monkeypatch.setattr(trajectory, "MAX_TABLE_VEHICLES", 0)
     one_by_one = trajectory.decode(data, "tracks")
     for name in ("time_ns", "position", "heading", "speed", "acceleration"):
         assert getattr(at_once, name).tobytes() == getattr(one_by_one, name).tobytes()

@@ -199,7 +199,7 @@ def test_lanes(seed, count):
         ),
         (b'"successors": [0]', b'"successors": [8]', "leads to a lane that is not there"),
         (b'{"name"', b'{"nome"', "KeyError"),
-        (b'{"name"', b'["name"', "does not say what its lanes are"),
+        (b'{"name"', b'["name"', "does not describe lanes"),
     ],
 )
 def test_lanes_that_say_what_cannot_be_are_refused(old, new, said):

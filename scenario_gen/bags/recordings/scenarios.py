@@ -251,13 +251,19 @@ def decode_with_witness(
     """
     seed, index = (entry.seed, entry.index) if entry else (0, k)
     late = bool(entry and entry.ego)  # the ego that was left out may have been the first vehicle
-    stamp, scenario = decode_scenario(data, seed=seed, index=index, what=what, late=late)
+    stamp, scenario = decode_scenario(
+        data, seed=seed, index=index, source=what, may_start_late=late
+    )
     if entry is not None:
         scenario = replace(scenario, facts=entry.facts)
     if witness is None:
         return stamp, scenario
     of, own = decode_scenario(
-        witness, seed=seed, index=index, what=f"{where}, of scenario {index}", late=True
+        witness,
+        seed=seed,
+        index=index,
+        source=f"{where}, of scenario {index}",
+        may_start_late=True,
     )
     known = {vehicle.id for vehicle in scenario.vehicles}
     if (

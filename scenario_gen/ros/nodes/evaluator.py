@@ -12,7 +12,7 @@ from msg_conventions.changepoints import decode_changepoints
 from msg_conventions.diagnostics import encode_diagnostics, Level, Status
 from msg_conventions.scenario_info import decode_info, INFO, RequestSummary, ScenarioEntry
 from msg_conventions.scenarios import decode_scenario, digest
-from msg_conventions.topics import MANY_HEARD
+from msg_conventions.topics import LOSSLESS
 from msg_conventions.tracks import decode_tracks
 from scenario_gen.bags.recordings.requests import Match, RequestTracker, TrackedRequest
 from scenario_gen.base.cancelling import stop_if_cancelled
@@ -69,7 +69,7 @@ class Evaluator(StageNode):
         """Subscribe to scenarios with a quality for which paced publishers wait."""
         self._requests = RequestTracker(self.config.keep)
         for topic in SCENARIOS:
-            self.listen(topic, MANY_HEARD)
+            self.listen(topic, LOSSLESS)
 
     def received(self, topic: str, data: bytes) -> None:
         """Store a message, and evaluate each request that is complete."""
@@ -141,7 +141,7 @@ class Evaluator(StageNode):
         segmentation = decode_changepoints(messages["changepoints"], encounter)
         # an ego that is left out may have been the first to come
         decoded = [
-            decode_scenario(data, seed=entry.seed, index=entry.index, late=True)
+            decode_scenario(data, seed=entry.seed, index=entry.index, may_start_late=True)
             for data, entry in scenarios
         ]
         if any(stamp != encounter.start_ns for stamp, _ in decoded):
@@ -177,7 +177,7 @@ class Evaluator(StageNode):
         for key, entry in row.values.items():
             if math.isfinite(entry.value):
                 values[key] = repr(entry.value)
-        notes = list(row.notes)
+        notes = [str(note) for note in row.notes]
         if row.name == WITH and measured < summary.published:
             notes.append(
                 f"measured on {measured} of {summary.published} scenarios, chosen by seed {self.config.seed}"

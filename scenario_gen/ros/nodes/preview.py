@@ -15,7 +15,7 @@ from rclpy.clock import Clock, ClockType
 
 from msg_conventions.fits import decode_fit
 from msg_conventions.frames import encode_frames
-from msg_conventions.markers import CUBE, DELETE_ALL, Marker, TEXT
+from msg_conventions.markers import Action, Kind, Marker
 from msg_conventions.pictures import body, COLOURS, encode_markers
 from msg_conventions.scenario_info import ScenarioEntry
 from scenario_gen.bags.recordings.arriving import ArrivingScenarios, TOPICS
@@ -101,7 +101,7 @@ class Preview(StageNode):
         names = tokens(vehicle.id for vehicle in scenario.vehicles)
         children = [f"preview/vehicle_{names[n]}" for n in here]
         self.outputs.publish(self._tf, encode_frames(poses, children, scenario.frame_id, stamp_ns))
-        markers = [Marker("", CUBE, DELETE_ALL)]
+        markers = [Marker("", Kind.CUBE, Action.DELETE_ALL)]
         for n, pose, speed in zip(here, poses.tolist(), speeds.tolist(), strict=True):
             vehicle = scenario.vehicles[n]
             markers.append(
@@ -112,20 +112,24 @@ class Preview(StageNode):
             words = f"{shown.reactions.get(names[n], names[n])}, {speed:.1f} m/s"
             place = (pose[0], pose[1] + vehicle.length, 0.0)
             markers.append(
-                Marker(f"text_{names[n]}", TEXT, pose=place, scale=(0.0, 0.0, HIGH), text=words)
+                Marker(
+                    f"text_{names[n]}", Kind.TEXT, pose=place, scale=(0.0, 0.0, HIGH), text=words
+                )
             )
         for k, (pose, words) in enumerate(shown.conflicts):
             markers.append(
                 Marker(
                     f"conflict_{k}",
-                    CUBE,
+                    Kind.CUBE,
                     pose=pose,
                     scale=(2.0, 2.0, 0.1),
                     colour=(0.9, 0.1, 0.1, 0.5),
                 )
             )
             markers.append(
-                Marker(f"conflict_text_{k}", TEXT, pose=pose, scale=(0.0, 0.0, HIGH), text=words)
+                Marker(
+                    f"conflict_text_{k}", Kind.TEXT, pose=pose, scale=(0.0, 0.0, HIGH), text=words
+                )
             )
         for n, anchors in enumerate(self._anchors[:, 1:-1]):
             for k, (x, y, yaw) in enumerate(anchors.tolist()):
@@ -133,7 +137,11 @@ class Preview(StageNode):
                 dot = (0.6, 0.6, 0.2)
                 markers.append(
                     Marker(
-                        f"changepoint_{n}_{k}", CUBE, pose=(x, y, yaw), scale=dot, colour=colour
+                        f"changepoint_{n}_{k}",
+                        Kind.CUBE,
+                        pose=(x, y, yaw),
+                        scale=dot,
+                        colour=colour,
                     )
                 )
         self.outputs.send("preview", encode_markers(markers, scenario.frame_id, stamp_ns))

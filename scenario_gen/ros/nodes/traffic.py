@@ -313,9 +313,9 @@ class Traffic(Node):  # type: ignore[misc]
         """End the wait for a command at its deadline; begin a scheduled scenario."""
         if monotonic() >= self._load_at:
             self._load(self._index + 1)
-        is_waiting = self._waiting is not None and not self._waiting.done()
-        if is_waiting and monotonic() > self._wait_deadline:
-            self._waiting.set_result(None)
+        waiting = self._waiting
+        if waiting is not None and not waiting.done() and monotonic() > self._wait_deadline:
+            waiting.set_result(None)
 
     def _step_refusal(self) -> str:
         if not self.config.lock_step:
