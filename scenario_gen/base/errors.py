@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The errors of the project, how they are shown, and how errors of libraries become ours."""
+"""The project's errors, their presentation, and the conversion of other errors into them."""
 
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
@@ -10,23 +10,24 @@ import errno
 from importlib.util import find_spec
 import sys
 
-LONGEST = 500  # characters of a message about an input: what is quoted from a broken file may be of any length
-LONGEST_REFUSAL = 2_000  # characters of a refusal, which may join several reasons
-JOIN, MOST_PARTS = "; ", 3  # of a message; so many from its beginning, and from its end, are kept
-ROOM = "; make room there, or name a place on another disk"
+MAX_INPUT_CHARACTERS = 500  # of a message about an input; quotations from files have any length
+MAX_REFUSAL_CHARACTERS = 2_000  # of a refusal, which may join several reasons
+PART_SEPARATOR = "; "
+MAX_PARTS_COUNT = 3  # of a long message, from its beginning and from its end
+FULL_DISK_ADVICE = "; make room there, or name a place on another disk"
 
 
 class ScenarioGenError(Exception):
-    """Base of every error this project raises on purpose; the command line prints it without a traceback and exits with 2."""
+    """Base of the errors that this project raises; the command line prints them without a traceback and exits with 2."""
 
     exit_code = 2
 
 
 class InputError(ScenarioGenError):
-    """A file, row, topic or parameter cannot be used as it is.
+    """A file, row, topic or parameter cannot be used.
 
-    The message may quote the file, so it is made presentable: characters that do not print are escaped, and the middle of a long
-    message is left out, so that the place at its beginning and the remedy at its end stay.
+    The message may quote the file. So unprintable characters are escaped, and a long message loses
+    its middle, so that the place at its beginning and the remedy at its end stay.
     """
 
     def __init__(self, message: str) -> None:
@@ -34,11 +35,11 @@ class InputError(ScenarioGenError):
 
 
 class UnforeseenError(InputError):
-    """A reader failed on a file in an unforeseen way; its cause is a fault of the reader."""
+    """A reader failed on a file in an unforeseen way: a bug in the reader."""
 
 
 class MissingExtraError(ScenarioGenError, ImportError):
-    """A library that only some uses need is not installed; the message names the extra that installs it."""
+    """An optional library is not installed; the message names the extra that installs it."""
 
 
 def needs(extra: str, *modules: str) -> None:
@@ -46,7 +47,7 @@ def needs(extra: str, *modules: str) -> None:
 
     Args:
         extra: one of the extras in pyproject.toml.
-        modules: top-level names; they are looked for, not imported.
+        modules: top-level names, which are not imported.
 
     Raises:
         MissingExtraError: one is missing.
@@ -58,98 +59,98 @@ def needs(extra: str, *modules: str) -> None:
         )
 
 
-def presentable(text: str, longest: int = LONGEST) -> str:
-    """Return a message with at most `longest` characters, all of which print, or are line breaks.
+def presentable(text: str, max_length: int = MAX_INPUT_CHARACTERS) -> str:
+    """Return a message of at most `max_length` printable characters and line breaks.
 
-    Of a long one each part (a reason, a remedy; a semicolon joins them) has its share, and loses its middle where that is less.
+    The parts of a long message (reasons and remedies, joined by semicolons) share the length; a
+    longer part loses its middle.
     """
-    if len(text) > 4 * longest:  # a first cut, for a quoted field may hold megabytes
-        text = text[: 2 * longest] + text[-2 * longest :]
+    if len(text) > 4 * max_length:  # a quoted field may have megabytes
+        text = text[: 2 * max_length] + text[-2 * max_length :]
     text = printable(text)
-    if len(text) <= longest:
+    if len(text) <= max_length:
         return text
-    parts = text.split(JOIN)
-    if len(parts) > 2 * MOST_PARTS:
-        parts = [*parts[:MOST_PARTS], "…", *parts[-MOST_PARTS:]]
-    room = longest - len(JOIN) * (len(parts) - 1)
+    parts = text.split(PART_SEPARATOR)
+    if len(parts) > 2 * MAX_PARTS_COUNT:
+        parts = [*parts[:MAX_PARTS_COUNT], "…", *parts[-MAX_PARTS_COUNT:]]
+    room = max_length - len(PART_SEPARATOR) * (len(parts) - 1)
     shortest_first = sorted(range(len(parts)), key=lambda k: len(parts[k]))
     for done, k in enumerate(shortest_first):
         parts[k] = _without_middle(parts[k], room // (len(parts) - done))
         room -= len(parts[k])
-    return JOIN.join(parts)
+    return PART_SEPARATOR.join(parts)
 
 
-def _without_middle(text: str, longest: int) -> str:
-    """Return a text with at most `longest` characters, cut between words where it has any."""
-    if len(text) <= longest:
+def _without_middle(text: str, max_length: int) -> str:
+    """Return a text of at most `max_length` characters, cut between words if possible."""
+    if len(text) <= max_length:
         return text
-    half = (longest - 3) // 2
+    half = (max_length - 3) // 2
     return f"{text[:half].rsplit(' ', 1)[0]} … {text[-half:].split(' ', 1)[-1]}"
 
 
 class RefusedError(ScenarioGenError):
-    """The input is sound but the request cannot be met with it, e.g. a template that fits no road."""
+    """The input is valid but the request is impossible, e.g. a template fits no road."""
 
 
 def did_you_mean(name: str, known: Iterable[str]) -> str:
-    """Return a question that names the known name nearest to an unknown one, to be put behind a message; "" if none is near."""
-    by_lower = {one.lower(): one for one in known}
-    near = get_close_matches(name.lower()[:LONGEST], by_lower, n=1, cutoff=0.6)
-    return f"; did you mean {by_lower[near[0]]}?" if near else ""
+    """Return a question with the known name most similar to an unknown one, as the end of a message; "" without one."""
+    by_lower = {each.lower(): each for each in known}
+    similar = get_close_matches(name.lower()[:MAX_INPUT_CHARACTERS], by_lower, n=1, cutoff=0.6)
+    return f"; did you mean {by_lower[similar[0]]}?" if similar else ""
 
 
 def of_system(error: OSError, name: object = None, advice: str = "") -> InputError:
-    """Return an error of the operating system as one of ours: file (`name`, or the one it names itself), reason, advice."""
+    """Return an OSError as an InputError: the file (`name`, or else that of the error), the reason, the advice."""
     file = error.filename if name is None else name
     place = "" if file is None else f"{file}: "
     if error.errno in (errno.ENOSPC, errno.EDQUOT):
-        advice = advice or ROOM
-    reason = (
-        "is a folder; name a file"
-        if isinstance(error, IsADirectoryError)
-        else error.strerror or error
-    )
+        advice = advice or FULL_DISK_ADVICE
+    reason = error.strerror or str(error)
+    if isinstance(error, IsADirectoryError):
+        reason = "is a folder; name a file"
     return InputError(f"{place}{reason}{advice}")
 
 
 def printable(text: str) -> str:
-    """Return the text with characters that control a terminal (also bidi marks) written as in Python source."""
+    """Return the text with control characters of a terminal, and bidi marks, escaped as in Python source."""
     return "".join(
         c if c.isprintable() or c == "\n" else c.encode("unicode_escape").decode() for c in text
     )
 
 
 def shown_error(error: Exception) -> str:
-    """Return the message of an error as it is printed; of one of many lines, say a refusal each, every line is presentable."""
-    return "\n".join(presentable(line, LONGEST_REFUSAL) for line in str(error).split("\n"))
+    """Return the printed message of an error, each of its lines presentable."""
+    return "\n".join(presentable(line, MAX_REFUSAL_CHARACTERS) for line in str(error).split("\n"))
 
 
 def print_error(error: ScenarioGenError | OSError) -> int:
     """Print the error on standard error; return the exit code."""
-    own = of_system(error) if isinstance(error, OSError) else error
-    print(f"error: {shown_error(own)}", file=sys.stderr)
-    return own.exit_code
+    if isinstance(error, OSError):
+        error = of_system(error)
+    print(f"error: {shown_error(error)}", file=sys.stderr)
+    return error.exit_code
 
 
 @contextmanager
 def guarded(where: str, *kinds: type[Exception], remedy: str = "") -> Iterator[None]:
-    """Turn the exceptions of a library that decodes into an InputError; the block holds nothing but calls into that library.
+    """Convert a decoding library's exceptions into an InputError; the block must only call that library.
 
     Args:
         where: the file and the place in it; begins the message.
-        kinds: of exceptions to turn; by default all: a decoder may fail in any way on damaged bytes, and as the block holds
-            no code of ours, no fault of ours is hidden.
-        remedy: what to do; ends the message.
+        kinds: the exceptions to convert, by default all: a decoder may fail in any way on damaged
+            bytes, and without code of ours in the block no bug of ours is hidden.
+        remedy: ends the message.
 
     Raises:
-        InputError: the library failed; with `where`, the message of the library, and `remedy`.
+        InputError: the library failed; the message has `where`, the library's message and `remedy`.
     """
-    turned = kinds or (Exception,)
+    converted = kinds or (Exception,)
     try:
         yield
     except ScenarioGenError:
         raise
-    except turned as error:
+    except converted as error:
         raise InputError(
             f"{where}: {describe(error)}" + (f"; {remedy}" if remedy else "")
         ) from error
@@ -157,12 +158,12 @@ def guarded(where: str, *kinds: type[Exception], remedy: str = "") -> Iterator[N
 
 @contextmanager
 def reading(path: object) -> Iterator[None]:
-    """Turn an unforeseen exception of a reader into an InputError that names the file; used once around each reader.
+    """Convert an unforeseen exception of a reader into an InputError that names the file; used once around each reader.
 
-    Unlike in `guarded` there is code of ours in the block, so the error has a class of its own, a finding of the fuzzing.
+    Unlike in `guarded` the block has code of ours, so the error has its own class, which fuzzing reports.
 
     Raises:
-        UnforeseenError: the reader failed with none of our errors, and none of the system's.
+        UnforeseenError: the reader raised neither an error of ours nor an OSError.
     """
     try:
         yield
@@ -170,12 +171,12 @@ def reading(path: object) -> Iterator[None]:
         raise
     except Exception as error:
         raise UnforeseenError(
-            f"{path} cannot be read: {describe(error)}; it is damaged, or of a kind that is not known"
+            f"{path} cannot be read: {describe(error)}; it is damaged, or in an unknown format"
         ) from error
 
 
 def describe(error: BaseException) -> str:
-    """Return the message of an error in one line, with its class where the message is a single word or empty."""
+    """Return the message of an error in one line, with its class if the message has at most one word."""
     if isinstance(error, MemoryError):
         return "asks for more memory than there is"
     text = " ".join(str((isinstance(error, OSError) and error.strerror) or error).split())

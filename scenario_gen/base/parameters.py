@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Parameters declared once: default, unit, range and meaning; the command line, the nodes and docs/ read them here."""
+"""Declarations of parameters for the command line, the nodes and docs/: default, unit, range and meaning."""
 
 from collections.abc import Mapping
 from contextlib import suppress
@@ -31,13 +31,13 @@ def parameter(
     """Declare one parameter of a frozen configuration dataclass; bounds are inclusive.
 
     Args:
-        default: its value, which also gives its type.
-        meaning: what it is, for people.
-        unit: of its values, "" for a plain number.
-        low: least value, None for no bound.
-        high: largest value, None for no bound.
-        choices: the texts allowed, none for any.
-        group: of entry points, whose names are allowed beside `choices` (see `base.registry`).
+        default: its value, which also determines its type.
+        meaning: its description.
+        unit: of its values, "" without one.
+        low: lower bound, or None.
+        high: upper bound, or None.
+        choices: the allowed texts; none: any.
+        group: entry points whose names are also allowed (see `base.registry`).
     """
     meta = {
         "meaning": meaning,
@@ -52,7 +52,7 @@ def parameter(
 
 @dataclass(frozen=True)
 class Parameters:
-    """Base of every configuration: its values are checked when it is created.
+    """Base of every configuration, which checks its values on creation.
 
     Raises:
         InputError: a value has the wrong type or is out of range.
@@ -70,7 +70,7 @@ class Parameters:
 
 
 def check_value(name: str, entry: "Field[Any]", value: Any) -> None:
-    """Raise InputError naming `name` if `value` does not suit the declaration `entry`."""
+    """Raise InputError naming `name` if `value` does not satisfy the declaration `entry`."""
     kind: type[Any] = type(entry.default)
     if isinstance(value, int) and not -WHOLE <= value < WHOLE:
         raise InputError(f"parameter {name} is an integer of more than 64 bits")
@@ -78,24 +78,35 @@ def check_value(name: str, entry: "Field[Any]", value: Any) -> None:
         value = float(value)
     if not isinstance(value, kind) or (kind is int and isinstance(value, bool)):
         raise InputError(f"parameter {name} must be {KINDS[kind]}, not {shown(value)!r}")
-    meta = entry.metadata
-    if meta["choices"] and value not in meta["choices"]:
-        plugins = installed(meta["group"]) if meta["group"] else {}
-        if value not in plugins:
-            choices = [one for one in (*meta["choices"], *plugins) if one]
-            listed = ", ".join(choices) + did_you_mean(str(value), choices)
-            raise InputError(f"parameter {name} is {shown(value)!r}; choose one of {listed}")
-    if kind in (int, float):
-        if not math.isfinite(value):
-            raise InputError(f"parameter {name} is {value}; give a finite number")
-        if meta["low"] is not None and value < meta["low"]:
-            raise InputError(
-                f"parameter {name} is {value}; it must be at least {meta['low']} {meta['unit']}".rstrip()
-            )
-        if meta["high"] is not None and value > meta["high"]:
-            raise InputError(
-                f"parameter {name} is {value}; it must be at most {meta['high']} {meta['unit']}".rstrip()
-            )
+    if kind is str:
+        _check_choice(name, entry.metadata, value)
+    elif kind is not bool:
+        _check_range(name, entry.metadata, value)
+
+
+def _check_choice(name: str, meta: Mapping[str, Any], value: str) -> None:
+    """Raise InputError if a text is none of the choices."""
+    if not meta["choices"] or value in meta["choices"]:
+        return
+    plugins = installed(meta["group"]) if meta["group"] else {}
+    if value not in plugins:
+        choices = [choice for choice in (*meta["choices"], *plugins) if choice]
+        listed = ", ".join(choices) + did_you_mean(value, choices)
+        raise InputError(f"parameter {name} is {shown(value)!r}; choose one of {listed}")
+
+
+def _check_range(name: str, meta: Mapping[str, Any], value: float) -> None:
+    """Raise InputError if a number is not finite or out of range."""
+    if not math.isfinite(value):
+        raise InputError(f"parameter {name} is {value}; give a finite number")
+    low, high, unit = meta["low"], meta["high"], meta["unit"]
+    bound = ""
+    if low is not None and value < low:
+        bound = f"at least {low} {unit}"
+    elif high is not None and value > high:
+        bound = f"at most {high} {unit}"
+    if bound:
+        raise InputError(f"parameter {name} is {value}; it must be {bound}".rstrip())
 
 
 def flatten(config: Any, prefix: str = "") -> dict[str, tuple["Field[Any]", Any]]:
@@ -128,43 +139,39 @@ def updated(config: Config, values: dict[str, Any], prefix: str = "") -> Config:
     Raises:
         InputError: a name is unknown, or a value has the wrong type or is out of range.
     """
+    declared = {entry.name: entry for entry in fields(config)}  # type: ignore[arg-type]
+    nested = {name: getattr(config, name) for name in declared}
+    nested = {name: part for name, part in nested.items() if is_dataclass(part)}
+    nested |= _of_plugins(config)
+
     changes: dict[str, Any] = {}
-    nested: dict[str, dict[str, Any]] = {}
-    known = {entry.name: entry for entry in fields(config)}  # type: ignore[arg-type]
-    inside: dict[str, Any] = {
-        name: part for name in known if is_dataclass(part := getattr(config, name))
-    }
-    inside.update(_of_plugins(config))
+    inner: dict[str, dict[str, Any]] = {}
     for name, value in values.items():
         head, _, rest = name.partition(".")
-        if (
-            head not in inside
-            if rest
-            else head in inside or head not in known or not known[head].metadata
-        ):
-            raise InputError(_unknown(config, name, prefix))
-        if rest:
-            nested.setdefault(head, {})[rest] = value
+        if rest and head in nested:
+            inner.setdefault(head, {})[rest] = value
+        elif not rest and head not in nested and head in declared and declared[head].metadata:
+            check_value(prefix + head, declared[head], value)
+            changes[head] = float(value) if isinstance(declared[head].default, float) else value
         else:
-            check_value(prefix + head, known[head], value)
-            changes[head] = float(value) if isinstance(known[head].default, float) else value
-    for head, inner in nested.items():
-        part = updated(inside[head], inner, f"{prefix}{head}.")
-        if head in known:
+            raise InputError(_unknown(config, name, prefix))
+
+    plugins = list(getattr(config, "plugins", ()))
+    for head, part_values in inner.items():
+        part = updated(nested[head], part_values, f"{prefix}{head}.")
+        if head in declared:
             changes[head] = part
         else:
-            changes["plugins"] = (
-                *changes.get("plugins", getattr(config, "plugins", ())),
-                (head, part),
-            )
+            plugins.append((head, part))
+            changes["plugins"] = tuple(plugins)
     return replace(config, **changes)  # type: ignore[type-var]
 
 
 def assigned(config: Config, assignment: str) -> Config:
-    """Return a copy of `config` with one `name=value` set; the value is YAML, but text for a parameter that is text.
+    """Return a copy of `config` with one `name=value` set; the value is YAML, or plain text for a text parameter.
 
     Raises:
-        InputError: there is no `=`, the name is unknown, or the value is no YAML or does not suit; the message names it.
+        InputError: there is no `=`, the name is unknown, or the value is no YAML or invalid; the message names it.
     """
     name, equals, text = assignment.partition("=")
     if not equals:
@@ -172,11 +179,11 @@ def assigned(config: Config, assignment: str) -> Config:
     known = flatten(config)
     if name not in known:
         raise InputError(_unknown(config, name))
-    is_text = isinstance(known[name][0].default, str)  # stays text: vehicle "007" is no number
+    is_text = isinstance(known[name][0].default, str)  # the vehicle "007" is no number
     value = text if is_text else parse_yaml(text, f"--set {name}={shown(text)}")
     if isinstance(known[name][0].default, float) and isinstance(value, str):
         with suppress(ValueError):
-            value = float(value)  # 1e9 and nan, which are texts in YAML
+            value = float(value)  # 1e9 and nan are texts in YAML
     return updated(config, {name: value})
 
 
@@ -184,7 +191,7 @@ def loaded(config: Config, path: Path) -> Config:
     """Return a copy of `config` with the values of a parameter file.
 
     Raises:
-        InputError: the file cannot be read, a name is unknown or a value does not suit; the message names file and parameter.
+        InputError: the file cannot be read, a name is unknown or a value is invalid; the message names file and parameter.
     """
     values = read_parameter_file(path)
     try:
@@ -197,15 +204,13 @@ def read_parameter_file(path: Path) -> dict[str, Any]:
     """Return {dotted name: value} of a ROS 2 parameter file (`/**: ros__parameters: ...`).
 
     Raises:
-        InputError: the file cannot be read or is not of that form.
+        InputError: the file cannot be read or has another form.
     """
     document = read_yaml(path)
-    body = (
-        next(iter(document.values()))
-        if isinstance(document, dict) and len(document) == 1
-        else None
-    )
-    nested = body.get("ros__parameters") if isinstance(body, dict) else None
+    nested = None
+    if isinstance(document, dict) and len(document) == 1:
+        (body,) = document.values()
+        nested = body.get("ros__parameters") if isinstance(body, dict) else None
     if not isinstance(nested, dict):
         raise InputError(f"{path}: not a parameter file of the form '/**: ros__parameters: ...'")
     return dict(_dotted(nested))
@@ -215,9 +220,8 @@ def _dotted(nested: dict[Any, Any], prefix: str = "") -> list[tuple[str, Any]]:
     """Flatten nested mappings to (dotted name, value) pairs."""
     pairs: list[tuple[str, Any]] = []
     for name, value in nested.items():
-        pairs += (
-            _dotted(value, f"{prefix}{name}.")
-            if isinstance(value, dict)
-            else [(f"{prefix}{name}", value)]
-        )
+        if isinstance(value, dict):
+            pairs += _dotted(value, f"{prefix}{name}.")
+        else:
+            pairs.append((f"{prefix}{name}", value))
     return pairs

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""What regenerates a scenario, as texts in the summary of its request: parameters and versions, written and read."""
+"""Parameters and versions that regenerate a scenario, as texts in the summary of its request."""
 
 from collections.abc import Mapping
 from importlib import metadata
@@ -21,13 +21,13 @@ RECORDING = (
 
 
 def versions() -> dict[str, str]:
-    """Return the versions on which the last digit of a scenario may depend."""
-    own = {"scenario_gen": scenario_gen.__version__, "python": platform.python_version()}
-    return own | {name: metadata.version(name) for name in ("numpy", "scipy", "numba")}
+    """Return the versions that can change the last digits of a scenario."""
+    result = {"scenario_gen": scenario_gen.__version__, "python": platform.python_version()}
+    return result | {name: metadata.version(name) for name in ("numpy", "scipy", "numba")}
 
 
 def parameter_texts(config: Any) -> dict[str, str]:
-    """Return {dotted name: text} of every parameter of a configuration; real numbers exact to the bit."""
+    """Return {dotted name: text} of all parameters of a configuration, floats exact to the bit."""
     return {name: str(value) for name, (_, value) in flatten(config).items()}
 
 

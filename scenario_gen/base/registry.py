@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""What is chosen by name (roads, planners, log and export formats, metrics): built-in, or of an installed package."""
+"""Registries of roads, planners, log and export formats and metrics: built-in ones and those of installed packages."""
 
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
@@ -16,44 +16,45 @@ T = TypeVar("T")
 
 @cache
 def installed(group: str) -> Mapping[str, EntryPoint]:
-    """Return the entry points of a group by name, sorted; none of them is loaded.
+    """Return the entry points of a group by name, sorted and not loaded.
 
     Raises:
         InputError: two distributions use one name.
     """
-    found: dict[str, EntryPoint] = {}
+    plugins: dict[str, EntryPoint] = {}
     for entry in sorted(entry_points(group=group), key=lambda entry: (entry.name, _source(entry))):
-        if entry.name in found:
-            raise InputError(
-                f"plugins: {_source(found[entry.name])} and {_source(entry)} both have {group} {entry.name!r}"
-            )
-        found[entry.name] = entry
-    return found
+        if entry.name in plugins:
+            sources = f"{_source(plugins[entry.name])} and {_source(entry)}"
+            raise InputError(f"plugins: {sources} both have {group} {entry.name!r}")
+        plugins[entry.name] = entry
+    return plugins
 
 
 def _source(entry: EntryPoint) -> str:
-    """Return the distribution of an entry point, with its version."""
+    """Return the distribution of an entry point with its version."""
     return f"{entry.dist.name} {entry.dist.version}" if entry.dist else entry.value
 
 
 class Registry(Generic[T]):
-    """Things of one kind by name: the built-in ones, and those that installed packages declare as entry points of one group.
+    """Objects of one kind by name: built-in ones, and entry points of one group in installed packages.
 
-    Source: entry points, as the Python Packaging User Guide has them ("Creating and discovering plugins").
+    Source: Python Packaging User Guide, "Creating and discovering plugins".
     """
 
     def __init__(self, group: str, built_in: Mapping[str, T], kind: type | None = None) -> None:
-        """Make a registry; installed packages are looked at when a name is not built in, or when a list is wanted.
+        """Create a registry; installed packages are searched only for lists and for names that are not built in.
 
         Args:
             group: of the entry points, e.g. "scenario_gen.roads".
-            built_in: by name, in the order in which they are listed and tried.
-            kind: what an entry point must be an instance of; None: it must be callable.
+            built_in: objects by name, in the order in which they are listed and tried.
+            kind: the required class of an entry point's object; None: it must be callable.
         """
-        self.group, self.kind, self.built_in = group, kind, built_in
+        self.group = group
+        self.kind = kind
+        self.built_in = built_in
 
     def names(self) -> tuple[str, ...]:
-        """Return all names: the built-in ones first, the others sorted.
+        """Return all names: the built-in ones, then the others, sorted.
 
         Raises:
             InputError: two distributions use one name, or one uses a built-in name.
@@ -66,14 +67,14 @@ class Registry(Generic[T]):
         return (*self.built_in, *plugins)
 
     def __contains__(self, name: str) -> bool:
-        """Return whether something has this name."""
+        """Return whether an object has this name."""
         return name in self.built_in or name in self.names()
 
     def __getitem__(self, name: str) -> T:
-        """Return what has this name.
+        """Return the object with a name.
 
         Raises:
-            InputError: nothing has it, its plugin cannot be loaded or is of a wrong kind, or `names` fails.
+            InputError: there is none, its plugin cannot be loaded or has a wrong kind, or `names` fails.
         """
         if name in self.built_in:
             return self.built_in[name]
@@ -95,10 +96,10 @@ class Registry(Generic[T]):
 
     @contextmanager
     def running(self, name: str) -> Iterator[None]:
-        """Name the plugin in an error of its code; what is built in answers for itself.
+        """Convert an error in a plugin's code into one that names the plugin.
 
         Raises:
-            InputError: the code of the plugin raised an error that is not ours, or wanted to leave the process.
+            InputError: the plugin raised an error that is not ours, or tried to exit.
         """
         try:
             yield
@@ -111,7 +112,7 @@ class Registry(Generic[T]):
             raise InputError(f"plugin {name!r} of {source} failed: {describe(error)}") from error
 
     def values(self) -> Iterator[T]:
-        """Yield everything in the order of `names`; a plugin is loaded when its turn comes.
+        """Yield the objects in the order of `names`; a plugin is loaded when its turn comes.
 
         Raises:
             InputError: as `__getitem__`.

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""A ROS domain that nobody else on this machine uses, and the environment of processes that meet in it and nowhere else."""
+"""An unused ROS domain on this machine, and the environment of processes that communicate only in it."""
 
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
@@ -14,14 +14,17 @@ from filelock import FileLock, Timeout
 
 from scenario_gen.base.errors import RefusedError
 
-DOMAINS = range(1, 102)  # above, the ports would be ephemeral ones
-PARTICIPANTS = 20  # of which one that was left over may be any: the first ones may have ended
+DOMAINS = range(1, 102)  # higher domains would use ephemeral ports
+CHECKED_PARTICIPANTS_COUNT = 20  # the first participants may have ended while a later one lives
+FIRST_UNICAST_PORT = 7410  # RTPS: 7400 + 250 · domain + 10 + 2 · participant
+PORTS_PER_DOMAIN_COUNT = 250
 
 
 def _quiet(domain: int) -> bool:
-    """Say whether the ports of a domain's first participants are free (RTPS: 7400 + 250·domain + 10 + 2·participant)."""
+    """Return whether the ports of a domain's first participants are free."""
+    first = FIRST_UNICAST_PORT + PORTS_PER_DOMAIN_COUNT * domain
     with suppress(OSError):
-        for port in range(7410 + 250 * domain, 7410 + 250 * domain + 2 * PARTICIPANTS, 2):
+        for port in range(first, first + 2 * CHECKED_PARTICIPANTS_COUNT, 2):
             with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
                 probe.bind(("", port))
         return True
@@ -30,10 +33,10 @@ def _quiet(domain: int) -> bool:
 
 @contextmanager
 def free_domain() -> Iterator[int]:
-    """Hold a domain id: no participant is in it, and no other run of ours takes it meanwhile.
+    """Reserve a domain id without participants.
 
     Raises:
-        RefusedError: none is free.
+        RefusedError: no domain is free.
     """
     for domain in reversed(DOMAINS):
         lock = FileLock(
@@ -43,7 +46,7 @@ def free_domain() -> Iterator[int]:
         )
         try:
             lock.acquire()
-        except (OSError, Timeout):  # held, or another user's, whose domain is passed over
+        except (OSError, Timeout):  # reserved, or the lock of another user
             continue
         try:
             if _quiet(domain):
@@ -58,38 +61,35 @@ def free_domain() -> Iterator[int]:
 
 @contextmanager
 def own_domain() -> Iterator[int]:
-    """Put this process and its children in a domain of their own, on this host.
+    """Run this process and its children in a domain of their own, on this host.
 
     Raises:
-        RefusedError: none is free.
+        RefusedError: no domain is free.
     """
     with free_domain() as domain:
-        own = {**this_host_only(), "ROS_DOMAIN_ID": str(domain)}
-        before = {name: os.environ.get(name) for name in own}
-        os.environ.update(own)
+        variables = {**this_host_only(), "ROS_DOMAIN_ID": str(domain)}
+        previous = {name: os.environ[name] for name in variables if name in os.environ}
+        os.environ.update(variables)
         try:
             yield domain
         finally:
-            for name in own:
+            for name in variables:
                 os.environ.pop(name, None)
-            os.environ.update({name: value for name, value in before.items() if value is not None})
+            os.environ.update(previous)
 
 
 def this_host_only(environment: Mapping[str, str] = os.environ) -> dict[str, str]:
-    """Return the variables that let a process meet others on this host only, whatever its domain.
+    """Return the variables that restrict a process to communication on this host, in any domain.
 
-    With Fast DDS they talk over UDP on the loopback device. Its shared memory, which ROS's own range LOCALHOST includes, takes a
-    process that did not run for a second for dead, and what it does then can end in a deadlock of the living (Fast DDS issue
-    6484): so it did in 3 of 40 storms of 40 callers beside six busy loops on two cores.
+    Fast DDS then uses UDP on the loopback device. Its shared memory, which ROS's range LOCALHOST
+    includes, considers a process dead that did not run for a second, and can then deadlock living
+    ones (Fast DDS issue 6484). This happened in 3 of 40 runs of 40 callers on two busy cores.
     """
     if not environment.get("RMW_IMPLEMENTATION", "rmw_fastrtps").startswith("rmw_fastrtps"):
         return {"ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"}
     profile = str(Path(__file__).resolve().parents[1] / "resources" / "loopback.xml")
-    names = (
-        "FASTRTPS_DEFAULT_PROFILES_FILE",
-        "FASTDDS_DEFAULT_PROFILES_FILE",
-    )  # of Jazzy's Fast DDS, and of the next
     return {
-        "ROS_AUTOMATIC_DISCOVERY_RANGE": "SYSTEM_DEFAULT",
-        **dict.fromkeys(names, profile),
-    }  # all is left to the profile
+        "ROS_AUTOMATIC_DISCOVERY_RANGE": "SYSTEM_DEFAULT",  # the profile decides
+        "FASTRTPS_DEFAULT_PROFILES_FILE": profile,  # Jazzy's Fast DDS
+        "FASTDDS_DEFAULT_PROFILES_FILE": profile,  # later versions
+    }

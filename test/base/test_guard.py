@@ -10,8 +10,8 @@ import pytest
 from scenario_gen.base.errors import (
     guarded,
     InputError,
-    LONGEST,
-    LONGEST_REFUSAL,
+    MAX_INPUT_CHARACTERS,
+    MAX_REFUSAL_CHARACTERS,
     print_error,
     RefusedError,
 )
@@ -20,7 +20,7 @@ from scenario_gen.base.errors import (
 @given(st.text(), st.integers(0, 3000))
 def test_a_message_is_short_and_prints(text, times):
     message = str(InputError(f"log.csv, line 3: {text * times}; name the column"))
-    assert len(message) <= LONGEST
+    assert len(message) <= MAX_INPUT_CHARACTERS
     assert all(c.isprintable() or c == "\n" for c in message)
     assert message.startswith("log.csv, line 3: ") and message.endswith("; name the column")
 
@@ -39,7 +39,7 @@ def test_of_joined_refusals_each_keeps_its_reason_and_remedy(capsys):
     print_error(RefusedError("; ".join(refusals)))
     said = capsys.readouterr().err
     assert said.count("choose road merge") == 2 and "road curve: vehicle 1 drives on" in said
-    assert len(said) <= len("error: \n") + LONGEST_REFUSAL
+    assert len(said) <= len("error: \n") + MAX_REFUSAL_CHARACTERS
     assert set(said.split()) <= {"error:", "…", *"; ".join(refusals).split()}, "no word is cut"
     print_error(
         RefusedError(

@@ -13,7 +13,7 @@ from pyarrow import parquet
 import pytest
 from support.log_builders import crossing, geographic, save
 
-from scenario_gen.base.errors import InputError, LONGEST
+from scenario_gen.base.errors import InputError, MAX_INPUT_CHARACTERS
 from scenario_gen.logs import LogConfig, read_log
 
 
@@ -240,7 +240,7 @@ def test_text_that_is_no_table(tmp_path, change, said):
     path.write_bytes(text if isinstance(text, bytes) else text.encode())
     with pytest.raises(InputError, match=said) as error:
         read_log(path)
-    assert "log.csv" in str(error.value) and len(str(error.value)) <= LONGEST
+    assert "log.csv" in str(error.value) and len(str(error.value)) <= MAX_INPUT_CHARACTERS
 
 
 @pytest.mark.parametrize("value", [1e300, -1e300, 1e308, 3e8])

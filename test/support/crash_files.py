@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from scenario_gen.base.errors import InputError, LONGEST
+from scenario_gen.base.errors import InputError, MAX_INPUT_CHARACTERS
 from support import broken
 from support.harness import CRASHES
 
@@ -33,7 +33,7 @@ def is_refused(read, *said: str) -> bool:
     try:
         read()
     except InputError as error:
-        assert 0 < len(str(error)) <= LONGEST
+        assert 0 < len(str(error)) <= MAX_INPUT_CHARACTERS
         assert all(text in str(error) for text in said), str(error)
         return True
     return False

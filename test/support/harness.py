@@ -31,7 +31,7 @@ import traceback
 from typing import TextIO
 import warnings
 
-from scenario_gen.base.errors import LONGEST, ScenarioGenError, UnforeseenError
+from scenario_gen.base.errors import MAX_INPUT_CHARACTERS, ScenarioGenError, UnforeseenError
 
 HERE = Path(__file__).resolve().parent
 DATA = Path(os.environ.get("SCENARIO_GEN_DATA", HERE.parents[2] / "shared" / "data"))
@@ -147,12 +147,12 @@ def execute(
         return signature(error.__cause__ or error), str(error)
     except ScenarioGenError as error:
         said = str(error)
-        if not 0 < len(said) <= LONGEST:
+        if not 0 < len(said) <= MAX_INPUT_CHARACTERS:
             return "LongMessage", f"{len(said)} characters: {said[:200]}"
         if target.named not in said and not said.startswith("parameter "):
             return "NoPlace", said
     except (Exception, OverTimeError) as error:
-        return signature(error), str(error)[:LONGEST]
+        return signature(error), str(error)[:MAX_INPUT_CHARACTERS]
     finally:
         signal.setitimer(signal.ITIMER_PROF, 0.0)
         shutil.rmtree(folder, ignore_errors=True)

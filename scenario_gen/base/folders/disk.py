@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Files written so that an error names them and a crash of the machine does not lose them."""
+"""Writes whose errors name the file, and flushes that survive a crash of the machine."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -11,7 +11,7 @@ from pathlib import Path
 
 @contextmanager
 def naming(path: Path) -> Iterator[None]:
-    """Let an OSError name the file that is being written: those of write and fsync do not."""
+    """Add the file's name to an OSError; those of write and fsync have none."""
     try:
         yield
     except OSError as error:
@@ -26,7 +26,7 @@ def write_text(path: Path, text: str) -> None:
 
 
 def sync(path: Path) -> None:
-    """Flush a file's content, or a folder's list of names, to the disk; an OSError names it."""
+    """Flush a file, or a folder's list of names, to the disk; an OSError names it."""
     with naming(path):
         descriptor = os.open(path, os.O_RDONLY)
         try:
@@ -36,7 +36,7 @@ def sync(path: Path) -> None:
 
 
 def sync_tree(path: Path) -> None:
-    """`sync` a file, or a folder after all that is in it."""
+    """`sync` a file, or a folder after its content."""
     for inside in path.rglob("*") if path.is_dir() else ():
         sync(inside)
     sync(path)

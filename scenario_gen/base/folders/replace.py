@@ -1,9 +1,9 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Results take their places whole: written beside it, then renamed; in the place of an earlier result of the same kind only.
+"""Results take their places whole, by a rename, and replace only unchanged earlier results of their kind.
 
-An earlier result is known by its marker, a file that holds its kind and the SHA-256 of every other file.
+An earlier result has a marker, a file with its kind and the SHA-256 of every other file.
 """
 
 from collections.abc import Iterable, Iterator
@@ -19,47 +19,44 @@ from scenario_gen.base.folders.disk import sync, sync_tree, write_text
 from scenario_gen.base.folders.scratch import claimed, OLD, PREFIX
 from scenario_gen.base.signals import signals_deferred
 
-MARKER, FORMAT = ".scenario_gen.json", 1
+MARKER = ".scenario_gen.json"
+FORMAT_VERSION = 1
 UNTOUCHED = (
     "; what was there is untouched; make room, or name another folder that you may write to"
 )
 Kind = NewType("Kind", str)
-"""A kind of result, as markers name it."""
+"""A kind of result, as in the markers."""
 
 
 @contextmanager
 def replaced_folder(target: Path, kind: Kind, inputs: Iterable[Path] = ()) -> Iterator[Path]:
-    """Yield an empty folder to write a result to, and move it to `target` at the end, flushed to the disk.
+    """Yield an empty folder for a result, and move it to `target` at the end, flushed to the disk.
 
-    Until then `target` stays as it is, also if the body raises, or the process is killed. It may be an empty folder or an
-    unchanged earlier result of the same kind. What a killed run left there is removed.
+    `target` stays unchanged until then, also if the body raises or the process is killed. It may be
+    an empty folder or an unchanged earlier result of the same kind.
 
     Args:
-        target: place of the result; folders above are created.
+        target: place of the result; its parents are created.
         kind: of the result.
-        inputs: files and folders that are read for it: none of them may lie in `target`.
+        inputs: files and folders that are read for it; none of them may be in `target`.
 
     Yields:
-        A folder of the same name, beside `target`.
+        A folder with the same name, beside `target`.
 
     Raises:
         InputError: `target` may not be replaced, another process is writing to it, it cannot be written, or the disk is full.
     """
     try:
         place = _place(target, inputs)
-    except (
-        OSError,
-        RuntimeError,
-        ValueError,
-    ) as error:  # too long, a loop of links, a null character
+    except (OSError, RuntimeError, ValueError) as error:  # too long, a loop of links, a null byte
         raise InputError(
             f"{target} cannot be written: {describe(error)}; name another folder"
         ) from error
-    own = place.with_name(f"{PREFIX}{place.name}")
+    scratch = place.with_name(f"{PREFIX}{place.name}")
     try:
-        with claimed(own, target) as above:
+        with claimed(scratch, target) as parent:
             _check(target, place, kind)
-            new = above / place.name
+            new = parent / place.name
             new.mkdir()
             yield new
             with signals_deferred():
@@ -67,47 +64,46 @@ def replaced_folder(target: Path, kind: Kind, inputs: Iterable[Path] = ()) -> It
                 _check(target, place, kind)
                 _put(target, place, new, kind)
     except OSError as error:
-        named = place if error.filename is None else Path(os.fsdecode(error.filename))
-        if not any(
-            one.is_relative_to(other)
-            for one, other in ((named, place), (named, own), (own, named))
-        ):
-            raise  # of what the body reads
-        waits = f"; the earlier result is in {own / OLD}, the next command puts it back"
-        raise of_system(
-            error, target, waits if os.path.lexists(own / OLD) else UNTOUCHED
-        ) from error
+        path = place if error.filename is None else Path(os.fsdecode(error.filename))
+        if not any(map(path.is_relative_to, (place, scratch))) and path not in scratch.parents:
+            raise  # a file that the body reads
+        advice = UNTOUCHED
+        if os.path.lexists(scratch / OLD):
+            advice = f"; the earlier result is in {scratch / OLD}, the next command puts it back"
+        raise of_system(error, target, advice) from error
 
 
 def _place(target: Path, inputs: Iterable[Path]) -> Path:
     """Return the target's absolute path.
 
     Raises:
-        InputError: no result may be there, or one of the inputs lies there.
+        InputError: no result may be there, or an input is there.
     """
     place = target.resolve()
-    there = next(folder for folder in (place, *place.parents) if folder.exists())
-    why = ""
+    existing = next(folder for folder in (place, *place.parents) if folder.exists())
+    fault = ""
     if target.is_symlink():
-        why = "is a link; name the folder that it leads to"
-    elif not there.is_dir():
-        why = f"cannot be a folder, because {there} is a file"
+        fault = "is a link; name the folder that it leads to"
+    elif not existing.is_dir():
+        fault = f"cannot be a folder, because {existing} is a file"
     elif Path.cwd().is_relative_to(place):
-        why = "is the folder that you are in, or above it"
+        fault = "is the folder that you are in, or above it"
     elif os.path.ismount(place):
-        why = "is a mount point, which cannot be replaced; name a folder in it"
-    elif read := next((path for path in inputs if path.resolve().is_relative_to(place)), None):
-        why = f"holds {read}, which is read, and would be replaced"
-    if why:
-        raise InputError(f"{target} {why}; name another folder")
+        fault = "is a mount point, which cannot be replaced; name a folder in it"
+    else:
+        for path in inputs:
+            if path.resolve().is_relative_to(place):
+                fault = f"holds {path}, which is read, and would be replaced"
+    if fault:
+        raise InputError(f"{target} {fault}; name another folder")
     return place
 
 
 def _put(target: Path, place: Path, new: Path, kind: Kind) -> None:
-    """Move the new result to its place; where that fails `claimed` puts the earlier one back.
+    """Move the new result to its place; on failure `claimed` puts the earlier one back.
 
     Raises:
-        InputError: something came into the earlier result at the last moment.
+        InputError: a file was added to the earlier result at the last moment.
         OSError: the file system refuses.
     """
     if place.exists():
@@ -115,56 +111,54 @@ def _put(target: Path, place: Path, new: Path, kind: Kind) -> None:
         place.rename(old)
         _check(target, old, kind)
     new.rename(place)
-    with suppress(OSError):  # of a file system without such a call; all data are on the disk
+    with suppress(OSError):  # a file system without fsync of folders; all data are on the disk
         sync(place.parent)
 
 
 def _finish(folder: Path, kind: Kind) -> None:
     """Write the marker of a new result, and flush all its files to the disk."""
-    document = {"kind": kind, "format": FORMAT, "files": _digests(folder)}
+    document = {"kind": kind, "format": FORMAT_VERSION, "files": _digests(folder)}
     write_text(folder / MARKER, json.dumps(document, indent=2) + "\n")
     sync_tree(folder)
 
 
 def _digests(folder: Path) -> dict[str, str]:
-    """Return {relative name: SHA-256} of all files at any depth, in order; "" of what is no regular file, as a link."""
-    found: dict[str, str] = {}
+    """Return {relative name: SHA-256} of all files at any depth, in order; "" for links and special files."""
+    digests: dict[str, str] = {}
     for path in sorted(folder.iterdir()):
         if path.is_dir() and not path.is_symlink():
-            found |= {f"{path.name}/{name}": digest for name, digest in _digests(path).items()}
+            digests |= {f"{path.name}/{name}": text for name, text in _digests(path).items()}
         else:
-            found[path.name] = "" if path.is_symlink() or not path.is_file() else sha256_of(path)
-    return found
+            is_regular = path.is_file() and not path.is_symlink()
+            digests[path.name] = sha256_of(path) if is_regular else ""
+    return digests
 
 
-def _check(target: Path, there: Path, kind: Kind) -> None:
-    """Raise InputError if `there` holds files that are not of an earlier result; some of its own may be missing."""
-    present = _digests(there) if there.exists() else {}
+def _check(target: Path, folder: Path, kind: Kind) -> None:
+    """Raise InputError if a folder has files that an earlier result has not; files may be missing."""
+    present = _digests(folder) if folder.exists() else {}
     files: dict[str, str] = {}
     if MARKER in present:
         with suppress(ValueError, KeyError, TypeError, RecursionError):
-            marker = json.loads((there / MARKER).read_text(encoding="utf-8"))
-            if (marker["kind"], marker["format"]) == (kind, FORMAT):
+            marker = json.loads((folder / MARKER).read_text(encoding="utf-8"))
+            if (marker["kind"], marker["format"]) == (kind, FORMAT_VERSION):
                 files = {**marker["files"], MARKER: present[MARKER]}
-    foreign = next((name for name, digest in present.items() if files.get(name) != digest), "")
-    if foreign:
-        why = (
-            f"{foreign} in it is new or changed"
-            if files
-            else f"it holds {foreign} and is not an earlier result ({kind})"
-        )
+    for name, digest in present.items():
+        if files.get(name) == digest:
+            continue
+        fault = f"it holds {name} and is not an earlier result ({kind})"
+        if files:
+            fault = f"{name} in it is new or changed"
         raise InputError(
-            f"{target} is not replaced: {why}; move that away, or name another folder"
+            f"{target} is not replaced: {fault}; move that away, or name another folder"
         )
 
 
 def sha256_of(path: Path) -> str:
-    """Return the SHA-256 of a file, or of a folder's files in order of their names."""
+    """Return the SHA-256 of a file, or of a folder's files in the order of their names, without its marker."""
     digest = hashlib.sha256()
     for file in sorted(path.rglob("*")) if path.is_dir() else [path]:
-        if file.is_file() and (
-            file == path or file.name != MARKER
-        ):  # which is about the files, and not in every bag
+        if file.is_file() and (file == path or file.name != MARKER):
             with file.open("rb") as stream:
                 hashlib.file_digest(stream, lambda: digest)
     return digest.hexdigest()

@@ -19,7 +19,7 @@ from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
 
 from msg_conventions.diagnostics import encode_diagnostics, Level, of_template, Status
-from scenario_gen.base.errors import LONGEST_REFUSAL, presentable, ScenarioGenError
+from scenario_gen.base.errors import MAX_REFUSAL_CHARACTERS, presentable, ScenarioGenError
 from scenario_gen.base.worker import stop_if_abandoned
 from scenario_gen.ros.common.topics import (
     create_publisher,
@@ -259,5 +259,5 @@ def bounded(status: Status) -> Status:
         values[key] = value
     if missing := len(status.values) - len(values):
         values["left_out"] = f"{missing} values, which would make the message too long"
-    message = presentable(status.message, LONGEST_REFUSAL)
-    return Status(status.name[:LONGEST_REFUSAL], status.level, message, values)
+    message = presentable(status.message, MAX_REFUSAL_CHARACTERS)
+    return Status(status.name[:MAX_REFUSAL_CHARACTERS], status.level, message, values)
