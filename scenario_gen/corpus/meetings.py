@@ -31,7 +31,7 @@ from scenario_gen.corpus.tracks import (
     tell_apart,
     tracks_of,
 )
-from scenario_gen.logs import METRES_PER_SECOND_APART, OUT_OF_RANGE_S, shortest
+from scenario_gen.logs import GAP_RATE_MPS, OUT_OF_RANGE_S, shortest
 from scenario_gen.numerics import Bools, Floats, Ints
 from scenario_gen.numerics.kernels import F, F1, I, I1, kernel, named
 
@@ -295,7 +295,7 @@ def _near_in_time(base: Any, pairs: dict[str, Ints], config: CorpusConfig) -> Bo
     own = {
         int(rows["device"][first]): slice(first, last) for first, last in runs_of(rows["device"])
     }
-    steps = int(config.interaction / METRES_PER_SECOND_APART / (BIN * 1e-6)) + 1
+    steps = int(config.interaction / GAP_RATE_MPS / (BIN * 1e-6)) + 1
     reach = config.interaction + config.slack + FASTEST_MPS * BIN * 0.25e-6
     north = rows["lat"] * NORTH
     kept = np.zeros(len(pairs["a"]), dtype=bool)

@@ -8,7 +8,7 @@ from scenario_gen.logs.cleaning import parse_origin
 from scenario_gen.logs.config import LogConfig
 from scenario_gen.logs.files import read_raw
 from scenario_gen.logs.formats import is_bag, is_log, is_spmd, is_table, LOG_FORMATS, LogFormat
-from scenario_gen.logs.gap import INTERACTS_M, METRES_PER_SECOND_APART, space_time_gap
+from scenario_gen.logs.gap import GAP_RATE_MPS, INTERACTS_M, space_time_gap
 from scenario_gen.logs.geodesy import (
     azimuthal,
     latitude_longitude,
@@ -27,9 +27,42 @@ from scenario_gen.logs.streams import Streams
 from scenario_gen.logs.synthetic import bundled, CASES
 
 __all__ = [
-    "CASES", "INTERACTS_M", "LOG_FORMATS", "METRES_PER_SECOND_APART", "OPENSCENARIO_SPEEDS", "OUT_OF_RANGE_S", "Growth", "LogConfig",
-    "LogFormat", "LogResult", "Meeting", "NoEncounterError", "Observations", "RawLog", "Rows", "Segment", "Streams",
-    "UnknownFormatError", "azimuthal", "bundled", "encounters_of", "is_bag", "is_log",
-    "is_spmd", "is_table", "latitude_longitude", "local_frame", "metres_per_degree", "middle_of", "parse_origin", "read_log",
-    "read_raw", "reprojected", "shortest", "space_time_gap", "ticks", "utm", "windows",
+    "CASES",
+    "GAP_RATE_MPS",
+    "INTERACTS_M",
+    "LOG_FORMATS",
+    "OPENSCENARIO_SPEEDS",
+    "OUT_OF_RANGE_S",
+    "Growth",
+    "LogConfig",
+    "LogFormat",
+    "LogResult",
+    "Meeting",
+    "NoEncounterError",
+    "Observations",
+    "RawLog",
+    "Rows",
+    "Segment",
+    "Streams",
+    "UnknownFormatError",
+    "azimuthal",
+    "bundled",
+    "encounters_of",
+    "is_bag",
+    "is_log",
+    "is_spmd",
+    "is_table",
+    "latitude_longitude",
+    "local_frame",
+    "metres_per_degree",
+    "middle_of",
+    "parse_origin",
+    "read_log",
+    "read_raw",
+    "reprojected",
+    "shortest",
+    "space_time_gap",
+    "ticks",
+    "utm",
+    "windows",
 ]  # fmt: skip

@@ -11,7 +11,7 @@ import numpy as np
 from scenario_gen.base.errors import InputError
 from scenario_gen.logs.config import chosen_vehicles, LogConfig
 from scenario_gen.logs.encounters import Piece
-from scenario_gen.logs.geodesy import about_its_middle
+from scenario_gen.logs.geodesy import in_own_frame
 from scenario_gen.logs.growing import Group, Meeting
 from scenario_gen.logs.quality import EncounterQuality, find_overlaps, Quality
 from scenario_gen.logs.raw import RawLog
@@ -64,7 +64,7 @@ def cut_encounter(
         origin=tracks[0].origin,
         present=np.array(list(spans.values())) - group.start - np.array([0, 1]),
     )
-    return encounter if config.origin else about_its_middle(encounter), notes
+    return encounter if config.origin else in_own_frame(encounter), notes
 
 
 def recorded_encounters(log: RawLog, config: LogConfig) -> tuple[tuple[Encounter, ...], Quality]:

@@ -1,101 +1,133 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The gap of two motions in place and time: how nearly two vehicles are at one place at one time."""
+"""The gap of two motions in space and time: how close two vehicles come to one place at one time."""
 
 import numpy as np
 
 from scenario_gen.numerics import Floats
 from scenario_gen.numerics.kernels import F2, kernel
 
-METRES_PER_SECOND_APART = 2.0  # of the time between two vehicles at one place
-INTERACTS_M = 6.0  # the gap up to which two vehicles interact
-CHORD_S = 0.3  # a motion is taken as straight and steady over so long: at 4 m/s² across, 5 cm off
-STEPS = 10  # of the search along a chord: each leaves 62 %, in all 10 cm of a chord at 40 m/s
-GOLDEN = 0.6180339887498949
+GAP_RATE_MPS = 2.0
+"""Metres of the gap per second between two vehicles at one place."""
+
+INTERACTS_M = 6.0
+"""Gap up to which two vehicles interact."""
+
+_CHORD_S = 0.3  # of straight and steady motion: at 4 m/s² lateral acceleration, 5 cm off
+_SEARCH_STEPS = 10  # of golden section: a chord at 40 m/s becomes 10 cm
+_GOLDEN_RATIO = 0.6180339887498949
 
 
 def space_time_gap(a: Floats, b: Floats, dt: float) -> tuple[float, int, int]:
-    """Return min over t, t' of |a(t) - b(t')| + 2 m/s |t - t'| [m], and the samples nearest to t and t'.
+    """Return min over t, t' of |a(t) - b(t')| + 2 m/s |t - t'| [m], and the nearest samples.
 
-    A vehicle that follows another on its path, s seconds behind, has a gap of 2 s [m] or less at any speed.
+    A vehicle that follows another on its path, s seconds behind, has a gap of 2 s [m] or less at
+    any speed.
 
     Args:
         a: (T, 2) positions [m], T at least 2.
         b: (T, 2) positions at the same times.
-        dt: s between two samples.
+        dt: seconds between two samples.
     """
-    ends = np.append(np.arange(0, len(a) - 1, max(round(CHORD_S / dt), 1)), len(a) - 1)
-    gap, when, then = _least_gap(_chords(a[ends], ends * dt), _chords(b[ends], ends * dt))
-    return float(gap), round(when / dt), round(then / dt)
+    step = max(round(_CHORD_S / dt), 1)
+    ends = np.append(np.arange(0, len(a) - 1, step), len(a) - 1)
+    gap, time_a, time_b = _least_gap(_chords(a[ends], ends * dt), _chords(b[ends], ends * dt))
+    return float(gap), round(time_a / dt), round(time_b / dt)
 
 
 def _chords(places: Floats, times: Floats) -> Floats:
-    """Straight motions between places (K, 2) [m] at times (K,) [s]: begin and velocity (x, y), from when to when, half length."""
-    step, seconds = np.diff(places, axis=0), np.diff(times)
-    half = 0.5 * np.hypot(step[:, 0], step[:, 1])
-    return np.column_stack([places[:-1], step / seconds[:, None], times[:-1], times[1:], half])
+    """Return straight motions between places (K, 2) [m] at times (K,) [s].
+
+    Columns: start (x, y), velocity (x, y), start and end time, half the length.
+    """
+    step = np.diff(places, axis=0)
+    seconds = np.diff(times)
+    half_length = 0.5 * np.hypot(step[:, 0], step[:, 1])
+    return np.column_stack(
+        [places[:-1], step / seconds[:, None], times[:-1], times[1:], half_length]
+    )
 
 
 @kernel(F2, F2)
-def _least_gap(one: Floats, other: Floats) -> tuple[float, float, float]:
-    """The least gap [m] of two chains of chords, and the times of it [s]."""
-    least, when, then = np.inf, 0.0, 0.0
-    for m in range(len(one)):
-        for n in range(len(other)):
-            if _at_least(one[m], other[n]) >= least:
+def _least_gap(chords_a: Floats, chords_b: Floats) -> tuple[float, float, float]:
+    """Return the least gap [m] of two chains of chords, and its times [s]."""
+    least = np.inf
+    least_a = 0.0
+    least_b = 0.0
+    for m in range(len(chords_a)):
+        for n in range(len(chords_b)):
+            if _lower_bound(chords_a[m], chords_b[n]) >= least:
                 continue
-            low, high = one[m, 4], one[m, 5]  # the gap to the other chord is convex between them
-            first, second = high - GOLDEN * (high - low), low + GOLDEN * (high - low)
-            gap, later = (
-                _gap_to_chord(one[m], first, other[n])[0],
-                _gap_to_chord(one[m], second, other[n])[0],
-            )
-            for _ in range(STEPS):
-                if gap <= later:
-                    high, second, later = second, first, gap
-                    first = high - GOLDEN * (high - low)
-                    gap = _gap_to_chord(one[m], first, other[n])[0]
-                else:
-                    low, first, gap = first, second, later
-                    second = low + GOLDEN * (high - low)
-                    later = _gap_to_chord(one[m], second, other[n])[0]
-            for time in (low, first, second, high):
-                gap, its = _gap_to_chord(one[m], time, other[n])
-                if gap < least:
-                    least, when, then = gap, time, its
-    return least, when, then
+            gap, time_a, time_b = _chord_gap(chords_a[m], chords_b[n])
+            if gap < least:
+                least = gap
+                least_a = time_a
+                least_b = time_b
+    return least, least_a, least_b
 
 
 @kernel(inline=True)
-def _at_least(one: Floats, other: Floats) -> float:
-    """A lower bound of the gap of two chords [m]: by their middles, their lengths and the time between them."""
-    mine, its = 0.5 * (one[5] - one[4]), 0.5 * (other[5] - other[4])
-    x = one[0] + mine * one[2] - other[0] - its * other[2]
-    y = one[1] + mine * one[3] - other[1] - its * other[3]
-    apart: float = max(np.sqrt(x * x + y * y) - one[6] - other[6], 0.0)
-    seconds: float = max(one[4] - other[5], other[4] - one[5], 0.0)
-    return apart + METRES_PER_SECOND_APART * seconds
+def _chord_gap(a: Floats, b: Floats) -> tuple[float, float, float]:
+    """Return the gap [m] of two chords, and its times [s]: it is convex along the first one."""
+    low = a[4]
+    high = a[5]
+    first = high - _GOLDEN_RATIO * (high - low)
+    second = low + _GOLDEN_RATIO * (high - low)
+    first_gap = _gap_to_chord(a, first, b)[0]
+    second_gap = _gap_to_chord(a, second, b)[0]
+    for _ in range(_SEARCH_STEPS):
+        if first_gap <= second_gap:
+            high = second
+            second = first
+            second_gap = first_gap
+            first = high - _GOLDEN_RATIO * (high - low)
+            first_gap = _gap_to_chord(a, first, b)[0]
+        else:
+            low = first
+            first = second
+            first_gap = second_gap
+            second = low + _GOLDEN_RATIO * (high - low)
+            second_gap = _gap_to_chord(a, second, b)[0]
+    least = np.inf
+    least_a = 0.0
+    least_b = 0.0
+    for time_a in (low, first, second, high):
+        gap, time_b = _gap_to_chord(a, time_a, b)
+        if gap < least:
+            least = gap
+            least_a = time_a
+            least_b = time_b
+    return least, least_a, least_b
 
 
 @kernel(inline=True)
-def _gap_to_chord(one: Floats, time: float, other: Floats) -> tuple[float, float]:
-    """The least gap [m] of one motion at a time [s] to a chord of the other, and the time on that [s]."""
-    dx, dy = (
-        one[0] + (time - one[4]) * one[2] - other[0],
-        one[1] + (time - one[4]) * one[3] - other[1],
-    )
-    vx, vy = other[2], other[3]
-    speed, then = np.sqrt(vx * vx + vy * vy), time
-    if speed > METRES_PER_SECOND_APART:  # else it pays nowhere to be at another time
-        foot = other[4] + (dx * vx + dy * vy) / (speed * speed)
-        aside = abs(dx * vy - dy * vx) / speed
-        off = (
-            METRES_PER_SECOND_APART
-            * aside
-            / (speed * np.sqrt(speed * speed - METRES_PER_SECOND_APART**2))
-        )
-        then = min(max(time, foot - off), foot + off)
-    then = min(max(then, other[4]), other[5])
-    dx, dy = dx - vx * (then - other[4]), dy - vy * (then - other[4])
-    return np.sqrt(dx * dx + dy * dy) + METRES_PER_SECOND_APART * abs(time - then), then
+def _lower_bound(a: Floats, b: Floats) -> float:
+    """Return a lower bound of the gap of two chords [m]: by centres, lengths and times."""
+    half_a = 0.5 * (a[5] - a[4])
+    half_b = 0.5 * (b[5] - b[4])
+    x = a[0] + half_a * a[2] - b[0] - half_b * b[2]
+    y = a[1] + half_a * a[3] - b[1] - half_b * b[3]
+    distance: float = max(np.sqrt(x * x + y * y) - a[6] - b[6], 0.0)
+    seconds: float = max(a[4] - b[5], b[4] - a[5], 0.0)
+    return distance + GAP_RATE_MPS * seconds
+
+
+@kernel(inline=True)
+def _gap_to_chord(a: Floats, time_a: float, b: Floats) -> tuple[float, float]:
+    """Return the gap [m] of one motion at a time [s] to a chord of the other, and its time [s]."""
+    dx = a[0] + (time_a - a[4]) * a[2] - b[0]
+    dy = a[1] + (time_a - a[4]) * a[3] - b[1]
+    vx = b[2]
+    vy = b[3]
+    speed = np.sqrt(vx * vx + vy * vy)
+    time_b = time_a
+    if speed > GAP_RATE_MPS:  # a slower vehicle is nearest at the same time
+        foot = b[4] + (dx * vx + dy * vy) / (speed * speed)
+        lateral = abs(dx * vy - dy * vx) / speed
+        reach = GAP_RATE_MPS * lateral / (speed * np.sqrt(speed * speed - GAP_RATE_MPS**2))
+        time_b = min(max(time_a, foot - reach), foot + reach)
+    time_b = min(max(time_b, b[4]), b[5])
+    dx = dx - vx * (time_b - b[4])
+    dy = dy - vy * (time_b - b[4])
+    return np.sqrt(dx * dx + dy * dy) + GAP_RATE_MPS * abs(time_a - time_b), time_b

@@ -1,10 +1,11 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Local frames: metres east and north of an origin, from degrees, in PROJ's azimuthal equidistant projection (WGS 84).
+"""Local frames: metres east and north of an origin, in PROJ's azimuthal equidistant projection.
 
-Distances and directions from the origin are exact; between two points r from it the scale is right to (r / 6371 km)² / 6.
-pyproj takes a tenth of a second to load, so it is loaded where degrees are read.
+Distances and directions from the origin are exact; between two points at a distance r from it, the
+scale error is (r / 6371 km)² / 6. The ellipsoid is WGS 84. pyproj takes a tenth of a second to
+load, so it is loaded when degrees are read.
 """
 
 from dataclasses import replace
@@ -19,10 +20,12 @@ from scenario_gen.base.errors import InputError
 from scenario_gen.numerics import Floats, Ints, wrap_angle
 from scenario_gen.types import Encounter
 
-EARTH_RADIUS_M = 6_371_000.0  # mean radius
-SITE_M = 10_000.0  # places nearer to each other than this are of one site, and so are those that a chain of such places joins
-OWN_FRAME_M = 1000.0  # from the middle of its site at which an encounter has a frame of its own
-LEVER_M = 100.0  # ahead of a vehicle, a point that tells how its heading turns from frame to frame
+EARTH_RADIUS_M = 6_371_000.0
+"""Mean radius."""
+
+_SITE_M = 10_000.0  # nearer places, and chains of such places, have one site
+_OWN_FRAME_M = 1000.0  # from the origin of its site, an encounter has its own frame
+_LEVER_M = 100.0  # ahead of a vehicle, a point that shows how its heading changes between frames
 
 
 def azimuthal(origin: tuple[float, float]) -> Any:
@@ -33,16 +36,15 @@ def azimuthal(origin: tuple[float, float]) -> Any:
 
 
 def utm(origin: tuple[float, float]) -> tuple[Any, str]:
-    """Return the `pyproj.Proj` of UTM in the zone of latitude and longitude in degrees, and the zone's name."""
+    """Return the `pyproj.Proj` of UTM in the zone of a place [degrees], and the zone's name."""
     import pyproj
 
     latitude, longitude = origin
     norway = 56.0 <= latitude < 64.0 and 3.0 <= longitude < 12.0  # its zone is wider
     zone = 32 if norway else int((longitude + 180.0) // 6.0) % 60 + 1
     half = "south" if latitude < 0.0 else "north"
-    return pyproj.Proj(
-        proj="utm", zone=zone, south=latitude < 0.0, ellps="WGS84"
-    ), f"UTM zone {zone} {half}"
+    projection = pyproj.Proj(proj="utm", zone=zone, south=latitude < 0.0, ellps="WGS84")
+    return projection, f"UTM zone {zone} {half}"
 
 
 def local_frame(latitude: Floats, longitude: Floats, origin: tuple[float, float]) -> Floats:
@@ -57,34 +59,35 @@ def local_frame(latitude: Floats, longitude: Floats, origin: tuple[float, float]
 
 
 def geodetic(position: Floats, origin: tuple[float, float]) -> tuple[Floats, Floats]:
-    """Return latitude and longitude in degrees of positions (..., 2) [m], the inverse of `local_frame`."""
+    """Return latitude and longitude [degrees] of positions (..., 2) [m], as to `local_frame`."""
     longitude, latitude = azimuthal(origin)(position[..., 0], position[..., 1], inverse=True)
     return latitude, longitude
 
 
 def metres_per_degree(origin: tuple[float, float]) -> tuple[float, float]:
-    """Return the metres of a degree of latitude and of longitude at a place, from geodesics of 0.001 degree."""
+    """Return the metres of a degree of latitude and of longitude at a place, by geodesics."""
     import pyproj
 
-    globe, (latitude, longitude), part = pyproj.Geod(ellps="WGS84"), origin, 1e-3
-    north = globe.inv(longitude, latitude - part / 2.0, longitude, latitude + part / 2.0)[2]
-    east = globe.inv(longitude - part / 2.0, latitude, longitude + part / 2.0, latitude)[2]
-    return north / part, east / part
+    globe = pyproj.Geod(ellps="WGS84")
+    latitude, longitude = origin
+    step = 1e-3  # degrees
+    north = globe.inv(longitude, latitude - step / 2.0, longitude, latitude + step / 2.0)[2]
+    east = globe.inv(longitude - step / 2.0, latitude, longitude + step / 2.0, latitude)[2]
+    return north / step, east / step
 
 
 def middle_of(degrees: Floats, left_out: float = 0.0, digits: int = 7) -> tuple[float, float]:
-    """Return the middle of latitudes and longitudes (F, 2) [degrees], also where they lie on both sides of the 180th meridian.
+    """Return the middle of latitudes and longitudes (F, 2) [degrees], also at the 180th meridian.
 
     Args:
         degrees: of places less than half the globe apart.
-        left_out: per cent of the places at either end that do not count, for a few may be wrong.
-        digits: to which it is rounded.
+        left_out: percentage of the places ignored at either end, since a few may be wrong.
+        digits: of the result.
     """
     turned = np.column_stack([degrees[:, 0], _wrapped(degrees[:, 1] - degrees[0, 1])])
     latitude, longitude = np.percentile(turned, [left_out, 100.0 - left_out], axis=0).mean(axis=0)
-    return round(float(latitude), digits), round(
-        float(_wrapped(longitude + degrees[0, 1])), digits
-    )
+    longitude = _wrapped(longitude + degrees[0, 1])
+    return round(float(latitude), digits), round(float(longitude), digits)
 
 
 def _wrapped(longitude: Any) -> Any:
@@ -92,35 +95,31 @@ def _wrapped(longitude: Any) -> Any:
 
 
 def on_sphere(degrees: Floats) -> Floats:
-    """Return places (F, 3) [m] about the middle of a spherical earth, of latitudes and longitudes (F, 2) [degrees]."""
+    """Return places (F, 3) [m] on a spherical earth of latitudes and longitudes (F, 2) [degrees]."""
     latitude, longitude = np.radians(degrees).T
-    around = np.cos(latitude)
+    parallel = np.cos(latitude)
     return EARTH_RADIUS_M * np.column_stack(
-        [around * np.cos(longitude), around * np.sin(longitude), np.sin(latitude)]
+        [parallel * np.cos(longitude), parallel * np.sin(longitude), np.sin(latitude)]
     )
 
 
 def sites_of(degrees: Floats) -> Ints:
-    """Return the number (F,) of the site of each place (F, 2) [degrees]; sites are `SITE_M` apart or more."""
-    place = np.floor(on_sphere(degrees) / SITE_M)
+    """Return the number (F,) of the site of each place (F, 2) [degrees]; sites are 10 km apart."""
+    place = np.floor(on_sphere(degrees) / _SITE_M)
     _, first, cell_of = np.unique(
         place @ (4096.0**2, 4096.0, 1.0), return_index=True, return_inverse=True
     )
     cells = place[first]
     i, j = cKDTree(cells).query_pairs(1.0, p=np.inf, output_type="ndarray").T
-    _, site = connected_components(
-        coo_array((np.ones(len(i), dtype=bool), (i, j)), shape=(len(cells), len(cells))),
-        directed=False,
-    )
+    is_neighbour = coo_array((np.ones(len(i), dtype=bool), (i, j)), shape=(len(cells), len(cells)))
+    _, site = connected_components(is_neighbour, directed=False)
     return np.asarray(site, dtype=np.int64)[cell_of]
 
 
-def about_its_middle(encounter: Encounter) -> Encounter:
-    """Return an encounter in the frame about its own middle, if that is farther than `OWN_FRAME_M` from its frame's origin."""
-    if (
-        encounter.origin is None
-        or not np.hypot(*encounter.position.reshape(-1, 2).T).max() > OWN_FRAME_M
-    ):
+def in_own_frame(encounter: Encounter) -> Encounter:
+    """Return an encounter in the frame about its middle, if it is far from its frame's origin."""
+    distance = np.hypot(*encounter.position.reshape(-1, 2).T)
+    if encounter.origin is None or not distance.max() > _OWN_FRAME_M:
         return encounter
     origin = middle_of(latitude_longitude(encounter).reshape(-1, 2), digits=5)
     position, heading = reprojected(
@@ -132,7 +131,7 @@ def about_its_middle(encounter: Encounter) -> Encounter:
 def reprojected(
     position: Floats, heading: Floats, origin: tuple[float, float], into: Any
 ) -> tuple[Floats, Floats]:
-    """Return positions (..., 2) [m] and headings (...) [rad] of the local frame about an origin in another projection.
+    """Return positions (..., 2) [m] and headings (...) [rad] in another projection.
 
     Args:
         position: metres east and north of the origin.
@@ -140,22 +139,27 @@ def reprojected(
         origin: latitude and longitude in degrees.
         into: a `pyproj.Proj`.
     """
-    ahead = position + LEVER_M * np.stack([np.cos(heading), np.sin(heading)], axis=-1)
-    there, ahead = (
-        np.stack(into(*geodetic(places, origin)[::-1]), axis=-1) for places in (position, ahead)
-    )
-    course = np.arctan2(*np.moveaxis(ahead - there, -1, 0)[::-1])
-    return there, heading + wrap_angle(course - heading)
+
+    def project(places: Floats) -> Floats:
+        latitude, longitude = geodetic(places, origin)
+        return np.stack(into(longitude, latitude), axis=-1)
+
+    forward = np.stack([np.cos(heading), np.sin(heading)], axis=-1)
+    projected = project(position)
+    lever = project(position + _LEVER_M * forward) - projected
+    course = np.arctan2(lever[..., 1], lever[..., 0])
+    return projected, heading + wrap_angle(course - heading)
 
 
 def latitude_longitude(encounter: Encounter) -> Floats:
     """Return latitude and longitude (N, T, 2) [degrees] of an encounter's positions.
 
     Raises:
-        InputError: its log came in metres, so it has no place on the globe.
+        InputError: its log has metres, so its place on the globe is unknown.
     """
     if encounter.origin is None:
         raise InputError(
-            f"encounter {encounter.name!r} came in metres without an origin; it cannot be streamed as NavSatFix"
+            f"encounter {encounter.name!r} has positions in metres without an origin, so it has "
+            "no latitudes and longitudes"
         )
     return np.stack(geodetic(encounter.position, encounter.origin), axis=-1)

@@ -1,17 +1,20 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Groups of vehicles that meet, and the time that each is there.
+"""Groups of vehicles that meet, and the time in which each is present.
 
-Two pieces *meet* while they are nearer than `proximity`, for at least `min_presence` seconds; a meeting longer than
-`max_duration` is cut. Groups grow from meetings of `min_duration` or more (`growing`), up to `max_vehicles`. Each member is there
-for the time in which it is recorded and near another, so it may arrive late and leave early.
-In a small log (of at most `max_vehicles`, as cut by a person) every meeting counts, and a vehicle joins that meets any member. In
-a larger one only those count in which a vehicle moves and the two interact (`gap`: they cross, follow, merge or pass), and a
-vehicle joins that so meets at least half of the members that it is together with.
+Two pieces *meet* while they are nearer than `proximity`, for at least `min_presence` seconds; a
+meeting longer than `max_duration` is cut. Groups grow from meetings of `min_duration` or more
+(`growing`), up to `max_vehicles`. Each member is present while it is recorded and near another
+one, so it may arrive late and leave early.
+
+In a small log (of at most `max_vehicles`, as cut by a person) every meeting counts, and a vehicle
+joins that meets any member. In a larger log only meetings count in which a vehicle moves and the
+two interact (`gap`: they cross, follow, merge or pass), and a vehicle joins that meets at least
+half of the members present with it.
 """
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from itertools import pairwise
 
 import numpy as np
@@ -19,179 +22,202 @@ import numpy as np
 from scenario_gen.logs.config import LogConfig
 from scenario_gen.logs.encounters import Piece
 from scenario_gen.logs.gap import INTERACTS_M, space_time_gap
-from scenario_gen.logs.growing import Group, Growth, Meeting, SHARED, Span
+from scenario_gen.logs.growing import Group, Growth, Meeting, MIN_MET_SHARE, Span
 from scenario_gen.logs.raw import natural
 from scenario_gen.numerics import Floats, runs
 
-MIN_SHARE = 0.6  # with `whole`, a vehicle that is there for less of the time is left out; for more, it shortens the time
-EDGE_S = 1.0  # s by which a group is shortened so that no vehicle joins late or leaves early
-OUT_OF_RANGE_S = 1.0  # s that a pair may be out of range within one meeting
-REST_S = 2.0  # s of a long standstill that belong to the encounter before or after it
+OUT_OF_RANGE_S = 1.0
+"""Time for which a pair may be out of range within one meeting."""
+
+_MIN_PRESENCE_SHARE = 0.6  # with `whole`, a vehicle joins if it is present for more of the time
+_EDGE_S = 1.0  # by which a group is shortened so that its vehicles start and end together
+_REST_S = 2.0  # part of a long standstill that belongs to the encounter before or after it
+_STANDING_MPS = 0.1
 
 
-class _OfPieces(Growth[Meeting]):
-    """Groups of the pieces of a log, in ticks; their notes name the vehicles that meet one and are left out, and why."""
+class _PieceGroups(Growth[Meeting]):
+    """Groups of the pieces of a log, in ticks; notes name vehicles that are left out, and why."""
 
     def __init__(self, pieces: Sequence[Piece], config: LogConfig, *, small: bool) -> None:
         super().__init__(
-            ticks(config.min_duration, config) + 1,
-            shortest(config),
-            config.max_vehicles,
-            share=0.0 if small else SHARED,
+            shortest=ticks(config.min_duration, config) + 1,
+            least=shortest(config),
+            most=config.max_vehicles,
+            share=0.0 if small else MIN_MET_SHARE,
         )
-        self.pieces, self.config = pieces, config
+        self.pieces = pieces
+        self.config = config
 
-    def strangers(self, group: Group[Meeting], others: Iterable[int]) -> list[int]:
-        """Those of some pieces whose vehicle is not in the group with another piece."""
-        ids = {self.pieces[m].track.id for m in group.spans}
-        return [other for other in others if self.pieces[other].track.id not in ids]
+    def _outsiders(self, group: Group[Meeting], others: Iterable[int]) -> list[str]:
+        """Return the vehicles of some pieces that are not in the group with another piece."""
+        ids = {self.pieces[member].track.id for member in group.spans}
+        return sorted({self.pieces[other].track.id for other in others} - ids)
 
     def full(self, group: Group[Meeting], others: Iterable[int]) -> None:
-        """Name those that are left out."""
-        if left := sorted(
-            {self.pieces[other].track.id for other in self.strangers(group, others)}
-        ):
+        """Note the vehicles that are left out."""
+        names = self._outsiders(group, others)
+        if names:
             group.notes.append(
-                f"left out of an encounter of {len(group.spans)} vehicles (max_vehicles): {', '.join(left)}"
+                f"left out of an encounter of {len(group.spans)} vehicles (max_vehicles): "
+                f"{', '.join(names)}"
             )
 
     def join(self, group: Group[Meeting], other: int, span: Span) -> None:
         """Add a vehicle for the time in which it is near any member, or note why not."""
-        if not self.strangers(group, [other]):
+        if not self._outsiders(group, [other]):
             return
-        config, name = self.config, self.pieces[other].track.id
-        begin, end = span = self.common_span(other, group)
-        lasts = group.end - group.start
-        near = f"near for {seconds(begin, end, config)} of {seconds(group.start, group.end, config)} s"
+        config = self.config
+        name = self.pieces[other].track.id
+        span = self._near_span(other, group)
+        duration = span[1] - span[0]
+        total = group.end - group.start
+        share = f"{_seconds(span, config)} of {_seconds((group.start, group.end), config)} s"
         if not config.whole:
-            if end - begin > ticks(config.min_presence, config):
+            if duration > ticks(config.min_presence, config):
                 group.spans[other] = span
-            elif end > begin:
-                group.notes.append(f"vehicle {name} is left out: {near} (min_presence)")
+            elif duration > 0:
+                group.notes.append(f"vehicle {name} is left out: near for {share} (min_presence)")
             return
-        if (end - begin) < MIN_SHARE * lasts or end - begin < self.shortest:
-            if end > begin:
-                group.notes.append(f"vehicle {name} is left out: {near} (whole)")
+        if duration < _MIN_PRESENCE_SHARE * total or duration < self.shortest:
+            if duration > 0:
+                group.notes.append(f"vehicle {name} is left out: near for {share} (whole)")
             return
-        if end - begin < lasts:
-            group.notes.append(
-                f"vehicle {name} shortens its encounter to {seconds(begin, end, config)} of "
-                f"{seconds(group.start, group.end, config)} s"
-            )
+        if duration < total:
+            group.notes.append(f"vehicle {name} shortens its encounter to {share}")
         group.start, group.end = span
         group.spans = dict.fromkeys((*group.spans, other), span)
 
     def finish(self, group: Group[Meeting]) -> None:
-        """Shorten a group by up to `EDGE` so that its vehicles come and go together; note those that do not."""
+        """Shorten a group a little so that its vehicles start and end together; note the others."""
         config = self.config
-        edge = ticks(EDGE_S, config)
-        first = max(begin for begin, _ in group.spans.values() if begin <= group.start + edge)
-        last = min(end for _, end in group.spans.values() if end >= group.end - edge)
+        edge = ticks(_EDGE_S, config)
+        spans = group.spans.values()
+        first = max(start for start, _ in spans if start <= group.start + edge)
+        last = min(end for _, end in spans if end >= group.end - edge)
         if last - first > ticks(config.min_duration, config):
-            group.start, group.end = first, last
+            group.start = first
+            group.end = last
             group.spans = {
-                m: (max(begin, first), min(end, last)) for m, (begin, end) in group.spans.items()
+                member: (max(start, first), min(end, last))
+                for member, (start, end) in group.spans.items()
             }
-        for m, (begin, end) in group.spans.items():
-            if (begin, end) != (group.start, group.end):
+        for member, (start, end) in group.spans.items():
+            if (start, end) != (group.start, group.end):
                 group.notes.append(
-                    f"vehicle {self.pieces[m].track.id} is recorded from {seconds(group.start, begin + 1, config)} to "
-                    f"{seconds(group.start, end, config)} s of {seconds(group.start, group.end, config)} s"
+                    f"vehicle {self.pieces[member].track.id} is recorded from "
+                    f"{_seconds((group.start, start + 1), config)} to "
+                    f"{_seconds((group.start, end), config)} s of "
+                    f"{_seconds((group.start, group.end), config)} s"
                 )
 
-    def common_span(self, other: int, group: Group[Meeting]) -> Span:
-        """Return the longest stretch of a group's time in which piece `other` is near a member that is there."""
+    def _near_span(self, other: int, group: Group[Meeting]) -> Span:
+        """Return the longest part of a group's time in which a piece is near a present member."""
         piece = self.pieces[other]
-        flags = np.zeros(group.end - group.start, dtype=bool)
+        is_near = np.zeros(group.end - group.start, dtype=bool)
         for member, (first, last) in group.spans.items():
+            distance = distances(piece, self.pieces[member])
             begin = max(piece.first, self.pieces[member].first)
-            close = distances(piece, self.pieces[member]) < self.config.proximity
-            low, high = max(begin, first), min(begin + len(close), last)
-            if high > low:
-                flags[low - group.start : high - group.start] |= close[low - begin : high - begin]
-        spans = runs(flags, ticks(OUT_OF_RANGE_S, self.config))
+            start = max(begin, first)
+            end = min(begin + len(distance), last)
+            if end > start:
+                close = distance[start - begin : end - begin] < self.config.proximity
+                is_near[start - group.start : end - group.start] |= close
+        spans = runs(is_near, ticks(OUT_OF_RANGE_S, self.config))
         begin, end = max(spans, key=lambda span: span[1] - span[0], default=(0, 0))
         return group.start + begin, group.start + end
 
 
 def find_groups(
     pieces: Sequence[Piece], config: LogConfig
-) -> tuple[tuple[Group[Meeting], ...], tuple[str, ...]]:
-    """Return the encounters in order of time, and notes on vehicles that were left out or shortened one."""
+) -> tuple[list[Group[Meeting]], list[str]]:
+    """Return the encounters by time, and notes on vehicles that were left out or present partly."""
     small = len({piece.track.id for piece in pieces}) <= config.max_vehicles
-    groups, notes = [], []
-    for group in _OfPieces(pieces, config, small=small).groups(
-        find_meetings(pieces, config, small=small)
-    ):
-        whole, left = split(group, pieces, config)
-        groups += whole
-        notes += [*group.notes, *left] if whole else []
+    meetings = _find_meetings(pieces, config, small=small)
+    groups = []
+    notes = []
+    for group in _PieceGroups(pieces, config, small=small).groups(meetings):
+        parts, part_notes = _split(group, pieces, config)
+        groups += parts
+        notes += [*group.notes, *part_notes] if parts else []
     groups.sort(key=lambda group: (group.start, group.end, sorted(group.spans)))
-    shared, until = set[str](), dict[int, int]()
-    for group in groups:
-        shared |= {
-            pieces[m].track.id for m in group.spans if until.get(m, group.start) > group.start
-        }
-        until |= {m: max(until.get(m, group.end), group.end) for m in group.spans}
+    shared = sorted(_in_several(groups, pieces), key=natural)
     if shared:
-        names = ", ".join(sorted(shared, key=natural))
         notes.append(
-            f"in several encounters at a time, for each holds who meets half of its vehicles: vehicle {names}"
+            "in several encounters at the same time, since each meets half of its vehicles: "
+            f"vehicle {', '.join(shared)}"
         )
-    return tuple(groups), tuple(notes)
+    return groups, notes
 
 
-def find_meetings(pieces: Sequence[Piece], config: LogConfig, *, small: bool) -> list[Meeting]:
-    """Return all meetings of two different vehicles, from a first tick to before a last one; in a `small` log each has gap 0."""
+def _in_several(groups: Sequence[Group[Meeting]], pieces: Sequence[Piece]) -> set[str]:
+    """Return the vehicles that are in several groups at the same time; groups are by time."""
+    shared = set()
+    busy_until: dict[int, int] = {}
+    for group in groups:
+        for member in group.spans:
+            if busy_until.get(member, group.start) > group.start:
+                shared.add(pieces[member].track.id)
+            busy_until[member] = max(busy_until.get(member, group.end), group.end)
+    return shared
+
+
+def _find_meetings(pieces: Sequence[Piece], config: LogConfig, *, small: bool) -> list[Meeting]:
+    """Return all meetings of two vehicles, in ticks; in a `small` log each has gap 0."""
     meetings = []
+    for i, j in _overlapping(pieces, shortest(config)):
+        for span in _near_spans(pieces[i], pieces[j], config):
+            gap = 0.0 if small else _gap(pieces[i], pieces[j], span, config)
+            if gap <= INTERACTS_M:
+                meetings.append(Meeting(gap, span[0], min(i, j), max(i, j), span[1]))
+    return meetings
+
+
+def _near_spans(a: Piece, b: Piece, config: LogConfig) -> Iterator[Span]:
+    """Yield the spans of at least `shortest` ticks in which two pieces are near each other."""
+    begin = max(a.first, b.first)
+    is_near = distances(a, b) < config.proximity
+    for low, high in runs(is_near, ticks(OUT_OF_RANGE_S, config)):
+        for first, last in windows(begin + low, begin + high, config):
+            if last - first >= shortest(config):
+                yield first, last
+
+
+def _overlapping(pieces: Sequence[Piece], least: int) -> Iterator[tuple[int, int]]:
+    """Yield the pairs of pieces of different vehicles that share at least `least` ticks."""
     order = sorted(range(len(pieces)), key=lambda i: pieces[i].first)
-    least = shortest(config)
     for k, i in enumerate(order):
         for j in order[k + 1 :]:
             if pieces[j].first > pieces[i].last - least:
                 break
-            if pieces[i].track.id == pieces[j].track.id:
-                continue
-            begin = max(pieces[i].first, pieces[j].first)
-            for low, high in runs(
-                distances(pieces[i], pieces[j]) < config.proximity, ticks(OUT_OF_RANGE_S, config)
-            ):
-                for first, last in windows(begin + low, begin + high, config):
-                    if last - first < least:
-                        continue
-                    gap = 0.0 if small else gap_of(pieces[i], pieces[j], first, last, config)
-                    if gap <= INTERACTS_M:
-                        meetings.append(Meeting(gap, first, min(i, j), max(i, j), last))
-    return meetings
+            if pieces[i].track.id != pieces[j].track.id:
+                yield i, j
 
 
-def gap_of(a: Piece, b: Piece, first: int, last: int, config: LogConfig) -> float:
-    """Return how close two vehicles come in place and time [m]; infinite if neither drives `travel` metres."""
-    if max(driven(piece, first, last, config) for piece in (a, b)) < config.travel:
+def _gap(a: Piece, b: Piece, span: Span, config: LogConfig) -> float:
+    """Return the gap of two vehicles in space and time [m]; infinite if neither drives `travel`."""
+    if max(driven(piece, *span, config) for piece in (a, b)) < config.travel:
         return float("inf")
-    return space_time_gap(a.position(first, last), b.position(first, last), config.period)[0]
+    gap, _, _ = space_time_gap(a.position(*span), b.position(*span), config.period)
+    return gap
 
 
-def windows(first: int, last: int, config: LogConfig) -> list[tuple[int, int]]:
-    """Cut a long meeting at whole multiples of `max_duration` on the common clock, so that all pairs are cut alike."""
-    longest, least = ticks(config.max_duration, config), ticks(config.min_duration, config) + 1
+def windows(first: int, last: int, config: LogConfig) -> list[Span]:
+    """Cut a long meeting at multiples of `max_duration` on the common clock, for all pairs alike."""
+    longest = ticks(config.max_duration, config)
+    least = ticks(config.min_duration, config) + 1
     if last - first <= longest:
         return [(first, last)]
-    inside = [
-        edge for edge in range(longest, last, longest) if first + least <= edge <= last - least
-    ]
-    return list(pairwise([first, *inside, last]))
+    multiples = range(longest, last, longest)
+    edges = [edge for edge in multiples if first + least <= edge <= last - least]
+    return list(pairwise([first, *edges, last]))
 
 
 def shortest(config: LogConfig) -> int:
-    """Return the fewest ticks of a meeting: of one that forms an encounter, or of one that joins it."""
-    return (
-        ticks(
-            config.min_duration if config.whole else min(config.min_presence, config.min_duration),
-            config,
-        )
-        + 1
-    )
+    """Return the ticks of the shortest meeting that forms an encounter, or joins it."""
+    seconds = config.min_duration
+    if not config.whole:
+        seconds = min(config.min_presence, seconds)
+    return ticks(seconds, config) + 1
 
 
 def ticks(seconds: float, config: LogConfig) -> int:
@@ -200,13 +226,14 @@ def ticks(seconds: float, config: LogConfig) -> int:
 
 
 def distances(a: Piece, b: Piece) -> Floats:
-    """Return the distances (T,) [m] of two pieces at their common ticks, infinite at two sites; empty where they have none."""
+    """Return the distances (T,) [m] of two pieces at their common ticks; infinite at two sites."""
     first = max(a.first, b.first)
     last = max(min(a.last, b.last), first)
     if a.track.origin != b.track.origin:
         return np.full(last - first, np.inf)
-    apart: Floats = np.hypot(*(a.position(first, last) - b.position(first, last)).T)
-    return apart
+    offset = a.position(first, last) - b.position(first, last)
+    distance: Floats = np.hypot(*offset.T)
+    return distance
 
 
 def driven(piece: Piece, first: int, last: int, config: LogConfig) -> float:
@@ -214,63 +241,72 @@ def driven(piece: Piece, first: int, last: int, config: LogConfig) -> float:
     return float(piece.speed(first, last).sum() * config.period)
 
 
-def seconds(first: int, last: int, config: LogConfig) -> str:
-    """Return the length of an interval of ticks in seconds, for notes."""
-    return f"{max(last - first - 1, 0) * config.period:.1f}"
+def _seconds(span: Span, config: LogConfig) -> str:
+    """Return the duration of some ticks in seconds, for notes."""
+    return f"{max(span[1] - span[0] - 1, 0) * config.period:.1f}"
 
 
-def split(
+def _split(
     group: Group[Meeting], pieces: Sequence[Piece], config: LogConfig
 ) -> tuple[list[Group[Meeting]], list[str]]:
-    """Cut a group at long standstills of all, and into equal parts where it lasts too long; keep the parts with motion.
+    """Cut a group at long standstills of all vehicles, and into equal parts if it lasts too long.
 
     Returns:
-        The parts, and notes on members that are there for too little of one.
+        The parts with motion, and notes on members that are present for too little of a part.
     """
-    stands = np.ones(group.end - group.start, dtype=bool)
-    for m, (first, last) in group.spans.items():
-        stands[first - group.start : last - group.start] &= pieces[m].speed(first, last) < 0.1
-    rest, busy = ticks(REST_S, config), np.ones(len(stands), dtype=bool)
-    for begin, end in runs(stands):
+    parts = []
+    notes = []
+    for first, last in _part_spans(group, pieces, config):
+        part, absent = _part_of(group, first, last, config)
+        if len(part.spans) < 2 or part.end - part.start <= ticks(config.min_duration, config):
+            continue
+        longest = max(driven(pieces[m], *span, config) for m, span in part.spans.items())
+        if longest >= config.travel:
+            parts.append(part)
+            duration = _seconds((part.start, part.end), config)
+            notes += [
+                f"vehicle {pieces[member].track.id} is left out of a part of {duration} s: "
+                f"present for {_seconds(span, config)} s (min_presence)"
+                for member, span in absent.items()
+            ]
+    return parts, notes
+
+
+def _part_spans(
+    group: Group[Meeting], pieces: Sequence[Piece], config: LogConfig
+) -> Iterator[Span]:
+    """Yield the spans between long standstills, in equal parts of at most `max_duration`."""
+    are_standing = np.ones(group.end - group.start, dtype=bool)
+    for member, (first, last) in group.spans.items():
+        speed = pieces[member].speed(first, last)
+        are_standing[first - group.start : last - group.start] &= speed < _STANDING_MPS
+    rest = ticks(_REST_S, config)
+    is_used = np.ones(len(are_standing), dtype=bool)
+    for begin, end in runs(are_standing):
         if end - begin > ticks(config.standstill, config):
-            busy[begin + rest : end - rest] = False
-    groups, notes = [], []
-    for begin, end in runs(busy):
-        parts = max(
-            int(np.ceil((end - begin - 1) * config.period / config.max_duration - 1e-9)), 1
-        )
-        edges = np.linspace(begin, end - 1, parts + 1).round().astype(int)
+            is_used[begin + rest : end - rest] = False
+    for begin, end in runs(is_used):
+        seconds = (end - begin - 1) * config.period
+        n_parts = max(int(np.ceil(seconds / config.max_duration - 1e-9)), 1)
+        edges = np.linspace(begin, end - 1, n_parts + 1).round().astype(int)
         for low, high in pairwise(edges.tolist()):
-            part, left = part_of(group, group.start + low, group.start + high + 1, config)
-            if len(part.spans) < 2 or part.end - part.start <= ticks(config.min_duration, config):
-                continue
-            if (
-                max(driven(pieces[m], *span, config) for m, span in part.spans.items())
-                >= config.travel
-            ):
-                groups.append(part)
-                notes += [
-                    f"vehicle {pieces[m].track.id} is left out of a part that lasts {seconds(part.start, part.end, config)} s: "
-                    f"there for {seconds(*span, config)} s (min_presence)"
-                    for m, span in left
-                ]
-    return groups, notes
+            yield group.start + low, group.start + high + 1
 
 
-def part_of(
+def _part_of(
     group: Group[Meeting], first: int, last: int, config: LogConfig
-) -> tuple[Group[Meeting], list[tuple[int, Span]]]:
-    """Return a part of a group with the members that are there long enough; the others are returned with their ticks."""
-    spans = {m: (max(own[0], first), min(own[1], last)) for m, own in group.spans.items()}
-    kept = {
-        m: own
-        for m, own in spans.items()
-        if own == (first, last) or own[1] - own[0] > ticks(config.min_presence, config)
-    }
-    left = [(m, own) for m, own in spans.items() if m not in kept and own[1] > own[0]]
-    if kept:
-        first, last = (
-            min(begin for begin, _ in kept.values()),
-            max(end for _, end in kept.values()),
-        )
-    return Group(first, last, kept), left
+) -> tuple[Group[Meeting], dict[int, Span]]:
+    """Return a part of a group with its members, and the spans of members present too shortly."""
+    present = {}
+    absent = {}
+    for member, (start, end) in group.spans.items():
+        span = (max(start, first), min(end, last))
+        is_long = span[1] - span[0] > ticks(config.min_presence, config)
+        if is_long or span == (first, last):
+            present[member] = span
+        elif span[1] > span[0]:
+            absent[member] = span
+    if present:
+        first = min(start for start, _ in present.values())
+        last = max(end for _, end in present.values())
+    return Group(first, last, present), absent

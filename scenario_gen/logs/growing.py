@@ -1,11 +1,12 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Who is joined to whom: meetings of two -> groups, for the pieces of a log and for the vehicles of an archive alike.
+"""Groups from meetings of two, for the pieces of a log and for the vehicles of an archive.
 
-A group grows from the strongest meeting that is left, one of at least `shortest`; its time is the group's. Who meets a member
-in that time joins, the longest first, if it meets at least `share` of the members that it is together with, up to `most`
-members. Meetings of two members are then used up, but for what of them lies outside the group's time, and the next group grows.
+A group grows from the strongest remaining meeting that lasts at least `shortest`; its time is that
+of the group. A vehicle that meets a member in that time joins, the longest meeting first, if it
+meets at least `share` of the members present with it, up to `most` members. The meetings of two
+members are then used up, except for their parts outside the group's time.
 """
 
 from collections import defaultdict
@@ -15,13 +16,19 @@ import heapq
 from typing import Generic, TypeVar
 
 Span = tuple[int, int]
-SHARED = 0.5  # least share of the members together with a vehicle that it interacts with
-EQUAL_M = 0.1  # gaps that round to the same multiple are equal, whatever the noise of the fixes
+
+MIN_MET_SHARE = 0.5
+"""Share of the members present with a vehicle that it meets at least."""
+
+_EQUAL_GAP_M = 0.1  # smaller differences are noise of the fixes
 
 
 @dataclass(frozen=True, order=True)
 class Meeting:
-    """`a` and `b` are near each other from `start` to `end`, in any unit of time; a smaller gap [m] interacts more."""
+    """`a` and `b` are near each other from `start` to `end`, in any unit of time.
+
+    A smaller gap [m] means more interaction.
+    """
 
     gap: float
     start: int
@@ -29,14 +36,14 @@ class Meeting:
     b: int
     end: int
 
-    def other(self, one: int) -> int:
-        """Return the one of the two that is not this one."""
-        return self.b if one == self.a else self.a
+    def other(self, member: int) -> int:
+        """Return the other one of the two."""
+        return self.b if member == self.a else self.a
 
     @property
     def rank(self) -> tuple[int, int, int, int, int]:
-        """Smaller for a stronger meeting: the gap, then how long it lasts, then when and who."""
-        return (round(self.gap / EQUAL_M), self.start - self.end, self.start, self.a, self.b)
+        """Smaller for a stronger meeting: by gap, duration, start and members."""
+        return (round(self.gap / _EQUAL_GAP_M), self.start - self.end, self.start, self.a, self.b)
 
 
 M = TypeVar("M", bound=Meeting)
@@ -44,7 +51,7 @@ M = TypeVar("M", bound=Meeting)
 
 @dataclass
 class Group(Generic[M]):
-    """A group of at least two from `start` to `end`: when each member is there, in the order in which they joined."""
+    """At least two members from `start` to `end`, with the span of each, in the order of joining."""
 
     start: int
     end: int
@@ -52,123 +59,146 @@ class Group(Generic[M]):
     meetings: tuple[M, ...] = ()
     notes: list[str] = field(default_factory=list)
 
+    def overlaps(self, meeting: M) -> bool:
+        """Return whether a meeting takes place in the group's time, at least partly."""
+        return meeting.start < self.end and meeting.end > self.start
+
+    def common_span(self, meeting: M) -> Span:
+        """Return the part of a meeting in the group's time."""
+        return max(meeting.start, self.start), min(meeting.end, self.end)
+
+
+class _Unused(Generic[M]):
+    """The meetings that are not used up, by member, and a queue of those that can form groups."""
+
+    def __init__(self, meetings: Iterable[M], shortest: int) -> None:
+        self.by_member: dict[int, set[M]] = defaultdict(set)
+        self._shortest = shortest
+        self._queue: list[tuple[tuple[int, ...], M]] = []
+        for meeting in meetings:
+            self.add(meeting)
+
+    def add(self, meeting: M) -> None:
+        self.by_member[meeting.a].add(meeting)
+        self.by_member[meeting.b].add(meeting)
+        if meeting.end - meeting.start >= self._shortest:
+            heapq.heappush(self._queue, (meeting.rank, meeting))
+
+    def remove(self, meeting: M) -> None:
+        self.by_member[meeting.a].discard(meeting)
+        self.by_member[meeting.b].discard(meeting)
+
+    def strongest(self) -> M | None:
+        """Take the strongest meeting that can form a group off the queue; None if there is none."""
+        while self._queue:
+            _, meeting = heapq.heappop(self._queue)
+            if meeting in self.by_member[meeting.a]:
+                return meeting
+        return None
+
+    def within(self, members: Iterable[int]) -> list[M]:
+        """Return the meetings of two members."""
+        chosen = set(members)
+        return [
+            meeting
+            for member in chosen
+            for meeting in self.by_member[member]
+            if meeting.a == member and meeting.b in chosen
+        ]
+
 
 @dataclass
 class Growth(Generic[M]):
-    """How groups grow; a subclass may look closer at who joins, and when a group begins and ends.
+    """Rules of growing groups; a subclass may refine who joins, and when a group begins and ends.
 
     Attributes:
-        shortest: of a meeting from which a group grows, in the meetings' unit of time.
-        least: of the part of a meeting that counts.
-        most: members of a group.
-        share: of the members together with one who joins that it meets.
+        shortest: duration of a meeting that can form a group, in the unit of time of the meetings.
+        least: duration of the part of a meeting that counts.
+        most: number of members.
+        share: of the members present with a vehicle that it must meet.
     """
 
     shortest: int
     least: int
     most: int
-    share: float = SHARED
+    share: float = MIN_MET_SHARE
 
     def join(self, group: Group[M], other: int, span: Span) -> None:
-        """Let `other`, who meets a member for `span`, join, if it does so for long enough."""
+        """Add a vehicle that meets a member for `span`, if that is long enough."""
         if span[1] - span[0] >= self.least:
             group.spans[other] = span
 
     def full(self, group: Group[M], others: Iterable[int]) -> None:
-        """Take note of those who meet a group that has `most` members."""
+        """Note the vehicles that meet a group with `most` members."""
 
     def finish(self, group: Group[M]) -> None:
-        """Settle a group that has grown."""
+        """Adjust a group that has grown."""
 
     def groups(self, meetings: Iterable[M]) -> list[Group[M]]:
-        """Return the groups, the strongest first; the meetings of each are those of its members in its time, sorted."""
-        left: dict[int, set[M]] = defaultdict(set)
-        queue: list[tuple[tuple[int, ...], M]] = []
-
-        def put(one: M) -> None:
-            left[one.a].add(one)
-            left[one.b].add(one)
-            if one.end - one.start >= self.shortest:
-                heapq.heappush(queue, (one.rank, one))
-
-        for one in meetings:
-            put(one)
-        found = []
-        while queue:
-            _, seed = heapq.heappop(queue)
-            if seed not in left[seed.a]:
-                continue
-            group = self._grow(seed, left)
-            start, end = seed.start, seed.end
+        """Return the groups, the strongest first, with the sorted meetings of their members."""
+        unused = _Unused(meetings, self.shortest)
+        groups = []
+        while (seed := unused.strongest()) is not None:
+            group = self._grow(seed, unused.by_member)
             self.finish(group)
-            both = [
-                one for a in group.spans for one in left[a] if one.a == a and one.b in group.spans
+            between_members = unused.within(group.spans)
+            used = [
+                meeting
+                for meeting in between_members
+                if meeting.start < seed.end and meeting.end > seed.start
             ]
-            inside = [one for one in both if one.start < end and one.end > start]
-            group.meetings = tuple(sorted(inside))
-            found.append(group)
-            for one in inside:
-                left[one.a].discard(one)
-                left[one.b].discard(one)
-                for first, last in (
-                    (one.start, min(one.end, group.start)),
-                    (max(one.start, group.end), one.end),
+            group.meetings = tuple(sorted(used))
+            groups.append(group)
+            for meeting in used:
+                unused.remove(meeting)
+                for start, end in (
+                    (meeting.start, min(meeting.end, group.start)),
+                    (max(meeting.start, group.end), meeting.end),
                 ):
-                    if last - first >= self.least:
-                        put(replace(one, start=first, end=last))
-        return found
+                    if end - start >= self.least:
+                        unused.add(replace(meeting, start=start, end=end))
+        return groups
 
-    def _grow(self, seed: M, left: dict[int, set[M]]) -> Group[M]:
-        """Return the group that a meeting makes."""
-        group: Group[M] = Group(
-            seed.start, seed.end, dict.fromkeys((seed.a, seed.b), (seed.start, seed.end))
-        )
-        refused: set[int] = set()
-        while near := self._near(group, refused, left):
-            spans = {
-                other: max((_inside(one, group) for one in ones), key=_length_first)
-                for other, ones in near.items()
-            }
+    def _grow(self, seed: M, by_member: dict[int, set[M]]) -> Group[M]:
+        """Return the group that grows from a meeting."""
+        span = (seed.start, seed.end)
+        group: Group[M] = Group(*span, {seed.a: span, seed.b: span})
+        considered: set[int] = set()
+        while near := self._near(group, considered, by_member):
             if len(group.spans) >= self.most:
                 self.full(group, near)
                 break
-            best = min(
-                near,
-                key=lambda other: (
-                    -_length_first(spans[other])[0],
-                    min(one.rank for one in near[other]),
-                    other,
-                ),
-            )
-            first, last = spans[best]
-            together = sum(begin < last and first < end for begin, end in group.spans.values())
-            if len({one.other(best) for one in near[best]}) >= self.share * together:
+            spans = {
+                other: max(map(group.common_span, meetings), key=_by_length)
+                for other, meetings in near.items()
+            }
+            ranks = {
+                other: min(meeting.rank for meeting in meetings)
+                for other, meetings in near.items()
+            }
+            best = min(near, key=lambda other: (-_by_length(spans[other])[0], ranks[other], other))
+            start, end = spans[best]
+            n_present = sum(begin < end and start < last for begin, last in group.spans.values())
+            n_met = len({meeting.other(best) for meeting in near[best]})
+            if n_met >= self.share * n_present:
                 self.join(group, best, spans[best])
-            refused.add(best)
+            considered.add(best)
         return group
 
     def _near(
-        self, group: Group[M], refused: set[int], left: dict[int, set[M]]
+        self, group: Group[M], considered: set[int], by_member: dict[int, set[M]]
     ) -> dict[int, list[M]]:
-        """Those who meet members in the group's time, with their meetings."""
+        """Return the vehicles that meet members in the group's time, with their meetings."""
         near: dict[int, list[M]] = defaultdict(list)
         for member in group.spans:
-            for one in left[member]:
-                other = one.other(member)
-                if (
-                    other not in group.spans
-                    and other not in refused
-                    and one.start < group.end
-                    and one.end > group.start
-                ):
-                    near[other].append(one)
+            for meeting in by_member[member]:
+                other = meeting.other(member)
+                is_new = other not in group.spans and other not in considered
+                if is_new and group.overlaps(meeting):
+                    near[other].append(meeting)
         return near
 
 
-def _inside(one: Meeting, group: Group[M]) -> Span:
-    return max(one.start, group.start), min(one.end, group.end)
-
-
-def _length_first(span: Span) -> Span:
-    """Sort key: the longer, then the earlier."""
+def _by_length(span: Span) -> Span:
+    """Sort key: by length, then the earlier one."""
     return span[1] - span[0], -span[0]

@@ -1,11 +1,11 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The path a vehicle drove: a penalised spline by distance driven, through its fixes and along its recorded headings.
+"""The path of a vehicle: a penalised spline by distance driven, through fixes and along headings.
 
-A driver steers in time, so the penalty on the change of curvature grows with the speed (lateral jerk), beside a smaller one for
-the limits of steering at any speed. The noise of fixes and headings, estimated per
-track, determines how far the path may be from either.
+A driver steers in time, so the penalty on the change of curvature grows with the speed (lateral
+jerk), in addition to a smaller one for the limits of steering at any speed. The noise of fixes and
+headings, estimated per track, determines how far the path may be from either.
 """
 
 from dataclasses import dataclass
@@ -18,38 +18,71 @@ from scipy.ndimage import uniform_filter1d
 
 from scenario_gen.numerics import Floats, Ints, wrap_angle
 
-KNOT_M = 1.0  # m between knots
-MARGIN_M = 5.0  # m of path beyond both ends, for fixes that lie there
-STEP_M = 0.1  # m between the points of the table from parameter to arc length
-CURVATURE = 0.1  # 1/m: spectral density of the curvature, about 0.1 1/m over 10 m
-STEERING = 0.002  # 1/m³: spectral density of the curvature's change, about 0.02 1/m² over 5 m
-LATERAL = 12.0  # m²/s³: spectral density of the lateral acceleration, about 2 m/s² over 3 s
-LATERAL_JERK = 1.0  # m²/s⁵: spectral density of the lateral jerk, about 1 m/s³ over 1 s
-CREEP_M = (
-    0.2  # m: fixes closer together than this share one weight, for their differences are GPS noise
-)
-SAME_HEADING_M = (
-    1.0  # m: headings closer together than this share one weight, for their error is one
-)
-STANDING_HEADING = 0.02  # the least weight of a heading: a stand of five seconds counts as much as a metre of driving
-HEADING_NOISE = float(np.radians(2.0))  # of a heading sensor at its best, slip included
-SCATTER_SAMPLES = 5  # samples on either side over which the scatter of headings is taken
-SCATTER = 9.0  # factor from the variance between neighbours to that of errors which they share
-MOVES_MPS = 1.0  # m/s: above it a course is known to a few degrees
-JUMP = float(np.radians(15.0))  # between two samples: no heading of a car
-CONTRADICTS = float(
-    np.radians(20.0)
-)  # headings further off the path are ignored: defaults, or of a reversing vehicle
+
+@dataclass(frozen=True)
+class PathModel:
+    """Tuning of the path.
+
+    Attributes:
+        knot_m: distance between knots.
+        margin_m: path beyond both ends, for fixes there.
+        table_step_m: between the points of the table from parameter to arc length.
+        curvature_per_m: spectral density of the curvature: about 0.1 1/m over 10 m.
+        steering_per_m3: spectral density of the curvature's change: about 0.02 1/m² over 5 m.
+        lateral_m2ps3: spectral density of the lateral acceleration: about 2 m/s² over 3 s.
+        lateral_jerk_m2ps5: spectral density of the lateral jerk: about 1 m/s³ over 1 s.
+        creep_m: closer fixes share one weight, since their differences are GPS noise.
+        same_heading_m: closer headings share one weight, since they share their error.
+        min_heading_weight: a stand of five seconds counts as much as a metre of driving.
+    """
+
+    knot_m: float = 1.0
+    margin_m: float = 5.0
+    table_step_m: float = 0.1
+    curvature_per_m: float = 0.1
+    steering_per_m3: float = 0.002
+    lateral_m2ps3: float = 12.0
+    lateral_jerk_m2ps5: float = 1.0
+    creep_m: float = 0.2
+    same_heading_m: float = 1.0
+    min_heading_weight: float = 0.02
+
+
+@dataclass(frozen=True)
+class HeadingModel:
+    """Tuning of recorded headings.
+
+    Attributes:
+        noise_rad: of a heading sensor at its best, slip included.
+        scatter_count: samples on either side over which the scatter of headings is measured.
+        shared_error_factor: from the variance between neighbours to that of shared errors.
+        moving_mps: above it, a course is known to a few degrees.
+        jump_rad: between two samples, larger than any of a car's heading.
+        contradiction_rad: headings farther off the path are ignored: defaults, or in reverse.
+    """
+
+    noise_rad: float = float(np.radians(2.0))
+    scatter_count: int = 5
+    shared_error_factor: float = 9.0
+    moving_mps: float = 1.0
+    jump_rad: float = float(np.radians(15.0))
+    contradiction_rad: float = float(np.radians(20.0))
+
+
+HEADINGS = HeadingModel()
+_PATH = PathModel()
 
 
 @dataclass(frozen=True, eq=False)
 class Path:
-    """The path a vehicle drove: a penalised cubic B-spline by distance driven (P-spline; Eilers & Marx 1996).
+    """The path of a vehicle: a penalised cubic B-spline by distance driven.
+
+    Source: Eilers & Marx 1996 (P-splines).
 
     Attributes:
-        curve: position (..., 2) [m] by parameter u, the distance driven as first guessed [m].
-        parameter: (K,) increasing u of a table.
-        length: (K,) the arc length [m] there.
+        curve: position (..., 2) [m] by parameter u, the first estimate of the distance driven [m].
+        parameter: (K,) increasing values of u in a table.
+        length: (K,) their arc lengths [m].
     """
 
     curve: BSpline
@@ -57,24 +90,27 @@ class Path:
     length: Floats
 
     def project(self, guess: Floats, points: Floats) -> tuple[Floats, Floats]:
-        """Return arc lengths (F,) [m] of the points' feet on the curve, and how far left (F,) [m] of it they are.
+        """Return arc length and lateral offset, positive to the left, of points (F, 2) [m].
 
         Args:
-            guess: (F,) parameters [m] near the feet.
+            guess: (F,) parameters [m] near their feet on the curve.
             points: (F, 2) [m].
+
+        Returns:
+            (F,) and (F,) [m].
         """
         tangent = self.curve(guess, 1)
-        gap = points - self.curve(guess)
-        foot = guess + (gap * tangent).sum(axis=1) / (np.square(tangent)).sum(axis=1)
+        offset = points - self.curve(guess)
+        foot = guess + (offset * tangent).sum(axis=1) / (np.square(tangent)).sum(axis=1)
         foot = np.clip(foot, self.parameter[0], self.parameter[-1])
-        gap, tangent = points - self.curve(foot), self.curve(foot, 1)
-        left = tangent[:, 0] * gap[:, 1] - tangent[:, 1] * gap[:, 0]
-        return np.interp(foot, self.parameter, self.length), np.where(
-            left < 0.0, -1.0, 1.0
-        ) * np.hypot(*gap.T)
+        offset = points - self.curve(foot)
+        tangent = self.curve(foot, 1)
+        cross = tangent[:, 0] * offset[:, 1] - tangent[:, 1] * offset[:, 0]
+        lateral = np.where(cross < 0.0, -1.0, 1.0) * np.hypot(*offset.T)
+        return np.interp(foot, self.parameter, self.length), lateral
 
     def pose(self, arc: Floats) -> tuple[Floats, Floats]:
-        """Return positions (T, 2) [m] and headings (T,) [rad], unwrapped, at arc lengths (T,) [m]."""
+        """Return positions (T, 2) [m] and unwrapped headings (T,) [rad] at arc lengths (T,) [m]."""
         u = np.interp(arc, self.length, self.parameter)
         tangent = self.curve(u, 1)
         return self.curve(u), np.unwrap(np.arctan2(tangent[:, 1], tangent[:, 0]))
@@ -82,7 +118,7 @@ class Path:
 
 @dataclass(frozen=True, eq=False)
 class Headings:
-    """Recorded headings (F,) [rad] at the fixes, and the weight (F,) [1/rad²] of each, 0 where there is none."""
+    """Recorded headings (F,) [rad] at the fixes, and their weights (F,) [1/rad²]; 0: none."""
 
     value: Floats
     weight: Floats
@@ -101,10 +137,11 @@ def fit_path(
     It minimises, over the curve c(u) with curvature κ and the speed v(u),
 
         Σ w |c(u_i) - p_i|² / σ² + Σ w_i (n_i · c'(u_i))²
-        + ∫ κ² (1/CURVATURE + v³/LATERAL) + κ'² (1/STEERING + v⁵/LATERAL_JERK) du
+        + ∫ κ² (1/curvature + v³/lateral) + κ'² (1/steering + v⁵/lateral_jerk) du
 
-    where n_i is across the recorded heading. With dt = du/v, the parts with v are ∫ (v²κ)² dt and ∫ (v³κ')² dt: lateral
-    acceleration and jerk, each over its spectral density.
+    where n_i is across the recorded heading, and the spectral densities are those of `PathModel`.
+    With dt = du/v, the parts with v are ∫ (v²κ)² dt and ∫ (v³κ')² dt: lateral acceleration and
+    jerk, each over its spectral density.
 
     Args:
         place: (F,) distances driven at the fixes [m], non-decreasing.
@@ -112,53 +149,47 @@ def fit_path(
         weight: (F,) in (0, 1].
         noise: standard deviation of the fixes [m].
         speed: (F,) [m/s].
-        headings: recorded ones, if there are any.
+        headings: recorded headings, or None.
     """
-    low, high = place.min() - MARGIN_M, place.max() + MARGIN_M
-    spans = max(int(np.ceil((high - low) / KNOT_M)), 4)
+    low = place.min() - _PATH.margin_m
+    high = place.max() + _PATH.margin_m
+    spans = max(int(np.ceil((high - low) / _PATH.knot_m)), 4)
     step = (high - low) / spans
     knots = low + step * np.arange(-3, spans + 4)
-    spread = np.abs(np.gradient(place)) if len(place) > 1 else np.ones(1)
-    weight = weight * np.clip(spread / CREEP_M, 0.005, 1.0) / np.square(noise)
+    spacing = np.abs(np.gradient(place)) if len(place) > 1 else np.ones(1)
+    weight = weight * np.clip(spacing / _PATH.creep_m, 0.005, 1.0) / np.square(noise)
     count = spans + 3
     band = np.zeros((8, 2 * count))  # x and y of each coefficient in turn
     right = np.zeros(2 * count)
     inside = np.clip(place, low, high - 1e-9)
-    basis = BSpline.design_matrix(inside, knots, 3)  # four entries a row, the zeros too
-    start, values = 2 * basis.indices[::4].astype(np.int64), basis.data.reshape(-1, 4)
+    basis = BSpline.design_matrix(inside, knots, 3)  # four entries per row, including zeros
+    start = 2 * basis.indices[::4].astype(np.int64)
+    values = basis.data.reshape(-1, 4)
     for axis in (0, 1):
         observe(band, right, start + axis, values, 2, weight, points[:, axis])
     if headings is not None:
         lower = BSpline.design_matrix(inside, knots[1:-1], 2).data.reshape(-1, 3)
-        slope = np.zeros(
-            (len(place), 4)
-        )  # of a cubic basis: differences of the quadratic one, which begins at the same span
+        # Slopes of a cubic basis are differences of the quadratic one, from the same span on.
+        slope = np.zeros((len(place), 4))
         slope[:, 1:] += lower / step
         slope[:, :-1] -= lower / step
         across = np.column_stack((-np.sin(headings.value), np.cos(headings.value)))
         entries = (slope[:, :, None] * across[:, None, :]).reshape(-1, 8)
-        shared = np.clip(spread / SAME_HEADING_M, STANDING_HEADING, 1.0)
+        shared = np.clip(spacing / _PATH.same_heading_m, _PATH.min_heading_weight, 1.0)
         observe(band, right, start, entries, 1, headings.weight * shared, np.zeros(len(place)))
-    for order, floor, moving, power in (
-        (2, CURVATURE, LATERAL, 3),
-        (3, STEERING, LATERAL_JERK, 5),
+    for order, by_distance, by_time in (
+        (2, _PATH.curvature_per_m, _PATH.lateral_m2ps3),
+        (3, _PATH.steering_per_m3, _PATH.lateral_jerk_m2ps5),
     ):
-        centre = low + step * (np.arange(count - order) + (order - 2) / 2.0)
+        rows = np.arange(count - order)
+        centre = low + step * (rows + (order - 2) / 2.0)
         v = np.interp(centre, place, speed)
-        weight = step ** (1 - 2 * order) * (1.0 / floor + v**power / moving)
+        penalty = step ** (1 - 2 * order) * (1.0 / by_distance + v ** (2 * order - 1) / by_time)
+        stencils = differences(count, order)
         for axis in (0, 1):
-            observe(
-                band,
-                right,
-                2 * np.arange(count - order) + axis,
-                differences(count, order),
-                2,
-                weight,
-                np.zeros(len(v)),
-            )
-    return tabulate(
-        BSpline(knots, linalg.solveh_banded(band, right, lower=True).reshape(-1, 2), 3), low, high
-    )
+            observe(band, right, 2 * rows + axis, stencils, 2, penalty, np.zeros(len(v)))
+    coefficients = linalg.solveh_banded(band, right, lower=True).reshape(-1, 2)
+    return _tabulate(BSpline(knots, coefficients, 3), low, high)
 
 
 def observe(
@@ -170,11 +201,11 @@ def observe(
     weight: Floats,
     target: Floats,
 ) -> None:
-    """Add Σ weight · (entries · c - target)² to a lower band matrix (B, n) and its right side (n,).
+    """Add Σ weight · (entries · c - target)² to a lower band matrix and its right side.
 
     Args:
-        band: the matrix.
-        right: the right side.
+        band: the matrix (B, n).
+        right: the right side (n,).
         start: (F,) first coefficient of each row.
         entries: (F, E) of each row, `stride` coefficients apart.
         stride: that distance.
@@ -184,41 +215,41 @@ def observe(
     for i in range(entries.shape[1]):
         np.add.at(right, start + stride * i, weight * entries[:, i] * target)
         for j in range(i + 1):
-            np.add.at(
-                band[stride * (i - j)], start + stride * j, weight * entries[:, i] * entries[:, j]
-            )
+            products = weight * entries[:, i] * entries[:, j]
+            np.add.at(band[stride * (i - j)], start + stride * j, products)
 
 
 def differences(count: int, order: int) -> Floats:
-    """Return the rows (count - order, order + 1) of the differences of an order of `count` values."""
+    """Return differences of an order (1 to 3) of `count` values as rows (count - order, order + 1)."""
     stencil = ((-1.0, 1.0), (1.0, -2.0, 1.0), (-1.0, 3.0, -3.0, 1.0))[order - 1]
     return np.tile(stencil, (count - order, 1))
 
 
 def straight_path(point: Floats, heading: float, low: float, high: float) -> Path:
-    """Return a straight line through `point` (2,) [m] where the distance driven is (low + high) / 2."""
+    """Return a straight path with `point` (2,) [m] at the distance (low + high) / 2."""
     direction = np.array([np.cos(heading), np.sin(heading)])
-    ends = np.array([low - MARGIN_M, high + MARGIN_M])
-    where = point + (ends - (low + high) / 2.0)[:, None] * direction
-    return tabulate(BSpline(np.repeat(ends, 2), where, 1), ends[0], ends[1])
+    ends = np.array([low - _PATH.margin_m, high + _PATH.margin_m])
+    positions = point + (ends - (low + high) / 2.0)[:, None] * direction
+    return _tabulate(BSpline(np.repeat(ends, 2), positions, 1), ends[0], ends[1])
 
 
-def tabulate(curve: BSpline, low: float, high: float) -> Path:
+def _tabulate(curve: BSpline, low: float, high: float) -> Path:
     """Measure the curve's arc length."""
-    u = np.linspace(low, high, int(np.ceil((high - low) / STEP_M)) + 1)
+    u = np.linspace(low, high, int(np.ceil((high - low) / _PATH.table_step_m)) + 1)
     rate = np.hypot(*curve(u, 1).T)
     length = low + np.concatenate([[0.0], np.cumsum((rate[1:] + rate[:-1]) / 2.0 * np.diff(u))])
     return Path(curve, u, length)
 
 
 def headings_of(heading: Floats, course: Floats, speed: Floats) -> Headings | None:
-    """Weigh recorded headings by their own scatter; values that are no headings of a car get weight 0.
+    """Weigh recorded headings by their scatter; values that are not headings of a car get 0.
 
-    A car's heading does not jump. So the headings are cut where they do, and a run counts if it agrees with the path where the
-    vehicle moves: a course over ground, taken from two fixes, jumps about where a vehicle is slow, and a default is another run.
+    A car's heading does not jump. So the headings are cut at jumps, and a run counts if it agrees
+    with the path while the vehicle moves: a course over ground from two fixes jumps if a vehicle is
+    slow, and a default value is a run that disagrees.
 
     Args:
-        heading: (F,) as recorded [rad], NaN where it is not recorded.
+        heading: (F,) as recorded [rad], NaN if not recorded.
         course: (F,) of the path fitted so far [rad].
         speed: (F,) [m/s].
 
@@ -228,21 +259,28 @@ def headings_of(heading: Floats, course: Floats, speed: Floats) -> Headings | No
     known = np.flatnonzero(np.isfinite(heading))
     value = heading[known]
     turn = wrap_angle(np.diff(value))
-    off = np.abs(wrap_angle(value - course[known]))
-    moves = speed[known] > MOVES_MPS
+    error = np.abs(wrap_angle(value - course[known]))
+    is_moving = speed[known] > HEADINGS.moving_mps
+    jumps = np.flatnonzero(np.abs(turn) > HEADINGS.jump_rad) + 1
     weight = np.zeros(len(heading))
-    for begin, end in pairwise(
-        [0, *(np.flatnonzero(np.abs(turn) > JUMP) + 1).tolist(), len(value)]
-    ):
-        own = slice(begin, end)
-        if moves[own].sum() < 3 or np.median(off[own][moves[own]]) > CONTRADICTS:
+    for begin, end in pairwise([0, *jumps.tolist(), len(value)]):
+        run = slice(begin, end)
+        moving_error = error[run][is_moving[run]]
+        if len(moving_error) < 3 or np.median(moving_error) > HEADINGS.contradiction_rad:
             continue
-        square = np.pad(np.square(np.diff(turn[begin : end - 1])) / 6.0, 1, mode="edge")
-        scatter = np.maximum(
-            uniform_filter1d(square, 2 * SCATTER_SAMPLES + 1, mode="nearest"), 0.0
-        )
-        noise = np.sqrt(np.square(HEADING_NOISE) + SCATTER * scatter)
-        weight[known[own]] = np.minimum(1.0, 2.0 * noise / np.maximum(off[own], 1e-9)) / np.square(
-            noise
-        )  # Huber's
-    return Headings(np.where(np.isfinite(heading), heading, 0.0), weight) if weight.any() else None
+        noise = _heading_noise(turn[begin : end - 1])
+        huber = np.minimum(1.0, 2.0 * noise / np.maximum(error[run], 1e-9))
+        weight[known[run]] = huber / np.square(noise)
+    if not weight.any():
+        return None
+    return Headings(np.where(np.isfinite(heading), heading, 0.0), weight)
+
+
+def _heading_noise(turn: Floats) -> Floats:
+    """Return the standard deviations (H,) [rad] of headings with turns (H-1,) between them."""
+    square = np.pad(np.square(np.diff(turn)) / 6.0, 1, mode="edge")
+    window = 2 * HEADINGS.scatter_count + 1
+    scatter = np.maximum(uniform_filter1d(square, window, mode="nearest"), 0.0)
+    variance = np.square(HEADINGS.noise_rad) + HEADINGS.shared_error_factor * scatter
+    noise: Floats = np.sqrt(variance)
+    return noise

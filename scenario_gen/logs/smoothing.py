@@ -1,17 +1,19 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Reconciling positions with measured speeds: a vehicle moves forward along a smooth path.
+"""Reconciling positions with measured speeds: a vehicle moves forwards along a smooth path.
 
-A track becomes a path (a curve by arc length, `Path`) and a motion along it (place and speed over time, `Motion`), fitted in
-turn. The path is smooth in *distance*, so GPS noise does not become heading noise however slowly the vehicle moves; the motion
-is smooth in *time*, never runs backwards, keeps to the limits of a car and is still where the car stands. So position, speed and
-heading agree by construction: the distance between samples is the mean of their speeds times dt, and the heading is the path's
-direction, held while standing.
+A track becomes a path (a curve by arc length, `Path`) and a motion along it (distance and speed
+over time, `Motion`), fitted in turn. The path is smooth in *distance*, so GPS noise does not become
+heading noise however slowly the vehicle moves. The motion is smooth in *time*, never runs
+backwards, respects the limits of a car, and is zero while the car stands. So position, speed and
+heading agree by construction: the distance between samples is the mean of their speeds times dt,
+and the heading is the direction of the path, constant while standing.
 """
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any, NamedTuple
 
 import clarabel  # type: ignore[import-untyped,unused-ignore]
 import numpy as np
@@ -24,9 +26,9 @@ from scenario_gen.logs.config import LogConfig
 from scenario_gen.logs.path import (
     differences,
     fit_path,
+    HEADINGS,
     Headings,
     headings_of,
-    MOVES_MPS,
     observe,
     Path,
     straight_path,
@@ -34,18 +36,41 @@ from scenario_gen.logs.path import (
 from scenario_gen.logs.raw import Observations
 from scenario_gen.numerics import Bools, Floats, Ints, runs, wrap_angle
 
-STANDS_MPS = (
-    0.3  # m/s: below this a vehicle stands, if it does so for a second and its fixes stay in place
-)
-STILL_MPS = 0.1  # m/s: below this it is not on its way to or from standing
-SHIFTED_M = 1.0  # m: if fixes move further while the speed is zero, the speed is wrong
-DOUBTED_MPS = 3.0  # a speed that differs more from that of the fixes is not used in the first layout; if most do, none is used
-MOVED_M = 0.5  # m: a vehicle that moves less has no direction of travel
-ROUNDS = 3  # of path and motion in turn
-LEAST_NOISE, MOST_NOISE = 0.1, 1.5  # m: of fixes, as estimated
-MIN_FIXES = 30  # moving fixes from which their noise can be estimated
-SETTLES_S = 0.3  # s at either end of a stand that are left to the motion: a car comes to rest, and starts, without a step
-STRAIGHT_M = 3.0  # m: a shorter path has no shape of its own
+DOUBTED_MPS = 3.0
+"""A speed that differs more from that of the fixes is not used in the first estimate; if most
+speeds do, none is used."""
+
+
+@dataclass(frozen=True)
+class SmoothingModel:
+    """Tuning of smoothing.
+
+    Attributes:
+        standing_mps: a vehicle stands if it is slower for a second and its fixes stay in place.
+        still_mps: slower than on the way to or from standing.
+        max_shift_m: if fixes move farther while the speed is zero, the speed is wrong.
+        settling_s: at either end of a stand, free for the motion: a car stops without a step.
+        min_travel_m: a vehicle that moves less has no direction of travel.
+        straight_m: a shorter path has no shape.
+        round_count: fits of path and motion in turn.
+        noise_m: bounds of the estimated noise of fixes.
+        min_fix_count: moving fixes from which noise can be estimated.
+        speed_noise_mps: bounds of the estimated noise of speeds.
+    """
+
+    standing_mps: float = 0.3
+    still_mps: float = 0.1
+    max_shift_m: float = 1.0
+    settling_s: float = 0.3
+    min_travel_m: float = 0.5
+    straight_m: float = 3.0
+    round_count: int = 3
+    noise_m: tuple[float, float] = (0.1, 1.5)
+    min_fix_count: int = 30
+    speed_noise_mps: tuple[float, float] = (0.3, 3.0)
+
+
+_MODEL = SmoothingModel()
 
 
 class UnreconciledError(InputError):
@@ -53,64 +78,79 @@ class UnreconciledError(InputError):
 
 
 class Motion:
-    """How far along its path a vehicle is: a quadratic B-spline on the common clock, fitted by a quadratic program.
+    """Distance along a path over time: a quadratic B-spline fitted by a quadratic program.
 
-    With coefficients c_0 … c_T and ticks i = 0 … T-1: place s_i = (c_i + c_{i+1})/2, speed v_i = (c_{i+1} - c_i)/dt, and the
-    acceleration between two ticks is constant. Second and third differences of c are acceleration and jerk, so limits on speed
-    and acceleration are sparse linear inequalities, and where a vehicle stands its coefficients are one variable: v = 0 exactly.
+    With coefficients c_0 … c_T and ticks i = 0 … T-1: distance s_i = (c_i + c_{i+1})/2, speed
+    v_i = (c_{i+1} - c_i)/dt, and the acceleration between two ticks is constant. Second and third
+    differences of c are acceleration and jerk, so limits on speed and acceleration are sparse
+    linear inequalities. While a vehicle stands, its coefficients are one variable: v = 0 exactly.
     """
 
     def __init__(self, stands: Bools, config: LogConfig) -> None:
-        """Set the program up; the speed is zero at the ticks of which `stands` (T,) is true."""
+        """Set up the program; the speed is zero at the ticks at which `stands` (T,) is true."""
         dt = config.period
-        self.dt, self.ticks = dt, len(stands)
-        self.variable = np.concatenate(
-            [[0], np.cumsum(~stands)]
-        )  # v_i = 0 makes c_{i+1} the variable of c_i
+        self.dt = dt
+        self.ticks = len(stands)
+        # v_i = 0 makes c_{i+1} the variable of c_i.
+        self.variable = np.concatenate([[0], np.cumsum(~stands)])
         self.size = int(self.variable[-1]) + 1
-        first, second, third = (self._differences(order) for order in (1, 2, 3))
-        speed, change = (
-            (first[0], first[1] * (1.0 / dt)),
-            (second[0], second[1] * (1.0 / np.square(dt))),
-        )
+        start, third = self._differences(3)
+        weight = np.full(len(start), dt / (config.jerk * dt**3) ** 2)
         self.prior = np.zeros((4, self.size + 3))
-        weight = np.full(len(third[0]), dt / (config.jerk * dt**3) ** 2)
-        observe(self.prior, np.zeros(self.size + 3), *third, 1, weight, np.zeros(len(weight)))
-        blocks = (speed[0], -speed[1]), change, (change[0], -change[1])
-        self.bounds = np.repeat(
-            [0.0, config.acceleration_limit, config.braking_limit],
-            [len(block[0]) for block in blocks],
-        )
-        above = np.cumsum([0, *(len(block[0]) for block in blocks)])
+        no_target = np.zeros(len(weight))
+        observe(self.prior, np.zeros(self.size + 3), start, third, 1, weight, no_target)
+        self.constraints, self.bounds = self._limits(config)
+
+    def _limits(self, config: LogConfig) -> tuple[Any, Floats]:
+        """Return the matrix and right side of the limits: speed, acceleration, deceleration."""
+        speed_start, first = self._differences(1)
+        start, second = self._differences(2)
+        speed = first * (1.0 / self.dt)
+        acceleration = second * (1.0 / np.square(self.dt))
+        blocks = ((speed_start, -speed), (start, acceleration), (start, -acceleration))
+        counts = [len(block_start) for block_start, _ in blocks]
+        limits = [0.0, config.acceleration_limit, config.braking_limit]
+        row_starts = np.cumsum([0, *counts])
         rows = [
-            np.repeat(top + np.arange(len(at)), values.shape[1])
-            for top, (at, values) in zip(above, blocks, strict=False)
+            np.repeat(row_start + np.arange(len(values)), values.shape[1])
+            for row_start, (_, values) in zip(row_starts, blocks, strict=False)
         ]
-        columns = [(at[:, None] + np.arange(values.shape[1])).ravel() for at, values in blocks]
+        columns = [
+            (block_start[:, None] + np.arange(values.shape[1])).ravel()
+            for block_start, values in blocks
+        ]
         entries = np.concatenate([values.ravel() for _, values in blocks])
-        some = entries != 0.0  # merged variables leave the last places of a row empty
-        places = np.concatenate(rows)[some], np.concatenate(columns)[some]
-        self.constraints = sparse.csc_array((entries[some], places), (above[-1], self.size))
+        used = entries != 0.0  # merged variables leave the last entries of a row empty
+        indices = (np.concatenate(rows)[used], np.concatenate(columns)[used])
+        shape = (row_starts[-1], self.size)
+        return sparse.csc_array((entries[used], indices), shape), np.repeat(limits, counts)
 
     def _merged(self, tick: Ints, weights: Floats) -> tuple[Ints, Floats]:
-        """Rows (F, E) over the coefficients from `tick` (F,) on, as the first variable (F,) and rows (F, E) from there."""
-        out = np.zeros(weights.shape)
-        column = (
-            self.variable[tick[:, None] + np.arange(weights.shape[1])]
-            - self.variable[tick][:, None]
-        )
-        np.add.at(out, (np.arange(len(tick))[:, None], column), weights)
-        return self.variable[tick], out
+        """Return rows (F, E) over coefficients from `tick` (F,) on as rows over variables.
+
+        Returns:
+            The first variable (F,), and the rows (F, E) from it on.
+        """
+        rows = np.zeros(weights.shape)
+        start = self.variable[tick]
+        variables = self.variable[tick[:, None] + np.arange(weights.shape[1])]
+        column = variables - start[:, None]
+        np.add.at(rows, (np.arange(len(tick))[:, None], column), weights)
+        return start, rows
 
     def _differences(self, order: int) -> tuple[Ints, Floats]:
-        """Return differences of the coefficients over the merged variables, as rows like those of `_merged`."""
+        """Return differences of the coefficients as rows over variables, as `_merged` does."""
         tick = np.arange(len(self.variable) - order)
         return self._merged(tick, differences(len(self.variable), order))
 
     def _weights(
         self, seconds: Floats, *, speed: bool = False
     ) -> tuple[Ints, tuple[Floats, Floats, Floats]]:
-        """The first of the three coefficients that count at any times (F,), and the weights (F,) of each: place or speed."""
+        """Return the weights of coefficients in the distances, or speeds, at any times (F,).
+
+        Returns:
+            The first of three coefficients (F,), and the weight (F,) of each.
+        """
         tick = np.clip(np.floor(seconds / self.dt).astype(np.int64), 0, max(self.ticks - 2, 0))
         u = seconds / self.dt - tick
         if speed:
@@ -121,34 +161,26 @@ class Motion:
         """Return the coefficients (T+1,) that fit best.
 
         Args:
-            observed: (seconds, values, standard deviations, whether the values are speeds rather than places).
+            observed: times, values and standard deviations (F,), and whether the values are speeds.
 
         Raises:
             UnreconciledError: the solver finds no solution.
         """
-        quadratic, linear = self.prior.copy(), np.zeros(self.size + 3)
-        for seconds, values, deviation, speed in observed:
-            tick, weights = self._weights(seconds, speed=speed)
-            observe(
-                quadratic,
-                linear,
-                *self._merged(tick, np.column_stack(weights)),
-                1,
-                1.0 / np.square(deviation),
-                values,
-            )
-        upper = sparse.dia_array(
-            (quadratic[:, : self.size], -np.arange(4)), (self.size, self.size)
-        ).T.tocsc()
+        quadratic = self.prior.copy()
+        linear = np.zeros(self.size + 3)
+        for seconds, values, deviation, are_speeds in observed:
+            tick, weights = self._weights(seconds, speed=are_speeds)
+            start, rows = self._merged(tick, np.column_stack(weights))
+            observe(quadratic, linear, start, rows, 1, 1.0 / np.square(deviation), values)
+        shape = (self.size, self.size)
+        lower = sparse.dia_array((quadratic[:, : self.size], -np.arange(4)), shape)
+        upper = lower.T.tocsc()
         settings = clarabel.DefaultSettings()
         settings.verbose = False
         settings.direct_solve_method = "qdldl"  # one thread: the same bits everywhere
         cones = [clarabel.NonnegativeConeT(len(self.bounds))]
-        for scaled in (
-            True,
-            False,
-        ):  # fixes seconds apart leave the matrix such that its scaling makes it worse
-            settings.equilibrate_enable = scaled
+        for equilibrate in (True, False):  # scaling worsens the matrix if fixes are seconds apart
+            settings.equilibrate_enable = equilibrate
             solver = clarabel.DefaultSolver(
                 upper, -linear[: self.size], self.constraints, self.bounds, cones, settings
             )
@@ -159,22 +191,23 @@ class Motion:
             ):
                 break
         else:
-            raise UnreconciledError("speeds and positions cannot be reconciled; check their units")
-        merged = np.maximum.accumulate(
-            np.asarray(solution.x)
-        )  # within the solver's tolerance it may run backwards
-        return np.asarray(merged[self.variable])
+            raise UnreconciledError(
+                "speeds and positions contradict each other; check their units"
+            )
+        # Within the solver's tolerance, the motion may run backwards.
+        increasing = np.maximum.accumulate(np.asarray(solution.x))
+        return np.asarray(increasing[self.variable])
 
     def place(self, coefficients: Floats, seconds: Floats) -> Floats:
-        """Return the distances driven (F,) [m] at any times (F,) [s], of coefficients (T+1,)."""
+        """Return the distances (F,) [m] at any times (F,) [s] for coefficients (T+1,)."""
         tick, (w0, w1, w2) = self._weights(seconds)
-        place: Floats = (
+        distance: Floats = (
             w0 * coefficients[tick] + w1 * coefficients[tick + 1] + w2 * coefficients[tick + 2]
         )
-        return place
+        return distance
 
     def at_ticks(self, coefficients: Floats) -> tuple[Floats, Floats]:
-        """Return distances driven (T,) [m] and speeds (T,) [m/s] at the ticks, of coefficients (T+1,)."""
+        """Return distances (T,) [m] and speeds (T,) [m/s] at the ticks for coefficients (T+1,)."""
         return (coefficients[1:] + coefficients[:-1]) / 2.0, np.diff(coefficients) / self.dt
 
 
@@ -187,13 +220,13 @@ class Smooth:
         position: (T, 2) metres.
         heading: (T,) rad, unwrapped; NaN if the vehicle never moved and none is recorded.
         speed: (T,) m/s.
-        before: (S,) measured speed less the speed of the raw fixes [m/s].
-        after: (T,) published speed less the speed of the published positions [m/s].
-        changed: (S,) measured speed less the published speed [m/s].
-        moved: (F,) distance of the raw fixes from the published positions at their stamps [m].
-        noise: standard deviation of the fixes [m], as estimated or as given.
-        turned: (H,) recorded headings less the published ones [rad] where the vehicle moves.
-        headings: (H',) for each recorded heading whether it was used.
+        before: (S,) measured speed minus the speed of the raw fixes [m/s].
+        after: (T,) smooth speed minus the speed of the smooth positions [m/s].
+        changed: (S,) measured speed minus the smooth speed [m/s].
+        moved: (F,) distance between the raw fixes and the smooth positions [m].
+        noise: standard deviation of the fixes [m], estimated or given.
+        turned: (H,) recorded minus smooth headings [rad] while the vehicle moves.
+        headings: (H',) whether each recorded heading was used.
     """
 
     first: int
@@ -209,188 +242,259 @@ class Smooth:
     headings: Bools
 
 
+class _Fit(NamedTuple):
+    """Path and motion fitted to a piece.
+
+    Attributes:
+        path: the path.
+        distance: (F,) distances driven at the fixes [m].
+        coefficients: (T+1,) of the motion.
+        noise: standard deviation of the fixes [m].
+        headings: recorded headings with weights, or None.
+    """
+
+    path: Path
+    distance: Floats
+    coefficients: Floats
+    noise: float
+    headings: Headings | None
+
+
 def smooth_piece(piece: Observations, origin_ns: int, config: LogConfig) -> Smooth | None:
-    """Fit path and motion to a piece of a track; `origin_ns` is the stamp of tick 0 of the common clock.
+    """Fit path and motion to a piece of a track.
+
+    Args:
+        piece: its fixes and speeds.
+        origin_ns: stamp of tick 0 of the common clock.
+        config: names period, noise and limits.
 
     Returns:
-        The piece on the clock, or None if fewer than three ticks lie in it.
+        The piece on the clock, or None if it has fewer than three ticks.
+
+    Raises:
+        UnreconciledError: no motion of a car fits.
     """
     dt = config.period
     fix_t = (piece.fix_ns - origin_ns).astype(np.float64) * 1e-9
     speed_t = (piece.speed_ns - origin_ns).astype(np.float64) * 1e-9
-    first, last = int(np.ceil(fix_t[0] / dt - 1e-6)), int(np.floor(fix_t[-1] / dt + 1e-6))
+    first = int(np.ceil(fix_t[0] / dt - 1e-6))
+    last = int(np.floor(fix_t[-1] / dt + 1e-6))
     if last - first < 2:
         return None
-    fix_t, speed_t = fix_t - first * dt, speed_t - first * dt
-    raw = speed_of_fixes(fix_t, piece.fix)
+    fix_t = fix_t - first * dt
+    speed_t = speed_t - first * dt
+    fix_speed = speed_of_fixes(fix_t, piece.fix)
     speed = piece.speed
     if not len(speed):
-        speed_t, speed = fix_t, raw
-    noise = first_noise = config.position_noise or estimated_noise(piece.fix)
+        speed_t = fix_t
+        speed = fix_speed
     ticks = dt * np.arange(last - first + 1, dtype=np.float64)
     stands = standing(ticks, fix_t, piece.fix, speed_t, speed)
-    motion = Motion(without_ends(stands, round(SETTLES_S / dt)), config)
-    differs = speed - np.interp(speed_t, fix_t, raw)
-    deviation = config.speed_noise or float(np.clip(white_equivalent(differs), 0.3, 3.0))
-    trusted = len(piece.speed) > 0 and np.median(np.abs(differs)) <= max(DOUBTED_MPS, 5.0 * noise)
-    measured = [(speed_t, speed, deviation * np.ones(len(speed)), True)] if trusted else []
-    guess = layout(
-        ticks, stands, np.interp(ticks, speed_t, speed), np.interp(ticks, fix_t, raw), fix_t
-    )
-    weight = np.ones(len(fix_t))
-    headings = None
-    for _ in range(ROUNDS):
-        path = path_of(guess, piece, weight, noise, np.gradient(guess, fix_t), headings)
-        place, aside = path.project(guess, piece.fix)
-        coefficients = motion.solve([*measured, (fix_t, place, noise / np.sqrt(weight), False)])
-        guess = motion.place(coefficients, fix_t)
-        if not config.position_noise:
-            noise = noise_about(
-                first_noise, np.interp(fix_t, ticks, stands) < 0.5, aside, place - guess
-            )
-        weight = np.minimum(
-            1.0, 2.0 * noise / np.maximum(np.hypot(aside, place - guess), 1e-9)
-        )  # Huber's
-        headings = headings_of(piece.heading, path.pose(guess)[1], np.gradient(guess, fix_t))
-    place, published = motion.at_ticks(coefficients)
-    position, heading = path.pose(place)
-    if np.ptp(place) < MOVED_M and not np.isfinite(piece.heading).any():
-        heading = np.full(len(place), np.nan)
-    known = np.isfinite(piece.heading)
-    rolls = known & (np.gradient(guess, fix_t) > MOVES_MPS)
+    motion = Motion(_without_ends(stands, round(_MODEL.settling_s / dt)), config)
+    difference = speed - np.interp(speed_t, fix_t, fix_speed)
+    noise = config.position_noise or estimated_noise(piece.fix)
+    deviation = config.speed_noise
+    if not deviation:
+        deviation = float(np.clip(white_equivalent(difference), *_MODEL.speed_noise_mps))
+    max_difference = max(DOUBTED_MPS, 5.0 * noise)
+    is_trusted = len(piece.speed) > 0 and np.median(np.abs(difference)) <= max_difference
+    measured = [(speed_t, speed, deviation * np.ones(len(speed)), True)] if is_trusted else []
+    tick_speed = np.interp(ticks, speed_t, speed)
+    tick_fix_speed = np.interp(ticks, fix_t, fix_speed)
+    guess = _first_distances(ticks, stands, tick_speed, tick_fix_speed, fix_t)
+    is_moving = np.interp(fix_t, ticks, stands) < 0.5
+
+    fit = _fit_in_turn(piece, fix_t, motion, measured, guess, is_moving, noise, config)
+    distance, smooth_speed = motion.at_ticks(fit.coefficients)
+    position, heading = fit.path.pose(distance)
+    is_known = np.isfinite(piece.heading)
+    if np.ptp(distance) < _MODEL.min_travel_m and not is_known.any():
+        heading = np.full(len(distance), np.nan)
+    if np.ptp(distance) < _MODEL.straight_m:
+        is_used = is_known
+    elif fit.headings is not None:
+        is_used = fit.headings.weight > 0.0
+    else:
+        is_used = ~is_known
+    rolling = is_known & (np.gradient(fit.distance, fix_t) > HEADINGS.moving_mps)
     return Smooth(
         first=first,
         position=position,
         heading=heading,
-        speed=published,
-        before=differs,
-        after=published - speed_of_fixes(ticks, position),
-        changed=piece.speed - np.interp(speed_t, ticks, published)[: len(piece.speed)],
-        moved=np.hypot(*(piece.fix - path.pose(guess)[0]).T),
-        noise=noise,
-        turned=wrap_angle(piece.heading[rolls] - np.interp(fix_t[rolls], ticks, heading)),
-        headings=known[known]
-        if np.ptp(place) < STRAIGHT_M
-        else (headings.weight > 0.0)[known]
-        if headings
-        else ~known[known],
+        speed=smooth_speed,
+        before=difference,
+        after=smooth_speed - speed_of_fixes(ticks, position),
+        changed=piece.speed - np.interp(speed_t, ticks, smooth_speed)[: len(piece.speed)],
+        moved=np.hypot(*(piece.fix - fit.path.pose(fit.distance)[0]).T),
+        noise=fit.noise,
+        turned=wrap_angle(piece.heading[rolling] - np.interp(fix_t[rolling], ticks, heading)),
+        headings=is_used[is_known],
     )
 
 
-def without_ends(stands: Bools, ends: int) -> Bools:
-    """Return the stands (T,) shorter by `ends` ticks where the vehicle comes to rest or starts."""
-    kept = np.zeros(len(stands), dtype=bool)
-    for begin, end in runs(stands):
-        kept[begin + ends * (begin > 0) : end - ends * (end < len(stands))] = True
-    return kept
-
-
-def layout(ticks: Floats, stands: Bools, speed: Floats, raw: Floats, seconds: Floats) -> Floats:
-    """Return a first guess of the distances driven (F,) [m]: the speed integrated, or that of the fixes where it is far off.
+def _fit_in_turn(
+    piece: Observations,
+    fix_t: Floats,
+    motion: Motion,
+    measured: Sequence[tuple[Floats, Floats, Floats, bool]],
+    distance: Floats,
+    is_moving: Bools,
+    first_noise: float,
+    config: LogConfig,
+) -> _Fit:
+    """Fit path and motion in turn; the weights of fixes and headings follow from the residuals.
 
     Args:
-        ticks: (T,) seconds.
-        stands: (T,) whether it stands there.
-        speed: (T,) measured [m/s].
-        raw: (T,) of the fixes [m/s].
-        seconds: (F,) stamps of the fixes.
+        piece: fixes and recorded headings.
+        fix_t: (F,) times of the fixes [s].
+        motion: the program.
+        measured: measured speeds, as in `Motion.solve`.
+        distance: (F,) first estimate of the distances driven [m].
+        is_moving: (F,) whether the vehicle moves.
+        first_noise: standard deviation of the fixes [m].
+        config: names the noise, if it is given.
+
+    Raises:
+        UnreconciledError: no motion fits.
     """
-    rate = np.where(stands, 0.0, np.where(np.abs(speed - raw) > DOUBTED_MPS, raw, speed))
-    driven = np.concatenate([[0.0], np.cumsum((rate[1:] + rate[:-1]) / 2.0 * np.diff(ticks))])
-    guess: Floats = np.interp(seconds, ticks, driven)
-    return guess
+    weight = np.ones(len(fix_t))
+    noise = first_noise
+    headings = None
+    for _ in range(_MODEL.round_count):
+        path = _fit_path(piece, distance, weight, noise, np.gradient(distance, fix_t), headings)
+        arc, lateral = path.project(distance, piece.fix)
+        along = (fix_t, arc, noise / np.sqrt(weight), False)
+        coefficients = motion.solve([*measured, along])
+        distance = motion.place(coefficients, fix_t)
+        longitudinal = arc - distance
+        if not config.position_noise:
+            noise = _residual_noise(first_noise, is_moving, lateral, longitudinal)
+        residual = np.maximum(np.hypot(lateral, longitudinal), 1e-9)
+        weight = np.minimum(1.0, 2.0 * noise / residual)  # Huber's
+        course = path.pose(distance)[1]
+        headings = headings_of(piece.heading, course, np.gradient(distance, fix_t))
+    return _Fit(path, distance, coefficients, noise, headings)
 
 
-def path_of(
-    guess: Floats,
+def _without_ends(stands: Bools, ends: int) -> Bools:
+    """Return stands (T,) shorter by `ends` ticks at which the vehicle stops or starts."""
+    shortened = np.zeros(len(stands), dtype=bool)
+    for begin, end in runs(stands):
+        first = begin + ends if begin > 0 else begin
+        last = end - ends if end < len(stands) else end
+        shortened[first:last] = True
+    return shortened
+
+
+def _first_distances(
+    ticks: Floats, stands: Bools, speed: Floats, fix_speed: Floats, fix_t: Floats
+) -> Floats:
+    """Return a first estimate of the distances driven (F,) [m]: the integral of the speed.
+
+    Args:
+        ticks: (T,) [s].
+        stands: (T,) whether the vehicle stands.
+        speed: (T,) measured [m/s].
+        fix_speed: (T,) of the fixes [m/s], used instead if the measured one is far off.
+        fix_t: (F,) times of the fixes [s].
+    """
+    is_doubted = np.abs(speed - fix_speed) > DOUBTED_MPS
+    rate = np.where(stands, 0.0, np.where(is_doubted, fix_speed, speed))
+    steps = (rate[1:] + rate[:-1]) / 2.0 * np.diff(ticks)
+    distance: Floats = np.interp(fix_t, ticks, np.concatenate([[0.0], np.cumsum(steps)]))
+    return distance
+
+
+def _fit_path(
     piece: Observations,
+    distance: Floats,
     weight: Floats,
     noise: float,
     speed: Floats,
     headings: Headings | None,
 ) -> Path:
-    """Fit the path; one too short to have a shape is straight, in the recorded heading where there is one.
+    """Fit the path; one that is too short to have a shape is straight, in the recorded heading.
 
     Args:
-        guess: (F,) distances driven at the fixes [m].
         piece: the fixes.
+        distance: (F,) distances driven at the fixes [m].
         weight: (F,) in (0, 1].
         noise: standard deviation of the fixes [m].
         speed: (F,) at the fixes [m/s].
-        headings: recorded ones, if there are any.
+        headings: recorded headings, or None.
     """
-    low, high = float(guess.min()), float(guess.max())
-    if high - low >= STRAIGHT_M:
-        return fit_path(guess, piece.fix, weight, noise, speed, headings)
+    low = float(distance.min())
+    high = float(distance.max())
+    if high - low >= _MODEL.straight_m:
+        return fit_path(distance, piece.fix, weight, noise, speed, headings)
     known = piece.heading[np.isfinite(piece.heading)]
     if len(known):
         heading = float(np.arctan2(np.median(np.sin(known)), np.median(np.cos(known))))
-    else:  # the direction of the fixes' regression on the distance driven
-        lever = guess - guess.mean()
-        heading = float(np.arctan2(*(lever @ (piece.fix - piece.fix.mean(axis=0)))[::-1]))
+    else:  # direction of the regression of the fixes on the distance
+        x, y = (distance - distance.mean()) @ (piece.fix - piece.fix.mean(axis=0))
+        heading = float(np.arctan2(y, x))
     point = np.median(piece.fix, axis=0)
-    return straight_path(point, heading, 2.0 * float(np.median(guess)) - high, high)
+    return straight_path(point, heading, 2.0 * float(np.median(distance)) - high, high)
 
 
 def speed_of_fixes(seconds: Floats, fix: Floats, window: float = 0.5) -> Floats:
-    """Return the speeds (F,) of the raw fixes over `window` seconds around each [m/s]."""
-    early = np.searchsorted(seconds, seconds - window / 2.0 - 1e-9)
-    late = np.searchsorted(seconds, seconds + window / 2.0 + 1e-9) - 1
-    early, late = (
-        np.where(late > early, early, np.maximum(early - 1, 0)),
-        np.where(late > early, late, np.minimum(late + 1, len(fix) - 1)),
-    )
-    rate: Floats = np.hypot(*(fix[late] - fix[early]).T) / (seconds[late] - seconds[early])
+    """Return the speeds (F,) [m/s] of raw fixes (F, 2) [m], over `window` seconds around each."""
+    first = np.searchsorted(seconds, seconds - window / 2.0 - 1e-9)
+    last = np.searchsorted(seconds, seconds + window / 2.0 + 1e-9) - 1
+    is_alone = last <= first
+    first = np.where(is_alone, np.maximum(first - 1, 0), first)
+    last = np.where(is_alone, np.minimum(last + 1, len(fix) - 1), last)
+    rate: Floats = np.hypot(*(fix[last] - fix[first]).T) / (seconds[last] - seconds[first])
     return rate
 
 
 def estimated_noise(fix: Floats) -> float:
-    """Return the standard deviation [m] of fixes (F, 2) [m]: from their residuals about local parabolas."""
+    """Return the standard deviation [m] of fixes (F, 2) [m] about local parabolas."""
     half = min(15, (len(fix) - 1) // 2)
     if half < 3:
         return 0.5
     lag = np.arange(-half, half + 1)
     square = np.square(lag) - np.square(lag).mean()
-    parabola = (
-        1.0 / len(lag) - np.square(lag).mean() * square / np.square(square).sum()
-    )  # the fitted parabola's value at lag 0
+    # Value at lag 0 of the parabola that fits best.
+    parabola = 1.0 / len(lag) - np.square(lag).mean() * square / np.square(square).sum()
     residual = fix[half : len(fix) - half] - sliding_window_view(fix, len(lag), axis=0) @ parabola
-    return float(
-        np.clip(
-            max(white_equivalent(residual[:, 0]), white_equivalent(residual[:, 1])),
-            LEAST_NOISE,
-            MOST_NOISE,
-        )
-    )
+    noise = max(white_equivalent(residual[:, 0]), white_equivalent(residual[:, 1]))
+    return float(np.clip(noise, *_MODEL.noise_m))
 
 
-def noise_about(guess: float, moves: Bools, aside: Floats, ahead: Floats) -> float:
-    """Return the standard deviation [m] of fixes about the path and motion fitted to them, at most twice the first estimate.
+def _residual_noise(
+    first_estimate: float, is_moving: Bools, lateral: Floats, longitudinal: Floats
+) -> float:
+    """Return the standard deviation [m] of fixes about the path and motion fitted to them.
 
-    Without that bound noise and smoothness would increase each other: smoothing leaves noise of long memory.
+    It is at most twice the first estimate. Without that bound, noise and smoothness would increase
+    each other, since smoothing leaves noise of long memory.
 
     Args:
-        guess: the first estimate; it is kept if few fixes are of a moving vehicle: those of a standing one are often repeated.
-        moves: (F,) whether it moves there.
-        aside: (F,) of the fixes from the path [m].
-        ahead: (F,) of the fixes from the motion along it [m].
+        first_estimate: returned if few fixes are of a moving vehicle, since those of a standing
+            one are often repeated.
+        is_moving: (F,) whether the vehicle moves.
+        lateral: (F,) of the fixes from the path [m].
+        longitudinal: (F,) of the fixes from the motion along it [m].
     """
-    if moves.sum() < MIN_FIXES:
-        return guess
-    seen = max(white_equivalent(aside[moves]), white_equivalent(ahead[moves]))
-    return float(np.clip(seen, LEAST_NOISE, min(2.0 * guess, MOST_NOISE)))
+    if is_moving.sum() < _MODEL.min_fix_count:
+        return first_estimate
+    noise = max(white_equivalent(lateral[is_moving]), white_equivalent(longitudinal[is_moving]))
+    low, high = _MODEL.noise_m
+    return float(np.clip(noise, low, min(2.0 * first_estimate, high)))
 
 
 def white_equivalent(noise: Floats) -> float:
-    """Return the deviation of the white noise whose mean is as uncertain as that of this coloured noise (T,) [m, m/s].
+    """Return the deviation of white noise whose mean is as uncertain as that of noise (T,).
 
-    Values beyond three robust deviations are pulled in; the deviation is then scaled by the root of the autocorrelation
-    time, 1 + 2 Σ ρ_l over the lags before the first ρ_l below 0.1.
+    Values beyond three robust deviations are clipped; the deviation is then scaled by the root of
+    the autocorrelation time, 1 + 2 Σ ρ_l over the lags before the first ρ_l below 0.1.
     """
     noise = noise - np.median(noise)
     limit = 3.0 * 1.4826 * float(np.median(np.abs(noise))) + 1e-3
     noise = np.clip(noise, -limit, limit)
-    power, time = float(np.square(noise).sum()), 1.0
+    power = float(np.square(noise).sum())
+    time = 1.0
     for lag in range(1, min(20, len(noise) // 3)):
         correlation = float((noise[:-lag] * noise[lag:]).sum()) / max(power, 1e-12)
         if correlation < 0.1:
@@ -400,7 +504,7 @@ def white_equivalent(noise: Floats) -> float:
 
 
 def standing(ticks: Floats, fix_t: Floats, fix: Floats, speed_t: Floats, speed: Floats) -> Bools:
-    """Return at which ticks the vehicle stands: slow for at least a second, with fixes that stay in place.
+    """Return at which ticks (T,) a vehicle stands: slow for a second, with fixes in place.
 
     Args:
         ticks: (T,) seconds.
@@ -413,14 +517,15 @@ def standing(ticks: Floats, fix_t: Floats, fix: Floats, speed_t: Floats, speed: 
     half = round(0.2 / dt)
     smooth = median_filter(np.interp(ticks, speed_t, speed), 2 * half + 1, mode="nearest")
     stands = np.zeros(len(ticks), dtype=bool)
-    for begin, end in runs(smooth < STANDS_MPS):
-        still = begin + np.flatnonzero(
-            smooth[begin:end] <= max(STILL_MPS, 1.5 * float(np.median(smooth[begin:end])))
-        )
-        begin, end = int(still[0]), int(still[-1]) + 1  # noqa: PLW2901 - rolling before and after the stop is not standing
+    for slow_begin, slow_end in runs(smooth < _MODEL.standing_mps):
+        slow = smooth[slow_begin:slow_end]
+        still_mps = max(_MODEL.still_mps, 1.5 * float(np.median(slow)))
+        still = slow_begin + np.flatnonzero(slow <= still_mps)  # not rolling before and after
+        begin = int(still[0])
+        end = int(still[-1]) + 1
         inside = fix[(fix_t >= ticks[begin]) & (fix_t <= ticks[end - 1])]
-        k = max(len(inside) // 5, 1)
         if (end - begin) * dt >= 1.0 and len(inside):
-            shift = np.median(inside[-k:], axis=0) - np.median(inside[:k], axis=0)
-            stands[begin:end] = np.hypot(*shift) <= SHIFTED_M
+            n_ends = max(len(inside) // 5, 1)
+            shift = np.median(inside[-n_ends:], axis=0) - np.median(inside[:n_ends], axis=0)
+            stands[begin:end] = np.hypot(*shift) <= _MODEL.max_shift_m
     return stands

@@ -9,7 +9,7 @@ import numpy as np
 
 from scenario_gen.logs.config import LogConfig
 from scenario_gen.logs.encounters import Piece
-from scenario_gen.logs.path import CONTRADICTS, MOVES_MPS
+from scenario_gen.logs.path import HEADINGS
 from scenario_gen.numerics import Floats, wrap_angle
 
 SHARE = 75.0  # per cent of the headings that are no farther off: one vehicle of two may face along an axis
@@ -58,7 +58,7 @@ def remarks_on_units(
         ticks = (piece.smooth.first + np.arange(len(piece.smooth.speed))) * config.period
         seconds = (piece.track.fix_ns - origin_ns) * 1e-9
         speed = np.interp(seconds, ticks, piece.smooth.speed)
-        moves = (speed > MOVES_MPS) & np.isfinite(piece.track.heading)
+        moves = (speed > HEADINGS.moving_mps) & np.isfinite(piece.track.heading)
         recorded.append(piece.track.heading[moves])
         along.append(np.interp(seconds[moves], ticks, piece.smooth.heading))
         stamps = (piece.track.speed_ns - origin_ns) * 1e-9
@@ -75,7 +75,7 @@ def remarks_on_units(
                 [driven.get(piece.track.id, np.zeros((0, 3))), own]
             )
     geographic = any(piece.track.origin for piece in pieces)
-    least = MOVES_MPS * config.period
+    least = HEADINGS.moving_mps * config.period
     totals = np.array(
         [_totals(own, least) for own in driven.values() if own.sum(axis=0)[:2].max() > DRIVEN_M]
     ).reshape(-1, 4)
@@ -110,7 +110,7 @@ def _of_headings(recorded: Floats, along: Floats, *, geographic: bool) -> str:
     def off(heading: Floats) -> float:
         return float(np.percentile(np.abs(wrap_angle(heading - along)), SHARE))
 
-    if not len(recorded) or off(recorded) <= CONTRADICTS:
+    if not len(recorded) or off(recorded) <= HEADINGS.contradiction_rad:
         return ""
     axes = (
         "lat and lon are swapped (log.columns=lat=LON,lon=LAT)"
