@@ -3,12 +3,14 @@
 
 """Scenario → Autoware's perception and localization outputs (docs/exchange.md has the source of each topic and frame).
 
-PredictedObjects on `/perception/object_recognition/objects`, TrackedObjects on `/perception/object_recognition/tracking/objects`:
-frame: the road's; each object is posed at its shape's centre, z = half its height; twist and acceleration in its own frame;
-its id is the first 16 bytes of the SHA-256 of the vehicle's id. The only predicted path holds the poses that will follow, every
-`STEP_NS` up to `HORIZON_NS` ahead or the end. Odometry of the ego on `/localization/kinematic_state`: frame: the road's, child
-frame `base_link`, the middle of the rear axle on the ground. Covariances are 0: the values are exact. QoS: reliable, volatile,
-depth 1.
+PredictedObjects on `/perception/object_recognition/objects`, TrackedObjects on
+`/perception/object_recognition/tracking/objects`:
+frame: the road's; each object is posed at its shape's centre, z = half its height; twist and
+    acceleration in its own frame;
+its id is the first 16 bytes of the SHA-256 of the vehicle's id. The only predicted path holds the
+poses that will follow, every `STEP_NS` up to `HORIZON_NS` ahead or the end. Odometry of the ego on
+`/localization/kinematic_state`: frame: the road's, child frame `base_link`, the middle of the rear
+axle on the ground. Covariances are 0: the values are exact. QoS: reliable, volatile, depth 1.
 """
 
 from collections.abc import Sequence
@@ -87,7 +89,10 @@ class AutowareEncoder:
         )
 
     def _ahead(self, n: int, k: int) -> list[int]:
-        """Return the instants of the predicted path from `k` on: those at whole steps, while the vehicle is there."""
+        """Return the instants of the predicted path from `k` on.
+
+        Those at whole steps, while the vehicle is there.
+        """
         last = int(self.scenario.present[n, 1])
         wanted = np.arange(
             self.time_ns[k], min(self.time_ns[last], self.time_ns[k] + HORIZON_NS) + 1, STEP_NS
@@ -120,7 +125,10 @@ def encode_predicted_objects(
 
 
 def encode_kinematic_state(vehicle: Vehicle, state: Floats, frame_id: str, stamp_ns: int) -> bytes:
-    """Return the ego as Odometry; `state` (6,) x, y [m], yaw [rad], speed [m/s], acceleration [m/s²], yaw rate [rad/s]."""
+    """Return the ego as Odometry.
+
+    `state` (6,) x, y [m], yaw [rad], speed [m/s], acceleration [m/s²], yaw rate [rad/s].
+    """
     axle = shifted(state[:2], state[2], -rear_axle(vehicle))
     return encode_odometry(
         np.array([*axle, *state[2:4]]), float(state[5]), BASE_LINK, frame_id, stamp_ns
@@ -128,7 +136,10 @@ def encode_kinematic_state(vehicle: Vehicle, state: Floats, frame_id: str, stamp
 
 
 def _object(vehicle: Vehicle, state: Floats) -> dict[str, Any]:
-    """Return source both messages say of a vehicle; `state` (6,) as in `encode_kinematic_state`."""
+    """Return source both messages say of a vehicle.
+
+    `state` (6,) as in `encode_kinematic_state`.
+    """
     _, _, _, speed, acceleration, rate = state.tolist()
     return {
         "id": np.frombuffer(uuid_of(vehicle), dtype=np.uint8),

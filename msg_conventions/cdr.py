@@ -128,7 +128,8 @@ class CdrReader:
     """Reads CDR; `place` is the position after the last byte read.
 
     Raises:
-        InputError: from every method, naming `source`: the data ends too early or is not little-endian CDR.
+        InputError: from every method, naming `source`: the data ends too early or is not
+            little-endian CDR.
     """
 
     def __init__(self, data: bytes, source: str) -> None:
@@ -142,7 +143,8 @@ class CdrReader:
         start = self.place + -self.place % alignment
         if size < 0 or start + size > len(self._data):
             raise InputError(
-                f"{self._source}: the message ends at byte {len(self._data)}, {start + size} are needed"
+                f"{self._source}: the message ends at byte {len(self._data)}, {start + size} are "
+                "needed"
             )
         self.place = start + size
         return self._data[start : start + size]
@@ -162,7 +164,10 @@ class CdrReader:
         return count
 
     def array(self, dtype: npt.DTypeLike, count: int, alignment: int) -> npt.NDArray[Any]:
-        """Read `count` items (n,) of a numpy type, the first one aligned; without items no padding either."""
+        """Read `count` items (n,) of a numpy type, the first one aligned.
+
+        Without items no padding either.
+        """
         kind = np.dtype(dtype)
         data = self._read(kind.itemsize * count, alignment) if count else b""
         return np.frombuffer(data, dtype=kind, count=count)
@@ -187,8 +192,8 @@ class CdrReader:
     def aligned(self, dtype: npt.DTypeLike, count: int) -> npt.NDArray[Any] | None:
         """Read `count` structures (n,) that end at multiples of 8 bytes; read nothing and return None if fewer bytes are left.
 
-        The type begins with 4 bytes and 4 bytes of padding. A first structure that begins at an odd
-        multiple of 4 lacks this padding.
+        The type begins with 4 bytes and 4 bytes of padding. A first structure that begins at an
+        odd multiple of 4 lacks this padding.
         """
         kind = np.dtype(dtype)
         start = self.place + -self.place % 4

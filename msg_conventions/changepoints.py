@@ -3,13 +3,14 @@
 
 """(Encounter, Segmentation) ⇄ `changepoints` and `posterior`.
 
-`changepoints` (conventions: trajectory.py) has one point per changepoint: the state of every vehicle there, in the template's
-frame. It is all that the stages after the segmenter need, so another segmenter may publish it too.
-`posterior` (sensor_msgs/PointCloud2, frame as tracks) has one row per vehicle and one column per sample: x, y, z [m, float32],
-vehicle, primitive [uint16], t [s since the stamp, float64], p [posterior probability of a changepoint, float64].
-Both bear the stamp of their tracks. QoS: reliable, transient_local, depth 1.
-`changepoints/live` has the changepoints that one sample of the vehicles' streams confirmed; its stamp is that of the first sample
-since which the same vehicles have been there. QoS: reliable, transient_local, depth 1000.
+`changepoints` (conventions: trajectory.py) has one point per changepoint: the state of every
+vehicle there, in the template's frame. It is all that the stages after the segmenter need, so
+another segmenter may publish it too. `posterior` (sensor_msgs/PointCloud2, frame as tracks) has
+one row per vehicle and one column per sample: x, y, z [m, float32], vehicle, primitive [uint16], t
+[s since the stamp, float64], p [posterior probability of a changepoint, float64]. Both bear the
+stamp of their tracks. QoS: reliable, transient_local, depth 1. `changepoints/live` has the
+changepoints that one sample of the vehicles' streams confirmed; its stamp is that of the first
+sample since which the same vehicles have been there. QoS: reliable, transient_local, depth 1000.
 """
 
 from collections.abc import Mapping
@@ -60,21 +61,25 @@ def decode_changepoints(
 ) -> Segmentation:
     """Return the segmentation that the message and its tracks describe: a primitive of its own for every segment.
 
-    Shared labels, probabilities and descriptions are in `posterior` and the diagnostics; no later stage needs them.
+    Shared labels, probabilities and descriptions are in `posterior` and the diagnostics; no later
+    stage needs them.
 
     Raises:
-        InputError: the message is damaged, bears another stamp, or has a changepoint off the template's clock.
+        InputError: the message is damaged, bears another stamp, or has a changepoint off the
+            template's clock.
     """
     message = trajectory.decode(data, source)
     if message.stamp_ns != encounter.start_ns:
         raise InputError(
-            f"{source}: stamp {message.stamp_ns} ns is not that of the tracks ({encounter.start_ns} ns)"
+            f"{source}: stamp {message.stamp_ns} ns is not that of the tracks "
+            f"({encounter.start_ns} ns)"
         )
     index, rest = np.divmod(message.time_ns, encounter.dt_ns)
     samples = encounter.speed.shape[1]
     if rest.any() or (np.diff(index) <= 0).any() or (index < 1).any() or (index >= samples).any():
         raise InputError(
-            f"{source}: times must increase and be those of samples 1 to {samples - 1} of the tracks"
+            f"{source}: times must increase and be those of samples 1 to {samples - 1} of the "
+            "tracks"
         )
     marks = np.zeros(samples)
     marks[index] = 1.0
@@ -127,7 +132,8 @@ def decode_posterior(
         or size == 0
     ):
         raise InputError(
-            f"{source}: expected a cloud of vehicles by samples with the fields {', '.join(POINT.names or ())}"
+            f"{source}: expected a cloud of vehicles by samples with the fields "
+            f"{', '.join(POINT.names or ())}"
         )
     cloud = found.data.view(POINT).reshape(n, samples)
     labels = cloud["primitive"][0].astype(np.int64)
@@ -150,7 +156,10 @@ def segmentation_status(segmentation: Segmentation, node: str, duration: float) 
 
 
 def segment_descriptions(statuses: Mapping[str, Mapping[str, str]]) -> tuple[str, ...]:
-    """Return the sentences of such a status, one for each segment; `statuses` are key-values by subject."""
+    """Return the sentences of such a status, one for each segment.
+
+    `statuses` are key-values by subject.
+    """
     return tuple(
         text
         for key, text in statuses.get("segmentation", {}).items()

@@ -39,7 +39,10 @@ class Subject(StrEnum):
 
 @dataclass(frozen=True)
 class Status:
-    """One diagnostic_msgs/DiagnosticStatus; its name is the node's full name, `: ` and the subject."""
+    """One diagnostic_msgs/DiagnosticStatus.
+
+    Its name is the node's full name, `: ` and the subject.
+    """
 
     name: str
     level: Level

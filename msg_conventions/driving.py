@@ -6,8 +6,8 @@
 Outputs at every step, with the drive's time (that of /clock) as their stamp, in the road's frame:
 
 - `vehicle_<id>/odom` (nav_msgs/Odometry) of all vehicles with the ego: child frame `vehicle_<id>`,
-  the centre of the footprint, x ahead; twist in that frame, linear.x the speed [m/s], angular.z the
-  yaw rate [rad/s]. QoS: reliable, volatile, depth 100.
+  the centre of the footprint, x ahead; twist in that frame, linear.x the speed [m/s], angular.z
+  the yaw rate [rad/s]. QoS: reliable, volatile, depth 100.
 - `traffic/markers` (visualization_msgs/MarkerArray): a box for each vehicle, black for the ego.
 - `traffic/local_map` (nav_msgs/OccupancyGrid): the drivable cells around the ego; other vehicles
   are obstacles. Depth 1.
@@ -18,8 +18,9 @@ Inputs for the ego; a stamp of 0 means "now":
 
 - `ego/cmd_vel` (geometry_msgs/Twist), `ego/cmd_vel_stamped` (TwistStamped): the target speed
   linear.x [m/s], reached as fast as the vehicle can, and angular.z [rad/s].
-- `ego/trajectory` (trajectory_msgs/MultiDOFJointTrajectory, conventions: trajectory.py), `ego/path`
-  (nav_msgs/Path with the time of each pose as its stamp): the poses that the ego tracks.
+- `ego/trajectory` (trajectory_msgs/MultiDOFJointTrajectory, conventions: trajectory.py),
+  `ego/path` (nav_msgs/Path with the time of each pose as its stamp): the poses that the ego
+  tracks.
 - `ego/odom` (nav_msgs/Odometry): the ego's state in another simulator.
 """
 
@@ -41,7 +42,10 @@ TWIST_TYPE, CLOCK_TYPE = "geometry_msgs/msg/Twist", "rosgraph_msgs/msg/Clock"
 
 @dataclass(frozen=True, eq=False)
 class TimedPath:
-    """Poses for the ego to track: (T,) times [ns] on the drive's clock, (T, 3) x, y [m], yaw [rad] in `frame_id`."""
+    """Poses for the ego to track.
+
+    (T,) times [ns] on the drive's clock, (T, 3) x, y [m], yaw [rad] in `frame_id`.
+    """
 
     time_ns: Floats
     poses: Floats
@@ -91,7 +95,8 @@ def decode_timed_path(data: bytes, source: str = "ego/path") -> TimedPath:
     """Return the path in a Path whose stamps are the times of its poses.
 
     Raises:
-        InputError: the message is damaged or empty, a value is not finite, or the stamps do not ascend.
+        InputError: the message is damaged or empty, a value is not finite, or the stamps do not
+            ascend.
     """
     _, frame_id, stamps, _, rows = read_path(data, source)
     if not len(rows):

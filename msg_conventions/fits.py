@@ -3,9 +3,10 @@
 
 """Fit ⇄ `fit`: the changepoints on the road (conventions: trajectory.py).
 
-Points are the anchors (start, changepoints, end) in the road's frame, at the template's times; the first and last are the
-states requested of every scenario, speed included. Speeds in between are the template's, scaled; no stage reads them.
-The decisions of the fitting are in the diagnostics, a status for each vehicle. QoS: reliable, transient_local, depth 1.
+Points are the anchors (start, changepoints, end) in the road's frame, at the template's times; the
+first and last are the states requested of every scenario, speed included. Speeds in between are
+the template's, scaled; no stage reads them. The decisions of the fitting are in the diagnostics, a
+status for each vehicle. QoS: reliable, transient_local, depth 1.
 """
 
 from collections.abc import Mapping, Sequence
@@ -71,7 +72,10 @@ def decode_fit(data: bytes, source: str = "fit") -> tuple[int, str, BoundaryStat
 def fit_statuses(
     fit: Fit, node: str, more: Mapping[str, str] | None = None, routes: Sequence[Route] = ()
 ) -> tuple[Status, ...]:
-    """Return the decisions: a status per vehicle, with figures of its route, one for the notes; each with the values `more`."""
+    """Return the decisions: a status per vehicle, with figures of its route, one for the notes.
+
+    Each with the values `more`.
+    """
     planned = [route.figures() for route in routes] or [{}] * len(fit.fitted)
     remarks = [
         route.remarks(vehicle.id) for vehicle, route in zip(fit.vehicles, routes, strict=False)
@@ -82,7 +86,8 @@ def fit_statuses(
             Level.OK
             if float(fitted.moved.max()) < 1.0 and not (remarks and remarks[k])
             else Level.WARN,
-            f"{fitted.manoeuvre}, scale {fitted.scale:.3f}, moved by at most {float(fitted.moved.max()):.2f} m",
+            f"{fitted.manoeuvre}, scale {fitted.scale:.3f}, moved by at most "
+            f"{float(fitted.moved.max()):.2f} m",
             {
                 "manoeuvre": fitted.manoeuvre,
                 "scale": repr(fitted.scale),

@@ -3,7 +3,8 @@
 
 """Coordinate frames ⇄ tf2_msgs/TFMessage: `/tf` for the vehicles of a scenario in motion.
 
-Parent: the road's frame. Child: `vehicle_<id>`, at the footprint's centre, x ahead. QoS: reliable, volatile, depth 100.
+Parent: the road's frame. Child: `vehicle_<id>`, at the footprint's centre, x ahead. QoS: reliable,
+    volatile, depth 100.
 """
 
 from collections.abc import Sequence

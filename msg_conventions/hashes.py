@@ -57,7 +57,10 @@ def template_hashes(messages: Mapping[str, bytes]) -> dict[str, str]:
 
 
 def encode_hashes(name: str, messages: Mapping[str, bytes], stamp_ns: int) -> bytes:
-    """Return the hashes of messages (by topic) as CDR bytes; `name` is the subject of the status."""
+    """Return the hashes of messages (by topic) as CDR bytes.
+
+    `name` is the subject of the status.
+    """
     hashes = {
         topic: hash_of(topic, data)
         for topic, data in sorted(messages.items())
@@ -78,6 +81,7 @@ def decode_hashes(data: bytes, source: str) -> dict[str, str]:
         re.fullmatch(rf"[0-9a-f]{{{HASH_DIGITS}}}", text) for text in hashes.values()
     ):
         raise InputError(
-            f"{source}: it must list by topic a hash of {HASH_DIGITS} hexadecimal digits of each message"
+            f"{source}: it must list by topic a hash of {HASH_DIGITS} hexadecimal digits of each "
+            "message"
         )
     return hashes

@@ -3,20 +3,20 @@
 
 """LaneNetwork ⇄ `road/lanes` (visualization_msgs/Marker): the lanes of a road, published with its grid.
 
-A LINE_LIST has all borders as pairs of neighbouring points: lane after lane, the left border before
-the right one. `text` is a JSON object with these members:
+A LINE_LIST has all borders as pairs of neighbouring points: lane after lane, the left border
+before the right one. `text` is a JSON object with these members:
 
 - `name`, `notes`, `note_kinds`
-- `lanes`, each with its `id`, the number of `points` of a border, `successors` and `beside` (indices
-  of lanes), `speed_limit` [m/s, null: unknown], `junction`; also `users` if it is not for all
-  vehicles, `crossing` true for crossings, and `height` [m] of its points if lanes lie above others.
-  Lanes closed to cars come last.
+- `lanes`, each with its `id`, the number of `points` of a border, `successors` and `beside`
+  (indices of lanes), `speed_limit` [m/s, null: unknown], `junction`; also `users` if it is not for
+  all vehicles, `crossing` true for crossings, and `height` [m] of its points if lanes lie above
+  others. Lanes closed to cars come last.
 - `rules`, if the map has traffic rules, each with `id`, `kind`, `lanes`, `over` (indices of lanes)
   and `line` (points of the stop line), and `rules_kept`
 - `origin`: latitude and longitude of the frame's origin, if the map has it
 - `drawn` true for lanes of a built-in road, and `drawn_for` for those drawn for a template: the
-  `frame` of the template (x, y [m], yaw [rad] on the road), and the ids of the `lanes` by which each
-  vehicle arrives and leaves
+  `frame` of the template (x, y [m], yaw [rad] on the road), and the ids of the `lanes` by which
+  each vehicle arrives and leaves
 
 Action 2 (delete) means that the road has no lanes. Stamp and frame: the map's. QoS: reliable,
 transient_local, depth 1.
@@ -128,11 +128,13 @@ def decode_lanes(data: bytes, source: str = TOPIC) -> tuple[str, LaneNetwork | N
         return frame_id, None
     if (found.kind, found.action) != (Kind.LINE_LIST, Action.ADD):
         raise InputError(
-            f"{source}: a marker of type {found.kind}, action {found.action}; a line list (5) that is added (0) is needed"
+            f"{source}: a marker of type {found.kind}, action {found.action}; a line list (5) "
+            "that is added (0) is needed"
         )
     if not (np.abs(points) <= MAX_COORDINATE_M).all():
         raise InputError(
-            f"{source}: a border has a point that is not finite or more than {MAX_COORDINATE_M:g} m away"
+            f"{source}: a border has a point that is not finite or more than {MAX_COORDINATE_M:g} "
+            "m away"
         )
     try:
         document = json.loads(found.text)
@@ -173,7 +175,8 @@ def _lanes(documents: list[dict[str, Any]], points: Floats, source: str) -> Iter
         pairs = 2 * (int(document["points"]) - 1)
         if pairs < 2 or at + 2 * pairs > len(points):
             raise InputError(
-                f"{source}: lane {document['id']!r} has borders of {document['points']} points, and {len(points) - at} are left"
+                f"{source}: lane {document['id']!r} has borders of {document['points']} points, "
+                f"and {len(points) - at} are left"
             )
         borders = [points[start : start + pairs] for start in (at, at + pairs)]
         left, right = (np.concatenate((border[:1], border[1::2])) for border in borders)

@@ -17,7 +17,10 @@ ARRAY_TYPE = "visualization_msgs/msg/MarkerArray"
 
 
 class Kind(IntEnum):
-    """Types of markers; a text faces the viewer, and the last number of its scale is its height."""
+    """Types of markers.
+
+    A text faces the viewer, and the last number of its scale is its height.
+    """
 
     CUBE = 1
     CYLINDER = 3

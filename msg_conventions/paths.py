@@ -3,9 +3,12 @@
 
 """Route ⇄ `vehicle_<id>/route`, and plain paths (nav_msgs/Path).
 
-Frame: the road's. `header.stamp`: the template's. A pose's stamp is the planned time: the template's stamp at every anchor
-(start, changepoints, end), between anchors in proportion to arc length. Equal consecutive poses are a dwell.
-QoS: reliable, transient_local, depth 1. Arc length is not in the message; it is the sum of the chords.
+Frame: the road's. `header.stamp`: the template's. A pose's stamp is the planned time: the
+    template's stamp at every anchor
+(start, changepoints, end), between anchors in proportion to arc length. Equal consecutive poses
+are a dwell.
+QoS: reliable, transient_local, depth 1. Arc length is not in the message; it is the sum of the
+    chords.
 """
 
 from collections.abc import Sequence
@@ -39,7 +42,8 @@ def encode_path(poses: Floats, stamps_ns: Ints, frame_id: str, stamp_ns: int) ->
     seconds, nanoseconds = np.divmod(stamps_ns, NANOSECONDS)
     if np.abs(seconds).max() >= 2**31:
         raise InputError(
-            f"a path of stamp {stamp_ns} ns cannot be sent: a stamp does not fit a ROS time (until 2038)"
+            f"a path of stamp {stamp_ns} ns cannot be sent: a stamp does not fit a ROS time "
+            "(until 2038)"
         )
     text = frame_id.encode() + b"\x00"
     begin = encode(BEGIN, stamp=stamp_ns, frame_id=frame_id, count=count)
@@ -113,7 +117,10 @@ def chord_length(points: Floats) -> Floats:
 
 
 def encode_route(route: Route, anchors_ns: Sequence[int], frame_id: str) -> bytes:
-    """Return the route as CDR bytes; `anchors_ns` (K + 2,) are the template's stamps at the anchors, the first its own."""
+    """Return the route as CDR bytes.
+
+    `anchors_ns` (K + 2,) are the template's stamps at the anchors, the first its own.
+    """
     index, stamps = [int(route.anchor[0])], [anchors_ns[0]]
     for k in range(1, len(route.anchor)):
         first, last = int(route.anchor[k - 1]), int(route.anchor[k])
@@ -142,7 +149,8 @@ def decode_route(
     """Return the frame and the route.
 
     Raises:
-        InputError: the message is damaged, bears another stamp, or has no pose at an anchor's stamp.
+        InputError: the message is damaged, bears another stamp, or has no pose at an anchor's
+            stamp.
     """
     stamp_ns, frame_id, poses, stamps = decode_path(data, source)
     if stamp_ns != anchors_ns[0]:
@@ -154,14 +162,16 @@ def decode_route(
     if (np.diff(stamps) < 0).any():
         bad = int(np.argmax(np.diff(stamps) < 0))
         raise InputError(
-            f"{source}: pose {bad + 1} bears an earlier stamp than pose {bad}; planned times must not decrease"
+            f"{source}: pose {bad + 1} bears an earlier stamp than pose {bad}; planned times must "
+            "not decrease"
         )
     moved = np.concatenate([[True], (np.diff(poses, axis=0) != 0.0).any(axis=1)])
     at = np.searchsorted(stamps, anchors_ns)
     missing = (at >= len(stamps)) | (stamps[np.minimum(at, len(stamps) - 1)] != anchors_ns)
     if missing.any():
         raise InputError(
-            f"{source}: no pose bears the stamp of changepoint {int(np.argmax(missing))}; every changepoint needs one"
+            f"{source}: no pose bears the stamp of changepoint {int(np.argmax(missing))}; every "
+            "changepoint needs one"
         )
     points = poses[moved]
     return frame_id, Route(

@@ -43,7 +43,10 @@ PAINT = {
 
 
 def encode_footprint(vehicle: Vehicle, stamp_ns: int, frame_id: str) -> bytes:
-    """Return the footprint in the vehicle's frame: four corners, counter-clockwise from the front left [m]."""
+    """Return the footprint in the vehicle's frame.
+
+    Four corners, counter-clockwise from the front left [m].
+    """
     x, y = 0.5 * vehicle.length, 0.5 * vehicle.width
     corners = ((x, y, 0.0), (-x, y, 0.0), (-x, -y, 0.0), (x, -y, 0.0))
     return encode(POLYGON, stamp=stamp_ns, frame_id=frame_id, points=corners)
@@ -56,7 +59,10 @@ def body(
     colour: tuple[float, ...],
     alpha: float,
 ) -> Marker:
-    """Return a box for a vehicle at a pose [m, rad], a cylinder for a pedestrian; exposed road users are yellow."""
+    """Return a box for a vehicle at a pose [m, rad], a cylinder for a pedestrian.
+
+    Exposed road users are yellow.
+    """
     kind = vehicle.kind
     if kind.width < MAX_EXPOSED_WIDTH_M and colour != EGO_COLOUR:
         colour = EXPOSED_COLOUR
@@ -71,7 +77,10 @@ def body(
 
 
 def scenario_markers(scenario: Scenario, stamp_ns: int) -> bytes:
-    """Return a scenario as a MarkerArray that replaces the previous one: each path with its vehicle at the start."""
+    """Return a scenario as a MarkerArray that replaces the previous one.
+
+    Each path with its vehicle at the start.
+    """
     markers = [_delete_all()]
     names = tokens(vehicle.id for vehicle in scenario.vehicles)
     for k, (name, vehicle) in enumerate(zip(names, scenario.vehicles, strict=True)):

@@ -12,7 +12,10 @@ from scenario_gen.numerics import Floats
 
 
 def pose_rows(poses: Floats) -> Floats:
-    """Return poses (M, 3) x, y, yaw as rows (M, 7) of geometry_msgs/Pose: position and quaternion."""
+    """Return poses (M, 3) x, y, yaw as rows (M, 7) of geometry_msgs/Pose.
+
+    Position and quaternion.
+    """
     rows = np.zeros((len(poses), 7))
     rows[:, :2] = poses[:, :2]
     rows[:, 5], rows[:, 6] = half_angle(poses[:, 2])
@@ -29,7 +32,8 @@ def poses_of(rows: Floats, source: str) -> Floats:
         raise InputError(f"{source}: a pose holds a value that is not finite")
     if (np.abs(rows[:, :3]) > MAX_COORDINATE_M).any():
         raise InputError(
-            f"{source}: a position is {np.abs(rows[:, :3]).max():g}; at most {MAX_COORDINATE_M:g} is read"
+            f"{source}: a position is {np.abs(rows[:, :3]).max():g}; at most {MAX_COORDINATE_M:g} "
+            "is read"
         )
     check_quaternions(rows[:, 3:], source)
     return np.column_stack([rows[:, :2], yaw(rows[:, 3:])])

@@ -3,8 +3,9 @@
 
 """`scenarios/info` (diagnostic_msgs/DiagnosticArray): an entry for each scenario, then a summary of its request.
 
-All keys of both are in this file; docs/interfaces.md lists them. Stamp: the template's. Entries are joined with their
-scenarios by the SHA-256 of the scenario's CDR bytes. QoS: reliable, transient_local, depth 1000.
+All keys of both are in this file; docs/interfaces.md lists them. Stamp: the template's. Entries
+are joined with their scenarios by the SHA-256 of the scenario's CDR bytes. QoS: reliable,
+transient_local, depth 1000.
 """
 
 from collections import Counter
@@ -68,8 +69,10 @@ class ScenarioEntry:
         index: its number in the request.
         seed: of the request.
         sha256: of the scenario's CDR bytes.
-        status: with all values: `asked_start`, `asked_end`, `achieved_start`, `achieved_end`, `template`, `road`, `ego…`, hashes.
-        messages: SHA-256 of each of the scenario's messages, in order; one, `sha256`, where all are there throughout.
+        status: with all values: `asked_start`, `asked_end`, `achieved_start`, `achieved_end`,
+            `template`, `road`, `ego…`, hashes.
+        messages: SHA-256 of each of the scenario's messages, in order; one, `sha256`, where all
+            are there throughout.
     """
 
     request: str
@@ -119,7 +122,10 @@ class ScenarioEntry:
         return BoundaryStates(start, end, self._relaxed(len(start), where, witness=witness))
 
     def _relaxed(self, count: int, where: str, *, witness: bool) -> Floats:
-        """Return by how much each of `count` vehicles may miss its states (count, 2, 2) [m, m/s]; 0 where it is not there."""
+        """Return by how much each of `count` vehicles may miss its states (count, 2, 2) [m, m/s].
+
+        0 where it is not there.
+        """
         relaxed = np.zeros((count, 2, 2))
         with guarded(where):
             texts = (self.status.values.get(key, "[]") for key in (FREED, EGO_FREED))
@@ -143,7 +149,8 @@ class RequestSummary:
     Attributes:
         request: its id.
         published: how many scenarios of it were published.
-        status: all of it: counts, adaptations, `ego…`, and source is needed to make it again (parameters, versions, logs).
+        status: all of it: counts, adaptations, `ego…`, and source is needed to make it again
+            (parameters, versions, logs).
     """
 
     request: str
@@ -162,7 +169,10 @@ class RequestSummary:
 
     @property
     def provenance(self) -> dict[str, str]:
-        """The values that regenerate it, and its seed: all that are neither its identity nor its outcome."""
+        """The values that regenerate it, and its seed.
+
+        All that are neither its identity nor its outcome.
+        """
         known = {
             "request",
             "requested",
@@ -274,7 +284,8 @@ def decode_info(data: bytes, source: str = INFO) -> tuple[Info, ...]:
     """Return the entries and summaries of a message; statuses that are neither are left out.
 
     Raises:
-        InputError: naming `source`, the message is damaged, or a key that every entry or summary has is missing.
+        InputError: naming `source`, the message is damaged, or a key that every entry or summary
+            has is missing.
     """
     found: list[Info] = []
     for status in decode_diagnostics(data, source)[1]:
@@ -324,7 +335,8 @@ def scenario_entry(
         template: the template's vehicles, of which the scenario may have fewer.
         asked: their states.
         ego: the vehicle that was left out.
-        about: further values for all scenarios of the request (names of template and road, hashes).
+        about: further values for all scenarios of the request (names of template and road,
+            hashes).
     """
     ids = [vehicle.id for vehicle in template]
     rows = [ids.index(vehicle.id) for vehicle in scenario.vehicles]
@@ -395,7 +407,8 @@ def request_summary(
         seed: of the request.
         provenance: the values that regenerate it.
         cancelled: whether it was ended early.
-        reactions: who reacts to whom in the template, `ReactionGraph.document` with the kept ones marked.
+        reactions: who reacts to whom in the template, `ReactionGraph.document` with the kept ones
+            marked.
     """
     edges = {REACTION: (reactions or {}).get("edges", ()), CUT: (reactions or {}).get("cut", ())}
     values = {

@@ -3,7 +3,8 @@
 
 """`scenarios` (conventions: trajectory.py): one message per scenario, several if vehicles arrive late or leave early.
 
-Frame: the road's. Stamp: the template's, so that the bytes depend on the request alone. A scenario's
+Frame: the road's. Stamp: the template's, so that the bytes depend on the request alone. A
+    scenario's
 SHA-256 joins it with its `scenarios/info`, which also has seed and index. QoS: reliable,
 transient_local, depth 1000.
 
@@ -91,7 +92,8 @@ def decode_scenario(
         may_start_late: whether it may begin after 0, as a vehicle that arrives late does.
 
     Raises:
-        InputError: a message is damaged, its times do not increase from 0, or messages are not of one scenario.
+        InputError: a message is damaged, its times do not increase from 0, or messages are not of
+            one scenario.
     """
     parts = [part for part, _ in _read(data, source)]
     for part in parts:
@@ -99,19 +101,22 @@ def decode_scenario(
             raise InputError(f"{source}: {len(part.time_ns)} point(s); at least 2 are needed")
         if (np.diff(part.time_ns) <= 0).any():
             raise InputError(
-                f"{source}: a point is not later than the previous one; time_from_start must increase from 0"
+                f"{source}: a point is not later than the previous one; time_from_start must "
+                "increase from 0"
             )
     time_ns = np.unique(np.concatenate([part.time_ns for part in parts]))
     if may_start_late and time_ns[0] > 0:
         time_ns = np.concatenate((np.zeros(1, dtype=np.int64), time_ns))
     if time_ns[0] != 0:
         raise InputError(
-            f"{source}: it begins at {time_ns[0] * 1e-9:g} s; time_from_start must increase from 0 (a vehicle that arrives "
+            f"{source}: it begins at {time_ns[0] * 1e-9:g} s; time_from_start must increase from "
+            "0 (a vehicle that arrives "
             "late has a message of its own: the scenario's other messages are needed, too)"
         )
     if time_ns[-1] > trajectory.MAX_DURATION_NS:
         raise InputError(
-            f"{source}: it lasts {time_ns[-1] * 1e-9:g} s; at most {trajectory.MAX_DURATION_NS * 1e-9:g} s are read"
+            f"{source}: it lasts {time_ns[-1] * 1e-9:g} s; at most "
+            f"{trajectory.MAX_DURATION_NS * 1e-9:g} s are read"
         )
     return parts[0].stamp_ns, _joined(parts, time_ns, seed, index, source)
 
@@ -125,7 +130,8 @@ def _joined(
     headers = {(part.stamp_ns, part.frame_id) for part in parts}
     if len(headers) > 1 or len(set(ids)) < len(ids):
         raise InputError(
-            f"{source}: messages with other stamps or frames, or with the same vehicle, are not one scenario"
+            f"{source}: messages with other stamps or frames, or with the same vehicle, are not "
+            "one scenario"
         )
     present, arrays = [], []
     for part in parts:
@@ -133,7 +139,8 @@ def _joined(
         last = first + len(part.time_ns) - 1
         if last >= len(time_ns) or (time_ns[first : last + 1] != part.time_ns).any():
             raise InputError(
-                f"{source}: vehicle {part.vehicles[0].id} has other instants than the vehicles present with it"
+                f"{source}: vehicle {part.vehicles[0].id} has other instants than the vehicles "
+                "present with it"
             )
         present += [(first, last)] * len(part.vehicles)
         widths = (first, len(time_ns) - 1 - last)

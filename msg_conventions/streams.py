@@ -3,7 +3,8 @@
 
 """A vehicle's state at one instant ⇄ `vehicle_<id>/fix` (NavSatFix) and `vehicle_<id>/speed` (TwistStamped).
 
-Stamp: the sample's, on the template's clock. Frame: `vehicle_<id>`. Speed: linear.x, m/s, of the body frame.
+Stamp: the sample's, on the template's clock. Frame: `vehicle_<id>`. Speed: linear.x, m/s, of the
+    body frame.
 QoS: reliable, volatile, depth 1000.
 """
 
@@ -57,5 +58,8 @@ def decode_speed(data: bytes, source: str = "speed") -> tuple[int, float]:
 
 
 def speed_of(x: float, y: float) -> float:
-    """Return the speed [m/s] of a twist: linear.x in the body frame, or the length of the horizontal vector."""
+    """Return the speed [m/s] of a twist.
+
+    Linear.x in the body frame, or the length of the horizontal vector.
+    """
     return x if y == 0.0 else np.hypot(x, y)

@@ -1,7 +1,10 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The suite's topics with their types and qualities of service; docs/interfaces.md describes them."""
+"""The suite's topics with their types and qualities of service.
+
+Docs/interfaces.md describes them.
+"""
 
 from functools import lru_cache
 import re

@@ -3,10 +3,10 @@
 
 """Encounter ⇄ `tracks`: a whole template in one message (conventions: trajectory.py).
 
-Frame `local_enu`: metres east and north of the log's origin. QoS: reliable, transient_local, depth 1.
-An absent vehicle is far below the ground (trajectory.py). Accelerations are the central differences
-of the speeds; `decode_tracks` ignores them.
-The encounter's name and geodetic origin are not in the message: nothing is computed from them.
+Frame `local_enu`: metres east and north of the log's origin. QoS: reliable, transient_local, depth
+1. An absent vehicle is far below the ground (trajectory.py). Accelerations are the central
+differences of the speeds; `decode_tracks` ignores them. The encounter's name and geodetic origin
+are not in the message: nothing is computed from them.
 """
 
 import numpy as np
@@ -53,22 +53,26 @@ def decode_tracks(data: bytes, name: str = "tracks") -> Encounter:
     """Return the encounter.
 
     Raises:
-        InputError: the message is damaged, its times are not evenly spaced from 0, or it is no encounter (one vehicle, …).
+        InputError: the message is damaged, its times are not evenly spaced from 0, or it is no
+            encounter (one vehicle, …).
     """
     message = trajectory.decode(data, name)
     if len(message.time_ns) < 2:
         raise InputError(
-            f"{name}: {len(message.time_ns)} sample(s); at least 2 are needed to say how anybody drives"
+            f"{name}: {len(message.time_ns)} sample(s); at least 2 are needed to say how anybody "
+            "drives"
         )
     steps = np.diff(message.time_ns)
     if message.time_ns[0] != 0:
         raise InputError(
-            f"{name}: the first sample is at {message.time_ns[0] * 1e-9:g} s; time_from_start must count from 0"
+            f"{name}: the first sample is at {message.time_ns[0] * 1e-9:g} s; time_from_start "
+            "must count from 0"
         )
     if (uneven := (steps <= 0) | (steps != steps[0])).any():
         at = int(np.argmax(uneven))
         raise InputError(
-            f"{name}: sample {at + 1} comes {steps[at] * 1e-9:g} s after the previous one, sample 1 {steps[0] * 1e-9:g} s; "
+            f"{name}: sample {at + 1} comes {steps[at] * 1e-9:g} s after the previous one, sample "
+            f"1 {steps[0] * 1e-9:g} s; "
             "time_from_start must count in even steps; resample the tracks (10 Hz is usual)"
         )
     if (
@@ -76,7 +80,8 @@ def decode_tracks(data: bytes, name: str = "tracks") -> Encounter:
         or message.time_ns[-1] > trajectory.MAX_DURATION_NS
     ):
         raise InputError(
-            f"{name}: {len(steps)} steps of {steps[0] * 1e-9:g} s; steps of 0.001 to 10 s and at most "
+            f"{name}: {len(steps)} steps of {steps[0] * 1e-9:g} s; steps of 0.001 to 10 s and at "
+            "most "
             f"{trajectory.MAX_DURATION_NS * 1e-9:g} s in all are read"
         )
     states = (message.position, message.heading, message.speed)
@@ -104,7 +109,8 @@ def _spans(present: Bools, vehicles: tuple[Vehicle, ...], name: str) -> Ints:
         intervals = runs(row)
         if len(intervals) != 1:
             raise InputError(
-                f"{name}: vehicle {vehicle.id} is present {len(intervals)} times (by its z); it must arrive and leave once"
+                f"{name}: vehicle {vehicle.id} is present {len(intervals)} times (by its z); it "
+                "must arrive and leave once"
             )
         begin, end = intervals[0]
         spans.append((begin, end - 1))

@@ -73,7 +73,10 @@ class Trajectory:
 
 
 def joint_names(vehicles: Sequence[Vehicle]) -> tuple[str, ...]:
-    """Return `<token>:<length>x<width>:<type>` of each vehicle [m]; the type is omitted if it is usual for the length."""
+    """Return `<token>:<length>x<width>:<type>` of each vehicle [m].
+
+    The type is omitted if it is usual for the length.
+    """
     names = []
     ids = tokens(vehicle.id for vehicle in vehicles)
     for name, vehicle in zip(ids, vehicles, strict=True):
@@ -99,7 +102,8 @@ def vehicle_of(joint_name: str) -> Vehicle:
         length = width = 0.0
     if not all(MIN_SIZE_M <= side <= MAX_SIZE_M for side in (length, width)):
         raise InputError(
-            f"joint name {joint_name!r}: expected <id>:<length>x<width> (and :<type>), {MIN_SIZE_M:g} to "
+            f"joint name {joint_name!r}: expected <id>:<length>x<width> (and :<type>), "
+            f"{MIN_SIZE_M:g} to "
             f"{MAX_SIZE_M:g} m each, e.g. car:4.8x1.9"
         )
     return Vehicle(name, length, width, kind)
@@ -151,7 +155,8 @@ def decode(data: bytes, source: str) -> Trajectory:
     """Return the content of the message; missing velocities or accelerations are zero.
 
     Raises:
-        InputError: naming `source`, the message is damaged, lacks poses, or has an impossible value.
+        InputError: naming `source`, the message is damaged, lacks poses, or has an impossible
+            value.
     """
     return decode_first(data, source)[0]
 
@@ -209,7 +214,10 @@ def _check_points(points: Points, source: str) -> None:
 
 
 def _read_table(reader: CdrReader, n: int, count: int) -> Points | None:
-    """Return the points from one array if each has all sequences; otherwise read nothing and return None."""
+    """Return the points from one array if each has all sequences.
+
+    Otherwise read nothing and return None.
+    """
     place = reader.place
     if n > MAX_TABLE_VEHICLES:
         return None

@@ -36,7 +36,8 @@ def check_quaternions(quaternions: Floats, source: str) -> None:
     """Refuse quaternions (..., 4) that are no rotation; lengths near 1 may come from rounding.
 
     Raises:
-        InputError: naming `source`, a quaternion is too short (usually it was not set) or too long.
+        InputError: naming `source`, a quaternion is too short (usually it was not set) or too
+            long.
     """
     bound = 2.0 * MAX_COMPONENT_RATIO
     squared = np.square(np.clip(quaternions, -bound, bound)).sum(axis=-1)
@@ -46,12 +47,16 @@ def check_quaternions(quaternions: Floats, source: str) -> None:
         row = int(np.argmax(wrong.reshape(-1)))
         x, y, z, w = quaternions.reshape(-1, 4)[row]
         raise InputError(
-            f"{source}: quaternion {row} is ({x:g}, {y:g}, {z:g}, {w:g}), which is no rotation; (0, 0, 0, 1) means a heading of 0"
+            f"{source}: quaternion {row} is ({x:g}, {y:g}, {z:g}, {w:g}), which is no rotation; "
+            "(0, 0, 0, 1) means a heading of 0"
         )
 
 
 def yaw(quaternions: Floats) -> Floats:
-    """Return the rotation about z [rad] of quaternions (..., 4) x, y, z, w; its canonical angle is the encoded one."""
+    """Return the rotation about z [rad] of quaternions (..., 4) x, y, z, w.
+
+    Its canonical angle is the encoded one.
+    """
     x, y, z, w = np.moveaxis(quaternions, -1, 0)
     angle: Floats = np.where(
         (x == 0.0) & (y == 0.0),

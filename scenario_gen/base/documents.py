@@ -1,7 +1,10 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""YAML and JSON of others, read with bounds: size, depth, no aliases, plain values only, a schema."""
+"""YAML and JSON of others, read with bounds.
+
+Size, depth, no aliases, plain values only, a schema.
+"""
 
 from collections.abc import Mapping
 from functools import cache
@@ -28,11 +31,17 @@ COUNT = {"type": "integer", "minimum": 0, "maximum": WHOLE - 1}
 
 @cache
 def _loader() -> Any:
-    """Return the class that reads YAML; PyYAML is imported with the first document, for the segmentation does not need it."""
+    """Return the class that reads YAML.
+
+    PyYAML is imported with the first document, for the segmentation does not need it.
+    """
     import yaml
 
     class Loader(yaml.CSafeLoader):  # type: ignore[misc]
-        """Plain values only: a date is text, `<<` and `=` are keys like others; numbers of more than 64 bits are refused."""
+        """Plain values only: a date is text, `<<` and `=` are keys like others.
+
+        Numbers of more than 64 bits are refused.
+        """
 
         yaml_implicit_resolvers = {  # noqa: RUF012 - as the base declares it
             first: [(tag, pattern) for tag, pattern in known if tag in PLAIN]
@@ -59,7 +68,8 @@ def parse_yaml(text: str, what: str) -> Any:
         what: names it in messages.
 
     Raises:
-        InputError: the text is too long, too deep, has aliases or tags of other kinds, or is no YAML.
+        InputError: the text is too long, too deep, has aliases or tags of other kinds, or is no
+            YAML.
     """
     import yaml
 
@@ -99,7 +109,8 @@ def _check_events(text: str, what: str) -> None:
         tag = getattr(event, "tag", None)
         if tag not in (None, "!") and tag not in PLAIN:
             raise InputError(
-                f"{place}: the tag {tag} is not read; write plain text, numbers, lists and mappings"
+                f"{place}: the tag {tag} is not read; write plain text, numbers, lists and "
+                "mappings"
             )
         depth += isinstance(event, yaml.CollectionStartEvent) - isinstance(
             event, yaml.CollectionEndEvent
@@ -170,7 +181,8 @@ def parse_json(text: str, what: str, schema: Mapping[str, Any]) -> Any:
     """Return the value of a JSON text that conforms to the schema; its numbers are finite if the schema uses `NUMBER`.
 
     Raises:
-        InputError: the text is no JSON, or does not conform; the message names the path inside the document.
+        InputError: the text is no JSON, or does not conform; the message names the path inside the
+            document.
     """
 
     def refuse(name: str) -> NoReturn:
@@ -213,7 +225,8 @@ def _check_schema(value: Any, what: str, schema: Mapping[str, Any]) -> None:
     ).lstrip(".")
     rule = f"{error.validator} {shown(error.validator_value, 120)}"
     raise InputError(
-        f"{what}: {place or 'the document'} is {shown(error.instance, 120)}; its schema asks for {rule}"
+        f"{what}: {place or 'the document'} is {shown(error.instance, 120)}; its schema asks for "
+        f"{rule}"
     )
 
 

@@ -18,7 +18,10 @@ FULL_DISK_ADVICE = "; make room there, or name a place on another disk"
 
 
 class ScenarioGenError(Exception):
-    """Base of the errors that this project raises; the command line prints them without a traceback and exits with 2."""
+    """Base of the errors that this project raises.
+
+    The command line prints them without a traceback and exits with 2.
+    """
 
     exit_code = 2
 
@@ -101,7 +104,10 @@ def did_you_mean(name: str, known: Iterable[str]) -> str:
 
 
 def of_system(error: OSError, name: object = None, advice: str = "") -> InputError:
-    """Return an OSError as an InputError: the file (`name`, or else that of the error), the reason, the advice."""
+    """Return an OSError as an InputError.
+
+    The file (`name`, or else that of the error), the reason, the advice.
+    """
     file = error.filename if name is None else name
     place = "" if file is None else f"{file}: "
     if error.errno in (errno.ENOSPC, errno.EDQUOT):
@@ -143,7 +149,8 @@ def guarded(where: str, *kinds: type[Exception], remedy: str = "") -> Iterator[N
         remedy: ends the message.
 
     Raises:
-        InputError: the library failed; the message has `where`, the library's message and `remedy`.
+        InputError: the library failed; the message has `where`, the library's message and
+            `remedy`.
     """
     converted = kinds or (Exception,)
     try:
@@ -160,7 +167,8 @@ def guarded(where: str, *kinds: type[Exception], remedy: str = "") -> Iterator[N
 def reading(path: object) -> Iterator[None]:
     """Convert an unforeseen exception of a reader into an InputError that names the file; used once around each reader.
 
-    Unlike in `guarded` the block has code of ours, so the error has its own class, which fuzzing reports.
+    Unlike in `guarded` the block has code of ours, so the error has its own class, which fuzzing
+    reports.
 
     Raises:
         UnforeseenError: the reader raised neither an error of ours nor an OSError.

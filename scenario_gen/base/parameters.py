@@ -1,7 +1,10 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Declarations of parameters for the command line, the nodes and docs/: default, unit, range and meaning."""
+"""Declarations of parameters for the command line, the nodes and docs/.
+
+Default, unit, range and meaning.
+"""
 
 from collections.abc import Mapping
 from contextlib import suppress
@@ -60,7 +63,10 @@ class Parameters:
 
     @property
     def of_plugins(self) -> "Mapping[str, Parameters]":
-        """Configurations nested in it that installed packages add, by name; they are kept in the field `plugins`."""
+        """Configurations nested in it that installed packages add, by name.
+
+        They are kept in the field `plugins`.
+        """
         return {}
 
     def __post_init__(self) -> None:
@@ -110,7 +116,10 @@ def _check_range(name: str, meta: Mapping[str, Any], value: float) -> None:
 
 
 def flatten(config: Any, prefix: str = "") -> dict[str, tuple["Field[Any]", Any]]:
-    """Return {dotted name: (declaration, value)} of a configuration and the configurations nested in it."""
+    """Return {dotted name.
+
+    (declaration, value)} of a configuration and the configurations nested in it.
+    """
     flat: dict[str, tuple[Field[Any], Any]] = {}
     for entry in fields(config):
         value = getattr(config, entry.name)
@@ -171,7 +180,8 @@ def assigned(config: Config, assignment: str) -> Config:
     """Return a copy of `config` with one `name=value` set; the value is YAML, or plain text for a text parameter.
 
     Raises:
-        InputError: there is no `=`, the name is unknown, or the value is no YAML or invalid; the message names it.
+        InputError: there is no `=`, the name is unknown, or the value is no YAML or invalid; the
+            message names it.
     """
     name, equals, text = assignment.partition("=")
     if not equals:
@@ -191,7 +201,8 @@ def loaded(config: Config, path: Path) -> Config:
     """Return a copy of `config` with the values of a parameter file.
 
     Raises:
-        InputError: the file cannot be read, a name is unknown or a value is invalid; the message names file and parameter.
+        InputError: the file cannot be read, a name is unknown or a value is invalid; the message
+            names file and parameter.
     """
     values = read_parameter_file(path)
     try:

@@ -41,7 +41,8 @@ def read_parameters(config: Config, texts: Mapping[str, str], prefix: str, what:
     """Return `config` with the values that `texts` has under `prefix`, e.g. "sampling.".
 
     Raises:
-        InputError: a parameter is missing there, or its text is no such value; the message names `what`.
+        InputError: a parameter is missing there, or its text is no such value; the message names
+            `what`.
     """
     values: dict[str, Any] = {}
     for name, (entry, _) in flatten(config).items():

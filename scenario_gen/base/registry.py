@@ -1,7 +1,10 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Registries of roads, planners, log and export formats and metrics: built-in ones and those of installed packages."""
+"""Registries of roads, planners, log and export formats and metrics.
+
+Built-in ones and those of installed packages.
+"""
 
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
@@ -62,7 +65,8 @@ class Registry(Generic[T]):
         plugins = installed(self.group)
         for name in sorted(plugins.keys() & self.built_in.keys()):
             raise InputError(
-                f"plugins: {_source(plugins[name])} has {self.group} {name!r}, which is built in; it must be renamed"
+                f"plugins: {_source(plugins[name])} has {self.group} {name!r}, which is built in; "
+                "it must be renamed"
             )
         return (*self.built_in, *plugins)
 
@@ -74,13 +78,15 @@ class Registry(Generic[T]):
         """Return the object with a name.
 
         Raises:
-            InputError: there is none, its plugin cannot be loaded or has a wrong kind, or `names` fails.
+            InputError: there is none, its plugin cannot be loaded or has a wrong kind, or `names`
+                fails.
         """
         if name in self.built_in:
             return self.built_in[name]
         if name not in self:
             raise InputError(
-                f"{self.group} has no {name!r}; choose one of {', '.join(self.names())}{did_you_mean(name, self.names())}"
+                f"{self.group} has no {name!r}; choose one of "
+                f"{', '.join(self.names())}{did_you_mean(name, self.names())}"
             )
         entry = installed(self.group)[name]
         try:

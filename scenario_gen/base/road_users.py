@@ -3,10 +3,14 @@
 
 """Types of road users: usual sizes, what each can do, and what others call it; a new type is an entry here or of a plugin.
 
-Sources: sizes: the defaults of SUMO's vehicle classes (Vehicle Type Parameter Defaults), a car's as of a European estate.
-Motion: limits, not what is usual. Turning: a bus and a truck keep to the annulus of 12.5 m and 5.3 m of UN Regulation 107 and
-Regulation (EU) 1230/2012, so that the middle of the footprint turns with 8 m; a car's turning circle between kerbs is 10.5 m.
-Walking: Weidmann 1993 (1.34 m/s, to 2 m/s); running ends at 5 m/s. Bicycles: 45 km/h (L1e-B) is the fastest that is one.
+Sources: sizes: the defaults of SUMO's vehicle classes (Vehicle Type Parameter Defaults), a car's
+as of a European estate.
+Motion: limits, not what is usual. Turning: a bus and a truck keep to the annulus of 12.5 m and 5.3
+    m of UN Regulation 107 and
+Regulation (EU) 1230/2012, so that the middle of the footprint turns with 8 m; a car's turning
+circle between kerbs is 10.5 m.
+Walking: Weidmann 1993 (1.34 m/s, to 2 m/s); running ends at 5 m/s. Bicycles: 45 km/h (L1e-B) is
+    the fastest that is one.
 """
 
 from collections.abc import Mapping
@@ -48,7 +52,10 @@ class Dynamics(Parameters):
 
     @property
     def planned(self) -> "Dynamics":
-        """What routes and speeds are planned with: somewhat less, so that what is drawn about them keeps to the limits."""
+        """What routes and speeds are planned with.
+
+        Somewhat less, so that what is drawn about them keeps to the limits.
+        """
         return replace(
             self,
             max_speed=self.max_speed * 8.0 / 9.0,
@@ -73,8 +80,10 @@ class VehicleType:
         osi: its name in MovingObject.VehicleClassification.Type, or "PEDESTRIAN".
         scenarionet: its type in MetaDrive's and ScenarioNet's descriptions.
         waits_below: speed [m/s] below which it waits.
-        speed_noise: differences of speed [m/s] that say nothing of what it is about; on foot those of a step.
-        varies: share of the spread of a car's end speeds, and places at a time, with which scenarios are drawn.
+        speed_noise: differences of speed [m/s] that say nothing of what it is about; on foot those
+            of a step.
+        varies: share of the spread of a car's end speeds, and places at a time, with which
+            scenarios are drawn.
     """
 
     length: float
@@ -103,7 +112,10 @@ class VehicleType:
 
     @property
     def lane_user(self) -> frozenset[str]:
-        """As what it may use lanes, one of `LANE_USERS`: a type of a plugin as the one with its category in OpenSCENARIO."""
+        """As what it may use lanes, one of `LANE_USERS`.
+
+        A type of a plugin as the one with its category in OpenSCENARIO.
+        """
         own = {"motorbike": "motorcycle"}.get(self.openscenario, self.openscenario)
         return frozenset((own if own in LANE_USERS else CAR,))
 
@@ -155,7 +167,8 @@ class TypeLimits(Parameters):
     """The limits of motion by type: planner, speed profiles, sampler, checker and closed loop read these, and no others.
 
     Attributes:
-        plugins: of types of installed packages, what was set, by name; the last one counts. Else they keep those of their entry.
+        plugins: of types of installed packages, what was set, by name; the last one counts. Else
+            they keep those of their entry.
     """
 
     car: Dynamics = _BUILT_IN[CAR].dynamics

@@ -1,7 +1,10 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Output to the terminal: names of files, vehicles and encounters are shown literally, whatever characters they have."""
+"""Output to the terminal.
+
+Names of files, vehicles and encounters are shown literally, whatever characters they have.
+"""
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -23,7 +26,10 @@ from scenario_gen.base.errors import printable
 
 
 class Terminal(Console):
-    """A console that interprets no markup in texts and prints no control characters; only Text objects have styles."""
+    """A console that interprets no markup in texts and prints no control characters.
+
+    Only Text objects have styles.
+    """
 
     def __init__(self, **options: Any) -> None:
         super().__init__(markup=False, emoji=False, highlight=False, **options)
@@ -35,7 +41,10 @@ class Terminal(Console):
 
 @contextmanager
 def progress_bars() -> Iterator[Callable[[str, int, int], None]]:
-    """Show progress bars on standard error if it is a terminal; yield a function that takes name, done and total of a bar."""
+    """Show progress bars on standard error if it is a terminal.
+
+    Yield a function that takes name, done and total of a bar.
+    """
     what = (TextColumn("{task.description}", markup=False), BarColumn(), MofNCompleteColumn())
     columns = (*what, TimeElapsedColumn(), TextColumn("left:"), TimeRemainingColumn())
     tasks: dict[str, TaskID] = {}
@@ -54,6 +63,9 @@ def progress_bars() -> Iterator[Callable[[str, int, int], None]]:
 
 @contextmanager
 def status_line() -> Iterator[Callable[[str], None]]:
-    """Show a changing line on standard error if it is a terminal; yield a function that sets its text."""
+    """Show a changing line on standard error if it is a terminal.
+
+    Yield a function that sets its text.
+    """
     with Terminal(stderr=True).status("starting") as status:
         yield lambda text: status.update(Text(printable(text)))

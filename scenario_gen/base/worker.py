@@ -98,7 +98,10 @@ class Worker:
         return running + names
 
     def status(self) -> dict[str, str]:
-        """Return the running jobs, the longest time [s] and the count of waiting jobs; {} when idle."""
+        """Return the running jobs, the longest time [s] and the count of waiting jobs.
+
+        {} when idle.
+        """
         with self._changed:
             if not self._running:
                 return {}

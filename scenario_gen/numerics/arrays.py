@@ -69,7 +69,10 @@ def canonical_heading(heading: npt.ArrayLike) -> Floats:
 
 
 def canonical_poses(poses: npt.ArrayLike, *, continuous: bool = False) -> Floats:
-    """Return poses (..., 3+) x, y, yaw, ... with canonical yaw; `continuous` unwraps it along the first axis."""
+    """Return poses (..., 3+) x, y, yaw, ... with canonical yaw.
+
+    `continuous` unwraps it along the first axis.
+    """
     array = np.array(poses, dtype=np.float64, order="C")
     canonical = canonical_heading if continuous else canonical_angle
     array[..., 2] = canonical(array[..., 2])

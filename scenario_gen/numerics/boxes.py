@@ -76,7 +76,10 @@ def box_gap(a: Box, b: Box) -> float:
 
 @kernel(inline=True)
 def box_distance(a: Box, b: Box) -> float:
-    """Return the distance [m] of two boxes, 0 if they overlap; it is attained at a corner of one of them."""
+    """Return the distance [m] of two boxes, 0 if they overlap.
+
+    It is attained at a corner of one of them.
+    """
     if box_gap(a, b) < 0.0:
         return 0.0
     return min(_corner_distance(a, b), _corner_distance(b, a))

@@ -30,7 +30,10 @@ class Curve:
 
     @classmethod
     def through(cls, xy: Floats) -> "Curve":
-        """Return the curve through points (M, 2) [m]; its yaw is the mean of both adjacent edges' directions."""
+        """Return the curve through points (M, 2) [m].
+
+        Its yaw is the mean of both adjacent edges' directions.
+        """
         xy = xy[np.concatenate(([True], edge_lengths(xy) > 1e-9))]
         edge = np.unwrap(edge_yaws(xy))
         yaw = np.concatenate((edge[:1], (edge[1:] + edge[:-1]) / 2.0, edge[-1:]))
@@ -81,7 +84,10 @@ class Curve:
         return Curve(points)
 
     def cut(self, start: float, end: float, step: float = 0.5) -> "Curve":
-        """Return the part between two stations [m], resampled; it may reach into the extensions."""
+        """Return the part between two stations [m], resampled.
+
+        It may reach into the extensions.
+        """
         count = max(int(np.ceil((end - start) / step)), 1)
         return Curve(self.at(np.linspace(start, end, count + 1)))
 

@@ -3,8 +3,9 @@
 
 """Motion between two samples: position is a cubic, heading and speed are linear.
 
-The cubic is the Hermite interpolant of two positions and two velocity vectors (speed along heading). It is the motion
-that the validity checker proves; everything else that looks between two samples evaluates it here.
+The cubic is the Hermite interpolant of two positions and two velocity vectors (speed along
+heading). It is the motion that the validity checker proves; everything else that looks between two
+samples evaluates it here.
 """
 
 import numpy as np
@@ -15,7 +16,10 @@ from scenario_gen.numerics.kernels import F1, F2, F3, I2, kernel, OUT3, OUT4
 
 @kernel(inline=True)
 def interval_at(time: Floats, t: float) -> int:
-    """Return the index k with time[k] <= t <= time[k + 1], of increasing times (T,); t lies between the first and last."""
+    """Return the index k with time[k] <= t <= time[k + 1], of increasing times (T,).
+
+    T lies between the first and last.
+    """
     last = time.shape[0] - 1
     low, high = 0, last
     guess = int((t - time[0]) / (time[last] - time[0]) * last)  # exact on most even clocks

@@ -51,7 +51,10 @@ def _with_imports(source: Path) -> list[Path]:
 
 @cache
 def root() -> Path:
-    """Return the folder of all caches: `NUMBA_CACHE_DIR`, the user's cache, or a temporary folder of this process."""
+    """Return the folder of all caches.
+
+    `NUMBA_CACHE_DIR`, the user's cache, or a temporary folder of this process.
+    """
     user = Path(os.environ.get("XDG_CACHE_HOME") or "~/.cache") / "scenario_gen"
     try:
         folder = Path(numba.config.CACHE_DIR or user.expanduser())

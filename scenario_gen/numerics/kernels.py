@@ -171,8 +171,10 @@ def kernel(
 
     Args:
         declared: numba types of the positional arguments, e.g. `kernel(F2, I, OUT1)`.
-        inline: a helper that only kernels call; it gets its types from them and is compiled with them.
-        forced: the caller includes the helper whatever its size; a call would count the references of its array arguments.
+        inline: a helper that only kernels call; it gets its types from them and is compiled with
+            them.
+        forced: the caller includes the helper whatever its size; a call would count the references
+            of its array arguments.
     """
 
     def decorate(function: Function) -> Function:
@@ -192,7 +194,10 @@ def registered() -> list[Kernel]:
 
 
 def import_all(packages: Sequence[str] = ()) -> None:
-    """Import the modules with kernels, of all or some packages; skip those whose extra is missing."""
+    """Import the modules with kernels, of all or some packages.
+
+    Skip those whose extra is missing.
+    """
     for file in sources():
         parts = file.relative_to(PACKAGE.parent).with_suffix("").parts
         if not packages or parts[1] in packages:

@@ -59,7 +59,8 @@ def meeting_shares(p: Floats, u: Floats, q: Floats, v: Floats) -> tuple[Floats, 
     """Intersect lines p + t u and q + s v (..., 2) [m].
 
     Returns:
-        t and s (...), not finite where the lines are parallel, and the cross product u x v (...) [m²].
+        t and s (...), not finite where the lines are parallel, and the cross product u x v (...)
+        [m²].
     """
     w = q - p
     cross = u[..., 0] * v[..., 1] - u[..., 1] * v[..., 0]

@@ -93,7 +93,10 @@ class Launch:
         return [name.strip() for name in self.options.without.split(",") if name.strip()]
 
     def parameter_files(self, *defaults: Path) -> list[str]:
-        """Return each node's parameter files. The last one has precedence; it is removed with this process."""
+        """Return each node's parameter files. The last one has precedence.
+
+        It is removed with this process.
+        """
         files = [str(path) for path in defaults]
         if self.options.params:
             files.append(self.options.params)
@@ -125,10 +128,12 @@ def parse_arguments(arguments: Arguments, texts: Mapping[str, str]) -> Launch:
 
     Args:
         arguments: of the launch file, in addition to `OPTIONS`.
-        texts: values on the command line by name, empty if not given. A launch file that includes ours may add others.
+        texts: values on the command line by name, empty if not given. A launch file that includes
+            ours may add others.
 
     Raises:
-        InputError: an argument has an unusable value, or resembles one of ours; the message names it.
+        InputError: an argument has an unusable value, or resembles one of ours; the message names
+            it.
     """
     declarations = _declarations(arguments)
     values: dict[str, Any] = {}
@@ -139,7 +144,8 @@ def parse_arguments(arguments: Arguments, texts: Mapping[str, str]) -> Launch:
             values[name] = _parse_value(name, declarations[name], text)
         elif suggestion := did_you_mean(name, declarations):
             raise InputError(
-                f"{name}:= is no argument of this launch file{suggestion} There are {', '.join(declarations)}"
+                f"{name}:= is no argument of this launch file{suggestion} There are "
+                f"{', '.join(declarations)}"
             )
     launch = Launch(
         {
@@ -154,7 +160,8 @@ def parse_arguments(arguments: Arguments, texts: Mapping[str, str]) -> Launch:
     _check_paths(launch, is_suite=is_suite)
     if is_suite and not (values.get("log") or launch.options.params):
         raise InputError(
-            f"no log is given: write log:=FILE, or log:={LIVE} to wait for tracks, or fixes and speeds, of other nodes"
+            f"no log is given: write log:=FILE, or log:={LIVE} to wait for tracks, or fixes and "
+            "speeds, of other nodes"
         )
     return launch
 
@@ -177,7 +184,8 @@ def _check_options(launch: Launch) -> None:
     namespace = launch.options.namespace
     if namespace and not NAMESPACE.fullmatch(namespace):
         raise InputError(
-            f"namespace:={shown(namespace)}: write names of letters, digits and underscores, separated by /"
+            f"namespace:={shown(namespace)}: write names of letters, digits and underscores, "
+            "separated by /"
         )
     for name in launch.excluded:
         if name not in SUITE:
@@ -206,7 +214,10 @@ def _check_paths(launch: Launch, *, is_suite: bool) -> None:
 
 
 def _check_folder(argument: str, folder: Path, *, new: bool) -> None:
-    """Raise InputError if a folder cannot be created, or exists where a `new` one is needed; remove it again."""
+    """Raise InputError if a folder cannot be created, or exists where a `new` one is needed.
+
+    Remove it again.
+    """
     missing = [path for path in (folder, *folder.parents) if not path.exists()]
     try:
         folder.mkdir(parents=True, exist_ok=not new)

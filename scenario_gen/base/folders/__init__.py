@@ -1,7 +1,10 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Folders of results: complete or not at all, replacing nothing but an earlier result of the same kind."""
+"""Folders of results.
+
+Complete or not at all, replacing nothing but an earlier result of the same kind.
+"""
 
 from scenario_gen.base.folders.disk import naming, sync, sync_tree, write_text
 from scenario_gen.base.folders.replace import Kind, MARKER, replaced_folder, sha256_of

@@ -32,8 +32,8 @@ Kind = NewType("Kind", str)
 def replaced_folder(target: Path, kind: Kind, inputs: Iterable[Path] = ()) -> Iterator[Path]:
     """Yield an empty folder for a result, and move it to `target` at the end, flushed to the disk.
 
-    `target` stays unchanged until then, also if the body raises or the process is killed. It may be
-    an empty folder or an unchanged earlier result of the same kind.
+    `target` stays unchanged until then, also if the body raises or the process is killed. It may
+    be an empty folder or an unchanged earlier result of the same kind.
 
     Args:
         target: place of the result; its parents are created.
@@ -44,7 +44,8 @@ def replaced_folder(target: Path, kind: Kind, inputs: Iterable[Path] = ()) -> It
         A folder with the same name, beside `target`.
 
     Raises:
-        InputError: `target` may not be replaced, another process is writing to it, it cannot be written, or the disk is full.
+        InputError: `target` may not be replaced, another process is writing to it, it cannot be
+            written, or the disk is full.
     """
     try:
         place = _place(target, inputs)
@@ -123,7 +124,10 @@ def _finish(folder: Path, kind: Kind) -> None:
 
 
 def _digests(folder: Path) -> dict[str, str]:
-    """Return {relative name: SHA-256} of all files at any depth, in order; "" for links and special files."""
+    """Return {relative name: SHA-256} of all files at any depth, in order.
+
+    "" for links and special files.
+    """
     digests: dict[str, str] = {}
     for path in sorted(folder.iterdir()):
         if path.is_dir() and not path.is_symlink():
@@ -135,7 +139,10 @@ def _digests(folder: Path) -> dict[str, str]:
 
 
 def _check(target: Path, folder: Path, kind: Kind) -> None:
-    """Raise InputError if a folder has files that an earlier result has not; files may be missing."""
+    """Raise InputError if a folder has files that an earlier result has not.
+
+    Files may be missing.
+    """
     present = _digests(folder) if folder.exists() else {}
     files: dict[str, str] = {}
     if MARKER in present:

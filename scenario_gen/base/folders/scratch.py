@@ -67,7 +67,8 @@ def claimed(folder: Path, purpose: Path, timeout_s: float = LOCK_TIMEOUT_S) -> I
                 _acquire(lock, folder, purpose, timeout_s)
                 if not _emptied(folder):
                     raise InputError(
-                        f"{folder / OLD} is an earlier result, in whose place {purpose} now is; move one of them away"
+                        f"{folder / OLD} is an earlier result, in whose place {purpose} now is; "
+                        "move one of them away"
                     )
                 (folder / NEW).mkdir()
             yield folder / NEW

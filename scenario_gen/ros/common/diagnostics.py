@@ -82,7 +82,10 @@ class NodeDiagnostics:
             self._entries.clear()
 
     def state(self, message: str, **values: str) -> None:
-        """Report the node's state; changed values alone are published with the next full message."""
+        """Report the node's state.
+
+        Changed values alone are published with the next full message.
+        """
         with self._lock:
             old = self._state
             self._state = self._status("state", Level.OK, message, values)
@@ -189,7 +192,10 @@ class NodeDiagnostics:
         self._drop_excess()
 
     def _repeated(self, status: Status, old: Status, times: int) -> Status:
-        """Return a finding with its count; it keeps the old message if no message contains that yet."""
+        """Return a finding with its count.
+
+        It keeps the old message if no message contains that yet.
+        """
         message = status.message
         if status.name in self._unpublished:
             message = old.message if message in old.message else f"{message}; {old.message}"
@@ -225,7 +231,10 @@ class NodeDiagnostics:
                 self._entries[name] = _Entry(status, monotonic())
 
     def _check_twins(self) -> None:
-        """Warn of other nodes that publish the node's topics: subscribers cannot tell their messages apart."""
+        """Warn of other nodes that publish the node's topics.
+
+        Subscribers cannot tell their messages apart.
+        """
         twins = {topic: other_publishers(self._node, topic) for topic in own_topics(self._node)}
         twins = {topic: nodes for topic, nodes in twins.items() if nodes}
         if twins == self._twins:
@@ -243,7 +252,10 @@ class NodeDiagnostics:
 
 
 def family(name: str) -> str:
-    """Return the node and the first word of a status's subject: `/planner: fit` of `/planner: fit of 7`."""
+    """Return the node and the first word of a status's subject.
+
+    `/planner: fit` of `/planner: fit of 7`.
+    """
     node, _, subject = name.partition(": ")
     return f"{node}: {subject.partition(' ')[0]}"
 

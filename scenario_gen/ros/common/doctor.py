@@ -30,7 +30,10 @@ NODE_PROGRAM = "import rclpy; rclpy.init(); rclpy.create_node('doctor'); print(r
 
 @dataclass(frozen=True)
 class Finding:
-    """The result of one check: `level` is "ok", "warning" or "error"; the message has the remedy."""
+    """The result of one check: `level` is "ok", "warning" or "error".
+
+    The message has the remedy.
+    """
 
     level: str
     subject: str

@@ -1,7 +1,10 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Messages between traffic and a planner under test: commands to the ego, live trials, states of a drive."""
+"""Messages between traffic and a planner under test.
+
+Commands to the ego, live trials, states of a drive.
+"""
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
@@ -238,7 +241,10 @@ def encode_predictions(loop: ClosedLoop, states: Sequence[State]) -> bytes:
 
 
 def encode_ego(loop: ClosedLoop, states: Sequence[State]) -> bytes:
-    """Return the CDR bytes of the ego's Odometry for Autoware, at its rear axle; arguments as above."""
+    """Return the CDR bytes of the ego's Odometry for Autoware, at its rear axle.
+
+    Arguments as above.
+    """
     vehicle = loop.scenario.vehicles[loop.ego]
     values = _with_rates(loop, states)[loop.ego]
     return encode_kinematic_state(vehicle, values, loop.scenario.frame_id, stamp_of(states[-1]))

@@ -103,11 +103,13 @@ class LiveStreams:
         vehicles = list(dict.fromkeys(vehicle for vehicle, _ in self._topics.values()))
         if name not in vehicles[:MAX_VEHICLES]:
             raise InputError(
-                f"{topic} is left out: {MAX_VEHICLES} others are in use; choose vehicles with log.vehicles"
+                f"{topic} is left out: {MAX_VEHICLES} others are in use; choose vehicles with "
+                "log.vehicles"
             )
         if publishers[0].topic_type != TYPES[kind]:
             raise InputError(
-                f"{topic} is a {publishers[0].topic_type}; {TYPES[kind]} is needed, so it is left out"
+                f"{topic} is a {publishers[0].topic_type}; {TYPES[kind]} is needed, so it is left "
+                "out"
             )
         self._refused.discard(topic)
         offers = [publisher.qos_profile for publisher in publishers]

@@ -36,7 +36,8 @@ class RoadServerParameters(Parameters):
 
     road_name: str = parameter(
         "t_intersection",
-        "straight, curve, t_intersection, four_way, merge, roundabout, corridor, a map_server YAML file, or a vector map "
+        "straight, curve, t_intersection, four_way, merge, roundabout, corridor, a map_server "
+        "YAML file, or a vector map "
         "(.osm, .xodr, .xml)",
     )
     wait_for_tracks: bool = parameter(False, "publish no road before tracks arrive")
@@ -55,7 +56,8 @@ class SamplerParameters(Parameters):
     )
     patience: float = parameter(
         60.0,
-        "time without acknowledgement after which a subscriber of scenarios is no longer waited for; 0: wait for ever",
+        "time without acknowledgement after which a subscriber of scenarios is no longer waited "
+        "for; 0: wait for ever",
         unit="s",
         low=0.0,
     )
@@ -73,7 +75,8 @@ class RecorderParameters(Parameters):
     )
     topics: str = parameter(
         "",
-        "regular expression of the full names of the topics; empty: those in the node's namespace, /clock and /tf",
+        "regular expression of the full names of the topics; empty: those in the node's "
+        "namespace, /clock and /tf",
     )
     compress: bool = parameter(True, "compress chunks with zstd")
     split_bytes: int = parameter(
@@ -94,7 +97,8 @@ class TrafficParameters(Parameters):
     )
     ego: str = parameter(
         "",
-        "id of the vehicle that the ego replaces; empty: the scenario's ego slot, or its first vehicle",
+        "id of the vehicle that the ego replaces; empty: the scenario's ego slot, or its first "
+        "vehicle",
     )
     index: int = parameter(0, "index of the first scenario in the bag, from 0", low=0)
     rate: float = parameter(1.0, "speed as a multiple of real time", low=0.01, high=1000.0)
@@ -111,7 +115,8 @@ class TrafficParameters(Parameters):
     follow_on: bool = parameter(True, "continue with the next scenario; false: wait for ~/next")
     autoware: bool = parameter(
         False,
-        "publish predicted objects and the ego's state for Autoware's planners; needs autoware_perception_msgs",
+        "publish predicted objects and the ego's state for Autoware's planners; needs "
+        "autoware_perception_msgs",
     )
     results: str = parameter(
         "", "folder for drives.json and junit.xml, rewritten after each drive; empty: none"

@@ -1,7 +1,10 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""traffic for `scenario-gen drive --ros`: drives all trials in lock-step with a planner that is a node."""
+"""traffic for `scenario-gen drive --ros`.
+
+Drives all trials in lock-step with a planner that is a node.
+"""
 
 from collections.abc import Callable, Sequence
 from time import monotonic
@@ -80,7 +83,8 @@ class TrialTraffic(Traffic):
             raise too_long(trial, self.config.drive)
         if now - max(start, self._last_reply_at) > SILENCE_TIMEOUT_S:
             raise InputError(
-                f"scenario {trial.name}: the planner's node has sent no command for {SILENCE_TIMEOUT_S:.0f} s: it hangs, "
+                f"scenario {trial.name}: the planner's node has sent no command for "
+                f"{SILENCE_TIMEOUT_S:.0f} s: it hangs, "
                 "or does not answer each odometry of the ego with one command"
             )
 
@@ -99,10 +103,12 @@ def drive_trials(
         config: the parameters of a drive.
         progress: called with the number of finished trials and the number of all.
         planner: its command, for the error.
-        check: called while waiting for the planner; it raises when the planner's process has ended.
+        check: called while waiting for the planner; it raises when the planner's process has
+            ended.
 
     Raises:
-        InputError: the planner publishes no command, or none any more, or takes longer than `drive_time` for a drive.
+        InputError: the planner publishes no command, or none any more, or takes longer than
+            `drive_time` for a drive.
     """
     rclpy.init(args=[], signal_handler_options=SignalHandlerOptions.NO)
     try:
@@ -138,7 +144,8 @@ def _wait_for_planner(
         check()
         if monotonic() > deadline:
             raise InputError(
-                f"--planner {planner}: no command from it in {START_TIMEOUT_S:.0f} s; it must publish one of "
+                f"--planner {planner}: no command from it in {START_TIMEOUT_S:.0f} s; it must "
+                "publish one of "
                 f"{', '.join(INPUTS)} (docs/closed_loop.md)"
             )
         executor.spin_once(timeout_sec=POLL_S)

@@ -3,10 +3,11 @@
 
 """The life of a process with nodes: create, compile kernels, spin, end by a signal or when all nodes are done.
 
-rclpy's signal handlers are not installed, because they invalidate the context. Nodes can publish until they have ended.
+rclpy's signal handlers are not installed, because they invalidate the context. Nodes can publish
+until they have ended.
 
-The kernels of all nodes are loaded, or compiled once per machine, before the executor spins. Requests that arrive meanwhile are
-answered then.
+The kernels of all nodes are loaded, or compiled once per machine, before the executor spins.
+Requests that arrive meanwhile are answered then.
 """
 
 from collections.abc import Callable, Iterable, Sequence
@@ -206,7 +207,10 @@ def print_help(text: str) -> None:
 
 
 def namespaces(arguments: Sequence[str]) -> list[str | None]:
-    """Return the values of `--namespace`, one node for each in this process; [None] without any."""
+    """Return the values of `--namespace`, one node for each in this process.
+
+    [None] without any.
+    """
     rest = non_ros_args(arguments)
     if any(word != "--namespace" for word in rest[::2]) or len(rest) % 2:
         raise SystemExit(f"{USAGE.format(name=arguments[0])}\n--help lists the parameters")

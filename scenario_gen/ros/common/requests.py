@@ -54,7 +54,10 @@ Answer = tuple[GenerationResult, RequestSummary]
 
 @dataclass(frozen=True)
 class Config(Request, SamplerParameters):
-    """The sampler's parameters; `fitting` and `planning` apply to requests with start or end states."""
+    """The sampler's parameters.
+
+    `fitting` and `planning` apply to requests with start or end states.
+    """
 
     fitting: FittingConfig = field(default_factory=FittingConfig)
     planning: PlanningConfig = field(default_factory=PlanningConfig)
@@ -148,7 +151,8 @@ class OpenRequests:
         with self._lock:
             if name and not NAME.fullmatch(name):
                 raise InputError(
-                    f"request is {name!r}; a letter and up to 63 letters, digits, `_`, `-` or `.` are a name"
+                    f"request is {name!r}; a letter and up to 63 letters, digits, `_`, `-` or `.` "
+                    "are a name"
                 )
             if name in self._open:
                 raise InputError(
@@ -301,7 +305,10 @@ class OpenRequests:
     async def _wait_for_inputs(
         self, request: OpenRequest, config: Any, wait: float
     ) -> tuple[Code, str]:
-        """Wait until the sampler is active and has its inputs; then append the request to the queue."""
+        """Wait until the sampler is active and has its inputs.
+
+        Then append the request to the queue.
+        """
         deadline = monotonic() + wait
 
         def is_over() -> bool:
@@ -321,7 +328,10 @@ class OpenRequests:
         return Code.OK, ""
 
     async def _until(self, is_over: Callable[[], bool]) -> None:
-        """Wait until `is_over` returns True; it is called ten times a second, and for every input."""
+        """Wait until `is_over` returns True.
+
+        It is called ten times a second, and for every input.
+        """
         if is_over():
             return
         arrived = Future()
@@ -332,12 +342,18 @@ class OpenRequests:
         self._node.executor.create_task(self.check_waiting)
 
     def missing(self, config: Any) -> list[str]:
-        """Return the topics that a request waits for; `activation` while the node is not active."""
+        """Return the topics that a request waits for.
+
+        `activation` while the node is not active.
+        """
         missing: list[str] = self._node.missing(config) if self._node.active else ["activation"]
         return missing
 
     def position(self, request: OpenRequest) -> int:
-        """Return how many requests are served before this one; 0 if it runs or waits for its inputs."""
+        """Return how many requests are served before this one.
+
+        0 if it runs or waits for its inputs.
+        """
         with self._lock:
             queue = [name for name, other in self._open.items() if not other.waiting_for]
         if request.started_at is not None or request.name not in queue:
@@ -404,13 +420,16 @@ def answer_request(
         config: the values of this request.
         request: gets the progress.
         node: the node's full name.
-        cancelled: returns whether to stop early; published scenarios stay, and the summary says so.
+        cancelled: returns whether to stop early; published scenarios stay, and the summary says
+            so.
         send: called with topic and CDR bytes of every message, as scenarios are drawn.
-        turn: held while the messages of a scenario, or of the end, are sent, so that parallel requests do not mix them.
+        turn: held while the messages of a scenario, or of the end, are sent, so that parallel
+            requests do not mix them.
 
     Raises:
         InputError: a message is damaged, or a named vehicle does not exist.
-        RefusedError: the request is impossible; the message says why, and which similar request is possible.
+        RefusedError: the request is impossible; the message says why, and which similar request is
+            possible.
     """
     template = decode_template(messages)
     encounter, segmentation, (road, _) = (

@@ -174,7 +174,10 @@ def config_of(node: Any) -> Any:
 
 
 def help_of(name: str, nodes: Sequence[Any]) -> str:
-    """Return the usage of an executable, and its nodes' parameters: default, unit, meaning, choices."""
+    """Return the usage of an executable, and its nodes' parameters.
+
+    Default, unit, meaning, choices.
+    """
     lines = [USAGE.format(name=name)]
     for node in nodes:
         module = sys.modules[node.__module__]

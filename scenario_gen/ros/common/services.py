@@ -1,7 +1,10 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Services without arguments: the answer is the result of an action, or the reason of its refusal."""
+"""Services without arguments.
+
+The answer is the result of an action, or the reason of its refusal.
+"""
 
 from collections.abc import Callable
 import traceback

@@ -265,7 +265,10 @@ class StageNode(LifecycleNode):  # type: ignore[misc]
             self.diagnostics.resolve(topic)
 
     def work(self, name: str, job: Job) -> None:
-        """Run a job off the executor's thread; a waiting one with its name is replaced, a running one cancelled."""
+        """Run a job off the executor's thread.
+
+        A waiting one with its name is replaced, a running one cancelled.
+        """
         if self._worker is not None:
             self._worker.submit(name, lambda cancelled: None if cancelled() else job(cancelled))
 
@@ -280,7 +283,8 @@ class StageNode(LifecycleNode):  # type: ignore[misc]
         Args:
             name: of the job.
             job: called with a function that returns whether it has been cancelled.
-            failed: returns the result of a job that raises; the error is also reported on /diagnostics.
+            failed: returns the result of a job that raises; the error is also reported on
+                /diagnostics.
         """
         answer = Future()
         executor = self.executor
@@ -306,7 +310,10 @@ class StageNode(LifecycleNode):  # type: ignore[misc]
     def status(
         self, level: Level, message: str, subject: str = "status", stamp_ns: int = 0, **values: str
     ) -> None:
-        """Report one status on /diagnostics and log it; an abandoned job ends here, before it is logged."""
+        """Report one status on /diagnostics and log it.
+
+        An abandoned job ends here, before it is logged.
+        """
         self.diagnostics.status(level, message, subject, values, stamp_ns)
 
     def update_diagnostics(self) -> None:

@@ -1,7 +1,10 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Run the suite for some jobs, over DDS, into one bag: the recorder in one process, all other nodes in another."""
+"""Run the suite for some jobs, over DDS, into one bag.
+
+The recorder in one process, all other nodes in another.
+"""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
@@ -123,7 +126,10 @@ class Progress:
 def parameters(
     jobs: Sequence[Job], config: PipelineConfig, count: int, seed: int, bag: Path
 ) -> dict[str, Any]:
-    """Return the suite's parameter file: for each node the pipeline's parameters that it declares."""
+    """Return the suite's parameter file.
+
+    For each node the pipeline's parameters that it declares.
+    """
     values = {name: value for name, (_, value) in flatten(config).items()}
     values |= {"count": count, "seed": seed}
     common = {}
@@ -168,7 +174,8 @@ def run_suite(
 
     Raises:
         InputError: a node cannot use its input.
-        RefusedError: a stage refused a job, a node died, or one did not answer in time; the message names it.
+        RefusedError: a stage refused a job, a node died, or one did not answer in time; the
+            message names it.
     """
     if bag.exists():
         raise InputError(f"{bag} exists already; name another folder for the bag, or remove it")
@@ -196,7 +203,10 @@ def run_suite(
 
 @contextmanager
 def _watched(state: Progress) -> Iterator[Callable[[], None]]:
-    """Subscribe to the suite's topics; yield a function that receives the messages that have arrived."""
+    """Subscribe to the suite's topics.
+
+    Yield a function that receives the messages that have arrived.
+    """
     rclpy.init(args=[], signal_handler_options=SignalHandlerOptions.NO)
     try:
         node = rclpy.create_node("watcher", enable_rosout=False, start_parameter_services=False)

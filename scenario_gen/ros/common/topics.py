@@ -65,7 +65,8 @@ def message_class(kind: str) -> Any:
         return getattr(importlib.import_module(f"{package}.msg"), name)
     except (ImportError, AttributeError, ValueError, TypeError):  # TypeError: an empty type
         raise InputError(
-            f"message type {kind} is not installed; source the workspace that has {package or 'it'}"
+            f"message type {kind} is not installed; source the workspace that has "
+            f"{package or 'it'}"
         ) from None
 
 
@@ -261,9 +262,10 @@ class Pace:
 
         Args:
             publisher: of rclpy.
-            patience: seconds without acknowledgement after which its subscribers are not waited for; 0: always wait.
-            report: called with 0 when that happens, and when all is acknowledged again, or at `end`, with the number of
-                messages that were published meanwhile.
+            patience: seconds without acknowledgement after which its subscribers are not waited
+                for; 0: always wait.
+            report: called with 0 when that happens, and when all is acknowledged again, or at
+                `end`, with the number of messages that were published meanwhile.
         """
         self._publisher = publisher
         self._patience = patience
@@ -353,13 +355,17 @@ def yield_to_executor(executor: Executor | None, stop: Callable[[], bool]) -> No
 
 
 def acknowledgement_warning(node: Node, topic: str, count: int) -> str:
-    """Return the warning for a report of `Pace`: a subscriber is not waited for, or may lack `count` messages."""
+    """Return the warning for a report of `Pace`.
+
+    A subscriber is not waited for, or may lack `count` messages.
+    """
     name = node.resolve_topic_name(topic)
     message = f"a subscriber of {name} acknowledges nothing; it is not waited for any more"
     if count:
         message = f"{count} messages of {name} were published without acknowledgement, a subscriber may lack them"
     subscribers = sorted({info.node_name for info in node.get_subscriptions_info_by_topic(name)})
     return (
-        f"{message} (subscribers: {', '.join(subscribers) or 'none any more'}); end the subscriber "
+        f"{message} (subscribers: {', '.join(subscribers) or 'none any more'}); end the "
+        "subscriber "
         "that hangs, or raise patience; a new subscriber gets the last 1000"
     )

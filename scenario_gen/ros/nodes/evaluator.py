@@ -1,7 +1,10 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""evaluator: `tracks`, `changepoints` and the `scenarios` of a request in; its metrics out as `report`."""
+"""evaluator: `tracks`, `changepoints` and the `scenarios` of a request in.
+
+Its metrics out as `report`.
+"""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -180,7 +183,8 @@ class Evaluator(StageNode):
         notes = [str(note) for note in row.notes]
         if row.name == WITH and measured < summary.published:
             notes.append(
-                f"measured on {measured} of {summary.published} scenarios, chosen by seed {self.config.seed}"
+                f"measured on {measured} of {summary.published} scenarios, chosen by seed "
+                f"{self.config.seed}"
             )
         name = f"{self.get_fully_qualified_name()}: {row.name}"
         return Status(name, Level.OK, "; ".join(notes), values)

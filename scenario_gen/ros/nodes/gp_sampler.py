@@ -98,7 +98,10 @@ class GpSampler(StageNode):
         return self.inputs.missing() or [topic for topic in ends if topic not in self.messages()]
 
     def messages(self) -> dict[str, bytes]:
-        """Return the template's messages; entries, exits and lanes only if the fit was made with them."""
+        """Return the template's messages.
+
+        Entries, exits and lanes only if the fit was made with them.
+        """
         messages = self.inputs.complete() or {}
         return {
             topic: data
@@ -137,7 +140,10 @@ class GpSampler(StageNode):
         config: Config,
         cancelled: Cancelled,
     ) -> Answer | None:
-        """Sample, check and publish; the request's summary closes `scenarios/info`. None if it was stopped early."""
+        """Sample, check and publish.
+
+        The request's summary closes `scenarios/info`. None if it was stopped early.
+        """
 
         def stop() -> bool:  # also within a set: no scenario on an old map follows a new map
             return bool(self.stop_reason(messages, cancelled))

@@ -58,7 +58,8 @@ class LogPlayer(StageNode):
         result = read_log(Path(config.log_path), config.log)
         if config.encounter >= len(result.encounters):
             raise InputError(
-                f"parameter encounter is {config.encounter}; {config.log_path} holds {len(result.encounters)}, counted from 0"
+                f"parameter encounter is {config.encounter}; {config.log_path} holds "
+                f"{len(result.encounters)}, counted from 0"
             )
         encounter = result.encounters[config.encounter]
         stop_if_cancelled()

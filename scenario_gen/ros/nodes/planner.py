@@ -166,7 +166,8 @@ def query_of(request: Any, frame_id: str, radius: float) -> Query:
     """Return the query of a nav_msgs/srv/GetPlan request.
 
     Raises:
-        InputError: a pose is not finite, in another frame than the map, or the tolerance is negative.
+        InputError: a pose is not finite, in another frame than the map, or the tolerance is
+            negative.
     """
     if not (math.isfinite(request.tolerance) and request.tolerance >= 0.0):
         raise InputError(f"tolerance is {request.tolerance}; it must be at least 0 m")

@@ -69,7 +69,8 @@ class Config(Parameters):
     clock: bool = parameter(False, "publish /clock")
     patience: float = parameter(
         60.0,
-        "time without acknowledgement after which a subscriber is no longer waited for; 0: wait for ever",
+        "time without acknowledgement after which a subscriber is no longer waited for; 0: wait "
+        "for ever",
         unit="s",
         low=0.0,
     )
@@ -119,7 +120,8 @@ class Player(Node):  # type: ignore[misc]
                 self._offer(topic, name, config.patience)
         if not self._offered:
             raise InputError(
-                f"{config.bag}: none of its topics can be played; see the messages above and the parameter topics"
+                f"{config.bag}: none of its topics can be played; see the messages above and the "
+                "parameter topics"
             )
         if not config.paused:
             self._running.set()
@@ -204,7 +206,10 @@ class Player(Node):  # type: ignore[misc]
         )
 
     def _from_offset(self, config: Config) -> Iterator[BagMessage]:
-        """Yield the messages after the offset; publish the last ones of latched topics before it first."""
+        """Yield the messages after the offset.
+
+        Publish the last ones of latched topics before it first.
+        """
         latched: dict[str, deque[bytes]] = {}
         begin_ns: int | None = None
         for message in read_messages(
@@ -224,7 +229,10 @@ class Player(Node):  # type: ignore[misc]
             yield message
 
     def _wait_until(self, due: float, elapsed: float, config: Config, first_ns: int) -> float:
-        """Let the bag's time run from `elapsed` to `due` [s], at `rate` and unless paused; return the time reached."""
+        """Let the bag's time run from `elapsed` to `due` [s], at `rate` and unless paused.
+
+        Return the time reached.
+        """
         while elapsed < due and not self._ended.is_set():
             self._elapsed = elapsed
             self._running.wait(TICK_S)

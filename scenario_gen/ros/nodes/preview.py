@@ -3,8 +3,9 @@
 
 """preview: the scenario that was published last, in motion: frames on /tf and markers on `preview`, again and again.
 
-It is for people who look: it keeps nobody waiting, and of many scenarios it takes the newest when the one that is shown ends.
-Frames are `preview/vehicle_<id>`, so that a player of the same vehicles is not disturbed.
+It is for people who look: it keeps nobody waiting, and of many scenarios it takes the newest when
+the one that is shown ends. Frames are `preview/vehicle_<id>`, so that a player of the same
+vehicles is not disturbed.
 """
 
 from dataclasses import dataclass
@@ -43,7 +44,8 @@ class Config(Parameters):
 class Shown:
     """A scenario in motion: since when on the steady clock [s], who reacts to whom, by the vehicle that does, and its conflicts.
 
-    A conflict is a pose x, y [m], yaw [rad], that of the second one when it enters the shared area, and words.
+    A conflict is a pose x, y [m], yaw [rad], that of the second one when it enters the shared
+    area, and words.
     """
 
     scenario: Scenario

@@ -194,7 +194,10 @@ class Recorder(Node):  # type: ignore[misc]
         self._warn(lost)
 
     def _loss_message(self, topic: str, text: str) -> str:
-        """Return the loss of a topic's messages with a remedy; two publishers of one topic cause losses."""
+        """Return the loss of a topic's messages with a remedy.
+
+        Two publishers of one topic cause losses.
+        """
         infos = self.get_publishers_info_by_topic(topic)
         nodes = sorted(f"{info.node_namespace.rstrip('/')}/{info.node_name}" for info in infos)
         if len(nodes) > 1:

@@ -37,7 +37,10 @@ from scenario_gen.types import Sample
 
 @dataclass(frozen=True)
 class Config(Parameters):
-    """The segmenter's parameters; `live`, `log` and `online` concern streams and apply from the next activation."""
+    """The segmenter's parameters.
+
+    `live`, `log` and `online` concern streams and apply from the next activation.
+    """
 
     segmentation: SegmentationConfig = field(default_factory=SegmentationConfig)
     seed: int = parameter(0, "seed of the sampler", low=0)

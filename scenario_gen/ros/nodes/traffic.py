@@ -6,9 +6,9 @@
 Scenarios come from a bag, or live from `scenarios`, `scenarios/info`, `ego/witness` and `map`. The
 ego replaces one vehicle. `ego/cmd_vel`, `ego/cmd_vel_stamped`, `ego/trajectory`, `ego/path` or
 `ego/odom` steer it: the drive begins with the first command, and the latest command counts.
-Services are `~/next`, `~/reset`, `~/pause`, `~/resume` and, in lock-step, `~/step`. Each step waits
-for a command that arrived after the previous step, so a client that answers each step with one
-command gets a repeatable drive. The next scenario begins by itself (parameter `follow_on`), in
+Services are `~/next`, `~/reset`, `~/pause`, `~/resume` and, in lock-step, `~/step`. Each step
+waits for a command that arrived after the previous step, so a client that answers each step with
+one command gets a repeatable drive. The next scenario begins by itself (parameter `follow_on`), in
 lock-step after 0.5 s: a reply to the last state of a drive must not count for the next drive.
 Topics, frames and units: msg_conventions/driving.py. Faults of the ego are on /diagnostics and in
 the verdict.
@@ -115,7 +115,8 @@ class Traffic(Node):  # type: ignore[misc]
         """Read the bag, or subscribe to scenarios, and begin.
 
         Raises:
-            InputError: the bag cannot be read, or has no such vehicle or scenario; autoware_perception_msgs is missing.
+            InputError: the bag cannot be read, or has no such vehicle or scenario;
+                autoware_perception_msgs is missing.
         """
         config = self.config
         if config.results:
@@ -127,7 +128,8 @@ class Traffic(Node):  # type: ignore[misc]
             self._trials = read_trials(Path(config.bag), config.ego)
             if config.index >= len(self._trials):
                 raise InputError(
-                    f"parameter index is {config.index}; {config.bag} has {len(self._trials)} scenarios, from 0"
+                    f"parameter index is {config.index}; {config.bag} has {len(self._trials)} "
+                    "scenarios, from 0"
                 )
             self._load(config.index)
         else:
@@ -140,7 +142,10 @@ class Traffic(Node):  # type: ignore[misc]
     # --- scenarios -----------------------------------------------------------------------------
 
     def _receive_scenario(self, topic: str, data: bytes) -> None:
-        """Receive a map or a message of a live scenario; scenarios are driven in the order of their completion."""
+        """Receive a map or a message of a live scenario.
+
+        Scenarios are driven in the order of their completion.
+        """
         try:
             self._trials += self._arriving.receive(topic, data, self.config.ego)
             if self._loop is None and len(self._trials) > self._index:
@@ -176,7 +181,10 @@ class Traffic(Node):  # type: ignore[misc]
     # --- the ego -------------------------------------------------------------------------------
 
     def _receive_command(self, topic: str, data: bytes) -> None:
-        """Store a command and report a damaged one, which commands nothing; ignore commands after a drive."""
+        """Store a command and report a damaged one, which commands nothing.
+
+        Ignore commands after a drive.
+        """
         if self._loop is None or self._load_at < math.inf:
             return
         state = self._states[-1]
@@ -272,7 +280,8 @@ class Traffic(Node):  # type: ignore[misc]
         elif self.config.bag:
             passed = sum(outcome.verdict.passed for outcome in self.outcomes)
             self.get_logger().info(
-                f"that was the last scenario of {self.config.bag}: {passed} of {len(self.outcomes)} drives passed"
+                f"that was the last scenario of {self.config.bag}: {passed} of "
+                f"{len(self.outcomes)} drives passed"
             )
 
     async def _serve_step(
@@ -353,7 +362,10 @@ class Traffic(Node):  # type: ignore[misc]
         publish(self, self._out[topic], data)
 
     def _publish_state(self) -> None:
-        """Publish the state of all vehicles, the ego's odometry last: replies to it know the other vehicles."""
+        """Publish the state of all vehicles, the ego's odometry last.
+
+        Replies to it know the other vehicles.
+        """
         if self._loop is None:
             return
         messages = surroundings(
@@ -370,7 +382,10 @@ class Traffic(Node):  # type: ignore[misc]
         self.diagnostics.status(level, message, subject, {}, log=False)
 
     def _report(self) -> None:
-        """Report the scenario and its progress, each second; resolve a fault of the ego that is over."""
+        """Report the scenario and its progress, each second.
+
+        Resolve a fault of the ego that is over.
+        """
         if self._loop is None:
             message = "there is no scenario yet"
             if self._arriving.unmatched:
