@@ -1,16 +1,19 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Scenario → Autoware's perception and localization outputs (docs/exchange.md has the source of each topic and frame).
+"""Scenario → Autoware's perception and localization outputs.
 
-PredictedObjects on `/perception/object_recognition/objects`, TrackedObjects on
-`/perception/object_recognition/tracking/objects`:
-frame: the road's; each object is posed at its shape's centre, z = half its height; twist and
-    acceleration in its own frame;
-its id is the first 16 bytes of the SHA-256 of the vehicle's id. The only predicted path holds the
-poses that will follow, every `STEP_NS` up to `HORIZON_NS` ahead or the end. Odometry of the ego on
-`/localization/kinematic_state`: frame: the road's, child frame `base_link`, the middle of the rear
-axle on the ground. Covariances are 0: the values are exact. QoS: reliable, volatile, depth 1.
+docs/exchange.md has the source of each topic and frame.
+
+PredictedObjects on `/perception/object_recognition/objects` and TrackedObjects on
+`/perception/object_recognition/tracking/objects` are in the road's frame. An object's pose is the
+centre of its shape, with z half its height; twist and acceleration are in its own frame. Its id is
+the first 16 bytes of the SHA-256 of the vehicle's id. The predicted path has a pose every `STEP_NS`
+up to `HORIZON_NS` ahead, or to the end.
+
+Odometry of the ego on `/localization/kinematic_state` is in the road's frame, with the child frame
+`base_link`, the centre of the rear axle on the ground. Covariances are 0, because the values are
+exact. QoS: reliable, volatile, depth 1.
 """
 
 from collections.abc import Sequence
@@ -46,7 +49,7 @@ class AutowareEncoder:
     """Encodes a scenario's instants, one after the other."""
 
     def __init__(self, scenario: Scenario) -> None:
-        """Take the scenario and compute its vehicles' states (N, T, 6), as `encode_predicted_objects` takes them, once."""
+        """Compute the vehicles' states (N, T, 6) for `encode_predicted_objects`."""
         self.scenario = scenario
         self.time_ns = np.rint(scenario.time * 1e9).astype(np.int64)
         rate = np.zeros_like(scenario.heading)
@@ -136,7 +139,7 @@ def encode_kinematic_state(vehicle: Vehicle, state: Floats, frame_id: str, stamp
 
 
 def _object(vehicle: Vehicle, state: Floats) -> dict[str, Any]:
-    """Return source both messages say of a vehicle.
+    """Return the fields of a vehicle in both messages.
 
     `state` (6,) as in `encode_kinematic_state`.
     """
@@ -156,7 +159,7 @@ def _object(vehicle: Vehicle, state: Floats) -> dict[str, Any]:
 
 
 def _shape_poses(vehicle: Vehicle, poses: Floats) -> Floats:
-    """Return (K, 7) poses of a vehicle's shape, as on the wire, of poses (K, 3) x, y [m], yaw [rad]."""
+    """Return the wire rows (K, 7) of a vehicle's shape at poses (K, 3) x, y [m], yaw [rad]."""
     rows = pose_rows(poses)
     rows[:, 2] = height(vehicle) / 2.0
     return rows

@@ -67,7 +67,7 @@ def stamp_of(data: bytes, source: str) -> int:
 
 
 class CdrWriter:
-    """Appends values at their natural alignment, counted from the byte after the encapsulation header."""
+    """Appends values at their natural alignment, counted after the encapsulation header."""
 
     def __init__(self) -> None:
         self.body = bytearray()
@@ -190,7 +190,9 @@ class CdrReader:
         return int(seconds) * NANOSECONDS + int(nanoseconds)
 
     def aligned(self, dtype: npt.DTypeLike, count: int) -> npt.NDArray[Any] | None:
-        """Read `count` structures (n,) that end at multiples of 8 bytes; read nothing and return None if fewer bytes are left.
+        """Read `count` structures (n,) that end at multiples of 8 bytes.
+
+        Reads nothing and returns None if fewer bytes are left.
 
         The type begins with 4 bytes and 4 bytes of padding. A first structure that begins at an
         odd multiple of 4 lacks this padding.
@@ -208,7 +210,10 @@ class CdrReader:
         return np.frombuffer(body, dtype=kind)
 
     def fields(self, layout: Layout, *, framed: bool = False) -> SimpleNamespace:
-        """Read the fields of a table: numbers, arrays, texts, stamps [ns], lists and namespaces; `framed` as in `decode`.
+        """Read the fields of a table.
+
+        Values are numbers, arrays, texts, stamps [ns], lists and namespaces; `framed` as in
+        `decode`.
 
         Raises:
             InputError: the frame is empty and must not be.

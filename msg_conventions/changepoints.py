@@ -59,7 +59,7 @@ def encode_live_changepoints(found: LiveChangepoints) -> bytes:
 def decode_changepoints(
     data: bytes, encounter: Encounter, source: str = "changepoints"
 ) -> Segmentation:
-    """Return the segmentation that the message and its tracks describe: a primitive of its own for every segment.
+    """Return the segmentation of a message and its tracks, with a new primitive for every segment.
 
     Shared labels, probabilities and descriptions are in `posterior` and the diagnostics; no later
     stage needs them.

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Reports ⇄ diagnostic_msgs/DiagnosticArray: key-values with full node names, one status per subject.
+"""Reports ⇄ diagnostic_msgs/DiagnosticArray: one status with key-values per node and subject.
 
 Used for `scenarios/info` (scenario_info.py), `road/info` and `fit/info` (hashes.py), `report`
 and `/diagnostics`. `header.stamp` is the template's stamp. On /diagnostics it is the time of the

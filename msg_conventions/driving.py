@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""A drive in closed loop ⇄ messages: the states from the node `traffic`, and the commands to the ego.
+"""A drive in closed loop ⇄ messages: states from the node `traffic`, commands to the ego.
 
 Outputs at every step, with the drive's time (that of /clock) as their stamp, in the road's frame:
 
@@ -65,7 +65,9 @@ def encode_twist(speed: float, yaw_rate: float) -> bytes:
 def decode_twist(
     data: bytes, source: str = "ego/cmd_vel", *, stamped: bool = False
 ) -> tuple[int, str, float, float]:
-    """Return stamp [ns] and frame (0 and "" if not `stamped`), linear.x [m/s] and angular.z [rad/s], finite or not.
+    """Return stamp [ns], frame, linear.x [m/s] and angular.z [rad/s], finite or not.
+
+    Stamp and frame are 0 and "" if the message is not `stamped`.
 
     Raises:
         InputError: the message is damaged.
@@ -111,5 +113,5 @@ def decode_timed_path(data: bytes, source: str = "ego/path") -> TimedPath:
 def encode_local_map(
     blocked: Bools, resolution: float, origin: Floats, frame_id: str, stamp_ns: int
 ) -> bytes:
-    """Return blocked cells (H, W), their size [m] and the lower-left corner (2,) [m] as an OccupancyGrid."""
+    """Return blocked cells (H, W), their size and lower-left corner (2,) [m] as an OccupancyGrid."""
     return encode_grid(np.where(blocked, OCCUPIED_CODE, 0), resolution, origin, frame_id, stamp_ns)

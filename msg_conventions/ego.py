@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The ego slot ⇄ `ego/start`, `ego/goal` (nav_msgs/Odometry) and `ego/witness` (conventions: trajectory.py; one vehicle).
+"""The ego slot ⇄ `ego/start`, `ego/goal` (nav_msgs/Odometry) and `ego/witness` (trajectory.py).
 
 Start and goal belong to the last request whose `scenarios/info` names the vehicle as its `ego`.
 Frame: the road's. Stamp: the template's, also for the goal. Odometry: `child_frame_id` is

@@ -116,7 +116,7 @@ def fit_statuses(
 
 
 def decode_losses(values: Mapping[str, str]) -> tuple[Loss, ...]:
-    """Return the losses in the planner's status `fit`; none in bags of versions that did not write them.
+    """Return the losses in the planner's status `fit`.
 
     Raises:
         InputError: it is damaged.
@@ -133,7 +133,7 @@ def decode_losses(values: Mapping[str, str]) -> tuple[Loss, ...]:
 
 
 def with_figures(route: Route, statuses: Mapping[str, Mapping[str, str]], vehicle: str) -> Route:
-    """Return a decoded route with the figures of its planning in the planner's status `fit of <vehicle>`, if they are there.
+    """Return a decoded route with the figures in the planner's status `fit of <vehicle>`, if any.
 
     Raises:
         InputError: they are damaged.

@@ -4,7 +4,7 @@
 """Coordinate frames ⇄ tf2_msgs/TFMessage: `/tf` for the vehicles of a scenario in motion.
 
 Parent: the road's frame. Child: `vehicle_<id>`, at the footprint's centre, x ahead. QoS: reliable,
-    volatile, depth 100.
+volatile, depth 100.
 """
 
 from collections.abc import Sequence
@@ -18,7 +18,7 @@ TYPE = "tf2_msgs/msg/TFMessage"
 
 
 def encode_frames(poses: Floats, children: Sequence[str], parent: str, stamp_ns: int) -> bytes:
-    """Return the frames `children` at `poses` (N, 3) x [m], y [m], yaw [rad] of `parent`, as CDR bytes."""
+    """Return frames `children` at `poses` (N, 3) x, y [m], yaw [rad] in `parent` as CDR bytes."""
     rows = zip(pose_rows(poses), children, strict=True)
     header = {"stamp": stamp_ns, "frame_id": parent}
     return encode(

@@ -1,7 +1,9 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Hashes of messages that belong together, by topic ⇄ `road/info` and `fit/info` (diagnostic_msgs/DiagnosticArray).
+"""Hashes of messages that belong together, by topic ⇄ `road/info` and `fit/info`.
+
+The type is diagnostic_msgs/DiagnosticArray.
 
 Most types have no field for them. Stamp: the template's. QoS: reliable, transient_local, depth 1.
 """
@@ -33,7 +35,9 @@ def hash_of(topic: str, data: bytes) -> str:
 
 
 def _without_stamps(grid: bytes) -> bytes:
-    """Return the bytes of a map without stamp, load time and padding; some of the bytes of a damaged map.
+    """Return the bytes of a map without stamp, load time and padding.
+
+    A damaged map gives some of its bytes.
 
     DDS pads small messages to a multiple of 4 bytes. All other hashed messages end at one, except
     `road/lanes`.
@@ -49,7 +53,10 @@ def _without_stamps(grid: bytes) -> bytes:
 
 
 def template_hashes(messages: Mapping[str, bytes]) -> dict[str, str]:
-    """Return the hashes of the template (its `tracks`) and the map, for diagnostics and `scenarios/info`."""
+    """Return the hashes of the template (its `tracks`) and the map.
+
+    Diagnostics and `scenarios/info` contain them.
+    """
     keys = {"tracks": TEMPLATE_HASH, "map": MAP_HASH}
     return {
         key: hash_of(topic, messages[topic]) for topic, key in keys.items() if topic in messages

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""LaneNetwork ⇄ `road/lanes` (visualization_msgs/Marker): the lanes of a road, published with its grid.
+"""LaneNetwork ⇄ `road/lanes` (visualization_msgs/Marker): a road's lanes beside its grid.
 
 A LINE_LIST has all borders as pairs of neighbouring points: lane after lane, the left border
 before the right one. `text` is a JSON object with these members:

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The fields of every message in the order of the wire, as tables for `cdr.encode` and `cdr.decode`.
+"""The fields of every message in the order of the wire: tables for `encode` and `decode`.
 
 A field is a number ("f4"), several numbers ("7f8"), a "string", a "time" (or duration) in
 nanoseconds, another table, or a sequence: a list with one of these. Neighbouring ROS fields of one

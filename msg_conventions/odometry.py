@@ -1,7 +1,9 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The state of one vehicle ⇄ nav_msgs/Odometry: pose in the header's frame, twist in the vehicle's frame; covariances are 0.
+"""The state of one vehicle ⇄ nav_msgs/Odometry.
+
+The pose is in the header's frame, the twist in the vehicle's frame. Covariances are 0.
 
 Speed: twist.linear.x, m/s; yaw rate: twist.angular.z, rad/s.
 """
@@ -20,7 +22,7 @@ TYPE = "nav_msgs/msg/Odometry"
 def encode_odometry(
     state: Floats, yaw_rate: float, child: str, frame_id: str, stamp_ns: int
 ) -> bytes:
-    """Return a state (4,) of x [m], y [m], yaw [rad], speed [m/s] and the yaw rate [rad/s] as CDR bytes."""
+    """Return a state (4,) x, y [m], yaw [rad], speed [m/s] and a yaw rate [rad/s] as CDR bytes."""
     pose, twist = pose_rows(state[None, :3]), (state[3], 0.0, 0.0, 0.0, 0.0, yaw_rate)
     return encode(ODOMETRY, stamp=stamp_ns, frame_id=frame_id, child=child, pose=pose, twist=twist)
 
@@ -28,7 +30,9 @@ def encode_odometry(
 def decode_odometry(
     data: bytes, source: str = "odom", *, framed: bool = False
 ) -> tuple[int, str, str, Floats]:
-    """Return stamp [ns], frame, child frame and (5,) x [m], y [m], yaw [rad], speed [m/s], yaw rate [rad/s].
+    """Return stamp [ns], frame, child frame and the state (5,) x, y, yaw, speed, yaw rate.
+
+    Units: m, rad, m/s, rad/s.
 
     Args:
         data: CDR bytes.

@@ -66,7 +66,10 @@ def encode_path(poses: Floats, stamps_ns: Ints, frame_id: str, stamp_ns: int) ->
 
 @lru_cache(maxsize=16)
 def _pose_type(size: int) -> np.dtype[np.void]:
-    """Return the layout of a pose that begins at a multiple of 8 bytes, in a frame of `size` bytes; it also ends at one."""
+    """Return the layout of a pose in a frame of `size` bytes.
+
+    The pose begins and ends at a multiple of 8 bytes.
+    """
     frame = size + -(12 + size) % 8
     return np.dtype(
         [
@@ -95,7 +98,9 @@ def decode_path(data: bytes, source: str = "path") -> tuple[int, str, Floats, In
 def read_path(
     data: bytes, source: str, *, framed: bool = False
 ) -> tuple[int, str, Ints, list[str], Floats]:
-    """Return stamp [ns] and frame, and of each pose its stamp [ns], frame and row (7,) as on the wire; `framed` as in `decode`.
+    """Return stamp [ns] and frame, and each pose's stamp [ns], frame and wire row (7,).
+
+    `framed` as in `decode`.
 
     Raises:
         InputError: the message is damaged.

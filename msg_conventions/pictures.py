@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Pictures for RViz and Foxglove: footprints (geometry_msgs/PolygonStamped) and markers (visualization_msgs/MarkerArray).
+"""Pictures for RViz and Foxglove: footprints (PolygonStamped) and markers (MarkerArray).
 
 Frame: that of the vehicles. QoS: reliable, transient_local.
 """
@@ -109,7 +109,10 @@ def vehicle_markers(
     frame_id: str,
     stamp_ns: int,
 ) -> bytes:
-    """Return the present vehicles, states (N, 3+) x, y [m], yaw [rad], in place of all previous boxes."""
+    """Return the present vehicles, states (N, 3+) x, y [m], yaw [rad], as boxes.
+
+    They replace all previous boxes.
+    """
     names = tokens(vehicle.id for vehicle in vehicles)
     markers = [_delete_all()]
     for k in np.flatnonzero(present).tolist():

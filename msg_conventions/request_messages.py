@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The messages of one request for scenarios, in the order in which they are published and recorded."""
+"""The messages of one request for scenarios, in the order of their publication."""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Road ⇄ `map` (nav_msgs/OccupancyGrid) and `road/entries`, `road/exits` (geometry_msgs/PoseArray).
+"""Road ⇄ `map` (nav_msgs/OccupancyGrid), `road/entries`, `road/exits` (PoseArray).
 
 Map: 0 free, 100 occupied, 99 occupied by an obstacle on the road, -1 unknown; a known cell below
     65
@@ -44,7 +44,10 @@ def encode_map(road: Road, stamp_ns: int) -> bytes:
 def encode_grid(
     cells: Ints, resolution: float, origin: Floats, frame_id: str, stamp_ns: int
 ) -> bytes:
-    """Return cells (H, W) from 0 to 100 or -1, their size [m] and the lower-left corner (2,) [m] as an OccupancyGrid."""
+    """Return cells (H, W) from 0 to 100 or -1 as an OccupancyGrid.
+
+    `resolution` is their size [m], `origin` (2,) the lower-left corner [m].
+    """
     height, width = cells.shape
     return encode(
         MAP,
@@ -80,7 +83,9 @@ def decode_map(
     lanes: bytes | None = None,
     name: str = "map",
 ) -> tuple[int, Road]:
-    """Return the stamp [ns] and the road, which may lack entries, exits and lanes: a plain map server sends none.
+    """Return the stamp [ns] and the road.
+
+    A road from a plain map server lacks entries, exits and lanes.
 
     Raises:
         InputError: the message is damaged, the map is rotated or empty, or the frames disagree.

@@ -1,7 +1,9 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""`scenarios/info` (diagnostic_msgs/DiagnosticArray): an entry for each scenario, then a summary of its request.
+"""`scenarios/info`: an entry for each scenario, then a summary of its request.
+
+The type is diagnostic_msgs/DiagnosticArray.
 
 All keys of both are in this file; docs/interfaces.md lists them. Stamp: the template's. Entries
 are joined with their scenarios by the SHA-256 of the scenario's CDR bytes. QoS: reliable,
@@ -49,7 +51,7 @@ REACTION, CUT = (
 )  # who reacts to whom in the template, JSON; those cut because they closed a circle
 MESSAGES, PRESENT = "messages", "present"  # of a scenario in which not all are there throughout
 SIZES = "sizes"  # length and width of its vehicles [m], where they are not those of the template
-FREED = "freed"  # metres and m/s by which start and end of each vehicle may differ from the requested states
+FREED = "freed"  # allowed deviation [m, m/s] of each vehicle from its requested states
 EGO_FREED = "ego_freed"  # likewise of the vehicle that was left out
 EGO_WITNESS = "ego_witness"  # of one with an ego slot
 Values = Mapping[str, str]
@@ -228,7 +230,9 @@ class RequestSummary:
 
     @property
     def reactions(self) -> tuple[dict[str, Any], ...]:
-        """Who reacts to whom in the template, each as `Reaction.document` with `kept`; those that were cut have no `kept`.
+        """The reactions in the template, each as `Reaction.document` with `kept`.
+
+        Reactions that were cut have no `kept`.
 
         Raises:
             InputError: they are damaged.
@@ -269,7 +273,7 @@ Info = ScenarioEntry | RequestSummary
 
 
 def source_values(source: Recorded | Recombined) -> dict[str, str]:
-    """Return the values of a summary that say which encounters a recombined template comes from."""
+    """Return the values of a summary that name the encounters of a recombined template."""
     if isinstance(source, Recorded):
         return {}
     return dict(zip(RECOMBINED, (source.first, source.second), strict=True))
@@ -438,7 +442,10 @@ def request_summary(
         ),
     }
     level = Level.OK if len(result.scenarios) == result.requested else Level.WARN
-    message = f"{len(result.scenarios)} of {result.requested} scenarios from {result.candidates} candidates"
+    message = (
+        f"{len(result.scenarios)} of {result.requested} scenarios "
+        f"from {result.candidates} candidates"
+    )
     return RequestSummary(
         request, len(result.scenarios), Status(f"{node}: request", level, message, values)
     )

@@ -1,7 +1,9 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""`scenarios` (conventions: trajectory.py): one message per scenario, several if vehicles arrive late or leave early.
+"""`scenarios` (conventions: trajectory.py): one message per scenario, or several.
+
+There are several if vehicles arrive late or leave early.
 
 Frame: the road's. Stamp: the template's, so that the bytes depend on the request alone. A
     scenario's

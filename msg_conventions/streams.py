@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""A vehicle's state at one instant ⇄ `vehicle_<id>/fix` (NavSatFix) and `vehicle_<id>/speed` (TwistStamped).
+"""A vehicle's state ⇄ `vehicle_<id>/fix` (NavSatFix), `vehicle_<id>/speed` (TwistStamped).
 
 Stamp: the sample's, on the template's clock. Frame: `vehicle_<id>`. Speed: linear.x, m/s, of the
     body frame.
@@ -35,7 +35,9 @@ def encode_speed(speed: float, stamp_ns: int, frame_id: str) -> bytes:
 
 
 def decode_fix(data: bytes, source: str = "fix") -> tuple[int, float, float]:
-    """Return stamp [ns], latitude and longitude [degrees] of a NavSatFix, NaN without a fix (status below 0).
+    """Return stamp [ns], latitude and longitude [degrees] of a NavSatFix.
+
+    They are NaN without a fix (status below 0).
 
     Raises:
         InputError: the message is damaged.

@@ -76,7 +76,9 @@ def vehicle_topic(token: str, name: str) -> str:
 
 @lru_cache(maxsize=1024)
 def topic_entry(topic: str) -> tuple[str, Quality]:
-    """Return type and quality of one of the suite's topics, with or without a namespace; the longest match counts.
+    """Return type and quality of one of the suite's topics, with or without a namespace.
+
+    Of several matches the longest counts.
 
     Raises:
         KeyError: it is no topic of the suite.

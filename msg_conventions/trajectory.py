@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""trajectory_msgs/MultiDOFJointTrajectory, the message for tracks, changepoints, fits and scenarios.
+"""trajectory_msgs/MultiDOFJointTrajectory for tracks, changepoints, fits and scenarios.
 
 - `header.frame_id`: the frame of the positions.
 - `header.stamp`: the template's first sample, repeated in messages derived from the template.
@@ -110,7 +110,7 @@ def vehicle_of(joint_name: str) -> Vehicle:
 
 
 def _point_type(n: int) -> np.dtype[np.void]:
-    """Return the wire layout of a point with `n` vehicles that begins and ends at a multiple of 8 bytes."""
+    """Return the wire layout of a point with `n` vehicles, aligned to 8 bytes."""
     fields: list[Any] = []
     for name, width in SEQUENCES.items():
         fields += [("n_" + name, "<u4"), ("pad_" + name, "<u4"), (name, "<f8", (n, width))]

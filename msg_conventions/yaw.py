@@ -14,7 +14,9 @@ MAX_COMPONENT_RATIO = 2.0
 
 
 def half_angle(heading: Floats) -> tuple[Floats, Floats]:
-    """Return sine and cosine of half of canonical headings [rad], any shape: z and w of the quaternion.
+    """Return z and w of the quaternions of canonical headings [rad], any shape.
+
+    They are the sine and cosine of half the heading.
 
     A canonical angle is a multiple of a nanoradian plus full turns, and is not near ±pi, so that
     removing the turns is exact enough.

@@ -134,7 +134,9 @@ def _yaml_problem(error: Exception) -> str:
 
 
 def read_bytes(path: Path, most: int, what: str, remedy: str = "") -> bytes:
-    """Return the content of a regular file of at most `most` bytes; `remedy` ends the message where it is larger.
+    """Return the content of a regular file of at most `most` bytes.
+
+    `remedy` ends the message about a larger file.
 
     Raises:
         InputError: it cannot be read, is no regular file, or is too large.
@@ -178,7 +180,9 @@ def read_yaml(path: Path, what: str = "") -> Any:
 
 
 def parse_json(text: str, what: str, schema: Mapping[str, Any]) -> Any:
-    """Return the value of a JSON text that conforms to the schema; its numbers are finite if the schema uses `NUMBER`.
+    """Return the value of a JSON text that conforms to a schema.
+
+    Its numbers are finite if the schema uses `NUMBER`.
 
     Raises:
         InputError: the text is no JSON, or does not conform; the message names the path inside the

@@ -97,7 +97,10 @@ class RefusedError(ScenarioGenError):
 
 
 def did_you_mean(name: str, known: Iterable[str]) -> str:
-    """Return a question with the known name most similar to an unknown one, as the end of a message; "" without one."""
+    """Return a question with the most similar known name, as the end of a message.
+
+    It is "" if no known name is similar.
+    """
     by_lower = {each.lower(): each for each in known}
     similar = get_close_matches(name.lower()[:MAX_INPUT_CHARACTERS], by_lower, n=1, cutoff=0.6)
     return f"; did you mean {by_lower[similar[0]]}?" if similar else ""
@@ -119,7 +122,7 @@ def of_system(error: OSError, name: object = None, advice: str = "") -> InputErr
 
 
 def printable(text: str) -> str:
-    """Return the text with control characters of a terminal, and bidi marks, escaped as in Python source."""
+    """Return the text with control characters and bidi marks escaped as in Python source."""
     return "".join(
         c if c.isprintable() or c == "\n" else c.encode("unicode_escape").decode() for c in text
     )
@@ -140,7 +143,9 @@ def print_error(error: ScenarioGenError | OSError) -> int:
 
 @contextmanager
 def guarded(where: str, *kinds: type[Exception], remedy: str = "") -> Iterator[None]:
-    """Convert a decoding library's exceptions into an InputError; the block must only call that library.
+    """Convert a decoding library's exceptions into an InputError.
+
+    The block must only call that library.
 
     Args:
         where: the file and the place in it; begins the message.
@@ -165,7 +170,9 @@ def guarded(where: str, *kinds: type[Exception], remedy: str = "") -> Iterator[N
 
 @contextmanager
 def reading(path: object) -> Iterator[None]:
-    """Convert an unforeseen exception of a reader into an InputError that names the file; used once around each reader.
+    """Convert an unforeseen exception of a reader into an InputError that names the file.
+
+    It is used once around each reader.
 
     Unlike in `guarded` the block has code of ours, so the error has its own class, which fuzzing
     reports.
@@ -184,7 +191,10 @@ def reading(path: object) -> Iterator[None]:
 
 
 def describe(error: BaseException) -> str:
-    """Return the message of an error in one line, with its class if the message has at most one word."""
+    """Return the message of an error in one line.
+
+    A message of at most one word gets the error's class.
+    """
     if isinstance(error, MemoryError):
         return "asks for more memory than there is"
     text = " ".join(str((isinstance(error, OSError) and error.strerror) or error).split())

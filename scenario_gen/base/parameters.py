@@ -177,7 +177,9 @@ def updated(config: Config, values: dict[str, Any], prefix: str = "") -> Config:
 
 
 def assigned(config: Config, assignment: str) -> Config:
-    """Return a copy of `config` with one `name=value` set; the value is YAML, or plain text for a text parameter.
+    """Return a copy of `config` with one `name=value` set.
+
+    The value is YAML, or plain text for a text parameter.
 
     Raises:
         InputError: there is no `=`, the name is unknown, or the value is no YAML or invalid; the

@@ -39,13 +39,15 @@ def _source(entry: EntryPoint) -> str:
 
 
 class Registry(Generic[T]):
-    """Objects of one kind by name: built-in ones, and entry points of one group in installed packages.
+    """Objects of one kind by name: built-in ones, and entry points of installed packages.
 
     Source: Python Packaging User Guide, "Creating and discovering plugins".
     """
 
     def __init__(self, group: str, built_in: Mapping[str, T], kind: type | None = None) -> None:
-        """Create a registry; installed packages are searched only for lists and for names that are not built in.
+        """Create a registry.
+
+        Installed packages are searched only for lists and for names that are not built in.
 
         Args:
             group: of the entry points, e.g. "scenario_gen.roads".

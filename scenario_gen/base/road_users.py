@@ -1,7 +1,9 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Types of road users: usual sizes, what each can do, and what others call it; a new type is an entry here or of a plugin.
+"""Types of road users: sizes, limits of motion, and names in other formats.
+
+A new type is an entry here or in a plugin.
 
 Sources: sizes: the defaults of SUMO's vehicle classes (Vehicle Type Parameter Defaults), a car's
 as of a European estate.
@@ -164,7 +166,7 @@ _BUILT_IN = VEHICLE_TYPES.built_in
 
 @dataclass(frozen=True)
 class TypeLimits(Parameters):
-    """The limits of motion by type: planner, speed profiles, sampler, checker and closed loop read these, and no others.
+    """The limits of motion by type, for all stages.
 
     Attributes:
         plugins: of types of installed packages, what was set, by name; the last one counts. Else

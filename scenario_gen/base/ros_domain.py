@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""An unused ROS domain on this machine, and the environment of processes that communicate only in it."""
+"""An unused ROS domain on this machine, and an environment restricted to it."""
 
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress

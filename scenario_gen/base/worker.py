@@ -1,7 +1,9 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Long work off the executor's thread: named jobs in order; a new job replaces a waiting one with its name.
+"""Long work off the executor's thread, as named jobs in order.
+
+A new job replaces a waiting one with its name.
 
 `concurrent.futures` replaces no waiting job, cancels no running one, and waits at the end for all.
 """
@@ -113,7 +115,9 @@ class Worker:
             }
 
     def close(self, timeout: float = 0.5) -> None:
-        """Cancel everything and end the threads; a job that continues after `timeout` seconds is abandoned.
+        """Cancel everything and end the threads.
+
+        A job that continues after `timeout` seconds is abandoned.
 
         An abandoned job has no further effect: see `stop_if_abandoned`.
         """

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""`python -m scenario_gen.numerics [PACKAGE ...]` compiles the kernels of the named packages, or all."""
+"""Compile kernels: `python -m scenario_gen.numerics [PACKAGE ...]`, by default all."""
 
 import importlib
 import os

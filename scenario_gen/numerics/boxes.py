@@ -22,7 +22,7 @@ PerAxis = tuple[float, float, float, float]
 
 
 class Box(NamedTuple):
-    """A rectangle: its centre [m], the cosine and sine of its heading, half its length and width [m]."""
+    """A rectangle: centre [m], cosine and sine of the heading, half length and half width [m]."""
 
     x: float
     y: float
@@ -33,7 +33,10 @@ class Box(NamedTuple):
 
 
 def corners(poses: Floats, length: float, width: float) -> Floats:
-    """Return the corners (M, 4, 2) [m] of footprints at poses (M, 3), counter-clockwise from the front left."""
+    """Return the corners (M, 4, 2) [m] of footprints at poses (M, 3).
+
+    They are counter-clockwise from the front left.
+    """
     ahead = np.array([1.0, -1.0, -1.0, 1.0]) * length / 2.0
     left = np.array([1.0, 1.0, -1.0, -1.0]) * width / 2.0
     return place(poses[:, None], ahead, left)
@@ -134,7 +137,7 @@ def time_to_touch(a: Box, b: Box, vx: float, vy: float) -> float:
 
 @kernel(inline=True)
 def fill_box(x: float, y: float, yaw: float, length: float, width: float, out: Floats) -> None:
-    """Write the fields of a `Box` with half sizes `length` and `width` [m], and its radius [m], into `out` (7,)."""
+    """Write the fields of a `Box` with half sizes [m], and its radius [m], into `out` (7,)."""
     out[0] = x
     out[1] = y
     out[2] = np.cos(yaw)
@@ -160,7 +163,9 @@ def boxes_meet(a: Floats, b: Floats) -> bool:
 def footprint_gaps(
     a: tuple[float, float], poses_a: Floats, b: tuple[float, float], poses_b: Floats
 ) -> tuple[Floats, Floats]:
-    """Return the signed gaps of two footprints; between corners the distance is larger than the gap.
+    """Return the signed gaps of two footprints.
+
+    Between corners the distance is larger than the gap.
 
     Args:
         a: half length and half width [m] of one footprint.

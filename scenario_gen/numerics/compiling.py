@@ -25,7 +25,7 @@ Progress = Callable[[int, int, float], None]  # compiled kernels, needed kernels
 
 
 class Compilable(Protocol):
-    """A kernel: its unique name, the file that exists once it is cached, and its code's size [bytes]."""
+    """A kernel: unique name, file that exists once it is cached, size of its code [bytes]."""
 
     @property
     def name(self) -> str: ...  # noqa: D102

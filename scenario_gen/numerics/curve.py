@@ -61,14 +61,14 @@ class Curve:
         return pose
 
     def beside(self, station: Floats, offset: Floats | float) -> Floats:
-        """Return the poses (..., 3) at arc lengths and lateral offsets [m, left positive], with the curve's yaw."""
+        """Return the poses (..., 3) at arc lengths and lateral offsets [m, left positive]."""
         pose = self.at(station)
         pose[..., 0] -= offset * np.sin(pose[..., 2])
         pose[..., 1] += offset * np.cos(pose[..., 2])
         return pose
 
     def project(self, xy: Floats) -> tuple[Floats, Floats]:
-        """Return stations and offsets (P,) [m, left positive] of the curve's nearest points to positions (P, 2)."""
+        """Return stations and offsets (P,) [m, left positive] of positions (P, 2)."""
         ends = self.at(np.array([-EXTENSION_M, self.length + EXTENSION_M]))
         line = np.vstack((ends[:1], self.points, ends[1:]))[:, :2]
         station = np.concatenate(([-EXTENSION_M], self.station, [self.length + EXTENSION_M]))
@@ -93,7 +93,7 @@ class Curve:
 
 
 def _project(xy: Floats, line: Floats, station: Floats) -> Floats:
-    """Return (2, P) stations and offsets of positions (P, 2) on a polyline (M + 1, 2) with stations (M + 1,)."""
+    """Return stations and offsets (2, P) of positions (P, 2) on a polyline (M + 1, 2)."""
     edge = np.diff(line, axis=0)
     length = np.hypot(edge[:, 0], edge[:, 1])
     near = _near_edges(xy, line, length)
@@ -114,7 +114,7 @@ def _project(xy: Floats, line: Floats, station: Floats) -> Floats:
 
 
 def _near_edges(xy: Floats, line: Floats, length: Floats) -> Ints:
-    """Return the ascending indices of the edges that can be nearest to one of the positions (P, 2).
+    """Return ascending indices of the edges that can be nearest to one of the positions (P, 2).
 
     In a circle around the positions, the nearest edge to any of them is no farther from the
     centre than the nearest vertex plus the diameter. An edge is no nearer than its first vertex
@@ -127,7 +127,9 @@ def _near_edges(xy: Floats, line: Floats, length: Floats) -> Ints:
 
 
 def crossings(first: Curve, second: Curve, min_angle: float = 0.35) -> Floats:
-    """Return the stations (K, 2) [m] where two curves cross at an angle of at least `min_angle` [rad].
+    """Return the stations (K, 2) [m] where two curves cross.
+
+    The angle between them is at least `min_angle` [rad].
 
     The first column is on `first`, in ascending order of its edges, the second one on `second`.
     """
@@ -149,7 +151,7 @@ def crossings(first: Curve, second: Curve, min_angle: float = 0.35) -> Floats:
 
 
 def _edges_in_box(points: Floats, others: Floats) -> Ints:
-    """Return the indices of a polyline's edges (M, 2) [m] whose bounding box meets that of other points (K, 2)."""
+    """Return the indices of edges whose bounding box meets that of other points (K, 2)."""
     low = np.minimum(points[:-1], points[1:])
     high = np.maximum(points[:-1], points[1:])
     return np.flatnonzero(((high >= others.min(axis=0)) & (low <= others.max(axis=0))).all(axis=1))

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Compiled kernels: `numba.njit` with declared types, compiled at the first call and cached by numba.
+"""Compiled kernels: `numba.njit` with declared types, compiled at the first call.
 
 Inputs are `F1`, `I2`, …, which the kernel only reads; outputs are `OUT1`, `OUTI2`, ….
 `kernel_cache.py` chooses the folder of the cache; `compiling.py` compiles kernels in parallel.
@@ -113,7 +113,7 @@ def _field_reader(declared: Any) -> Callable[[Any], Any]:
 
 
 class Kernel:
-    """A function that numba compiles for its declared types, for Python and for the kernels that call it."""
+    """A function that numba compiles for its declared types, for Python and other kernels."""
 
     def __init__(self, function: Callable[..., Any], declared: Sequence[Any]) -> None:
         """Declare the kernel; its first call compiles or loads it."""

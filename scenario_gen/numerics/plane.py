@@ -36,7 +36,7 @@ def ahead_and_left(offset: Floats, yaw: Floats | float) -> tuple[Floats, Floats]
 
 
 def place(poses: Floats, ahead: Floats | float, left: Floats | float) -> Floats:
-    """Return the points (..., 2) [m] at offsets `ahead` and `left` (...) [m] in the frames of poses (..., 3)."""
+    """Return points (..., 2) [m] at offsets (...) [m] in the frames of poses (..., 3)."""
     cos, sin = np.cos(poses[..., 2]), np.sin(poses[..., 2])
     x = poses[..., 0] + ahead * cos - left * sin
     y = poses[..., 1] + ahead * sin + left * cos

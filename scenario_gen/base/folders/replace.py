@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Results take their places whole, by a rename, and replace only unchanged earlier results of their kind.
+"""Results take their places whole and replace only unchanged earlier ones of their kind.
 
 An earlier result has a marker, a file with its kind and the SHA-256 of every other file.
 """
@@ -162,7 +162,7 @@ def _check(target: Path, folder: Path, kind: Kind) -> None:
 
 
 def sha256_of(path: Path) -> str:
-    """Return the SHA-256 of a file, or of a folder's files in the order of their names, without its marker."""
+    """Return the SHA-256 of a file, or of a folder's files by name without its marker."""
     digest = hashlib.sha256()
     for file in sorted(path.rglob("*")) if path.is_dir() else [path]:
         if file.is_file() and (file == path or file.name != MARKER):

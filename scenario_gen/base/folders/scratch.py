@@ -1,7 +1,9 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Folders of intermediate files, removed with their command; the next command removes those of killed ones.
+"""Folders of intermediate files, which end with their command.
+
+The next command removes those of killed commands.
 
 .scenario_gen-NAME/lock   locked while the process lives; names the process
                   /new    files that are being written
@@ -98,7 +100,9 @@ def _acquire(lock: FileLock, folder: Path, purpose: Path, timeout_s: float) -> N
 
 
 def _emptied(folder: Path) -> bool:
-    """Remove the intermediate files in a locked folder; put an earlier result without a successor back.
+    """Remove the intermediate files in a locked folder.
+
+    An earlier result without a successor is put back.
 
     Returns:
         False if an earlier result stays, because something else has taken its place.
@@ -116,7 +120,7 @@ def _emptied(folder: Path) -> bool:
 
 
 def scratch(parent: Path) -> AbstractContextManager[Path]:
-    """Return an empty folder in `parent` that only this user may enter, and remove it at the end, as `claimed` does."""
+    """Return a private empty folder in `parent`, removed at the end as by `claimed`."""
     if parent == Path(tempfile.gettempdir()):
         sweep(parent)  # workers may be killed while their command continues
     folder = parent / f"{PREFIX}{token_hex(8)}"
@@ -137,7 +141,10 @@ def sweep_tree(folder: Path) -> None:
 
 
 def sweep_beside(arguments: Iterable[str]) -> None:
-    """`sweep` the folders in a command's arguments, their parents and subfolders, and that of temporary files."""
+    """`sweep` the folders in a command's arguments and that of temporary files.
+
+    Their parents and subfolders are included.
+    """
     folders = {Path(tempfile.gettempdir())}
     for argument in arguments:
         with suppress(OSError, ValueError):

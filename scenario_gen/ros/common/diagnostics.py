@@ -37,7 +37,7 @@ MAX_VALUES_CHARACTERS = 65_536  # of one status
 
 @dataclass(frozen=True)
 class _Entry:
-    """A status, when it was reported [s], how often in a row as a finding, and whether it is over."""
+    """A status, its time [s], its count in a row as a finding, and whether it is over."""
 
     status: Status
     since: float
@@ -138,7 +138,10 @@ class NodeDiagnostics:
             logger.error(message)
 
     def failed(self, name: str, error: BaseException) -> None:
-        """Report an error; the node continues. For a numbered job such as `get_plan 7` the subject is `get_plan`."""
+        """Report an error; the node continues.
+
+        For a numbered job such as `get_plan 7` the subject is `get_plan`.
+        """
         if not self._node.context.ok():
             return
         kind = type(error).__name__

@@ -1,7 +1,9 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""doctor: find what an environment lacks for this suite; `ros2 doctor` examines network, middleware and QoS.
+"""doctor: find what an environment lacks for this suite.
+
+`ros2 doctor` examines network, middleware and QoS.
 
 It imports only the standard library, so `python -m scenario_gen.ros.common.doctor` also runs
 where the command cannot start.
@@ -25,7 +27,12 @@ INTERFACES = (
     "rcl_interfaces", "rosgraph_msgs", "sensor_msgs", "std_msgs", "std_srvs", "trajectory_msgs",
     "visualization_msgs",
 )  # fmt: skip
-NODE_PROGRAM = "import rclpy; rclpy.init(); rclpy.create_node('doctor'); print(rclpy.get_rmw_implementation_identifier())"
+NODE_PROGRAM = """\
+import rclpy
+rclpy.init()
+rclpy.create_node("doctor")
+print(rclpy.get_rmw_implementation_identifier())
+"""
 
 
 @dataclass(frozen=True)
@@ -64,7 +71,10 @@ def examine(environment: Mapping[str, str] | None = None) -> Iterator[Finding]:
     action = importlib.util.find_spec("scenario_gen_interfaces")
     message = "scenario_gen_interfaces is here"
     if not (action and action.origin):
-        message = "scenario_gen_interfaces is not built: gp_sampler has no action generate_scenarios, only the service"
+        message = (
+            "scenario_gen_interfaces is not built: gp_sampler has no action generate_scenarios, "
+            "only the service"
+        )
     yield Finding(OK, "action", message)
     run = subprocess.run(
         [sys.executable, "-c", NODE_PROGRAM],

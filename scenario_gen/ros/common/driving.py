@@ -87,7 +87,9 @@ def stamp_of(state: State) -> int:
 
 
 def decode_command(topic: str, data: bytes, loop: ClosedLoop, child: str, step: int) -> EgoCommand:
-    """Return the command in a message; a damaged message, or one in another frame, has a fault instead.
+    """Return the command in a message.
+
+    A damaged message, or one in another frame, has a fault instead.
 
     Args:
         topic: one of `INPUTS`.
@@ -251,7 +253,7 @@ def encode_ego(loop: ClosedLoop, states: Sequence[State]) -> bytes:
 
 
 def _with_rates(loop: ClosedLoop, states: Sequence[State]) -> Floats:
-    """Return (N, 6) x, y [m], yaw [rad], speed [m/s], acceleration [m/s²], yaw rate [rad/s] of all vehicles."""
+    """Return (N, 6) x, y, yaw, speed, acceleration, yaw rate of all vehicles [SI units]."""
     before = states[0].vehicles
     now = states[-1].vehicles
     acceleration = (now[:, 3] - before[:, 3]) / loop.config.step

@@ -133,7 +133,7 @@ class Goals:
 
 
 def action_type() -> Any:
-    """Return the type of the action, None where scenario_gen_interfaces is not built or not sourced."""
+    """Return the type of the action, None where scenario_gen_interfaces is missing."""
     try:
         return importlib.import_module("scenario_gen_interfaces.action").Generate
     except (ImportError, AttributeError):  # a checkout has a folder with that name

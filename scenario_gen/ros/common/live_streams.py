@@ -70,7 +70,7 @@ class LiveStreams:
         self._timer = node.create_timer(CHECK_PERIOD_S, self._check, clock=steady)
 
     def _check(self) -> None:
-        """Forget refused streams that have ended, subscribe to new ones, and end the log after silence."""
+        """Forget ended streams, subscribe to new ones, and end the log after silence."""
         for topic in list(self._refused):
             if not self._node.get_publishers_info_by_topic(topic):
                 self._refused.discard(topic)
@@ -116,7 +116,7 @@ class LiveStreams:
         self._node.listen(topic, adapted_quality(topic, offers)[0])
 
     def _vehicles(self) -> list[str]:
-        """Return the vehicles in `log.vehicles`, or all that have a fix in the node's namespace."""
+        """Return the vehicles in `log.vehicles`, or all with a fix in the node's namespace."""
         if names := [token(name) for name in self._log.vehicles.split(",") if name.strip()]:
             return names
         namespace = re.escape(self._node.get_namespace().rstrip("/"))

@@ -47,7 +47,10 @@ class TrialTraffic(Traffic):
         self._sent_count = 0
 
     def _publish_state(self) -> None:
-        """Publish the last state, the same one again only after a while, because the planner may reply to each copy."""
+        """Publish the last state; repeat it only after a while.
+
+        The planner may reply to each copy.
+        """
         now = monotonic()
         state = self._states[-1]
         if state is not self._sent:
@@ -77,7 +80,7 @@ class TrialTraffic(Traffic):
             await self._wait_for_command(self._states[-1], LAST_REPLY_S)
 
     def _check_time(self, trial: Trial, start: float) -> None:
-        """Raise InputError if a drive with that start [s] takes too long, or the planner is silent for too long."""
+        """Raise InputError if a drive takes too long, or the planner is silent for too long."""
         now = monotonic()
         if now - start > self.config.drive.drive_time:
             raise too_long(trial, self.config.drive)
@@ -96,7 +99,7 @@ def drive_trials(
     planner: str,
     check: Callable[[], None],
 ) -> list[Outcome]:
-    """Drive a planner's node through every trial, in lock-step; return the outcomes in the trials' order.
+    """Drive a planner's node through all trials in lock-step; return their outcomes.
 
     Args:
         trials: scenarios, each with an ego and a road.

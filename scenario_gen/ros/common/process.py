@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The life of a process with nodes: create, compile kernels, spin, end by a signal or when all nodes are done.
+"""The life of a process with nodes: create, compile kernels, spin, end.
 
 rclpy's signal handlers are not installed, because they invalidate the context. Nodes can publish
 until they have ended.
@@ -49,7 +49,7 @@ NodeMaker = Callable[[str | None], Any]
 
 
 def run_nodes(makers: Sequence[NodeMaker], arguments: Sequence[str] | None = None) -> int:
-    """Spin one node of each maker per `--namespace` until Ctrl-C, SIGTERM, SIGHUP, or all are done.
+    """Spin one node of each maker per `--namespace` until a signal, or until all are done.
 
     Returns:
         The exit code.
@@ -173,7 +173,7 @@ def end_seconds(node: Any) -> float:
 
 
 def end_within(seconds: float) -> None:
-    """End the process after `seconds` in any case, with exit code 1 and its stack on standard error.
+    """End the process after `seconds`, with exit code 1 and its stack on standard error.
 
     DDS can deadlock in a call that holds Python's lock.
     """
@@ -218,7 +218,7 @@ def namespaces(arguments: Sequence[str]) -> list[str | None]:
 
 
 def kernels_ready(stages: Iterable[str], progress: Progress = lambda *_: None) -> int:
-    """Load the kernels of some stages, compile those that are not in the cache; return their number.
+    """Load or compile the kernels of some stages; return their number.
 
     A node imports its own stages only: all of them would cost seconds.
     """

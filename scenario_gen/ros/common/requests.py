@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The sampler's requests: its parameters, the open requests with their services, and their answers.
+"""The sampler's requests: its parameters, the open requests, and their answers.
 
 A request arrives by the service `~/generate` or the action `~/generate_scenarios`
 (generate_action.py).
@@ -194,7 +194,8 @@ class OpenRequests:
             names = ", ".join(list(self._open)[:MAX_NAMED_COUNT])
         if request is None or not self.cancel(request):
             raise InputError(f"no request {name!r} is open; open: {names or 'none'}")
-        return f"request {name} is cancelled, {request.accepted} of {request.n_requested} scenarios were found"
+        count = f"{request.accepted} of {request.n_requested}"
+        return f"request {name} is cancelled, {count} scenarios were found"
 
     def cancel(self, request: OpenRequest) -> bool:
         """Cancel a request; return False if it has ended."""
@@ -205,7 +206,7 @@ class OpenRequests:
         return bool(self._node.cancel(request.job))
 
     def report(self) -> None:
-        """Report the progress of the running request on /diagnostics, and now and then on the terminal."""
+        """Report the progress of the running request on /diagnostics and the terminal."""
         with self._lock:
             requests = list(self._open.values())
         running = next((each for each in requests if each.started_at is not None), None)
@@ -374,7 +375,7 @@ class OpenRequests:
     async def _wait_until_ready(
         self, _request: Trigger.Request, response: Trigger.Response
     ) -> Trigger.Response:
-        """Answer once a request with the node's parameters can be served, however long that takes."""
+        """Answer once a request with the node's parameters can be served."""
         await self._until(lambda: not self.missing(self._node.config))
         response.success = True
         response.message = "ready"

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""ROS parameters from configuration dataclasses: same names, types, ranges and meanings as on the command line.
+"""ROS parameters from configuration dataclasses, the same as on the command line.
 
 ROS tools guess a value's type from its text, each in its own way: `-p ego:=21202` is an integer,
 and `param load` reads the 1e-06 that `param dump` wrote as a text. So values are converted to the
@@ -37,7 +37,10 @@ STATE_PARAMETERS = ("starts", "goals")
 
 
 def descriptor(entry: "Field[Any]") -> ParameterDescriptor:
-    """Return the descriptor of a declared parameter, dynamically typed if `converted` may change the type."""
+    """Return the descriptor of a declared parameter.
+
+    It is dynamically typed if `converted` may change the type.
+    """
     meta = entry.metadata
     result = ParameterDescriptor(
         description=meta["meaning"] + _unit(entry),

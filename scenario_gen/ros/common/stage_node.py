@@ -80,7 +80,7 @@ def refuse_damaged(topic: str, data: bytes) -> None:
 
 @dataclass(frozen=True)
 class _Message:
-    """A message with its stamp and hash, and the hashes that it lists by topic if it is an info."""
+    """A message with stamp and hash, and the hashes by topic that an info lists."""
 
     data: bytes
     stamp: int
@@ -147,7 +147,7 @@ class Inputs:
         return silent + self._outdated() + self._unmatched()
 
     def _outdated(self) -> list[str]:
-        """Return the paired topics whose stamp is not that of the tracks, or else the newest one."""
+        """Return the paired topics without the stamp of the tracks, or without the newest one."""
         stamps = {topic: self._newest[topic].stamp for topic in self._paired & set(self._newest)}
         newest = stamps.get("tracks", max(stamps.values(), default=0))
         return sorted(topic for topic, stamp in stamps.items() if stamp != newest)
@@ -217,7 +217,10 @@ class StageNode(LifecycleNode):  # type: ignore[misc]
 
     @property
     def default_callback_group(self) -> ReentrantCallbackGroup:
-        """A reentrant one: in rclpy's default group a service that awaits its answer blocks all other callbacks."""
+        """A reentrant group.
+
+        In rclpy's default group a service that awaits its answer blocks all other callbacks.
+        """
         return self._callback_group
 
     @property
@@ -250,7 +253,7 @@ class StageNode(LifecycleNode):  # type: ignore[misc]
         """Forget the inputs; called at deactivation, when no job runs any more."""
 
     def listen(self, topic: str, quality: Quality | None = None) -> None:
-        """Subscribe `received` to one of the suite's topics, raw, with the declared or another quality."""
+        """Subscribe `received` to one of the suite's topics, raw, with any quality."""
         if topic not in self._subscribed:
             receive = self._receive_latched if topic_entry(topic)[1] == LATCHED else self._receive
             self._subscribed[topic] = create_subscription(
@@ -278,7 +281,9 @@ class StageNode(LifecycleNode):  # type: ignore[misc]
         job: Callable[[Callable[[], bool]], Result],
         failed: Callable[[BaseException], Result],
     ) -> Result:
-        """Run a job off the executor's thread for a service, also a job cancelled before its turn; return its result.
+        """Run a job off the executor's thread for a service; return its result.
+
+        A job that is cancelled before its turn runs, too.
 
         Args:
             name: of the job.
@@ -376,7 +381,10 @@ class StageNode(LifecycleNode):  # type: ignore[misc]
         super().destroy_node()
 
     def _receive_latched(self, topic: str, data: bytes) -> None:
-        """Ignore a repetition of the last message (its publisher restarted), unless the parameters changed."""
+        """Ignore a repetition of the last message, unless the parameters changed.
+
+        A publisher that restarted repeats it.
+        """
         if self._latched.get(topic) != (data, self.config):
             self._latched[topic] = (data, self.config)
             self._receive(topic, data)

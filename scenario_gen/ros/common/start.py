@@ -17,10 +17,12 @@ from scenario_gen.base.errors import InputError, print_error
 from scenario_gen.ros.node_names import COMPOSABLE, SUITE
 
 SUITE_HELP = """\
-suite: all nodes in one process with one executor, for small machines: `ros2 run scenario_gen suite`.
+suite: all nodes in one process with one executor, for small machines.
 
-A parameter applies to every node that has it: `--ros-args -p log_path:=LOG -p road_name:=straight -p seed:=7`.
-For one node, write it into a parameter file, or, without a namespace, after the node's name: `-p recorder:bag:=BAG`.
+A parameter applies to every node that has it:
+`--ros-args -p log_path:=LOG -p road_name:=straight -p seed:=7`.
+For one node, write it into a parameter file, or, without a namespace, after the node's name:
+`-p recorder:bag:=BAG`.
 `--nodes segmenter,planner` starts only these nodes. `player` starts only if `--nodes` names it.
 """
 

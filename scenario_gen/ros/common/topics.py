@@ -212,7 +212,9 @@ class Outputs:
     def paced(
         self, topics: Iterable[str], patience: float, report: Callable[[str, int], None]
     ) -> Iterator[None]:
-        """Let `send_paced` pace these topics inside; `report` gets the topic and the report of its `Pace`.
+        """Let `send_paced` pace these topics inside.
+
+        `report` gets the topic and the report of its `Pace`.
 
         Several threads may pace the same topics; they share the paces of the first thread.
         """
@@ -233,7 +235,9 @@ class Outputs:
                     self._paces.pop(topic).end()
 
     def send_paced(self, topic: str, data: bytes, stop: Callable[[], bool]) -> None:
-        """Publish as `send` does; on a paced topic once its subscribers have room, or `stop` returns True.
+        """Publish as `send` does; on a paced topic once its subscribers have room.
+
+        A `stop` that returns True ends the wait.
 
         After the last of the topics that are paced together, the executor gets a turn, so that
         nodes in this process can receive. Must not be called on the executor's thread.
@@ -328,7 +332,10 @@ def own_topics(node: Node) -> list[str]:
 
 
 def other_publishers(node: Node, topic: str) -> list[str]:
-    """Return the full names of other nodes that publish a topic, also of another node with the same name."""
+    """Return the full names of other nodes that publish a topic.
+
+    They include another node with the same name.
+    """
     names = [
         f"{info.node_namespace.rstrip('/')}/{info.node_name}"
         for info in node.get_publishers_info_by_topic(topic)
@@ -342,7 +349,9 @@ def other_publishers(node: Node, topic: str) -> list[str]:
 
 
 def yield_to_executor(executor: Executor | None, stop: Callable[[], bool]) -> None:
-    """Wait until an executor with several nodes has completed one round, in which each subscription receives.
+    """Wait until an executor with several nodes has completed one round.
+
+    Each subscription receives a message in it.
 
     Otherwise the calling worker could outrun the executor's thread without end.
     """
@@ -362,7 +371,10 @@ def acknowledgement_warning(node: Node, topic: str, count: int) -> str:
     name = node.resolve_topic_name(topic)
     message = f"a subscriber of {name} acknowledges nothing; it is not waited for any more"
     if count:
-        message = f"{count} messages of {name} were published without acknowledgement, a subscriber may lack them"
+        message = (
+            f"{count} messages of {name} were published without acknowledgement, "
+            "a subscriber may lack them"
+        )
     subscribers = sorted({info.node_name for info in node.get_subscriptions_info_by_topic(name)})
     return (
         f"{message} (subscribers: {', '.join(subscribers) or 'none any more'}); end the "

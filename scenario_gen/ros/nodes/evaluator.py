@@ -126,7 +126,8 @@ class Evaluator(StageNode):
             return
         self._last_message = math.inf
         for request in self._requests.incomplete(closed=True):
-            message = f"{request.sentence()}: they were lost, or published before this node listened; it is not evaluated"
+            cause = "they were lost, or published before this node listened"
+            message = f"{request.sentence()}: {cause}; it is not evaluated"
             self.status(Level.WARN, message, "requests", missing=str(request.missing))
 
     def _submit(self, messages: Mapping[str, bytes], request: TrackedRequest) -> None:

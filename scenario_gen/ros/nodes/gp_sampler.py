@@ -1,7 +1,9 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""gp_sampler: road, tracks, changepoints, fit and routes of one template in; checked `scenarios` and `scenarios/info` out.
+"""gp_sampler: a template with road, fit and routes in; checked `scenarios` out.
+
+`scenarios/info` describes each scenario.
 
 It generates when the inputs are complete, for the action `~/generate_scenarios`, and for the
 service `~/generate`. Their parameters are the node's own, valid for that request only, and

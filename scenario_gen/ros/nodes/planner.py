@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""planner: `map`, `tracks` and `changepoints` of one template in; `fit`, each `vehicle_<id>/route` and `fit/info` out.
+"""planner: `map`, `tracks`, `changepoints` of one template in; `fit` and routes out.
 
 `~/get_plan` (nav_msgs/GetPlan) plans on the newest map. An impossible plan is empty, and
 /diagnostics has the reason.
@@ -185,7 +185,7 @@ def query_of(request: Any, frame_id: str, radius: float) -> Query:
 
 
 def plan_poses(road: Road, query: Query, config: PlanningConfig, seed: int) -> Floats:
-    """Return (M, 3) x [m], y [m], yaw [rad] along the planned path; each yaw is that of the next edge.
+    """Return (M, 3) x, y [m], yaw [rad] along the planned path, with each next edge's yaw.
 
     Raises:
         RefusedError: the start or goal is blocked, there is no route, or the budget is spent.

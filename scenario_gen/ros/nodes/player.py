@@ -1,7 +1,9 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""player: a bag's messages as they were recorded, raw; `~/pause` and `~/resume`; any rosbag2 bag, MCAP or SQLite.
+"""player: a bag's messages as they were recorded, raw; `~/pause` and `~/resume`.
+
+It plays any rosbag2 bag, MCAP or SQLite.
 
 Each topic has the quality of service of its recording, or the one that the parameters
 `qos_overrides./topic.publisher.reliability` and its siblings set. With an offset, the earlier

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""preview: the scenario that was published last, in motion: frames on /tf and markers on `preview`, again and again.
+"""preview: the last published scenario in motion, on /tf and `preview`.
 
 It is for people who look: it keeps nobody waiting, and of many scenarios it takes the newest when
 the one that is shown ends. Frames are `preview/vehicle_<id>`, so that a player of the same

@@ -47,7 +47,7 @@ SUITE_TOPICS = (
 
 
 def default_topics(namespace: str) -> str:
-    """Return the regular expression of the suites' topics in a namespace and of the domain's topics."""
+    """Return the expression of the suites' topics in a namespace and the domain's topics."""
     prefix = re.escape(namespace.rstrip("/"))
     return rf"{prefix}(/.*)?/({SUITE_TOPICS}|{DOMAIN_TOPICS})|/({DOMAIN_TOPICS})"
 
@@ -115,7 +115,9 @@ class Recorder(Node):  # type: ignore[misc]
         self._subscribe_to_new()
 
     def stop(self, *, drain: bool = True) -> str:
-        """Close the bag, if one is open, after arrived messages unless `drain` is false; return its folder.
+        """Close the bag, if one is open; return its folder.
+
+        Messages that have arrived are recorded first, unless `drain` is false.
 
         Raises:
             InputError: the disk is full, or fails.
@@ -201,7 +203,9 @@ class Recorder(Node):  # type: ignore[misc]
         infos = self.get_publishers_info_by_topic(topic)
         nodes = sorted(f"{info.node_namespace.rstrip('/')}/{info.node_name}" for info in infos)
         if len(nodes) > 1:
-            return f"{topic}: {text}; {' and '.join(nodes)} publish it: end one of them, or give it another namespace"
+            publishers = " and ".join(nodes)
+            remedy_text = "end one of them, or give it another namespace"
+            return f"{topic}: {text}; {publishers} publish it: {remedy_text}"
         return f"{topic}: {text}; {remedy(text)}"
 
     def _warn(self, lost: Mapping[str, str]) -> None:

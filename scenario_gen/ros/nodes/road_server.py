@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""road_server: `map`, `road/entries`, `road/exits`; `~/get_map`, and `~/load_map` for another road.
+"""road_server: `map`, `road/entries`, `road/exits`; `~/get_map`, `~/load_map`.
 
 Built-in roads are sized to the template: the node publishes the road for each encounter on
 `tracks`, with its stamp. Without tracks it publishes the road in its default size with stamp 0

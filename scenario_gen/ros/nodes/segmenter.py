@@ -1,7 +1,9 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""segmenter: `tracks`, or the vehicles' streams, in; `changepoints` and `posterior` out; `~/segment` repeats it.
+"""segmenter: `tracks` or streams in; `changepoints`, `posterior` out.
+
+`~/segment` repeats the segmentation.
 
 While `vehicle_<id>/fix` and `vehicle_<id>/speed` arrive, confirmed changepoints are published on
 `changepoints/live`. At the end of the streams, or on `~/segment`, the buffered messages are read
@@ -109,7 +111,10 @@ class Segmenter(StageNode):
             encounter = max(result.encounters, key=lambda e: e.speed.size)
             notes = {f"note.{k}": note for k, note in enumerate(result.quality.lines())}
             n, samples = encounter.speed.shape
-            message = f"streams of {n} vehicles, {samples} samples; the largest of {len(result.encounters)} encounter(s)"
+            message = (
+                f"streams of {n} vehicles, {samples} samples; the largest of "
+                f"{len(result.encounters)} encounter(s)"
+            )
             self.status(Level.OK, message, "encounter", encounter.start_ns, **notes)
             self.outputs.send("tracks", encode_tracks(encounter))
 

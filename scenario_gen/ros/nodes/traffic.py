@@ -1,7 +1,9 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""traffic: drives the vehicles of a scenario around a planner's ego, in real time or in lock-step, and judges the planner.
+"""traffic: drives a scenario's vehicles around a planner's ego, and judges the planner.
+
+It runs in real time or in lock-step.
 
 Scenarios come from a bag, or live from `scenarios`, `scenarios/info`, `ego/witness` and `map`. The
 ego replaces one vehicle. `ego/cmd_vel`, `ego/cmd_vel_stamped`, `ego/trajectory`, `ego/path` or
@@ -216,7 +218,10 @@ class Traffic(Node):  # type: ignore[misc]
         return command.at(state), note
 
     def _multiple_replies(self, state: State) -> str:
-        """Return a note if a state has several replies in lock-step, except the first one, which is sent repeatedly."""
+        """Return a note if a state has several replies in lock-step.
+
+        The first state is sent repeatedly and may have several.
+        """
         if not self.config.lock_step or self._reply_count < 2 or state.step == 0:
             return ""
         return f"{self._reply_count} replies to one state; the last one before the step counts"
@@ -287,7 +292,7 @@ class Traffic(Node):  # type: ignore[misc]
     async def _serve_step(
         self, _: Trigger.Request, response: Trigger.Response
     ) -> Trigger.Response:
-        """Step with a command that arrived after the previous step, or after the patience without one."""
+        """Step with a command for the last state, or after the patience without one."""
         loop = self._loop
         if loop is None or self._verdict or not self.config.lock_step:
             response.message = self._step_refusal()
@@ -307,7 +312,7 @@ class Traffic(Node):  # type: ignore[misc]
             self._advance(loop)
 
     async def _wait_for_command(self, state: State, patience: float) -> None:
-        """Return when a command for this state has arrived, or after `patience` [s] of real time."""
+        """Return when a command for this state arrives, or after `patience` [s] of real time."""
         if self._received is not None and self._received.step >= state.step:
             return
         await self._next_command(monotonic() + patience)
