@@ -1,10 +1,10 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Bags of rosbag2 and of ROS 1: per-vehicle fixes and speeds, odometry, or tracks that are encounters already."""
+"""Bags of rosbag2 and ROS 1: fixes and speeds, odometry, tracked objects, or recorded encounters."""
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 import math
 from pathlib import Path
@@ -25,17 +25,25 @@ from scenario_gen.bags.vehicles import (
 )
 from scenario_gen.base.errors import InputError
 from scenario_gen.logs.config import listed, LogConfig
-from scenario_gen.logs.raw import check_size, check_vehicles, RawLog, Rows, Segment
+from scenario_gen.logs.raw import check_size, check_vehicles, Observations, RawLog, Rows, Segment
 from scenario_gen.types import Encounter
 
-AT_START_M = 0.5  # m from a frame's origin, in which two vehicles cannot be at once
-SPAWNED_S = 1.0  # s after which another one may begin there
-USED = (FIX, TWIST, ODOMETRY, TRACKS, TRACKED)
+_AT_ORIGIN_M = 0.5  # within it, two vehicles cannot be at the same time
+_SAME_START_NS = 1e9  # a later vehicle may start at the origin, too
+_READABLE_TYPES = (FIX, TWIST, ODOMETRY, TRACKS, TRACKED)
 
 
 @dataclass
 class Topic:
-    """The messages of one topic: log stamps and CDR bytes, in the order of the log; `label` names the log in messages."""
+    """The messages of one topic in the order of the log.
+
+    Attributes:
+        name: full name.
+        type: of the messages.
+        label: the log's name in messages to the user.
+        stamps: log stamps [ns].
+        data: CDR bytes.
+    """
 
     name: str
     type: str
@@ -43,123 +51,141 @@ class Topic:
     stamps: list[int] = field(default_factory=list)
     data: list[bytes] = field(default_factory=list)
 
-    @property
-    def where(self) -> str:
-        """Log and topic."""
-        return f"{self.label}, topic {self.name}"
+    def where(self, number: int) -> str:
+        """Name the log, the topic and a message."""
+        return f"{self.label}, topic {self.name}, message {number}"
 
-    def segment(self, row: int) -> Segment:
-        """Return the place of its messages, which are the rows of the log from `row` on."""
-        return Segment(row, self.where, "message", 1)
+    def segment(self, first_row: int) -> Segment:
+        """Return the place of its messages, which are rows of the log from `first_row` on."""
+        return Segment(first_row, f"{self.label}, topic {self.name}", "message", 1)
 
 
 def read(paths: Sequence[Path], config: LogConfig) -> RawLog:
-    """Read the topics that this project knows; several bags are one log."""
-    topics = read_topics(paths, config)
+    """Read the known topics; several bags are one log.
+
+    Raises:
+        InputError: a bag is damaged or too large, or its topics do not give positions.
+    """
+    topics = _read_topics(paths, config)
     name = paths[0].stem if paths[0].is_file() else paths[0].name
-    for kind, read_kind in ((TRACKS, read_tracks), (TRACKED, read_tracked)):
-        if own := [topic for topic in topics if topic.type == kind]:
-            return read_kind(own, name, [topic.name for topic in topics if topic.type != kind])
-    return read_streams(topics, name, config)
+    tracks = [topic for topic in topics if topic.type == TRACKS]
+    tracked = [topic for topic in topics if topic.type == TRACKED]
+    if tracks:
+        log = _read_encounters(tracks, name)
+    elif tracked:
+        log = _read_tracked(tracked, name)
+    else:
+        return _read_streams(topics, name, config)
+    kind = TRACKS if tracks else TRACKED
+    others = [topic.name for topic in topics if topic.type != kind]
+    if not others:
+        return log
+    note = f"not read: {', '.join(others)}; choose topics with --set log.topics=…"
+    return replace(log, notes=(*log.notes, note))
 
 
-def read_topics(paths: Sequence[Path], config: LogConfig) -> list[Topic]:
-    """Read the messages of all topics that can be used, sorted by name.
+def _read_topics(paths: Sequence[Path], config: LogConfig) -> list[Topic]:
+    """Read the messages of all usable topics, by name.
 
     Raises:
         InputError: a file is damaged or too large, or no topic can be used.
     """
-    listed_topics = listed(config.topics)
+    requested = listed(config.topics)
     label = str(paths[0]) if len(paths) == 1 else f"{paths[0]} and {len(paths) - 1} more"
-    topics: dict[str, Topic] = {}
-    seen: dict[str, str] = {}
     bounds = BagConfig(most_bytes=config.size_limit << 20)
-    rows = 0
+    topics: dict[str, Topic] = {}
+    types: dict[str, str] = {}
+    n_rows = 0
+
+    def is_used(topic: str, kind: str) -> bool:
+        if requested:
+            return topic in requested and kind in _READABLE_TYPES
+        is_other_trajectory = kind == TRACKS and topic.rpartition("/")[2] != "tracks"
+        return kind in _READABLE_TYPES and not is_other_trajectory
+
     for path in paths:
         with open_bag(path, bounds, "log.size_limit") as bag:
-            seen |= {topic.name: topic.type for topic in bag.topics()}
-            for message in bag.messages(lambda name, kind: is_used(name, kind, listed_topics)):
-                rows += 1
-                check_size(str(path), 0, rows, config)
+            types |= {topic.name: topic.type for topic in bag.topics()}
+            for message in bag.messages(is_used):
+                n_rows += 1
+                check_size(str(path), 0, n_rows, config)
                 topic = topics.setdefault(message.topic, Topic(message.topic, message.type, label))
                 topic.stamps.append(message.stamp_ns)
                 topic.data.append(message.data)
-    for name in listed_topics:
-        if name not in seen:
-            raise InputError(
-                f"parameter topics: {paths[0]} has no topic {name!r}; it has {listing(seen)}"
-            )
-        if seen[name] not in USED:
-            raise InputError(
-                f"{paths[0]}, topic {name}: type {seen[name]} is not one of {', '.join(USED)}"
-            )
+    _check_requested(requested, types, paths[0])
     if not topics:
         raise InputError(
-            f"{paths[0]}: no topic to read. It has {listing(seen)}. Needed is {FIX} with {TWIST}, or {ODOMETRY}, one per "
-            f"vehicle, or a topic named tracks of {TRACKS}, or {TRACKED}; the parameter topics chooses by name"
+            f"{paths[0]}: no topic to read, it has {_listing(types)}. Needed per vehicle: {FIX} "
+            f"with {TWIST}, or {ODOMETRY}; or a topic named tracks of {TRACKED} or {TRACKS}; "
+            "choose others by name with --set log.topics=…"
         )
     return [topics[name] for name in sorted(topics)]
 
 
-def is_used(topic: str, kind: str, topics: list[str]) -> bool:
-    """Return whether a topic is read; of trajectories only those called tracks, unless `topics` names some."""
-    if topics:
-        return topic in topics and kind in USED
-    return kind in USED and (kind != TRACKS or topic.rpartition("/")[2] == "tracks")
+def _check_requested(requested: Sequence[str], types: Mapping[str, str], path: Path) -> None:
+    """Check the topics that the parameter names.
+
+    Raises:
+        InputError: one does not exist, or has another type.
+    """
+    for name in requested:
+        if name not in types:
+            raise InputError(
+                f"parameter topics: {path} has no topic {name!r}; it has {_listing(types)}"
+            )
+        if types[name] not in _READABLE_TYPES:
+            raise InputError(
+                f"{path}, topic {name}: type {types[name]} is not one of "
+                f"{', '.join(_READABLE_TYPES)}"
+            )
 
 
-def listing(kinds: dict[str, str]) -> str:
+def _listing(types: Mapping[str, str]) -> str:
     """Return topics and types for a message."""
-    return ", ".join(f"{name} ({kind})" for name, kind in sorted(kinds.items())) or "no topics"
+    return ", ".join(f"{name} ({kind})" for name, kind in sorted(types.items())) or "no topics"
 
 
-def vehicle_id(topic: str) -> str:
-    """Return the vehicle of a topic: its namespace, without the prefix `vehicle_` that this project writes."""
-    namespace = topic.strip("/").rpartition("/")[0]
-    return namespace.rpartition("/")[2].removeprefix("vehicle_") or topic.strip("/")
+def _listing_of(topics: Iterable[Topic]) -> str:
+    return _listing({topic.name: topic.type for topic in topics})
 
 
-def read_streams(topics: list[Topic], name: str, config: LogConfig) -> RawLog:
+def _read_streams(topics: Sequence[Topic], name: str, config: LogConfig) -> RawLog:
     """Collect fixes, speeds and odometry per vehicle.
 
     Raises:
-        InputError: a message is damaged, positions are of two kinds, or a vehicle has none, or there are too many vehicles.
+        InputError: a message is damaged, positions have two types, or a vehicle has none.
     """
     label = topics[0].label
     if len({topic.type == ODOMETRY for topic in topics if topic.type != TWIST}) > 1:
-        mixed = listing({topic.name: topic.type for topic in topics})
         raise InputError(
-            f"{label} has both {FIX} and {ODOMETRY} ({mixed}); choose with the parameter topics"
+            f"{label} has both {FIX} and {ODOMETRY} ({_listing_of(topics)}); choose with "
+            "--set log.topics=…"
         )
-    vehicles: dict[str, Rows] = {}
-    segments: list[Segment] = []
-    unstamped: list[str] = []
-    frames: dict[str, str] = {}  # of odometry, by vehicle
-    owners = find_owners(topics)
+    owners = _find_owners(topics)
     check_vehicles(label, len(set(owners.values())), config)
-    row = 0
+    vehicles: dict[str, Rows] = {}
+    odometry_frames: dict[str, str] = {}
+    segments = []
+    unstamped = []
+    n_rows = 0
     for topic in topics:
-        segments.append(topic.segment(row))
-        frame, is_unstamped = collect(topic, vehicles.setdefault(owners[topic.name], Rows()), row)
-        frames |= {owners[topic.name]: frame} if topic.type == ODOMETRY else {}
-        unstamped += [topic.name] if is_unstamped else []
-        row += len(topic.data)
-    notes = check_frames(label, frames, vehicles)
-    silent = [
-        owners[topic.name]
-        for topic in topics
-        if topic.type == TWIST and not vehicles[owners[topic.name]].fixes
-    ]
-    if silent:
-        raise InputError(
-            f"{label}: there are speeds but no positions of {', '.join(silent)}; put {FIX} and {TWIST} in one namespace"
-        )
+        owner = owners[topic.name]
+        segments.append(topic.segment(n_rows))
+        frame, has_stamps = _collect(topic, vehicles.setdefault(owner, Rows()), n_rows)
+        if topic.type == ODOMETRY:
+            odometry_frames[owner] = frame
+        if not has_stamps:
+            unstamped.append(topic.name)
+        n_rows += len(topic.data)
+    _check_positions(topics, owners, vehicles)
+    notes = _check_frames(label, odometry_frames, vehicles)
     if unstamped:
-        notes += [
-            f"{len(unstamped)} topic(s) have no header stamps; the time of reception is used: {', '.join(unstamped)}"
-        ]
+        notes.append(
+            f"{len(unstamped)} topic(s) have no header stamps; the time of reception is used: "
+            f"{', '.join(unstamped)}"
+        )
     notes += [
-        f"vehicle {vehicle} has no speeds: taken from its positions"
+        f"vehicle {vehicle} has no speeds: derived from its positions"
         for vehicle, rows in vehicles.items()
         if not rows.speeds
     ]
@@ -167,159 +193,195 @@ def read_streams(topics: list[Topic], name: str, config: LogConfig) -> RawLog:
         name=name,
         geographic=any(topic.type == FIX for topic in topics),
         vehicles=tuple(rows.observations(vehicle) for vehicle, rows in vehicles.items()),
-        rows=row,
+        rows=n_rows,
         segments=tuple(segments),
         notes=tuple(notes),
     )
 
 
-def find_owners(topics: list[Topic]) -> dict[str, str]:
-    """Return the vehicle of each topic by its namespace; by the level in which they differ, where several topics share the last.
+def _check_positions(
+    topics: Sequence[Topic], owners: Mapping[str, str], vehicles: Mapping[str, Rows]
+) -> None:
+    """Check that each vehicle with speeds has positions.
+
+    Raises:
+        InputError: one has none.
+    """
+    owners_of_speeds = [owners[topic.name] for topic in topics if topic.type == TWIST]
+    without = [vehicle for vehicle in owners_of_speeds if not vehicles[vehicle].fixes]
+    if without:
+        raise InputError(
+            f"{topics[0].label}: speeds but no positions of {', '.join(without)}; put {FIX} and "
+            f"{TWIST} into one namespace"
+        )
+
+
+def _find_owners(topics: Sequence[Topic]) -> dict[str, str]:
+    """Return the vehicle of each topic: its namespace, or the first level in which topics differ.
 
     Raises:
         InputError: two topics of one type share a namespace.
     """
-    owners = {topic.name: vehicle_id(topic.name) for topic in topics}
-    parts = {topic.name: topic.name.strip("/").split("/")[:-1] for topic in topics}
-    for level in range(min(map(len, parts.values()))):
+    owners = {topic.name: _vehicle_of(topic.name) for topic in topics}
+    levels = {topic.name: topic.name.strip("/").split("/")[:-1] for topic in topics}
+    for level in range(min(map(len, levels.values()))):
         if len({(owners[topic.name], topic.type) for topic in topics}) == len(topics):
             break
-        owners = {name: own[level].removeprefix("vehicle_") or name for name, own in parts.items()}
+        owners = {
+            name: parts[level].removeprefix("vehicle_") or name for name, parts in levels.items()
+        }
     taken: dict[tuple[str, str], str] = {}
     for topic in topics:
-        other = taken.setdefault((owners[topic.name], topic.type), topic.name)
+        owner = owners[topic.name]
+        other = taken.setdefault((owner, topic.type), topic.name)
         if other != topic.name:
             raise InputError(
-                f"{topic.label}: {other} and {topic.name} are both {topic.type} of vehicle {owners[topic.name]}; choose one with "
-                "the parameter topics, or record each vehicle in a namespace of its own"
+                f"{topic.label}: {other} and {topic.name} are both {topic.type} of vehicle "
+                f"{owner}; choose one with --set log.topics=…, or record each vehicle in its own "
+                "namespace"
             )
     return owners
 
 
-def collect(topic: Topic, vehicle: Rows, row: int) -> tuple[str, bool]:
-    """Decode the messages of a topic, rows from `row` on, for a vehicle; return its frame, and whether headers bear no stamps."""
-    frame, unstamped = "", False
-    for number, (received, data) in enumerate(zip(topic.stamps, topic.data, strict=True)):
-        sample = decode_sample(data, topic.type, f"{topic.where}, message {number + 1}")
+def _vehicle_of(topic: str) -> str:
+    """Return the namespace of a topic, without the prefix `vehicle_` that this project writes."""
+    namespace = topic.strip("/").rpartition("/")[0]
+    return namespace.rpartition("/")[2].removeprefix("vehicle_") or topic.strip("/")
+
+
+def _collect(topic: Topic, vehicle: Rows, first_row: int) -> tuple[str, bool]:
+    """Add the messages of a topic, rows from `first_row` on, to a vehicle.
+
+    Returns:
+        The frame, and whether all headers have stamps.
+
+    Raises:
+        InputError: a message is damaged.
+    """
+    frame = ""
+    has_stamps = True
+    for row, (received_ns, data) in enumerate(
+        zip(topic.stamps, topic.data, strict=True), first_row
+    ):
+        sample = decode_sample(data, topic.type, topic.where(row - first_row + 1))
         frame = frame or sample.frame
-        unstamped |= sample.stamp_ns == 0
-        stamp = sample.stamp_ns or received
+        has_stamps = has_stamps and sample.stamp_ns != 0
+        stamp_ns = sample.stamp_ns or received_ns
         if sample.position is not None:
-            vehicle.fixes.append((stamp, row + number, *sample.position, sample.heading))
+            vehicle.fixes.append((stamp_ns, row, *sample.position, sample.heading))
         if sample.speed is not None:
-            vehicle.speeds.append((stamp, row + number, sample.speed))
-    return frame, unstamped
+            vehicle.speeds.append((stamp_ns, row, sample.speed))
+    return frame, has_stamps
 
 
-def check_frames(label: str, frames: dict[str, str], vehicles: dict[str, Rows]) -> list[str]:
+def _check_frames(
+    label: str, frames: Mapping[str, str], vehicles: Mapping[str, Rows]
+) -> list[str]:
     """Return notes on the frames of odometries, by vehicle.
 
     Raises:
-        InputError: each counts from where it started, or from a vehicle that moves: they have no frame in common.
+        InputError: a frame moves, or each odometry starts at its vehicle's start: they have no
+            common frame.
     """
     for vehicle, frame in frames.items():
-        refuse_moving(frame, f"{label}: the odometry of vehicle {vehicle}")
-    first = {
+        _check_fixed_frame(frame, f"{label}: the odometry of vehicle {vehicle}")
+    first_fixes = {
         vehicle: min(vehicles[vehicle].fixes) for vehicle in frames if vehicles[vehicle].fixes
     }
-    began = [
-        vehicle for vehicle, (_, _, x, y, _) in first.items() if math.hypot(x, y) < AT_START_M
+    at_origin = [
+        vehicle
+        for vehicle, (_, _, x, y, _) in first_fixes.items()
+        if math.hypot(x, y) < _AT_ORIGIN_M
     ]
-    at_once = (
-        len(began) >= 2 and np.ptp([first[vehicle][0] for vehicle in began]) < 1e9 * SPAWNED_S
-    )
-    named = ", ".join(f"{vehicle} in {frame!r}" for vehicle, frame in frames.items())
-    if at_once or len({frames[vehicle] for vehicle in began}) >= 2:
+    starts_ns = [first_fixes[vehicle][0] for vehicle in at_origin]
+    start_together = len(at_origin) >= 2 and np.ptp(starts_ns) < _SAME_START_NS
+    names = ", ".join(f"{vehicle} in {frame!r}" for vehicle, frame in frames.items())
+    if start_together or len({frames[vehicle] for vehicle in at_origin}) >= 2:
         raise InputError(
-            f"{label}: the odometries of {' and '.join(began)} begin at 0, 0, each where its vehicle started ({named}); record "
-            "positions in one frame, such as map, or choose with the parameter topics"
+            f"{label}: the odometries of {' and '.join(at_origin)} begin at 0, 0, each where its "
+            f"vehicle started ({names}); record positions in one frame, such as map, or choose "
+            "with --set log.topics=…"
         )
-    return (
-        [f"the odometries name several frames ({named}); they are read as one"]
-        if len(set(frames.values())) > 1
-        else []
-    )
+    if len(set(frames.values())) > 1:
+        return [f"the odometries name several frames ({names}); they are read as one"]
+    return []
 
 
-def refuse_moving(frame: str, what: str) -> None:
-    """Refuse positions in the frame of a vehicle that moves.
+def _check_fixed_frame(frame: str, what: str) -> None:
+    """Check that positions are not in the frame of a moving vehicle.
 
     Raises:
         InputError: they are.
     """
     if frame.rpartition("/")[2].startswith("base_"):
         raise InputError(
-            f"{what} is in frame {frame!r}, which moves with its vehicle; record it in a frame that stands, such as map"
+            f"{what} is in frame {frame!r}, which moves with its vehicle; record it in a fixed "
+            "frame, such as map"
         )
 
 
-def read_tracks(topics: list[Topic], name: str, others: list[str]) -> RawLog:
-    """Read tracks: each message on an even clock is an encounter as it stands, without any cleaning; repeats count once.
+def _read_encounters(topics: Sequence[Topic], name: str) -> RawLog:
+    """Read recorded encounters, one per message, without cleaning; repeats count once.
 
-    Args:
-        topics: those of tracks.
-        name: of the log.
-        others: names of the topics that could be read instead.
+    Raises:
+        InputError: a message is damaged.
     """
+    n_encounters = len({data for topic in topics for data in topic.data})
     encounters: list[Encounter] = []
-    segments, row = [], 0
-    whole = len({data for topic in topics for data in topic.data})
+    segments = []
+    n_rows = 0
     for topic in topics:
-        segments.append(topic.segment(row))
-        row += len(topic.data)
-        for number, data in enumerate(dict.fromkeys(topic.data)):
-            found = decode_tracks(data, f"{topic.where}, message {number + 1}")
-            encounters.append(
-                replace(found, name=name if whole == 1 else f"{name}-{len(encounters) + 1}")
-            )
-    known = ", ".join(topic.name for topic in topics)
-    notes = (
-        (f"read from {known}; the parameter topics can choose {', '.join(others)}",)
-        if others
-        else ()
-    )
-    return RawLog(name, False, (), row, tuple(segments), notes, encounters=tuple(encounters))
+        segments.append(topic.segment(n_rows))
+        n_rows += len(topic.data)
+        for number, data in enumerate(dict.fromkeys(topic.data), 1):
+            encounter = decode_tracks(data, topic.where(number))
+            suffix = f"-{len(encounters) + 1}" if n_encounters > 1 else ""
+            encounters.append(replace(encounter, name=f"{name}{suffix}"))
+    return RawLog(name, False, (), n_rows, tuple(segments), encounters=tuple(encounters))
 
 
-def read_tracked(topics: list[Topic], name: str, others: list[str]) -> RawLog:
-    """Read the objects that a perception tracks; a type is the most frequent label.
+@dataclass
+class _TrackedVehicle:
+    """The observations of one tracked object: states, sizes [m] and labels."""
 
-    Args:
-        topics: of tracked objects, one.
-        name: of the log.
-        others: names of the topics that could be read instead.
+    rows: Rows = field(default_factory=Rows)
+    sizes: list[tuple[float, float]] = field(default_factory=list)
+    kinds: Counter[str] = field(default_factory=Counter)
+
+    def observations(self, name: str) -> Observations:
+        """Return the states with the median size and the most frequent label."""
+        length, width = np.median(np.array(self.sizes), axis=0).tolist()
+        kind = self.kinds.most_common(1)[0][0]
+        return replace(self.rows.observations(name), length=length, width=width, kind=kind)
+
+
+def _read_tracked(topics: Sequence[Topic], name: str) -> RawLog:
+    """Read the objects that a perception tracks.
 
     Raises:
         InputError: a message is damaged, or there are several topics or frames.
     """
-    topic, frames = topics[0], set()
+    topic = topics[0]
     if len(topics) > 1:
-        listed_topics = listing({t.name: t.type for t in topics})
         raise InputError(
-            f"{topic.label} has {listed_topics}; choose one with the parameter topics"
+            f"{topic.label} has {_listing_of(topics)}; choose one with --set log.topics=…"
         )
-    vehicles: dict[str, Rows] = {}
-    sizes: dict[str, list[tuple[float, float]]] = {}
-    kinds: dict[str, Counter[str]] = {}
-    for row, (received, data) in enumerate(zip(topic.stamps, topic.data, strict=True)):
-        where = f"{topic.where}, message {row + 1}"
-        stamp, frame, objects = decode_tracked(data, where)
-        refuse_moving(frame, where)
-        frames.add(frame)
-        if len(frames) > 1:
-            raise InputError(f"{where}: frame {frame!r} differs from that of the messages before")
-        for item in objects:
-            kinds.setdefault(item.id, Counter())[item.kind] += 1
-            rows = vehicles.setdefault(item.id, Rows())
-            rows.fixes.append((stamp or received, row, *item.position, item.heading))
-            rows.speeds.append((stamp or received, row, item.speed))
-            sizes.setdefault(item.id, []).append(item.size)
-    notes = [f"read from {topic.name} in frame {next(iter(frames), '')!r}"]
-    if others:
-        notes.append(f"the parameter topics can choose {', '.join(others)}")
-    found = []
-    for vehicle, rows in vehicles.items():
-        length, width = np.median(np.array(sizes[vehicle]), axis=0).tolist()
-        kind = kinds[vehicle].most_common(1)[0][0]
-        found.append(replace(rows.observations(vehicle), length=length, width=width, kind=kind))
-    return RawLog(name, False, tuple(found), len(topic.data), (topic.segment(0),), tuple(notes))
+    vehicles: dict[str, _TrackedVehicle] = {}
+    first_frame = ""
+    for row, (received_ns, data) in enumerate(zip(topic.stamps, topic.data, strict=True)):
+        where = topic.where(row + 1)
+        header_ns, frame, objects = decode_tracked(data, where)
+        _check_fixed_frame(frame, where)
+        first_frame = frame if row == 0 else first_frame
+        if frame != first_frame:
+            raise InputError(f"{where}: frame {frame!r} differs from {first_frame!r} before")
+        stamp_ns = header_ns or received_ns
+        for tracked in objects:
+            vehicle = vehicles.setdefault(tracked.id, _TrackedVehicle())
+            vehicle.rows.fixes.append((stamp_ns, row, *tracked.position, tracked.heading))
+            vehicle.rows.speeds.append((stamp_ns, row, tracked.speed))
+            vehicle.sizes.append(tracked.size)
+            vehicle.kinds[tracked.kind] += 1
+    observations = tuple(vehicle.observations(key) for key, vehicle in vehicles.items())
+    note = f"read from {topic.name} in frame {first_frame!r}"
+    return RawLog(name, False, observations, len(topic.data), (topic.segment(0),), (note,))

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""What logs call the types of road users, and which of them are read."""
+"""Types of road users in logs, and which of them are read."""
 
 from collections import Counter
 from collections.abc import Mapping
@@ -14,8 +14,8 @@ from scenario_gen.logs.config import listed, LogConfig
 from scenario_gen.logs.raw import Observations, RawLog
 from scenario_gen.types import CAR, OTHER, VEHICLE_TYPES, words
 
-NO_ROAD_USERS = frozenset(
-    (
+_NOT_ROAD_USERS = frozenset(
+    [
         "animal",
         "dog",
         "cone",
@@ -29,66 +29,64 @@ NO_ROAD_USERS = frozenset(
         "train",
         "watercraft",
         "aircraft",
-    )
+    ]
 )
-UNTOLD = frozenset(
-    ("", "nan", "none", "vehicle", "land vehicle", "motor vehicle", "default vehtype")
-)
-"""Words that say nothing of the type: it is told from the size."""
+_UNSPECIFIC = ("", "nan", "none", "vehicle", "land vehicle", "motor vehicle", "default vehtype")
 
 
 @cache
 def type_called(word: str) -> str | None:
-    """Return the type that a log means by a word, "" where the size tells it, None where it is not known."""
+    """Return the type for a log's word, "" if its size determines it, None if it is unknown."""
     plain = _plain(word)
-    if plain in UNTOLD:
+    if plain in _UNSPECIFIC:
         return ""
-    known = {_plain(each): name for each, name in words().items()}
+    known = {_plain(name): kind for name, kind in words().items()}
     parts = plain.split()
-    found = [
-        part
-        for part in (plain, *parts, *(part.removesuffix("s") for part in parts))
-        if part in known
-    ]
-    return known[max(found, key=len)] if found else None
+    singular = [part.removesuffix("s") for part in parts]
+    matches = [part for part in (plain, *parts, *singular) if part in known]
+    return known[max(matches, key=len)] if matches else None
 
 
 def _plain(word: str) -> str:
+    """Return the letters of a word in lower case."""
     return " ".join(re.findall(r"[a-z]+", word.lower()))
 
 
-def is_road_user(word: str) -> bool:
-    """Return whether who is so called takes part in traffic on a road."""
-    return NO_ROAD_USERS.isdisjoint(_plain(word).split())
+def _is_road_user(word: str) -> bool:
+    """Return whether a log's word denotes a road user."""
+    return _NOT_ROAD_USERS.isdisjoint(_plain(word).split())
 
 
 def typed(log: RawLog, config: LogConfig) -> RawLog:
-    """Return a log with types in place of what it calls them; a note counts who is left out, and what is not known.
+    """Return a log with types instead of its words; it counts road users that are left out.
 
     Raises:
-        InputError: the parameter `types` names one that there is not.
+        InputError: the parameter `types` names an unknown type.
     """
     wanted = listed(config.types)
     for name in wanted:
         if name not in VEHICLE_TYPES:
             known = VEHICLE_TYPES.names()
-            near = did_you_mean(name, known)
             raise InputError(
-                f"parameter log.types: there is no type {name!r}; choose one of {', '.join(known)}{near}"
+                f"parameter log.types: there is no type {name!r}; choose one of "
+                f"{', '.join(known)}{did_you_mean(name, known)}"
             )
-    left_out, unknown = Counter[str](), Counter[str]()
-    kept: list[Observations] = []
-    for seen in log.vehicles:
-        called = type_called(seen.kind)
-        if not is_road_user(seen.kind) or (wanted and (called or OTHER) not in wanted):
-            left_out[seen.kind] += 1
+    excluded: Counter[str] = Counter()
+    unknown: Counter[str] = Counter()
+    vehicles: list[Observations] = []
+    for vehicle in log.vehicles:
+        word = vehicle.kind
+        kind = type_called(word)
+        if not _is_road_user(word) or (wanted and (kind or OTHER) not in wanted):
+            excluded[word] += 1
             continue
-        unknown[seen.kind] += called is None
-        kept.append(replace(seen, kind=called or ""))
+        if kind is None:
+            unknown[word] += 1
+        vehicles.append(replace(vehicle, kind=kind or ""))
     notes = log.notes
-    if +unknown:
-        notes = (*notes, f"types that are not known, read by size: {counted(+unknown)}")
-    return replace(log, vehicles=tuple(kept), notes=notes, excluded=left_out)
+    if unknown:
+        notes = (*notes, f"unknown types, guessed from the sizes: {counted(unknown)}")
+    return replace(log, vehicles=tuple(vehicles), notes=notes, excluded=excluded)
 
 
 def counted(counts: Mapping[str, int]) -> str:
@@ -99,7 +97,7 @@ def counted(counts: Mapping[str, int]) -> str:
 
 
 def usual_size(name: str, config: LogConfig) -> tuple[float, float]:
-    """Return length and width [m] of a type of which the log says no sizes: the parameters' of a car, and where none is known."""
+    """Return length and width [m] of a type, if a log has none; a car's are parameters."""
     if name in ("", CAR, OTHER):
         return config.length, config.width
     return VEHICLE_TYPES[name].length, VEHICLE_TYPES[name].width

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Logs that are packed, .gz or .zip: unpacked to temporary files while they are read, within the bound on sizes."""
+"""Packed logs (.gz, .zip), unpacked to temporary files within the bound on sizes."""
 
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
@@ -18,20 +18,21 @@ from scenario_gen.logs.config import LogConfig
 from scenario_gen.logs.formats import is_packed, without_packing
 from scenario_gen.logs.raw import check_size
 
-MOST_FILES = 10_000  # in a .zip
-DAMAGE = (
+_MAX_FILE_COUNT = 10_000  # in a .zip
+_BLOCK_BYTES = 1 << 20
+_DAMAGE = (
     OSError,
     EOFError,
     zlib.error,
     zipfile.BadZipFile,
-    RuntimeError,
-    NotImplementedError,
-)  # or a password, or a method
+    RuntimeError,  # a password
+    NotImplementedError,  # a compression method
+)
 
 
 @contextmanager
 def unpacked(paths: Sequence[Path], config: LogConfig) -> Iterator[list[Path]]:
-    """Give the paths, those of packed files as the file, or the folder of several files, that is in them.
+    """Yield the paths; a packed file is replaced by its only file, or a folder of its files.
 
     Raises:
         InputError: a file is damaged, or too large when unpacked.
@@ -40,40 +41,55 @@ def unpacked(paths: Sequence[Path], config: LogConfig) -> Iterator[list[Path]]:
     if not packed:
         yield list(paths)
         return
-    with scratch(temporary()) as place:
-        targets = {k: place / str(k) / without_packing(path).name for k, path in packed.items()}
-        with naming_objects({str(targets[k]): str(path) for k, path in packed.items()}):
-            room = config.size_limit << 20
+    with scratch(temporary()) as folder:
+        targets = {k: folder / str(k) / without_packing(path).name for k, path in packed.items()}
+        names = {str(targets[k]): str(path) for k, path in packed.items()}
+        with naming_objects(names):
+            left_bytes = config.size_limit << 20
             for k, path in packed.items():
                 targets[k].parent.mkdir()
-                room -= _unpack(path, targets[k], room, config)
-            yield [_only(targets.get(k, path)) for k, path in enumerate(paths)]
+                left_bytes -= _unpack(path, targets[k], left_bytes, config)
+            yield [_only_file(targets.get(k, path)) for k, path in enumerate(paths)]
 
 
-def _unpack(path: Path, target: Path, room: int, config: LogConfig) -> int:
-    """Unpack a file to a file, or a .zip to a folder; return the bytes written, at most `room`."""
-    size = 0
-    with guarded(f"{path} cannot be unpacked", *DAMAGE):
+def _unpack(path: Path, target: Path, left_bytes: int, config: LogConfig) -> int:
+    """Unpack a .gz to a file, or a .zip to a folder; return the bytes written.
+
+    Raises:
+        InputError: the file is damaged, or has more than `left_bytes`.
+    """
+    with guarded(f"{path} cannot be unpacked", *_DAMAGE):
         if path.suffix.lower() == ".gz":
             with gzip.open(path) as source:
-                size = _copy(source, target, room)
+                size = _copy(source, target, left_bytes)
         else:
-            with zipfile.ZipFile(path) as archive:
-                members = [
-                    one
-                    for one in archive.infolist()
-                    if not one.is_dir() and not _is_hidden(one.filename)
-                ]
-                target.mkdir()
-                for one in members[:MOST_FILES]:
-                    file = target / Path(one.filename).name  # folders in it do not count
-                    if file.exists():
-                        raise InputError(
-                            f"{path} has two files {file.name}; unpack it, and give one folder at a time"
-                        )
-                    with archive.open(one) as source:
-                        size += _copy(source, file, room - size)
-    check_size(str(path), (config.size_limit << 20) + size - room, 0, config)
+            size = _unpack_zip(path, target, left_bytes)
+    check_size(str(path), (config.size_limit << 20) + size - left_bytes, 0, config)
+    return size
+
+
+def _unpack_zip(path: Path, target: Path, left_bytes: int) -> int:
+    """Unpack a .zip to a folder, without its own folders; return the bytes written.
+
+    Raises:
+        InputError: two files have the same name.
+    """
+    size = 0
+    target.mkdir()
+    with zipfile.ZipFile(path) as archive:
+        members = [
+            member
+            for member in archive.infolist()
+            if not member.is_dir() and not _is_hidden(member.filename)
+        ]
+        for member in members[:_MAX_FILE_COUNT]:
+            file = target / Path(member.filename).name
+            if file.exists():
+                raise InputError(
+                    f"{path} has two files {file.name}; unpack it, and read one folder at a time"
+                )
+            with archive.open(member) as source:
+                size += _copy(source, file, left_bytes - size)
     return size
 
 
@@ -81,17 +97,20 @@ def _is_hidden(name: str) -> bool:
     return any(part.startswith((".", "__MACOSX")) for part in name.split("/"))
 
 
-def _copy(source: IO[bytes] | gzip.GzipFile, target: Path, room: int) -> int:
-    """Copy bytes, at most one more than there is room for; return how many."""
+def _copy(source: IO[bytes] | gzip.GzipFile, target: Path, max_bytes: int) -> int:
+    """Copy at most one byte more than `max_bytes`; return the number of bytes."""
+    size = 0
     with target.open("wb") as file:
-        left = room + 1
-        while left > 0 and (data := source.read(min(left, 1 << 20))):
-            file.write(data)
-            left -= len(data)
-    return room + 1 - left
+        while size <= max_bytes:
+            block = source.read(min(max_bytes + 1 - size, _BLOCK_BYTES))
+            if not block:
+                break
+            file.write(block)
+            size += len(block)
+    return size
 
 
-def _only(target: Path) -> Path:
-    """Return the file that is alone in a folder, else the folder, or the file itself."""
-    inside = list(target.iterdir()) if target.is_dir() else []
-    return inside[0] if len(inside) == 1 else target
+def _only_file(target: Path) -> Path:
+    """Return the only file in a folder, else the folder, or the file itself."""
+    files = list(target.iterdir()) if target.is_dir() else []
+    return files[0] if len(files) == 1 else target

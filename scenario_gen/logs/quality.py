@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The data-quality summary of a log: rows read and dropped, gaps bridged, speeds reconciled, overlaps in the record."""
+"""The data quality of a log: dropped rows, bridged gaps, reconciled speeds, overlaps."""
 
 from dataclasses import dataclass
 from itertools import combinations
@@ -16,7 +16,7 @@ from scenario_gen.types import Encounter, together
 
 @dataclass(frozen=True)
 class Dropped:
-    """`count` rows left out (or sorted) for `reason`; `first` names the place of the first of them."""
+    """`count` rows dropped (or sorted) for `reason`; `first` is the place of the first one."""
 
     reason: str
     count: int
@@ -39,16 +39,16 @@ class VehicleQuality:
         longest_bridged: the longest of them [s].
         cut: gaps at which the track was cut.
         longest_cut: the longest of them [s].
-        reversals: stops at which the track was cut because the vehicle drove back where it came from.
-        speed_before: RMS of measured speed less speed of the raw positions [m/s].
-        speed_after: RMS of published speed less speed of the published positions [m/s].
-        changed: RMS of measured less published speed [m/s].
-        moved: RMS distance between raw and published positions [m].
+        reversals: stops at which the track was cut because the vehicle reversed.
+        speed_before: RMS of measured speed minus speed of the raw positions [m/s].
+        speed_after: RMS of smooth speed minus speed of the smooth positions [m/s].
+        changed: RMS of measured minus smooth speed [m/s].
+        moved: RMS distance between raw and smooth positions [m].
         moved_most: the largest such distance [m].
-        noise: standard deviation of the fixes [m], as estimated from the track (or as given); how smooth it is follows from it.
-        turned: median difference of recorded and published headings while it moves [rad]; NaN if none is recorded.
-        headings: share of the recorded headings that were used; the others contradict the path, or jump.
-        lost: seconds of pieces that are left out, since no motion of a car fits them.
+        noise: standard deviation of the fixes [m], estimated or given; determines smoothness.
+        turned: median difference of recorded and smooth headings while it moves [rad], or NaN.
+        headings: share of the recorded headings that were used; others contradict the path.
+        lost: seconds of pieces left out, since no motion of a car fits them.
     """
 
     id: str
@@ -73,7 +73,7 @@ class VehicleQuality:
 
 @dataclass(frozen=True)
 class Overlap:
-    """The recorded footprints of two vehicles overlap during `share` of the encounter, at most by `area` m²."""
+    """The footprints of two vehicles overlap during `share` of the encounter, by up to `area` m²."""
 
     first: str
     second: str
@@ -82,21 +82,21 @@ class Overlap:
 
     def __str__(self) -> str:
         return (
-            f"recorded footprints of {self.first} and {self.second} overlap {100 * self.share:.0f} % of the time "
-            f"(up to {self.area:.1f} m²)"
+            f"recorded footprints of {self.first} and {self.second} overlap "
+            f"{100 * self.share:.0f} % of the time (up to {self.area:.1f} m²)"
         )
 
 
 @dataclass(frozen=True)
 class EncounterQuality:
-    """Facts of one encounter that are reported, not repaired.
+    """Facts about one encounter that are reported, not repaired.
 
     Attributes:
-        name: the encounter's.
-        vehicles: their names.
-        seconds: how long it lasts.
+        name: of the encounter.
+        vehicles: ids.
+        seconds: its duration.
         overlaps: recorded overlaps of footprints.
-        partly: vehicles that are there for a part of it: name, from when, to when [s].
+        partly: vehicles present for a part of it: id, start and end [s].
     """
 
     name: str
@@ -108,7 +108,7 @@ class EncounterQuality:
 
 @dataclass(frozen=True)
 class Quality:
-    """The summary of a log; `rows` counts what was read."""
+    """The quality of a log; `rows` is the number of rows read."""
 
     name: str
     rows: int
@@ -118,7 +118,7 @@ class Quality:
     notes: tuple[str, ...] = ()
 
     def remarks(self) -> tuple[str, ...]:
-        """Return what a person should know before anything is made of the log."""
+        """Return notes and overlaps: what a user should know before using the log."""
         overlaps = [
             f"encounter {encounter.name}: {overlap}"
             for encounter in self.encounters
@@ -127,34 +127,30 @@ class Quality:
         return (*self.notes, *overlaps)
 
     def lines(self) -> tuple[str, ...]:
-        """Return the summary for people, one fact per line."""
-        out = [
-            f"{self.name}: {self.rows} rows of {len(self.vehicles)} vehicles, {len(self.encounters)} encounter(s)"
+        """Return a summary for people, one fact per line."""
+        lines = [
+            f"{self.name}: {self.rows} rows of {len(self.vehicles)} vehicles, "
+            f"{len(self.encounters)} encounter(s)"
         ]
-        out += [f"  {drop}" for drop in self.dropped]
-        out += [vehicle_line(vehicle) for vehicle in self.vehicles]
+        lines += [f"  {drop}" for drop in self.dropped]
+        lines += map(_vehicle_line, self.vehicles)
         for encounter in self.encounters:
-            out.append(
-                f"  encounter {encounter.name}: {encounter.seconds:.1f} s of {', '.join(encounter.vehicles)}"
-            )
-            if encounter.partly:
-                out.append(
-                    "    vehicle "
-                    + ", vehicle ".join(
-                        f"{name} from {a:.1f} to {b:.1f} s" for name, a, b in encounter.partly
-                    )
-                )
-            out += [f"    {overlap}" for overlap in encounter.overlaps]
-        return (*out, *(f"  {note}" for note in self.notes))
+            names = ", ".join(encounter.vehicles)
+            lines.append(f"  encounter {encounter.name}: {encounter.seconds:.1f} s of {names}")
+            parts = [
+                f"vehicle {name} from {start:.1f} to {end:.1f} s"
+                for name, start, end in encounter.partly
+            ]
+            lines += [f"    {', '.join(parts)}"] if parts else []
+            lines += [f"    {overlap}" for overlap in encounter.overlaps]
+        return (*lines, *(f"  {note}" for note in self.notes))
 
 
-def vehicle_line(vehicle: VehicleQuality) -> str:
+def _vehicle_line(vehicle: VehicleQuality) -> str:
     """Return a vehicle's quality in one line."""
-    gaps = (
-        f"{vehicle.bridged} gaps bridged (up to {vehicle.longest_bridged:.1f} s)"
-        if vehicle.bridged
-        else "no gaps bridged"
-    )
+    gaps = "no gaps bridged"
+    if vehicle.bridged:
+        gaps = f"{vehicle.bridged} gaps bridged (up to {vehicle.longest_bridged:.1f} s)"
     if vehicle.cut:
         gaps += f", cut at {vehicle.cut} (up to {vehicle.longest_cut:.1f} s)"
     if vehicle.reversals:
@@ -162,36 +158,30 @@ def vehicle_line(vehicle: VehicleQuality) -> str:
     headings = ""
     if math.isfinite(vehicle.headings):
         headings = f"; {100.0 * vehicle.headings:.0f} % of its headings used"
-        headings += (
-            f", changed by {math.degrees(vehicle.turned):.1f}° (median)"
-            if math.isfinite(vehicle.turned)
-            else ""
-        )
+    if headings and math.isfinite(vehicle.turned):
+        headings += f", changed by {math.degrees(vehicle.turned):.1f}° (median)"
     return (
-        f"  vehicle {vehicle.id}: {vehicle.fixes} fixes, {vehicle.seconds:.1f} s; {gaps}; speed against position "
-        f"{vehicle.speed_before:.2f} → {vehicle.speed_after:.2f} m/s RMS, speeds changed by {vehicle.changed:.2f} m/s, "
-        f"positions by {vehicle.moved:.2f} m RMS (at most {vehicle.moved_most:.1f} m; noise of the fixes {vehicle.noise:.2f} m)"
-        + headings
+        f"  vehicle {vehicle.id}: {vehicle.fixes} fixes, {vehicle.seconds:.1f} s; {gaps}; "
+        f"speed against position {vehicle.speed_before:.2f} → {vehicle.speed_after:.2f} m/s RMS, "
+        f"speeds changed by {vehicle.changed:.2f} m/s, positions by {vehicle.moved:.2f} m RMS "
+        f"(at most {vehicle.moved_most:.1f} m; noise of the fixes {vehicle.noise:.2f} m){headings}"
     )
 
 
 def find_overlaps(encounter: Encounter) -> tuple[Overlap, ...]:
-    """Return the pairs whose footprints overlap at some sample, with the share of their common samples and the largest area."""
+    """Return the pairs whose footprints overlap at some sample."""
     poses = np.concatenate([encounter.position, encounter.heading[..., None]], axis=-1)
-    footprints = [
-        corners(poses[n], vehicle.length, vehicle.width)
+    polygons = [
+        shapely.polygons(corners(poses[n], vehicle.length, vehicle.width))
         for n, vehicle in enumerate(encounter.vehicles)
     ]
-    polygons = [shapely.polygons(each) for each in footprints]
     overlaps = []
     for a, b in combinations(range(len(polygons)), 2):
         area = shapely.area(shapely.intersection(polygons[a], polygons[b]))
         area = area[together(encounter.present, a, b)]
-        share = float((area > 0.0).mean()) if len(area) else 0.0
-        if share > 0.0:
-            overlaps.append(
-                Overlap(
-                    encounter.vehicles[a].id, encounter.vehicles[b].id, share, float(area.max())
-                )
-            )
+        if (area > 0.0).any():
+            first = encounter.vehicles[a].id
+            second = encounter.vehicles[b].id
+            share = float((area > 0.0).mean())
+            overlaps.append(Overlap(first, second, share, float(area.max())))
     return tuple(overlaps)

@@ -102,7 +102,7 @@ def test_who_is_of_no_known_type_is_counted_and_some_can_be_left_out(tmp_path):
     notes = read_log(folder).quality.notes
     assert (
         "left out: 1 × tram" in notes
-        and "types that are not known, read by size: 1 × hovercraft" in notes
+        and "unknown types, guessed from the sizes: 1 × hovercraft" in notes
     )
     cars = read_log(folder, LogConfig(types="car"))
     assert [vehicle.type for vehicle in cars.encounters[0].vehicles] == ["car", "car"]

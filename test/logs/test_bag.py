@@ -359,7 +359,8 @@ def test_unknown_types_are_named(tmp_path):
     text = bytes(STORES.serialize_cdr(STORES.types[STRING](data="hi"), STRING))
     bag = write(tmp_path / "bag", [Line("/chatter", STRING, 1, text)])
     with pytest.raises(
-        InputError, match=rf"no topic to read. It has /chatter \({STRING}\). Needed is {FIX}"
+        InputError,
+        match=rf"no topic to read, it has /chatter \({STRING}\). Needed per vehicle: {FIX}",
     ):
         read_log(bag)
     with pytest.raises(InputError, match=rf"topic /chatter: type {STRING} is not one of"):
@@ -373,9 +374,9 @@ def test_topics_that_cannot_be_told_apart(tmp_path):
     twice = [*lines, Line("/vehicle_a/gps", FIX, lines[0].stamp, lines[0].data)]
     with pytest.raises(InputError, match="/vehicle_a/fix and /vehicle_a/gps are both"):
         read_log(write(tmp_path / "twice", twice))
-    with pytest.raises(InputError, match="choose with the parameter topics"):
+    with pytest.raises(InputError, match="choose with --set log.topics"):
         read_log(write(tmp_path / "mixed", [*lines, *odometry(crossing())]))
-    with pytest.raises(InputError, match="there are speeds but no positions of a, b"):
+    with pytest.raises(InputError, match="speeds but no positions of a, b"):
         read_log(write(tmp_path / "speeds", [line for line in lines if line.type == TWIST]))
 
 
@@ -394,5 +395,5 @@ def test_genuine_bags_without_vehicles_are_refused_by_their_topics(data):
             bag,
             next(file for file in sorted(bag.iterdir()) if file.suffix in (".mcap", ".db3")),
         ):
-            with pytest.raises(InputError, match=r"no topic to read\. It has .*msgs"):
+            with pytest.raises(InputError, match=r"no topic to read, it has .*msgs"):
                 read_log(path)

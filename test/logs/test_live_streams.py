@@ -188,7 +188,7 @@ def test_memory_is_bounded(encounter):
         streams.put_fix("1", k * TICK // 50, 42.0, -83.0)
         streams.put_fix("2", k * TICK // 50, 42.0, -83.0)
         streams.samples()
-    assert len(streams._whole["1"].fixes) <= 200
+    assert len(streams._all["1"].fixes) <= 200
     assert len(streams._recent["1"].fixes) <= 200
 
 
