@@ -14,15 +14,14 @@ import numpy as np
 
 from scenario_gen.closed_loop.simulation import Drive
 from scenario_gen.method.validity import first_exits, Ground, Proof
-from scenario_gen.numerics import Bools, Floats, sealed
-from scenario_gen.numerics.distance_field import distance_transform
+from scenario_gen.numerics import Bools, Floats
 from scenario_gen.numerics.hermite import control_points
 from scenario_gen.numerics.kernels import B2, F1, F2, kernel, OUT2
 from scenario_gen.numerics.plane import edge_lengths
 from scenario_gen.roads import footprint_fits, to_cells
-from scenario_gen.types import Motion, once_per_object, Road
+from scenario_gen.types import Motion, Road
+from scenario_gen.types.road import MAX_DEPTH_M
 
-FARTHEST = 10.0  # metres; margins and depths beyond are told as this
 APART = (
     0.05  # metres that a point of the footprint moves at most between two poses that are looked at
 )
@@ -37,7 +36,7 @@ class RoadUse(NamedTuple):
 
     Attributes:
         margin: least signed distance [m] to what is not drivable: positive inside, negative the greatest depth outside; NaN if
-            no road is known, at most FARTHEST either way.
+            no road is known, at most MAX_DEPTH_M either way.
         area: greatest part of the footprint [m²] that was outside at one instant; 0 if it stayed inside.
         time: when the depth first reached the limit [s], NaN if it never did.
     """
@@ -78,7 +77,7 @@ def road_use(drive: Drive, road: Road | None, limit: float) -> RoadUse:
             reached = (fine >= limit) & (fine > 0.0)
             part = int(np.argmax(reached)) / PARTS if reached.any() else 1.0
             begin = float(motion.time[k] + part * (motion.time[k + 1] - motion.time[k]))
-        if deepest >= FARTHEST and most > 0.0:
+        if deepest >= MAX_DEPTH_M and most > 0.0:
             break  # nothing more is told
         deepest, most = max(deepest, float(found[:, 0].max())), max(most, float(found[:, 1].max()))
     return RoadUse(-deepest, most, begin)
@@ -94,7 +93,7 @@ def is_off_road(road: Road, pose: Floats, half: tuple[float, float], limit: floa
 def poses_in(motion: Motion, rows: list[int], k: int, u: Floats) -> Floats:
     """Return x, y [m], yaw [rad] (R, U, 3) of vehicles at parts `u` (U,) of step k."""
     start, end = motion.time[k : k + 2]
-    return motion.select(rows).at(start + u * (end - start)).poses
+    return motion.of_vehicles(rows).at(start + u * (end - start)).poses
 
 
 def _parts(motion: Motion, ego: int, k: int) -> int:
@@ -123,9 +122,10 @@ def _measured(road: Road, poses: Floats, half: tuple[float, float], *, outside: 
     grid = np.concatenate([to_cells(road, poses[:, :2]), poses[:, 2:]], axis=1)
     out = np.empty((len(poses), 2))
     if outside:
-        solid, near, edge = _blocked(road)
-        grid[:, :2] += edge
-        measure(solid, near, grid, points, np.array((FARTHEST / res, float(edge), 1.0)), out)
+        closed, depth = road.closed_cells, road.depth_cells
+        rim = (closed.shape[0] - road.drivable.shape[0]) // 2
+        grid[:, :2] += rim
+        measure(closed, depth, grid, points, np.array((MAX_DEPTH_M / res, float(rim), 1.0)), out)
         out[:, 1] *= 4.0 * half[0] * half[1] / len(points)
     else:
         measure(
@@ -133,22 +133,12 @@ def _measured(road: Road, poses: Floats, half: tuple[float, float], *, outside: 
             road.clearance_cells,
             grid,
             points,
-            np.array((FARTHEST / res, 0.0, -1.0)),
+            np.array((MAX_DEPTH_M / res, 0.0, -1.0)),
             out,
         )
         out[:, 1] = 0.0
     out[:, 0] *= res
     return out
-
-
-@once_per_object
-def _blocked(road: Road) -> tuple[Bools, Floats, int]:
-    """Return what is not drivable, with a rim of cells around it, the distance [cells] to what is, and the rim's width."""
-    edge = 2 * math.ceil(FARTHEST / road.resolution) + 2
-    solid = np.pad(~road.drivable, edge, constant_values=True)
-    near = np.empty(solid.shape)
-    distance_transform(solid, near)
-    return solid, sealed(near), edge
 
 
 @kernel(B2, F2, F2, F2, F1, OUT2)

@@ -42,7 +42,6 @@ from scenario_gen.types import (
     GenerationResult,
     Interval,
     join_ego,
-    once_per_object,
     Road,
     Scenario,
     token,
@@ -328,13 +327,8 @@ def trial_runner(
 
         def run(trials: Sequence[Trial]) -> Iterator[Outcome]:
             tasks = (
-                (
-                    replace(trial, road=None),
-                    _packed(trial.road) if trial.road else b"",
-                    planner,
-                    config,
-                )
-                for trial in trials
+                (replace(trial, road=None), road, planner, config)
+                for trial, road in zip(trials, _packed_roads(trials), strict=True)
             )
             with ctrl_c_blocked():
                 results = pool.map(
@@ -355,9 +349,11 @@ def trial_runner(
         yield run
 
 
-@once_per_object
-def _packed(road: Road) -> bytes:
-    return pickle.dumps(road)
+def _packed_roads(trials: Sequence[Trial]) -> list[bytes]:
+    """Return the pickled road of each trial, "" without one; a road that several trials share is pickled once."""
+    roads = {id(trial.road): trial.road for trial in trials}
+    packed = {key: pickle.dumps(road) if road else b"" for key, road in roads.items()}
+    return [packed[id(trial.road)] for trial in trials]
 
 
 @lru_cache(maxsize=4)

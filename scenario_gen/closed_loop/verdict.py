@@ -306,7 +306,7 @@ def _contact_in(motion: Scenario, pair: list[int], span: slice) -> float | None:
     k = min(int(found / step + 1e-9), len(motion.time) - 2)
     start = float(motion.time[k])
     u = np.linspace(0.0, max(found - start, 0.0) / step, PARTS + 1)
-    fine = motion.select(pair).at_times(start + u * step)
+    fine = motion.of_vehicles(pair).at_times(start + u * step)
     touch = footprint_distance(fine, 0, 1) <= 0.0  # from when on, to a PART of the step
     return start + float(u[np.argmax(touch)]) * step if touch.any() else found
 

@@ -17,7 +17,6 @@ from scenario_gen.base.road_users import (
 )
 from scenario_gen.types.body import height, rear_axle, shifted, WHEELBASE
 from scenario_gen.types.coverage import Coverage, Spread
-from scenario_gen.types.derived import once_per_object
 from scenario_gen.types.ego import join_ego, split_off, with_witness
 from scenario_gen.types.encounter import Encounter, Recombined, Recorded
 from scenario_gen.types.evaluation import (
@@ -190,7 +189,6 @@ __all__ = [
     "mask",
     "most_exposed",
     "note_kinds",
-    "once_per_object",
     "read_numbers",
     "read_states",
     "rear_axle",

@@ -215,6 +215,13 @@ class Motion:
             **{name: getattr(self, name)[chosen, part] for name in self.array_names},
         )
 
+    def of_vehicles(self, rows: Sequence[int]) -> "Motion":
+        """Return the motion of some vehicles, in this order, on the same clock."""
+        chosen = list(rows)
+        vehicles = tuple(self.vehicles[n] for n in chosen)
+        arrays = (self.position[chosen], self.heading[chosen], self.speed[chosen])
+        return Motion(vehicles, self.time, *arrays, present=self.present[chosen])
+
     def pair(self, i: int, j: int) -> "Motion":
         """Return the motion of two vehicles while both are present, on the same clock.
 

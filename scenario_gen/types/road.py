@@ -6,6 +6,7 @@
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
+import math
 
 import numpy as np
 import numpy.typing as npt
@@ -35,6 +36,7 @@ DIRECTION_COUNT = 16
 """The directions that `Road.lane_directions` tells apart."""
 _AGAINST_RAD = np.pi / 2.0 + np.pi / DIRECTION_COUNT  # half a direction's width stays open
 _CHUNK_CELLS = 4096
+MAX_DEPTH_M = 10.0  # a depth off the road is measured up to this
 
 
 @dataclass(frozen=True, eq=False)
@@ -112,6 +114,17 @@ class Road:
     def clearance(self) -> Floats:
         """(H, W) [m]: `clearance_cells` in metres."""
         return sealed(self.clearance_cells * self.resolution)
+
+    @cached_property
+    def closed_cells(self) -> Bools:
+        """(H + 2 R, W + 2 R) closed cells, with a closed rim of R cells all around, wider than 2 MAX_DEPTH_M."""
+        rim = 2 * math.ceil(MAX_DEPTH_M / self.resolution) + 2
+        return sealed(np.pad(~self.drivable, rim, constant_values=True))
+
+    @cached_property
+    def depth_cells(self) -> Floats:
+        """(H + 2 R, W + 2 R) [cells] from each centre of `closed_cells` to the nearest drivable square."""
+        return distance_field(self.closed_cells)
 
     @cached_property
     def closed_before(self) -> Counts:

@@ -28,7 +28,7 @@ from scenario_gen.method.evaluation.measures import MEASURES
 from scenario_gen.method.evaluation.population import FEATURES, generated_member, Member, member_of
 from scenario_gen.numerics import Floats
 from scenario_gen.situation import EncounterKind
-from scenario_gen.types import Encounter, Measures, once_per_object, Scenario
+from scenario_gen.types import Encounter, Measures, Scenario
 
 SHIPPED = Path(scenario_gen.__file__).parent / "resources" / "population.json"
 MEAN_ENCOUNTERS, SPREAD_ENCOUNTERS = (
@@ -86,26 +86,22 @@ def rarity_in(
         encounter: the template; it counts once, whether it is in the population or not.
         population: recorded encounters; those of the same features are one, whatever they are called.
     """
-    members = [_member(encounter)]
-    for member in map(_member, population):
-        if not any(
-            member.kind == other.kind and np.allclose(member.features, other.features)
-            for other in members
-        ):
+    template = member_of(encounter, encounter.name, 0)
+    members = [template]
+    for recorded in population:
+        member = member_of(recorded, recorded.name, 0)
+        if not any(_is_same(member, other) for other in members):
             members.append(member)
     laws = {
         kind: Law.of(kind, [member.features for member in members if member.kind == kind])
         for kind in EncounterKind
     }
 
-    @once_per_object
     def rarity(scenario: Scenario) -> float:
-        member = generated_member(scenario, _member(encounter), encounter)
-        return (
-            math.inf
-            if member.kind is None
-            else laws[member.kind].distance(member.features) / USUAL
-        )
+        member = generated_member(scenario, template, encounter)
+        if member.kind is None:
+            return math.inf
+        return laws[member.kind].distance(member.features) / USUAL
 
     return rarity
 
@@ -121,9 +117,8 @@ def measures_in(
     )
 
 
-@once_per_object
-def _member(encounter: Encounter) -> Member:
-    return member_of(encounter, encounter.name, 0)
+def _is_same(member: Member, other: Member) -> bool:
+    return member.kind == other.kind and np.allclose(member.features, other.features)
 
 
 def _shipped_law(kind: EncounterKind) -> tuple[Floats, Floats]:

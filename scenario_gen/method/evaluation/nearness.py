@@ -43,7 +43,7 @@ def timed_poses(motion: Motion, here: Bools, n: int) -> Floats:
     if len(its) < 2:
         return np.empty((0, 4))
     fine = np.linspace(motion.time[its[0]], motion.time[its[-1]], FINER * (len(its) - 1) + 1)
-    return np.column_stack([fine, motion.select([n]).at(fine).poses[0]])
+    return np.column_stack([fine, motion.of_vehicles([n]).at(fine).poses[0]])
 
 
 def least_shift(a: Floats, b: Floats, vehicles: tuple[Vehicle, Vehicle]) -> float:

@@ -174,7 +174,7 @@ def chosen(motion: Motion, ids: Sequence[str]) -> Motion:
     """Return the motion of the vehicles with these ids, in their order."""
     own = [vehicle.id for vehicle in motion.vehicles]
     rows = [own.index(known) for known in ids]
-    return motion if rows == list(range(len(own))) else motion.select(rows)
+    return motion if rows == list(range(len(own))) else motion.of_vehicles(rows)
 
 
 def common_motion(motion: Motion, ids: tuple[str, str], samples: int) -> Motion | None:

@@ -12,7 +12,7 @@ from support.textbook_motions import labelled
 
 from scenario_gen import InputError
 from scenario_gen.method.evaluation.population import member_of, members_of, population_of
-from scenario_gen.types import Encounter, Scenario
+from scenario_gen.types import Encounter, Recombined, Scenario
 
 KINDS = (
     "crossing, stops",
@@ -139,7 +139,7 @@ def test_what_is_recombined_counts_where_both_are_drawn_and_is_no_recorded_encou
         (
             "both",
             Made(
-                replace(encounters[i], name=f"e{i} + e{j}"),
+                replace(encounters[i], source=Recombined(f"e{i}", f"e{j}")),
                 (encounters[(j + len(KINDS)) % len(encounters)],),
             ),
         )
