@@ -6,7 +6,7 @@
 import numpy as np
 import pytest
 
-from scenario_gen.closed_loop.off_road import _measured, FARTHEST
+from scenario_gen.closed_loop.off_road import _measured, MAX_DEPTH_M
 from scenario_gen.types.road import Road
 
 HALF = (2.0, 0.9)
@@ -23,7 +23,7 @@ def plain(drivable, res, pose, *, outside):
     du = np.maximum(np.maximum(columns - rim - px[:, None], px[:, None] - columns + rim - 1), 0.0)
     dv = np.maximum(np.maximum(rows - rim - py[:, None], py[:, None] - rows + rim - 1), 0.0)
     nearest = np.sqrt(du * du + dv * dv).min(axis=1) * res
-    return min(nearest.max() if outside else nearest.min(), FARTHEST)
+    return min(nearest.max() if outside else nearest.min(), MAX_DEPTH_M)
 
 
 @pytest.mark.parametrize("seed", range(2))
@@ -51,4 +51,4 @@ def test_area_of_a_footprint_half_outside():
     ((depth, area),) = _measured(road, np.array([[10.0, 10.0, 0.0]]), HALF, outside=True)
     assert depth == pytest.approx(0.9) and area == pytest.approx(3.6, rel=0.06)
     ((depth, area),) = _measured(road, np.array([[500.0, 10.0, 0.0]]), HALF, outside=True)
-    assert depth == FARTHEST and area == pytest.approx(7.2)
+    assert depth == MAX_DEPTH_M and area == pytest.approx(7.2)
