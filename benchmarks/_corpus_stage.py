@@ -16,9 +16,10 @@ from benchmarks._archive import write_archive
 from scenario_gen.corpus.config import CorpusConfig
 from scenario_gen.corpus.encounters import clean_found
 from scenario_gen.corpus.grouping import group_partition
+from scenario_gen.corpus.inventory import inventory
 from scenario_gen.corpus.meetings import search_hours
 from scenario_gen.corpus.messages import parse_range, ranges
-from scenario_gen.corpus.mine import clean_tasks, group_tasks, hour_tasks, inventory
+from scenario_gen.corpus.schedule import clean_tasks, group_tasks, hour_tasks
 
 STAGES = ("parse", "search", "group", "clean")
 

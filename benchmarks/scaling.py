@@ -18,7 +18,7 @@ import numpy as np
 
 from benchmarks._size import sized
 from benchmarks.row import lower, Row
-from scenario_gen.corpus.mine import inventory
+from scenario_gen.corpus.inventory import inventory
 
 COUNT, SECONDS, CELL = 50, 20.0, 0.2
 COARSE = 0.5  # m: with cells of 0.2 m, 300 s of a crossing at 10 m/s are more than `road.max_cells` may be

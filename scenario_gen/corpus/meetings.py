@@ -19,7 +19,7 @@ import numpy as np
 
 from scenario_gen.base.stores import fetched, Place, workplace
 from scenario_gen.corpus.config import CorpusConfig
-from scenario_gen.corpus.messages import database, DEGREE, GROUP, HOUR, quoted, write_messages
+from scenario_gen.corpus.messages import database, DEGREE, GROUP, HOUR_US, quoted, write_messages
 from scenario_gen.corpus.tasks import arriving
 from scenario_gen.corpus.tracks import (
     FASTEST_MPS,
@@ -104,7 +104,7 @@ def _search(
     from pyarrow import parquet
 
     edge = overlap(config)
-    begin, end = hour * HOUR - edge, (hour + 1) * HOUR + edge
+    begin, end = hour * HOUR_US - edge, (hour + 1) * HOUR_US + edge
     names = [str(path) for path in files]
     base.execute(
         f"CREATE TEMP TABLE messages AS SELECT device, t, lat / {DEGREE} AS lat, lon / {DEGREE} AS lon, speed, heading FROM "
@@ -123,7 +123,7 @@ def _search(
         for meeting in meetings(
             tracks[a], tracks[b], ((first - 2) * BIN, (last + 3) * BIN), config
         )
-        if hour * HOUR <= meeting["start"] < (hour + 1) * HOUR
+        if hour * HOUR_US <= meeting["start"] < (hour + 1) * HOUR_US
     ]
     found.sort(key=lambda one: (one["start"], one["a"], one["b"]))
     numbers = dict.fromkeys(("gap", "distance", "travel", "lat", "lon"), pa.float64())

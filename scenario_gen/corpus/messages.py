@@ -22,7 +22,7 @@ from scenario_gen.base.stores import download, Part, Place, Remote, size_of, wor
 from scenario_gen.corpus.tasks import arriving
 from scenario_gen.logs.tables import SPMD_COLUMNS
 
-HOUR = 3_600_000_000  # µs
+HOUR_US = 3_600_000_000  # µs
 MOST_WRONG = 0.5  # of a file's rows whose clocks differ: beyond, the second clock is something else and is not used
 SMALLER = "make room where the results go, or see the parameters memory, task_rows and range_size"
 NAMED_DAY = re.compile(r"_(4\d{4})(?:_|\.)")
@@ -193,13 +193,13 @@ def _parse(base: Any, names: dict[str, str], target: Path) -> dict[str, Any]:
     for name, count in base.execute(rejected).fetchall():
         account[names[name]]["rows"] += count
         account[names[name]]["left out: no row of 19 fields with numbers"] += count
-    days = f"SELECT file, t // {24 * HOUR}, count(*) FROM parsed WHERE cause = 0 GROUP BY ALL"
+    days = f"SELECT file, t // {24 * HOUR_US}, count(*) FROM parsed WHERE cause = 0 GROUP BY ALL"
     for file, day, count in base.execute(days).fetchall():
         named = NAMED_DAY.search(Path(true[file]).name)
         if named and abs(day - (int(named[1]) - DAY_OF_2004)) > 1:
             account[true[file]]["kept: stamps of another day"] += count
     hours = base.execute(
-        f"SELECT t // {HOUR}, count(*) FROM parsed WHERE cause = 0 GROUP BY ALL ORDER BY ALL"
+        f"SELECT t // {HOUR_US}, count(*) FROM parsed WHERE cause = 0 GROUP BY ALL ORDER BY ALL"
     ).fetchall()
     return {
         "files": {

@@ -6,7 +6,8 @@
 import pytest
 from support.source_files import ROOT
 
-from scenario_gen.corpus.mine import inventory, mine
+from scenario_gen.corpus.inventory import inventory
+from scenario_gen.corpus.mine import mine
 
 SPMD = ",".join(["1"] * 19) + "\n"
 

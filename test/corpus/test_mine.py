@@ -20,7 +20,8 @@ from scenario_gen.corpus.config import CorpusConfig
 from scenario_gen.corpus.encounters import encounter_of, tables_of
 from scenario_gen.corpus.grouping import group, label, Meeting, partitions
 from scenario_gen.corpus.messages import parse_range, ranges
-from scenario_gen.corpus.mine import clean_tasks, mine
+from scenario_gen.corpus.mine import mine
+from scenario_gen.corpus.schedule import clean_tasks
 from scenario_gen.corpus.tables import rows_of
 from scenario_gen.logs.config import LogConfig
 from scenario_gen.situation import Situation
@@ -153,7 +154,7 @@ def test_a_file_that_cannot_be_read_is_said_and_does_not_end_the_others(archive,
         and "one.csv" in mined.failed[0]
         and "unpacked" in mined.failed[1]
     )
-    assert [one["name"] for one in mined.refused] == ["wide"] and "no table" in mined.refused[0][
+    assert [one["name"] for one in mined.refused] == ["wide"] and "not a table" in mined.refused[0][
         "why"
     ]
     assert not list((tmp_path / "out").glob("found/*"))
