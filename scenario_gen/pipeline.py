@@ -14,7 +14,7 @@ from scenario_gen.method.evaluation import coverage_of, evaluate, measures_in, r
 from scenario_gen.method.fitting import fit_template
 from scenario_gen.method.reference_sets import with_references
 from scenario_gen.method.routing import plan_routes
-from scenario_gen.method.sampling import Callbacks, Progress, sample_scenarios
+from scenario_gen.method.sampling import Callbacks, Plan, Progress, sample_scenarios
 from scenario_gen.method.segmentation import segment
 from scenario_gen.method.suitable_roads import AUTO, on_first_suitable_road
 from scenario_gen.roads import road_and_template
@@ -95,13 +95,14 @@ def generate(
     )
     routes = plan_routes(road, fit, config.planning, seed, config.limits)
     planned = GenerationResult(encounter, segmentation, road, fit, routes, seed=seed)
+    plan = Plan.of(planned, config.sampling, config.limits, request, situation=situation)
     result = sample_scenarios(
         planned,
         config.sampling,
         config.limits,
         request,
         count=count,
-        situation=situation,
+        plan=plan,
         callbacks=Callbacks(progress, accepts=partial(accepts, road)),
         measures=measures_in(config.sampling.variety, encounter, population),
     )

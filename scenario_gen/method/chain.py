@@ -10,7 +10,7 @@ from scenario_gen.method.config import PipelineConfig
 from scenario_gen.method.evaluation import measures_in
 from scenario_gen.method.fitting import fit_template
 from scenario_gen.method.routing import plan_routes
-from scenario_gen.method.sampling import Callbacks, sample_scenarios
+from scenario_gen.method.sampling import Callbacks, Plan, sample_scenarios
 from scenario_gen.situation import Situation, Wait
 from scenario_gen.types import Encounter, GenerationResult, Request, Road, Segmentation
 
@@ -76,14 +76,11 @@ class Chain:
             InputError, RefusedError: as `sample_scenarios`.
         """
         config = self.config
+        stage = (planned, config.sampling, config.limits, self.request)
         return sample_scenarios(
-            planned,
-            config.sampling,
-            config.limits,
-            self.request,
+            *stage,
             count=self.count,
-            waits=self.waits,
-            situation=self.situation,
+            plan=Plan.of(*stage, self.waits, self.situation),
             callbacks=callbacks,
             measures=measures_in(config.sampling.variety, self.encounter, self.population),
         )

@@ -13,11 +13,7 @@ from support.lengths import LONG
 from scenario_gen.bags.recordings.write import write_recording
 from scenario_gen.base.errors import InputError
 from scenario_gen.method.config import PipelineConfig
-from scenario_gen.method.evaluation.measures import (
-    figures_of,
-    measure,
-    most_critical,
-)
+from scenario_gen.method.evaluation.measures import figures_of, measure, most_critical
 from scenario_gen.method.sampling import SamplingConfig
 from scenario_gen.method.sampling.importance_sampling import TargetError
 from scenario_gen.output.results import provenance_of
@@ -81,12 +77,7 @@ def test_a_range_that_cannot_be_had_is_refused_with_what_can(chain):
 
 
 @pytest.mark.parametrize(
-    "request_",
-    [
-        Request(target=f"pet={LOW}..{HIGH}", ego="1"),
-        Request(order="free"),
-    ],
-    ids=str,
+    "request_", [Request(target=f"pet={LOW}..{HIGH}", ego="1"), Request(order="free")], ids=str
 )
 def test_each_comes_again_bit_for_bit_and_is_valid(chain, request_, tmp_path):
     config = PipelineConfig()

@@ -19,22 +19,12 @@ from scenario_gen.method.sampling.deviations import (
     road_ahead,
     ROOM_SIGMAS,
 )
-from scenario_gen.method.sampling.extrapolation import (
-    ACCELERATION_DECAY_S,
-    MAX_EXTRAPOLATION_S,
-)
-from scenario_gen.method.sampling.nominal_clock import (
-    clock_from_rate,
-    slowed_clock,
-    template_grid,
-)
+from scenario_gen.method.sampling.extrapolation import ACCELERATION_DECAY_S, MAX_EXTRAPOLATION_S
+from scenario_gen.method.sampling.nominal_clock import clock_from_rate, slowed_clock, template_grid
 from scenario_gen.method.sampling.plan import Plan
-from scenario_gen.method.sampling.routed_vehicle import (
-    MeanSpeed,
-    route_vehicle,
-    RoutedVehicle,
-)
+from scenario_gen.method.sampling.routed_vehicle import route_vehicle, RoutedVehicle
 from scenario_gen.method.sampling.speed_profile.knots import least_shares, standing_part
+from scenario_gen.method.sampling.speed_profile.mean import MeanSpeed
 from scenario_gen.method.sampling.speed_profile.model import SpeedModel
 from scenario_gen.method.sampling.time_warp import Clock, TimeWarp
 from scenario_gen.method.sampling.trimming import trimming_of
@@ -117,8 +107,7 @@ def build_model(plan: Plan, config: SamplingConfig, order: str = "keep") -> Buil
         reacting = {edge.who for edge in reactions.edges}
         models = [
             replace(
-                model,
-                variation=_variation(n, each, plan, nominal, fixed, n in reacting, config),
+                model, variation=_variation(n, each, plan, nominal, fixed, n in reacting, config)
             )
             for n, (model, each) in enumerate(zip(models, routed, strict=True))
         ]
@@ -169,15 +158,15 @@ def _nominal_clock(
     slowdowns = []
     for vehicle in routed:
         mean = vehicle.without_bends.mean(plain)
-        infeasible = isinstance(mean, str)
-        slowdowns.append(
-            np.ones(len(grid)) if infeasible else vehicle.slowdown(mean.coefficients, grid)
-        )
+        slowdown = np.ones(len(grid))
+        if not isinstance(mean, str):
+            slowdown = vehicle.slowdown(mean.coefficients, grid)
+        slowdowns.append(slowdown)
     clock = slowed_clock(grid, slowdowns, 1.0 + config.max_stretch)
     slowest = float(clock.rate.max())
     if slowest < 1.0 + _TUNING.noted_slowing:
         return _NotedClock(plain, [])
-    n, k = np.unravel_index(np.argmax(slowdowns), (len(routed), len(grid)))
+    n, k = divmod(int(np.argmax(slowdowns)), len(grid))
     note = Note.of(
         NoteKind.SLOWED,
         percent=100.0 * (1.0 - 1.0 / slowest),
@@ -206,7 +195,7 @@ def _feasible_stretch(
     """
     longest = (1.0 + config.max_stretch) * float(clock.grid[-1] / clock.time[-1])
     count = _TUNING.stretches if longest > 1.0 else 1
-    best, least_shift, best_stretch = None, np.inf, 1.0
+    best, least_shift = _Stretch(clock, None, [], ""), np.inf
     failed: list[MeanSpeed | str] = []
     for stretch in np.linspace(1.0, max(longest, 1.0), count).tolist():
         stretched = clock_from_rate(clock.grid, stretch * clock.rate)
@@ -215,20 +204,24 @@ def _feasible_stretch(
         if len(feasible) < len(means):
             failed = means
             continue
-        shift = max(
-            vehicle.largest_shift(mean.coefficients)
-            for vehicle, mean in zip(routed, feasible, strict=True)
-        )
-        if best is None or shift < least_shift - _TUNING.free_shift:
-            best, least_shift, best_stretch = feasible, shift, stretch
+        shift = _largest_shift(routed, feasible)
+        if shift < least_shift - _TUNING.free_shift:
+            best, least_shift = _Stretch(stretched, feasible, _stretch_notes(stretch), ""), shift
         if shift <= _TUNING.free_shift:
             break
-    notes = []
-    if best_stretch > 1.0:
-        notes.append(Note.of(NoteKind.STRETCHED, percent=100.0 * (best_stretch - 1.0)))
-    stretched = clock_from_rate(clock.grid, best_stretch * clock.rate)
-    refusal = _refusal(routed, failed, clock) if best is None else ""
-    return _Stretch(stretched, best, notes, refusal)
+    return best if best.means else best._replace(refusal=_refusal(routed, failed, clock))
+
+
+def _largest_shift(routed: Sequence[RoutedVehicle], means: Sequence[MeanSpeed]) -> float:
+    """Return the largest distance [m] of any vehicle from a changepoint when it is due."""
+    pairs = zip(routed, means, strict=True)
+    return max(vehicle.largest_shift(mean.coefficients) for vehicle, mean in pairs)
+
+
+def _stretch_notes(stretch: float) -> list[Note]:
+    """Return the note on a stretched clock, if it is stretched."""
+    percent = 100.0 * (stretch - 1.0)
+    return [Note.of(NoteKind.STRETCHED, percent=percent)] if percent > 0.0 else []
 
 
 def _refusal(

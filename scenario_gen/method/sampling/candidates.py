@@ -20,7 +20,7 @@ from scenario_gen.types import ReactionGraph, Scenario
 _MIN_DISTANCE_M = 0.05  # of two poses that imply a curvature
 _ROUNDING_STEPS = 1e-6
 _ROUNDING_S = 1e-9
-_SIGNS = (-1.0, 1.0)  # before a start, after an end
+_DIRECTION_FACTOR = (-1.0, 1.0)  # before a start, after an end
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,7 +53,7 @@ class CandidateModel:
     @property
     def size(self) -> int:
         """Standard normal numbers per candidate."""
-        return self.numbers.count
+        return self.numbers.total
 
     def draw(self, eps: Floats, scale: NoiseScale) -> "Batch":
         """Return S candidates.
@@ -128,7 +128,7 @@ class Extension:
         states = np.stack([each.states(at[:, n], four) for n, (_, each) in enumerate(pairs)])
         reach = ends.copy()
         for n, end in np.argwhere(throughout).tolist():
-            variation, sign = models[n].variation, _SIGNS[end]
+            variation, sign = models[n].variation, _DIRECTION_FACTOR[end]
             if models[n].stands_at(end):
                 reach[:, n, end] = sign * np.inf
             elif variation is not None:
@@ -149,7 +149,7 @@ class Extension:
     def extend(self, n: int, end: int, at: Floats, out: Floats) -> None:
         """Overwrite states (S, T, 5) of vehicle n where times (S, T) [s] lie beyond its route."""
         assert self.states is not None
-        sign = _SIGNS[end]
+        sign = _DIRECTION_FACTOR[end]
         since = np.maximum(sign * (at - self.ends[:, n, end : end + 1]), 0.0)
         beyond = np.flatnonzero((since > 0.0).any(axis=0))
         if len(beyond):

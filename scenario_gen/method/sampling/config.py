@@ -97,10 +97,7 @@ class SamplingConfig(Parameters):
         high=10.0,
     )
     steering: float = parameter(
-        1.0,
-        "lateral corrections of a driver, over those in the recording",
-        low=0.0,
-        high=10.0,
+        1.0, "lateral corrections of a driver, over those in the recording", low=0.0, high=10.0
     )
     longitudinal_sigma: float = parameter(
         1.2,

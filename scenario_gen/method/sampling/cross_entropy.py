@@ -3,8 +3,8 @@
 
 """The proposal towards a target, found stage by stage by the cross-entropy method.
 
-Source: the cross-entropy method (Rubinstein & Kroese 2004), with the samples of all stages weighted
-together (adaptive multiple importance sampling, Cornuet et al. 2012).
+Source: the cross-entropy method (Rubinstein & Kroese 2004), with the samples of all stages
+weighted together (adaptive multiple importance sampling, Cornuet et al. 2012).
 """
 
 from collections import Counter
@@ -16,12 +16,7 @@ import numpy as np
 from scenario_gen.method.sampling.filters import Candidate, ValidityFilter
 from scenario_gen.method.sampling.importance_sampling import directions, Proposal, TargetSet
 from scenario_gen.method.sampling.plan import Cancelled
-from scenario_gen.method.sampling.sampler import (
-    BLOCK_CANDIDATES,
-    LEVELS,
-    Sampler,
-    STAGE_SLOT,
-)
+from scenario_gen.method.sampling.sampler import BLOCK_CANDIDATES, LEVELS, Sampler, STAGE_SLOT
 from scenario_gen.numerics import Bools, Floats
 from scenario_gen.types import Cause, Scenario, UNITS
 
@@ -289,10 +284,10 @@ def _is_settled(best: int, since_best: int) -> bool:
 def _draw_stage(
     sampler: Sampler, level: int, first: int, evaluations: Evaluations, unit: Floats
 ) -> tuple[list[int], list[Scenario | None], list[int]]:
-    """Draw and measure a stage; return indices, scenarios, and rows from the nearest to the range."""
+    """Draw and measure a stage; return indices, scenarios, and rows, the nearest first."""
     numbers = range(first, first + STAGE_BLOCKS_COUNT)
     blocks = [sampler.block(level, number) for number in numbers]
-    index = [each for block in blocks for each in block.index]
+    index = [each for block in blocks for each in block.indices]
     drawn = [each for block in blocks for each in block.scenarios]
     z = np.concatenate([sampler.numbers(level, number) for number in numbers])
     stage = Stage.of(evaluations.target, z, sampler.proposal, drawn)

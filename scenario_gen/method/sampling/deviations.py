@@ -99,8 +99,8 @@ class Steering:
         """Return the corrections in a recorded drive: its heading minus a moving average.
 
         For a process with standard deviation a and length scale l the lateral speed has the
-        standard deviation a / l, the lateral acceleration sqrt(3) a / l². Both follow from medians,
-        for in turns a drive differs from its course by more than corrections.
+        standard deviation a / l, the lateral acceleration sqrt(3) a / l². Both follow from
+        medians, for in turns a drive differs from its course by more than corrections.
 
         Args:
             time: (T,) seconds, evenly spaced.
@@ -218,10 +218,10 @@ def _all_drivable(road: Road, points: Floats) -> Bools:
 
 
 def road_ahead(path: BasePath, vehicle: Vehicle, road: Road, most: Floats) -> Floats:
-    """Return for how many metres (2,) the road is free straight on, before the route and behind it.
+    """Return for how many metres (2,) the road is free straight on before and behind a route.
 
-    Where the road has lanes, straight on must follow one of them, too: before a bend it would cross
-    the lanes of others.
+    Where the road has lanes, straight on must follow one of them, too: before a bend it would
+    cross the lanes of others.
 
     Args:
         path: the route.

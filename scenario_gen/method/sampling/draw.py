@@ -14,6 +14,7 @@ import numpy as np
 
 from scenario_gen.base.errors import InputError, RefusedError
 from scenario_gen.method.sampling.build_model import build_model
+from scenario_gen.method.sampling.candidates import CandidateModel
 from scenario_gen.method.sampling.config import SamplingConfig
 from scenario_gen.method.sampling.cross_entropy import find_proposal, STAGE_BLOCKS_COUNT
 from scenario_gen.method.sampling.filters import (
@@ -104,41 +105,39 @@ def draw_scenarios(
     built = build_model(plan, config, request.order)
     if built.model is None:
         refused = Counter({Cause.SPEED_PROFILE: 1})
-        notes: tuple[Note, ...] = (Note.of(NoteKind.NOT_DRIVABLE, reasons=built.refusal),)
-        drawn = ScenarioSet(count, (), 1, refused, notes, slot)
+        note = Note.of(NoteKind.NOT_DRIVABLE, reasons=built.refusal)
+        drawn = ScenarioSet(count, (), 1, refused, (note,), slot)
     else:
         target = TargetSet.of(plan.situation, request, measures)
-        label = label_of(plan.situation, request, target, measures)
-        ego = request.ego_of(plan.encounter)
-        sampler = Sampler(built.model, seed, plan.road.frame_id, ego, label=label)
+        sampler = _sampler(built.model, plan, request, seed, target, measures)
         validity = ValidityFilter.of(sampler, check, enough_share(config, request))
-        rarity = rarity_filter(sampler, validity, measures)
-        kept = tuple(
-            edge
-            for edge in built.model.reactions.edges
-            if (edge.who, edge.whom) not in validity.lost
-        )
+        filters = Filters(validity, target, rarity_filter(sampler, validity, measures))
+        kept = validity.kept(built.model.reactions.edges)
         label = label_of(plan.situation, request, target, measures, kept, validity.lost)
-        run = _Run(
-            Filters(validity, target, rarity),
-            count,
-            callbacks,
-            replace(sampler, label=label),
-            lambda scenario: callbacks.found(scenario, plan.requested, slot),
-        )
-        reached = run.draw(config.attempts * rarity.valid_per_kept)
-        lost = [Note.of(NoteKind.REACTION_LOST, message=each) for each in validity.lost.values()]
-        notes = (*built.notes, *lost, *rarity.notes(), *run.notes)
+
+        def on_valid(scenario: Scenario) -> None:
+            callbacks.on_valid(scenario, plan.requested, slot)
+
+        run = _Run(filters, count, callbacks, replace(sampler, label=label), on_valid)
+        reached = run.draw(config.attempts * filters.rarity.valid_per_kept)
+        notes = (*built.notes, *filters.notes(), *run.notes)
         drawn = ScenarioSet(
             count, run.scenarios(), run.candidates, run.refused, notes, slot, reached, kept
         )
-    if request.moves and not drawn.scenarios and not callbacks.cancelled():
+    if request.moves and not callbacks.cancelled():
+        _refuse_empty(drawn)
+    return drawn
+
+
+def _refuse_empty(drawn: ScenarioSet) -> None:
+    """Refuse a set without scenarios."""
+    if not drawn.scenarios:
         causes = (f"{number} × {cause.value}" for cause, number in drawn.refused.most_common())
         reasons = "; ".join((", ".join(causes), *map(str, drawn.adaptations)))
         raise RefusedError(
-            f"none of {drawn.candidates} candidate(s) with the requested states is valid ({reasons})"
+            f"none of {drawn.candidates} candidate(s) with the requested states is valid "
+            f"({reasons})"
         )
-    return drawn
 
 
 def regenerate(
@@ -163,15 +162,27 @@ def regenerate(
     if built.model is None:
         return None
     target = TargetSet.of(plan.situation, request, measures)
-    label = label_of(plan.situation, request, target, measures)
-    ego = request.ego_of(plan.encounter)
-    sampler = Sampler(built.model, seed, plan.road.frame_id, ego, label=label)
+    sampler = _sampler(built.model, plan, request, seed, target, measures)
     if place_of(index)[0] == DIRECTED_SLOT:
         if target is None or check is None:
             raise InputError(f"index {index} is from a proposal, but no target was requested")
         validity = ValidityFilter.of(sampler, check, enough_share(config, request))
         sampler = find_proposal(sampler, validity, target, lambda: False).sampler
     return sampler.scenario(index)
+
+
+def _sampler(
+    model: CandidateModel,
+    plan: Plan,
+    request: Request,
+    seed: int,
+    target: TargetSet | None,
+    measures: Measures | None,
+) -> Sampler:
+    """Return the sampler of a request, before it is known which reactions scenarios keep."""
+    label = label_of(plan.situation, request, target, measures)
+    ego = request.ego_of(plan.encounter)
+    return Sampler(model, seed, plan.road.frame_id, ego, label=label)
 
 
 def enough_share(config: SamplingConfig, request: Request = Request()) -> float:
@@ -209,7 +220,7 @@ class _Run:
         count: scenarios wanted.
         callbacks: of the caller.
         sampler: draws the candidates.
-        found: called with each scenario of the set.
+        on_valid: called with each scenario of the set.
         index: of all scenarios of the set.
         stored: the first MAX_STORED_SCENARIOS of them.
         refused: number of refused candidates by cause.
@@ -221,7 +232,7 @@ class _Run:
     count: int
     callbacks: Callbacks
     sampler: Sampler
-    found: Callable[[Scenario], None]
+    on_valid: Callable[[Scenario], None]
     index: Any = field(default_factory=lambda: array("q"))
     stored: list[Scenario] = field(default_factory=list)
     refused: Counter[Cause] = field(default_factory=Counter)
@@ -253,11 +264,13 @@ class _Run:
         judged = [self.filters.judged(self.sampler.blocks(level)) for level in range(len(LEVELS))]
         shares: list[float] = []
         for candidates in judged:
-            shares.append(self._take(candidates, min(PILOT_CANDIDATES, budget - self.candidates)))
+            shares.append(
+                self._consume(candidates, min(PILOT_CANDIDATES, budget - self.candidates))
+            )
             if self._is_done(budget) or shares[-1] >= self.filters.validity.enough:
                 break
         best = int(np.argmax(shares))
-        self._take(judged[best], budget - self.candidates)
+        self._consume(judged[best], budget - self.candidates)
         self._note_level(best, len(shares))
 
     def _draw_directed(self, target: TargetSet, budget: int) -> Reached | None:
@@ -269,7 +282,7 @@ class _Run:
         if search.evaluations.hits:
             judged = self._directed(search.pilot)
             while not self._is_done(budget) and not self._is_hopeless():
-                self._take(judged, min(BLOCK_CANDIDATES, budget - self.candidates))
+                self._consume(judged, min(BLOCK_CANDIDATES, budget - self.candidates))
         reached = None
         if self.candidates:
             weights = np.array([self.sampler.weight(index) for index in self.index])
@@ -301,18 +314,18 @@ class _Run:
         further = self.sampler.blocks(self.sampler.base, STAGE_BLOCKS_COUNT)
         return itertools.chain(self.filters.rejudged(pilot), self.filters.judged(further))
 
-    def _take(self, candidates: Iterator[Candidate], most: int) -> float:
-        """Take up to `most` candidates; return the share of them that is valid."""
-        taken = valid = 0
-        while taken < most and not self._is_complete():
+    def _consume(self, candidates: Iterator[Candidate], most: int) -> float:
+        """Add up to `most` candidates; return the share of them that is valid."""
+        added = valid = 0
+        while added < most and not self._is_complete():
             candidate = next(candidates)
-            taken += 1
+            added += 1
             valid += candidate.is_valid
             self.candidates += 1
             self._add(candidate)
-            if taken % BLOCK_CANDIDATES == 0 or taken == most or self._is_complete():
+            if added % BLOCK_CANDIDATES == 0 or added == most or self._is_complete():
                 self.callbacks.progress(len(self.index), self.count, self.candidates)
-        return valid / taken if taken else 0.0
+        return valid / added if added else 0.0
 
     def _add(self, candidate: Candidate) -> None:
         """Add a candidate to the set, or to the account of refused ones."""
@@ -323,7 +336,7 @@ class _Run:
             self.index.append(candidate.index)
             if len(self.stored) < MAX_STORED_SCENARIOS:
                 self.stored.append(published)
-            self.found(published)
+            self.on_valid(published)
 
     def _is_complete(self) -> bool:
         return len(self.index) >= self.count or self.callbacks.cancelled()

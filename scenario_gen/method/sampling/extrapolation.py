@@ -60,7 +60,7 @@ def extrapolation_time(state: Floats, ahead: float, sign: float) -> Floats:
 
 
 def _decay_time(state: Floats, sign: float) -> Floats:
-    """Return the time constants (S,) [s] by which accelerations decay before the vehicles stand."""
+    """Return the time constants (S,) [s] with which accelerations decay before a standstill."""
     loss = np.maximum(-sign * state[:, 4], 1e-9)
     until_slow = np.maximum(0.5 * _MIN_SPEED_SHARE * state[:, 3] / loss, 1e-6)
     return np.minimum(ACCELERATION_DECAY_S, until_slow)

@@ -4,13 +4,12 @@
 """The filters of candidates: target, validity, rarity. Each refusal has a cause."""
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 import math
-from typing import NamedTuple
 
 from scenario_gen.method.sampling.importance_sampling import TargetSet
 from scenario_gen.method.sampling.sampler import Block, BLOCK_CANDIDATES, LEVELS, Sampler
-from scenario_gen.types import Cause, Note, NoteKind, Scenario, Verdict
+from scenario_gen.types import Cause, Note, NoteKind, Reaction, Scenario, Verdict
 
 Check = Callable[[Sequence[Scenario]], list[Verdict]]
 
@@ -21,7 +20,8 @@ _LARGE_PILOT_FACTOR = 5  # over a pilot that has too few valid candidates
 _KEPT_SHARE = 0.4  # of the valid candidates that are kept at least
 
 
-class Candidate(NamedTuple):
+@dataclass(frozen=True, eq=False)
+class Candidate:
     """A candidate with its verdict.
 
     Attributes:
@@ -88,6 +88,10 @@ class ValidityFilter:
             if violation.cause != Cause.REACTION or violation.vehicles not in self.lost:
                 return violation.cause
         return Cause.CONFLICT_LOST if verdict.not_applicable > self.max_absent else None
+
+    def kept(self, edges: Iterable[Reaction]) -> tuple[Reaction, ...]:
+        """Return the reactions that candidates keep."""
+        return tuple(edge for edge in edges if (edge.who, edge.whom) not in self.lost)
 
     def valid(self, blocks: Iterable[Block]) -> list[Scenario]:
         """Return the valid candidates of some blocks."""
@@ -204,9 +208,15 @@ class Filters:
         for candidate in candidates:
             scenario, cause = candidate.scenario, candidate.cause
             if scenario is not None and cause is None and not self._in_range(scenario):
-                yield candidate._replace(cause=Cause.OUT_OF_RANGE)
+                yield replace(candidate, cause=Cause.OUT_OF_RANGE)
             else:
                 yield self._with_rarity(candidate)
+
+    def notes(self) -> tuple[Note, ...]:
+        """Return notes on reactions that cannot be kept, and on rare scenarios that are kept."""
+        messages = self.validity.lost.values()
+        lost = [Note.of(NoteKind.REACTION_LOST, message=message) for message in messages]
+        return (*lost, *self.rarity.notes())
 
     def _in_range(self, scenario: Scenario) -> bool:
         return self.target is None or self.target.holds(self.target.values(scenario))
@@ -215,4 +225,4 @@ class Filters:
         scenario = candidate.scenario
         if scenario is None or candidate.cause is not None or self.rarity(scenario):
             return candidate
-        return candidate._replace(cause=Cause.UNUSUAL)
+        return replace(candidate, cause=Cause.UNUSUAL)

@@ -104,12 +104,10 @@ class Features:
         scale = 2.0 / (self.high - self.low)
         u = scale * (np.asarray(x, dtype=np.float64) - self.low) - 1.0
         power = scale**derivative
-        coefficients, mean = self._coefficients, np.eye(self.degree + 1)
-        if derivative:
-            coefficients = chebyshev.chebder(coefficients, derivative) * power
+        coefficients = np.asarray(chebyshev.chebder(self._coefficients, derivative) * power)
         columns = [chebyshev.chebvander(u, coefficients.shape[0] - 1) @ coefficients]
         if self.degree >= 0:
-            mean = legendre.legder(mean, derivative)
+            mean = legendre.legder(np.eye(self.degree + 1), derivative)
             columns.append((legendre.legvander(u, mean.shape[0] - 1) @ mean) * power)
         return np.hstack(columns)
 
@@ -196,7 +194,8 @@ class Regression:
         diagonal = np.abs(np.diag(r)).min(initial=np.inf)
         if r.shape[0] < r.shape[1] or diagonal < _MIN_DIAGONAL_RATIO * np.abs(r).max(initial=0.0):
             raise InputError(
-                f"{len(observed.x)} observations are too few for a mean of degree {features.degree}"
+                f"{len(observed.x)} observations are too few "
+                f"for a mean of degree {features.degree}"
             )
         self._weights = start + basis @ linalg.solve_triangular(r, q.T @ target)
         self._root = linalg.solve_triangular(r, basis.T, trans="T").T  # basis r⁻¹

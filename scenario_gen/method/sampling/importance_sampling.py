@@ -120,7 +120,7 @@ class TargetSet:
     def distance(
         self, values: Sequence[float], guides: Sequence[float], unit: Sequence[float]
     ) -> float:
-        """Return how far figures are from their ranges, in units of `unit`; NaN: infinitely far."""
+        """Return how far figures are from their ranges, in units of `unit`; inf for NaN."""
         if any(math.isnan(value) for value in values):
             return math.inf
         total, k = 0.0, 0

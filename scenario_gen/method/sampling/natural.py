@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""A request's scenarios as a function of standard normal numbers, for a search that selects them."""
+"""Scenarios as a function of standard normal numbers, for a search that selects these."""
 
 from dataclasses import dataclass
 

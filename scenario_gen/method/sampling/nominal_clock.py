@@ -3,9 +3,10 @@
 
 """The nominal clock: the template's, slowed before bends that do not suit the template's speed.
 
-A route may bend more than the recorded path did. A vehicle that slowed down alone would have to
-speed up, brake and speed up again, for lengths and changepoint times are given. So the clock of all
-vehicles runs slower there, before the bend already, and they meet as in the recording.
+A route may bend more than the recorded path did. A vehicle that slowed down alone would have
+to speed up, brake and speed up again, for lengths and changepoint times are given. So the
+clock of all vehicles runs slower there, before the bend already, and they meet as in the
+recording.
 """
 
 from collections.abc import Sequence

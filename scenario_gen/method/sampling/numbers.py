@@ -51,8 +51,8 @@ class VehicleNumbers(NamedTuple):
         return cls(*consecutive((lateral, speed, *free)))
 
     @property
-    def count(self) -> int:
-        """How many there are."""
+    def total(self) -> int:
+        """How many numbers there are."""
         return int(max(part.stop for part in self))
 
 
@@ -72,10 +72,10 @@ class ModelNumbers(NamedTuple):
     @classmethod
     def of(cls, clock: int, vehicles: Iterable[VehicleNumbers], trimming: int) -> "ModelNumbers":
         """Lay out the numbers of a candidate."""
-        parts = consecutive((clock, *(numbers.count for numbers in vehicles), trimming))
+        parts = consecutive((clock, *(numbers.total for numbers in vehicles), trimming))
         return cls(parts[0], tuple(parts[1:-1]), parts[-1])
 
     @property
-    def count(self) -> int:
-        """How many there are."""
+    def total(self) -> int:
+        """How many numbers there are."""
         return int(self.trimming.stop)

@@ -31,8 +31,8 @@ MIN_NODES_COUNT = 5
 _FINE_STEPS = 8  # per point of the route, to measure its arc length
 _NEWTON_STEPS = 3  # |dp/du| hardly varies in a cell
 _NEWTON_TOLERANCE_M = 1e-6
-_GAUSS_X = (0.5 - np.sqrt(0.15), 0.5, 0.5 + np.sqrt(0.15))
-_GAUSS_W = (5.0 / 18.0, 8.0 / 18.0, 5.0 / 18.0)
+_GAUSS_POINTS = (0.5 - np.sqrt(0.15), 0.5, 0.5 + np.sqrt(0.15))
+_GAUSS_WEIGHT = (5.0 / 18.0, 8.0 / 18.0, 5.0 / 18.0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -163,7 +163,7 @@ def _arc_length(c: Floats, j: int, h: float, x: float) -> float:
     """Return the arc length of cell j up to fraction x, by three-point Gauss quadrature."""
     total = 0.0
     for k in range(3):
-        total += _GAUSS_W[k] * _speed(c, j, h, x * _GAUSS_X[k])
+        total += _GAUSS_WEIGHT[k] * _speed(c, j, h, x * _GAUSS_POINTS[k])
     return total * x * h
 
 

@@ -95,10 +95,10 @@ class Callbacks:
         progress: takes (valid so far, count, candidates so far).
         cancelled: called before each candidate; if True, the set so far is returned.
         accepts: called with each valid scenario; a scenario that it refuses is left out.
-        found: called with each scenario of the set as it is drawn, in the set's order.
+        on_valid: called with each scenario of the set as it is drawn, in the set's order.
     """
 
     progress: Progress = lambda *_: None
     cancelled: Cancelled = lambda: False
     accepts: Callable[[Scenario], bool] = lambda _: True
-    found: OnValid = lambda *_: None
+    on_valid: OnValid = lambda *_: None

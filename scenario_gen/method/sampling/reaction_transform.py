@@ -167,7 +167,7 @@ def _solve(
     n: int, equations: Sequence[_Equations], numbers: ModelNumbers
 ) -> tuple[Floats, Floats]:
     """Return `gather` and `scatter` of vehicle n."""
-    part, count = numbers.vehicles[n], numbers.count
+    part, count = numbers.vehicles[n], numbers.total
     if not equations:
         return np.zeros((count, 0)), np.zeros((0, part.stop - part.start))
     whitened = []
@@ -198,16 +198,19 @@ class _Context:
             yield from self._following(edge)
         elif edge.gap == math.inf:
             slows = np.array([edge.since if edge.stands else edge.until])
-            rows = {edge.who: self.late(edge.who, slows), edge.whom: -self.late(edge.whom, slows)}
+            rows = {
+                edge.who: self._lateness(edge.who, slows),
+                edge.whom: -self._lateness(edge.whom, slows),
+            }
             yield _Equations(rows, _variance(edge.residual))
         else:
             yield from self._yielding(edge)
 
-    def late(self, n: int, at: Floats) -> Floats:
+    def _lateness(self, n: int, at: Floats) -> Floats:
         """Return the lateness of vehicle n, see `lateness`."""
         return lateness(self.models[n], at, self.nominal, self.scale)
 
-    def ahead(self, n: int, at: Floats) -> Floats:
+    def _advance(self, n: int, at: Floats) -> Floats:
         """Return the advance of vehicle n, see `advance`."""
         return advance(self.models[n], at, self.scale)
 
@@ -227,10 +230,10 @@ class _Context:
         slow += np.square(_RESIDUALS.rough_share) * np.eye(count)
         quick = np.square(_RESIDUALS.quick_sigma) * _correlation(at, _RESIDUALS.quick_length)
 
-        late = {who: self.late(who, at), whom: -self.late(whom, before)}
-        yield _Equations(late, seconds[:, None] * seconds * slow)
-        ahead = {who: self.ahead(who, at), whom: -self._response(edge, before)}
-        yield _Equations(ahead, metres[:, None] * metres * slow + quick)
+        seconds_rows = {who: self._lateness(who, at), whom: -self._lateness(whom, before)}
+        yield _Equations(seconds_rows, seconds[:, None] * seconds * slow)
+        metres_rows = {who: self._advance(who, at), whom: -self._response(edge, before)}
+        yield _Equations(metres_rows, metres[:, None] * metres * slow + quick)
 
     def _response(self, edge: Reaction, at: Floats) -> Floats:
         """Return the metres (q, d) of a leader's motion to which its follower responds.
@@ -238,8 +241,8 @@ class _Context:
         The share `gain` counts at once, the rest averaged over some seconds.
         """
         offsets = np.linspace(-_RESIDUALS.averaging, _RESIDUALS.averaging, 7)
-        averaged = np.mean([self.ahead(edge.whom, at + offset) for offset in offsets], axis=0)
-        return np.asarray(edge.gain * self.ahead(edge.whom, at) + (1.0 - edge.gain) * averaged)
+        averaged = np.mean([self._advance(edge.whom, at + offset) for offset in offsets], axis=0)
+        return np.asarray(edge.gain * self._advance(edge.whom, at) + (1.0 - edge.gain) * averaged)
 
     def _yielding(self, edge: Reaction) -> Iterator[_Equations]:
         """Yield the equations of a yielder's entry and departure."""
@@ -248,7 +251,7 @@ class _Context:
         enters = self._arrival(edge.who, edge.enters)
         yield _Equations({edge.who: enters, edge.whom: clears}, _variance(sigma))
         if edge.stands:
-            leaves = self.late(edge.who, np.array([edge.until]))
+            leaves = self._lateness(edge.who, np.array([edge.until]))
             covariance = _variance(edge.residual) + _variance(_RESIDUALS.event)
             yield _Equations({edge.who: leaves, edge.whom: clears}, covariance)
 
@@ -256,7 +259,7 @@ class _Context:
         """Return the seconds (1, d) by which vehicle n is late where it is at a template time."""
         at = np.array([time])
         speed = np.maximum(_mean_speed(self.models[n], at), _RESIDUALS.min_crossing_speed)
-        return self.late(n, at) - self.ahead(n, at) / speed
+        return self._lateness(n, at) - self._advance(n, at) / speed
 
 
 def _variance(sigma: float) -> Floats:
@@ -288,7 +291,7 @@ def lateness(model: VehicleModel, at: Floats, nominal: Clock, scale: NoiseScale)
         nominal: the clock without deviation.
         scale: factors on the standard deviations.
     """
-    rows = np.zeros((len(at), model.numbers.count))
+    rows = np.zeros((len(at), model.numbers.total))
     if model.variation is not None:
         clock = model.variation.clock
         basis = np.stack([np.interp(at, nominal.grid, values) for values in clock.basis], axis=1)
@@ -304,7 +307,7 @@ def advance(model: VehicleModel, at: Floats, scale: NoiseScale) -> Floats:
         at: (q,) template times [s].
         scale: factors on the standard deviations.
     """
-    rows = np.zeros((len(at), model.numbers.count))
+    rows = np.zeros((len(at), model.numbers.total))
     driven = model.speed.spline.driven(_within(model, at))
     rows[:, model.numbers.speed] = scale.longitudinal * (driven @ model.speed.factor)
     if model.variation is not None:

@@ -31,7 +31,7 @@ from scenario_gen.method.sampling.speed_profile.mean import (
 )
 from scenario_gen.method.sampling.speed_profile.spline import SpeedSpline
 from scenario_gen.method.sampling.time_warp import Clock
-from scenario_gen.numerics import Floats
+from scenario_gen.numerics import Bools, Floats
 from scenario_gen.situation import Track, Wait
 from scenario_gen.types import Dynamics, Encounter, Vehicle
 
@@ -212,7 +212,7 @@ class RoutedVehicle:
         return slowdown
 
     def _recorded_lateral(self, at: Floats) -> Floats:
-        """Return a little more than the template's lateral acceleration [m/s²] at times (q,) [s]."""
+        """Return a little more than the recorded lateral acceleration [m/s²] at times (q,) [s]."""
         lateral = np.interp(at, self.recorded_time, self.lateral)
         return np.asarray(_TUNING.bend_factor * lateral)
 
@@ -244,8 +244,7 @@ def route_vehicle(
     encounter, route = plan.encounter, plan.routes[n]
     vehicle, path = encounter.vehicles[n], BasePath.of(route)
     limits = plan.limits.of(vehicle.type).planned
-    first, last = encounter.present[n].tolist()
-    span = slice(first, last + 1)
+    span = _presence(encounter, n)
     time, speed = encounter.time[span], encounter.speed[n, span]
     driven = float(0.5 * encounter.dt * (speed[1:] + speed[:-1]).sum())
     scale = min(path.length / driven, _TUNING.max_scale) if driven > 1e-3 else 1.0
@@ -254,11 +253,10 @@ def route_vehicle(
     known = np.concatenate([[0], inner, [len(times) - 1]])
     times = np.concatenate([time[:1], times[inner], time[-1:]])
     dwells = np.diff(route.anchor[known]) == 0
-    ends = (float(plan.requested.start[n, 3]), float(plan.requested.end[n, 3]))
+    requested = (float(plan.requested.start[n, 3]), float(plan.requested.end[n, 3]))
+    ends = (0.0, 0.0) if dwells.all() else requested
     stands = lengthened_waits(n, waits, creeping=False)
-    if dwells.all():
-        ends = (0.0, 0.0)
-    else:
+    if not dwells.all():
         stands, dwells = standing_within(times, dwells, stands, time, speed)
     creeping = lengthened_waits(n, waits, creeping=True)
     knots = speed_knots(times, dwells, stands, ends, creeping)
@@ -269,11 +267,10 @@ def route_vehicle(
     rests = _rests(knots, times)
     spline = SpeedSpline.over(float(times[0]), float(times[-1]), rests)
     lines = rounded_lines(spline, knots, time, scale * speed, recorded)
-    track = plan.situation.tracks[n]
-    jerk = _largest_jerk(scale * speed, encounter.dt)
+    track, jerk = plan.situation.tracks[n], _largest_jerk(scale * speed, encounter.dt)
     lateral = _largest_lateral(encounter, track, n)
     bend = config.bend_acceleration or max(_TUNING.bend_factor * lateral, _TUNING.min_bend)
-    yaw = np.unwrap(encounter.heading[n, span])
+    steering = Steering.of(time, np.unwrap(encounter.heading[n, span]), speed, path.length)
     return RoutedVehicle(
         vehicle,
         path,
@@ -289,13 +286,19 @@ def route_vehicle(
         config.max_jerk or max(_TUNING.jerk_factor * jerk, _TUNING.min_jerk),
         min(bend, _TUNING.curve_share * limits.max_lateral_acceleration),
         _lateral(track, encounter.speed[n])[span],
-        Steering.of(time, yaw, speed, path.length),
+        steering,
         rests,
         limits,
     )
 
 
-def _unless(zero: Floats, speeds: Sequence[float] | Floats) -> tuple[float, float]:
+def _presence(encounter: Encounter, n: int) -> slice:
+    """Return the samples at which vehicle n is present."""
+    first, last = encounter.present[n].tolist()
+    return slice(first, last + 1)
+
+
+def _unless(zero: Bools, speeds: Sequence[float] | Floats) -> tuple[float, float]:
     """Return two end speeds [m/s], 0 where `zero` (2,) is true."""
     start, end = np.where(zero, 0.0, speeds).tolist()
     return start, end
@@ -326,15 +329,14 @@ def _largest_jerk(speed: Floats, dt: float) -> float:
 
 def _largest_lateral(encounter: Encounter, track: Track, n: int) -> float:
     """Return the largest lateral acceleration [m/s²] of vehicle n, averaged over half a second."""
-    first, last = encounter.present[n].tolist()
-    span = slice(first, last + 1)
+    span = _presence(encounter, n)
     width = 2 * round(0.5 * _TUNING.averaging / encounter.dt) + 1
     lateral = np.gradient(track.poses[span, 2], encounter.dt) * encounter.speed[n, span]
     return float(np.abs(ndimage.uniform_filter1d(lateral, width, mode="nearest")).max())
 
 
 def _lateral(track: Track, speed: Floats) -> Floats:
-    """Return lateral accelerations (T,) [m/s²] at speeds (T,) [m/s], with curvature as on a route."""
+    """Return lateral accelerations (T,) [m/s²] at speeds (T,) [m/s] on a track."""
     driven = np.zeros(0)
     if not track.still:
         driven = np.arange(track.progress[0], track.progress[-1], NODE_SPACING_M)

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""One candidate by its index: seed and index give the same candidate, whatever was drawn before."""
+"""Candidates by their index: seed and index determine a candidate."""
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
@@ -67,7 +67,7 @@ def place_of(index: int) -> tuple[int, int]:
 class Block(NamedTuple):
     """Candidates that are drawn together; None for one without a speed profile."""
 
-    index: list[int]
+    indices: list[int]
     scenarios: list[Scenario | None]
 
 
@@ -96,9 +96,9 @@ class Sampler:
     def block(self, level: int, number: int) -> Block:
         """Return a block of a level's candidates."""
         first = index_of(level, number * BLOCK_CANDIDATES)
-        index = list(range(first, first + BLOCK_CANDIDATES))
+        indices = list(range(first, first + BLOCK_CANDIDATES))
         batch = self.model.draw(self.numbers(level, number), self._scale(level))
-        return Block(index, batch.scenarios(self.seed, index, self.frame_id))
+        return Block(indices, batch.scenarios(self.seed, indices, self.frame_id))
 
     def blocks(self, level: int, first: int = 0) -> Iterator[Block]:
         """Yield the blocks of a level, from a number on."""
@@ -177,14 +177,14 @@ class RedrawnScenarios(Sequence[Scenario]):
 
     Attributes:
         sampler: draws them.
-        index: (S,) indices of valid candidates.
+        indices: (S,) of valid candidates.
     """
 
     sampler: Sampler
-    index: Ints
+    indices: Ints
 
     def __len__(self) -> int:
-        return len(self.index)
+        return len(self.indices)
 
     @overload
     def __getitem__(self, at: int) -> Scenario: ...
@@ -194,7 +194,7 @@ class RedrawnScenarios(Sequence[Scenario]):
 
     def __getitem__(self, at: int | slice) -> "Scenario | RedrawnScenarios":
         if isinstance(at, slice):
-            return RedrawnScenarios(self.sampler, self.index[at])
-        scenario = self.sampler.scenario(int(self.index[at]))
+            return RedrawnScenarios(self.sampler, self.indices[at])
+        scenario = self.sampler.scenario(int(self.indices[at]))
         assert scenario is not None
         return scenario

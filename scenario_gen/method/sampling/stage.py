@@ -10,7 +10,6 @@ from scenario_gen.method.sampling.config import SamplingConfig
 from scenario_gen.method.sampling.draw import draw_scenarios
 from scenario_gen.method.sampling.plan import Callbacks, Plan
 from scenario_gen.method.validity import Checker, Limits
-from scenario_gen.situation import Situation, Wait
 from scenario_gen.types import GenerationResult, Measures, NoteKind, Request
 
 
@@ -21,8 +20,7 @@ def sample_scenarios(
     request: Request = Request(),
     *,
     count: int,
-    waits: tuple[Wait, ...] | None = None,
-    situation: Situation | None = None,
+    plan: Plan | None = None,
     callbacks: Callbacks = Callbacks(),
     measures: Measures | None = None,
 ) -> GenerationResult:
@@ -36,8 +34,7 @@ def sample_scenarios(
         limits: of motion, and the checker's.
         request: what is requested.
         count: valid scenarios wanted.
-        waits: that are kept; the template's unless given.
-        situation: the template's, if it is known.
+        plan: what the scenarios are drawn from, if it is known.
         callbacks: called on progress and with valid scenarios.
         measures: measures scenarios for a target.
 
@@ -45,7 +42,7 @@ def sample_scenarios(
         InputError: road or fit are not known.
         RefusedError: as `draw_scenarios`.
     """
-    plan = Plan.of(planned, sampling, limits, request, waits, situation)
+    plan = plan or Plan.of(planned, sampling, limits, request)
     generated = draw_scenarios(
         plan,
         checker_of(plan, sampling, limits, request).check,
@@ -60,9 +57,7 @@ def sample_scenarios(
     notes = road.lanes.notes if road.lanes is not None else ()
     mirrored = [note for note in notes if note.kind is NoteKind.MIRRORED]
     generated = replace(
-        generated,
-        adaptations=(*mirrored, *generated.adaptations),
-        graph=plan.situation.reactions,
+        generated, adaptations=(*mirrored, *generated.adaptations), graph=plan.situation.reactions
     )
     return replace(planned, fit=replace(fit, requested=plan.requested), generated=generated)
 

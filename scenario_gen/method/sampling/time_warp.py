@@ -14,6 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 from scipy import special
+from scipy.interpolate import CubicHermiteSpline
 
 from scenario_gen.method.sampling.config import SamplingConfig
 from scenario_gen.method.sampling.gp import Features, Observations, principal, Regression
@@ -65,17 +66,8 @@ class Clock:
         Args:
             tau: (q,) template times [s].
         """
-        cell = np.clip(np.searchsorted(self.grid, tau, side="right") - 1, 0, len(self.grid) - 2)
-        h = self.step
-        x = (tau - self.grid[cell]) / h
-        start, end = self.time[cell], self.time[cell + 1]
-        c1, q = h * self.rate[cell], h * self.rate[cell + 1]
-        c2 = 3.0 * (end - start) - 2.0 * c1 - q
-        c3 = 2.0 * (start - end) + c1 + q
-        value = start + x * (c1 + x * (c2 + x * c3))
-        rate = (c1 + x * (2.0 * c2 + 3.0 * c3 * x)) / h
-        slope = (2.0 * c2 + 6.0 * c3 * x) / (h * h)
-        return value, rate, slope, 6.0 * c3 / (h * h * h)
+        curve = CubicHermiteSpline(self.grid, self.time, self.rate)
+        return curve(tau), curve(tau, 1), curve(tau, 2), curve(tau, 3)
 
 
 class TimeWarp:

@@ -81,7 +81,7 @@ class VehicleModel:
         """Return S samples.
 
         Args:
-            z: (S, numbers.count) standard normal numbers.
+            z: (S, numbers.total) standard normal numbers.
             scale: factors on the standard deviations.
             shared: S clocks that all vehicles share.
             nominal: the clock without deviation.

@@ -9,11 +9,4 @@ from scenario_gen.method.validity.containment import first_exits, Ground
 from scenario_gen.method.validity.cubic import Proof
 from scenario_gen.method.validity.limits import Limits
 
-__all__ = [
-    "Checker",
-    "Ground",
-    "Limits",
-    "Proof",
-    "first_contacts",
-    "first_exits",
-]
+__all__ = ["Checker", "Ground", "Limits", "Proof", "first_contacts", "first_exits"]

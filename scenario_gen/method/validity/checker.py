@@ -11,11 +11,7 @@ import numpy as np
 from scenario_gen.base.errors import InputError
 from scenario_gen.method.validity.collision import contact_violations
 from scenario_gen.method.validity.containment import exit_violations, Ground
-from scenario_gen.method.validity.dynamics import (
-    is_motion,
-    LARGEST_VALUE_RATIO,
-    motion_violations,
-)
+from scenario_gen.method.validity.dynamics import is_motion, LARGEST_VALUE_RATIO, motion_violations
 from scenario_gen.method.validity.limits import Limits
 from scenario_gen.method.validity.reactions import broken_reactions, tailgaters
 from scenario_gen.method.validity.template_checks import (
@@ -24,7 +20,7 @@ from scenario_gen.method.validity.template_checks import (
     state_violations,
     wait_violations,
 )
-from scenario_gen.numerics import Bools
+from scenario_gen.numerics import Bools, Floats
 from scenario_gen.numerics.hermite import control_points
 from scenario_gen.roads import drives_against, ground_for, RuleCheck
 from scenario_gen.situation import (
@@ -56,9 +52,10 @@ _ARRAYS = ("time", "position", "heading", "speed", "acceleration")
 class Checker:
     """Checks scenarios against a road, requested states, a template and limits.
 
-    Proven at every instant of the motion that `Scenario` defines, not at samples only: footprints
-    do not overlap, and each lies inside drivable cells. A scenario is refused if that is not proven
-    at `limits.time_resolution`. The other guarantees are listed in docs/validity.md. Any of road,
+    Proven at every instant of the motion that `Scenario` defines, not at samples only:
+    footprints do not overlap, and each lies inside drivable cells. A scenario is refused if
+    that is not proven at `limits.time_resolution`. The other guarantees are listed in
+    docs/validity.md. Any of road,
     requested, conflicts and waits may be None: those checks are left out, and `not_applicable`
     names them. One checker serves many scenarios of one request.
 
@@ -69,11 +66,11 @@ class Checker:
         waits: the template's waits; in every scenario the vehicle stands, or moves slowly, as
             often, one after the other.
         limits: the limits; the default ones if None.
-        first: the vehicle that must go first at each conflict, None for either (`required_orders`);
-            a conflict whose order is swapped must exist.
+        first: the vehicle that must go first at each conflict, None for either
+        (`required_orders`); a conflict whose order is swapped must exist.
         reactions: of the template, which every scenario keeps.
-        ends: (N, 2) whether each vehicle is present at the template's first and last instant, as it
-            then must be at the scenario's; None if that is not known.
+        ends: (N, 2) whether each vehicle is present at the template's first and last instant, as
+            it then must be at the scenario's; None if that is not known.
         lane_gaps: the gaps of the template's followers, as `lane_gaps` returns them; None if they
             are not known.
 
@@ -163,8 +160,8 @@ class Checker:
         """Return one verdict per scenario.
 
         Raises:
-            InputError: the arrays of a scenario disagree in shape, or its vehicles or its frame are
-                not those of the request.
+            InputError: the arrays of a scenario disagree in shape, or its vehicles or its frame
+                are not those of the request.
         """
         return [self._check(scenario) for scenario in scenarios]
 
@@ -195,23 +192,19 @@ class Checker:
     def _refuse_misfits(self, scenario: Scenario) -> None:
         """Refuse a scenario that cannot be compared with the request."""
         label = f"scenario {scenario.index} of seed {scenario.seed}"
-        n, t = len(scenario.vehicles), scenario.time.shape[0]
+        n = len(scenario.vehicles)
         counts = f"{label} has {n} vehicle(s)"
         _refuse_shapes(scenario, label)
-        if n == 0 or t < 2:
-            raise InputError(f"{counts} and {t} sample(s); at least 1 and 2 are needed")
-        if not all(vehicle.length > 0.0 and vehicle.width > 0.0 for vehicle in scenario.vehicles):
-            raise InputError(f"{label}: the length or width of a vehicle is not positive")
         if self.road is not None and scenario.frame_id != self.road.frame_id:
             raise InputError(
                 f"{label} is in frame {scenario.frame_id!r}, its road in {self.road.frame_id!r}"
             )
         requested = self.requested
-        tables = [] if self.ends is None else [self.ends]
+        tables: list[Floats | Bools | None] = [self.ends]
         if requested is not None:
             tables += [requested.start, requested.end, requested.relaxed]
         for table in tables:
-            if len(table) != n:
+            if table is not None and len(table) != n:
                 raise InputError(f"{counts}, but states were requested for {len(table)}")
         named = [wait.vehicle for wait in self.waits or ()]
         for conflict in self.conflicts or ():
@@ -221,7 +214,8 @@ class Checker:
         for i in named:
             if not 0 <= i < n:
                 raise InputError(
-                    f"{counts}, but the recording's waits, conflicts and reactions name vehicle {i}"
+                    f"{counts}, but the recording's waits, conflicts and reactions "
+                    f"name vehicle {i}"
                 )
 
     def _state_faults(self, scenario: Scenario) -> Iterator[Violation]:
@@ -286,13 +280,19 @@ class Checker:
 
 
 def _refuse_shapes(scenario: Scenario, label: str) -> None:
-    """Refuse arrays whose shapes disagree."""
+    """Refuse a scenario whose arrays disagree in shape, or that is empty."""
     n, t = len(scenario.vehicles), scenario.time.shape[0]
     shapes = {scenario.heading.shape, scenario.speed.shape, scenario.acceleration.shape}
     if scenario.position.shape != (n, t, 2) or shapes != {(n, t)}:
         raise InputError(
             f"{label}: arrays disagree in shape with {n} vehicle(s) and {t} sample(s)"
         )
+    if n == 0 or t < 2:
+        raise InputError(
+            f"{label} has {n} vehicle(s) and {t} sample(s); at least 1 and 2 are needed"
+        )
+    if not all(vehicle.length > 0.0 and vehicle.width > 0.0 for vehicle in scenario.vehicles):
+        raise InputError(f"{label}: the length or width of a vehicle is not positive")
 
 
 def _unusable_value(scenario: Scenario) -> Violation | None:

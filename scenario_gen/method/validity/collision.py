@@ -49,8 +49,8 @@ class _Turning(NamedTuple):
 def _gap(d: Floats, a: _Turning, b: _Turning, u: float, margin: float) -> float:
     """Largest separation [m] along the four box axes, valid for all positions and headings.
 
-    A box's extent along its longitudinal axis grows by at most width sin(turn) <= width turn, along
-    any other line by at most (half diagonal) turn.
+    A box's extent along its longitudinal axis grows by at most width sin(turn) <= width turn,
+    along any other line by at most (half diagonal) turn.
 
     Args:
         d: (4, 2) control points of the relative position [m].
@@ -125,7 +125,7 @@ def _first_contact(
 
 @kernel(inline=True)
 def _block_bounds(control: Floats) -> Floats:
-    """Bounds (N, B, 4) low x, high x, low y, high y of each block of control points (N, K, 4, 2)."""
+    """Low x, high x, low y, high y (N, B, 4) of each block of control points (N, K, 4, 2)."""
     n, intervals = control.shape[0], control.shape[1]
     bounds = np.empty((n, (intervals + _BLOCK_STEPS - 1) // _BLOCK_STEPS, 4))
     bounds[:, :, 0::2] = np.inf
@@ -150,7 +150,7 @@ def _first_contact_in_block(
     reach: float,
     required: _Separation,
 ) -> tuple[int, float, float]:
-    """Outcome, time [s] and gap [m] of the first contact of two vehicles in a block of intervals."""
+    """Outcome, time [s] and gap [m] of the first contact of two vehicles in a block."""
     d = np.empty((4, 2))
     end = min(len(time) - 1, (block + 1) * _BLOCK_STEPS)
     for k in range(block * _BLOCK_STEPS, end):

@@ -47,7 +47,7 @@ class MotionLimits(NamedTuple):
         curvature: 1/m.
         slip: m/s by which displacement over time may differ from the published velocity.
         slip_share: the same as a share of the speed, in addition.
-        tolerance: m/s² by which accelerations taken from speeds or positions may exceed the limits.
+        tolerance: m/s² by which accelerations from speeds or positions may exceed the limits.
     """
 
     speed: float

@@ -40,14 +40,15 @@ class Limits(TypeLimits):
     )
     min_clearance: float = parameter(
         -1.0,
-        "smallest gap between two footprints, by their best separating axis; a gap of 0 (touching) "
-        "is an overlap; -1: half the recording's smallest gap, at most 0.5 m",
+        "smallest gap between two footprints, by their best separating axis; a gap of 0 "
+        "(touching) is an overlap; -1: half the recording's smallest gap, at most 0.5 m",
         unit="m",
         low=-1.0,
     )
     slip: float = parameter(
         0.2,
-        "largest difference of displacement over time from speed along heading, ahead and sideways",
+        "largest difference of displacement over time from speed along heading, ahead and "
+        "sideways",
         unit="m/s",
         low=0.0,
     )

@@ -451,7 +451,7 @@ def answer_request(
         with turn:
             sender.scenario(scenario, requested, ego)
 
-    callbacks = Callbacks(advance, cancelled, found=in_turn)
+    callbacks = Callbacks(advance, cancelled, on_valid=in_turn)
     stages = PipelineConfig(
         fitting=config.fitting,
         planning=config.planning,

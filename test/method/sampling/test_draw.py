@@ -282,7 +282,9 @@ def test_progress_and_cancellation():
 def test_nothing_is_given_out_after_a_cancellation():
     *head, waits = scene()
     given = []
-    callbacks = Callbacks(found=lambda *a: given.append(a[0]), cancelled=lambda: len(given) == 3)
+    callbacks = Callbacks(
+        on_valid=lambda *a: given.append(a[0]), cancelled=lambda: len(given) == 3
+    )
     made = draw_scenarios(
         Plan(Situation.of(head[0]), *head[1:], waits), all_valid, count=500, callbacks=callbacks
     )

@@ -35,15 +35,15 @@ def test_the_slices_are_consecutive_and_complete():
     vehicle = VehicleNumbers.of(3, 5, 2)
     assert [part.stop - part.start for part in vehicle] == [3, 5, 2, 1, 2, 1]
     assert [part.start for part in vehicle[1:]] == [part.stop for part in vehicle[:-1]]
-    assert vehicle.count == 14 and VehicleNumbers.of(3, 5, None).count == 8
+    assert vehicle.total == 14 and VehicleNumbers.of(3, 5, None).total == 8
     whole = ModelNumbers.of(4, [vehicle, vehicle], 2)
-    assert whole.vehicles == (slice(4, 18), slice(18, 32)) and whole.count == 34
+    assert whole.vehicles == (slice(4, 18), slice(18, 32)) and whole.total == 34
 
 
 @pytest.mark.parametrize("name", VehicleNumbers._fields)
 def test_each_slice_moves_what_it_is_named_after(model, name):
     vehicle, nominal = model.vehicles[0], model.warp.nominal
-    z = np.zeros((2, vehicle.numbers.count))
+    z = np.zeros((2, vehicle.numbers.total))
     z[1, getattr(vehicle.numbers, name)] = 1.5
     shared = model.warp.sample(np.zeros((2, model.warp.count)), 1.0)
     samples = vehicle.sample(z, NoiseScale(), shared, nominal)
@@ -65,7 +65,7 @@ def test_reactions_read_the_slices_that_move_time_and_place(model):
     ahead = advance(vehicle, at, NoiseScale())
     time, place = np.flatnonzero(late.any(axis=0)), np.flatnonzero(ahead.any(axis=0))
     numbers = vehicle.numbers
-    everything = np.arange(numbers.count)
+    everything = np.arange(numbers.total)
     assert set(time) == set(everything[numbers.clock])
     assert set(place) <= set(everything[numbers.speed]) | set(everything[numbers.end_speeds])
     assert set(place) & set(everything[numbers.end_speeds])

@@ -1,4 +1,4 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The speed profile of a vehicle: its knots, the stops it keeps, and the quadratic program that finds it."""
+"""The speed profile of a vehicle: knots, spline basis, mean and random deviations."""

@@ -8,7 +8,7 @@ Knots lie at changepoints, and where a stand or a slow wait begins or ends.
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from itertools import pairwise
+from itertools import chain, pairwise
 
 import numpy as np
 
@@ -68,15 +68,13 @@ def speed_knots(
         return bool(dwells[k]) or _contains(stands, time)
 
     # a vehicle that stands in the template rolls where it is requested to move
-    start, end = float(clock[0]), float(clock[-1])
     margin = 0.5 * _MIN_KNOT_DISTANCE_S
-    if stands_at(start + margin) and ends[0] > STANDING_MPS:
-        start += max(_MIN_KNOT_DISTANCE_S, ends[0] / _ROLLING_MPS2)
-    if stands_at(end - margin) and ends[1] > STANDING_MPS:
-        end -= max(_MIN_KNOT_DISTANCE_S, ends[1] / _ROLLING_MPS2)
+    start, end = float(clock[0]), float(clock[-1])
+    start += _rolling_time(ends[0]) if stands_at(start + margin) else 0.0
+    end -= _rolling_time(ends[1]) if stands_at(end - margin) else 0.0
 
     knots = clock.tolist()
-    for time in (start, end, *(each for span in (*stands, *creeping) for each in span)):
+    for time in (start, end, *chain(*stands, *creeping)):
         distance = min(abs(time - knot) for knot in knots)
         if clock[0] < time < clock[-1] and distance >= _MIN_KNOT_DISTANCE_S - 1e-9:
             knots.append(float(time))
@@ -85,6 +83,11 @@ def speed_knots(
     still = np.array([start < time < end and stands_at(time) for time in middles])
     slow = np.array([_contains(creeping, time) for time in middles])
     return SpeedKnots(np.array(knots), still, slow & ~still)
+
+
+def _rolling_time(speed: float) -> float:
+    """Return the seconds from a standstill to a requested speed [m/s]; 0 if it is a standstill."""
+    return max(_MIN_KNOT_DISTANCE_S, speed / _ROLLING_MPS2) if speed > STANDING_MPS else 0.0
 
 
 def _contains(spans: Spans, time: float) -> bool:

@@ -206,10 +206,7 @@ def _solve(
     settings = clarabel.DefaultSettings()
     settings.verbose = False
     settings.direct_solve_method = "qdldl"  # one thread, so the bits are the same everywhere
-    cones = [
-        clarabel.ZeroConeT(equations),
-        clarabel.NonnegativeConeT(len(upper) - equations),
-    ]
+    cones = [clarabel.ZeroConeT(equations), clarabel.NonnegativeConeT(len(upper) - equations)]
     solver = clarabel.DefaultSolver(
         sparse.csc_array(np.triu(quadratic)),
         linear,

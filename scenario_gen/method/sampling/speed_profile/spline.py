@@ -1,10 +1,11 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Speed as a cubic B-spline over the template's clock: acceleration is continuous, jerk bounded by the coefficients.
+"""Speed as a cubic B-spline over the template's clock, with continuous acceleration.
 
-The coefficients of the derivatives are differences of neighbouring ones, and a spline lies in the convex hull of its
-coefficients (de Boor, A Practical Guide to Splines, 2001): coefficients that are not negative are speeds that are not.
+The coefficients of the derivatives are differences of neighbouring ones, and a spline lies in
+the convex hull of its coefficients (de Boor, A Practical Guide to Splines, 2001): coefficients
+that are not negative are speeds that are not.
 """
 
 from dataclasses import dataclass
