@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Bags of rosbag2 and ROS 1: fixes and speeds, odometry, tracked objects, or recorded encounters."""
+"""Bags of rosbag2 and ROS 1: fixes, speeds, odometry, tracked objects or encounters."""
 
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
@@ -307,7 +307,7 @@ def _check_frames(
     return []
 
 
-def _check_fixed_frame(frame: str, what: str) -> None:
+def _check_fixed_frame(frame: str, place: str) -> None:
     """Check that positions are not in the frame of a moving vehicle.
 
     Raises:
@@ -315,7 +315,7 @@ def _check_fixed_frame(frame: str, what: str) -> None:
     """
     if frame.rpartition("/")[2].startswith("base_"):
         raise InputError(
-            f"{what} is in frame {frame!r}, which moves with its vehicle; record it in a fixed "
+            f"{place} is in frame {frame!r}, which moves with its vehicle; record it in a fixed "
             "frame, such as map"
         )
 

@@ -3,7 +3,7 @@
 
 """The columns of a table by quantity, with their units: by option, or by name and suffix."""
 
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 import math
 from pathlib import Path
@@ -137,27 +137,43 @@ def find_columns(header: Sequence[str], path: Path, option: str) -> dict[str, Co
     """
     by_name = {normalized(name): name for name in header}
     requested = _requested(header, path, option)
-    columns = {quantity: column for quantity, column in requested.items() if column is not None}
-    is_ngsim = _NGSIM["x"][0] in by_name and _NGSIM["speed"][0] in by_name
-    for quantity, (name, unit) in _NGSIM.items():
-        if is_ngsim and name in by_name and quantity not in requested:
-            columns[quantity] = as_column(quantity, by_name[name], unit)
-    underscored = {name.replace(" ", "_"): raw for name, raw in by_name.items() if " " in name}
-    for quantity, aliases in NAMES.items():
-        if quantity in columns or quantity in requested:
-            continue
-        suffixes = ("", *(f"_{unit}" for unit in UNITS[quantity]))
-        candidates = [alias + suffix for alias in aliases for suffix in suffixes]
-        raw_names = [by_name[name] for name in candidates if name in by_name]
-        raw_names += [underscored[name] for name in candidates if name in underscored]
-        if raw_names:
-            columns[quantity] = as_column(quantity, raw_names[0])
-    if "heading" in columns and "time" in columns:
-        is_bsm = columns["time"].name.strip().lower() == "gentime"
-        if is_bsm:
-            name = columns["heading"].name
-            columns["heading"] = Column(name, math.pi / 180.0, clockwise=True)
+    columns = _ngsim_columns(by_name)
+    for quantity in NAMES:
+        name = _preferred_name(quantity, by_name)
+        if quantity not in columns and name is not None:
+            columns[quantity] = as_column(quantity, name)
+    for quantity, column in requested.items():
+        columns.pop(quantity, None)
+        if column is not None:
+            columns[quantity] = column
+    time = columns.get("time")
+    if time and time.name.strip().lower() == "gentime" and "heading" in columns:  # SPMD
+        name = columns["heading"].name
+        columns["heading"] = Column(name, math.pi / 180.0, clockwise=True)
     return _complete(columns, path, list(by_name.values()))
+
+
+def _ngsim_columns(by_name: Mapping[str, str]) -> dict[str, Column]:
+    """Return the columns of NGSIM's trajectories; none of other tables."""
+    if _NGSIM["x"][0] not in by_name or _NGSIM["speed"][0] not in by_name:
+        return {}
+    return {
+        quantity: as_column(quantity, by_name[name], unit)
+        for quantity, (name, unit) in _NGSIM.items()
+        if name in by_name
+    }
+
+
+def _preferred_name(quantity: str, by_name: Mapping[str, str]) -> str | None:
+    """Return the column whose name is the preferred alias of a quantity, with or without unit."""
+    suffixes = ("", *(f"_{unit}" for unit in UNITS[quantity]))
+    candidates = [alias + suffix for alias in NAMES[quantity] for suffix in suffixes]
+    underscored = {name.replace(" ", "_"): raw for name, raw in by_name.items() if " " in name}
+    for names in (by_name, underscored):
+        for candidate in candidates:
+            if candidate in names:
+                return names[candidate]
+    return None
 
 
 def _requested(header: Sequence[str], path: Path, option: str) -> dict[str, Column | None]:
@@ -171,30 +187,35 @@ def _requested(header: Sequence[str], path: Path, option: str) -> dict[str, Colu
     columns: dict[str, Column | None] = {}
     for part in listed(option):
         quantity, _, text = (word.strip() for word in part.partition("="))
-        if quantity == "point":
-            continue
-        if quantity not in NAMES:
+        if quantity not in (*NAMES, "point"):
             raise InputError(
                 f"parameter columns: write quantity=column, …; {quantity!r} is none of "
                 f"{', '.join(NAMES)}, point"
             )
-        if text == "none":
-            columns[quantity] = None
-            continue
-        is_flipped = text.startswith("-") and text.lower() not in known
-        name = text.removeprefix("-").strip() if is_flipped else text
-        unit = ""
-        if name.lower() not in known and ":" in name:
-            name, _, unit = (word.strip() for word in name.rpartition(":"))
-        if name.lower() not in known:
-            raise InputError(
-                f"{path} has no column {text!r} (requested as {quantity}); "
-                f"it has {', '.join(header)}"
-            )
-        _check_unit(quantity, unit)
-        column = as_column(quantity, known[name.lower()], unit)
-        columns[quantity] = replace(column, factor=-column.factor) if is_flipped else column
+        if quantity != "point":
+            columns[quantity] = None if text == "none" else _parsed(quantity, text, known, path)
     return columns
+
+
+def _parsed(quantity: str, text: str, known: Mapping[str, str], path: Path) -> Column:
+    """Return the column of a text `name`, `name:unit` or `-name` (flipped).
+
+    Raises:
+        InputError: the table has no such column, or the quantity no such unit.
+    """
+    is_flipped = text.startswith("-") and text.lower() not in known
+    name = text.removeprefix("-").strip() if is_flipped else text
+    unit = ""
+    if name.lower() not in known and ":" in name:
+        name, _, unit = (word.strip() for word in name.rpartition(":"))
+    if name.lower() not in known:
+        raise InputError(
+            f"{path} has no column {text!r} (requested as {quantity}); "
+            f"it has {', '.join(dict.fromkeys(known.values()))}"
+        )
+    _check_unit(quantity, unit)
+    column = as_column(quantity, known[name.lower()], unit)
+    return replace(column, factor=-column.factor) if is_flipped else column
 
 
 def _check_unit(quantity: str, unit: str) -> None:
@@ -266,13 +287,13 @@ def _complete(columns: dict[str, Column], path: Path, header: Sequence[str]) -> 
 
 
 def _missing_column(
-    what: str, remedy: str, quantities: Sequence[str], path: Path, header: Sequence[str]
+    missing: str, remedy: str, quantities: Sequence[str], path: Path, header: Sequence[str]
 ) -> UnknownFormatError:
     """Return the error on a missing column, with a similar name that may be meant."""
     aliases = {alias for quantity in quantities for alias in NAMES[quantity]}
     return UnknownFormatError(
-        f"{path} has no column for {what}; it has {', '.join(header)}. Rename it, or name it with "
-        f"--set log.columns={remedy}{_similar(header, aliases)}"
+        f"{path} has no column for {missing}; it has {', '.join(header)}. Rename it, or name it "
+        f"with --set log.columns={remedy}{_similar(header, aliases)}"
     )
 
 

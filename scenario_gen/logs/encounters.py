@@ -247,7 +247,7 @@ def _driven_forwards(pieces: Sequence[Piece], config: LogConfig) -> tuple[list[P
 
 
 def _moved_ahead(smooth: Smooth, distance: float) -> Smooth:
-    """Return the motion of a point `distance` [m] ahead; a vehicle of unknown heading faces east."""
+    """Return the motion of a point `distance` [m] ahead; unknown headings are taken as east."""
     heading = np.nan_to_num(smooth.heading)
     forward = np.stack([np.cos(heading), np.sin(heading)], axis=-1)
     return replace(smooth, position=smooth.position + distance * forward)
@@ -285,7 +285,7 @@ def _steerable(
 
 
 def _is_relocation(seconds: Floats, distance: Floats) -> Bools:
-    """Return which steps (F-1,) no vehicle drives, at least not one as fast as just before and after.
+    """Return which steps (F-1,) no vehicle drives that is as fast as just before and after.
 
     Args:
         seconds: (F-1,) duration of each step.
@@ -330,7 +330,7 @@ def _reversals(track: Observations, config: LogConfig) -> Bools:
 
 
 def _course(fix: Floats) -> Floats | None:
-    """Return the unit vector (2,) from the first fix (F, 2) [m] to the next distant one, or None."""
+    """Return the unit vector (2,) from the first fix (F, 2) [m] to a distant one, or None."""
     offset = fix - fix[0]
     distance = np.hypot(offset[:, 0], offset[:, 1])
     far = np.flatnonzero(distance > _LIMITS.course_length_m)

@@ -50,28 +50,37 @@ def _format_of(files: Sequence[Path], config: LogConfig) -> LogFormat:
     )
 
 
+def _check_exists(path: Path) -> None:
+    """Check that a path is a file or a folder with content.
+
+    Raises:
+        InputError: it is not.
+    """
+    if path.is_file():
+        if path.stat().st_size == 0:
+            raise InputError(f"{path} is empty (0 bytes); copy it again")
+    elif path.is_dir():
+        if not any(path.iterdir()):
+            raise InputError(f"{path} is an empty folder; name a folder with a recording")
+    elif path.exists():
+        raise InputError(f"{path} is neither a file nor a folder")
+    else:
+        local(path, "a log")
+        neighbours = [file.name for file in path.parent.iterdir()] if path.parent.is_dir() else []
+        raise InputError(
+            f"{path} does not exist; check the name and the folder"
+            f"{did_you_mean(path.name, neighbours)}"
+        )
+
+
 def log_files(path: Path) -> list[Path]:
     """Return the files of a path: the tables of a folder; a file or the folder of a bag itself.
 
     Raises:
         InputError: nothing there can be read.
     """
-    if not path.exists():
-        neighbours = [file.name for file in path.parent.iterdir()] if path.parent.is_dir() else []
-        local(path, "a log")
-        raise InputError(
-            f"{path} does not exist; check the name and the folder"
-            f"{did_you_mean(path.name, neighbours)}"
-        )
-    if path.is_file():
-        if path.stat().st_size == 0:
-            raise InputError(f"{path} is empty (0 bytes); copy it again")
-        return [path]
-    if not path.is_dir():
-        raise InputError(f"{path} is neither a file nor a folder")
-    if not any(path.iterdir()):
-        raise InputError(f"{path} is an empty folder; name a folder with a recording")
-    if is_bag(path):
+    _check_exists(path)
+    if path.is_file() or is_bag(path):
         return [path]
     tables = {file for file in path.iterdir() if is_table(file) and file.stat().st_size}
     packed_again = {

@@ -65,7 +65,7 @@ def is_bag(path: Path) -> bool:
 
 
 def is_osi(path: Path) -> bool:
-    """Return whether a file is a trace of ASAM OSI: MCAP without ROS's profile, with OSI's names."""
+    """Return whether a file is a trace of ASAM OSI: MCAP of another profile, with OSI's names."""
     if path.suffix.lower() != ".mcap" or not path.is_file():
         return False
     with path.open("rb") as file:

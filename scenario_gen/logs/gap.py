@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The gap of two motions in space and time: how close two vehicles come to one place at one time."""
+"""The gap of two motions in space and time: how close vehicles are to one place at one time."""
 
 import numpy as np
 

@@ -95,7 +95,7 @@ def _wrapped(longitude: Any) -> Any:
 
 
 def on_sphere(degrees: Floats) -> Floats:
-    """Return places (F, 3) [m] on a spherical earth of latitudes and longitudes (F, 2) [degrees]."""
+    """Return places (F, 3) [m] on a spherical earth of coordinates (F, 2) [degrees]."""
     latitude, longitude = np.radians(degrees).T
     parallel = np.cos(latitude)
     return EARTH_RADIUS_M * np.column_stack(

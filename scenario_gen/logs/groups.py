@@ -88,7 +88,7 @@ class _PieceGroups(Growth[Meeting]):
         group.spans = dict.fromkeys((*group.spans, other), span)
 
     def finish(self, group: Group[Meeting]) -> None:
-        """Shorten a group a little so that its vehicles start and end together; note the others."""
+        """Shorten a group a little so that its vehicles are present throughout; note others."""
         config = self.config
         edge = ticks(_EDGE_S, config)
         spans = group.spans.values()
@@ -130,7 +130,7 @@ class _PieceGroups(Growth[Meeting]):
 def find_groups(
     pieces: Sequence[Piece], config: LogConfig
 ) -> tuple[list[Group[Meeting]], list[str]]:
-    """Return the encounters by time, and notes on vehicles that were left out or present partly."""
+    """Return the encounters by time, and notes on vehicles left out or present partly."""
     small = len({piece.track.id for piece in pieces}) <= config.max_vehicles
     meetings = _find_meetings(pieces, config, small=small)
     groups = []
@@ -194,7 +194,7 @@ def _overlapping(pieces: Sequence[Piece], least: int) -> Iterator[tuple[int, int
 
 
 def _gap(a: Piece, b: Piece, span: Span, config: LogConfig) -> float:
-    """Return the gap of two vehicles in space and time [m]; infinite if neither drives `travel`."""
+    """Return the space-time gap of two vehicles [m]; infinite if neither drives `travel`."""
     if max(driven(piece, *span, config) for piece in (a, b)) < config.travel:
         return float("inf")
     gap, _, _ = space_time_gap(a.position(*span), b.position(*span), config.period)
@@ -202,7 +202,7 @@ def _gap(a: Piece, b: Piece, span: Span, config: LogConfig) -> float:
 
 
 def windows(first: int, last: int, config: LogConfig) -> list[Span]:
-    """Cut a long meeting at multiples of `max_duration` on the common clock, for all pairs alike."""
+    """Cut a long meeting at multiples of `max_duration` on the common clock."""
     longest = ticks(config.max_duration, config)
     least = ticks(config.min_duration, config) + 1
     if last - first <= longest:

@@ -51,7 +51,7 @@ M = TypeVar("M", bound=Meeting)
 
 @dataclass
 class Group(Generic[M]):
-    """At least two members from `start` to `end`, with the span of each, in the order of joining."""
+    """At least two members from `start` to `end`, with their spans, in the order of joining."""
 
     start: int
     end: int
@@ -89,7 +89,7 @@ class _Unused(Generic[M]):
         self.by_member[meeting.b].discard(meeting)
 
     def strongest(self) -> M | None:
-        """Take the strongest meeting that can form a group off the queue; None if there is none."""
+        """Remove and return the strongest meeting of the queue; None if there is none."""
         while self._queue:
             _, meeting = heapq.heappop(self._queue)
             if meeting in self.by_member[meeting.a]:

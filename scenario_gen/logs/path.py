@@ -110,7 +110,7 @@ class Path:
         return np.interp(foot, self.parameter, self.length), lateral
 
     def pose(self, arc: Floats) -> tuple[Floats, Floats]:
-        """Return positions (T, 2) [m] and unwrapped headings (T,) [rad] at arc lengths (T,) [m]."""
+        """Return positions (T, 2) [m] and unwrapped headings (T,) at arc lengths (T,) [m]."""
         u = np.interp(arc, self.length, self.parameter)
         tangent = self.curve(u, 1)
         return self.curve(u), np.unwrap(np.arctan2(tangent[:, 1], tangent[:, 0]))
@@ -220,7 +220,7 @@ def observe(
 
 
 def differences(count: int, order: int) -> Floats:
-    """Return differences of an order (1 to 3) of `count` values as rows (count - order, order + 1)."""
+    """Return differences (1st to 3rd) of `count` values as rows (count - order, order + 1)."""
     stencil = ((-1.0, 1.0), (1.0, -2.0, 1.0), (-1.0, 3.0, -3.0, 1.0))[order - 1]
     return np.tile(stencil, (count - order, 1))
 
@@ -245,8 +245,8 @@ def headings_of(heading: Floats, course: Floats, speed: Floats) -> Headings | No
     """Weigh recorded headings by their scatter; values that are not headings of a car get 0.
 
     A car's heading does not jump. So the headings are cut at jumps, and a run counts if it agrees
-    with the path while the vehicle moves: a course over ground from two fixes jumps if a vehicle is
-    slow, and a default value is a run that disagrees.
+    with the path while the vehicle moves: a course over ground from two fixes jumps if a vehicle
+    is slow, and a default value is a run that disagrees.
 
     Args:
         heading: (F,) as recorded [rad], NaN if not recorded.

@@ -73,7 +73,7 @@ class VehicleQuality:
 
 @dataclass(frozen=True)
 class Overlap:
-    """The footprints of two vehicles overlap during `share` of the encounter, by up to `area` m²."""
+    """Two footprints overlap during `share` of the encounter, by up to `area` m²."""
 
     first: str
     second: str

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Raw logs, the result of every reader: observations per vehicle, with the places they came from, within bounds."""
+"""Raw logs, the result of every reader: observations per vehicle, and their places in files."""
 
 from bisect import bisect_right
 from collections.abc import Mapping, Sequence
@@ -23,12 +23,12 @@ class UnknownFormatError(InputError):
 
 @dataclass(frozen=True, eq=False)
 class Observations:
-    """Observations of one vehicle, in the order of the log; values may still be NaN, stamps unordered.
+    """Observations of one vehicle, in the order of the log; not yet cleaned.
 
     Attributes:
         id: the vehicle's name in the log.
         fix_ns: (F,) stamps of the positions, nanoseconds.
-        fix: (F, 2) latitude and longitude in degrees, or x and y in metres (see `RawLog.geographic`).
+        fix: (F, 2) latitude and longitude [degrees], or x and y [m]; see `RawLog.geographic`.
         fix_row: (F,) rows of the log; see `RawLog.where`.
         heading: (F,) rad, counter-clockwise from east; NaN where it is not recorded.
         speed_ns: (S,) stamps of the speeds, nanoseconds.
@@ -94,7 +94,7 @@ class Observations:
 
 @dataclass
 class Rows:
-    """Messages of one vehicle as they arrive: (stamp [ns], row, values…), as in `Observations`."""
+    """Messages of one vehicle: (stamp [ns], row, values…), as in `Observations`."""
 
     fixes: list[tuple[int, int, float, float, float]] = field(default_factory=list)
     speeds: list[tuple[int, int, float]] = field(default_factory=list)
@@ -116,7 +116,7 @@ class Rows:
 
 @dataclass(frozen=True)
 class Segment:
-    """The rows from `first` on are from `label`, called `unit` there and numbered from `number`."""
+    """Rows from `first` on are from `label`, called `unit` there, numbered from `number`."""
 
     first: int
     label: str

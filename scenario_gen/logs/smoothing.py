@@ -4,8 +4,8 @@
 """Reconciling positions with measured speeds: a vehicle moves forwards along a smooth path.
 
 A track becomes a path (a curve by arc length, `Path`) and a motion along it (distance and speed
-over time, `Motion`), fitted in turn. The path is smooth in *distance*, so GPS noise does not become
-heading noise however slowly the vehicle moves. The motion is smooth in *time*, never runs
+over time, `Motion`), fitted in turn. The path is smooth in *distance*, so GPS noise does not
+become heading noise however slowly the vehicle moves. The motion is smooth in *time*, never runs
 backwards, respects the limits of a car, and is zero while the car stands. So position, speed and
 heading agree by construction: the distance between samples is the mean of their speeds times dt,
 and the heading is the direction of the path, constant while standing.
@@ -161,7 +161,7 @@ class Motion:
         """Return the coefficients (T+1,) that fit best.
 
         Args:
-            observed: times, values and standard deviations (F,), and whether the values are speeds.
+            observed: times, values, standard deviations (F,), and whether values are speeds.
 
         Raises:
             UnreconciledError: the solver finds no solution.

@@ -62,7 +62,7 @@ class Streams:
         return (self._newest_ns - self._first_ns) * 1e-9
 
     def breaks(self, stamp_ns: int) -> bool:
-        """Return whether the clock was set: several messages in a row are far from the earlier ones.
+        """Return whether the clock was set: several messages in a row are far from earlier ones.
 
         A single such message is wrong, and `put_fix` and `put_speed` ignore it.
         """

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The bundled logs: the paper's three cases (V-A, Fig. 3) and the demo's encounters, all invented (docs/logs.md)."""
+"""The bundled synthetic logs: the paper's three cases (V-A, Fig. 3) and the demo's encounters."""
 
 from pathlib import Path
 
@@ -11,11 +11,13 @@ RESOURCES = Path(__file__).resolve().parents[1] / "resources"
 
 
 def bundled(case: str) -> Path:
-    """Return the path of a bundled log: the bag of a case of `CASES`, or the table of one of `DEMO`.
+    """Return the path of a bundled log: the bag of one of `CASES`, or the table of one of `DEMO`.
 
     Raises:
         ValueError: there is no such case.
     """
     if case not in CASES + DEMO:
         raise ValueError(f"there is no case {case!r}; choose one of {', '.join(CASES + DEMO)}")
-    return RESOURCES / "demo" / f"{case}.csv" if case in DEMO else RESOURCES / f"synthetic_{case}"
+    if case in DEMO:
+        return RESOURCES / "demo" / f"{case}.csv"
+    return RESOURCES / f"synthetic_{case}"

@@ -454,7 +454,7 @@ def _observations(name: str, group: pd.DataFrame, position: tuple[str, str]) -> 
 
 
 def _typical_size(values: Floats) -> float:
-    """Return the median of possible sizes [m]; of all if none is possible; NaN if none is known."""
+    """Return the median of possible sizes [m], or of all if none is possible, or NaN."""
     values = values[np.isfinite(values)]
     possible = values[(values > 0.0) & (values < CLEANING.max_length_m)]
     if len(possible):

@@ -7,7 +7,7 @@
 |---|---|---|---|
 | time | metadata.recordGeneratedAt; coreData.secMark, ms of the minute | the same | T_s, s |
 | vehicle | coreData.id | the same | the same |
-| position | position.latitude, longitude, degrees | lat, long, 1e-7 degrees | X_m east, Y_m north |
+| position | position.latitude, longitude, degrees | lat, long, 1e-7 degrees | X_m, Y_m |
 | speed | speed, m/s | speed, 0.02 m/s; 8191: unknown | speed_mps |
 | heading | heading, degrees | heading, 0.0125 degrees; 28800: unknown | heading_deg |
 | length, width | size, cm | the same | the same |
@@ -169,7 +169,7 @@ def _row(core: Any, seconds: float, state: Row) -> Row:
 
 
 def _seconds(generated: str, second_mark: Any) -> float:
-    """Return the stamp [s since 1970] by the date of a record and the milliseconds of the minute."""
+    """Return the stamp [s since 1970] by a record's date and the milliseconds of the minute."""
     date = pd.to_datetime(re.sub(r"\s*\[.*", "", generated), utc=True, errors="coerce")
     if pd.isna(date):
         return math.nan

@@ -19,6 +19,7 @@ Source: ASAM OpenSCENARIO XML 1.2.
 """
 
 from collections.abc import Iterator, Sequence
+from itertools import product
 import math
 from pathlib import Path
 from typing import NamedTuple
@@ -161,12 +162,12 @@ def _followers(root: Element) -> Iterator[_Follower]:
         for action in private.findall(_FOLLOW_ACTION):
             yield _Follower(private.attribute("entityRef"), action, 0.0)
     for group in root.findall("Storyboard/Story/Act/ManeuverGroup"):
+        actors = [actor.attribute("entityRef") for actor in group.findall("Actors/EntityRef")]
         for event in group.findall("Maneuver/Event"):
             conditions = event.findall(_TIME_CONDITION)
             start_s = conditions[0].number("value") if conditions else 0.0
-            for action in event.findall(f"Action/{_FOLLOW_ACTION}"):
-                for actor in group.findall("Actors/EntityRef"):
-                    yield _Follower(actor.attribute("entityRef"), action, start_s)
+            actions = event.findall(f"Action/{_FOLLOW_ACTION}")
+            yield from (_Follower(*pair, start_s) for pair in product(actors, actions))
 
 
 def _observations(

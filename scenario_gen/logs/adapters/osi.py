@@ -157,8 +157,8 @@ def _rows(message: Any, place: str) -> Iterator[Row]:
     """
     stamp = message.timestamp
     if stamp is None or not 0 <= stamp.seconds < _MAX_STAMP_S:
-        found = "no timestamp" if stamp is None else f"a timestamp of {stamp.seconds} s"
-        raise InputError(f"{place}: {found}; 0 to 9e9 s can be read")
+        problem = "no timestamp" if stamp is None else f"a timestamp of {stamp.seconds} s"
+        raise InputError(f"{place}: {problem}; 0 to 9e9 s can be read")
     nanoseconds = stamp.seconds * 1_000_000_000 + stamp.nanos
     for number, moving in enumerate(message.moving_object, 1):
         base = moving.base

@@ -80,27 +80,31 @@ def read(
 
 def recognised(path: Path) -> str:
     """Return the name of the data set of a file, or of its tracks; "" if unknown."""
-    suffix = path.suffix.lower()
-    if suffix == ".parquet":
-        needs("parquet", "pyarrow")
-        from pyarrow import parquet
-
-        try:
-            names = set(parquet.read_schema(path).names)
-        except Exception:  # the reader of tables reports the damage
-            return ""
-    elif suffix == ".csv":
-        for data_set in DATA_SETS.values():
-            if data_set.companions and _is_companion(path, data_set.companions):
-                tracks = _companion(path, data_set.companions, data_set.companions.tracks)
-                return recognised(tracks) if tracks.is_file() else ""
-        with path.open(encoding="utf-8-sig", errors="replace") as file:
-            names = {field.strip() for field in file.readline().split(",")}
-        if _has_pedestrians(path, _INTERACTION) and names >= _PEDESTRIAN_COLUMNS:
-            return _INTERACTION
-    else:
-        return ""
+    for data_set in DATA_SETS.values():
+        if data_set.companions and _is_companion(path, data_set.companions):
+            tracks = _companion(path, data_set.companions, data_set.companions.tracks)
+            return recognised(tracks) if tracks.is_file() else ""
+    names = _header(path)
+    if _has_pedestrians(path, _INTERACTION) and names >= _PEDESTRIAN_COLUMNS:
+        return _INTERACTION
     return next((name for name, known in DATA_SETS.items() if known.needed <= names), "")
+
+
+def _header(path: Path) -> set[str]:
+    """Return the column names of a CSV or Parquet file; none of other or damaged files."""
+    suffix = path.suffix.lower()
+    if suffix == ".csv":
+        with path.open(encoding="utf-8-sig", errors="replace") as file:
+            return {field.strip() for field in file.readline().split(",")}
+    if suffix != ".parquet":
+        return set()
+    needs("parquet", "pyarrow")
+    from pyarrow import parquet
+
+    try:
+        return set(parquet.read_schema(path).names)
+    except Exception:  # the reader of tables reports the damage
+        return set()
 
 
 def _is_companion(path: Path, companions: Companions) -> bool:
