@@ -8,7 +8,8 @@ from functools import cache
 import numpy as np
 
 from benchmarks._paper_speed_profile import SpeedProfile
-from scenario_gen.situation import Wait
+from scenario_gen.method.sampling import Plan
+from scenario_gen.situation import Situation, Wait
 from scenario_gen.types import Encounter, Vehicle
 from scenario_gen.types.road import Road
 from scenario_gen.types.route import Route
@@ -71,3 +72,9 @@ def scene(width=60.0):
         )
     )
     return encounter, segmentation, road, tuple(routes), asked, (Wait(1, 7.0, 13.0),)
+
+
+def scene_plan(width=60.0):
+    """The scene as the sampler's input."""
+    encounter, *planned = scene(width)
+    return Plan(Situation.of(encounter), *planned)

@@ -7,18 +7,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from support.sampling_scenes import CLOCK, route, scene, TIME, turn
+from support.sampling_scenes import CLOCK, route, scene_plan, TIME, turn
 
 from benchmarks._paper_speed_profile import SpeedProfile
 from scenario_gen.base.errors import InputError
 from scenario_gen.base.road_users import Dynamics, TypeLimits
-from scenario_gen.method.sampling import (
-    Callbacks,
-    draw_scenarios,
-    Plan,
-    regenerate,
-    SamplingConfig,
-)
+from scenario_gen.method.sampling import Callbacks, draw_scenarios, regenerate, SamplingConfig
 from scenario_gen.method.sampling.build_model import build_model
 from scenario_gen.method.sampling.sampler import LEVEL_CANDIDATES
 from scenario_gen.method.sampling.vehicle_model import NoiseScale
@@ -37,25 +31,13 @@ def all_valid(scenarios):
 
 
 def drawn(count=50, check=all_valid, config=None, seed=5):
-    *head, waits = scene()
-    return draw_scenarios(
-        Plan(Situation.of(head[0]), *head[1:], waits),
-        check,
-        config or PLAIN,
-        count=count,
-        seed=seed,
-    )
+    return draw_scenarios(scene_plan(), check, config or PLAIN, count=count, seed=seed)
 
 
 def batch(samples=200, scale=None, **changes):
-    *head, waits = scene(120.0)
-    model = build_model(
-        Plan(Situation.of(head[0]), *head[1:], waits),
-        SamplingConfig(variety="narrow", bend_acceleration=5.0, **changes),
-    ).model
-    return model, model.draw(
-        np.random.default_rng(1).standard_normal((samples, model.size)), scale or NoiseScale()
-    )
+    model = build_model(scene_plan(120.0), replace(PLAIN, **changes)).model
+    eps = np.random.default_rng(1).standard_normal((samples, model.size))
+    return model, model.draw(eps, scale or NoiseScale())
 
 
 @pytest.fixture(scope="module")
@@ -81,7 +63,7 @@ def test_grid_and_duration(fifty):
 
 
 def test_asked_states(fifty):
-    asked = scene()[4]
+    asked = scene_plan().requested
     for s in fifty.scenarios:
         for k, state in ((0, asked.start), (-1, asked.end)):
             assert s.position[:, k] == pytest.approx(state[:, :2], abs=1e-5)
@@ -128,16 +110,13 @@ def test_headings_are_smooth(fifty):
 def test_same_seed_same_bytes_and_any_one_again(fifty):
     again = drawn()
     more = drawn(count=120)
-    *head, waits = scene()
     for a, b, c in zip(fifty.scenarios, again.scenarios, more.scenarios, strict=False):
         assert (
             a.position.tobytes() == b.position.tobytes() and a.speed.tobytes() == b.speed.tobytes()
         )
         np.testing.assert_allclose(c.position, a.position, atol=1e-9)
     last = more.scenarios[-1]
-    one = regenerate(
-        Plan(Situation.of(head[0]), *head[1:], waits), PLAIN, seed=5, index=last.index
-    )
+    one = regenerate(scene_plan(), PLAIN, seed=5, index=last.index)
     for name in ("time", "position", "heading", "speed", "acceleration"):
         np.testing.assert_allclose(getattr(one, name), getattr(last, name), atol=1e-9)
     assert (
@@ -222,19 +201,15 @@ def test_clocks_are_monotone_and_shared_and_end_on_the_grid():
 
 
 def test_lateral_deviation_leaves_room_on_a_narrow_road():
-    encounter, segmentation, road, routes, asked, waits = scene()
-    lane = np.zeros(road.drivable.shape, dtype=bool)
+    plan = scene_plan()
+    lane = np.zeros(plan.road.drivable.shape, dtype=bool)
     lane[57:63] = True  # 1.5 m to either side of y = 0
-    narrow = Road("lane", lane, 0.5, road.origin, [], [])
-    done = build_model(
-        Plan(Situation.of(encounter), segmentation, narrow, routes, asked, waits),
-        SamplingConfig(variety="narrow"),
-    )
-    some = done.model.draw(
-        np.random.default_rng(0).standard_normal((500, done.model.size)), NoiseScale()
-    )
-    assert np.abs(some.samples[0].paths.curve[..., 1]).max() < 1.5 - 0.5 * 1.9
-    assert NoteKind.NARROW in {note.kind for note in done.notes}
+    narrow = replace(plan, road=Road("lane", lane, 0.5, plan.road.origin, [], []))
+    built = build_model(narrow, SamplingConfig(variety="narrow"))
+    eps = np.random.default_rng(0).standard_normal((500, built.model.size))
+    curve = built.model.draw(eps, NoiseScale()).samples[0].paths.curve
+    assert np.abs(curve[..., 1]).max() < 1.5 - 0.5 * 1.9
+    assert NoteKind.NARROW in {note.kind for note in built.notes}
 
 
 def test_refusals_are_counted_by_cause_and_levels_are_tried():
@@ -250,11 +225,8 @@ def test_refusals_are_counted_by_cause_and_levels_are_tried():
     assert set(found.refused) == {Cause.OFF_ROAD}
     assert NoteKind.LESS_VARIATION in {note.kind for note in found.adaptations}
     assert max(s.index for s in found.scenarios) >= LEVEL_CANDIDATES
-    *head, waits = scene()
     last = found.scenarios[-1]
-    again = regenerate(
-        Plan(Situation.of(head[0]), *head[1:], waits), PLAIN, seed=5, index=last.index
-    )
+    again = regenerate(scene_plan(), PLAIN, seed=5, index=last.index)
     np.testing.assert_allclose(again.position, last.position, atol=1e-9)
 
 
@@ -268,36 +240,28 @@ def test_short_set_is_returned_with_its_account():
 
 
 def test_progress_and_cancellation():
-    *head, waits = scene()
     seen = []
     callbacks = Callbacks(progress=lambda *a: seen.append(a), cancelled=lambda: len(seen) > 2)
-    found = draw_scenarios(
-        Plan(Situation.of(head[0]), *head[1:], waits), all_valid, count=500, callbacks=callbacks
-    )
+    found = draw_scenarios(scene_plan(), all_valid, count=500, callbacks=callbacks)
     assert 0 < len(found.scenarios) < 500
     assert seen[-1] == (len(found.scenarios), 500, found.candidates)
     assert NoteKind.CANCELLED in {note.kind for note in found.adaptations}
 
 
 def test_nothing_is_given_out_after_a_cancellation():
-    *head, waits = scene()
     given = []
     callbacks = Callbacks(
         on_valid=lambda *a: given.append(a[0]), cancelled=lambda: len(given) == 3
     )
-    made = draw_scenarios(
-        Plan(Situation.of(head[0]), *head[1:], waits), all_valid, count=500, callbacks=callbacks
-    )
+    made = draw_scenarios(scene_plan(), all_valid, count=500, callbacks=callbacks)
     assert [s.index for s in given] == [s.index for s in made.scenarios]
     assert len(given) == 3
 
 
 def test_a_wait_stands_where_the_vehicle_does_not_where_it_creeps():
-    *head, _ = scene()
     speed = (
         build_model(
-            Plan(Situation.of(head[0]), *head[1:], (Wait(1, 6.8, 13.2),)),
-            SamplingConfig(variety="narrow"),
+            replace(scene_plan(), waits=(Wait(1, 6.8, 13.2),)), SamplingConfig(variety="narrow")
         )
         .model.vehicles[1]
         .speed
@@ -308,48 +272,35 @@ def test_a_wait_stands_where_the_vehicle_does_not_where_it_creeps():
 
 
 def test_a_creeping_wait_stays_slow_and_does_not_stand():
-    encounter, segmentation, road, routes, asked, _ = scene()
+    plan = scene_plan()
+    encounter = plan.encounter
     rolls = np.interp(TIME, [0.0, 6.0, 8.0, 12.0, 13.0, 20.0], [6.0, 6.0, 0.4, 0.4, 0.6, 6.0])
     creeping = replace(encounter, speed=np.array([encounter.speed[0], rolls, encounter.speed[2]]))
     total = SpeedProfile(TIME, rolls).travelled[-1]
-    own = route(*turn(35.0, 9.0, total - 35.0 - 4.5 * np.pi), rolls)
-    ends = np.array(asked.end)
-    ends[1] = [*own.points[-1], 6.0]
+    slow_route = route(*turn(35.0, 9.0, total - 35.0 - 4.5 * np.pi), rolls)
+    ends = np.array(plan.requested.end)
+    ends[1] = [*slow_route.points[-1], 6.0]
     waits = tuple(wait for wait in find_waits(creeping) if wait.vehicle == 1)
     assert [wait.moves_slowly for wait in waits] == [True]
-    given = (
-        creeping,
-        segmentation,
-        road,
-        (routes[0], own, routes[2]),
-        BoundaryStates(asked.start, ends),
+    plan = replace(
+        plan,
+        situation=Situation.of(creeping),
+        routes=(plan.routes[0], slow_route, plan.routes[2]),
+        requested=BoundaryStates(plan.requested.start, ends),
+        waits=waits,
     )
-    made = draw_scenarios(
-        Plan(Situation.of(given[0]), *given[1:], waits), all_valid, PLAIN, count=20, seed=1
-    ).scenarios
+    made = draw_scenarios(plan, all_valid, PLAIN, count=20, seed=1).scenarios
     verdicts = Checker(None, None, None, waits).check(made)
-    assert not any(
-        violation.cause is Cause.STOP_NOT_KEPT
-        for verdict in verdicts
-        for violation in verdict.violations
-    )
+    causes = [violation.cause for verdict in verdicts for violation in verdict.violations]
+    assert Cause.STOP_NOT_KEPT not in causes
     assert all((s.speed[1] > 0.0).all() for s in made)
-    stands = Plan(Situation.of(given[0]), *given[1:], (replace(waits[0], moves_slowly=False),))
+    stands = replace(plan, waits=(replace(waits[0], moves_slowly=False),))
     stood = draw_scenarios(stands, all_valid, PLAIN, count=20, seed=1).scenarios
     assert all((s.speed[1] == 0.0).sum() > 30 for s in stood)
 
 
 def test_stretched_clock_is_said():
-    encounter, segmentation, road, routes, asked, waits = scene()
-    plan = Plan(
-        Situation.of(encounter),
-        segmentation,
-        road,
-        routes,
-        asked,
-        waits,
-        TypeLimits(car=Dynamics(max_speed=6.75)),
-    )
+    plan = replace(scene_plan(), limits=TypeLimits(car=Dynamics(max_speed=6.75)))
     done = build_model(plan, PLAIN)
     assert done.model is not None
     assert NoteKind.STRETCHED in {note.kind for note in done.notes}
@@ -362,10 +313,6 @@ def test_stretched_clock_is_said():
 
 
 def test_routes_that_do_not_suit():
-    encounter, segmentation, road, routes, asked, waits = scene()
+    plan = scene_plan()
     with pytest.raises(InputError, match="routes do not suit"):
-        draw_scenarios(
-            Plan(Situation.of(encounter), segmentation, road, routes[:2], asked, waits),
-            all_valid,
-            count=5,
-        )
+        draw_scenarios(replace(plan, routes=plan.routes[:2]), all_valid, count=5)

@@ -7,15 +7,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from support.sampling_scenes import scene
+from support.sampling_scenes import scene_plan
 
-from scenario_gen.method.sampling import Plan, relaxed_states, SamplingConfig
+from scenario_gen.method.sampling import relaxed_states, SamplingConfig
 from scenario_gen.method.sampling.build_model import build_model
 from scenario_gen.method.sampling.candidates import CandidateModel
 from scenario_gen.method.sampling.numbers import ModelNumbers, VehicleNumbers
 from scenario_gen.method.sampling.reaction_transform import advance, lateness
 from scenario_gen.method.sampling.vehicle_model import NoiseScale
-from scenario_gen.situation import Situation
 from scenario_gen.types import FOLLOW, Reaction, ReactionGraph, Request
 
 EDGE = Reaction(FOLLOW, 1, 0, 1.0, 0.8, 0.5, 1.0, 2.0, 18.0, (1.0, 1.5, 2.0))
@@ -24,10 +23,9 @@ EDGE = Reaction(FOLLOW, 1, 0, 1.0, 0.8, 0.5, 1.0, 2.0, 18.0, (1.0, 1.5, 2.0))
 @pytest.fixture(scope="module")
 def model():
     """Vehicle 1 follows vehicle 0; all that preset `wide` varies is free."""
-    encounter, segmentation, road, routes, asked, waits = scene()
-    situation, config = Situation.of(encounter), SamplingConfig()
-    states = relaxed_states(asked, situation, config, Request())
-    built = build_model(Plan(situation, segmentation, road, routes, states, waits), config).model
+    plan = scene_plan()
+    states = relaxed_states(plan.requested, plan.situation, SamplingConfig(), Request())
+    built = build_model(replace(plan, requested=states), SamplingConfig()).model
     return CandidateModel(built.vehicles, built.warp, ReactionGraph((EDGE,), (0, 1, 2)))
 
 

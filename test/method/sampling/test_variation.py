@@ -9,9 +9,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 import numpy as np
 import pytest
-from support.sampling_scenes import scene
+from support.sampling_scenes import scene_plan
 
-from scenario_gen.method.sampling import draw_scenarios, Plan, relaxed_states, SamplingConfig
+from scenario_gen.method.sampling import draw_scenarios, relaxed_states, SamplingConfig
 from scenario_gen.method.sampling.build_model import build_model
 from scenario_gen.method.sampling.extrapolation import (
     ACCELERATION_DECAY_S,
@@ -22,9 +22,9 @@ from scenario_gen.method.sampling.nominal_clock import clock_from_rate
 from scenario_gen.method.sampling.variation import CAR_SIZES, truncate, Variation, VehicleClock
 from scenario_gen.method.sampling.vehicle_model import NoiseScale
 from scenario_gen.method.validity import Checker
-from scenario_gen.situation import Situation
 from scenario_gen.types import Vehicle
 from scenario_gen.types.request import Request
+from scenario_gen.types.scenario import Cause
 
 GRID = 0.1 * np.arange(201)
 NOMINAL = clock_from_rate(GRID, np.ones(201))
@@ -34,13 +34,16 @@ def normal(count, size, seed=0):
     return np.random.default_rng(seed).standard_normal((count, size))
 
 
-def batch(count=300, request=Request(), **parameters):
-    encounter, segmentation, road, routes, asked, waits = scene()
-    config = replace(SamplingConfig(), **parameters)
-    states = relaxed_states(asked, Situation.of(encounter), config, request)
-    model = build_model(
-        Plan(Situation.of(encounter), segmentation, road, routes, states, waits), config
-    ).model
+def relaxed_plan(config=SamplingConfig(), request=Request()):
+    """The scene with the states that preset `wide` relaxes."""
+    plan = scene_plan()
+    states = relaxed_states(plan.requested, plan.situation, config, request)
+    return replace(plan, requested=states)
+
+
+def batch(count=300, **parameters):
+    config = SamplingConfig(**parameters)
+    model = build_model(relaxed_plan(config), config).model
     return model, model.draw(normal(count, model.size), NoiseScale())
 
 
@@ -117,53 +120,37 @@ def test_own_clocks_run_forward_within_their_bounds_and_agree_where_states_are_a
         )
 
 
-def test_what_is_asked_holds_and_what_is_freed_keeps_its_bounds():
-    encounter, segmentation, road, routes, asked, waits = scene()
-    config = SamplingConfig()
-    x, y, yaw, speed = asked.start[0]
+def test_requested_states_hold_and_relaxed_ones_keep_their_bounds():
+    x, y, yaw, speed = scene_plan().requested.start[0]
     request = Request(starts=f"a: {x} {y} {yaw} {speed}")
-    states = relaxed_states(asked, Situation.of(encounter), config, request)
-    assert (states.relaxed[0, 0] == 0.0).all()
-    assert (states.relaxed[0, 1] > 0.0).all()
-    check = Checker(None, states, None, None).check
-    made = draw_scenarios(
-        Plan(Situation.of(encounter), segmentation, road, routes, states, waits),
-        check,
-        config,
-        count=40,
-        request=request,
-    )
+    plan = relaxed_plan(request=request)
+    assert (plan.requested.relaxed[0, 0] == 0.0).all()
+    assert (plan.requested.relaxed[0, 1] > 0.0).all()
+    check = Checker(None, plan.requested, None, None).check
+    made = draw_scenarios(plan, check, count=40, request=request)
     assert len(made.scenarios) == 40
     for scenario in made.scenarios:
-        assert np.hypot(*(scenario.position[0, 0] - asked.start[0, :2])) < 0.1
+        assert np.hypot(*(scenario.position[0, 0] - (x, y))) < 0.1
         assert abs(scenario.speed[0, 0] - speed) < 0.1
     ends = np.array([scenario.position[0, -1] for scenario in made.scenarios])
     assert np.ptp(ends[:, 0]) > 1.0  # its end is free
 
 
-def test_nothing_is_freed_by_preset_narrow():
-    encounter, *_, asked, _ = scene()
-    assert (
-        relaxed_states(asked, Situation.of(encounter), SamplingConfig(variety="narrow"), Request())
-        is asked
-    )
+def test_preset_narrow_relaxes_nothing():
+    plan = scene_plan()
+    config = SamplingConfig(variety="narrow")
+    states = relaxed_states(plan.requested, plan.situation, config, Request())
+    assert states is plan.requested
 
 
 def test_a_start_off_its_bounds_is_refused():
-    encounter, segmentation, road, routes, asked, waits = scene()
-    config = SamplingConfig()
-    states = relaxed_states(asked, Situation.of(encounter), config, Request())
-    given = (encounter, segmentation, road, routes, states)
-    made = draw_scenarios(
-        Plan(Situation.of(given[0]), *given[1:], waits),
-        Checker(None, states, None, None).check,
-        config,
-        count=20,
-    )
+    plan = relaxed_plan()
+    made = draw_scenarios(plan, Checker(None, plan.requested, None, None).check, count=20)
     assert len(made.scenarios) == 20
-    tight = replace(states, relaxed=0.0 * states.relaxed)
+    tight = replace(plan.requested, relaxed=0.0 * plan.requested.relaxed)
     verdicts = Checker(None, tight, None, None).check(made.scenarios)
-    assert any("from the request" in v.message for verdict in verdicts for v in verdict.violations)
+    causes = {violation.cause for verdict in verdicts for violation in verdict.violations}
+    assert Cause.BOUNDARY_STATE in causes
 
 
 @pytest.mark.parametrize(
