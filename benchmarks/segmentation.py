@@ -31,7 +31,7 @@ from scenario_gen.method.segmentation import (
     SegmentationConfig,
 )
 from scenario_gen.method.segmentation.hdp_hmm.chain import TRACE
-from scenario_gen.method.segmentation.hdp_hmm.config import GAUSSIAN_DOF
+from scenario_gen.method.segmentation.hdp_hmm.config import GAUSSIAN_DOF_COUNT
 from scenario_gen.numerics.arrays import Floats, Ints
 
 SEEDS = range(9101, sized(9113, quick=9102))
@@ -312,7 +312,7 @@ def _sweeps() -> list[Row]:
     for cell in ("A", "B", "C"):
         x = gaussian_hmm(cell, SEEDS[0]).x
         cost = {}
-        for name, dof in (("Gaussian", GAUSSIAN_DOF), ("Student-t", 4.0)):
+        for name, dof in (("Gaussian", GAUSSIAN_DOF_COUNT), ("Student-t", 4.0)):
             spent = []
             for sweeps in (50, 250):  # what a call costs besides its sweeps goes out
                 config = SamplerConfig(sweeps=sweeps, r_hat=1.0, dof=dof, weight=1.0, chains=1)

@@ -38,10 +38,10 @@ from scenario_gen.method.segmentation import (
     assign,
     Assignment,
     build_library,
+    CONVERGED_R_HAT_RATIO,
     DEFAULT,
     PrimitiveLibrary,
     SegmentationConfig,
-    USUAL_R_HAT,
 )
 from scenario_gen.numerics import Ints
 from scenario_gen.situation import Situation
@@ -96,7 +96,7 @@ class Built:
             f"convergence: split R̂ at most {self.r_hat:.3f}; two seeds agree to {self.seeds:.2f} (adjusted Rand)",
             f"pairs assigned agree with the fit to {self.agreement:.2f} (adjusted Rand)",
         ]
-        if self.r_hat > USUAL_R_HAT:
+        if self.r_hat > CONVERGED_R_HAT_RATIO:
             lines.append(
                 "R̂ is above 1.1: the chains have not mixed; rely on what two seeds agree on, or raise sampler.sweeps"
             )

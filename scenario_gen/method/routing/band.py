@@ -199,4 +199,4 @@ def _curvature(points: Floats, mirror: Floats, spacing: float) -> Floats:
     before = points[1] - 2.0 * mirror[0]
     after = points[-2] + 2.0 * mirror[1]
     second = np.diff(np.vstack((before, points, after)), n=2, axis=0)
-    return np.hypot(*second.T) / spacing**2
+    return np.asarray(np.hypot(*second.T) / spacing**2)

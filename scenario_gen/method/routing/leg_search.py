@@ -86,7 +86,7 @@ def search_disc_path(task: VehicleTask, leg: Leg) -> Floats:
     row, column, _ = task.road.cells(ends)
     room = float(task.road.clearance[row, column].min()) - task.road.resolution
     radius = max(min(0.5 * task.vehicle.width + task.config.margin, room), 0.0)
-    query = Query(*ends, radius)
+    query = Query(leg.start[:2], leg.end[:2], radius)
     seed = task.seed + leg.first
     plan = partial(plan_with_retry, task.planner, task.road, query, task.config.iterations, seed)
     try:

@@ -4,9 +4,9 @@
 """Encounter -> primitives and changepoints, with their posterior (paper II-B)."""
 
 from scenario_gen.method.segmentation.estimator import (
+    CONVERGED_R_HAT_RATIO,
     SegmentationWarning,
     StickyHDPHMM,
-    USUAL_R_HAT,
 )
 from scenario_gen.method.segmentation.hdp_hmm.config import SamplerConfig
 from scenario_gen.method.segmentation.library import (
@@ -27,7 +27,21 @@ from scenario_gen.method.segmentation.segmenter import (
 from scenario_gen.method.segmentation.series import segment_series
 
 __all__ = [
-    "DEFAULT", "USUAL_R_HAT", "Assignment", "LiveSegmenter",
-    "OnlineConfig", "OnlineSegmenter", "Posterior", "PrimitiveLibrary", "SamplerConfig", "SegmentationConfig",
-    "SegmentationWarning", "StickyHDPHMM", "assign", "build_library", "segment", "segment_series", "segment_track",
+    "CONVERGED_R_HAT_RATIO",
+    "DEFAULT",
+    "Assignment",
+    "LiveSegmenter",
+    "OnlineConfig",
+    "OnlineSegmenter",
+    "Posterior",
+    "PrimitiveLibrary",
+    "SamplerConfig",
+    "SegmentationConfig",
+    "SegmentationWarning",
+    "StickyHDPHMM",
+    "assign",
+    "build_library",
+    "segment",
+    "segment_series",
+    "segment_track",
 ]  # fmt: skip

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""What each vehicle does in each primitive, in plain language with figures."""
+"""Plain-language descriptions of what each vehicle does in each primitive."""
 
 from itertools import pairwise
 
@@ -10,26 +10,26 @@ import numpy as np
 from scenario_gen.numerics import Floats, Ints
 from scenario_gen.types import Motion, VehicleType
 
-STEADY = 0.25
-TURNING = np.deg2rad(15.0)
-LEANING = 0.5
+STEADY_MPS2 = 0.25  # a smaller acceleration is none
+TURNING_RAD = np.deg2rad(15.0)  # a smaller change of heading is no turn
+TURNING_MPS2 = 0.5  # a smaller lateral acceleration is no turn
 
 
 def describe_motion(speed: Floats, heading: Floats, dt: float, kind: VehicleType) -> str:
-    """Describe speed [m/s] and heading [rad], both (n,), of one vehicle of a type in one primitive."""
+    """Describe speed [m/s] and heading [rad], both (n,), of a vehicle in one primitive."""
     n, slow = len(speed), kind.waits_below
-    line = np.column_stack([np.arange(n) * dt, np.ones(n)])
-    slope, level = (
-        np.linalg.lstsq(line, speed, rcond=None)[0].tolist() if n > 1 else (0.0, float(speed[0]))
-    )
+    slope, level = 0.0, float(speed[0])
+    if n > 1:
+        line = np.column_stack([np.arange(n) * dt, np.ones(n)])
+        slope, level = np.linalg.lstsq(line, speed, rcond=None)[0].tolist()
     first, last = max(level, 0.0), max(level + slope * (n - 1) * dt, 0.0)
     if np.median(speed) < slow and max(first, last) < 2.0 * slow:
         return "stands"
     turn = float(heading[-1] - heading[0])
     bend = ""
-    if abs(turn) >= TURNING:
+    if abs(turn) >= TURNING_RAD:
         bend = f", turning {'left' if turn > 0.0 else 'right'} by {abs(np.rad2deg(turn)):.0f}°"
-    if abs(last - first) < slow or abs(slope) < STEADY:
+    if abs(last - first) < slow or abs(slope) < STEADY_MPS2:
         return f"{'walks' if kind.walks else 'drives'} at {np.mean(speed):.1f} m/s{bend}"
     if slope > 0.0:
         verb = "pulls away" if first < slow else "accelerates"
@@ -39,52 +39,43 @@ def describe_motion(speed: Floats, heading: Floats, dt: float, kind: VehicleType
 
 
 def describe_segments(encounter: Motion, changepoints: Ints) -> tuple[str, ...]:
-    """One sentence per segment between changepoints (K,), naming every vehicle by its id."""
-    edges = [0, *(int(c) for c in changepoints), encounter.speed.shape[1]]
-    return tuple(
-        ", ".join(
+    """Return one sentence per segment between changepoints (K,), with the ids of the vehicles."""
+    sentences = []
+    for a, b in pairwise([0, *changepoints.tolist(), encounter.speed.shape[1]]):
+        clauses = [
             f"vehicle {vehicle.id} {_in_segment(encounter, i, a, b)}"
             for i, vehicle in enumerate(encounter.vehicles)
-        )
-        for a, b in pairwise(edges)
-    )
+        ]
+        sentences.append(", ".join(clauses))
+    return tuple(sentences)
 
 
 def _in_segment(encounter: Motion, i: int, a: int, b: int) -> str:
-    """Describe what vehicle i does from sample a to before b, as far as it is there."""
+    """Describe what vehicle i does from sample a to b - 1, while it is present."""
     first, last = encounter.present[i].tolist()
     if last < a:
         return "has left"
     if first >= b - 1:
-        return "is not there yet"
-    own = slice(max(a, first), min(b, last + 1))
-    motion = describe_motion(
-        encounter.speed[i, own],
-        encounter.heading[i, own],
-        encounter.dt,
-        encounter.vehicles[i].kind,
-    )
-    comes = f"arrives after {(first - a) * encounter.dt:.1f} s and " if first > a else ""
-    goes = f", leaves after {(last - a) * encounter.dt:.1f} s" if last < b - 1 else ""
-    return f"{comes}{motion}{goes}"
+        return "has not arrived yet"
+    present, dt = slice(max(a, first), min(b, last + 1)), encounter.dt
+    speed, heading = encounter.speed[i, present], encounter.heading[i, present]
+    motion = describe_motion(speed, heading, dt, encounter.vehicles[i].kind)
+    arrival = f"arrives after {(first - a) * dt:.1f} s and " if first > a else ""
+    departure = f", leaves after {(last - a) * dt:.1f} s" if last < b - 1 else ""
+    return f"{arrival}{motion}{departure}"
 
 
 def describe_accelerations(mean: Floats) -> str:
-    """Describe a primitive by its mean features (3N,), vehicles numbered from 0; see `features`."""
+    """Describe a primitive by its mean features (3N,); vehicles are numbered from 0."""
     parts = []
     for i, (along, across, moves) in enumerate(mean.reshape(-1, 3)):
         if moves < 0.5:
             parts.append(f"vehicle {i} stands")
             continue
-        pace = (
-            "drives steadily"
-            if abs(along) < STEADY
-            else f"{'accelerates' if along > 0.0 else 'brakes'} at {abs(along):.1f} m/s²"
-        )
-        bend = (
-            ""
-            if abs(across) < LEANING
-            else f", turning {'left' if across > 0.0 else 'right'} at {abs(across):.1f} m/s²"
-        )
+        pace, bend = "drives steadily", ""
+        if abs(along) >= STEADY_MPS2:
+            pace = f"{'accelerates' if along > 0.0 else 'brakes'} at {abs(along):.1f} m/s²"
+        if abs(across) >= TURNING_MPS2:
+            bend = f", turning {'left' if across > 0.0 else 'right'} at {abs(across):.1f} m/s²"
         parts.append(f"vehicle {i} {pace}{bend}")
     return ", ".join(parts)

@@ -1,9 +1,10 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""A posterior over labels -> the parameters of each state: emissions and transitions, in the series' own units."""
+"""A posterior over labels -> the parameters of each state, in the units of the series."""
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from scipy import linalg
@@ -14,34 +15,34 @@ from scenario_gen.method.segmentation.hdp_hmm.smoother import expected_statistic
 from scenario_gen.method.segmentation.posterior import Posterior
 from scenario_gen.numerics import Bools, Floats, Ints
 
-ROUNDS, SETTLED = 50, 1e-7
-RIDGE = 1e-12  # of a variance, on covariances that channels which follow from others make singular
+MAX_ROUNDS_COUNT, TOLERANCE_RATIO = 50, 1e-7  # of EM, in standardised units
+RIDGE_RATIO = 1e-12  # to a variance: collinear channels make covariances singular
 
 
 def regressed(x: Floats, ends: Ints, config: SamplerConfig) -> tuple[Problem, Ints]:
-    """Stack regressors and samples of x (T, D); also the sample (T',) of each row.
+    """Stack regressors and samples of x (T, D); return also the sample (T',) of each row.
 
     Raises:
         InputError: a sequence is too short for the order.
     """
     problem = Problem.build(x, ends, config, np.zeros(x.shape[1]))
-    starts = np.concatenate([[0], ends[:-1]])
-    return problem, np.concatenate(
-        [np.arange(a + problem.lead, b) for a, b in zip(starts, ends, strict=True)]
-    )
+    rows = [np.arange(a + problem.lead, b) for a, b in pairwise([0, *ends.tolist()])]
+    return problem, np.concatenate(rows)
 
 
 def hidden_channels(problem: Problem) -> Bools:
-    """(T', D) which channels of each row were not observed."""
+    """Return which channels of each row were not observed: (T', D)."""
     hidden = np.zeros(problem.y.shape, np.bool_)
     hidden[problem.gaps] = problem.hidden
     return hidden
 
 
 def whitened(regression: Floats, covariance: Floats) -> Floats:
-    """(D, P + D) map of (z, y) to the whitened residual, from A (D, P) and Σ (D, D)."""
+    """Return the map (D, P + D) of (z, y) to the whitened residual, from A (D, P) and Σ (D, D)."""
     spread = np.diag(covariance)
-    factor = np.linalg.cholesky(covariance + RIDGE * np.diag(np.where(spread > 0.0, spread, 1.0)))
+    factor = np.linalg.cholesky(
+        covariance + RIDGE_RATIO * np.diag(np.where(spread > 0.0, spread, 1.0))
+    )
     root = linalg.solve_triangular(factor, np.eye(len(spread)), lower=True)
     return np.hstack([-(root @ regression), root])
 
@@ -57,60 +58,62 @@ class Emissions:
 def estimate(
     x: Floats, ends: Ints, posterior: Posterior, config: SamplerConfig
 ) -> tuple[Floats, Floats, Floats]:
-    """Posterior means of each state's parameters, given how often each sample was in it (Fox et al. 2011).
+    """Return posterior means of each state's parameters, given how often each sample was in it.
 
-    With r_t the share of the posterior's draws in which sample t is in the state, w the weight of a sample, u_t the mass of
-    heavy-tailed noise (1 for Gaussian noise) and the prior (A, Σ) ~ MNIW(M, K, ν0, S0):
+    With r_t the share of the posterior's draws in which sample t is in the state, w the weight of
+    a sample, u_t the mass of heavy-tailed noise (1 for Gaussian noise) and the prior
+    (A, Σ) ~ MNIW(M, K, ν0, S0):
 
         K'  = K + w Σ r u z zᵀ              A = (M K + w Σ r u y zᵀ) K'⁻¹
         S'  = S0 + w Σ r u (y - A z)(y - A z)ᵀ + (A - M) K (A - M)ᵀ
         E Σ = S' / (ν0 + w Σ r - D - 1)
 
-    With z = 1 A is the mean, and K is κ0. κ0 and ν0 are those that the sampler drew, S0 = (ν0 - D - 1) × the covariance within
-    states. Masses and what was not observed take their means given A and Σ, until that stands still (EM). Channels that the
-    sampler left out are here again; masses do not count them.
+    With z = 1, A is the mean and K is κ0. κ0 and ν0 are the drawn ones, and S0 = (ν0 - D - 1) ×
+    the covariance within states. Masses and hidden values have their means given A and Σ, which
+    EM iterates. Channels that the sampler left out are included, but masses ignore them.
+
+    Source: Fox et al. 2011.
 
     Args:
         x: (T, D), NaN where hidden.
-        ends: index one past the last sample of each sequence.
+        ends: one past the index of the last sample of each sequence.
         posterior: of these samples.
         config: model.
 
     Returns:
-        Means (K, D), covariances (K, D, D) and regressions (K, D, P) in x's units; NaN for a channel that was never observed.
+        Means (K, D), covariances (K, D, D) and regressions (K, D, P) in x's units; NaN for a
+        channel that was never observed.
     """
     absent = np.isnan(x).all(axis=0)
     seen = np.where(absent, 0.0, x)
     centre, spread = np.nanmean(seen, axis=0), np.nanstd(seen, axis=0)
-    unit = np.where(
-        spread > 1e-9 * np.maximum(np.nanmax(np.abs(seen), axis=0), 1e-300), spread, 1.0
-    )
+    varies = spread > 1e-9 * np.maximum(np.nanmax(np.abs(seen), axis=0), 1e-300)
+    unit = np.where(varies, spread, 1.0)
     problem, rows = regressed((seen - centre) / unit, ends, config)
     states = int(posterior.labels.max()) + 1
     share = np.stack([(posterior.samples == k).mean(axis=0) for k in range(states)])
-    settled = settle_emissions(problem, share[:, rows], posterior)
-    regression = settled.regression * unit[:, None]
+    standardised = fit_emissions(problem, share[:, rows], posterior)
+    regression = standardised.regression * unit[:, None]
     p = problem.regressors
     if p > 1:
         regression[:, :, 1:] /= np.tile(unit, problem.lead)
-    regression[:, :, 0] += centre - (regression[:, :, 1:] * np.tile(centre, problem.lead)).sum(
-        axis=2
-    )
-    covariance = settled.covariance * unit[:, None] * unit
+    slopes = regression[:, :, 1:] * np.tile(centre, problem.lead)
+    regression[:, :, 0] += centre - slopes.sum(axis=2)
+    covariance = standardised.covariance * unit[:, None] * unit
     means = regression[:, :, 0].copy()
     if p > 1:
         counts = share[:, :, None] * ~np.isnan(seen)
         total = counts.sum(axis=1)
         sums = (counts * np.nan_to_num(seen)).sum(axis=1)
         means = np.where(total > 0.0, sums / np.maximum(total, 1e-300), centre)
-    means[:, absent] = regression[:, absent] = covariance[:, absent] = covariance[:, :, absent] = (
-        np.nan
-    )
+    for values in (means, regression, covariance):
+        values[:, absent] = np.nan
+    covariance[:, :, absent] = np.nan
     return means, covariance, regression
 
 
-def settle_emissions(problem: Problem, share: Floats, posterior: Posterior) -> Emissions:
-    """Repeat `estimate`'s equations until they stand still; share (K, T') of each row's samples in each state."""
+def fit_emissions(problem: Problem, share: Floats, posterior: Posterior) -> Emissions:
+    """Iterate the equations of `estimate` by EM; `share` (K, T') is that of each row's draws."""
     d, p, states = problem.dimensions, problem.regressors, len(share)
     hidden = hidden_channels(problem)
     unused = hidden.copy()
@@ -119,17 +122,16 @@ def settle_emissions(problem: Problem, share: Floats, posterior: Posterior) -> E
     weight, freedom = posterior.weight, posterior.extra - 1.0
     mean, precision = problem.mean, problem.precision * posterior.worth
     total = share.sum(axis=1)
-    now = Emissions(
-        np.repeat(mean[None], states, axis=0), np.repeat(np.eye(d)[None], states, axis=0)
-    )
+    covariance = np.repeat(np.eye(d)[None], states, axis=0)
+    fitted = Emissions(np.repeat(mean[None], states, axis=0), covariance)
     if p == 1:
-        now.regression[:, :, 0] = (share @ problem.y) / np.maximum(total, 1e-300)[:, None]
+        fitted.regression[:, :, 0] = (share @ problem.y) / np.maximum(total, 1e-300)[:, None]
     outer, sums = np.empty((p + d, p + d)), np.empty(2)
     rows = Rows(problem.v, hidden, unused, weight, posterior.dof)
-    for _ in range(ROUNDS):
-        regression, scatter = np.empty_like(now.regression), np.empty_like(now.covariance)
+    for _ in range(MAX_ROUNDS_COUNT):
+        regression, scatter = np.empty_like(fitted.regression), np.empty_like(covariance)
         for k in range(states):
-            coef = whitened(now.regression[k], now.covariance[k])
+            coef = whitened(fitted.regression[k], fitted.covariance[k])
             expected_statistics(rows, share[k], coef, outer, sums)
             pull = mean @ precision + weight * outer[p:, :p]
             a = linalg.solve(precision + weight * outer[:p, :p], pull.T, assume_a="pos").T
@@ -139,44 +141,42 @@ def settle_emissions(problem: Problem, share: Floats, posterior: Posterior) -> E
         samples = float(total.sum())
         within = scatter.sum(axis=0) / max(samples - p * states, 0.5 * samples, 1.0)
         shift = regression - mean
-        covariance = (
-            freedom * within + weight * scatter + shift @ precision @ shift.transpose(0, 2, 1)
-        )
-        before, now = (
-            now,
-            Emissions(regression, covariance / (freedom + weight * total)[:, None, None]),
-        )
+        from_prior = shift @ precision @ shift.transpose(0, 2, 1)
+        covariance = freedom * within + weight * scatter + from_prior
+        covariance = covariance / (freedom + weight * total)[:, None, None]
         moved = max(
-            np.abs(now.regression - before.regression).max(),
-            np.abs(now.covariance - before.covariance).max(),
+            np.abs(regression - fitted.regression).max(),
+            np.abs(covariance - fitted.covariance).max(),
         )
-        if moved < SETTLED:
+        fitted = Emissions(regression, covariance)
+        if moved < TOLERANCE_RATIO:
             break
-    return now
+    return fitted
 
 
 def mean_transitions(posterior: Posterior, states: int) -> tuple[Floats, Floats]:
-    """Posterior mean of the transitions (K, K) between the estimate's states, and of the first state (K,).
+    """Return the posterior mean of the transitions (K, K), and of the first state (K,).
 
-    E π_j = (α β + κ δ_j + n_j) / (α + κ + n_j.) (Fox et al. 2011, algorithm 3, step 4), with the counts n averaged over the
-    posterior's samples, and α, κ, γ over its trace; the first state likewise, without κ. β, which is not kept, is taken at its
-    mean given that each segment opened one table of its state.
+    E π_j = (α β + κ δ_j + n_j) / (α + κ + n_j.), with the counts n averaged over the posterior's
+    samples, and α, κ, γ over its trace; for the first state κ is 0. β, which is not stored, has
+    its mean given that each segment opened one table of its state.
+
+    Source: Fox et al. 2011, algorithm 3, step 4.
     """
     if not posterior.trace:
         return np.ones((1, 1)), np.ones(1)
     samples, size = posterior.samples, max(int(posterior.samples.max()) + 1, states)
     starts = np.concatenate([[0], posterior.ends[:-1]])
     inside = np.setdiff1d(np.arange(1, samples.shape[1]), starts)
-    pairs = np.bincount(
-        (samples[:, inside - 1] * size + samples[:, inside]).ravel(), minlength=size * size
-    ).reshape(size, size)
+    codes = samples[:, inside - 1] * size + samples[:, inside]
+    pairs = np.bincount(codes.ravel(), minlength=size * size).reshape(size, size)
     first = np.bincount(samples[:, starts].ravel(), minlength=size)
-    counts, begun = pairs / len(samples), first / len(samples)
+    counts, first_counts = pairs / len(samples), first / len(samples)
     kept = [trace for trace, keep in zip(posterior.trace, posterior.kept, strict=True) if keep]
     _, _, gamma, total, rho = np.concatenate(kept).mean(axis=0)
-    dwells = counts.sum(axis=0) - np.diag(counts) + begun
+    dwells = counts.sum(axis=0) - np.diag(counts) + first_counts
     beta = (gamma / posterior.states + dwells) / (gamma + dwells.sum())
     alpha = (1.0 - rho) * total
     transitions = (alpha * beta + rho * total * np.eye(size) + counts)[:states, :states]
-    initial = (alpha * beta + begun)[:states]
+    initial = (alpha * beta + first_counts)[:states]
     return transitions / transitions.sum(axis=1, keepdims=True), initial / initial.sum()

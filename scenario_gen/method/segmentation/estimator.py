@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The sticky HDP-HMM as an estimator in scikit-learn's manner; scikit-learn itself is not needed."""
+"""The sticky HDP-HMM as an estimator with scikit-learn's interface, without depending on it."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -30,19 +30,19 @@ from scenario_gen.method.segmentation.series import (
 )
 from scenario_gen.numerics import Floats, Ints
 
-Data = Any  # an array (T, D) or what becomes one, or a list of them
+Data = Any  # an array (T, D), or data that numpy converts to one, or a list of them
 
 DEFAULT = SamplerConfig()
-LEAST_SAMPLES = 4
-USUAL_R_HAT = 1.1  # asked for where `r_hat` = 1 has all sweeps run
+MIN_SAMPLES = 4
+CONVERGED_R_HAT_RATIO = 1.1  # required where `r_hat` = 1 demands all sweeps
 
 
 class SegmentationWarning(UserWarning):
-    """A fit that should be looked at before it is believed."""
+    """A fit that the user should check before relying on it."""
 
 
 class EstimatorError(InputError, ValueError):
-    """Data or a parameter that cannot be used; also a ValueError, as scikit-learn's users expect."""
+    """Unusable data or parameters; also a ValueError, which scikit-learn's users expect."""
 
 
 @contextmanager
@@ -59,34 +59,65 @@ def as_value_error() -> Iterator[None]:
 
 
 class NotFittedError(ValueError, AttributeError):
-    """Asked for what only `fit` finds; where scikit-learn is installed, its own NotFittedError is raised."""
+    """A method that needs `fit` was called before it.
+
+    Where scikit-learn is installed, its own NotFittedError is raised.
+    """
 
 
 class StickyHDPHMM:
-    """Segments sequences into states that recur, how many of them unknown (Fox, Sudderth, Jordan, Willsky 2011).
+    """Segmentation into recurring states, whose number is inferred, by a sticky HDP-HMM.
 
-    A parameter is a field of `SamplerConfig`, which says what it means.
+    Source: Fox, Sudderth, Jordan, Willsky 2011.
+
+    Args:
+        emission: "gaussian", or "autoregressive": a vector autoregression per state.
+        order: number of past samples that an autoregressive emission regresses on.
+        states: weak-limit truncation L; 0: chosen from the data.
+        chains: number of independent chains.
+        sweeps: maximum number of Gibbs sweeps per chain.
+        r_hat: split R-hat at which the chains stop; 1: all sweeps are run.
+        moves: split or merge moves per sweep.
+        dof: degrees of freedom of Student-t noise; 0: from the data; 1000 or more: Gaussian.
+        mean_weight: prior samples that the regression of an autoregressive state is worth.
+        weight: weight of a sample in (0, 1]; 0: from the data.
+        gamma_shape: shape of the Gamma prior of the concentration gamma.
+        gamma_rate: rate of the Gamma prior of the concentration gamma.
+        alpha_kappa_shape: shape of the Gamma prior of alpha + kappa.
+        alpha_kappa_rate: rate of the Gamma prior of alpha + kappa.
+        rho_a: first parameter of the Beta prior of rho = kappa / (alpha + kappa).
+        rho_b: second parameter of the Beta prior of rho.
+        random_state: seed; None: a different one for every fit.
 
     Attributes:
-        labels_: (T,) state of each sample, 0 .. K - 1 in order of first appearance; several sequences stand one after the other.
-        changepoints_: samples, counted over all sequences, whose state differs from the one before; a sequence's start is none.
+        labels_: (T,) state of each sample, 0 .. K - 1 in order of first appearance. Several
+            sequences are concatenated.
+        changepoints_: indices of samples, over all sequences, whose state differs from the
+            previous one; the start of a sequence is none.
         changepoint_probability_: (T,) posterior probability of a changepoint at each sample.
         n_states_: K.
         n_features_in_: D.
         means_: (K, D) mean of each state's samples, in X's units.
-        covariances_: (K, D, D) Σ of each state's noise. Under Student-t noise it is the scale matrix, of which the
-            covariance is `dof_` / (`dof_` - 2) times.
-        coefficients_: (K, D, P) regression on z = 1, or (1, x of one sample before, x of two before, ...).
-        transitions_: (K, K) probability of the next sample's state.
+        covariances_: (K, D, D) covariance of each state's noise. Under Student-t noise it is the
+            scale matrix; the covariance is `dof_` / (`dof_` - 2) times that.
+        coefficients_: (K, D, P) regression on z = 1, or on z = (1, previous x, ...).
+        transitions_: (K, K) transition probabilities.
         startprob_: (K,) probability of a sequence's first state.
         dof_: degrees of freedom of the noise; inf: Gaussian.
-        r_hat_: split R̂ of each trace, by its name.
-        converged_: whether every R̂ is as low as was asked for.
-        posterior_: all that was sampled.
-    """
+        r_hat_: split R-hat of each trace, by its name.
+        converged_: whether every R-hat is as low as required.
+        posterior_: the sampled segmentations.
 
-    states: int
-    random_state: int | None
+    Examples:
+        >>> import numpy as np
+        >>> rng = np.random.default_rng(0)
+        >>> X = np.concatenate([rng.normal(0, 1, (100, 2)), rng.normal(5, 1, (100, 2))])
+        >>> model = StickyHDPHMM(random_state=0).fit(X)
+        >>> model.n_states_
+        2
+        >>> model.changepoints_
+        array([100])
+    """
 
     def __init__(
         self,
@@ -109,39 +140,55 @@ class StickyHDPHMM:
         rho_b: float = DEFAULT.rho_b,
         random_state: int | None = None,
     ) -> None:
-        """Take the parameters of `SamplerConfig` and a seed (None: another one at every fit); `fit` checks them."""
-        vars(self).update({name: value for name, value in locals().items() if name != "self"})
+        """Store the parameters; `fit` validates them."""
+        self.emission = emission
+        self.order = order
+        self.states = states
+        self.chains = chains
+        self.sweeps = sweeps
+        self.r_hat = r_hat
+        self.moves = moves
+        self.dof = dof
+        self.mean_weight = mean_weight
+        self.weight = weight
+        self.gamma_shape = gamma_shape
+        self.gamma_rate = gamma_rate
+        self.alpha_kappa_shape = alpha_kappa_shape
+        self.alpha_kappa_rate = alpha_kappa_rate
+        self.rho_a = rho_a
+        self.rho_b = rho_b
+        self.random_state = random_state
 
     def fit(self, X: Data, lengths: npt.ArrayLike | None = None, y: object = None) -> Self:
         """Sample the segmentations of X, and estimate each state's parameters from them.
 
         Args:
-            X: (T, D), or a list of sequences (T_i, D); NaN where nothing was measured.
-            lengths: where X is one array of several sequences, how long each is. An array with an entry per sample is taken
-                for a target, which pipelines pass in this place, and ignored.
-            y: ignored, as scikit-learn has it.
+            X: (T, D), or a list of sequences (T_i, D); NaN marks missing values.
+            lengths: length of each sequence if X concatenates several. An array with one entry
+                per sample is ignored: pipelines pass targets in this position.
+            y: ignored; present for API consistency.
+
+        Returns:
+            The fitted estimator.
 
         Warns:
-            SegmentationWarning: chains disagree, all states were in use, channels are left out, or outliers are hidden.
+            SegmentationWarning: chains disagree, all states were in use, channels are left out,
+                or outliers are ignored.
 
         Raises:
-            EstimatorError: fewer than 4 samples, an infinite value, or a parameter out of its range.
+            EstimatorError: fewer than 4 samples, an infinite value, or an invalid parameter.
         """
         x, ends = stacked(X, lengths)
         config = self._config()
-        if len(x) < LEAST_SAMPLES:
-            raise EstimatorError(
-                f"X has n_samples = {len(x)}; at least {LEAST_SAMPLES} are needed"
-            )
-        seed = (
-            int(np.random.default_rng().integers(2**62))
-            if self.random_state is None
-            else int(self.random_state)
-        )
+        if len(x) < MIN_SAMPLES:
+            raise EstimatorError(f"X has n_samples = {len(x)}; at least {MIN_SAMPLES} are needed")
+        seed = self.random_state
+        if seed is None:
+            seed = int(np.random.default_rng().integers(2**62))
         self._usual = usual_distances(x, ends)
         visible = without_outliers(x, self._usual, ends)
         with as_value_error():
-            posterior = segment_visible(visible, config, seed, ends, np.zeros(x.shape[1]))
+            posterior = segment_visible(visible, config, int(seed), ends, np.zeros(x.shape[1]))
         self.posterior_ = posterior
         self.n_features_in_ = x.shape[1]
         emissions = estimate(visible, ends, posterior, config)
@@ -153,7 +200,7 @@ class StickyHDPHMM:
         self.transitions_, self.startprob_ = mean_transitions(posterior, self.n_states_)
         self.dof_ = posterior.dof or np.inf
         self.r_hat_ = dict(zip(TRACE, posterior.r_hat.tolist(), strict=True))
-        requested = config.r_hat if config.r_hat > 1.0 else USUAL_R_HAT
+        requested = config.r_hat if config.r_hat > 1.0 else CONVERGED_R_HAT_RATIO
         self.converged_ = max(self.r_hat_.values()) <= requested
         for concern in self._concerns(x, visible, requested):
             warnings.warn(concern, SegmentationWarning, stacklevel=2)
@@ -164,15 +211,15 @@ class StickyHDPHMM:
         return self.fit(X, lengths).labels_
 
     def predict(self, X: Data, lengths: npt.ArrayLike | None = None) -> Ints:
-        """(T,) the most probable state of each sample given all of its sequence, that is the largest of `predict_proba`."""
+        """Return the most probable state (T,) of each sample; see `predict_proba`."""
         labels: Ints = self.predict_proba(X, lengths).argmax(axis=1).astype(np.int64)
         return labels
 
     def predict_proba(self, X: Data, lengths: npt.ArrayLike | None = None) -> Floats:
-        """(T, K) posterior probability of each state, by forward-backward smoothing under the estimated parameters.
+        """Return the posterior probability (T, K) of each state, by forward-backward smoothing.
 
-        A sample counts for `posterior_.weight`, as in the fit; what is NaN, or lies as far out as what the fit hid, is
-        integrated out.
+        The parameters are the estimated ones, and a sample has the weight `posterior_.weight`, as
+        in the fit. Missing values, and outliers by the rule of the fit, are integrated out.
 
         Raises:
             EstimatorError: as `fit`, or another number of channels than in the fit.
@@ -180,9 +227,10 @@ class StickyHDPHMM:
         return self._smooth(X, lengths, None)[0]
 
     def score(self, X: Data, lengths: npt.ArrayLike | None = None, y: object = None) -> float:
-        """Mean log-likelihood of a sample under the estimated parameters, states integrated out; channels left out do not count.
+        """Return the mean log-likelihood per sample under the estimated parameters.
 
-        Samples count in full, as in a density they must, whatever they counted for in the fit.
+        States are integrated out; channels that were left out do not count. Samples have weight
+        1, whatever weight they had in the fit, since the result is a density.
 
         Raises:
             EstimatorError: as `predict_proba`.
@@ -191,7 +239,9 @@ class StickyHDPHMM:
         return total / len(proba)
 
     def to_arviz(self) -> Any:
-        """Return arviz.InferenceData: per chain and draw the five traces and the labels (-1: of a chain that was left out).
+        """Return arviz.InferenceData: the five traces and the labels of each chain and draw.
+
+        Labels of chains that were left out are -1.
 
         Raises:
             ImportError: arviz is not installed.
@@ -204,20 +254,13 @@ class StickyHDPHMM:
                 "to_arviz needs arviz, which is not installed: pip install arviz"
             ) from None
         posterior = self.posterior_
-        draws = np.array(
-            posterior.trace
-            if posterior.trace
-            else np.zeros((1, len(posterior.samples), len(TRACE)))
-        )
+        no_draws = np.zeros((1, len(posterior.samples), len(TRACE)))
+        draws = np.array(posterior.trace or no_draws)
         labels = np.full((len(draws), draws.shape[1], len(posterior.labels)), -1, np.int64)
         for chain in np.unique(posterior.chain):
             labels[chain] = posterior.samples[posterior.chain == chain]
-        groups: dict[str, Any] = {
-            "posterior": {
-                **{name: draws[:, :, i] for i, name in enumerate(TRACE)},
-                "labels": labels,
-            }
-        }
+        traces = {name: draws[:, :, i] for i, name in enumerate(TRACE)}
+        groups: dict[str, Any] = {"posterior": traces | {"labels": labels}}
         options: dict[str, Any] = {
             "dims": {"labels": ["time"]},
             "coords": {"time": np.arange(len(posterior.labels))},
@@ -227,33 +270,40 @@ class StickyHDPHMM:
         return arviz.from_dict(**groups, **options)
 
     def get_params(self, deep: bool = True) -> dict[str, Any]:
-        """Return the parameters by name."""
-        return {name: getattr(self, name) for name in _parameters()}
+        """Return the parameters of this estimator.
+
+        Args:
+            deep: ignored, since no parameter is an estimator; present for API consistency.
+        """
+        return {name: getattr(self, name) for name in _default_params()}
 
     def set_params(self, **params: Any) -> Self:
-        """Set parameters by name.
+        """Set parameters of this estimator, and return it.
 
         Raises:
             EstimatorError: there is no parameter of that name.
         """
+        known = _default_params()
         for name, value in params.items():
-            if name not in _parameters():
+            if name not in known:
                 raise EstimatorError(
-                    f"StickyHDPHMM has no parameter {name!r}; it has {', '.join(_parameters())}"
+                    f"invalid parameter {name!r} for StickyHDPHMM; valid parameters are "
+                    f"{', '.join(known)}"
                 )
             setattr(self, name, value)
         return self
 
     def __repr__(self) -> str:
-        changed = {
-            n: v
-            for n, v in self.get_params().items()
-            if v is not _parameters()[n] and v != _parameters()[n]
-        }
-        return f"StickyHDPHMM({', '.join(f'{name}={value!r}' for name, value in changed.items())})"
+        defaults = _default_params()
+        changed = [
+            f"{name}={value!r}"
+            for name, value in self.get_params().items()
+            if value is not defaults[name] and value != defaults[name]
+        ]
+        return f"StickyHDPHMM({', '.join(changed)})"
 
     def __sklearn_tags__(self) -> Any:
-        """Return what scikit-learn asks its estimators: NaN is allowed, and no fit equals the one before."""
+        """Return scikit-learn's tags: a density estimator that accepts NaN."""
         from sklearn.utils import InputTags, Tags, TargetTags
 
         return Tags(
@@ -261,21 +311,19 @@ class StickyHDPHMM:
         )
 
     def _config(self) -> SamplerConfig:
-        """Check the parameters."""
+        """Validate the parameters."""
         values = self.get_params()
         seed = values.pop("random_state")
-        if seed is not None and (
-            isinstance(seed, bool) or not isinstance(seed, int | np.integer) or seed < 0
-        ):
+        is_whole = isinstance(seed, int | np.integer) and not isinstance(seed, bool)
+        if seed is not None and not (is_whole and seed >= 0):
             raise EstimatorError(
                 f"random_state is {seed!r}; it must be a whole number >= 0, or None"
             )
-        plain = {
-            name: value.item() if isinstance(value, np.generic) else value
-            for name, value in values.items()
-        }
+        for name, value in values.items():
+            if isinstance(value, np.generic):
+                values[name] = value.item()
         with as_value_error():
-            return SamplerConfig(**plain)
+            return SamplerConfig(**values)
 
     def _check_fitted(self) -> None:
         if not hasattr(self, "posterior_"):
@@ -288,12 +336,16 @@ class StickyHDPHMM:
     def _smooth(
         self, X: Data, lengths: npt.ArrayLike | None, weight: float | None
     ) -> tuple[Floats, float]:
-        """(T, K) smoothed probabilities and the log-likelihood, samples counting for `weight` (None: as in the fit)."""
+        """Return smoothed probabilities (T, K) and the log-likelihood.
+
+        Samples have this weight; None: that of the fit.
+        """
         self._check_fitted()
         x, ends = stacked(X, lengths)
         if x.shape[1] != self.n_features_in_:
             raise EstimatorError(
-                f"X has {x.shape[1]} features, but StickyHDPHMM is expecting {self.n_features_in_} features as input"
+                f"X has {x.shape[1]} features, but StickyHDPHMM is expecting "
+                f"{self.n_features_in_} features as input"
             )
         used = self.posterior_.channels
         absent = np.isnan(self.means_).all(axis=0)
@@ -310,72 +362,68 @@ class StickyHDPHMM:
             coef = np.stack(
                 [whitened(a[used], covariance[np.ix_(used, used)]) for a, covariance in states]
             )
-            counts = self.posterior_.weight if weight is None else weight
-            log_densities(v, hidden, coef, counts, self.posterior_.dof, density)
-        every = np.zeros((len(x), self.n_states_))
-        every[rows] = density
-        proba = np.empty_like(every)
-        total = smooth(every, self.transitions_, self.startprob_, ends, proba, np.empty(len(x)))
+            if weight is None:
+                weight = self.posterior_.weight
+            log_densities(v, hidden, coef, weight, self.posterior_.dof, density)
+        log_density = np.zeros((len(x), self.n_states_))
+        log_density[rows] = density
+        proba = np.empty_like(log_density)
+        changed = np.empty(len(x))
+        total = smooth(log_density, self.transitions_, self.startprob_, ends, proba, changed)
         return proba, total
 
     def _concerns(self, x: Floats, visible: Floats, requested: float) -> list[str]:
-        """What a user should know of the fit."""
-        concerns = []
+        """Return the warnings about the fit of x (T, D), of which `visible` was used."""
+        posterior, concerns = self.posterior_, list[str]()
         if not self.converged_:
-            far = ", ".join(
-                f"{name} {value:.2f}" for name, value in self.r_hat_.items() if value > requested
-            )
-            ran, chains = len(self.posterior_.trace[0]) * 2, len(self.posterior_.trace)
+            high = [f"{name} {r:.2f}" for name, r in self.r_hat_.items() if r > requested]
+            sweeps, chains = len(posterior.trace[0]) * 2, len(posterior.trace)
             concerns.append(
-                f"R-hat is above {requested:g} after {ran} sweeps of {chains} chain(s): {far}. What was sampled "
-                "depends on where it began: raise `sweeps`, and compare the chains (`to_arviz`)"
+                f"R-hat is above {requested:g} after {sweeps} sweeps of {chains} chain(s): "
+                f"{', '.join(high)}. The result depends on the starting points: raise `sweeps`, "
+                "and compare the chains (`to_arviz`)"
             )
-        if self.posterior_.full:
+        if posterior.full:
+            remedy = "the series may have no recurring states"
+            if self.states:
+                remedy = "raise `states`, or set it to 0"
             concerns.append(
-                f"all L = {self.posterior_.states} states were in use in more than a few samples: more may be needed; "
-                + (
-                    "raise `states`, or set it to 0"
-                    if self.states
-                    else "the series may have no states that recur"
-                )
+                f"all L = {posterior.states} states were in use in more than a few samples: more "
+                f"may be needed; {remedy}"
             )
-        left = sorted(set(range(x.shape[1])) - set(self.posterior_.channels.tolist()))
-        if left:
-            concerns.append(
-                "channels that say nothing of their own are left out: "
-                + ", ".join(f"{i} ({why(x[:, i])})" for i in left)
-            )
+        left_out = sorted(set(range(x.shape[1])) - set(posterior.channels.tolist()))
+        if left_out:
+            reasons = ", ".join(f"{i} ({_why_left_out(x[:, i])})" for i in left_out)
+            concerns.append(f"channels without information of their own are left out: {reasons}")
         hidden = np.argwhere(np.isnan(visible) & ~np.isnan(x))
         if len(hidden):
-            at = ", ".join(f"sample {t} of channel {i}" for t, i in hidden[:3]) + (
-                ", ..." if len(hidden) > 3 else ""
-            )
+            places = [f"sample {t} of channel {i}" for t, i in hidden[:3]]
+            places += ["..."] * (len(hidden) > 3)
             concerns.append(
-                f"{len(hidden)} values far from those before and after them are taken for not measured: {at}"
+                f"{len(hidden)} values far from their neighbours are treated as missing: "
+                f"{', '.join(places)}"
             )
         return concerns
 
 
-def _parameters() -> dict[str, Any]:
-    """Names and defaults of the estimator's parameters."""
+def _default_params() -> dict[str, Any]:
+    """Return the estimator's parameters and their defaults, from its signature."""
     signature = inspect.signature(StickyHDPHMM.__init__)
     return {name: value.default for name, value in signature.parameters.items() if name != "self"}
 
 
-def why(column: Floats) -> str:
-    """Say why a channel (T,) was left out."""
-    seen = column[~np.isnan(column)]
-    if len(seen) < 2:
+def _why_left_out(column: Floats) -> str:
+    """Return why a channel (T,) was left out."""
+    measured = column[~np.isnan(column)]
+    if len(measured) < 2:
         return "not measured"
-    return (
-        "does not vary"
-        if np.ptp(seen) <= 1e-9 * np.abs(seen).max()
-        else "follows from those before it"
-    )
+    if np.ptp(measured) <= 1e-9 * np.abs(measured).max():
+        return "does not vary"
+    return "follows from those before it"
 
 
 def stacked(X: Data, lengths: npt.ArrayLike | None) -> tuple[Floats, Ints]:
-    """Return the sequences one after the other (T, D), and the index one past the last sample of each.
+    """Return the concatenated sequences (T, D), and one past the index of the last sample of each.
 
     Raises:
         EstimatorError: X is not (T, D) nor a list of (T_i, D), or the lengths do not add up to T.
@@ -386,27 +434,27 @@ def stacked(X: Data, lengths: npt.ArrayLike | None) -> tuple[Floats, Ints]:
         if lengths is not None:
             raise EstimatorError("X is a list of sequences, so `lengths` is not needed")
         parts = [matrix(part) for part in X]
-        if len({part.shape[1] for part in parts}) > 1:
-            raise EstimatorError(
-                f"the sequences differ in their channels: {[part.shape[1] for part in parts]}"
-            )
+        widths = [part.shape[1] for part in parts]
+        if len(set(widths)) > 1:
+            raise EstimatorError(f"the sequences differ in their channels: {widths}")
         return np.vstack(parts), np.cumsum([len(part) for part in parts])
     x = matrix(X)
-    sizes = np.array([len(x)]) if lengths is None else np.asarray(lengths)
-    if sizes.shape[:1] == (len(x),) and not (
-        sizes.ndim == 1 and np.array_equal(sizes, np.ones(len(x)))
-    ):
-        sizes = np.array([len(x)])  # as long as X: no lengths, but a target
-    if (
-        sizes.ndim != 1
-        or sizes.dtype.kind not in "iu"
-        or (sizes < 1).any()
-        or sizes.sum() != len(x)
-    ):
+    return x, _ends(lengths, len(x))
+
+
+def _ends(lengths: npt.ArrayLike | None, samples: int) -> Ints:
+    """Return one past the index of the last sample of each sequence."""
+    sizes = np.array([samples]) if lengths is None else np.asarray(lengths)
+    is_ones = sizes.ndim == 1 and np.array_equal(sizes, np.ones(samples))
+    if sizes.shape[:1] == (samples,) and not is_ones:
+        sizes = np.array([samples])  # a target, not lengths
+    is_valid = sizes.ndim == 1 and sizes.dtype.kind in "iu" and (sizes >= 1).all()
+    if not is_valid or sizes.sum() != samples:
         raise EstimatorError(
-            f"lengths must be whole numbers >= 1 that add up to {len(x)} samples; they are {sizes.tolist()}"
+            f"lengths must be whole numbers >= 1 that add up to {samples} samples; they are "
+            f"{sizes.tolist()}"
         )
-    return x, np.cumsum(sizes).astype(np.int64)
+    return np.cumsum(sizes).astype(np.int64)
 
 
 def matrix(X: npt.ArrayLike) -> Floats:
@@ -421,7 +469,8 @@ def matrix(X: npt.ArrayLike) -> Floats:
     x = values.astype(np.float64)
     if x.ndim != 2:
         raise EstimatorError(
-            f"X must be 2D (samples, channels), not of shape {x.shape}. Reshape your data, e.g. X.reshape(-1, 1)"
+            f"X must be 2D (samples, channels), not of shape {x.shape}. Reshape your data, "
+            "e.g. X.reshape(-1, 1)"
         )
     if x.shape[1] == 0:
         raise EstimatorError(
@@ -430,6 +479,7 @@ def matrix(X: npt.ArrayLike) -> Floats:
     if np.isinf(x).any():
         row, column = np.argwhere(np.isinf(x))[0]
         raise EstimatorError(
-            f"X holds {x[row, column]} at sample {row}, channel {column}; put NaN where nothing was measured"
+            f"X holds {x[row, column]} at sample {row}, channel {column}; use NaN for missing "
+            "values"
         )
     return x

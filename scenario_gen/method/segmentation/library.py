@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""A library of primitives shared by many encounters: what the hierarchy of the HDP is for."""
+"""A library of primitives shared by many encounters, by the hierarchy of the HDP."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -35,7 +35,7 @@ _ROW = {
     "type": "array",
     "minItems": 1,
     "items": {**NUMBER, "minimum": -1e9, "maximum": 1e9},
-}  # of accelerations, speeds, seconds
+}
 _SHARES = {
     "type": "array",
     "minItems": 1,
@@ -63,7 +63,7 @@ SCHEMA: dict[str, Any] = {
     },
 }
 SCHEMA["required"] = list(SCHEMA["properties"])
-"""Of the JSON that `save` writes; that the shapes agree is checked beside it."""
+"""JSON Schema of the file that `save` writes; `load` also checks shapes and values."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,14 +71,15 @@ class PrimitiveLibrary:
     """K primitives of encounters of N vehicles.
 
     Attributes:
-        vehicles: N; vehicle order matters, a primitive says what the first and what the second one does.
-        means: (K, 3N) features (longitudinal and lateral acceleration [m/s²], moving 0..1, vehicle by vehicle).
+        vehicles: N; their order matters.
+        means: (K, 3N) longitudinal and lateral acceleration [m/s²], and moving (0 to 1), vehicle
+            by vehicle.
         covariances: (K, 3N, 3N).
         transition: (K, K) probability of the next sample's primitive.
         initial: (K,) probability of being the first.
-        segments: (K,) how many segments were seen.
+        segments: (K,) number of segments.
         seconds: (K,) mean duration of a segment.
-        weight: what a sample counts for.
+        weight: of a sample.
         windows: (4,) windows [s] and noises [m/s²] of the features, see `driving_features`.
         descriptions: K sentences.
     """
@@ -100,15 +101,16 @@ class PrimitiveLibrary:
         object.__setattr__(self, "segments", frozen_ints(self.segments))
 
     def features(self, encounter: Encounter) -> Floats:
-        """(T, 3N) features of an encounter as this library looks at them.
+        """Return the features (T, 3N) of an encounter, with the windows of this library.
 
         Raises:
             InputError: the encounter has another number of vehicles.
         """
-        if len(encounter.vehicles) != self.vehicles:
-            count = len(encounter.vehicles)
+        count = len(encounter.vehicles)
+        if count != self.vehicles:
             raise InputError(
-                f"encounter {encounter.name!r} has {count} vehicles; the primitive library is for {self.vehicles}"
+                f"encounter {encounter.name!r} has {count} vehicles; the primitive library is for "
+                f"{self.vehicles}"
             )
         return driving_features(encounter, *(float(w) for w in self.windows))[0]
 
@@ -127,8 +129,8 @@ class PrimitiveLibrary:
         Raises:
             InputError: the file cannot be read or is no such library.
         """
-        what = f"{path} is not a primitive library"
-        values = read_json(path, SCHEMA, what)
+        problem = f"{path} is not a primitive library"
+        values = read_json(path, SCHEMA, problem)
         k, width = len(values["means"]), 3 * values["vehicles"]
         shapes = {
             "means": (k, width),
@@ -137,28 +139,28 @@ class PrimitiveLibrary:
             **dict.fromkeys(("initial", "segments", "seconds", "descriptions"), (k,)),
         }
         for name, shape in shapes.items():
-            check_shape(values[name], shape, f"{what}: {name}")
+            check_shape(values[name], shape, f"{problem}: {name}")
         for name, part in (("transition", "row"), ("initial", "list")):
             sums = np.sum(values[name], axis=-1)
             if (np.abs(sums - 1.0) > 1e-6).any():
                 raise InputError(
-                    f"{what}: {name} holds probabilities; each {part} must sum to 1, not {np.ravel(sums)[0]:g}"
+                    f"{problem}: {name} holds probabilities; each {part} must sum to 1, not "
+                    f"{np.ravel(sums)[0]:g}"
                 )
-        with guarded(
-            f"{what}: covariances", remedy="each must be symmetric and positive definite"
-        ):
+        remedy = "each must be symmetric and positive definite"
+        with guarded(f"{problem}: covariances", remedy=remedy):
             covariances = np.array(values["covariances"])
             for covariance in covariances:
                 np.linalg.cholesky(covariance)
         if not np.allclose(covariances, covariances.swapaxes(1, 2)):
-            raise InputError(f"{what}: covariances must be symmetric")
-        known = {name: values[name] for name in cls.__dataclass_fields__}
-        return cls(**known | {"descriptions": tuple(values["descriptions"])})
+            raise InputError(f"{problem}: covariances must be symmetric")
+        fields = {name: values[name] for name in cls.__dataclass_fields__}
+        return cls(**fields | {"descriptions": tuple(values["descriptions"])})
 
 
 @dataclass(frozen=True, eq=False)
 class Assignment:
-    """An encounter in terms of a library: its segmentation, and the library's primitive (K + 1,) of each segment."""
+    """An encounter's segmentation, and the library's primitive (K + 1,) of each segment."""
 
     segmentation: Segmentation
     primitives: Ints
@@ -180,90 +182,87 @@ def build_library(
     kinds = {(len(e.vehicles), e.dt_ns) for e in encounters}
     if len(kinds) != 1:
         raise InputError(
-            "a primitive library needs encounters with one number of vehicles and one sampling period, at least one"
+            "a primitive library needs encounters with one number of vehicles and one sampling "
+            "period, at least one"
         )
     windows = (config.speed_window, config.turn_window, config.speed_noise, config.turn_noise)
-    parts = [driving_features(e, *windows) for e in encounters]
+    parts = [driving_features(encounter, *windows) for encounter in encounters]
     x, blur = np.vstack([features for features, _ in parts]), parts[0][1]
-    ends = tuple(int(n) for n in np.cumsum([len(features) for features, _ in parts]))
+    ends = tuple(np.cumsum([len(features) for features, _ in parts]).tolist())
     posterior = segment_series(x, config.sampler, seed, ends=ends, blur=blur)
     labels = posterior.labels.copy()
-    points = []
-    for encounter, start, stop in zip(encounters, (0, *ends[:-1]), ends, strict=True):
-        own = posterior.part(start, stop)
-        changepoints = on_trends(encounter, own, cut(own, config, encounter.dt), config)
-        labels[start:stop] = relabel(posterior.labels[start:stop], changepoints, fresh=False)
-        points.append(np.flatnonzero(np.diff(labels[start:stop])) + 1)
+    bounds = list(pairwise((0, *ends)))
+    for encounter, (start, stop) in zip(encounters, bounds, strict=True):
+        part = posterior.part(start, stop)
+        points = on_trends(encounter, part, cut(part, config, encounter.dt), config)
+        labels[start:stop] = relabel(posterior.labels[start:stop], points, fresh=False)
     labels = in_order(labels)
-    library = _summarise(
-        x, labels, ends, encounters[0], windows, config.sampler.weight or 1.0, blur
+    weight, dt = config.sampler.weight or 1.0, encounters[0].dt
+    library = PrimitiveLibrary(
+        vehicles=len(encounters[0].vehicles),
+        weight=weight,
+        windows=np.array(windows),
+        **_statistics(x, labels, ends, blur, dt),
     )
+    r_hat = float(posterior.r_hat.max())
     assignments = []
-    for encounter, start, stop, own_points in zip(
-        encounters, (0, *ends[:-1]), ends, points, strict=True
-    ):
-        own_labels = labels[start:stop]
-        segmentation = Segmentation(
-            in_order(own_labels),
-            own_points,
-            posterior.probability[start:stop],
-            describe_segments(encounter, own_points),
-            float(posterior.r_hat.max()),
-        )
-        assignments.append(Assignment(segmentation, frozen_ints(own_labels[[0, *own_points]])))
+    for encounter, (start, stop) in zip(encounters, bounds, strict=True):
+        probability = posterior.probability[start:stop]
+        assignments.append(_assignment(encounter, labels[start:stop], probability, r_hat))
     return library, tuple(assignments)
 
 
-def _summarise(
-    x: Floats,
-    labels: Ints,
-    ends: tuple[int, ...],
-    example: Encounter,
-    windows: tuple[float, float, float, float],
-    weight: float,
-    blur: Floats,
-) -> PrimitiveLibrary:
-    """Take every primitive's statistics from labelled samples."""
-    k = int(labels.max()) + 1
+def _assignment(
+    encounter: Encounter, labels: Ints, probability: Floats, r_hat: float = float("nan")
+) -> Assignment:
+    """Return the assignment of an encounter whose samples have these primitives (T,)."""
+    points = np.flatnonzero(np.diff(labels)) + 1
+    descriptions = describe_segments(encounter, points)
+    segmentation = Segmentation(in_order(labels), points, probability, descriptions, r_hat)
+    return Assignment(segmentation, frozen_ints(labels[[0, *points]]))
+
+
+def _statistics(
+    x: Floats, labels: Ints, ends: tuple[int, ...], blur: Floats, dt: float
+) -> dict[str, Any]:
+    """Return every primitive's statistics from samples x (T, D) with labels (T,), by field."""
+    k, d = int(labels.max()) + 1, x.shape[1]
     pairs = np.ones((k, k)) * 0.1 / k
     initial = np.full(k, 0.1)
     lengths: list[list[float]] = [[] for _ in range(k)]
-    for start, stop in zip((0, *ends[:-1]), ends, strict=True):
-        own = labels[start:stop]
-        np.add.at(pairs, (own[:-1], own[1:]), 1.0)
-        initial[own[0]] += 1.0
-        edges = [0, *(np.flatnonzero(np.diff(own)) + 1), len(own)]
+    for start, stop in pairwise((0, *ends)):
+        part = labels[start:stop]
+        np.add.at(pairs, (part[:-1], part[1:]), 1.0)
+        initial[part[0]] += 1.0
+        edges = [0, *(np.flatnonzero(np.diff(part)) + 1), len(part)]
         for a, b in pairwise(edges):
-            lengths[own[a]].append((b - a) * example.dt)
+            lengths[part[a]].append((b - a) * dt)
     means = np.array([x[labels == j].mean(axis=0) for j in range(k)])
     within = x - means[labels]
     within -= within.mean(axis=0)
-    pooled = (within.T @ within) / (len(x) - 1) + np.diag(np.square(blur))
-    covariances = np.empty((k, x.shape[1], x.shape[1]))
-    prior = 3.0 * x.shape[1]
+    error = np.diag(np.square(blur))
+    pooled = (within.T @ within) / (len(x) - 1) + error
+    covariances = np.empty((k, d, d))
+    prior = 3.0 * d  # samples that the pooled covariance is worth
     for j in range(k):
-        rest = x[labels == j] - means[j]
-        covariances[j] = (
-            prior * pooled + rest.T @ rest + len(rest) * np.diag(np.square(blur))
-        ) / (prior + len(rest))
-    return PrimitiveLibrary(
-        vehicles=len(example.vehicles),
-        means=means,
-        covariances=covariances,
-        transition=pairs / pairs.sum(axis=1, keepdims=True),
-        initial=initial / initial.sum(),
-        segments=np.array([len(each) for each in lengths]),
-        seconds=np.array([np.mean(each) for each in lengths]),
-        weight=weight,
-        windows=np.array(windows),
-        descriptions=tuple(describe_accelerations(mean) for mean in means),
-    )
+        residual = x[labels == j] - means[j]
+        scatter = prior * pooled + residual.T @ residual + len(residual) * error
+        covariances[j] = scatter / (prior + len(residual))
+    return {
+        "means": means,
+        "covariances": covariances,
+        "transition": pairs / pairs.sum(axis=1, keepdims=True),
+        "initial": initial / initial.sum(),
+        "segments": np.array([len(durations) for durations in lengths]),
+        "seconds": np.array([np.mean(durations) for durations in lengths]),
+        "descriptions": tuple(describe_accelerations(mean) for mean in means),
+    }
 
 
 def assign(
     encounter: Encounter, library: PrimitiveLibrary, config: SegmentationConfig = DEFAULT
 ) -> Assignment:
-    """Cut a new encounter into the primitives of a library, without fitting anything (forward-backward smoothing).
+    """Cut a new encounter into the primitives of a library by forward-backward smoothing.
 
     Raises:
         InputError: the encounter has another number of vehicles than the library.
@@ -274,23 +273,15 @@ def assign(
     points = np.flatnonzero(np.diff(labels)) + 1
     gap = max(2, round(config.min_segment / encounter.dt))
     while len(points) and np.diff([0, *points, len(x)]).min() < gap:
-        near = int(np.argmin(np.diff([0, *points, len(x)])))
-        points = np.delete(points, min(near, len(points) - 1))
-    result = relabel(labels, points, fresh=False)
-    points = np.flatnonzero(np.diff(result)) + 1
-    segmentation = Segmentation(
-        in_order(result), points, changed, describe_segments(encounter, points)
-    )
-    return Assignment(segmentation, frozen_ints(result[[0, *points]]))
+        shortest = int(np.argmin(np.diff([0, *points, len(x)])))
+        points = np.delete(points, min(shortest, len(points) - 1))
+    return _assignment(encounter, relabel(labels, points, fresh=False), changed)
 
 
 def _smooth(library: PrimitiveLibrary, x: Floats) -> tuple[Floats, Floats]:
-    """(T, K) probability of each primitive and (T,) of a change, at each sample of x (T, D); NaN: not measured."""
-    density, smoothed, changed = (
-        np.empty((len(x), len(library.means))),
-        np.empty((len(x), len(library.means))),
-        np.empty(len(x)),
-    )
+    """Return probabilities of each primitive (T, K), and of a change (T,), in x (T, D)."""
+    density = np.empty((len(x), len(library.means)))
+    smoothed, changed = np.empty_like(density), np.empty(len(x))
     states = zip(library.means, library.covariances, strict=True)
     coef = np.stack([whitened(mean[:, None], covariance) for mean, covariance in states])
     rows = np.column_stack([np.ones(len(x)), np.nan_to_num(x)])

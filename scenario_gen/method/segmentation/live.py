@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Samples as they come → changepoints as they are confirmed, for whoever is there."""
+"""Samples as they arrive -> changepoints as they are confirmed, for the vehicles present."""
 
 from collections import deque
 from collections.abc import Sequence
@@ -14,10 +14,10 @@ from scenario_gen.types import LiveChangepoints, Sample
 
 
 class LiveSegmenter:
-    """An `OnlineSegmenter` for vehicles that come and go: each change of who is there begins a new stretch."""
+    """An `OnlineSegmenter` for vehicles that come and go; it restarts at each such change."""
 
     def __init__(self, dt_ns: int, config: OnlineConfig = OnlineConfig()) -> None:
-        """Start with no samples; they will be `dt_ns` nanoseconds apart."""
+        """Start without samples; they are `dt_ns` nanoseconds apart."""
         self._dt_ns = dt_ns
         self._config = config
         self._past: deque[Sample] = deque(maxlen=round(config.window * 1e9 / dt_ns))
@@ -25,7 +25,7 @@ class LiveSegmenter:
         self._start_ns = 0
 
     def push(self, sample: Sample) -> LiveChangepoints | None:
-        """Take the next sample and return the changepoints it confirms, if any."""
+        """Add the next sample, and return the changepoints that it confirms, if any."""
         last = self._past[-1] if self._past else None
         if self._online is None or last is None or not self._follows(last, sample):
             self._past.clear()
@@ -39,11 +39,9 @@ class LiveSegmenter:
         return sample.stamp_ns == last.stamp_ns + self._dt_ns and sample.vehicles == last.vehicles
 
     def _states(self, changepoints: Sequence[Changepoint]) -> LiveChangepoints:
-        time_ns = (
-            np.array([changepoint.sample for changepoint in changepoints], dtype=np.int64)
-            * self._dt_ns
-        )
-        at = (self._start_ns + time_ns - self._past[0].stamp_ns) // self._dt_ns
+        samples = np.array([changepoint.sample for changepoint in changepoints], dtype=np.int64)
+        time_ns = samples * self._dt_ns
+        index = (self._start_ns + time_ns - self._past[0].stamp_ns) // self._dt_ns
         position = np.stack([sample.position for sample in self._past], axis=1)
         speed = np.stack([sample.speed for sample in self._past], axis=1)
         vehicles = self._past[-1].vehicles
@@ -55,8 +53,8 @@ class LiveSegmenter:
             self._start_ns,
             vehicles,
             time_ns,
-            position[:, at],
-            heading[:, at],
-            speed[:, at],
+            position[:, index],
+            heading[:, index],
+            speed[:, index],
             probability=np.array([changepoint.probability for changepoint in changepoints]),
         )

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The posterior over segmentations: a point estimate, changepoint probabilities, intervals, and whether to believe them."""
+"""The posterior over segmentations: estimate, changepoint probabilities, intervals, R-hat."""
 
 from dataclasses import dataclass, field, replace
 
@@ -10,7 +10,8 @@ from scipy.optimize import linear_sum_assignment
 
 from scenario_gen.numerics import Bools, Floats, frozen, frozen_ints, Ints
 
-MOST_SAMPLES = 400  # labels of more sweeps than these are thinned evenly; traces are not
+MAX_SAMPLES = 400  # sampled label sequences; more are thinned evenly, traces are not
+MIN_SCORE_GAP_LOG_RATIO = 10.0  # of a chain's mean score to the best one's, to leave it out
 
 
 @dataclass(frozen=True, eq=False)
@@ -18,21 +19,24 @@ class Posterior:
     """Sampled segmentations of T samples.
 
     Attributes:
-        labels: (T,) the point estimate, 0 .. K - 1 in order of first appearance: the most probable label of every sample, which
-            minimises the expected Hamming distance to the samples once their labels are matched.
-        samples: (S, T) sampled labels, of sweeps evenly apart, of the chains that agree where the mass is; matched to `labels`.
+        labels: (T,) point estimate, 0 .. K - 1 in order of first appearance: the most probable
+            label of every sample. It minimises the expected Hamming distance to the samples once
+            their labels are matched.
+        samples: (S, T) sampled labels of evenly spaced sweeps of the kept chains, matched to
+            `labels`.
         probability: (T,) posterior probability of a changepoint at each sample.
         ends: index one past the last sample of each sequence.
         chain: (S,) chain of each sample.
         trace: per chain (S', 5), see `hdp_hmm.chain.TRACE`.
-        kept: (chains,) which chains the samples are from; the others are stuck in a far less probable place.
+        kept: (chains,) which chains the samples come from; the others are stuck in a far less
+            probable mode.
         states: weak-limit truncation L that was used.
-        full: whether all of them were in use more than now and then, so that more might be.
+        full: whether all of them were often in use, so that more may be needed.
         dof: degrees of freedom of the noise; 0: Gaussian.
-        weight: what a sample counted for.
+        weight: of a sample.
         channels: (D',) channels that were used; the others do not vary or follow from these.
         extra: ν0 - D of the emissions' prior, as last drawn (geometric mean of the chains).
-        worth: κ0, or what the prior precision K is in units of the configured one, likewise.
+        worth: κ0, or the factor of the configured prior precision K, as last drawn.
     """
 
     labels: Ints
@@ -52,25 +56,18 @@ class Posterior:
 
     @property
     def r_hat(self) -> Floats:
-        """(5,) split R̂ of each trace over all chains."""
+        """(5,) split R-hat of each trace over all chains."""
         return r_hat(list(self.trace))
 
     @classmethod
     def constant(cls, ends: Ints) -> "Posterior":
-        """The posterior of sequences that do not vary: one primitive, with certainty; they end before the samples `ends` (Q,)."""
-        zeros = np.zeros(int(ends[-1]), np.int64)
-        return cls(
-            zeros,
-            zeros[None],
-            np.zeros(len(zeros)),
-            ends,
-            np.zeros(1, np.int64),
-            (),
-            np.zeros(0, np.bool_),
-        )
+        """Return the posterior of sequences that do not vary: one primitive, with certainty."""
+        labels, no_chain = np.zeros(int(ends[-1]), np.int64), np.zeros(0, np.bool_)
+        probability, chain = np.zeros(len(labels)), np.zeros(1, np.int64)
+        return cls(labels, labels[None], probability, ends, chain, (), no_chain)
 
     def part(self, start: int, stop: int) -> "Posterior":
-        """Return the posterior of the samples start..stop alone."""
+        """Return the posterior of samples start to stop - 1."""
         ends = np.array([stop - start])
         labels, samples = in_order(self.labels[start:stop]), self.samples[:, start:stop]
         return replace(
@@ -83,11 +80,11 @@ class Posterior:
 
     @property
     def changepoints(self) -> Ints:
-        """(K,) changepoints of the point estimate; the start of a further sequence is none."""
+        """(K,) changepoints of the point estimate; the start of a sequence is none."""
         return changepoints_of(self.labels, self.ends)
 
     def probability_within(self, radius: int) -> Floats:
-        """(T,) posterior probability of at least one changepoint within `radius` samples of each sample."""
+        """Return the posterior probability (T,) of a changepoint within `radius` samples."""
         rows, samples = self.samples.shape
         changed = np.zeros((rows, samples), np.int32)
         changed[:, 1:] = np.diff(self.samples, axis=1) != 0
@@ -99,29 +96,29 @@ class Posterior:
         return np.asarray((before[:, high] > before[:, low]).mean(axis=0))
 
     def intervals(self, low: float = 0.05, high: float = 0.95) -> Floats:
-        """(K, 2) credible interval of each changepoint's sample index, from the sampled changepoints nearest to it."""
-        centres = self.changepoints
-        samples: list[list[int]] = [[] for _ in centres]
-        for row in self.samples if len(centres) else []:
-            sampled = changepoints_of(row, self.ends)
-            for k, centre in enumerate(centres):
-                if len(sampled):
-                    samples[k].append(int(sampled[np.argmin(np.abs(sampled - centre))]))
-        return np.array(
-            [
-                np.quantile(f, [low, high], method="inverted_cdf") if f else [c, c]
-                for f, c in zip(samples, centres, strict=True)
-            ]
-        ).reshape(-1, 2)
+        """Return the credible interval (K, 2) of each changepoint's sample index.
+
+        It is that of the nearest changepoint in each sampled segmentation.
+        """
+        sampled = [changepoints_of(row, self.ends) for row in self.samples]
+        sampled = [changepoints for changepoints in sampled if len(changepoints)]
+        intervals = np.repeat(self.changepoints[:, None].astype(np.float64), 2, axis=1)
+        for k, centre in enumerate(self.changepoints if sampled else ()):
+            nearest = [row[np.argmin(np.abs(row - centre))] for row in sampled]
+            intervals[k] = np.quantile(nearest, [low, high], method="inverted_cdf")
+        return intervals
 
     def primitives(self) -> Floats:
-        """(n,) posterior probability of 0, 1, 2, ... primitives in use."""
+        """Return the posterior probability (n,) of 0, 1, 2, ... primitives in use."""
         used = np.array([len(np.unique(row)) for row in self.samples])
         return np.bincount(used) / len(used)
 
 
 def r_hat(traces: list[Floats]) -> Floats:
-    """Split R̂ (Gelman et al. 2013, 11.4) of traces, each (S, n): (n,); 1 where nothing varies."""
+    """Return split R-hat (n,) of traces (S, n); 1 where nothing varies.
+
+    Source: Gelman et al. 2013, 11.4.
+    """
     if not traces or len(traces[0]) < 4:
         return np.ones(5)
     half = min(len(trace) for trace in traces) // 2
@@ -134,7 +131,7 @@ def r_hat(traces: list[Floats]) -> Floats:
 
 
 def changepoints_of(labels: Ints, ends: Ints) -> Ints:
-    """Return the samples (K,) whose label, of (T,), differs from the one before, within each sequence."""
+    """Return the samples (K,) whose label differs from the one before, within each sequence."""
     changepoints = np.flatnonzero(np.diff(labels)) + 1
     return changepoints[~np.isin(changepoints, ends)].astype(np.int64)
 
@@ -146,7 +143,7 @@ def in_order(labels: Ints) -> Ints:
 
 
 def matched_labels(samples: Ints, reference: Ints, size: int) -> Ints:
-    """Rename each row's labels (S, T), below `size`, to agree with `reference` (T,) in as many samples as possible."""
+    """Permute each row's labels (S, T), below `size`, for the best match with `reference` (T,)."""
     overlaps = [
         np.bincount(row * size + reference, minlength=size * size).reshape(size, size)
         for row in samples
@@ -158,43 +155,29 @@ def matched_labels(samples: Ints, reference: Ints, size: int) -> Ints:
 
 
 def pool(samples: list[Ints], traces: list[Floats], ends: Ints, lead: int) -> Posterior:
-    """Put the chains together.
+    """Combine the chains.
 
-    The score of a sample is log p(x, labels) with emissions and transitions integrated out: unlike p(x | parameters), it does
-    not grow with unneeded states. Chains whose mean score lies far below the best chain's are stuck and left out. All
-    others' samples are matched to the best-scored sample, then to the estimate itself, until that stands still.
+    The score of a sample is log p(x, labels) with emissions and transitions integrated out. Unlike
+    p(x | parameters), it does not grow with unneeded states. Chains whose mean score lies far
+    below the best chain's are stuck and left out. The samples of the others are matched to the
+    best-scored sample, then to the estimate itself, until it no longer changes.
 
     Args:
-        samples: per chain (S', T') labels.
-        traces: per chain (S', 5).
-        ends: index one past the last sample of each sequence, in samples.
-        lead: samples missing at the head of each sequence; they get the label of the first row.
+        samples: labels (S', T') of each chain.
+        traces: (S', 5) of each chain.
+        ends: one past the index of the last sample of each sequence.
+        lead: samples without a row at the head of each sequence; they get the first row's label.
     """
     means = np.array([trace[:, 0].mean() for trace in traces])
     best = int(np.argmax(means))
-    kept = means >= means[best] - max(10.0, 3.0 * float(traces[best][:, 0].std()))
-    every = max(
-        1, -(-sum(len(s) for s, keep in zip(samples, kept, strict=True) if keep) // MOST_SAMPLES)
-    )
-    stack = np.vstack([s[::every] for s, keep in zip(samples, kept, strict=True) if keep])
-    chain = np.concatenate(
-        [
-            np.full(len(s[::every]), k)
-            for k, (s, keep) in enumerate(zip(samples, kept, strict=True))
-            if keep
-        ]
-    )
-    scores = np.concatenate([t[::every, 0] for t, keep in zip(traces, kept, strict=True) if keep])
-    estimate = stack[int(np.argmax(scores))]
-    size = int(stack.max()) + 1
-    for _ in range(3):
-        matched = matched_labels(stack, estimate, size)
-        votes = np.stack([(matched == k).sum(axis=0) for k in range(size)])
-        update = votes.argmax(axis=0).astype(np.int64)
-        if np.array_equal(update, estimate):
-            break
-        estimate = update
-    stack = matched
+    margin = max(MIN_SCORE_GAP_LOG_RATIO, 3.0 * float(traces[best][:, 0].std()))
+    kept = means >= means[best] - margin
+    chains = np.flatnonzero(kept)
+    every = max(1, -(-sum(len(samples[k]) for k in chains) // MAX_SAMPLES))
+    stack = np.vstack([samples[k][::every] for k in chains])
+    chain = np.concatenate([np.full(len(samples[k][::every]), k) for k in chains])
+    scores = np.concatenate([traces[k][::every, 0] for k in chains])
+    estimate, stack = _consensus(stack, stack[int(np.argmax(scores))])
     order = in_order(np.concatenate([estimate, np.arange(stack.max() + 1)]))[len(estimate) :]
     if lead:
         starts = np.concatenate([[0], ends[:-1] - lead * np.arange(1, len(ends))])
@@ -213,3 +196,16 @@ def pool(samples: list[Ints], traces: list[Floats], ends: Ints, lead: int) -> Po
         tuple(traces),
         kept,
     )
+
+
+def _consensus(samples: Ints, estimate: Ints) -> tuple[Ints, Ints]:
+    """Return the most frequent label (T,) of every sample, and the matched samples (S, T)."""
+    size = int(samples.max()) + 1
+    for _ in range(3):
+        matched = matched_labels(samples, estimate, size)
+        votes = np.stack([(matched == k).sum(axis=0) for k in range(size)])
+        update = votes.argmax(axis=0).astype(np.int64)
+        if np.array_equal(update, estimate):
+            break
+        estimate = update
+    return estimate, matched

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Encounter -> Segmentation: features, sampler, and the few rules of the road."""
+"""Encounter -> Segmentation: features, sampler, and rules for plausible changepoints."""
 
 from dataclasses import dataclass
 from itertools import pairwise
@@ -37,7 +37,7 @@ class SegmentationConfig(Parameters):
     )
     max_rate: float = parameter(
         0.5,
-        "most changepoints per second of duration, on average (the least useful are dropped)",
+        "maximum mean number of changepoints per second (the least useful are dropped)",
         unit="1/s",
         low=0.0,
         high=10.0,
@@ -54,7 +54,7 @@ class SegmentationConfig(Parameters):
     )
     significance_level: float = parameter(
         1e-4,
-        "probability with which noise alone makes a changepoint look as useful as is required of one",
+        "probability that noise alone makes a changepoint as useful as required",
         low=1e-12,
         high=0.5,
     )
@@ -69,14 +69,14 @@ class SegmentationConfig(Parameters):
     )
     speed_noise: float = parameter(
         0.2,
-        "differences of longitudinal acceleration that mean nothing",
+        "differences of longitudinal acceleration that are noise",
         unit="m/s²",
         low=0.0,
         high=5.0,
     )
     turn_noise: float = parameter(
         0.4,
-        "differences of lateral acceleration that mean nothing",
+        "differences of lateral acceleration that are noise",
         unit="m/s²",
         low=0.0,
         high=5.0,
@@ -94,7 +94,8 @@ def segment(
 
     Args:
         encounter: N >= 1 vehicles, T samples.
-        config: with `preset="paper"` the sampler sees raw positions and speeds, and only what is too short is merged.
+        config: with `preset="paper"` the sampler gets raw positions and speeds, and only segments
+            that are too short are merged.
         seed: same seed, same answer.
 
     Raises:
@@ -134,62 +135,67 @@ def segment_track(
         seed: same seed, same answer.
 
     Raises:
-        InputError: fewer than 4 samples, shapes that disagree, a value that is not finite, or a negative speed.
+        InputError: fewer than 4 samples, inconsistent shapes, a value that is not finite, or a
+            negative speed.
     """
     position, speed = np.asarray(position, np.float64), np.asarray(speed, np.float64)
-    if (
-        position.ndim != 2
-        or position.shape[1] != 2
-        or speed.shape != (len(position),)
-        or len(speed) < 4
-    ):
+    samples = len(speed) if speed.ndim == 1 else 0
+    if position.shape != (samples, 2) or samples < 4:
         raise InputError(
-            f"a track is (T, 2) positions and (T,) speeds, T at least 4; not {position.shape} and {speed.shape}"
+            "a track needs (T, 2) positions and (T,) speeds with T >= 4; the shapes are "
+            f"{position.shape} and {speed.shape}"
         )
-    if not (dt > 0.0 and np.isfinite(position).all() and np.isfinite(speed).all()):
-        raise InputError(f"a track holds finite positions and speeds, dt > 0 s apart; dt is {dt}")
+    is_finite = np.isfinite(position).all() and np.isfinite(speed).all()
+    if not (dt > 0.0 and is_finite and (speed >= 0.0).all()):
+        raise InputError(
+            f"a track needs finite positions, finite speeds >= 0 and dt > 0 s; dt is {dt}"
+        )
     heading = course(position, speed, dt)[0]
-    return segment(
-        Motion.sampled((Vehicle("0"),), dt, position[None], heading[None], speed[None]),
-        config,
-        seed,
-    )
+    track = Motion.sampled((Vehicle("0"),), dt, position[None], heading[None], speed[None])
+    return segment(track, config, seed)
 
 
 def on_trends(
     encounter: Motion, posterior: Posterior, points: Ints, config: SegmentationConfig
 ) -> Ints:
-    """Put changepoints (K,) where trends change, see `trends`, and keep the most useful ones up to `max_rate`."""
+    """Move changepoints (K,) to where trends change, and keep the most useful ones.
+
+    See `trends`; `max_rate` limits their number.
+    """
     trends = Trends.of(
         encounter.position, encounter.speed, encounter.dt, encounter.vehicles, encounter.present
     )
     chance = config.significance_level
-    least, certain = trends.threshold(chance), trends.threshold(chance * chance)
+    min_gain, sure_gain = trends.threshold(chance), trends.threshold(chance * chance)
     reach = round(config.settle / encounter.dt)
-    gap = max(2, int(np.ceil(config.min_segment / encounter.dt - 1e-9)))
-    most = int(encounter.duration * config.max_rate)
-    everything = encounter.speed.shape[1]
-    candidates = np.flatnonzero(
-        posterior.probability_within(round(0.5 / encounter.dt)) > config.min_probability
-    )
-    changepoints = trends.settle([int(c) for c in points], reach, gap)
-    changepoints = trends.settle(trends.drop(changepoints, least, everything), reach, gap)
-    changepoints = trends.settle(trends.add(changepoints, candidates, least, gap), reach, gap)
-    # speeds that change by less than their noise in the sampler's window still show in a line's knots over many seconds
-    changepoints = trends.settle(
-        trends.add(changepoints, np.arange(trends.samples), certain, gap), reach, gap
-    )
-    changepoints = trends.settle(trends.drop(changepoints, least, most), reach, gap)
-    return np.array(changepoints, dtype=np.int64)
+    gap = _min_samples(config, encounter.dt)
+    no_limit = encounter.speed.shape[1]
+    max_count = int(encounter.duration * config.max_rate)
+    probability = posterior.probability_within(round(0.5 / encounter.dt))
+    candidates = np.flatnonzero(probability > config.min_probability)
+    knots = trends.align(points.tolist(), reach, gap)
+    knots = trends.align(trends.drop(knots, min_gain, no_limit), reach, gap)
+    knots = trends.align(trends.add(knots, candidates, min_gain, gap), reach, gap)
+    # A speed change below the noise in the sampler's window can still be clear over many seconds.
+    anywhere = np.arange(trends.samples)
+    knots = trends.align(trends.add(knots, anywhere, sure_gain, gap), reach, gap)
+    knots = trends.align(trends.drop(knots, min_gain, max_count), reach, gap)
+    return np.array(knots, dtype=np.int64)
+
+
+def _min_samples(config: SegmentationConfig, dt: float) -> int:
+    """Return the number of samples of the shortest segment."""
+    return max(2, int(np.ceil(config.min_segment / dt - 1e-9)))
 
 
 def cut(posterior: Posterior, config: SegmentationConfig, dt: float) -> Ints:
-    """Return the estimate's changepoints (K,) without segments below `min_segment` or states with fewer than 2 samples.
+    """Return the estimate's changepoints (K,) without segments shorter than `min_segment`.
 
-    Of the two changepoints around such a segment the less probable one goes (at either end, the inner one).
+    Of the two changepoints around such a segment the less probable one is removed; of a segment at
+    either end, the inner one.
     """
     labels = posterior.labels
-    shortest = max(2, int(np.ceil(config.min_segment / dt - 1e-9)))
+    shortest = _min_samples(config, dt)
     points = list(posterior.changepoints)
     while points:
         edges = np.array([0, *points, len(labels)])
@@ -198,16 +204,18 @@ def cut(posterior: Posterior, config: SegmentationConfig, dt: float) -> Ints:
         if lengths[i] >= shortest:
             break
         around = [j for j in (i - 1, i) if 0 <= j < len(points)]
-        near = [posterior.probability[max(points[j] - 1, 0) : points[j] + 2].sum() for j in around]
-        del points[around[int(np.argmin(near))]]
+        probability = [
+            posterior.probability[max(points[j] - 1, 0) : points[j] + 2].sum() for j in around
+        ]
+        del points[around[int(np.argmin(probability))]]
     return np.array(points, dtype=np.int64)
 
 
 def relabel(labels: Ints, points: Ints, *, fresh: bool = True) -> Ints:
-    """Give every segment between `points` (K,) the label, of (T,), that most of its samples have, and neighbours different ones.
+    """Give each segment between `points` (K,) the most frequent one of its labels (T,).
 
-    Where a segment holds no other label than its left neighbour's, it gets a new one; or, if not `fresh`, the
-    neighbour's after all, so that the changepoint between them is one no longer.
+    Neighbours get different labels. A segment that has only its left neighbour's label gets a new
+    one; or, if not `fresh`, that label after all, so that their changepoint disappears.
     """
     edges = [0, *(int(c) for c in points), len(labels)]
     result = np.empty_like(labels)
@@ -216,7 +224,10 @@ def relabel(labels: Ints, points: Ints, *, fresh: bool = True) -> Ints:
         votes = np.bincount(labels[a:b])
         if 0 <= previous < len(votes):
             votes[previous] = 0
-        label = int(votes.argmax()) if votes.max() > 0 else (new if fresh else previous)
+        label = int(votes.argmax())
+        if votes.max() == 0:
+            label = new if fresh else previous
         new += label == new
-        result[a:b] = previous = label
+        previous = label
+        result[a:b] = label
     return result

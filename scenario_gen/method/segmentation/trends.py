@@ -1,17 +1,19 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Changepoints as knots of a constant-acceleration, constant-turn-rate law: put them where the trends change.
+"""Changepoints as knots of a constant-acceleration, constant-turn-rate law.
 
-Within a primitive each vehicle's speed and course are nearly linear in time (paper IV-B). The sampler says how many
-primitives there are and about where they change; features taken over windows of a second or two cannot say exactly
-where. So its changepoints are shifted, by less than a second, to where continuous piecewise-linear functions with knots
-at the changepoints describe speed and course best; changepoints that this description does not miss are dropped, and
-places where the posterior sees some chance of one, and which it does miss, are added.
+Within a primitive each vehicle's speed and course are nearly linear in time (paper IV-B). The
+sampler finds the number of primitives and roughly where they change; features of windows of a
+second or two cannot locate the change exactly. So its changepoints are shifted, by less than a
+second, to where continuous piecewise-linear functions with knots at the changepoints fit speed and
+course best. Changepoints that the fit does not need are dropped. Places with some posterior
+probability of a changepoint are added if the fit needs them.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
@@ -22,55 +24,83 @@ from scenario_gen.numerics import Floats, Ints
 from scenario_gen.numerics.kernels import F2, I, I1, kernel, OUT1
 from scenario_gen.types import ALWAYS, canonical_presence, Vehicle
 
-COURSE_NOISE = 0.3
-COURSE_WINDOW = 0.9
+COURSE_NOISE_MPS = 0.3  # standard deviation of the speed across the course
+COURSE_WINDOW_S = 0.9
+
+
+class _Normal(NamedTuple):
+    """Tridiagonal normal equations of the values at K knots."""
+
+    diagonal: Floats
+    off: Floats
+    right: Floats
+
+
+@kernel(inline=True)
+def _accumulate(
+    signal: Floats, weight: Floats, knots: Ints, normal: _Normal, total: float
+) -> float:
+    """Fill the normal equations of hat functions at the knots; return total + sum of squares."""
+    diagonal, off, right = normal
+    diagonal[:], off[:], right[:] = 1e-9, 0.0, 0.0
+    count = len(knots)
+    for k in range(count - 1):
+        a, b = knots[k], knots[k + 1]
+        for t in range(a, b + (1 if k == count - 2 else 0)):
+            w = weight[t] ** 2
+            y = signal[t]
+            h = (t - a) / (b - a)
+            diagonal[k] += w * (1.0 - h) ** 2
+            off[k] += w * h * (1.0 - h)
+            diagonal[k + 1] += w * h * h
+            right[k] += w * (1.0 - h) * y
+            right[k + 1] += w * h * y
+            total += w * y * y
+    return total
+
+
+@kernel(inline=True)
+def _eliminate(normal: _Normal, total: float) -> float:
+    """Return the least squared misfit, given the weighted sum of squares, in one pass."""
+    diagonal, off, right = normal
+    for k in range(len(diagonal)):
+        if k > 0:
+            ratio = off[k - 1] / diagonal[k - 1]
+            diagonal[k] -= ratio * off[k - 1]
+            right[k] -= ratio * right[k - 1]
+        total -= right[k] ** 2 / diagonal[k]
+    return total
 
 
 @kernel(F2, F2, I1, I, I1, OUT1)
 def knot_misfits(
     signals: Floats, weights: Floats, knots: Ints, moved: int, places: Ints, out: Floats
 ) -> None:
-    """Weighted squared misfit of continuous piecewise-linear functions, for each place of one knot.
-
-    The hat functions' normal equations are tridiagonal: accumulated and eliminated in one pass.
+    """Fill the weighted squared misfit of piecewise-linear functions, for each place of one knot.
 
     Args:
         signals: (n, T).
         weights: (n, T), the inverse of each sample's standard deviation.
-        knots: (K,) rising sample indices; the first and last bound the stretch looked at.
-        moved: index of the knot that is put at each of `places`; -1: none, and `places` has one entry that is not used.
+        knots: (K,) rising sample indices; the first and last bound the samples that count.
+        moved: index of the knot that is put at each of `places`; -1: none, and `places` has one
+            entry that is not used.
         places: (P,) between the neighbours of that knot.
         out: (P,).
     """
     count = len(knots)
-    at = knots.copy()
-    diagonal, beside, right = np.empty(count), np.empty(count), np.empty(count)
+    current = knots.copy()
+    normal = _Normal(np.empty(count), np.empty(count), np.empty(count))
     for place in range(len(places)):
         if moved >= 0:
-            at[moved] = places[place]
+            current[moved] = places[place]
         total = 0.0
         for row in range(signals.shape[0]):
-            for k in range(count):
-                diagonal[k], beside[k], right[k] = 1e-9, 0.0, 0.0
-            for k in range(count - 1):
-                a, b = at[k], at[k + 1]
-                for t in range(a, b + (1 if k == count - 2 else 0)):
-                    w = weights[row, t] ** 2
-                    y = signals[row, t]
-                    h = (t - a) / (b - a)
-                    diagonal[k] += w * (1.0 - h) ** 2
-                    beside[k] += w * h * (1.0 - h)
-                    diagonal[k + 1] += w * h * h
-                    right[k] += w * (1.0 - h) * y
-                    right[k + 1] += w * h * y
-                    total += w * y * y
-            for k in range(count):
-                if k > 0:
-                    ratio = beside[k - 1] / diagonal[k - 1]
-                    diagonal[k] -= ratio * beside[k - 1]
-                    right[k] -= ratio * right[k - 1]
-                total -= right[k] ** 2 / diagonal[k]
+            total = _accumulate(signals[row], weights[row], current, normal, total)
+            total = _eliminate(normal, total)
         out[place] = total
+
+
+Memo = dict[tuple[int, ...], tuple[float, int]]  # gain and place of a knot between others
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,13 +108,12 @@ class Trends:
     """The signals whose trends count: speed [m/s] and course [rad] of every vehicle.
 
     Attributes:
-        signals: (2N, T), each less its mean.
-        weights: (2N, T), inverse standard deviations; 0 for the course of a vehicle that hardly moves.
+        signals: (2N, T), each minus its mean.
+        weights: (2N, T), inverse standard deviations; 0 for the course of a slow vehicle.
     """
 
     signals: Floats
     weights: Floats
-    _cache: dict[tuple[int, ...], tuple[float, int]] = field(default_factory=dict)
 
     @classmethod
     def of(
@@ -95,47 +124,45 @@ class Trends:
         vehicles: Sequence[Vehicle],
         present: Ints = ALWAYS,
     ) -> "Trends":
-        """Take the trends of N vehicles; noise is at least that of its type in speed, and 0.3 m/s across the course.
+        """Return the trends of N vehicles.
+
+        The standard deviation is at least that of the vehicle's type in speed, and 0.3 m/s across
+        the course.
 
         Args:
             position: (N, T, 2) m.
             speed: (N, T) m/s.
             dt: s.
-            vehicles: N, whose types say what is noise and how slow one is that has no course.
-            present: (N, 2) first and last sample of each vehicle; outside of them nothing has weight.
+            vehicles: N; their types say what is noise, and which speeds have no course.
+            present: (N, 2) first and last sample of each vehicle; the others have weight 0.
         """
-        signals, weights = [], []
+        signals, weights = list[Floats](), list[Floats]()
         samples = speed.shape[1]
-        for i, (first, last) in enumerate(
-            canonical_presence(present, len(speed), samples, "trends").tolist()
-        ):
-            xy, v, kind = (
-                position[i, first : last + 1],
-                speed[i, first : last + 1],
-                vehicles[i].kind,
-            )
-            beyond = (first, samples - 1 - last)
-            bend = np.diff(v, 2)
-            noise = max(
-                kind.speed_noise,
-                1.4826 * float(np.median(np.abs(bend))) / np.sqrt(6.0) if len(bend) else 0.0,
-            )
-            signals.append(np.pad(v, beyond, mode="edge"))
-            weights.append(np.pad(np.full(len(v), 1.0 / noise), beyond))
-            angle, pace = course(xy, v, dt, kind.least_course)
-            signals.append(np.pad(angle, beyond, mode="edge"))
-            sure = np.where(pace > kind.least_course, pace / COURSE_NOISE, 0.0)
-            edge = round(COURSE_WINDOW / dt) // 2
-            sure[:edge] = sure[len(sure) - edge :] = 0.0  # half a window has three times the noise
-            weights.append(np.pad(sure, beyond))
+        present = canonical_presence(present, len(speed), samples, "trends")
+        for i, (first, last) in enumerate(present.tolist()):
+            v = speed[i, first : last + 1]
+            kind = vehicles[i].kind
+            noise, bend = kind.speed_noise, np.diff(v, 2)
+            if len(bend):
+                noise = max(noise, 1.4826 * float(np.median(np.abs(bend))) / np.sqrt(6.0))
+            angle, pace = course(position[i, first : last + 1], v, dt, kind.least_course)
+            weight = np.where(pace > kind.least_course, pace / COURSE_NOISE_MPS, 0.0)
+            edge = round(COURSE_WINDOW_S / dt) // 2
+            weight[:edge] = 0.0  # half a window has three times the noise
+            weight[len(weight) - edge :] = 0.0
+            padding = (first, samples - 1 - last)
+            signals += [np.pad(v, padding, mode="edge"), np.pad(angle, padding, mode="edge")]
+            weights += [np.pad(np.full(len(v), 1.0 / noise), padding), np.pad(weight, padding)]
         stack = np.array(signals)
-        return cls(
-            np.ascontiguousarray(stack - stack.mean(axis=1, keepdims=True)), np.array(weights)
-        )
+        centred = np.ascontiguousarray(stack - stack.mean(axis=1, keepdims=True))
+        return cls(centred, np.array(weights))
 
-    def threshold(self, chance: float) -> float:
-        """Return the gain that noise alone exceeds with probability `chance`: a quantile of χ² with one degree per signal."""
-        return float(special.chdtri(len(self.signals), chance))
+    def threshold(self, probability: float) -> float:
+        """Return the gain that noise alone exceeds with this probability.
+
+        It is a quantile of the chi-squared distribution with one degree per signal.
+        """
+        return float(special.chdtri(len(self.signals), probability))
 
     @property
     def samples(self) -> int:
@@ -143,84 +170,96 @@ class Trends:
         return int(self.signals.shape[1])
 
     def misfits(self, knots: list[int], moved: int, places: Ints) -> Floats:
-        """(P,) misfit for each place of knot number `moved` (-1: the misfit as it is)."""
+        """Return the misfit (P,) for each place of knot number `moved` (-1: none is moved)."""
         out = np.empty(len(places))
-        knot_misfits(
-            self.signals, self.weights, np.array(knots, dtype=np.int64), moved, places, out
-        )
+        rising = np.array(knots, dtype=np.int64)
+        knot_misfits(self.signals, self.weights, rising, moved, places, out)
         return out
 
     def gain(self, points: list[int], i: int) -> float:
-        """Return how much worse the description is without changepoint i."""
-        knots, j = self._around(points, i)
-        return self._best(knots[:j] + knots[j + 1 :], j, np.array([knots[j]]))[0]
+        """Return the increase of the misfit without changepoint i."""
+        return self._gain(points, i, {})
 
-    def _around(self, points: list[int], i: int) -> tuple[list[int], int]:
-        """Knots that bear on changepoint i: two on either side; and its index among them."""
-        every = [0, *points, self.samples - 1]
+    def _gain(self, points: list[int], i: int, memo: Memo) -> float:
+        knots, j = self._neighbours(points, i)
+        return self._best_knot(knots[:j] + knots[j + 1 :], j, np.array([knots[j]]), memo)[0]
+
+    def _neighbours(self, points: list[int], i: int) -> tuple[list[int], int]:
+        """Return the knots from two before to two after changepoint i, and its index."""
+        knots = [0, *points, self.samples - 1]
         low = max(i + 1 - 2, 0)
-        return every[low : i + 4], i + 1 - low
+        return knots[low : i + 4], i + 1 - low
 
-    def _best(self, knots: list[int], j: int, places: Ints) -> tuple[float, int]:
-        """Return the largest gain of one more knot before knot number j, and where."""
+    def _best_knot(self, knots: list[int], j: int, places: Ints, memo: Memo) -> tuple[float, int]:
+        """Return the largest gain of a new knot before knot number j, and its place."""
         key = (*knots, -1, j, int(places[0]), int(places[-1]), len(places))
-        if key not in self._cache:
+        if key not in memo:
             without = self.misfits(knots, -1, places[:1])[0]
-            costs = self.misfits([*knots[:j], int(places[0]), *knots[j:]], j, places)
-            self._cache[key] = (float(without - costs.min()), int(places[costs.argmin()]))
-        return self._cache[key]
+            misfits = self.misfits([*knots[:j], int(places[0]), *knots[j:]], j, places)
+            memo[key] = (float(without - misfits.min()), int(places[misfits.argmin()]))
+        return memo[key]
 
-    def settle(self, points: list[int], reach: int, gap: int, rounds: int = 3) -> list[int]:
-        """Shift each changepoint by up to `reach` samples to where the trends change; at least `gap` samples apart."""
-        home, points = list(points), list(points)
-        for _ in range(rounds):
-            before = list(points)
-            for i in range(len(points)):
-                knots, j = self._around(points, i)
-                low = max(home[i] - reach, knots[j - 1] + gap)
-                high = min(home[i] + reach, knots[j + 1] - gap)
+    def align(self, points: list[int], reach: int, gap: int) -> list[int]:
+        """Shift each changepoint by up to `reach` samples to where the trends change.
+
+        Changepoints stay at least `gap` samples apart.
+        """
+        aligned = list(points)
+        for _ in range(3):
+            before = list(aligned)
+            for i, point in enumerate(points):
+                knots, j = self._neighbours(aligned, i)
+                low = max(point - reach, knots[j - 1] + gap)
+                high = min(point + reach, knots[j + 1] - gap)
                 if low <= high:
                     places = np.arange(low, high + 1)
-                    points[i] = int(places[self.misfits(knots, j, places).argmin()])
-            if points == before:
+                    aligned[i] = int(places[self.misfits(knots, j, places).argmin()])
+            if aligned == before:
                 break
-        return points
+        return aligned
 
-    def drop(self, points: list[int], least_gain: float, most: int) -> list[int]:
-        """Drop changepoints, always the least useful one, until each gains `least_gain` and there are `most` at most."""
-        points = list(points)
+    def drop(self, points: list[int], min_gain: float, max_count: int) -> list[int]:
+        """Drop the least useful changepoints until each gains `min_gain`.
+
+        More are dropped if there are more than `max_count`.
+        """
+        points, memo = list(points), Memo()
         while points:
-            gains = [self.gain(points, i) for i in range(len(points))]
+            gains = [self._gain(points, i, memo) for i in range(len(points))]
             i = int(np.argmin(gains))
-            if gains[i] >= least_gain and len(points) <= most:
+            if gains[i] >= min_gain and len(points) <= max_count:
                 break
             del points[i]
         return points
 
-    def add(self, points: list[int], candidates: Ints, least_gain: float, gap: int) -> list[int]:
-        """Add candidates (C,), always the most useful one, while one gains `least_gain`."""
-        points = list(points)
+    def add(self, points: list[int], candidates: Ints, min_gain: float, gap: int) -> list[int]:
+        """Add the most useful ones of candidates (C,) while they gain more than `min_gain`."""
+        points, memo = list(points), Memo()
         while True:
-            every = [0, *points, self.samples - 1]
-            best = (least_gain, 0, 0)
+            knots = [0, *points, self.samples - 1]
+            best = (min_gain, 0, 0)
             for i in range(len(points) + 1):
-                places = candidates[
-                    (candidates >= every[i] + gap) & (candidates <= every[i + 1] - gap)
-                ]
+                is_free = (candidates >= knots[i] + gap) & (candidates <= knots[i + 1] - gap)
+                places = candidates[is_free]
                 if len(places):
                     low = max(i - 1, 0)
-                    gain, place = self._best(every[low : i + 3], i + 1 - low, places)
+                    neighbours = knots[low : i + 3]
+                    gain, place = self._best_knot(neighbours, i + 1 - low, places, memo)
                     best = max(best, (gain, place, i))
-            if best[0] <= least_gain:
+            gain, place, i = best
+            if gain <= min_gain:
                 return points
-            points.insert(best[2], best[1])
+            points.insert(i, place)
 
 
 def course(
     position: Floats, speed: Floats, dt: float, least: float = 1.0
 ) -> tuple[Floats, Floats]:
-    """Course over ground [rad], unwrapped and held where it is slower than `least` [m/s], and smoothed speed [m/s], each (T,)."""
-    half = max(1, min(round(COURSE_WINDOW / dt) // 2, (len(speed) - 1) // 2))
+    """Return the course over ground (T,) [rad], unwrapped, and the smoothed speed (T,) [m/s].
+
+    The course is held where the vehicle is slower than `least` [m/s].
+    """
+    half = max(1, min(round(COURSE_WINDOW_S / dt) // 2, (len(speed) - 1) // 2))
     steps = np.arange(-half, half + 1)
     padded = np.pad(position, ((half, half), (0, 0)), mode="reflect", reflect_type="odd")
     velocity = (sliding_window_view(padded, 2 * half + 1, axis=0) @ steps) / ((steps @ steps) * dt)

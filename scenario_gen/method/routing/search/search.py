@@ -61,7 +61,15 @@ class Search:
         node[0] = (*root, 0.0, 0.0, -1, -1, -1, -1, -1)
         side = max(max(self.scene.clearance.shape) / 8.0, MIN_SIDE_CELLS)
         near = np.empty(MAX_NEAR_COUNT, dtype=NEIGHBOUR)
-        tree = Tree(root, goal, node, np.ones(1, dtype=np.int64), np.zeros((0, 0)), near, side)
+        tree = Tree(
+            root,
+            goal,
+            node,
+            np.ones(1, dtype=np.int64),
+            np.zeros((0, 0), dtype=np.int64),
+            near,
+            side,
+        )
         return self._with_buckets(tree, side)
 
     def _with_buckets(self, tree: Tree, side: float) -> Tree:
@@ -87,9 +95,9 @@ class Search:
         count = int(self.state["meetings"][0])
         if not count:
             return
-        costs = sum(
-            tree.node["cost"][self.meeting[:count, k]] for k, tree in enumerate(self.trees)
-        )
+        first, second = (tree.node["cost"] for tree in self.trees)
+        pairs = self.meeting[:count]
+        costs = first[pairs[:, 0]] + second[pairs[:, 1]]
         self._best_meeting = int(np.argmin(costs))
         self.best = float(costs[self._best_meeting])
         self._tighten_bound(self.best)

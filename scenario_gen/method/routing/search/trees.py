@@ -82,7 +82,7 @@ def pose_of(tree: Tree, m: int) -> Pose:
 @kernel(inline=True, forced=True)
 def has_room(tree: Tree) -> bool:
     """Whether another node can be added."""
-    return tree.size[0] < tree.node.shape[0]
+    return bool(tree.size[0] < tree.node.shape[0])
 
 
 @kernel(inline=True, forced=True)

@@ -1,16 +1,19 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""One chain of the weak-limit blocked Gibbs sampler for the sticky HDP-HMM (Fox, Sudderth, Jordan, Willsky 2011)."""
+"""One chain of the weak-limit blocked Gibbs sampler for the sticky HDP-HMM.
+
+Source: Fox, Sudderth, Jordan, Willsky 2011, algorithm 3; its steps are named beside the lines.
+"""
 
 import numpy as np
 
 from scenario_gen.method.segmentation.hdp_hmm.emission import (
     accumulate,
     add_sample,
-    BLOCK,
     block_likelihood,
     block_log_likelihood,
+    BLOCK_SAMPLES,
     blurred,
     draw_emission,
     log_marginal,
@@ -49,17 +52,18 @@ from scenario_gen.numerics import Floats, Ints
 from scenario_gen.numerics.kernels import I, kernel
 
 TRACE = ("log_joint", "occupied", "gamma", "alpha_kappa", "rho")
-LEAST_MESSAGE = 1e-30
-REFRESH = 20
-PRIOR_EVERY = 3
+MIN_MESSAGE_RATIO = 1e-30  # a smaller sum of a message is rescaled
+REFRESH_ITERATIONS = 20  # sweeps after which statistics are accumulated anew
+PRIOR_ITERATIONS = 3  # sweeps after which the prior is drawn
 
 
 @kernel(inline=True)
 def backward_step(row: Floats, columns: Floats, message: Floats, rescale: bool) -> None:
-    """Turn `row` (L,), the likelihoods of a sample, into likelihood times message; pass `message` (L,) on to the sample before.
+    """Multiply `row` (L,), a sample's likelihoods, by `message` (L,); compute the next message.
 
-    Only ratios within a row or a message count, so they are rescaled no more often than underflow asks for: a step makes a
-    message smaller by a factor of 1e-100 (see `dirichlet_draw`) at most, so that every second is often enough.
+    Only ratios within a row or a message matter, so they are rescaled only against underflow: a
+    step shrinks a message by a factor of 1e-100 at most (see `dirichlet_draw`), so that every
+    second step suffices.
     """
     states = len(message)
     for k in range(states):
@@ -77,61 +81,78 @@ def backward_step(row: Floats, columns: Floats, message: Floats, rescale: bool) 
         for j in range(states):
             message[j] += c0 * columns[k, j]
     if rescale:
-        total = 0.0
-        for j in range(states):
-            total += message[j]
-        if total < LEAST_MESSAGE:
-            for j in range(states):
-                message[j] /= total
+        rescale_small(message)
+
+
+@kernel(inline=True, forced=True)
+def rescale_small(message: Floats) -> None:
+    """Scale a message (L,) to sum 1 if its sum is small."""
+    total = 0.0
+    for j in range(len(message)):
+        total += message[j]
+    if total < MIN_MESSAGE_RATIO:
+        for j in range(len(message)):
+            message[j] /= total
+
+
+@kernel(inline=True, forced=True)
+def replace_gaps(
+    data: Data, gap: int, start: int, emitted: States, hyper: Hyper, block: Floats
+) -> int:
+    """Put the log-likelihoods of samples with hidden channels, from `start` on, into a block.
+
+    `gap` is the index of the last one of them; returns that of the last one before `start`.
+    """
+    while gap >= 0 and data.gaps[gap] >= start:
+        t = data.gaps[gap]
+        out = block[:, t - start]
+        observed_log_likelihood(
+            data.vt[:, t],
+            data.hidden[gap],
+            emitted.coef,
+            emitted.shape,
+            hyper.weight,
+            hyper.dof,
+            out,
+        )
+        gap -= 1
+    return gap
 
 
 @kernel(inline=True)
 def backward_messages(data: Data, emitted: States, hyper: Hyper, pi: Floats, w: Floats) -> None:
-    """Fill w (T, L) with likelihood times backward message at each sample, each row up to a factor.
+    """Fill w (T, L) with likelihood times backward message (step 1), each row up to a factor.
 
-    Transition rows pi (L + 1, L), the last is the initial distribution (Fox et al., algorithm 3, step 1).
+    Transition rows are pi (L + 1, L); the last one is the initial distribution.
     """
-    vt, gaps, hidden, ends, (coef, shape) = data.vt, data.gaps, data.hidden, data.ends, emitted
-    weight, dof = hyper.weight, hyper.dof
-    states = w.shape[1]
-    block = np.empty((states, BLOCK))
-    work = np.empty((2, BLOCK))
-    best = np.empty(BLOCK)
+    ends, states = data.ends, w.shape[1]
+    block = np.empty((states, BLOCK_SAMPLES))
+    work = np.empty((2, BLOCK_SAMPLES))
+    best = np.empty(BLOCK_SAMPLES)
     message = np.ones(states)
     columns = np.empty((states, states))
     for j in range(states):
         for k in range(states):
             columns[k, j] = pi[j, k]
     last = len(ends) - 1
-    gap = len(gaps) - 1
+    gap = len(data.gaps) - 1
     stop = w.shape[0]
     while stop > 0:
-        start = max(0, stop - BLOCK)
-        block_log_likelihood(vt, start, stop, emitted, weight, dof, block, best)
-        while gap >= 0 and gaps[gap] >= start:
-            observed_log_likelihood(
-                vt[:, gaps[gap]],
-                hidden[gap],
-                coef,
-                shape,
-                weight,
-                dof,
-                block[:, gaps[gap] - start],
-            )
-            gap -= 1
+        start = max(0, stop - BLOCK_SAMPLES)
+        block_log_likelihood(data.vt, start, stop, emitted, hyper.weight, hyper.dof, block, best)
+        gap = replace_gaps(data, gap, start, emitted, hyper, block)
         block_likelihood(block, stop - start, best, work, w[start:stop])
         for t in range(stop - 1, start - 1, -1):
             if last >= 0 and t + 1 == ends[last]:
                 last -= 1
-                for k in range(states):
-                    message[k] = 1.0
+                message[:] = 1.0
             backward_step(w[t], columns, message, t % 2 == 0)
         stop = start
 
 
 @kernel(inline=True)
 def sample_labels(state: State, w: Floats, pi: Floats, ends: Ints, labels: Ints) -> None:
-    """Draw labels (T,) forward in time from w (T, L), see `backward_messages` (Fox et al., algorithm 3, step 2)."""
+    """Draw labels (T,) forward in time (step 2) from w (T, L), see `backward_messages`."""
     samples, states = w.shape
     share = np.empty(states)
     whole = states - states % 4
@@ -141,7 +162,7 @@ def sample_labels(state: State, w: Floats, pi: Floats, ends: Ints, labels: Ints)
         row, chances = w[t], pi[previous]
         for k in range(states):
             share[k] = chances[k] * row[k]
-        s0, s1, s2, s3 = 0.0, 0.0, 0.0, 0.0  # four sums that do not wait for each other
+        s0, s1, s2, s3 = 0.0, 0.0, 0.0, 0.0  # four independent sums
         for k in range(0, whole, 4):
             s0 += share[k]
             s1 += share[k + 1]
@@ -153,9 +174,7 @@ def sample_labels(state: State, w: Floats, pi: Floats, ends: Ints, labels: Ints)
         u = uniform(state) * total
         if previous == states:
             previous = pick(share, u, -1)
-        elif (
-            u > share[previous]
-        ):  # most samples stay where the one before was: that is looked at first
+        elif u > share[previous]:  # most samples stay in the state of the one before
             previous = pick(share, u - float(share[previous]), previous)
         labels[t] = previous
         if t + 1 == ends[sequence]:
@@ -167,7 +186,10 @@ def sample_labels(state: State, w: Floats, pi: Floats, ends: Ints, labels: Ints)
 def update_outer(
     v: Floats, before: Ints, labels: Ints, mass: Floats, outer: Floats, sums: Floats
 ) -> None:
-    """Bring the statistics (see `accumulate`) from labels `before` (T,) to `labels`, few of which change in a sweep."""
+    """Update the statistics (see `accumulate`) from labels `before` (T,) to `labels` (T,).
+
+    Few labels change in a sweep.
+    """
     for t in range(len(labels)):
         a, b = before[t], labels[t]
         if a != b and mass[t] > 0.0:
@@ -185,7 +207,10 @@ def update_outer(
 def draw_samples(
     state: State, data: Data, emitted: States, hyper: Hyper, pi: Floats, w: Floats, labels: Ints
 ) -> None:
-    """Draw labels (T,), masses and hidden channels, given transitions pi (L + 1, L) and emissions; w (T, L) is work space."""
+    """Draw labels (T,), masses and hidden channels, given transitions pi (L + 1, L), emissions.
+
+    w (T, L) is work space.
+    """
     backward_messages(data, emitted, hyper, pi, w)
     sample_labels(state, w, pi, data.ends, labels)
     if hyper.dof > 0.0:
@@ -196,15 +221,16 @@ def draw_samples(
 @kernel(inline=True)
 def fit_states(stats: Statistics, joint: Joint) -> None:
     """Fill the factors and marginal likelihoods of all states from their other statistics."""
-    for k in range(len(stats.own)):
+    for k in range(len(stats.marginal)):
         posterior_factor(stats.outer[k], stats.sums[k, 1], joint, stats.factors[k])
-        stats.own[k] = log_marginal(stats.factors[k], joint.weight * stats.sums[k, 0], joint)
+        n = joint.weight * stats.sums[k, 0]
+        stats.marginal[k] = log_marginal(stats.factors[k], n, joint)
 
 
 @kernel(inline=True)
 def draw_emissions(state: State, stats: Statistics, joint: Joint, emitted: States) -> None:
     """Draw the emissions of all states from their posteriors."""
-    for k in range(len(stats.own)):
+    for k in range(len(stats.marginal)):
         coef = emitted.coef[k]
         emitted.shape[k, 0] = draw_emission(
             state, stats.factors[k], joint.weight * stats.sums[k, 0], joint, coef
@@ -218,60 +244,70 @@ def write_trace(
 ) -> None:
     """Fill row (5,), see TRACE; `base` is the log marginal likelihood of no samples."""
     used = stats.n.sum(axis=0) > 0
-    row[0] = log_transitions(stats.n, top[1], top[2], top[3:]) + (stats.own[used] - base).sum()
-    row[0] += (
-        log_masses(data.mass, hyper.weight * len(hyper.blur), hyper.dof)
-        if hyper.dof > 0.0
-        else 0.0
-    )
-    row[1], row[2:] = used.sum(), top[:3]
+    row[0] = log_transitions(stats.n, top[1], top[2], top[3:])
+    row[0] += (stats.marginal[used] - base).sum()
+    if hyper.dof > 0.0:
+        row[0] += log_masses(data.mass, hyper.weight * len(hyper.blur), hyper.dof)
+    row[1] = used.sum()
+    row[2:] = top[:3]
 
 
-@kernel(DATA, GRID, HYPERS, START, OUTPUT, I)
-def run_chain(data: Data, grid: Grid, hyper: Hyper, start: Start, out: Out, seed: int) -> None:
-    """Run one chain from `start`; every row of `out.trace` is one sweep, the last ones leave their labels, too."""
-    m, states, sweeps, burn = (
-        data.v.shape[1],
-        len(out.emissions),
-        len(out.trace),
-        len(out.trace) - len(out.samples),
-    )
-    state = np.empty(1, np.uint64)
-    state[0] = np.uint64(seed)
-    labels, before = start.labels.copy(), start.labels.copy()
-    stats = Statistics(
+@kernel(inline=True)
+def new_statistics(states: int, m: int) -> Statistics:
+    """Return room for the statistics of L states of samples of M numbers."""
+    return Statistics(
         np.empty((states, m, m)),
         np.empty((states, 2)),
         np.empty((states, m, m)),
         np.empty(states),
         np.empty((states + 1, states), np.int64),
     )
+
+
+@kernel(inline=True)
+def update_statistics(
+    data: Data, hyper: Hyper, sweep: int, before: Ints, labels: Ints, stats: Statistics
+) -> None:
+    """Bring the sums of the statistics from labels `before` (T,) to `labels` (T,)."""
+    is_due = sweep < 0 or sweep % REFRESH_ITERATIONS == REFRESH_ITERATIONS - 1
+    if hyper.dof > 0.0 or len(data.gaps) > 0 or is_due:
+        accumulate(data.v, labels, data.mass, stats.outer, stats.sums)
+    else:
+        update_outer(data.v, before, labels, data.mass, stats.outer, stats.sums)
+
+
+@kernel(DATA, GRID, HYPERS, START, OUTPUT, I)
+def run_chain(data: Data, grid: Grid, hyper: Hyper, start: Start, out: Out, seed: int) -> None:
+    """Run one chain from `start`.
+
+    Every row of `out.trace` is one sweep; the last ones also leave their labels in `out.samples`.
+    """
+    m, states, sweeps = data.v.shape[1], len(out.emissions), len(out.trace)
+    burn = sweeps - len(out.samples)
+    state = np.empty(1, np.uint64)
+    state[0] = np.uint64(seed)
+    labels, before = start.labels.copy(), start.labels.copy()
+    stats = new_statistics(states, m)
     emitted = States(out.emissions, np.empty((states, 2)))
     pi, w = np.empty((states + 1, states)), np.empty((len(labels), states))
     g0, factor = np.empty((m, m)), np.empty((m, m))
     top, chosen = start.top, start.chosen
-    base, joint = set_prior(
-        grid, grid.extras[chosen[0]], grid.worths[chosen[1]], hyper, g0, factor
-    )
+    extra, worth = grid.extras[chosen[0]], grid.worths[chosen[1]]
+    base, joint = set_prior(grid, extra, worth, hyper, g0, factor)
     for sweep in range(-1, sweeps):
         if sweep >= 0:
-            draw_samples(state, data, emitted, hyper, pi, w, labels)
-        if hyper.dof > 0.0 or len(data.gaps) > 0 or sweep < 0 or sweep % REFRESH == REFRESH - 1:
-            accumulate(data.v, labels, data.mass, stats.outer, stats.sums)
-        else:
-            update_outer(data.v, before, labels, data.mass, stats.outer, stats.sums)
-        if sweep % PRIOR_EVERY == 0:
+            draw_samples(state, data, emitted, hyper, pi, w, labels)  # steps 1 and 2
+        update_statistics(data, hyper, sweep, before, labels, stats)
+        if sweep % PRIOR_ITERATIONS == 0:
             sample_prior(state, stats, grid, hyper, chosen, g0, factor)
-            base, joint = set_prior(
-                grid, grid.extras[chosen[0]], grid.worths[chosen[1]], hyper, g0, factor
-            )
+            extra, worth = grid.extras[chosen[0]], grid.worths[chosen[1]]
+            base, joint = set_prior(grid, extra, worth, hyper, g0, factor)
         fit_states(stats, joint)
         count_transitions(labels, data.ends, stats.n)
-        if sweep >= 0:
-            for _ in range(hyper.moves):
-                split_or_merge(state, data, joint, top, labels, stats)
+        for _ in range(hyper.moves if sweep >= 0 else 0):
+            split_or_merge(state, data, joint, top, labels, stats)
         before[:] = labels
-        sample_transitions(state, stats.n, hyper.levels, top, top[3:], pi)
+        sample_transitions(state, stats.n, hyper.levels, top, top[3:], pi)  # steps 3 to 5
         draw_emissions(state, stats, joint, emitted)
         if sweep >= 0:
             write_trace(data, hyper, stats, base, top, out.trace[sweep])

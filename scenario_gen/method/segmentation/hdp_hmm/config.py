@@ -10,26 +10,33 @@ import numpy as np
 from scenario_gen.base.parameters import parameter, Parameters
 from scenario_gen.numerics import Floats
 
-GAUSSIAN_DOF = 1000.0
+GAUSSIAN_DOF_COUNT = 1000.0  # degrees of freedom from which noise counts as Gaussian
 
 
 @dataclass(frozen=True)
 class SamplerConfig(Parameters):
-    """The sticky HDP-HMM and its sampler; the defaults suit any series from D = 1 to D = 24."""
+    """The sticky HDP-HMM and its sampler; the defaults suit series with 1 to 24 channels."""
 
     emission: str = parameter(
-        "gaussian", "what a state emits", choices=("gaussian", "autoregressive")
+        "gaussian",
+        "distribution of the samples of a state",
+        choices=("gaussian", "autoregressive"),
     )
-    order: int = parameter(1, "past samples an autoregressive emission looks at", low=1, high=5)
+    order: int = parameter(
+        1, "past samples that an autoregressive emission regresses on", low=1, high=5
+    )
     states: int = parameter(
         0,
-        "weak-limit truncation L: states there are, used or not; 0: from the data, and more when all are used",
+        "weak-limit truncation L; 0: from the data, and more if all states are used",
         low=0,
         high=200,
     )
-    chains: int = parameter(3, "independent chains, each from a start of its own", low=1, high=16)
+    chains: int = parameter(3, "independent chains with different starts", low=1, high=16)
     sweeps: int = parameter(
-        600, "most Gibbs sweeps of each chain; it ends when the chains agree", low=10, high=100_000
+        600,
+        "maximum Gibbs sweeps per chain; chains end earlier when they agree",
+        low=10,
+        high=100_000,
     )
     r_hat: float = parameter(
         1.1,
@@ -37,7 +44,7 @@ class SamplerConfig(Parameters):
         low=1.0,
         high=10.0,
     )
-    moves: int = parameter(8, "split or merge moves tried in a sweep", low=0, high=100)
+    moves: int = parameter(8, "split or merge moves per sweep", low=0, high=100)
     dof: float = parameter(
         0.0,
         "degrees of freedom of Student-t noise; 0: from the data; 1000 or more: Gaussian",
@@ -46,13 +53,13 @@ class SamplerConfig(Parameters):
     )
     mean_weight: float = parameter(
         0.05,
-        "prior samples that the regression of an autoregressive state is worth; a Gaussian state's mean: from the data",
+        "prior samples that the regression of an autoregressive state is worth",
         low=1e-6,
         high=100.0,
     )
     weight: float = parameter(
         0.0,
-        "what one sample counts for, below 1 where neighbours repeat each other; 0: from the data",
+        "weight of a sample, below 1 if neighbours are correlated; 0: from the data",
         low=0.0,
         high=1.0,
     )
@@ -65,7 +72,7 @@ class SamplerConfig(Parameters):
 
     @property
     def hyper(self) -> Floats:
-        """(6,) parameters of the hyperpriors, in the order in which the kernels read them."""
+        """(6,) parameters of the hyperpriors, in the order of `transitions.HYPER`."""
         return np.array(
             [
                 self.gamma_shape,

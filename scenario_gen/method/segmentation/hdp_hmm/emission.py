@@ -1,12 +1,13 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Emissions of all states at once: y = A z + noise, (A, Σ) ~ MNIW(M, K, ν0, S0), in one form for Gaussian and AR.
+"""Emissions y = A z + noise, (A, Σ) ~ MNIW(M, K, ν0, S0): one form for Gaussian and AR states.
 
-With the regressor z = 1 this is the Gaussian-NIW emission (A is the mean, K its κ0); with z = (1, past samples) it is
-the autoregressive one. A sample is v = (z, y), P + D numbers. All that a state knows is G = G0 + Σ v vᵀ with
-G0 = [[K, K Mᵀ], [M K, S0 + M K Mᵀ]]; its Cholesky factor [[Lz, 0], [Lyz, Ly]] holds the whole posterior:
-K' = Lz Lzᵀ, A' = Lyz Lz⁻¹, S' = Ly Lyᵀ. Plain loops: they compile fast, and vectorise over the last axis.
+With the regressor z = 1 this is the Gaussian emission with a NIW prior (A is the mean, K its κ0);
+with z = (1, past samples) it is the autoregressive one. A sample is v = (z, y), P + D numbers. The
+sufficient statistic of a state is G = G0 + Σ v vᵀ with G0 = [[K, K Mᵀ], [M K, S0 + M K Mᵀ]]. Its
+Cholesky factor [[Lz, 0], [Lyz, Ly]] contains the posterior: K' = Lz Lzᵀ, A' = Lyz Lz⁻¹,
+S' = Ly Lyᵀ. Plain loops compile fast and vectorise over the last axis.
 """
 
 import math
@@ -18,20 +19,23 @@ from scenario_gen.method.segmentation.hdp_hmm.random import gamma_draw, normal, 
 from scenario_gen.numerics import Floats, Ints
 from scenario_gen.numerics.kernels import kernel
 
-BLOCK = 64
-LEAST_LOG = -300.0
-LOG2_E = 1.4426950408889634
-LN2_HIGH, LN2_LOW = 6.93147180369123816490e-01, 1.90821492927058770002e-10
-TO_INTEGER = 6755399441055744.0  # 1.5 * 2**52: adding it rounds to an integer, which its lowest bits then hold
+BLOCK_SAMPLES = 64
+MIN_LOG_RATIO = -300.0  # of a likelihood to the best one; a smaller one is 0
+LOG2_E_RATIO = 1.4426950408889634
+LN2_HIGH_RATIO, LN2_LOW_RATIO = 6.93147180369123816490e-01, 1.90821492927058770002e-10
+ROUNDING_RATIO = 6755399441055744.0  # 1.5 * 2**52: adding it rounds to an integer in its low bits
 ONE_BITS = 1023 << 52  # the bits of 1.0
 ROOT_BITS = 0x3FE6A09E667F3BCD  # the bits of √½: mantissas lie in √½ .. √2
-LN2, LOG_PI = 6.93147180559945309417e-01, 1.14472988584940017414
-MOST_PRODUCT = 1e100
+LN2_RATIO, LOG_PI_RATIO = 6.93147180559945309417e-01, 1.14472988584940017414
+MAX_PRODUCT_RATIO = 1e100  # above which a product of numbers is replaced by its logarithm
 
 
 @kernel(inline=True)
 def cholesky(matrix: Floats) -> bool:
-    """Overwrite the lower triangle of `matrix` (n, n) with its Cholesky factor; False if it is not positive definite."""
+    """Replace the lower triangle of `matrix` (n, n) by its Cholesky factor.
+
+    Returns False if the matrix is not positive definite.
+    """
     n = matrix.shape[0]
     for j in range(n):
         for k in range(j):
@@ -53,7 +57,8 @@ def accumulate(v: Floats, labels: Ints, mass: Floats, outer: Floats, sums: Float
     Args:
         v: rows (z, y).
         labels: 0 .. L - 1.
-        mass: what a sample's square counts for: 1, the scale of heavy-tailed noise, or 0 for a sample that was not observed.
+        mass: weight of a sample's square: 1, the precision scale of heavy-tailed noise, or 0 if
+            the sample was not observed.
         outer: (L, M, M) output, Σ mass v vᵀ; lower triangles.
         sums: (L, 2) output, observed samples and Σ mass.
     """
@@ -77,7 +82,10 @@ def add_sample(v: Floats, mass: float, outer: Floats) -> None:
 
 @kernel(inline=True)
 def posterior_factor(outer: Floats, total: float, joint: Joint, out: Floats) -> None:
-    """Fill `out` (M, M) with the Cholesky factor of a state's G from its Σ mass v vᵀ (M, M; lower triangle) and total mass."""
+    """Fill `out` (M, M) with the Cholesky factor of a state's G.
+
+    `outer` is its Σ mass v vᵀ (M, M; lower triangle), `total` its Σ mass.
+    """
     m, d = len(joint.g0), len(joint.blur)
     for i in range(m):
         for j in range(i + 1):
@@ -91,22 +99,23 @@ def posterior_factor(outer: Floats, total: float, joint: Joint, out: Floats) -> 
 def log_marginal(factor: Floats, n: float, joint: Joint) -> float:
     """Part of log p(samples) that depends on them, from the Cholesky factor (M, M) of G.
 
-    log p = c(factor, n) - c(prior factor, 0) with c = -nD/2 log π + log Γ_D(ν'/2) - ν'/2 log|S'| - D/2 log|K'|.
+    log p = c(factor, n) - c(prior factor, 0) with
+    c = -nD/2 log π + log Γ_D(ν'/2) - ν'/2 log|S'| - D/2 log|K'|.
     """
     d, nu = len(joint.blur), joint.nu
     p = len(factor) - d
-    value: float = log_gammas(0.5 * (nu + n), d) - 0.5 * n * d * LOG_PI
+    value: float = log_gammas(0.5 * (nu + n), d) - 0.5 * n * d * LOG_PI_RATIO
     value -= d * log_diagonal(factor[:p, :p]) + (nu + n) * log_diagonal(factor[p:, p:])
     return value
 
 
 @kernel(inline=True)
 def log_diagonal(matrix: Floats) -> float:
-    """Return Σ log of the diagonal of `matrix` (n, n), as the logarithm of products, which cost less."""
+    """Return Σ log of the diagonal of `matrix` (n, n), by logarithms of products."""
     value, product = 0.0, 1.0
     for i in range(len(matrix)):
         product *= matrix[i, i]
-        if not 1.0 / MOST_PRODUCT < product < MOST_PRODUCT:
+        if not 1.0 / MAX_PRODUCT_RATIO < product < MAX_PRODUCT_RATIO:
             value += np.log(product)
             product = 1.0
     return value + math.log(product)
@@ -114,7 +123,10 @@ def log_diagonal(matrix: Floats) -> float:
 
 @kernel(inline=True)
 def log_gammas(a: float, d: int) -> float:
-    """Return log Γ(a) + log Γ(a - 1/2) + ... + log Γ(a - (d - 1) / 2), every second one by Γ(x + 1) = x Γ(x) from the least."""
+    """Return log Γ(a) + log Γ(a - 1/2) + ... + log Γ(a - (d - 1) / 2).
+
+    Every second term follows from the smallest by Γ(x + 1) = x Γ(x).
+    """
     value = 0.0
     for least in range(max(d - 2, 0), d):
         x = a - 0.5 * least
@@ -124,7 +136,7 @@ def log_gammas(a: float, d: int) -> float:
             ratio *= x + step
             product *= ratio
             value += base
-            if product > MOST_PRODUCT:
+            if product > MAX_PRODUCT_RATIO:
                 base, value = base + np.log(ratio), value + np.log(product)
                 ratio, product = 1.0, 1.0
         value += np.log(product)
@@ -133,10 +145,11 @@ def log_gammas(a: float, d: int) -> float:
 
 @kernel(inline=True)
 def draw_emission(state: State, factor: Floats, n: float, joint: Joint, coef: Floats) -> float:
-    """Draw (A, Σ) from the posterior, of which `factor` (M, M) and the number n of samples are known; returns log|Σ|^(-1/2).
+    """Draw (A, Σ) from the posterior with this factor (M, M) and n samples; return log|Σ|^(-1/2).
 
-    `coef` (D, M) becomes the map of v to its whitened residual: W y - B z with WᵀW = Σ⁻¹ (W lower) and B = W A.
-    Σ⁻¹ = Ly⁻ᵀ U Uᵀ Ly⁻¹ with U upper triangular (Bartlett), so W = Uᵀ Ly⁻¹; A = (Lyz + W⁻¹ E) Lz⁻¹, E standard normal.
+    `coef` (D, M) becomes the map of v to its whitened residual: W y - B z with WᵀW = Σ⁻¹ (W lower)
+    and B = W A. Σ⁻¹ = Ly⁻ᵀ U Uᵀ Ly⁻¹ with U upper triangular (Bartlett), so W = Uᵀ Ly⁻¹ and
+    A = (Lyz + W⁻¹ E) Lz⁻¹, E standard normal.
     """
     d, nu = len(joint.blur), joint.nu
     p = len(factor) - d
@@ -150,6 +163,28 @@ def draw_emission(state: State, factor: Floats, n: float, joint: Joint, coef: Fl
             coef[i, q] = -normal(state)
         solve_row(factor, p, coef, i)
     return log_diagonal(coef[:, p:])
+
+
+@kernel(inline=True, forced=True)
+def block_residual(c: Floats, vt: Floats, start: int, stop: int, used: int, row: Floats) -> None:
+    """Fill row (BLOCK,) with c (M,) times the first `used` numbers of each sample."""
+    n = stop - start
+    x = vt[0, start:stop]
+    for t in range(n):
+        row[t] = c[0] * x[t]
+    j = 1
+    while j + 3 < used:  # four at a time: a partial sum is loaded and stored a quarter as often
+        c0, c1, c2, c3 = c[j], c[j + 1], c[j + 2], c[j + 3]
+        x0, x1 = vt[j, start:stop], vt[j + 1, start:stop]
+        x2, x3 = vt[j + 2, start:stop], vt[j + 3, start:stop]
+        for t in range(n):
+            row[t] += (c0 * x0[t] + c1 * x1[t]) + (c2 * x2[t] + c3 * x3[t])
+        j += 4
+    for rest in range(j, used):
+        c0 = c[rest]
+        x = vt[rest, start:stop]
+        for t in range(n):
+            row[t] += c0 * x[t]
 
 
 @kernel(inline=True)
@@ -170,7 +205,7 @@ def block_log_likelihood(
         start: first sample.
         stop: one past the last, at most BLOCK further.
         emitted: emissions of the states.
-        weight: what a sample counts for.
+        weight: of a sample.
         dof: degrees of freedom of Student-t noise; 0: Gaussian.
         out: output.
         row: (BLOCK,) work space.
@@ -183,30 +218,7 @@ def block_log_likelihood(
         for t in range(n):
             total[t] = shape[k, 1]
         for i in range(d):
-            used = m - d + i + 1
-            c = coef[k, i]
-            x = vt[0, start:stop]
-            for t in range(n):
-                row[t] = c[0] * x[t]
-            j = 1
-            while (
-                j + 3 < used
-            ):  # four at a time: a partial sum is fetched and stored a quarter as often
-                c0, c1, c2, c3 = c[j], c[j + 1], c[j + 2], c[j + 3]
-                x0, x1, x2, x3 = (
-                    vt[j, start:stop],
-                    vt[j + 1, start:stop],
-                    vt[j + 2, start:stop],
-                    vt[j + 3, start:stop],
-                )
-                for t in range(n):
-                    row[t] += (c0 * x0[t] + c1 * x1[t]) + (c2 * x2[t] + c3 * x3[t])
-                j += 4
-            for rest in range(j, used):
-                c0 = c[rest]
-                x = vt[rest, start:stop]
-                for t in range(n):
-                    row[t] += c0 * x[t]
+            block_residual(coef[k, i], vt, start, stop, m - d + i + 1, row)
             for t in range(n):
                 total[t] += row[t] * row[t]
         if dof > 0.0:
@@ -220,9 +232,10 @@ def block_log_likelihood(
 def student(
     total: Floats, n: int, logdet: float, share: float, power: float, work: Floats
 ) -> None:
-    """Overwrite the first n squares of `total` (B,) with logdet - power log(1 + share × square); work (B,).
+    """Replace the first n squares of `total` (B,) by logdet - power log(1 + share × square).
 
-    The logarithm is 2 artanh((m - 1) / (m + 1)) of the mantissa, a series, which is vectorised; it is right to 1e-13.
+    The logarithm is the series 2 artanh((m - 1) / (m + 1)) of the mantissa m, which vectorises;
+    its error is below 1e-13. `work` (B,) is work space.
     """
     bits = work.view(np.int64)
     for t in range(n):
@@ -242,7 +255,7 @@ def student(
         p = p * s + 2.0 / 5.0
         p = p * s + 2.0 / 3.0
         p = p * s + 2.0
-        total[t] = logdet - power * (total[t] * LN2 + p * f)
+        total[t] = logdet - power * (total[t] * LN2_RATIO + p * f)
 
 
 @kernel(inline=True)
@@ -260,7 +273,7 @@ def square(coef: Floats, v: Floats) -> float:
 
 @kernel(inline=True)
 def mean_emission(factor: Floats, n: float, joint: Joint, coef: Floats, shape: Floats) -> None:
-    """Fill coef (D, M) and shape (2,), see `States`, with the posterior's mean precision and regression."""
+    """Fill coef (D, M) and shape (2,), see `States`, with the posterior means."""
     d, nu = len(joint.blur), joint.nu
     p = len(factor) - d
     root = math.sqrt(nu + n)
@@ -276,7 +289,10 @@ def mean_emission(factor: Floats, n: float, joint: Joint, coef: Floats, shape: F
 
 @kernel(inline=True)
 def solve_row(factor: Floats, p: int, coef: Floats, i: int) -> None:
-    """Turn row i of coef (D, M), (e, u), into (e - u Ly⁻¹ Lyz) Lz⁻¹ and u Ly⁻¹, with the factor (M, M) of a state's G."""
+    """Turn row i of coef (D, M), (e, u), into (e - u Ly⁻¹ Lyz) Lz⁻¹ and u Ly⁻¹.
+
+    `factor` (M, M) is that of a state's G.
+    """
     for j in range(i, -1, -1):
         c = coef[i, p + j] / factor[p + j, p + j]
         coef[i, p + j] = c
@@ -304,12 +320,41 @@ def blurred(coef: Floats, blur: Floats) -> float:
     return total
 
 
+@kernel(inline=True, forced=True)
+def exponentials(x: Floats, best: Floats, n: int, power: Floats, value: Floats) -> None:
+    """Fill value (BLOCK,) and power (BLOCK,), whose product is exp(x - best), for n numbers.
+
+    The exponential is a polynomial (Cody & Waite), which vectorises, unlike a call per number; its
+    error is below 3e-13, like that of a log-likelihood of a thousand.
+    """
+    bits = power.view(np.int64)
+    for t in range(n):
+        y = x[t] - best[t]
+        y = y if y > MIN_LOG_RATIO else MIN_LOG_RATIO
+        shifted = y * LOG2_E_RATIO + ROUNDING_RATIO
+        power[t] = shifted
+        turns = shifted - ROUNDING_RATIO
+        r = (y - turns * LN2_HIGH_RATIO) - turns * LN2_LOW_RATIO
+        p = 1.0 / 3628800.0
+        p = p * r + 1.0 / 362880.0
+        p = p * r + 1.0 / 40320.0
+        p = p * r + 1.0 / 5040.0
+        p = p * r + 1.0 / 720.0
+        p = p * r + 1.0 / 120.0
+        p = p * r + 1.0 / 24.0
+        p = p * r + 1.0 / 6.0
+        p = p * r + 0.5
+        p = p * r + 1.0
+        value[t] = (p * r + 1.0) if y > MIN_LOG_RATIO else 0.0
+    for t in range(n):
+        bits[t] = (bits[t] << 52) + ONE_BITS
+
+
 @kernel(inline=True)
 def block_likelihood(logs: Floats, n: int, best: Floats, work: Floats, out: Floats) -> None:
-    """Fill out (n, L) with exp(logs - best of all states), logs (L, BLOCK); below e^-300 it is 0. Work (2, BLOCK).
+    """Fill out (n, L) with exp(logs - best of all states), logs (L, BLOCK); below e^-300 it is 0.
 
-    The exponential is a polynomial (Cody & Waite), which is vectorised, unlike a call per number; it is right to 3e-13,
-    as exact as a log-likelihood of a thousand is.
+    best (BLOCK,) and work (2, BLOCK) are work space.
     """
     states = logs.shape[0]
     for t in range(n):
@@ -319,29 +364,8 @@ def block_likelihood(logs: Floats, n: int, best: Floats, work: Floats, out: Floa
         for t in range(n):
             best[t] = x[t] if x[t] > best[t] else best[t]
     power, value = work[0], work[1]
-    bits = power.view(np.int64)
     for k in range(states):
-        x = logs[k]
-        for t in range(n):
-            y = x[t] - best[t]
-            y = y if y > LEAST_LOG else LEAST_LOG
-            shifted = y * LOG2_E + TO_INTEGER
-            power[t] = shifted
-            turns = shifted - TO_INTEGER
-            r = (y - turns * LN2_HIGH) - turns * LN2_LOW
-            p = 1.0 / 3628800.0
-            p = p * r + 1.0 / 362880.0
-            p = p * r + 1.0 / 40320.0
-            p = p * r + 1.0 / 5040.0
-            p = p * r + 1.0 / 720.0
-            p = p * r + 1.0 / 120.0
-            p = p * r + 1.0 / 24.0
-            p = p * r + 1.0 / 6.0
-            p = p * r + 0.5
-            p = p * r + 1.0
-            value[t] = (p * r + 1.0) if y > LEAST_LOG else 0.0
-        for t in range(n):
-            bits[t] = (bits[t] << 52) + ONE_BITS
+        exponentials(logs[k], best, n, power, value)
         for t in range(n):
             out[t, k] = value[t] * power[t]
 

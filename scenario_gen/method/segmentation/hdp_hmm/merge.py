@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Greedy merging of states by marginal likelihood: what Gibbs sampling alone does with difficulty."""
+"""Greedy merging of states by marginal likelihood, which Gibbs sampling alone seldom does."""
 
 import math
 
@@ -20,9 +20,9 @@ from scenario_gen.numerics.kernels import F, F1, F2, I1, kernel, OUTI1
 
 @kernel(inline=True)
 def merge_gain(n: Ints, i: int, j: int, stay: float, move: float) -> float:
-    """Gain in log p(labels) from making states i and j one, by counts n (L + 1, L).
+    """Return the gain in log p(labels) from merging states i and j, by counts n (L + 1, L).
 
-    Rows are Dirichlet with `stay` at home and `move` elsewhere.
+    Rows have Dirichlet priors with `stay` for the state itself and `move` for every other one.
     """
     states = n.shape[1]
     gain: float = 0.0
@@ -72,7 +72,10 @@ def merge_gain(n: Ints, i: int, j: int, stay: float, move: float) -> float:
 def joint_marginal(
     outer: Floats, sums: Floats, i: int, j: int, prior: Joint, factor: Floats
 ) -> float:
-    """Log marginal likelihood of states i and j as one, or of i alone if they are the same; outer (L, M, M), sums (L, 2)."""
+    """Return the log marginal likelihood of states i and j as one, or of i if they are equal.
+
+    Statistics are outer (L, M, M) and sums (L, 2).
+    """
     count, total = sums[i, 0], sums[i, 1]
     both = outer[i].copy()
     if i != j:
@@ -87,34 +90,55 @@ def joint_marginal(
 
 @kernel(inline=True)
 def best_merge(
-    data: Floats, own: Floats, counts: Ints, n: Ints, stay: float, move: float
+    pairs: Floats, single: Floats, counts: Ints, n: Ints, stay: float, move: float
 ) -> tuple[int, int]:
-    """Return the pair of states (i > j), of data (L, M, M), whose merge gains most, or (-1, -1) if none gains anything."""
+    """Return the states (i > j) whose merge gains most, or (-1, -1) if no merge gains anything.
+
+    pairs (L, L) and single (L,) are log marginal likelihoods of two states as one, and of each.
+    """
     best, best_i, best_j = 0.0, -1, -1
-    for i in range(len(own)):
+    for i in range(len(single)):
         for j in range(i):
-            if counts[i] > 0 and counts[j] > 0:
-                gain = data[i, j] - own[i] - own[j] + merge_gain(n, i, j, stay, move)
-                if gain > best:
-                    best, best_i, best_j = gain, i, j
+            if counts[i] == 0 or counts[j] == 0:
+                continue
+            gain = pairs[i, j] - single[i] - single[j] + merge_gain(n, i, j, stay, move)
+            if gain > best:
+                best, best_i, best_j = gain, i, j
     return best_i, best_j
+
+
+@kernel(inline=True)
+def fill_pairs(
+    outer: Floats,
+    sums: Floats,
+    counts: Ints,
+    prior: Joint,
+    base: float,
+    factor: Floats,
+    pairs: Floats,
+) -> None:
+    """Fill the missing log marginal likelihoods of pairs (L, L), in its lower triangle."""
+    for i in range(len(counts)):
+        for j in range(i):
+            if counts[i] > 0 and counts[j] > 0 and np.isnan(pairs[i, j]):
+                pairs[i, j] = joint_marginal(outer, sums, i, j, prior, factor) - base
 
 
 @kernel(F2, F1, I1, JOINT, F, F, OUTI1)
 def merge_states(
     v: Floats, mass: Floats, ends: Ints, prior: Joint, stay: float, move: float, labels: Ints
 ) -> None:
-    """Merge states greedily while the probability of the labels, emissions and transitions integrated out, grows.
+    """Merge states greedily while log p(labels, samples) grows, parameters integrated out.
 
-    Gibbs sampling alone splits easily and merges with difficulty; this is run on the labels that a chain starts from.
+    Gibbs sampling splits easily but seldom merges; this is run on the labels of a chain's start.
 
     Args:
         v: (T, M) samples.
         mass: (T,) see `accumulate`.
-        ends: index one past the last sample of each sequence.
+        ends: one past the index of the last sample of each sequence.
         prior: of the emissions.
-        stay: prior weight of the own state in a transition row.
-        move: prior weight of every other one.
+        stay: prior weight of the state itself in a transition row.
+        move: prior weight of every other state.
         labels: (T,) updated; `labels.max() + 1` states.
     """
     m, states = v.shape[1], 0
@@ -125,23 +149,20 @@ def merge_states(
     n = np.empty((states + 1, states), np.int64)
     posterior_factor(np.zeros((m, m)), 0.0, prior, factor)
     base = log_marginal(factor, 0.0, prior)
-    own = np.zeros(states)
-    data = np.full((states, states), np.nan)
+    single = np.zeros(states)
+    pairs = np.full((states, states), np.nan)
     accumulate(v, labels, mass, outer, sums)
     for t in range(len(labels)):
         counts[labels[t]] += 1
     for k in range(states):
-        own[k] = joint_marginal(outer, sums, k, k, prior, factor) - base
+        single[k] = joint_marginal(outer, sums, k, k, prior, factor) - base
     while True:
         count_transitions(labels, ends, n)
-        for i in range(states):
-            for j in range(i):
-                if counts[i] > 0 and counts[j] > 0 and np.isnan(data[i, j]):
-                    data[i, j] = joint_marginal(outer, sums, i, j, prior, factor) - base
-        i, j = best_merge(data, own, counts, n, stay, move)
+        fill_pairs(outer, sums, counts, prior, base, factor, pairs)
+        i, j = best_merge(pairs, single, counts, n, stay, move)
         if i < 0:
             break
-        own[j], own[i] = data[i, j], 0.0
+        single[j], single[i] = pairs[i, j], 0.0
         outer[j] += outer[i]
         sums[j] += sums[i]
         counts[j] += counts[i]
@@ -150,5 +171,5 @@ def merge_states(
             if labels[t] == i:
                 labels[t] = j
         for k in range(states):
-            data[j, k] = np.nan
-            data[k, j] = np.nan
+            pairs[j, k] = np.nan
+            pairs[k, j] = np.nan

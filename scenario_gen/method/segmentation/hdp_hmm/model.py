@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""What the sampler's kernels pass to each other. T samples v = (z, y) of M = P + D numbers, L states."""
+"""Types of the kernels: T samples v = (z, y) of M = P + D numbers, L states."""
 
 from typing import NamedTuple
 
@@ -26,12 +26,12 @@ class Data(NamedTuple):
     """The samples.
 
     Attributes:
-        v: (T, M) samples (z, y); what is hidden is drawn anew in every sweep.
+        v: (T, M) samples (z, y); hidden values are drawn anew in every sweep.
         vt: (M, T) the same, transposed.
         gaps: (R,) samples with hidden channels, rising.
         hidden: (R, D) which channels were not observed.
-        mass: (T,) see `accumulate`, to start from; updated. A sample of which nothing was observed has 0.
-        ends: index one past the last sample of each sequence.
+        mass: (T,) initial masses, see `accumulate`; updated. Of a sample that was not observed, 0.
+        ends: one past the index of the last sample of each sequence.
     """
 
     v: Floats
@@ -43,7 +43,7 @@ class Data(NamedTuple):
 
 
 class Grid(NamedTuple):
-    """What the prior of the emissions may be.
+    """Candidates for the prior of the emissions.
 
     Attributes:
         mean: (D, P) prior mean M of the regressions.
@@ -51,7 +51,7 @@ class Grid(NamedTuple):
         within: (D, D) prior mean of the states' covariances; S0 is (ν0 - D - 1) times it.
         extras: (A,) what ν0 - D may be, all equally probable beforehand.
         worths: (B,) what K may be in units of `precision`.
-        odds: (B,) logarithms of how probable each is beforehand.
+        odds: (B,) logarithms of their prior probabilities.
     """
 
     mean: Floats
@@ -63,14 +63,14 @@ class Grid(NamedTuple):
 
 
 class Hyper(NamedTuple):
-    """What stays as it is in a chain.
+    """Constants of a chain.
 
     Attributes:
         levels: (6,) parameters of the hyperpriors, see `transitions.HYPER`.
-        weight: what a sample counts for.
+        weight: of a sample.
         dof: degrees of freedom of Student-t noise; 0: Gaussian.
-        blur: (D,) variance to which each channel is known at all.
-        moves: split or merge moves that are tried in a sweep.
+        blur: (D,) variance of each channel's measurement error.
+        moves: split or merge moves per sweep.
     """
 
     levels: Floats
@@ -86,7 +86,7 @@ class Start(NamedTuple):
     Attributes:
         labels: (T,) 0 .. L - 1.
         top: (3 + L,) γ, α+κ, ρ and β; updated.
-        chosen: (2,) which of the grid's `extras` and `worths` hold; updated.
+        chosen: (2,) indices of the current `extras` and `worths` of the grid; updated.
     """
 
     labels: Ints
@@ -95,7 +95,7 @@ class Start(NamedTuple):
 
 
 class Out(NamedTuple):
-    """What a chain writes: a row for each sweep.
+    """The output of a chain: a row for each sweep.
 
     Attributes:
         samples: (S, T) labels of the last S sweeps.
@@ -109,13 +109,13 @@ class Out(NamedTuple):
 
 
 class Joint(NamedTuple):
-    """The prior of the emissions that holds now.
+    """The current prior of the emissions.
 
     Attributes:
         g0: (M, M) G0, see `emission`.
         nu: degrees of freedom ν0.
-        weight: what a sample counts for (1: all of it; less where neighbouring samples repeat each other).
-        blur: (D,) variance to which a sample's channels are known at all.
+        weight: of a sample; below 1 if neighbouring samples are correlated.
+        blur: (D,) variance of each channel's measurement error.
     """
 
     g0: Floats
@@ -137,20 +137,20 @@ class States(NamedTuple):
 
 
 class Statistics(NamedTuple):
-    """All that the labels say of the states.
+    """Statistics of the states, given the labels.
 
     Attributes:
         outer: (L, M, M) Σ mass v vᵀ; lower triangles.
         sums: (L, 2) observed samples and Σ mass.
         factors: (L, M, M) Cholesky factors of the posteriors.
-        own: (L,) log marginal likelihood of each state's samples.
+        marginal: (L,) log marginal likelihood of each state's samples.
         n: (L + 1, L) transition counts.
     """
 
     outer: Floats
     sums: Floats
     factors: Floats
-    own: Floats
+    marginal: Floats
     n: Ints
 
 

@@ -1,12 +1,12 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Samples that count for less than one: outliers under heavy tails, and channels that were not observed.
+"""Heavy-tailed noise and hidden channels.
 
-Student-t noise is Gaussian noise whose precision is scaled by a mass of its own in every sample, Gamma(ν/2, ν/2) (Andrews &
-Mallows 1974). Labels are drawn with the masses integrated out, then masses given labels. Channels that are missing are
-integrated out of the likelihood, then drawn given the others, so that the statistics keep one form. A sample of which
-nothing was observed has mass 0.
+Student-t noise is Gaussian noise whose precision is scaled by a mass per sample, Gamma(ν/2, ν/2)
+(Andrews & Mallows 1974). Labels are drawn with the masses integrated out, then masses given
+labels. Hidden channels are integrated out of the likelihood, then drawn given the others, so that
+the statistics have one form. A sample of which nothing was observed has mass 0.
 """
 
 import math
@@ -21,17 +21,59 @@ from scenario_gen.numerics.kernels import kernel
 
 
 @kernel(inline=True)
+def hidden_precision(
+    hidden: Bools, coef: Floats, rest: Floats, factor: Floats, shift: Floats
+) -> int:
+    """Fill Λ, the precision of the hidden channels, and C' r; return their number.
+
+    Args:
+        hidden: (D,).
+        coef: (D, M) emission of the state.
+        rest: (D,) r, the whitened residual of the observed channels.
+        factor: (D, D) output, Λ (lower triangle) in its first rows and columns.
+        shift: (D,) output, C' r.
+    """
+    d, m = coef.shape
+    p = m - d
+    a = 0
+    for i in range(d):
+        if not hidden[i]:
+            continue
+        b = 0
+        for j in range(i + 1):
+            if hidden[j]:
+                factor[a, b] = product_of_columns(coef, p + i, p + j)
+                b += 1
+        shift[a] = 0.0
+        for q in range(d):
+            shift[a] += coef[q, p + i] * rest[q]
+        a += 1
+    return a
+
+
+@kernel(inline=True)
+def product_of_columns(coef: Floats, i: int, j: int) -> float:
+    """Return the inner product of two columns of coef (D, M)."""
+    total = 0.0
+    for q in range(coef.shape[0]):
+        total += coef[q, i] * coef[q, j]
+    return total
+
+
+@kernel(inline=True)
 def without_hidden(
     v: Floats, hidden: Bools, coef: Floats, factor: Floats, shift: Floats
 ) -> tuple[float, float]:
-    """Squared whitened residual of a sample's observed channels, and log|Λ|^(1/2), Λ the precision of the hidden given them.
+    """Return the squared whitened residual of a sample's observed channels, and log|Λ|^(1/2).
+
+    Λ is the precision of the hidden channels given the observed ones.
 
     Args:
-        v: (M,) sample; what it holds in hidden channels does not matter.
+        v: (M,) sample; the values of hidden channels do not matter.
         hidden: (D,).
         coef: (D, M) emission of the state.
-        factor: (D, D) output, Cholesky factor R of Λ in its first rows and columns, one per hidden channel.
-        shift: (D,) output, R⁻¹ C' r: the hidden channels' mean given the others is -R⁻ᵀ shift.
+        factor: (D, D) output, Cholesky factor R of Λ in its first rows and columns.
+        shift: (D,) output, R⁻¹ C' r: the mean of the hidden channels is -R⁻ᵀ shift.
     """
     d, m = coef.shape
     p = m - d
@@ -43,20 +85,7 @@ def without_hidden(
     total = 0.0
     for i in range(d):
         total += rest[i] * rest[i]
-    a = 0
-    for i in range(d):
-        if hidden[i]:
-            b = 0
-            for j in range(i + 1):
-                if hidden[j]:
-                    factor[a, b] = 0.0
-                    for q in range(d):
-                        factor[a, b] += coef[q, p + i] * coef[q, p + j]
-                    b += 1
-            shift[a] = 0.0
-            for q in range(d):
-                shift[a] += coef[q, p + i] * rest[q]
-            a += 1
+    a = hidden_precision(hidden, coef, rest, factor, shift)
     cholesky(factor[:a, :a])
     half = 0.0
     for i in range(a):
@@ -75,7 +104,7 @@ def log_radial(square: float, n: float, weight: float, dof: float) -> float:
     Args:
         square: squared whitened residual.
         n: observed channels times `weight`.
-        weight: what a sample counts for.
+        weight: of a sample.
         dof: degrees of freedom of Student-t noise; 0: Gaussian.
     """
     if dof > 0.0:
@@ -87,7 +116,7 @@ def log_radial(square: float, n: float, weight: float, dof: float) -> float:
 def observed_log_likelihood(
     v: Floats, hidden: Bools, coef: Floats, shape: Floats, weight: float, dof: float, out: Floats
 ) -> None:
-    """Fill out (L,) with the log-likelihood of a sample's observed channels, up to a constant; see `block_log_likelihood`."""
+    """Fill out (L,) with the log-likelihood of a sample's observed channels, up to a constant."""
     states, d = coef.shape[0], coef.shape[1]
     seen = d - hidden.sum()
     if seen == 0:
@@ -103,7 +132,7 @@ def observed_log_likelihood(
 
 @kernel(inline=True)
 def draw_masses(state: State, data: Data, labels: Ints, emitted: States, hyper: Hyper) -> None:
-    """Draw the samples' masses given labels (T,) and emissions; those that are 0 stay so."""
+    """Draw the samples' masses given labels (T,) and emissions; those of 0 do not change."""
     v, gaps, hidden, mass, (coef, shape) = data.v, data.gaps, data.hidden, data.mass, emitted
     weight, dof, d = hyper.weight, hyper.dof, len(hyper.blur)
     factor, shift = np.empty((d, d)), np.empty(d)
@@ -112,47 +141,56 @@ def draw_masses(state: State, data: Data, labels: Ints, emitted: States, hyper: 
         while gap < len(gaps) and gaps[gap] < t:
             gap += 1
         k = labels[t]
-        if mass[t] > 0.0:
-            if gap < len(gaps) and gaps[gap] == t:
-                seen = d - hidden[gap].sum()
-                total = without_hidden(v[t], hidden[gap], coef[k], factor, shift)[0]
-            else:
-                seen = d
-                total = square(coef[k], v[t])
-            total += shape[k, 1] * seen / d
-            mass[t] = np.exp(log_gamma_draw(state, 0.5 * (dof + weight * seen))) / (
-                0.5 * (dof + weight * total)
-            )
+        if not mass[t] > 0.0:
+            continue
+        if gap < len(gaps) and gaps[gap] == t:
+            seen = d - hidden[gap].sum()
+            total = without_hidden(v[t], hidden[gap], coef[k], factor, shift)[0]
+        else:
+            seen = d
+            total = square(coef[k], v[t])
+        total += shape[k, 1] * seen / d
+        mass[t] = np.exp(log_gamma_draw(state, 0.5 * (dof + weight * seen))) / (
+            0.5 * (dof + weight * total)
+        )
 
 
 @kernel(inline=True)
 def draw_hidden(state: State, data: Data, labels: Ints, coef: Floats) -> None:
-    """Draw the hidden channels of the samples given the observed ones, labels (T,) and emissions coef (L, D, M)."""
+    """Draw the hidden channels given the observed ones, labels (T,), emissions coef (L, D, M)."""
     v, vt, mass, gaps, hidden = data.v, data.vt, data.mass, data.gaps, data.hidden
     d, m = coef.shape[1], coef.shape[2]
     p = m - d
     factor, shift = np.empty((d, d)), np.empty(d)
     for r in range(len(gaps)):
         t = gaps[r]
-        if mass[t] > 0.0:
-            without_hidden(v[t], hidden[r], coef[labels[t]], factor, shift)
-            a = hidden[r].sum()
-            for i in range(a):
-                shift[i] = normal(state) / math.sqrt(mass[t]) - shift[i]
-            for i in range(a - 1, -1, -1):
-                for j in range(i + 1, a):
-                    shift[i] -= factor[j, i] * shift[j]
-                shift[i] /= factor[i, i]
-            a = 0
-            for i in range(d):
-                if hidden[r, i]:
-                    v[t, p + i] = vt[p + i, t] = shift[a]
-                    a += 1
+        if not mass[t] > 0.0:
+            continue
+        without_hidden(v[t], hidden[r], coef[labels[t]], factor, shift)
+        a = hidden[r].sum()
+        for i in range(a):
+            shift[i] = normal(state) / math.sqrt(mass[t]) - shift[i]
+        solve_transposed(factor, a, shift)
+        a = 0
+        for i in range(d):
+            if hidden[r, i]:
+                v[t, p + i] = shift[a]
+                vt[p + i, t] = shift[a]
+                a += 1
+
+
+@kernel(inline=True)
+def solve_transposed(factor: Floats, n: int, x: Floats) -> None:
+    """Replace the first n numbers of x by R⁻ᵀ x, R the leading (n, n) part of factor."""
+    for i in range(n - 1, -1, -1):
+        for j in range(i + 1, n):
+            x[i] -= factor[j, i] * x[j]
+        x[i] /= factor[i, i]
 
 
 @kernel(inline=True)
 def log_masses(mass: Floats, power: float, dof: float) -> float:
-    """Log density of mass (T,), and what they add to the samples' log density: Σ ½ power log mass; up to a constant."""
+    """Return the log density of mass (T,) plus Σ ½ power log mass, up to a constant."""
     value = 0.0
     for t in range(len(mass)):
         if mass[t] > 0.0:

@@ -1,10 +1,10 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The emissions' prior: how alike and how far apart states are is drawn with the emissions integrated out.
+"""The prior of the emissions, whose ν0 and κ0 are drawn from a grid, emissions integrated out.
 
-ν0 says how alike the states' covariances are, κ0 how far apart their means lie beside their own spread. Both decide what a state
-of its own costs, so neither is fixed: each is one of a grid, drawn given the labels.
+ν0 determines how similar the states' covariances are, κ0 the distance of their means relative to
+their spread. Both determine the cost of another state, so neither is fixed.
 """
 
 import numpy as np
@@ -30,7 +30,7 @@ def set_prior(
         grid: M, unit of K and of S0.
         extra: ν0 - D.
         worth: K in its unit.
-        hyper: a sample's weight and blur.
+        hyper: weight and blur of a sample.
         g0: (M, M) output, of the prior.
         factor: (M, M) output, its Cholesky factor.
     """
@@ -59,6 +59,32 @@ def set_prior(
 
 
 @kernel(inline=True)
+def log_evidence(
+    stats: Statistics, base: float, joint: Joint, weight: float, factor: Floats, value: float
+) -> float:
+    """Return `value` plus the log marginal likelihood of all states under a prior.
+
+    `base` is that of no samples; factor (M, M) is work space.
+    """
+    for k in range(len(stats.marginal)):
+        if stats.sums[k, 0] > 0.0:
+            posterior_factor(stats.outer[k], stats.sums[k, 1], joint, factor)
+            value += log_marginal(factor, weight * stats.sums[k, 0], joint) - base
+    return value
+
+
+@kernel(inline=True)
+def draw_option(state: State, logs: Floats) -> int:
+    """Draw an index with these log probabilities (n,), up to a constant; they are overwritten."""
+    top = logs.max()
+    total = 0.0
+    for option in range(len(logs)):
+        logs[option] = np.exp(logs[option] - top)
+        total += logs[option]
+    return pick(logs, uniform(state) * total, -1)
+
+
+@kernel(inline=True)
 def sample_prior(
     state: State,
     stats: Statistics,
@@ -68,26 +94,17 @@ def sample_prior(
     g0: Floats,
     factor: Floats,
 ) -> None:
-    """Draw `chosen` (2,), which of the grid's `extras` and `worths` hold, one given the other, from the states' statistics."""
+    """Draw the indices `chosen` (2,) of the grid's `extras` and `worths`, one given the other."""
     for side in range(2):
-        options = grid.extras if side == 0 else grid.worths
-        if len(options) < 2:
+        count = len(grid.extras) if side == 0 else len(grid.worths)
+        if count < 2:
             continue
-        logs = np.empty(len(options))
-        for option in range(len(options)):
-            extra = options[option] if side == 0 else grid.extras[chosen[0]]
-            worth = options[option] if side == 1 else grid.worths[chosen[1]]
+        logs = np.zeros(count)
+        index = chosen.copy()
+        for option in range(count):
+            index[side] = option
+            extra, worth = grid.extras[index[0]], grid.worths[index[1]]
             base, joint = set_prior(grid, extra, worth, hyper, g0, factor)
-            logs[option] = grid.odds[option] if side == 1 else 0.0
-            for k in range(len(stats.own)):
-                if stats.sums[k, 0] > 0.0:
-                    posterior_factor(stats.outer[k], stats.sums[k, 1], joint, factor)
-                    logs[option] += (
-                        log_marginal(factor, hyper.weight * stats.sums[k, 0], joint) - base
-                    )
-        top = logs.max()
-        total = 0.0
-        for option in range(len(options)):
-            logs[option] = np.exp(logs[option] - top)
-            total += logs[option]
-        chosen[side] = pick(logs, uniform(state) * total, -1)
+            odds = grid.odds[option] if side == 1 else 0.0
+            logs[option] = log_evidence(stats, base, joint, hyper.weight, factor, odds)
+        chosen[side] = draw_option(state, logs)

@@ -1,10 +1,10 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""A small generator for the kernels: SplitMix64 (Steele et al. 2014) and the draws that Gibbs sampling needs.
+"""A random generator for kernels: SplitMix64 (Steele et al. 2014), and draws for Gibbs sampling.
 
-The state is one uint64 in an array of length 1, seeded from a numpy SeedSequence; no draw depends on anything else, so
-the same seed gives the same bytes on every thread and with every version of numpy.
+The state is one uint64 in an array of length 1, seeded from a numpy SeedSequence. No draw depends
+on anything else, so a seed gives the same bytes on every thread and with every version of numpy.
 """
 
 from decimal import Decimal, localcontext
@@ -26,26 +26,24 @@ _LAYER, _SIGN = np.uint64(255), np.uint64(256)
 
 
 def _layers() -> tuple[Floats, Floats]:
-    """(257,) edges and heights of 256 layers of equal area under exp(-x²/2), the widest first (Doornik 2005, ZIGNOR).
+    """Return edges and heights (257,) of 256 layers of equal area under exp(-x²/2), widest first.
 
-    In decimal numbers, whose functions are rounded correctly, so that every machine has the same table.
+    Decimal numbers, whose functions are rounded correctly, give every machine the same table.
+
+    Source: Doornik 2005, ZIGNOR.
     """
     with localcontext(prec=30):
-        last, area = (
-            Decimal("3.6541528853610087963519472518"),
-            Decimal("0.0049286732339746549315909"),
-        )
-        edges, heights = (
-            [area / (-last * last / 2).exp(), last],
-            [Decimal(0), (-last * last / 2).exp()],
-        )
-        for _ in range(LAYERS - 2):
+        last = Decimal("3.6541528853610087963519472518")
+        area = Decimal("0.0049286732339746549315909")
+        density = (-last * last / 2).exp()
+        edges, heights = [area / density, last], [Decimal(0), density]
+        for _ in range(LAYERS_COUNT - 2):
             heights.append(heights[-1] + area / edges[-1])
             edges.append((-2 * heights[-1].ln()).sqrt())
         return np.array([*map(float, edges), 0.0]), np.array([*map(float, heights), 1.0])
 
 
-LAYERS = 256
+LAYERS_COUNT = 256
 EDGES, HEIGHTS = _layers()
 TAIL = float(EDGES[1])
 
@@ -69,7 +67,7 @@ def uniform(state: State) -> float:
 
 @kernel(inline=True)
 def normal(state: State) -> float:
-    """Return a standard normal number, by the layers of a ziggurat (Marsaglia & Tsang 2000; Doornik 2005)."""
+    """Return a standard normal number by the ziggurat method (Marsaglia & Tsang 2000)."""
     while True:
         bits = next_bits(state)
         layer = np.int64(bits & _LAYER)
@@ -128,7 +126,10 @@ def log_beta_draw(state: State, a: float, b: float) -> tuple[float, float]:
 
 @kernel(inline=True)
 def pick(share: Floats, u: float, without: int) -> int:
-    """Return the entry at which the running sum of `share` (n,), entry `without` left out (-1: none), reaches u."""
+    """Return the entry at which the running sum of `share` (n,) reaches u.
+
+    Entry `without` is left out; -1: none.
+    """
     last = 0
     for k in range(len(share)):
         if k != without:
@@ -141,10 +142,11 @@ def pick(share: Floats, u: float, without: int) -> int:
 
 @kernel(inline=True)
 def dirichlet_draw(state: State, weights: Floats, out: Floats) -> None:
-    """Dirichlet(weights) into `out`, both (L,); no entry is below 1e-100, so that backward messages never vanish.
+    """Draw `out` from Dirichlet(weights), both (L,); `weights` are overwritten.
 
-    `weights` are overwritten. A Gamma(a, 1) draw of a < 1 is one of a + 1 times u^(1/a): of that the logarithm is kept, until
-    the largest is known, for all may be too small for a number.
+    No entry is below 1e-100, so that backward messages never vanish. A Gamma(a, 1) draw with a < 1
+    is one of a + 1 times u^(1/a). Its logarithm is stored until the largest one is known, since
+    all may underflow.
     """
     n = len(weights)
     top = -np.inf
@@ -166,7 +168,7 @@ def dirichlet_draw(state: State, weights: Floats, out: Floats) -> None:
 
 @kernel(inline=True)
 def tables_draw(state: State, customers: int, concentration: float) -> int:
-    """Number of tables that `customers` open in a Chinese restaurant of the given concentration."""
+    """Draw the number of tables that `customers` open in a Chinese restaurant."""
     tables = 0
     for n in range(customers):
         if uniform(state) * (n + concentration) < concentration:

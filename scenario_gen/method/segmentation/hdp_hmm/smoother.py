@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""A hidden Markov model with known parameters: densities, forward-backward smoothing, and the statistics its emissions need."""
+"""A hidden Markov model with known parameters: densities, smoothing, expected statistics."""
 
 import math
 from typing import NamedTuple
@@ -13,22 +13,23 @@ from scenario_gen.method.segmentation.hdp_hmm.observed import log_radial, withou
 from scenario_gen.numerics import Bools, Floats, Ints
 from scenario_gen.numerics.kernels import B2, F, F1, F2, F3, I1, kernel, named, OUT1, OUT2
 
-LEAST_LOG = -600.0
+MIN_LOG_RATIO = -600.0  # of a density to the best state's
 
 
 @kernel(F2, B2, F3, F, F, OUT2)
 def log_densities(
     v: Floats, hidden: Bools, coef: Floats, weight: float, dof: float, out: Floats
 ) -> None:
-    """Fill out (T, K) with log p(y_t | z_t, state), hidden channels integrated out; 0 where none was observed.
+    """Fill out (T, K) with log p(y_t | z_t, state), hidden channels integrated out.
 
-    A weight below 1 tempers the density as the sampler does; then it is known up to a constant of each sample.
+    It is 0 where no channel was observed. A weight below 1 tempers the density as in the sampler;
+    the density is then known up to a constant per sample.
 
     Args:
         v: (T, P + D) rows (z, y), finite also where hidden.
         hidden: (T, D) which channels of y were not observed.
         coef: (K, D, P + D) emissions, see `draw_emission`.
-        weight: what a sample counts for.
+        weight: of a sample.
         dof: degrees of freedom of Student-t noise; 0: Gaussian.
         out: output.
     """
@@ -59,7 +60,7 @@ def log_densities(
 
 @kernel(inline=True)
 def scaled(row: Floats) -> float:
-    """Scale row (K,) to sum to 1; returns the sum that it had."""
+    """Scale row (K,) to sum 1; return the sum that it had."""
     total = 0.0
     for k in range(len(row)):
         total += row[k]
@@ -70,34 +71,29 @@ def scaled(row: Floats) -> float:
 
 @kernel(inline=True)
 def relative_likelihood(log_density: Floats, out: Floats) -> float:
-    """Fill out (K,) with the exponentials of log_density (K,) less its largest, which is returned."""
+    """Fill out (K,) with exp(log_density - its maximum), and return the maximum."""
     best: float = log_density.max()
     for k in range(len(out)):
-        out[k] = np.exp(max(log_density[k] - best, LEAST_LOG))
+        out[k] = np.exp(max(log_density[k] - best, MIN_LOG_RATIO))
     return best
 
 
-@kernel(F2, F2, F1, I1, OUT2, OUT1)
-def smooth(
-    log_density: Floats,
-    transition: Floats,
-    initial: Floats,
-    ends: Ints,
-    out: Floats,
-    changed: Floats,
-) -> float:
-    """Fill out (T, K) with the posterior probability of each state; returns log p(samples) (Rabiner 1989, III-A and V-A, scaled).
+@kernel(inline=True)
+def predict(filtered: Floats, transition: Floats, ahead: Floats) -> None:
+    """Fill ahead (K,) with the probabilities one sample after those of `filtered` (K,)."""
+    for k in range(len(ahead)):
+        ahead[k] = 0.0
+        for j in range(len(ahead)):
+            ahead[k] += filtered[j] * transition[j, k]
 
-    Args:
-        log_density: (T, K) of each sample under each state.
-        transition: (K, K) rows sum to 1.
-        initial: (K,) of the first state of every sequence.
-        ends: index one past the last sample of each sequence.
-        out: output, rows sum to 1.
-        changed: (T,) output, probability that the state differs from that of the sample before; 0 where a sequence begins.
-    """
+
+@kernel(inline=True)
+def filter_forward(
+    log_density: Floats, transition: Floats, initial: Floats, ends: Ints, out: Floats
+) -> float:
+    """Fill out (T, K) with the probability of each state given its past; return log p(samples)."""
     samples, states = log_density.shape
-    likelihood, ahead, message = np.empty(states), np.empty(states), np.ones(states)
+    likelihood, ahead = np.empty(states), np.empty(states)
     total = 0.0
     sequence = 0
     ahead[:] = initial
@@ -110,10 +106,56 @@ def smooth(
             sequence += 1
             ahead[:] = initial
         else:
-            for k in range(states):
-                ahead[k] = 0.0
-                for j in range(states):
-                    ahead[k] += out[t, j] * transition[j, k]
+            predict(out[t], transition, ahead)
+    return total
+
+
+@kernel(inline=True)
+def pass_back(transition: Floats, likelihood: Floats, before: Floats, message: Floats) -> float:
+    """Fill message (K,) for the sample before; return the probability of a change of state.
+
+    Args:
+        transition: (K, K).
+        likelihood: (K,) of this sample and all later ones.
+        before: (K,) filtered probabilities of the sample before.
+        message: (K,) output, up to a factor.
+    """
+    stays, whole = 0.0, 0.0
+    for j in range(len(message)):
+        message[j] = 0.0
+        for k in range(len(message)):
+            message[j] += transition[j, k] * likelihood[k]
+        stays += before[j] * transition[j, j] * likelihood[j]
+        whole += before[j] * message[j]
+    return 1.0 - stays / whole
+
+
+@kernel(F2, F2, F1, I1, OUT2, OUT1)
+def smooth(
+    log_density: Floats,
+    transition: Floats,
+    initial: Floats,
+    ends: Ints,
+    out: Floats,
+    changed: Floats,
+) -> float:
+    """Fill out (T, K) with the posterior probability of each state; return log p(samples).
+
+    Source: Rabiner 1989, III-A and V-A, scaled.
+
+    Args:
+        log_density: (T, K) of each sample under each state.
+        transition: (K, K) rows sum to 1.
+        initial: (K,) of the first state of every sequence.
+        ends: one past the index of the last sample of each sequence.
+        out: output, rows sum to 1.
+        changed: (T,) output, probability that the state differs from that of the sample before; 0
+            at the start of a sequence.
+    """
+    samples, states = log_density.shape
+    likelihood, message = np.empty(states), np.ones(states)
+    total = filter_forward(log_density, transition, initial, ends, out)
+    sequence = len(ends)
     for t in range(samples - 1, -1, -1):
         if t + 1 == ends[sequence - 1]:
             sequence -= 1
@@ -123,16 +165,9 @@ def smooth(
             out[t, k] *= message[k]
             likelihood[k] *= message[k]
         scaled(out[t])
-        stays, whole = 0.0, 0.0
-        for j in range(states):
-            message[j] = 0.0
-            for k in range(states):
-                message[j] += transition[j, k] * likelihood[k]
-            if t > 0:
-                stays += out[t - 1, j] * transition[j, j] * likelihood[j]
-                whole += out[t - 1, j] * message[j]
+        change = pass_back(transition, likelihood, out[max(t - 1, 0)], message)
         begins = t == 0 or (sequence > 0 and t == ends[sequence - 1])
-        changed[t] = 0.0 if begins else 1.0 - stays / whole
+        changed[t] = 0.0 if begins else change
         scaled(message)
     return total
 
@@ -147,32 +182,41 @@ def fill_hidden(
     y: Floats,
     outer: Floats,
 ) -> None:
-    """Put the hidden channels of y (D,) at their means given the others, and add `share` × their covariance to outer (D, D).
+    """Set the hidden channels of y (D,) to their means given the others.
+
+    Their covariance times `share` is added to outer (D, D).
 
     Args:
         hidden: (D,).
         factor: (D, D) R, see `without_hidden`: the covariance is (R Rᵀ)⁻¹.
         shift: (D,) see there.
-        share: what the sample counts for.
+        share: of the sample.
         inverse: (D, D) work space, for R⁻¹.
         y: updated.
         outer: updated; lower triangle.
     """
-    at = np.flatnonzero(hidden)
-    a = len(at)
-    for j in range(a):
-        for i in range(a):
+    channels = np.flatnonzero(hidden)
+    a = len(channels)
+    invert(factor, a, inverse)
+    for b in range(a):
+        i = channels[b]
+        y[i] = 0.0
+        for q in range(a):
+            y[i] -= inverse[q, b] * shift[q]
+        for c in range(b + 1):
+            for q in range(a):
+                outer[i, channels[c]] += share * inverse[q, b] * inverse[q, c]
+
+
+@kernel(inline=True)
+def invert(factor: Floats, n: int, inverse: Floats) -> None:
+    """Fill inverse (D, D) with that of the leading (n, n) part of the triangular factor (D, D)."""
+    for j in range(n):
+        for i in range(n):
             value = 1.0 if i == j else 0.0
             for q in range(i):
                 value -= factor[i, q] * inverse[q, j]
             inverse[i, j] = value / factor[i, i]
-    for b in range(a):
-        y[at[b]] = 0.0
-        for q in range(a):
-            y[at[b]] -= inverse[q, b] * shift[q]
-        for c in range(b + 1):
-            for q in range(a):
-                outer[at[b], at[c]] += share * inverse[q, b] * inverse[q, c]
 
 
 class Rows(NamedTuple):
@@ -181,8 +225,8 @@ class Rows(NamedTuple):
     Attributes:
         v: (T, P + D) rows (z, y), finite also where hidden.
         hidden: (T, D) which channels of y were not observed.
-        unused: (T, D) the same, and all channels that say nothing of their own about how far off a sample is.
-        weight: what a sample counts for.
+        unused: (T, D) the same, and all channels that follow from others.
+        weight: of a sample.
         dof: degrees of freedom of Student-t noise; 0: Gaussian.
     """
 
@@ -197,11 +241,13 @@ class Rows(NamedTuple):
 def expected_statistics(
     rows: Rows, share: Floats, coef: Floats, outer: Floats, sums: Floats
 ) -> None:
-    """Fill the expected statistics of one state: hidden channels and the masses of heavy-tailed noise at their conditional means.
+    """Fill the expected statistics of one state, given its emission.
+
+    Hidden channels and the masses of heavy-tailed noise have their conditional means.
 
     Args:
         rows: T samples.
-        share: (T,) probability that the sample is this state's; 0 leaves it out.
+        share: (T,) probability that the sample has this state; samples of 0 do not count.
         coef: (D, P + D) emission, see `draw_emission`.
         outer: (P + D, P + D) output, Σ share E[mass v vᵀ].
         sums: (2,) output, Σ share and Σ share E[mass].

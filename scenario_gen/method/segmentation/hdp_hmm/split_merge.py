@@ -3,10 +3,11 @@
 
 """Split and merge moves on the labels, with emissions and π integrated out.
 
-Gibbs sampling moves a few samples at a time, and seldom through what lies between one state and two. A move (after Jain &
-Neal 2004; Hughes, Fox, Sudderth 2012 for HMMs) splits a state or merges two. In a split two of its samples each start a state
-of their own, a few rounds of fitting and labelling bring them to rest, and the labels of the last round are drawn, forward in
-time, so that their probability is known. A merge draws such a pair, too, to know how probable the way back is.
+Gibbs sampling moves a few samples at a time, and seldom crosses the region between one state and
+two. A move (after Jain & Neal 2004; Hughes, Fox, Sudderth 2012 for HMMs) splits a state or merges
+two. In a split, two of its samples, the anchors, each start a state; a few rounds of fitting and
+labelling refine them; the labels of the last round are drawn, forward in time, so that their
+probability is known. A merge draws such anchors, too, for the probability of the reverse move.
 """
 
 import math
@@ -16,8 +17,8 @@ import numpy as np
 
 from scenario_gen.method.segmentation.hdp_hmm.emission import (
     add_sample,
-    BLOCK,
     block_log_likelihood,
+    BLOCK_SAMPLES,
     log_marginal,
     mean_emission,
     posterior_factor,
@@ -28,10 +29,12 @@ from scenario_gen.method.segmentation.hdp_hmm.transitions import count_transitio
 from scenario_gen.numerics import Floats, Ints
 from scenario_gen.numerics.kernels import kernel
 
-ROUNDS = 2
-AROUND = 5
-MOST_STAY, LEAST_STAY = 0.99, 0.6
-MOST_LOG_RATIO, CERTAIN, LEAST_PRODUCT = 200.0, 1e150, 1e-150
+REFINEMENTS_COUNT = 2  # rounds of fitting and labelling
+ANCHOR_SAMPLES = 5  # on either side of an anchor, which share its label at first
+MAX_STAY_PROBABILITY, MIN_STAY_PROBABILITY = 0.99, 0.6
+MAX_LOG_RATIO = 200.0  # of the likelihoods of two sides
+CERTAIN_RATIO = 1e150  # of the likelihoods at an anchor
+MIN_PRODUCT_RATIO = 1e-150  # below which a product is replaced by its logarithm
 
 
 class Group(NamedTuple):
@@ -41,7 +44,7 @@ class Group(NamedTuple):
         members: (n,) their numbers.
         opens: (n,) 1 where a run of them begins.
         outer: (M, M) their Σ mass v vᵀ.
-        sums: (2,) how many were observed, and Σ mass.
+        sums: (2,) number of observed samples, and Σ mass.
     """
 
     members: Ints
@@ -55,12 +58,13 @@ class Proposal(NamedTuple):
 
     Attributes:
         pair: (2,) the states i and j.
-        group: their samples; of a merge none, for they all go to i.
-        side: (n,) 1 where a sample of the group goes to state j, else 0: to i.
+        group: their samples; of a merge none, since all get state i.
+        side: (n,) 1 where a sample of the group gets state j; 0: state i.
         n: (L + 1, L) transition counts after it.
         outer: (2, M, M) statistics of both states after it.
         sums: (2, 2) likewise.
-        gain: logarithm of how probable the choices of the way back are, over those of the way there, as far as known.
+        gain: log of the proposal probability of the reverse move over that of this move, as far
+            as known.
     """
 
     pair: Ints
@@ -113,7 +117,10 @@ def fit_side(
 
 @kernel(inline=True)
 def fit_sides(data: Data, group: Group, side: Ints, outer: Floats, sums: Floats) -> None:
-    """Fill outer (2, M, M) and sums (2, 2) with the statistics of sides (n,): the rarer's, and what it leaves of all."""
+    """Fill outer (2, M, M) and sums (2, 2) with the statistics of sides (n,).
+
+    Those of the smaller side are summed; the others are the rest of the group's.
+    """
     rare = 1 if 2 * side.sum() <= len(side) else 0
     fit_side(data, group, side, rare, outer[rare], sums[rare])
     rest = 1 - rare
@@ -134,33 +141,31 @@ def likelihood_ratios(
         vt: (M, n) samples.
         mass: (n,).
         emitted: of both sides.
-        weight: what a sample counts for.
-        work: (3, BLOCK).
+        weight: of a sample.
+        work: (3, BLOCK_SAMPLES).
         ratio: output.
     """
     alike = weight * (emitted.shape[1, 0] - emitted.shape[0, 0])
     emitted.shape[:, 0] = 0.0
-    for start in range(0, len(mass), BLOCK):
-        stop = min(start + BLOCK, len(mass))
+    for start in range(0, len(mass), BLOCK_SAMPLES):
+        stop = min(start + BLOCK_SAMPLES, len(mass))
         block_log_likelihood(vt, start, stop, emitted, weight, 0.0, work[:2], work[2])
         for r in range(start, stop):
             log_ratio = alike + mass[r] * (work[1, r - start] - work[0, r - start])
-            ratio[r] = (
-                np.exp(min(max(log_ratio, -MOST_LOG_RATIO), MOST_LOG_RATIO))
-                if mass[r] > 0.0
-                else 1.0
-            )
+            ratio[r] = 1.0
+            if mass[r] > 0.0:
+                ratio[r] = np.exp(min(max(log_ratio, -MAX_LOG_RATIO), MAX_LOG_RATIO))
 
 
 @kernel(inline=True)
 def through(odds: float, stay: float) -> float:
-    """Odds of side 1 over side 0 one step away from a sample whose odds are given."""
+    """Return the odds of side 1 over side 0 one step away from a sample with these odds."""
     return (stay * odds + (1.0 - stay)) / ((1.0 - stay) * odds + stay)
 
 
 @kernel(inline=True)
 def ahead(ratio: Floats, opens: Ints, stay: float, message: Floats) -> None:
-    """Fill message (n,) with the odds of side 1 over side 0 at each sample, by it and all later samples of its run."""
+    """Fill message (n,) with the odds of side 1, given the sample and the rest of its run."""
     later = 1.0
     for r in range(len(ratio) - 1, -1, -1):
         message[r] = ratio[r] * later
@@ -169,7 +174,7 @@ def ahead(ratio: Floats, opens: Ints, stay: float, message: Floats) -> None:
 
 @kernel(inline=True)
 def best_sides(ratio: Floats, opens: Ints, stay: float, message: Floats, side: Ints) -> None:
-    """Fill side (n,) with the more probable side of each sample given all others (forward and backward)."""
+    """Fill side (n,) with the more probable side of each sample given all (forward, backward)."""
     ahead(ratio, opens, stay, message)
     before = 1.0
     for r in range(len(ratio)):
@@ -183,7 +188,7 @@ def best_sides(ratio: Floats, opens: Ints, stay: float, message: Floats, side: I
 def draw_sides(
     state: State, ratio: Floats, opens: Ints, stay: float, message: Floats, side: Ints, given: bool
 ) -> float:
-    """Draw side (n,) forward in time, or take it as given; returns the log-probability of it."""
+    """Draw side (n,) forward in time, or use the given one; return its log-probability."""
     ahead(ratio, opens, stay, message)
     jump = stay / (1.0 - stay)
     value, product = 0.0, 1.0
@@ -194,7 +199,7 @@ def draw_sides(
         if not given:
             side[r] = 1 if uniform(state) * (1.0 + odds) < odds else 0
         product *= (odds if side[r] == 1 else 1.0) / (1.0 + odds)
-        if product < LEAST_PRODUCT:
+        if product < MIN_PRODUCT_RATIO:
             value += math.log(product)
             product = 1.0
     return value + math.log(product)
@@ -202,16 +207,16 @@ def draw_sides(
 
 @kernel(inline=True)
 def around_anchors(opens: Ints, anchors: tuple[int, int]) -> Ints:
-    """(n,) side 0 or 1 for the two anchors and the samples around them, -1 for others."""
+    """Return side (n,): 0 or 1 for the two anchors and the samples around them, -1 for others."""
     side = np.full(len(opens), -1, np.int64)
     for s in range(2):
         r = anchors[s]
         side[r] = s
-        for step in range(1, AROUND + 1):
+        for step in range(1, ANCHOR_SAMPLES + 1):
             if r - step < 0 or opens[r - step + 1] == 1 or side[r - step] == 1 - s:
                 break
             side[r - step] = s
-        for step in range(1, AROUND + 1):
+        for step in range(1, ANCHOR_SAMPLES + 1):
             if r + step >= len(opens) or opens[r + step] == 1 or side[r + step] == 1 - s:
                 break
             side[r + step] = s
@@ -229,21 +234,22 @@ def log_sides(
     side: Ints,
     given: bool,
 ) -> float:
-    """Draw sides (n,) for the samples of a group, or take them as given; returns the log-probability of drawing them.
+    """Draw sides (n,) for a group's samples, or use the given ones; return their log-probability.
 
-    Everything but the last draw depends on the samples and the two anchors only, so that it is the same there and back.
+    All but the last draw depends only on the samples and the two anchors, so that it is the same
+    for a move and its reverse.
     """
     (m, d), n = (len(joint.g0), len(joint.blur)), len(side)
     outer, sums, factor = np.empty((2, m, m)), np.empty((2, 2)), np.empty((m, m))
     emitted = States(np.empty((2, d, m)), np.empty((2, 2)))
-    ratio, message, scratch = np.empty(n), np.empty(n), np.empty((3, BLOCK))
+    ratio, message, scratch = np.empty(n), np.empty(n), np.empty((3, BLOCK_SAMPLES))
     members, masses = np.empty((m, n)), np.empty(n)
     for r in range(n):
         masses[r] = data.mass[group.members[r]]
         for i in range(m):
             members[i, r] = data.v[group.members[r], i]
     work = around_anchors(group.opens, anchors)
-    for turn in range(ROUNDS + 1):
+    for turn in range(REFINEMENTS_COUNT + 1):
         if turn > 0:
             fit_sides(data, group, work, outer, sums)
         for s in range(2):
@@ -254,15 +260,18 @@ def log_sides(
                 factor, joint.weight * sums[s, 0], joint, emitted.coef[s], emitted.shape[s]
             )
         likelihood_ratios(members, masses, emitted, joint.weight, scratch, ratio)
-        ratio[anchors[0]], ratio[anchors[1]] = 1.0 / CERTAIN, CERTAIN  # of these there is no doubt
-        if turn < ROUNDS:
+        ratio[anchors[0]], ratio[anchors[1]] = 1.0 / CERTAIN_RATIO, CERTAIN_RATIO
+        if turn < REFINEMENTS_COUNT:
             best_sides(ratio, group.opens, stay, message, work)
     return draw_sides(state, ratio, group.opens, stay, message, side, given)
 
 
 @kernel(inline=True)
 def predecessors(n: Ints, k: int) -> int:
-    """Rows of n (L + 1, L), other than k's own, from which state k is entered; at least 1. So many tables it has at least."""
+    """Return the number of rows of n (L + 1, L), except row k, that enter state k; at least 1.
+
+    It is a lower bound of the number of tables of state k.
+    """
     count = 0
     for j in range(n.shape[0]):
         if j != k and n[j, k] > 0:
@@ -272,7 +281,10 @@ def predecessors(n: Ints, k: int) -> int:
 
 @kernel(inline=True)
 def log_share(a: float, first: int, second: int, log_first: float, log_second: float) -> float:
-    """Dirichlet prior of a pair of β over the density its shares are drawn with, Beta(a + first, a + second); logarithm."""
+    """Return the log ratio of the Dirichlet prior of two β to the density of their drawn shares.
+
+    The shares are drawn from Beta(a + first, a + second).
+    """
     value = (
         math.lgamma(a + first) + math.lgamma(a + second) - math.lgamma(2.0 * a + first + second)
     )
@@ -281,7 +293,7 @@ def log_share(a: float, first: int, second: int, log_first: float, log_second: f
 
 @kernel(inline=True)
 def chosen_state(counts: Ints, number: int, occupied: bool) -> int:
-    """Return state number `number` of those with counts (L,) above 0, or of the others."""
+    """Return state number `number` of the occupied states by counts (L,), or of the empty ones."""
     for k in range(len(counts)):
         if (counts[k] > 0) == occupied:
             if number == 0:
@@ -292,7 +304,7 @@ def chosen_state(counts: Ints, number: int, occupied: bool) -> int:
 
 @kernel(inline=True)
 def log_pair(members: int, left: int, right: int, used: int, empty: int) -> float:
-    """Logarithm of how often a merge draws a pair and its anchors, over how often the split that undoes it does.
+    """Return the log ratio of the probabilities to draw a merge, and its reverse split.
 
     Args:
         members: samples of both.
@@ -306,7 +318,7 @@ def log_pair(members: int, left: int, right: int, used: int, empty: int) -> floa
 
 @kernel(inline=True)
 def draw_split(state: State, counts: Ints) -> tuple[int, int, int, int]:
-    """Draw a state of two samples or more, an empty one (-1 if there are none), and the numbers of two anchors in the first."""
+    """Draw a state, an empty state (-1: impossible), and the numbers of two anchors."""
     used = (counts > 0).sum()
     i = chosen_state(counts, int(uniform(state) * used), True)
     if used == len(counts) or counts[i] < 2:
@@ -319,7 +331,7 @@ def draw_split(state: State, counts: Ints) -> tuple[int, int, int, int]:
 
 @kernel(inline=True)
 def draw_merge(state: State, counts: Ints) -> tuple[int, int, int, int]:
-    """Draw two states in use, the second -1 if there are none, and the number of an anchor in each."""
+    """Draw two occupied states (the second is -1 if impossible), and an anchor in each."""
     used = (counts > 0).sum()
     i = chosen_state(counts, int(uniform(state) * used), True)
     if used < 2:
@@ -388,7 +400,7 @@ def log_undone(
     stats: Statistics,
     drawn: tuple[int, int, int, int],
 ) -> float:
-    """Log-probability of dividing what a merge makes one as it was divided before, by anchors numbered within both states."""
+    """Return the log-probability of the split that undoes a merge, given its anchors' numbers."""
     group, numbers = group_of(labels, data.ends, drawn[0], drawn[1], stats), (drawn[2], drawn[3])
     side = np.empty(len(group.members), np.int64)
     first, second = 0, 0
@@ -407,7 +419,7 @@ def log_undone(
 
 @kernel(inline=True)
 def relabel(labels: Ints, group: Group, side: Ints, i: int, j: int) -> None:
-    """Give labels (T,) of state j to state i, then those of a group's side 1 to j; side (n,)."""
+    """Change labels (T,) of state j to i, then those of a group's side 1, by side (n,), to j."""
     for t in range(len(labels)):
         if labels[t] == j:
             labels[t] = i
@@ -420,7 +432,7 @@ def relabel(labels: Ints, group: Group, side: Ints, i: int, j: int) -> None:
 def split_or_merge(
     state: State, data: Data, joint: Joint, top: Floats, labels: Ints, stats: Statistics
 ) -> bool:
-    """Propose one move and accept or reject it (Metropolis-Hastings); returns whether it was accepted.
+    """Propose one move, and accept or reject it (Metropolis-Hastings); return whether accepted.
 
     Args:
         state: generator.
@@ -433,7 +445,7 @@ def split_or_merge(
     threshold = np.log(uniform(state))
     splits = uniform(state) < 0.5
     counts = stats.n.sum(axis=0)
-    stay = min(max(top[2], LEAST_STAY), MOST_STAY)
+    stay = min(max(top[2], MIN_STAY_PROBABILITY), MAX_STAY_PROBABILITY)
     drawn = draw_split(state, counts) if splits else draw_merge(state, counts)
     if drawn[1] < 0:
         return False
@@ -443,17 +455,17 @@ def split_or_merge(
         else propose_merge(joint, stats, drawn)
     )
     i, j = drawn[0], drawn[1]
-    beta, factors, own, gain = top[3:], np.empty_like(move.outer), np.empty(2), move.gain
+    beta, gain = top[3:], move.gain
+    factors, marginal = np.empty_like(move.outer), np.empty(2)
     for s in range(2):
         posterior_factor(move.outer[s], move.sums[s, 1], joint, factors[s])
-        own[s] = log_marginal(factors[s], joint.weight * move.sums[s, 0], joint)
-    gain += own[0] + own[1] - stats.own[i] - stats.own[j]
+        marginal[s] = log_marginal(factors[s], joint.weight * move.sums[s, 0], joint)
+    gain += marginal[0] + marginal[1] - stats.marginal[i] - stats.marginal[j]
     after = beta.copy()
     gain += draw_shares(state, top[0] / len(beta), stats.n, move, beta, after)
-    gain += log_transitions(move.n, top[1], top[2], after) - log_transitions(
-        stats.n, top[1], top[2], beta
-    )
-    if not splits and gain >= threshold:  # what costs most comes last
+    log_after = log_transitions(move.n, top[1], top[2], after)
+    gain += log_after - log_transitions(stats.n, top[1], top[2], beta)
+    if not splits and gain >= threshold:  # the most expensive part comes last
         gain += log_undone(state, data, joint, stay, labels, stats, drawn)
     if not gain >= threshold:
         return False
@@ -462,7 +474,7 @@ def split_or_merge(
     for s in range(2):
         k = move.pair[s]
         stats.outer[k], stats.sums[k] = move.outer[s], move.sums[s]
-        stats.factors[k], stats.own[k] = factors[s], own[s]
+        stats.factors[k], stats.marginal[k] = factors[s], marginal[s]
     return True
 
 
@@ -470,15 +482,17 @@ def split_or_merge(
 def draw_shares(
     state: State, a: float, n: Ints, move: Proposal, beta: Floats, after: Floats
 ) -> float:
-    """Draw how the pair shares its β after a move, into after (L,); returns the gain. `a` is γ / L, n the counts before."""
+    """Draw the shares of a pair in its β after a move, into after (L,); return the gain.
+
+    `a` is γ / L; n are the counts before the move.
+    """
     i, j = move.pair[0], move.pair[1]
     both = beta[i] + beta[j]
-    here, there = (
-        (predecessors(n, j) if n[:, j].any() else 0),
-        (predecessors(move.n, j) if move.n[:, j].any() else 0),
-    )
-    share_i, share_j = log_beta_draw(state, a + predecessors(move.n, i), a + there)
-    gain: float = log_share(a, predecessors(move.n, i), there, share_i, share_j)
-    gain -= log_share(a, predecessors(n, i), here, np.log(beta[i] / both), np.log(beta[j] / both))
-    after[i], after[j] = max(both * np.exp(share_i), 1e-100), max(both * np.exp(share_j), 1e-100)
+    old = predecessors(n, j) if n[:, j].any() else 0
+    new = predecessors(move.n, j) if move.n[:, j].any() else 0
+    share_i, share_j = log_beta_draw(state, a + predecessors(move.n, i), a + new)
+    gain: float = log_share(a, predecessors(move.n, i), new, share_i, share_j)
+    gain -= log_share(a, predecessors(n, i), old, np.log(beta[i] / both), np.log(beta[j] / both))
+    after[i] = max(both * np.exp(share_i), 1e-100)
+    after[j] = max(both * np.exp(share_j), 1e-100)
     return gain

@@ -21,22 +21,21 @@ from scenario_gen.method.segmentation.hdp_hmm.problem import (
 )
 from scenario_gen.numerics import Floats
 
-WINDOWS = (9, 15, 5, 25)
-GUESS = (25.0, 0.1)  # ν0 - D and κ0 to begin with
-DEGREES_OF_FREEDOM = (2.0, 3.0, 4.0, 6.0, 10.0)
-LEAST_GAIN = 10.0
-CLUSTERS, MOST_STATES = 20, 160
-FULL = 0.8
-MORE_STATES = 2
-STAGES = (15, 10)
-LEAST_WEIGHT = 0.02
-KMEANS_ROUNDS = 10
-FAR_QUANTILE, FAR_MARGIN = 0.02, 0.5
+WINDOW_SAMPLES = (9, 15, 5, 25)  # averaged before k-means; each chain has another one
+INITIAL_EXTRA_COUNT, INITIAL_WORTH_WEIGHT = 25.0, 0.1  # ν0 - D and κ0
+DOF_COUNT = (2.0, 3.0, 4.0, 6.0, 10.0)  # candidates for the noise's degrees of freedom
+MIN_GAIN_LOG_RATIO = 10.0  # of heavy tails over Gaussian noise
+CLUSTERS_COUNT, MAX_STATES_COUNT = 20, 160
+FULL_SHARE = 0.8  # of the clusters in use, above which there are too few
+EXTRA_STATES_COUNT = 2  # of the other chains
+STAGE_ITERATIONS = (15, 10)  # Gibbs sweeps between two rounds of merging
+MIN_WEIGHT = 0.02  # of a sample
+TAIL_SHARE, TAIL_MARGIN_RATIO = 0.02, 0.5  # clipped before k-means
 
 
 @dataclass(frozen=True, eq=False)
 class Start:
-    """Where to start from, and the problem and prior to run under, chosen from the data."""
+    """Where a chain starts, and the problem and prior, whose open parameters are chosen."""
 
     problem: Problem
     prior: Prior
@@ -49,26 +48,22 @@ class Start:
 
 
 def cluster(problem: Problem, clusters: int, window: int, rng: np.random.Generator) -> Place:
-    """Labels of k-means on the samples averaged over `window`; what lies far outside the rest is drawn in first."""
+    """Label samples by k-means of moving averages over `window`; outliers are clipped first."""
     window = min(window, max(len(problem.v) // 8, 1))
     signals = problem.y if problem.regressors == 1 else _dynamics(problem)
-    low, high = np.quantile(signals, [FAR_QUANTILE, 1.0 - FAR_QUANTILE], axis=0)
-    margin = FAR_MARGIN * (high - low)
-    smooth = np.ascontiguousarray(
-        moving_mean(np.clip(signals, low - margin, high + margin), window)
-    )
+    low, high = np.quantile(signals, [TAIL_SHARE, 1.0 - TAIL_SHARE], axis=0)
+    margin = TAIL_MARGIN_RATIO * (high - low)
+    clipped = np.clip(signals, low - margin, high + margin)
+    smooth = np.ascontiguousarray(moving_mean(clipped, window))
     centres = min(clusters, max(2, len(smooth) // 4))
-    with (
-        warnings.catch_warnings(),
-        np.errstate(invalid="ignore"),
-    ):  # of clusters that run empty, of samples that are all the same
-        warnings.simplefilter("ignore", UserWarning)
-        _, labels = kmeans2(smooth, centres, iter=KMEANS_ROUNDS, minit="++", rng=rng)
+    with warnings.catch_warnings(), np.errstate(invalid="ignore"):
+        warnings.simplefilter("ignore", UserWarning)  # empty clusters, equal samples
+        _, labels = kmeans2(smooth, centres, iter=10, minit="++", rng=rng)
     return Place(compact(labels), problem.observed)
 
 
 def _dynamics(problem: Problem) -> Floats:
-    """What distinguishes autoregressive states, per row: sample, step and size of the step."""
+    """Return what distinguishes autoregressive states: sample, step and size of the step."""
     y = problem.y
     step = y - problem.v[:, 1 : 1 + problem.dimensions]
     size = np.abs(step)
@@ -76,48 +71,45 @@ def _dynamics(problem: Problem) -> Floats:
 
 
 def find_start(problem: Problem, config: SamplerConfig, rng: np.random.Generator) -> Start:
-    """Find where the first chain starts, and choose from the data what the model leaves open.
+    """Find where the first chain starts, and choose open parameters of the model from the data.
 
-    k-means on averaged samples gives labels; a few Gibbs sweeps clean them; states are merged while the marginal likelihood
-    grows; twice. Chosen on the way: how heavy the noise's tails are (`tails`), what a sample counts for (`sample_weight`), and
-    the mean of the states' covariances, which is what is seen within the states found. Where most clusters stay in use, it
-    begins again with twice as many.
+    k-means of averaged samples gives labels; a few Gibbs sweeps improve them; states are merged
+    while the marginal likelihood grows; all this twice. Chosen on the way: the tails of the noise
+    (`tails`), the weight of a sample (`sample_weight`), and the mean of the states' covariances.
+    If most clusters stay in use, it starts again with twice as many.
     """
-    clusters = config.states or CLUSTERS
+    clusters = config.states or CLUSTERS_COUNT
+    largest = min(MAX_STATES_COUNT, len(problem.v) // 8)
     while True:
-        start = _search(problem, config, clusters, rng)
-        if (
-            config.states
-            or start.states < FULL * clusters
-            or clusters >= min(MOST_STATES, len(problem.v) // 8)
-        ):
+        start = _start_with(problem, config, clusters, rng)
+        if config.states or start.states < FULL_SHARE * clusters or clusters >= largest:
             return start
         clusters *= 2
 
 
-def _search(
+def _start_with(
     problem: Problem, config: SamplerConfig, clusters: int, rng: np.random.Generator
 ) -> Start:
-    place = cluster(problem, clusters, WINDOWS[0], rng)
-    rough = _autocorrelation(problem, place)
-    prior = Prior(problem.within(place), *GUESS)
-    for stage, sweeps in enumerate(STAGES):
+    place = cluster(problem, clusters, WINDOW_SAMPLES[0], rng)
+    initial_correlation = _autocorrelation(problem, place)
+    prior = Prior(problem.within(place), INITIAL_EXTRA_COUNT, INITIAL_WORTH_WEIGHT)
+    for stage, sweeps in enumerate(STAGE_ITERATIONS):
         top = new_top(max(clusters, place.labels.max() + 1))
-        place, held, _, _ = problem.run(
-            config, prior, place, top, sweeps - 1, 1, int(rng.integers(2**62))
-        )
-        place = problem.merge(held, place)
-        prior = replace(held, within=problem.within(place))
+        seed = int(rng.integers(2**62))
+        place, drawn, _, _ = problem.run(config, prior, place, top, sweeps - 1, 1, seed)
+        place = problem.merge(drawn, place)
+        prior = replace(drawn, within=problem.within(place))
         if stage == 0:
             chosen = problem
             if config.dof == 0.0:
                 chosen = replace(chosen, dof=tails(problem, place))
             if config.weight == 0.0:
-                chosen = replace(chosen, weight=sample_weight(problem, place, rough))
+                weight = sample_weight(problem, place, initial_correlation)
+                chosen = replace(chosen, weight=weight)
             if chosen.dof == 0.0:
                 place = Place(place.labels, problem.observed)
             if chosen.weight != problem.weight:
-                place = cluster(chosen, clusters, WINDOWS[0], rng)
+                place = cluster(chosen, clusters, WINDOW_SAMPLES[0], rng)
             problem = chosen
     return Start(problem, prior, place)
 
@@ -125,19 +117,22 @@ def _search(
 def other_start(
     start: Start, config: SamplerConfig, index: int, rng: np.random.Generator
 ) -> Place:
-    """Where chain number `index` > 0 starts: k-means with another window, a few sweeps, merges, under the prior of `start`."""
-    problem, clusters = start.problem, start.states + MORE_STATES
-    place = cluster(problem, clusters, WINDOWS[index % len(WINDOWS)], rng)
-    place = problem.run(
-        config, start.prior, place, new_top(clusters), STAGES[1] - 1, 1, int(rng.integers(2**62))
-    )[0]
+    """Return where chain number `index` > 0 starts, under the prior of `start`.
+
+    It uses k-means with another window, a few sweeps, and merging.
+    """
+    problem, clusters = start.problem, start.states + EXTRA_STATES_COUNT
+    place = cluster(problem, clusters, WINDOW_SAMPLES[index % len(WINDOW_SAMPLES)], rng)
+    seed, sweeps = int(rng.integers(2**62)), STAGE_ITERATIONS[1]
+    place = problem.run(config, start.prior, place, new_top(clusters), sweeps - 1, 1, seed)[0]
     return problem.merge(start.prior, place)
 
 
 def tails(problem: Problem, place: Place) -> float:
-    """Degrees of freedom of the noise, of a grid, by the likelihood of the whitened squares; 0 (Gaussian) if none is far better.
+    """Return the most likely of DOF_COUNT given the whitened squares; 0 (Gaussian) if none is.
 
-    For each a common scale of the squares is fitted, too: states fitted under other tails have another spread.
+    For each a common scale of the squares is fitted, too: states fitted under other tails have
+    another spread.
     """
     squares = problem.unexplained(place)[2][place.mass > 0.0]
     d, n = problem.dimensions, len(squares)
@@ -145,53 +140,50 @@ def tails(problem: Problem, place: Place) -> float:
         return 0.0
     scale = n * d / max(float(squares.sum()), 1e-300)
     gaussian = 0.5 * n * d * (np.log(scale) - 1.0)
-    best, chosen = LEAST_GAIN / problem.weight, 0.0
-    for dof in DEGREES_OF_FREEDOM:
+    best, chosen = MIN_GAIN_LOG_RATIO / problem.weight, 0.0
+    for dof in DOF_COUNT:
         c = scale
         for _ in range(30):
             c = n * d / float(((dof + d) * squares / (dof + c * squares)).sum())
-        value = n * (
-            special.gammaln(0.5 * (dof + d))
-            - special.gammaln(0.5 * dof)
-            - 0.5 * d * np.log(0.5 * dof)
-        )
-        value += 0.5 * n * d * np.log(c) - 0.5 * (dof + d) * float(
-            np.log(1.0 + c * squares / dof).sum()
-        )
+        gammas = special.gammaln(0.5 * (dof + d)) - special.gammaln(0.5 * dof)
+        value = n * (gammas - 0.5 * d * np.log(0.5 * dof))
+        distances = float(np.log(1.0 + c * squares / dof).sum())
+        value += 0.5 * n * d * np.log(c) - 0.5 * (dof + d) * distances
         if value - gaussian > best:
             best, chosen = value - gaussian, dof
     return chosen
 
 
-def sample_weight(problem: Problem, place: Place, rough: float) -> float:
-    """What a sample counts for: (1 - φ) / (1 + φ), φ the lag-1 autocorrelation of what states leave unexplained.
+def sample_weight(problem: Problem, place: Place, initial_correlation: float) -> float:
+    """Return the weight of a sample: (1 - φ) / (1 + φ), φ the lag-1 autocorrelation of residuals.
 
-    An HMM takes samples as independent given their state. Where they are not (smoothed, slowly varying or oversampled
-    signals), it believes each wiggle and spends states on it. The weight makes n correlated samples count for as many
-    independent ones as they are worth; for independent samples it is 1. States that are not right yet leave
-    correlation too, so φ is the smaller of two: around k-means' labels (`rough`), and around those of `place`.
+    An HMM assumes independent samples given their state. If they are correlated (smoothed, slowly
+    varying or oversampled signals), it spends states on wiggles. The weight makes n correlated
+    samples count as many as the independent ones that hold the same information; for independent
+    samples it is 1. Wrong states leave correlation, too, so φ is the smaller one of that around
+    k-means' labels (`initial_correlation`) and that around the labels of `place`.
     """
-    phi = min(rough, _autocorrelation(problem, place))
-    return (
-        1.0
-        if phi < 2.0 / np.sqrt(len(problem.v))
-        else max((1.0 - phi) / (1.0 + phi), LEAST_WEIGHT)
-    )
+    phi = min(initial_correlation, _autocorrelation(problem, place))
+    if phi < 2.0 / np.sqrt(len(problem.v)):
+        return 1.0
+    return max((1.0 - phi) / (1.0 + phi), MIN_WEIGHT)
 
 
 def _autocorrelation(problem: Problem, place: Place) -> float:
-    """Lag-1 autocorrelation of the residuals, mean over channels, from neighbours with one label that were both observed."""
+    """Return the lag-1 autocorrelation of the residuals, mean over channels.
+
+    Only neighbours with one label count that were both observed.
+    """
     labels = place.labels
     residual = problem.unexplained(place)[0] * np.sqrt(place.mass)[:, None]
     pairs = labels[:-1] == labels[1:]
     pairs[problem.ends[:-1] - 1] = False
     if not pairs.any():
         return 0.0
-    seen = np.ones(residual.shape, np.bool_)
-    seen[problem.gaps] = ~problem.hidden
-    residual[~seen] = 0.0  # what was filled in repeats its neighbours
-    power = np.square(residual).sum(axis=0) / np.maximum(seen.sum(axis=0), 1) + 1e-300
-    both = (seen[:-1] & seen[1:])[pairs].sum(axis=0)
-    return float(
-        np.mean((residual[:-1] * residual[1:])[pairs].sum(axis=0) / np.maximum(both, 1) / power)
-    )
+    observed = np.ones(residual.shape, np.bool_)
+    observed[problem.gaps] = ~problem.hidden
+    residual[~observed] = 0.0  # interpolated values repeat their neighbours
+    power = np.square(residual).sum(axis=0) / np.maximum(observed.sum(axis=0), 1) + 1e-300
+    both = (observed[:-1] & observed[1:])[pairs].sum(axis=0)
+    products = (residual[:-1] * residual[1:])[pairs].sum(axis=0)
+    return float(np.mean(products / np.maximum(both, 1) / power))

@@ -1,7 +1,10 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Labels' transitions: counts, what they say of concentrations and stickiness, and draws of π (Fox et al. 2011, algorithm 3)."""
+"""Transitions: counts, concentrations, stickiness, and draws of β and π.
+
+Source: Fox et al. 2011, algorithm 3 and appendix.
+"""
 
 import math
 
@@ -18,17 +21,15 @@ from scenario_gen.method.segmentation.hdp_hmm.random import (
 from scenario_gen.numerics import Floats, Ints
 from scenario_gen.numerics.kernels import kernel
 
-# Hyperpriors in the order of `hyper`; what follows them there is the weight of a sample, the noise's degrees of freedom (0:
-# Gaussian) and the blur of each of the D channels.
+# Hyperpriors, in the order of `hyper`.
 HYPER = ("gamma_shape", "gamma_rate", "alpha_kappa_shape", "alpha_kappa_rate", "rho_a", "rho_b")
-SLICE_WIDTH = 1.0
-MOST_STEPS = 8
-SLICE_ROUNDS = 1
+SLICE_WIDTH_LOG_RATIO = 1.0
+MAX_OUT_STEPS = 8
 
 
 @kernel(inline=True)
 def count_transitions(labels: Ints, ends: Ints, n: Ints) -> None:
-    """Fill n (L + 1, L) with transition counts; the last row counts the first labels of the sequences."""
+    """Fill n (L + 1, L) with transition counts; the last row counts first labels."""
     states = n.shape[1]
     for j in range(states + 1):
         for k in range(states):
@@ -45,14 +46,14 @@ def count_transitions(labels: Ints, ends: Ints, n: Ints) -> None:
 
 @kernel(inline=True)
 def sample_tables(state: State, n: Ints, top: Floats, beta: Floats, tables: Floats) -> None:
-    """Draw the tables of every dish in every restaurant, and override those that stickiness alone opened.
+    """Draw the tables m_jk of every dish k in every restaurant j, less the overridden ones.
 
     Args:
         state: generator.
         n: (L + 1, L) counts.
         top: (γ, α+κ, ρ).
         beta: (L,).
-        tables: (L,) output, tables of each dish that β explains.
+        tables: (L,) output, tables of each dish that β explains: Σ_j m_jk without the sticky ones.
     """
     states = n.shape[1]
     total, rho = top[1], top[2]
@@ -84,7 +85,7 @@ def log_rising(a: float, n: int) -> float:
 
 @kernel(inline=True)
 def log_transitions(n: Ints, total: float, rho: float, beta: Floats) -> float:
-    """Return log p(labels | β, α+κ, ρ) with π integrated out, from counts n (L + 1, L) and β (L,)."""
+    """Return log p(labels | β, α+κ, ρ), π integrated out, from counts n (L + 1, L), β (L,)."""
     states = n.shape[1]
     alpha, kappa = (1.0 - rho) * total, rho * total
     value = 0.0
@@ -101,7 +102,10 @@ def log_transitions(n: Ints, total: float, rho: float, beta: Floats) -> float:
 
 @kernel(inline=True)
 def log_concentration(n: Ints, hyper: Floats, beta: Floats, x: float, y: float) -> float:
-    """Log density of x = log(α+κ) and y = logit ρ, given counts n (L + 1, L) and β (L,), π integrated out, up to a constant."""
+    """Return the log density of x = log(α+κ) and y = logit ρ, π integrated out, up to a constant.
+
+    Given are counts n (L + 1, L) and β (L,).
+    """
     total = np.exp(x)
     rho = 1.0 / (1.0 + np.exp(-y))
     value = log_transitions(n, total, rho, beta)
@@ -139,58 +143,55 @@ def slice_concentration(
         x and y after the step, and `log_concentration` there.
     """
     height = value + np.log(uniform(state))
-    here = x if along == 0 else y
-    low = here - SLICE_WIDTH * uniform(state)
-    high = low + SLICE_WIDTH
-    left = int(MOST_STEPS * uniform(state))
-    right = MOST_STEPS - 1 - left
+    current = x if along == 0 else y
+    low = current - SLICE_WIDTH_LOG_RATIO * uniform(state)
+    high = low + SLICE_WIDTH_LOG_RATIO
+    left = int(MAX_OUT_STEPS * uniform(state))
+    right = MAX_OUT_STEPS - 1 - left
     while left > 0 and along_density(n, hyper, beta, x, y, low, along) > height:
-        low -= SLICE_WIDTH
+        low -= SLICE_WIDTH_LOG_RATIO
         left -= 1
     while right > 0 and along_density(n, hyper, beta, x, y, high, along) > height:
-        high += SLICE_WIDTH
+        high += SLICE_WIDTH_LOG_RATIO
         right -= 1
     while True:
-        there = low + (high - low) * uniform(state)
-        new = along_density(n, hyper, beta, x, y, there, along)
+        proposed = low + (high - low) * uniform(state)
+        new = along_density(n, hyper, beta, x, y, proposed, along)
         if new > height:
             break
-        if there < here:
-            low = there
+        if proposed < current:
+            low = proposed
         else:
-            high = there
+            high = proposed
     if along == 0:
-        return there, y, new
-    return x, there, new
+        return proposed, y, new
+    return x, proposed, new
 
 
 @kernel(inline=True)
 def along_density(
     n: Ints, hyper: Floats, beta: Floats, x: float, y: float, at: float, along: int
 ) -> float:
-    """`log_concentration` of counts n (L + 1, L) and β (L,) with x or y replaced by `at`."""
-    return (
-        log_concentration(n, hyper, beta, at, y)
-        if along == 0
-        else log_concentration(n, hyper, beta, x, at)
-    )
+    """Return `log_concentration` with x (along = 0) or y (along = 1) replaced by `at`."""
+    if along == 0:
+        return log_concentration(n, hyper, beta, at, y)
+    return log_concentration(n, hyper, beta, x, at)
 
 
 @kernel(inline=True)
 def sample_stickiness(state: State, n: Ints, hyper: Floats, top: Floats, beta: Floats) -> None:
-    """Draw α+κ and ρ, in top (3,), given counts n (L + 1, L) and β (L,), by slices in log(α+κ) and logit ρ.
+    """Draw α+κ and ρ, in top (3,), by slice sampling of log(α+κ) and logit ρ.
 
-    Tables and π are integrated out.
-    The usual draws given tables (Fox et al. 2011, appendix) move by little: tables nearly determine both.
+    Given are counts n (L + 1, L) and β (L,); tables and π are integrated out. The usual draws
+    given the tables (Fox et al. 2011, appendix) mix slowly, since tables nearly determine both.
     """
     x = np.log(top[1])
     y = np.log(top[2] / (1.0 - top[2]))
     value = log_concentration(n, hyper, beta, x, y)
-    for _ in range(SLICE_ROUNDS):
-        if hyper[2] > 0.0:
-            x, y, value = slice_concentration(state, n, hyper, beta, x, y, value, 0)
-        if hyper[4] > 0.0:
-            x, y, value = slice_concentration(state, n, hyper, beta, x, y, value, 1)
+    if hyper[2] > 0.0:
+        x, y, value = slice_concentration(state, n, hyper, beta, x, y, value, 0)
+    if hyper[4] > 0.0:
+        x, y, value = slice_concentration(state, n, hyper, beta, x, y, value, 1)
     top[1] = np.exp(x)
     top[2] = min(max(1.0 / (1.0 + np.exp(-y)), 1e-9), 1.0 - 1e-9)
 
@@ -199,15 +200,15 @@ def sample_stickiness(state: State, n: Ints, hyper: Floats, top: Floats, beta: F
 def sample_transitions(
     state: State, n: Ints, hyper: Floats, top: Floats, beta: Floats, pi: Floats
 ) -> None:
-    """Draw α+κ, ρ, then γ and β, then π, given transition counts (Fox et al., algorithm 3, steps 3-5, and appendix).
+    """Draw α+κ, ρ, then γ and β, then π, given transition counts (steps 3 to 5, and appendix).
 
-    γ is drawn with β integrated out, exactly for the weak limit: each dish's tables are seated once more, in a
-    restaurant of concentration γ / L.
+    γ is drawn with β integrated out, which is exact for the weak limit: each dish's tables are
+    seated again, in a restaurant of concentration γ / L.
 
     Args:
         state: generator.
         n: (L + 1, L) counts.
-        hyper: see HYPER; a shape (or rho_a) <= 0 keeps that concentration as it is.
+        hyper: see HYPER; a shape (or rho_a) <= 0 means that this concentration is fixed.
         top: (γ, α+κ, ρ), updated.
         beta: (L,) updated.
         pi: (L + 1, L) updated.
