@@ -103,13 +103,16 @@ class CdrWriter:
             self._count(nanoseconds)
         elif isinstance(kind, str):
             self._numbers(kind, np.zeros(_dtype(kind).shape) if value is None else value)
-        elif isinstance(kind[0], dict) or kind[0] == "string":
-            self._count(len(value or ()))
-            for item in value or ():
-                self._append(kind[0], item)
         else:
-            self._count(0 if value is None else len(value))
-            self._numbers(kind[0], () if value is None else value)
+            self._sequence(kind[0], () if value is None else value)
+
+    def _sequence(self, kind: Any, values: Any) -> None:
+        self._count(len(values))
+        if isinstance(kind, dict) or kind == "string":
+            for value in values:
+                self._append(kind, value)
+        else:
+            self._numbers(kind, values)
 
     def _count(self, count: int) -> None:
         self.body += bytes(-len(self.body) % 4) + int(count).to_bytes(4, "little")

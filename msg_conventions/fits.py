@@ -23,6 +23,8 @@ from scenario_gen.base.errors import guarded, InputError
 from scenario_gen.numerics import Floats, Ints
 from scenario_gen.types import BoundaryStates, Encounter, Fit, FittedVehicle, Loss, Route
 
+CLOSE_ANCHORS_M = 1.0  # anchors that moved less need no warning
+
 
 def anchor_stamps(encounter: Encounter, changepoints: Ints) -> list[int]:
     """Return the K + 2 stamps [ns] of start, changepoints (K,) and end on the template's clock."""
@@ -72,47 +74,53 @@ def decode_fit(data: bytes, source: str = "fit") -> tuple[int, str, BoundaryStat
 def fit_statuses(
     fit: Fit, node: str, more: Mapping[str, str] | None = None, routes: Sequence[Route] = ()
 ) -> tuple[Status, ...]:
-    """Return the decisions: a status per vehicle, with figures of its route, one for the notes.
+    """Return the decisions of the fitting: a status per vehicle, and one with notes and losses.
 
-    Each with the values `more`.
+    Args:
+        fit: the fit.
+        node: full name of the planner.
+        more: values for each status.
+        routes: the planned routes, whose figures and remarks are added.
     """
-    planned = [route.figures() for route in routes] or [{}] * len(fit.fitted)
-    remarks = [
-        route.remarks(vehicle.id) for vehicle, route in zip(fit.vehicles, routes, strict=False)
-    ]
-    per_vehicle = tuple(
-        Status(
-            f"{node}: fit of {vehicle.id}",
-            Level.OK
-            if float(fitted.moved.max()) < 1.0 and not (remarks and remarks[k])
-            else Level.WARN,
-            f"{fitted.manoeuvre}, scale {fitted.scale:.3f}, moved by at most "
-            f"{float(fitted.moved.max()):.2f} m",
-            {
-                "manoeuvre": fitted.manoeuvre,
-                "scale": repr(fitted.scale),
-                "moved_m": json.dumps(fitted.moved.tolist()),
-                "stands": json.dumps([bool(value) for value in fitted.stands]),
-                "turned_rad": json.dumps(
-                    list(fitted.turned) if np.isfinite(fitted.turned).all() else None
-                ),
-                **{key: json.dumps(value) for key, value in planned[k].items()},
-                **(more or {}),
-            },
+    common = dict(more or {})
+    statuses = []
+    notes = [str(note) for note in fit.notes]
+    for k, (vehicle, fitted) in enumerate(zip(fit.vehicles, fit.fitted, strict=True)):
+        remarks = routes[k].remarks(vehicle.id) if routes else ()
+        figures = routes[k].figures() if routes else {}
+        notes += map(str, remarks)
+        largest = float(fitted.moved.max())
+        is_close = largest < CLOSE_ANCHORS_M and not remarks
+        statuses.append(
+            Status(
+                f"{node}: fit of {vehicle.id}",
+                Level.OK if is_close else Level.WARN,
+                f"{fitted.manoeuvre}, scale {fitted.scale:.3f}, moved by at most {largest:.2f} m",
+                _fitted_values(fitted)
+                | {key: json.dumps(value) for key, value in figures.items()}
+                | common,
+            )
         )
-        for k, (vehicle, fitted) in enumerate(zip(fit.vehicles, fit.fitted, strict=True))
-    )
-    sentences = (*fit.notes, *(remark for each in remarks for remark in each))
-    notes = {f"note.{k}": str(note) for k, note in enumerate(sentences)}
-    lost = {
-        f"lost.{k}": json.dumps([loss.kind, list(loss.vehicles), loss.message])
-        for k, loss in enumerate(fit.losses)
-    }
-    message = "recording fitted to the road" + (
-        f"; {len(lost)} of its properties are not kept" if lost else ""
-    )
+    values = {f"note.{k}": note for k, note in enumerate(notes)}
+    for k, loss in enumerate(fit.losses):
+        values[f"lost.{k}"] = json.dumps([loss.kind, list(loss.vehicles), loss.message])
+    message = "recording fitted to the road"
+    if fit.losses:
+        message += f"; {len(fit.losses)} of its properties are not kept"
     level = Level.WARN if any(loss.kind != "arm" for loss in fit.losses) else Level.OK
-    return (*per_vehicle, Status(f"{node}: fit", level, message, notes | lost | dict(more or {})))
+    return (*statuses, Status(f"{node}: fit", level, message, values | common))
+
+
+def _fitted_values(fitted: FittedVehicle) -> dict[str, str]:
+    """Return the decisions of the fitting for a vehicle."""
+    has_turn = np.isfinite(fitted.turned).all()
+    return {
+        "manoeuvre": fitted.manoeuvre,
+        "scale": repr(fitted.scale),
+        "moved_m": json.dumps(fitted.moved.tolist()),
+        "stands": json.dumps([bool(value) for value in fitted.stands]),
+        "turned_rad": json.dumps(list(fitted.turned) if has_turn else None),
+    }
 
 
 def decode_losses(values: Mapping[str, str]) -> tuple[Loss, ...]:
@@ -121,15 +129,13 @@ def decode_losses(values: Mapping[str, str]) -> tuple[Loss, ...]:
     Raises:
         InputError: it is damaged.
     """
-    found = []
+    losses = []
     for key, text in values.items():
         if key.startswith("lost."):
             with guarded(f"fit: {key} is damaged"):
                 kind, vehicles, sentence = json.loads(text)
-                found.append(
-                    Loss(str(kind), tuple(str(vehicle) for vehicle in vehicles), str(sentence))
-                )
-    return tuple(found)
+                losses.append(Loss(str(kind), tuple(map(str, vehicles)), str(sentence)))
+    return tuple(losses)
 
 
 def with_figures(route: Route, statuses: Mapping[str, Mapping[str, str]], vehicle: str) -> Route:

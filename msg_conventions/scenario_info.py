@@ -291,7 +291,7 @@ def decode_info(data: bytes, source: str = INFO) -> tuple[Info, ...]:
         InputError: naming `source`, the message is damaged, or a key that every entry or summary
             has is missing.
     """
-    found: list[Info] = []
+    infos: list[Info] = []
     for status in decode_diagnostics(data, source)[1]:
         values, where = status.values, f"{source}: {status.name!r}"
         if not {"published", "sha256"} & values.keys():
@@ -299,16 +299,15 @@ def decode_info(data: bytes, source: str = INFO) -> tuple[Info, ...]:
         if "request" not in values:
             raise InputError(f"{where}: request is missing")
         if "published" in values:
-            found.append(
-                RequestSummary(values["request"], _count(values, "published", where), status)
-            )
+            count = _count(values, "published", where)
+            infos.append(RequestSummary(values["request"], count, status))
         else:
-            found.append(_entry(status, where))
-    return tuple(found)
+            infos.append(_entry(status, where))
+    return tuple(infos)
 
 
 def _entry(status: Status, where: str) -> ScenarioEntry:
-    """Return the entry that a status is."""
+    """Return the entry of a status."""
     values = status.values
     index, seed = (_count(values, key, where) for key in ("index", "seed"))
     with guarded(f"{where}: {MESSAGES} of {status.message}"):
@@ -344,14 +343,6 @@ def scenario_entry(
     """
     ids = [vehicle.id for vehicle in template]
     rows = [ids.index(vehicle.id) for vehicle in scenario.vehicles]
-    own = asked.relaxed[[ids.index(ego.vehicle.id)] if ego is not None else []]
-    several = messages_of(data) if not scenario.all_present else ()
-    sizes = [[vehicle.length, vehicle.width] for vehicle in scenario.vehicles]
-    drive = scenario.reference_drive
-    spans = [
-        [float(scenario.time[first]), float(scenario.time[last])]
-        for first, last in scenario.present.tolist()
-    ]
     values = {
         "request": request,
         "index": str(scenario.index),
@@ -359,37 +350,37 @@ def scenario_entry(
         "sha256": digest(data),
         "achieved_start": _states_text(scenario, 0),
         "achieved_end": _states_text(scenario, -1),
-        **({} if scenario.all_present else {PRESENT: json.dumps(spans)}),
-        **(
-            {SIZES: json.dumps(sizes)}
-            if sizes != [[template[n].length, template[n].width] for n in rows]
-            else {}
-        ),
-        **(
-            {MESSAGES: json.dumps([digest(message) for message in several])}
-            if len(several) > 1
-            else {}
-        ),
+        **_presence_values(scenario, data),
         **(about or {}),
         **fact_values(scenario.facts),
         **ego_values(ego),
-        **(
-            {}
-            if drive is None
-            else {EGO_WITNESS: digest(encode_scenario(drive, stamp_of(data, INFO)))}
-        ),
         "asked_start": json.dumps(asked.start[rows].tolist()),
         "asked_end": json.dumps(asked.end[rows].tolist()),
-        **{
-            key: json.dumps(freed.tolist())
-            for key, freed in ((FREED, asked.relaxed[rows]), (EGO_FREED, own))
-            if freed.any()
-        },
     }
-    status = Status(
-        f"{node}: scenario", Level.OK, f"scenario {scenario.index} of request {request}", values
-    )
-    return _entry(status, INFO)
+    sizes = [[vehicle.length, vehicle.width] for vehicle in scenario.vehicles]
+    if sizes != [[template[n].length, template[n].width] for n in rows]:
+        values[SIZES] = json.dumps(sizes)
+    if scenario.reference_drive is not None:
+        witness = encode_scenario(scenario.reference_drive, stamp_of(data, INFO))
+        values[EGO_WITNESS] = digest(witness)
+    ego_rows = [] if ego is None else [ids.index(ego.vehicle.id)]
+    for key, relaxed in ((FREED, asked.relaxed[rows]), (EGO_FREED, asked.relaxed[ego_rows])):
+        if relaxed.any():
+            values[key] = json.dumps(relaxed.tolist())
+    message = f"scenario {scenario.index} of request {request}"
+    return _entry(Status(f"{node}: scenario", Level.OK, message, values), INFO)
+
+
+def _presence_values(scenario: Scenario, data: bytes) -> dict[str, str]:
+    """Return the times of presence and the messages' hashes, unless all are present throughout."""
+    if scenario.all_present:
+        return {}
+    spans = scenario.time[scenario.present].tolist()
+    messages = messages_of(data)
+    values = {PRESENT: json.dumps(spans)}
+    if len(messages) > 1:
+        values[MESSAGES] = json.dumps([digest(message) for message in messages])
+    return values
 
 
 def request_summary(

@@ -239,13 +239,19 @@ def _read_points(reader: CdrReader, source: str, n: int, count: int) -> Points:
         InputError: naming `source`, the message is damaged or lacks poses.
     """
     points = [reader.fields(layouts.POINT) for _ in range(count)]
-    blocks = []
-    for name, width in SEQUENCES.items():
-        rows = [getattr(point, name) for point in points]
-        for k, row in enumerate(rows):
-            if len(row) != n and (len(row) or width == 7):
-                raise InputError(f"{source}: point {k} has {len(row)} entries for {n} joint names")
-        block = [row if len(row) else np.zeros((n, width)) for row in rows]
-        blocks.append(np.array(block).reshape(count, n, width))
-    pose, velocity, acceleration = blocks
-    return np.array([point.time for point in points], dtype=np.int64), pose, velocity, acceleration
+    time_ns = np.array([point.time for point in points], dtype=np.int64)
+    pose = _stacked([point.transforms for point in points], n, 7, source)
+    velocity = _stacked([point.velocities for point in points], n, 6, source)
+    acceleration = _stacked([point.accelerations for point in points], n, 6, source)
+    return time_ns, pose, velocity, acceleration
+
+
+def _stacked(rows: list[Floats], n: int, width: int, source: str) -> Floats:
+    """Return the entries of all points (T, n, width); only poses may not be missing."""
+    stacked = np.zeros((len(rows), n, width))
+    for k, row in enumerate(rows):
+        if len(row) == n:
+            stacked[k] = row
+        elif len(row) or width == SEQUENCES["transforms"]:
+            raise InputError(f"{source}: point {k} has {len(row)} entries for {n} joint names")
+    return stacked

@@ -15,17 +15,17 @@ from typing import Any, NoReturn
 
 from scenario_gen.base.errors import guarded, InputError
 
-MOST_YAML = (
+MAX_YAML_BYTES = (
     512 * 1024
-)  # bytes; the parameters of all stages take 9 kB, the metadata of a bag of 1000 topics 500 kB
-MOST_JSON = 8 * 1024 * 1024  # bytes; the figures of one case take 9 kB
-DEEPEST = 32  # nested lists and mappings
+)  # all parameters have 9 kB, the metadata of a bag of 1000 topics 500 kB
+MAX_JSON_BYTES = 8 * 1024 * 1024  # the figures of one case have 9 kB
+MAX_NESTING_LEVELS = 32  # nested lists and mappings
 WHOLE = 2**63  # bound of the integers that parameters and stamps can be
-LARGEST = 1e300  # of a number in JSON: finite, also after some arithmetic
+MAX_NUMBER_FACTOR = 1e300  # of a number in JSON: finite, also after some arithmetic
 PLAIN = frozenset(
     f"tag:yaml.org,2002:{kind}" for kind in ("null", "bool", "int", "float", "str", "seq", "map")
 )
-NUMBER = {"type": "number", "minimum": -LARGEST, "maximum": LARGEST}
+NUMBER = {"type": "number", "minimum": -MAX_NUMBER_FACTOR, "maximum": MAX_NUMBER_FACTOR}
 COUNT = {"type": "integer", "minimum": 0, "maximum": WHOLE - 1}
 
 
@@ -60,12 +60,12 @@ def _loader() -> Any:
     return Loader
 
 
-def parse_yaml(text: str, what: str) -> Any:
+def parse_yaml(text: str, source: str) -> Any:
     """Return the value of a YAML text: mappings, lists, texts, numbers, true, false and null.
 
     Args:
         text: one document.
-        what: names it in messages.
+        source: names it in messages.
 
     Raises:
         InputError: the text is too long, too deep, has aliases or tags of other kinds, or is no
@@ -73,25 +73,23 @@ def parse_yaml(text: str, what: str) -> Any:
     """
     import yaml
 
-    if len(text) > MOST_YAML:
-        raise InputError(f"{what}: {len(text)} characters of YAML; at most {MOST_YAML} are read")
+    if len(text) > MAX_YAML_BYTES:
+        raise InputError(
+            f"{source}: {len(text)} characters of YAML; at most {MAX_YAML_BYTES} are read"
+        )
     try:
-        _check_events(text, what)
+        _check_events(text, source)
         return yaml.load(text, Loader=_loader())
     except yaml.YAMLError as error:
-        raise InputError(f"{what}: {_yaml_problem(error)}") from error
-    except (
-        ValueError,
-        KeyError,
-        IndexError,
-        AttributeError,
-    ) as error:  # PyYAML's own constructors, of `!!int ""` or `!!bool x`
+        raise InputError(f"{source}: {_yaml_problem(error)}") from error
+    except (ValueError, KeyError, IndexError, AttributeError) as error:
+        # PyYAML's constructors raise these for `!!int ""` or `!!bool x`.
         raise InputError(
-            f"{what}: a value does not suit its tag ({type(error).__name__})"
+            f"{source}: a value does not suit its tag ({type(error).__name__})"
         ) from error
 
 
-def _check_events(text: str, what: str) -> None:
+def _check_events(text: str, source: str) -> None:
     """Check a YAML text's structure before any value is built from it.
 
     Raises:
@@ -101,7 +99,7 @@ def _check_events(text: str, what: str) -> None:
 
     depth = 0
     for event in yaml.parse(text, Loader=_loader()):
-        place = f"{what}, line {event.start_mark.line + 1}, column {event.start_mark.column + 1}"
+        place = f"{source}, line {event.start_mark.line + 1}, column {event.start_mark.column + 1}"
         if isinstance(event, yaml.AliasEvent):
             raise InputError(
                 f"{place}: the alias *{event.anchor} is not read; write the value out"
@@ -115,9 +113,9 @@ def _check_events(text: str, what: str) -> None:
         depth += isinstance(event, yaml.CollectionStartEvent) - isinstance(
             event, yaml.CollectionEndEvent
         )
-        if depth > DEEPEST:
+        if depth > MAX_NESTING_LEVELS:
             raise InputError(
-                f"{place}: lists or mappings nested more than {DEEPEST} deep are not read"
+                f"{place}: lists or mappings nested more than {MAX_NESTING_LEVELS} deep are not read"
             )
 
 
@@ -133,7 +131,7 @@ def _yaml_problem(error: Exception) -> str:
     return f"not YAML ({place}{problem})"
 
 
-def read_bytes(path: Path, most: int, what: str, remedy: str = "") -> bytes:
+def read_bytes(path: Path, most: int, source: str, remedy: str = "") -> bytes:
     """Return the content of a regular file of at most `most` bytes.
 
     `remedy` ends the message about a larger file.
@@ -142,44 +140,43 @@ def read_bytes(path: Path, most: int, what: str, remedy: str = "") -> bytes:
         InputError: it cannot be read, is no regular file, or is too large.
     """
     try:
-        if not stat.S_ISREG(
-            path.stat().st_mode
-        ):  # before it is opened: a pipe would wait for its writer
-            raise InputError(f"{what}: not a regular file")
+        # A pipe, if opened, would wait for its writer.
+        if not stat.S_ISREG(path.stat().st_mode):
+            raise InputError(f"{source}: not a regular file")
         with path.open("rb") as file:
             data = file.read(most + 1)
     except (OSError, ValueError) as error:  # ValueError: a name with a null byte
         raise InputError(
-            f"{what}: cannot be read ({getattr(error, 'strerror', None) or error})"
+            f"{source}: cannot be read ({getattr(error, 'strerror', None) or error})"
         ) from error
     if len(data) > most:
-        raise InputError(f"{what}: {path.stat().st_size} bytes; at most {most} are read{remedy}")
+        raise InputError(f"{source}: {path.stat().st_size} bytes; at most {most} are read{remedy}")
     return data
 
 
-def read_text(path: Path, most: int, what: str) -> str:
+def read_text(path: Path, most: int, source: str) -> str:
     """Return the text of a regular file of at most `most` bytes.
 
     Raises:
         InputError: as `read_bytes`, or it is not UTF-8.
     """
     try:
-        return read_bytes(path, most, what).decode("utf-8-sig")
+        return read_bytes(path, most, source).decode("utf-8-sig")
     except UnicodeDecodeError as error:
-        raise InputError(f"{what}: not UTF-8 text (byte {error.start})") from error
+        raise InputError(f"{source}: not UTF-8 text (byte {error.start})") from error
 
 
-def read_yaml(path: Path, what: str = "") -> Any:
+def read_yaml(path: Path, source: str = "") -> Any:
     """Return the value of a YAML file, as `parse_yaml` does.
 
     Raises:
         InputError: likewise, or the file cannot be read.
     """
-    what = what or str(path)
-    return parse_yaml(read_text(path, MOST_YAML, what), what)
+    source = source or str(path)
+    return parse_yaml(read_text(path, MAX_YAML_BYTES, source), source)
 
 
-def parse_json(text: str, what: str, schema: Mapping[str, Any]) -> Any:
+def parse_json(text: str, source: str, schema: Mapping[str, Any]) -> Any:
     """Return the value of a JSON text that conforms to a schema.
 
     Its numbers are finite if the schema uses `NUMBER`.
@@ -190,37 +187,37 @@ def parse_json(text: str, what: str, schema: Mapping[str, Any]) -> Any:
     """
 
     def refuse(name: str) -> NoReturn:
-        raise InputError(f"{what}: {name} is no JSON; write null where there is no number")
+        raise InputError(f"{source}: {name} is no JSON; write null where there is no number")
 
     try:
         value = json.loads(text, parse_constant=refuse)
     except RecursionError:
-        raise InputError(f"{what}: lists or objects are nested too deep") from None
+        raise InputError(f"{source}: lists or objects are nested too deep") from None
     except ValueError as error:
-        raise InputError(f"{what}: not JSON ({error})") from error
-    _check_schema(value, what, schema)
+        raise InputError(f"{source}: not JSON ({error})") from error
+    _check_schema(value, source, schema)
     return value
 
 
-def read_json(path: Path, schema: Mapping[str, Any], what: str = "") -> Any:
+def read_json(path: Path, schema: Mapping[str, Any], source: str = "") -> Any:
     """Return the value of a JSON file, as `parse_json` does.
 
     Raises:
         InputError: likewise, or the file cannot be read.
     """
-    what = what or str(path)
-    return parse_json(read_text(path, MOST_JSON, what), what, schema)
+    source = source or str(path)
+    return parse_json(read_text(path, MAX_JSON_BYTES, source), source, schema)
 
 
-def _check_schema(value: Any, what: str, schema: Mapping[str, Any]) -> None:
+def _check_schema(value: Any, source: str, schema: Mapping[str, Any]) -> None:
     """Check a value against a JSON schema.
 
     Raises:
-        InputError: it does not conform; names the path, what was found there and what is needed.
+        InputError: it does not conform; names the path, source was found there and source is needed.
     """
     import jsonschema  # takes a quarter of a second
 
-    with guarded(what, RecursionError, remedy="lists or objects are nested too deep"):
+    with guarded(source, RecursionError, remedy="lists or objects are nested too deep"):
         error = next(jsonschema.Draft202012Validator(schema).iter_errors(value), None)
     if error is None:
         return
@@ -229,12 +226,12 @@ def _check_schema(value: Any, what: str, schema: Mapping[str, Any]) -> None:
     ).lstrip(".")
     rule = f"{error.validator} {shown(error.validator_value, 120)}"
     raise InputError(
-        f"{what}: {place or 'the document'} is {shown(error.instance, 120)}; its schema asks for "
+        f"{source}: {place or 'the document'} is {shown(error.instance, 120)}; its schema asks for "
         f"{rule}"
     )
 
 
-def check_shape(value: Any, shape: tuple[int, ...], what: str) -> None:
+def check_shape(value: Any, shape: tuple[int, ...], source: str) -> None:
     """Check nested lists against the shape of an array.
 
     Raises:
@@ -243,10 +240,10 @@ def check_shape(value: Any, shape: tuple[int, ...], what: str) -> None:
     if not shape:
         return
     if not isinstance(value, list) or len(value) != shape[0]:
-        there = f"{len(value)} items" if isinstance(value, list) else shown(value)
-        raise InputError(f"{what} holds {there} where {shape[0]} are needed")
+        content = f"{len(value)} items" if isinstance(value, list) else shown(value)
+        raise InputError(f"{source} holds {content} where {shape[0]} are needed")
     for k, item in enumerate(value) if shape[1:] else ():
-        check_shape(item, shape[1:], f"{what}[{k}]")
+        check_shape(item, shape[1:], f"{source}[{k}]")
 
 
 def shown(value: Any, most: int = 80) -> str:

@@ -6,7 +6,7 @@
 Default, unit, range and meaning.
 """
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, Field, field, fields, is_dataclass, replace
 import math
@@ -149,10 +149,7 @@ def updated(config: Config, values: dict[str, Any], prefix: str = "") -> Config:
         InputError: a name is unknown, or a value has the wrong type or is out of range.
     """
     declared = {entry.name: entry for entry in fields(config)}  # type: ignore[arg-type]
-    nested = {name: getattr(config, name) for name in declared}
-    nested = {name: part for name, part in nested.items() if is_dataclass(part)}
-    nested |= _of_plugins(config)
-
+    nested = _nested(config, declared)
     changes: dict[str, Any] = {}
     inner: dict[str, dict[str, Any]] = {}
     for name, value in values.items():
@@ -165,15 +162,23 @@ def updated(config: Config, values: dict[str, Any], prefix: str = "") -> Config:
         else:
             raise InputError(_unknown(config, name, prefix))
 
-    plugins = list(getattr(config, "plugins", ()))
-    for head, part_values in inner.items():
-        part = updated(nested[head], part_values, f"{prefix}{head}.")
-        if head in declared:
-            changes[head] = part
-        else:
-            plugins.append((head, part))
-            changes["plugins"] = tuple(plugins)
+    parts = {
+        head: updated(nested[head], part_values, f"{prefix}{head}.")
+        for head, part_values in inner.items()
+    }
+    changes |= {head: part for head, part in parts.items() if head in declared}
+    plugins = tuple((head, part) for head, part in parts.items() if head not in declared)
+    if plugins:
+        changes["plugins"] = (*getattr(config, "plugins", ()), *plugins)
     return replace(config, **changes)  # type: ignore[type-var]
+
+
+def _nested(config: Any, names: Iterable[str]) -> dict[str, Any]:
+    """Return the configurations nested in a configuration by name, with those of plugins."""
+    parts = {name: getattr(config, name) for name in names}
+    return {name: part for name, part in parts.items() if is_dataclass(part)} | dict(
+        _of_plugins(config)
+    )
 
 
 def assigned(config: Config, assignment: str) -> Config:

@@ -45,8 +45,14 @@ def progress_bars() -> Iterator[Callable[[str, int, int], None]]:
 
     Yield a function that takes name, done and total of a bar.
     """
-    what = (TextColumn("{task.description}", markup=False), BarColumn(), MofNCompleteColumn())
-    columns = (*what, TimeElapsedColumn(), TextColumn("left:"), TimeRemainingColumn())
+    columns = (
+        TextColumn("{task.description}", markup=False),
+        BarColumn(),
+        MofNCompleteColumn(),
+        TimeElapsedColumn(),
+        TextColumn("left:"),
+        TimeRemainingColumn(),
+    )
     tasks: dict[str, TaskID] = {}
     console = Terminal(stderr=True)
     with Progress(

@@ -27,7 +27,10 @@ from scenario_gen.ros.common.topics import create_frames_publisher
 from scenario_gen.situation import find_conflicts
 from scenario_gen.types import Scenario, tokens
 
-HIGH = 1.2  # metres of a letter
+LETTER_HEIGHT_M = 1.2
+CONFLICT_SIZE_M = (2.0, 2.0, 0.1)
+CONFLICT_COLOUR = (0.9, 0.1, 0.1, 0.5)
+CHANGEPOINT_SIZE_M = (0.6, 0.6, 0.2)
 
 
 @dataclass(frozen=True)
@@ -42,10 +45,13 @@ class Config(Parameters):
 
 @dataclass(frozen=True, eq=False)
 class Shown:
-    """A scenario in motion: since when on the steady clock [s], who reacts to whom, by the vehicle that does, and its conflicts.
+    """A scenario in motion.
 
-    A conflict is a pose x, y [m], yaw [rad], that of the second one when it enters the shared
-    area, and words.
+    Attributes:
+        scenario: the scenario.
+        since: its start on the steady clock [s].
+        reactions: texts by the reacting vehicle.
+        conflicts: the pose [m, m, rad] of the second vehicle at its entry, with a text.
     """
 
     scenario: Scenario
@@ -98,76 +104,73 @@ class Preview(StageNode):
         self._publish(shown, min(now - shown.since, float(shown.scenario.time[-1])))
 
     def _publish(self, shown: Shown, time: float) -> None:
-        scenario, stamp_ns = shown.scenario, self.get_clock().now().nanoseconds
-        here, poses, speeds = states_at(scenario, time)
+        scenario = shown.scenario
+        stamp_ns = self.get_clock().now().nanoseconds
+        present, poses, speeds = states_at(scenario, time)
         names = tokens(vehicle.id for vehicle in scenario.vehicles)
-        children = [f"preview/vehicle_{names[n]}" for n in here]
+        children = [f"preview/vehicle_{names[n]}" for n in present]
         self.outputs.publish(self._tf, encode_frames(poses, children, scenario.frame_id, stamp_ns))
+
         markers = [Marker("", Kind.CUBE, Action.DELETE_ALL)]
-        for n, pose, speed in zip(here, poses.tolist(), speeds.tolist(), strict=True):
+        for n, (x, y, yaw), speed in zip(present, poses.tolist(), speeds.tolist(), strict=True):
             vehicle = scenario.vehicles[n]
-            markers.append(
-                body(
-                    names[n], vehicle, (pose[0], pose[1], pose[2]), COLOURS[n % len(COLOURS)], 0.9
-                )
-            )
-            words = f"{shown.reactions.get(names[n], names[n])}, {speed:.1f} m/s"
-            place = (pose[0], pose[1] + vehicle.length, 0.0)
-            markers.append(
-                Marker(
-                    f"text_{names[n]}", Kind.TEXT, pose=place, scale=(0.0, 0.0, HIGH), text=words
-                )
-            )
-        for k, (pose, words) in enumerate(shown.conflicts):
+            markers.append(body(names[n], vehicle, (x, y, yaw), COLOURS[n % len(COLOURS)], 0.9))
+            text = f"{shown.reactions.get(names[n], names[n])}, {speed:.1f} m/s"
+            markers.append(text_marker(f"text_{names[n]}", (x, y + vehicle.length, 0.0), text))
+        for k, (pose, text) in enumerate(shown.conflicts):
             markers.append(
                 Marker(
                     f"conflict_{k}",
                     Kind.CUBE,
                     pose=pose,
-                    scale=(2.0, 2.0, 0.1),
-                    colour=(0.9, 0.1, 0.1, 0.5),
+                    scale=CONFLICT_SIZE_M,
+                    colour=CONFLICT_COLOUR,
                 )
             )
-            markers.append(
-                Marker(
-                    f"conflict_text_{k}", Kind.TEXT, pose=pose, scale=(0.0, 0.0, HIGH), text=words
-                )
-            )
-        for n, anchors in enumerate(self._anchors[:, 1:-1]):
-            for k, (x, y, yaw) in enumerate(anchors.tolist()):
-                colour = (*COLOURS[n % len(COLOURS)], 0.6)
-                dot = (0.6, 0.6, 0.2)
-                markers.append(
-                    Marker(
-                        f"changepoint_{n}_{k}",
-                        Kind.CUBE,
-                        pose=(x, y, yaw),
-                        scale=dot,
-                        colour=colour,
-                    )
-                )
+            markers.append(text_marker(f"conflict_text_{k}", pose, text))
+        markers += changepoint_markers(self._anchors[:, 1:-1])
         self.outputs.send("preview", encode_markers(markers, scenario.frame_id, stamp_ns))
 
 
+def text_marker(name: str, pose: tuple[float, float, float], text: str) -> Marker:
+    """Return a text at a pose [m, m, rad]."""
+    return Marker(name, Kind.TEXT, pose=pose, scale=(0.0, 0.0, LETTER_HEIGHT_M), text=text)
+
+
+def changepoint_markers(anchors: Floats) -> list[Marker]:
+    """Return a box for each changepoint; `anchors` (N, K, 3) x, y [m], yaw [rad]."""
+    markers = []
+    for n, poses in enumerate(anchors):
+        colour = (*COLOURS[n % len(COLOURS)], 0.6)
+        for k, (x, y, yaw) in enumerate(poses.tolist()):
+            markers.append(
+                Marker(
+                    f"changepoint_{n}_{k}",
+                    Kind.CUBE,
+                    pose=(x, y, yaw),
+                    scale=CHANGEPOINT_SIZE_M,
+                    colour=colour,
+                )
+            )
+    return markers
+
+
 def conflicts_of(scenario: Scenario) -> tuple[tuple[tuple[float, float, float], str], ...]:
-    """Return where paths meet, and who goes first there."""
+    """Return the pose of the second vehicle at each conflict, with a text."""
     names = tokens(vehicle.id for vehicle in scenario.vehicles)
-    found = []
+    conflicts = []
     for conflict in find_conflicts(scenario):
-        n = conflict.second
-        x, y, yaw = scenario.at(conflict.entry_second).poses[n].tolist()
-        first, second = names[conflict.first], names[n]
-        words = (
-            f"{second} behind {first}"
-            if conflict.following
-            else f"{first} first, {second} {conflict.encroachment:.1f} s later"
-        )
-        found.append(((x, y, yaw), words))
-    return tuple(found)
+        x, y, yaw = scenario.at(conflict.entry_second).poses[conflict.second].tolist()
+        first, second = names[conflict.first], names[conflict.second]
+        text = f"{first} first, {second} {conflict.encroachment:.1f} s later"
+        if conflict.following:
+            text = f"{second} behind {first}"
+        conflicts.append(((x, y, yaw), text))
+    return tuple(conflicts)
 
 
 def states_at(scenario: Scenario, time: float) -> tuple[list[int], Floats, Floats]:
-    """Return who is present at a time [s], their poses (M, 3) x, y [m], yaw [rad], and speeds (M,) [m/s]."""
+    """Return the present vehicles at a time [s], their poses (M, 3) and speeds (M,) [m/s]."""
     states = scenario.at(time)
     present = np.flatnonzero(states.is_present)
     return present.tolist(), states.poses[present], states.speed[present]
