@@ -32,7 +32,7 @@ class _Search:
         natural_share: of natural candidates that are hits, from which no proposal is needed.
         good_share: of a proposal's candidates that are hits, from which it is good enough.
         fair_share: with this share, one stage without a better one ends the search.
-        patience: with any hits, so many stages without a better one do.
+        patience: stages without a better one that end the search, with fewer hits.
         stages: at most.
         elite: candidates from which a proposal is made, at least.
         chunk: candidates that are checked together, the nearest to the range first.

@@ -240,7 +240,10 @@ class _Run:
     notes: list[Note] = field(default_factory=list)
 
     def draw(self, attempts: int) -> Reached | None:
-        """Draw the set with so many candidates per scenario; return what a target came to.
+        """Draw the set; return the outcome of a target, if there is one.
+
+        Args:
+            attempts: candidates per scenario, at most.
 
         Raises:
             TargetError: no valid candidate in the range was found; the message states which range
@@ -406,7 +409,7 @@ def label_of(
 
 
 def _passing_order(names: Sequence[str], recorded: Conflict, whole: Scenario) -> PassingOrder:
-    """Return who passes one of the template's conflicts first in a scenario."""
+    """Return the order in which a scenario passes one of the template's conflicts."""
     conflict = conflict_of(whole, *recorded.pair)
     change = OrderChange.NONE
     if conflict is None:

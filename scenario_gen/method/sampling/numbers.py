@@ -6,7 +6,7 @@
     z = (shared clock, vehicle 0, vehicle 1, …, trimming)
     vehicle = (lateral, speed, clock (shift, pace, waits), place, end speeds, size)
 
-Everybody who reads a number asks for its slice by name.
+All code reads these numbers through named slices.
 """
 
 from collections.abc import Iterable
@@ -43,16 +43,16 @@ class VehicleNumbers(NamedTuple):
         """Lay out the numbers of a vehicle.
 
         Args:
-            lateral: how many there are for deviations across the route.
-            speed: how many for those along it.
-            clock: how many for its clock; None if nothing but the deviations is free.
+            lateral: number of deviations across the route.
+            speed: number of deviations along it.
+            clock: numbers of its clock; None if only the deviations vary.
         """
         free = (0, 0, 0, 0) if clock is None else (clock, 1, 2, 1)
         return cls(*consecutive((lateral, speed, *free)))
 
     @property
     def total(self) -> int:
-        """How many numbers there are."""
+        """Number of standard normal numbers."""
         return int(max(part.stop for part in self))
 
 
@@ -77,5 +77,5 @@ class ModelNumbers(NamedTuple):
 
     @property
     def total(self) -> int:
-        """How many numbers there are."""
+        """Number of standard normal numbers."""
         return int(self.trimming.stop)

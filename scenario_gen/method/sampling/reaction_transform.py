@@ -24,7 +24,7 @@ At template time τ vehicle n is late by ℓ_n(τ)ᵀz_n (shift, pace, waits) an
 Given the numbers of the vehicles to which it reacts, those of a vehicle are again Gaussian. With
 the whitened equations A z + B z_others = η and A = U S Vᵀ they are
 z = ε + V ((I + S²)^-½ - I) Vᵀ ε - V S (I + S²)⁻¹ Uᵀ B z_others. So all numbers follow from
-independent ones, ε, vehicle by vehicle in the order of the graph. A vehicle that reacts to nobody
+independent ones, ε, vehicle by vehicle in the order of the graph. A vehicle without reactions
 keeps its ε. The others react to the truncated lateness: a wait cannot be much shorter.
 """
 

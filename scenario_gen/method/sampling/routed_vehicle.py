@@ -148,7 +148,7 @@ class RoutedVehicle:
         return Target(grid, np.maximum(line, 0.0), *places, ends, self.path.length)
 
     def mean(self, clock: Clock) -> MeanSpeed | str:
-        """Return the mean speed on this clock; or why there is none."""
+        """Return the mean speed on this clock, or the reason for its absence."""
         spline, limits = self.spline, self.limits
         motion, target = Motion.of(spline, *clock.at(spline.stations)[1:]), self.target(clock)
         at, pace = spline.middle, clock.at(spline.middle)[1]

@@ -125,7 +125,7 @@ class Sampler:
     def undisturbed(self) -> Scenario | None:
         """Return the drive without deviations.
 
-        None where nothing varies and nobody reacts, or where it has no speed profile.
+        None if nothing varies and no vehicle reacts, or if it has no speed profile.
         """
         if not self.varies and not self.model.reactions.edges:
             return None

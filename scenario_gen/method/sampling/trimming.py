@@ -3,8 +3,8 @@
 
 """Trimming: scenarios begin nearer to the first conflict, or end sooner after the last one.
 
-A recording begins and ends by chance: at the edge of a camera's view, or where somebody cut it. So
-a scenario may leave out a part of the time before the first conflict and after the last one.
+A recording begins and ends by chance: at the edge of a camera's view, or where it was cut. So a
+scenario may leave out a part of the time before the first conflict and after the last one.
 """
 
 from dataclasses import dataclass

@@ -246,7 +246,7 @@ class VehicleClock:
 
 @dataclass(frozen=True, eq=False)
 class Variation:
-    """What varies of one vehicle besides the deviations from its route.
+    """The variation of one vehicle, in addition to the deviations from its route.
 
     Attributes:
         clock: its clock.

@@ -63,7 +63,7 @@ class Limits(TypeLimits):
     presence_margin: float = parameter(
         1.0,
         "time that a vehicle is present before it enters and after it leaves, at its speed and "
-        "rate of turn there; nobody may be in its place then",
+        "rate of turn there; no other vehicle may be in its place then",
         unit="s",
         low=0.0,
         high=10.0,

@@ -20,7 +20,7 @@ def presence_violations(scenario: Scenario, ends: Bools) -> Iterator[Violation]:
     """Yield vehicles that enter or leave, though the template has them at its start or end.
 
     Otherwise a standing vehicle could vanish at once: its first and last state would be as
-    requested, and nobody would meet it.
+    requested, and no other vehicle would meet it.
 
     Args:
         scenario: the vehicles.

@@ -26,11 +26,10 @@ from scenario_gen.base.errors import InputError, ScenarioGenError
 from scenario_gen.base.folders import Kind, sha256_of
 from scenario_gen.base.provenance import read_parameters, versions
 from scenario_gen.logs import LogConfig, read_log
-from scenario_gen.method.chain import Chain
 from scenario_gen.method.config import PipelineConfig
 from scenario_gen.method.evaluation import MEASURES
-from scenario_gen.method.fitting import FittingConfig
-from scenario_gen.method.routing import PlanningConfig
+from scenario_gen.method.fitting import fit_template, FittingConfig
+from scenario_gen.method.routing import plan_routes, PlanningConfig
 from scenario_gen.method.sampling import checker_of, Plan, regenerate, SamplingConfig
 from scenario_gen.method.segmentation import segment, SegmentationConfig
 from scenario_gen.method.validity import Limits
@@ -209,10 +208,12 @@ def _replan(found: "_Found", what: str, log: Path | None) -> Replanned:
             encounter, segmentation = _from_log(log, encounter, found.summary, seed, what)
         fitting = read_parameters(FittingConfig(), values, "fitting.", what)
         planning = read_parameters(PlanningConfig(), values, "planning.", what)
-        config = replace(config, fitting=fitting, planning=planning)
-        planned = Chain(
-            Situation.of(encounter), segmentation, road, config, requested, seed=seed
-        ).plan()
+        situation, limits = Situation.of(encounter), config.limits
+        fit = fit_template(
+            situation, segmentation, road, fitting, request=requested, limits=limits
+        )
+        routes = plan_routes(road, fit, planning, seed, limits)
+        planned = GenerationResult(encounter, segmentation, road, fit, routes, seed=seed)
     return Replanned(planned, requested, config.sampling, config.limits)
 
 

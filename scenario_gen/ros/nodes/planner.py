@@ -30,10 +30,14 @@ from msg_conventions.tracks import decode_tracks
 from scenario_gen.base.cancelling import stop_if_cancelled
 from scenario_gen.base.errors import InputError, RefusedError, ScenarioGenError
 from scenario_gen.base.parameters import parameter, Parameters
-from scenario_gen.method.chain import Chain
-from scenario_gen.method.config import PipelineConfig
-from scenario_gen.method.fitting import FittingConfig
-from scenario_gen.method.routing import make_planner, plan_with_retry, PlanningConfig, Query
+from scenario_gen.method.fitting import fit_template, FittingConfig
+from scenario_gen.method.routing import (
+    make_planner,
+    plan_routes,
+    plan_with_retry,
+    PlanningConfig,
+    Query,
+)
 from scenario_gen.method.validity import Limits
 from scenario_gen.numerics import Floats
 from scenario_gen.ros.common.services import REQUESTS
@@ -100,13 +104,9 @@ class Planner(StageNode):
             messages.get("road/exits"),
             messages.get(LANES),
         )
-        stages = PipelineConfig(
-            fitting=config.fitting, planning=config.planning, limits=config.limits
-        )
-        planned = Chain(
-            Situation.of(encounter), segmentation, road, stages, seed=config.seed
-        ).plan()
-        (_, fit), routes = planned.road_and_fit(), planned.routes
+        situation, limits = Situation.of(encounter), config.limits
+        fit = fit_template(situation, segmentation, road, config.fitting, limits=limits)
+        routes = plan_routes(road, fit, config.planning, config.seed, limits)
         stop_if_cancelled()
         anchors = anchor_stamps(encounter, segmentation.changepoints)
         results = {
