@@ -1,15 +1,16 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""An hour of messages -> which vehicles meet: candidates by a join of half-second bins, then every 0.1 s of those.
+"""From an hour of messages to meetings of two vehicles.
 
-Vehicles are not sampled at the same instants, so nothing is joined by exact time. All messages of a vehicle in a half second give
-one row, driven on to the middle of it with its speed and heading. Rows of the same half second meet in cells as wide as the
-proximity and what a vehicle drives in between: each looks into its own cell and into half of those around it. The database only
-proposes: what decides is computed from the messages.
+Vehicles are not sampled at the same instants, so nothing is joined by exact time. All messages of a
+vehicle within half a second give one row, moved to the middle of it with speed and heading. Rows of
+the same half second are joined in cells as wide as the proximity and the distance driven meanwhile:
+each looks into its own cell and into half of its neighbours. The database only proposes candidates;
+the decision is computed from the messages, every 0.1 s.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 import json
 from pathlib import Path
@@ -19,36 +20,57 @@ import numpy as np
 
 from scenario_gen.base.stores import fetched, Place, workplace
 from scenario_gen.corpus.config import CorpusConfig
-from scenario_gen.corpus.messages import database, DEGREE, GROUP, HOUR_US, quoted, write_messages
+from scenario_gen.corpus.messages import (
+    database,
+    DEGREE,
+    GROUP_ROWS,
+    HOUR_US,
+    quoted,
+    write_messages,
+)
 from scenario_gen.corpus.tasks import arriving
 from scenario_gen.corpus.tracks import (
-    FASTEST_MPS,
-    LONGITUDE,
+    LATITUDE_M,
+    LONGITUDE_M,
+    MAX_LATITUDE_M,
+    MAX_SPEED_MPS,
     meetings,
-    METRES,
-    NORTH,
+    MICROSECOND_S,
     runs_of,
-    tell_apart,
+    separate_senders,
+    Track,
     tracks_of,
 )
 from scenario_gen.logs import GAP_RATE_MPS, OUT_OF_RANGE_S, shortest
 from scenario_gen.numerics import Bools, Floats, Ints
 from scenario_gen.numerics.kernels import F, F1, I, I1, kernel, named
 
-BIN = 500_000  # µs
-SPREAD = 0.0006  # degrees, 65 m or so, between two messages of one vehicle in one bin: further, and there are two of them
-ASKEW = 0.37  # of the longitude, added to the latitude, so that one number tells two places apart
-ROW = 1 << 24  # cells in a row around the globe, at the most
-SHARED = 3  # such bins make an id one that may be shared
-TOGETHER = 10  # bins in which two vehicles send: fewer, and it is one whose fixes jump
-MORE = 1.4  # times the messages of one vehicle in a bin: so many are sent by two
-ELSEWHERE = 1 << 40  # added to a shared id for each further vehicle that bears it
-MARGIN = 3_000_000  # µs of messages that are kept before and after a meeting
+BIN_US = 500_000
+BIN_S = BIN_US * MICROSECOND_S
+CELL_M = 117.5  # side of a cell: proximity and slack, and the distance driven within a bin
+SPREAD_DEG = 0.0006  # about 65 m; messages of one bin with more are from two vehicles
+LONGITUDE_FACTOR = 0.37  # one number, latitude + 0.37 longitude, distinguishes two places
+CELLS_PER_ROW_COUNT = 1 << 24  # at most, around the globe
+MIN_SPREAD_COUNT = 3  # bins with too large a spread, from which on an id may be shared
+MIN_COMMON_COUNT = 10  # bins in which several vehicles send; fewer are fixes that jump
+SENDERS_RATIO = 1.4  # of the messages of one vehicle in a bin, from which on two are sending
+SHARED_ID_STEP_COUNT = 1 << 40  # added to a shared id for each further vehicle
+EXCERPT_MARGIN_US = 3_000_000  # messages that are kept before and after a meeting
+MAX_GAP_COUNT = 4  # bins without candidates, between which a meeting is one
+
+Columns = Mapping[str, Any]  # arrays (M,) by column
 
 
 @dataclass(frozen=True)
 class HourTask:
-    """Hours to search: (hour since 2004, the files that hold it or a neighbour), and where `meetings` are written."""
+    """Hours to search.
+
+    Attributes:
+        name: of the task.
+        hours: (hour since 2004, the files with this hour or a neighbour).
+        folder: where `meetings` are written.
+        config: the parameters.
+    """
 
     name: str
     hours: tuple[tuple[int, tuple[Place, ...]], ...]
@@ -57,44 +79,35 @@ class HourTask:
 
 
 def overlap(config: CorpusConfig) -> int:
-    """Microseconds before and after an hour that its task sees: an encounter at its longest, with what windows may add."""
-    return round(
-        1e6
-        * (
-            config.log.max_duration
-            + config.log.min_duration
-            + OUT_OF_RANGE_S
-            + config.log.longest_gap
-            + 1.0
-        )
-    )
+    """Return the microseconds before and after an hour that its task reads.
+
+    It is the longest encounter, with the time that windows may add.
+    """
+    log = config.log
+    seconds = log.max_duration + log.min_duration + OUT_OF_RANGE_S + log.longest_gap + 1.0
+    return round(seconds / MICROSECOND_S)
 
 
 def search_hours(task: HourTask) -> None:
-    """Write the meetings of each hour and the messages of those who meet; hours whose table is there are done.
+    """Write the meetings of each hour and their messages; hours with a table are finished.
 
     Raises:
         InputError: the database fails.
     """
-    left = [one for one in task.hours if not (task.folder / f"hour-{one[0]}.parquet").exists()]
-    if not left:
+    targets = {hour: task.folder / f"hour-{hour}.parquet" for hour, _ in task.hours}
+    remaining = [(hour, files) for hour, files in task.hours if not targets[hour].exists()]
+    if not remaining:
         return
-    own = task.folder.parent
-    tables = sorted({path for _, files in left for path in files}, key=str)
+    corpus = task.folder.parent
+    tables = sorted({path for _, files in remaining for path in files}, key=str)
     with (
-        fetched(tables) as here,
-        database(workplace(own), task.config.memory, f"{task.name} of {own}") as base,
+        fetched(tables) as paths,
+        database(workplace(corpus), task.config.memory, f"{task.name} of {corpus}") as base,
     ):
-        local = dict(zip(tables, here, strict=True))
-        for hour, files in left:
+        local = dict(zip(tables, paths, strict=True))
+        for hour, files in remaining:
             with base.cursor() as cursor:  # its tables end with it
-                _search(
-                    cursor,
-                    hour,
-                    [local[path] for path in files],
-                    task.folder / f"hour-{hour}.parquet",
-                    task.config,
-                )
+                _search(cursor, hour, [local[path] for path in files], targets[hour], task.config)
 
 
 def _search(
@@ -105,213 +118,242 @@ def _search(
 
     edge = overlap(config)
     begin, end = hour * HOUR_US - edge, (hour + 1) * HOUR_US + edge
-    names = [str(path) for path in files]
-    base.execute(
-        f"CREATE TEMP TABLE messages AS SELECT device, t, lat / {DEGREE} AS lat, lon / {DEGREE} AS lon, speed, heading FROM "
-        f"read_parquet([{quoted(names)}]) WHERE t >= {begin} AND t < {end} AND cause = 0"
-    )
-    shared = _bins(base)
+    names = quoted([str(path) for path in files])
+    base.execute(f"""
+        CREATE TEMP TABLE messages AS
+        SELECT device, t, lat / {DEGREE} AS lat, lon / {DEGREE} AS lon, speed, heading
+        FROM read_parquet([{names}])
+        WHERE t >= {begin} AND t < {end} AND cause = 0""")
+    shared = _fill_bins(base)
     pairs = _candidates(base, config)
-    rows = _messages(base, "told_apart" if shared else "messages")
-    tracks = tracks_of(rows)
-    found = [
-        meeting
-        for a, b, first, last in zip(
-            *(pairs[name].tolist() for name in ("a", "b", "first", "last")), strict=True
-        )
-        if a in tracks and b in tracks
-        for meeting in meetings(
-            tracks[a], tracks[b], ((first - 2) * BIN, (last + 3) * BIN), config
-        )
-        if hour * HOUR_US <= meeting["start"] < (hour + 1) * HOUR_US
+    rows = _messages(base, "separated" if shared else "messages")
+    found = _meetings_in_hour(pairs, tracks_of(rows), hour, config)
+    schema = [
+        *((name, pa.int64()) for name in ("a", "b", "start", "end")),
+        *((name, pa.float64()) for name in ("gap", "distance", "travel", "lat", "lon")),
     ]
-    found.sort(key=lambda one: (one["start"], one["a"], one["b"]))
-    numbers = dict.fromkeys(("gap", "distance", "travel", "lat", "lon"), pa.float64())
-    kinds = {**dict.fromkeys(("a", "b", "start", "end"), pa.int64()), **numbers}
-    table = pa.Table.from_pylist(found, schema=pa.schema(list(kinds.items())))
+    table = pa.Table.from_pylist(found, schema=pa.schema(schema))
     wanted = _excerpt(rows, found)
     excerpt = {name: values[wanted] for name, values in rows.items()}
-    excerpt |= {
-        name: np.rint(excerpt[name] * DEGREE).astype(np.int32) for name in ("lat", "lon")
-    }  # exactly what was read
+    for name in ("lat", "lon"):  # exactly the recorded numbers
+        excerpt[name] = np.rint(excerpt[name] * DEGREE).astype(np.int32)
     with arriving(target.with_suffix(".rows.parquet")) as part:
-        write_messages(pa.table(excerpt).to_reader(GROUP), part)
+        write_messages(pa.table(excerpt).to_reader(GROUP_ROWS), part)
     with arriving(target) as part:
-        parquet.write_table(
-            table.replace_schema_metadata({"shared": json.dumps(shared)}), part, compression="zstd"
-        )
+        described = table.replace_schema_metadata({"shared": json.dumps(shared)})
+        parquet.write_table(described, part, compression="zstd")
 
 
-def _messages(base: Any, source: str) -> dict[str, Any]:
-    """Return the messages (M,) of all candidates by column, in order of vehicle and time, one for each stamp."""
-    rows = base.execute(
-        f"SELECT * FROM {source} WHERE device IN (SELECT a FROM candidates UNION SELECT b FROM candidates)"
-    ).fetchnumpy()
+def _meetings_in_hour(
+    pairs: Columns, tracks: Mapping[int, Track], hour: int, config: CorpusConfig
+) -> list[dict[str, Any]]:
+    """Return the meetings of candidate pairs that begin in an hour, in order of time."""
+    columns = (pairs[name].tolist() for name in ("a", "b", "first", "last"))
+    found = []
+    for a, b, first, last in zip(*columns, strict=True):
+        if a in tracks and b in tracks:
+            span = ((first - 2) * BIN_US, (last + 3) * BIN_US)
+            found += meetings(tracks[a], tracks[b], span, config)
+    begin, end = hour * HOUR_US, (hour + 1) * HOUR_US
+    found = [meeting for meeting in found if begin <= meeting["start"] < end]
+    return sorted(found, key=lambda meeting: (meeting["start"], meeting["a"], meeting["b"]))
+
+
+def _messages(base: Any, source: str) -> Columns:
+    """Return the messages (M,) of all candidates, by vehicle and time, one for each stamp."""
+    rows = base.execute(f"""
+        SELECT * FROM {source}
+        WHERE device IN (SELECT a FROM candidates UNION SELECT b FROM candidates)""").fetchnumpy()
     order = in_order(rows)
     device, t = rows["device"][order], rows["t"][order]
-    order = order[
-        np.concatenate(
-            [np.ones(min(len(t), 1), dtype=bool), (np.diff(t) != 0) | (np.diff(device) != 0)]
-        )
-    ]
-    return {name: np.asarray(values[order]) for name, values in rows.items()}
+    is_first = np.ones(len(t), dtype=bool)
+    is_first[1:] = (np.diff(t) != 0) | (np.diff(device) != 0)
+    return {name: np.asarray(values[order[is_first]]) for name, values in rows.items()}
 
 
-def in_order(rows: dict[str, Any]) -> Ints:
-    """(M,) the order of messages by vehicle and time; of those of one stamp by the rest, whatever order they were read in."""
+def in_order(rows: Columns) -> Ints:
+    """(M,) the order of messages by vehicle and time.
+
+    The other columns order messages with the same stamp, independently of the order of reading.
+    """
     order = np.lexsort((rows["t"], rows["device"]))
     device, t = rows["device"][order], rows["t"][order]
     same = np.zeros(len(t) + 1, dtype=bool)
     same[1:-1] = (np.diff(t) == 0) & (np.diff(device) == 0)
     tied = np.flatnonzero(same[1:] | same[:-1])
-    own = order[tied]
-    order[tied] = own[
-        np.lexsort([rows[name][own] for name in ("heading", "speed", "lon", "lat", "t", "device")])
-    ]
+    ties = order[tied]
+    keys = ("heading", "speed", "lon", "lat", "t", "device")
+    order[tied] = ties[np.lexsort([rows[name][ties] for name in keys])]
     return order
 
 
-def _excerpt(rows: dict[str, Any], found: list[dict[str, Any]]) -> Bools:
-    """(M,) which messages are of those who meet, from 3 s before to 3 s after."""
+def _excerpt(rows: Columns, found: Sequence[Mapping[str, Any]]) -> Bools:
+    """(M,) which messages belong to a meeting, from 3 s before to 3 s after it."""
     wanted = np.zeros(len(rows["t"]), dtype=bool)
-    own = {int(rows["device"][first]): (first, last) for first, last in runs_of(rows["device"])}
-    for one in found:
-        for device in (one["a"], one["b"]):
-            first, last = own[device]
-            low, high = np.searchsorted(
-                rows["t"][first:last], [one["start"] - MARGIN, one["end"] + MARGIN + 1]
-            )
+    spans = {int(rows["device"][first]): (first, last) for first, last in runs_of(rows["device"])}
+    for meeting in found:
+        window = [meeting["start"] - EXCERPT_MARGIN_US, meeting["end"] + EXCERPT_MARGIN_US + 1]
+        for device in (meeting["a"], meeting["b"]):
+            first, last = spans[device]
+            low, high = np.searchsorted(rows["t"][first:last], window)
             wanted[first + low : first + high] = True
     return wanted
 
 
-MEAN = f"""
-    SELECT device, t // {BIN} AS bin, avg(t % {BIN}) AS late, avg(lat) AS lat, avg(lon) AS lon, any_value(speed) AS speed,
-           any_value(heading) AS heading, max(lat + {ASKEW} * lon) - min(lat + {ASKEW} * lon) AS spread
-    FROM {{source}} GROUP BY ALL"""
+def _means_of(source: str) -> str:
+    """Return the query for one row per vehicle and bin."""
+    place = f"(lat + {LONGITUDE_FACTOR} * lon)"
+    return f"""
+        SELECT device, t // {BIN_US} AS bin, avg(t % {BIN_US}) AS late,
+               avg(lat) AS lat, avg(lon) AS lon,
+               any_value(speed) AS speed, any_value(heading) AS heading,
+               max({place}) - min({place}) AS spread
+        FROM {source} GROUP BY ALL"""
 
 
-def _bins(base: Any) -> dict[str, int]:
-    """Make the table `binned`; return which ids are shared, and by how many vehicles."""
-    base.execute("CREATE TEMP TABLE means AS " + MEAN.format(source="messages"))
-    ids = base.execute(
-        f"SELECT device FROM means WHERE spread > {SPREAD} GROUP BY device HAVING count(*) >= {SHARED} ORDER BY device"
-    ).fetchnumpy()["device"]
-    shared: dict[str, int] = {}
-    if len(ids):
-        import pyarrow as pa
+def _fill_bins(base: Any) -> dict[str, int]:
+    """Create the tables `binned` and `cells`; return the shared ids and how many vehicles share them."""
+    base.execute(f"CREATE TEMP TABLE means AS {_means_of('messages')}")
+    ids = base.execute(f"""
+        SELECT device FROM means WHERE spread > {SPREAD_DEG}
+        GROUP BY device HAVING count(*) >= {MIN_SPREAD_COUNT} ORDER BY device""").fetchnumpy()
+    shared = _separate_shared(base, ids["device"]) if len(ids["device"]) else {}
 
-        who_shares = f"({', '.join(map(str, ids.tolist()))})"
-        rows = base.sql(
-            f"SELECT * FROM messages WHERE device IN {who_shares} ORDER BY device, t, lat, lon, speed, heading"
-        ).to_arrow_table()
-        device, *columns = (
-            rows.column(name).to_numpy() for name in ("device", "t", "lat", "lon", "speed")
-        )
-        who = np.zeros(len(device), dtype=np.int64)
-        for first, last in runs_of(device):
-            own = tell_apart(*(column[first:last] for column in columns))
-            if _together(columns[0][first:last], own) < TOGETHER:
-                continue  # one vehicle whose fixes jump
-            who[first:last] = own
-            shared[str(device[first])] = int(own.max()) + 1
-        base.register("split", rows.set_column(0, "device", pa.array(device + who * ELSEWHERE)))
-        base.execute(
-            f"CREATE TEMP VIEW told_apart AS SELECT * FROM messages WHERE device NOT IN {who_shares} "
-            "UNION ALL SELECT * FROM split"
-        )
-        base.execute(f"DELETE FROM means WHERE device IN {who_shares}")
-        base.execute("INSERT INTO means " + MEAN.format(source="split"))
-    side = 117.5
-    row = f"floor(lat * {METRES} / {side})"
-    base.execute(
-        f"CREATE TEMP TABLE binned AS SELECT device, bin, lat + cos(radians(heading)) * rest / {METRES} AS lat, "
-        f"lon + sin(radians(heading)) * rest / ({LONGITUDE} * cos(radians(lat))) AS lon FROM "
-        f"(SELECT device, bin, lat, lon, heading, speed * ({BIN // 2} - late) * 1e-6 AS rest FROM means)"
-    )
+    row = f"floor(lat * {LATITUDE_M} / {CELL_M})"
+    base.execute(f"""
+        CREATE TEMP TABLE binned AS
+        SELECT device, bin, lat + cos(radians(heading)) * rest / {LATITUDE_M} AS lat,
+               lon + sin(radians(heading)) * rest / ({LONGITUDE_M} * cos(radians(lat))) AS lon
+        FROM (SELECT device, bin, lat, lon, heading,
+                     speed * ({BIN_US // 2} - late) * 1e-6 AS rest FROM means)""")
     base.execute("DROP TABLE means")
-    column = f"{side} / ({LONGITUDE} * cos(radians(greatest(abs({{row}}), abs({{row}} + 1)) * {side} / {METRES})))"
-    base.execute(
-        f"CREATE TEMP TABLE cells AS SELECT device, bin, lat, lon, r, floor(lon / w)::BIGINT AS c, floor(lon / v)::BIGINT AS d "
-        f"FROM (SELECT *, {column.format(row='r')} AS w, {column.format(row='(r + 1)')} AS v FROM "
-        f"(SELECT *, {row}::BIGINT AS r FROM binned))"
-    )
+
+    def width(name: str) -> str:
+        highest = f"greatest(abs({name}), abs({name} + 1)) * {CELL_M} / {LATITUDE_M}"
+        return f"{CELL_M} / ({LONGITUDE_M} * cos(radians({highest})))"
+
+    base.execute(f"""
+        CREATE TEMP TABLE cells AS
+        SELECT device, bin, lat, lon, r,
+               floor(lon / w)::BIGINT AS c, floor(lon / v)::BIGINT AS d
+        FROM (SELECT *, {width("r")} AS w, {width("(r + 1)")} AS v
+              FROM (SELECT *, {row}::BIGINT AS r FROM binned))""")
     return shared
 
 
-def _together(t: Ints, who: Ints) -> int:
-    """Return in how many bins more than one of the vehicles of an id sends, and together more than one does; t (M,) µs, who (M,).
+def _separate_shared(base: Any, ids: Ints) -> dict[str, int]:
+    """Give vehicles that share an id different ones; return the ids with their numbers of vehicles."""
+    import pyarrow as pa
 
-    Fixes of one vehicle that jump do not add messages.
+    listed = f"({', '.join(map(str, ids.tolist()))})"
+    rows = base.sql(f"""
+        SELECT * FROM messages WHERE device IN {listed}
+        ORDER BY device, t, lat, lon, speed, heading""").to_arrow_table()
+    device, t, lat, lon, speed = (
+        rows.column(name).to_numpy() for name in ("device", "t", "lat", "lon", "speed")
+    )
+    shared: dict[str, int] = {}
+    sender = np.zeros(len(device), dtype=np.int64)
+    for first, last in runs_of(device):
+        span = slice(first, last)
+        senders = separate_senders(t[span], lat[span], lon[span], speed[span])
+        if _common_bins(t[span], senders) >= MIN_COMMON_COUNT:
+            sender[span] = senders
+            shared[str(device[first])] = int(senders.max()) + 1
+    ids_of_senders = pa.array(device + sender * SHARED_ID_STEP_COUNT)
+    base.register("split", rows.set_column(0, "device", ids_of_senders))
+    base.execute(f"""
+        CREATE TEMP VIEW separated AS
+        SELECT * FROM messages WHERE device NOT IN {listed} UNION ALL SELECT * FROM split""")
+    base.execute(f"DELETE FROM means WHERE device IN {listed}")
+    base.execute(f"INSERT INTO means {_means_of('split')}")
+    return shared
+
+
+def _common_bins(t: Ints, sender: Ints) -> int:
+    """Return in how many bins several vehicles with one id send more messages than one vehicle does.
+
+    Fixes of one vehicle that jump do not add messages. `t` (M,) is in µs, `sender` (M,) a number.
     """
-    sent = np.unique(np.stack([t, who]), axis=1)  # heard twice, it counts once
-    messages = np.unique(sent[0] // BIN, return_counts=True)[1]
-    senders = np.unique(
-        np.unique(np.stack([sent[0] // BIN, sent[1]]), axis=1)[0], return_counts=True
-    )[1]
+    sent = np.unique(np.stack([t, sender]), axis=1)  # a message that is received twice counts once
+    messages = np.unique(sent[0] // BIN_US, return_counts=True)[1]
+    pairs = np.unique(np.stack([sent[0] // BIN_US, sent[1]]), axis=1)
+    senders = np.unique(pairs[0], return_counts=True)[1]
     alone = messages[senders == 1]
-    usual = float(np.quantile(alone, 0.9) if len(alone) >= TOGETHER else np.median(messages) / 2.0)
-    return int(((senders > 1) & (messages >= MORE * usual)).sum())
+    if len(alone) >= MIN_COMMON_COUNT:
+        usual = float(np.quantile(alone, 0.9))
+    else:
+        usual = float(np.median(messages) / 2.0)
+    return int(((senders > 1) & (messages >= SENDERS_RATIO * usual)).sum())
 
 
 def _candidates(base: Any, config: CorpusConfig) -> dict[str, Ints]:
-    """Make the table `candidates`: pairs a, b and the bins first, last from which to which they are near, roughly; return it."""
-    reach = config.log.proximity + config.slack
-    least = max(int(shortest(config.log) * config.log.period / 0.5) - 2, 1)
-    key, above = f"r * {ROW} + c", f"(r + 1) * {ROW} + d"
-    probes = f"[{key}, {key} + 1, {above} - 1, {above}, {above} + 1]"
-    base.execute(
-        f"CREATE TEMP TABLE near AS SELECT least(p.device, q.device) AS a, greatest(p.device, q.device) AS b, p.bin FROM "
-        f"(SELECT device, bin, lat, lon, {key} AS own, unnest({probes}) AS key FROM cells) p "
-        f"JOIN (SELECT device, bin, lat, lon, {key} AS key FROM cells) q ON p.bin = q.bin AND p.key = q.key "
-        f"WHERE p.device <> q.device AND (p.key <> p.own OR p.device < q.device) AND "
-        f"pow((p.lat - q.lat) * {METRES}, 2) + pow((p.lon - q.lon) * {LONGITUDE} * cos(radians(p.lat)), 2) < {reach * reach}"
-    )
-    base.execute(
-        "CREATE TEMP TABLE candidates AS SELECT a, b, min(bin) AS first, max(bin) AS last FROM (SELECT *, sum(new) OVER "
-        "(PARTITION BY a, b ORDER BY bin) AS part FROM (SELECT a, b, bin, "
-        "(bin - lag(bin, 1, -99) OVER (PARTITION BY a, b ORDER BY bin) > 4)::INTEGER AS new FROM near)) "
-        f"GROUP BY a, b, part HAVING count(*) >= {max(least // 2, 1)} ORDER BY a, b, first"
-    )
-    found: dict[str, Ints] = base.execute("FROM candidates").fetchnumpy()
-    kept = _near_in_time(base, found, config)
-    found = {name: np.asarray(values[kept]) for name, values in found.items()}
+    """Create the table `candidates` and return it.
+
+    Its rows are pairs a, b and the bins first, last in which they are roughly near each other.
+    """
     import pyarrow as pa
 
-    base.register("remaining", pa.table(found))
+    reach = config.log.proximity + config.slack
+    least = max(int(shortest(config.log) * config.log.period / BIN_S) - 2, 1)
+    key, above = f"r * {CELLS_PER_ROW_COUNT} + c", f"(r + 1) * {CELLS_PER_ROW_COUNT} + d"
+    probes = f"[{key}, {key} + 1, {above} - 1, {above}, {above} + 1]"
+    north = f"(p.lat - q.lat) * {LATITUDE_M}"
+    east = f"(p.lon - q.lon) * {LONGITUDE_M} * cos(radians(p.lat))"
+    base.execute(f"""
+        CREATE TEMP TABLE near AS
+        SELECT least(p.device, q.device) AS a, greatest(p.device, q.device) AS b, p.bin
+        FROM (SELECT device, bin, lat, lon, {key} AS home, unnest({probes}) AS key FROM cells) p
+        JOIN (SELECT device, bin, lat, lon, {key} AS key FROM cells) q
+          ON p.bin = q.bin AND p.key = q.key
+        WHERE p.device <> q.device AND (p.key <> p.home OR p.device < q.device)
+          AND pow({north}, 2) + pow({east}, 2) < {reach * reach}""")
+    begins = f"(bin - lag(bin, 1, -99) OVER (PARTITION BY a, b ORDER BY bin) > {MAX_GAP_COUNT})"
+    base.execute(f"""
+        CREATE TEMP TABLE candidates AS
+        SELECT a, b, min(bin) AS first, max(bin) AS last
+        FROM (SELECT *, sum(new) OVER (PARTITION BY a, b ORDER BY bin) AS part
+              FROM (SELECT a, b, bin, {begins}::INTEGER AS new FROM near))
+        GROUP BY a, b, part HAVING count(*) >= {max(least // 2, 1)} ORDER BY a, b, first""")
+    pairs: dict[str, Ints] = base.execute("FROM candidates").fetchnumpy()
+    is_near = _near_in_time(base, pairs, config)
+    pairs = {name: np.asarray(values[is_near]) for name, values in pairs.items()}
+    base.register("remaining", pa.table(pairs))
     base.execute("CREATE OR REPLACE TEMP TABLE candidates AS FROM remaining")
-    return found
+    return pairs
 
 
-def _near_in_time(base: Any, pairs: dict[str, Ints], config: CorpusConfig) -> Bools:
-    """(C,) which candidates may have to do with each other: somewhere they come near within the seconds that count.
+def _near_in_time(base: Any, pairs: Mapping[str, Ints], config: CorpusConfig) -> Bools:
+    """(C,) which candidates may interact: somewhere they are near within the relevant seconds.
 
-    With bins a half second apart places are missed by what is driven in a quarter of a second, and by the slack of a bin.
+    Bins of half a second miss places by the distance driven in a quarter of a second.
     """
-    rows = base.execute(
-        "SELECT device, bin, lat, lon FROM binned WHERE device IN (SELECT a FROM candidates UNION SELECT b FROM candidates) "
-        "ORDER BY device, bin"
-    ).fetchnumpy()
-    own = {
-        int(rows["device"][first]): slice(first, last) for first, last in runs_of(rows["device"])
-    }
-    steps = int(config.interaction / GAP_RATE_MPS / (BIN * 1e-6)) + 1
-    reach = config.interaction + config.slack + FASTEST_MPS * BIN * 0.25e-6
-    north = rows["lat"] * NORTH
-    kept = np.zeros(len(pairs["a"]), dtype=bool)
-    for k, (a, b, first, last) in enumerate(
-        zip(*(pairs[name].tolist() for name in ("a", "b", "first", "last")), strict=True)
-    ):
-        wide = LONGITUDE * np.cos(float(rows["lat"][own[a]][0]) * np.pi / 180.0)
-        one, other = (
-            _Sent(rows["bin"][own[n]], north[own[n]], rows["lon"][own[n]]) for n in (a, b)
+    rows = base.execute("""
+        SELECT device, bin, lat, lon FROM binned
+        WHERE device IN (SELECT a FROM candidates UNION SELECT b FROM candidates)
+        ORDER BY device, bin""").fetchnumpy()
+    sent = {
+        int(rows["device"][first]): _Sent(
+            rows["bin"][first:last],
+            rows["lat"][first:last] * MAX_LATITUDE_M,
+            rows["lon"][first:last],
         )
-        kept[k] = _least_apart(one, other, wide, first, last, steps) <= reach * reach
-    return kept
+        for first, last in runs_of(rows["device"])
+    }
+    latitude = {int(rows["device"][k]): float(rows["lat"][k]) for k, _ in runs_of(rows["device"])}
+    steps = int(config.interaction / GAP_RATE_MPS / BIN_S) + 1
+    reach = config.interaction + config.slack + MAX_SPEED_MPS * BIN_S / 4.0
+    is_near = np.zeros(len(pairs["a"]), dtype=bool)
+    columns = (pairs[name].tolist() for name in ("a", "b", "first", "last"))
+    for k, (a, b, first, last) in enumerate(zip(*columns, strict=True)):
+        degree = LONGITUDE_M * np.cos(latitude[a] * np.pi / 180.0)
+        square = _least_square(sent[a], sent[b], degree, first, last, steps)
+        is_near[k] = square <= reach * reach
+    return is_near
 
 
 class _Sent(NamedTuple):
-    """Where a vehicle is in bins (M,) in which it sends: how far north [m] and at which longitude [degrees]."""
+    """Bins (M,) in which a vehicle sends, metres north and degrees east in each."""
 
     bins: Ints
     north: Floats
@@ -322,24 +364,22 @@ _SENT = named(_Sent, I1, F1, F1)
 
 
 @kernel(_SENT, _SENT, F, I, I, I)
-def _least_apart(
-    one: _Sent, other: _Sent, wide: float, first: int, last: int, steps: int
-) -> float:
-    """Square of how near [m²] one, in bins from first to last, comes to the other, at most `steps` bins away.
+def _least_square(a: _Sent, b: _Sent, degree: float, first: int, last: int, steps: int) -> float:
+    """Least square distance [m²] of a, in bins from first to last, to b, at most `steps` bins away.
 
-    `wide` is the length of a degree of longitude [m].
+    `degree` is the length of a degree of longitude [m].
     """
-    bins, others = one.bins, other.bins
     least = np.inf
     begin = 0
-    for m in range(len(bins)):
-        if bins[m] < first or bins[m] > last:
+    for m in range(len(a.bins)):
+        if a.bins[m] < first or a.bins[m] > last:
             continue
-        while begin < len(others) and others[begin] < bins[m] - steps:
+        while begin < len(b.bins) and b.bins[begin] < a.bins[m] - steps:
             begin += 1
         n = begin
-        while n < len(others) and others[n] <= bins[m] + steps:
-            up, right = one.north[m] - other.north[n], (one.lon[m] - other.lon[n]) * wide
-            least = min(least, up * up + right * right)
+        while n < len(b.bins) and b.bins[n] <= a.bins[m] + steps:
+            north = a.north[m] - b.north[n]
+            east = (a.lon[m] - b.lon[n]) * degree
+            least = min(least, north * north + east * east)
             n += 1
     return least

@@ -43,7 +43,7 @@ CAUSES = (  # in the order of messages.sql; each row is counted under the first 
 )
 OFF = len(CAUSES)
 ROWS = Path(__file__).with_suffix(".sql").read_text(encoding="utf-8")
-GROUP = 122_880  # rows of a group in a table
+GROUP_ROWS = 122_880  # rows of a group in a table
 PACKED: dict[
     str, Any
 ] = {  # how tables of messages are written: differences between rows, of one vehicle and in order of time
@@ -176,7 +176,7 @@ def _parse(base: Any, names: dict[str, str], target: Path) -> dict[str, Any]:
     ):
         base.execute(f"SET VARIABLE {name} = ?", [value])
     base.execute("CREATE TYPE read AS ENUM (SELECT unnest(getvariable('files')))")
-    write_messages(base.sql(ROWS).to_arrow_reader(GROUP), target)
+    write_messages(base.sql(ROWS).to_arrow_reader(GROUP_ROWS), target)
     base.execute("CREATE VIEW parsed AS FROM read_parquet(getvariable('parsed'))")
     unchecked = _unchecked(base, target)
     account: dict[str, Counter[str]] = {name: Counter() for name in true}
@@ -223,7 +223,7 @@ def _unchecked(base: Any, target: Path) -> list[int]:
         again, listed = target.with_name("again.parquet"), ", ".join(map(str, files))
         kept = f"(CASE WHEN cause = {OFF} AND file IN ({listed}) THEN 0 ELSE cause END)::UTINYINT AS cause"
         write_messages(
-            base.sql(f"SELECT * REPLACE ({kept}) FROM parsed").to_arrow_reader(GROUP), again
+            base.sql(f"SELECT * REPLACE ({kept}) FROM parsed").to_arrow_reader(GROUP_ROWS), again
         )
         again.replace(target)
     return files

@@ -1,8 +1,12 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Tracks of vehicles in an hour of messages: those that share an id told apart, outliers left out, and when two meet."""
+"""Tracks of vehicles in an hour of messages, and the meetings of two vehicles.
 
+Vehicles that share an id are separated, and outliers are left out.
+"""
+
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any
@@ -21,12 +25,18 @@ from scenario_gen.logs import (
 from scenario_gen.numerics import Bools, Floats, Ints, runs
 from scenario_gen.numerics.kernels import F1, I1, kernel, OUT2, OUTI1
 
-FASTEST_MPS = 35.0  # m/s: what a vehicle drives in a bin widens the cells
-METRES = 110_574.0  # of a degree of latitude, at the least
-NORTH = 111_120.0  # m of one, within 0.5 % of it anywhere
-LONGITUDE = 111_320.0  # m of a degree of longitude at the equator
-MAX_SAME = 64  # vehicles that share an id in an hour
-OUTLIER_M = 15.0  # m from the median of five messages, beyond what is driven meanwhile: further is no position
+MAX_SPEED_MPS = 35.0  # the distance driven in a bin widens the cells
+LATITUDE_M = 110_574.0  # length of a degree of latitude, at least
+MAX_LATITUDE_M = 111_120.0  # and within 0.5 % anywhere
+LONGITUDE_M = 111_320.0  # length of a degree of longitude at the equator
+MICROSECOND_S = 1e-6
+MAX_SENDERS_COUNT = 64  # vehicles that share an id in an hour
+OUTLIER_M = 15.0  # from the median of five messages, beyond the distance driven meanwhile
+MAX_OUTLIER_GAP_S = 2.0
+SENDER_RADIUS_M = 20.0  # within which the next message of a vehicle is, beyond its driving
+SENDER_SPEED_RATIO = 1.5  # of its speed
+MIN_SENDER_SPEED_MPS = 5.0
+MAX_SENDER_GAP_S = 600.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,7 +49,7 @@ class Motion:
 
 @dataclass(frozen=True, eq=False)
 class Track:
-    """A vehicle's messages (M,) in order of time, one for each stamp: t [µs since 2004], degrees, m/s, rad from east."""
+    """Messages (M,) of a vehicle in order of time: t [µs since 2004], degrees, m/s, rad from east."""
 
     device: int
     t: Ints
@@ -55,130 +65,137 @@ def runs_of(values: Ints) -> list[tuple[int, int]]:
     return list(pairwise(edges)) if len(values) else []
 
 
-def tracks_of(rows: dict[str, Any]) -> dict[int, Track]:
-    """Return the vehicles' tracks without what lies far from the messages about it.
+def tracks_of(rows: Mapping[str, Any]) -> dict[int, Track]:
+    """Return the tracks of vehicles, without outliers.
 
     Args:
-        rows: (M,) by column, in order of vehicle and time, one for each stamp; heading in degrees clockwise from north.
+        rows: (M,) by column, ordered by vehicle and time, one for each stamp; heading in degrees
+            clockwise from north.
     """
     device, t = rows["device"], rows["t"]
-    own = runs_of(device)
-    if not own:
+    spans = runs_of(device)
+    if not spans:
         return {}
-    lengths = np.array([last - first for first, last in own])
-    first, last = (np.repeat(np.array(ends), lengths) for ends in zip(*own, strict=True))
-    at = np.arange(len(t))
-    around = [np.clip(at + k, first, last - 1) for k in (-2, -1, 0, 1, 2)]
-    seconds = np.minimum((t[around[4]] - t[around[0]]) * 1e-6, 2.0)
-    good = np.ones(len(t), dtype=bool)
-    wide = LONGITUDE * np.cos(rows["lat"] * (np.pi / 180.0))
-    for name, metres in (("lat", METRES), ("lon", wide)):
-        middle = np.sort([rows[name][index] for index in around], axis=0)[2]
-        good &= np.abs(rows[name] - middle) * metres < OUTLIER_M + FASTEST_MPS * seconds
+    is_good = ~_outliers(rows, spans)
     heading = np.pi / 2.0 - rows["heading"].astype(np.float64) * (np.pi / 180.0)
     speed = rows["speed"].astype(np.float64)
-    found = {}
-    for begin, end in own:
-        kept = np.flatnonzero(good[begin:end]) + begin
-        if len(kept) > 1:
-            found[int(device[begin])] = Track(
-                int(device[begin]),
-                t[kept],
-                rows["lat"][kept],
-                rows["lon"][kept],
-                speed[kept],
-                heading[kept],
-            )
-    return found
+    tracks = {}
+    for begin, end in spans:
+        index = np.flatnonzero(is_good[begin:end]) + begin
+        if len(index) > 1:
+            name = int(device[begin])
+            lat, lon = rows["lat"][index], rows["lon"][index]
+            tracks[name] = Track(name, t[index], lat, lon, speed[index], heading[index])
+    return tracks
+
+
+def _outliers(rows: Mapping[str, Any], spans: Sequence[tuple[int, int]]) -> Bools:
+    """(M,) whether a message lies far from the median of the five messages around it."""
+    t = rows["t"]
+    lengths = [last - first for first, last in spans]
+    first = np.repeat([span[0] for span in spans], lengths)
+    last = np.repeat([span[1] for span in spans], lengths)
+    index = np.arange(len(t))
+    around = [np.clip(index + k, first, last - 1) for k in (-2, -1, 0, 1, 2)]
+    seconds = np.minimum((t[around[4]] - t[around[0]]) * MICROSECOND_S, MAX_OUTLIER_GAP_S)
+    limit = OUTLIER_M + MAX_SPEED_MPS * seconds
+    east = LONGITUDE_M * np.cos(rows["lat"] * (np.pi / 180.0))
+    is_outlier = np.zeros(len(t), dtype=bool)
+    for name, metres in (("lat", LATITUDE_M), ("lon", east)):
+        median = np.sort([rows[name][index] for index in around], axis=0)[2]
+        is_outlier |= ~(np.abs(rows[name] - median) * metres < limit)
+    return is_outlier
 
 
 def meetings(
     a: Track, b: Track, span: tuple[int, int], config: CorpusConfig
 ) -> list[dict[str, Any]]:
-    """Return the meetings of two vehicles within a span of time [µs since 2004], each as a row of the table.
+    """Return the meetings of two vehicles within a span of time [µs since 2004], as table rows.
 
-    Both near each other for long enough, one of them moves, and they have to do with each other.
+    In a meeting both are near each other for long enough, one of them moves, and they interact.
     """
-    period = round(config.log.period * 1e6)
-    first, last = (
-        -(-max(span[0], int(a.t[0]), int(b.t[0])) // period),
-        min(span[1], int(a.t[-1]), int(b.t[-1])) // period + 1,
-    )
+    period = round(config.log.period / MICROSECOND_S)
+    first = -(-max(span[0], int(a.t[0]), int(b.t[0])) // period)
+    last = min(span[1], int(a.t[-1]), int(b.t[-1])) // period + 1
     if last - first < shortest(config.log):
         return []
-    at = np.arange(first, last) * period
-    inside = (a.t >= at[0]) & (a.t <= at[-1])
-    origin = (
-        (float(a.lat[inside].mean()), float(a.lon[inside].mean()))
-        if inside.any()
-        else (float(a.lat[0]), float(a.lon[0]))
-    )
-    one, other = (_at(track, at, origin, config) for track in (a, b))
-    apart = np.hypot(*(one[0].position - other[0].position).T)
-    near = one[1] & other[1] & (apart < config.log.proximity)
-    found = []
-    for low, high in runs(near, ticks(OUT_OF_RANGE_S, config.log)):
+    stamps = np.arange(first, last) * period
+    inside = np.flatnonzero((a.t >= stamps[0]) & (a.t <= stamps[-1]))
+    if len(inside) == 0:
+        inside = np.array([0])
+    origin = float(a.lat[inside].mean()), float(a.lon[inside].mean())
+    motion_a, present_a = _motion_at(a, stamps, origin, config)
+    motion_b, present_b = _motion_at(b, stamps, origin, config)
+    distance = np.hypot(*(motion_a.position - motion_b.position).T)
+    both = present_a & present_b
+    rows = []
+    for low, high in runs(
+        both & (distance < config.log.proximity), ticks(OUT_OF_RANGE_S, config.log)
+    ):
         for begin, end in _windows(first + low, first + high, config):
             if end - begin < shortest(config.log):
                 continue
-            there = (
-                np.flatnonzero(
-                    one[1][begin - first : end - first] & other[1][begin - first : end - first]
-                )
-                + begin
-                - first
-            )
-            p, q = (Motion(m.position[there], m.speed[there]) for m, _ in (one, other))
-            travel = max(float(m.speed.sum()) for m in (p, q)) * config.log.period
-            if travel < config.log.travel:
-                continue
-            gap, _, _ = space_time_gap(p.position, q.position, config.log.period)
-            if gap > config.interaction:
-                continue
-            found.append({
-                "a": a.device, "b": b.device, "start": begin * period, "end": (end - 1) * period, "gap": gap,
-                "distance": float(apart[there].min()), "travel": travel, "lat": origin[0], "lon": origin[1],
-            })  # fmt: skip
-    return found
+            index = np.flatnonzero(both[begin - first : end - first]) + begin - first
+            facts = _interaction(motion_a, motion_b, index, config)
+            if facts is not None:
+                rows.append({
+                    "a": a.device,
+                    "b": b.device,
+                    "start": begin * period,
+                    "end": (end - 1) * period,
+                    "distance": float(distance[index].min()),
+                    "lat": origin[0],
+                    "lon": origin[1],
+                    **facts,
+                })  # fmt: skip
+    return rows
+
+
+def _interaction(
+    a: Motion, b: Motion, index: Ints, config: CorpusConfig
+) -> dict[str, float] | None:
+    """Return gap and travel [m] of two vehicles at some samples; None if they do not interact."""
+    longest = max(float(motion.speed[index].sum()) for motion in (a, b))
+    travel = longest * config.log.period
+    if travel < config.log.travel:
+        return None
+    gap, _, _ = space_time_gap(a.position[index], b.position[index], config.log.period)
+    return None if gap > config.interaction else {"gap": gap, "travel": travel}
 
 
 def _windows(first: int, last: int, config: CorpusConfig) -> list[tuple[int, int]]:
-    """Cut as `logs.groups.windows` does, at whole multiples of `max_duration`, of ticks that count from 2004."""
+    """Cut as `logs.groups.windows` does, at multiples of `max_duration`, in ticks since 2004."""
     longest = ticks(config.log.max_duration, config.log)
     base = max(first // longest - 1, 0) * longest
-    return [
-        (begin + base, end + base) for begin, end in windows(first - base, last - base, config.log)
-    ]
+    cuts = windows(first - base, last - base, config.log)
+    return [(begin + base, end + base) for begin, end in cuts]
 
 
-def _at(
-    track: Track, at: Ints, origin: tuple[float, float], config: CorpusConfig
+def _motion_at(
+    track: Track, stamps: Ints, origin: tuple[float, float], config: CorpusConfig
 ) -> tuple[Motion, Bools]:
-    """A vehicle's motion at stamps (T,) [µs], and whether it is there: between messages no further apart than gaps may be."""
-    low, high = np.searchsorted(track.t, [at[0], at[-1]])
-    own = slice(max(int(low) - 1, 0), int(high) + 1)
-    t = track.t[own]
+    """A vehicle's motion at stamps (T,) [µs], and whether it is present.
+
+    It is present between messages with gaps that are short enough.
+    """
+    low, high = np.searchsorted(track.t, [stamps[0], stamps[-1]])
+    rows = slice(max(int(low) - 1, 0), int(high) + 1)
+    t = track.t[rows]
     north, east = metres_per_degree(origin)
-    place = np.stack(
-        [(track.lon[own] - origin[1]) * east, (track.lat[own] - origin[0]) * north], axis=1
-    )
-    seconds, when = (t - at[0]) * 1e-6, (at - at[0]) * 1e-6
-    position = np.stack(
-        [np.interp(when, seconds, place[:, 0]), np.interp(when, seconds, place[:, 1])], axis=1
-    )
-    after = np.clip(np.searchsorted(t, at), 1, len(t) - 1)
-    there: Bools = (
-        (at >= t[0])
-        & (at <= t[-1])
-        & (t[after] - t[after - 1] <= config.log.longest_gap * 1e6 + 1.0)
-    )
-    return Motion(position, np.interp(when, seconds, track.speed[own])), there
+    seconds, times = (t - stamps[0]) * MICROSECOND_S, (stamps - stamps[0]) * MICROSECOND_S
+    x = np.interp(times, seconds, (track.lon[rows] - origin[1]) * east)
+    y = np.interp(times, seconds, (track.lat[rows] - origin[0]) * north)
+    after = np.clip(np.searchsorted(t, stamps), 1, len(t) - 1)
+    longest = config.log.longest_gap / MICROSECOND_S + 1.0
+    is_present = (stamps >= t[0]) & (stamps <= t[-1]) & (t[after] - t[after - 1] <= longest)
+    speed = np.interp(times, seconds, track.speed[rows])
+    return Motion(np.stack([x, y], axis=1), speed), np.asarray(is_present)
 
 
-def tell_apart(t: Ints, lat: Floats, lon: Floats, speed: Floats) -> Ints:
-    """Return (M,) which of the vehicles that share an id sent each message: 0, 1, …, in order of their first.
+def separate_senders(t: Ints, lat: Floats, lon: Floats, speed: Floats) -> Ints:
+    """Return (M,) which of the vehicles with one id sent each message: 0, 1, … by first message.
 
-    A message belongs to the vehicle that could have driven there from its message before, the nearest such.
+    A message belongs to the nearest vehicle that can have driven there since its last message.
 
     Args:
         t: (M,) µs, ascending.
@@ -186,41 +203,42 @@ def tell_apart(t: Ints, lat: Floats, lon: Floats, speed: Floats) -> Ints:
         lon: (M,) degrees.
         speed: (M,) m/s.
     """
-    who = np.zeros(len(t), dtype=np.int64)
-    wide = np.cos(float(lat.mean()) * np.pi / 180.0) * LONGITUDE
-    _tell_apart(
+    sender = np.zeros(len(t), dtype=np.int64)
+    east = np.cos(float(lat.mean()) * np.pi / 180.0) * LONGITUDE_M
+    _separate_senders(
         np.asarray(t, dtype=np.int64),
-        lat * METRES,
-        lon * wide,
+        lat * LATITUDE_M,
+        lon * east,
         np.asarray(speed, dtype=np.float64),
-        np.zeros((MAX_SAME, 4)),
-        who,
+        np.zeros((MAX_SENDERS_COUNT, 4)),
+        sender,
     )
-    return who
+    return sender
 
 
 @kernel(I1, F1, F1, F1, OUT2, OUTI1)
-def _tell_apart(
-    t: Ints, north: Floats, east: Floats, speed: Floats, places: Floats, who: Ints
+def _separate_senders(
+    t: Ints, north: Floats, east: Floats, speed: Floats, latest: Floats, sender: Ints
 ) -> None:
-    """`places` (V, 4) takes the last message of each vehicle: t, north, east, speed; the last one takes whoever is left."""
+    """Fill `sender`; `latest` (V, 4) has the latest t, north, east, speed of each vehicle.
+
+    The last vehicle gets all messages that remain.
+    """
     count = 0
     for k in range(len(t)):
         best, nearest = -1, np.inf
         for n in range(count):
-            seconds = (t[k] - places[n, 0]) * 1e-6
-            away = max(abs(north[k] - places[n, 1]), abs(east[k] - places[n, 2]))
-            if (
-                away < nearest
-                and seconds < 600.0
-                and away < 20.0 + 1.5 * max(speed[k], places[n, 3], 5.0) * seconds
-            ):
-                best, nearest = n, away
+            seconds = (t[k] - latest[n, 0]) * MICROSECOND_S
+            distance = max(abs(north[k] - latest[n, 1]), abs(east[k] - latest[n, 2]))
+            fastest = max(speed[k], latest[n, 3], MIN_SENDER_SPEED_MPS)
+            reach = SENDER_RADIUS_M + SENDER_SPEED_RATIO * fastest * seconds
+            if distance < min(nearest, reach) and seconds < MAX_SENDER_GAP_S:
+                best, nearest = n, distance
         if best < 0:
-            best = min(count, len(places) - 1)
+            best = min(count, len(latest) - 1)
             count = best + 1
-        places[best, 0] = t[k]
-        places[best, 1] = north[k]
-        places[best, 2] = east[k]
-        places[best, 3] = speed[k]
-        who[k] = best
+        latest[best, 0] = t[k]
+        latest[best, 1] = north[k]
+        latest[best, 2] = east[k]
+        latest[best, 3] = speed[k]
+        sender[k] = best

@@ -154,9 +154,9 @@ def test_a_file_that_cannot_be_read_is_said_and_does_not_end_the_others(archive,
         and "one.csv" in mined.failed[0]
         and "unpacked" in mined.failed[1]
     )
-    assert [one["name"] for one in mined.refused] == ["wide"] and "not a table" in mined.refused[0][
-        "why"
-    ]
+    assert [one["name"] for one in mined.refused] == ["wide"] and "not a table" in mined.refused[
+        0
+    ]["why"]
     assert not list((tmp_path / "out").glob("found/*"))
     assert mined.account == {
         "rows": 4,
