@@ -1,13 +1,13 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The requests and scenarios of one namespace of a bag, and what of them is missing."""
+"""The requests and scenarios in one namespace of a bag."""
 
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from functools import cached_property
-from itertools import islice, pairwise
+from itertools import pairwise
 from pathlib import Path
 
 from msg_conventions.cdr import stamp_of
@@ -21,7 +21,7 @@ from msg_conventions.scenario_info import (
     ScenarioEntry,
 )
 from msg_conventions.scenarios import decode_scenario, digest
-from scenario_gen.bags.recordings.requests import RequestTracker
+from scenario_gen.bags.recordings.request_tracker import RequestTracker
 from scenario_gen.bags.storage.bag import BagMessage
 from scenario_gen.base.errors import InputError
 from scenario_gen.types import Scenario, ScenarioSet
@@ -35,18 +35,18 @@ class RecordedScenarios:
     def __init__(
         self, path: Path, name: str, messages: Mapping[str, Sequence[BagMessage]]
     ) -> None:
-        """Take the bag's path, the namespace's name and its messages by topic."""
-        self.path, self.name, self._recorded = path, name, messages
+        """Use the messages of a namespace of the bag `path`, by topic."""
+        self.path = path
+        self.name = name
+        self._recorded = messages
 
     @cached_property
     def messages(self) -> Mapping[str, Sequence[BagMessage]]:
-        """The messages by topic; those of one scenario are joined, so that there is one for each scenario."""
-        if not (SCENARIOS in self._recorded and INFO in self._recorded):
+        """The messages by topic; several messages of one scenario are joined."""
+        if SCENARIOS not in self._recorded or INFO not in self._recorded:
             return self._recorded
-        return {
-            **self._recorded,
-            SCENARIOS: joined_messages(self._recorded[SCENARIOS], self.entries),
-        }
+        joined = joined_messages(self._recorded[SCENARIOS], self.entries)
+        return {**self._recorded, SCENARIOS: joined}
 
     def data(self, topic: str) -> list[bytes]:
         """Return the messages of a topic, in order."""
@@ -57,41 +57,38 @@ class RecordedScenarios:
         return f"{self.name}/{topic}"
 
     def newest(self, topic: str, stamp_ns: int) -> bytes | None:
-        """Return the last message of a topic that bears the stamp.
+        """Return the last message of a topic with the stamp, None if there is none.
 
         Raises:
             InputError: a message is damaged.
         """
-        return next(
-            (
-                data
-                for data in reversed(self.data(topic))
-                if stamp_of(data, self.where(topic)) == stamp_ns
-            ),
-            None,
-        )
+        for data in reversed(self.data(topic)):
+            if stamp_of(data, self.where(topic)) == stamp_ns:
+                return data
+        return None
 
     # Requests, by `scenarios/info`.
 
     @cached_property
     def infos(self) -> Sequence[tuple[BagMessage, tuple[Info, ...]]]:
-        """The messages of `scenarios/info`, each with what it holds; damaged ones are left out (see `check_infos`)."""
+        """The messages of `scenarios/info`, decoded; without damaged ones (see `check_infos`)."""
         return self._decoded_infos[0]
 
     @cached_property
     def _decoded_infos(
         self,
     ) -> tuple[list[tuple[BagMessage, tuple[Info, ...]]], InputError | None]:
-        found, damage = [], None
+        decoded = []
+        damage = None
         for message in self._recorded.get(INFO, ()):
             try:
-                found.append((message, decode_info(message.data, message.topic)))
+                decoded.append((message, decode_info(message.data, message.topic)))
             except InputError as error:
                 damage = damage or error
-        return found, damage
+        return decoded, damage
 
     def check_infos(self) -> None:
-        """Refuse a damaged message of `scenarios/info`.
+        """Check the messages of `scenarios/info`.
 
         Raises:
             InputError: one is damaged.
@@ -116,8 +113,8 @@ class RecordedScenarios:
 
     @cached_property
     def missing(self) -> tuple[str, ...]:
-        """One sentence for each request that is not complete."""
-        tracker = RequestTracker(most_unmatched=len(self.hashes))
+        """A sentence for each incomplete request."""
+        tracker = RequestTracker(max_unmatched=len(self.hashes))
         for sha256 in self.hashes:
             tracker.add_scenario(sha256)
         for _, infos in self.infos:
@@ -141,7 +138,7 @@ class RecordedScenarios:
         return self._entry_by_hash.get(self.hashes[k])
 
     def scenario(self, k: int) -> tuple[int, Scenario]:
-        """Return stamp [ns] and scenario `k` with its ego's witness, numbered by its entry or, without one, by its place.
+        """Return stamp [ns] and scenario `k` with its ego's witness; without an entry, `k` is its index.
 
         Raises:
             InputError: its message, or that of its witness, is damaged.
@@ -151,9 +148,8 @@ class RecordedScenarios:
     def _decoded(self, data: bytes, entry: ScenarioEntry | None, k: int) -> tuple[int, Scenario]:
         message = self.witnesses.get(entry.witness) if entry else None
         witness = None if message is None else message.data
-        return decode_with_witness(
-            data, entry, k, witness, f"{self.where(SCENARIOS)}, message {k}", self.where(WITNESS)
-        )
+        place = f"{self.where(SCENARIOS)}, message {k}"
+        return decode_with_witness(data, entry, k, witness, place, self.where(WITNESS))
 
     @cached_property
     def witnesses(self) -> Mapping[str, BagMessage]:
@@ -161,149 +157,159 @@ class RecordedScenarios:
         return {digest(message.data): message for message in self.messages.get(WITNESS, ())}
 
     def without_witness(self, entry: ScenarioEntry) -> bool:
-        """Whether the witness that an entry names is not in the bag."""
+        """Return whether the witness that an entry names is not in the bag."""
         return bool(entry.witness) and entry.witness not in self.witnesses
 
     @cached_property
     def strange_witnesses(self) -> bool:
-        """Whether there is a witness that no entry names, though entries are there."""
+        """Whether no entry names one of the witnesses."""
         return bool(self.witnesses.keys() - {entry.witness for entry in self.entries})
 
     @cached_property
     def unknown(self) -> dict[int, ScenarioEntry | None]:
-        """Places of the scenarios without an entry, where there are entries; each with the entry that stands in its place.
+        """Scenarios without an entry, if there are entries; with the entry in the same place.
 
-        Such a scenario was altered if an entry between those of its neighbours names a scenario that is not in the bag. Otherwise
-        its entry was lost, e.g. with the last chunk of a recording that was killed, and the scenario may be sound.
+        Such a scenario was altered if an entry between those of its neighbours names a scenario
+        that is not in the bag. Otherwise its entry was lost, e.g. with the last chunk of a killed
+        recorder, and the scenario may be valid.
         """
         if not self.entries:
             return {}
-        entries = list(_numbered(entry.sha256 for entry in self.entries))
-        place = {key: k for k, key in enumerate(entries)}
-        seen = list(_numbered(self.hashes))
-        there = set(seen)
-        lost = [k for k, key in enumerate(entries) if key not in there]
-        known = [
-            (-1, -1),
-            *((k, place[key]) for k, key in enumerate(seen) if key in place),
-            (len(seen), len(entries)),
-        ]
-        found: dict[int, ScenarioEntry | None] = {}
-        for (first, after), (last, before) in pairwise(known):
-            between = iter([self.entries[k] for k in lost if after < k < before])
-            found |= {
-                k: next(between, None) for k in range(first + 1, last) if self.entry(k) is None
-            }
-        return found
+        entry_keys = list(_numbered(entry.sha256 for entry in self.entries))
+        entry_index = {key: k for k, key in enumerate(entry_keys)}
+        keys = list(_numbered(self.hashes))
+        present = set(keys)
+        lost = [k for k, key in enumerate(entry_keys) if key not in present]
+        matched = [(k, entry_index[key]) for k, key in enumerate(keys) if key in entry_index]
+        matched = [(-1, -1), *matched, (len(keys), len(entry_keys))]
+        unknown: dict[int, ScenarioEntry | None] = {}
+        for (scenario, entry), (next_scenario, next_entry) in pairwise(matched):
+            between = (self.entries[k] for k in lost if entry < k < next_entry)
+            for k in range(scenario + 1, next_scenario):
+                if self.entry(k) is None:
+                    unknown[k] = next(between, None)
+        return unknown
 
     def scenario_set(self) -> ScenarioSet:
-        """Return the scenarios and counts of the last request that was closed.
+        """Return scenarios and counts of the last closed request.
 
-        A sampler that was killed and started again counts its requests from 1 again, so a repeated index, or another seed, begins
-        the request anew. Index 0 may be missing, for its candidate may have been refused, and indices do not always ascend, for
-        adapted candidates are counted apart.
+        A restarted sampler counts its requests from 1 again, so a repeated index or another seed
+        begins the request anew. Index 0 may be missing, if its candidate was rejected, and indices
+        do not always increase, since adapted candidates are counted separately.
 
         Raises:
-            InputError: no request was closed, or a scenario of it is missing or damaged.
+            InputError: no request was closed, or a scenario is missing or damaged.
         """
         self.check_infos()
         if not self.summaries:
             raise InputError(f"{self.path}: no request was closed on {self.where(INFO)}")
-        summary, own = self.summaries[-1], dict[int, ScenarioEntry]()
-        for entry in self.entries:
-            if entry.request == summary.request:
-                if entry.index in own or any(
-                    entry.seed != other.seed for other in islice(own.values(), 1)
-                ):
-                    own.clear()
-                own[entry.index] = entry
+        summary = self.summaries[-1]
+        entries = self._last_entries(summary.request)
         by_hash = dict(zip(self.hashes, self.data(SCENARIOS), strict=True))
-        what = self.where(SCENARIOS)
-        for entry in own.values():
+        topic = self.where(SCENARIOS)
+        for entry in entries:
             if entry.sha256 not in by_hash:
                 raise InputError(
-                    f"{self.path}: scenario {entry.index} of request {entry.request} is not on {what}"
+                    f"{self.path}: scenario {entry.index} of request {entry.request} is not on "
+                    f"{topic}"
                 )
-        if len(own) != summary.published:
+        if len(entries) != summary.published:
             raise InputError(
-                f"{self.path}: {summary.published} scenarios were published, {len(own)} are on {what}"
+                f"{self.path}: {summary.published} scenarios were published, {len(entries)} are "
+                f"on {topic}"
             )
-        return summary.result(
-            tuple(self._decoded(by_hash[e.sha256], e, e.index)[1] for e in own.values())
-        )
+        scenarios = [self._decoded(by_hash[e.sha256], e, e.index)[1] for e in entries]
+        return summary.result(tuple(scenarios))
+
+    def _last_entries(self, request: str) -> list[ScenarioEntry]:
+        """Return the entries of the last request with this id."""
+        entries: dict[int, ScenarioEntry] = {}
+        seed = None
+        for entry in self.entries:
+            if entry.request != request:
+                continue
+            if entry.index in entries or entry.seed != seed:
+                entries.clear()
+            seed = entry.seed
+            entries[entry.index] = entry
+        return list(entries.values())
 
 
 def decode_with_witness(
-    data: bytes, entry: ScenarioEntry | None, k: int, witness: bytes | None, what: str, where: str
+    data: bytes,
+    entry: ScenarioEntry | None,
+    k: int,
+    witness: bytes | None,
+    place: str,
+    witness_topic: str,
 ) -> tuple[int, Scenario]:
-    """Return stamp [ns] and scenario, numbered by its entry or, without one, by its place.
+    """Return stamp [ns] and scenario, with seed and index of its entry.
 
     Args:
-        data: of the scenario's messages.
-        entry: its own on `scenarios/info`, if it has one.
-        k: its place.
-        witness: the message of its ego's witness, if it has one.
-        what: names the scenario in messages.
-        where: names the topic of the witness.
+        data: messages of the scenario.
+        entry: its entry on `scenarios/info`, or None.
+        k: its index without an entry.
+        witness: message of its ego's witness, or None.
+        place: names the scenario in messages.
+        witness_topic: names the topic of the witness in messages.
 
     Raises:
-        InputError: a message is damaged, or the witness is not of another vehicle on the same road.
+        InputError: a message is damaged, or the witness does not belong to the scenario.
     """
     seed, index = (entry.seed, entry.index) if entry else (0, k)
-    late = bool(entry and entry.ego)  # the ego that was left out may have been the first vehicle
-    stamp, scenario = decode_scenario(
-        data, seed=seed, index=index, source=what, may_start_late=late
+    may_start_late = bool(entry and entry.ego)  # the omitted ego may have been the first vehicle
+    stamp_ns, scenario = decode_scenario(
+        data, seed=seed, index=index, source=place, may_start_late=may_start_late
     )
     if entry is not None:
         scenario = replace(scenario, facts=entry.facts)
     if witness is None:
-        return stamp, scenario
-    of, own = decode_scenario(
-        witness,
-        seed=seed,
-        index=index,
-        source=f"{where}, of scenario {index}",
-        may_start_late=True,
+        return stamp_ns, scenario
+    source = f"{witness_topic}, of scenario {index}"
+    witness_ns, drive = decode_scenario(
+        witness, seed=seed, index=index, source=source, may_start_late=True
     )
-    known = {vehicle.id for vehicle in scenario.vehicles}
-    if (
-        (of, own.frame_id) != (stamp, scenario.frame_id)
-        or len(own.vehicles) != 1
-        or own.vehicles[0].id in known
-    ):
+    is_same_frame = (witness_ns, drive.frame_id) == (stamp_ns, scenario.frame_id)
+    others = {vehicle.id for vehicle in scenario.vehicles}
+    if not is_same_frame or len(drive.vehicles) != 1 or drive.vehicles[0].id in others:
         raise InputError(
-            f"{where}, of scenario {index}: it is not one other vehicle with the scenario's stamp and frame"
+            f"{source}: it is not one other vehicle with the scenario's stamp and frame"
         )
-    return stamp, replace(scenario, reference_drive=own)
+    return stamp_ns, replace(scenario, reference_drive=drive)
 
 
 def joined_messages(
     messages: Sequence[BagMessage], entries: Iterable[ScenarioEntry]
 ) -> Sequence[BagMessage]:
-    """Return one message per scenario: vehicles that come or go are in messages of their own, which an entry names.
+    """Return one message per scenario: vehicles that arrive or leave have separate messages.
 
-    A scenario of which a message is missing is not joined: its entry then has no scenario, which `missing` reports.
+    A scenario with a missing message is not joined: its entry then has no scenario, which
+    `missing` reports.
     """
     several = [entry for entry in entries if MESSAGES in entry.status.values]
     if not several:
         return messages
-    places: dict[str, list[int]] = {}
+    indices: dict[str, list[int]] = {}
     for k, message in enumerate(messages):
-        places.setdefault(digest(message.data), []).append(k)
+        indices.setdefault(digest(message.data), []).append(k)
     joined = dict(enumerate(messages))
     for entry in several:
-        try:
-            own = [places[sha256].pop(0) for sha256 in entry.messages if places.get(sha256)]
-            whole = len(own) == len(entry.messages)
-        except InputError:
-            continue
-        if not whole:
-            continue
-        data = b"".join(messages[k].data for k in own)
-        for k in own:
-            joined.pop(k)
-        joined[own[0]] = replace(messages[own[0]], data=data)
+        parts = _parts_of(entry, indices)
+        if parts:
+            data = b"".join(messages[k].data for k in parts)
+            for k in parts:
+                joined.pop(k)
+            joined[parts[0]] = replace(messages[parts[0]], data=data)
     return [joined[k] for k in sorted(joined)]
+
+
+def _parts_of(entry: ScenarioEntry, indices: Mapping[str, list[int]]) -> list[int]:
+    """Remove and return the indices of an entry's messages; none if one is missing."""
+    try:
+        parts = [indices[sha256].pop(0) for sha256 in entry.messages if indices.get(sha256)]
+        return parts if len(parts) == len(entry.messages) else []
+    except InputError:  # the entry is damaged
+        return []
 
 
 def _numbered(texts: Iterable[str]) -> Iterable[tuple[str, int]]:

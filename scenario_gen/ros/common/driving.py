@@ -29,7 +29,7 @@ from msg_conventions.paths import encode_path
 from msg_conventions.pictures import vehicle_markers
 from msg_conventions.roads import decode_map
 from msg_conventions.topics import vehicle_topic
-from scenario_gen.bags.recordings.arriving import ArrivingScenarios
+from scenario_gen.bags.recordings.scenario_decoder import ScenarioDecoder
 from scenario_gen.base.errors import InputError, ScenarioGenError
 from scenario_gen.closed_loop.ego import Command, Pose
 from scenario_gen.closed_loop.local_map import local_map
@@ -163,7 +163,7 @@ class ArrivingTrials:
 
     def __init__(self) -> None:
         self._roads: dict[str, Road] = {}  # by the hashes of their maps
-        self._scenarios = ArrivingScenarios()
+        self._scenarios = ScenarioDecoder()
 
     @property
     def unmatched(self) -> int:
@@ -184,7 +184,7 @@ class ArrivingTrials:
         if topic == "map":
             self._roads[hash_of("map", data)] = decode_map(data)[1]
             return
-        for entry, _, scenario in self._scenarios.take(topic, data):
+        for entry, _, scenario in self._scenarios.add(topic, data):
             name = f"{entry.request} {entry.index}"
             road = self._roads.get(entry.map_hash or "")
             yield trial_of(name, scenario, entry, road, ego, f"scenario {name}")

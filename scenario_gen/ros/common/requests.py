@@ -27,7 +27,7 @@ from msg_conventions.diagnostics import Level, Subject
 from msg_conventions.hashes import template_hashes
 from msg_conventions.request_messages import RequestMessages
 from msg_conventions.scenario_info import request_summary, RequestSummary
-from scenario_gen.bags.recordings.sending import RequestSender, Send
+from scenario_gen.bags.recordings.scenario_publisher import ScenarioPublisher, Send
 from scenario_gen.bags.recordings.template import decode_template
 from scenario_gen.base.cancelling import CancelledError
 from scenario_gen.base.errors import InputError, RefusedError, ScenarioGenError
@@ -443,7 +443,7 @@ def answer_request(
         request.progress(done, candidates, encounter.start_ns)
 
     hashes = template_hashes(messages)
-    sender = RequestSender(
+    sender = ScenarioPublisher(
         RequestMessages(encounter, request.name, node, hashes), road.frame_id, send
     )
 

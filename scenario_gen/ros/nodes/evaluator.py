@@ -17,7 +17,7 @@ from msg_conventions.scenario_info import decode_info, INFO, RequestSummary, Sce
 from msg_conventions.scenarios import decode_scenario, digest
 from msg_conventions.topics import LOSSLESS
 from msg_conventions.tracks import decode_tracks
-from scenario_gen.bags.recordings.requests import Match, RequestTracker, TrackedRequest
+from scenario_gen.bags.recordings.request_tracker import Match, RequestTracker, TrackedRequest
 from scenario_gen.base.cancelling import stop_if_cancelled
 from scenario_gen.base.errors import InputError
 from scenario_gen.base.parameters import parameter, Parameters
@@ -88,14 +88,14 @@ class Evaluator(StageNode):
         if not {"tracks", "changepoints"} <= set(self._newest):
             return
         for name, request in list(self._requests.open.items()):
-            if request.whole:
+            if request.is_complete:
                 self._requests.forget(name)
                 self._submit(dict(self._newest), request)
 
     def _keep(self, match: Match | None) -> None:
         if match is not None:
             request, entry, data = match
-            request.keep(entry, data, self.config.seed, self.config.measured)
+            request.store(entry, data, self.config.seed, self.config.measured)
 
     def _drop_excess(self) -> None:
         """Drop the oldest requests above the limits of closed requests and of stored scenarios."""
@@ -104,7 +104,7 @@ class Evaluator(StageNode):
         for name in closed[: max(0, len(closed) - self.config.wait)]:
             self._drop(name)
         while len(requests) > 1:
-            stored = sum(len(request.kept) for request in requests.values())
+            stored = sum(len(request.stored) for request in requests.values())
             if stored <= self.config.keep:
                 break
             self._drop(next(iter(requests)))

@@ -19,7 +19,7 @@ from msg_conventions.frames import encode_frames
 from msg_conventions.markers import Action, Kind, Marker
 from msg_conventions.pictures import body, COLOURS, encode_markers
 from msg_conventions.scenario_info import ScenarioEntry
-from scenario_gen.bags.recordings.arriving import ArrivingScenarios, TOPICS
+from scenario_gen.bags.recordings.scenario_decoder import ScenarioDecoder, TOPICS
 from scenario_gen.base.parameters import parameter, Parameters
 from scenario_gen.numerics import Floats
 from scenario_gen.ros.common.stage_node import StageNode
@@ -70,7 +70,7 @@ class Preview(StageNode):
     def __init__(self, namespace: str | None = None) -> None:
         super().__init__("preview", Config(), namespace)
         self._tf = create_frames_publisher(self)
-        self._arriving = ArrivingScenarios()
+        self._arriving = ScenarioDecoder()
         self._newest: tuple[Scenario, ScenarioEntry] | None = None
         self._shown: Shown | None = None
         self._anchors = np.zeros((0, 0, 3))
@@ -80,7 +80,7 @@ class Preview(StageNode):
 
     def stopped(self) -> None:
         """Forget what was shown."""
-        self._arriving = ArrivingScenarios()
+        self._arriving = ScenarioDecoder()
         self._newest = self._shown = None
 
     def received(self, topic: str, data: bytes) -> None:
@@ -88,7 +88,7 @@ class Preview(StageNode):
         if topic == "fit":
             self._anchors = decode_fit(data)[3]
             return
-        for entry, _, scenario in self._arriving.take(topic, data):
+        for entry, _, scenario in self._arriving.add(topic, data):
             self._newest = scenario, entry
 
     def _tick(self) -> None:

@@ -24,7 +24,7 @@ from rclpy.node import Node
 from rclpy.time import Time
 
 from msg_conventions.diagnostics import Level, Subject
-from scenario_gen.bags.recordings.losses import Losses, remedy
+from scenario_gen.bags.recordings.message_loss import MessageLoss, TopicLoss
 from scenario_gen.bags.storage.metadata import qos_yaml
 from scenario_gen.bags.storage.writer import BagWriter, Split
 from scenario_gen.base.errors import InputError, of_system
@@ -90,8 +90,8 @@ class Recorder(Node):  # type: ignore[misc]
         offer_trigger(self, "~/stop", self._stop_now)
         self.create_timer(LOOK_PERIOD_S, self._subscribe_to_new)
         self.create_timer(FLUSH_PERIOD_S, self._flush)
-        self._losses = Losses(self.count_publishers)
-        self._warned: dict[str, str] = {}
+        self._losses = MessageLoss(self.count_publishers)
+        self._warned: dict[str, TopicLoss] = {}
         self.diagnostics = NodeDiagnostics(self, self._report_counts)
         self._report(Level.OK, "nothing is being recorded")
 
@@ -108,7 +108,7 @@ class Recorder(Node):  # type: ignore[misc]
                 compress=config.compress,
                 split=Split(config.split_bytes, config.split_seconds),
             )
-        self._losses, self._warned = Losses(self.count_publishers), {}
+        self._losses, self._warned = MessageLoss(self.count_publishers), {}
         self._report(Level.OK, f"recording to {folder}")
         self._refused.clear()
         self.diagnostics.resolve("topics")
@@ -129,8 +129,9 @@ class Recorder(Node):  # type: ignore[misc]
         bag, self._bag = self._bag, None
         if bag is None:
             return ""
-        bag.info.not_recorded = dict(self._losses.summary(ended=True))
-        self._warn(bag.info.not_recorded)
+        lost = self._losses.summary(ended=True)
+        bag.info.not_recorded = {topic: str(loss) for topic, loss in lost.items()}
+        self._warn(lost)
         with _disk_errors():
             bag.close()
         self._report(Level.OK, f"{bag.folder} is closed")
@@ -191,11 +192,12 @@ class Recorder(Node):  # type: ignore[misc]
         self.diagnostics.status(Level.OK, folder, Subject.RECORDED, counts, log=False)
         lost = self._losses.summary()
         if lost:
-            message = "; ".join(self._loss_message(topic, text) for topic, text in lost.items())
-            self.diagnostics.status(Level.WARN, message, "losses", lost, log=False)
+            message = "; ".join(self._loss_message(topic, loss) for topic, loss in lost.items())
+            texts = {topic: str(loss) for topic, loss in lost.items()}
+            self.diagnostics.status(Level.WARN, message, "losses", texts, log=False)
         self._warn(lost)
 
-    def _loss_message(self, topic: str, text: str) -> str:
+    def _loss_message(self, topic: str, loss: TopicLoss) -> str:
         """Return the loss of a topic's messages with a remedy.
 
         Two publishers of one topic cause losses.
@@ -205,14 +207,14 @@ class Recorder(Node):  # type: ignore[misc]
         if len(nodes) > 1:
             publishers = " and ".join(nodes)
             remedy_text = "end one of them, or give it another namespace"
-            return f"{topic}: {text}; {publishers} publish it: {remedy_text}"
-        return f"{topic}: {text}; {remedy(text)}"
+            return f"{topic}: {loss}; {publishers} publish it: {remedy_text}"
+        return f"{topic}: {loss}; {loss.remedy}"
 
-    def _warn(self, lost: Mapping[str, str]) -> None:
+    def _warn(self, lost: Mapping[str, TopicLoss]) -> None:
         """Log new losses."""
-        for topic, text in lost.items():
-            if text != self._warned.get(topic):
-                self.get_logger().warning(self._loss_message(topic, text))
+        for topic, loss in lost.items():
+            if loss != self._warned.get(topic):
+                self.get_logger().warning(self._loss_message(topic, loss))
         self._warned = dict(lost)
 
     def _flush(self) -> None:
@@ -258,7 +260,7 @@ class Recorder(Node):  # type: ignore[misc]
             now: Time = self.get_clock().now()
             with self._guarded():
                 self._bag.write(topic, data, now.nanoseconds)
-            self._losses.take(topic, data, number)
+            self._losses.add(topic, data, number)
 
     @contextmanager
     def _guarded(self) -> Iterator[None]:

@@ -31,7 +31,7 @@ from std_srvs.srv import Trigger
 from msg_conventions.autoware import EGO, OBJECTS
 from msg_conventions.diagnostics import Level
 from msg_conventions.topics import vehicle_topic
-from scenario_gen.bags.recordings.arriving import TOPICS
+from scenario_gen.bags.recordings.scenario_decoder import TOPICS
 from scenario_gen.base.errors import InputError, of_system, ScenarioGenError
 from scenario_gen.closed_loop.ego import Command, Pose
 from scenario_gen.closed_loop.origin import Trial

@@ -11,7 +11,7 @@ from support.message_examples import scenario
 
 from msg_conventions.scenario_info import encode_info, scenario_entry
 from msg_conventions.scenarios import encode_scenario, messages_of
-from scenario_gen.bags.recordings.arriving import ArrivingScenarios, INFO, SCENARIOS, WITNESS
+from scenario_gen.bags.recordings.scenario_decoder import INFO, ScenarioDecoder, SCENARIOS, WITNESS
 from scenario_gen.base.errors import InputError
 from scenario_gen.types.ego import join_ego, with_witness
 from scenario_gen.types.scenario import BoundaryStates, EgoSlot, Scenario
@@ -55,21 +55,21 @@ MADE, MESSAGES = set_of(2)
 @given(st.permutations(range(len(MESSAGES))))
 @settings(max_examples=25)
 def test_whatever_comes_first(order):
-    arriving = ArrivingScenarios()
-    found = [one for k in order for one in arriving.take(*MESSAGES[k])]
+    arriving = ScenarioDecoder()
+    found = [one for k in order for one in arriving.add(*MESSAGES[k])]
     assert sorted(entry.index for entry, _, _ in found) == [0, 1] and arriving.unmatched == 0
     for entry, stamp, got in found:
         assert stamp == 17 and entry.ego == got.reference_drive.vehicles[0].id
         wanted = join_ego(MADE[entry.index])
         assert encode_scenario(join_ego(got), 17) == encode_scenario(wanted, 17)
-    assert [one for k in order for one in arriving.take(*MESSAGES[k])] == [], (
+    assert [one for k in order for one in arriving.add(*MESSAGES[k])] == [], (
         "what comes twice counts once"
     )
 
 
 def test_what_is_not_whole_waits():
-    arriving = ArrivingScenarios()
-    assert all(arriving.take(*message) == [] for message in MESSAGES if message[0] != WITNESS)
+    arriving = ScenarioDecoder()
+    assert all(arriving.add(*message) == [] for message in MESSAGES if message[0] != WITNESS)
     assert arriving.unmatched > 0
     with pytest.raises(InputError):
-        arriving.take(INFO, b"damaged")
+        arriving.add(INFO, b"damaged")

@@ -6,7 +6,7 @@
 import pytest
 
 from msg_conventions.topics import topic_entry
-from scenario_gen.bags.recordings.losses import LATE, Losses
+from scenario_gen.bags.recordings.message_loss import BEGAN_LATE, MessageLoss
 
 
 @pytest.mark.parametrize(
@@ -14,12 +14,12 @@ from scenario_gen.bags.recordings.losses import LATE, Losses
     ["/tf", "/clock", "/vehicle_1/odom", "/vehicle_1/fix", "/verdicts", "/ego/witness", "/map"],
 )
 def test_what_was_published_before_the_recording_is_missed_of_results_only(topic):
-    losses, quality = Losses(lambda _: 1), topic_entry(topic)[1]
+    losses, quality = MessageLoss(lambda _: 1), topic_entry(topic)[1]
     losses.begin(topic, quality)
     for number in (5358, 5359, 5362):
-        losses.take(topic, b"", number)
-    said = losses.summary().get(topic, "")
-    assert (LATE in said) == (topic in ("/verdicts", "/ego/witness"))
+        losses.add(topic, b"", number)
+    said = str(losses.summary().get(topic, ""))
+    assert (BEGAN_LATE in said) == (topic in ("/verdicts", "/ego/witness"))
     assert said.startswith("2 lost") == (topic != "/map"), (
         "a map that was overwritten is not missed"
     )
