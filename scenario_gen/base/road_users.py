@@ -23,16 +23,16 @@ from scenario_gen.base.parameters import parameter, Parameters
 from scenario_gen.base.registry import Registry
 
 CAR, TRUCK, OTHER = "car", "truck", "other"
-TRUCK_LENGTH = 7.0  # m, from which on a vehicle of unknown type counts as a truck
+MIN_TRUCK_LENGTH_M = 7.0  # of a vehicle of unknown type
 LANE_USERS = frozenset(
     (CAR, "van", TRUCK, "bus", "motorcycle", "bicycle", "pedestrian")
 )  # whom lanes can be for
-ON_THE_SPOT = 2.0  # 1/m: who turns on the spot is planned to walk so sharp a curve
+MAX_PLANNED_CURVATURE_PER_M = 2.0  # for a type that can turn on the spot
 
 
 @dataclass(frozen=True)
 class Dynamics(Parameters):
-    """Limits of a type's motion, to which a valid scenario keeps."""
+    """Limits of a type's motion, which valid scenarios satisfy."""
 
     max_speed: float = parameter(45.0, "highest speed", unit="m/s", low=0.0)
     max_acceleration: float = parameter(5.0, "strongest speeding up", unit="m/s²", low=0.0)
@@ -49,7 +49,7 @@ class Dynamics(Parameters):
 
     @property
     def sharpest(self) -> float:
-        """The largest curvature [1/m]; infinite for who turns on the spot."""
+        """The largest curvature [1/m], infinite for a type that turns on the spot."""
         return self.max_curvature or math.inf
 
     @property
@@ -64,7 +64,7 @@ class Dynamics(Parameters):
             max_acceleration=self.max_acceleration * 0.9,
             max_deceleration=self.max_deceleration * 8.0 / 9.0,
             max_lateral_acceleration=self.max_lateral_acceleration * 5.0 / 6.0,
-            max_curvature=min(self.sharpest * 0.9, ON_THE_SPOT),
+            max_curvature=min(self.sharpest * 0.9, MAX_PLANNED_CURVATURE_PER_M),
         )
 
 
@@ -73,19 +73,19 @@ class VehicleType:
     """A type of road users.
 
     Attributes:
-        length, width, height: usual ones, metres.
-        dynamics: its limits, unless parameters `limits.<type>.…` say otherwise.
-        words: what logs call it, in small letters.
+        length: usual length [m].
+        width: usual width [m].
+        height: usual height [m].
+        dynamics: its limits; the parameters `limits.<type>.…` have precedence.
+        words: its names in logs, in lower case.
         autoware: its label in ObjectClassification.
         commonroad: its obstacle type.
         openscenario: its VehicleCategory, or "pedestrian".
         osi: its name in MovingObject.VehicleClassification.Type, or "PEDESTRIAN".
         scenarionet: its type in MetaDrive's and ScenarioNet's descriptions.
         waits_below: speed [m/s] below which it waits.
-        speed_noise: differences of speed [m/s] that say nothing of what it is about; on foot those
-            of a step.
-        varies: share of the spread of a car's end speeds, and places at a time, with which
-            scenarios are drawn.
+        speed_noise: meaningless differences of speed [m/s], on foot those of a step.
+        varies: factor of a car's standard deviations of end speeds and of places at a time.
     """
 
     length: float
@@ -104,7 +104,7 @@ class VehicleType:
 
     @property
     def least_course(self) -> float:
-        """Speed [m/s] above which positions say where it is going."""
+        """Speed [m/s] above which its positions determine its direction."""
         return 2.0 * self.waits_below
 
     @property
@@ -114,54 +114,105 @@ class VehicleType:
 
     @property
     def lane_user(self) -> frozenset[str]:
-        """As what it may use lanes, one of `LANE_USERS`.
-
-        A type of a plugin as the one with its category in OpenSCENARIO.
-        """
-        own = {"motorbike": "motorcycle"}.get(self.openscenario, self.openscenario)
-        return frozenset((own if own in LANE_USERS else CAR,))
+        """The one of `LANE_USERS` as which it may use lanes, by its category in OpenSCENARIO."""
+        user = {"motorbike": "motorcycle"}.get(self.openscenario, self.openscenario)
+        return frozenset((user if user in LANE_USERS else CAR,))
 
 
-VEHICLE_TYPES = Registry[VehicleType](
-    "scenario_gen.vehicle_types",
-    {
-        CAR: VehicleType(
-            4.8, 1.9, 1.5, Dynamics(),
-            ("auto", "automobile", "passenger", "taxi", "suv", "priorityvehicle", "pickup"),
-            1, "car", "car", "CAR",
+_BUILT_IN = {
+    CAR: VehicleType(
+        length=4.8,
+        width=1.9,
+        height=1.5,
+        dynamics=Dynamics(),
+        words=("auto", "automobile", "passenger", "taxi", "suv", "priorityvehicle", "pickup"),
+        autoware=1,
+        commonroad="car",
+        openscenario="car",
+        osi="CAR",
+    ),
+    "van": VehicleType(
+        length=6.5,
+        width=2.2,
+        height=2.5,
+        dynamics=Dynamics(45.0, 4.0, 9.0, 5.5, 0.22),
+        words=("delivery", "minibus"),
+        autoware=1,
+        commonroad="car",
+        openscenario="van",
+        osi="DELIVERY_VAN",
+    ),
+    TRUCK: VehicleType(
+        length=7.1,
+        width=2.4,
+        height=3.2,
+        dynamics=Dynamics(36.0, 3.0, 7.5, 4.5, 0.16),
+        words=("lorry", "semitractor", "semitrailer", "trailer", "heavy", "hgv"),
+        autoware=2,
+        commonroad="truck",
+        openscenario="truck",
+        osi="HEAVY_TRUCK",
+    ),
+    "bus": VehicleType(
+        length=12.0,
+        width=2.55,
+        height=3.2,
+        dynamics=Dynamics(30.0, 3.0, 7.0, 4.0, 0.125),
+        words=("coach",),
+        autoware=3,
+        commonroad="bus",
+        openscenario="bus",
+        osi="BUS",
+    ),
+    "motorcycle": VehicleType(
+        length=2.2,
+        width=0.9,
+        height=1.5,
+        dynamics=Dynamics(50.0, 7.0, 9.0, 8.0, 0.4),
+        words=("motorcyclist", "motorbike", "moped", "scooter"),
+        autoware=5,
+        commonroad="motorcycle",
+        openscenario="motorbike",
+        osi="MOTORBIKE",
+        scenarionet="CYCLIST",
+    ),
+    "bicycle": VehicleType(
+        length=1.8,
+        width=0.65,
+        height=1.7,
+        dynamics=Dynamics(14.0, 3.0, 6.0, 4.5, 0.7),
+        words=(
+            *("bicyclist", "cyclist", "cycle", "bike"),
+            *("biker", "biketype", "standup", "micromobility"),
         ),
-        "van": VehicleType(
-            6.5, 2.2, 2.5, Dynamics(45.0, 4.0, 9.0, 5.5, 0.22), ("delivery", "minibus"), 1, "car", "van", "DELIVERY_VAN"
+        autoware=6,
+        commonroad="bicycle",
+        openscenario="bicycle",
+        osi="BICYCLE",
+        scenarionet="CYCLIST",
+    ),
+    "pedestrian": VehicleType(
+        length=0.5,
+        width=0.5,
+        height=1.7,
+        dynamics=Dynamics(5.0, 4.0, 5.0, 4.0, 0.0),
+        words=(
+            *("ped", "pedtype", "person", "people", "human", "walker"),
+            *("adult", "child", "wheelchair", "stroller", "skater"),
         ),
-        TRUCK: VehicleType(
-            7.1, 2.4, 3.2, Dynamics(36.0, 3.0, 7.5, 4.5, 0.16),
-            ("lorry", "semitractor", "semitrailer", "trailer", "heavy", "hgv"), 2, "truck", "truck", "HEAVY_TRUCK",
-        ),
-        "bus": VehicleType(
-            12.0, 2.55, 3.2, Dynamics(30.0, 3.0, 7.0, 4.0, 0.125), ("coach",), 3, "bus", "bus", "BUS"
-        ),
-        "motorcycle": VehicleType(
-            2.2, 0.9, 1.5, Dynamics(50.0, 7.0, 9.0, 8.0, 0.4),
-            ("motorcyclist", "motorbike", "moped", "scooter"), 5, "motorcycle", "motorbike", "MOTORBIKE", "CYCLIST",
-        ),
-        "bicycle": VehicleType(
-            1.8, 0.65, 1.7, Dynamics(14.0, 3.0, 6.0, 4.5, 0.7),
-            ("bicyclist", "cyclist", "cycle", "bike", "biker", "biketype", "standup", "micromobility"),
-            6, "bicycle", "bicycle", "BICYCLE", "CYCLIST",
-        ),
-        "pedestrian": VehicleType(
-            0.5, 0.5, 1.7, Dynamics(5.0, 4.0, 5.0, 4.0, 0.0),
-            ("ped", "pedtype", "person", "people", "human", "walker", "adult", "child", "wheelchair", "stroller", "skater"),
-            7, "pedestrian", "pedestrian", "PEDESTRIAN", "PEDESTRIAN", 0.2, 0.15, 0.3,
-        ),
-        OTHER: VehicleType(4.8, 1.9, 1.5, Dynamics()),
-    },
-    VehicleType,
-)  # fmt: skip
-"""By name; those of installed packages come last."""
-
-
-_BUILT_IN = VEHICLE_TYPES.built_in
+        autoware=7,
+        commonroad="pedestrian",
+        openscenario="pedestrian",
+        osi="PEDESTRIAN",
+        scenarionet="PEDESTRIAN",
+        waits_below=0.2,
+        speed_noise=0.15,
+        varies=0.3,
+    ),
+    OTHER: VehicleType(length=4.8, width=1.9, height=1.5, dynamics=Dynamics()),
+}
+VEHICLE_TYPES = Registry[VehicleType]("scenario_gen.vehicle_types", _BUILT_IN, VehicleType)
+"""The types by name, those of installed packages last."""
 
 
 @dataclass(frozen=True)
@@ -169,8 +220,7 @@ class TypeLimits(Parameters):
     """The limits of motion by type, for all stages.
 
     Attributes:
-        plugins: of types of installed packages, what was set, by name; the last one counts. Else
-            they keep those of their entry.
+        plugins: changed limits of types in installed packages, by name; the last one counts.
     """
 
     car: Dynamics = _BUILT_IN[CAR].dynamics
@@ -185,7 +235,7 @@ class TypeLimits(Parameters):
 
     @property
     def of_plugins(self) -> Mapping[str, Dynamics]:
-        """Those of types of installed packages."""
+        """The limits of types in installed packages."""
         return {
             name: self.of(name)
             for name in VEHICLE_TYPES.names()
@@ -196,21 +246,22 @@ class TypeLimits(Parameters):
         """Return the limits of a type.
 
         Raises:
-            InputError: there is no type of this name.
+            InputError: no type has this name.
         """
-        own: Dynamics | None = (
-            getattr(self, name, None) if name in VEHICLE_TYPES.built_in else None
-        )
-        return own or dict(self.plugins).get(name) or VEHICLE_TYPES[name].dynamics
+        if name in VEHICLE_TYPES.built_in:
+            built_in: Dynamics = getattr(self, name)
+            return built_in
+        return dict(self.plugins).get(name) or VEHICLE_TYPES[name].dynamics
 
 
 def usual_type(length: float) -> str:
-    """Return the type of a vehicle of which no more is known than its length [m]."""
-    return TRUCK if length >= TRUCK_LENGTH else CAR
+    """Return the type of a vehicle with only its length [m] known."""
+    return TRUCK if length >= MIN_TRUCK_LENGTH_M else CAR
 
 
 def words() -> Mapping[str, str]:
-    """Return what logs call types, of installed packages too, and the types."""
-    return {
-        word: name for name in VEHICLE_TYPES.names() for word in (name, *VEHICLE_TYPES[name].words)
-    }
+    """Return the types by their names in logs."""
+    types = {}
+    for name in VEHICLE_TYPES.names():
+        types |= dict.fromkeys((name, *VEHICLE_TYPES[name].words), name)
+    return types

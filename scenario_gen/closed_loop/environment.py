@@ -33,7 +33,7 @@ from scenario_gen.closed_loop.trials import read_trials
 from scenario_gen.closed_loop.verdict import judge
 from scenario_gen.numerics import Floats
 from scenario_gen.numerics.plane import ahead_and_left, angle_between, unit
-from scenario_gen.types import ON_THE_SPOT
+from scenario_gen.types import MAX_PLANNED_CURVATURE_PER_M
 
 OTHERS = 8  # nearest others that are seen
 AHEAD = np.array((5.0, 10.0, 15.0, 20.0, 30.0, 40.0))  # metres along the route at which it is seen
@@ -115,7 +115,9 @@ class DriveEnv(gymnasium.Env[Seen, Seen]):  # type: ignore[misc]
         if index not in self._loops:
             self._loops[index] = ClosedLoop(trial.scenario, trial.ego, trial.road, self.config)
         self._loop = self._loops[index]
-        self.sharpest = min(self._loop.limits.sharpest, ON_THE_SPOT)  # 1/m, of the wheel's ends
+        self.sharpest = min(
+            self._loop.limits.sharpest, MAX_PLANNED_CURVATURE_PER_M
+        )  # 1/m, of the wheel's ends
         self._follower = RouteFollower()
         self._follower.reset(self._loop.task())
         self._states: list[State] = [self._loop.start()]
@@ -206,7 +208,7 @@ class DriveEnv(gymnasium.Env[Seen, Seen]):  # type: ignore[misc]
 
 def observation_space() -> Box:
     """Return the space of what is seen, with finite bounds."""
-    own = np.array((FASTEST, ON_THE_SPOT, REACH, np.pi, FARTHEST))
+    own = np.array((FASTEST, MAX_PLANNED_CURVATURE_PER_M, REACH, np.pi, FARTHEST))
     each = np.array((1.0, REACH, REACH, 1.0, 1.0, FASTEST, LONGEST))
     high = np.concatenate([own, np.full(2 * len(AHEAD), REACH), np.tile(each, OTHERS)])
     low = -high

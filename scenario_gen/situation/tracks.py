@@ -25,7 +25,7 @@ from scenario_gen.base.cancelling import stop_if_cancelled
 from scenario_gen.numerics import Bools, Floats, frozen, frozen_ints, Ints, wrap_angle
 from scenario_gen.numerics.curve import Curve
 from scenario_gen.numerics.plane import polyline_of, unit
-from scenario_gen.types import Encounter, mask, ON_THE_SPOT, Vehicle
+from scenario_gen.types import Encounter, mask, MAX_PLANNED_CURVATURE_PER_M, Vehicle
 
 # wavelengths that the smoothing halves
 WAVELENGTHS_M = (8.0, 12.0, 16.0, 24.0, 32.0, 48.0, 64.0, 96.0, 128.0)
@@ -160,7 +160,7 @@ def _clean(encounter: Encounter, n: int) -> Track:
     extent = float(np.hypot(*np.ptp(record.position, axis=0)))
     still = bool(record.distance[-1] < MIN_PATH_M or extent < MIN_PATH_M)
     dynamics = encounter.vehicles[n].kind.dynamics
-    max_curvature = min(CURVATURE_SHARE * dynamics.sharpest, ON_THE_SPOT)
+    max_curvature = min(CURVATURE_SHARE * dynamics.sharpest, MAX_PLANNED_CURVATURE_PER_M)
     max_lateral = LATERAL_SHARE * dynamics.max_lateral_acceleration
     path = _standing(record) if still else _smoothed(record, max_curvature, max_lateral)
     padding = (first, encounter.speed.shape[1] - 1 - last)
