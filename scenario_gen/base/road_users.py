@@ -261,7 +261,7 @@ def usual_type(length: float) -> str:
 
 def words() -> Mapping[str, str]:
     """Return the types by their names in logs."""
-    types = {}
+    types: dict[str, str] = {}
     for name in VEHICLE_TYPES.names():
         types |= dict.fromkeys((name, *VEHICLE_TYPES[name].words), name)
     return types
