@@ -12,8 +12,22 @@ from typing import Annotated
 import typer
 
 from scenario_gen.base.errors import did_you_mean, InputError, printable
-from scenario_gen.cli.options import assigned_all, configured, ParametersOption, remind, SetOption
-from scenario_gen.cli.output import bars, beside, Commands, give, open_page, say, say_rows
+from scenario_gen.cli.options import (
+    assigned_all,
+    Commands,
+    configured,
+    ParametersOption,
+    SetOption,
+    warn_of_metadata,
+)
+from scenario_gen.cli.output import (
+    default_output,
+    emit_json,
+    open_page,
+    print_,
+    print_table,
+    progress,
+)
 
 commands = Commands("Look at a bag of scenarios")
 
@@ -41,10 +55,10 @@ def evaluate(
     from scenario_gen.output.review.evaluation import bag_results
 
     config = configured(parameter_file, assignments)
-    remind(bag)
+    warn_of_metadata(bag)
     inputs = [bag, *([parameter_file] if parameter_file else ())]
     with nullcontext() if out is None else replaced_folder(out, EVALUATED, inputs) as folder:
-        with bars() as advance:
+        with progress() as advance:
             cases = bag_results(
                 bag,
                 config.evaluation,
@@ -54,8 +68,8 @@ def evaluate(
             )
         if folder is not None:
             write_evaluation(folder, cases, bag, config.bag)
-    give(cases=[json.loads(case.evaluation.to_json()) for case in cases], folder=out)
-    say(Markdown(printable(as_table(cases))), wrap=True)
+    emit_json(cases=[json.loads(case.evaluation.to_json()) for case in cases], folder=out)
+    print_(Markdown(printable(as_table(cases))), wrap=True)
 
 
 @commands.command()
@@ -85,13 +99,13 @@ def report(
     ):  # `generate` wrote it already
         page = folders[0] / REPORT
     else:
-        remind(bag)
-        folder = out or beside(bag, f"{bag.resolve().stem}_report")
-        with bars() as advance:
+        warn_of_metadata(bag)
+        folder = out or default_output(bag, f"{bag.resolve().stem}_report")
+        with progress() as advance:
             write_page(bag, folder, progress=partial(advance, "scenarios"))
         page = folder / REPORT
-    give(report=page, opened=browse and open_page(page))
-    say(f"report: {page}")
+    emit_json(report=page, opened=browse and open_page(page))
+    print_(f"report: {page}")
 
 
 @commands.command()
@@ -107,14 +121,14 @@ def validate(
     from scenario_gen.output.review.validation import validate_bag
 
     config = configured(parameter_file, assignments)
-    remind(bag)
-    with bars() as advance:
+    warn_of_metadata(bag)
+    with progress() as advance:
         found = validate_bag(
             bag, config.limits, config.bag, progress=partial(advance, "scenarios")
         )
-    give(valid=not any(one.invalid for one in found), namespaces=found)
+    emit_json(valid=not any(one.invalid for one in found), namespaces=found)
     for one in found:
-        say(
+        print_(
             f"{one.namespace or '/'}: {one.scenarios - one.invalid} of {one.scenarios} scenarios are valid"
         )
         if one.found:
@@ -122,16 +136,16 @@ def validate(
                 (cause, str(entry.count), str(entry.scenario), entry.message)
                 for cause, entry in one.found.items()
             ]
-            say_rows(("cause", "scenarios", "first", "what"), rows)
+            print_table(("cause", "scenarios", "first", "what"), rows)
         if one.unaccounted:
-            say(f"  {one.unaccounted} without an entry: {NO_ENTRY}")
+            print_(f"  {one.unaccounted} without an entry: {NO_ENTRY}")
         for sentence in (
             *(f"{message}: {count} scenarios" for message, count in one.proven.items()),
             *one.missing,
         ):
-            say(f"  {sentence}")
+            print_(f"  {sentence}")
         for sentence, count in one.left_out.items():
-            say(f"  not checked in {count}: {sentence}")
+            print_(f"  not checked in {count}: {sentence}")
     if any(one.invalid for one in found):
         raise typer.Exit(1)
 
@@ -196,9 +210,9 @@ def export_scenarios(
         ExportConfig(ego=ego, map=road_map),
         [option for option in options or [] if option not in of_bag],
     )
-    remind(bag)
-    folder = out or beside(bag, f"{bag.resolve().name}_{to}")
-    with bars() as advance:
+    warn_of_metadata(bag)
+    folder = out or default_output(bag, f"{bag.resolve().name}_{to}")
+    with progress() as advance:
         result = export_bag(
             bag,
             folder,
@@ -209,8 +223,8 @@ def export_scenarios(
             indices=index or (),
             progress=partial(advance, "scenarios"),
         )
-    give(scenarios=result.scenarios, folder=folder, notes=result.notes)
-    say("\n".join((*result.notes, f"{result.scenarios} scenarios: {folder}")))
+    emit_json(scenarios=result.scenarios, folder=folder, notes=result.notes)
+    print_("\n".join((*result.notes, f"{result.scenarios} scenarios: {folder}")))
 
 
 @commands.command("reindex")
@@ -230,10 +244,10 @@ def save_bag(
     """Recover the intact messages of an unclosed or damaged bag. The old files stay as they are."""
     from scenario_gen.bags.storage.reindex import reindex
 
-    target = out or beside(bag, f"{bag.resolve().name}_reindexed")
+    target = out or default_output(bag, f"{bag.resolve().name}_reindexed")
     result = reindex(bag, target, configured(parameter_file, assignments).bag)
-    give(messages=result.messages, bag=target, notes=result.lines())
-    say(f"{result.messages} messages: {target}", *result.lines(), sep="\n")
+    emit_json(messages=result.messages, bag=target, notes=result.lines())
+    print_(f"{result.messages} messages: {target}", *result.lines(), sep="\n")
 
 
 @commands.command("compare")
@@ -247,5 +261,7 @@ def compare_sets(
     from scenario_gen.method.evaluation import compare, comparison_table, read_evaluations
 
     differences = compare(read_evaluations(first), read_evaluations(second))
-    give(differences=differences)
-    say(Markdown(printable(comparison_table(differences, (first.name, second.name)))), wrap=True)
+    emit_json(differences=differences)
+    print_(
+        Markdown(printable(comparison_table(differences, (first.name, second.name)))), wrap=True
+    )

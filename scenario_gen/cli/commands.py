@@ -1,46 +1,34 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The command line: its commands and its exit codes. Each command loads the libraries that it needs."""
+"""The command line: its commands and exit codes. Each command imports the libraries it needs."""
 
 from contextlib import suppress
 from importlib import metadata
 import os
 import sys
-from typing import Annotated, Any, NoReturn
+from typing import Annotated, Any
 
 import typer
 
-from scenario_gen.base.errors import (
-    did_you_mean,
-    InputError,
-    of_system,
-    ScenarioGenError,
-    shown_error,
-)
+from scenario_gen.base.errors import InputError, of_system, ScenarioGenError, shown_error
 from scenario_gen.cli import bags, corpus, generation, output, testing
+from scenario_gen.cli.options import Commands
 
-app = typer.Typer(
-    cls=output.Program,
-    help="Turn recorded encounters of vehicles into new, valid ones on other roads.",
-    no_args_is_help=True,
-    add_completion=False,
-    pretty_exceptions_enable=False,
-)
-
-installation = output.Commands("This installation")
-PLAIN = {  # words of the library that reads the options
-    "Input should be greater than or equal to": "it must be at least",
-    "Input should be less than or equal to": "it must be at most",
-    "Input should be a valid integer, unable to parse string as an integer": "it must be a whole number",
-    "Input should be a valid number, unable to parse string as a number": "it must be a number",
-}
+PROGRAM = "scenario-gen"
+GLOBAL_OPTIONS = ("--quiet", "-q", "--verbose", "-v", "--json")
 UsageError: Any = typer.BadParameter.__bases__[0]  # typer has its own copy of click
 
+app = typer.Typer(
+    help="Turn recorded encounters of vehicles into new, valid scenarios on other roads.",
+    pretty_exceptions_enable=False,
+)
+installation = Commands("This installation")
 
-def _print_version(wanted: bool) -> None:
-    if wanted:
-        print(f"scenario-gen {metadata.version('scenario_gen')}")
+
+def _print_version(requested: bool) -> None:
+    if requested:
+        print(f"{PROGRAM} {metadata.version('scenario_gen')}")
         raise typer.Exit
 
 
@@ -52,27 +40,26 @@ def options(
             "--version", callback=_print_version, is_eager=True, help="Print the version."
         ),
     ] = False,
-    quiet: Annotated[
-        bool, typer.Option("--quiet", "-q", help="Of any command: print errors only.")
-    ] = False,
+    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print errors only.")] = False,
     verbose: Annotated[
         bool,
         typer.Option(
             "--verbose",
             "-v",
-            help="Of `generate` and `demo`: routes and the comparison with the recording, too.",
+            help="Let `generate` and `demo` also print routes and the comparison with the recording.",
         ),
     ] = False,
     as_json: Annotated[
         bool,
         typer.Option(
             "--json",
-            help="Of any command: print one JSON object to standard output, messages to standard error.",
+            help="Print one JSON object to standard output, and messages to standard error.",
         ),
     ] = False,
 ) -> None:
-    """Turn recorded encounters of vehicles into new, valid ones on other roads."""
-    del version, quiet, verbose, as_json  # which `output.Program` takes
+    """Turn recorded encounters of vehicles into new, valid scenarios on other roads."""
+    del version
+    output.configure(quiet=quiet, verbose=verbose, as_json=as_json)
 
 
 @installation.command()
@@ -83,20 +70,17 @@ def parameters() -> None:
     from scenario_gen.base.parameters import flatten
     from scenario_gen.pipeline import PipelineConfig
 
-    known = flatten(PipelineConfig())
     keys = ("meaning", "unit", "low", "high", "choices")
-    output.give(
-        parameters={
-            name: {"default": value} | {key: e.metadata[key] for key in keys}
-            for name, (e, value) in known.items()
-        }
-    )
-    for name, (entry, value) in known.items():
+    table = {}
+    for name, (entry, default) in flatten(PipelineConfig()).items():
         meta = entry.metadata
+        table[name] = {"default": default} | {key: meta[key] for key in keys}
         bounds = [str(meta[end]) if meta[end] is not None else "" for end in ("low", "high")]
         allowed = " | ".join(meta["choices"]) or ("…".join(bounds) if any(bounds) else "")
-        text = f" = {value!r} {meta['unit']} {f'({allowed})' if allowed else ''}\n    {meta['meaning']}"
-        output.say(Text(name, style="bold"), text, sep="", wrap=True)
+        allowed = f"({allowed})" if allowed else ""
+        text = f" = {default!r} {meta['unit']} {allowed}\n    {meta['meaning']}"
+        output.print_(Text(name, style="bold"), text, sep="", wrap=True)
+    output.emit_json(parameters=table)
 
 
 @installation.command()
@@ -106,9 +90,9 @@ def doctor() -> None:
 
     findings = []
     for finding in examine():
-        output.say(finding.line())
+        output.print_(finding.line())
         findings.append(finding)
-    output.give(findings=findings)
+    output.emit_json(findings=findings)
     raise typer.Exit(int(any(finding.level == ERROR for finding in findings)))
 
 
@@ -122,82 +106,80 @@ for commands in (
     app.add_typer(commands)
 
 
-def refuse_undecodable(words: list[str]) -> None:
-    """Refuse names that could not be written to a bag or a page.
+def arguments(words: list[str]) -> list[str]:
+    """Return the arguments with the global options first, so that these may follow a command's name.
 
     Raises:
-        InputError: one is not valid UTF-8.
+        InputError: a word is not valid UTF-8, so that no bag or page could contain it.
     """
     for word in words:
         if any("\ud800" <= letter <= "\udfff" for letter in word):
             raise InputError(f"{word}: the name is not valid UTF-8; rename the file")
+    end = words.index("--") if "--" in words else len(words)
+    first = [word for word in words[:end] if word in GLOBAL_OPTIONS]
+    return [*first, *(word for word in words[:end] if word not in first), *words[end:]]
+
+
+def usage_error(error: Any) -> InputError:
+    """Return a usage error of typer as an error of ours, with the help of a missing parameter."""
+    message = " ".join(error.format_message().split()).rstrip(".")
+    parameter = getattr(error, "param", None)
+    if parameter is not None and parameter.help and not error.message:  # it is missing
+        message = f"{message} ({parameter.help.split('. ')[0].rstrip('.')})"
+    path = error.ctx.command_path if error.ctx else PROGRAM
+    return InputError(f"{message}; see `{path} --help`")
+
+
+def run(words: list[str]) -> int:
+    """Run a command; return its exit code.
+
+    Raises:
+        ScenarioGenError: the command failed.
+    """
+    try:
+        code = app(arguments(words) or ["--help"], standalone_mode=False, prog_name=PROGRAM)
+        sys.stdout.flush()
+    except UsageError as error:
+        raise usage_error(error) from error
+    except MemoryError as error:
+        message = "not enough memory; use a shorter log, fewer scenarios or a smaller map"
+        raise InputError(message) from error
+    except BrokenPipeError:
+        return 1  # the reader of standard output has ended
+    except OSError as error:
+        name = error.filename or "standard output or an unnamed file"
+        raise of_system(error, name) from error
+    return code if isinstance(code, int) else 0
 
 
 def main() -> None:
-    """Run the command line. An error becomes one message and an exit code, never a traceback."""
+    """Run the command line: an error becomes one message and an exit code, not a traceback."""
+    words = sys.argv[1:]
+    ended: dict[str, Any] = {}
     try:
-        try:
-            refuse_undecodable(sys.argv[1:])
-            code = app(standalone_mode=False, prog_name="scenario-gen")
-        finally:
-            sys.stdout.flush()
-        sys.exit(code if isinstance(code, int) else 0)
-    except UsageError as error:
-        wrong = of_usage(error)
-        if "--json" in sys.argv[1:]:  # which was not read as an option
-            output.print_object({"exit_code": wrong.exit_code, "error": str(wrong)})
-        fail(wrong)
+        ended["exit_code"] = run(words)
     except ScenarioGenError as error:
-        fail(error)
-    except MemoryError:
-        fail(InputError("not enough memory; use a shorter log, fewer scenarios or a smaller map"))
-    except BrokenPipeError:
-        sys.stdout = open(os.devnull, "w")  # noqa: PTH123, SIM115 - the reader has gone
-        sys.exit(1)
-    except OSError as error:
-        fail(of_system(error, error.filename or "standard output or an unnamed file"))
+        ended |= {"exit_code": error.exit_code, "error": shown_error(error)}
+        _print_error(ended["error"])
+    with suppress(OSError):
+        if "--json" in words:
+            command = next((word for word in words if word not in GLOBAL_OPTIONS), None)
+            output.print_json({"command": command} | output.current.results | ended)
+        output.configure()
+        sys.stdout.flush()
+        sys.exit(ended["exit_code"])
+    # The disk is full or the reader has ended: Python must not try to write the rest at its exit.
+    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+    sys.exit(ended["exit_code"] or 1)
 
 
-def of_usage(error: Any) -> InputError:
-    """Return an error in the words of the command line as one of ours: what is wrong, and what to do."""
-    if type(error).__name__ == "NoArgsIsHelpError":  # prints the help, as without any error
-        print(error.ctx.get_help())
-        sys.exit(2)
-    message = " ".join(error.format_message().split())
-    for its, ours in PLAIN.items():
-        message = message.replace(its, ours)
-    if type(error).__name__ == "MissingParameter" and getattr(error.param, "help", None):
-        message = f"{message.rstrip('.')} ({error.param.help.split('. ')[0].rstrip('.')})"
-    path = error.ctx.command_path if error.ctx else "scenario-gen"
-    unknown, known = getattr(error, "option_name", ""), []
-    if unknown and error.ctx:
-        known = [
-            name
-            for entry in error.ctx.command.get_params(error.ctx)
-            for name in entry.opts
-            if name.startswith("--")
-        ]
-        message = f"there is no option {unknown}{did_you_mean(unknown, known)}"
-        if unknown[1:].isdecimal():
-            message = f"{unknown}: a number here must not be negative"
-    return InputError(f"{message.rstrip('.')}; see `{path} --help`")
-
-
-def fail(error: ScenarioGenError) -> NoReturn:
-    """Print the error and exit."""
+def _print_error(message: str) -> None:
     from rich.text import Text
 
     from scenario_gen.base.terminal import Terminal
 
     with suppress(OSError):
-        Terminal(stderr=True).print(
-            Text("error:", style="bold red"), shown_error(error), soft_wrap=True
-        )
-    try:
-        sys.stdout.flush()
-    except OSError:  # the disk is full or the reader has gone: what is left to print is dropped
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-    sys.exit(error.exit_code)
+        Terminal(stderr=True).print(Text("error:", style="bold red"), message, soft_wrap=True)
 
 
 if __name__ == "__main__":

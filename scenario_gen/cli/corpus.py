@@ -14,8 +14,8 @@ import typer
 
 from scenario_gen.base.errors import InputError, RefusedError
 from scenario_gen.base.stores import Place, place
-from scenario_gen.cli.options import assigned_all, takes
-from scenario_gen.cli.output import bars, Commands, give, say, say_rows
+from scenario_gen.cli.options import assigned_all, Commands, takes
+from scenario_gen.cli.output import emit_json, print_, print_table, progress
 
 if TYPE_CHECKING:
     from scenario_gen.corpus.tasks import Workers
@@ -38,7 +38,7 @@ def workers_of(count: int, scheduler: str) -> Iterator["Workers"]:
     """Give the workers; show the tasks done and the time left."""
     from scenario_gen.corpus.tasks import Workers
 
-    with bars() as advance:
+    with progress() as advance:
         yield Workers(count, scheduler, partial(advance, "tasks"))
 
 
@@ -48,8 +48,8 @@ def conclude(summary: list[str], failed: Sequence[str], out: Place, **files: Pla
     Raises:
         RefusedError: a task failed.
     """
-    give(summary=summary, **files, out=out, failed=failed)
-    say(*summary, *(f"{name}: {path}" for name, path in files.items()), sep="\n")
+    emit_json(summary=summary, **files, out=out, failed=failed)
+    print_(*summary, *(f"{name}: {path}" for name, path in files.items()), sep="\n")
     if failed:
         raise RefusedError(
             f"{len(failed)} tasks failed, see above; the rest is in {out}; the same command tries them again"
@@ -184,32 +184,36 @@ def find(
         )
     source = place(batch)
     found = finding.find(source, condition)
-    give(scenarios=found.rows, coverage=finding.coverage_lines(found, source))
+    emit_json(scenarios=found.rows, coverage=finding.coverage_lines(found, source))
     listed = found.rows[: limit or None]
     titles = [
         f"{name} [{finding.UNITS[name]}]" if name in finding.UNITS else name
         for name in finding.COLUMNS
     ]
-    say_rows(titles, [[shown(row[name]) for name in finding.COLUMNS] for row in listed], names=3)
+    print_table(
+        titles, [[shown(row[name]) for name in finding.COLUMNS] for row in listed], names=3
+    )
     rest = (
         f", the first {len(listed)} are listed; --limit 0 lists all"
         if len(listed) < len(found.rows)
         else ""
     )
-    say(f"{len(found.rows)} found{rest}; a ttc above evaluation.ttc_horizon (10 s) counts as this")
-    say(*finding.coverage_lines(found, source), sep="\n")
+    print_(
+        f"{len(found.rows)} found{rest}; a ttc above evaluation.ttc_horizon (10 s) counts as this"
+    )
+    print_(*finding.coverage_lines(found, source), sep="\n")
     if again:
         for row in found.rows:
             finding.make_again(source, row)
-        say(f"{len(found.rows)} scenarios generated again: all byte-identical")
+        print_(f"{len(found.rows)} scenarios generated again: all byte-identical")
     if bag is not None:
         finding.export_hits(source, found.rows, bag)
-        give(bag=bag)
-        say(f"bag: {bag}")
+        emit_json(bag=bag)
+        print_(f"bag: {bag}")
         if report is not None:
             write_page(bag, report)
-            give(report=report)
-            say(f"report: {report}")
+            emit_json(report=report)
+            print_(f"report: {report}")
 
 
 @commands.command(urls=("corpus",))
@@ -272,7 +276,7 @@ def coverage(
     results = results_of(bags)
     found = population_of(results, templates or (5, 10, 20), draws=draws, seed=seed)
     write_coverage(out, results, found)
-    give(population=found, page=out)
-    say(found.lead)
-    say_rows(*found.table())
-    say(*found.remarks(), f"page: {out}", sep="\n")
+    emit_json(population=found, page=out)
+    print_(found.lead)
+    print_table(*found.table())
+    print_(*found.remarks(), f"page: {out}", sep="\n")

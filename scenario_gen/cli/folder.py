@@ -88,7 +88,7 @@ def generate_folder(
     *,
     record: Callable[[Path, Sequence[GenerationResult]], None] | None = None,
     progress: Callable[[], AbstractContextManager[Advance]] = lambda: nullcontext(lambda *_: None),
-    tell: Callable[[str], None] = lambda _: None,
+    notify: Callable[[str], None] = lambda _: None,
 ) -> tuple[list[GenerationResult], list[str]]:
     """Generate scenarios of all encounters of some logs; write bag, report and figures to `out`.
 
@@ -97,7 +97,7 @@ def generate_folder(
         requested: what it is to hold.
         record: writes the bag (its path and the cases are given) instead of this process.
         progress: a context whose value is called with the progress of each case.
-        tell: called with notes on the logs, and for each set with an ego slot with how many scenarios need no reaction.
+        notify: called with notes on the logs, and for each set with an ego slot with how many scenarios need no reaction.
 
     Returns:
         The cases, and a sentence for each encounter and road that was refused or came out short.
@@ -109,11 +109,11 @@ def generate_folder(
     with replaced_folder(
         out, GENERATED, [*requested.logs, *map(Path, requested.roads), *requested.also_read]
     ) as folder:
-        readings = read_logs(requested, progress, tell)
+        readings = read_logs(requested, progress, notify)
         sources = sources_of(readings)
         taken = chosen([source.encounter for source in sources.values()], requested.encounters)
         if requested.recombine:
-            taken += recombine(taken, sources, requested, tell)
+            taken += recombine(taken, sources, requested, notify)
         pairs = [
             (encounter, road) for encounter in taken for road in sources[encounter.name].roads
         ]
@@ -136,7 +136,7 @@ def generate_folder(
             drives = ClosedLoopConfig(limits=requested.config.limits)
             untested = [sentence for case in cases if (sentence := baseline_passes(case, drives))]
         for line in (*faults_of(cases), *untested):
-            tell(line)
+            notify(line)
         if record is not None:
             record(folder / BAG, cases)
         quality = [line for log, _ in readings for line in log.quality.lines()]
@@ -175,9 +175,9 @@ def recombine(
     recorded: Sequence[Encounter],
     sources: dict[str, Source],
     requested: FolderRequest,
-    tell: Callable[[str], None],
+    notify: Callable[[str], None],
 ) -> list[Encounter]:
-    """Return encounters recombined of recorded ones, which are put among the sources; tell how many, and why not more."""
+    """Return encounters recombined of recorded ones, which are put among the sources; notify how many, and why not more."""
     made, refused = recombinations(recorded, requested.recombine, requested.seed)
     for encounter in made:
         assert isinstance(encounter.source, Recombined)
@@ -191,14 +191,14 @@ def recombine(
         if len(made) < requested.recombine
         else ""
     )
-    tell(f"recombined encounters: {len(made)} of {requested.recombine}{why}")
+    notify(f"recombined encounters: {len(made)} of {requested.recombine}{why}")
     return made
 
 
 def read_logs(
     requested: FolderRequest,
     progress: Callable[[], AbstractContextManager[Advance]],
-    tell: Callable[[str], None],
+    notify: Callable[[str], None],
 ) -> list[tuple[LogResult, Sequence[str]]]:
     """Return each log with the roads for its encounters; of several logs, those without an encounter are told and left out.
 
@@ -214,9 +214,9 @@ def read_logs(
             except NoEncounterError as error:
                 if len(requested.jobs) == 1:
                     raise
-                tell(f"no encounter: {error}")  # a result; the other logs may have some
+                notify(f"no encounter: {error}")  # a result; the other logs may have some
     for line in notes_of([log for log, _ in readings]):
-        tell(line)
+        notify(line)
     return readings
 
 

@@ -10,8 +10,15 @@ from typing import Annotated, TYPE_CHECKING
 import typer
 
 from scenario_gen.base.errors import RefusedError
-from scenario_gen.cli.options import configured, ParametersOption, remind, SetOption, takes
-from scenario_gen.cli.output import bars, Commands, give, is_verbose, say, status
+from scenario_gen.cli.options import (
+    Commands,
+    configured,
+    ParametersOption,
+    SetOption,
+    takes,
+    warn_of_metadata,
+)
+from scenario_gen.cli.output import current, emit_json, print_, progress, status
 from scenario_gen.situation import Situation
 
 if TYPE_CHECKING:
@@ -169,7 +176,7 @@ def generate(options: Generate) -> None:
         for_testing=options.for_testing,
         recombine=options.recombine,
     )
-    conclude(*generate_folder(options.out, request, progress=bars, tell=say), options.out)
+    conclude(*generate_folder(options.out, request, progress=progress, notify=print_), options.out)
 
 
 @commands.command()
@@ -214,8 +221,8 @@ def roads(
                     Situation.of(template), segment(template, config.segmentation, 0), config
                 )
             )
-        give(roads=names)
-        say(
+        emit_json(roads=names)
+        print_(
             f"{'roads' if template is None else f'roads that take {template.name}'}: {', '.join(names)}"
         )
         return
@@ -226,8 +233,8 @@ def roads(
     picture, said = map_picture(road, template)
     out.parent.mkdir(parents=True, exist_ok=True)
     write_text(out, picture)
-    give(picture=out, notes=said)
-    say("\n".join([*said, f"picture: {out}"]))
+    emit_json(picture=out, notes=said)
+    print_("\n".join([*said, f"picture: {out}"]))
 
 
 @commands.command()
@@ -254,17 +261,19 @@ def regenerate(
     """Generate one scenario of a bag again and check that it is the same: its bytes, or its places within 1 cm."""
     from scenario_gen.output.review.regenerate import regenerate_scenario, write_regenerated
 
-    remind(bag)
+    warn_of_metadata(bag)
     config = configured(parameter_file, assignments).bag
     result = regenerate_scenario(
         bag, index, namespace=namespace, request=request, log=log, config=config
     )
-    give(index=index, bytes=len(result.data), sha256=result.sha256, apart_m=result.distance)
-    say(f"scenario {index}: {result.comparison}, {len(result.data)} bytes, sha256 {result.sha256}")
+    emit_json(index=index, bytes=len(result.data), sha256=result.sha256, apart_m=result.distance)
+    print_(
+        f"scenario {index}: {result.comparison}, {len(result.data)} bytes, sha256 {result.sha256}"
+    )
     if out is not None:
         written = write_regenerated(result, out, [bag, *([log] if log else ())])
-        give(bag=written)
-        say(f"bag: {written}")
+        emit_json(bag=written)
+        print_(f"bag: {written}")
 
 
 @commands.command()
@@ -281,10 +290,12 @@ def demo(
     """Generate scenarios from three bundled encounters: a left turn that waits, a follower, and an all-way stop."""
     from scenario_gen.cli.demo import run_demo
 
-    cases, refusals = run_demo(out, count=count, seed=seed, ros=ros, progress=bars, status=status)
+    cases, refusals = run_demo(
+        out, count=count, seed=seed, ros=ros, progress=progress, status=status
+    )
     if ros:
         total = sum(len(case.generated.scenarios) for case in cases)
-        say(f"{total} scenarios of the ROS nodes are byte-identical to those of this process")
+        print_(f"{total} scenarios of the ROS nodes are byte-identical to those of this process")
     conclude(cases, refusals, out)
 
 
@@ -297,16 +308,16 @@ def conclude(cases: "list[GenerationResult]", refusals: list[str], out: Path) ->
     from scenario_gen.output.report.summary import summary
     from scenario_gen.output.results import BAG, FIGURES, REPORT
 
-    give(
+    emit_json(
         report=out / REPORT,
         bag=out / BAG,
         figures=out / FIGURES,
         cases=[case_of(case) for case in cases],
         refusals=refusals,
     )
-    say(summary(cases, verbose=is_verbose()), wrap=True)
-    say(f"report: {out / REPORT}\nbag:    {out / BAG}")
-    say("next:   open the report; `scenario-gen drive --help` tests a planner on the bag")
+    print_(summary(cases, verbose=current.verbose), wrap=True)
+    print_(f"report: {out / REPORT}\nbag:    {out / BAG}")
+    print_("next:   open the report; `scenario-gen drive --help` tests a planner on the bag")
     if refusals:
         raise RefusedError("part of the request could not be generated:\n" + "\n".join(refusals))
 

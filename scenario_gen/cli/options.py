@@ -1,17 +1,18 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""What the commands share: options, how a command takes a class of them, and the configuration."""
+"""Options that commands share, options as a dataclass, URLs as arguments, and the configuration."""
 
-from collections.abc import Callable
-from functools import reduce
+from collections.abc import Callable, Sequence
+from functools import reduce, wraps
 import inspect
 from pathlib import Path
 from typing import Annotated, Any, get_type_hints, TYPE_CHECKING, TypeVar
 
 import typer
 
-from scenario_gen.cli.output import say
+from scenario_gen.cli import places
+from scenario_gen.cli.output import print_
 
 if TYPE_CHECKING:
     from scenario_gen.pipeline import PipelineConfig
@@ -22,58 +23,98 @@ SetOption = Annotated[
     list[str] | None,
     typer.Option(
         "--set",
-        help="Set one parameter, as name=value (repeatable). `scenario-gen parameters` lists them.",
+        help="Set a parameter, as name=value. Repeatable. `scenario-gen parameters` lists them.",
     ),
 ]
 ParametersOption = Annotated[
     Path | None,
     typer.Option("--params", help="Read parameters from a YAML file such as config/default.yaml."),
 ]
+SeedOption = Annotated[
+    int, typer.Option(min=0, help="Random seed. The same seed gives the same result.")
+]
+WorkersOption = Annotated[
+    int, typer.Option(min=0, max=1024, help="Number of processes. 0: one per core.")
+]
+
+
+class Commands(typer.Typer):
+    """A group of commands in `--help`. Each command accepts URLs of object stores as paths."""
+
+    def __init__(self, panel: str) -> None:
+        super().__init__()
+        self.panel = panel
+
+    def command(
+        self, name: str | None = None, *, panel: str = "", urls: Sequence[str] = (), **options: Any
+    ) -> Callable[..., Any]:
+        """Return a decorator that registers a function as a command.
+
+        Args:
+            name: of the command; the function's name by default.
+            panel: in `--help`; that of the group by default.
+            urls: names of parameters whose URLs the function itself accepts.
+            options: further ones of typer.
+        """
+
+        def register(function: Callable[..., None]) -> Callable[..., None]:
+            paths = places.paths_of(function, urls)
+
+            @wraps(function)
+            def run(**values: Any) -> None:
+                with places.as_files(values, paths) as local:
+                    function(**local)
+
+            add = super(Commands, self).command
+            add(name, rich_help_panel=panel or self.panel, **options)(run)
+            return function
+
+        return register
 
 
 def takes(options: type[Options]) -> Callable[[Callable[[Options], None]], Callable[..., None]]:
-    """Let typer give a command its options as one frozen dataclass, whose fields are annotated as typer's parameters are."""
+    """Pass a command's options to it as one frozen dataclass, whose fields are annotated for typer."""
 
-    def of(command: Callable[[Options], None]) -> Callable[..., None]:
+    def decorate(command: Callable[[Options], None]) -> Callable[..., None]:
         def parsed(**values: Any) -> None:
             command(options(**values))
 
-        parsed.__name__, parsed.__doc__ = command.__name__, command.__doc__
+        parsed.__name__ = command.__name__
+        parsed.__doc__ = command.__doc__
         parsed.__annotations__ = get_type_hints(options, include_extras=True)
         parsed.__signature__ = inspect.signature(options)  # type: ignore[attr-defined]
         return parsed
 
-    return of
+    return decorate
 
 
-def assigned_all(config: Config, assignments: list[str] | None) -> Config:
-    """Return a configuration with each `name=value` in it.
+def assigned_all(config: Config, assignments: Sequence[str] | None) -> Config:
+    """Return a configuration with each `name=value` applied.
 
     Raises:
-        InputError: a name is unknown or a value does not suit; the message names it.
+        InputError: a name is unknown or a value is not allowed; the message names it.
     """
     from scenario_gen.base.parameters import assigned
 
     return reduce(assigned, assignments or [], config)
 
 
-def configured(file: Path | None, assignments: list[str] | None) -> "PipelineConfig":
+def configured(file: Path | None, assignments: Sequence[str] | None) -> "PipelineConfig":
     """Return the pipeline's configuration: defaults, then the file, then each `name=value`.
 
     Raises:
-        InputError: the file cannot be read, a name is unknown or a value does not suit; the message names it.
+        InputError: the file cannot be read, a name is unknown or a value is not allowed.
     """
     from scenario_gen.base.parameters import loaded
     from scenario_gen.pipeline import PipelineConfig
 
-    return assigned_all(
-        PipelineConfig() if file is None else loaded(PipelineConfig(), file), assignments
-    )
+    config = PipelineConfig() if file is None else loaded(PipelineConfig(), file)
+    return assigned_all(config, assignments)
 
 
-def remind(bag: Path) -> None:
-    """Say what is missing of a bag that is read all the same."""
+def warn_of_metadata(bag: Path) -> None:
+    """Print what is missing in the metadata of a bag that can be read nevertheless."""
     from scenario_gen.bags.storage.files import metadata_warnings
 
-    for remark in metadata_warnings(bag):
-        say(remark)
+    for warning in metadata_warnings(bag):
+        print_(warning)

@@ -1,12 +1,11 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""What commands print: messages, tables, progress, and with --json one object of results."""
+"""Output of commands: messages, tables, progress, and with --json one object with the results."""
 
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, field, fields, is_dataclass
-import functools
 import json
 import math
 import os
@@ -15,17 +14,15 @@ import sys
 from typing import Any
 import webbrowser
 
-import typer
-from typer.core import TyperGroup
-
-from scenario_gen.base.errors import InputError, printable, ScenarioGenError, shown_error
+from scenario_gen.base.errors import InputError, printable
 from scenario_gen.base.stores import renamed
-from scenario_gen.cli import places
+
+UNBOUNDED_COLUMNS = 10_000  # measures a table without wrapping it
 
 
 @dataclass
 class Output:
-    """How the running command prints, and its results so far."""
+    """How the running command prints, and the fields of its JSON object so far."""
 
     quiet: bool = False
     verbose: bool = False
@@ -33,98 +30,35 @@ class Output:
     results: dict[str, Any] = field(default_factory=dict)
 
 
-_current = Output()
-FLAGS = ("--quiet", "-q", "--verbose", "-v", "--json")
+current = Output()
+"""Set by the options before a command; the command line runs one command per process."""
 
 
-class Program(TyperGroup):
-    """The program: takes --quiet, --verbose and --json before and behind a command's name, and prints what --json asks for."""
-
-    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
-        """Take the flags of all commands, wherever they stand before a `--`."""
-        end = args.index("--") if "--" in args else len(args)
-        flags = [word for word in args[:end] if word in FLAGS]
-        return super().parse_args(
-            ctx, [*flags, *(word for word in args[:end] if word not in FLAGS), *args[end:]]
-        )
-
-    def invoke(self, ctx: Any) -> Any:
-        """Run the command; with --json, print its results as the last line of standard output, also after an error."""
-        global _current  # noqa: PLW0603 - the command line runs one command in a process
-        _current = Output(ctx.params["quiet"], ctx.params["verbose"], ctx.params["as_json"])
-        ended: dict[str, Any] = {"exit_code": 0}
-        try:
-            return super().invoke(ctx)
-        except typer.Exit as end:
-            ended["exit_code"] = end.exit_code
-            raise
-        except (ScenarioGenError, OSError) as error:
-            ended |= {"exit_code": getattr(error, "exit_code", 2), "error": shown_error(error)}
-            raise
-        except Exception:  # a wrong option, which the caller reports
-            _current.as_json = False
-            raise
-        finally:
-            if _current.as_json:
-                print_object({"command": ctx.invoked_subcommand} | _current.results | ended)
-            _current = Output()
+def configure(**options: Any) -> None:
+    """Set how the running command prints; the fields are those of `Output`."""
+    vars(current).update(vars(Output(**options)))
 
 
-class Commands(typer.Typer):
-    """Commands that stand together in `--help`; each takes URLs of a store where it takes paths."""
-
-    def __init__(self, panel: str) -> None:
-        super().__init__()
-        self.panel = panel
-
-    def command(
-        self, name: str | None = None, *, panel: str = "", urls: Sequence[str] = (), **options: Any
-    ) -> Callable[..., Any]:
-        """Return a decorator that adds a command, as typer's; the function itself stays as it is.
-
-        Args:
-            name: of the command; the function's by default.
-            panel: of `--help`.
-            urls: parameters whose URLs the function takes itself.
-            options: of typer.
-        """
-
-        def of(function: Callable[..., None]) -> Callable[..., None]:
-            paths = places.paths_of(function, urls)
-
-            @functools.wraps(function)
-            def run(**values: Any) -> None:
-                with places.as_files(values, paths) as local:
-                    function(**local)
-
-            super(Commands, self).command(name, rich_help_panel=panel or self.panel, **options)(
-                run
-            )
-            return function
-
-        return of
+def emit_json(**results: Any) -> None:
+    """Add fields to the JSON object of the running command."""
+    current.results |= json_value(results)
 
 
-def give(**results: Any) -> None:
-    """Add results to the object of --json."""
-    _current.results |= plain(results)
+def print_json(results: Mapping[str, Any]) -> None:
+    """Print one JSON object on one line."""
+    print(json.dumps(json_value(results), ensure_ascii=False, allow_nan=False))
 
 
-def print_object(results: Mapping[str, Any]) -> None:
-    """Print results as one JSON object in one line."""
-    print(json.dumps(plain(results), ensure_ascii=False, allow_nan=False))
-
-
-def plain(value: Any) -> Any:
-    """Return a value as JSON has it: dataclasses become objects, paths texts, NaN and infinity null."""
+def json_value(value: Any) -> Any:
+    """Return a value for JSON: dataclasses become objects, paths become text, NaN and infinity null."""
     if is_dataclass(value) and not isinstance(value, type):
-        return {entry.name: plain(getattr(value, entry.name)) for entry in fields(value)}
+        return {entry.name: json_value(getattr(value, entry.name)) for entry in fields(value)}
     if isinstance(value, Mapping):
-        return {str(getattr(key, "value", key)): plain(inner) for key, inner in value.items()}
+        return {str(getattr(key, "value", key)): json_value(item) for key, item in value.items()}
     if isinstance(value, (list, tuple, set, frozenset)):
-        return [plain(inner) for inner in value]
-    if hasattr(value, "tolist"):  # numpy's
-        return plain(value.tolist())
+        return [json_value(item) for item in value]
+    if hasattr(value, "tolist"):  # NumPy arrays and scalars
+        return json_value(value.tolist())
     if isinstance(value, float):
         return value if math.isfinite(value) else None
     if value is None or isinstance(value, (bool, int)):
@@ -132,91 +66,81 @@ def plain(value: Any) -> Any:
     return printable(renamed(str(value)))
 
 
-def is_verbose() -> bool:
-    """Return whether --verbose was given."""
-    return _current.verbose
-
-
-def say(*what: Any, sep: str = " ", wrap: bool = False) -> None:
-    """Print a message: texts letter by letter, and what rich can draw; `wrap` breaks lines at the terminal's width."""
+def print_(*values: Any, sep: str = " ", wrap: bool = False) -> None:
+    """Print texts literally, and whatever rich can draw; `wrap` breaks lines at the terminal width."""
     from scenario_gen.base.terminal import Terminal
 
-    if not _current.quiet:
-        texts = [renamed(one) if isinstance(one, str) else one for one in what]
-        Terminal(stderr=_current.as_json).print(*texts, sep=sep, soft_wrap=not wrap)
+    if not current.quiet:
+        texts = [renamed(value) if isinstance(value, str) else value for value in values]
+        Terminal(stderr=current.as_json).print(*texts, sep=sep, soft_wrap=not wrap)
 
 
-def say_rows(columns: Sequence[str], rows: Sequence[Sequence[str]], names: int = 1) -> None:
-    """Print a table; nothing in it is cut off.
+def print_table(columns: Sequence[str], rows: Sequence[Sequence[str]], names: int = 1) -> None:
+    """Print a table without cutting anything off.
 
-    Where standard output is no terminal, fields are separated by tabs. Where the terminal is too narrow, each row becomes a
-    text: what it is, then its other fields with their names.
+    Fields are separated by tabs unless standard output is a terminal. If the terminal is too
+    narrow, each row is printed as text: its name, then its other fields with their column names.
 
     Args:
         columns: their names.
         rows: their texts.
-        names: the first so many columns say what a row is.
+        names: number of leading columns that together name a row.
     """
     from rich.table import Table
 
     from scenario_gen.base.terminal import Terminal
 
-    terminal = Terminal(stderr=_current.as_json)
+    terminal = Terminal(stderr=current.as_json)
     if not terminal.is_terminal:
-        for row in (columns, *rows) if not _current.quiet else ():
+        for row in (columns, *rows) if not current.quiet else ():
             print("\t".join(printable(" ".join(text.split())) for text in row), file=terminal.file)
         return
     table = Table(*columns, box=None, pad_edge=False)
     for row in rows:
         table.add_row(*row)
-    if (
-        terminal.measure(table, options=terminal.options.update(width=10_000)).maximum
-        <= terminal.width
-    ):
-        say(table)
+    unbounded = terminal.options.update(width=UNBOUNDED_COLUMNS)
+    if terminal.measure(table, options=unbounded).maximum <= terminal.width:
+        print_(table)
         return
     for row in rows:
-        pairs = [
-            f"{name}\N{NO-BREAK SPACE}{text}"
-            for name, text in zip(columns[names:], row[names:], strict=True)
-            if text
-        ]
-        say(", ".join([" ".join(row[:names]), *pairs]), wrap=True)
+        pairs = zip(columns[names:], row[names:], strict=True)
+        texts = [f"{name}\N{NO-BREAK SPACE}{text}" for name, text in pairs if text]
+        print_(", ".join([" ".join(row[:names]), *texts]), wrap=True)
 
 
-def bars() -> AbstractContextManager[Callable[[str, int, int], None]]:
-    """Return progress bars with the remaining time, or with --quiet nothing; the value takes name, done and total of a bar."""
+def progress() -> AbstractContextManager[Callable[[str, int, int], None]]:
+    """Return progress bars, or nothing with --quiet; call the value with name, done and total of a bar."""
     from scenario_gen.base.terminal import progress_bars
 
-    return nullcontext(lambda *_: None) if _current.quiet else progress_bars()
+    return nullcontext(lambda *_: None) if current.quiet else progress_bars()
 
 
 def status() -> AbstractContextManager[Callable[[str], None]]:
-    """Return a line that changes, or with --quiet nothing; the value takes its text."""
+    """Return a status line, or nothing with --quiet; call the value with its text."""
     from scenario_gen.base.terminal import status_line
 
-    return nullcontext(lambda _: None) if _current.quiet else status_line()
+    return nullcontext(lambda _: None) if current.quiet else status_line()
 
 
-def beside(path: Path, name: str) -> Path:
-    """Return the path of that name beside an input, where a command writes by default.
+def default_output(path: Path, name: str) -> Path:
+    """Return the path `name` in the folder of an input, where a command writes without --out.
 
     Raises:
-        InputError: the input is the copy of an object, beside which nothing would stay.
+        InputError: the input is in an object store.
     """
     if (url := renamed(str(path))) != str(path):
-        raise InputError(
-            f"--out is missing: name a folder or a place in a store, for nothing is written beside {url}"
-        )
+        raise InputError(f"--out is missing: give a folder or a URL, as the input {url} is remote")
     return path.resolve().with_name(name)
 
 
 def open_page(page: Path) -> bool:
-    """Open a page in a browser if somebody sits at this terminal and there is a display; return whether it was opened."""
+    """Open a page in a browser if this is an interactive terminal with a display; return whether it was opened."""
     has_display = sys.platform == "darwin" or any(
         os.environ.get(name) for name in ("DISPLAY", "WAYLAND_DISPLAY")
     )
-    is_copy = renamed(str(page)) != str(page)
-    if is_copy or _current.as_json or _current.quiet or not (sys.stdout.isatty() and has_display):
+    is_remote = renamed(str(page)) != str(page)
+    if is_remote or current.as_json or current.quiet:
+        return False
+    if not (has_display and sys.stdout.isatty()):
         return False
     return webbrowser.open(page.resolve().as_uri())

@@ -11,8 +11,8 @@ from typing import Annotated, TYPE_CHECKING
 import typer
 
 from scenario_gen.base.errors import InputError
-from scenario_gen.cli.options import remind, takes
-from scenario_gen.cli.output import bars, Commands, give, say, say_rows
+from scenario_gen.cli.options import Commands, takes, warn_of_metadata
+from scenario_gen.cli.output import emit_json, print_, print_table, progress
 
 if TYPE_CHECKING:
     from scenario_gen.closed_loop.command import RunTrials
@@ -82,7 +82,7 @@ def drive(options: Drive) -> None:
     """Test a planner in closed loop in every scenario of a bag. Exit code 1: a threshold is not met."""
     from scenario_gen.closed_loop.command import drive_bag, DriveRequest, in_processes
 
-    remind(options.bag)
+    warn_of_metadata(options.bag)
     planner, processes = options.planner, in_processes(options.workers)
     request = DriveRequest(
         options.bag,
@@ -92,7 +92,7 @@ def drive(options: Drive) -> None:
         options.assignments or [],
         options.against,
     )
-    with bars() as advance:
+    with progress() as advance:
         result = drive_bag(
             request,
             options.out,
@@ -102,7 +102,7 @@ def drive(options: Drive) -> None:
         )
     _report(result, options.out)
     if result.broken:
-        say("thresholds not met: " + "; ".join(result.broken))
+        print_("thresholds not met: " + "; ".join(result.broken))
     if result.broken:
         raise typer.Exit(1)
 
@@ -113,25 +113,25 @@ def _report(drives: "Drives", out: Path) -> None:
     from scenario_gen.closed_loop.trials import rates
 
     found, files = rates(drives.outcomes), [out / name for name in (JSON, JUNIT, PAGE)]
-    give(rates=found, notes=drives.notes(), bars_not_met=drives.broken, files=files)
-    say_rows(("drives", drives.planner), [(name, str(rate)) for name, rate in found.items()])
-    say(*drives.notes(), sep="\n")
+    emit_json(rates=found, notes=drives.notes(), bars_not_met=drives.broken, files=files)
+    print_table(("drives", drives.planner), [(name, str(rate)) for name, rate in found.items()])
+    print_(*drives.notes(), sep="\n")
     if comparison := drives.comparison:
         for title, names in (("now fail", comparison.now_fail), ("now pass", comparison.now_pass)):
             if names:
                 more = f" and {len(names) - NAMED} more" if len(names) > NAMED else ""
-                give(**{title.replace(" ", "_"): names})
-                say(f"{title}: {', '.join(names[:NAMED])}{more}")
+                emit_json(**{title.replace(" ", "_"): names})
+                print_(f"{title}: {', '.join(names[:NAMED])}{more}")
     took = Decisions.all_of([outcome.decisions for outcome in drives.outcomes])
     if took.count:
         slow = f"{took.slow} of {took.count} slower than decision_time, the longest {took.longest:.3f} s"
-        say(f"decisions: {slow} (depends on this machine, so no file has it)")
+        print_(f"decisions: {slow} (depends on this machine, so no file has it)")
     failed = [
         drives.outcomes[k] for k in drives.by_severity() if not drives.outcomes[k].verdict.passed
     ]
     for outcome in failed[:WORST]:
-        say(f"scenario {outcome.name}: {outcome.verdict.sentence()}")
-    say(*map(str, files), sep="\n")
+        print_(f"scenario {outcome.name}: {outcome.verdict.sentence()}")
+    print_(*map(str, files), sep="\n")
 
 
 def _over_dds() -> "RunTrials":
@@ -260,7 +260,7 @@ def search(options: Search) -> None:
         raise InputError(
             "--max-rate: a search for the worst gives no rate; leave out --worst, or --max-rate"
         )
-    remind(options.source)
+    warn_of_metadata(options.source)
     source = drawn_from(options)
     request = SearchRequest(
         source.planned,
@@ -275,23 +275,23 @@ def search(options: Search) -> None:
         options.worst,
         options.assignments or [],
     )
-    say(
+    print_(
         f"Drives are kept in {options.out}{JOURNAL}. The same command continues a search that was stopped."
     )
-    with bars() as advance:
+    with progress() as advance:
         result = search_failures(
             request,
             options.out,
             workers=options.workers,
             progress=lambda done, total: advance("drives", done, total),
         )
-    give(
+    emit_json(
         rate=result.estimate.rate,
         failures=len(result.findings),
         sentences=result.sentences(),
         files=result.written,
     )
-    say(*result.sentences(), sep="\n")
+    print_(*result.sentences(), sep="\n")
     if result.findings:
         rows = [
             (
@@ -301,13 +301,13 @@ def search(options: Search) -> None:
             )
             for kind, own in result.kinds.items()
         ]
-        say_rows(("kind of failure", "kept", "likeliest"), rows)
-    say(*map(str, result.written), sep="\n")
+        print_table(("kind of failure", "kept", "likeliest"), rows)
+    print_(*map(str, result.written), sep="\n")
     if result.findings:
         again = f"scenario-gen drive {options.out / 'bag'} --planner {options.planner} --ego {request.ego_id()}"
-        say(f"as a regression test: {again}")
+        print_(f"as a regression test: {again}")
     if options.max_rate is not None and not result.estimate.bound <= options.max_rate:
-        say(
+        print_(
             f"the failure rate may be above {options.max_rate:g}: its bound is {result.estimate.bound:.3g} (95 %)"
         )
         raise typer.Exit(1)

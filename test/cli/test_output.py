@@ -97,7 +97,7 @@ def test_plain_values_are_json():
         "1": [1, True, None, None],
         "odd": "\\x1b",
     }
-    assert output.plain(value) == expected
+    assert output.json_value(value) == expected
 
 
 class Narrow(Terminal):
@@ -119,7 +119,7 @@ ROW = (
 
 
 def test_a_table_for_a_program_has_tabs(capsys):
-    output.say_rows(COLUMNS, [ROW], names=3)
+    output.print_table(COLUMNS, [ROW], names=3)
     assert capsys.readouterr().out == "\t".join(COLUMNS) + "\n" + "\t".join(ROW) + "\n"
 
 
@@ -138,7 +138,7 @@ def test_figures_are_short():
 def test_a_table_in_80_columns_cuts_nothing_off(monkeypatch, columns):
     monkeypatch.setattr("scenario_gen.base.terminal.Terminal", Narrow)
     Narrow.text = io.StringIO()
-    output.say_rows(COLUMNS[:columns], [ROW[:columns]], names=3)
+    output.print_table(COLUMNS[:columns], [ROW[:columns]], names=3)
     text = Narrow.text.getvalue()
     assert "…" not in text and all(len(line) <= 80 for line in text.splitlines())
     assert all(word in text for word in (*ROW[:columns], *COLUMNS[3:columns]))

@@ -73,11 +73,7 @@ def test_what_is_written_to_a_store_is_what_is_written_to_a_folder_and_is_read_t
     ), text
     assert {"evaluation.json", "report.html"} < set(objects(f"{bucket}/figures"))
     code, text = run("report", f"{bucket}/made/bag")
-    assert (
-        code == 2
-        and f"--out is missing: name a folder or a place in a store, for nothing is written beside {bucket}"
-        in text
-    )
+    assert code == 2 and f"--out is missing: give a folder or a URL, as the input {bucket}" in text
     assert (
         run("report", f"{bucket}/made/bag", "--out", "page")[0] == 0
         and (tmp_path / "page" / "report.html").exists()
