@@ -77,30 +77,26 @@ def report(
     bag: Annotated[
         Path,
         typer.Argument(
-            help="A bag with the topics `tracks` and `scenarios`, or a folder of `generate`."
+            help="A bag with the topics `tracks` and `scenarios`, or a folder from `generate`."
         ),
     ],
     out: Annotated[
-        Path | None, typer.Option(help="Folder for the page. Default: BAG_report beside the bag.")
+        Path | None, typer.Option(help="Folder for the page. Default: BAG_report next to the bag.")
     ] = None,
     browse: Annotated[
         bool, typer.Option("--open/--no-open", help="Open the page in a browser.")
     ] = True,
 ) -> None:
-    """Write the page of a bag and open it."""
+    """Write an HTML page about a bag and open it."""
     from scenario_gen.output.results import BAG, REPORT
     from scenario_gen.output.review.evaluation import write_page
 
-    folders = [
-        place for place in (bag.resolve(), bag.resolve().parent) if (place / REPORT).is_file()
-    ]
-    if (
-        out is None and folders and bag.resolve() in (folders[0], folders[0] / BAG)
-    ):  # `generate` wrote it already
-        page = folders[0] / REPORT
-    else:
+    path = bag.resolve()
+    results = path.parent if path.name == BAG else path  # a folder from `generate`
+    page = results / REPORT
+    if out is not None or not page.is_file():
         warn_of_metadata(bag)
-        folder = out or default_output(bag, f"{bag.resolve().stem}_report")
+        folder = out or default_output(bag, f"{path.stem}_report")
         with progress() as advance:
             write_page(bag, folder, progress=partial(advance, "scenarios"))
         page = folder / REPORT
@@ -116,7 +112,7 @@ def validate(
     assignments: SetOption = None,
     parameter_file: ParametersOption = None,
 ) -> None:
-    """Check every scenario of a bag at every instant. Exit code 1: a scenario is invalid."""
+    """Check every scenario of a bag in continuous time. Exit code 1: a scenario is invalid."""
     from scenario_gen.bags.recordings.read import NO_ENTRY
     from scenario_gen.output.review.validation import validate_bag
 
@@ -128,15 +124,14 @@ def validate(
         )
     emit_json(valid=not any(one.invalid for one in found), namespaces=found)
     for one in found:
-        print_(
-            f"{one.namespace or '/'}: {one.scenarios - one.invalid} of {one.scenarios} scenarios are valid"
-        )
+        valid = one.scenarios - one.invalid
+        print_(f"{one.namespace or '/'}: {valid} of {one.scenarios} scenarios are valid")
         if one.found:
             rows = [
                 (cause, str(entry.count), str(entry.scenario), entry.message)
                 for cause, entry in one.found.items()
             ]
-            print_table(("cause", "scenarios", "first", "what"), rows)
+            print_table(("cause", "scenarios", "first", "violation"), rows)
         if one.unaccounted:
             print_(f"  {one.unaccounted} without an entry: {NO_ENTRY}")
         for sentence in (
@@ -163,7 +158,7 @@ def export_scenarios(
     ],
     out: Annotated[
         Path | None,
-        typer.Option(help="Folder for the files. Default: BAG_commonroad etc. beside the bag."),
+        typer.Option(help="Folder for the files. Default: BAG_commonroad etc. next to the bag."),
     ] = None,
     index: Annotated[
         list[int] | None,
@@ -184,26 +179,27 @@ def export_scenarios(
         str,
         typer.Option(
             "--map",
-            help="openscenario: the map the scenarios were made on (.xodr, .osm). It is copied and named as their road.",
+            help="openscenario: the map of the scenarios (.xodr, .osm). It is copied and "
+            "referenced as their road.",
         ),
     ] = "",
     options: Annotated[
         list[str] | None,
         typer.Option(
             "--set",
-            help="Set run_out, step, goal_length, goal_width, goal_late, late, following or bag.…, as name=value.",
+            help="Set run_out, step, goal_length, goal_width, goal_late, late, following or "
+            "bag.…, as name=value.",
         ),
     ] = None,
 ) -> None:
-    """Write scenarios for other software: CommonRoad, OpenSCENARIO with OpenDRIVE, Autoware, ScenarioNet."""
+    """Export scenarios: CommonRoad, OpenSCENARIO with OpenDRIVE, Autoware, ScenarioNet."""
     from scenario_gen.bags.storage.config import BagConfig
     from scenario_gen.output.exchange.config import ExportConfig
     from scenario_gen.output.exchange.export import export_bag, EXPORTS
 
     if to not in EXPORTS:
-        raise InputError(
-            f"--to {to}: choose one of {', '.join(EXPORTS.names())}{did_you_mean(to, EXPORTS.names())}"
-        )
+        known = EXPORTS.names()
+        raise InputError(f"--to {to}: choose one of {', '.join(known)}{did_you_mean(to, known)}")
     of_bag = [option for option in options or [] if option.startswith("bag.")]
     bag_config = assigned_all(BagConfig(), [option.removeprefix("bag.") for option in of_bag])
     config = assigned_all(
@@ -231,9 +227,7 @@ def export_scenarios(
 def save_bag(
     bag: Annotated[
         Path,
-        typer.Argument(
-            help="Folder of a bag that was not closed or is damaged, or one of its MCAP files."
-        ),
+        typer.Argument(help="Folder of an unclosed or damaged bag, or one of its MCAP files."),
     ],
     out: Annotated[
         Path | None, typer.Option(help="Folder for the new bag. Default: BAG_reindexed.")
@@ -241,7 +235,7 @@ def save_bag(
     assignments: SetOption = None,
     parameter_file: ParametersOption = None,
 ) -> None:
-    """Recover the intact messages of an unclosed or damaged bag. The old files stay as they are."""
+    """Recover the intact messages of an unclosed or damaged bag. The old files are not changed."""
     from scenario_gen.bags.storage.reindex import reindex
 
     target = out or default_output(bag, f"{bag.resolve().name}_reindexed")
@@ -253,7 +247,7 @@ def save_bag(
 @commands.command("compare")
 def compare_sets(
     first: Annotated[Path, typer.Argument(help="Folder of results, or its evaluation.json.")],
-    second: Annotated[Path, typer.Argument(help="Another one.")],
+    second: Annotated[Path, typer.Argument(help="Another folder or file.")],
 ) -> None:
     """Compare two sets of scenarios: two seeds, two settings or two versions."""
     from rich.markdown import Markdown

@@ -46,7 +46,7 @@ def options(
         typer.Option(
             "--verbose",
             "-v",
-            help="Let `generate` and `demo` also print routes and the comparison with the recording.",
+            help="In `generate` and `demo`: print routes and the comparison with the recording.",
         ),
     ] = False,
     as_json: Annotated[
@@ -85,7 +85,7 @@ def parameters() -> None:
 
 @installation.command()
 def doctor() -> None:
-    """Check this environment: Python, packages, ROS 2. `ros2 doctor` checks the network and QoS."""
+    """Check Python, packages and ROS 2 (`ros2 doctor` checks the network and QoS)."""
     from scenario_gen.ros.common.doctor import ERROR, examine
 
     findings = []
@@ -107,7 +107,7 @@ for commands in (
 
 
 def arguments(words: list[str]) -> list[str]:
-    """Return the arguments with the global options first, so that these may follow a command's name.
+    """Return the arguments with the global options first; users may write them after a command.
 
     Raises:
         InputError: a word is not valid UTF-8, so that no bag or page could contain it.

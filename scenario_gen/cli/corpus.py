@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The commands for archives of many encounters."""
+"""The commands for archives with many encounters."""
 
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
@@ -14,7 +14,14 @@ import typer
 
 from scenario_gen.base.errors import InputError, RefusedError
 from scenario_gen.base.stores import Place, place
-from scenario_gen.cli.options import assigned_all, Commands, takes
+from scenario_gen.cli.options import (
+    assigned_all,
+    Commands,
+    SeedOption,
+    SetOption,
+    takes,
+    WorkersOption,
+)
 from scenario_gen.cli.output import emit_json, print_, print_table, progress
 
 if TYPE_CHECKING:
@@ -22,20 +29,17 @@ if TYPE_CHECKING:
 
 commands = Commands("Archives of recordings")
 
-WorkersOption = Annotated[
-    int, typer.Option(min=0, max=1024, help="Number of processes. 0: one per core.")
-]
 SchedulerOption = Annotated[
     str,
     typer.Option(
-        help="Address of a Dask scheduler, e.g. tcp://host:8786, to use instead of local processes."
+        help="Address of a Dask scheduler instead of local processes, e.g. tcp://host:8786."
     ),
 ]
 
 
 @contextmanager
 def workers_of(count: int, scheduler: str) -> Iterator["Workers"]:
-    """Give the workers; show the tasks done and the time left."""
+    """Yield the workers; show the completed tasks and the remaining time."""
     from scenario_gen.corpus.tasks import Workers
 
     with progress() as advance:
@@ -43,7 +47,7 @@ def workers_of(count: int, scheduler: str) -> Iterator["Workers"]:
 
 
 def conclude(summary: list[str], failed: Sequence[str], out: Place, **files: Place) -> None:
-    """Give and print the summary of tasks, and the files.
+    """Print the summary of tasks, and the files.
 
     Raises:
         RefusedError: a task failed.
@@ -52,7 +56,8 @@ def conclude(summary: list[str], failed: Sequence[str], out: Place, **files: Pla
     print_(*summary, *(f"{name}: {path}" for name, path in files.items()), sep="\n")
     if failed:
         raise RefusedError(
-            f"{len(failed)} tasks failed, see above; the rest is in {out}; the same command tries them again"
+            f"{len(failed)} tasks failed, see above; the other results are in {out}; "
+            "run the same command to try them again"
         )
 
 
@@ -61,12 +66,13 @@ def mine(
     archive: Annotated[
         list[Path],
         typer.Argument(
-            help="Folders of SPMD files, tables and bags, or single files, or s3://, gs://, abfs://. Repeatable."
+            help="Folders or files with recordings in any log format, or s3://, gs://, abfs://. "
+            "Repeatable."
         ),
     ],
     out: Annotated[
         Path,
-        typer.Option(help="Folder for the corpus, or s3://…. An unfinished corpus is continued."),
+        typer.Option(help="Folder for the corpus, or s3://…; an unfinished one is continued."),
     ],
     workers: WorkersOption = 0,
     scheduler: SchedulerOption = "",
@@ -94,7 +100,7 @@ class Batch:
 
     corpus: Annotated[Path, typer.Argument(help="A corpus that `mine` wrote, or s3://….")]
     roads: Annotated[
-        list[str], typer.Option(help="Roads, as for `generate`: separated by commas, or repeated.")
+        list[str], typer.Option(help="Roads, as for `generate`, separated by commas. Repeatable.")
     ]
     out: Annotated[
         Path,
@@ -105,27 +111,19 @@ class Batch:
     count: Annotated[
         int, typer.Option(min=1, max=100_000, help="Scenarios per encounter and road.")
     ] = 50
-    seed: Annotated[
-        int, typer.Option(min=0, help="Random seed. The same seed gives the same scenarios.")
-    ] = 0
+    seed: SeedOption = 0
     templates: Annotated[
-        int, typer.Option(min=0, help="Use the first so many encounters of the corpus. 0: all.")
+        int, typer.Option(min=0, help="Use only the first N encounters of the corpus. 0: all.")
     ] = 0
     workers: WorkersOption = 0
     scheduler: SchedulerOption = ""
-    assignments: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--set",
-            help="Set one parameter, as name=value (repeatable). `scenario-gen parameters` lists them.",
-        ),
-    ] = None
+    assignments: SetOption = None
 
 
 @commands.command(urls=("corpus", "out"))
 @takes(Batch)
 def batch(options: Batch) -> None:
-    """Generate scenarios from all encounters of a corpus on all given roads."""
+    """Generate scenarios from all encounters of a corpus on several roads."""
     from scenario_gen.corpus.batch import BatchRequest, run_batch
     from scenario_gen.method.config import PipelineConfig
 
@@ -143,45 +141,46 @@ def batch(options: Batch) -> None:
 
 
 def shown(value: object) -> str:
-    """Return a value of the table as text, a number with three digits, at most two of them decimals."""
-    if isinstance(value, float):
-        return f"{value:.{2 if abs(value) < 9.995 else 1 if abs(value) < 99.95 else 0}f}"
-    return "" if value is None else str(value)
+    """Return a value as text; a number has three digits, at most two of which are decimals."""
+    if not isinstance(value, float):
+        return "" if value is None else str(value)
+    decimals = 2 - sum(abs(value) >= bound for bound in (9.995, 99.95))
+    return f"{value:.{decimals}f}"
 
 
 @commands.command(urls=("batch",))
 def find(
     batch: Annotated[
         Path,
-        typer.Argument(help="A batch, finished or not, or a corpus that `mine` wrote; or s3://…."),
+        typer.Argument(
+            help="A batch (also unfinished), or a corpus that `mine` wrote, or s3://…."
+        ),
     ],
     condition: Annotated[
         str, typer.Argument(help="Condition in SQL, e.g. \"kind = 'crossing' and pet < 1\".")
     ] = "true",
-    limit: Annotated[int, typer.Option(min=0, help="Most scenarios to list here. 0: all.")] = 20,
+    limit: Annotated[int, typer.Option(min=0, help="Number of scenarios to list. 0: all.")] = 20,
     bag: Annotated[
         Path | None,
         typer.Option(
-            help="Write the scenarios found to this bag, with their recordings and roads."
+            help="Write the matching scenarios to this bag, with their recordings and roads."
         ),
     ] = None,
-    report: Annotated[Path | None, typer.Option(help="Folder for the page of that bag.")] = None,
+    report: Annotated[Path | None, typer.Option(help="Folder for a page about --bag.")] = None,
     again: Annotated[
         bool,
         typer.Option(
             "--again",
-            help="Generate each scenario found again and check that it is byte-identical.",
+            help="Generate each matching scenario again and check that it is byte-identical.",
         ),
     ] = False,
 ) -> None:
-    """Find scenarios of a batch, or recorded encounters of a corpus, by kind, road, PET, time to collision, …."""
+    """Find scenarios in a batch, or recorded encounters in a corpus, by kind, road, PET or TTC."""
     from scenario_gen.corpus import find as finding
     from scenario_gen.output.review.evaluation import write_page
 
     if report is not None and bag is None:
-        raise InputError(
-            "--report needs --bag: the page shows the bag of the scenarios found; give both"
-        )
+        raise InputError("--report needs --bag, the bag that the page describes; give both")
     source = place(batch)
     found = finding.find(source, condition)
     emit_json(scenarios=found.rows, coverage=finding.coverage_lines(found, source))
@@ -193,14 +192,12 @@ def find(
     print_table(
         titles, [[shown(row[name]) for name in finding.COLUMNS] for row in listed], names=3
     )
-    rest = (
-        f", the first {len(listed)} are listed; --limit 0 lists all"
-        if len(listed) < len(found.rows)
-        else ""
-    )
-    print_(
-        f"{len(found.rows)} found{rest}; a ttc above evaluation.ttc_horizon (10 s) counts as this"
-    )
+    summary = f"{len(found.rows)} scenarios" if found.rows else "no scenario matches"
+    if len(listed) < len(found.rows):
+        summary += f"; the first {len(listed)} are listed, --limit 0 lists all"
+    if found.rows:
+        summary += "; ttc is capped at evaluation.ttc_horizon (10 s)"
+    print_(summary)
     print_(*finding.coverage_lines(found, source), sep="\n")
     if again:
         for row in found.rows:
@@ -226,12 +223,10 @@ def library(
         int,
         typer.Option(
             min=4,
-            help="Most pairs of vehicles that are fitted. The others are assigned to the result.",
+            help="Number of vehicle pairs to fit. Further pairs are assigned to the result.",
         ),
     ] = 1000,
-    seed: Annotated[
-        int, typer.Option(min=0, help="Random seed. The same seed gives the same library.")
-    ] = 0,
+    seed: SeedOption = 0,
     workers: WorkersOption = 0,
     scheduler: SchedulerOption = "",
     assignments: Annotated[
@@ -239,7 +234,7 @@ def library(
         typer.Option("--set", help="Set a parameter of the segmentation, as name=value."),
     ] = None,
 ) -> None:
-    """Segment the encounters of a corpus together; write the primitives that they share."""
+    """Segment all encounters of a corpus jointly, and write their shared primitives."""
     from scenario_gen.corpus.library import build, SHARED
 
     config, source = assigned_all(SHARED, assignments), place(corpus, to_write=True)
@@ -251,28 +246,30 @@ def library(
 @commands.command()
 def coverage(
     bags: Annotated[
-        list[Path], typer.Argument(help="Bags of `generate`, of at least two recordings.")
+        list[Path], typer.Argument(help="Bags from `generate`, of at least two recordings.")
     ],
     templates: Annotated[
         list[int] | None,
         typer.Option(
-            min=1, help="Recorded encounters to draw as templates. Repeatable; default: 5, 10, 20."
+            min=1,
+            help="Number of recorded encounters to draw as templates. Repeatable; "
+            "default: 5, 10, 20.",
         ),
     ] = None,
     draws: Annotated[
-        int, typer.Option(min=1, help="Draws of templates, for the intervals.")
+        int, typer.Option(min=1, help="Number of draws of templates, for the intervals.")
     ] = 200,
-    seed: Annotated[int, typer.Option(min=0, help="Random seed of the draws.")] = 0,
-    out: Annotated[Path, typer.Option(help="The page to write, HTML.")] = Path("coverage.html"),
+    seed: SeedOption = 0,
+    out: Annotated[Path, typer.Option(help="HTML file for the page.")] = Path("coverage.html"),
 ) -> None:
-    """Measure how much unseen traffic recordings and the scenarios generated from them represent."""
+    """Measure how well recordings, and the scenarios from them, represent unseen traffic."""
     from scenario_gen.corpus.coverage import results_of, write_coverage
     from scenario_gen.method.evaluation.population import population_of
 
     if out.suffix.lower() != ".html" or (
         out.exists() and not out.read_bytes()[:15].lower().startswith(b"<!doctype html>")
     ):
-        raise InputError(f"--out {out}: name a new file that ends with .html")
+        raise InputError(f"--out {out}: name a new .html file, or a page to replace")
     results = results_of(bags)
     found = population_of(results, templates or (5, 10, 20), draws=draws, seed=seed)
     write_coverage(out, results, found)

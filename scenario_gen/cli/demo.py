@@ -1,7 +1,10 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The demo: three reactions, in this process and, if asked, by the ROS nodes over DDS, which must agree byte for byte."""
+"""The demo: three encounters with reactions.
+
+This process and, on request, the ROS nodes generate scenarios; both must agree byte for byte.
+"""
 
 from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager
@@ -18,8 +21,8 @@ from scenario_gen.pipeline import PipelineConfig
 from scenario_gen.types import GenerationResult
 
 ROADS = {"left_turn": "four_way", "follower": "curve", "all_way_stop": "four_way"}
-"""The bundled encounters, and the road of each."""
-TITLE = "Demo: new encounters from three invented ones"
+"""The bundled encounters and their roads."""
+TITLE = "Demo: new scenarios from three synthetic encounters"
 
 
 def run_demo(
@@ -31,19 +34,19 @@ def run_demo(
     progress: Callable[[], AbstractContextManager[Advance]],
     status: Callable[[], AbstractContextManager[Callable[[str], None]]],
 ) -> tuple[list[GenerationResult], list[str]]:
-    """Generate scenarios of the bundled encounters to a folder, as `generate_folder` does, with sets to compare with.
+    """Generate scenarios from the bundled encounters, and sets to compare with.
 
     Args:
         out: the folder.
         count: scenarios per case.
-        seed: of all randomness.
-        ros: let the nodes record the bag, over DDS; their scenarios must be those made in this process.
-        progress: as of `generate_folder`.
-        status: a context that gives what is told what the nodes are about.
+        seed: of all random numbers.
+        ros: let the nodes record the bag over DDS, and compare their scenarios.
+        progress: as in `generate_folder`.
+        status: a context manager whose value shows a status line about the nodes.
 
     Raises:
-        InputError: ROS 2 is not installed, or `out` may not be replaced.
-        ScenarioGenError: the nodes' scenarios are others, which is a fault of ours.
+        InputError: ROS 2 is not installed, or `out` must not be replaced.
+        ScenarioGenError: the scenarios from the nodes differ, which is a bug.
     """
     config = PipelineConfig(evaluation=EvaluationConfig(compare=True))
     jobs = [((bundled(case),), (road,)) for case, road in ROADS.items()]
@@ -59,7 +62,7 @@ def recorder(
     seed: int,
     status: Callable[[], AbstractContextManager[Callable[[str], None]]],
 ) -> Callable[[Path, Sequence[GenerationResult]], None]:
-    """Return what has the ROS suite record a bag, one namespace per case, and compares it with the cases of this process.
+    """Return a function that lets the ROS suite record a bag, and compares it with given cases.
 
     Raises:
         InputError: ROS 2 is not installed.
@@ -77,28 +80,26 @@ def recorder(
             Job(name, bundled(case), road)
             for name, (case, road) in zip(names, ROADS.items(), strict=True)
         ]
-        with status() as say:
-            run_suite(jobs, config, count=count, seed=seed, bag=bag, progress=say)
+        with status() as show:
+            run_suite(jobs, config, count=count, seed=seed, bag=bag, progress=show)
         compare_with_nodes(cases, bag)
 
     return record
 
 
 def compare_with_nodes(cases: Sequence[GenerationResult], bag: Path) -> None:
-    """Check that the scenarios that the nodes recorded are those made in this process, byte for byte.
+    """Check that the nodes recorded the scenarios of this process, byte for byte.
 
     Raises:
-        ScenarioGenError: they differ, which is a fault of ours.
+        ScenarioGenError: they differ, which is a bug.
     """
     recorded = {
-        name: found.data(SCENARIOS)
-        for name, found in read_recording(bag, topics=(SCENARIOS,)).namespaces.items()
+        name: namespace.data(SCENARIOS)
+        for name, namespace in read_recording(bag, topics=(SCENARIOS,)).namespaces.items()
     }
     for case, namespace in zip(cases, namespaces(len(cases)), strict=True):
-        own = [
-            scenario_bytes(scenario, case.encounter)[0] for scenario in case.generated.scenarios
-        ]
-        if own != recorded.get(namespace, []):
+        expected = [scenario_bytes(scenario, case.encounter)[0] for scenario in case]
+        if expected != recorded.get(namespace, []):
             raise ScenarioGenError(
-                f"the nodes' scenarios of {case.encounter.name} differ from those made in this process"
+                f"{case.encounter.name}: the nodes generated other scenarios than this process"
             )

@@ -1,10 +1,11 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""A planner that is a ROS 2 node of its own, driven through many scenarios over DDS in lock-step: `scenario-gen drive --ros`.
+"""Drives of a planner that is a ROS 2 node, over DDS in lock-step: `scenario-gen drive --ros`.
 
-The node `traffic` runs in this process, and steps when the planner has answered: any node does that answers each odometry with
-one command. The planner is started as a command, in a ROS domain in which nobody else is.
+The node `traffic` runs in this process and takes a step after each answer of the planner. The
+planner can be any node that answers each odometry message with one command. It is started by a
+command, in a ROS domain of its own.
 """
 
 from collections.abc import Callable, Sequence
@@ -23,8 +24,8 @@ from scenario_gen.closed_loop.origin import Trial
 from scenario_gen.closed_loop.trials import Outcome
 from scenario_gen.ros.common.planner_trials import drive_trials
 
-END_S = 10.0  # seconds that a planner's node has to end by itself
-LINES = 8  # of what the planner wrote last, that an error shows
+SHUTDOWN_S = 10.0  # in which the planner's node has to end by itself
+LAST_LINES_COUNT = 8  # of the planner's output, in an error message
 
 
 def drive_over_dds(
@@ -33,16 +34,16 @@ def drive_over_dds(
     config: ClosedLoopConfig,
     progress: Callable[[int, int], None],
 ) -> list[Outcome]:
-    """Drive the node that a command starts through every trial; results are in the order of the trials.
+    """Drive a planner's node through every trial; the results are in the order of the trials.
 
     Args:
-        trials: what is driven.
-        command: starts the planner's node, e.g. `ros2 run my_package my_planner`; words are parted as by a shell.
+        trials: the drives to make.
+        command: starts the planner's node, e.g. `ros2 run my_package my_planner`.
         config: the parameters of a drive.
-        progress: called with how many are done, and how many there are.
+        progress: called with the number of finished drives and of all drives.
 
     Raises:
-        InputError: the command cannot be run, its node publishes no command, or ends before the drives do.
+        InputError: the command cannot be run, its node publishes no command, or it ends too early.
         RefusedError: no ROS domain is free.
     """
     words = shlex.split(command)
@@ -61,9 +62,10 @@ def drive_over_dds(
         def check() -> None:
             if process.poll() is not None:
                 output.seek(0)
-                lines = output.read().decode(errors="replace").splitlines()[-LINES:]
+                lines = output.read().decode(errors="replace").splitlines()[-LAST_LINES_COUNT:]
                 raise InputError(
-                    f"--planner {command}: the command ended with code {process.returncode}; its last output: {' | '.join(lines)}"
+                    f"--planner {command}: the command ended with code {process.returncode}; "
+                    f"its last output: {' | '.join(lines)}"
                 )
 
         try:
@@ -74,9 +76,9 @@ def drive_over_dds(
 
 
 def _end(process: "subprocess.Popen[bytes]") -> None:
-    """End a planner's process and all that it has started (`ros2 run` and `ros2 launch` start others)."""
+    """End a planner's process and its children (`ros2 run` and `ros2 launch` start some)."""
     for number in (signal.SIGTERM, signal.SIGKILL):
         with suppress(ProcessLookupError):
             os.killpg(process.pid, number)
         with suppress(subprocess.TimeoutExpired):
-            process.wait(END_S)
+            process.wait(SHUTDOWN_S)

@@ -1,12 +1,13 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""A folder of results from logs: scenarios of every encounter on every road, with bag, report and figures."""
+"""A folder of results from logs: scenarios, bag, report and figures."""
 
 from collections import Counter
 from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -18,37 +19,41 @@ from scenario_gen.method.nearest import answer_refusal
 from scenario_gen.method.recombination import recombinations
 from scenario_gen.output.results import BAG, GENERATED, provenance_of, write_results
 from scenario_gen.pipeline import generate, PipelineConfig
-from scenario_gen.types import Encounter, GenerationResult, NoteKind, Recombined, Recorded, Request
+from scenario_gen.types import (
+    Encounter,
+    GenerationResult,
+    NoteKind,
+    Recombined,
+    Recorded,
+    Request,
+)
 
 if TYPE_CHECKING:
     from scenario_gen.closed_loop.reacting import Testing
 
 Advance = Callable[[str, int, int], None]
 """Called with the progress of a case: its name, scenarios so far, scenarios requested."""
-EGO_AUTO = "auto"  # the vehicle that has to react, by --ego
-NOTES = 5  # on logs, that the terminal shows
-OPTIONS = {
-    "starts:='": "--start '", "goals:='": "--goal '", "sampling.max_stretch:=": "--set sampling.max_stretch=",
-    "fitting.allow=": "--allow ",
-}  # fmt: skip
-"""Parameters of nodes, as the nearest possible request names them, and the command line's options for them."""
+Progress = Callable[[], AbstractContextManager[Advance]]
+Notify = Callable[[str], None]
+EGO_AUTO = "auto"  # value of --ego: the vehicle that has to react
+MAX_LOG_NOTES_COUNT = 5  # on the terminal; the report has all
 
 
 @dataclass(frozen=True)
 class FolderRequest:
-    """What a folder of results is to hold.
+    """The contents of a folder of results.
 
     Attributes:
-        jobs: files that are read as one log, and the roads for its encounters.
+        jobs: files that together are one log, and the roads for its encounters.
         config: the parameters of every stage.
         count: scenarios per encounter and road.
-        seed: of all randomness.
-        title: heading of the report; the logs' names by default.
-        encounters: names of those to take; all by default.
-        request: a vehicle to be left out, and start and end states.
-        for_testing: scenarios in which the ego has to react.
-        recombine: encounters to recombine of those that were recorded, at most.
-        also_read: what else is read, so that the folder may not hold it: maps, a parameter file.
+        seed: of all random numbers.
+        title: heading of the report; the names of the logs by default.
+        encounters: names of the encounters to use; all by default.
+        request: a vehicle to leave out, start and end states, targets.
+        also_read: further inputs, which the folder must not contain: maps, a parameter file.
+        for_testing: whether to search for scenarios in which the ego has to react.
+        recombine: largest number of encounters to recombine from the recorded ones.
     """
 
     jobs: Sequence[tuple[Sequence[Path], Sequence[str]]]
@@ -64,7 +69,7 @@ class FolderRequest:
 
     @property
     def logs(self) -> list[Path]:
-        """All files that are read as logs."""
+        """The files of all logs."""
         return [path for group, _ in self.jobs for path in group]
 
     @property
@@ -72,14 +77,31 @@ class FolderRequest:
         """The roads of all jobs."""
         return [road for _, names in self.jobs for road in names]
 
+    @property
+    def inputs(self) -> list[Path]:
+        """All files that are read."""
+        return [*self.logs, *map(Path, self.roads), *self.also_read]
+
+    def provenance(self) -> dict[str, str]:
+        """Return what is needed to generate the folder again."""
+        values = provenance_of(
+            self.logs, self.seed, self.count, self.roads, self.config, self.request
+        )
+        return ({"recombine": str(self.recombine)} if self.recombine else {}) | values
+
 
 @dataclass(frozen=True)
 class Source:
-    """An encounter, the roads that it is to drive on, and the name of the recording, or of both, that it is of."""
+    """An encounter, its roads, and the names of the recordings from which its vehicles come."""
 
     encounter: Encounter
     roads: Sequence[str]
     recording: str
+
+
+def no_progress() -> AbstractContextManager[Advance]:
+    """Show no progress."""
+    return nullcontext(lambda *_: None)
 
 
 def generate_folder(
@@ -87,55 +109,42 @@ def generate_folder(
     requested: FolderRequest,
     *,
     record: Callable[[Path, Sequence[GenerationResult]], None] | None = None,
-    progress: Callable[[], AbstractContextManager[Advance]] = lambda: nullcontext(lambda *_: None),
-    notify: Callable[[str], None] = lambda _: None,
+    progress: Progress = no_progress,
+    notify: Notify = lambda _: None,
 ) -> tuple[list[GenerationResult], list[str]]:
-    """Generate scenarios of all encounters of some logs; write bag, report and figures to `out`.
+    """Generate scenarios for all encounters of some logs; write bag, report and figures to `out`.
 
     Args:
-        out: the folder; an earlier result there is replaced.
-        requested: what it is to hold.
-        record: writes the bag (its path and the cases are given) instead of this process.
-        progress: a context whose value is called with the progress of each case.
-        notify: called with notes on the logs, and for each set with an ego slot with how many scenarios need no reaction.
+        out: the folder; an earlier result in it is replaced.
+        requested: the contents.
+        record: writes the bag, given its path and the cases, instead of this process.
+        progress: a context manager whose value is called with the progress of each case.
+        notify: called with notes on logs and maps, and, with an ego slot, with the number of
+            scenarios that need no reaction.
 
     Returns:
-        The cases, and a sentence for each encounter and road that was refused or came out short.
+        The cases, and a sentence on each encounter and road that was refused or incomplete.
 
     Raises:
-        InputError: a log cannot be read, an encounter is unknown, or `out` may not be replaced.
+        InputError: a log cannot be read, an encounter is unknown, or `out` must not be replaced.
         RefusedError: nothing could be generated.
     """
-    with replaced_folder(
-        out, GENERATED, [*requested.logs, *map(Path, requested.roads), *requested.also_read]
-    ) as folder:
+    with replaced_folder(out, GENERATED, requested.inputs) as folder:
         readings = read_logs(requested, progress, notify)
         sources = sources_of(readings)
-        taken = chosen([source.encounter for source in sources.values()], requested.encounters)
+        templates = chosen([source.encounter for source in sources.values()], requested.encounters)
         if requested.recombine:
-            taken += recombine(taken, sources, requested, notify)
+            templates += recombine(templates, sources, requested, notify)
         pairs = [
-            (encounter, road) for encounter in taken for road in sources[encounter.name].roads
+            (template, road) for template in templates for road in sources[template.name].roads
         ]
         with progress() as advance:
             cases, refusals = generate_all(pairs, requested, advance)
-        cases = [
-            replace(
-                case,
-                provenance={**case.provenance, RECORDING: sources[case.encounter.name].recording},
-            )
-            for case in cases
-        ]
         if not cases:
             raise RefusedError("nothing could be generated:\n" + "\n".join(refusals))
-        untested: list[str] = []
-        if requested.request.ego:
-            from scenario_gen.closed_loop.config import ClosedLoopConfig
-            from scenario_gen.closed_loop.reacting import baseline_passes
-
-            drives = ClosedLoopConfig(limits=requested.config.limits)
-            untested = [sentence for case in cases if (sentence := baseline_passes(case, drives))]
-        for line in (*faults_of(cases), *untested):
+        cases = [_with_recording(case, sources) for case in cases]
+        untested = _untested(cases, requested)
+        for line in (*map_faults(cases), *untested):
             notify(line)
         if record is not None:
             record(folder / BAG, cases)
@@ -145,29 +154,38 @@ def generate_folder(
             cases,
             title=requested.title or ", ".join(path.stem for path in requested.logs),
             quality=[*quality, *refusals, *untested],
-            provenance=({"recombine": str(requested.recombine)} if requested.recombine else {})
-            | provenance_of(
-                requested.logs,
-                requested.seed,
-                requested.count,
-                requested.roads,
-                requested.config,
-                requested.request,
-            ),
+            provenance=requested.provenance(),
         )
     return cases, refusals
 
 
+def _with_recording(case: GenerationResult, sources: dict[str, Source]) -> GenerationResult:
+    recording = {RECORDING: sources[case.encounter.name].recording}
+    return replace(case, provenance={**case.provenance, **recording})
+
+
+def _untested(cases: Sequence[GenerationResult], requested: FolderRequest) -> list[str]:
+    """Return sentences on scenarios with an ego slot in which the ego need not react."""
+    if not requested.request.ego:
+        return []
+    from scenario_gen.closed_loop.config import ClosedLoopConfig
+    from scenario_gen.closed_loop.reacting import baseline_passes
+
+    config = ClosedLoopConfig(limits=requested.config.limits)
+    return [sentence for case in cases if (sentence := baseline_passes(case, config))]
+
+
 def sources_of(readings: Sequence[tuple[LogResult, Sequence[str]]]) -> dict[str, Source]:
-    """Return all encounters by name; of logs of one name the further ones are numbered, and so are their encounters."""
+    """Return all encounters by name; further logs of the same name are numbered."""
     sources: dict[str, Source] = {}
-    seen: Counter[str] = Counter()
+    logs: Counter[str] = Counter()
     for log, roads in readings:
-        seen[log.quality.name] += 1
-        number = f" ({seen[log.quality.name]})" if seen[log.quality.name] > 1 else ""
+        name = log.quality.name
+        logs[name] += 1
+        number = f" ({logs[name]})" if logs[name] > 1 else ""
         for encounter in log.encounters:
-            own = replace(encounter, name=encounter.name + number) if number else encounter
-            sources[own.name] = Source(own, roads, log.quality.name + number)
+            numbered = replace(encounter, name=encounter.name + number)
+            sources[numbered.name] = Source(numbered, roads, name + number)
     return sources
 
 
@@ -175,35 +193,29 @@ def recombine(
     recorded: Sequence[Encounter],
     sources: dict[str, Source],
     requested: FolderRequest,
-    notify: Callable[[str], None],
+    notify: Notify,
 ) -> list[Encounter]:
-    """Return encounters recombined of recorded ones, which are put among the sources; notify how many, and why not more."""
+    """Return recombined encounters, which are added to the sources; notify how many there are."""
     made, refused = recombinations(recorded, requested.recombine, requested.seed)
     for encounter in made:
         assert isinstance(encounter.source, Recombined)
-        one, other = sources[encounter.source.first], sources[encounter.source.second]
-        sources[encounter.name] = Source(
-            encounter, one.roads, ", ".join(dict.fromkeys((one.recording, other.recording)))
-        )
-    why = "; ".join(f"{count} × {cause}" for cause, count in refused.most_common())
-    why = (
-        f" ({why or 'no more pairs are of one kind; --recording adds some'})"
-        if len(made) < requested.recombine
-        else ""
-    )
+        first, second = sources[encounter.source.first], sources[encounter.source.second]
+        recordings = dict.fromkeys((first.recording, second.recording))
+        sources[encounter.name] = Source(encounter, first.roads, ", ".join(recordings))
+    causes = "; ".join(f"{count} × {cause}" for cause, count in refused.most_common())
+    why = causes or "no more pairs of the same kind; add recordings with --recording"
+    why = f" ({why})" if len(made) < requested.recombine else ""
     notify(f"recombined encounters: {len(made)} of {requested.recombine}{why}")
     return made
 
 
 def read_logs(
-    requested: FolderRequest,
-    progress: Callable[[], AbstractContextManager[Advance]],
-    notify: Callable[[str], None],
+    requested: FolderRequest, progress: Progress, notify: Notify
 ) -> list[tuple[LogResult, Sequence[str]]]:
-    """Return each log with the roads for its encounters; of several logs, those without an encounter are told and left out.
+    """Return each log with its roads; of several logs, those without an encounter are skipped.
 
     Raises:
-        InputError: a log cannot be read, or is the only one and has no encounter.
+        InputError: a log cannot be read, or the only log has no encounter.
     """
     readings = []
     with progress() as advance:
@@ -214,34 +226,34 @@ def read_logs(
             except NoEncounterError as error:
                 if len(requested.jobs) == 1:
                     raise
-                notify(f"no encounter: {error}")  # a result; the other logs may have some
-    for line in notes_of([log for log, _ in readings]):
+                notify(f"no encounter: {error}")
+    for line in log_notes([log for log, _ in readings]):
         notify(line)
     return readings
 
 
-def faults_of(cases: Sequence[GenerationResult]) -> list[str]:
-    """Return what was left out of the cases' maps, because it is faulty."""
-    maps = {
-        case.road.name: case.road.lanes.notes
+def map_faults(cases: Sequence[GenerationResult]) -> list[str]:
+    """Return notes on faulty elements that were left out of the maps of cases."""
+    networks = {
+        case.road.name: case.road.lanes
         for case in cases
         if case.road is not None and case.road.lanes is not None
     }
     return [
         f"map {name}: {note}"
-        for name, notes in maps.items()
-        for note in notes
+        for name, network in networks.items()
+        for note in network.notes
         if note.kind is NoteKind.FAULTY
     ]
 
 
-def notes_of(readings: Sequence[LogResult]) -> list[str]:
-    """Return what there is to say about how logs were read, at most `NOTES` lines; the report has all."""
+def log_notes(readings: Sequence[LogResult]) -> list[str]:
+    """Return notes on how logs were read, at most MAX_LOG_NOTES_COUNT; the report has all."""
     notes = [f"{log.quality.name}: {note}" for log in readings for note in log.quality.remarks()]
-    more = len(notes) - NOTES
-    return (
-        notes if more <= 0 else [*notes[:NOTES], f"{more} more notes on the log are in the report"]
-    )
+    more = len(notes) - MAX_LOG_NOTES_COUNT
+    if more <= 0:
+        return notes
+    return [*notes[:MAX_LOG_NOTES_COUNT], f"{more} more notes on the log are in the report"]
 
 
 def generate_all(
@@ -249,76 +261,93 @@ def generate_all(
     requested: FolderRequest,
     advance: Advance = lambda *_: None,
 ) -> tuple[list[GenerationResult], list[str]]:
-    """Generate scenarios of each encounter on its road; return the cases, and a sentence for each refused or incomplete one."""
-    config, count, seed, request = (
-        requested.config,
-        requested.count,
-        requested.seed,
-        requested.request,
-    )
-    population = [encounter for encounter, _ in pairs if isinstance(encounter.source, Recorded)]
+    """Generate scenarios for encounters on their roads.
+
+    Returns:
+        The cases, and a sentence on each encounter and road that was refused or incomplete.
+    """
+    recorded = [encounter for encounter, _ in pairs if isinstance(encounter.source, Recorded)]
     cases: list[GenerationResult] = []
     refusals: list[str] = []
     for encounter, road in pairs:
         name = f"{encounter.name} on {Path(road).stem}"
-        advance(name, 0, count)
-
-        def report(done: int, total: int, _candidates: int, name: str = name) -> None:
-            advance(name, done, total)
-
-        def testing(
-            wanted: Request, encounter: Encounter = encounter, road: str = road
-        ) -> "Testing":
-            from scenario_gen.closed_loop.reacting import Testing
-
-            return Testing(encounter, road, config, wanted, seed)
-
-        own = request
+        advance(name, 0, requested.count)
         try:
-            if request.ego == EGO_AUTO:
-                own = replace(request, ego=testing(request).who_reacts_most())
-            if requested.for_testing:
-                case = testing(own).run(count, report)
-            else:
-                template = [encounter, *population]
-                case = generate(
-                    template, road, config, count=count, seed=seed, request=own, progress=report
-                )
+            case = _generate_case(encounter, road, requested, recorded, partial(advance, name))
         except RefusedError as error:
-            named = replace(own, ego="") if own.ego == EGO_AUTO else own
-            answer = answer_refusal(error, encounter, road, config, named, count, seed)
-            refusals.append(f"{encounter.name} on {road}: {as_options(str(answer))}")
+            refusals.append(f"{encounter.name} on {road}: {error}")
             continue
         cases.append(case)
-        n_scenarios, refused = len(case.generated.scenarios), case.generated.refused
-        if n_scenarios < count:
-            causes = (
-                ", ".join(f"{number} × {cause}" for cause, number in refused.most_common())
-                or "no candidate was drawn"
-            )
-            causes = str(case.generated.adaptations[-1]) if requested.for_testing else causes
+        if len(case) < requested.count:
             refusals.append(
-                f"{encounter.name} on {road}: only {n_scenarios} of {count} scenarios: {causes}"
+                f"{encounter.name} on {road}: only {len(case)} of {requested.count} scenarios: "
+                f"{_shortage(case, requested)}"
             )
     return cases, refusals
 
 
+def _generate_case(
+    encounter: Encounter,
+    road: str,
+    requested: FolderRequest,
+    recorded: Sequence[Encounter],
+    advance: Callable[[int, int], None],
+) -> GenerationResult:
+    """Generate scenarios for one encounter and road.
+
+    Raises:
+        RefusedError: nothing could be generated; the message names the nearest possible request.
+    """
+    config, count, seed = requested.config, requested.count, requested.seed
+
+    def report(done: int, total: int, _candidates: int) -> None:
+        advance(done, total)
+
+    def testing(request: Request) -> "Testing":
+        from scenario_gen.closed_loop.reacting import Testing
+
+        return Testing(encounter, road, config, request, seed)
+
+    request = requested.request
+    try:
+        if request.ego == EGO_AUTO:
+            request = replace(request, ego=testing(request).who_reacts_most())
+        if requested.for_testing:
+            return testing(request).run(count, report)
+        return generate(
+            [encounter, *recorded],
+            road,
+            config,
+            count=count,
+            seed=seed,
+            request=request,
+            progress=report,
+        )
+    except RefusedError as error:
+        named = replace(request, ego="") if request.ego == EGO_AUTO else request
+        raise answer_refusal(error, encounter, road, config, named, count, seed) from error
+
+
+def _shortage(case: GenerationResult, requested: FolderRequest) -> str:
+    """Return why a case has fewer scenarios than requested."""
+    if requested.for_testing:
+        return str(case.generated.adaptations[-1])
+    counts = case.generated.refused.most_common()
+    causes = ", ".join(f"{count} × {cause}" for cause, count in counts)
+    return causes or "no candidate was drawn"
+
+
 def chosen(encounters: Sequence[Encounter], names: Sequence[str]) -> list[Encounter]:
-    """Return the encounters of those names, or all.
+    """Return the encounters with these names, or all.
 
     Raises:
         InputError: a name is unknown; the message lists the known ones.
     """
     known = {encounter.name: encounter for encounter in encounters}
-    for unknown in (name for name in names if name not in known):
-        raise InputError(
-            f"the log has no encounter {unknown!r}; it has {', '.join(known)}{did_you_mean(unknown, known)}"
-        )
+    for name in names:
+        if name not in known:
+            raise InputError(
+                f"the log has no encounter {name!r}; it has {', '.join(known)}"
+                f"{did_you_mean(name, known)}"
+            )
     return [known[name] for name in names] or list(encounters)
-
-
-def as_options(message: str) -> str:
-    """Write the nearest possible request, which the nodes take as parameters, as options of the command line."""
-    for parameter, option in OPTIONS.items():
-        message = message.replace(parameter, option)
-    return message

@@ -41,10 +41,11 @@ class Generate:
     road: Annotated[
         list[str],
         typer.Option(
-            help="straight, curve, t_intersection, four_way, merge, roundabout, corridor (drawn around the recording), auto (the "
-            "first of these that suits), a nav2 map (.yaml), or a vector map: Lanelet2 (.osm), OpenDRIVE (.xodr), CommonRoad "
-            "(.xml). Of a vector map a part can be named: MAP#box=x0,y0,x1,y1, #lanelet=ID, #junction=ID. `scenario-gen roads` "
-            "draws a map with the places that fit. Repeatable."
+            help="straight, curve, t_intersection, four_way, merge, roundabout, corridor (drawn "
+            "around the recording), auto (the first of these that suits), a nav2 map (.yaml), or "
+            "a vector map: Lanelet2 (.osm), OpenDRIVE (.xodr), CommonRoad (.xml). Append "
+            "#box=x0,y0,x1,y1, #lanelet=ID or #junction=ID for a part of a vector map. "
+            "`scenario-gen roads` draws a map with suitable places. Repeatable."
         ),
     ]
     count: Annotated[
@@ -61,7 +62,7 @@ class Generate:
     recording: Annotated[
         list[Path] | None,
         typer.Option(
-            help="A further recording, on a clock of its own, for the same roads. Repeatable."
+            help="Another recording for the same roads, with a separate clock. Repeatable."
         ),
     ] = None
     recombine: Annotated[
@@ -69,14 +70,15 @@ class Generate:
         typer.Option(
             min=0,
             max=MAX_COUNT,
-            help="So many new encounters at most: one vehicle of a recorded encounter with one of another of its kind.",
+            help="Create up to this many new encounters by pairing vehicles from two recordings "
+            "of the same kind.",
         ),
     ] = 0
     ego: Annotated[
         str,
         typer.Option(
-            help="Id of the vehicle to leave out for a planner under test, or auto: the one that has to react. The bag has its "
-            "start, goal and track."
+            help="Id of the vehicle to leave out for a planner under test, or auto: the one that "
+            "has to react. The bag contains its start, goal and track."
         ),
     ] = ""
     start: Annotated[
@@ -92,43 +94,44 @@ class Generate:
     target: Annotated[
         list[str] | None,
         typer.Option(
-            help=r"Range of pet, ttc, gap, arrival_gap, closing_speed or baseline_margin, e.g. 'pet=0.5..1.5', 'ttc\[1,2]=1..2'. "
-            "Repeatable."
+            help="Range of pet, ttc, gap, arrival_gap, closing_speed or baseline_margin, "
+            r"e.g. 'pet=0.5..1.5', 'ttc\[1,2]=1..2'. Repeatable."
         ),
     ] = None
     for_testing: Annotated[
         bool,
         typer.Option(
             "--for-testing",
-            help="Search for scenarios in which the --ego has to react: a baseline that ignores the others collides, and a "
-            "simple reactive planner passes.",
+            help="Search for scenarios in which the --ego has to react: a baseline that ignores "
+            "the others collides, and a simple reactive planner passes.",
         ),
     ] = False
     compare: Annotated[
         bool,
         typer.Option(
             "--compare",
-            help="Draw and measure further sets, too: without changepoints, with evenly spaced ones, with preset narrow. It "
-            "takes twice the time.",
+            help="Also draw and measure sets without changepoints, with evenly spaced "
+            "changepoints, and with preset narrow. Doubles the run time.",
         ),
     ] = False
     order: Annotated[
         str,
         typer.Option(
-            help="Who goes first. keep: as recorded. free: anyone. swap: the other one at the closest crossing."
+            help="Who goes first. keep: as recorded. free: anyone. swap: the second vehicle at "
+            "the closest crossing."
         ),
     ] = "keep"
     allow: Annotated[
         str,
         typer.Option(
-            help="What may be lost on the road, with commas between: lost_conflict, lost_order, lost_following, lost_merge, "
-            "lost_lane_change, lost_overtaking, lost_stand, lost_turn."
+            help="Losses to accept on the road, separated by commas: lost_conflict, lost_order, "
+            "lost_following, lost_merge, lost_lane_change, lost_overtaking, lost_stand, lost_turn."
         ),
     ] = ""
     obstacle: Annotated[
         list[str] | None,
         typer.Option(
-            help="Obstacle on the road, e.g. a parked car: 'x y yaw length width'. Repeatable."
+            help="Obstacle on the road, such as a parked car: 'x y yaw length width'. Repeatable."
         ),
     ] = None
     assignments: SetOption = None
@@ -144,34 +147,32 @@ def generate(options: Generate) -> None:
     from scenario_gen.roads import read_obstacles
     from scenario_gen.types import join_pieces, Request
 
-    allowed = [f"fitting.allow={options.allow}"] if options.allow else []
-    compared = ["evaluation.compare=true"] if options.compare else []
-    config = configured(
-        options.parameter_file, [*(options.assignments or []), *allowed, *compared]
-    )
+    config = configured(options.parameter_file, options.assignments)
     for text in options.obstacle or []:
         read_obstacles(text, "--obstacle")
+    obstacles = [text for text in (config.road.obstacles, *(options.obstacle or [])) if text]
     config = updated(
         config,
         {
-            "road.obstacles": join_pieces(
-                filter(None, [config.road.obstacles, *(options.obstacle or [])])
-            )
+            "fitting.allow": options.allow or config.fitting.allow,
+            "evaluation.compare": options.compare or config.evaluation.compare,
+            "road.obstacles": join_pieces(obstacles),
         },
     )
-    starts, goals, targets = (
-        join_pieces(texts or []) for texts in (options.start, options.goal, options.target)
-    )
+    logs = [options.log, *([path] for path in options.recording or [])]
     request = FolderRequest(
-        jobs=[
-            (files, options.road)
-            for files in (options.log, *([path] for path in options.recording or []))
-        ],
+        jobs=[(files, options.road) for files in logs],
         config=config,
         count=options.count,
         seed=options.seed,
         encounters=options.encounter or [],
-        request=Request(options.ego, starts, goals, targets, options.order),
+        request=Request(
+            options.ego,
+            join_pieces(options.start or []),
+            join_pieces(options.goal or []),
+            join_pieces(options.target or []),
+            options.order,
+        ),
         also_read=[options.parameter_file] if options.parameter_file else [],
         for_testing=options.for_testing,
         recombine=options.recombine,
@@ -184,22 +185,22 @@ def roads(
     road: Annotated[
         str,
         typer.Argument(
-            help="A map, or the name of a built-in road; without it all of these are listed."
+            help="A map, or the name of a built-in road. Default: list the built-in roads."
         ),
     ] = "",
     log: Annotated[
         Path | None,
-        typer.Option(help="A recording: the roads or places that fit its encounter are named."),
+        typer.Option(help="A recording: show the roads or places that suit its encounter."),
     ] = None,
     encounter: Annotated[
         list[str] | None,
         typer.Option(help="Name of the encounter in the log; default: the first."),
     ] = None,
-    out: Annotated[Path, typer.Option(help="The picture to write, SVG.")] = Path("roads.svg"),
+    out: Annotated[Path, typer.Option(help="SVG file for the picture.")] = Path("roads.svg"),
     assignments: SetOption = None,
     parameter_file: ParametersOption = None,
 ) -> None:
-    """Draw a map with its lanes, arms and the places where a recording fits; or list the built-in roads."""
+    """Draw a map with lanes and the places that suit a recording, or list the built-in roads."""
     from scenario_gen.base.errors import InputError
     from scenario_gen.base.folders import write_text
     from scenario_gen.cli.folder import chosen
@@ -222,19 +223,18 @@ def roads(
                 )
             )
         emit_json(roads=names)
-        print_(
-            f"{'roads' if template is None else f'roads that take {template.name}'}: {', '.join(names)}"
-        )
+        title = "roads" if template is None else f"roads that suit {template.name}"
+        print_(f"{title}: {', '.join(names)}")
         return
     if out.suffix.lower() != ".svg":
         raise InputError(f"--out {out}: name a file that ends with .svg")
     if out.exists() and not out.read_bytes()[:4] == b"<svg":
-        raise InputError(f"--out {out} is there and no picture of a map; name another file")
-    picture, said = map_picture(road, template)
+        raise InputError(f"--out {out} exists and is not a picture of a map; name another file")
+    picture, notes = map_picture(road, template)
     out.parent.mkdir(parents=True, exist_ok=True)
     write_text(out, picture)
-    emit_json(picture=out, notes=said)
-    print_("\n".join([*said, f"picture: {out}"]))
+    emit_json(picture=out, notes=notes)
+    print_("\n".join([*notes, f"picture: {out}"]))
 
 
 @commands.command()
@@ -253,12 +253,12 @@ def regenerate(
     ] = None,
     log: Annotated[
         Path | None,
-        typer.Option(help="Start from this raw log instead of the bag's tracks and changepoints."),
+        typer.Option(help="Start from the raw log instead of the bag's tracks and changepoints."),
     ] = None,
     assignments: SetOption = None,
     parameter_file: ParametersOption = None,
 ) -> None:
-    """Generate one scenario of a bag again and check that it is the same: its bytes, or its places within 1 cm."""
+    """Generate a scenario of a bag again and check that it is the same, to the byte or 1 cm."""
     from scenario_gen.output.review.regenerate import regenerate_scenario, write_regenerated
 
     warn_of_metadata(bag)
@@ -287,7 +287,7 @@ def demo(
         bool, typer.Option("--ros", help="Let the ROS nodes generate the scenarios, over DDS.")
     ] = False,
 ) -> None:
-    """Generate scenarios from three bundled encounters: a left turn that waits, a follower, and an all-way stop."""
+    """Generate scenarios from three bundled encounters: left turn, follower, all-way stop."""
     from scenario_gen.cli.demo import run_demo
 
     cases, refusals = run_demo(
@@ -295,15 +295,15 @@ def demo(
     )
     if ros:
         total = sum(len(case.generated.scenarios) for case in cases)
-        print_(f"{total} scenarios of the ROS nodes are byte-identical to those of this process")
+        print_(f"{total} scenarios from the ROS nodes are byte-identical to those of this process")
     conclude(cases, refusals, out)
 
 
 def conclude(cases: "list[GenerationResult]", refusals: list[str], out: Path) -> None:
-    """Print the summary and give the results.
+    """Print the summary of generated cases.
 
     Raises:
-        RefusedError: anything asked for is missing.
+        RefusedError: a requested case is missing or incomplete.
     """
     from scenario_gen.output.report.summary import summary
     from scenario_gen.output.results import BAG, FIGURES, REPORT
@@ -317,19 +317,19 @@ def conclude(cases: "list[GenerationResult]", refusals: list[str], out: Path) ->
     )
     print_(summary(cases, verbose=current.verbose), wrap=True)
     print_(f"report: {out / REPORT}\nbag:    {out / BAG}")
-    print_("next:   open the report; `scenario-gen drive --help` tests a planner on the bag")
+    print_("next:   open the report, or test a planner on the bag (`scenario-gen drive --help`)")
     if refusals:
         raise RefusedError("part of the request could not be generated:\n" + "\n".join(refusals))
 
 
 def case_of(case: "GenerationResult") -> dict[str, object]:
-    """Return an encounter on a road in figures."""
-    made = case.generated
+    """Return the figures of a case for JSON."""
+    generated = case.generated
     return {
         "title": case.title,
         "vehicles": [vehicle.id for vehicle in case.encounter.vehicles],
-        "requested": made.requested,
-        "scenarios": len(made.scenarios),
-        "candidates": made.candidates,
-        "refused": made.refused,
+        "requested": generated.requested,
+        "scenarios": len(generated.scenarios),
+        "candidates": generated.candidates,
+        "refused": generated.refused,
     }

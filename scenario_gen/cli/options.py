@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Options that commands share, options as a dataclass, URLs as arguments, and the configuration."""
+"""Options and arguments that commands share, and the configuration."""
 
 from collections.abc import Callable, Sequence
 from functools import reduce, wraps
@@ -73,7 +73,7 @@ class Commands(typer.Typer):
 
 
 def takes(options: type[Options]) -> Callable[[Callable[[Options], None]], Callable[..., None]]:
-    """Pass a command's options to it as one frozen dataclass, whose fields are annotated for typer."""
+    """Pass options to a command as one frozen dataclass, annotated for typer."""
 
     def decorate(command: Callable[[Options], None]) -> Callable[..., None]:
         def parsed(**values: Any) -> None:

@@ -50,7 +50,7 @@ def print_json(results: Mapping[str, Any]) -> None:
 
 
 def json_value(value: Any) -> Any:
-    """Return a value for JSON: dataclasses become objects, paths become text, NaN and infinity null."""
+    """Return a value for JSON: dataclasses become objects, paths text, NaN and infinity null."""
     if is_dataclass(value) and not isinstance(value, type):
         return {entry.name: json_value(getattr(value, entry.name)) for entry in fields(value)}
     if isinstance(value, Mapping):
@@ -67,7 +67,7 @@ def json_value(value: Any) -> Any:
 
 
 def print_(*values: Any, sep: str = " ", wrap: bool = False) -> None:
-    """Print texts literally, and whatever rich can draw; `wrap` breaks lines at the terminal width."""
+    """Print texts literally, and rich objects; `wrap` breaks lines at the terminal width."""
     from scenario_gen.base.terminal import Terminal
 
     if not current.quiet:
@@ -109,14 +109,14 @@ def print_table(columns: Sequence[str], rows: Sequence[Sequence[str]], names: in
 
 
 def progress() -> AbstractContextManager[Callable[[str, int, int], None]]:
-    """Return progress bars, or nothing with --quiet; call the value with name, done and total of a bar."""
+    """Return progress bars (none with --quiet); call the value with name, done and total."""
     from scenario_gen.base.terminal import progress_bars
 
     return nullcontext(lambda *_: None) if current.quiet else progress_bars()
 
 
 def status() -> AbstractContextManager[Callable[[str], None]]:
-    """Return a status line, or nothing with --quiet; call the value with its text."""
+    """Return a status line (none with --quiet); call the value with its text."""
     from scenario_gen.base.terminal import status_line
 
     return nullcontext(lambda _: None) if current.quiet else status_line()
@@ -134,7 +134,7 @@ def default_output(path: Path, name: str) -> Path:
 
 
 def open_page(page: Path) -> bool:
-    """Open a page in a browser if this is an interactive terminal with a display; return whether it was opened."""
+    """Open a page in a browser if a user is present; return whether it was opened."""
     has_display = sys.platform == "darwin" or any(
         os.environ.get(name) for name in ("DISPLAY", "WAYLAND_DISPLAY")
     )

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""URLs as arguments of commands: what a command reads is copied to files first, what it writes goes to the store at its end."""
+"""URLs as arguments of commands: inputs are copied to files, outputs are uploaded at the end."""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, ExitStack
@@ -22,71 +22,73 @@ from scenario_gen.base.stores import (
     url_of,
 )
 
-READ = (
-    "log",
-    "parameter_file",
-    "against",
-)  # options that name an input; those of all other options are written
+INPUT_OPTIONS = ("log", "recording", "parameter_file", "against")
+"""Options that name an input; all other options with a path name an output."""
 
 
-def paths_of(command: Callable[..., None], own: Sequence[str]) -> dict[str, bool]:
-    """Return {name: whether it is written} of the parameters that are paths, without the command's `own`, whose URLs it takes."""
-    found = {}
+def paths_of(command: Callable[..., None], skipped: Sequence[str]) -> dict[str, bool]:
+    """Return the path parameters of a command, except the `skipped`, and whether each is an output."""
+    paths = {}
     for name, annotation in get_type_hints(command, include_extras=True).items():
         kind, info = (*get_args(annotation), None, None)[:2]
-        if name not in own and (kind is Path or Path in get_args(kind)):
-            found[name] = name == "out" or (
-                type(info) is type(typer.Option()) and name not in READ
-            )
-    return found
+        if name not in skipped and (kind is Path or Path in _members(kind)):
+            is_option = type(info) is type(typer.Option())
+            paths[name] = name == "out" or (is_option and name not in INPUT_OPTIONS)
+    return paths
+
+
+def _members(kind: Any) -> set[Any]:
+    """Return the arguments of a type and of its arguments, as of list[Path] | None."""
+    arguments = get_args(kind)
+    return {*arguments, *(inner for argument in arguments for inner in get_args(argument))}
 
 
 @contextmanager
-def as_files(values: Mapping[str, Any], written: Mapping[str, bool]) -> Iterator[dict[str, Any]]:
-    """Give a command's values with files in place of URLs; what it writes is in the store afterwards, also if it refuses some.
+def as_files(values: Mapping[str, Any], outputs: Mapping[str, bool]) -> Iterator[dict[str, Any]]:
+    """Yield a command's values with files in place of URLs; upload its outputs afterwards.
+
+    Outputs are also uploaded if the command refuses a part of the request.
 
     Args:
         values: of the parameters.
-        written: for those that are paths, whether the command writes them.
+        outputs: whether each path among them is an output.
 
     Raises:
-        InputError: a store lets nobody in, or holds something where is to be written.
+        InputError: a store denies access, or an output exists already.
     """
     uploads: list[tuple[Path, Remote]] = []
     with ExitStack() as stack:
 
-        def local(one: Path, *, to_write: bool) -> Path:
-            """Return the file that stands for what a URL names."""
-            there = place(one, to_write=to_write) if url_of(one) else one
-            if isinstance(there, Path):
-                return there
-            if not to_write:
-                return stack.enter_context(fetched([there]))[0]
-            if there.exists():
+        def local(path: Path, *, is_output: bool) -> Path:
+            """Return the file in place of a path or URL."""
+            remote = place(path, to_write=is_output) if url_of(path) else path
+            if isinstance(remote, Path):
+                return remote
+            if not is_output:
+                return stack.enter_context(fetched([remote]))[0]
+            if remote.exists():
                 raise InputError(
-                    f"{there} is there already, and nothing in a store is replaced; name another place, or remove it"
+                    f"{remote} exists, and objects are never overwritten; choose another place"
                 )
-            path = stack.enter_context(scratch(temporary())) / there.name
-            stack.enter_context(naming_objects({str(path): there.url}))
-            uploads.append((path, there))
-            return path
+            file = stack.enter_context(scratch(temporary())) / remote.name
+            stack.enter_context(naming_objects({str(file): remote.url}))
+            uploads.append((file, remote))
+            return file
 
         files = dict(values)
-        for name, to_write in written.items():
+        for name, is_output in outputs.items():
             value = values[name]
-            several = [
-                local(one, to_write=to_write)
-                for one in (value if isinstance(value, list) else [value])
-                if one is not None
-            ]
-            files[name] = several if isinstance(value, list) else several[0] if several else None
+            if isinstance(value, list):
+                files[name] = [local(path, is_output=is_output) for path in value]
+            elif value is not None:
+                files[name] = local(value, is_output=is_output)
         refused: Exception | None = None
         try:
             yield files
         except (typer.Exit, RefusedError) as error:
             refused = error
-        for path, there in uploads:
-            if path.exists():
-                upload(path, there)
+        for file, remote in uploads:
+            if file.exists():
+                upload(file, remote)
         if refused is not None:
             raise refused

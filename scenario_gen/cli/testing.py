@@ -1,8 +1,9 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The commands that test a planner: drive it in every scenario of a bag, and search for its failures."""
+"""The commands that test a planner: drive it in scenarios, and search for its failures."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -11,7 +12,7 @@ from typing import Annotated, TYPE_CHECKING
 import typer
 
 from scenario_gen.base.errors import InputError
-from scenario_gen.cli.options import Commands, takes, warn_of_metadata
+from scenario_gen.cli.options import Commands, SeedOption, takes, warn_of_metadata, WorkersOption
 from scenario_gen.cli.output import emit_json, print_, print_table, progress
 
 if TYPE_CHECKING:
@@ -20,48 +21,50 @@ if TYPE_CHECKING:
     from scenario_gen.output.review.regenerate import Replanned
 
 commands = Commands("Test a planner")
-NAMED = 12  # scenarios that the terminal names
-WORST = 5  # drives that failed, likewise
+MAX_NAMES_COUNT = 12  # of changed scenarios, on the terminal
+MAX_FAILURES_COUNT = 5  # on the terminal
 
 
 @dataclass(frozen=True)
 class Drive:
     """The options of `drive`."""
 
-    bag: Annotated[Path, typer.Argument(help="A bag of this suite with scenarios.")]
+    bag: Annotated[Path, typer.Argument(help="A bag with scenarios from this suite.")]
     planner: Annotated[
         str,
         typer.Option(
-            help="MODULE:CLASS of the planner, e.g. mine:MyPlanner. With --ros: the command that starts its node."
+            help="MODULE:CLASS of the planner, e.g. mine:MyPlanner. With --ros: the command that "
+            "starts its node."
         ),
     ]
     ego: Annotated[
         str,
         typer.Option(
-            help="Id of the vehicle that the planner drives. Default: the one left out with --ego, or the first."
+            help="Id of the vehicle that the planner drives. Default: the one left out with "
+            "--ego, or the first."
         ),
     ] = ""
     ros: Annotated[
         bool,
         typer.Option(
             "--ros",
-            help="The planner is a ROS 2 node that answers each odometry message with a command, over DDS in lock-step.",
+            help="The planner is a ROS 2 node that answers each odometry message with a command, "
+            "over DDS in lock-step.",
         ),
     ] = False
-    count: Annotated[int, typer.Option(min=0, help="Most scenarios to drive. 0: all.")] = 0
-    workers: Annotated[
-        int, typer.Option(min=0, max=1024, help="Number of processes. 0: one per core.")
-    ] = 0
+    count: Annotated[int, typer.Option(min=0, help="Number of scenarios to drive. 0: all.")] = 0
+    workers: WorkersOption = 0
     against: Annotated[
         Path | None,
         typer.Option(
-            help="drives.json of another planner on the same bag. Exit code 1 if this planner is worse."
+            help="drives.json of another planner on the same bag. Exit code 1 if this planner is "
+            "worse."
         ),
     ] = None
     baseline: Annotated[
         bool,
         typer.Option(
-            help="Also drive the non-reactive baseline, to show how many scenarios need no reaction."
+            help="Also drive the non-reactive baseline, to count scenarios that need no reaction."
         ),
     ] = True
     out: Annotated[
@@ -71,7 +74,8 @@ class Drive:
         list[str] | None,
         typer.Option(
             "--set",
-            help="Set a parameter of the drive (step, policy, …) or a threshold (bars.collisions, …), as name=value.",
+            help="Set a parameter of the drive (step, policy, …) or a threshold "
+            "(bars.collisions, …), as name=value.",
         ),
     ] = None
 
@@ -79,7 +83,7 @@ class Drive:
 @commands.command()
 @takes(Drive)
 def drive(options: Drive) -> None:
-    """Test a planner in closed loop in every scenario of a bag. Exit code 1: a threshold is not met."""
+    """Test a planner in closed loop in the scenarios of a bag. Exit code 1: below a threshold."""
     from scenario_gen.closed_loop.command import drive_bag, DriveRequest, in_processes
 
     warn_of_metadata(options.bag)
@@ -103,7 +107,6 @@ def drive(options: Drive) -> None:
     _report(result, options.out)
     if result.broken:
         print_("thresholds not met: " + "; ".join(result.broken))
-    if result.broken:
         raise typer.Exit(1)
 
 
@@ -112,33 +115,40 @@ def _report(drives: "Drives", out: Path) -> None:
     from scenario_gen.closed_loop.results import JSON, JUNIT, PAGE
     from scenario_gen.closed_loop.trials import rates
 
-    found, files = rates(drives.outcomes), [out / name for name in (JSON, JUNIT, PAGE)]
-    emit_json(rates=found, notes=drives.notes(), bars_not_met=drives.broken, files=files)
-    print_table(("drives", drives.planner), [(name, str(rate)) for name, rate in found.items()])
+    files = [out / name for name in (JSON, JUNIT, PAGE)]
+    table = rates(drives.outcomes)
+    emit_json(rates=table, notes=drives.notes(), bars_not_met=drives.broken, files=files)
+    print_table(("drives", drives.planner), [(name, str(rate)) for name, rate in table.items()])
     print_(*drives.notes(), sep="\n")
-    if comparison := drives.comparison:
-        for title, names in (("now fail", comparison.now_fail), ("now pass", comparison.now_pass)):
-            if names:
-                more = f" and {len(names) - NAMED} more" if len(names) > NAMED else ""
-                emit_json(**{title.replace(" ", "_"): names})
-                print_(f"{title}: {', '.join(names[:NAMED])}{more}")
-    took = Decisions.all_of([outcome.decisions for outcome in drives.outcomes])
-    if took.count:
-        slow = f"{took.slow} of {took.count} slower than decision_time, the longest {took.longest:.3f} s"
-        print_(f"decisions: {slow} (depends on this machine, so no file has it)")
-    failed = [
-        drives.outcomes[k] for k in drives.by_severity() if not drives.outcomes[k].verdict.passed
-    ]
-    for outcome in failed[:WORST]:
+    if drives.comparison is not None:
+        emit_json(now_fail=drives.comparison.now_fail, now_pass=drives.comparison.now_pass)
+        _print_names("now fail", drives.comparison.now_fail)
+        _print_names("now pass", drives.comparison.now_pass)
+    decisions = Decisions.all_of([outcome.decisions for outcome in drives.outcomes])
+    if decisions.count:
+        print_(
+            f"planner step: {1e3 * decisions.longest:.0f} ms at most; {decisions.slow} of "
+            f"{decisions.count} exceed decision_time (not written to files)"
+        )
+    outcomes = [drives.outcomes[k] for k in drives.by_severity()]
+    failures = [outcome for outcome in outcomes if not outcome.verdict.passed]
+    for outcome in failures[:MAX_FAILURES_COUNT]:
         print_(f"scenario {outcome.name}: {outcome.verdict.sentence()}")
     print_(*map(str, files), sep="\n")
+
+
+def _print_names(title: str, names: Sequence[str]) -> None:
+    if names:
+        rest = len(names) - MAX_NAMES_COUNT
+        more = f" and {rest} more" if rest > 0 else ""
+        print_(f"{title}: {', '.join(names[:MAX_NAMES_COUNT])}{more}")
 
 
 def _over_dds() -> "RunTrials":
     """Return the function that drives over DDS.
 
     Raises:
-        InputError: ROS 2 is not in this environment.
+        InputError: ROS 2 is not installed.
     """
     try:
         from scenario_gen.cli.drive import drive_over_dds
@@ -156,53 +166,53 @@ class Search:
     source: Annotated[
         Path,
         typer.Argument(
-            help="A bag of `generate`: the search uses its recording, road and parameters. Or a log, with --road."
+            help="A bag from `generate` with recording, road and parameters, or a log with --road."
         ),
     ]
     planner: Annotated[str, typer.Option(help="MODULE:CLASS of the planner, e.g. mine:MyPlanner.")]
     budget: Annotated[
         int,
         typer.Option(
-            min=1, max=10_000_000, help="Most drives. A larger budget continues an earlier search."
+            min=1,
+            max=10_000_000,
+            help="Number of drives. A larger budget continues an earlier search.",
         ),
     ] = 1000
     road: Annotated[str, typer.Option(help="Road, if the source is a log.")] = ""
     encounter: Annotated[
-        str, typer.Option(help="Name of the encounter, if the source is a log of several.")
+        str, typer.Option(help="Name of the encounter, if the source is a log with several.")
     ] = ""
     objective: Annotated[
         str,
         typer.Option(
-            help="What counts as a failure: at_fault, collision, off_road, goal, or e.g. 'ttc<1.5', 'pet<1' (s)."
+            help="Definition of a failure: at_fault, collision, off_road, goal, or e.g. "
+            "'ttc<1.5', 'pet<1' (s)."
         ),
     ] = "at_fault"
     ego: Annotated[
         str,
         typer.Option(
-            help="Id of the vehicle that the planner drives. Default: the one left out with --ego, or the first."
+            help="Id of the vehicle that the planner drives. Default: the one left out with "
+            "--ego, or the first."
         ),
     ] = ""
     worst: Annotated[
         bool,
-        typer.Option("--worst", help="Look for the worst failure instead of the failure rate."),
+        typer.Option("--worst", help="Search for the worst failure instead of the failure rate."),
     ] = False
     max_rate: Annotated[
         float | None,
         typer.Option(
             min=0.0,
             max=1.0,
-            help="Exit code 1 if the failure rate's upper bound (95 %) is above this.",
+            help="Exit code 1 if the upper bound of the failure rate (95 %) exceeds this.",
         ),
     ] = None
     namespace: Annotated[
         str | None, typer.Option(help="Namespace of the scenarios, if the bag has several.")
     ] = None
-    seed: Annotated[
-        int, typer.Option(min=0, help="Random seed. The same seed gives the same search.")
-    ] = 0
-    workers: Annotated[
-        int, typer.Option(min=0, max=1024, help="Number of processes. 0: one per core.")
-    ] = 0
+    seed: SeedOption = 0
+    workers: WorkersOption = 0
     out: Annotated[
         Path,
         typer.Option(
@@ -218,11 +228,12 @@ class Search:
 
 
 def drawn_from(options: Search) -> "Replanned":
-    """Return what the scenarios are drawn from: a bag's template on its road, or an encounter of a log on the road given.
+    """Return the source of scenarios: a bag's template and road, or an encounter from a log.
 
     Raises:
-        InputError: source, road or encounter cannot be read, or the log has several encounters and none was chosen.
-        RefusedError: the road does not take the encounter.
+        InputError: source, road or encounter cannot be read, or the log has several encounters
+            and none was chosen.
+        RefusedError: the encounter does not fit the road.
     """
     from scenario_gen.cli.folder import FolderRequest, generate_folder
     from scenario_gen.output.results import BAG
@@ -252,13 +263,13 @@ def drawn_from(options: Search) -> "Replanned":
 @commands.command()
 @takes(Search)
 def search(options: Search) -> None:
-    """Find the scenarios in which a planner fails, and the rate at which it does."""
+    """Search for scenarios in which a planner fails, and estimate its failure rate."""
     from scenario_gen.closed_loop.search.command import JOURNAL, search_failures, SearchRequest
     from scenario_gen.closed_loop.search.objective import Objective
 
     if options.worst and options.max_rate is not None:
         raise InputError(
-            "--max-rate: a search for the worst gives no rate; leave out --worst, or --max-rate"
+            "--max-rate: a search for the worst failure estimates no rate; omit one of both"
         )
     warn_of_metadata(options.source)
     source = drawn_from(options)
@@ -276,7 +287,7 @@ def search(options: Search) -> None:
         options.assignments or [],
     )
     print_(
-        f"Drives are kept in {options.out}{JOURNAL}. The same command continues a search that was stopped."
+        f"drives are stored in {options.out}{JOURNAL}; the same command continues a stopped search"
     )
     with progress() as advance:
         result = search_failures(
@@ -301,13 +312,16 @@ def search(options: Search) -> None:
             )
             for kind, own in result.kinds.items()
         ]
-        print_table(("kind of failure", "kept", "likeliest"), rows)
+        print_table(("kind of failure", "shown", "most likely"), rows)
     print_(*map(str, result.written), sep="\n")
     if result.findings:
-        again = f"scenario-gen drive {options.out / 'bag'} --planner {options.planner} --ego {request.ego_id()}"
-        print_(f"as a regression test: {again}")
+        print_(
+            f"as a regression test: scenario-gen drive {options.out / 'bag'} "
+            f"--planner {options.planner} --ego {request.ego_id()}"
+        )
     if options.max_rate is not None and not result.estimate.bound <= options.max_rate:
         print_(
-            f"the failure rate may be above {options.max_rate:g}: its bound is {result.estimate.bound:.3g} (95 %)"
+            f"the failure rate may exceed {options.max_rate:g}: its upper bound is "
+            f"{result.estimate.bound:.3g} (95 %)"
         )
         raise typer.Exit(1)

@@ -3,7 +3,7 @@
 
 """What is possible instead of a refused request; every suggestion is tried before it is made."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import islice
 
@@ -39,6 +39,19 @@ SHARES = tuple(
 )  # of the way from a requested state to the road's own placement
 STRETCHES = (0.25, 0.5, 0.75, 1.0)  # of the clock
 
+PARAMETER_FORMS = {
+    "starts": "starts:='{}'",
+    "goals": "goals:='{}'",
+    "max_stretch": "sampling.max_stretch:={}",
+}
+"""How suggestions write parameters for nodes."""
+OPTION_FORMS = {
+    "starts": "--start '{}'",
+    "goals": "--goal '{}'",
+    "max_stretch": "--set sampling.max_stretch={}",
+}
+"""How suggestions write parameters for the command line."""
+
 StateKey = tuple[str, str]  # "starts" or "goals", and a vehicle's id
 
 
@@ -68,7 +81,10 @@ class ImpossibleError(RefusedError):
 
 
 def suggest_nearest(
-    error: RefusedError, requested: Chain, cancelled: Cancelled = lambda: False
+    error: RefusedError,
+    requested: Chain,
+    cancelled: Cancelled = lambda: False,
+    forms: Mapping[str, str] = PARAMETER_FORMS,
 ) -> RefusedError:
     """Return a refusal that names possible requests or roads, for a command or node to answer with.
 
@@ -76,6 +92,7 @@ def suggest_nearest(
         error: the refusal.
         requested: the refused request.
         cancelled: whether to stop; then nothing is suggested.
+        forms: how parameters are written in the message.
 
     Returns:
         An ImpossibleError with possible requests if states were requested, a LostEncounterError
@@ -84,7 +101,8 @@ def suggest_nearest(
     if isinstance(error, TargetError):  # the states are possible
         return error
     if requested.request.moves:
-        search = _Search(replace(requested, count=min(requested.count, MAX_SCENARIOS)), cancelled)
+        limited = replace(requested, count=min(requested.count, MAX_SCENARIOS))
+        search = _Search(limited, cancelled, forms)
         suggestions = tuple(search.run())
         return ImpossibleError(str(error), () if cancelled() else suggestions)
     if isinstance(error, LostEncounterError):
@@ -112,7 +130,7 @@ def answer_refusal(
     road, encounter = road_and_template(road, encounter, config.road)
     segmentation = segment(encounter, config.segmentation, seed)
     chain = Chain(Situation.of(encounter), segmentation, road, config, request, count, seed)
-    return suggest_nearest(error, chain)
+    return suggest_nearest(error, chain, forms=OPTION_FORMS)
 
 
 def _with_state(request: Request, key: StateKey, state: State) -> Request:
@@ -130,7 +148,8 @@ def _rounded(pose: Floats) -> State:
 class _Search:
     """A search for possible requests."""
 
-    def __init__(self, requested: Chain, cancelled: Cancelled) -> None:
+    def __init__(self, requested: Chain, cancelled: Cancelled, forms: Mapping[str, str]) -> None:
+        self._forms = forms
         self._requested = requested
         self._cancelled = cancelled
         self._vehicles = requested.encounter.vehicles
@@ -252,7 +271,7 @@ class _Search:
         for stretch in STRETCHES:
             if stretch > current and self._is_possible(request, stretch):
                 longer = f"up to {duration * (1.0 + stretch):.1f} s instead of {duration:.1f} s"
-                message = f"sampling.max_stretch:={stretch:g} ({longer})"
+                message = f"{self._forms['max_stretch'].format(stretch)} ({longer})"
                 if request != self._requested.request:
                     message += f" with {self._describe(request)}"
                 return Suggestion(request, message, stretch)
@@ -269,7 +288,8 @@ class _Search:
                 if (change := _describe_change(name, before[name], after[name]))
             ]
             if changes:
-                messages.append(f"{end}:='{getattr(request, end)}' ({', '.join(changes)})")
+                states = self._forms[end].format(getattr(request, end))
+                messages.append(f"{states} ({', '.join(changes)})")
         return " and ".join(messages)
 
 

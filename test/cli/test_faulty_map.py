@@ -8,7 +8,7 @@ from dataclasses import replace
 from support.bag_examples import hand_made_run
 from support.map_builders import lanelet2
 
-from scenario_gen.cli.folder import faults_of
+from scenario_gen.cli.folder import map_faults
 from scenario_gen.roads import build_road
 
 
@@ -16,6 +16,6 @@ def test_faulty_elements_of_a_map_are_said(tmp_path):
     extra = '<member type="way" ref="1002" role="left"/></relation>'
     (tmp_path / "town.osm").write_text(lanelet2().replace("</relation>", extra, 1))
     case = replace(hand_made_run(), road=build_road(str(tmp_path / "town.osm")))
-    (said,) = faults_of([case, case])
+    (said,) = map_faults([case, case])
     assert said.startswith("map town: 1 faulty lanelet left out (2000), first: ")
-    assert faults_of([hand_made_run()]) == []
+    assert map_faults([hand_made_run()]) == []

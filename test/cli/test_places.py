@@ -87,9 +87,7 @@ def test_nothing_in_a_store_is_replaced_and_what_fails_writes_nothing(bucket, ru
     code, text = run(
         "generate", f"{bucket}/logs/synthetic_c", *GENERATE, "--out", f"{bucket}/logs"
     )
-    assert (
-        code == 2 and f"{bucket}/logs is there already, and nothing in a store is replaced" in text
-    )
+    assert code == 2 and f"{bucket}/logs exists, and objects are never overwritten" in text
     code, text = run("generate", f"{bucket}/none.csv", *GENERATE, "--out", f"{bucket}/made")
     assert code == 2 and f"{bucket}/none.csv does not exist" in text
     code, text = run(
