@@ -52,21 +52,23 @@ def join_waypoints(task: VehicleTask, waypoints: list[int], curvature: float) ->
         RefusedError: there is no route from start to end.
     """
     kept, eased = list(waypoints), set[int]()
-    guesses = list[Guess]()
+    guesses, is_searched = list[Guess](), list[bool]()
     poses = task.anchors.copy()
     while len(guesses) < len(kept) - 1:
         stop_if_cancelled()
         first, second = kept[len(guesses)], kept[len(guesses) + 1]
         leg = Leg(first, second, poses[first], poses[second], curvature, len(kept) == 2)
         try:
-            guesses.append(_guess(task, leg))
+            direct = _direct_guess(task, leg)
+            guesses.append(direct or Guess.even(search_path(task, leg), SEARCHED_WEIGHT))
+            is_searched.append(direct is None)
         except RefusedError:
             inner = [w for w in (first, second) if w not in (kept[0], kept[-1])]
             if not inner:
                 raise
             place = _ease_or_drop(task, kept, inner, eased, poses)
-            del guesses[place - 1 :]  # the legs to and from this waypoint
-    searched = sum(bool(guess.hold[0] == SEARCHED_WEIGHT) for guess in guesses)
+            del guesses[place - 1 :], is_searched[place - 1 :]  # legs to and from this waypoint
+    searched = sum(is_searched)
     left_out = tuple(w for w in waypoints if w not in kept)
     return Legs(Guess.joined(guesses), kept, left_out, len(guesses) - searched, searched)
 
@@ -87,15 +89,13 @@ def _ease_or_drop(
     return place
 
 
-def _guess(task: VehicleTask, leg: Leg) -> Guess:
-    """Return the first that is free: the fitted path, a direct curve, a path that is searched."""
+def _direct_guess(task: VehicleTask, leg: Leg) -> Guess | None:
+    """Return the fitted path or else a direct curve, if one of them is free."""
     fitted = _fitted_piece(task, leg.start, leg.end)
     if fitted is not None:
         return Guess.even(fitted, FITTED_WEIGHT)
     curve = direct_curve(task.road, task.vehicle, leg.start, leg.end, task.max_curvature)
-    if curve is not None:
-        return Guess.even(curve, DIRECT_WEIGHT)
-    return Guess.even(search_path(task, leg), SEARCHED_WEIGHT)
+    return None if curve is None else Guess.even(curve, DIRECT_WEIGHT)
 
 
 def _fitted_piece(task: VehicleTask, start: Floats, end: Floats) -> Floats | None:

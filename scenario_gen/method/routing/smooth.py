@@ -24,7 +24,7 @@ from scenario_gen.numerics import Floats, wrap_angle
 from scenario_gen.numerics.plane import edge_lengths, unit
 
 ROUND_STEPS = 8  # of the band, before it is resampled
-CHECK_ROUNDS = 4  # after so many the spline is verified
+CHECK_ROUNDS_COUNT = 4  # after so many the spline is verified
 ANCHOR_WEIGHT = 200.0
 INITIAL_PUSH_WEIGHT = 5.0  # of the obstacles
 DISCS_COUNT = 5  # that cover a footprint
@@ -118,7 +118,7 @@ def smooth(task: VehicleTask, weights: Floats, guess: Guess, rounds: int) -> Cur
         moved, adaptive = relax(band, adaptive, points - origin, ROUND_STEPS)
         is_still = np.abs(moved + origin - points).max() < STILL_M
         points = moved + origin
-        if is_still or k % CHECK_ROUNDS == 0:
+        if is_still or k % CHECK_ROUNDS_COUNT == 0:
             curve = _verified(task, points)
             if curve.is_drivable(task.max_curvature):
                 break

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""RRT*-Connect in the vehicle's own space: its curves, its exact sweep, its paths, and the routes round obstacles."""
+"""RRT*-Connect for vehicles: Dubins curves, exact sweep, paths, routes around obstacles."""
 
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
@@ -104,7 +104,7 @@ def test_a_dubins_curve_is_as_long_driven_backwards():
 
 @settings(max_examples=60)
 @given(st.integers(0, 2**32 - 1))
-def test_what_is_swept_is_free_exactly(seed):
+def test_the_sweep_is_exact(seed):
     rng = np.random.default_rng(seed)
     road = road_of("random", rng.random((14, 14)) > 0.06, 1.0)
     curvature, size = rng.uniform(-0.3, 0.3), (rng.uniform(2.0, 5.0), rng.uniform(1.0, 2.0))
@@ -207,7 +207,7 @@ def test_a_slalom_is_driven():
     assert off_road_area(road, route.points) < 1e-6
 
 
-def test_where_smoothing_fails_a_gentler_way_is_searched_for(monkeypatch):
+def test_if_smoothing_fails_a_gentler_path_is_searched(monkeypatch):
     case = obstructed(113)
     ends = (case.query.start, case.query.goal)
     route = route_on(case.road, *ends, seed=1)
@@ -215,12 +215,12 @@ def test_where_smoothing_fails_a_gentler_way_is_searched_for(monkeypatch):
         np.abs(np.diff(route.points[:, 2]) / np.diff(route.length)).max()
         <= Dynamics().planned.max_curvature
     )
-    monkeypatch.setattr(plan, "CURVATURE_SHARES", plan.CURVATURE_SHARES[:1])
+    monkeypatch.setattr(plan, "CURVATURE_SHARE", plan.CURVATURE_SHARE[:1])
     with pytest.raises(RefusedError, match="its curvature reaches"):
         route_on(case.road, *ends, seed=1)
 
 
-def test_what_is_far_from_the_fit_is_said():
+def test_routes_far_from_the_fit_are_reported():
     path = [(4.0, 3.0, 0.0), (56.0, 3.0, 0.0)]
     straight, round_it = (
         route_on(street(text), *path, path=path) for text in ("", "30 3 0 4.5 1.8")
@@ -232,7 +232,8 @@ def test_what_is_far_from_the_fit_is_said():
         f"vehicle 7: its route passes {round_it.farthest:.1f} m from its fitted path"
     ]
     assert routes_in_words([straight, round_it]) == (
-        f"1 legs joined at once, 1 searched for, at most {round_it.farthest:.2f} m from the fitted paths"
+        f"1 legs joined at once, 1 searched for, at most {round_it.farthest:.2f} m "
+        "from the fitted paths"
     )
     assert np.isnan(max_distance(straight.points, np.zeros((0, 3))))
     assert (
@@ -241,7 +242,7 @@ def test_what_is_far_from_the_fit_is_said():
     )
 
 
-def test_a_changepoint_that_cannot_be_passed_is_left_out_and_said():
+def test_an_impassable_changepoint_is_left_out_and_reported():
     hidden = (30.0, 2.05, 1.3)  # beside the kerb, heading off the lane
     route = route_on(street("36 3 0 6 4"), (4.0, 3.0, 0.0), hidden, (56.0, 3.0, 0.0))
     if route.left_out:

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""RRT*-Connect and string pulling: never through an obstacle, never shorter than the optimum, and close to it."""
+"""RRT*-Connect and string pulling: free paths, close to the optimum and never shorter."""
 
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -169,7 +169,7 @@ def test_the_cheapest_of_all_meeting_nodes_wins():
     assert search.best == costs.min()
 
 
-def test_only_an_informed_search_leaves_out_what_cannot_help():
+def test_only_an_informed_search_discards_useless_samples():
     drivable = np.ones((200, 200), dtype=bool)
     drivable[95:140, 100] = False  # a wall to go round
     road, ends = road_of("open", drivable), np.array([[80.5, 100.5], [120.5, 100.5]])
@@ -242,7 +242,7 @@ def test_a_disc_needs_its_room():
         RrtStarConnect().plan(road, Query(*query, 1.6), Budget(2000), 0)
 
 
-def test_patience_finds_the_way_that_a_small_budget_does_not():
+def test_a_retry_finds_a_path_that_a_small_budget_does_not():
     drivable = np.zeros((60, 60), dtype=bool)
     drivable[:, :28] = drivable[:, 34:] = True
     drivable[57, :] = True

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""OMPL's planners behind the Protocol: sound answers, and neither hang nor crash reaches the caller."""
+"""OMPL's planners behind the Protocol: sound answers; the caller survives hangs and crashes."""
 
 import numpy as np
 import pytest

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Routes: exact ends, on the road, drivable, through the anchors, on their side of the road; and clear refusals."""
+"""Routes: exact ends, on the road, drivable, through the anchors, on their side; refusals."""
 
 import csv
 
@@ -59,7 +59,7 @@ def routes_of(road, *vehicles, config=PlanningConfig(), seed=0):
 
 
 def off_road_area(road, route, car):
-    """Largest area [m²] of the footprint off the road, at every point of the route and between, by shapely."""
+    """Largest area [m²] of the footprint off the road, along the whole route, by shapely."""
     at = np.linspace(0.0, route.length[-1], max(4 * len(route.points), 2))
     poses = np.column_stack([np.interp(at, route.length, column) for column in route.points.T])
     shapes = footprints(poses[:, :2], poses[:, 2], car.length, car.width)

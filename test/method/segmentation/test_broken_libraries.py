@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Primitive libraries that once broke the reader or what uses it: an error that names the file and the path inside it."""
+"""Broken primitive libraries: an error that names the file and the path inside it."""
 
 import json
 

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The estimator: its parameters in X's units, what it predicts, what it warns of, and scikit-learn's own checks."""
+"""The estimator: parameters in X's units, predictions, warnings, scikit-learn's checks."""
 
 from dataclasses import fields
 import json
@@ -328,13 +328,11 @@ def test_a_fit_can_be_pickled_and_the_seed_decides(fitted):
 
 
 def test_scikit_learns_checks():
-    """Of the checks none needs leave but one: the second argument of `fit` is `lengths`, as for other hidden Markov models."""
+    """All checks pass but one: the second argument of `fit` is `lengths`, as in hmmlearn."""
     checks = pytest.importorskip(
         "sklearn.utils.estimator_checks", reason="scikit-learn is not installed"
     )
-    leave = {
-        "check_fit_score_takes_y": "the second argument is `lengths`; `y` is the third, and ignored"
-    }
+    leave = {"check_fit_score_takes_y": "the second argument is `lengths`; `y` is ignored"}
     small = StickyHDPHMM(chains=1, sweeps=20)
     ran = checks.check_estimator(small, expected_failed_checks=leave, on_fail=None, on_skip=None)
     failed = {each["check_name"]: each["exception"] for each in ran if each["status"] == "failed"}
@@ -370,9 +368,12 @@ TAKEN_ALONG = {
 
 def test_the_segmentation_loads_numpy_scipy_and_numba_alone():
     program = (
-        "import json, sys; before = set(sys.modules); import scenario_gen.method.segmentation as s, numpy as np;"
-        "s.StickyHDPHMM(chains=1, sweeps=10, random_state=0).fit(np.arange(40.0).reshape(20, 2) % 7);"
-        "print(json.dumps([n for n in set(sys.modules) - before if getattr(sys.modules[n], '__file__', None)]))"
+        "import json, sys; before = set(sys.modules);"
+        "import scenario_gen.method.segmentation as s, numpy as np;"
+        "x = np.arange(40.0).reshape(20, 2) % 7;"
+        "s.StickyHDPHMM(chains=1, sweeps=10, random_state=0).fit(x);"
+        "new = set(sys.modules) - before;"
+        "print(json.dumps([n for n in new if getattr(sys.modules[n], '__file__', None)]))"
     )
     ran = subprocess.run(
         [sys.executable, "-W", "ignore", "-c", program], capture_output=True, text=True, check=True

@@ -36,7 +36,7 @@ def test_matching_is_the_best_one():
 
 
 def test_a_chain_goes_on_from_the_labels_it_ended_with():
-    """Also after a single sweep: renumbered, they would no longer belong to the β that goes with them."""
+    """Also after a single sweep: renumbered labels would no longer match their β."""
     x = np.random.default_rng(5).normal(size=(60, 2))
     config, ends = SamplerConfig(), np.array([60])
     problem = Problem.build(x, ends, config, np.zeros(2))

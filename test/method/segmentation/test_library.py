@@ -11,7 +11,7 @@ from scenario_gen.method.segmentation import assign, build_library, PrimitiveLib
 
 
 def stop_and_go(encounter_of, seed, shift):
-    """Vehicle 0 stands; vehicle 1 cruises, brakes at 2 m/s² to a stop, stands, pulls away at 2 m/s²."""
+    """Vehicle 0 stands; vehicle 1 cruises, brakes to a stop, stands, pulls away at 2 m/s²."""
     t = np.arange(250) * 0.1
     other = np.interp(t, np.array([0, 5, 10, 15, 20, 25]) + shift, [10, 10, 0, 0, 10, 10])
     return encounter_of(np.array([np.zeros(250), other]), noise=0.05, seed=seed)

@@ -56,7 +56,7 @@ def test_refuses_bad_samples(bad):
 
 
 def drive(behaviours, seed=1, seconds=5.0):
-    """One vehicle that cruises (0), brakes (1), speeds up (2) or turns left (3): positions and speeds."""
+    """A vehicle that cruises (0), brakes (1), accelerates (2) or turns left (3)."""
     rng = np.random.default_rng(seed)
     true = np.repeat(behaviours, round(seconds * 10))
     speed = 12.0 + np.cumsum(np.array([0.0, -1.5, 1.5, 0.0])[true]) * 0.1
@@ -90,7 +90,7 @@ def test_single_outliers_change_nothing():
 
 
 def test_probability_rises_with_the_change():
-    """Of changes of a car's acceleration by 0.1 to 1.5 m/s², found at a level at which noise passes, too."""
+    """Changes of acceleration by 0.1 to 1.5 m/s², at a level that noise reaches, too."""
     least = {}
     for change in (0.1, 0.2, 1.5):
         speed = 12.0 + np.where(np.arange(300) < 150, 0.0, (np.arange(300) - 150) * 0.1 * change)

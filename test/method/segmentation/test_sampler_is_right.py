@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The sampler samples what it says: Geweke's joint-distribution test, and calibration on sequences from the model's own prior."""
+"""The sampler is correct: Geweke's joint-distribution test, and calibration under the prior."""
 
 import numpy as np
 import pytest
@@ -17,7 +17,7 @@ ODDS = np.array([0.2, 0.5, 0.3])
 
 
 def draw_prior(rng, samples, d, order):
-    """Draw concentrations, transitions, emissions, labels and a series from the model; returns labels, x, top, means, scales."""
+    """Draw labels, series, concentrations, means and scales from the model."""
     gamma, total, rho = (
         rng.gamma(HYPER[0]) / HYPER[1],
         rng.gamma(HYPER[2]) / HYPER[3],
@@ -67,7 +67,7 @@ def draw_masses(rng, samples, dof, gaps):
 
 
 def draw_series(rng, labels, regressions, roots, mass, order):
-    """Rows v = (regressors, sample) of a series given labels and emissions; a past before the first sample is zero."""
+    """Rows v = (regressors, sample) of a series given labels and emissions; the past is zero."""
     d = roots.shape[1]
     past = np.zeros(d)
     rows = []
@@ -80,7 +80,7 @@ def draw_series(rng, labels, regressions, roots, mass, order):
 
 
 def gibbs(v, labels, top, mass, chosen, d, order, dof, moves, gaps, hidden, seed):
-    """One sweep of the chain; returns labels, concentrations and regressions; `mass`, `v` and `chosen` are updated."""
+    """Labels, concentrations, regressions after a sweep; `mass`, `v`, `chosen` are updated."""
     samples, trace, emissions = (
         np.empty((1, len(v)), np.int64),
         np.empty((1, 5)),
@@ -133,7 +133,7 @@ CASES = {
 @pytest.mark.slow
 @pytest.mark.parametrize("case", list(CASES))
 def test_geweke(case):
-    """Prior draws and the chain (labels, parameters | series) <-> (series | labels, parameters) have the same moments."""
+    """Prior draws and the chain labels, parameters | series | ... have the same moments."""
     order, dof, moves, (gaps, hidden) = CASES[case]
     d, samples, draws = 2, 12, 2500 if LONG else 400
     rng = np.random.default_rng([11, list(CASES).index(case)])

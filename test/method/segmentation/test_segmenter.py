@@ -17,7 +17,7 @@ from scenario_gen.types import Encounter, Motion, Vehicle
 
 
 def wait_and_brake(encounter_of) -> Encounter:
-    """The paper's case (a): one stands; the other brakes for 7 s to a stop; both stand; the second pulls away."""
+    """The paper's case (a): one stands; the other brakes to a stop, stands, pulls away."""
     t = np.arange(200) * 0.1
     other = np.interp(t, [0, 7, 11, 20], [10, 0, 0, 12])
     return encounter_of(np.array([np.zeros(200), other]), noise=0.05)
@@ -190,7 +190,7 @@ def test_what_is_held_outside_of_a_presence_does_not_count(encounter_of, preset)
 
 
 def test_steps_of_a_pedestrian_are_no_changepoints_and_its_halt_is_seen():
-    """At 1.3 m/s with 0.15 m/s up and down in each step; one halts for 3 s and goes on within a step."""
+    """At 1.3 ± 0.15 m/s in each step; one halts for 3 s and goes on within a step."""
     time, rng = np.arange(0.0, 16.0, 0.1), np.random.default_rng(4)
     steady = 1.3 + 0.15 * np.sin(2.0 * np.pi * 1.9 * time) + rng.normal(0.0, 0.03, len(time))
     halts = np.where((time > 6.0) & (time < 9.0), 0.0, steady)

@@ -74,7 +74,7 @@ def test_constant_channel_and_constant_series():
 
 @pytest.mark.parametrize("tremble", [1e-7, 0.1])
 def test_channel_that_varies_less_than_it_is_known_hides_nothing(tremble):
-    """A vehicle that stands throughout: blown up to unit variance, its trembling drowned every other channel's changes."""
+    """Scaled to unit variance, the noise of a standing vehicle hid all other changes."""
     x, labels = two_states(8)
     still = tremble * np.random.default_rng(1).normal(size=(240, 2))
     posterior = segment_series(
@@ -253,7 +253,7 @@ def test_a_sequence_shorter_than_the_order_is_named():
 
 @pytest.mark.parametrize("missing", [0.4])
 def test_what_is_missing_does_not_make_the_rest_look_correlated(missing):
-    """Gaps are filled with lines between neighbours; those once let independent samples count for two thirds."""
+    """Interpolated gaps must not lower the weight of independent samples."""
     rng = np.random.default_rng(0)
     labels = np.repeat([0, 1, 0, 1], 200)
     x = rng.normal(size=(800, 3)) + 4.0 * labels[:, None]
