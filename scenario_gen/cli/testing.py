@@ -111,8 +111,8 @@ def drive(options: Drive) -> None:
 
 
 def _report(drives: "Drives", out: Path) -> None:
-    from scenario_gen.closed_loop.bounded import Decisions
     from scenario_gen.closed_loop.results import JSON, JUNIT, PAGE
+    from scenario_gen.closed_loop.timeouts import Decisions
     from scenario_gen.closed_loop.trials import rates
 
     files = [out / name for name in (JSON, JUNIT, PAGE)]

@@ -55,7 +55,8 @@ class DriveRequest:
         planner: MODULE:CLASS; over DDS the command that starts its node.
         ego: id of the vehicle in whose place it drives.
         count: scenarios at most; 0: all.
-        assignments: parameters as name=value; those of a drive without prefix, those of the bars as bars.name.
+        assignments: parameters as name=value; those of a drive without prefix, those of the bars
+            as bars.name.
         against: drives.json of an earlier planner on the same scenarios, or its folder.
     """
 
@@ -94,10 +95,12 @@ def drive_bag(
         out: folder of the results.
         progress: called with how many are done of how many.
         run: drives them; `in_processes()` if None, or over DDS, one after the other.
-        baseline: drives at most MAX_BASELINE_DRIVES of the scenarios with the non-reactive baseline; None: it is left out.
+        baseline: drives at most MAX_BASELINE_DRIVES of the scenarios with the non-reactive
+            baseline; None: it is left out.
 
     Raises:
-        InputError: bag, planner, folder, a parameter or the file to compare with is wrong; the message names it.
+        InputError: bag, planner, folder, a parameter or the file to compare with is wrong; the
+            message names it.
     """
     config, planner = request.config(), request.planner
     earlier = read_drives(request.against) if request.against is not None else None

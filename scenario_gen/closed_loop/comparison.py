@@ -56,7 +56,8 @@ class Comparison:
 
     Attributes:
         planner: the earlier one.
-        difference: share of failures less that of the earlier one, with its 95 % interval; above 0 is worse.
+        difference: share of failures less that of the earlier one, with its 95 % interval; above 0
+            is worse.
         now_fail, now_pass: names of the scenarios that changed sides.
         of: scenarios.
         encounters: that they are of.

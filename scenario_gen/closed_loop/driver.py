@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from scenario_gen.closed_loop.certified import pose_at, World
+from scenario_gen.closed_loop.coordination_space import pose_at, World
 from scenario_gen.numerics import Floats, Ints
 from scenario_gen.numerics.boxes import boxes_meet, fill_box
 from scenario_gen.numerics.kernels import B, F, F1, I1, kernel, named
@@ -25,7 +25,7 @@ EGO_CLOCK, EGO_RATE, ON_PATH = range(6, 9)
 """Columns of `State.seen` behind those of `EgoState`."""
 
 
-class Self(NamedTuple):
+class DriverState(NamedTuple):
     """A driver at the begin of a step: which, its clock [s], the clock's rate and its acceleration in the step before [m/s²]."""
 
     i: int
@@ -34,7 +34,7 @@ class Self(NamedTuple):
     was: float
 
 
-class Manner(NamedTuple):
+class DriverParameters(NamedTuple):
     """How the others drive: fields of `ClosedLoopConfig`; how far they look ahead [s]; whether, and after (N,) how many steps.
 
     The strongest braking (N,) is that of each one's type, if less.
@@ -53,7 +53,7 @@ class Manner(NamedTuple):
     delay: Ints
 
 
-MANNER = named(Manner, F, F, F, F, F1, F, F, F, B, B, I1)
+DRIVER_PARAMETERS = named(DriverParameters, F, F, F, F, F1, F, F, F, B, B, I1)
 
 
 @kernel(inline=True)
@@ -66,7 +66,7 @@ def _eased(short: float, jerk: float, h: float) -> float:
 
 @kernel(inline=True)
 def rate_after(
-    manner: Manner,
+    parameters: DriverParameters,
     r: float,
     v: float,
     a: float,
@@ -77,10 +77,11 @@ def rate_after(
 ) -> float:
     """Rate of a clock after a step in which its driver brakes, as far as its foot gets: acceleration changes by the jerk at most.
 
-    With nothing in the way the rate goes back to 1; at 1 the motion is the certified one, whatever jerk that has.
+    With nothing in the way the rate goes back to 1; at 1 the motion is the certified one, whatever
+    jerk that has.
 
     Args:
-        manner: how it drives.
+        parameters: how it drives.
         r: rate of its clock; its speed is r v.
         v: certified speed there [m/s].
         a: certified acceleration there [m/s²].
@@ -91,12 +92,12 @@ def rate_after(
     """
     if v < STAND:
         return 1.0
-    u, jerk = r * v, manner.jerk
+    u, jerk = r * v, parameters.jerk
     end = max(v + r * a * h, STAND)  # certified speed where the step ends, about
     on = 1.0
     if r < 1.0:
         gain = min(
-            max(manner.acceleration, r * r * a), r * a + _eased(v - u, jerk, h), was + jerk * h
+            max(parameters.acceleration, r * r * a), r * a + _eased(v - u, jerk, h), was + jerk * h
         )
         on = min(max((u + gain * h) / end, 0.0), 1.0)
     if braking <= FREE:
@@ -111,7 +112,8 @@ def rate_after(
 def gap_ahead(world: World, i: int, clock: float, box: Floats, here: Floats) -> tuple[float, int]:
     """Way [m] that vehicle i can drive on its path from a clock until it meets a box (7,), and the cell of its clock there.
 
-    Infinity and -1 if it does not within AHEAD, or if the box lies behind it; `here` is its pose (5,).
+    Infinity and -1 if it does not within AHEAD, or if the box lies behind it; `here` is its pose
+    (5,).
     """
     cells, cell = world.cells[i], world.cell
     count = cells.shape[0]
@@ -144,14 +146,15 @@ def gap_ahead(world: World, i: int, clock: float, box: Floats, here: Floats) -> 
 
 
 @kernel(inline=True)
-def _idm(gap: float, u: float, ahead: float, manner: Manner) -> float:
+def _idm(gap: float, u: float, ahead: float, parameters: DriverParameters) -> float:
     """Braking [m/s²] behind one at `gap` [m] whose speed along the path is `ahead` [m/s]; none where the gap is wide enough.
 
-    Source: intelligent driver model, Treiber, Hennecke & Helbing 2000; its braking term, for the free one is the certificate.
+    Source: intelligent driver model, Treiber, Hennecke & Helbing 2000; its braking term, for the
+        free one is the certificate.
     """
-    a, b = manner.acceleration, manner.comfortable
-    wanted = manner.standstill + max(
-        0.0, u * manner.headway + u * (u - ahead) / (2.0 * np.sqrt(a * b))
+    a, b = parameters.acceleration, parameters.comfortable
+    wanted = parameters.standstill + max(
+        0.0, u * parameters.headway + u * (u - ahead) / (2.0 * np.sqrt(a * b))
     )
     share = wanted / max(gap, 0.1)
     return float(min(max(a * (share * share - 1.0), 0.0), b))
@@ -160,8 +163,8 @@ def _idm(gap: float, u: float, ahead: float, manner: Manner) -> float:
 @kernel(inline=True)
 def minded(
     world: World,
-    manner: Manner,
-    me: Self,
+    parameters: DriverParameters,
+    me: DriverState,
     pose: Floats,
     j: int,
     box: Floats,
@@ -170,14 +173,15 @@ def minded(
 ) -> float:
     """Braking [m/s²] of a driver at its certified pose (5,) for j, whose box (7,) and speed [m/s] are given, if on its path.
 
-    FREE if j is no nearer than in the certified execution at the same clock; `later` [s] than its own is what is given of j.
+    FREE if j is no nearer than in the certified execution at the same clock; `later` [s] than its
+    own is what is given of j.
     """
     i, clock = me.i, me.clock
     gap, at = gap_ahead(world, i, clock, box, pose)
     if at < 0:
         return FREE
     ahead = speed * max(box[2] * world.cells[i, at, 2] + box[3] * world.cells[i, at, 3], 0.0)
-    braking = _idm(gap, me.rate * pose[3], ahead, manner)
+    braking = _idm(gap, me.rate * pose[3], ahead, parameters)
     if braking <= 0.0:
         return FREE
     certain, there = np.empty(5), np.empty(7)

@@ -3,8 +3,9 @@
 
 """The ego's body: a kinematic bicycle with limits.
 
-Its reference point is the centre of the footprint, and its velocity points along its heading, as everywhere in this suite: so
-what was certified can be driven by it. The curvature of its way stands for the angle of its front wheels, κ = tan(δ) / wheelbase.
+Its reference point is the centre of the footprint, and its velocity points along its heading, as
+everywhere in this suite: so what was certified can be driven by it. The curvature of its way
+stands for the angle of its front wheels, κ = tan(δ) / wheelbase.
 """
 
 from dataclasses import dataclass
@@ -71,9 +72,10 @@ def move(
 ) -> Moved:
     """Return the ego one step later.
 
-    A command is cut to the body's limits. Nothing asked, or something that is not finite, is a fault: the ego then brakes at its
-    limit and keeps its curvature; one that is moved from outside stays where it is. A pose that is farther away than the highest
-    speed allows is a fault, too, but is taken, for whoever gives poses answers for them.
+    A command is cut to the body's limits. Nothing asked, or something that is not finite, is a
+    fault: the ego then brakes at its limit and keeps its curvature; one that is moved from outside
+    stays where it is. A pose that is farther away than the highest speed allows is a fault, too,
+    but is taken, for whoever gives poses answers for them.
 
     Raises:
         InputError: what is asked is neither a command nor a pose, or not of numbers.
@@ -116,7 +118,8 @@ def _placed(ego: EgoState, pose: Pose, step: float, limits: Dynamics) -> Moved:
 def _driven(ego: EgoState, asked: Command, config: ClosedLoopConfig, limits: Dynamics) -> EgoState:
     """Return the ego one step later; its way is an arc, along which its speed changes evenly until it stands.
 
-    Source: kinematic bicycle, e.g. Rajamani 2012, section 2.2, with the reference point where there is no slip.
+    Source: kinematic bicycle, e.g. Rajamani 2012, section 2.2, with the reference point where
+        there is no slip.
     """
     step, speed, change = config.step, ego.speed, config.ego_curvature_rate * config.step
     a = min(

@@ -9,7 +9,8 @@
     seen, info = env.reset(seed=7, options={"index": 0})
     seen, reward, terminated, truncated, info = env.step(env.action_space.sample())
 
-Many at once: `gymnasium.make_vec("scenario_gen/Drive-v0", 8, "async", trials="out/mine/bag", ego="2")`.
+Many at once: `gymnasium.make_vec("scenario_gen/Drive-v0", 8, "async", trials="out/mine/bag",
+ego="2")`.
 """
 
 from collections.abc import Sequence
@@ -55,17 +56,21 @@ class DriveEnv(gymnasium.Env[Seen, Seen]):  # type: ignore[misc]
 
     Observation (float32, all in the ego's frame, x ahead):
 
-    - the ego: speed [m/s], curvature [1/m], offset from the route [m, left positive], angle to it [rad], metres to the goal;
+    - the ego: speed [m/s], curvature [1/m], offset from the route [m, left positive], angle to it
+      [rad], metres to the goal;
     - the route at 5, 10, 15, 20, 30 and 40 m ahead: x, y [m] each;
-    - the 8 nearest others within 100 m: 1, x, y [m], cos and sin of the relative yaw, speed [m/s], length [m]; zeros where there
-      are fewer.
+    - the 8 nearest others within 100 m: 1, x, y [m], cos and sin of the relative yaw, speed [m/s],
+      length [m]; zeros where there are fewer.
 
-    All are cut to the bounds of the space: 100 m and m/s, 1000 m to the goal, 50 m of length, the body's sharpest curvature.
+    All are cut to the bounds of the space: 100 m and m/s, 1000 m to the goal, 50 m of length, the
+    body's sharpest curvature.
 
-    Action (float32, 2): -1 to 1 of acceleration (the body's braking to its acceleration), -1 to 1 of its sharpest curvature.
+    Action (float32, 2): -1 to 1 of acceleration (the body's braking to its acceleration), -1 to 1
+    of its sharpest curvature.
 
-    Reward: metres driven along the route; -100 for a collision or leaving the road, +10 at the goal. It terminates with each of
-    those, and is truncated when the time is up; `info["verdict"]` then holds the verdict.
+    Reward: metres driven along the route; -100 for a collision or leaving the road, +10 at the
+    goal. It terminates with each of those, and is truncated when the time is up; `info["verdict"]`
+    then holds the verdict.
     """
 
     metadata: ClassVar[dict[str, Any]] = {"render_modes": ["rgb_array"], "render_fps": 10}
@@ -80,7 +85,8 @@ class DriveEnv(gymnasium.Env[Seen, Seen]):  # type: ignore[misc]
         """Take what is driven in: trials, or the path of a bag, where `ego` names the vehicle whose place the ego takes.
 
         Raises:
-            InputError: the bag cannot be read, there is nothing to drive in, or the render mode is not known.
+            InputError: the bag cannot be read, there is nothing to drive in, or the render mode is
+                not known.
         """
         if render_mode not in (None, *self.metadata["render_modes"]):
             raise InputError(
@@ -128,7 +134,8 @@ class DriveEnv(gymnasium.Env[Seen, Seen]):  # type: ignore[misc]
         """Drive one step.
 
         Args:
-            action: (2,) pedal and wheel, -1 to 1 (shares of the body's limits); what is beyond is cut.
+            action: (2,) pedal and wheel, -1 to 1 (shares of the body's limits); what is beyond is
+                cut.
 
         Raises:
             InputError: a number of the action is not finite.

@@ -4,8 +4,8 @@
 """Whose fault a contact with the ego was.
 
 The others keep their certified paths, speeds and order. A contact is therefore the fault of the
-vehicle that was at a place, or at a time, where the certificate does not have it. `RULES` lists the
-reasons; the first one that applies is the reason of the contact.
+vehicle that was at a place, or at a time, where the certificate does not have it. `RULES` lists
+the reasons; the first one that applies is the reason of the contact.
 """
 
 from collections.abc import Callable
@@ -315,7 +315,8 @@ def find_cut_in(
 ) -> CutIn | None:
     """Return how vehicle `pair[0]` last entered the path of `pair[1]` before a time [s].
 
-    The path is the certified one, as wide as its vehicle. None if the vehicle was there from the start.
+    The path is the certified one, as wide as its vehicle. None if the vehicle was there from the
+    start.
     """
     motion, (entering, other) = drive.motion, pair
     present = drive.here[entering] & drive.here[other] & (motion.time <= time + 1e-9)
@@ -352,7 +353,8 @@ def find_cut_in(
 def _entry(offset: Floats, half_width: float) -> int | None:
     """Return the first row after which a footprint, by its corners' offsets (M, 4) [m], stays in a path.
 
-    The last row is not looked at: at the contact it touches the other vehicle. None if it was always inside.
+    The last row is not looked at: at the contact it touches the other vehicle. None if it was
+    always inside.
     """
     clear: Bools = (offset.min(axis=1) > half_width) | (offset.max(axis=1) < -half_width)
     outside = np.flatnonzero(clear[:-1])

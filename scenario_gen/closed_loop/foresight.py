@@ -7,15 +7,15 @@ from typing import NamedTuple
 
 import numpy as np
 
-from scenario_gen.closed_loop.certified import pose_at, World
+from scenario_gen.closed_loop.coordination_space import pose_at, World
 from scenario_gen.closed_loop.driver import (
+    DriverParameters,
+    DriverState,
     EGO_CLOCK,
     EGO_RATE,
     FREE,
-    Manner,
     ON_PATH,
     rate_after,
-    Self,
 )
 from scenario_gen.closed_loop.order import limit, PARTS
 from scenario_gen.numerics import Floats
@@ -33,7 +33,8 @@ class Foreseen(NamedTuple):
     """What one driver, or all, expect of the steps to come.
 
     Attributes:
-        ego: (M, 4) the ego's x, y [m], yaw [rad], speed [m/s] at the end of this step and of the following ones.
+        ego: (M, 4) the ego's x, y [m], yaw [rad], speed [m/s] at the end of this step and of the
+            following ones.
         clock: of the ego on its witness' path at the end of this step [s].
         rate: of that clock; negative if the ego is not on that path.
         coming: (N, M) clocks of the others at the step's begin and at the end of each [s].
@@ -53,8 +54,8 @@ class Foreseen(NamedTuple):
 def foresee_ego(world: World, seen: Floats, ago: int, out: Floats) -> None:
     """Fill `out` (M, 4) with the ego's x, y, yaw and speed at the end of this step and of the following ones.
 
-    On its witness' path it goes on as the witness did, at its own rate; else straight on. If it brakes, on that path harder than
-    the witness, it goes on braking.
+    On its witness' path it goes on as the witness did, at its own rate; else straight on. If it
+    brakes, on that path harder than the witness, it goes on braking.
 
     Args:
         world: the scenario.
@@ -102,24 +103,30 @@ def foresee_ego(world: World, seen: Floats, ago: int, out: Floats) -> None:
 
 @kernel(inline=True)
 def weakest(
-    world: World, manner: Manner, me: Self, least: float, foreseen: Foreseen, others: bool
+    world: World,
+    parameters: DriverParameters,
+    me: DriverState,
+    least: float,
+    foreseen: Foreseen,
+    others: bool,
 ) -> float:
     """The weakest braking [m/s²], `least` or more, with which a driver meets nothing that it foresees; the strongest if none.
 
-    Looked for between a few brakings first, for more is not always better: who brakes more may be there when the ego is.
+    Looked for between a few brakings first, for more is not always better: who brakes more may be
+    there when the ego is.
     """
-    if _clear(world, manner, me, least, foreseen, others):
+    if _clear(world, parameters, me, least, foreseen, others):
         return least
-    low = max(least, -manner.acceleration)
-    comfortable, strongest = manner.comfortable, manner.strongest[me.i]
+    low = max(least, -parameters.acceleration)
+    comfortable, strongest = parameters.comfortable, parameters.strongest[me.i]
     for tried in (0.0, 0.5 * comfortable, comfortable, 0.5 * (comfortable + strongest), strongest):
         if tried <= low:
             continue
-        if _clear(world, manner, me, tried, foreseen, others):
+        if _clear(world, parameters, me, tried, foreseen, others):
             high = tried
             for _ in range(HALVINGS):
                 middle = 0.5 * (low + high)
-                if _clear(world, manner, me, middle, foreseen, others):
+                if _clear(world, parameters, me, middle, foreseen, others):
                     high = middle
                 else:
                     low = middle
@@ -130,7 +137,12 @@ def weakest(
 
 @kernel(inline=True)
 def _clear(
-    world: World, manner: Manner, me: Self, braking: float, foreseen: Foreseen, others: bool
+    world: World,
+    parameters: DriverParameters,
+    me: DriverState,
+    braking: float,
+    foreseen: Foreseen,
+    others: bool,
 ) -> bool:
     """Whether a driver, braking so, stays clear of the ego ahead of it, and keeps to what the order is foreseen to let it do."""
     h, time, motion, cell, order = (
@@ -150,7 +162,7 @@ def _clear(
     pose_at(time, motion, t, pose)
     for m in range(foreseen.ego.shape[0] - 1):
         u = r * pose[3]
-        after = rate_after(manner, r, pose[3], pose[4], was, braking, 0.0, h)
+        after = rate_after(parameters, r, pose[3], pose[4], was, braking, 0.0, h)
         t += 0.5 * (r + after) * h
         r = after
         pose_at(time, motion, t, pose)
@@ -166,7 +178,7 @@ def _clear(
                 return False
         passed = foreseen.clock + foreseen.rate * m * h
         if (
-            manner.yields
+            parameters.yields
             and foreseen.rate >= 0.0
             and t > limit(order[world.ego], cell, passed) + LATE
         ):
@@ -184,7 +196,9 @@ def _clear(
 
 
 @kernel(inline=True)
-def foresee_self(world: World, manner: Manner, me: Self, braking: float, out: Floats) -> None:
+def foresee_self(
+    world: World, parameters: DriverParameters, me: DriverState, braking: float, out: Floats
+) -> None:
     """Fill `out` (M,) with a driver's clocks [s] at the step's begin and at the end of each, if it brakes so."""
     h, time, motion, pose = world.step, world.time, world.motion[me.i], np.empty(5)
     t, r, was = me.clock, me.rate, me.was
@@ -192,7 +206,7 @@ def foresee_self(world: World, manner: Manner, me: Self, braking: float, out: Fl
     for m in range(1, out.shape[0]):
         if r < 1.0 or braking > FREE:
             pose_at(time, motion, t, pose)
-            after = rate_after(manner, r, pose[3], pose[4], was, braking, 0.0, h)
+            after = rate_after(parameters, r, pose[3], pose[4], was, braking, 0.0, h)
             u = r * pose[3]
             t += 0.5 * (r + after) * h
             pose_at(time, motion, t, pose)

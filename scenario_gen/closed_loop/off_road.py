@@ -3,8 +3,9 @@
 
 """How far the ego's footprint stayed inside what is drivable, or how deep and how much of it was outside.
 
-Whether it stayed inside at every instant is proven by the checker's kernel; only where that finds an exit is the depth measured,
-at poses that lie so close together that no point of the footprint moves farther than APART between two of them.
+Whether it stayed inside at every instant is proven by the checker's kernel; only where that finds
+an exit is the depth measured, at poses that lie so close together that no point of the footprint
+moves farther than APART between two of them.
 """
 
 import math
@@ -35,9 +36,10 @@ class RoadUse(NamedTuple):
     """What the footprint did to the road's edge.
 
     Attributes:
-        margin: least signed distance [m] to what is not drivable: positive inside, negative the greatest depth outside; NaN if
-            no road is known, at most MAX_DEPTH_M either way.
-        area: greatest part of the footprint [m²] that was outside at one instant; 0 if it stayed inside.
+        margin: least signed distance [m] to what is not drivable: positive inside, negative the
+            greatest depth outside; NaN if no road is known, at most MAX_DEPTH_M either way.
+        area: greatest part of the footprint [m²] that was outside at one instant; 0 if it stayed
+            inside.
         time: when the depth first reached the limit [s], NaN if it never did.
     """
 
@@ -152,7 +154,8 @@ def measure(
         near: (H, W) distance [cells] from each centre to the nearest square that is not solid.
         poses: (P, 3) x, y [cells], yaw [rad].
         points: (M, 2) of the footprint in its own frame [cells].
-        how: the largest depth that is told [cells]; width of the rim of `solid`; 1: the largest depth is wanted, -1: the least.
+        how: the largest depth that is told [cells]; width of the rim of `solid`; 1: the largest
+            depth is wanted, -1: the least.
         out: (P, 2) that depth [cells], and how many points are in solid cells.
     """
     height, width = solid.shape

@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from scenario_gen.closed_loop.certified import World
+from scenario_gen.closed_loop.coordination_space import World
 from scenario_gen.numerics import Bools, Floats
 from scenario_gen.numerics.kernels import kernel
 
@@ -63,8 +63,9 @@ def _slope(c: Clocks, i: int, h: float, part: float) -> float:
 def _ordered(world: World, c: Clocks, i: int, j: int) -> bool:
     """Whether vehicle i keeps to the order with j throughout the step, proven for each of its parts.
 
-    In a part, either the clock of i ends no farther than it may while that of j is where it begins, for that limit only grows; or
-    it stays behind the clock of j throughout: their difference is a parabola, least at an end or at its vertex.
+    In a part, either the clock of i ends no farther than it may while that of j is where it
+    begins, for that limit only grows; or it stays behind the clock of j throughout: their
+    difference is a parabola, least at an end or at its vertex.
     """
     h, cell, order = world.step, world.cell, world.order[i, j]
     a0, b0 = c.begin[i], c.begin[j]
@@ -89,8 +90,9 @@ def _ordered(world: World, c: Clocks, i: int, j: int) -> bool:
 def keep_order(world: World, c: Clocks) -> None:
     """Hold back who would come to a place before its turn; the ego is not held back.
 
-    First at the rate of the one it waits for, then at once, evenly to where the order ends its way at the step's begin: that is
-    allowed whatever the other does. Holding one back may hold back others, but the way of each is cut only once.
+    First at the rate of the one it waits for, then at once, evenly to where the order ends its way
+    at the step's begin: that is allowed whatever the other does. Holding one back may hold back
+    others, but the way of each is cut only once.
     """
     n, h, ego = c.begin.shape[0], world.step, world.ego
     wanted, wanted_rate = c.end.copy(), c.end_rate.copy()
@@ -131,8 +133,9 @@ def keep_order(world: World, c: Clocks) -> None:
 def _go_together(world: World, c: Clocks, wanted: Floats, wanted_rate: Floats) -> None:
     """Let those with the earliest clock go on, evenly and with one clock, if the order held them back only for each other.
 
-    That is always allowed, up to the next later clock: on one clock they are certified, and nobody is behind them. Without it
-    they could stand for ever: each alone may not leave the others behind, and a whole step would take them beyond the next one.
+    That is always allowed, up to the next later clock: on one clock they are certified, and nobody
+    is behind them. Without it they could stand for ever: each alone may not leave the others
+    behind, and a whole step would take them beyond the next one.
     """
     n, h, ego = c.begin.shape[0], world.step, world.ego
     least, later = np.inf, np.inf

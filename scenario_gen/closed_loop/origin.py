@@ -24,7 +24,8 @@ class Origin:
     Attributes:
         encounter: the recorded one that it was made of, "" if that is not known.
         digest: SHA-256 of its motion and of who is the ego, "" if nobody looked.
-        copy_of: name of an earlier scenario of the same encounter in which all move likewise; "" if there is none.
+        copy_of: name of an earlier scenario of the same encounter in which all move likewise; ""
+            if there is none.
     """
 
     encounter: str = ""
@@ -94,7 +95,8 @@ def digest_of(scenario: Scenario, ego: int) -> str:
 def units_of(names: Sequence[str], several: Sequence[Origin]) -> tuple[Ints, int]:
     """Return the number (S,) of what each drive counts with, and of how many encounters they are.
 
-    That is its encounter; where all are of one encounter, those that are no copies of another count by themselves.
+    That is its encounter; where all are of one encounter, those that are no copies of another
+    count by themselves.
     """
     encounters, unit = np.unique([one.encounter for one in several], return_inverse=True)
     if len(encounters) > 1:

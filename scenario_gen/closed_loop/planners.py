@@ -62,7 +62,8 @@ class ConstantSpeed(RouteFollower):
 class IdmFollower(RouteFollower):
     """Follows its route and keeps its distance to whoever is on it, or will be if all go straight on (IDM).
 
-    Source: intelligent driver model, Treiber, Hennecke & Helbing 2000. `speed` [m/s] is driven on a free and straight way.
+    Source: intelligent driver model, Treiber, Hennecke & Helbing 2000. `speed` [m/s] is driven on
+        a free and straight way.
     """
 
     speed: float = 10.0
@@ -94,7 +95,8 @@ class IdmFollower(RouteFollower):
     def _nearest(self, seen: Observation, station: float) -> tuple[float, float]:
         """Return gap [m] and speed along the route [m/s] of who is, or comes, next on the route; infinity and 0 if nobody does.
 
-        One that comes from aside counts where it comes onto the route, as long as it does so before the ego has passed there.
+        One that comes from aside counts where it comes onto the route, as long as it does so
+        before the ego has passed there.
         """
         if self.route is None or not len(seen.ids):
             return math.inf, 0.0

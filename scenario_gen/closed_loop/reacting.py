@@ -105,7 +105,8 @@ class Testing:
     def generate(self, count: int, progress: Progress = lambda *_: None) -> GenerationResult:
         """Return `count` scenarios, or as many as the parameters give.
 
-        The ego's motion varies as the others' does; sampling is directed to where it meets one of them if it ignores all.
+        The ego's motion varies as the others' does; sampling is directed to where it meets one of
+        them if it ignores all.
 
         Raises:
             InputError, RefusedError: as `pipeline.generate`; a TargetError if there is none.
@@ -152,7 +153,8 @@ class Testing:
         """Return the vehicle that has to react in most scenarios if it is the ego.
 
         Raises:
-            TargetError: nobody has to, with more freedom neither; the message names roads where somebody has.
+            TargetError: nobody has to, with more freedom neither; the message names roads where
+                somebody has.
             RefusedError: as `pipeline.generate`.
         """
         for tried in self.attempts():
@@ -191,7 +193,7 @@ def _noted(case: GenerationResult, note: Note) -> GenerationResult:
     )
 
 
-def hardly_tests(passed: int, driven: int) -> str:
+def is_trivial(passed: int, driven: int) -> str:
     """Say that a set hardly tests a planner, by how many of its scenarios the baseline passes; "" if it does test one."""
     if passed <= EASY * driven:
         return ""
@@ -210,4 +212,4 @@ def baseline_passes(case: GenerationResult, config: ClosedLoopConfig = ClosedLoo
     ]
     passed = sum(judge(loop, loop.drive(NonReactive())).passed for loop in loops)
     said = f"the non-reactive baseline, in place of {ego}, passes {passed} of {len(loops)}"
-    return f"{case.title}: {hardly_tests(passed, len(loops)) or said}"
+    return f"{case.title}: {is_trivial(passed, len(loops)) or said}"

@@ -20,7 +20,7 @@ from scenario_gen.base.parameters import flatten
 from scenario_gen.closed_loop.comparison import Comparison
 from scenario_gen.closed_loop.config import ClosedLoopConfig
 from scenario_gen.closed_loop.origin import Trial
-from scenario_gen.closed_loop.reacting import hardly_tests
+from scenario_gen.closed_loop.reacting import is_trivial
 from scenario_gen.closed_loop.trials import Outcome, passed_of, rates
 from scenario_gen.output.report.data import FRAME_PERIOD, MAX_FRAMES, pack, road_data, states
 from scenario_gen.output.report.html import render_page
@@ -42,7 +42,8 @@ class Drives:
         planner: its name.
         config: the parameters of the drives.
         trials: that were driven; without them there is no page.
-        broken: the thresholds that are not met, and, if it is worse than the planner it is compared with, that.
+        broken: the thresholds that are not met, and, if it is worse than the planner it is
+            compared with, that.
         baseline: drives of the non-reactive baseline.
         comparison: with an earlier planner.
     """
@@ -65,7 +66,7 @@ class Drives:
     @property
     def easy(self) -> str:
         """A sentence if the non-reactive baseline passes most scenarios, else ""."""
-        return hardly_tests(sum(one.verdict.passed for one in self.baseline), len(self.baseline))
+        return is_trivial(sum(one.verdict.passed for one in self.baseline), len(self.baseline))
 
     def scores(self) -> dict[str, float]:
         """Return the means of the terms of nuPlan's and NAVSIM's scores, and of these scores."""

@@ -3,17 +3,19 @@
 
 """The terms of nuPlan's and NAVSIM's scores, for one drive in closed loop.
 
-Sources: nuPlan's closed-loop score (Karnchanachari et al. 2024, "Towards learning-based planning: the nuPlan benchmark", and the
-metric configurations of nuplan-devkit 1.2); NAVSIM's predictive driver model score, PDMS (Dauner et al. 2024, "NAVSIM:
-data-driven non-reactive autonomous vehicle simulation and benchmarking"). Both multiply what must hold and weigh the rest::
+Sources: nuPlan's closed-loop score (Karnchanachari et al. 2024, "Towards learning-based planning:
+the nuPlan benchmark", and the metric configurations of nuplan-devkit 1.2); NAVSIM's predictive
+driver model score, PDMS (Dauner et al. 2024, "NAVSIM: data-driven non-reactive autonomous vehicle
+simulation and benchmarking"). Both multiply what must hold and weigh the rest::
 
     nuPlan:  no at-fault collision · drivable area · driving direction · making progress
              · (5 TTC + 5 progress + 4 speed limit + 2 comfort) / 16
     PDMS:    no at-fault collision · drivable area · (5 TTC + 5 progress + 2 comfort) / 12
 
-A road of this suite knows neither directions nor speed limits: those terms of nuPlan are left out, and the sum is divided by 12.
-Progress is measured against the witness (nuPlan: the expert; PDMS: its rule-based planner). Lanes are not known either: a contact
-at the side counts as at fault if the ego was off the road, as in nuPlan, but not for being in two lanes.
+A road of this suite knows neither directions nor speed limits: those terms of nuPlan are left out,
+and the sum is divided by 12. Progress is measured against the witness (nuPlan: the expert; PDMS:
+its rule-based planner). Lanes are not known either: a contact at the side counts as at fault if
+the ego was off the road, as in nuPlan, but not for being in two lanes.
 """
 
 from dataclasses import dataclass
@@ -54,8 +56,9 @@ class Terms:
     """Each from 0 to 1.
 
     Attributes:
-        no_at_fault_collision: 0 if, as nuPlan has it, the ego hit one that stood, or hit one with its front, or was off the road
-            when it was hit at the side; not if it stood or was hit from behind. `Collision.reason` has another definition.
+        no_at_fault_collision: 0 if, as nuPlan has it, the ego hit one that stood, or hit one with
+            its front, or was off the road when it was hit at the side; not if it stood or was hit
+            from behind. `Collision.reason` has another definition.
         drivable_area: 0 if the footprint was deeper than 0.3 m outside; 1 where no road is known.
         making_progress: 0 below 20 % of the witness' way.
         ttc: 0 if the time to collision with one that is not behind was less than 0.95 s.

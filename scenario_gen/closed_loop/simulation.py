@@ -3,8 +3,9 @@
 
 """The closed loop: a certified scenario, an ego in the place of one of its vehicles, and one step after the other.
 
-`ClosedLoop` holds what does not change; `State` is one instant; `step` gives the next and changes nothing. So a drive can be
-repeated, branched and searched, and two drives with the same commands are the same, bit for bit.
+`ClosedLoop` holds what does not change; `State` is one instant; `step` gives the next and changes
+nothing. So a drive can be repeated, branched and searched, and two drives with the same commands
+are the same, bit for bit.
 """
 
 from collections.abc import Callable
@@ -15,11 +16,11 @@ from zlib import crc32
 import numpy as np
 
 from scenario_gen.base.errors import InputError
-from scenario_gen.closed_loop.advance import advance, ego_hits
-from scenario_gen.closed_loop.certified import world_of
 from scenario_gen.closed_loop.config import ClosedLoopConfig, FORESIGHT, REPLAY, TEMPLATE
-from scenario_gen.closed_loop.driver import Manner
+from scenario_gen.closed_loop.coordination_space import world_of
+from scenario_gen.closed_loop.driver import DriverParameters
 from scenario_gen.closed_loop.ego import Command, EgoState, misplaced, move, Pose
+from scenario_gen.closed_loop.step import advance, ego_hits
 from scenario_gen.numerics import Bools, Floats, wrap_angle
 from scenario_gen.numerics.plane import ahead_and_left, edge_lengths
 from scenario_gen.roads import ground_for
@@ -36,14 +37,17 @@ class State:
         ego: the ego.
         vehicles: (N, 4) x, y [m], yaw [rad], speed [m/s] of all.
         here: (N,) whether each is on the scene.
-        clock: (N,) certified time [s] at which each one is where it is now; for the ego, on its witness' path.
+        clock: (N,) certified time [s] at which each one is where it is now; for the ego, on its
+            witness' path.
         rate: (N,) how fast the clocks run; 1 is the certified speed.
         acceleration: (N,) of the others [m/s²], as their drivers want it.
-        waited: (N,) patience that each driver has spent waiting for an ego that stands [s]; infinity once it goes before the ego.
-        seen: (K, 9) the ego now and before, newest first, as far back as the slowest driver's reaction time: `EgoState`, its
-            clock on its witness' path [s], the rate of that clock, and 1 if it is on that path.
-        forced: how many times so far one of the others has braked harder than the strongest braking, or more suddenly than the
-            jerk allows, to keep the order.
+        waited: (N,) patience that each driver has spent waiting for an ego that stands [s];
+            infinity once it goes before the ego.
+        seen: (K, 9) the ego now and before, newest first, as far back as the slowest driver's
+            reaction time: `EgoState`, its clock on its witness' path [s], the rate of that clock,
+            and 1 if it is on that path.
+        forced: how many times so far one of the others has braked harder than the strongest
+            braking, or more suddenly than the jerk allows, to keep the order.
         fault: what was wrong with the last command, "" if nothing.
     """
 
@@ -69,7 +73,8 @@ class Task:
         vehicle: the ego's identity and footprint.
         start: (4,) x, y [m], yaw [rad], speed [m/s].
         goal: (4,) likewise: where the witness ends.
-        route: (M, 3) x, y [m], yaw [rad] of a way from start to goal that can be driven: the witness' path, without its speeds.
+        route: (M, 3) x, y [m], yaw [rad] of a way from start to goal that can be driven: the
+            witness' path, without its speeds.
         road: what is drivable for the ego's type, if it is known.
         step: time between two decisions [s].
         config: the parameters of the drive.
@@ -122,12 +127,14 @@ class Drive:
     """One drive from start to end; N vehicles, T instants.
 
     Attributes:
-        motion: all vehicles, the ego in its witness' place, as they drove: a scenario like the certified one.
+        motion: all vehicles, the ego in its witness' place, as they drove: a scenario like the
+            certified one.
         ego: its index.
         here: (N, T) whether each was on the scene.
         clock: (N, T) as in `State`.
         accelerations: (T,) the ego's own [m/s²].
-        forced: how many times one of the others braked harder or more suddenly than drivers do, to keep the order.
+        forced: how many times one of the others braked harder or more suddenly than drivers do, to
+            keep the order.
         faults: what was wrong with commands, by step.
     """
 
@@ -159,7 +166,8 @@ GOAL_TURN = 1.0  # rad, largest difference of heading at the goal
 def reaction_time(scenario: Scenario, vehicle: str, mean: float) -> float:
     """Draw the reaction time [s] of a vehicle's driver, evenly from half to one and a half of the mean.
 
-    It follows from the scenario's seed and index and from the vehicle's id, whoever the ego is and whatever it does.
+    It follows from the scenario's seed and index and from the vehicle's id, whoever the ego is and
+    whatever it does.
     """
     words = [
         number % 2**32
@@ -206,7 +214,7 @@ class ClosedLoop:
                 for vehicle in scenario.vehicles
             ]
         )
-        self._manner = Manner(
+        self._parameters = DriverParameters(
             config.headway,
             config.standstill_gap,
             config.acceleration,
@@ -224,7 +232,7 @@ class ClosedLoop:
             reactive,
             np.round(self.reactions / config.step).astype(np.int64),
         )
-        self._slowest = int(self._manner.delay.max())
+        self._slowest = int(self._parameters.delay.max())
         self._sizes = 2.0 * self.world.half
         self._ids = tuple(vehicle.id for vehicle in scenario.vehicles)
         self._others = np.arange(len(self._ids)) != self.ego
@@ -285,7 +293,9 @@ class ClosedLoop:
         seen = np.empty((min(len(state.seen), self._slowest) + 1, 9))
         seen[0, :6], seen[1:] = ego, state.seen[: len(seen) - 1]
         after, vehicles, here = np.empty((n, 5)), np.empty((n, 4)), np.empty(n, dtype=np.bool_)
-        advance(self.world, self._manner, self.begin + time, before, seen, after, vehicles, here)
+        advance(
+            self.world, self._parameters, self.begin + time, before, seen, after, vehicles, here
+        )
         clock, rate, acceleration, waited, forced = after.T
         count = state.forced + int(np.count_nonzero(forced))
         return State(
@@ -314,7 +324,8 @@ class ClosedLoop:
 
         Args:
             planner: what is tested.
-            ended: says when to stop; by default at the goal, at a collision (of instants only) or after the time given.
+            ended: says when to stop; by default at the goal, at a collision (of instants only) or
+                after the time given.
         """
         planner.reset(self.task())
         states = [self.start()]

@@ -32,10 +32,10 @@ from scenario_gen.bags.storage.config import BagConfig
 from scenario_gen.base.errors import did_you_mean, InputError, ScenarioGenError
 from scenario_gen.base.parameters import parameter, Parameters
 from scenario_gen.base.signals import ctrl_c_blocked, end_with_parent
-from scenario_gen.closed_loop.bounded import bounded, Decisions, Timed, TooLongError
 from scenario_gen.closed_loop.config import ClosedLoopConfig
 from scenario_gen.closed_loop.origin import Origin, origins_of, Trial, units_of
 from scenario_gen.closed_loop.simulation import ClosedLoop, Drive, Planner
+from scenario_gen.closed_loop.timeouts import bounded, Decisions, Timed, TooLongError
 from scenario_gen.closed_loop.verdict import DriveVerdict, judge
 from scenario_gen.method.evaluation import clustered_wilson
 from scenario_gen.types import (
@@ -136,12 +136,14 @@ def read_trials(
 
     Args:
         bag: of this suite.
-        ego: id of the vehicle in whose place the ego drives. "": that of the scenario's ego slot, or the first if it has none.
+        ego: id of the vehicle in whose place the ego drives. "": that of the scenario's ego slot,
+            or the first if it has none.
         count: how many at most; all if 0.
         config: how much is read at most.
 
     Raises:
-        InputError: the bag is damaged or holds no scenario, or one has no vehicle `ego`, or a slot for another.
+        InputError: the bag is damaged or holds no scenario, or one has no vehicle `ego`, or a slot
+            for another.
     """
     trials: list[Trial] = []
     with naming_bag(bag):
@@ -183,11 +185,13 @@ def trial_of(
         scenario: as it was recorded or heard.
         entry: its own on `scenarios/info`, if there is one.
         road: its road, if it is known.
-        ego: id of the vehicle in whose place the ego drives; "": that of the ego slot, or the first.
+        ego: id of the vehicle in whose place the ego drives; "": that of the ego slot, or the
+            first.
         where: names it in messages.
 
     Raises:
-        InputError: naming `where`, there is no such vehicle, the scenario was made for another, or the witness is missing.
+        InputError: naming `where`, there is no such vehicle, the scenario was made for another, or
+            the witness is missing.
     """
     return Trial(
         name, join_ego(scenario), _ego_of(scenario, entry.ego if entry else "", ego, where), road
@@ -223,7 +227,8 @@ def _ego_of(scenario: Scenario, slot: str, asked: str, where: str) -> str:
     """Return the id of the vehicle in whose place the ego drives.
 
     Raises:
-        InputError: naming `where`, there is no such vehicle, the scenario was made for another, or the witness is missing.
+        InputError: naming `where`, there is no such vehicle, the scenario was made for another, or
+            the witness is missing.
     """
     if scenario.reference_drive is not None:
         own = scenario.reference_drive.vehicles[0].id
@@ -268,7 +273,8 @@ def run_trials(
 
     Args:
         trials: what is driven.
-        planner: makes a planner, or its name as MODULE:CLASS; with several workers, a name or what can be pickled.
+        planner: makes a planner, or its name as MODULE:CLASS; with several workers, a name or what
+            can be pickled.
         config: the parameters.
         workers: processes.
         progress: called with how many are done, and how many there are.
@@ -420,8 +426,8 @@ class Rate:
 def rates(outcomes: Sequence[Outcome]) -> dict[str, Rate]:
     """Return how often what happened: failures of any kind, collisions, those by the ego's fault, and so on.
 
-    Drives of one encounter are alike, so intervals are for encounters that are drawn at random; with one encounter alone they
-    hold for that one, and copies of one scenario count as one.
+    Drives of one encounter are alike, so intervals are for encounters that are drawn at random;
+    with one encounter alone they hold for that one, and copies of one scenario count as one.
     """
     verdicts = [outcome.verdict for outcome in outcomes]
     flags = {

@@ -44,7 +44,8 @@ class Collision:
         time: when [s]; vehicle: with whom; speed: relative [m/s].
         ran: who closed the gap; that says nothing of fault.
         reason: why they met, and so whose fault it was.
-        cut_in: how the ego came into the other's way ahead of it or beside it, if it did and both drove the same way.
+        cut_in: how the ego came into the other's way ahead of it or beside it, if it did and both
+            drove the same way.
     """
 
     time: float
@@ -68,25 +69,32 @@ class DriveVerdict:
     """What one drive came to. Times in seconds from the drive's start; NaN where there is no such thing.
 
     Attributes:
-        index: of the scenario; seed: of its request; ego: id of the vehicle in whose place the ego drove.
+        index: of the scenario; seed: of its request; ego: id of the vehicle in whose place the ego
+            drove.
         duration: length of the drive.
         collision: first contact with another vehicle, None if there is none at any instant.
-        off_road: when the footprint was first as deep outside drivable space as counts, NaN if never, or if no road is known.
-        road_margin: least signed distance [m] of the footprint to what is not drivable: positive inside, negative the greatest
-            depth outside; at most 10 m either way; NaN if no road is known.
-        off_road_depth: depth [m] from which a footprint is off the road; off_road_area: greatest part of it outside [m²].
+        off_road: when the footprint was first as deep outside drivable space as counts, NaN if
+            never, or if no road is known.
+        road_margin: least signed distance [m] of the footprint to what is not drivable: positive
+            inside, negative the greatest depth outside; at most 10 m either way; NaN if no road is
+            known.
+        off_road_depth: depth [m] from which a footprint is off the road; off_road_area: greatest
+            part of it outside [m²].
         goal: when the goal is reached; NaN if never.
         delay: by how much later than the witness.
-        min_ttc: least time to collision, at most the horizon; min_gap: least distance of two footprints [m]; min_pet: least
-            post-encroachment time at crossings, negative if both were inside.
-        hardest_braking: m/s²; hard_braking: seconds of hard braking; jerk: largest change of acceleration over 0.5 s [m/s³].
+        min_ttc: least time to collision, at most the horizon; min_gap: least distance of two
+            footprints [m]; min_pet: least post-encroachment time at crossings, negative if both
+            were inside.
+        hardest_braking: m/s²; hard_braking: seconds of hard braking; jerk: largest change of
+            acceleration over 0.5 s [m/s³].
         progress: share of the witness' way that was driven, by its path.
         faults: steps in which a command was missing, not finite, or a jump.
         jumps: of these, poses that no vehicle can reach in a step, and those that are no place.
         stood: seconds for which the ego stood at the end of the drive.
         terms: those of nuPlan's and NAVSIM's scores.
         among_others: contacts of the others among themselves; there are none.
-        forced: how many times one of the others braked harder than the strongest braking, to keep the order.
+        forced: how many times one of the others braked harder than the strongest braking, to keep
+            the order.
     """
 
     index: int
@@ -207,8 +215,9 @@ class DriveVerdict:
 def judge(loop: ClosedLoop, drive: Drive) -> DriveVerdict:
     """Judge one drive.
 
-    Collisions and the road are looked at in continuous time, by the motion that `Scenario` defines between two instants. A jump
-    is no motion: nobody is met on the way, and what comes after it reaches no goal and leaves no road.
+    Collisions and the road are looked at in continuous time, by the motion that `Scenario` defines
+    between two instants. A jump is no motion: nobody is met on the way, and what comes after it
+    reaches no goal and leaves no road.
     """
     motion, ego = drive.motion, drive.ego
     time, n = motion.time, len(motion.vehicles)

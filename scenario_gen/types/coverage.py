@@ -33,8 +33,10 @@ class Coverage:
         index: of each measured scenario, as in `scenarios/info`.
         spreads: figures of the most critical pair of each scenario, by name.
         bins: names of the bins of PET.
-        pairs: how many pairs of vehicles of all scenarios are in each bin, by the pair's manoeuvres.
-        picks: index of the most critical, most typical and most different scenario, by those words; none of an empty set.
+        pairs: how many pairs of vehicles of all scenarios are in each bin, by the pair's
+            manoeuvres.
+        picks: index of the most critical, most typical and most different scenario, by those
+            words; none of an empty set.
         orders: how often each outcome of the passing order came, where it was free or swapped.
     """
 

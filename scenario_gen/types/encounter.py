@@ -46,12 +46,13 @@ class Encounter(Motion):
     Attributes:
         name: where it comes from, for people.
         start_ns: stamp of the first sample, nanoseconds on the log's clock.
-        origin: (latitude, longitude) in degrees of the frame's origin, or None if the log is in metres.
+        origin: (latitude, longitude) in degrees of the frame's origin, or None if the log is in
+            metres.
         source: whether its vehicles were recorded together.
 
     Raises:
-        InputError: shapes disagree, a value is not finite, a speed is negative, ids repeat, the sampling is
-            uneven, or no vehicle is present at the first or at the last sample.
+        InputError: shapes disagree, a value is not finite, a speed is negative, ids repeat, the
+            sampling is uneven, or no vehicle is present at the first or at the last sample.
     """
 
     name: str

@@ -208,7 +208,8 @@ class Evaluation:
         """Read what `to_json` wrote.
 
         Raises:
-            InputError: the text is not such a document; the message names `what` and the path inside it.
+            InputError: the text is not such a document; the message names `what` and the path
+                inside it.
         """
         return cls.from_document(parse_json(text, what, SCHEMA))
 

@@ -24,8 +24,10 @@ class FittedVehicle:
         stands: (K + 1,) True for the primitives during which the vehicle stands: a dwell, no path.
         scale: factor s of eq 9, template lengths -> road lengths.
         manoeuvre: "straight", "left", "right", "U-turn", or "wait" of one that stands throughout.
-        turned: how far [rad, left positive] the vehicle turns in the template and on the road; NaN where it is not known.
-        path: (M, 3) x, y, yaw of the fitted path from start to end, at most 0.5 m apart; no row where it is not known (a bag).
+        turned: how far [rad, left positive] the vehicle turns in the template and on the road; NaN
+            where it is not known.
+        path: (M, 3) x, y, yaw of the fitted path from start to end, at most 0.5 m apart; no row
+            where it is not known (a bag).
     """
 
     anchors: Floats
@@ -65,8 +67,8 @@ class Loss:
     """Something of the template's interaction that the fitted motion has not, or has otherwise.
 
     Attributes:
-        kind: "turn", "conflict" (paths that cross or merge), "following", "new conflict", "order", "beside" or "arm" (an arm
-            of the road that nobody uses).
+        kind: "turn", "conflict" (paths that cross or merge), "following", "new conflict", "order",
+            "beside" or "arm" (an arm of the road that nobody uses).
         vehicles: ids of whom it concerns.
         message: a sentence, with figures.
     """
@@ -83,10 +85,12 @@ class Fit:
     Attributes:
         vehicles: N identities and footprints.
         fitted: N fitted vehicles; none where only the requested states are known.
-        anchor_index: (K + 2,) sample index in the template of each anchor (0, changepoints, T - 1).
+        anchor_index: (K + 2,) sample index in the template of each anchor (0, changepoints, T -
+            1).
         requested: start and end states requested of every scenario (after repair).
         notes: what was decided (an entry chosen and why, an anchor moved by how much).
-        losses: what of the template's turns, conflicts and neighbours is lost on this road; none where nothing is.
+        losses: what of the template's turns, conflicts and neighbours is lost on this road; none
+            where nothing is.
     """
 
     vehicles: tuple[Vehicle, ...]

@@ -43,17 +43,20 @@ class GenerationResult:
         routes: one for each vehicle, or none.
         generated: the valid scenarios, and the account of every candidate.
         seed: of the request.
-        evaluation: of `generated`, `references` and `replay`; without rows if they were not evaluated.
-        references: sets to measure `generated` against, by row: WITHOUT is the paper's ablation, UNIFORM has as many changepoints
-            evenly spaced, both drawn as `generated` is; NARROW has the same changepoints and preset `narrow`.
+        evaluation: of `generated`, `references` and `replay`; without rows if they were not
+            evaluated.
+        references: sets to measure `generated` against, by row: WITHOUT is the paper's ablation,
+            UNIFORM has as many changepoints evenly spaced, both drawn as `generated` is; NARROW
+            has the same changepoints and preset `narrow`.
         refusals: why a reference is missing, by row.
         replay: the recording as fitted to the road, replayed.
         row_name: that of the evaluation's row of `generated`.
         provenance: what is needed to make it again: log hashes, versions, parameters.
         coverage: what `generated` covers, None if it was not measured.
-        not_compared: why `generated` is not compared with the references: what was requested of it alone (a target, a choice, an
-            order); "" if it is.
-        valid: how many of those scenarios are valid, where all of a bag's are shown; None: all of them are.
+        not_compared: why `generated` is not compared with the references: what was requested of it
+            alone (a target, a choice, an order); "" if it is.
+        valid: how many of those scenarios are valid, where all of a bag's are shown; None: all of
+            them are.
     """
 
     encounter: Encounter

@@ -35,7 +35,8 @@ class Lane:
         beside: indices of the lanes of the same direction to which its traffic may change.
         speed_limit: m/s; NaN where the map does not say.
         junction: the junction that it is part of, "" if none.
-        height: (M,) metres, of each cross-section; NaN where it is not known, as where none is given.
+        height: (M,) metres, of each cross-section; NaN where it is not known, as where none is
+            given.
         users: who may use it, of `LANE_USERS`; (): all that drive.
         crossing: it leads people across the lanes of others, as a zebra crossing does.
     """
@@ -165,11 +166,13 @@ class LaneNetwork:
         notes: how it was read: projection, what was left out, which part it is.
         rules: its signs, lights and rights of way.
         rules_kept: whether scenarios keep to the rules.
-        drawn: whether it was drawn with its road: it is shown and exported, and nobody is held to it.
+        drawn: whether it was drawn with its road: it is shown and exported, and nobody is held to
+            it.
         drawn_for: how it was drawn for a template; None: for none, or without a place for it.
-        origin: latitude and longitude [degrees] about which the frame is `geodesy`'s; (): the map says metres.
-        of_all: the lanes of all users, those of cars first, in the order of `lanes`; their `successors` and `beside` count in
-            here. (): no lane is closed to cars.
+        origin: latitude and longitude [degrees] about which the frame is `geodesy`'s; (): the map
+            says metres.
+        of_all: the lanes of all users, those of cars first, in the order of `lanes`; their
+            `successors` and `beside` count in here. (): no lane is closed to cars.
     """
 
     name: str

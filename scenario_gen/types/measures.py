@@ -22,7 +22,8 @@ class Measures:
 
     Attributes:
         figure: returns one figure by its name, of a pair or of the most critical one.
-        rarity: returns how unusual a scenario is among recorded encounters of its kind, up to 1 it is usual; None: nobody asks.
+        rarity: returns how unusual a scenario is among recorded encounters of its kind, up to 1 it
+            is usual; None: nobody asks.
     """
 
     figure: Measure

@@ -269,7 +269,8 @@ class Motion:
     def to_dataframe(self) -> "DataFrame":
         """Return a table with a row for each vehicle and each sample at which it is present.
 
-        Columns: vehicle (id), time [s], x, y [m], heading [rad], speed [m/s]. `read_log` reads such tables.
+        Columns: vehicle (id), time [s], x, y [m], heading [rad], speed [m/s]. `read_log` reads
+            such tables.
         """
         import pandas as pd
 

@@ -3,8 +3,9 @@
 
 """Presence: from which to which sample each vehicle of an encounter or a scenario is there.
 
-A vehicle may arrive late and leave early. Arrays keep their full shape; outside its presence a vehicle's rows hold its first or
-last value there, which says nothing of where it is. So whoever looks at a motion looks at the presence too.
+A vehicle may arrive late and leave early. Arrays keep their full shape; outside its presence a
+vehicle's rows hold its first or last value there, which says nothing of where it is. So whoever
+looks at a motion looks at the presence too.
 """
 
 import numpy as np
@@ -27,8 +28,8 @@ def canonical_presence(present: Ints, count: int, samples: int, name: str) -> In
         name: what it belongs to, for the message.
 
     Raises:
-        InputError: the shape is wrong, or they are no whole numbers, or a vehicle has fewer than two samples or lies
-            outside of 0 … T - 1.
+        InputError: the shape is wrong, or they are no whole numbers, or a vehicle has fewer than
+            two samples or lies outside of 0 … T - 1.
     """
     if np.shape(present) == (0, 2):
         return sealed(np.tile(np.array([0, samples - 1], dtype=np.int64), (count, 1)))

@@ -22,16 +22,22 @@ class Reaction:
         kind: FOLLOW (same way, behind) or YIELD (crossing or merging, second).
         who: the one that reacts.
         whom: the one it reacts to.
-        lag: seconds; of a follower from its leader's change of speed to its own, of a yielder from the other's clearing of the
-            shared area to when it drives off, or is slowest (negative if it anticipates).
-        gain: how much of a leader's quick change of speed its follower takes over, 0 to 1; 1 of a yielder.
-        residual: what is its own: metres of gap of a follower, seconds of lag of a yielder (one standard deviation).
+        lag: seconds; of a follower from its leader's change of speed to its own, of a yielder from
+            the other's clearing of the shared area to when it drives off, or is slowest (negative
+            if it anticipates).
+        gain: how much of a leader's quick change of speed its follower takes over, 0 to 1; 1 of a
+            yielder.
+        residual: what is its own: metres of gap of a follower, seconds of lag of a yielder (one
+            standard deviation).
         confidence: 0 to 1, how much better the record is explained with the edge than without.
-        since, until: seconds of the template's clock: during which it follows; from its wait's begin to its departure.
-        headway: least, median and greatest time gap [s], bumper to bumper, of a follower while it drives; zeros of a yielder.
-        stands: whether a yielder stands before it goes; one that does not only slows down, or passes (`since` is `until`).
-        gap: seconds from the other's clearing of the shared area to a yielder's entry; infinite if it does not come behind it: it
-            stops, or lets the other one pass close by.
+        since, until: seconds of the template's clock: during which it follows; from its wait's
+            begin to its departure.
+        headway: least, median and greatest time gap [s], bumper to bumper, of a follower while it
+            drives; zeros of a yielder.
+        stands: whether a yielder stands before it goes; one that does not only slows down, or
+            passes (`since` is `until`).
+        gap: seconds from the other's clearing of the shared area to a yielder's entry; infinite if
+            it does not come behind it: it stops, or lets the other one pass close by.
         merges: whether a yielder enters the other's lane and goes on behind it.
     """
 
@@ -103,7 +109,8 @@ class ReactionGraph:
     Attributes:
         edges: the reactions, those of a vehicle behind those of the ones it reacts to.
         order: all vehicles, each behind those it reacts to.
-        cut: reactions that were left out because they close a circle, each the least sure one of it.
+        cut: reactions that were left out because they close a circle, each the least sure one of
+            it.
         why: why there is none, "" if there is one.
     """
 

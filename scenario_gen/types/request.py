@@ -107,7 +107,8 @@ def read_states(text: str, what: str) -> dict[str, State]:
     """Return {vehicle id: state} of a text such as `1: 10.5 -1.75 0.0 8.0; 2: 3 4 1.57`.
 
     Raises:
-        InputError: it is not of that form, a value is not finite, a speed is negative, or a vehicle comes twice.
+        InputError: it is not of that form, a value is not finite, a speed is negative, or a
+            vehicle comes twice.
     """
     states: dict[str, State] = {}
     for piece in split_pieces(text):

@@ -44,15 +44,22 @@ class Road:
     """An occupancy grid with entries and exits.
 
     Attributes:
-        name: e.g. "t_intersection", or the stem of the map's file; for people, nothing is computed from it.
-        drivable: (H, W) bool; row 0 is the lowest y, column 0 the lowest x (nav_msgs/OccupancyGrid order).
+        name: e.g. "t_intersection", or the stem of the map's file; for people, nothing is computed
+            from it.
+        drivable: (H, W) bool; row 0 is the lowest y, column 0 the lowest x (nav_msgs/OccupancyGrid
+            order).
         resolution: cell size in metres, exactly representable in float32 (as it is on the wire).
-        origin: (2,) x, y in metres of the lower-left corner of cell (0, 0); the grid is not rotated.
-        entries: (E, 3) x, y, yaw: centre of each lane by which traffic comes in, heading into the road.
-        exits: (X, 3) x, y, yaw: centre of each lane by which traffic leaves, heading out of the road.
+        origin: (2,) x, y in metres of the lower-left corner of cell (0, 0); the grid is not
+            rotated.
+        entries: (E, 3) x, y, yaw: centre of each lane by which traffic comes in, heading into the
+            road.
+        exits: (X, 3) x, y, yaw: centre of each lane by which traffic leaves, heading out of the
+            road.
         frame_id: the frame of all poses.
-        lanes: those of a vector map that the grid was drawn from, or those drawn with it; None: nothing is known of lanes.
-        obstructed: (H, W) bool; cells that would be drivable, but for something that stands there. None: nothing does.
+        lanes: those of a vector map that the grid was drawn from, or those drawn with it; None:
+            nothing is known of lanes.
+        obstructed: (H, W) bool; cells that would be drivable, but for something that stands there.
+            None: nothing does.
     """
 
     name: str

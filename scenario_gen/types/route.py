@@ -19,13 +19,18 @@ class Route:
     """A smooth path through a vehicle's anchors.
 
     Attributes:
-        points: (M, 3) x [m], y [m], yaw [rad, unwrapped]; at most 0.5 m apart, no two equal; M = 1 if it stands throughout.
-        anchor: (K + 2,) index into `points` of each anchor, non-decreasing; equal neighbours are a dwell.
+        points: (M, 3) x [m], y [m], yaw [rad, unwrapped]; at most 0.5 m apart, no two equal; M = 1
+            if it stands throughout.
+        anchor: (K + 2,) index into `points` of each anchor, non-decreasing; equal neighbours are a
+            dwell.
         length: (M,) arc length [m] from the start to each point.
-        joined: legs between waypoints that a direct curve joined at once; None where it is not known (a bag).
+        joined: legs between waypoints that a direct curve joined at once; None where it is not
+            known (a bag).
         searched: legs that were searched for; likewise.
-        left_out: anchors that no free route leads through, so that the route passes them as near as it may.
-        farthest: largest distance [m] between the route and the fitted path, seen from either; NaN where it is not known.
+        left_out: anchors that no free route leads through, so that the route passes them as near
+            as it may.
+        farthest: largest distance [m] between the route and the fitted path, seen from either; NaN
+            where it is not known.
     """
 
     points: Floats

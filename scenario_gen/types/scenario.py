@@ -99,7 +99,8 @@ class BoundaryStates:
 
     Attributes:
         start, end: (N, 4) x [m], y [m], yaw [rad], speed [m/s].
-        freed: (N, 2, 2) metres and m/s by which a scenario's start and end may differ from that; 0 where it was requested.
+        freed: (N, 2, 2) metres and m/s by which a scenario's start and end may differ from that; 0
+            where it was requested.
     """
 
     start: Floats
@@ -162,7 +163,8 @@ class Violation:
 class Verdict:
     """The checker's answer for one scenario; valid if there is no violation.
 
-    `conflicts` counts the template's conflicts that also exist in the scenario, `not_applicable` those that do not.
+    `conflicts` counts the template's conflicts that also exist in the scenario, `not_applicable`
+    those that do not.
     """
 
     violations: tuple[Violation, ...] = ()
@@ -188,11 +190,12 @@ class EgoSlot:
 class ScenarioSet:
     """What a request got: valid scenarios, and an account of every candidate.
 
-    `refused` counts refused candidates by their first cause; `adaptations` are notes on how they were drawn. `ego` is the
-    vehicle that was left out for a planner under test, if one was; each scenario then has its reference drive.
-    The scenarios of a large set are not in memory but drawn again whenever they are looked at. `reached` says what sampling
-    towards a target came to.
-    `graph` says who reacts to whom in the template (None: nobody looked), `reactions` are those that every scenario keeps.
+    `refused` counts refused candidates by their first cause; `adaptations` are notes on how they
+    were drawn. `ego` is the vehicle that was left out for a planner under test, if one was; each
+    scenario then has its reference drive. The scenarios of a large set are not in memory but drawn
+    again whenever they are looked at. `reached` says what sampling towards a target came to.
+    `graph` says who reacts to whom in the template (None: nobody looked), `reactions` are those
+    that every scenario keeps.
     """
 
     requested: int

@@ -18,10 +18,12 @@ class Segmentation:
 
     Attributes:
         labels: (T,) primitive of each sample, 0 .. n_primitives - 1 in order of first appearance.
-        changepoints: (K,) sample indices, each the first sample whose primitive differs (0 is none); labels change exactly there.
+        changepoints: (K,) sample indices, each the first sample whose primitive differs (0 is
+            none); labels change exactly there.
         changepoint_probability: (T,) posterior probability that a changepoint sits at each sample.
         descriptions: K + 1 sentences, one per segment ("vehicle 0 brakes, vehicle 1 stands").
-        r_hat: largest split R-hat of the sampler's traces: whether its chains agreed; nan: not known.
+        r_hat: largest split R-hat of the sampler's traces: whether its chains agreed; nan: not
+            known.
     """
 
     labels: Ints
@@ -54,7 +56,8 @@ class LiveChangepoints:
     """Changepoints that one sample confirmed, with the vehicles' states there.
 
     Attributes:
-        start_ns: stamp of the stretch's first sample: since then the same vehicles have been there at every tick.
+        start_ns: stamp of the stretch's first sample: since then the same vehicles have been there
+            at every tick.
         vehicles: N identities and footprints.
         time_ns: (K,) since `start_ns`, increasing.
         position: (N, K, 2) m.

@@ -33,7 +33,8 @@ class Target:
     Attributes:
         name: of the figure, one of UNITS.
         low, high: the bounds; one of them may be infinite.
-        vehicles: ids of the pair it is of; of one vehicle: its most critical pair; none: the most critical of all pairs.
+        vehicles: ids of the pair it is of; of one vehicle: its most critical pair; none: the most
+            critical of all pairs.
     """
 
     name: str
@@ -77,8 +78,10 @@ class Reached:
     Attributes:
         targets: what was requested.
         stages: of the adaptation; candidates: of all of them.
-        share: estimated share of natural candidates that are valid and in the range, with its 95 % interval low, high.
-        directed: whether a proposal was used; else candidates are as without a target, and all weights are 1.
+        share: estimated share of natural candidates that are valid and in the range, with its 95 %
+            interval low, high.
+        directed: whether a proposal was used; else candidates are as without a target, and all
+            weights are 1.
     """
 
     targets: tuple[Target, ...]
@@ -123,7 +126,8 @@ def read_targets(text: str) -> tuple[Target, ...]:
     """Return the targets of a text such as `pet=0.5..1.5; ttc[1,2]=1..2`; a bound that is left out is open.
 
     Raises:
-        InputError: it is not of that form, a figure is unknown or comes twice, or a range is empty.
+        InputError: it is not of that form, a figure is unknown or comes twice, or a range is
+            empty.
     """
     targets: list[Target] = []
     for piece in split_pieces(text):

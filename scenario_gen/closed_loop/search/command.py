@@ -207,7 +207,8 @@ def search_failures(
 ) -> SearchResult:
     """Search, and write search.json, search.html, junit.xml and a bag of the failures.
 
-    Every drive is kept in a journal beside the folder: the same search goes on where it was stopped, and with a larger budget.
+    Every drive is kept in a journal beside the folder: the same search goes on where it was
+    stopped, and with a larger budget.
 
     Args:
         request: what is searched.
@@ -216,8 +217,8 @@ def search_failures(
         progress: called with how many drives are done, of how many.
 
     Raises:
-        InputError: the planner fails, a vehicle or parameter is wrong, the journal is of another search, or a file cannot be
-            written; the message names it.
+        InputError: the planner fails, a vehicle or parameter is wrong, the journal is of another
+            search, or a file cannot be written; the message names it.
         RefusedError: no scenario can be drawn.
     """
     if request.budget < 1:

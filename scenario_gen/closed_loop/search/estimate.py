@@ -5,12 +5,14 @@
 
 Two steps take turns, so that any budget is a prefix of a larger one:
 
-- Exploration by small runs of subset simulation (Au & Beck 2001) with preconditioned Crank-Nicolson moves (Cotter et al. 2013).
-  Of many moves the one is driven that a regression predicts to be the nearest to failure. Runs start anew, so that they find the
-  first failure early, and different failures.
-- Estimation by two-phase sampling (Neyman 1938). Natural scenarios are drawn; each is driven with a probability that is the
-  higher the nearer to failure it is predicted to be, and counts by the inverse of that (Horvitz & Thompson 1952). So the rate is
-  unbiased whatever the regression is worth, and no weight exceeds the inverse of the least probability.
+- Exploration by small runs of subset simulation (Au & Beck 2001) with preconditioned
+  Crank-Nicolson moves (Cotter et al. 2013). Of many moves the one is driven that a regression
+  predicts to be the nearest to failure. Runs start anew, so that they find the first failure
+  early, and different failures.
+- Estimation by two-phase sampling (Neyman 1938). Natural scenarios are drawn; each is driven with
+  a probability that is the higher the nearer to failure it is predicted to be, and counts by the
+  inverse of that (Horvitz & Thompson 1952). So the rate is unbiased whatever the regression is
+  worth, and no weight exceeds the inverse of the least probability.
 """
 
 from collections.abc import Sequence
@@ -54,7 +56,8 @@ class Response:
 
     Attributes:
         margin: 0 or less if it failed; the smaller, the nearer to failure.
-        parts: figures whose least is the margin where it did not fail; as many for every drive, or none.
+        parts: figures whose least is the margin where it did not fail; as many for every drive, or
+            none.
         kind: which failure it is, "" for none.
         events: what happened whose rates are told, too.
     """
@@ -98,7 +101,8 @@ class Estimate:
         rate: share of certified natural scenarios in which the planner fails, with its interval.
         plain: the same by natural drives alone: failures, drives.
         drives: how many; first: number of the first that failed, counted from 1, 0 if none did.
-        seen: certified natural scenarios that the rate is of, driven or not; valid: their share of the candidates.
+        seen: certified natural scenarios that the rate is of, driven or not; valid: their share of
+            the candidates.
         unexpected: upper end (95 %) of the rate of failures that the regression does not expect.
         shares: of the rate, by kind of failure.
         events: rates of the events of the responses, by name, with their intervals.
@@ -143,7 +147,8 @@ class Search:
         worst: explore on beyond the first failures, for the worst, and estimate no rate.
         z: (d,) numbers of each drive.
         responses: of each drive.
-        weights: of drives of natural scenarios that count for the rate: for how many of these each stands.
+        weights: of drives of natural scenarios that count for the rate: for how many of these each
+            stands.
         told: names of events whose rates are told.
     """
 
@@ -315,8 +320,8 @@ class Search:
     def _estimate(self) -> bool:
         """Draw one batch of natural scenarios and drive in some of them; False if none can be certified.
 
-        The batch is drawn whole and weighed before anything is driven, so that the rate is unbiased. One that the budget cuts off
-        does not count.
+        The batch is drawn whole and weighed before anything is driven, so that the rate is
+        unbiased. One that the budget cuts off does not count.
         """
         generator = self._generator(2, self._batches)
         self._batches += 1
@@ -400,9 +405,10 @@ class Search:
     def _rate(self, hits: Sequence[int], *, also: bool) -> Interval:
         """Return the rate over the batches of what happened in some drives, with its interval.
 
-        That is the gamma interval of a sum of weights (Fay & Feuer 1997). If it never happened, the upper end is the rate at
-        which that has a probability of 2.5 %: in batch b each of n scenarios is driven with a probability of e at least, which
-        is fixed before they are drawn, so it is Π (1 - rate · e)^n at most. `also`: nor in any natural drive of the exploration.
+        That is the gamma interval of a sum of weights (Fay & Feuer 1997). If it never happened,
+        the upper end is the rate at which that has a probability of 2.5 %: in batch b each of n
+        scenarios is driven with a probability of e at least, which is fixed before they are drawn,
+        so it is Π (1 - rate · e)^n at most. `also`: nor in any natural drive of the exploration.
         """
         w = np.array([self.weights[k] for k in hits])
         if not len(w):

@@ -37,8 +37,10 @@ class Finding:
     Attributes:
         drive: its number in the search, from 0.
         kind: who, how and where.
-        weight: for how many natural scenarios it stands in the rate; None where the exploration found it.
-        deviation: from the mean scenario, in standard deviations along the direction that the regression goes by.
+        weight: for how many natural scenarios it stands in the rate; None where the exploration
+            found it.
+        deviation: from the mean scenario, in standard deviations along the direction that the
+            regression goes by.
         trial: the scenario, of all vehicles.
         outcome: the drive.
         passed: whether the ego's witness passes it.

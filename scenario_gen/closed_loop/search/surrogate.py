@@ -39,7 +39,8 @@ class Surrogate:
     def fit(cls, columns: Floats, figure: Floats, features: int, natural: Bools) -> "Surrogate":
         """Fit to columns (n, q), in any unit, of which the last are features, and a figure (n,), 0 or less at failure.
 
-        `natural` (n,) says which drives are of natural scenarios: by these, if there are enough, the error is told.
+        `natural` (n,) says which drives are of natural scenarios: by these, if there are enough,
+        the error is told.
         """
         high = max(float(np.quantile(np.maximum(figure, 0.0), CUT_QUANTILE)), 1e-9)
         y = np.clip(figure, -BEYOND * high, high)

@@ -3,8 +3,8 @@
 
 """Confidence intervals by the bootstrap: samples are drawn again with replacement, as weights.
 
-Every set metric is written as a function of weights (B, S) over its S samples, so that all resamples are computed at
-once, mostly as one matrix product.
+Every set metric is written as a function of weights (B, S) over its S samples, so that all
+resamples are computed at once, mostly as one matrix product.
 """
 
 from collections.abc import Callable
@@ -64,8 +64,8 @@ class Bootstrap:
     def interval(self, statistic: Statistic) -> Interval:
         """Return the statistic of the whole set with its percentile bounds (Efron 1979), widened to hold the value.
 
-        Distances such as E cannot fall below zero, and resampling raises them. Correcting for that bias makes intervals too
-        short near zero, so it is left in.
+        Distances such as E cannot fall below zero, and resampling raises them. Correcting for that
+        bias makes intervals too short near zero, so it is left in.
 
         Args:
             statistic: maps weights (B, S) to values (B,); NaN where a resample has no value.
@@ -105,9 +105,10 @@ def wilson(count: int, total: int, level: float) -> Interval:
 def clustered_wilson(hits: Bools, unit: Ints, level: float) -> Interval:
     """Return the share of hits (S,) with Wilson's interval for samples that depend on each other within units (S,).
 
-    The number of samples is divided by the design effect: the variance between the totals of units over that of independent
-    samples, at least 1. The quantile is Student's with a degree of freedom for each unit but one. Where nothing or everything
-    is a hit, no sample tells how much those of a unit are alike, and each unit counts as one sample.
+    The number of samples is divided by the design effect: the variance between the totals of units
+    over that of independent samples, at least 1. The quantile is Student's with a degree of
+    freedom for each unit but one. Where nothing or everything is a hit, no sample tells how much
+    those of a unit are alike, and each unit counts as one sample.
     Source: Korn & Graubard 1998; for Wilson's interval, Franco, Little, Louis & Slud 2019.
     """
     count, total = int(np.count_nonzero(hits)), len(hits)
@@ -127,8 +128,9 @@ def clustered_wilson(hits: Bools, unit: Ints, level: float) -> Interval:
 def paired_difference(differences: Floats, unit: Ints, level: float) -> Interval:
     """Return the mean of differences (S,) of -1, 0 or 1 between pairs, with an interval for pairs that depend on each other.
 
-    Its variance is that between the totals of units (S,), its quantile Student's with a degree of freedom for each unit but one.
-    Where no pair differs the bounds are those of a share of 0 among as many units.
+    Its variance is that between the totals of units (S,), its quantile Student's with a degree of
+    freedom for each unit but one. Where no pair differs the bounds are those of a share of 0 among
+    as many units.
     Source: Liang & Zeger 1986, for one mean.
     """
     _, member = np.unique(unit, return_inverse=True)

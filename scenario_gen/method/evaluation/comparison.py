@@ -130,7 +130,8 @@ def read_evaluations(path: Path) -> tuple[Evaluation, ...]:
     """Read the figures of a run: its folder, its evaluation.json, or one evaluation as JSON.
 
     Raises:
-        InputError: there is no such file, or it is not one; the message names the path inside the document.
+        InputError: there is no such file, or it is not one; the message names the path inside the
+            document.
     """
     file = path / "evaluation.json" if path.is_dir() else path
     document = read_json(file, FILE_SCHEMA, f"{file} is no evaluation")

@@ -44,9 +44,10 @@ ALIKE = (
 def coverage_of(encounter: Encounter, scenarios: Sequence[Scenario]) -> Coverage:
     """Measure what a set covers; of a set of more than MEASURED scenarios that many, as the evaluation does.
 
-    The figures are those of a scenario's most critical pair (`most_critical`). Most critical is the scenario with the least PET,
-    or, if nobody crosses, the least gap; most typical the one nearest to the medians of the set, each figure in units of its
-    spread; most different the one farthest from the template.
+    The figures are those of a scenario's most critical pair (`most_critical`). Most critical is
+    the scenario with the least PET, or, if nobody crosses, the least gap; most typical the one
+    nearest to the medians of the set, each figure in units of its spread; most different the one
+    farthest from the template.
     """
     whole = [join_ego(scenario) for scenario in measured(scenarios)]
     each = [figures_of(scenario) for scenario in whole]

@@ -23,8 +23,9 @@ class Criticality:
     Attributes:
         min_distance: least distance between two footprints [m]; NaN with one vehicle.
         min_ttc: least time to collision [s], at most the horizon; likewise.
-        pet: least post-encroachment time [s] over crossing conflicts: from the first vehicle's exit of the shared area to
-            the second's entry; negative if both were inside; NaN without such a conflict.
+        pet: least post-encroachment time [s] over crossing conflicts: from the first vehicle's
+            exit of the shared area to the second's entry; negative if both were inside; NaN
+            without such a conflict.
         order: (pair, which of them went first) of every conflict, by vehicle index.
     """
 

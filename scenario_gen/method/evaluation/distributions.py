@@ -45,9 +45,9 @@ QUANTITIES = (
 def values_of(motion: Motion) -> dict[str, Floats]:
     """Return {quantity id: all its values (n,) in one motion}, in the units of QUANTITIES (m, s, rad).
 
-    Acceleration, jerk and yaw rate are differentiated from speed and heading, for recorded and generated motion alike; the
-    gap is the distance between two footprints. A motion shorter than the smoothing has no jerk. A vehicle counts while it is
-    there, a gap while both are.
+    Acceleration, jerk and yaw rate are differentiated from speed and heading, for recorded and
+    generated motion alike; the gap is the distance between two footprints. A motion shorter than
+    the smoothing has no jerk. A vehicle counts while it is there, a gap while both are.
     """
     width = max(1, round(SMOOTHING / motion.dt))
     samples: dict[str, list[Floats]] = {quantity.id: [np.zeros(0)] for quantity in QUANTITIES}

@@ -3,10 +3,11 @@
 
 """Dynamic time warping and the paper's feature: the normalised matrix of pairwise distances (paper V-B, Fig. 5).
 
-Series are laid out (D, T): one row per channel, so that the inner loops run over contiguous time. D = 2 for position
-(Euclidean distance), 1 for speed, where Euclidean and Manhattan are both the absolute difference, and 1 for heading, whose
-difference is wrapped. A kernel takes the kind of distance as one number, `turn`: 0 is Euclidean, infinite Manhattan, any other a
-circle's circumference.
+Series are laid out (D, T): one row per channel, so that the inner loops run over contiguous time.
+D = 2 for position (Euclidean distance), 1 for speed, where Euclidean and Manhattan are both the
+absolute difference, and 1 for heading, whose difference is wrapped. A kernel takes the kind of
+distance as one number, `turn`: 0 is Euclidean, infinite Manhattan, any other a circle's
+circumference.
 """
 
 from typing import Literal
@@ -88,7 +89,8 @@ def _feature_rows(
 def _wavefront(a: Floats, b: Floats, turn: float, band: int) -> float:
     """Exact DTW by anti-diagonals: no cell of one depends on another, so the loop vectorises; three diagonals are kept.
 
-    Cell (i, j) of diagonal k = i + j stands at index i + 1; b is reversed, so j = k - i runs forward in memory with i.
+    Cell (i, j) of diagonal k = i + j stands at index i + 1; b is reversed, so j = k - i runs
+    forward in memory with i.
     """
     channels, n = a.shape
     m = b.shape[1]
@@ -139,10 +141,12 @@ def dtw_distance(
         a: (n,) or (n, D).
         b: (m,) or (m, D).
         distance: between two samples.
-        band: how many samples the path may leave the corridor between the two diagonals (Sakoe-Chiba); None: any.
+        band: how many samples the path may leave the corridor between the two diagonals
+            (Sakoe-Chiba); None: any.
 
     Raises:
-        InputError: an empty series, a different number of channels, a value that is not finite, or a negative band.
+        InputError: an empty series, a different number of channels, a value that is not finite, or
+            a negative band.
     """
     left, right = _channels(a, distance), _channels(b, distance)
     return float(_wavefront(left, right, _TURN[distance], _band(left, right, band)))
@@ -172,7 +176,8 @@ def feature_rows(
 ) -> Floats:
     """Return rows `rows` of the feature matrices of S samples, (S, len(rows)·m), given their extents (S, 2).
 
-    A set of long encounters does not fit in memory at once, so what sums over matrices goes through them row by row.
+    A set of long encounters does not fit in memory at once, so what sums over matrices goes
+    through them row by row.
     """
     out = np.empty((a.shape[0], len(rows) * b.shape[2]))
     _feature_rows(

@@ -45,7 +45,8 @@ def evaluate(
         config: how to measure.
 
     Returns:
-        One row for the recorded template, one for `generated` and for each reference, and `REPLAY` if there is a replay.
+        One row for the recorded template, one for `generated` and for each reference, and `REPLAY`
+        if there is a replay.
 
     Raises:
         InputError: a scenario has a vehicle that the encounter has not.
@@ -75,18 +76,20 @@ def evaluate_scenarios(
 
     Args:
         encounter: the recorded template.
-        sets: scenarios, or several sets of them by name, each a row: "mine", "replay". A `ScenarioSet` brings its account of
-            candidates along. An empty set gives an empty row, with a note. Of a set of more than MEASURED
-            scenarios that many are measured, see `measured`.
+        sets: scenarios, or several sets of them by name, each a row: "mine", "replay". A
+            `ScenarioSet` brings its account of candidates along. An empty set gives an empty row,
+            with a note. Of a set of more than MEASURED scenarios that many are measured, see
+            `measured`.
         changepoints: their number K stands beside E, for more changepoints always fit better.
         checks: the checker's account of the candidates of a row, where its set brings none.
-        replay: the row whose first scenario is the fitted template, to which displacements are measured.
+        replay: the row whose first scenario is the fitted template, to which displacements are
+            measured.
         road: name of the road, for the heading.
         config: how to measure.
         seed: of the bootstrap.
 
-    A vehicle that a scenario lacks (one left out for an ego) is left out of every row, the template's too; with one vehicle
-    left, what needs two is not a number.
+    A vehicle that a scenario lacks (one left out for an ego) is left out of every row, the
+    template's too; with one vehicle left, what needs two is not a number.
 
     Returns:
         One row for the recorded template and one for each set.
@@ -139,8 +142,9 @@ def evaluate_scenarios(
 def measured(scenarios: Sequence[Scenario]) -> Sequence[Scenario]:
     """Return the scenarios of a set that the figures are taken of: all, or MEASURED of a larger one.
 
-    Those are RUNS runs of consecutive scenarios, evenly spaced from the first to the last: whatever changes along the set is in
-    them, and nearly every scenario has its mirror image beside it, as in a smaller set.
+    Those are RUNS runs of consecutive scenarios, evenly spaced from the first to the last:
+    whatever changes along the set is in them, and nearly every scenario has its mirror image
+    beside it, as in a smaller set.
     """
     if len(scenarios) <= MEASURED:
         return scenarios

@@ -3,15 +3,18 @@
 
 """How recorded encounters of one kind differ: the law that `sampling.variety=population` draws from.
 
-The law is a Gaussian of an encounter's features (FEATURES of `scenario_gen.method.evaluation.population`): speeds, braking and
-stands of both vehicles, the approach, their gaps at the conflict. It is learned from the template and the other recorded
-encounters of its kind, and shrunk towards a shipped one: with n of them of features x_i, sum over them Σ,
+The law is a Gaussian of an encounter's features (FEATURES of
+`scenario_gen.method.evaluation.population`): speeds, braking and stands of both vehicles, the
+approach, their gaps at the conflict. It is learned from the template and the other recorded
+encounters of its kind, and shrunk towards a shipped one: with n of them of features x_i, sum over
+them Σ,
 
     μ = (a μ₀ + Σ x_i) / (a + n),   S = (b S₀ + Σ (x_i − μ)(x_i − μ)ᵀ) / (b + n),
 
-the conjugate estimates of mean and covariance with a prior that counts as a and b encounters; the correlations of S are shrunk by
-a share c. A scenario of features x is at a distance d(x) = sqrt((x − μ)ᵀ S⁻¹ (x − μ) / F) from the middle, and up to 0.6 it
-is usual. `resources/population.json` holds μ₀ and S₀ of each kind; its source stands there.
+the conjugate estimates of mean and covariance with a prior that counts as a and b encounters; the
+correlations of S are shrunk by a share c. A scenario of features x is at a distance d(x) = sqrt((x
+− μ)ᵀ S⁻¹ (x − μ) / F) from the middle, and up to 0.6 it is usual. `resources/population.json`
+holds μ₀ and S₀ of each kind; its source stands there.
 """
 
 from collections.abc import Callable, Sequence
@@ -79,12 +82,13 @@ def rarity_in(
 ) -> Callable[[Scenario], float]:
     """Return what says how unusual scenarios of a template are: their distance from the middle over USUAL.
 
-    The law is that of the scenario's own kind, which on another road may be another one than the template's. Of those whose
-    vehicles share no area nothing is known: their rarity is infinite.
+    The law is that of the scenario's own kind, which on another road may be another one than the
+    template's. Of those whose vehicles share no area nothing is known: their rarity is infinite.
 
     Args:
         encounter: the template; it counts once, whether it is in the population or not.
-        population: recorded encounters; those of the same features are one, whatever they are called.
+        population: recorded encounters; those of the same features are one, whatever they are
+            called.
     """
     template = member_of(encounter, encounter.name, 0)
     members = [template]

@@ -5,18 +5,19 @@
 
 They are taken on the published samples (0.1 s). Of a pair a, b:
 
-- `pet`: post-encroachment time [s] (Allen, Shin & Cooper 1978): from the first one's exit of the area that both footprints sweep
-  to the second one's entry; negative if both were inside at once. Of crossing and merging pairs only, see
-  `scenario_gen.situation.conflicts`.
-- `arrival_gap` [s]: from the first one's entry into that area to the second one's. Of a named pair [a,b] it has a sign:
-  negative if b is first. Of crossing and merging pairs only.
-- `ttc` [s]: least time to collision while both keep their velocities (Hayward 1972), of the footprints; infinite if they are
-  never on a collision course.
+- `pet`: post-encroachment time [s] (Allen, Shin & Cooper 1978): from the first one's exit of the
+  area that both footprints sweep to the second one's entry; negative if both were inside at once.
+  Of crossing and merging pairs only, see `scenario_gen.situation.conflicts`.
+- `arrival_gap` [s]: from the first one's entry into that area to the second one's. Of a named pair
+  [a,b] it has a sign: negative if b is first. Of crossing and merging pairs only.
+- `ttc` [s]: least time to collision while both keep their velocities (Hayward 1972), of the
+  footprints; infinite if they are never on a collision course.
 - `gap` [m]: least distance of the two footprints.
-- `closing_speed` [m/s]: rate at which the distance of the two centres shrinks when the first one enters the shared area; of a
-  pair that neither crosses nor merges the greatest rate while both are there.
-- `baseline_margin` [s]: time by which vehicle a, as the non-reactive baseline, would have to be shifted to meet b; 0 if it
-  would. See `scenario_gen.method.evaluation.non_reactive`.
+- `closing_speed` [m/s]: rate at which the distance of the two centres shrinks when the first one
+  enters the shared area; of a pair that neither crosses nor merges the greatest rate while both
+  are there.
+- `baseline_margin` [s]: time by which vehicle a, as the non-reactive baseline, would have to be
+  shifted to meet b; 0 if it would. See `scenario_gen.method.evaluation.non_reactive`.
 
 Over all pairs the most critical value counts: the least, of `closing_speed` the greatest.
 """
@@ -56,7 +57,8 @@ def measure(scenario: Motion, name: str, pair: Pair | None = None) -> float:
     Args:
         scenario: with all its vehicles, an ego's reference drive too.
         name: of the figure, see above.
-        pair: indices of two vehicles, the sign of `arrival_gap` follows their order; of one: its most critical pair.
+        pair: indices of two vehicles, the sign of `arrival_gap` follows their order; of one: its
+            most critical pair.
     """
     motion = scenario.resampled(PERIOD)
     ordered = permutations(range(len(motion.vehicles)), 2)

@@ -51,7 +51,8 @@ class MetricGroup:
 
     Attributes:
         metrics: what they are called; a heading (`group`) of their own stands below the others.
-        measure: returns the estimate of each by its id, of one or more scenarios; one that cannot be had is left out or NaN.
+        measure: returns the estimate of each by its id, of one or more scenarios; one that cannot
+            be had is left out or NaN.
         of_template: returns those that the recorded encounter has, too.
     """
 

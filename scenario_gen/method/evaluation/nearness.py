@@ -3,9 +3,10 @@
 
 """How near two vehicles came to a collision, in time: a figure that goes smoothly to 0 as a collision comes near.
 
-It is by how much one of them would have had to be earlier or later on its way for their footprints to meet. At a crossing that is
-the post-encroachment time (Allen, Shin & Cooper 1978), behind another the time gap. Least distances do not do: vehicles that pass
-each other in their lanes are always near, and never meet.
+It is by how much one of them would have had to be earlier or later on its way for their footprints
+to meet. At a crossing that is the post-encroachment time (Allen, Shin & Cooper 1978), behind
+another the time gap. Least distances do not do: vehicles that pass each other in their lanes are
+always near, and never meet.
 """
 
 import numpy as np

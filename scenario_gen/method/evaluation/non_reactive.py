@@ -3,7 +3,8 @@
 
 """The non-reactive baseline: follows its path as fast as it ever drove, slows down in bends and to stop, and ignores all others.
 
-Planners are compared with it; the figure `baseline_margin` is the time by which it would miss the others.
+Planners are compared with it; the figure `baseline_margin` is the time by which it would miss the
+others.
 """
 
 import numpy as np

@@ -3,13 +3,16 @@
 
 """How much unseen traffic a few recordings stand for: coverage and precision of what is generated from them.
 
-Both as of Kynkäänniemi et al. (2019), with balls about recorded encounters. An encounter is that of its most critical pair. Its
-features (FEATURES) are independent of the place, and the same for recorded and generated motions; distances are in standard
-deviations of the recorded encounters of the same kind, root mean square over features. Of one kind r is the median distance of
-an encounter to its nearest in other recordings.
+Both as of Kynkäänniemi et al. (2019), with balls about recorded encounters. An encounter is that
+of its most critical pair. Its features (FEATURES) are independent of the place, and the same for
+recorded and generated motions; distances are in standard deviations of the recorded encounters of
+the same kind, root mean square over features. Of one kind r is the median distance of an encounter
+to its nearest in other recordings.
 
-- coverage: share of unseen encounters, which are of other recordings, within r of the nearest member;
-- precision: share of members within r of a recorded encounter of another recording than their template's.
+- coverage: share of unseen encounters, which are of other recordings, within r of the nearest
+  member;
+- precision: share of members within r of a recorded encounter of another recording than their
+  template's.
 """
 
 from collections import Counter
@@ -79,7 +82,8 @@ class Member:
         recording: its name; of a generated one that of its template.
         template: place of its template among the recorded.
         pair: its vehicles that count, None if no two share an area.
-        other: place of the recorded encounter whose second vehicle it has, too, if it is of a recombined one; else -1.
+        other: place of the recorded encounter whose second vehicle it has, too, if it is of a
+            recombined one; else -1.
         scenario: its number, -1 of a recorded one.
     """
 
@@ -108,8 +112,8 @@ class Point:
         alone: coverage by the templates.
         generated: coverage by templates and generated.
         precision: of the generated; `recorded`: of the templates themselves.
-        multiplier: recordings that cover alone as much (with the quantiles of `generated`), over `templates`; inf: more than
-            there are.
+        multiplier: recordings that cover alone as much (with the quantiles of `generated`), over
+            `templates`; inf: more than there are.
     """
 
     templates: int
@@ -147,10 +151,12 @@ class Population:
         encounters: recorded, by kind.
         scenarios: generated from them, by kind.
         curve: coverage by number of templates, drawn of all kinds.
-        by_kind: the same by kind, of templates that are all of that kind; without kinds that hold too few.
+        by_kind: the same by kind, of templates that are all of that kind; without kinds that hold
+            too few.
         unreached: encounters that no other recording's set reaches, the farthest first.
         farthest: scenarios that are farthest from all recorded encounters, at most ten.
-        needed: recordings that would cover 0.9 by the curve's extrapolation, inf where it does not rise.
+        needed: recordings that would cover 0.9 by the curve's extrapolation, inf where it does not
+            rise.
     """
 
     encounters: dict[str, int]
@@ -233,8 +239,9 @@ def member_of(
 ) -> Member:
     """Return kind and features of a motion's pair, the one that has most to do with each other by default.
 
-    That is, of the pairs that cross or merge the one with the least PET, and where there are none the followers nearest to each
-    other. The kind is None where the pair, or every pair, shares no area.
+    That is, of the pairs that cross or merge the one with the least PET, and where there are none
+    the followers nearest to each other. The kind is None where the pair, or every pair, shares no
+    area.
     """
     whole = motion.resampled(PERIOD)
     figures = {own.pair: own for own in figures_of(motion) if pair in (None, own.pair)}
@@ -447,8 +454,9 @@ class Members:
 def members_of(results: Iterable[tuple[str, GenerationResult]]) -> Members:
     """Return the members of recordings and of the sets generated from them; arguments as of `population_of`.
 
-    An encounter that is called as two others are together, "A + B", is recombined of these: it is no recorded one, and what is
-    generated from it is of both. It is left out where one of these is not among the results.
+    An encounter that is called as two others are together, "A + B", is recombined of these: it is
+    no recorded one, and what is generated from it is of both. It is left out where one of these is
+    not among the results.
     """
     recorded: list[Member] = []
     made: list[Member] = []
@@ -499,7 +507,8 @@ class _Near:
     Attributes:
         members: recorded ones.
         recording: (R,) number of each one's recording.
-        template: (M, 2) indices of each generated member's templates, twice the same but for recombined ones.
+        template: (M, 2) indices of each generated member's templates, twice the same but for
+            recombined ones.
         scaled: (R + M, F) features in standard deviations of the kind, recorded ones first.
         apart: (R + M, R) distances to recorded members in units of r, inf between kinds.
     """

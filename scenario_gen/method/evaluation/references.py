@@ -3,7 +3,8 @@
 
 """Changepoints that know nothing: what the segmenter's have to be measured against at the same K.
 
-More changepoints always fit better; a primitive must earn its place. Uniform ones are what anybody could place.
+More changepoints always fit better; a primitive must earn its place. Uniform ones are what anybody
+could place.
 """
 
 from dataclasses import replace

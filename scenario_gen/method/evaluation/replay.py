@@ -15,8 +15,9 @@ MIN_CHORD = 0.5
 def replay(encounter: Encounter, fit: Fit, frame_id: str = "map") -> Scenario:
     """Map every piece of the template between two anchors onto the road by its own similarity (eqs 7-9).
 
-    Start goes to start and end to end; speeds scale with the lengths. A standing primitive stands at its anchor. A piece
-    whose chord is too short to give a direction keeps its shape and is turned by the headings of its start.
+    Start goes to start and end to end; speeds scale with the lengths. A standing primitive stands
+    at its anchor. A piece whose chord is too short to give a direction keeps its shape and is
+    turned by the headings of its start.
     """
     first, last = int(fit.anchor_index[0]), int(fit.anchor_index[-1])
     window = slice(first, last + 1)

@@ -151,7 +151,8 @@ class Samples:
 class VehiclePair:
     """Two vehicles while both are there, in the template and in S samples, at the same number of instants T.
 
-    `template` holds positions (2, T, 2) [m], speeds (2, T) [m/s] and headings (2, T) [rad], `samples` the same of S.
+    `template` holds positions (2, T, 2) [m], speeds (2, T) [m/s] and headings (2, T) [rad],
+    `samples` the same of S.
     """
 
     template: tuple[Floats, ...]

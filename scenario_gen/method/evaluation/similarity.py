@@ -3,10 +3,11 @@
 
 """How like the template a set of scenarios is: the paper's figure 5 as numbers (method §7).
 
-For a pair of vehicles let M_s be the feature matrix of sample s and T the template's. E is the Frobenius norm of the mean
-of M_s - T over the norm of T. With D_s = M_s - T flattened and weights w summing to 1, its square is w'Gw / |T|² with the
-Gram matrix G = D D'; so a bootstrap of E needs the matrices once and then only G. Samples that are always drawn together (units)
-enter by their sums, which makes G a quarter as large where they come in pairs.
+For a pair of vehicles let M_s be the feature matrix of sample s and T the template's. E is the
+Frobenius norm of the mean of M_s - T over the norm of T. With D_s = M_s - T flattened and weights
+w summing to 1, its square is w'Gw / |T|² with the Gram matrix G = D D'; so a bootstrap of E needs
+the matrices once and then only G. Samples that are always drawn together (units) enter by their
+sums, which makes G a quarter as large where they come in pairs.
 """
 
 from dataclasses import dataclass
@@ -23,7 +24,8 @@ class PairSimilarity:
     """Sums over the feature matrices of one pair of vehicles, enough for E and the correlation under any weights.
 
     Attributes:
-        gram: (U, U) inner products of D_r and D_s, where D_s is the sum over the samples of unit s.
+        gram: (U, U) inner products of D_r and D_s, where D_s is the sum over the samples of unit
+            s.
         cross: (U,) inner products of D_s and T.
         total: (U,) sums of the entries of D_s.
         template: number of entries, their sum, and their sum of squares in T.
@@ -78,7 +80,8 @@ def pair_similarity(
         template: series of the two vehicles, (D, T) each.
         generated: series of the two vehicles in S samples, (S, D, T) each.
         distance: of the feature; the paper takes Euclidean for position, Manhattan for speed.
-        least: a template whose distances spread by less counts as constant: scaled to [0, 1] it would show its noise.
+        least: a template whose distances spread by less counts as constant: scaled to [0, 1] it
+            would show its noise.
         unit: (S,) the number, from 0, of the unit of each sample; None: each is one of its own.
     """
     a, b = (np.ascontiguousarray(series) for series in generated)

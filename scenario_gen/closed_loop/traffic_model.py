@@ -3,37 +3,39 @@
 
 """The others in one step: how fast each clock runs, so that they stay clear of the ego and never meet each other.
 
-Each vehicle keeps its certified path and never exceeds its certified speed there: its clock runs at a rate of 0 to 1. Three
-things slow it down, the strongest counts:
+Each vehicle keeps its certified path and never exceeds its certified speed there: its clock runs
+at a rate of 0 to 1. Three things slow it down, the strongest counts:
 
-- who is ahead on its path, the ego included (IDM), but only if nearer than in the certified execution at the same place;
-- the weakest braking that keeps it clear of where the ego will be if it goes on as it does, and behind what the order of events
-  lets it do; its acceleration changes by the jerk at most;
+- who is ahead on its path, the ego included (IDM), but only if nearer than in the certified
+  execution at the same place;
+- the weakest braking that keeps it clear of where the ego will be if it goes on as it does, and
+  behind what the order of events lets it do; its acceleration changes by the jerk at most;
 - the order itself, without exception: see order.py.
 
-Each driver sees the ego as it was one reaction time ago, and goes before one that stands when it has waited long enough. Who is
-on foot goes on whatever the ego does, but does not step onto a lane before one that cannot stop: see kerb.py.
+Each driver sees the ego as it was one reaction time ago, and goes before one that stands when it
+has waited long enough. Who is on foot goes on whatever the ego does, but does not step onto a lane
+before one that cannot stop: see kerb.py.
 """
 
 from typing import NamedTuple
 
 import numpy as np
 
-from scenario_gen.closed_loop.certified import pose_at, World
+from scenario_gen.closed_loop.coordination_space import pose_at, World
 from scenario_gen.closed_loop.driver import (
     ACCELERATION,
     CLOCK,
+    DriverParameters,
+    DriverState,
     EGO_CLOCK,
     EGO_RATE,
     FREE,
     gap_ahead,
     HELD,
-    Manner,
     minded,
     ON_PATH,
     RATE,
     rate_after,
-    Self,
     STAND,
     WAITED,
 )
@@ -57,11 +59,12 @@ ASIDE = 0.5  # metres that a driver leaves beside an ego that is not on its way
 ENTRY = 3.0  # metres ahead of and behind its place that the ego must leave free for one who comes onto the scene
 
 
-class Now(NamedTuple):
+class StepState(NamedTuple):
     """All vehicles at the begin of a step, and what their drivers expect.
 
     Attributes:
-        drivers: (N, 4) clock [s], its rate, acceleration [m/s²] and patience spent [s], as in `State`.
+        drivers: (N, 4) clock [s], its rate, acceleration [m/s²] and patience spent [s], as in
+            `State`.
         pose: (N, 5) x, y [m], yaw [rad], certified speed [m/s] and acceleration [m/s²] there.
         goes: (N,) whose clock runs.
         here: (N,) who is on the scene.
@@ -82,37 +85,39 @@ class Now(NamedTuple):
 
 
 @kernel(inline=True)
-def react(world: World, manner: Manner, seen: Floats, drivers: Floats, after: Floats) -> None:
+def react(
+    world: World, parameters: DriverParameters, seen: Floats, drivers: Floats, after: Floats
+) -> None:
     """Write what becomes of all drivers in a step; the row of the ego is left to the caller.
 
     Args:
         world: the scenario and the step.
-        manner: how they drive.
+        parameters: how they drive.
         seen: (K, 9) the ego as in `State.seen`, at the end of this step and before.
-        drivers: (N, 4) as in `Now`.
-        after: (N, 5) clock [s], rate, acceleration that the driver wanted [m/s²], patience spent [s], and 1 where the order held
-            it back.
+        drivers: (N, 4) as in `StepState`.
+        after: (N, 5) clock [s], rate, acceleration that the driver wanted [m/s²], patience spent
+            [s], and 1 where the order held it back.
     """
     n = drivers.shape[0]
-    now = _begin(world, manner, drivers, seen)
+    now = _begin(world, parameters, drivers, seen)
     level, rate = np.full(n, FREE), drivers[:, RATE].copy()
-    _regard_ego(world, manner, now, level, rate, after)
+    _regard_ego(world, parameters, now, level, rate, after)
     if n > 2:
         for i in range(n):
             if i != world.ego and now.goes[i]:
-                foresee_self(world, manner, _me(now, i), level[i], now.coming[i])
+                foresee_self(world, parameters, _me(now, i), level[i], now.coming[i])
         for i in range(n):
             if i != world.ego and now.here[i]:
                 rate[i] = _regard_others(
-                    world, manner, now, i, level[i], rate[i], after[i, WAITED]
+                    world, parameters, now, i, level[i], rate[i], after[i, WAITED]
                 )
     _move(world, now, rate, after)
 
 
 @kernel(inline=True)
-def _begin(world: World, manner: Manner, drivers: Floats, seen: Floats) -> Now:
+def _begin(world: World, parameters: DriverParameters, drivers: Floats, seen: Floats) -> StepState:
     """Where everyone is."""
-    n, steps = drivers.shape[0], int(np.ceil(manner.foresight / world.step))
+    n, steps = drivers.shape[0], int(np.ceil(parameters.foresight / world.step))
     pose, goes, here = np.empty((n, 5)), np.empty(n, dtype=np.bool_), np.empty(n, dtype=np.bool_)
     for i in range(n):
         clock = drivers[i, CLOCK]
@@ -122,12 +127,16 @@ def _begin(world: World, manner: Manner, drivers: Floats, seen: Floats) -> Now:
     coming = np.empty((n, steps + 1))
     for m in range(steps + 1):
         coming[:, m] = drivers[:, CLOCK] + m * world.step  # of those who have left
-    return Now(drivers, pose, goes, here, seen, manner.delay, np.empty((n, steps + 1, 4)), coming)
+    return StepState(
+        drivers, pose, goes, here, seen, parameters.delay, np.empty((n, steps + 1, 4)), coming
+    )
 
 
 @kernel(inline=True)
-def _me(now: Now, i: int) -> Self:
-    return Self(i, now.drivers[i, CLOCK], now.drivers[i, RATE], now.drivers[i, ACCELERATION])
+def _me(now: StepState, i: int) -> DriverState:
+    return DriverState(
+        i, now.drivers[i, CLOCK], now.drivers[i, RATE], now.drivers[i, ACCELERATION]
+    )
 
 
 @kernel(inline=True)
@@ -149,7 +158,7 @@ def _fill_ego(world: World, pose: Floats, out: Floats) -> None:
 
 
 @kernel(inline=True)
-def _expected(world: World, now: Now, i: int, spent: float) -> Foreseen:
+def _expected(world: World, now: StepState, i: int, spent: float) -> Foreseen:
     """What driver i expects; it does not wait for the ego where the template did if its patience is spent for good."""
     ago = min(now.delay[i], now.seen.shape[0] - 1)
     ego = now.seen[ago]
@@ -160,10 +169,11 @@ def _expected(world: World, now: Now, i: int, spent: float) -> Foreseen:
 
 
 @kernel(inline=True)
-def _spent(world: World, manner: Manner, now: Now, i: int) -> float:
+def _spent(world: World, parameters: DriverParameters, now: StepState, i: int) -> float:
     """Patience [s] that driver i has spent waiting for an ego that hardly moves; infinity once it goes before the ego.
 
-    That it does when its patience is over and its path is free of the ego, where it expects it to be now and as far as it looks.
+    That it does when its patience is over and its path is free of the ego, where it expects it to
+    be now and as far as it looks.
     """
     spent: float = now.drivers[i, WAITED]
     u, box = now.drivers[i, RATE] * now.pose[i, 3], np.empty(7)
@@ -180,14 +190,19 @@ def _spent(world: World, manner: Manner, now: Now, i: int) -> float:
     for m in (0, now.ahead.shape[1] - 1):
         _fill_ego(world, now.ahead[i, m], box)
         _, at = gap_ahead(world, i, now.drivers[i, CLOCK], box, now.pose[i])
-        if spent < manner.patience or at >= 0:
+        if spent < parameters.patience or at >= 0:
             return spent
     return float(np.inf)
 
 
 @kernel(inline=True)
 def _regard_ego(
-    world: World, manner: Manner, now: Now, level: Floats, rate: Floats, after: Floats
+    world: World,
+    parameters: DriverParameters,
+    now: StepState,
+    level: Floats,
+    rate: Floats,
+    after: Floats,
 ) -> None:
     """Write each driver's braking with regard to the ego alone [m/s²], its rate after the step, and its patience spent."""
     last, box = -1, np.empty(7)
@@ -204,27 +219,35 @@ def _regard_ego(
         else:
             foresee_ego(world, now.seen[ago], ago, ahead)
         last = last if world.walks[i] else i  # one on foot expects something else
-        after[i, WAITED] = _spent(world, manner, now, i)
+        after[i, WAITED] = _spent(world, parameters, now, i)
         v, a = now.pose[i, 3], now.pose[i, 4]
         _fill_ego(world, ahead[0], box)
-        least = minded(world, manner, me, now.pose[i], world.ego, box, ahead[0, 3], world.step)
-        level[i] = _for_ego(world, manner, now, i, least, after[i, WAITED])
-        rate[i] = rate_after(manner, me.rate, v, a, me.was, level[i], 0.0, world.step)
+        least = minded(world, parameters, me, now.pose[i], world.ego, box, ahead[0, 3], world.step)
+        level[i] = _for_ego(world, parameters, now, i, least, after[i, WAITED])
+        rate[i] = rate_after(parameters, me.rate, v, a, me.was, level[i], 0.0, world.step)
 
 
 @kernel(inline=True)
-def _for_ego(world: World, manner: Manner, now: Now, i: int, least: float, spent: float) -> float:
+def _for_ego(
+    world: World, parameters: DriverParameters, now: StepState, i: int, least: float, spent: float
+) -> float:
     """Braking [m/s²] of driver i for the ego, `least` or more."""
     me, expected = _me(now, i), _expected(world, now, i, spent)
     if before_kerb(world, me):
         foresee_fast_ego(world, now.seen[0], now.ahead[i])
-        return max(least, braking_at_kerb(world, manner, me, now.pose[i], expected))
-    return weakest(world, manner, me, least, expected, False)
+        return max(least, braking_at_kerb(world, parameters, me, now.pose[i], expected))
+    return weakest(world, parameters, me, least, expected, False)
 
 
 @kernel(inline=True)
 def _regard_others(
-    world: World, manner: Manner, now: Now, i: int, level: float, rate: float, spent: float
+    world: World,
+    parameters: DriverParameters,
+    now: StepState,
+    i: int,
+    level: float,
+    rate: float,
+    spent: float,
 ) -> float:
     """Rate of driver i after the step with regard to the others, too; `rate` is that with its braking for the ego, `level`."""
     me, v, a, box, least = _me(now, i), now.pose[i, 3], now.pose[i, 4], np.empty(7), level
@@ -232,23 +255,25 @@ def _regard_others(
         if j not in (i, world.ego) and now.here[j] and now.drivers[j, CLOCK] < me.clock:
             other, speed = now.pose[j], now.drivers[j, RATE] * now.pose[j, 3]
             fill_box(other[0], other[1], other[2], world.half[j, 0], world.half[j, 1], box)
-            least = max(least, minded(world, manner, me, now.pose[i], j, box, speed, 0.0))
+            least = max(least, minded(world, parameters, me, now.pose[i], j, box, speed, 0.0))
     least = weakest(
-        world, manner, me, least, beyond_kerb(world, me, _expected(world, now, i, spent)), True
+        world, parameters, me, least, beyond_kerb(world, me, _expected(world, now, i, spent)), True
     )
     if least <= level:
         return rate
     return min(
-        rate, rate_after(manner, me.rate, v, a, me.was, least, _creep(world, now, i), world.step)
+        rate,
+        rate_after(parameters, me.rate, v, a, me.was, least, _creep(world, now, i), world.step),
     )
 
 
 @kernel(inline=True)
-def _creep(world: World, now: Now, i: int) -> float:
+def _creep(world: World, now: StepState, i: int) -> float:
     """Speed [m/s] to which driver i brakes for the order at most.
 
-    It creeps, so that nobody waits for one who waits for it. For one whose clock is behind and who does not wait for it, it comes
-    to a stand where the order ends its way. The one with the earliest clock creeps in any case.
+    It creeps, so that nobody waits for one who waits for it. For one whose clock is behind and who
+    does not wait for it, it comes to a stand where the order ends its way. The one with the
+    earliest clock creeps in any case.
     """
     clock, speed = now.drivers[i, CLOCK], CREEP
     for j in range(now.pose.shape[0]):
@@ -262,7 +287,7 @@ def _creep(world: World, now: Now, i: int) -> float:
 
 
 @kernel(inline=True)
-def _move(world: World, now: Now, rate: Floats, after: Floats) -> None:
+def _move(world: World, now: StepState, rate: Floats, after: Floats) -> None:
     """Move the clocks as the drivers want, as far as the order lets them."""
     n, h, clock, before = (
         rate.shape[0],

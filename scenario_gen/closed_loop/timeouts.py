@@ -74,7 +74,8 @@ class Timed:
 def bounded(seconds: float) -> Iterator[None]:
     """End what runs inside after some seconds of real time.
 
-    In a process of its own, code that no interrupt reaches (compiled, without end) ends that process a little later.
+    In a process of its own, code that no interrupt reaches (compiled, without end) ends that
+    process a little later.
 
     Raises:
         TooLongError: the time is over.

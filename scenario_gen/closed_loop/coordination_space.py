@@ -3,12 +3,14 @@
 
 """What is known of a scenario before it is driven: its motion by the clock of its certificate, and the order of its events.
 
-Every vehicle i has a clock τ_i: it is where the certified scenario has it at time τ_i. All clocks equal and running is the
-certified execution; a vehicle that is held up has a clock that runs more slowly. For two vehicles the certificate says that no
-collision lies on τ_i = τ_j. A collision at τ_i > τ_j is at a place that j passed first: i may come there only when j has gone.
-So `order[i, j]` says how far the clock of i may go for each clock of j, and it may always go as far as that of j
-(docs/closed_loop.md).
-Source: priorities in the coordination space, Gregoire, Bonnabel & de La Fortelle 2014, on clocks instead of path lengths.
+Every vehicle i has a clock τ_i: it is where the certified scenario has it at time τ_i. All clocks
+equal and running is the certified execution; a vehicle that is held up has a clock that runs more
+slowly. For two vehicles the certificate says that no collision lies on τ_i = τ_j. A collision at
+τ_i > τ_j is at a place that j passed first: i may come there only when j has gone. So `order[i,
+j]` says how far the clock of i may go for each clock of j, and it may always go as far as that of
+j (docs/closed_loop.md).
+Source: priorities in the coordination space, Gregoire, Bonnabel & de La Fortelle 2014, on clocks
+instead of path lengths.
 """
 
 from typing import NamedTuple
@@ -41,17 +43,21 @@ class World(NamedTuple):
         time: (T,) the scenario's instants [s].
         motion: (N, T, 6) x, y [m], yaw [rad], speed [m/s], velocity x, y [m/s] at these.
         half: (N, 2) half lengths and widths [m].
-        spans: (N, 2) clocks [s] at which each vehicle comes onto the scene and at which its certified motion ends.
+        spans: (N, 2) clocks [s] at which each vehicle comes onto the scene and at which its
+            certified motion ends.
         leaves: (N,) whether it leaves the scene then; who stands at the scenario's end stays.
-        cells: (N, K, 8) of each cell of the clock: the box that holds the footprint throughout (centre x, y [m], cos and sin of
-            its yaw, half length, half width [m], radius [m]), and the way driven [m] at its start.
+        cells: (N, K, 8) of each cell of the clock: the box that holds the footprint throughout
+            (centre x, y [m], cos and sin of its yaw, half length, half width [m], radius [m]), and
+            the way driven [m] at its start.
         cell: length of a cell [s].
-        order: (N, N, K) `order[i, j, k]`: clock [s] that vehicle i may not pass while the clock of j is in cell k, unless that
-            of j is there, too; inf if nothing is in its way. It holds back who waits for j in the template, too.
+        order: (N, N, K) `order[i, j, k]`: clock [s] that vehicle i may not pass while the clock of
+            j is in cell k, unless that of j is there, too; inf if nothing is in its way. It holds
+            back who waits for j in the template, too.
         ego: index of the ego's witness.
         walks: (N,) who is on foot.
-        kerbs: (N, K) clock [s] at which one on foot, in each cell, next steps onto a lane where somebody drives; the cell's start
-            if it is on one, inf if it never does, and for who drives.
+        kerbs: (N, K) clock [s] at which one on foot, in each cell, next steps onto a lane where
+            somebody drives; the cell's start if it is on one, inf if it never does, and for who
+            drives.
     """
 
     step: float
@@ -136,7 +142,8 @@ def world_of(scenario: Scenario, ego: int | str, step: float = 0.1) -> World:
 def _keep_waiting(scenario: Scenario, who: int, whom: int, order: Floats) -> None:
     """Lower the `order` (K,) of a yielder and the one it waits for: until that one has cleared it does not enter.
 
-    Its clock is held where that one clears, or where it enters, if that is earlier. So its gap behind the clearing stays.
+    Its clock is held where that one clears, or where it enters, if that is earlier. So its gap
+    behind the clearing stays.
     """
     conflict = conflict_of(scenario, who, whom)
     if conflict is None or conflict.second != who:
@@ -174,7 +181,8 @@ def fill_cells(
 ) -> None:
     """Fill `cells` (N, K, 8) of `World`, from the motion (N, T, 6), half sizes (N, 2) [m], spans and the cells' length [s].
 
-    The box stands at the middle pose, is longer and wider by what the ends ask for, by what the turn adds, and by ROOM.
+    The box stands at the middle pose, is longer and wider by what the ends ask for, by what the
+    turn adds, and by ROOM.
     """
     a, b, m = np.empty(5), np.empty(5), np.empty(5)
     for i in range(out.shape[0]):
@@ -209,8 +217,9 @@ def fill_cells(
 def fill_order(cells: Floats, cell: float, out: Floats) -> None:
     """Fill `out` (N, N, K) with `order` of `World`, from the cells (N, K, 8) and their length [s].
 
-    For each cell k of j the first cell l >= k of i whose boxes meet, at whose start i must wait; then the least over all later k,
-    for what j has not passed yet it may still come to. The price of taking cells together is waiting a little farther away.
+    For each cell k of j the first cell l >= k of i whose boxes meet, at whose start i must wait;
+    then the least over all later k, for what j has not passed yet it may still come to. The price
+    of taking cells together is waiting a little farther away.
     """
     n, count = cells.shape[0], cells.shape[1]
     for i in range(n):

@@ -5,18 +5,18 @@
 
 import numpy as np
 
-from scenario_gen.closed_loop.certified import pose_at, WORLD, World
+from scenario_gen.closed_loop.coordination_space import pose_at, WORLD, World
 from scenario_gen.closed_loop.driver import (
     ACCELERATION,
     CLOCK,
+    DRIVER_PARAMETERS,
+    DriverParameters,
     EGO_CLOCK,
     HELD,
-    MANNER,
-    Manner,
     RATE,
     WAITED,
 )
-from scenario_gen.closed_loop.others import react
+from scenario_gen.closed_loop.traffic_model import react
 from scenario_gen.numerics import Bools, Floats
 from scenario_gen.numerics.boxes import boxes_meet, fill_box
 from scenario_gen.numerics.kernels import B1, F, F2, I, kernel, OUT2, OUTB1
@@ -97,10 +97,10 @@ def place(time: Floats, motion: Floats, drivers: Floats, out: Floats) -> None:
         )
 
 
-@kernel(WORLD, MANNER, F, F2, OUT2, OUT2, OUT2, OUTB1)
+@kernel(WORLD, DRIVER_PARAMETERS, F, F2, OUT2, OUT2, OUT2, OUTB1)
 def advance(
     world: World,
-    manner: Manner,
+    parameters: DriverParameters,
     now: float,
     before: Floats,
     seen: Floats,
@@ -112,20 +112,21 @@ def advance(
 
     Args:
         world: the scenario and the step.
-        manner: how the others drive.
+        parameters: how the others drive.
         now: certified time at the step's end [s].
         before: (N, 4) columns CLOCK … of `driver`.
-        seen: (K, 9) as in `State`, at the end of the step; the ego's clock, its rate and whether it is on its path are written.
-        after: (N, 5) output, at the end of the step; HELD is 1 where the order makes one of the others brake harder than the
-            strongest, or more suddenly than the jerk allows.
+        seen: (K, 9) as in `State`, at the end of the step; the ego's clock, its rate and whether
+            it is on its path are written.
+        after: (N, 5) output, at the end of the step; HELD is 1 where the order makes one of the
+            others brake harder than the strongest, or more suddenly than the jerk allows.
         vehicles: (N, 4) output, x, y [m], yaw [rad], speed [m/s] then.
         here: (N,) output, who is on the scene then.
     """
     h, time, motion, ego = world.step, world.time, world.motion, world.ego
     pose, body, witness = np.empty(5), seen[0, :EGO_CLOCK], seen[0, EGO_CLOCK:]
     locate(now, time, motion[ego], body, before[ego, CLOCK], witness)
-    if manner.reacts:
-        react(world, manner, seen, before, after)
+    if parameters.reacts:
+        react(world, parameters, seen, before, after)
     else:
         after[:] = 0.0
         after[:, CLOCK], after[:, RATE] = min(now, time[-1]), 1.0
@@ -145,14 +146,14 @@ def advance(
         gained = (speed - before[i, RATE] * pose[3]) / h
         if after[i, HELD] > 0.0:
             hard, sudden = (
-                gained + manner.strongest[i] + HARDER / h,
-                gained - min(was, 0.0) + manner.jerk * h + SUDDEN / h,
+                gained + parameters.strongest[i] + HARDER / h,
+                gained - min(was, 0.0) + parameters.jerk * h + SUDDEN / h,
             )
             after[i, HELD] = 1.0 if min(hard, sudden) < 0.0 else 0.0
         if after[i, HELD] == 0.0 or speed == 0.0:
             after[i, ACCELERATION] = gained if speed > 0.0 else 0.0
         after[i, ACCELERATION] = min(
-            max(after[i, ACCELERATION], -manner.strongest[i]), manner.acceleration
+            max(after[i, ACCELERATION], -parameters.strongest[i]), parameters.acceleration
         )
         begin, end = world.spans[i]
         here[i] = i == ego or (clock >= begin and not (world.leaves[i] and clock >= end))
