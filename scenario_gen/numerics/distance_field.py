@@ -5,12 +5,12 @@
 
 import numpy as np
 
-from scenario_gen.numerics.arrays import Bools, Floats, sealed
+from scenario_gen.numerics.arrays import Bools, Floats, Ints, sealed
 from scenario_gen.numerics.kernels import B2, kernel, OUT2
 
 
 def distance_field(is_open: Bools) -> Floats:
-    """Return (H, W), read-only: the distance [cells] from each cell's centre to the nearest closed square.
+    """Return distances (H, W) [cells] from cell centres to the nearest closed square, read-only.
 
     Closed cells are 0; everything outside the grid is closed.
     """
@@ -21,21 +21,13 @@ def distance_field(is_open: Bools) -> Floats:
 
 @kernel(B2, OUT2)
 def distance_transform(is_open: Bools, out: Floats) -> None:
-    """Fill `out` (H, W) with the distance [cells] from each cell's centre to the nearest closed square.
+    """Fill `out` (H, W) with the distances [cells] from cell centres to the nearest closed square.
 
     Source: the lower envelope of parabolas (Felzenszwalb & Huttenlocher 2012), here of squares
     instead of points.
     """
     height, width = is_open.shape
-    for i in range(height):  # down the columns: cells to the nearest closed one above
-        for j in range(width):
-            above = out[i - 1, j] if i > 0 else 0.0
-            out[i, j] = above + 1.0 if is_open[i, j] else 0.0
-    for i in range(height - 1, -1, -1):  # up the columns: the nearest closed cell below
-        for j in range(width):
-            below = out[i + 1, j] if i < height - 1 else 0.0
-            out[i, j] = min(out[i, j], below + 1.0)
-
+    _vertical_distances(is_open, out)
     # The columns on the lower envelope, and the first column that each of them governs.
     site = np.empty(width + 2, dtype=np.int64)
     begin = np.empty(width + 3, dtype=np.int64)
@@ -45,7 +37,21 @@ def distance_transform(is_open: Bools, out: Floats) -> None:
 
 
 @kernel(inline=True)
-def _envelope_of_row(out: Floats, i: int, site: Floats, begin: Floats, level: Floats) -> None:
+def _vertical_distances(is_open: Bools, out: Floats) -> None:
+    """Fill `out` (H, W) with the cells to the nearest closed one in each column."""
+    height, width = is_open.shape
+    for i in range(height):  # the nearest closed cell above
+        for j in range(width):
+            above = out[i - 1, j] if i > 0 else 0.0
+            out[i, j] = above + 1.0 if is_open[i, j] else 0.0
+    for i in range(height - 1, -1, -1):  # and below
+        for j in range(width):
+            below = out[i + 1, j] if i < height - 1 else 0.0
+            out[i, j] = min(out[i, j], below + 1.0)
+
+
+@kernel(inline=True)
+def _envelope_of_row(out: Floats, i: int, site: Ints, begin: Ints, level: Floats) -> None:
     """Replace the vertical distances of row i by the lower envelope of phi(x - j) + h_j^2."""
     width = out.shape[1]
     site[0], begin[0], level[0] = -1, 0, 0.0

@@ -51,7 +51,7 @@ def segments_free(road: Road, start: Floats, end: Floats, radius: float) -> Bool
 
 
 def footprint_fits(road: Road, poses: Floats, length: float, width: float) -> Bools:
-    """Return whether an oriented rectangle covers drivable cells only, exactly; it may touch others.
+    """Return whether a rectangle covers drivable cells only, exactly; it may touch others.
 
     Args:
         road: the grid.
@@ -77,7 +77,7 @@ def footprint_fits(road: Road, poses: Floats, length: float, width: float) -> Bo
 def nearest_pose_with_room(
     road: Road, pose: Floats, length: float, width: float, max_distance: float = 3.0
 ) -> tuple[Floats, float] | None:
-    """Move a pose as little as needed for its footprint to cover drivable cells only; keep its yaw.
+    """Move a pose as little as its footprint needs to have room; keep its yaw.
 
     Offsets on a lattice of the grid's resolution are tried, the shortest first. The first that
     fits is shortened as far as the footprint still has room, so the result is within about half a
@@ -164,18 +164,22 @@ def _gap_squared(ax: float, ay: float, bx: float, by: float, left: float, low: f
 
 
 @kernel(inline=True)
+def _is_open(clearance: Floats, i: int, j: int) -> bool:
+    """Return whether a cell is inside the grid and drivable."""
+    height, width = clearance.shape
+    return 0 <= i < height and 0 <= j < width and clearance[i, j] != 0.0
+
+
+@kernel(inline=True)
 def _near_squares_free(
     clearance: Floats, ax: float, ay: float, bx: float, by: float, radius: float
 ) -> bool:
     """Return whether each closed square is farther than `radius` from a short segment a-b."""
-    height, width = clearance.shape
     reach = radius + CONTACT_CELLS
     for i in range(int(np.floor(min(ay, by) - reach)), int(np.floor(max(ay, by) + reach)) + 1):
         for j in range(int(np.floor(min(ax, bx) - reach)), int(np.floor(max(ax, bx) + reach)) + 1):
-            inside = 0 <= i < height and 0 <= j < width
-            if (not inside or clearance[i, j] == 0.0) and _gap_squared(
-                ax, ay, bx, by, float(j), float(i)
-            ) <= reach * reach:
+            is_open = _is_open(clearance, i, j)
+            if not is_open and _gap_squared(ax, ay, bx, by, j, i) <= reach * reach:
                 return False
     return True
 
@@ -258,9 +262,8 @@ def _footprint_free(
     clearance: Floats, x: float, y: float, yaw: float, half_length: float, half_width: float
 ) -> bool:
     """Return whether the rectangle at one pose covers drivable cells only."""
-    height, width = clearance.shape
     i, j = int(np.floor(y)), int(np.floor(x))
-    if i < 0 or j < 0 or i >= height or j >= width or clearance[i, j] == 0.0:
+    if not _is_open(clearance, i, j):
         return False
     reach = np.sqrt(half_length * half_length + half_width * half_width)
     if clearance[i, j] - _HALF_DIAGONAL_CELLS >= reach:
@@ -276,7 +279,7 @@ def _footprint_free(
     for i in range(first, last):
         low, high = _extent_in_row(corner_x, corner_y, i)
         for j in range(int(np.floor(low + CONTACT_CELLS)), int(np.ceil(high - CONTACT_CELLS))):
-            if i < 0 or j < 0 or i >= height or j >= width or clearance[i, j] == 0.0:
+            if not _is_open(clearance, i, j):
                 return False
     return True
 

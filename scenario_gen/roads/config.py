@@ -30,7 +30,7 @@ class RoadConfig(Parameters):
     )
     traffic_rules: str = parameter(
         "kept",
-        "whether scenarios obey the stop lines and rights of way of a vector map, or of `priority`",
+        "whether scenarios obey stop lines and rights of way, of a vector map or of `priority`",
         choices=("kept", "ignored"),
     )
     priority: str = parameter(

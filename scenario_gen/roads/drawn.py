@@ -121,15 +121,13 @@ class _RoadDrawing:
         }
         self._mouths = self._find_mouths()
         if plan.has_junction:
-            for connection in self._straight_connections():
-                if self._route(connection) is None:  # the mouths are too near to each other
-                    route = self._route_between_ends(connection)
-                    if route is not None:
-                        self._driven[connection] = route
+            self._add_routes_between_ends()
             self._mouths = self._find_mouths()
         self._lane_index: dict[tuple[int, bool, int], int] = {}  # by arm, inward, and number
         self._arm_of_route: dict[int, int] = {}  # the arm that each route's lane comes from
-        self._add_arm_lanes()
+        for k in range(self._arm_count):
+            self._add_arm_lanes(k, inward=True)
+            self._add_arm_lanes(k, inward=False)
         if plan.has_junction:
             self._add_routes()
 
@@ -238,19 +236,15 @@ class _RoadDrawing:
             return arms[arm].inward
         return arms[arm].outward if self._plan.has_junction else arms[1].inward
 
-    def _add_arm_lanes(self) -> None:
-        for k in range(self._arm_count):
-            for inward in (True, False):
-                count = self._lane_count(k, inward=inward)
-                offsets = [self._width * n for n in range(count + 1)]
-                first = len(self.lanes)
-                borders = self._offset_lines(k, offsets, inward=inward)
-                for n, (inner, outer) in enumerate(pairwise(borders)):
-                    left, right = (inner, outer) if self._sign > 0.0 else (outer, inner)
-                    neighbours = [first + m for m in (n - 1, n + 1) if 0 <= m < count]
-                    self._lane_index[k, inward, n] = len(self.lanes)
-                    name = lane_id(k, n, inward=inward)
-                    self.lanes.append(Lane(name, left, right, beside=tuple(neighbours)))
+    def _add_arm_lanes(self, k: int, *, inward: bool) -> None:
+        count = self._lane_count(k, inward=inward)
+        first = len(self.lanes)
+        offsets = [self._width * n for n in range(count + 1)]
+        for n, borders in enumerate(pairwise(self._offset_lines(k, offsets, inward=inward))):
+            left, right = borders if self._sign > 0.0 else borders[::-1]
+            neighbours = tuple(first + m for m in (n - 1, n + 1) if 0 <= m < count)
+            self._lane_index[k, inward, n] = first + n
+            self.lanes.append(Lane(lane_id(k, n, inward=inward), left, right, beside=neighbours))
 
     def _add_routes(self) -> None:
         """Add the lanes through the junction, and the ground that they need."""
@@ -356,34 +350,41 @@ class _RoadDrawing:
 
     def _routes(self) -> dict[Connection, Curve]:
         """Return the driven routes, the straight ones, and those of lanes without a route."""
-        arms = self._plan.arms
         routes: dict[Connection, Curve] = {}
-        for connection in dict.fromkeys((*self._driven, *self._straight_connections())):
-            self._add_route(routes, connection)
-        for a, b in permutations(range(len(arms)), 2):
-            outermost = Connection(a, arms[a].inward - 1, b, arms[b].outward - 1)
-            starts = {(each.from_arm, each.from_lane) for each in routes}
-            goals = {(each.to_arm, each.to_lane) for each in routes}
-            missing = [
-                outermost._replace(from_lane=i)
-                for i in range(arms[a].inward)
-                if (a, i) not in starts
-            ]
-            missing += [
-                outermost._replace(to_lane=j)
-                for j in range(arms[b].outward)
-                if (b, j) not in goals
-            ]
-            for connection in missing:
-                if min(connection) >= 0:
-                    self._add_route(routes, connection)
+        self._add_possible(routes, (*self._driven, *self._straight_connections()))
+        for a, b in permutations(range(len(self._plan.arms)), 2):
+            self._add_possible(routes, self._missing_connections(routes, a, b))
         return routes
 
-    def _add_route(self, routes: dict[Connection, Curve], connection: Connection) -> None:
-        """Add the route of a connection, if cars can drive it."""
-        route = self._route(connection)
-        if route is not None:
-            routes[connection] = route
+    def _missing_connections(
+        self, routes: Iterable[Connection], a: int, b: int
+    ) -> list[Connection]:
+        """Return connections of two arms for the lanes that no route joins."""
+        inward, outward = self._plan.arms[a].inward, self._plan.arms[b].outward
+        if not inward or not outward:
+            return []
+        starts = {(route.from_arm, route.from_lane) for route in routes}
+        goals = {(route.to_arm, route.to_lane) for route in routes}
+        missing = [Connection(a, i, b, outward - 1) for i in range(inward) if (a, i) not in starts]
+        missing += [Connection(a, inward - 1, b, j) for j in range(outward) if (b, j) not in goals]
+        return missing
+
+    def _add_possible(
+        self, routes: dict[Connection, Curve], connections: Iterable[Connection]
+    ) -> None:
+        """Add the routes of connections, if cars can drive them."""
+        for connection in dict.fromkeys(connections):
+            route = self._route(connection)
+            if route is not None:
+                routes[connection] = route
+
+    def _add_routes_between_ends(self) -> None:
+        """Add straight routes whose mouths are too near to each other as driven ones."""
+        for connection in self._straight_connections():
+            if self._route(connection) is None:
+                route = self._route_between_ends(connection)
+                if route is not None:
+                    self._driven[connection] = route
 
     def _route_between_ends(self, connection: Connection) -> Curve | None:
         """Return the route between the ends of two lanes; None if cars cannot drive it."""

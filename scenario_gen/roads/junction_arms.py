@@ -225,47 +225,51 @@ def _mean_yaw(ends: list[PathEnd]) -> float:
 
 def lanes_of_arm(arm: ArmDirection, config: RoadConfig) -> ArmLanes:
     """Return the lanes of an arm, in which its vehicles are where they were recorded."""
-    left, width = unit_left(arm.yaw), config.lane_width
-    # Lanes inward lie to the left of an observer who looks outward.
+    width = config.lane_width
+    # Offsets to the outside of each direction: lanes inward lie to the left, looking outward.
     keeps_right = 1.0 if config.traffic_side == "right" else -1.0
     side = {True: keeps_right, False: -keeps_right}
-    offset = {end.key: float((end.steady_begin * left).sum()) for end in arm.ends}
+    outside = {
+        end.key: side[end.inward] * float((end.steady_begin * unit_left(arm.yaw)).sum())
+        for end in arm.ends
+    }
     sure = [end.key for end in arm.ends if end.reaches_arm and end.steady >= SURE_LENGTH_M / 2.0]
-    sure = sure or list(offset)
+    sure = sure or list(outside)
 
-    lane_of: dict[EndKey, int] = {}
-    innermost: dict[bool, float] = {}
-    for inward in (True, False):
-        beside = {key[0]: side[inward] * offset[key] for key in sure if key[1] == inward}
-        for vehicle, lane in _numbered_lanes(beside, width).items():
-            lane_of[vehicle, inward] = lane
-        if beside:
-            innermost[inward] = side[inward] * min(beside.values())
-    if len(innermost) == 2:
-        between = keeps_right * (innermost[True] - innermost[False])
-        free = min(max(round(between / width) - 1, 0), _MAX_LANES_BETWEEN_COUNT)
-        for key in lane_of:
-            lane_of[key] += (free + 1) // 2 if key[1] else free // 2
-
-    lines = [offset[key] - side[key[1]] * (lane_of[key] + 0.5) * width for key in sure]
+    lane_of = _lanes_of_ends({key: outside[key] for key in sure}, width)
+    lines = [side[key[1]] * (outside[key] - (lane_of[key] + 0.5) * width) for key in sure]
     dividing_line = float(np.mean(lines)) if lines else 0.0
     lanes = ArmLanes(dividing_line, lane_of)
-    for key, at in offset.items():
-        if key not in lane_of:  # the nearest lane that the arm already has
-            nearest = round(side[key[1]] * (at - dividing_line) / width - 0.5)
-            lane_of[key] = min(max(nearest, 0), lanes.count(inward=key[1]) - 1)
+    for key in outside.keys() - lane_of.keys():  # the nearest lane that the arm already has
+        nearest = round((outside[key] - side[key[1]] * dividing_line) / width - 0.5)
+        lane_of[key] = min(max(nearest, 0), lanes.count(inward=key[1]) - 1)
     return lanes
 
 
-def _numbered_lanes(offset: dict[int, float], width: float) -> dict[int, int]:
-    """Return the lane of each vehicle, from offsets [m] that grow outward."""
-    lanes: dict[int, int] = {}
+def _lanes_of_ends(offset: dict[EndKey, float], width: float) -> dict[EndKey, int]:
+    """Return the lane of each end; lanes between the two directions may be left free."""
+    inward = {key: at for key, at in offset.items() if key[1]}
+    outward = {key: at for key, at in offset.items() if not key[1]}
+    free = 0
+    if inward and outward:
+        between = min(inward.values()) + min(outward.values())
+        free = min(max(round(between / width) - 1, 0), _MAX_LANES_BETWEEN_COUNT)
+    lanes_in, lanes_out = _numbered_lanes(inward, width), _numbered_lanes(outward, width)
+    return {
+        **{key: lane + (free + 1) // 2 for key, lane in lanes_in.items()},
+        **{key: lane + free // 2 for key, lane in lanes_out.items()},
+    }
+
+
+def _numbered_lanes(offset: dict[EndKey, float], width: float) -> dict[EndKey, int]:
+    """Return the lane of each end, from offsets [m] that grow outward."""
+    lanes: dict[EndKey, int] = {}
     lane = 0
     group: list[float] = []
-    for at, vehicle in sorted((at, vehicle) for vehicle, at in offset.items()):
-        if group and at - float(np.mean(group)) > LANE_GAP_M:
-            lane += max(1, round((at - float(np.mean(group))) / width))
+    for key in sorted(offset, key=lambda key: (offset[key], key)):
+        if group and offset[key] - float(np.mean(group)) > LANE_GAP_M:
+            lane += max(1, round((offset[key] - float(np.mean(group))) / width))
             group = []
-        group.append(at)
-        lanes[vehicle] = lane
+        group.append(offset[key])
+        lanes[key] = lane
     return lanes

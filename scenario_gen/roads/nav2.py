@@ -159,8 +159,8 @@ def _free_cells(path: Path, image: _Image, max_cells: int) -> Bools:
             width, height = opened.size
             if width * height > max_cells:
                 raise InputError(
-                    f"map {path}: image {image.path.name} has {width} x {height} pixels, more than "
-                    f"road.max_cells ({max_cells}); crop it or make it coarser, or set "
+                    f"map {path}: image {image.path.name} has {width} x {height} pixels, more "
+                    f"than road.max_cells ({max_cells}); crop it or make it coarser, or set "
                     "road.max_cells"
                 )
             with guarded(where):

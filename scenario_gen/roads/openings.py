@@ -63,28 +63,31 @@ def find_openings(
     exits: list[list[float]] = []
     total = 0
     for edge in _edges(drivable, low, high):
-        for first, size in _openings(edge.cells, resolution):
-            lanes = max(round(size / config.lane_width), 1)
-            total += lanes
+        for place, side in _lanes(edge, resolution, config.lane_width):
+            total += 1
             if total > _MAX_LANES_COUNT:
                 raise InputError(
                     f"the openings at the map's border have room for more than {_MAX_LANES_COUNT} "
                     f"lanes of {config.lane_width:g} m at {resolution:g} m per cell; check the "
                     "resolution, or crop the map to a road"
                 )
-            for k in range(lanes):
-                place = edge.begin + (first + (k + 0.5) * size / lanes) * edge.along
-                side = (2 * k + 1 - lanes) * edge.right * keeps_right
-                if side >= 0:
-                    exits.append([*place, edge.outward])
-                if side <= 0:
-                    entries.append([*place, edge.outward + np.pi])
+            if side * keeps_right >= 0:
+                exits.append([*place, edge.outward])
+            if side * keeps_right <= 0:
+                entries.append([*place, edge.outward + np.pi])
     return np.array(entries).reshape(-1, 3), np.array(exits).reshape(-1, 3)
 
 
-def _openings(cells: Bools, resolution: float) -> Iterator[tuple[float, float]]:
-    """Yield the begins and sizes [m] of runs of drivable cells with room for a car."""
-    for first, last in runs(cells):
+def _lanes(edge: _Edge, resolution: float, lane_width: float) -> Iterator[tuple[Floats, int]]:
+    """Yield the lanes in the openings of an edge.
+
+    Each has a place (2,) [m], and a side: positive to the right of a driver who leaves, 0 in the
+    middle.
+    """
+    for first, last in runs(edge.cells):
         size = (last - first) * resolution
         if size >= _MIN_OPENING_M:
-            yield first * resolution, size
+            lanes = max(round(size / lane_width), 1)
+            for k in range(lanes):
+                along = first * resolution + (k + 0.5) * size / lanes
+                yield edge.begin + along * edge.along, (2 * k + 1 - lanes) * edge.right

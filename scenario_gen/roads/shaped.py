@@ -144,7 +144,7 @@ class MergeLayout:
         """
         tracks = situation.drivers
         frenet = to_frenet(tracks)
-        merging = _merging_vehicles(tracks, frenet)
+        merging = _merging_vehicles(frenet)
         on_main_road = frenet.lane[[i for i in range(len(tracks)) if i not in merging]]
         lanes = max(int(on_main_road.max(initial=0)), int(frenet.lane[merging, 1].max())) + 1
 
@@ -228,21 +228,19 @@ def draw_merge(name: str, encounter: Encounter | None, config: RoadConfig) -> Ro
     return draw_plan(layout.plan(situation.drivers, config), name, config)
 
 
-def _merging_vehicles(tracks: tuple[Track, ...], frenet: FrenetTracks) -> list[int]:
+def _merging_vehicles(frenet: FrenetTracks) -> list[int]:
     """Return the vehicles that leave the outermost lane of their direction for the next one.
 
     Raises:
         RefusedError: there is none, or others stay in the outermost lane.
     """
     for sign in (1, -1):
-        vehicles = [i for i in range(len(tracks)) if frenet.direction[i] == sign]
-        outermost = max((int(frenet.lane[i].max()) for i in vehicles), default=0)
-        merging = [
-            i for i in vehicles if frenet.lane[i, 0] == outermost and frenet.lane[i, 1] < outermost
-        ]
-        others = [i for i in vehicles if i not in merging]
-        if merging and all(outermost not in frenet.lane[i] for i in others):
-            return merging
+        vehicles = np.flatnonzero(frenet.direction == sign)
+        lanes = frenet.lane[vehicles]
+        outermost = lanes.max(initial=0)
+        merges = (lanes[:, 0] == outermost) & (lanes[:, 1] < outermost)
+        if merges.any() and not (lanes[~merges] == outermost).any():
+            return [int(vehicle) for vehicle in vehicles[merges]]
     raise RefusedError(
         "road merge: no recorded vehicle changes from the outermost lane of its direction to the "
         "next one, so none would use the ramp"

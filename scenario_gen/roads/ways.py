@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Routes across a road, from a lane in to a lane out: a line, a bend with continuous curvature, a line.
+"""Routes from one lane to another: a line, a bend with continuous curvature, and a line.
 
 The bend is a clothoid, an arc and a clothoid. Its curvature is the requested one, as recorded. If
 the road has no room for it, gentler and tighter bends are tried in turn. So a route is driven like
@@ -233,7 +233,7 @@ def _shifted(entry: Floats, ahead: float, left: float, turn: float) -> Curve | N
 
 
 def _joined(entry: Floats, before: float, bend: Floats, after: float) -> Curve:
-    """Return a straight line of `before` [m], a bend (M, 3) from the origin along x, and a line."""
+    """Return a line of `before` [m], a bend (M, 3) from the origin along x, and a line."""
     points = bend + np.array([before, 0.0, 0.0])
     end = points[-1] + np.array([*(after * unit(points[-1, 2])), 0.0])
     pieces = [points]

@@ -59,22 +59,33 @@ def markings(network: LaneNetwork) -> Mapping[Marking, tuple[Floats, ...]]:
 
     The junction of a drawn road has none.
     """
+    lanes, crossings = _painted_lanes(network)
+    # Without a junction, a crossing is in the middle of a drawn road.
+    has_junction = len(lanes) + len(crossings) < len(network.every_lane)
+    crossed = network.drawn and bool(crossings) and not has_junction
+    arrows = _arrows(lanes, share=0.25 if crossed else 0.5)
+    lines = [
+        *_edges(lanes),
+        *_rule_lines(network),
+        *((Marking.ARROW, arrow) for arrow in arrows),
+        *((Marking.ZEBRA, bar) for bar in _zebras(crossings)),
+    ]
+    kinds = [kind for kind in Marking if crossings or kind != Marking.ZEBRA]
+    return {kind: tuple(line for each, line in lines if each == kind) for kind in kinds}
+
+
+def _painted_lanes(network: LaneNetwork) -> tuple[list[Lane], list[Lane]]:
+    """Return the lanes with markings, and the crossings."""
     shown = [lane for lane in network.every_lane if not (network.drawn and lane.junction)]
     lanes = [lane for lane in shown if not lane.crossing]
-    crossings = [lane for lane in shown if lane.crossing]
-    # Without a junction, a crossing is in the middle of a drawn road.
-    crossed = network.drawn and bool(crossings) and len(shown) == len(network.every_lane)
-    painted: dict[Marking, list[Floats]] = {kind: [] for kind in Marking}
-    for kind, line in _edges(lanes):
-        painted[kind].append(line)
+    return lanes, [lane for lane in shown if lane.crossing]
+
+
+def _rule_lines(network: LaneNetwork) -> Iterator[tuple[Marking, Floats]]:
+    """Yield the lines of traffic rules."""
     for rule in network.rules:
         if rule.kind in _MARKING_OF_RULE and len(rule.line):
-            painted[_MARKING_OF_RULE[rule.kind]].append(rule.line)
-    painted[Marking.ARROW].extend(_arrows(lanes, share=0.25 if crossed else 0.5))
-    painted[Marking.ZEBRA].extend(_zebras(crossings))
-    if not crossings:
-        del painted[Marking.ZEBRA]
-    return {kind: tuple(lines) for kind, lines in painted.items()}
+            yield _MARKING_OF_RULE[rule.kind], rule.line
 
 
 def _edges(lanes: Sequence[Lane]) -> Iterator[tuple[Marking, Floats]]:

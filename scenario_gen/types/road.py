@@ -25,7 +25,6 @@ from scenario_gen.numerics import (
     sealed,
     wrap_angle,
 )
-from scenario_gen.numerics.distance_field import distance_field
 from scenario_gen.numerics.polygons import fill_slits, polygon_cells
 from scenario_gen.types.lanes import Lane, LaneNetwork
 
@@ -115,6 +114,8 @@ class Road:
 
         Everything outside the grid is closed.
         """
+        from scenario_gen.numerics.distance_field import distance_field  # loads numba
+
         return distance_field(self.drivable)
 
     @cached_property

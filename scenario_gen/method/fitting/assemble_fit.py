@@ -83,14 +83,20 @@ def assemble_fit(
         fitted.append(FittedVehicle(anchors, moved, stands, scale, manoeuvre, turns, path))
 
         speeds = encounter.speed[i, [0, last]] * scale
-        speeds = np.where(speeds < STANDING_SPEED_MPS, 0.0, speeds)
-        speeds = np.where(np.isfinite(given[i, :, 0]), given[i, :, 3], speeds)
-        speeds = np.where(track.still, 0.0, speeds)
+        speeds = _end_speeds(speeds, given[i], still=track.still)
         states.append(np.column_stack((anchors[[0, -1]], speeds)))
     start, end = np.stack(states, axis=1)
     requested = BoundaryStates(start=start, end=end)
     losses = (*find_losses(situation.tracks, placement.tracks), *placement.unused)
     return Fit(encounter.vehicles, tuple(fitted), index, requested, tuple(notes), losses)
+
+
+def _end_speeds(speeds: Floats, given: Floats, *, still: bool) -> Floats:
+    """Return the speeds (2,) [m/s] at start and end: recorded ones, or given states (2, 4)."""
+    if still:
+        return np.zeros(2)
+    slow = np.where(speeds < STANDING_SPEED_MPS, 0.0, speeds)
+    return np.where(np.isfinite(given[:, 0]), given[:, 3], slow)
 
 
 def _with_given_ends(anchors: Floats, progress: Floats, given: Floats, *, still: bool) -> Floats:

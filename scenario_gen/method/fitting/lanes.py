@@ -170,10 +170,8 @@ def _refuse_turns(tracks: tuple[Track, ...], road: Road) -> None:
     right = max(float((np.maximum.accumulate(yaw) - yaw).max()) for yaw in yaws)
     for track in tracks:
         if not -right - MAX_TURN_CHANGE_RAD <= turn_of(track) <= left + MAX_TURN_CHANGE_RAD:
-            raise RefusedError(
-                f"vehicle {track.vehicle.id} {describe_turn(turn_of(track))}: road {road.name} has no "
-                "lanes for that"
-            )
+            turns = f"vehicle {track.vehicle.id} {describe_turn(turn_of(track))}"
+            raise RefusedError(f"{turns}: road {road.name} has no lanes for that")
 
 
 def _shortened(tracks: tuple[Track, ...], road: Road, config: FittingConfig) -> float:

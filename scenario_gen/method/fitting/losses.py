@@ -1,9 +1,9 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""What a fit loses of the recorded encounter: turns, conflicts and their order, lanes, passings."""
+"""The parts of a recorded encounter that a fit loses: turns, conflicts, lanes, passings."""
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from itertools import combinations, permutations
 
 import numpy as np
@@ -67,7 +67,7 @@ def allowed_losses(allow: str) -> frozenset[str]:
     for name in names:
         if name not in known:
             raise InputError(
-                f"parameter allow has {name!r}; choose from {', '.join(known)}, separated by commas"
+                f"parameter allow has {name!r}; choose from {', '.join(known)}, with commas"
             )
     return frozenset(known[name] for name in names)
 
@@ -111,7 +111,7 @@ def find_unused(network: LaneNetwork, used: Iterable[int]) -> tuple[Loss, ...]:
 
 
 def find_losses(tracks: Tracks, placed: Tracks) -> tuple[Loss, ...]:
-    """Return what the placed tracks lose of the recorded ones; one loss for each set of vehicles."""
+    """Return the losses of placed tracks, one for each set of vehicles."""
     losses = [
         *_lost_turns(tracks, placed),
         *_lost_passings(tracks, placed),
@@ -130,7 +130,8 @@ def _lost_turns(tracks: Tracks, placed: Tracks) -> Iterator[Loss]:
         turn, name = turn_of(placed_track), track.vehicle.id
         lost = next((each for each in turns_to_keep(track) if not is_same_turn(each, turn)), None)
         if lost is not None:
-            message = f"vehicle {name} {describe_turn(lost)} in the recording, {describe_turn(turn)} on this road"
+            recorded, placed_turn = describe_turn(lost), describe_turn(turn)
+            message = f"vehicle {name} {recorded} in the recording, {placed_turn} on this road"
             yield Loss("turn", (name,), message)
 
 
@@ -159,7 +160,10 @@ def _lost_meeting(tracks: Tracks, pair: tuple[int, int], *, following: bool) -> 
     first, second = (tracks[k] for k in pair)
     a, b = first.vehicle.id, second.vehicle.id
     if not following:
-        message = f"vehicles {a} and {b} have crossing or merging paths in the recording, and do not meet on this road"
+        message = (
+            f"vehicles {a} and {b} have crossing or merging paths in the recording, and do not "
+            "meet on this road"
+        )
         return Loss("conflict", (a, b), message)
     if first.vehicle.kind.walks or second.vehicle.kind.walks:
         return None
@@ -193,37 +197,30 @@ def _lost_lanes(tracks: Tracks, placed: Tracks) -> Iterator[Loss]:
     for i, j in permutations(drivers, 2):
         before = [_offset_at_end(tracks[i], tracks[j], end) for end in (0, 1)]
         after = [_offset_at_end(placed[i], placed[j], end) for end in (0, 1)]
-        in_lane = [abs(offset) < _IN_LANE_M for offset in before]
-        max_offset = np.inf if any(in_lane) else _MAX_SIDE_OFFSET_M
-        if any(
-            _changes_lane(recorded, on_road, max_offset)
-            for recorded, on_road in zip(before, after, strict=True)
-        ):
-            known = [
-                inside
-                for inside, offset in zip(in_lane, before, strict=True)
-                if not np.isnan(offset)
-            ]
-            kind, message = _lane_loss(tracks[i].vehicle.id, tracks[j].vehicle.id, known)
-            yield Loss(kind, (tracks[i].vehicle.id, tracks[j].vehicle.id), message)
+        shares_lane = any(abs(offset) < _IN_LANE_M for offset in before)
+        max_offset = np.inf if shares_lane else _MAX_SIDE_OFFSET_M
+        if any(map(_changes_lane, before, after, (max_offset, max_offset))):
+            yield _lane_loss(tracks[i].vehicle.id, tracks[j].vehicle.id, before)
 
 
-def _lane_loss(a: str, b: str, in_lane: list[bool]) -> tuple[str, str]:
-    """Return the kind and the message for a vehicle b that was in the lane of a at some ends."""
+def _lane_loss(a: str, b: str, offsets: Sequence[float]) -> Loss:
+    """Return the loss of a vehicle b with recorded offsets [m] from a at the start and the end."""
+    known = [offset for offset in offsets if not np.isnan(offset)]
+    in_lane = [abs(offset) < _IN_LANE_M for offset in known]
     if all(in_lane):
         message = f"vehicles {a} and {b} drive in one lane in the recording, not on this road"
-        return "following", message
+        return Loss("following", (a, b), message)
     if in_lane[-1]:
-        return "merge", f"vehicle {b} enters the lane of {a} in the recording, not on this road"
+        message = f"vehicle {b} enters the lane of {a} in the recording, not on this road"
+        return Loss("merge", (a, b), message)
+    message = f"vehicles {a} and {b} drive in two lanes in the recording, otherwise on this road"
     if in_lane[0]:
         message = f"vehicle {b} leaves the lane of {a} in the recording, not on this road"
-        return "lane_change", message
-    message = f"vehicles {a} and {b} drive in two lanes in the recording, otherwise on this road"
-    return "lane_change", message
+    return Loss("lane_change", (a, b), message)
 
 
 def _changes_lane(recorded: float, on_road: float, max_offset: float) -> bool:
-    """Return whether a vehicle with an offset [m] from another one's lane is elsewhere on the road.
+    """Return whether a vehicle has another lane on the road, from offsets [m] to another one.
 
     Recorded offsets beyond `max_offset` [m] are not compared.
     """

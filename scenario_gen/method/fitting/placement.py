@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The placement of a recording on a road: its motion there, its scale, and the room that it has."""
+"""The placement of a recording on a road: its motion there, its scale, and its room."""
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace

@@ -12,6 +12,7 @@ pattern search on the fine field. The recording moves as one piece, so all meeti
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
+import math
 
 import numpy as np
 
@@ -74,35 +75,33 @@ def place_by_search(tracks: tuple[Track, ...], road: Road, config: FittingConfig
         RefusedError: no placement gives (almost) all footprints room.
     """
     search = _GridSearch.of(tracks, road, config)
-    best: tuple[float, Placement] | None = None
+    least_repair, best = math.inf, None
     reason = f"the recording ({np.ptp(search.discs, axis=0).max():.0f} m) is larger than the map"
-    for scale in filter(config.accepts, SCALES):
-        for similarity in search.candidates(scale):
-            stop_if_cancelled()
-            placed = Placement.of(
-                search.moved(tracks, similarity), similarity.scale, [similarity.note(road)]
+    for similarity in search.candidates(config):
+        stop_if_cancelled()
+        moved = search.moved(tracks, similarity)
+        placed = Placement.of(moved, similarity.scale, [similarity.note(road)])
+        try:
+            placement = separated(placed, config, sideways=1.0)
+            repair = max_repair(placement.tracks, road, config.max_move)
+        except RefusedError as error:
+            reason = str(error)
+            continue
+        share = min(share_with_room(road, track) for track in placement.tracks)
+        if share == 1.0:
+            return placement
+        if share >= _MIN_ROOM_SHARE and repair < least_repair:
+            least_repair, best = repair, placement
+        elif best is None:
+            reason = (
+                "in the best placement a vehicle has room at only "
+                f"{100.0 * share:.0f} % of its samples"
             )
-            try:
-                placement = separated(placed, config, sideways=1.0)
-                repair = max_repair(placement.tracks, road, config.max_move)
-            except RefusedError as error:
-                reason = str(error)
-                continue
-            share = min(share_with_room(road, track) for track in placement.tracks)
-            if share == 1.0:
-                return placement
-            if share >= _MIN_ROOM_SHARE and (best is None or repair < best[0]):
-                best = repair, placement
-            elif best is None:
-                reason = (
-                    "in the best placement a vehicle has room at only "
-                    f"{100.0 * share:.0f} % of its samples"
-                )
     if best is None:
         raise RefusedError(
             f"no placement on road {road.name} has room for the recording: {reason}"
         )
-    return best[1]
+    return best
 
 
 @dataclass(frozen=True, eq=False)
@@ -135,10 +134,12 @@ class _GridSearch:
         required = max(track.vehicle.width for track in tracks) / 2.0 + config.margin
         return cls(discs - centre, centre, required, road)
 
-    def candidates(self, scale: float) -> list[_Similarity]:
-        """Return the best similarities with a scale, the best first."""
-        coarse = sorted(self._coarse(scale), key=lambda each: each.rank)[:_REFINED_CANDIDATES]
-        return sorted(map(self._refined, coarse), key=lambda each: each.rank)
+    def candidates(self, config: FittingConfig) -> Iterator[_Similarity]:
+        """Yield the best similarities with each accepted scale, the best first."""
+        for scale in filter(config.accepts, SCALES):
+            coarse = sorted(self._coarse(scale), key=lambda each: each.rank)
+            refined = map(self._refined, coarse[:_REFINED_CANDIDATES])
+            yield from sorted(refined, key=lambda each: each.rank)
 
     def moved(self, tracks: tuple[Track, ...], similarity: _Similarity) -> tuple[Track, ...]:
         """Return tracks on the map."""

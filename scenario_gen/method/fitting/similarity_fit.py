@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Placements by a similarity (eqs 7-9, corrected): in the recording's frame, or by given states."""
+"""Placements by a similarity (eqs 7-9, corrected): in the recorded frame, or by given states."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -19,7 +19,7 @@ from scenario_gen.method.fitting.placement import (
     share_with_room,
     STANDING_SPEED_MPS,
 )
-from scenario_gen.numerics import Floats, frozen
+from scenario_gen.numerics import Bools, Floats, frozen
 from scenario_gen.numerics.curve import Curve
 from scenario_gen.numerics.plane import place
 from scenario_gen.roads import draw_route
@@ -61,8 +61,8 @@ def place_given(
     """Map every vehicle's start to the given start, and its end to the given goal.
 
     If a route of line, arc and line can be drawn between the two, eq 9 applies along it: the
-    recorded arc lengths times s. Otherwise it is the similarity of the plane. A vehicle whose chord
-    is too short for that takes rotation and scale from all vehicles (Umeyama 1991).
+    recorded arc lengths times s. Otherwise it is the similarity of the plane. A vehicle with too
+    short a chord takes rotation and scale from all vehicles (Umeyama 1991).
 
     Args:
         situation: of the recording.
@@ -90,7 +90,7 @@ def place_given(
         ),
         axis=1,
     )
-    is_given = np.isfinite(states[..., 0])
+    is_given: Bools = np.isfinite(states[..., 0])
     ends = states
     if base is not None:
         ends = np.where(is_given[..., None], states, _end_states(base, encounter))
@@ -105,16 +105,15 @@ def place_given(
             continue
         placed_track, scale[n], method = _placed(track, ends[n], joint, road, config)
         placed.append(placed_track)
-        names = [name for name, given in zip(("start", "goal"), is_given[n], strict=True) if given]
-        note = Note.of(
-            NoteKind.STATE_GIVEN,
-            vehicle=track.vehicle.id,
-            states=" and ".join(names),
-            method=method,
-        )
-        notes.append(note)
-    given = np.where(is_given.any(axis=1)[:, None, None], ends, np.nan)
+        notes.append(_note(track, is_given[n], method))
+    given = np.where(np.any(is_given, axis=1, keepdims=True)[..., None], ends, np.nan)
     return Placement(tuple(placed), frozen(scale), frozen(moved), tuple(notes)), given
+
+
+def _note(track: Track, is_given: Bools, method: str) -> Note:
+    names = [name for name, given in zip(("start", "goal"), is_given, strict=True) if given]
+    states = " and ".join(names)
+    return Note.of(NoteKind.STATE_GIVEN, vehicle=track.vehicle.id, states=states, method=method)
 
 
 def _end_states(base: Placement, encounter: Encounter) -> Floats:

@@ -91,12 +91,12 @@ class _Map:
     def speed_limits(self) -> dict[str, float]:
         """Speed limits [m/s] by the id of their sign."""
         limits = {}
-        for sign in self.root.findall("trafficSign"):
-            for element in sign.findall("trafficSignElement"):
-                with self.faults.leaving_out("speed sign", sign.get("id", "?")):
-                    limit = _speed_limit_of_sign(element)
-                    if not math.isnan(limit):
-                        limits[sign.attribute("id")] = limit
+        for element in self.root.findall("trafficSign/trafficSignElement"):
+            name = element.getparent().get("id", "?")
+            with self.faults.leaving_out("speed sign", name):
+                limit = _speed_limit_of_sign(element)
+                if not math.isnan(limit):
+                    limits[name] = limit
         return limits
 
     @cached_property
@@ -174,8 +174,9 @@ class _Map:
         limits = [self.speed_limits[sign] for sign in signs if sign in self.speed_limits]
         return min(limits, default=math.nan)
 
-    def rules(self) -> Iterator[DraftRule]:
-        """Yield a rule for each sign and light to which a lanelet for cars refers."""
+    @cached_property
+    def rule_kinds(self) -> dict[tuple[str, str], RuleKind]:
+        """The meanings of signs and lights, by the tag of references to them and their ids."""
         kinds: dict[tuple[str, str], RuleKind] = {}
         for sign in self.root.findall("trafficSign"):
             known = [kind for kind in map(kind_of_sign, _sign_names(sign)) if kind is not None]
@@ -183,22 +184,26 @@ class _Map:
                 kinds["trafficSignRef", sign.get("id", "?")] = known[0]
         for light in self.root.findall("trafficLight"):
             kinds["trafficLightRef", light.get("id", "?")] = RuleKind.TRAFFIC_LIGHT
-        tags = dict.fromkeys(tag for tag, _ in kinds)
-        for name, users in self.users.items():
-            if not users & CARS:
-                continue
+        return kinds
+
+    def rules(self) -> Iterator[DraftRule]:
+        """Yield a rule for each sign and light to which a lanelet for cars refers."""
+        for name in (name for name, users in self.users.items() if users & CARS):
             with self.faults.leaving_out("stop line", name):
-                lanelet = self.lanelets[name]
-                line = _stop_line(lanelet)
-                refs = [
-                    (tag, link.attribute("ref"))
-                    for tag in tags
-                    for path in (tag, f"stopLine/{tag}")
-                    for link in lanelet.findall(path)
-                ]
-                for ref in dict.fromkeys(refs):
-                    if ref in kinds:
-                        yield DraftRule(ref[1], kinds[ref], (name,), line=line)
+                yield from self._rules_of(name)
+
+    def _rules_of(self, name: str) -> Iterator[DraftRule]:
+        lanelet = self.lanelets[name]
+        line = _stop_line(lanelet)
+        refs = [
+            (tag, link.attribute("ref"))
+            for tag in ("trafficSignRef", "trafficLightRef")
+            for path in (tag, f"stopLine/{tag}")
+            for link in lanelet.findall(path)
+        ]
+        for ref in dict.fromkeys(refs):
+            if ref in self.rule_kinds:
+                yield DraftRule(ref[1], self.rule_kinds[ref], (name,), line=line)
 
     def notes(self) -> Iterator[Note]:
         """Yield the notes on the file."""

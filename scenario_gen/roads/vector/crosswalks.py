@@ -33,8 +33,8 @@ def crosswalks(road: OpenDriveRoad, faults: Faults) -> Iterator[Draft]:
                 ring = ring[:-1]
             if len(ring) < 4 or shapely.Polygon(ring).area < _MIN_AREA_M2:
                 raise InputError(
-                    f"{element.place}: {name} has no area; an outline with four corners, or length "
-                    "and width, are needed"
+                    f"{element.place}: {name} has no area; an outline with four corners, or "
+                    "length and width, are needed"
                 )
             left, right = _borders(ring - pose[:2], float(pose[2]))
             yield Draft(
@@ -50,7 +50,7 @@ def crosswalks(road: OpenDriveRoad, faults: Faults) -> Iterator[Draft]:
 def _borders(ring: Floats, yaw: float) -> list[Floats]:
     """Return the left and the right border of an outline (P, 2) [m] about a place on a road.
 
-    They join the outline's rightmost edge, seen in the road's direction [rad], to its leftmost one.
+    They join the outline's rightmost edge, seen in the road's direction [rad], to its leftmost.
     """
     _, left = ahead_and_left(ring + np.roll(ring, -1, axis=0), yaw)
     rightmost = int(np.argmin(left))

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The lanes that the readers of map formats return, the elements that they leave out, and bounds."""
+"""What the readers of map formats return: lanes, faults and notes; and bounds of maps."""
 
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager

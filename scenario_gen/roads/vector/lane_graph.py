@@ -193,7 +193,7 @@ class LaneField:
         size: (2,) its columns and rows.
         cell: [m] size of its cells.
         rows: (size,) the row of `distance` of each cell, by flat index.
-        distance: (C + 1, 16) [m], at most `_MAX_FIELD_DISTANCE_M`; the last row is the off-road one.
+        distance: (C + 1, 16) [m], at most `_MAX_FIELD_DISTANCE_M`; the last row is off the road.
     """
 
     low: Floats

@@ -188,7 +188,7 @@ class LaneletMap:
             for tag in ("node", "way", "relation")
         )
         parsed = cls(root.file, nodes, ways, [*map(_Relation, relations.values())], faults)
-        if not any(lanelet.users & CARS for lanelet in parsed.lanelets):
+        if not parsed.car_lanelets:
             raise InputError(
                 f"{root.file}: none of its {parsed.lanelet_count} lanelets is for cars"
             )
@@ -206,6 +206,11 @@ class LaneletMap:
         return [each for each in self.relations if each.is_lanelet and each.users]
 
     @cached_property
+    def car_lanelets(self) -> list[_Relation]:
+        """The lanelets for cars."""
+        return [lanelet for lanelet in self.lanelets if lanelet.users & CARS]
+
+    @cached_property
     def borders(self) -> dict[str, tuple[str, str]]:
         """The ways of the left and the right border of each lanelet, without faulty ones."""
         borders = {}
@@ -221,10 +226,9 @@ class LaneletMap:
     def regulations(self) -> list[_Regulation]:
         """The rules for lanelets that cars use."""
         lanelets_of: dict[str, list[str]] = defaultdict(list)
-        for lanelet in self.lanelets:
-            if lanelet.users & CARS:
-                for ref in lanelet.members("regulatory_element"):
-                    lanelets_of[ref].append(lanelet.id)
+        for lanelet in self.car_lanelets:
+            for ref in lanelet.members("regulatory_element"):
+                lanelets_of[ref].append(lanelet.id)
         regulations = []
         for element in self.relations:
             kind = self._rule_kind(element)
@@ -241,11 +245,10 @@ class LaneletMap:
     def stop_lines(self) -> dict[str, list[str]]:
         """The nodes of the ways that may be stop lines, without faulty ones."""
         lines = {}
-        for regulation in self.regulations:
-            for ref in regulation.ways:
-                if ref not in lines:
-                    with self.faults.leaving_out("stop line", ref):
-                        lines[ref] = self._nodes_of(ref)
+        refs = [ref for regulation in self.regulations for ref in regulation.ways]
+        for ref in dict.fromkeys(refs):
+            with self.faults.leaving_out("stop line", ref):
+                lines[ref] = self._nodes_of(ref)
         return lines
 
     @cached_property
@@ -257,12 +260,7 @@ class LaneletMap:
         """
         refs = [ref for pair in self.borders.values() for ref in pair]
         refuse_too_long(sum(len(self.ways[ref]) for ref in refs), self.file)
-        for_cars = {
-            ref
-            for lanelet in self.lanelets
-            if lanelet.users & CARS
-            for ref in self.borders.get(lanelet.id, ())
-        }
+        for_cars = {ref for each in self.car_lanelets for ref in self.borders.get(each.id, ())}
         nodes_of = {ref: self._nodes_of(ref) for ref in refs}
         central: dict[str, None] = {}  # in the order of the file
         for ref, nodes in nodes_of.items():
@@ -279,14 +277,13 @@ class LaneletMap:
     def drafts(self) -> Iterator[Draft]:
         """Yield the lanes, and those for both ways once for each."""
         directed = []
-        for relation in self.lanelets:
-            if relation.id in self.borders:
-                with self.faults.leaving_out("lanelet", relation.id):
-                    left, right = map(self._border, self.borders[relation.id])
-                    lanelet = _Lanelet.of(relation, left, right)
-                    directed.append(lanelet)
-                    if relation.both_ways:
-                        directed.append(lanelet.turned())
+        for relation in (each for each in self.lanelets if each.id in self.borders):
+            with self.faults.leaving_out("lanelet", relation.id):
+                left, right = map(self._border, self.borders[relation.id])
+                lanelet = _Lanelet.of(relation, left, right)
+                directed.append(lanelet)
+                if relation.both_ways:
+                    directed.append(lanelet.turned())
         limits = {relation.id: self._sign_limit(relation) for relation in self.relations}
         return _drafts(directed, limits)
 
@@ -461,7 +458,7 @@ def _drafts(lanelets: Sequence[_Lanelet], limits: dict[str, float]) -> Iterator[
 
 
 def _speed_limit(lanelet: _Relation, limits: dict[str, float]) -> float:
-    """Return the speed limit [m/s] of a lanelet: its tag, its signs, or the default; NaN if none."""
+    """Return the speed limit [m/s] of a lanelet by its tag, its signs, or the default, or NaN."""
     limit = speed_of(lanelet.tags.get("speed_limit", ""), "km/h")
     if not math.isnan(limit):
         return limit

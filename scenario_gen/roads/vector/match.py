@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""A recording on the lanes of a map: which lanes each vehicle follows, and where on them it starts.
+"""A recording on the lanes of a map: the lanes that each vehicle follows, and its start there.
 
 A rigid placement (`search`) says about where the recording lies. Each vehicle then gets the chain
 of lanes that its path is nearest to, with at most one lane change where the map allows it. A least
@@ -11,7 +11,7 @@ vehicles in one lane stay as recorded.
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from itertools import islice, product
+from itertools import combinations, islice, product
 import math
 from typing import NamedTuple
 
@@ -237,7 +237,7 @@ def _lane_path(
     *,
     prefer_reserved: bool,
 ) -> LanePath | None:
-    """Return the path along lanes that resembles a vehicle's poses (K, 3) most, if there is any."""
+    """Return the path along lanes that resembles a vehicle's poses (K, 3) most, if any."""
     reserved = graph.reserved_for(track) if prefer_reserved else frozenset[int]()
     length = graph.length
     driven = scale * track.travelled
@@ -371,26 +371,22 @@ def _moved_starts(
     """Move the starts so that crossings and gaps are as far along as recorded (least squares)."""
     known = [Equation(((i, 1.0),), path.start, WEIGHTS.placement) for i, path in enumerate(paths)]
     crossing_of = {(a, b): crossing for a, b, crossing in pair_crossings(tracks)}
-    for a in range(len(tracks)):
-        for b in range(a):
-            if crossing := crossing_of.get((a, b)):
-                along = scale * np.array([crossing.first, crossing.second])
-                meeting = met.get((b, a))
-                weight = WEIGHTS.beyond_crossing
-                if crossing.driven:
-                    weight = WEIGHTS.driven_crossing
-                elif meeting is not None and not meeting.following:
-                    weight = WEIGHTS.met_crossing
-                known += _crossing_equations(paths, (a, b), along, weight)
-            known += _gap_equations(paths, tracks, (a, b), scale)
-            known += _gap_equations(paths, tracks, (b, a), scale)
-    turning_of = {equation.terms[0][0]: equation for equation in turning}
+    for b, a in combinations(range(len(tracks)), 2):
+        crossing = crossing_of.get((a, b))
+        if crossing is not None:
+            along = scale * np.array([crossing.first, crossing.second])
+            weight = WEIGHTS.beyond_crossing
+            if crossing.driven:
+                weight = WEIGHTS.driven_crossing
+            elif (b, a) in met and not met[b, a].following:
+                weight = WEIGHTS.met_crossing
+            known += _crossing_equations(paths, (a, b), along, weight)
+        known += _gap_equations(paths, tracks, (a, b), scale)
+        known += _gap_equations(paths, tracks, (b, a), scale)
+    known += turning
     for i, (path, track) in enumerate(zip(paths, tracks, strict=True)):
-        known += [turning_of[i]] if i in turning_of else []
-        known += [
-            Equation(((i, 1.0),), start, WEIGHTS.stop_line)
-            for start in _starts_to_stop(network, path, track, scale)
-        ]
+        stops = _starts_to_stop(network, path, track, scale)
+        known += [Equation(((i, 1.0),), start, WEIGHTS.stop_line) for start in stops]
     starts = solve_placement(range(len(paths)), known)
     return [replace(path, start=starts[i]) for i, path in enumerate(paths)]
 
@@ -398,7 +394,7 @@ def _moved_starts(
 def _crossing_equations(
     paths: list[LanePath], pair: tuple[int, int], along: Floats, weight: float
 ) -> list[Equation]:
-    """Return the equations that keep the distances `along` (2,) [m] to a crossing, if it is left."""
+    """Return equations that keep the distances `along` (2,) [m] to a crossing, if there is one."""
     first, second = (paths[k] for k in pair)
     stations = crossings(first.curve, second.curve, LIMITS.crossing_angle_rad)
     if not len(stations):

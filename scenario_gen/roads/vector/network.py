@@ -158,11 +158,9 @@ def with_junctions(network: LaneNetwork) -> LaneNetwork:
     crossing = {k for pair in pairs for k in pair}
     for lane in network.lanes:
         inner = [k for k in lane.successors if k in crossing]
-        if inner:
-            pairs += [(inner[0], k) for k in lane.successors if k not in crossing]
-    joined = {k for pair in pairs for k in pair}
-
+        pairs += [(inner[0], k) for k in lane.successors if inner and k not in crossing]
     ends = np.array(pairs, dtype=np.int64).reshape(-1, 2).T
+    joined = set(ends.ravel().tolist())
     count = len(network.lanes)
     edges = coo_array((np.ones(len(pairs)), tuple(ends)), (count, count))
     _, part = connected_components(edges, directed=False)

@@ -158,10 +158,11 @@ class LaneLinks:
     def add_road(self, road: OpenDriveRoad) -> None:
         """Link a road's sections to each other, and the road to those before and after it."""
         for lane in road.lanes:
-            for tag in ("predecessor", "successor"):
-                for link in lane.element.findall(f"link/{tag}"):
-                    with self.faults.leaving_out("link", f"{tag} of lane {lane.name}"):
-                        self._add_link(road, lane, link)
+            links = [*lane.element.findall("link/predecessor")]
+            links += lane.element.findall("link/successor")
+            for link in links:
+                with self.faults.leaving_out("link", f"{link.tag} of lane {lane.name}"):
+                    self._add_link(road, lane, link)
 
     def _add_link(self, road: OpenDriveRoad, lane: SectionLane, link: Element) -> None:
         """Link a lane to the one that its predecessor or successor element names."""
@@ -242,17 +243,17 @@ def _lane_end(road: OpenDriveRoad, contact: str, lane: int) -> LaneEnd:
 
 def _drafts(roads: dict[str, OpenDriveRoad], links: LaneLinks) -> Iterator[Draft]:
     """Yield all lanes with users, and lanes for both ways once for each."""
-    for road in roads.values():
-        for lane in road.lanes:
-            width = float(np.hypot(*(lane.outer - lane.inner).T).max())
-            if lane.users and width >= 0.1:
-                yield _draft(road, lane, links, along_s=lane.forward)
-                if lane.both_ways and lane.users & DRIVERS:
-                    yield _draft(road, lane, links, along_s=not lane.forward)
+    lanes = [(road, lane) for road in roads.values() for lane in road.lanes]
+    for road, lane in lanes:
+        width = float(np.hypot(*(lane.outer - lane.inner).T).max())
+        if lane.users and width >= 0.1:
+            yield _draft(road, lane, links, along_s=lane.forward)
+            if lane.both_ways and lane.users & DRIVERS:
+                yield _draft(road, lane, links, along_s=not lane.forward)
 
 
 def _draft(road: OpenDriveRoad, lane: SectionLane, links: LaneLinks, *, along_s: bool) -> Draft:
-    """Return a lane driven along s or against it; against its own direction its name ends in "r"."""
+    """Return a lane driven along s or not; against its own direction its name ends in "r"."""
     height = road.elevation.at(lane.s, float(lane.s[-1]))
     inner, outer = (np.column_stack((border, height)) for border in (lane.inner, lane.outer))
     left, right = (inner, outer) if lane.key[2] < 0 else (outer, inner)

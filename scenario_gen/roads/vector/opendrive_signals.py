@@ -28,53 +28,50 @@ _MAX_STOP_LINE_DISTANCE_M = 15.0  # from its sign
 
 def signal_rules(roads: dict[str, OpenDriveRoad], faults: Faults) -> Iterator[DraftRule]:
     """Yield the rules of signals where they are placed and where roads refer to them."""
-    signals: list[tuple[OpenDriveRoad, Element]] = []
-    for road in roads.values():
-        for tag in ("signal", "signalReference"):
-            signals += [(road, signal) for signal in road.element.findall(f"signals/{tag}")]
-    stop_lines = [(road, signal) for road, signal in signals if _is_stop_line(signal)]
-    for road in roads.values():
-        objects = road.element.findall("objects/object")
-        stop_lines += [(road, line) for line in objects if _is_stop_line(line)]
     kinds: dict[str, RuleKind] = {}
-    for _, signal in signals:
+    for signal in _elements(roads, "signals/signal"):
         kind = _kind_of_signal(signal)
-        if signal.tag == "signal" and kind is not None:
+        if kind is not None:
             kinds[signal.get("id", "?")] = kind
+    for road in roads.values():
+        signals = road.element.findall("signals/signal")
+        signals += road.element.findall("signals/signalReference")
+        lines = [*signals, *road.element.findall("objects/object")]
+        lines = [line for line in lines if _is_stop_line(line)]
+        for signal in [signal for signal in signals if signal.get("id", "?") in kinds]:
+            name = signal.get("id", "?")
+            with faults.leaving_out("signal", name):
+                yield from _rules_of_signal(road, signal, kinds[name], lines)
 
-    for road, signal in signals:
-        name = signal.get("id", "?")
-        if name not in kinds:
-            continue
-        with faults.leaving_out("signal", name):
-            lines = [
-                line.number("s")
-                for line_road, line in stop_lines
-                if line_road is road and _share_direction(signal, line)
-            ]
-            s = _station_of_stop(signal.number("s"), lines)
-            for lane in _lanes_at(road, signal, s):
-                yield DraftRule(name, kinds[name], (lane.name,), line=_cross_section(lane, s))
+
+def _rules_of_signal(
+    road: OpenDriveRoad, signal: Element, kind: RuleKind, lines: list[Element]
+) -> Iterator[DraftRule]:
+    """Yield the rule of a signal for each lane that it applies to."""
+    s = _station_of_stop(signal, lines)
+    for lane in _lanes_at(road, signal, s):
+        yield DraftRule(signal.get("id", "?"), kind, (lane.name,), line=_cross_section(lane, s))
+
+
+def _elements(roads: dict[str, OpenDriveRoad], path: str) -> list[Element]:
+    """Return the elements below all roads along a path of tags."""
+    return [element for road in roads.values() for element in road.element.findall(path)]
 
 
 def other_signals(roads: dict[str, OpenDriveRoad]) -> int:
     """Return how many signals have a meaning that is not read."""
-    signals = [
-        signal for road in roads.values() for signal in road.element.findall("signals/signal")
-    ]
-    return sum(not _is_known(signal) for signal in signals)
+    return sum(not _is_known(signal) for signal in _elements(roads, "signals/signal"))
 
 
 def priorities(root: Element, roads: dict[str, OpenDriveRoad]) -> Iterator[DraftRule]:
     """Yield the priorities at junctions: traffic of the low road gives way to the high road."""
-    for junction in root.findall("junction"):
-        name = f"junction {junction.get('id', '?')}"
-        for priority in junction.findall("priority"):
-            high, low = (roads.get(priority.get(name, "")) for name in ("high", "low"))
-            if high is not None and low is not None:
-                giving_way = tuple(lane.name for lane in low.lanes)
-                going_first = tuple(lane.name for lane in high.lanes)
-                yield DraftRule(name, RuleKind.GIVE_WAY, giving_way, going_first)
+    for priority in root.findall("junction/priority"):
+        name = f"junction {priority.getparent().get('id', '?')}"
+        high, low = (roads.get(priority.get(level, "")) for level in ("high", "low"))
+        if high is not None and low is not None:
+            giving_way = tuple(lane.name for lane in low.lanes)
+            going_first = tuple(lane.name for lane in high.lanes)
+            yield DraftRule(name, RuleKind.GIVE_WAY, giving_way, going_first)
 
 
 def _kind_of_signal(signal: Element) -> RuleKind | None:
@@ -89,7 +86,7 @@ def _sign(signal: Element) -> tuple[str, str, str]:
 
 
 def _is_stop_line(element: Element) -> bool:
-    """Return whether a signal or an object is a stop line; some tools give it a name, but no type."""
+    """Return whether a signal or an object is a stop line; some tools give it a name, no type."""
     name = re.sub("[^a-z]", "", element.get("name", "").lower())
     return element.get("type") == _STOP_LINE_TYPE or name.startswith("stopline")
 
@@ -110,9 +107,11 @@ def _share_direction(a: Element, b: Element) -> bool:
     return "none" in directions or len(directions) == 1
 
 
-def _station_of_stop(s: float, lines: list[float]) -> float:
-    """Return the arc length [m] of the stop line near a sign at s, or that of the sign."""
-    nearest = min(lines, key=lambda line: abs(line - s), default=math.inf)
+def _station_of_stop(signal: Element, lines: list[Element]) -> float:
+    """Return the arc length [m] of the stop line near a sign, or that of the sign itself."""
+    s = signal.number("s")
+    stations = [line.number("s") for line in lines if _share_direction(signal, line)]
+    nearest = min(stations, key=lambda station: abs(station - s), default=math.inf)
     return nearest if abs(nearest - s) <= _MAX_STOP_LINE_DISTANCE_M else s
 
 

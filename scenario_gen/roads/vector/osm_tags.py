@@ -35,7 +35,7 @@ def value_of_first(tags: dict[str, str], keys: Sequence[str]) -> str | None:
 def users_of_tags(tags: dict[str, str]) -> frozenset[str]:
     """Return the users of a lanelet: its participants, or those of its subtype if it names none.
 
-    If vehicles are named and bicycles are not, as in Autoware's maps, the subtype decides on these.
+    If it names vehicles, but no bicycles, as in Autoware's maps, the subtype decides on these.
     """
     default = _USERS_BY_SUBTYPE.get(tags.get("subtype", "road"), frozenset())
     if not any(key.startswith("participant:") for key in tags):

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""All ways of placing a recording on the lanes of a map, the best first, and the map around one."""
+"""All ways of placing a recording on the lanes of a map, the best first."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
@@ -80,25 +80,18 @@ def placements(
     """
     search = _Search(graph, tracks, scales)
     home = search.at_home() if lanes is None else None
-    if home is not None and not home.refusal:
+    home_refusal = "" if home is None else home.refusal
+    has_place = home is not None and not home_refusal
+    if home is not None and has_place:
         yield home.match, 1.0
-    has_place = home is not None and not home.refusal
 
-    rigid = rigid_placements(graph, tracks, lanes)
-    crossed = crossing_placements(graph, tracks) if lanes is None else []
     streets = street_matches(graph, tracks, lanes)
-    batch = MATCHED_PLACEMENTS_COUNT
-    for first in range(0, max(len(rigid), len(crossed), 1), batch):
-        if first and not has_place:
-            break  # worse ones are not looked at
-        candidates = [*rigid[first : first + batch], *crossed[first : first + batch]]
-        if search.drawn_place is not None and first == 0:
-            candidates.insert(0, search.drawn_place)
+    for candidates in search.batches(lanes):
         for placed in search.near(candidates, list(islice(streets, _MATCHED_STREETS_COUNT))):
             has_place = True
             yield placed
-    if not has_place:
-        raise NoPlaceError(_refusal(search, home.refusal if home is not None else ""))
+        if not has_place:
+            raise NoPlaceError(_refusal(search, home_refusal))
 
 
 def _refusal(search: "_Search", at_home: str) -> str:
@@ -174,7 +167,7 @@ class _JudgedMatch:
 
     @property
     def rank(self) -> tuple[float, ...]:
-        """Order by lost meetings, reserved lanes (on drawn roads), right of way and resemblance."""
+        """Order by lost meetings, reserved lanes on drawn roads, right of way, and cost."""
         off_reserved = self.search.graph.network.drawn and self.match.off_reserved_cost > 0.0
         cost = round(self.match.cost + self.match.off_reserved_cost, 3)
         return self.lost_meetings, off_reserved, not self.yields, cost
@@ -249,6 +242,16 @@ class _Search:
         if home.cost > _HOME_COST_M2 or (self.graph.network.drawn and self.has_reserved):
             return None
         return _JudgedMatch(next(match(self.graph, self.tracks, self.met, home)), self)
+
+    def batches(self, lanes: Sequence[int] | None) -> Iterator[list[RigidPlacement]]:
+        """Yield the rigid placements to be matched, some at a time, the best first."""
+        rigid = rigid_placements(self.graph, self.tracks, lanes)
+        crossed = crossing_placements(self.graph, self.tracks) if lanes is None else []
+        first = [] if self.drawn_place is None else [self.drawn_place]
+        size = MATCHED_PLACEMENTS_COUNT
+        for k in range(0, max(len(rigid), len(crossed), 1), size):
+            yield [*first, *rigid[k : k + size], *crossed[k : k + size]]
+            first = []
 
     def near(
         self, rigid: Sequence[RigidPlacement], streets: Sequence[Match]

@@ -155,7 +155,7 @@ def _arc(shape: Element, length: float, ds: Floats) -> tuple[Floats, Floats, Flo
 
 
 def _spiral(shape: Element, length: float, ds: Floats) -> tuple[Floats, Floats, Floats]:
-    """A clothoid: the curvature changes linearly; cosine and sine of the heading are integrated."""
+    """A clothoid: the curvature changes linearly; the heading's cosine and sine are integrated."""
     first, last = shape.number("curvStart"), shape.number("curvEnd")
     rate = (last - first) / length if length > 0.0 else 0.0
     steps = np.arange(1, math.ceil(float(ds.max(initial=0.0)) / _QUADRATURE_STEP_M) + 1)

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The grid of a road: a cell is drivable if its centre lies in a lane, or on other paved ground."""
+"""The grid of a road: cells with their centre in a lane or on paved ground are drivable."""
 
 import numpy as np
 import shapely

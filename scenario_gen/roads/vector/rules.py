@@ -103,12 +103,12 @@ class RuleCheck:
 
     def _run_lines(self, motion: Motion, n: int) -> Iterator[Breach]:
         """Yield the stop lines that vehicle n crosses without a stop."""
-        there = motion.is_present[n]
-        if not self._stops or there.sum() < 2:
+        present = motion.is_present[n]
+        if not self._stops or present.sum() < 2:
             return
-        heading, speed = motion.heading[n, there], motion.speed[n, there]
+        heading, speed = motion.heading[n, present], motion.speed[n, present]
         half_length = 0.5 * motion.vehicles[n].length
-        front = motion.position[n, there] + half_length * unit(heading)
+        front = motion.position[n, present] + half_length * unit(heading)
         driven = _driven(front)
         for rule in self._stops:
             k = self._crossing_step(rule, front, heading)
@@ -124,7 +124,7 @@ class RuleCheck:
                     f"crosses the stop line of {rule.id}; its minimum speed before it is "
                     f"{slowest:.1f} m/s"
                 )
-                yield Breach(float(motion.time[there][k]), (n,), message)
+                yield Breach(float(motion.time[present][k]), (n,), message)
 
     def _crossing_step(self, rule: TrafficRule, front: Floats, heading: Floats) -> int | None:
         """Return the step in which a front (T, 2) [m] crosses a rule's line along its lanes."""
@@ -147,7 +147,7 @@ class RuleCheck:
         return float(np.cos(yaw - heading)) > _LIMITS.direction_cosine
 
     def _violated_right(self, motion: Motion, met: Conflict) -> Iterator[Breach]:
-        """Yield the right of way of the second vehicle that the first one at a conflict violates."""
+        """Yield the right of way that the first vehicle at a conflict violates."""
         if not self._rights:
             return
         first, second = (met.first, met.entry_first), (met.second, met.entry_second)

@@ -4,8 +4,8 @@
 """The best rigid placements of a recording on a whole map: its paths lie along lanes.
 
 Every placement that puts one of a few recorded poses onto a lane is tried. Its cost is the mean
-squared distance of the recorded poses from the nearest lane of their direction. The best placements
-are refined.
+squared distance of the recorded poses from the nearest lane of their direction. The best ones are
+refined.
 """
 
 from collections.abc import Sequence

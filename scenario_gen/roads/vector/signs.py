@@ -110,7 +110,7 @@ def with_rules(network: LaneNetwork, drafts: Sequence[DraftRule]) -> LaneNetwork
     """
     index = {lane.id: k for k, lane in enumerate(network.lanes)}
     rules = [rule for draft in drafts for rule in _rules_of(draft, index, network)]
-    rules = [*_with_going_first(network, rules)]
+    rules = _with_going_first(network, rules)
     if not rules:
         return network
     counts = {kind: len({rule.id for rule in rules if rule.kind == kind}) for kind in RuleKind}
@@ -135,33 +135,41 @@ def _rules_of(
         yield TrafficRule(draft.id, draft.kind, lanes, over, draft.line)
 
 
-def _with_going_first(network: LaneNetwork, rules: Sequence[TrafficRule]) -> Iterator[TrafficRule]:
-    """Yield the rules; those without `over` get the lanes without a sign into the same junction."""
-    yielding = {
-        mouth
-        for rule in rules
-        if rule.kind in YIELDING_KINDS
-        for k in rule.lanes
-        for mouth in _mouths(network, k)
-    }
-    into: dict[str, list[int]] = defaultdict(list)
-    for k, lane in enumerate(network.lanes):
-        for name in _junctions_after(network, k):
-            if name != lane.junction:
-                into[name].append(k)
+def _with_going_first(network: LaneNetwork, rules: Sequence[TrafficRule]) -> list[TrafficRule]:
+    """Return the rules; those without `over` get the unsigned lanes into the same junction."""
+    yielding = [rule for rule in rules if rule.kind in YIELDING_KINDS]
+    signed = {k for rule in yielding for k in _all_mouths(network, rule.lanes)}
+    into = _lanes_into_junctions(network)
+    completed = []
     for rule in rules:
         if rule.kind not in YIELDING_KINDS or rule.over:
-            yield rule
+            completed.append(rule)
             continue
-        mouths = [mouth for k in rule.lanes for mouth in _mouths(network, k)]
-        names = dict.fromkeys(name for k in mouths for name in _junctions_after(network, k))
-        over = dict.fromkeys(k for name in names for k in into[name] if k not in yielding)
-        yield replace(rule, over=tuple(over))
+        junctions = _junctions_after(network, _all_mouths(network, rule.lanes))
+        over = dict.fromkeys(k for name in junctions for k in into[name] if k not in signed)
+        completed.append(replace(rule, over=tuple(over)))
+    return completed
 
 
-def _junctions_after(network: LaneNetwork, lane: int) -> list[str]:
-    """Return the names of the junctions that a lane's successors belong to."""
-    names = [network.lanes[k].junction for k in network.lanes[lane].successors]
+def _lanes_into_junctions(network: LaneNetwork) -> dict[str, list[int]]:
+    """Return the lanes that lead into each junction from outside of it."""
+    into: dict[str, list[int]] = defaultdict(list)
+    for k, lane in enumerate(network.lanes):
+        for name in _junctions_after(network, [k]):
+            if name != lane.junction:
+                into[name].append(k)
+    return into
+
+
+def _all_mouths(network: LaneNetwork, lanes: Sequence[int]) -> list[int]:
+    """Return the lanes by which traffic from some lanes enters the next junctions."""
+    return [mouth for k in lanes for mouth in _mouths(network, k)]
+
+
+def _junctions_after(network: LaneNetwork, lanes: Sequence[int]) -> list[str]:
+    """Return the names of the junctions that the successors of lanes belong to."""
+    following = [k for lane in lanes for k in network.lanes[lane].successors]
+    names = [network.lanes[k].junction for k in following]
     return list(dict.fromkeys(name for name in names if name))
 
 
@@ -170,7 +178,7 @@ def _mouths(network: LaneNetwork, first: int) -> list[int]:
     mouths: list[int] = []
     level = [first]
     for _ in range(_MAX_LANES_TO_JUNCTION_COUNT):
-        mouths += [k for k in level if _junctions_after(network, k)]
+        mouths += [k for k in level if _junctions_after(network, [k])]
         level = [
             following
             for k in level

@@ -3,14 +3,15 @@
 
 """A recording along one road of a map: following, oncoming, passing, on parallel lanes.
 
-Stations on the recording's reference line (`situation.frenet`) become stations on a chain of lanes.
-Its lanes, counted from the driver's left, become lanes next to that chain. So the road may wind
-otherwise than the recorded one.
+Stations on the recording's reference line (`situation.frenet`) become stations on a chain of
+lanes. Its lanes, counted from the driver's left, become lanes next to that chain. So the road may
+wind otherwise than the recorded one.
 """
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import product
 import math
 
 import numpy as np
@@ -174,13 +175,11 @@ def street_matches(
     if compact.swerve.any():  # without room to swerve, the fit says what is lost
         variants.append(replace(compact, swerve=np.zeros_like(compact.swerve)))
     preferences = (True, False) if any(map(graph.reserved_for, tracks)) else (False,)
-    for frenet in variants:
-        for stretch in stretches:
-            stop_if_cancelled()
-            for prefer_reserved in preferences:
-                match = _match_on(stretch, tracks, frenet, low, prefer_reserved=prefer_reserved)
-                if match is not None:
-                    yield match
+    for frenet, stretch, prefer_reserved in product(variants, stretches, preferences):
+        stop_if_cancelled()
+        match = _match_on(stretch, tracks, frenet, low, prefer_reserved=prefer_reserved)
+        if match is not None:
+            yield match
 
 
 def _stretches(graph: LaneGraph, span: float, lanes: Sequence[int] | None) -> Iterator[_Stretch]:
