@@ -85,7 +85,8 @@ def road_and_template(
 
     Raises:
         InputError: as in `build_road`.
-        RefusedError: likewise, or the encounter is too large, or a vehicle drives backwards.
+        RefusedError: as in `build_road`; or the encounter is too large, or a vehicle drives
+            backwards.
     """
     refuse_too_large(encounter)
     refuse_reversing(encounter)

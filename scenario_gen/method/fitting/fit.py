@@ -51,7 +51,7 @@ def fit_template(
         config: how the recording is placed, and how far it may be scaled and moved.
         starts: (N, 3) or (N, 4) start poses x [m], y [m], yaw [rad], and speeds [m/s] of all
             vehicles; with `goals`.
-        goals: likewise, at the end.
+        goals: the same for the end.
         request: the start and end states that are requested for some vehicles.
         limits: of motion; no requested state may exceed a planned speed.
 

@@ -3,7 +3,7 @@
 
 """Placing a recording anywhere on a grid: the similarity that gives its footprints the most room.
 
-The search is deterministic and goes from coarse to fine. First, all translations of each rotation
+The search is deterministic, from coarse to fine. First, all translations of each rotation
 are tried at once: the cost of a placement is the correlation of a penalty field (the missing
 clearance) with the rasterised recorded paths, computed by FFT. Then the best few are refined by a
 pattern search on the fine field. The recording moves as one piece, so all meetings are kept.

@@ -62,7 +62,7 @@ def place_given(
 
     If a route of line, arc and line can be drawn between the two, eq 9 applies along it: the
     recorded arc lengths times s. Otherwise it is the similarity of the plane. A vehicle with too
-    short a chord takes rotation and scale from all vehicles (Umeyama 1991).
+    short a chord gets rotation and scale from all vehicles (Umeyama 1991).
 
     Args:
         situation: of the recording.
@@ -70,7 +70,7 @@ def place_given(
         config: which scales are accepted.
         starts: (N, 3) or (N, 4) x, y [m], yaw [rad], and speed [m/s]; a speed that is NaN or
             missing is the recorded one.
-        goals: likewise.
+        goals: the same for the end.
         base: another placement. With it, a row of NaN means the state there; a vehicle without a
             given state keeps its path there.
 
@@ -177,7 +177,7 @@ class _Similarity:
 
     @classmethod
     def of_chords(cls, u: Floats, v: Floats) -> "_Similarity":
-        """Return the similarity that takes chord u (2,) [m] to v.
+        """Return the similarity that maps chord u (2,) [m] to v.
 
         Source: eq 8a, with the sign of the angle.
         """

@@ -54,7 +54,7 @@ def refuse_misfits(fit: Fit, starts: Floats, goals: Floats) -> None:
     Args:
         fit: with all start and end states.
         starts: (N, 4) requested ones, NaN where there is none.
-        goals: (N, 4) likewise.
+        goals: (N, 4) the same for the end.
 
     Raises:
         RefusedError: two footprints overlap at the start or the end, or a vehicle that stands

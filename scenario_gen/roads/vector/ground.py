@@ -51,7 +51,7 @@ def ground_for(road: Road, vehicle: Vehicle) -> Road:
 
 
 def own_side(road: Road, path: Floats, vehicle: Vehicle) -> Road:
-    """Return the part of a road on which a vehicle keeps to its side.
+    """Return the side of a road that a vehicle uses.
 
     These are the lanes along which its path lies, those of the same direction next to them, and a
     kerb.

@@ -3,10 +3,10 @@
 
 """A recording on the lanes of a map: the lanes that each vehicle follows, and its start there.
 
-A rigid placement (`search`) says about where the recording lies. Each vehicle then gets the chain
-of lanes that its path is nearest to, with at most one lane change where the map allows it. A least
-squares problem moves the starts along the chains, so that distances to crossings and gaps between
-vehicles in one lane stay as recorded.
+A rigid placement (`search`) gives the approximate pose of the recording. Each vehicle then gets
+the chain of lanes that its path is nearest to, with at most one lane change where the map allows
+it. A least squares problem moves the starts along the chains, so that distances to crossings and
+gaps between vehicles in one lane stay as recorded.
 """
 
 from collections.abc import Iterator, Sequence
@@ -181,9 +181,9 @@ def match(
         graph: of the map or a part of it.
         tracks: the recording.
         met: its conflicts.
-        placement: where it lies.
+        placement: its approximate pose on the map.
         scale: s of eq 9, of the distances driven.
-        ends: ids of the lanes by which each vehicle comes and goes, "" for any; (): any for all.
+        ends: ids of the lanes by which each vehicle enters and leaves, "" for any; () for all.
         prefer_reserved: whether vehicles with reserved lanes are put onto these if some are near.
     """
     paths = []
@@ -408,7 +408,7 @@ def _crossing_equations(
 def _gap_equations(
     paths: list[LanePath], tracks: Sequence[Track], pair: tuple[int, int], scale: float
 ) -> list[Equation]:
-    """Return the equation that keeps the gap of a follower to its leader, if it is one."""
+    """Return the equation that preserves the gap between a follower and its leader."""
     follower, leader = pair
     gap = _recorded_gap(tracks[follower], tracks[leader])
     if gap is None:

@@ -3,8 +3,8 @@
 
 """OpenDRIVE maps (.xodr), versions 1.4 to 1.8: lanes along reference lines, linked to each other.
 
-A lane is named road.section.lane, e.g. 5.0.-1. The road is seen from above; its elevation tells
-which lanes can meet.
+A lane is named road.section.lane, e.g. 5.0.-1. The road is seen from above; its elevation
+decides which lanes can meet.
 
 Source: ASAM OpenDRIVE 1.8, chapters "Roads", "Lanes" and "Junctions".
 """

@@ -24,7 +24,7 @@ _QUADRATURE_STEP_M = 1.0  # of a spiral
 
 
 def _piece_at(begin: Floats, s: Floats, end: float) -> Ints:
-    """Return which of the pieces beginning at (K,) [m] each s (M,) of a section lies in.
+    """Return the piece for each s (M,) of a section, of those that begin at (K,) [m].
 
     The first piece also counts before its begin. A piece that begins where the section ends
     belongs to the next section.
@@ -126,7 +126,7 @@ def _shape_of(piece: Element) -> Element:
     """Return the element with the shape of a piece of geometry."""
     shape = next((child for child in piece if child.tag in _SHAPES), None)
     if shape is None:
-        raise InputError(f"{piece.place} holds none of {', '.join(_SHAPES)}")
+        raise InputError(f"{piece.place} has none of {', '.join(_SHAPES)}")
     return shape
 
 
@@ -195,7 +195,7 @@ def _param_poly3(shape: Element, length: float, ds: Floats) -> tuple[Floats, Flo
 
 
 def _is_normalized(shape: Element, length: float) -> bool:
-    """Return whether p goes from 0 to 1, which is the default, rather than to the length.
+    """Return whether p ends at 1, which is the default, rather than at the length.
 
     If a file does not say so, the initial speed of the curve tells which it is.
     """

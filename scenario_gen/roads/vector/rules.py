@@ -90,7 +90,7 @@ class RuleCheck:
         return breaches
 
     def kept_orders(self, motion: Motion, conflicts: Sequence[Conflict]) -> int:
-        """Return at how many conflicts the vehicle that goes second gives way by a rule.
+        """Return the number of conflicts at which the second vehicle gives way by a rule.
 
         Only conflicts within a few seconds count.
         """

@@ -229,7 +229,7 @@ def _match_on(
     """Return the recording on a stretch of road; None if lanes are missing.
 
     Args:
-        stretch: where it lies.
+        stretch: the part of the road.
         tracks: the recording.
         frenet: the same in path coordinates.
         low: station [m] of their reference line at which the stretch begins.
@@ -287,7 +287,7 @@ def _path_along(
 ) -> LanePath | None:
     """Return the path of vehicle i along the lanes that it uses; None if it has no room there.
 
-    `shift` [m] takes stations of the reference line to arc lengths on the stretch's axis.
+    `shift` [m] converts stations of the reference line to arc lengths on the stretch's axis.
     """
     station = shift + frenet.station[i]
     first, last = used

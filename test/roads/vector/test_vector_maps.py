@@ -221,7 +221,7 @@ ODD = [  # one odd element: suffix, text, the note with its reason
         "second node 1, first on line 1",
     ),
     (".xodr", opendrive().replace('curvature="0.125"', 'curvature="1e9"', 1), "curvature"),
-    (".xodr", opendrive().replace("<line/>", "<helix/>", 1), "holds none of line, arc, spiral"),
+    (".xodr", opendrive().replace("<line/>", "<helix/>", 1), "has none of line, arc, spiral"),
     (".xodr", opendrive().replace('a="3.5"', 'a="inf"', 1), "is not a number"),
     (
         ".xodr",
