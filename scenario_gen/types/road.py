@@ -132,6 +132,8 @@ class Road:
     @cached_property
     def depth_cells(self) -> Floats:
         """(H + 2 R, W + 2 R) [cells] from each centre of `closed_cells` to the nearest drivable square."""
+        from scenario_gen.numerics.distance_field import distance_field  # loads numba
+
         return distance_field(self.closed_cells)
 
     @cached_property
