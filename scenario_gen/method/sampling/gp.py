@@ -94,11 +94,6 @@ class Features:
         transform[0] *= 0.5
         self._coefficients = transform @ root
 
-    @property
-    def rank(self) -> int:
-        """Number of features that carry the kernel (without those of the mean)."""
-        return int(self._coefficients.shape[1])
-
     def __call__(self, x: Floats, derivative: int = 0) -> Floats:
         """Features (m, rank + degree + 1) at x (m,), or their derivative of that order."""
         scale = 2.0 / (self.high - self.low)
