@@ -12,7 +12,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from scenario_gen.method.evaluation.population import FEATURES, KINDS, Member, Members
+from scenario_gen.method.evaluation.encounter_features import EncounterFeatures, FEATURES
+from scenario_gen.method.evaluation.population import KINDS, Members
 from scenario_gen.numerics import Bools, Floats
 from scenario_gen.situation import EncounterKind
 from scenario_gen.types import Interval
@@ -42,7 +43,7 @@ def at_precision(null: Members, precision: float, count: int) -> tuple[Interval,
 def scaled(null: Members, times: float) -> Members:
     """Return members whose deviations from their templates are `times` as large; those of another kind stay."""
 
-    def moved(member: Member) -> Member:
+    def moved(member: EncounterFeatures) -> EncounterFeatures:
         own = null.recorded[member.template]
         if member.kind != own.kind:
             return member
@@ -102,7 +103,7 @@ def joint_gain(found: Members, mixed: Members, count: int) -> dict[EncounterKind
     return gains
 
 
-def _joint(members: Sequence[Member]) -> list[Member]:
+def _joint(members: Sequence[EncounterFeatures]) -> list[EncounterFeatures]:
     """Return members with JOINT features alone."""
     columns = [FEATURES.index(name) for name in JOINT]
     return [replace(member, features=member.features[columns]) for member in members]

@@ -32,7 +32,8 @@ from scenario_gen.base.errors import ScenarioGenError
 from scenario_gen.logs import LogConfig, read_log
 from scenario_gen.method.chain import Chain
 from scenario_gen.method.config import PipelineConfig
-from scenario_gen.method.evaluation.population import in_words, KINDS, Members, members_of
+from scenario_gen.method.evaluation.population import KINDS, Members, members_of
+from scenario_gen.method.evaluation.population_result import in_words
 from scenario_gen.method.recombination import recombinations
 from scenario_gen.method.sampling import SamplingConfig
 from scenario_gen.method.segmentation import segment

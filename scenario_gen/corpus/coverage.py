@@ -10,7 +10,7 @@ from pathlib import Path
 from scenario_gen.bags.recordings.read import read_recording, result_in
 from scenario_gen.base.provenance import RECORDING
 from scenario_gen.corpus.page import curve, sketch, write_page
-from scenario_gen.method.evaluation.population import Population
+from scenario_gen.method.evaluation.population_result import Population
 from scenario_gen.types import Encounter, GenerationResult, Scenario
 
 DRAWN = 24  # encounters that are never reached, on the page

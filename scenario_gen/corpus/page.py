@@ -11,7 +11,7 @@ from markupsafe import Markup
 import numpy as np
 
 from scenario_gen.base.folders import write_text
-from scenario_gen.method.evaluation.population import Population
+from scenario_gen.method.evaluation.population_result import Population
 from scenario_gen.output.report.html import render_page
 from scenario_gen.types import Encounter, Scenario
 

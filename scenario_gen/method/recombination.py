@@ -25,8 +25,8 @@ import math
 import numpy as np
 
 from scenario_gen.base.errors import RefusedError
+from scenario_gen.method.evaluation.encounter_features import DISTANCE, features_of
 from scenario_gen.method.evaluation.law import Law
-from scenario_gen.method.evaluation.population import DISTANCE, member_of
 from scenario_gen.numerics import Floats
 from scenario_gen.numerics.plane import ahead_and_left, place
 from scenario_gen.situation import Conflict, EncounterKind, Situation, time_gaps, Track
@@ -118,7 +118,7 @@ class InteractingPair:
 def pair_of(encounter: Encounter) -> InteractingPair | None:
     """Return the pair of an encounter; None if no two vehicles share an area."""
     situation = Situation.of(encounter)
-    member = member_of(encounter, "", 0)
+    member = features_of(encounter, "", 0)
     conflict = None if member.pair is None else situation.conflict(*member.pair)
     if member.kind is None or conflict is None:
         return None

@@ -14,7 +14,8 @@ from benchmarks._coverage_nulls import (
     scaled,
     speed_spread,
 )
-from scenario_gen.method.evaluation.population import FEATURES, Member, Members
+from scenario_gen.method.evaluation.encounter_features import EncounterFeatures, FEATURES
+from scenario_gen.method.evaluation.population import Members
 
 WIDTH = len(FEATURES)
 
@@ -24,10 +25,11 @@ def found():
     """Forty recorded encounters of eight recordings, and ten members of each that differ by 0.3 standard deviations."""
     rng = np.random.default_rng(7)
     recorded = [
-        Member("crossing", rng.standard_normal(WIDTH), f"{n // 5}", n, (0, 1)) for n in range(40)
+        EncounterFeatures("crossing", rng.standard_normal(WIDTH), f"{n // 5}", n, (0, 1))
+        for n in range(40)
     ]
     made = [
-        Member(
+        EncounterFeatures(
             "crossing",
             own.features + 0.3 * rng.standard_normal(WIDTH),
             own.recording,

@@ -11,7 +11,7 @@ import pytest
 from support.textbook_motions import labelled
 
 from scenario_gen import generate, recombined, RefusedError
-from scenario_gen.method.evaluation.population import member_of
+from scenario_gen.method.evaluation.encounter_features import features_of
 from scenario_gen.method.recombination import pair_of, recombinations
 from scenario_gen.situation import conflict_of, lane_gaps, time_gaps
 from scenario_gen.types import FOLLOW, Recorded, YIELD
@@ -153,7 +153,7 @@ def test_recombined_encounters_are_like_recorded_ones_and_new():
     known = recorded(FOLLOWS, *range(12)) + recorded(WAITS, *range(12))
     for kind in ("following", "crossing"):
         own = [encounter for encounter in known if pair_of(encounter).kind == kind]
-        features = np.array([member_of(encounter, "", 0).features for encounter in own])
+        features = np.array([features_of(encounter, "", 0).features for encounter in own])
         spread = np.maximum(features.std(axis=0), 0.05 * features.std(axis=0).max())
         names = [encounter.name for encounter in own]
         between = np.sqrt(
@@ -162,7 +162,7 @@ def test_recombined_encounters_are_like_recorded_ones_and_new():
         nearest, to_parents = [], []
         for encounter in recombinations(own, 40, seed=1)[0]:
             away = np.sqrt(
-                np.square((member_of(encounter, "", 0).features - features) / spread).mean(axis=-1)
+                np.square((features_of(encounter, "", 0).features - features) / spread).mean(axis=-1)
             )
             parents = [names.index(name) for name in parents_of(encounter)]
             to_parents.append(away[parents].min())

@@ -27,8 +27,13 @@ from pathlib import Path
 import numpy as np
 
 import scenario_gen
+from scenario_gen.method.evaluation.encounter_features import (
+    EncounterFeatures,
+    FEATURES,
+    features_of,
+    scenario_features,
+)
 from scenario_gen.method.evaluation.measures import MEASURES
-from scenario_gen.method.evaluation.population import FEATURES, generated_member, Member, member_of
 from scenario_gen.numerics import Floats
 from scenario_gen.situation import EncounterKind
 from scenario_gen.types import Encounter, Measures, Scenario
@@ -90,10 +95,10 @@ def rarity_in(
         population: recorded encounters; those of the same features are one, whatever they are
             called.
     """
-    template = member_of(encounter, encounter.name, 0)
+    template = features_of(encounter, encounter.name, 0)
     members = [template]
     for recorded in population:
-        member = member_of(recorded, recorded.name, 0)
+        member = features_of(recorded, recorded.name, 0)
         if not any(_is_same(member, other) for other in members):
             members.append(member)
     laws = {
@@ -102,7 +107,7 @@ def rarity_in(
     }
 
     def rarity(scenario: Scenario) -> float:
-        member = generated_member(scenario, template, encounter)
+        member = scenario_features(scenario, template, encounter)
         if member.kind is None:
             return math.inf
         return laws[member.kind].distance(member.features) / USUAL
@@ -121,7 +126,7 @@ def measures_in(
     )
 
 
-def _is_same(member: Member, other: Member) -> bool:
+def _is_same(member: EncounterFeatures, other: EncounterFeatures) -> bool:
     return member.kind == other.kind and np.allclose(member.features, other.features)
 
 

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""How much unseen traffic a few recordings stand for: coverage and precision of what is generated from them.
+"""How well a few recordings, and scenarios generated from them, cover unseen traffic.
 
 Both as of Kynkäänniemi et al. (2019), with balls about recorded encounters. An encounter is that
 of its most critical pair. Its features (FEATURES) are independent of the place, and the same for
@@ -25,206 +25,33 @@ import numpy as np
 from scipy.spatial import distance
 
 from scenario_gen.base.errors import InputError
-from scenario_gen.method.evaluation.geometry import footprint_distance
-from scenario_gen.method.evaluation.measures import figures_of, PERIOD
-from scenario_gen.numerics import Bools, Floats, Ints
-from scenario_gen.situation import (
-    Conflict,
-    conflicts_by_pair,
-    EncounterKind,
-    find_conflicts,
-    kind_of,
+from scenario_gen.method.evaluation.encounter_features import (
+    EncounterFeatures,
+    FEATURES,
+    features_of,
+    scenario_features,
 )
+from scenario_gen.method.evaluation.population_result import (
+    COVERAGE_GOAL_SHARE,
+    CoveragePoint,
+    Population,
+    Unreached,
+)
+from scenario_gen.numerics import Bools, Floats, Ints
+from scenario_gen.situation import EncounterKind
 from scenario_gen.types import (
-    Encounter,
     GenerationResult,
     Interval,
     join_ego,
-    Motion,
-    Pair,
     Recombined,
-    Scenario,
 )
 
-NO_SHARED_AREA = "apart"  # counts the scenarios whose pair shares no area: they are near nothing
 KINDS = tuple(EncounterKind)
-EACH = (
-    "first speed",
-    "least speed before",
-    "speed at conflict",
-    "braking",
-    "acceleration",
-    "standing time",
-)
-COMMON = ("gap", "arrival gap", "distance", "time to collision", "closing speed", "approach")
-FEATURES = (*COMMON, *(f"{name} of the {who}" for who in ("first", "second") for name in EACH))
-DISTANCE = FEATURES.index("distance")
-LONGEST_S, FARTHEST_M = 10.0, 30.0  # gaps and times above, distances above, are as good as this
-SECOND = round(1.0 / PERIOD)  # samples
-STANDS_MPS = 0.5
-SMALLEST_R = 0.05  # standard deviations: the same encounter in two files makes no smaller ball
-SMALLEST_SHARE = 0.05  # of the largest standard deviation: a feature in which nobody differs does not count for all
-CHOSEN = (
-    0.5  # share of the encounters that are drawn at most; those of other recordings are unseen
-)
-SHOWN = 10  # scenarios that are like nothing recorded
-WANTED = 0.9  # coverage
-FARTHEST_TOLD = 100.0  # times the largest number of templates that was measured
-
-
-@dataclass(frozen=True, eq=False)
-class Member:
-    """An encounter, recorded or generated.
-
-    Attributes:
-        kind: what the pair does; None if it shares no area.
-        features: (F,).
-        recording: its name; of a generated one that of its template.
-        template: place of its template among the recorded.
-        pair: its vehicles that count, None if no two share an area.
-        other: place of the recorded encounter whose second vehicle it has, too, if it is of a
-            recombined one; else -1.
-        scenario: its number, -1 of a recorded one.
-    """
-
-    kind: EncounterKind | None
-    features: Floats
-    recording: str
-    template: int
-    pair: Pair | None
-    other: int = -1
-    scenario: int = -1
-
-    @property
-    def kind_name(self) -> str:
-        """The kind in words."""
-        return self.kind or NO_SHARED_AREA
-
-
-@dataclass(frozen=True)
-class Point:
-    """What so many templates cover, alone and with what is generated from them, and how precise the generated are.
-
-    Shares are medians over draws of templates, with the 5 and 95 % quantiles.
-
-    Attributes:
-        templates: drawn.
-        alone: coverage by the templates.
-        generated: coverage by templates and generated.
-        precision: of the generated; `recorded`: of the templates themselves.
-        multiplier: recordings that cover alone as much (with the quantiles of `generated`), over
-            `templates`; inf: more than there are.
-    """
-
-    templates: int
-    alone: Interval
-    generated: Interval
-    precision: Interval
-    recorded: Interval
-    multiplier: Interval
-
-
-@dataclass(frozen=True)
-class Unreached:
-    """A recorded encounter that nothing of other recordings comes near, or a scenario that is near no recorded encounter.
-
-    Attributes:
-        encounter: its name; of a scenario that of its template.
-        kind: of KINDS.
-        distance: to the nearest, in units of r.
-        feature: in which they differ most.
-        scenario: number of the scenario, -1 of an encounter.
-    """
-
-    encounter: str
-    kind: str
-    distance: float
-    feature: str
-    scenario: int = -1
-
-
-@dataclass(frozen=True)
-class Population:
-    """What recordings and the sets generated from them cover.
-
-    Attributes:
-        encounters: recorded, by kind.
-        scenarios: generated from them, by kind.
-        curve: coverage by number of templates, drawn of all kinds.
-        by_kind: the same by kind, of templates that are all of that kind; without kinds that hold
-            too few.
-        unreached: encounters that no other recording's set reaches, the farthest first.
-        farthest: scenarios that are farthest from all recorded encounters, at most ten.
-        needed: recordings that would cover 0.9 by the curve's extrapolation, inf where it does not
-            rise.
-    """
-
-    encounters: dict[str, int]
-    scenarios: dict[str, int]
-    curve: tuple[Point, ...]
-    by_kind: dict[str, tuple[Point, ...]]
-    unreached: tuple[Unreached, ...]
-    farthest: tuple[Unreached, ...]
-    needed: float
-
-    @property
-    def lead(self) -> str:
-        """What was measured, in a sentence."""
-        kinds = ", ".join(f"{count} {kind}" for kind, count in sorted(self.encounters.items()))
-        recorded, made = (sum(counts.values()) for counts in (self.encounters, self.scenarios))
-        return f"{recorded} encounters whose vehicles share an area ({kinds}), {made} scenarios"
-
-    def table(self) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
-        """Return the columns and the rows of the curves as texts; in brackets the 5 and 95 % quantiles over draws."""
-        columns = (
-            "of",
-            "templates",
-            "coverage alone",
-            "with generated",
-            "precision",
-            "of the recorded",
-            "stand for",
-        )
-        rows = []
-        for kind, curve in {"all kinds": self.curve, **self.by_kind}.items():
-            for point in curve:
-                shares = (point.alone, point.generated, point.precision, point.recorded)
-                rows.append(
-                    (kind, str(point.templates), *map(in_words, shares), _stands_for(point))
-                )
-        return columns, rows
-
-    def remarks(self) -> list[str]:
-        """Return what the curve says, in sentences."""
-        needed = (
-            f"{self.needed:.0f} recorded encounters"
-            if math.isfinite(self.needed)
-            else "more encounters than can be told"
-        )
-        lines = [f"coverage of {WANTED} takes {needed}, if the curve goes on as it does"]
-        if self.unreached:
-            worst = self.unreached[0]
-            farthest = f"the farthest is {worst.encounter} ({worst.kind}): {worst.feature}"
-            lines.append(f"{len(self.unreached)} encounters are never reached; {farthest}")
-        return lines
-
-
-def _stands_for(point: Point) -> str:
-    """How many recordings, with the quantiles."""
-
-    def words(multiplier: float) -> str:
-        return (
-            f"{multiplier * point.templates:.0f}"
-            if math.isfinite(multiplier)
-            else "more than there are"
-        )
-
-    return f"{words(point.multiplier.value)} [{words(point.multiplier.low)}, {words(point.multiplier.high)}]"
-
-
-def in_words(share: Interval) -> str:
-    """Return a share with its quantiles in brackets."""
-    return f"{share.value:.2f} [{share.low:.2f}, {share.high:.2f}]"
+MIN_RADIUS_RATIO = 0.05  # of a standard deviation: two files may hold the same encounter
+MIN_SPREAD_RATIO = 0.05  # of the largest spread: a constant feature does not decide alone
+MAX_TEMPLATE_SHARE = 0.5  # of the encounters; the other recordings stay unseen
+SHOWN_COUNT = 10  # scenarios that resemble no recorded encounter
+MAX_EXTRAPOLATION_FACTOR = 100.0  # of the largest measured number of templates
 
 
 def _over_draws(values: Iterable[float]) -> Interval:
@@ -232,87 +59,6 @@ def _over_draws(values: Iterable[float]) -> Interval:
     told = [value for value in values if math.isfinite(value)]
     low, middle, high = np.quantile(told, [0.05, 0.5, 0.95]).tolist() if told else [math.nan] * 3
     return Interval(middle, low, high)
-
-
-def member_of(
-    motion: Encounter | Scenario, recording: str, template: int, pair: Pair | None = None
-) -> Member:
-    """Return kind and features of a motion's pair, the one that has most to do with each other by default.
-
-    That is, of the pairs that cross or merge the one with the least PET, and where there are none
-    the followers nearest to each other. The kind is None where the pair, or every pair, shares no
-    area.
-    """
-    whole = motion.resampled(PERIOD)
-    figures = {own.pair: own for own in figures_of(motion) if pair in (None, own.pair)}
-    met = conflicts_by_pair(find_conflicts(whole))
-    conflicts: dict[Pair, Conflict] = {own: met[own] for own in met if own in figures}
-    if not conflicts:
-        return Member(None, np.zeros(len(FEATURES)), recording, template, pair)
-
-    def closeness(own: Pair) -> tuple[bool, float]:
-        conflict = conflicts[own]
-        return conflict.following, figures[
-            own
-        ].gap if conflict.following else conflict.encroachment
-
-    chosen = min(conflicts, key=closeness)
-    conflict, most = conflicts[chosen], figures[chosen]
-    first, second = conflict.first, conflict.second
-    both = whole.present_slice(first, second)
-    gap = _headway(whole, conflict) if conflict.following else conflict.encroachment
-    common = [
-        np.clip(gap, -LONGEST_S, LONGEST_S),
-        min(conflict.arrival_gap, LONGEST_S),
-        min(most.gap, FARTHEST_M),
-        min(most.ttc, LONGEST_S),
-        most.closing_speed,
-        min(conflict.entry_second - both.start * whole.dt, 2.0 * LONGEST_S),
-    ]
-    entries = (conflict.entry_first, conflict.entry_second)
-    each = [_driving(whole, n, entry) for n, entry in zip((first, second), entries, strict=True)]
-    return Member(
-        kind_of(whole, first, second),
-        np.array([*common, *each[0], *each[1]]),
-        recording,
-        template,
-        chosen,
-    )
-
-
-def generated_member(scenario: Scenario, template: Member, encounter: Encounter) -> Member:
-    """The member that a scenario is, by the pair of its template, whose vehicles may stand in another order."""
-    ids = [vehicle.id for vehicle in scenario.vehicles]
-    a, b = sorted(ids.index(encounter.vehicles[n].id) for n in template.pair or (0, 1))
-    return replace(
-        member_of(scenario, template.recording, template.template, (a, b)), scenario=scenario.index
-    )
-
-
-def _headway(motion: Motion, conflict: Conflict) -> float:
-    """The median time [s] that the follower needs for the gap to its leader, while it moves."""
-    both = motion.present_slice(conflict.first, conflict.second)
-    speed = motion.speed[conflict.second, both]
-    moves = speed > STANDS_MPS
-    gap = footprint_distance(motion, conflict.first, conflict.second)[both]
-    return float(np.median(gap[moves] / speed[moves])) if moves.any() else LONGEST_S
-
-
-def _driving(motion: Motion, n: int, entry: float) -> list[float]:
-    """How one vehicle drives: EACH."""
-    own = motion.present_slice(n)
-    speed = motion.speed[n, own]
-    at = int(np.clip(round(entry / motion.dt) - own.start, 0, len(speed) - 1))
-    change = (speed[SECOND:] - speed[:-SECOND]) if len(speed) > SECOND else np.zeros(1)
-    standing = float((speed < STANDS_MPS).sum() * motion.dt)
-    return [
-        speed[0],
-        speed[: at + 1].min(),
-        speed[at],
-        max(-change.min(), 0.0),
-        max(change.max(), 0.0),
-        standing,
-    ]
 
 
 def population_of(
@@ -338,9 +84,9 @@ def population_of(
         raise InputError(
             "encounters of at least two recordings are needed; give results of more logs"
         )
-    drawn = [n for n in sorted(set(counts)) if n <= CHOSEN * len(found.recorded)]
+    drawn = [n for n in sorted(set(counts)) if n <= MAX_TEMPLATE_SHARE * len(found.recorded)]
     if not drawn:
-        known, most = len(found.recorded), int(CHOSEN * len(found.recorded))
+        known, most = len(found.recorded), int(MAX_TEMPLATE_SHARE * len(found.recorded))
         raise InputError(
             f"{known} encounters share an area: at most {most} templates can be drawn; ask for fewer, or give more logs"
         )
@@ -349,10 +95,10 @@ def population_of(
         dict(Counter(member.kind_name for member in members))
         for members in (found.recorded, found.made)
     )
-    by_kind: dict[str, tuple[Point, ...]] = {}
+    by_kind: dict[str, tuple[CoveragePoint, ...]] = {}
     for kind in KINDS:
         own = found.of_kind(kind)
-        few = [n for n in drawn if n <= CHOSEN * len(own.recorded)]
+        few = [n for n in drawn if n <= MAX_TEMPLATE_SHARE * len(own.recorded)]
         if few and own.recordings > 1:
             by_kind[kind] = own.curve(few, draws=draws, seed=seed)
     return Population(
@@ -370,8 +116,8 @@ def population_of(
 class Members:
     """Recorded encounters whose vehicles share an area, their names, and what is generated from them."""
 
-    recorded: Sequence[Member]
-    made: Sequence[Member]
+    recorded: Sequence[EncounterFeatures]
+    made: Sequence[EncounterFeatures]
     names: Sequence[str] = ()
 
     @cached_property
@@ -384,7 +130,7 @@ class Members:
         """Number of recordings."""
         return len({member.recording for member in self.recorded})
 
-    def name_of(self, member: Member) -> str:
+    def name_of(self, member: EncounterFeatures) -> str:
         """Return the name of a member's template."""
         first = self.names[member.template]
         return Recombined(first, self.names[member.other]).name if member.other >= 0 else first
@@ -396,7 +142,7 @@ class Members:
             for k, n in enumerate(n for n, own in enumerate(self.recorded) if own.kind == kind)
         } | {-1: -1}
 
-        def own(members: Sequence[Member]) -> list[Member]:
+        def own(members: Sequence[EncounterFeatures]) -> list[EncounterFeatures]:
             return [
                 replace(member, template=places[member.template], other=places[member.other])
                 for member in members
@@ -412,7 +158,7 @@ class Members:
     def shares(
         self, count: int, *, draws: int = 200, seed: int = 0
     ) -> tuple[Interval, Interval, Interval, Interval]:
-        """Return coverage alone and with what is generated, and precision of the generated and of the templates, as `Point` has.
+        """Return coverage alone and with what is generated, and precision of the generated and of the templates, as `CoveragePoint` has.
 
         Arguments as of `population_of`.
         """
@@ -429,7 +175,7 @@ class Members:
 
     def curve(
         self, counts: Sequence[int], *, draws: int = 200, seed: int = 0
-    ) -> tuple[Point, ...]:
+    ) -> tuple[CoveragePoint, ...]:
         """Return what so many templates cover, and what they stand for; arguments as of `population_of`."""
         near, rng = self.near, np.random.default_rng(seed)
         alone = {
@@ -447,7 +193,7 @@ class Members:
                 stands_for(coverage) / n
                 for coverage in (shares[1].value, shares[1].low, shares[1].high)
             ]
-            points.append(Point(n, *shares, Interval(*equal)))
+            points.append(CoveragePoint(n, *shares, Interval(*equal)))
         return tuple(points)
 
 
@@ -458,16 +204,16 @@ def members_of(results: Iterable[tuple[str, GenerationResult]]) -> Members:
     no recorded one, and what is generated from it is of both. It is left out where one of these is
     not among the results.
     """
-    recorded: list[Member] = []
-    made: list[Member] = []
+    recorded: list[EncounterFeatures] = []
+    made: list[EncounterFeatures] = []
     names: list[str] = []
-    recombined: list[tuple[Recombined, list[Member]]] = []
+    recombined: list[tuple[Recombined, list[EncounterFeatures]]] = []
     for recording, result in results:
-        own = member_of(result.encounter, recording, len(recorded))
+        own = features_of(result.encounter, recording, len(recorded))
         if own.kind is None:
             continue
         generated = [
-            generated_member(join_ego(scenario), own, result.encounter) for scenario in result
+            scenario_features(join_ego(scenario), own, result.encounter) for scenario in result
         ]
         if isinstance(result.encounter.source, Recombined):
             recombined.append((result.encounter.source, generated))
@@ -486,16 +232,16 @@ def members_of(results: Iterable[tuple[str, GenerationResult]]) -> Members:
     return Members(recorded, made, names)
 
 
-def _needed(points: Sequence[Point]) -> float:
+def _needed(points: Sequence[CoveragePoint]) -> float:
     """Templates at which what is not covered, as a power of their number, falls to 0.1; inf where that is too far to be told."""
     missed = np.array([1.0 - point.generated.value for point in points])
     if len(points) < 2 or missed.min() <= 0.0:
         return math.inf
     slope, level = np.polyfit(np.log([point.templates for point in points]), np.log(missed), 1)
-    needed = (math.log(1.0 - WANTED) - level) / slope if slope < 0.0 else math.inf
+    needed = (math.log(1.0 - COVERAGE_GOAL_SHARE) - level) / slope if slope < 0.0 else math.inf
     return (
         math.ceil(math.exp(needed))
-        if needed < math.log(FARTHEST_TOLD * points[-1].templates)
+        if needed < math.log(MAX_EXTRAPOLATION_FACTOR * points[-1].templates)
         else math.inf
     )
 
@@ -513,14 +259,16 @@ class _Near:
         apart: (R + M, R) distances to recorded members in units of r, inf between kinds.
     """
 
-    members: Sequence[Member]
+    members: Sequence[EncounterFeatures]
     recording: Ints
     template: Ints
     scaled: Floats
     apart: Floats
 
     @classmethod
-    def of(cls, recorded: Sequence[Member], made: Sequence[Member]) -> "_Near":
+    def of(
+        cls, recorded: Sequence[EncounterFeatures], made: Sequence[EncounterFeatures]
+    ) -> "_Near":
         """Scale features by kind, and measure all distances."""
         every = [*recorded, *made]
         recording = np.unique([member.recording for member in recorded], return_inverse=True)[1]
@@ -535,7 +283,7 @@ class _Near:
                 np.flatnonzero(kinds[: len(recorded)] == kind),
             )
             spread = scaled[columns].std(axis=0)
-            scaled[rows] /= np.maximum(spread, max(SMALLEST_SHARE * float(spread.max()), 1e-9))
+            scaled[rows] /= np.maximum(spread, max(MIN_SPREAD_RATIO * float(spread.max()), 1e-9))
             between = distance.cdist(scaled[rows], scaled[columns]) / math.sqrt(scaled.shape[1])
             others = np.where(
                 recording[columns, None] == recording[columns], math.inf, between[: len(columns)]
@@ -543,7 +291,9 @@ class _Near:
             nearest = others.min(axis=1)
             known = nearest[np.isfinite(nearest)]
             if len(known):
-                apart[np.ix_(rows, columns)] = between / max(float(np.median(known)), SMALLEST_R)
+                apart[np.ix_(rows, columns)] = between / max(
+                    float(np.median(known)), MIN_RADIUS_RATIO
+                )
         template = [
             (member.template, member.template if member.other < 0 else member.other)
             for member in made
@@ -625,7 +375,7 @@ class _Near:
                 found.name_of(own := found.made[n]), own.kind_name, float(nearest[n]),
                 self._differ(len(self.members) + n, int(away[n].argmin()), nearest[n]), own.scenario,
             )
-            for n in np.argsort(-nearest, kind="stable")[:SHOWN].tolist()
+            for n in np.argsort(-nearest, kind="stable")[:SHOWN_COUNT].tolist()
         )  # fmt: skip
 
     def _differ(self, n: int, recorded: int, apart: float) -> str:

@@ -12,8 +12,8 @@ from support.textbook_motions import labelled
 
 from scenario_gen import generate, PipelineConfig
 from scenario_gen.cli.folder import FolderRequest, generate_all
+from scenario_gen.method.evaluation.encounter_features import FEATURES, features_of
 from scenario_gen.method.evaluation.law import Law, measures_in, SHIPPED
-from scenario_gen.method.evaluation.population import FEATURES, member_of
 from scenario_gen.method.sampling import (
     checker_of,
     NaturalScenarios,
@@ -126,7 +126,7 @@ def test_vehicles_that_share_no_area_are_in_no_population(encounters):
 
 def test_approaches_of_a_set_spread_towards_those_of_the_population(sets, encounters):
     def spread(motions):
-        return np.std([member_of(motion, "", 0).features[APPROACH] for motion in motions])
+        return np.std([features_of(motion, "", 0).features[APPROACH] for motion in motions])
 
     population, wide = map(spread, sets)
     assert 1.2 * wide < population < spread(encounters)

@@ -11,7 +11,8 @@ import pytest
 from support.textbook_motions import labelled
 
 from scenario_gen import InputError
-from scenario_gen.method.evaluation.population import member_of, members_of, population_of
+from scenario_gen.method.evaluation.encounter_features import features_of
+from scenario_gen.method.evaluation.population import members_of, population_of
 from scenario_gen.types import Encounter, Recombined, Scenario
 
 KINDS = (
@@ -69,7 +70,7 @@ def test_kinds_are_those_of_the_drawn_motions():
         "follows": "following",
     }
     for kind, name in wanted.items():
-        found = [member_of(labelled(kind, seed).encounter, "", 0).kind for seed in range(5)]
+        found = [features_of(labelled(kind, seed).encounter, "", 0).kind for seed in range(5)]
         assert found.count(name) >= 4, (kind, found)
 
 
@@ -132,7 +133,7 @@ def test_what_is_recombined_counts_where_both_are_drawn_and_is_no_recorded_encou
     known = [
         (f"recording {k}", Made(replace(own, name=f"e{k}"))) for k, own in enumerate(encounters)
     ]
-    kinds = [member_of(own, "", 0).kind for own in encounters]
+    kinds = [features_of(own, "", 0).kind for own in encounters]
     pairs = [(i, j) for i, a in enumerate(kinds) for j, b in enumerate(kinds) if i != j and a == b]
     # a copy of a third one stands for what is recombined of two
     more = [

@@ -1,0 +1,160 @@
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""Features of an encounter that do not depend on the place, the same for recorded and generated ones.
+
+They describe its most critical pair of vehicles; `FEATURES` names them.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from scenario_gen.method.evaluation.geometry import footprint_distance
+from scenario_gen.method.evaluation.measures import figures_of, PERIOD
+from scenario_gen.numerics import Floats
+from scenario_gen.situation import (
+    Conflict,
+    conflicts_by_pair,
+    EncounterKind,
+    find_conflicts,
+    kind_of,
+)
+from scenario_gen.types import Encounter, Motion, Pair, Scenario
+
+NO_SHARED_AREA = "apart"
+"""The kind, in words, of a pair that shares no area."""
+VEHICLE_FEATURES = (
+    "first speed",
+    "least speed before",
+    "speed at conflict",
+    "braking",
+    "acceleration",
+    "standing time",
+)
+PAIR_FEATURES = (
+    "gap",
+    "arrival gap",
+    "distance",
+    "time to collision",
+    "closing speed",
+    "approach",
+)
+FEATURES = (
+    *PAIR_FEATURES,
+    *(f"{name} of the first" for name in VEHICLE_FEATURES),
+    *(f"{name} of the second" for name in VEHICLE_FEATURES),
+)
+DISTANCE = FEATURES.index("distance")
+MAX_GAP_S = 10.0  # larger time gaps are alike
+MAX_DISTANCE_M = 30.0  # larger distances are alike
+STANDSTILL_MPS = 0.5
+
+
+@dataclass(frozen=True, eq=False)
+class EncounterFeatures:
+    """The features of an encounter, recorded or generated.
+
+    Attributes:
+        kind: what the pair does; None if it shares no area.
+        features: (F,).
+        recording: name of the recording; of a generated encounter that of its template.
+        template: index of the template among the recorded encounters.
+        pair: the vehicles that are described; None if no two share an area.
+        other: of a recombined encounter the index of the recorded one with its second vehicle,
+            else -1.
+        scenario: number of the scenario, -1 of a recorded encounter.
+    """
+
+    kind: EncounterKind | None
+    features: Floats
+    recording: str
+    template: int
+    pair: Pair | None
+    other: int = -1
+    scenario: int = -1
+
+    @property
+    def kind_name(self) -> str:
+        """The kind in words."""
+        return self.kind or NO_SHARED_AREA
+
+
+def features_of(
+    motion: Motion, recording: str, template: int, pair: Pair | None = None
+) -> EncounterFeatures:
+    """Return the features of a pair of vehicles, by default of the most critical pair.
+
+    That is the crossing or merging pair with the least PET or, without one, the following pair with
+    the least gap. The kind is None if the pair, or every pair, shares no area.
+    """
+    motion = motion.resampled(PERIOD)
+    figures = {own.pair: own for own in figures_of(motion) if pair in (None, own.pair)}
+    conflicts = {
+        known: conflict
+        for known, conflict in conflicts_by_pair(find_conflicts(motion)).items()
+        if known in figures
+    }
+    if not conflicts:
+        return EncounterFeatures(None, np.zeros(len(FEATURES)), recording, template, pair)
+
+    def closeness(known: Pair) -> tuple[bool, float]:
+        conflict = conflicts[known]
+        if conflict.following:
+            return True, figures[known].gap
+        return False, conflict.encroachment
+
+    chosen = min(conflicts, key=closeness)
+    conflict, figure = conflicts[chosen], figures[chosen]
+    start = motion.present_slice(conflict.first, conflict.second).start
+    gap = _headway(motion, conflict) if conflict.following else conflict.encroachment
+    values = [
+        np.clip(gap, -MAX_GAP_S, MAX_GAP_S),
+        min(conflict.arrival_gap, MAX_GAP_S),
+        min(figure.gap, MAX_DISTANCE_M),
+        min(figure.ttc, MAX_GAP_S),
+        figure.closing_speed,
+        min(conflict.entry_second - start * motion.dt, 2.0 * MAX_GAP_S),
+        *_vehicle_features(motion, conflict.first, conflict.entry_first),
+        *_vehicle_features(motion, conflict.second, conflict.entry_second),
+    ]
+    kind = kind_of(motion, conflict.first, conflict.second)
+    return EncounterFeatures(kind, np.array(values), recording, template, chosen)
+
+
+def scenario_features(
+    scenario: Scenario, template: EncounterFeatures, encounter: Encounter
+) -> EncounterFeatures:
+    """Return the features of the template's pair in a scenario, whose vehicles may be in another order."""
+    ids = [vehicle.id for vehicle in scenario.vehicles]
+    a, b = sorted(ids.index(encounter.vehicles[n].id) for n in template.pair or (0, 1))
+    features = features_of(scenario, template.recording, template.template, (a, b))
+    return replace(features, scenario=scenario.index)
+
+
+def _headway(motion: Motion, conflict: Conflict) -> float:
+    """Return the median time [s] that the follower needs for the gap to its leader, while it moves."""
+    both = motion.present_slice(conflict.first, conflict.second)
+    speed = motion.speed[conflict.second, both]
+    moves = speed > STANDSTILL_MPS
+    if not moves.any():
+        return MAX_GAP_S
+    gap = footprint_distance(motion, conflict.first, conflict.second)[both]
+    return float(np.median(gap[moves] / speed[moves]))
+
+
+def _vehicle_features(motion: Motion, n: int, entry: float) -> list[float]:
+    """Return the VEHICLE_FEATURES of a vehicle that enters the shared area at `entry` [s]."""
+    present = motion.present_slice(n)
+    speed = motion.speed[n, present]
+    at = int(np.clip(round(entry / motion.dt) - present.start, 0, len(speed) - 1))
+    second = round(1.0 / PERIOD)
+    change = speed[second:] - speed[:-second] if len(speed) > second else np.zeros(1)
+    return [
+        speed[0],
+        speed[: at + 1].min(),
+        speed[at],
+        max(-change.min(), 0.0),
+        max(change.max(), 0.0),
+        float((speed < STANDSTILL_MPS).sum() * motion.dt),
+    ]
