@@ -36,8 +36,8 @@ OBJECTS, TRACKS = (
 EGO, BASE_LINK = "/localization/kinematic_state", "base_link"
 QUALITY = Quality(depth=1, transient_local=False)
 STEP_NS, HORIZON_NS = 500_000_000, 10_000_000_000
-BOUNDING_BOX = 0  # type of Shape
-ORIENTATION_KNOWN = 2  # TrackedObjectKinematics.AVAILABLE
+BOUNDING_BOX_CODE = 0  # type of Shape
+ORIENTATION_CODE = 2  # TrackedObjectKinematics.AVAILABLE
 
 
 def uuid_of(vehicle: Vehicle) -> bytes:
@@ -54,10 +54,10 @@ class AutowareEncoder:
         self.time_ns = np.rint(scenario.time * 1e9).astype(np.int64)
         rate = np.zeros_like(scenario.heading)
         for n, (first, last) in enumerate(scenario.present.tolist()):
-            there = slice(first, last + 1)
-            rate[n, there] = np.gradient(scenario.heading[n, there], scenario.time[there])
-        rest = (scenario.heading, scenario.speed, scenario.acceleration, rate)
-        self.states = np.concatenate((scenario.position, np.stack(rest, axis=-1)), axis=-1)
+            steps = slice(first, last + 1)
+            rate[n, steps] = np.gradient(scenario.heading[n, steps], scenario.time[steps])
+        motion = (scenario.heading, scenario.speed, scenario.acceleration, rate)
+        self.states = np.concatenate((scenario.position, np.stack(motion, axis=-1)), axis=-1)
 
     def present_at(self, k: int) -> list[int]:
         """Return the vehicles that are present at instant `k`."""
@@ -69,18 +69,18 @@ class AutowareEncoder:
 
     def predicted_objects(self, k: int, stamp_ns: int) -> bytes:
         """Return instant `k` as PredictedObjects."""
-        here, frame = self.present_at(k), self.scenario.frame_id
-        vehicles, paths = (
-            [self.scenario.vehicles[n] for n in here],
-            [self.states[n, self._ahead(n, k), :3] for n in here],
-        )
-        return encode_predicted_objects(vehicles, self.states[here, k], paths, frame, stamp_ns)
+        present = self.present_at(k)
+        vehicles = [self.scenario.vehicles[n] for n in present]
+        paths = [self.states[n, self._horizon(n, k), :3] for n in present]
+        states = self.states[present, k]
+        frame_id = self.scenario.frame_id
+        return encode_predicted_objects(vehicles, states, paths, frame_id, stamp_ns)
 
     def tracked_objects(self, k: int, stamp_ns: int) -> bytes:
         """Return instant `k` as TrackedObjects."""
         objects = [
             _object(self.scenario.vehicles[n], self.states[n, k])
-            | {"orientation": ORIENTATION_KNOWN, "is_stationary": self.scenario.speed[n, k] == 0.0}
+            | {"orientation": ORIENTATION_CODE, "is_stationary": self.scenario.speed[n, k] == 0.0}
             for n in self.present_at(k)
         ]
         return encode(TRACKED, stamp=stamp_ns, frame_id=self.scenario.frame_id, objects=objects)
@@ -91,16 +91,14 @@ class AutowareEncoder:
             self.scenario.vehicles[n], self.states[n, k], self.scenario.frame_id, stamp_ns
         )
 
-    def _ahead(self, n: int, k: int) -> list[int]:
-        """Return the instants of the predicted path from `k` on.
-
-        Those at whole steps, while the vehicle is there.
-        """
+    def _horizon(self, n: int, k: int) -> list[int]:
+        """Return the instants of the predicted path from `k` on while the vehicle is present."""
         last = int(self.scenario.present[n, 1])
-        wanted = np.arange(
-            self.time_ns[k], min(self.time_ns[last], self.time_ns[k] + HORIZON_NS) + 1, STEP_NS
-        )
-        return [int(at) for at in np.minimum(np.searchsorted(self.time_ns, wanted), last)]
+        start = self.time_ns[k]
+        end = min(self.time_ns[last], start + HORIZON_NS)
+        times = np.arange(start, end + 1, STEP_NS)
+        index: list[int] = np.minimum(np.searchsorted(self.time_ns, times), last).tolist()
+        return index
 
 
 def encode_predicted_objects(
@@ -152,7 +150,7 @@ def _object(vehicle: Vehicle, state: Floats) -> dict[str, Any]:
         "twist": (speed, 0.0, 0.0, 0.0, 0.0, rate),
         "acceleration": (acceleration, 0.0, 0.0, 0.0, 0.0, 0.0),
         "shape": {
-            "type": BOUNDING_BOX,
+            "type": BOUNDING_BOX_CODE,
             "dimensions": (vehicle.length, vehicle.width, height(vehicle)),
         },
     }

@@ -28,7 +28,9 @@ from scenario_gen.base.errors import InputError
 from scenario_gen.types import Encounter, LiveChangepoints, Segmentation
 
 POSTERIOR_TYPE = "sensor_msgs/msg/PointCloud2"
-UINT16, FLOAT32, FLOAT64 = 4, 7, 8  # sensor_msgs/PointField datatypes
+UINT16_CODE = 4  # sensor_msgs/PointField datatypes
+FLOAT32_CODE = 7
+FLOAT64_CODE = 8
 POINT = np.dtype(
     [
         ("x", "<f4"),
@@ -40,7 +42,7 @@ POINT = np.dtype(
         ("p", "<f8"),
     ]
 )
-DATATYPES = {"<f4": FLOAT32, "<u2": UINT16, "<f8": FLOAT64}
+DATATYPES = {"<f4": FLOAT32_CODE, "<u2": UINT16_CODE, "<f8": FLOAT64_CODE}
 
 
 def encode_changepoints(encounter: Encounter, segmentation: Segmentation) -> bytes:
@@ -48,11 +50,11 @@ def encode_changepoints(encounter: Encounter, segmentation: Segmentation) -> byt
     return encode_samples(encounter, segmentation.changepoints)
 
 
-def encode_live_changepoints(found: LiveChangepoints) -> bytes:
-    """Return newly confirmed changepoints as CDR bytes; accelerations are not known yet: 0."""
-    states = (found.position, found.heading, found.speed, np.zeros_like(found.speed))
+def encode_live_changepoints(live: LiveChangepoints) -> bytes:
+    """Return newly confirmed changepoints as CDR bytes; accelerations are still unknown and 0."""
+    states = (live.position, live.heading, live.speed, np.zeros_like(live.speed))
     return trajectory.encode(
-        Trajectory(found.start_ns, FRAME, found.vehicles, found.time_ns, *states)
+        Trajectory(live.start_ns, FRAME, live.vehicles, live.time_ns, *states)
     )
 
 
@@ -101,7 +103,8 @@ def encode_posterior(encounter: Encounter, segmentation: Segmentation) -> bytes:
         {"name": name, "offset": at, "datatype": DATATYPES[kind.str], "count": 1}
         for name, (kind, at, *_) in columns
     ]
-    steps, data = (POINT.itemsize, POINT.itemsize * samples), np.frombuffer(cloud, dtype=np.uint8)
+    steps = (POINT.itemsize, POINT.itemsize * samples)
+    data = np.frombuffer(cloud, dtype=np.uint8)
     return encode(
         CLOUD,
         stamp=encounter.start_ns,
@@ -122,20 +125,17 @@ def decode_posterior(
     Raises:
         InputError: the message is damaged or not of this convention.
     """
-    found = decode(CLOUD, data, source)
-    n, samples = found.size.tolist()
-    size, names = n * samples * POINT.itemsize, tuple(field.name for field in found.fields)
-    if (
-        names != POINT.names
-        or found.steps[0] != POINT.itemsize
-        or len(found.data) != size
-        or size == 0
-    ):
+    message = decode(CLOUD, data, source)
+    n, samples = message.size.tolist()
+    size = n * samples * POINT.itemsize
+    names = tuple(field.name for field in message.fields)
+    is_cloud = names == POINT.names and message.steps[0] == POINT.itemsize
+    if not is_cloud or len(message.data) != size or size == 0:
         raise InputError(
             f"{source}: expected a cloud of vehicles by samples with the fields "
             f"{', '.join(POINT.names or ())}"
         )
-    cloud = found.data.view(POINT).reshape(n, samples)
+    cloud = message.data.view(POINT).reshape(n, samples)
     labels = cloud["primitive"][0].astype(np.int64)
     return Segmentation(
         labels, 1 + np.flatnonzero(np.diff(labels)), cloud["p"][0].astype(np.float64), descriptions

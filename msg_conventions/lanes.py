@@ -122,13 +122,13 @@ def decode_lanes(data: bytes, source: str = TOPIC) -> tuple[str, LaneNetwork | N
     Raises:
         InputError: the message is damaged, or its lanes contradict their borders.
     """
-    found = decode(MARKER, data, source, framed=True)
-    frame_id, points = found.frame_id, found.points[:, :2]
-    if found.action == Action.DELETE:
+    marker = decode(MARKER, data, source, framed=True)
+    frame_id, points = marker.frame_id, marker.points[:, :2]
+    if marker.action == Action.DELETE:
         return frame_id, None
-    if (found.kind, found.action) != (Kind.LINE_LIST, Action.ADD):
+    if (marker.kind, marker.action) != (Kind.LINE_LIST, Action.ADD):
         raise InputError(
-            f"{source}: a marker of type {found.kind}, action {found.action}; a line list (5) "
+            f"{source}: a marker of type {marker.kind}, action {marker.action}; a line list (5) "
             "that is added (0) is needed"
         )
     if not (np.abs(points) <= MAX_COORDINATE_M).all():
@@ -137,7 +137,7 @@ def decode_lanes(data: bytes, source: str = TOPIC) -> tuple[str, LaneNetwork | N
             "m away"
         )
     try:
-        document = json.loads(found.text)
+        document = json.loads(marker.text)
         lanes = tuple(_lanes(document["lanes"], points, source))
         notes = recorded_notes(map(str, document["notes"]), str(document.get("note_kinds", "")))
         rules = tuple(map(_rule, document.get("rules", ())))

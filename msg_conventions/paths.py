@@ -48,16 +48,15 @@ def encode_path(poses: Floats, stamps_ns: Ints, frame_id: str, stamp_ns: int) ->
     text = frame_id.encode() + b"\x00"
     begin = encode(BEGIN, stamp=stamp_ns, frame_id=frame_id, count=count)
     rows = np.zeros(count, dtype=_pose_type(len(text)))
-    rows["sec"], rows["nanosec"], rows["size"], rows["frame"] = (
-        seconds,
-        nanoseconds,
-        len(text),
-        text,
-    )
+    rows["sec"] = seconds
+    rows["nanosec"] = nanoseconds
+    rows["size"] = len(text)
+    rows["frame"] = text
     pose = rows["pose"]
     pose[:, :2] = poses[:, :2]
     pose[:, 5], pose[:, 6] = half_angle(poses[:, 2])
-    body, used = rows.tobytes(), 12 + len(text)
+    body = rows.tobytes()
+    used = 12 + len(text)
     gap = (
         -(len(begin) - len(HEADER) + used) % 8
     )  # before the first pose, which may begin amid 8 bytes
@@ -126,26 +125,21 @@ def encode_route(route: Route, anchors_ns: Sequence[int], frame_id: str) -> byte
 
     `anchors_ns` (K + 2,) are the template's stamps at the anchors, the first its own.
     """
-    index, stamps = [int(route.anchor[0])], [anchors_ns[0]]
+    index = [int(route.anchor[0])]
+    stamps = [anchors_ns[0]]
     for k in range(1, len(route.anchor)):
         first, last = int(route.anchor[k - 1]), int(route.anchor[k])
-        span = route.length[last] - route.length[first]
         inner = np.arange(first + 1, last)
-        share = (
-            (route.length[inner] - route.length[first]) / span
-            if span > 0.0
-            else np.zeros(len(inner))
-        )
+        span = route.length[last] - route.length[first]
+        share = np.zeros(len(inner))
+        if span > 0.0:
+            share = (route.length[inner] - route.length[first]) / span
         duration = anchors_ns[k] - anchors_ns[k - 1]
-        planned = (
-            np.clip(np.rint(share * duration).astype(np.int64), 1, duration - 1)
-            + anchors_ns[k - 1]
-        )
+        elapsed = np.clip(np.rint(share * duration).astype(np.int64), 1, duration - 1)
         index += [*inner.tolist(), last]
-        stamps += [*planned.tolist(), anchors_ns[k]]
-    return encode_path(
-        route.points[index], np.array(stamps, dtype=np.int64), frame_id, anchors_ns[0]
-    )
+        stamps += [*(elapsed + anchors_ns[k - 1]).tolist(), anchors_ns[k]]
+    stamps_ns = np.array(stamps, dtype=np.int64)
+    return encode_path(route.points[index], stamps_ns, frame_id, anchors_ns[0])
 
 
 def decode_route(

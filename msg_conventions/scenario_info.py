@@ -119,8 +119,9 @@ class ScenarioEntry:
             return None
         start, end = (_states(values[key], where) for key, _ in keys)
         if witness:
-            own = (_states(f"[{values[key]}]", where) for _, key in keys)
-            start, end = (np.concatenate(rows) for rows in zip((start, end), own, strict=True))
+            ego_start, ego_end = (_states(f"[{values[key]}]", where) for _, key in keys)
+            start = np.concatenate((start, ego_start))
+            end = np.concatenate((end, ego_end))
         return BoundaryStates(start, end, self._relaxed(len(start), where, witness=witness))
 
     def _relaxed(self, count: int, where: str, *, witness: bool) -> Floats:
@@ -129,18 +130,22 @@ class ScenarioEntry:
         0 where it is not there.
         """
         relaxed = np.zeros((count, 2, 2))
+        vehicles = self._relaxed_of(FREED, count - witness, where)
+        relaxed[: len(vehicles)] = vehicles
+        ego = self._relaxed_of(EGO_FREED, 1, where)
+        if witness and len(ego):
+            relaxed[count - 1] = ego[0]
+        return relaxed
+
+    def _relaxed_of(self, key: str, max_count: int, where: str) -> Floats:
+        """Return the deviations (M, 2, 2) [m, m/s] under a key, of at most `max_count` vehicles."""
         with guarded(where):
-            texts = (self.status.values.get(key, "[]") for key in (FREED, EGO_FREED))
-            own, ego = (
-                np.array(json.loads(text), dtype=np.float64).reshape(-1, 2, 2) for text in texts
+            values = json.loads(self.status.values.get(key, "[]"))
+            relaxed = np.array(values, dtype=np.float64).reshape(-1, 2, 2)
+        if len(relaxed) > max_count or not np.isfinite(relaxed).all() or (relaxed < 0.0).any():
+            raise InputError(
+                f"{where}: {key} is not metres and m/s of at most {max_count} vehicles"
             )
-        for key, freed, most in ((FREED, own, count - witness), (EGO_FREED, ego, 1)):
-            if len(freed) > most or not np.isfinite(freed).all() or (freed < 0.0).any():
-                raise InputError(
-                    f"{where}: {key} is not metres and m/s of at most {most} vehicles"
-                )
-        relaxed[: len(own)] = own
-        relaxed[count - witness :] = ego if witness and len(ego) else 0.0
         return relaxed
 
 
@@ -237,17 +242,18 @@ class RequestSummary:
         Raises:
             InputError: they are damaged.
         """
-        source, found = f"{INFO}: {REACTION} of {self.status.message}", []
+        source = f"{INFO}: {REACTION} of {self.status.message}"
+        reactions = []
         for key, text in self.values.items():
             if key.startswith(REACTION):
-                found.append(
+                reactions.append(
                     parse_json(
                         text,
                         source,
                         {"type": "object", "required": ["words", "lag", "confidence"]},
                     )
                 )
-        return tuple(found)
+        return tuple(reactions)
 
     def sentence(self) -> str:
         """Return a sentence on the result of the request."""
@@ -423,8 +429,8 @@ def request_summary(
         **({KINDS: note_kinds(result.adaptations)} if result.adaptations else {}),
         **{
             f"{key}{k}": json.dumps(edge)
-            for key, found in edges.items()
-            for k, edge in enumerate(found)
+            for key, listed in edges.items()
+            for k, edge in enumerate(listed)
         },
         **(
             {}
