@@ -1,22 +1,24 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Vehicles in the messages of others, of either byte order: fixes, twists and odometry of one, tracked objects of many.
+"""Vehicles in messages of other programs: fixes, twists, odometry, and tracked objects.
 
-TrackedObjects of Autoware's perception (autoware_perception_msgs) are read as follows:
+TrackedObjects of Autoware's perception (autoware_perception_msgs):
 
 | quantity | field | unit |
 |---|---|---|
 | stamp, frame | header | |
 | id | objects[].object_id | UUID, written as hexadecimal digits |
-| class | objects[].classification[]: the label with the highest probability | |
-| position, heading | objects[].kinematics.pose_with_covariance.pose: the middle of the shape | m |
-| speed | objects[].kinematics.twist_with_covariance.twist.linear, in the object's own frame | m/s |
+| class | objects[].classification[]: the most probable label | |
+| position, heading | objects[].kinematics.pose_with_covariance.pose: the shape's centre | m |
+| speed | objects[].kinematics.twist_with_covariance.twist.linear, in its frame | m/s |
 | length, width | objects[].shape.dimensions.x, y | m |
 """
 
 from dataclasses import dataclass
+from enum import IntEnum
 import math
+from operator import attrgetter
 from typing import Any
 
 import numpy as np
@@ -29,7 +31,7 @@ from scenario_gen.base.errors import guarded
 from scenario_gen.types import Encounter
 
 FIX, TWIST, ODOMETRY, TRACKS = topics.FIX_TYPE, topics.TWIST_TYPE, odometry.TYPE, trajectory.TYPE
-KINDS = (
+KINDS = [
     "unknown",
     "car",
     "truck",
@@ -38,9 +40,15 @@ KINDS = (
     "motorcycle",
     "bicycle",
     "pedestrian",
-)  # by label
-UNAVAILABLE, SIGN_UNKNOWN = 0, 1  # of orientation_availability
-_SLOW = 0.5  # m/s: below, a velocity does not tell which way an object faces
+]  # by label
+_MIN_DIRECTION_MPS = 0.5  # a slower velocity does not show which way an object faces
+
+
+class _Orientation(IntEnum):
+    """Values of orientation_availability."""
+
+    UNAVAILABLE = 0
+    SIGN_UNKNOWN = 1
 
 
 @dataclass(frozen=True)
@@ -48,11 +56,12 @@ class Sample:
     """The state of one vehicle in one message.
 
     Attributes:
-        stamp_ns: of its header, 0 if that bears none.
-        position: latitude and longitude [degrees], or x and y [m]; NaN where there is no fix, None of a TwistStamped.
-        heading: rad; NaN if it is not given.
-        speed: m/s; None if it is not given.
-        frame: of the position, "" if it is not given.
+        stamp_ns: of its header, or 0.
+        position: latitude and longitude [degrees], or x and y [m]; NaN without a fix, None of a
+            TwistStamped.
+        heading: [rad], or NaN.
+        speed: [m/s], or None.
+        frame: of the position, or "".
     """
 
     stamp_ns: int
@@ -64,7 +73,7 @@ class Sample:
 
 @dataclass(frozen=True)
 class TrackedObject:
-    """One object of a perception: position [m], heading [rad] or NaN, speed [m/s], length and width [m]."""
+    """A tracked object: position [m], heading [rad] or NaN, speed [m/s], length and width [m]."""
 
     id: str
     kind: str
@@ -74,21 +83,21 @@ class TrackedObject:
     size: tuple[float, float]
 
 
-def decode_sample(data: bytes, kind: str, what: str) -> Sample:
+def decode_sample(data: bytes, kind: str, place: str) -> Sample:
     """Return the state in a message of type FIX, TWIST or ODOMETRY.
 
     Raises:
-        InputError: naming `what`, it is damaged.
+        InputError: it is damaged; names `place`.
     """
-    message, stamp = _decode(data, kind, what)
+    message, stamp = _decode(data, kind, place)
     if kind == FIX:
-        known = message.status.status >= 0
-        return Sample(
-            stamp, (message.latitude, message.longitude) if known else (math.nan, math.nan)
-        )
+        has_fix = message.status.status >= 0
+        position = (message.latitude, message.longitude) if has_fix else (math.nan, math.nan)
+        return Sample(stamp, position)
     if kind == TWIST:
         return Sample(stamp, speed=speed_of(message.twist.linear.x, message.twist.linear.y))
-    pose, linear = message.pose.pose, message.twist.twist.linear  # the speed is in the body frame
+    pose = message.pose.pose
+    linear = message.twist.twist.linear  # in the body frame
     return Sample(
         stamp,
         (pose.position.x, pose.position.y),
@@ -98,29 +107,29 @@ def decode_sample(data: bytes, kind: str, what: str) -> Sample:
     )
 
 
-def decode_tracks(data: bytes, what: str) -> Encounter:
+def decode_tracks(data: bytes, place: str) -> Encounter:
     """Return the encounter in a message of type TRACKS.
 
     Raises:
-        InputError: naming `what`, it is damaged, or no encounter.
+        InputError: it is damaged, or not an encounter; names `place`.
     """
-    return tracks.decode_tracks(data, what)
+    return tracks.decode_tracks(data, place)
 
 
-def decode_tracked(data: bytes, what: str) -> tuple[int, str, list[TrackedObject]]:
+def decode_tracked(data: bytes, place: str) -> tuple[int, str, list[TrackedObject]]:
     """Return stamp [ns], frame and objects of a message of type TRACKED.
 
     Raises:
-        InputError: naming `what`, it is damaged.
+        InputError: it is damaged; names `place`.
     """
-    message, stamp = _decode(data, TRACKED, what)
+    message, stamp = _decode(data, TRACKED, place)
     return stamp, message.header.frame_id, [_object(entry) for entry in message.objects]
 
 
-def _decode(data: bytes, kind: str, what: str) -> tuple[Any, int]:
+def _decode(data: bytes, kind: str, place: str) -> tuple[Any, int]:
     """Return a message and the stamp [ns] of its header."""
     store = type_store()
-    with guarded(f"{what}: not a {kind}"):
+    with guarded(f"{place}: not a {kind}"):
         message = store.deserialize_cdr(data, kind)
     return message, message.header.stamp.sec * 10**9 + message.header.stamp.nanosec
 
@@ -131,20 +140,17 @@ def _heading(pose: Any) -> float:
 
 
 def _object(entry: Any) -> TrackedObject:
-    best = max(
-        entry.classification, key=lambda candidate: float(candidate.probability), default=None
-    )
-    label = int(best.label) if best is not None else 0
-    kinematics = entry.kinematics
-    pose, linear = (
-        kinematics.pose_with_covariance.pose,
-        kinematics.twist_with_covariance.twist.linear,
-    )
+    likely = max(entry.classification, key=attrgetter("probability"), default=None)
+    label = int(likely.label) if likely is not None else 0
+    pose = entry.kinematics.pose_with_covariance.pose
+    linear = entry.kinematics.twist_with_covariance.twist.linear
     heading = _heading(pose)
-    known = int(kinematics.orientation_availability)
-    if known == UNAVAILABLE or (known == SIGN_UNKNOWN and abs(linear.x) < _SLOW):
+    orientation = int(entry.kinematics.orientation_availability)
+    if orientation == _Orientation.UNAVAILABLE or (
+        orientation == _Orientation.SIGN_UNKNOWN and abs(linear.x) < _MIN_DIRECTION_MPS
+    ):
         heading = math.nan
-    elif known == SIGN_UNKNOWN and linear.x < 0.0:
+    elif orientation == _Orientation.SIGN_UNKNOWN and linear.x < 0.0:
         heading += math.pi
     return TrackedObject(
         id=bytes(np.asarray(entry.object_id.uuid, dtype=np.uint8)).hex(),

@@ -222,6 +222,6 @@ def _speed_at(track: Observations, stamp_ns: int) -> float:
     if len(track.speed_ns):
         return float(np.interp(stamp_ns, track.speed_ns, track.speed))
     start_ns = int(track.fix_ns[0])
-    seconds = (track.fix_ns - start_ns) * 1e-9
+    seconds = (track.fix_ns - start_ns).astype(np.float64) * 1e-9
     fix_speed = speed_of_fixes(seconds, track.fix)
     return float(np.interp((stamp_ns - start_ns) * 1e-9, seconds, fix_speed))

@@ -86,7 +86,8 @@ def remarks_on_units(
 
 def _tick_seconds(piece: Piece, config: LogConfig) -> Floats:
     """Return the times (T,) of a piece's samples [s]."""
-    return (piece.smooth.first + np.arange(len(piece.smooth.speed))) * config.period
+    ticks = np.arange(len(piece.smooth.speed), dtype=np.float64)
+    return (piece.smooth.first + ticks) * config.period
 
 
 def _heading_remark(

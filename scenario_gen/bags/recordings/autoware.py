@@ -21,24 +21,29 @@ def autoware_messages(
     """Yield topic, CDR bytes and log stamp [ns] of every message, in order of the stamps.
 
     Args:
-        others: the vehicles around.
-        ego: the ego's track, a scenario of one vehicle on a clock of its own that begins at the same instant; None: none.
+        others: the other vehicles.
+        ego: the ego's track on its own clock, from the same instant; or None.
         start_ns: stamp of the first instant.
     """
-    objects, at = AutowareEncoder(others), None if ego is None else AutowareEncoder(ego)
-    moments = [(int(t), 0, k) for k, t in enumerate(objects.time_ns)]
-    moments += [] if at is None else [(int(t), 1, k) for k, t in enumerate(at.time_ns)]
-    for time_ns, of_ego, k in sorted(moments):
-        stamp = start_ns + time_ns
-        if of_ego and at is not None:
-            yield EGO, at.odometry(k, stamp), stamp
+    encoders = [AutowareEncoder(others)]
+    if ego is not None:
+        encoders.append(AutowareEncoder(ego))
+    instants = [
+        (int(time_ns), n, k)
+        for n, encoder in enumerate(encoders)
+        for k, time_ns in enumerate(encoder.time_ns)
+    ]
+    for time_ns, n, k in sorted(instants):
+        stamp_ns = start_ns + time_ns
+        if n:
+            yield EGO, encoders[n].odometry(k, stamp_ns), stamp_ns
         else:
-            yield OBJECTS, objects.predicted_objects(k, stamp), stamp
-            yield TRACKS, objects.tracked_objects(k, stamp), stamp
+            yield OBJECTS, encoders[n].predicted_objects(k, stamp_ns), stamp_ns
+            yield TRACKS, encoders[n].tracked_objects(k, stamp_ns), stamp_ns
 
 
 def add_autoware(bag: BagWriter, others: Scenario, ego: Scenario | None, start_ns: int) -> None:
-    """Write a scenario to a bag that is open; arguments as of `autoware_messages`.
+    """Write a scenario to an open bag; arguments as in `autoware_messages`.
 
     Raises:
         InputError: a stamp is out of ROS's range.

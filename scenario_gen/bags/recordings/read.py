@@ -1,9 +1,10 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Recordings read: template, road, scenarios and requests of each namespace of a bag, decoded when they are needed.
+"""Reads recordings: template, road, scenarios and requests of each namespace of a bag.
 
-The one reader of the conventions' topics, whoever recorded them: evaluation, validation and regeneration use it.
+This is the only reader of the conventions' topics: evaluation, validation and regeneration use it.
+Messages are decoded when they are needed.
 """
 
 from collections.abc import Collection, Mapping, Sequence
@@ -64,40 +65,49 @@ __all__ = [
 ]
 
 NO_ENTRY = f"{INFO} has no entry for them (lost with the end of a recording?)"
-TEMPLATE_TOPICS = r"tracks|changepoints|map|fit|road/entries|road/exits|road/lanes|vehicle_\w+/route|ego/(?:start|goal)"
-TEMPLATE = re.compile(TEMPLATE_TOPICS, re.DOTALL)
-READ = re.compile(
-    rf"(?:(?P<namespace>.*?)/)?(?P<topic>{TEMPLATE_TOPICS}|posterior|fit/info|ego/witness|scenarios|scenarios/info|diagnostics)",
-    re.DOTALL,
+
+_TEMPLATE_TOPICS = (
+    r"tracks|changepoints|map|fit|road/entries|road/exits|road/lanes|vehicle_\w+/route"
+    r"|ego/(?:start|goal)"
 )
-Statuses = Mapping[str, Mapping[str, str]]  # key-values of diagnostics, by subject
+_OTHER_TOPICS = "posterior|fit/info|ego/witness|scenarios|scenarios/info|diagnostics"
+_TEMPLATE_TOPIC = re.compile(_TEMPLATE_TOPICS, re.DOTALL)
+_TOPIC = re.compile(
+    rf"(?:(?P<namespace>.*?)/)?(?P<topic>{_TEMPLATE_TOPICS}|{_OTHER_TOPICS})", re.DOTALL
+)
+
+Statuses = Mapping[str, Mapping[str, str]]
+"""Key-values of diagnostics, by subject."""
+
+Roads = dict[tuple[str, bytes | None, str], Road]
+"""The roads of a bag by map hash, lanes and name: each is large, and decoded once."""
 
 
 @dataclass(frozen=True, eq=False)
 class Recording:
-    """A bag, read once: `namespaces` by name ("" is the root), sorted."""
+    """A bag in memory; its namespaces by name ("" is the root), sorted."""
 
     path: Path
     namespaces: Mapping[str, "Namespace"]
 
     @property
     def results(self) -> tuple[str, ...]:
-        """The namespaces that hold a template with scenarios."""
+        """The namespaces with a template and scenarios."""
         return tuple(
             name
-            for name, one in self.namespaces.items()
-            if {"tracks", SCENARIOS} <= one.messages.keys()
+            for name, namespace in self.namespaces.items()
+            if {"tracks", SCENARIOS} <= namespace.messages.keys()
         )
 
     @property
     def provenance(self) -> dict[str, str]:
-        """How its scenarios were generated: logs, seed, versions, parameters; different values side by side."""
-        found: dict[str, list[str]] = {}
+        """Logs, seed, versions and parameters of the generation; different values joined by |."""
+        values: dict[str, list[str]] = {}
         for namespace in self.namespaces.values():
             for summary in namespace.summaries:
                 for key, value in summary.provenance.items():
-                    found.setdefault(key, []).append(value)
-        return {key: " | ".join(dict.fromkeys(values)) for key, values in found.items()}
+                    values.setdefault(key, []).append(value)
+        return {key: " | ".join(dict.fromkeys(texts)) for key, texts in values.items()}
 
 
 def read_recording(
@@ -106,47 +116,41 @@ def read_recording(
     """Read the messages of a bag.
 
     Args:
-        path: of the bag.
-        config: what is read at most.
-        topics: names without namespace; none: all topics of the conventions. With scenarios come their witnesses.
+        path: the bag.
+        config: bounds of reading it.
+        topics: names without namespace; none: all topics of the conventions. Scenarios include
+            their witnesses.
 
     Raises:
-        InputError: the bag is missing or damaged, or larger than `config` allows.
+        InputError: the bag does not exist, is damaged, or larger than `config` allows.
     """
-    wanted = {*topics, *((WITNESS,) if SCENARIOS in topics else ())}
+    wanted = {*topics, WITNESS} if SCENARIOS in topics else set(topics)
 
-    def known(name: str) -> re.Match[str] | None:
-        match = READ.fullmatch(name)
+    def parsed(name: str) -> re.Match[str] | None:
+        match = _TOPIC.fullmatch(name)
         return match if match and (not topics or match["topic"] in wanted) else None
 
-    found: dict[str, dict[str, list[BagMessage]]] = {}
-    for message in read_messages(path, lambda name: known(name) is not None, config):
-        if match := known(message.topic):
-            found.setdefault(match["namespace"] or "", {}).setdefault(match["topic"], []).append(
-                message
-            )
-    shared = [
-        message.data for message in found.get("", {}).get("diagnostics", ())
-    ]  # one topic for the nodes of all namespaces
+    messages: dict[str, dict[str, list[BagMessage]]] = {}
+    for message in read_messages(path, lambda name: parsed(name) is not None, config):
+        match = parsed(message.topic)
+        if match:
+            by_topic = messages.setdefault(match["namespace"] or "", {})
+            by_topic.setdefault(match["topic"], []).append(message)
+    # /diagnostics is one topic for the nodes of all namespaces.
+    diagnostics = [message.data for message in messages.get("", {}).get("diagnostics", ())]
     roads: Roads = {}
-    return Recording(
-        path,
-        {
-            name: Namespace(path, name, messages, shared, roads)
-            for name, messages in sorted(found.items())
-        },
-    )
-
-
-Roads = dict[tuple[str, bytes | None, str], Road]
-"""Those of a bag, by their map's hash, lanes and name: what is derived from a road is large, and derived once."""
+    namespaces = {
+        name: Namespace(path, name, by_topic, diagnostics, roads)
+        for name, by_topic in sorted(messages.items())
+    }
+    return Recording(path, namespaces)
 
 
 class Namespace(RecordedScenarios):
-    """What a bag holds in one namespace.
+    """The messages of one namespace of a bag.
 
-    Properties for people to look at (`statuses`, `segmentation`, `fit`, `entries`, …) leave out what is missing or damaged; what
-    a scenario is checked against or generated from raises an error then.
+    Properties for display (`statuses`, `segmentation`, `fit`, `entries`, …) omit missing and
+    damaged messages; functions for checking or generating scenarios raise an error instead.
     """
 
     def __init__(
@@ -157,39 +161,40 @@ class Namespace(RecordedScenarios):
         shared: Sequence[bytes],
         roads: "Roads",
     ) -> None:
-        """Take the bag's path, the namespace's name, its messages by topic, and /diagnostics and roads of all namespaces."""
+        """Use messages by topic; /diagnostics and roads are shared by all namespaces of a bag."""
         super().__init__(path, name, messages)
-        self._shared, self._roads = shared, roads
+        self._shared = shared
+        self._roads = roads
 
     # The template and the road of one scenario.
 
     def tracks_of(self, entry: ScenarioEntry | None, stamp_ns: int) -> Encounter | None:
-        """Return the tracks that an entry names, else the newest ones of the stamp; None if there are none.
+        """Return the tracks that an entry names, else the newest with the stamp, or None.
 
         Raises:
             InputError: a message is damaged.
         """
-        own = entry.template_hash if entry else None
-        data = next(
-            (data for data in self.data("tracks") if own and hash_of("tracks", data) == own), None
-        )
-        data = data or self.newest("tracks", stamp_ns)
+        wanted = entry.template_hash if entry else None
+        named = [data for data in self.data("tracks") if wanted == hash_of("tracks", data)]
+        data = named[0] if named else self.newest("tracks", stamp_ns)
         return decode_tracks(data, self.where("tracks")) if data else None
 
     def road_of(self, entry: ScenarioEntry | None, stamp_ns: int) -> Road | None:
-        """Return the road whose map an entry names; where it names none, the newest one of the stamp, or of all.
+        """Return the road that an entry names, else the newest with the stamp, or of all.
 
         Raises:
             InputError: a message is damaged.
         """
-        maps, what = self.data("map"), self.where("map")
-        if entry is not None and entry.map_hash:
-            data = next((data for data in maps if hash_of("map", data) == entry.map_hash), None)
-            for other in maps if data is None else ():
-                decode_map(other, name=what)  # it may be the one that is damaged
-        else:
+        maps = self.data("map")
+        if entry is None or not entry.map_hash:
             data = self.newest("map", stamp_ns) or (maps[-1] if maps else None)
-        return self._decode_road(data) if data else None
+            return self._decode_road(data) if data else None
+        for data in maps:
+            if hash_of("map", data) == entry.map_hash:
+                return self._decode_road(data)
+        for data in maps:
+            decode_map(data, name=self.where("map"))  # raises if it is damaged
+        return None
 
     def _decode_road(self, data: bytes) -> Road:
         lanes = lanes_beside(
@@ -197,21 +202,20 @@ class Namespace(RecordedScenarios):
         )
         key = (hash_of("map", data), lanes, self.road_name)
         if key not in self._roads:
-            self._roads[key] = replace(
-                decode_map(data, lanes=lanes, name=self.where("map"))[1], name=self.road_name
-            )
+            _, road = decode_map(data, lanes=lanes, name=self.where("map"))
+            self._roads[key] = replace(road, name=self.road_name)
         return self._roads[key]
 
     @cached_property
     def roads_differ(self) -> bool:
-        """Whether a scenario without an entry may belong to any of several maps, while entries name theirs."""
+        """Whether a scenario without an entry may belong to any of several maps."""
         return (
             any(e.map_hash for e in self.entries)
             and len({hash_of("map", data) for data in self.data("map")}) > 1
         )
 
     def segmentation_of(self, encounter: Encounter) -> Segmentation | None:
-        """Return the segmentation of the newest changepoints of an encounter, None if there are none.
+        """Return the segmentation by the newest changepoints of an encounter, or None.
 
         Raises:
             InputError: a message is damaged.
@@ -220,35 +224,34 @@ class Namespace(RecordedScenarios):
         return decode_changepoints(data, encounter, self.where("changepoints")) if data else None
 
     def template_messages(self, entry: ScenarioEntry, stamp_ns: int) -> dict[str, BagMessage]:
-        """Return what a scenario was generated from, by topic: template, road, fit, routes, ego.
+        """Return the inputs of a scenario by topic: template, road, fit, routes, ego.
 
-        Of each topic this is the message that `fit/info` names beside the scenario's map and template; where it names none, the
-        newest message of the stamp (of maps without that stamp: the newest).
+        For each topic, this is the message that `fit/info` names together with the scenario's map
+        and template; if it names none, the newest message with the stamp (or the newest map).
 
         Raises:
             InputError: a message is damaged.
         """
-        together: dict[str, str] = {}
+        hashes: dict[str, str] = {}
         for message in self.messages.get("fit/info", ()):
-            hashes = decode_hashes(message.data, message.topic)
-            if hashes.get("map") == entry.map_hash and hashes.get("tracks") == entry.template_hash:
-                together = hashes
-        found: dict[str, BagMessage] = {}
+            named = decode_hashes(message.data, message.topic)
+            inputs = (named.get("map"), named.get("tracks"))
+            if inputs == (entry.map_hash, entry.template_hash):
+                hashes = named
+        inputs_by_topic: dict[str, BagMessage] = {}
         for topic, messages in self.messages.items():
-            if not TEMPLATE.fullmatch(topic):
+            if not _TEMPLATE_TOPIC.fullmatch(topic):
                 continue
-            own = [
-                m
-                for m in messages
-                if topic not in together or hash_of(topic, m.data) == together[topic]
-            ]
-            of_stamp = [m for m in own if stamp_of(m.data, m.topic) == stamp_ns]
-            if of_stamp or (own and topic == "map"):
-                found[topic] = (of_stamp or own)[-1]
-        return found
+            named_messages = [m for m in messages if _has_hash(m, topic, hashes.get(topic))]
+            stamped = [m for m in named_messages if stamp_of(m.data, m.topic) == stamp_ns]
+            if topic == "map":
+                stamped = stamped or named_messages
+            if stamped:
+                inputs_by_topic[topic] = stamped[-1]
+        return inputs_by_topic
 
     def published(self, entry: ScenarioEntry) -> tuple[bytes, bytes]:
-        """Return the bytes of a scenario and of its witness, empty if there is none."""
+        """Return the bytes of a scenario and of its witness; empty if missing."""
         pairs = zip(self.messages.get(SCENARIOS, ()), self.hashes, strict=True)
         data = next((message.data for message, sha256 in pairs if sha256 == entry.sha256), b"")
         return data, self.witnesses[entry.witness].data if entry.witness else b""
@@ -256,7 +259,7 @@ class Namespace(RecordedScenarios):
     def messages_of(
         self, info: BagMessage, entry: ScenarioEntry, summary: RequestSummary
     ) -> tuple[BagMessage, ...]:
-        """Return the messages for a bag of one scenario: its template, the scenario, its entry, and a summary of it alone.
+        """Return the messages for a bag of one scenario: inputs, scenario, entry and summary.
 
         Args:
             info: the message of the entry.
@@ -264,30 +267,27 @@ class Namespace(RecordedScenarios):
             summary: of its request.
 
         Raises:
-            InputError: a message is damaged, or the scenario itself or its witness is not in the bag.
+            InputError: a message is damaged, or the scenario or its witness is missing.
         """
         stamp = stamp_of(info.data, info.topic)
-        same = [
-            m
-            for m, sha256 in zip(self.messages.get(SCENARIOS, ()), self.hashes, strict=True)
-            if sha256 == entry.sha256
-        ]
-        if not same:
+        messages = dict(zip(self.hashes, self.messages.get(SCENARIOS, ()), strict=True))
+        if entry.sha256 not in messages:
             raise InputError(
-                f"{self.path}: the scenario with SHA-256 {entry.sha256} is not on {self.where(SCENARIOS)}"
+                f"{self.path}: the scenario with SHA-256 {entry.sha256} is not on "
+                f"{self.where(SCENARIOS)}"
             )
-        closing = replace(info, data=encode_info(summary.of_one_scenario(), stamp))
-        own = (
-            [replace(same[-1], data=data) for data in messages_of(same[-1].data)]
-            if len(entry.messages) > 1
-            else same[-1:]
-        )
         if self.without_witness(entry):
             raise InputError(
-                f"{self.path}: the reference drive with SHA-256 {entry.witness} is not on {self.where(WITNESS)}"
+                f"{self.path}: the reference drive with SHA-256 {entry.witness} is not on "
+                f"{self.where(WITNESS)}"
             )
-        witness = (self.witnesses[entry.witness],) if entry.witness else ()
-        return (*self.template_messages(entry, stamp).values(), *witness, *own, info, closing)
+        message = messages[entry.sha256]
+        parts = [message]
+        if len(entry.messages) > 1:
+            parts = [replace(message, data=data) for data in messages_of(message.data)]
+        witness = [self.witnesses[entry.witness]] if entry.witness else []
+        closing = replace(info, data=encode_info(summary.of_one_scenario(), stamp))
+        return (*self.template_messages(entry, stamp).values(), *witness, *parts, info, closing)
 
     # To look at: the newest template and the diagnostics about it.
 
@@ -301,18 +301,16 @@ class Namespace(RecordedScenarios):
 
     @cached_property
     def statuses(self) -> Statuses:
-        """The diagnostics about the newest template; the last value counts."""
+        """The newest diagnostics about the newest template."""
         stamp = self.encounter.start_ns
-        return template_statuses(self._shared, stamp, f"{self.name}/") | template_statuses(
-            self.data("diagnostics"), stamp
-        )
+        shared = template_statuses(self._shared, stamp, f"{self.name}/")
+        return shared | template_statuses(self.data("diagnostics"), stamp)
 
     @cached_property
     def road_name(self) -> str:
-        """Name of the road, by the entries; else the map's topic."""
-        return next(
-            (entry.road for entry in reversed(self.entries) if entry.road), self.where("map")
-        )
+        """Name of the road by the last entry, else the map's topic."""
+        names = [entry.road for entry in self.entries if entry.road]
+        return names[-1] if names else self.where("map")
 
     @cached_property
     def road(self) -> Road | None:
@@ -322,7 +320,7 @@ class Namespace(RecordedScenarios):
 
     @cached_property
     def segmentation(self) -> Segmentation:
-        """The newest segmentation, with shared labels, probabilities and sentences where the bag has them.
+        """The newest segmentation, with labels, probabilities and descriptions if recorded.
 
         Raises:
             InputError: the changepoints are damaged or of another template.
@@ -351,7 +349,7 @@ class Namespace(RecordedScenarios):
 
     @cached_property
     def fit(self) -> tuple[Fit | None, tuple[Route, ...]]:
-        """Fit and routes of the newest template; None and no routes unless both are there with all that the fitting decided."""
+        """Fit and routes of the newest template; None and no routes unless both are complete."""
         encounter, changepoints = self.encounter, self.segmentation.changepoints
         stamps = fits.anchor_stamps(encounter, changepoints)
         try:
@@ -398,13 +396,18 @@ class Namespace(RecordedScenarios):
         ), routes
 
 
+def _has_hash(message: BagMessage, topic: str, wanted: str | None) -> bool:
+    """Return whether a message has a hash; any message if it is None."""
+    return wanted is None or hash_of(topic, message.data) == wanted
+
+
 def read_scenario_set(
     path: Path, namespace: str = "", config: BagConfig = BagConfig()
 ) -> ScenarioSet:
-    """Return the last request's scenarios and counts from a bag, whoever recorded it.
+    """Return scenarios and counts of the last request in a bag.
 
     Raises:
-        InputError: the bag cannot be read, no request was closed in it, or a scenario of the request is missing.
+        InputError: the bag cannot be read, no request was closed, or a scenario is missing.
     """
     found = read_recording(path, config, (SCENARIOS, INFO)).namespaces.get(namespace)
     if found is None:
@@ -416,15 +419,15 @@ def read_scenario_set(
 def load(
     path: Path | str, namespace: str = "", config: BagConfig = BagConfig()
 ) -> GenerationResult:
-    """Return a result that a bag holds: its template and the scenarios of its last request, not evaluated.
+    """Return a result from a bag: template and scenarios of its last request, not evaluated.
 
     Args:
-        path: of the bag, as `GenerationResult.save` or `scenario-gen generate` wrote it.
+        path: the bag of `GenerationResult.save` or `scenario-gen generate`.
         namespace: "" or e.g. "/case_2".
-        config: what is read at most.
+        config: bounds of reading it.
 
     Raises:
-        InputError: the bag cannot be read, the namespace is not there, or a scenario of the request is missing.
+        InputError: the bag cannot be read, or the namespace or a scenario is missing.
     """
     return result_in(read_recording(Path(path), config), namespace)
 
@@ -433,15 +436,15 @@ def result_in(recording: Recording, namespace: str = "") -> GenerationResult:
     """Return a result of a recording, as `load` does.
 
     Raises:
-        InputError: the namespace is not among its `results`, or a scenario of the request is missing.
+        InputError: the namespace is not among its `results`, or a scenario is missing.
     """
     if namespace not in recording.results:
         names = " or ".join(map(repr, recording.results))
-        remedy = (
-            f"choose one: namespace={names}" if names else "no namespace has any; is it a log?"
-        )
+        remedy = "no namespace has; is it a log?"
+        if names:
+            remedy = f"choose one: namespace={names}"
         raise InputError(
-            f"{recording.path}: namespace {namespace!r} holds no recording with scenarios; {remedy}"
+            f"{recording.path}: namespace {namespace!r} has no template with scenarios; {remedy}"
         )
     found = recording.namespaces[namespace]
     with naming_bag(recording.path):

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""A template from its messages: tracks, changepoints, road, fit and routes, and the diagnostics about it."""
+"""A template from its messages: tracks, changepoints, road, fit, routes and diagnostics."""
 
 from collections.abc import Iterable, Mapping, Sequence
 
@@ -22,24 +22,23 @@ from scenario_gen.types import Encounter, Fit, GenerationResult, Route, tokens
 
 
 def missing_topics(messages: Mapping[str, bytes]) -> list[str]:
-    """Return the topics that `decode_template` needs and that are not among the messages.
+    """Return the topics that `decode_template` needs and the messages lack.
 
     Raises:
         InputError: `tracks` is damaged.
     """
     needed = ["tracks", "changepoints", "map", "fit"]
     if "tracks" in messages:
-        vehicles = decode_tracks(messages["tracks"]).vehicles
-        needed += [
-            vehicle_topic(name, "route") for name in tokens(vehicle.id for vehicle in vehicles)
-        ]
+        names = tokens(vehicle.id for vehicle in decode_tracks(messages["tracks"]).vehicles)
+        needed += [vehicle_topic(name, "route") for name in names]
     return [topic for topic in needed if topic not in messages]
 
 
 def decode_template(messages: Mapping[str, bytes]) -> GenerationResult:
-    """Return the fitted template that the messages (by topic) describe; the road's entries, exits and lanes may be missing.
+    """Return the fitted template in messages by topic; entries, exits and lanes are optional.
 
-    Its fit holds the requested states, but not what was decided for each vehicle: the messages do not hold that.
+    Its fit has the requested states, but not the decisions for each vehicle, which the messages
+    lack.
 
     Raises:
         InputError: a message is damaged, in another frame than the map, or missing.
@@ -56,14 +55,14 @@ def decode_template(messages: Mapping[str, bytes]) -> GenerationResult:
     anchors = anchor_stamps(encounter, segmentation.changepoints)
     if poses.shape[:2] != (len(encounter.vehicles), len(anchors)):
         raise InputError(
-            f"fit: {poses.shape[0]} vehicles at {poses.shape[1]} points, where tracks and changepoints have "
-            f"{len(encounter.vehicles)} at {len(anchors)}"
+            f"fit: {poses.shape[0]} vehicles at {poses.shape[1]} points, but tracks and "
+            f"changepoints have {len(encounter.vehicles)} at {len(anchors)}"
         )
     routes = decode_routes(messages, encounter, anchors)
     for topic, other, _ in routes:
         if {frame, other} != {road.frame_id}:
             raise InputError(
-                f"{topic}: frame {other!r}, fit {frame!r} and map {road.frame_id!r} must be one and the same"
+                f"{topic}: frame {other!r}, fit {frame!r} and map {road.frame_id!r} must be the same"
             )
     fit = Fit(
         encounter.vehicles, (), anchor_index(encounter, segmentation.changepoints), requested, ()
@@ -76,42 +75,49 @@ def decode_template(messages: Mapping[str, bytes]) -> GenerationResult:
 def decode_routes(
     messages: Mapping[str, bytes], encounter: Encounter, anchors_ns: Sequence[int]
 ) -> list[tuple[str, str, Route]]:
-    """Return topic, frame and route of every vehicle; `messages` are by topic, `anchors_ns` (K + 2,) the template's stamps.
+    """Return topic, frame and route of every vehicle.
+
+    Args:
+        messages: by topic.
+        encounter: names the vehicles.
+        anchors_ns: (K + 2,) stamps of the template.
 
     Raises:
         InputError: a route is missing or damaged.
     """
-    found = []
+    routes = []
     for name in tokens(vehicle.id for vehicle in encounter.vehicles):
         topic = vehicle_topic(name, "route")
         if topic not in messages:
-            raise InputError(f"{topic} is missing, though tracks has a vehicle {name!r}")
-        found.append((topic, *decode_route(messages[topic], anchors_ns, topic)))
-    return found
+            raise InputError(f"{topic} is missing, but tracks has a vehicle {name!r}")
+        routes.append((topic, *decode_route(messages[topic], anchors_ns, topic)))
+    return routes
 
 
 def lanes_beside(
     grid: bytes, maps: Iterable[bytes], lanes: Sequence[bytes], infos: Iterable[bytes]
 ) -> bytes | None:
-    """Return the lanes of a map: those that a `fit/info` names beside it; where none does, those of a bag of one map.
+    """Return the lanes that a `fit/info` names with a map, or those of a bag with one map.
 
     Args:
-        grid: the map's message.
-        maps: all of the bag.
-        lanes: all messages of `road/lanes`.
-        infos: all messages of `fit/info`.
+        grid: message of the map.
+        maps: all maps of the bag.
+        lanes: all messages on `road/lanes`.
+        infos: all messages on `fit/info`.
 
     Raises:
         InputError: one of `infos` is damaged.
     """
-    own = hash_of("map", grid)
-    for info in infos if lanes else ():
-        together = decode_hashes(info, "fit/info")
-        if together.get("map") == own:
-            return next(
-                (data for data in lanes if hash_of(LANES, data) == together.get(LANES)), None
-            )
-    return lanes[-1] if lanes and len({hash_of("map", data) for data in maps}) == 1 else None
+    if not lanes:
+        return None
+    map_hash = hash_of("map", grid)
+    for info in infos:
+        hashes = decode_hashes(info, "fit/info")
+        if hashes.get("map") == map_hash:
+            named = (data for data in lanes if hash_of(LANES, data) == hashes.get(LANES))
+            return next(named, None)
+    has_one_map = len({hash_of("map", data) for data in maps}) == 1
+    return lanes[-1] if has_one_map else None
 
 
 def anchor_index(encounter: Encounter, changepoints: Ints) -> Ints:

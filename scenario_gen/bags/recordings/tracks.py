@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""One encounter as bytes and back, for stores of very many of them: the message that a bag holds on `tracks`."""
+"""An encounter as bytes, for storing very many: the message of the topic `tracks`."""
 
 from dataclasses import replace
 
@@ -10,12 +10,12 @@ from scenario_gen.types import Encounter
 
 
 def tracks_bytes(encounter: Encounter) -> bytes:
-    """Return the encounter as CDR bytes; its name and its geodetic origin are not in them."""
+    """Return the encounter as CDR bytes, without its name and geodetic origin."""
     return encode_tracks(encounter)
 
 
 def tracks_of(data: bytes, name: str, origin: tuple[float, float] | None = None) -> Encounter:
-    """Return the encounter that `tracks_bytes` wrote, bit for bit.
+    """Return the encounter of `tracks_bytes`, exactly.
 
     Args:
         data: CDR bytes.

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Recordings written: a generation as messages and as a bag, the same bytes that the nodes publish."""
+"""Writes recordings: a result as messages and as a bag, with the bytes that the nodes publish."""
 
 from collections.abc import Iterator, Mapping
 from pathlib import Path
@@ -27,19 +27,18 @@ from scenario_gen.bags.storage.metadata import qos_yaml
 from scenario_gen.bags.storage.writer import atomic_bag, BagWriter
 from scenario_gen.types import Encounter, GenerationResult, Scenario, tokens
 
-SCENARIO_STEP_NS = (
-    100_000_000  # scenarios are logged this far apart, so that a player shows one after the other
-)
+SCENARIO_STEP_NS = 100_000_000
+"""Time between the log stamps of scenarios, so that a player shows them one after the other."""
 
 
 def result_messages(
     result: GenerationResult, request: str = "1"
 ) -> Iterator[tuple[str, bytes, int]]:
-    """Yield topic (without namespace), CDR bytes and log stamp [ns] of every message of a result, in order of the stamps.
+    """Yield topic (without namespace), CDR bytes and log stamp [ns] of a result's messages.
 
     Args:
-        result: of one request, for one template on one road.
-        request: its id.
+        result: result of one request, for one template on one road.
+        request: id.
 
     Raises:
         InputError: its road or its fit is not known.
@@ -106,12 +105,13 @@ def result_messages(
 def write_recording(
     folder: Path, results: GenerationResult | Mapping[str, GenerationResult]
 ) -> Path:
-    """Write one result, or several by namespace ("" or e.g. "/case_a"), to the bag `folder`, whole or not; return `folder`.
+    """Write one result, or several by namespace ("" or e.g. "/case_a"), to a bag; return it.
 
-    Same results, same bytes. A bag that this function wrote there earlier is replaced.
+    The bag appears complete or not at all, and replaces an earlier one of this function. The same
+    results give the same bytes.
 
     Raises:
-        InputError: the folder is there and is something else, or cannot be written; a road or a fit is not known.
+        InputError: the folder has other content or cannot be written, or a road or fit is unknown.
     """
     with atomic_bag(folder) as bag:
         add_results(bag, {"": results} if isinstance(results, GenerationResult) else results)
@@ -141,12 +141,15 @@ def scenario_bytes(scenario: Scenario, encounter: Encounter) -> tuple[bytes, str
 
 
 def distance_apart(scenario: Scenario, encounter: Encounter, recorded: bytes) -> float | None:
-    """Return the largest distance [m] of a scenario from the recorded one: None for the same bytes, inf for another scenario.
+    """Return the largest distance [m] of a scenario from the recorded one.
 
     Args:
-        scenario: as it was made again.
+        scenario: generated again.
         encounter: its template.
         recorded: CDR bytes.
+
+    Returns:
+        None for the same bytes, inf for another scenario.
     """
     data, _ = scenario_bytes(scenario, encounter)
     if data == recorded:

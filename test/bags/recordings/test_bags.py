@@ -347,5 +347,5 @@ def test_what_holds_no_result_cannot_be_loaded(run, tmp_path):
     assert len(load(str(folder), "/case_2")) == 5
     with pytest.raises(InputError, match="choose one: namespace='/case_1' or '/case_2'"):
         load(folder)
-    with pytest.raises(InputError, match="no namespace has any"):
+    with pytest.raises(InputError, match="no namespace has; is it a log"):
         load(bundled("a"))
