@@ -220,3 +220,20 @@ def test_nothing_of_this_machine_and_no_registry_is_named():
             continue
         found = leak.search(path.read_text(errors="replace"))
         assert not found, f"{name}: {found.group() if found else ''}"
+
+
+READS_TEXT = re.compile(
+    r"\b(?:\w*notes?|adaptations?|str\(\w*error\w*\)|\w*message|remarks?|sentences?|\w*fault)"
+    r"\.(?:startswith|endswith|partition|rpartition|split)\("
+    r"|[\"'A-Z]\)? (?:not )?in (?:note|str\(\w*error\w*\)|sentence|remark)\b"
+)
+
+
+def test_logic_reads_kinds_and_attributes_not_the_wording_of_notes_and_errors():
+    found = [
+        f"{path.relative_to(ROOT)}:{number}"
+        for path in PYTHON_FILES
+        for number, line in enumerate(path.read_text().splitlines(), 1)
+        if READS_TEXT.search(line)
+    ]
+    assert not found

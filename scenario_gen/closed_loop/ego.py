@@ -53,18 +53,11 @@ class Moved:
 
     state: EgoState
     fault: str = ""
+    jumped: bool = False  # no body can take the pose after one step
 
 
 FARTHEST = 1e8  # metres, and rad and m/s: beyond that a pose given from outside is no place in any road's frame
 JUMP = 1.0  # metres beyond what the highest speed covers in one step, from which on a pose given from outside is called a jump
-
-
-JUMPED, NO_PLACE = "jumped", "pose is"  # how the faults of poses begin
-
-
-def misplaced(fault: str) -> bool:
-    """Whether a fault is that of a pose which no body can take after one step."""
-    return fault.startswith((JUMPED, NO_PLACE))
 
 
 def move(
@@ -102,8 +95,9 @@ def move(
 def _placed(ego: EgoState, pose: Pose, step: float, limits: Dynamics) -> Moved:
     largest = np.abs(pose).max()
     if not largest <= FARTHEST:
-        fault = f"{NO_PLACE} {'out of range' if np.isfinite(largest) else 'not finite'}"
-        return Moved(EgoState(ego.x, ego.y, ego.yaw, 0.0, 0.0, -ego.speed / step), fault)
+        fault = f"pose is {'out of range' if np.isfinite(largest) else 'not finite'}"
+        state = EgoState(ego.x, ego.y, ego.yaw, 0.0, 0.0, -ego.speed / step)
+        return Moved(state, fault, jumped=True)
     way = np.hypot(pose.x - ego.x, pose.y - ego.y)
     far = way > limits.max_speed * step + JUMP
     turn = angle_between(pose.yaw, ego.yaw)  # the yaw stays continuous
@@ -112,7 +106,7 @@ def _placed(ego: EgoState, pose: Pose, step: float, limits: Dynamics) -> Moved:
     state = EgoState(
         pose.x, pose.y, ego.yaw + turn, max(pose.speed, 0.0), float(curvature), acceleration
     )
-    return Moved(state, f"{JUMPED} {way:.1f} m" if far else "")
+    return Moved(state, f"jumped {way:.1f} m" if far else "", jumped=bool(far))
 
 
 def _driven(ego: EgoState, asked: Command, config: ClosedLoopConfig, limits: Dynamics) -> EgoState:

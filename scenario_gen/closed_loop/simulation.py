@@ -19,7 +19,7 @@ from scenario_gen.base.errors import InputError
 from scenario_gen.closed_loop.config import ClosedLoopConfig, FORESIGHT, REPLAY, TEMPLATE
 from scenario_gen.closed_loop.coordination_space import world_of
 from scenario_gen.closed_loop.driver import DriverParameters
-from scenario_gen.closed_loop.ego import Command, EgoState, misplaced, move, Pose
+from scenario_gen.closed_loop.ego import Command, EgoState, move, Pose
 from scenario_gen.closed_loop.step import advance, ego_hits
 from scenario_gen.numerics import Bools, Floats, wrap_angle
 from scenario_gen.numerics.plane import ahead_and_left, edge_lengths
@@ -49,6 +49,7 @@ class State:
         forced: how many times so far one of the others has braked harder than the strongest
             braking, or more suddenly than the jerk allows, to keep the order.
         fault: what was wrong with the last command, "" if nothing.
+        jumped: whether no body can take the ego's pose after one step.
     """
 
     step: int
@@ -63,6 +64,7 @@ class State:
     seen: Floats
     forced: int = 0
     fault: str = ""
+    jumped: bool = False
 
 
 @dataclass(frozen=True, eq=False)
@@ -136,6 +138,7 @@ class Drive:
         forced: how many times one of the others braked harder or more suddenly than drivers do, to
             keep the order.
         faults: what was wrong with commands, by step.
+        jumps: the instants before which the ego jumped.
     """
 
     motion: Scenario
@@ -145,11 +148,7 @@ class Drive:
     accelerations: Floats
     forced: int
     faults: tuple[tuple[int, str], ...]
-
-    @property
-    def jumps(self) -> tuple[int, ...]:
-        """The instants before which the ego jumped."""
-        return tuple(step for step, fault in self.faults if misplaced(fault))
+    jumps: tuple[int, ...] = ()
 
     @property
     def driven(self) -> int:
@@ -311,6 +310,7 @@ class ClosedLoop:
             seen,
             count,
             note or moved.fault,
+            moved.jumped,
         )
 
     def observe(self, state: State) -> Observation:
@@ -384,4 +384,5 @@ class ClosedLoop:
             np.array([state.ego.acceleration for state in states]),
             states[-1].forced,
             tuple((state.step, state.fault) for state in states if state.fault),
+            tuple(state.step for state in states if state.jumped),
         )
