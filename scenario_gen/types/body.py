@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""What is assumed of a vehicle's body from its type and footprint: height, rear axle; for formats that need them."""
+"""Height and rear axle of a vehicle, estimated from its type and footprint for exports."""
 
 import numpy as np
 
@@ -19,7 +19,7 @@ def height(vehicle: Vehicle) -> float:
 
 
 def rear_axle(vehicle: Vehicle) -> float:
-    """Metres from the footprint's centre back to the middle of the rear axle; a share of the length, for logs do not hold it.
+    """Metres from the footprint's centre back to the rear axle's middle, as a share of the length.
 
     Who walks is placed by the middle.
     """
@@ -27,5 +27,5 @@ def rear_axle(vehicle: Vehicle) -> float:
 
 
 def shifted(position: Floats, heading: Floats, ahead: float) -> Floats:
-    """Return points (..., 2) [m] that lie `ahead` metres along headings (...) [rad] from positions (..., 2) [m]."""
+    """Return positions (..., 2) [m] shifted by `ahead` [m] along headings (...) [rad]."""
     return np.asarray(position + ahead * unit(heading))

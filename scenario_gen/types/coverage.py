@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""What a set of scenarios covers: how its criticality is distributed, and which of its scenarios stand out."""
+"""Coverage of a scenario set: the distribution of its criticality, and its notable scenarios."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -48,7 +48,7 @@ class Coverage:
     orders: Mapping[str, int]
 
     def document(self) -> dict[str, Any]:
-        """Return all of it, ready for JSON; figures have five significant digits, null stands where there is none."""
+        """Return a JSON document; figures have five significant digits, missing ones are null."""
 
         def number(value: float) -> float | None:
             return float(f"{value:.5g}") if math.isfinite(value) else None

@@ -22,7 +22,10 @@ def split_off(scenario: Scenario, index: int) -> tuple[Scenario, Scenario]:
 
 
 def with_witness(scenario: Scenario, index: int) -> Scenario:
-    """Return the scenario without one vehicle, whose motion becomes the witness; it ends when the last of the others does."""
+    """Return the scenario without one vehicle, whose motion becomes the reference drive.
+
+    It ends when the last of the other vehicles leaves.
+    """
     others, witness = split_off(scenario, index)
     last = int(others.present[:, 1].max()) + 1
     arrays = {name: getattr(others, name)[:, :last] for name in _ROWS}
@@ -30,7 +33,7 @@ def with_witness(scenario: Scenario, index: int) -> Scenario:
 
 
 def join_ego(scenario: Scenario) -> Scenario:
-    """Return a scenario and its witness as one of all vehicles, the witness last; the same where there is no witness."""
+    """Return the scenario of all vehicles, that of the reference drive last, if there is one."""
     witness = scenario.reference_drive
     if witness is None:
         return scenario
@@ -48,7 +51,7 @@ def join_ego(scenario: Scenario) -> Scenario:
 
 
 def _held(part: Scenario, time: Floats) -> Ints:
-    """Return for each instant (T,) [s] the part's sample there; where it has none nobody of it is there, and any will do."""
+    """Return the sample of a part at each time (T,) [s]; arbitrary where nobody is present."""
     return np.minimum(np.searchsorted(part.time, time), len(part.time) - 1)
 
 

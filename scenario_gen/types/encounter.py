@@ -41,7 +41,7 @@ class Recombined:
 
 @dataclass(frozen=True, eq=False)
 class Encounter(Motion):
-    """The motion of N >= 2 vehicles in a local east-north frame, sampled evenly; every value is finite.
+    """The evenly sampled, finite motion of N >= 2 vehicles in a local east-north frame.
 
     Attributes:
         name: where it comes from, for people.
@@ -97,7 +97,8 @@ def _check_arrays(encounter: Encounter) -> None:
     n, t = np.shape(encounter.speed)
     if n < 2 or t < 2:
         raise InputError(
-            f"{encounter.title} has {n} vehicle(s) and {t} sample(s); at least 2 of each are needed"
+            f"{encounter.title} has {n} vehicle(s) and {t} sample(s); "
+            "at least 2 of each are needed"
         )
     shapes = (np.shape(encounter.position), np.shape(encounter.heading), np.shape(encounter.time))
     if shapes != ((n, t, 2), (n, t), (t,)) or len(encounter.vehicles) != n:

@@ -68,7 +68,7 @@ _KEYS = {
 
 @dataclass(frozen=True)
 class Interval:
-    """An estimate and its confidence interval; NaN bounds mean that there is none (a single sample)."""
+    """An estimate and its confidence interval; NaN bounds: no interval (a single sample)."""
 
     value: float
     low: float = float("nan")
@@ -77,7 +77,7 @@ class Interval:
 
 @dataclass(frozen=True)
 class CheckCounts:
-    """The checker's account of the candidates of one row: how many there were, and how many were refused, by first cause."""
+    """The number of candidates of one row, and of refused ones by their first cause."""
 
     candidates: int
     refused: Mapping[Cause, int] = field(default_factory=dict)
@@ -97,7 +97,7 @@ class CheckCounts:
         )
 
     def share_of(self, causes: Sequence[Cause]) -> tuple[int, int]:
-        """Return how many candidates were refused for one of `causes`, and the number of candidates."""
+        """Return the number of candidates refused for one of `causes`, and of all candidates."""
         return sum(self.refused.get(cause, 0) for cause in causes), self.candidates
 
 
@@ -230,8 +230,10 @@ class Evaluation:
         lines = [
             f"# {as_markdown(self.encounter)} on {as_markdown(self.road)}",
             "",
-            f"{len(self.vehicles)} vehicles, {self.duration:.1f} s, K = {self.changepoints} changepoints; "
-            f"{self.level:.0%} bootstrap intervals in brackets ({self.resamples} resamples, seed {self.seed}).",
+            f"{len(self.vehicles)} vehicles, {self.duration:.1f} s, "
+            f"K = {self.changepoints} changepoints; "
+            f"{self.level:.0%} bootstrap intervals in brackets "
+            f"({self.resamples} resamples, seed {self.seed}).",
             "",
             "| metric | better | "
             + " | ".join(f"{row.name} ({row.samples})" for row in self.rows)
@@ -261,7 +263,7 @@ def as_markdown(name: str) -> str:
 def formatted(
     estimate: Interval | None, unit: str, *, bounds: bool = True, cap: float | None = None
 ) -> str:
-    """Lay out an estimate for people: three significant digits, the interval in brackets, a dash if there is none.
+    """Format an estimate: three significant digits, the interval in brackets, a dash without one.
 
     Where nothing lies below `cap` (see `Metric`), this is said.
     """

@@ -32,7 +32,7 @@ class OrderChange(StrEnum):
 
 @dataclass(frozen=True)
 class PassingOrder:
-    """Who passes a conflict first in the recording and second, and what changed; ROS names of vehicle ids."""
+    """Who passes a conflict first and second in the recording, and the change; ROS names."""
 
     first: str
     second: str

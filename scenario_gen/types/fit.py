@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""What the fitting answers: where every changepoint stands on the road, and what of the template's interaction is lost there."""
+"""The result of the fitting: the changepoints on the road, and the losses of interaction."""
 
 from dataclasses import dataclass, field
 from typing import Any
@@ -47,7 +47,7 @@ class FittedVehicle:
         )
 
     def figures(self) -> dict[str, Any]:
-        """Return what the fitting decided, ready for JSON: manoeuvre, scale, largest move [m], turns [deg, left positive]."""
+        """Return a JSON document: manoeuvre, scale, largest move [m], left turns [deg]."""
         turned = (
             [round(float(turn), 1) for turn in np.degrees(self.turned)]
             if np.isfinite(self.turned).all()

@@ -33,7 +33,7 @@ _WORDS = {WITHOUT: "no changepoints at all keep", UNIFORM: "evenly spaced change
 
 @dataclass(frozen=True, eq=False)
 class GenerationResult:
-    """What was generated from one encounter on one road, from the first stage to the last that was run.
+    """The results of all stages that were run for one encounter on one road.
 
     Attributes:
         encounter: the recorded template.
@@ -79,7 +79,8 @@ class GenerationResult:
     def __repr__(self) -> str:
         road = self.road.name if self.road is not None else "no road"
         vehicles = f"{len(self.encounter.vehicles)} vehicles, {self.encounter.duration:.1f} s"
-        return f"GenerationResult({len(self)} of {self.generated.candidates} candidates, {road}, {vehicles}, seed {self.seed})"
+        sizes = f"{len(self)} of {self.generated.candidates} candidates"
+        return f"GenerationResult({sizes}, {road}, {vehicles}, seed {self.seed})"
 
     def __len__(self) -> int:
         return len(self.generated)
@@ -98,7 +99,7 @@ class GenerationResult:
         )
 
     def to_dataframe(self) -> "DataFrame":
-        """Return all scenarios as one table: a row for each scenario, vehicle and instant; columns as `Scenario.to_dataframe`."""
+        """Return all scenarios as one table, with the columns of `Scenario.to_dataframe`."""
         return dataframe(self)
 
     def _repr_html_(self) -> str:
@@ -114,7 +115,8 @@ class GenerationResult:
             f"refused candidates: {refused}",
             *map(str, self.generated.adaptations),
         ]
-        return f"<b>{escape(repr(self))}</b><ul>{''.join(f'<li>{escape(line)}</li>' for line in lines)}</ul>"
+        items = "".join(f"<li>{escape(line)}</li>" for line in lines)
+        return f"<b>{escape(repr(self))}</b><ul>{items}</ul>"
 
     def measures(self) -> "DataFrame":
         """Return how critical each scenario is, as `scenario_gen.measures` does."""
@@ -123,7 +125,7 @@ class GenerationResult:
         return scenario_gen.measures(self)
 
     def filter(self, condition: str) -> "GenerationResult":
-        """Return the result with the scenarios for which a condition holds, as `scenario_gen.filter_scenarios` does.
+        """Return the result with the scenarios that meet a condition, see `filter_scenarios`.
 
         Raises:
             InputError: the condition cannot be evaluated.
@@ -154,7 +156,7 @@ class GenerationResult:
 
     @property
     def compared(self) -> tuple[str, ...]:
-        """Rows whose E may be compared: that of `generated` first, then the references drawn with the same freedom."""
+        """Rows whose E may be compared: `generated`, then the references of equal freedom."""
         return (
             self.row_name,
             *(
@@ -165,13 +167,13 @@ class GenerationResult:
         )
 
     def best(self, metric: str) -> str:
-        """Return the compared row with the least figure, that of `generated` where they are equal; "" if there is none."""
+        """Return the compared row with the least figure, the first in a tie; "" if none."""
         values = {row: self.evaluation.value(row, metric) for row in self.compared}
         known = [row for row, value in values.items() if math.isfinite(value)]
         return min(known, key=values.__getitem__) if len(known) > 1 else ""
 
     def better_references(self) -> tuple[str, ...]:
-        """Return a sentence for each reference that is nearer to the recording than `generated`, by at least 0.001 in E."""
+        """Return a sentence for each reference whose E is lower than `generated` by 0.001."""
         sentences = []
         for row in self.compared[1:]:
             better = []
@@ -184,7 +186,7 @@ class GenerationResult:
         return tuple(sentences)
 
     def similarity(self) -> dict[str, Any]:
-        """Return E of `generated` and of the rows beside it, by row, which is the best one, and sentences about it."""
+        """Return E of `generated` and of the other rows, the best row, and remarks."""
 
         def figures(row: str) -> dict[str, float | None]:
             values = {metric: self.evaluation.value(row, metric) for metric in ERRORS}

@@ -66,7 +66,8 @@ class Lane:
         )
         if not users <= LANE_USERS:
             raise InputError(
-                f"lane {self.id}: users {', '.join(sorted(users))}; choose of {', '.join(sorted(LANE_USERS))}"
+                f"lane {self.id}: users {', '.join(sorted(users))}; "
+                f"choose of {', '.join(sorted(LANE_USERS))}"
             )
         if (
             self.left.shape != self.right.shape
@@ -75,7 +76,8 @@ class Lane:
             or len(self.left) < 2
         ):
             raise InputError(
-                f"lane {self.id}: borders of shapes {self.left.shape} and {self.right.shape}; (M, 2), M >= 2, are needed"
+                f"lane {self.id}: borders of shapes {self.left.shape} and {self.right.shape}; "
+                "(M, 2), M >= 2, are needed"
             )
         if not (np.isfinite(self.left).all() and np.isfinite(self.right).all()):
             raise InputError(f"lane {self.id}: a border is not finite")
@@ -158,7 +160,7 @@ class DrawnFor:
 
 @dataclass(frozen=True, eq=False)
 class LaneNetwork:
-    """The lanes of a road that cars may use, those of a map or of a part of it; in metres in the road's own frame.
+    """The lanes that cars may use, of a map or of a part of it; in metres in the road's frame.
 
     Attributes:
         name: of the map, for people.
@@ -299,7 +301,7 @@ class LaneNetwork:
 
     @cached_property
     def arms(self) -> dict[str, tuple[int, ...]]:
-        """The lanes of each arm of a drawn road, which are named arm.lane; a road through is one arm."""
+        """The lanes of each arm of a drawn road, named arm.lane; a through road is one arm."""
         arms: dict[str, tuple[int, ...]] = {}
         for k, lane in enumerate(self.lanes):
             if self.drawn and not lane.junction and not lane.crossing:
@@ -309,7 +311,7 @@ class LaneNetwork:
 
     @cached_property
     def traffic_side(self) -> str:
-        """Return "right" or "left": on which side of the road traffic drives; "" where no lane has an oncoming one beside it.
+        """The side on which traffic drives: "right" or "left"; "" without oncoming lanes.
 
         In right-hand traffic the oncoming lane has the same left border.
         """
@@ -340,7 +342,7 @@ def _chosen(lanes: Sequence[Lane], kept: Sequence[int]) -> tuple[Lane, ...]:
 
 
 def _shared(borders: Sequence[Floats]) -> int:
-    """How many points of borders (M, 2) [m] have another border that runs the other way in their square metre."""
+    """Count points of borders (M, 2) [m] with an opposite border in the same square metre."""
     there: dict[tuple[int, int], list[Floats]] = {}
     count = 0
     for border in borders:

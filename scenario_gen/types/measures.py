@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""What measures scenarios, for targets and choices: the evaluation provides it, the sampler calls it."""
+"""The interface by which the sampler measures scenarios; the evaluation implements it."""
 
 from collections.abc import Callable
 from dataclasses import dataclass

@@ -89,7 +89,7 @@ class Motion:
         *args: Any,
         **fields: Any,
     ) -> Self:
-        """Return a motion that is sampled every `period` [s] from 0 s on; the rest as in the class."""
+        """Return a motion that is sampled every `period` [s] from 0 s on."""
         time = frozen(np.arange(np.shape(speed)[-1]) * period)
         return cls(vehicles, time, position, heading, speed, *args, **fields)
 
@@ -135,7 +135,7 @@ class Motion:
         return np.concatenate([self.position, self.heading[..., None]], axis=-1)
 
     def present_slice(self, *rows: int) -> slice:
-        """Return the samples at which all of these vehicles are present; empty if there are none."""
+        """Return the samples at which all of these vehicles are present, possibly none."""
         return together(self.present, *rows)
 
     def at(self, time: Floats | float) -> States:
@@ -156,7 +156,7 @@ class Motion:
         return States(out[..., :2], out[..., 2], out[..., 3], is_present)
 
     def resampled(self, dt: float) -> Self:
-        """Return the motion every `dt` [s] from its start on; a last part shorter than dt is dropped.
+        """Return the motion sampled every `dt` [s]; a last part shorter than dt is dropped.
 
         Raises:
             InputError: the motion is shorter than dt.
@@ -164,7 +164,8 @@ class Motion:
         count = int(np.floor(self.duration / dt + 1e-6)) + 1
         if count < 2:
             raise InputError(
-                f"{self.title} lasts {self.duration:g} s, shorter than the sampling period of {dt:g} s"
+                f"{self.title} lasts {self.duration:g} s, "
+                f"shorter than the sampling period of {dt:g} s"
             )
         return self.at_times(np.minimum(self.time[0] + np.arange(count) * dt, self.time[-1]))
 
@@ -198,7 +199,7 @@ class Motion:
         return self.select(range(len(self.vehicles)), first, last)
 
     def select(self, rows: Sequence[int], first: int = 0, last: int | None = None) -> Self:
-        """Return some vehicles, in this order, from sample `first` to `last` (default: the last one).
+        """Return some vehicles, in this order, from sample `first` to `last` (default: the end).
 
         The clock of the result starts at 0 s.
 
@@ -244,7 +245,10 @@ class Motion:
         return ("position", "heading", "speed")
 
     def footprints(self, k: int) -> Floats:
-        """Return the corners (N, 4, 2) [m] of all vehicles at sample k, from the front left one counter-clockwise."""
+        """Return the corners (N, 4, 2) [m] of all vehicles at sample k.
+
+        They are in counter-clockwise order from the front left one.
+        """
         poses = self.poses[:, k]
         return np.concatenate(
             [
@@ -254,7 +258,7 @@ class Motion:
         )
 
     def columns(self) -> dict[str, Any]:
-        """Return the columns of its table: a row for each vehicle and each sample at which it is present."""
+        """Return the columns of its table: a row for each vehicle and sample with it present."""
         row, sample = np.nonzero(self.is_present)
         ids = np.array([vehicle.id for vehicle in self.vehicles], dtype=object)
         return {

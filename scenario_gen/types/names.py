@@ -11,7 +11,7 @@ from scenario_gen.types.encounter import Encounter
 
 
 def token(vehicle_id: str) -> str:
-    """Return `vehicle_id` as a ROS name token: whatever is not a letter, digit or underscore becomes one underscore.
+    """Return `vehicle_id` as a ROS name token: other characters become one underscore.
 
     Raises:
         InputError: nothing is left of the id.
@@ -35,7 +35,8 @@ def tokens(vehicle_ids: Iterable[str]) -> tuple[str, ...]:
         other = owner.setdefault(token(vehicle_id), vehicle_id)
         if other != vehicle_id:
             raise InputError(
-                f"vehicle ids {other!r} and {vehicle_id!r} are both {token(vehicle_id)!r} as ROS names; rename one"
+                f"vehicle ids {other!r} and {vehicle_id!r} are both {token(vehicle_id)!r} "
+                "as ROS names; rename one"
             )
     return tuple(owner)
 
@@ -52,5 +53,6 @@ def vehicle_index(encounter: Encounter, name: str, what: str) -> int:
         if name in known:
             return known.index(name)
     raise InputError(
-        f"{what}: no vehicle {name!r} in {encounter.name}; there are: {', '.join(ids)}{did_you_mean(name, ids)}"
+        f"{what}: no vehicle {name!r} in {encounter.name}; "
+        f"there are: {', '.join(ids)}{did_you_mean(name, ids)}"
     )

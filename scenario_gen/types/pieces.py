@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Texts of several pieces parted by `;`, as the command line, parameters and entries of a scenario have them."""
+"""Texts of several pieces separated by `;`, as in options, parameters and facts."""
 
 from collections.abc import Iterable
 import math
@@ -18,7 +18,7 @@ def join_pieces(pieces: Iterable[object]) -> str:
 
 
 def read_numbers(text: str) -> tuple[float, ...]:
-    """Return the numbers of a piece, parted by blanks or commas; none where one of them is no finite number."""
+    """Return the numbers of a piece, separated by blanks or commas; () if one is not finite."""
     try:
         numbers = tuple(float(word) for word in text.replace(",", " ").split())
     except ValueError:

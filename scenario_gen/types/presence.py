@@ -19,7 +19,7 @@ ALWAYS: Ints = sealed(
 
 
 def canonical_presence(present: Ints, count: int, samples: int, name: str) -> Ints:
-    """Return the presence (N, 2) of `count` vehicles over `samples` instants, `ALWAYS` written out.
+    """Return the presence (N, 2) of `count` vehicles over `samples` samples; expands `ALWAYS`.
 
     Args:
         present: (N, 2) first and last sample index of each vehicle, or `ALWAYS`.
@@ -40,19 +40,21 @@ def canonical_presence(present: Ints, count: int, samples: int, name: str) -> In
     rows = np.array(present, dtype=np.int64, order="C")
     if rows.shape != (count, 2):
         raise InputError(
-            f"{name}: presence has shape {rows.shape}; {count} rows of first and last sample are needed"
+            f"{name}: presence has shape {rows.shape}; "
+            f"{count} rows of first and last sample are needed"
         )
     bad = np.flatnonzero((rows[:, 0] < 0) | (rows[:, 1] >= samples) | (rows[:, 0] >= rows[:, 1]))
     if len(bad):
         first, last = rows[bad[0]].tolist()
         raise InputError(
-            f"{name}: row {bad[0]} is present from sample {first} to {last} of {samples}; at least two samples inside are needed"
+            f"{name}: row {bad[0]} is present from sample {first} to {last} of {samples}; "
+            "at least two samples inside are needed"
         )
     return sealed(rows)
 
 
 def at_ends(present: Ints, samples: int) -> Bools:
-    """Return (N, 2) whether each vehicle is there at the first and at the last of T `samples`, of presence (N, 2)."""
+    """Return (N, 2) whether each vehicle is present at the first and the last of T `samples`."""
     there: Bools = present == (0, samples - 1)
     return there
 
@@ -63,7 +65,7 @@ def always(present: Ints, samples: int) -> bool:
 
 
 def held(values: Floats, present: Ints) -> Floats:
-    """Return values (N, T, …), of any unit; rows outside of the presence (N, 2) hold the first or last value inside of it."""
+    """Return values (N, T, …) with the first or last one outside of the presence (N, 2)."""
     samples = values.shape[1]
     if always(present, samples):
         return values
@@ -79,14 +81,14 @@ def mask(present: Ints, samples: int) -> Bools:
 
 
 def together(present: Ints, *rows: int) -> slice:
-    """Return the samples at which all of these vehicles are present, from presence (N, 2); empty if there are none."""
+    """Return the samples at which all of these vehicles are present, possibly none."""
     first = int(present[list(rows), 0].max())
     last = int(present[list(rows), 1].min())
     return slice(first, max(last + 1, first))
 
 
 def cut(present: Ints, first: int, last: int) -> Ints:
-    """Return the presence (N, 2) counted within samples `first` to before `last`; a row that is left empty has first > last."""
+    """Return the presence (N, 2) within samples first … last - 1; empty rows: first > last."""
     inside: Ints = np.column_stack(
         (np.maximum(present[:, 0] - first, 0), np.minimum(present[:, 1], last - 1) - first)
     )

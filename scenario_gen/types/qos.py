@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class Quality:
-    """Quality of service; publishers always keep the last, subscribers that may withhold acknowledgements keep all."""
+    """Quality of service; publishers keep the last, subscribers with delayed acks keep all."""
 
     depth: int = 1
     reliable: bool = True

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""A reaction: who answers to whom in an encounter, how late and how strongly, and how sure that is."""
+"""A reaction of one vehicle to another: its delay, its strength and its confidence."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -62,7 +62,7 @@ class Reaction:
 
     @property
     def clears(self) -> float:
-        """When [s] the other has cleared the shared area, on the template's clock; of a yielder."""
+        """When the other one has cleared the shared area [s, template's clock]; for yielders."""
         return self.until - self.lag
 
     def named(self, ids: Sequence[str]) -> NamedReaction:
@@ -73,7 +73,10 @@ class Reaction:
         """Return the reaction in words, with the vehicles' types and ids."""
         who, whom = vehicles[self.who].label, vehicles[self.whom].label
         if self.kind == FOLLOW:
-            text = f"{who} follows {whom}, {self.headway[1]:.1f} s bumper to bumper, and answers its speed after {self.lag:.1f} s"
+            text = (
+                f"{who} follows {whom}, {self.headway[1]:.1f} s bumper to bumper, "
+                f"and answers its speed after {self.lag:.1f} s"
+            )
         else:
             verb = (
                 f"waits for {whom}, then"
@@ -96,8 +99,13 @@ class Reaction:
     def document(self, vehicles: Sequence[Vehicle]) -> dict[str, str | float | bool]:
         """Return the reaction as a flat document, with the vehicles' ids and the words."""
         return {
-            "kind": self.kind, "who": vehicles[self.who].id, "whom": vehicles[self.whom].id, "lag": round(self.lag, 3),
-            "gain": round(self.gain, 3), "residual": round(self.residual, 3), "confidence": round(self.confidence, 3),
+            "kind": self.kind,
+            "who": vehicles[self.who].id,
+            "whom": vehicles[self.whom].id,
+            "lag": round(self.lag, 3),
+            "gain": round(self.gain, 3),
+            "residual": round(self.residual, 3),
+            "confidence": round(self.confidence, 3),
             "doubtful": self.doubtful, "words": self.words(vehicles),
         }  # fmt: skip
 
@@ -122,7 +130,7 @@ class ReactionGraph:
     def sentences(
         self, vehicles: Sequence[Vehicle], kept: Sequence[Reaction] | None = None
     ) -> tuple[str, ...]:
-        """Return one sentence for each edge of the graph, which also names those that are not among the `kept`."""
+        """Return one sentence for each edge; it says whether the edge is among the `kept`."""
         free = "" if kept is None else ": the scenarios are not held to it"
         sentences = [
             edge.words(vehicles) if edge in (kept or ()) else f"{edge.words(vehicles)}{free}"
@@ -139,7 +147,7 @@ class ReactionGraph:
     def document(
         self, vehicles: Sequence[Vehicle], kept: Sequence[Reaction] | None = None
     ) -> dict[str, Any]:
-        """Return the graph as a document: edges, those that were cut, sentences; and of each edge whether it is `kept`."""
+        """Return a JSON document: edges, with whether they are `kept`, cut edges and sentences."""
         return {
             "edges": [
                 edge.document(vehicles) | ({} if kept is None else {"kept": edge in kept})

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""A request for an ego slot, states, targets, a choice, an order: the same text on the command line and in ROS parameters."""
+"""A request for an ego slot, states, targets or an order, by option or ROS parameter."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -38,11 +38,13 @@ class Request(Parameters):
     goals: str = parameter("", f"end states, likewise `{_FORM}`", unit="m, rad, m/s")
     target: str = parameter(
         "",
-        "ranges to aim at, of pet, ttc, gap, arrival_gap, closing_speed, baseline_margin: `pet=0.5..1.5; ttc[1,2]=1..2`",
+        "ranges to aim at, of pet, ttc, gap, arrival_gap, closing_speed, baseline_margin: "
+        "`pet=0.5..1.5; ttc[1,2]=1..2`",
     )
     order: str = parameter(
         "keep",
-        "who goes first at a conflict; keep: as in the recording, free: anyone, swap: the other one at the closest crossing",
+        "who goes first at a conflict; keep: as in the recording, free: anyone, "
+        "swap: the second vehicle at the closest crossing",
         choices=ORDERS,
     )
 
@@ -59,7 +61,7 @@ class Request(Parameters):
 
     @property
     def moves(self) -> bool:
-        """Whether start or end states are requested, so that the template must be fitted and planned anew."""
+        """Whether start or end states are requested, which requires a new fit and plan."""
         return bool(self.starts or self.goals)
 
     @property
@@ -84,7 +86,7 @@ class Request(Parameters):
         return replace(self, **{end: text})
 
     def rows(self, end: str, encounter: Encounter) -> Floats:
-        """Return the states at one end as the fitting takes them: (N, 4), NaN where nothing is requested.
+        """Return the requested states (N, 4) at one end, NaN where nothing is requested.
 
         Raises:
             InputError: a vehicle is not the encounter's; the message lists those that are.
@@ -116,7 +118,8 @@ def read_states(text: str, what: str) -> dict[str, State]:
         name, state = name.strip(), read_numbers(numbers)
         if not name or len(state) not in (3, 4):
             raise InputError(
-                f"{what}: {piece!r} is not of the form `{_FORM}` with finite numbers, e.g. `1: 10.5 -1.75 0.0 8.0`"
+                f"{what}: {piece!r} is not of the form `{_FORM}` with finite numbers, "
+                "e.g. `1: 10.5 -1.75 0.0 8.0`"
             )
         if len(state) == 4 and state[3] < 0.0:
             raise InputError(f"{what}: {piece!r} asks for a negative speed")

@@ -85,16 +85,18 @@ class Road:
             raise InputError(f"road {self.name!r} has no drivable cell")
         if not FINEST <= self.resolution <= COARSEST:
             raise InputError(
-                f"road {self.name!r} has resolution {self.resolution:g} m; {FINEST:g} to {COARSEST:g} m are read"
+                f"road {self.name!r} has resolution {self.resolution:g} m; "
+                f"{FINEST:g} to {COARSEST:g} m are read"
             )
         if self.origin.shape != (2,) or not (np.abs(self.origin) <= FARTHEST).all():
             raise InputError(
-                f"road {self.name!r} has origin {self.origin}; at most {FARTHEST:g} m from the frame's origin are read"
+                f"road {self.name!r} has origin {self.origin}; "
+                f"at most {FARTHEST:g} m from the frame's origin are read"
             )
 
     @property
     def map_lanes(self) -> LaneNetwork | None:
-        """The lanes of a vector map: templates are placed on them, and who drives is held to them."""
+        """The lanes of a vector map, on which templates are placed and vehicles stay."""
         return None if self.lanes is None or self.lanes.drawn else self.lanes
 
     def __repr__(self) -> str:
@@ -125,26 +127,26 @@ class Road:
 
     @cached_property
     def closed_cells(self) -> Bools:
-        """(H + 2 R, W + 2 R) closed cells, with a closed rim of R cells all around, wider than 2 MAX_DEPTH_M."""
+        """(H + 2 R, W + 2 R) closed cells, with a closed rim wider than 2 MAX_DEPTH_M."""
         rim = 2 * math.ceil(MAX_DEPTH_M / self.resolution) + 2
         return sealed(np.pad(~self.drivable, rim, constant_values=True))
 
     @cached_property
     def depth_cells(self) -> Floats:
-        """(H + 2 R, W + 2 R) [cells] from each centre of `closed_cells` to the nearest drivable square."""
+        """(H + 2 R, W + 2 R) [cells] from centres of `closed_cells` to the nearest open square."""
         from scenario_gen.numerics.distance_field import distance_field  # loads numba
 
         return distance_field(self.closed_cells)
 
     @cached_property
     def closed_before(self) -> Counts:
-        """(H, W + 1): how many cells left of each column are closed, so that any run can be counted."""
+        """(H, W + 1): number of closed cells left of each column, to count in any run."""
         closed = np.cumsum(~self.drivable, axis=1, dtype=np.int32)
         return sealed(np.pad(closed, ((0, 0), (1, 0))))
 
     @cached_property
     def walkable(self) -> "Road":
-        """The road for pedestrians: all cells but those of obstacles are drivable; it has no lanes."""
+        """The road for pedestrians: all cells except obstacles are drivable; without lanes."""
         return replace(self, drivable=~self._obstacle_cells, lanes=None)
 
     @cached_property
@@ -213,7 +215,7 @@ class Road:
         return cells
 
     def cells(self, points: Floats) -> tuple[Ints, Ints, Bools]:
-        """Return rows and columns (...) of the cells nearest to points (..., 2) [m], and whether the points lie on the grid."""
+        """Return rows and columns (...) of cells nearest to points (..., 2) [m]; whether inside."""
         cell = np.floor((points - self.origin) / self.resolution).astype(np.int64)
         height, width = self.drivable.shape
         column, row = np.clip(cell[..., 0], 0, width - 1), np.clip(cell[..., 1], 0, height - 1)

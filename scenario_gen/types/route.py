@@ -46,7 +46,7 @@ class Route:
         freeze(self, points=points, anchor=frozen_ints(self.anchor), length=frozen(self.length))
 
     def figures(self) -> dict[str, Any]:
-        """Return what is known of how it was planned, ready for JSON: legs, anchors left out, distance to the fitted path [m]."""
+        """Return a JSON document: legs, anchors left out, distance to the fitted path [m]."""
         return {
             "legs_joined": self.joined,
             "legs_searched": self.searched,
@@ -55,7 +55,7 @@ class Route:
         }
 
     def remarks(self, vehicle: str) -> list[str]:
-        """Return sentences about what a user should know: far from the fitted path, anchors left out."""
+        """Return remarks for users: a large distance to the fitted path, anchors left out."""
         sentences = []
         if self.farthest > FAR_OFF:
             sentences.append(
@@ -64,13 +64,14 @@ class Route:
         if self.left_out:
             which = ", ".join(str(k) for k in self.left_out)
             sentences.append(
-                f"vehicle {vehicle}: no free route leads through its changepoint {which} as fitted; its route passes beside"
+                f"vehicle {vehicle}: no free route leads through its changepoint {which} as fitted; "
+                "its route passes beside"
             )
         return sentences
 
 
 def routes_in_words(routes: Sequence[Route]) -> str:
-    """Return how many legs of some routes were joined at once and searched for, and how far routes pass from fitted paths.
+    """Summarize routes: joined and searched legs, and distances to the fitted paths.
 
     What is not known is left out, up to nothing.
     """

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Names of the rows of an evaluation: the recording, what was generated, and what it is measured against."""
+"""Names of the rows of an evaluation: recording, generated set and references."""
 
 RECORDING = "recording"
 """The recorded encounter itself."""

@@ -131,7 +131,7 @@ class Cause(StrEnum):
     CURVATURE = "curvature"
     PASSING_ORDER = "passing_order"  # not the template's order at a conflict
     STOP_NOT_KEPT = "stop_not_kept"  # a vehicle does not keep a stop of the template
-    TRAFFIC_RULE = "traffic_rule"  # a vehicle runs a stop line of the map, or takes another one's right of way
+    TRAFFIC_RULE = "traffic_rule"  # a stop line of the map or a right of way is violated
     REACTION = (
         "reaction"  # who reacts in the template goes too early, too late, or at another distance
     )
@@ -151,7 +151,7 @@ def causes_in_words(refused: Mapping[Cause, int]) -> list[tuple[str, int]]:
 
 @dataclass(frozen=True)
 class Violation:
-    """One thing wrong with a scenario: its cause, when [s], which vehicles (indices), and a sentence with the figures."""
+    """A violation: its cause, time [s], vehicles (indices), and a sentence with figures."""
 
     cause: Cause
     time: float
@@ -179,7 +179,12 @@ class Verdict:
 
 @dataclass(frozen=True, eq=False)
 class EgoSlot:
-    """A vehicle that is left out for a planner, and the states (4,) x [m], y [m], yaw [rad], speed [m/s] required of it."""
+    """A vehicle that is left out for a planner, and its required states.
+
+    Attributes:
+        vehicle: its identity and footprint.
+        start, goal: (4,) x [m], y [m], yaw [rad], speed [m/s].
+    """
 
     vehicle: Vehicle
     start: Floats

@@ -42,12 +42,14 @@ class Segmentation:
         return int(self.labels.max()) + 1
 
     def remark(self, duration: float) -> str:
-        """What its user should know of it, or nothing: an encounter of `duration` s in which nothing seemed to change."""
+        """A remark for users on an encounter of `duration` s without changepoints, or ""."""
         if len(self.changepoints) or duration <= LONG_WITHOUT:
             return ""
         return (
-            f"no changepoint in {duration:.0f} s: speeds and courses looked constant; what is generated keeps no other dynamics "
-            "(if they were not: raise segmentation.significance_level, lower segmentation.speed_noise and turn_noise)"
+            f"no changepoint in {duration:.0f} s: speeds and courses looked constant; "
+            "what is generated keeps no other dynamics "
+            "(if they were not: raise segmentation.significance_level, "
+            "lower segmentation.speed_noise and turn_noise)"
         )
 
 

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""How close vehicles come, as figures of one scenario, and the range of one that a request asks for."""
+"""Criticality figures of a scenario, and the range of one that a request asks for."""
 
 from dataclasses import dataclass
 import math
@@ -20,7 +20,7 @@ UNITS = {
     "closing_speed": "m/s",
     "baseline_margin": "s",
 }
-"""The figures that a target can be set on, with their units; `scenario_gen.method.evaluation.measures` defines them."""
+"""Figures that a target can be set on, with units; see `method.evaluation.measures`."""
 Pair = tuple[int, ...]  # of vehicle indices; one: with whom it is the most critical
 _FORM = "NAME=LOW..HIGH, NAME[a]=LOW..HIGH or NAME[a,b]=LOW..HIGH"
 _EXAMPLE = "pet=0.5..1.5; ttc[1,2]=1..2"
@@ -123,7 +123,7 @@ class Reached:
 
 
 def read_targets(text: str) -> tuple[Target, ...]:
-    """Return the targets of a text such as `pet=0.5..1.5; ttc[1,2]=1..2`; a bound that is left out is open.
+    """Return the targets in a text such as `pet=0.5..1.5; ttc[1,2]=1..2`; bounds may be omitted.
 
     Raises:
         InputError: it is not of that form, a figure is unknown or comes twice, or a range is
@@ -153,7 +153,8 @@ def read_targets(text: str) -> tuple[Target, ...]:
             ) from None
         if not low < high or (math.isinf(low) and math.isinf(high)):
             raise InputError(
-                f"target: {piece!r}: the lower bound must be below the upper one, and one of them finite"
+                f"target: {piece!r}: the lower bound must be below the upper one, "
+                "and one of them finite"
             )
         target = Target(name, low, high, ids)
         if target.label in {other.label for other in targets}:
