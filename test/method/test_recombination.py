@@ -162,7 +162,9 @@ def test_recombined_encounters_are_like_recorded_ones_and_new():
         nearest, to_parents = [], []
         for encounter in recombinations(own, 40, seed=1)[0]:
             away = np.sqrt(
-                np.square((features_of(encounter, "", 0).features - features) / spread).mean(axis=-1)
+                np.square((features_of(encounter, "", 0).features - features) / spread).mean(
+                    axis=-1
+                )
             )
             parents = [names.index(name) for name in parents_of(encounter)]
             to_parents.append(away[parents].min())

@@ -42,7 +42,14 @@ from scenario_gen.ros.common.node_parameters import SamplerParameters
 from scenario_gen.ros.common.ros_parameters import values_of_call
 from scenario_gen.ros.common.services import offer_trigger, REQUESTS
 from scenario_gen.situation import Situation
-from scenario_gen.types import BoundaryStates, EgoSlot, GenerationResult, Request, Scenario
+from scenario_gen.types import (
+    BoundaryStates,
+    EgoSlot,
+    GenerationResult,
+    Request,
+    Road,
+    Scenario,
+)
 
 MAX_NAMED_COUNT = 20  # waiting requests in a message
 LOG_PERIOD_S = 5.0  # between two progress lines on the terminal
@@ -433,54 +440,57 @@ def answer_request(
             possible.
     """
     template = decode_template(messages)
-    encounter, segmentation, (road, _) = (
-        template.encounter,
-        template.segmentation,
-        template.road_and_fit(),
-    )
+    encounter = template.encounter
+    road, _ = template.road_and_fit()
+    hashes = template_hashes(messages)
+    encoder = RequestMessages(encounter, request.name, node, hashes)
+    publisher = ScenarioPublisher(encoder, road.frame_id, send)
 
     def advance(done: int, _total: int, candidates: int) -> None:
         request.progress(done, candidates, encounter.start_ns)
 
-    hashes = template_hashes(messages)
-    sender = ScenarioPublisher(
-        RequestMessages(encounter, request.name, node, hashes), road.frame_id, send
-    )
-
-    def in_turn(scenario: Scenario, requested: BoundaryStates, ego: EgoSlot | None) -> None:
+    def publish(scenario: Scenario, requested: BoundaryStates, ego: EgoSlot | None) -> None:
         with turn:
-            sender.scenario(scenario, requested, ego)
+            publisher.scenario(scenario, requested, ego)
 
-    callbacks = Callbacks(advance, cancelled, on_valid=in_turn)
+    outcome = _sample(template, road, config, Callbacks(advance, cancelled, on_valid=publish))
+    result = outcome.generated
+    summary = request_summary(
+        result,
+        request.name,
+        node,
+        config.seed,
+        parameter_texts(config) | versions() | hashes,
+        cancelled=cancelled() and len(result.scenarios) < result.requested,
+        reactions=outcome.reacting,
+    )
+    with turn:
+        publisher.close(result, summary)
+    return outcome, summary
+
+
+def _sample(
+    template: GenerationResult, road: Road, config: Config, callbacks: Callbacks
+) -> GenerationResult:
+    """Sample scenarios, after a new plan if start or end states are requested.
+
+    Raises:
+        RefusedError: the request is impossible; the message names the nearest possible one.
+    """
     stages = PipelineConfig(
         fitting=config.fitting,
         planning=config.planning,
         sampling=config.sampling,
         limits=config.limits,
     )
+    situation = Situation.of(template.encounter)
     chain = Chain(
-        Situation.of(encounter), segmentation, road, stages, config, config.count, config.seed
+        situation, template.segmentation, road, stages, config, config.count, config.seed
     )
     try:
-        outcome = chain.sample(
-            chain.plan() if config.moves else replace(template, seed=config.seed), callbacks
-        )
+        planned = chain.plan() if config.moves else replace(template, seed=config.seed)
+        return chain.sample(planned, callbacks)
     except RefusedError as error:
         from scenario_gen.method.nearest import suggest_nearest  # only a refusal needs it
 
-        raise suggest_nearest(error, chain, cancelled) from None
-    result = outcome.generated
-    provenance = parameter_texts(config) | versions() | hashes
-    stopped = cancelled() and len(result.scenarios) < result.requested
-    summary = request_summary(
-        result,
-        request.name,
-        node,
-        config.seed,
-        provenance,
-        cancelled=stopped,
-        reactions=outcome.reacting,
-    )
-    with turn:
-        sender.close(result, summary)
-    return outcome, summary
+        raise suggest_nearest(error, chain, callbacks.cancelled) from None
