@@ -57,12 +57,12 @@ class Bootstrap:
         return cls(times[:, member], level, member)
 
     def of_units(self) -> "Bootstrap":
-        """Return the same draws for samples that are pooled by unit: what all of a unit enter alike is computed once for each."""
+        """Return the same draws for samples that are pooled by unit."""
         units, first = np.unique(self.unit, return_index=True)
         return Bootstrap(self.weights[:, first], self.level, units)
 
     def interval(self, statistic: Statistic) -> Interval:
-        """Return the statistic of the whole set with its percentile bounds (Efron 1979), widened to hold the value.
+        """Return the statistic with percentile bounds that include it (Efron 1979).
 
         Distances such as E cannot fall below zero, and resampling raises them. Correcting for that
         bias makes intervals too short near zero, so it is left in.
@@ -96,14 +96,14 @@ def mean_of(values: Floats, weights: Floats) -> Floats:
 
 
 def wilson(count: int, total: int, level: float) -> Interval:
-    """Return the share count / total with Wilson's interval (1927), which stays in [0, 1] and is not empty at 0 or 1."""
+    """Return the share count / total with Wilson's interval (1927), which stays in [0, 1]."""
     if total == 0:
         return Interval(float("nan"))
     return _wilson(count / total, total, float(special.ndtri(0.5 + 0.5 * level)))
 
 
 def clustered_wilson(hits: Bools, unit: Ints, level: float) -> Interval:
-    """Return the share of hits (S,) with Wilson's interval for samples that depend on each other within units (S,).
+    """Return the share of hits (S,) with Wilson's interval for samples that depend within units.
 
     The number of samples is divided by the design effect: the variance between the totals of units
     over that of independent samples, at least 1. The quantile is Student's with a degree of
@@ -126,7 +126,7 @@ def clustered_wilson(hits: Bools, unit: Ints, level: float) -> Interval:
 
 
 def paired_difference(differences: Floats, unit: Ints, level: float) -> Interval:
-    """Return the mean of differences (S,) of -1, 0 or 1 between pairs, with an interval for pairs that depend on each other.
+    """Return the mean of paired differences (S,) of -1, 0 or 1, with an interval for units.
 
     Its variance is that between the totals of units (S,), its quantile Student's with a degree of
     freedom for each unit but one. Where no pair differs the bounds are those of a share of 0 among

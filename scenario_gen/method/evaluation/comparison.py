@@ -40,7 +40,7 @@ class Difference:
 
     @property
     def clear(self) -> bool:
-        """True if both have an interval and these do not overlap; a cautious sign that the sets differ."""
+        """Whether both have intervals that do not overlap; a cautious sign of a difference."""
         if self.first is None or self.second is None:
             return False
         bounds = (self.first.low, self.first.high, self.second.low, self.second.high)
@@ -50,7 +50,7 @@ class Difference:
 
     @property
     def better(self) -> str:
-        """Return "first" or "second" where they clearly differ and the metric has a better direction, else ""."""
+        """Return "first" or "second" if one is clearly better, else ""."""
         if not self.clear or not self.metric.better or self.first is None or self.second is None:
             return ""
         lower = "first" if self.first.value < self.second.value else "second"
@@ -98,7 +98,7 @@ def compare(
 def comparison_table(
     differences: Sequence[Difference], names: tuple[str, str] = ("A", "B")
 ) -> str:
-    """Return Markdown: one table per case; the better one is named where the intervals do not overlap."""
+    """Return Markdown: one table per case, with the better set if intervals do not overlap."""
     lines: list[str] = []
     case = ("", "")
     names = (as_markdown(names[0]), as_markdown(names[1]))

@@ -25,7 +25,8 @@ class EvaluationConfig(Parameters):
     )
     max_entries: int = parameter(
         400_000,
-        "most entries of the feature matrices of all pairs together; of many vehicles each has fewer instants",
+        "most entries of the feature matrices of all pairs together; with many vehicles each "
+        "has fewer samples",
         low=1000,
     )
     period: float = parameter(
@@ -36,5 +37,6 @@ class EvaluationConfig(Parameters):
     )
     compare: bool = parameter(
         False,
-        "`generate`: draw also sets without changepoints, with evenly spaced ones and with preset narrow, to compare with",
+        "`generate`: draw also sets without changepoints, with evenly spaced ones and with "
+        "preset narrow, to compare with",
     )

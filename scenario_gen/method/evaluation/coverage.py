@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The coverage of a set: distributions of criticality, a matrix of manoeuvres and criticality, the scenarios that stand out."""
+"""Coverage of a set: distributions of criticality, manoeuvres, and notable scenarios."""
 
 from collections import Counter
 from collections.abc import Sequence
@@ -42,7 +42,7 @@ ALIKE = (
 
 
 def coverage_of(encounter: Encounter, scenarios: Sequence[Scenario]) -> Coverage:
-    """Measure what a set covers; of a set of more than MEASURED scenarios that many, as the evaluation does.
+    """Measure the coverage of a set; of a large set the same scenarios as in the evaluation.
 
     The figures are those of a scenario's most critical pair (`most_critical`). Most critical is
     the scenario with the least PET, or, if nobody crosses, the least gap; most typical the one
@@ -126,6 +126,6 @@ def _picks(
 
 
 def _from(table: Floats, centre: Floats, spread: Floats) -> Floats:
-    """Squared distances (S,) of rows to a centre in units of `spread`; what one of both has not counts as one spread."""
+    """Squared distances (S,) of rows to a centre in spreads; a missing value counts as 1."""
     step = (table - centre) / spread
     return np.asarray(np.square(np.where(np.isfinite(step), step, 1.0)).sum(axis=1))

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""How close it gets, and who goes first: distances, time to collision, post-encroachment time, passing order."""
+"""Criticality of a motion: distances, time to collision, encroachment, passing order."""
 
 from dataclasses import dataclass
 from itertools import combinations
@@ -35,13 +35,13 @@ class Criticality:
     order: tuple[tuple[tuple[int, int], int], ...]
 
     def keeps_order_of(self, template: "Criticality") -> float:
-        """Return the share of the template's conflicts that exist here too and have the same first; NaN if none exists."""
+        """Return the share of the template's conflicts found here that have the same order."""
         mine = dict(self.order)
         same = [mine[pair] == first for pair, first in template.order if pair in mine]
         return float(np.mean(same)) if same else math.nan
 
     def vanished_of(self, template: "Criticality") -> int:
-        """Return how many of the template's conflicts do not exist here; the order says nothing of those."""
+        """Return the number of the template's conflicts that do not exist here."""
         return len(dict(template.order).keys() - dict(self.order).keys())
 
 

@@ -20,12 +20,12 @@ SMOOTHING = 0.5
 
 MOST_COUNTS = 20_000_000  # bins of all samples together
 ROUNDING = 1e-6
-"""Bins: a value this little below an edge belongs to the bin above, or rounding would move a cruise at 10 m/s."""
+"""Bins: a value this little below an edge counts as above it, against rounding."""
 
 
 @dataclass(frozen=True)
 class Quantity:
-    """A quantity whose distribution is compared: id, label, unit, and the width of its histogram's bins."""
+    """A quantity whose distribution is compared: id, label, unit, and width of its bins."""
 
     id: str
     label: str
@@ -43,7 +43,7 @@ QUANTITIES = (
 
 
 def values_of(motion: Motion) -> dict[str, Floats]:
-    """Return {quantity id: all its values (n,) in one motion}, in the units of QUANTITIES (m, s, rad).
+    """Return all values (n,) of each quantity in one motion, in the units of QUANTITIES.
 
     Acceleration, jerk and yaw rate are differentiated from speed and heading, for recorded and
     generated motion alike; the gap is the distance between two footprints. A motion shorter than
@@ -89,11 +89,11 @@ class Comparison:
     wasserstein: float
 
     def jensen_shannon(self, weights: Floats) -> Floats:
-        """Return the Jensen-Shannon divergences (B,) in bits under weights (B, S), between 0 and 1."""
+        """Return the Jensen-Shannon divergences (B,) in bits under weights (B, S), 0 to 1."""
         return jensen_shannon(weights @ self.samples, self.template)
 
     def wasserstein_near(self, weights: Floats) -> Floats:
-        """Return Wasserstein distances (B,) under weights (B, S), integrated over the grid (for intervals)."""
+        """Return Wasserstein distances (B,) under weights (B, S), integrated over the grid."""
         with np.errstate(invalid="ignore"):
             apart = weights @ self.sample_cdf[:, :-1]
             apart /= (weights @ self.sizes)[
@@ -103,7 +103,7 @@ class Comparison:
         return np.abs(apart, out=apart) @ np.diff(self.grid)
 
     def coverage(self, weights: Floats) -> Floats:
-        """Return the share (B,) of the template's values that lie in a bin which the set visits too."""
+        """Return the share (B,) of the template's values in bins that the set visits, too."""
         with np.errstate(invalid="ignore"):
             return np.asarray(
                 (((weights @ self.samples) > 0.0) @ self.template) / self.template.sum()
@@ -111,7 +111,7 @@ class Comparison:
 
 
 def wasserstein(a: Floats, b: Floats) -> float:
-    """Wasserstein-1 distance of two samples (n,) and (m,): the area between their distribution functions.
+    """Wasserstein-1 distance of two samples (n,) and (m,): area between their CDFs.
 
     Source: Vallender 1974.
     """
@@ -157,8 +157,8 @@ def compare(
     span = (everything.max() - everything.min()) / quantity.bin_width
     if not span * (len(samples) + 1) < MOST_COUNTS:
         raise InputError(
-            f"{quantity.label} from {everything.min():g} to {everything.max():g} {quantity.unit}: no "
-            "vehicles move so; check the units"
+            f"{quantity.label} from {everything.min():g} to {everything.max():g} "
+            f"{quantity.unit}: no vehicles move so; check the units"
         )
     first, last = (int(bin_of(np.array(bound))) for bound in (everything.min(), everything.max()))
 
@@ -189,7 +189,7 @@ def compare(
 
 
 def jensen_shannon(p: Floats, q: Floats) -> Floats:
-    """Return the Jensen-Shannon divergence in bits of histograms p (..., bins) and q (bins,), counts or shares.
+    """Return the Jensen-Shannon divergence in bits of histograms p (..., bins) and q (bins,).
 
     Source: Lin 1991, with logarithms of base 2.
     """

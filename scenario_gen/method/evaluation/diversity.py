@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""How much the samples of a set differ from each other, and how near the nearest comes to the fitted template."""
+"""Differences within a set, and the distance of its nearest scenario to the replay."""
 
 import numpy as np
 
@@ -24,7 +24,7 @@ def displacements(position: Floats, there: Bools | None = None) -> Floats:
 
 
 def diversity(table: Floats, weights: Floats) -> Floats:
-    """Return the mean displacement (B,) of two different samples under weights (B, S); NaN for one sample.
+    """Return the mean displacement (B,) of two samples under weights (B, S); NaN for one.
 
     A sample drawn twice makes no pair with itself, or resampling would shrink the diversity.
     """
@@ -44,7 +44,7 @@ def _mean(distance: Floats, there: Bools | None) -> Floats:
 
 
 def displacement_to(position: Floats, target: Floats, there: Bools | None = None) -> Floats:
-    """Return (S,): mean distance in metres of samples (S, N, T, 2) to a target (N, T, 2), over vehicles and instants (ADE).
+    """Return the mean distance (S,) [m] of samples (S, N, T, 2) to a target (N, T, 2) (ADE).
 
     Those that count, if `there` (N, T) says so.
 

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Dynamic time warping and the paper's feature: the normalised matrix of pairwise distances (paper V-B, Fig. 5).
+"""Dynamic time warping, and the paper's normalised distance matrix (V-B, Fig. 5).
 
 Series are laid out (D, T): one row per channel, so that the inner loops run over contiguous time.
 D = 2 for position (Euclidean distance), 1 for speed, where Euclidean and Manhattan are both the
@@ -34,7 +34,7 @@ def _step(difference: float, turn: float) -> float:
 
 @kernel(inline=True)
 def _sums(a: Floats, i: int, b: Floats, turn: float, out: Floats) -> None:
-    """Write the distance of sample i of a (D, n) to every sample of b (D, m) into out (m,); squared if Euclidean."""
+    """Write distances of sample i of a (D, n) to all of b (D, m) to out (m,); Euclid: squares."""
     for channel in range(a.shape[0]):
         x = a[channel, i]
         row = b[channel]
@@ -72,7 +72,7 @@ def _extent(a: Floats, b: Floats, turn: float, out: Floats) -> None:
 def _feature_rows(
     a: Floats, b: Floats, extents: Floats, turn: float, first: int, out: Floats
 ) -> None:
-    """Write rows first, first + 1, … of every sample's normalised matrix into out (S, rows·m)."""
+    """Write rows first, first + 1, … of each sample's normalised matrix to out (S, rows·m)."""
     m = b.shape[2]
     for s in range(a.shape[0]):
         low, high = extents[s, 0], extents[s, 1]
@@ -87,7 +87,7 @@ def _feature_rows(
 
 @kernel(F2, F2, F, I)
 def _wavefront(a: Floats, b: Floats, turn: float, band: int) -> float:
-    """Exact DTW by anti-diagonals: no cell of one depends on another, so the loop vectorises; three diagonals are kept.
+    """Exact DTW by anti-diagonals, whose cells are independent; three diagonals are kept.
 
     Cell (i, j) of diagonal k = i + j stands at index i + 1; b is reversed, so j = k - i runs
     forward in memory with i.
@@ -153,7 +153,7 @@ def dtw_distance(
 
 
 def feature_matrix(a: npt.ArrayLike, b: npt.ArrayLike, distance: Distance = "euclidean") -> Floats:
-    """Return the paper's feature (n, m): pairwise distances of a (n[, D]) and b (m[, D]), scaled to [0, 1].
+    """Return the paper's feature (n, m): distances of a (n[, D]) and b (m[, D]) in [0, 1].
 
     The smallest distance becomes 0 and the largest 1; if all are equal, the matrix is 0.
     """
@@ -164,7 +164,7 @@ def feature_matrix(a: npt.ArrayLike, b: npt.ArrayLike, distance: Distance = "euc
 
 
 def feature_extents(a: Floats, b: Floats, distance: Distance = "euclidean") -> Floats:
-    """Return (S, 2): the smallest and largest pairwise distance of each of S samples a (S, D, n) and b (S, D, m)."""
+    """Return the least and largest pairwise distance (S, 2) of a (S, D, n) and b (S, D, m)."""
     a, b, extents = _within(a, distance), _within(b, distance), np.empty((a.shape[0], 2))
     for s in range(a.shape[0]):
         _extent(a[s], b[s], _TURN[distance], extents[s])
@@ -174,7 +174,7 @@ def feature_extents(a: Floats, b: Floats, distance: Distance = "euclidean") -> F
 def feature_rows(
     a: Floats, b: Floats, extents: Floats, rows: range, distance: Distance = "euclidean"
 ) -> Floats:
-    """Return rows `rows` of the feature matrices of S samples, (S, len(rows)·m), given their extents (S, 2).
+    """Return rows of the feature matrices of S samples, (S, len(rows)·m), from their extents.
 
     A set of long encounters does not fit in memory at once, so what sums over matrices goes
     through them row by row.
@@ -202,7 +202,7 @@ def mean_feature(a: Floats, b: Floats, distance: Distance = "euclidean") -> Floa
 
 
 def blocks(n: int, width: int, budget: int = 400_000) -> list[range]:
-    """Cut n rows of `width` numbers into ranges of at most `budget` numbers (3 MB), at least one row each."""
+    """Cut n rows of `width` numbers into ranges of at most `budget` numbers, at least one row."""
     step = max(1, budget // max(width, 1))
     return [range(first, min(n, first + step)) for first in range(0, n, step)]
 
@@ -212,7 +212,8 @@ def _channels(series: npt.ArrayLike, distance: Distance) -> Floats:
     array = np.asarray(series, dtype=np.float64)
     if array.ndim not in (1, 2) or array.size == 0:
         raise InputError(
-            f"a series of shape {array.shape} cannot be compared; give (samples,) or (samples, channels)"
+            f"a series of shape {array.shape} cannot be compared; "
+            "give (samples,) or (samples, channels)"
         )
     if not np.isfinite(array).all():
         raise InputError("a series holds a value that is not finite")

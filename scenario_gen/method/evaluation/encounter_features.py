@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Features of an encounter that do not depend on the place, the same for recorded and generated ones.
+"""Features of recorded and generated encounters that do not depend on the place.
 
 They describe its most critical pair of vehicles; `FEATURES` names them.
 """
@@ -85,8 +85,8 @@ def features_of(
 ) -> EncounterFeatures:
     """Return the features of a pair of vehicles, by default of the most critical pair.
 
-    That is the crossing or merging pair with the least PET or, without one, the following pair with
-    the least gap. The kind is None if the pair, or every pair, shares no area.
+    That is the crossing or merging pair with the least PET or, without one, the following pair
+    with the least gap. The kind is None if the pair, or every pair, shares no area.
     """
     motion = motion.resampled(PERIOD)
     figures = {own.pair: own for own in figures_of(motion) if pair in (None, own.pair)}
@@ -125,7 +125,7 @@ def features_of(
 def scenario_features(
     scenario: Scenario, template: EncounterFeatures, encounter: Encounter
 ) -> EncounterFeatures:
-    """Return the features of the template's pair in a scenario, whose vehicles may be in another order."""
+    """Return the features of the template's pair in a scenario; vehicles may be reordered."""
     ids = [vehicle.id for vehicle in scenario.vehicles]
     a, b = sorted(ids.index(encounter.vehicles[n].id) for n in template.pair or (0, 1))
     features = features_of(scenario, template.recording, template.template, (a, b))
@@ -133,7 +133,7 @@ def scenario_features(
 
 
 def _headway(motion: Motion, conflict: Conflict) -> float:
-    """Return the median time [s] that the follower needs for the gap to its leader, while it moves."""
+    """Return the median time [s] that the moving follower needs for its gap."""
     both = motion.present_slice(conflict.first, conflict.second)
     speed = motion.speed[conflict.second, both]
     moves = speed > STANDSTILL_MPS

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The evaluation of sets of scenarios against the encounter that they were generated from (paper V-B, method §7)."""
+"""Evaluation of scenario sets against their recorded encounter (paper V-B, method §7)."""
 
 from collections.abc import Mapping, Sequence
 from itertools import chain
@@ -29,7 +29,7 @@ from scenario_gen.types import (
 )
 
 MEASURED = 1000
-"""Scenarios of a set that are measured; of a larger one this many, in RUNS evenly spaced runs of consecutive ones."""
+"""Number of scenarios measured in a larger set, in RUNS evenly spaced runs."""
 RUNS = 20
 LEAST_STEPS = 20  # instants of a feature matrix, however many vehicles there are
 Scenarios = Sequence[Scenario] | ScenarioSet
@@ -140,7 +140,7 @@ def evaluate_scenarios(
 
 
 def measured(scenarios: Sequence[Scenario]) -> Sequence[Scenario]:
-    """Return the scenarios of a set that the figures are taken of: all, or MEASURED of a larger one.
+    """Return the scenarios of a set that are measured: all, or MEASURED of a larger one.
 
     Those are RUNS runs of consecutive scenarios, evenly spaced from the first to the last:
     whatever changes along the set is in them, and nearly every scenario has its mirror image
@@ -168,13 +168,15 @@ def shared_vehicles(
             own = {vehicle.id for vehicle in scenario.vehicles}
             if len(own) != len(scenario.vehicles) or not own <= set(ids):
                 raise InputError(
-                    f"row {name!r}: scenario {scenario.index} has {len(scenario.vehicles)} vehicles ({', '.join(sorted(own))}), "
+                    f"row {name!r}: scenario {scenario.index} has {len(scenario.vehicles)} "
+                    f"vehicles ({', '.join(sorted(own))}), "
                     f"the encounter {encounter.name!r} has {len(ids)} ({', '.join(ids)})"
                 )
             shared = [known for known in shared if known in own]
     if not shared:
         raise InputError(
-            f"no vehicle of {encounter.name!r} is in all scenarios; measure requests with different egos one by one"
+            f"no vehicle of {encounter.name!r} is in all scenarios; "
+            "measure requests with different egos one by one"
         )
     return tuple(shared)
 

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Two oriented footprints, at many instants at once: their distance, and the time until they meet."""
+"""Two oriented footprints at many instants: their distance and time to collision."""
 
 from typing import NamedTuple
 
@@ -15,12 +15,12 @@ from scenario_gen.types import Motion
 
 
 def footprint_distance(motion: Motion, a: int, b: int) -> Floats:
-    """Return the distance (T,) in metres between the footprints of vehicles a and b; 0 where they overlap."""
+    """Return the distance (T,) [m] between footprints a and b; 0 where they overlap."""
     return distance_and_ttc(motion, a, b)[0]
 
 
 def time_to_collision(motion: Motion, a: int, b: int) -> Floats:
-    """Return the time (T,) in seconds until footprints a and b touch if both keep their velocity; inf if never.
+    """Return the time (T,) [s] until footprints a and b touch at constant velocity, or inf.
 
     Source: Hayward 1972.
     """
@@ -40,7 +40,7 @@ def distance_and_ttc(motion: Motion, a: int, b: int) -> tuple[Floats, Floats]:
 
 
 class _Driven(NamedTuple):
-    """A vehicle's positions (T, 2) [m], directions (T, 2), speeds (T,) [m/s], half length and half width [m]."""
+    """Positions (T, 2) [m], directions (T, 2), speeds (T,) [m/s], half length, half width [m]."""
 
     position: Floats
     ahead: Floats

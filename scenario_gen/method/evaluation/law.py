@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""How recorded encounters of one kind differ: the law that `sampling.variety=population` draws from.
+"""The distribution of recorded encounters of one kind, for `sampling.variety=population`.
 
 The law is a Gaussian of an encounter's features (FEATURES of
 `scenario_gen.method.evaluation.population`): speeds, braking and stands of both vehicles, the
@@ -44,7 +44,7 @@ MEAN_ENCOUNTERS, SPREAD_ENCOUNTERS = (
     10.0,
 )  # a and b: that the shipped mean and covariance count as
 UNCORRELATED = 0.3  # c: share by which correlations are smaller than seen
-USUAL = 0.6  # d, in standard deviations, root mean square over features: what is nearer to the middle is usual
+USUAL = 0.6  # d of usual encounters, RMS over features, in standard deviations
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,7 +61,7 @@ class Law:
 
     @classmethod
     def of(cls, kind: EncounterKind, seen: Sequence[Floats]) -> "Law":
-        """Learn the law of a kind from the features (F,) of recorded encounters and the shipped law."""
+        """Learn the law of a kind from features (F,) of encounters and the shipped law."""
         (mean, covariance), n = _shipped_law(kind), len(seen)
         rows = np.array(seen).reshape(n, len(mean))
         mean = (MEAN_ENCOUNTERS * mean + rows.sum(axis=0)) / (MEAN_ENCOUNTERS + n)
@@ -70,7 +70,7 @@ class Law:
         return cls(mean, np.asarray(np.linalg.inv(shrunk(covariance)), dtype=np.float64))
 
     def distance(self, features: Floats) -> float:
-        """Return how far features (F,) are from the middle, in standard deviations, root mean square over features."""
+        """Return the RMS distance of features (F,) from the mean, in standard deviations."""
         off = features - self.mean
         return math.sqrt(float(off @ self.precision @ off) / len(off))
 
@@ -85,7 +85,7 @@ def shrunk(covariance: Floats) -> Floats:
 def rarity_in(
     encounter: Encounter, population: Sequence[Encounter] = ()
 ) -> Callable[[Scenario], float]:
-    """Return what says how unusual scenarios of a template are: their distance from the middle over USUAL.
+    """Return the rarity of a template's scenarios: their distance from the mean over USUAL.
 
     The law is that of the scenario's own kind, which on another road may be another one than the
     template's. Of those whose vehicles share no area nothing is known: their rarity is infinite.
@@ -118,7 +118,7 @@ def rarity_in(
 def measures_in(
     variety: str, encounter: Encounter, population: Sequence[Encounter] = ()
 ) -> Measures:
-    """Return what measures scenarios of a template, with variety `population` their rarity, too."""
+    """Return the measures of a template's scenarios, with rarity for variety `population`."""
     return (
         replace(MEASURES, rarity=rarity_in(encounter, population))
         if variety == "population"
@@ -131,7 +131,7 @@ def _is_same(member: EncounterFeatures, other: EncounterFeatures) -> bool:
 
 
 def _shipped_law(kind: EncounterKind) -> tuple[Floats, Floats]:
-    """Return mean (F,) and covariance (F, F) of a kind; of one that is not shipped those of crossings."""
+    """Return mean (F,) and covariance (F, F) of a kind; by default those of crossings."""
     laws = _shipped()
     return laws[kind if kind in laws else EncounterKind.CROSSING]
 

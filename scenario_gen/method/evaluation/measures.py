@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""How critical a scenario is, pair by pair: the figures that a target can be set on, and that the coverage page counts.
+"""Criticality of a scenario, pair by pair: figures for targets and the coverage page.
 
 They are taken on the published samples (0.1 s). Of a pair a, b:
 
@@ -40,7 +40,7 @@ PERIOD = 0.1  # s
 
 @dataclass(frozen=True)
 class PairFigures:
-    """All figures of one pair (a < b); NaN where there is none. `first`: who enters the shared area first, None without one."""
+    """All figures of one pair (a < b), NaN if undefined; `first` enters the shared area first."""
 
     pair: Pair
     first: int | None
@@ -75,7 +75,7 @@ def measure(scenario: Motion, name: str, pair: Pair | None = None) -> float:
 
 
 def figures_of(scenario: Motion) -> tuple[PairFigures, ...]:
-    """Return all figures of every pair of vehicles that are there together; `arrival_gap` without sign."""
+    """Return all figures of each pair that is present together; `arrival_gap` unsigned."""
     motion = scenario.resampled(PERIOD)
     figures = []
     for a, b in combinations(range(len(motion.vehicles)), 2):
@@ -97,7 +97,7 @@ def figures_of(scenario: Motion) -> tuple[PairFigures, ...]:
 
 
 def most_critical(figures: Sequence[PairFigures]) -> PairFigures | None:
-    """Return the figures of the pair with the least PET, or, where no pair crosses, with the least gap; None without pairs."""
+    """Return the pair with the least PET or, without a crossing, with the least gap."""
     crossing = [pair for pair in figures if not math.isnan(pair.pet)]
     return (
         min(crossing, key=lambda pair: pair.pet)
@@ -111,7 +111,7 @@ MEASURES = Measures(measure)
 
 
 def _crossing(motion: Motion, a: int, b: int) -> Conflict | None:
-    """The conflict of two vehicles whose paths cross or merge; None of others, and of followers."""
+    """The conflict of two vehicles whose paths cross or merge, else None."""
     conflict = conflict_of(motion, a, b)
     return None if conflict is None or conflict.following else conflict
 
@@ -137,7 +137,7 @@ def _figure(motion: Motion, name: str, a: int, b: int) -> float:
 
 
 def _closing_speed(motion: Motion, a: int, b: int, conflict: Conflict | None) -> float:
-    """The rate [m/s] at which the distance of two centres shrinks, at the conflict's first entry, or else the greatest."""
+    """The closing speed [m/s] of two centres at the conflict's first entry, else the greatest."""
     both = motion.present_slice(a, b)
     if conflict is not None:  # at the sample nearest to it at which both are there
         at = min(max(round(conflict.entry_first / motion.dt), both.start), both.stop - 1)

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The metrics: what each figure is called, its unit and meaning, and how it is computed of a set of scenarios."""
+"""The metrics: name, unit, meaning and computation of each figure of a scenario set."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
@@ -30,7 +30,7 @@ LIMIT_CAUSES = (
 )
 """Causes that count as a violated limit."""
 TURNS = math.radians(10.0)
-"""Of a pair whose headings' differences spread by less, E for heading would measure noise; it has none."""
+"""E for heading is undefined for pairs whose heading differences spread by less."""
 HEADINGS = _SIMILARITY, _REALISM, _CRITICAL, _VALID, _DIVERSITY = (
     "Similarity to the recording",
     "Distributions against the recording",
@@ -115,7 +115,7 @@ VALIDITY = MetricGroup(
 
 
 def _similarity(samples: Samples) -> Estimates:
-    """E and the correlation: Euclidean distance for position, Manhattan for speed, as in the paper; wrapped for heading.
+    """E and correlation: Euclidean for position, Manhattan for speed; headings are wrapped.
 
     Where nobody turns there is nothing of headings.
     """
@@ -184,7 +184,8 @@ SIMILARITY = MetricGroup(
             "%",
             "higher",
             _SIMILARITY,
-            "vehicles that do the recording's manoeuvre and turn as far, within 25°, from start to end",
+            "vehicles that do the recording's manoeuvre and turn as far, within 25°, "
+            "from start to end",
         ),
     ),
     _similarity,
@@ -192,7 +193,7 @@ SIMILARITY = MetricGroup(
 
 
 def _distributions(samples: Samples) -> Estimates:
-    """Compare the values of each quantity; the coverage, which stands under diversity, is counted in the same bins."""
+    """Compare the values of each quantity; coverage is counted in the same bins."""
     values = [values_of(motion) for motion in samples.periodic]
     bootstrap, template = samples.bootstrap, samples.template.values
     units, drawn = (
@@ -318,7 +319,8 @@ CRITICALITY = MetricGroup(
             "",
             "lower",
             _CRITICAL,
-            "conflicts of the recording that a scenario does not have, mean; the passing order is of the others",
+            "conflicts of the recording that a scenario does not have, mean; "
+            "the passing order is of the others",
         ),
     ),
     _criticality,
@@ -382,7 +384,7 @@ METRICS = Registry[MetricGroup](
     },
     MetricGroup,
 )
-"""All groups of metrics, in the order in which they are computed; those of installed packages are in every evaluation."""
+"""All groups of metrics in order of computation, with those of installed packages."""
 
 
 def catalogue(config: EvaluationConfig = EvaluationConfig()) -> tuple[Metric, ...]:
@@ -400,7 +402,8 @@ def catalogue(config: EvaluationConfig = EvaluationConfig()) -> tuple[Metric, ..
     for k, metric in enumerate(metrics):
         if metric.id in {other.id for other in metrics[:k]}:
             raise InputError(
-                f"plugins: the metric {metric.id!r} is declared twice; {METRICS.group} are {', '.join(METRICS.names())}"
+                f"plugins: the metric {metric.id!r} is declared twice; "
+                f"{METRICS.group} are {', '.join(METRICS.names())}"
             )
     headings = [*HEADINGS, *(metric.group for metric in metrics)]
     return tuple(sorted(metrics, key=lambda metric: headings.index(metric.group)))

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""How near two vehicles came to a collision, in time: a figure that goes smoothly to 0 as a collision comes near.
+"""The time by which two vehicles missed a collision; it falls smoothly to 0.
 
 It is by how much one of them would have had to be earlier or later on its way for their footprints
 to meet. At a crossing that is the post-encroachment time (Allen, Shin & Cooper 1978), behind
@@ -21,7 +21,7 @@ APART = 5.0  # s, at most: what is farther apart, or never meets, is all the sam
 
 
 def time_apart(motion: Motion, here: Bools, ego: int, other: int) -> float:
-    """Return the time [s] by which a vehicle would have to be shifted to meet another; 0 if they do, at most APART.
+    """Return the least time shift [s] with which a vehicle would meet another, at most APART.
 
     Args:
         motion: as driven.
@@ -39,7 +39,7 @@ def time_apart(motion: Motion, here: Bools, ego: int, other: int) -> float:
 
 
 def timed_poses(motion: Motion, here: Bools, n: int) -> Floats:
-    """Return (R, 4) time [s], x, y [m], yaw [rad] of a vehicle while it is here (T,), FINER times as dense as the motion."""
+    """Return (R, 4) time [s], x, y [m], yaw [rad] while a vehicle is here (T,), FINER as dense."""
     its = np.flatnonzero(here)
     if len(its) < 2:
         return np.empty((0, 4))
@@ -48,7 +48,7 @@ def timed_poses(motion: Motion, here: Bools, n: int) -> Floats:
 
 
 def least_shift(a: Floats, b: Floats, vehicles: tuple[Vehicle, Vehicle]) -> float:
-    """Return the least difference of times [s] at which two vehicles' footprints overlap, at most APART.
+    """Return the least time difference [s] of overlapping footprints, at most APART.
 
     Args:
         a: (S, 4) time [s], x, y [m], yaw [rad] of one.

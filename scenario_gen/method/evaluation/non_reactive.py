@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The non-reactive baseline: follows its path as fast as it ever drove, slows down in bends and to stop, and ignores all others.
+"""The non-reactive baseline: it follows its path, slows in bends, and ignores others.
 
 Planners are compared with it; the figure `baseline_margin` is the time by which it would miss the
 others.
@@ -26,7 +26,7 @@ _CELL = 0.5  # m of its path for which it has one speed
 
 
 def wanted_speeds(route: Curve, station: Floats, top: float, *, stops: bool) -> Floats:
-    """Return (S,) speeds [m/s] wanted at stations (S,) [m] of a free route: `top`, less before bends and a stop at its end."""
+    """Return desired speeds (S,) [m/s] at stations (S,) [m]: `top`, less in bends and at stops."""
     bend = (
         np.abs(np.diff(route.at(station[:, None] + _FORESIGHT)[..., 2], axis=1)).max(axis=1)
         / _FORESIGHT[1]
@@ -40,13 +40,13 @@ def wanted_speeds(route: Curve, station: Floats, top: float, *, stops: bool) -> 
 
 
 def free_acceleration(speed: float, wanted: float, most: float = PULLS_AWAY) -> float:
-    """Return the acceleration [m/s²] towards a wanted speed on a free way (IDM); to be too fast is no reason to brake hard."""
+    """Return the free-road acceleration [m/s²] towards a desired speed (IDM), braking softly."""
     over = speed / max(wanted, 0.1)
     return max(most * (1.0 - over * over), -BRAKING)
 
 
 def baseline_margin(motion: Motion, a: int, b: int) -> float:
-    """Return the least time [s] by which vehicle a, driven by the baseline, would have to be shifted to meet b.
+    """Return the least time shift [s] with which vehicle a, as the baseline, meets b.
 
     0: it would meet b. At most APART.
     """

@@ -55,7 +55,7 @@ MAX_EXTRAPOLATION_FACTOR = 100.0  # of the largest measured number of templates
 
 
 def _over_draws(values: Iterable[float]) -> Interval:
-    """The median of one value per draw, and the 5 and 95 % quantiles; NaN are draws of which nothing is told."""
+    """Median and 5 and 95 % quantiles of one value per draw; NaN values are left out."""
     told = [value for value in values if math.isfinite(value)]
     low, middle, high = np.quantile(told, [0.05, 0.5, 0.95]).tolist() if told else [math.nan] * 3
     return Interval(middle, low, high)
@@ -88,7 +88,8 @@ def population_of(
     if not drawn:
         known, most = len(found.recorded), int(MAX_TEMPLATE_SHARE * len(found.recorded))
         raise InputError(
-            f"{known} encounters share an area: at most {most} templates can be drawn; ask for fewer, or give more logs"
+            f"{known} encounters share an area: at most {most} templates can be drawn; "
+            "ask for fewer, or give more logs"
         )
     near, points = found.near, found.curve(drawn, draws=draws, seed=seed)
     counted, generated = (
@@ -114,7 +115,7 @@ def population_of(
 
 @dataclass(frozen=True, eq=False)
 class Members:
-    """Recorded encounters whose vehicles share an area, their names, and what is generated from them."""
+    """Recorded encounters with a shared area, their names, and the generated ones."""
 
     recorded: Sequence[EncounterFeatures]
     made: Sequence[EncounterFeatures]
@@ -136,7 +137,7 @@ class Members:
         return Recombined(first, self.names[member.other]).name if member.other >= 0 else first
 
     def of_kind(self, kind: str) -> "Members":
-        """Return the recorded of a kind, and what is generated from them, of whatever kind that is."""
+        """Return the recorded encounters of a kind, and everything generated from them."""
         places = {
             n: k
             for k, n in enumerate(n for n, own in enumerate(self.recorded) if own.kind == kind)
@@ -158,7 +159,7 @@ class Members:
     def shares(
         self, count: int, *, draws: int = 200, seed: int = 0
     ) -> tuple[Interval, Interval, Interval, Interval]:
-        """Return coverage alone and with what is generated, and precision of the generated and of the templates, as `CoveragePoint` has.
+        """Return coverage and precision for random templates, as in `CoveragePoint`.
 
         Arguments as of `population_of`.
         """
@@ -176,7 +177,7 @@ class Members:
     def curve(
         self, counts: Sequence[int], *, draws: int = 200, seed: int = 0
     ) -> tuple[CoveragePoint, ...]:
-        """Return what so many templates cover, and what they stand for; arguments as of `population_of`."""
+        """Return one point of the curve; arguments as in `population_of`."""
         near, rng = self.near, np.random.default_rng(seed)
         alone = {
             n: _over_draws(near.alone(near.chosen(rng, n)) for _ in range(draws))
@@ -198,7 +199,7 @@ class Members:
 
 
 def members_of(results: Iterable[tuple[str, GenerationResult]]) -> Members:
-    """Return the members of recordings and of the sets generated from them; arguments as of `population_of`.
+    """Return the members of recordings and generated sets; arguments as in `population_of`.
 
     An encounter that is called as two others are together, "A + B", is recombined of these: it is
     no recorded one, and what is generated from it is of both. It is left out where one of these is
@@ -233,7 +234,7 @@ def members_of(results: Iterable[tuple[str, GenerationResult]]) -> Members:
 
 
 def _needed(points: Sequence[CoveragePoint]) -> float:
-    """Templates at which what is not covered, as a power of their number, falls to 0.1; inf where that is too far to be told."""
+    """Return the number of templates for the coverage goal by a power law; inf if too far."""
     missed = np.array([1.0 - point.generated.value for point in points])
     if len(points) < 2 or missed.min() <= 0.0:
         return math.inf
@@ -314,7 +315,7 @@ class _Near:
         return self._covered(chosen, self._unseen(chosen))
 
     def judged(self, chosen: Ints) -> tuple[float, float, float, float]:
-        """Return coverage by templates alone, with what is generated, and precision of generated and of templates."""
+        """Return coverage alone and with generated ones, precision of generated and templates."""
         unseen = self._unseen(chosen)
         if not unseen.any():
             return (math.nan,) * 4
@@ -340,14 +341,14 @@ class _Near:
         )
 
     def _precision(self, members: Ints, own: Ints) -> float:
-        """The share of members within r of an encounter of another recording than their own (K, 1 or 2)."""
+        """The share of members within r of an encounter from another recording (K, 1 or 2)."""
         there = np.where(
             (own[..., None] == self.recording).any(axis=1), math.inf, self.apart[members]
         )
         return float((there.min(axis=1) <= 1.0).mean()) if len(members) else math.nan
 
     def unreached(self, names: Sequence[str]) -> list[Unreached]:
-        """Return the recorded encounters that nothing from other recordings is near, the farthest first."""
+        """Return recorded encounters that no other recording comes near, the farthest first."""
         source = np.concatenate(
             [np.repeat(self.recording[:, None], 2, axis=1), self.recording[self.template]]
         )
@@ -370,13 +371,21 @@ class _Near:
         """Return the generated members that are farthest from all recorded ones."""
         away = self.apart[len(self.members) :]
         nearest = away.min(axis=1, initial=math.inf)
-        return tuple(
-            Unreached(
-                found.name_of(own := found.made[n]), own.kind_name, float(nearest[n]),
-                self._differ(len(self.members) + n, int(away[n].argmin()), nearest[n]), own.scenario,
+        farthest = []
+        for n in np.argsort(-nearest, kind="stable")[:SHOWN_COUNT].tolist():
+            member = found.made[n]
+            closest = int(away[n].argmin())
+            feature = self._differ(len(self.members) + n, closest, nearest[n])
+            farthest.append(
+                Unreached(
+                    found.name_of(member),
+                    member.kind_name,
+                    float(nearest[n]),
+                    feature,
+                    member.scenario,
+                )
             )
-            for n in np.argsort(-nearest, kind="stable")[:SHOWN_COUNT].tolist()
-        )  # fmt: skip
+        return tuple(farthest)
 
     def _differ(self, n: int, recorded: int, apart: float) -> str:
         """In which feature a member differs most from a recorded one, which is so far apart."""

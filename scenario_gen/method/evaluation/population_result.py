@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The coverage that recordings and the sets generated from them reach, with its table and remarks."""
+"""Coverage by recordings and the sets generated from them, with table and remarks."""
 
 from dataclasses import dataclass
 import math
@@ -13,7 +13,7 @@ COVERAGE_GOAL_SHARE = 0.9
 
 @dataclass(frozen=True)
 class CoveragePoint:
-    """What so many templates cover, alone and with what is generated from them, and how precise the generated are.
+    """Coverage by a number of templates, alone and with generated sets, and precision.
 
     Shares are medians over draws of templates, with the 5 and 95 % quantiles.
 
@@ -36,7 +36,7 @@ class CoveragePoint:
 
 @dataclass(frozen=True)
 class Unreached:
-    """A recorded encounter that nothing of other recordings comes near, or a scenario that is near no recorded encounter.
+    """A recorded encounter, or a scenario, that is near nothing recorded elsewhere.
 
     Attributes:
         encounter: its name; of a scenario that of its template.
@@ -85,7 +85,7 @@ class Population:
         return f"{recorded} encounters whose vehicles share an area ({kinds}), {made} scenarios"
 
     def table(self) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
-        """Return the columns and the rows of the curves as texts; in brackets the 5 and 95 % quantiles over draws."""
+        """Return columns and rows of the curves as texts; quantiles are in brackets."""
         columns = (
             "of",
             "templates",
@@ -131,7 +131,8 @@ def _stands_for(point: CoveragePoint) -> str:
             else "more than there are"
         )
 
-    return f"{words(point.multiplier.value)} [{words(point.multiplier.low)}, {words(point.multiplier.high)}]"
+    estimate = point.multiplier
+    return f"{words(estimate.value)} [{words(estimate.low)}, {words(estimate.high)}]"
 
 
 def in_words(share: Interval) -> str:

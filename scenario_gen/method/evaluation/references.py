@@ -18,7 +18,7 @@ from scenario_gen.types import Segmentation
 def with_changepoints_at(
     segmentation: Segmentation, changepoints: Ints, what: str
 ) -> Segmentation:
-    """Return a segmentation of the same encounter with changepoints (K,), every segment a primitive of its own."""
+    """Return a segmentation with changepoints (K,); each segment is its own primitive."""
     labels = np.zeros(len(segmentation.labels), dtype=np.int64)
     labels[changepoints] = 1
     names = tuple(f"{what} {k + 1}" for k in range(len(changepoints) + 1))

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The replay: the recording as fitted to the road; what the fitting costs before anything is generated."""
+"""The replay: the recording as fitted to the road, before anything is generated."""
 
 import numpy as np
 
@@ -13,7 +13,7 @@ MIN_CHORD = 0.5
 
 
 def replay(encounter: Encounter, fit: Fit, frame_id: str = "map") -> Scenario:
-    """Map every piece of the template between two anchors onto the road by its own similarity (eqs 7-9).
+    """Map each piece between two anchors onto the road by its own similarity (eqs 7-9).
 
     Start goes to start and end to end; speeds scale with the lengths. A standing primitive stands
     at its anchor. A piece whose chord is too short to give a direction keeps its shape and is

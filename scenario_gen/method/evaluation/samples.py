@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""What metrics are taken of: the scenarios of a set beside their template, brought to common clocks once."""
+"""The inputs of metrics: scenarios and their template on common clocks."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -25,7 +25,7 @@ MIN_COMMON_S = 1.0  # two vehicles that are present together for less are not co
 
 @dataclass(frozen=True, eq=False)
 class Template:
-    """The recorded encounter, which every set is measured against, with the vehicles that all sets have.
+    """The recorded encounter as the reference of every set, with the vehicles of all sets.
 
     Attributes:
         encounter: as recorded.
@@ -48,7 +48,7 @@ class Template:
         return chosen(source.with_samples(self.steps), self.ids)
 
     def periodic(self, source: Encounter | Scenario) -> Motion:
-        """Return the motion of these vehicles on the clock of distributions and criticality (`period`)."""
+        """Return the motion of these vehicles at the period of distributions and criticality."""
         return chosen(source.resampled(self.config.period), self.ids)
 
     @cached_property
@@ -104,7 +104,7 @@ class Samples:
 
     @cached_property
     def bootstrap(self) -> Bootstrap:
-        """What turns a figure of each sample, or a statistic of weights, into an estimate with its interval."""
+        """The bootstrap of one figure per sample or of a statistic of weights."""
         config = self.template.config
         return Bootstrap.draw(
             antithetic_pairs(self.scenarios), config.resamples, config.level, self.template.seed
@@ -112,7 +112,7 @@ class Samples:
 
     @cached_property
     def pooled(self) -> Bootstrap:
-        """The same of at most MOST_UNITS units, neighbours drawn together: the cost of E grows with their square."""
+        """The bootstrap of at most MOST_UNITS units: the cost of E grows with their square."""
         unit, config = self.bootstrap.unit, self.template.config
         size = -(-(int(unit.max(initial=0)) + 1) // MOST_UNITS)
         return (
@@ -123,7 +123,7 @@ class Samples:
 
     @cached_property
     def pairs(self) -> tuple["VehiclePair", ...]:
-        """The pairs of vehicles that are present together for MIN_COMMON_S in the template and in all samples."""
+        """Pairs that are present together for MIN_COMMON_S in the template and all samples."""
         template, steps = self.template.motion, self.template.steps
         throughout = all(motion.all_present for motion in (template, *self.motions))
         whole = stacked(self.motions)
@@ -149,7 +149,7 @@ class Samples:
 
 @dataclass(frozen=True, eq=False)
 class VehiclePair:
-    """Two vehicles while both are there, in the template and in S samples, at the same number of instants T.
+    """Two vehicles while both are present, in the template and S samples, at T instants.
 
     `template` holds positions (2, T, 2) [m], speeds (2, T) [m/s] and headings (2, T) [rad],
     `samples` the same of S.
@@ -193,7 +193,7 @@ def common_motion(motion: Motion, ids: tuple[str, str], samples: int) -> Motion 
 
 
 def stacked(motions: Sequence[Motion]) -> tuple[Floats, Floats, Floats]:
-    """Stack S motions of equal T: positions (S, N, T, 2) [m], speeds [m/s] and headings [rad], both (S, N, T)."""
+    """Stack S motions: positions (S, N, T, 2) [m], speeds [m/s], headings [rad] (S, N, T)."""
     return (
         np.stack([motion.position for motion in motions]),
         np.stack([motion.speed for motion in motions]),

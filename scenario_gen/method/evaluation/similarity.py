@@ -21,7 +21,7 @@ from scenario_gen.numerics import Floats, Ints
 
 @dataclass(frozen=True, eq=False)
 class PairSimilarity:
-    """Sums over the feature matrices of one pair of vehicles, enough for E and the correlation under any weights.
+    """Sums over the feature matrices of one pair, for E and correlation under any weights.
 
     Attributes:
         gram: (U, U) inner products of D_r and D_s, where D_s is the sum over the samples of unit
@@ -43,7 +43,7 @@ class PairSimilarity:
         return np.asarray(weights / (weights @ self.count)[:, None])
 
     def error(self, weights: Floats) -> Floats:
-        """Return E (B,) under weights (B, U); NaN if T is zero (both vehicles stand throughout)."""
+        """Return E (B,) under weights (B, U); NaN if T is zero (both vehicles always stand)."""
         shares = self._shares(weights)
         square = ((shares @ self.gram) * shares).sum(axis=1)
         norm = self.template[2]
@@ -115,7 +115,7 @@ def pair_similarity(
 def pair_similarities(
     template: Floats, generated: Floats, distance: Distance, least: float = 0.0
 ) -> list[PairSimilarity]:
-    """Compare all pairs of vehicles: template (N, T, D) against generated (S, N, T, D), as `pair_similarity` does."""
+    """Compare all pairs: template (N, T, D) and generated (S, N, T, D), see `pair_similarity`."""
     target, series = np.moveaxis(template, -1, -2), np.moveaxis(generated, -1, -2)
     return [
         pair_similarity((target[a], target[b]), (series[:, a], series[:, b]), distance, least)
@@ -124,12 +124,12 @@ def pair_similarities(
 
 
 def mean_error(pairs: list[PairSimilarity], weights: Floats) -> Floats:
-    """Return E (B,) averaged over the pairs of vehicles for which it is defined; NaN if for none."""
+    """Return E (B,) averaged over the pairs for which it is defined; NaN without one."""
     return _mean_over_pairs([pair.error(weights) for pair in pairs])
 
 
 def mean_correlation(pairs: list[PairSimilarity], weights: Floats) -> Floats:
-    """Return the correlation (B,) averaged over the pairs for which it is defined; NaN if for none."""
+    """Return the correlation (B,) averaged over the pairs for which it is defined, or NaN."""
     return _mean_over_pairs([pair.correlation(weights) for pair in pairs])
 
 
