@@ -8,7 +8,7 @@ docs/exchange.md has the source of each topic and frame.
 PredictedObjects on `/perception/object_recognition/objects` and TrackedObjects on
 `/perception/object_recognition/tracking/objects` are in the road's frame. An object's pose is the
 centre of its shape, with z half its height; twist and acceleration are in its own frame. Its id is
-the first 16 bytes of the SHA-256 of the vehicle's id. The predicted path has a pose every `STEP_NS`
+the first 16 bytes of the SHA-256 of the vehicle's id. Predicted paths have a pose every `STEP_NS`
 up to `HORIZON_NS` ahead, or to the end.
 
 Odometry of the ego on `/localization/kinematic_state` is in the road's frame, with the child frame

@@ -113,5 +113,5 @@ def decode_timed_path(data: bytes, source: str = "ego/path") -> TimedPath:
 def encode_local_map(
     blocked: Bools, resolution: float, origin: Floats, frame_id: str, stamp_ns: int
 ) -> bytes:
-    """Return blocked cells (H, W), their size and lower-left corner (2,) [m] as an OccupancyGrid."""
+    """Return blocked cells (H, W), their size and lower-left corner [m] as an OccupancyGrid."""
     return encode_grid(np.where(blocked, OCCUPIED_CODE, 0), resolution, origin, frame_id, stamp_ns)

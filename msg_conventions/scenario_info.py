@@ -138,7 +138,7 @@ class ScenarioEntry:
         return relaxed
 
     def _relaxed_of(self, key: str, max_count: int, where: str) -> Floats:
-        """Return the deviations (M, 2, 2) [m, m/s] under a key, of at most `max_count` vehicles."""
+        """Return the deviations (M, 2, 2) [m, m/s] of a key, M at most `max_count`."""
         with guarded(where):
             values = json.loads(self.status.values.get(key, "[]"))
             relaxed = np.array(values, dtype=np.float64).reshape(-1, 2, 2)

@@ -115,7 +115,8 @@ def _check_events(text: str, source: str) -> None:
         )
         if depth > MAX_NESTING_LEVELS:
             raise InputError(
-                f"{place}: lists or mappings nested more than {MAX_NESTING_LEVELS} deep are not read"
+                f"{place}: lists or mappings nested more than {MAX_NESTING_LEVELS} deep are not "
+                "read"
             )
 
 
@@ -213,7 +214,7 @@ def _check_schema(value: Any, source: str, schema: Mapping[str, Any]) -> None:
     """Check a value against a JSON schema.
 
     Raises:
-        InputError: it does not conform; names the path, source was found there and source is needed.
+        InputError: it does not conform; the message has the path, the value and the rule.
     """
     import jsonschema  # takes a quarter of a second
 
@@ -226,8 +227,8 @@ def _check_schema(value: Any, source: str, schema: Mapping[str, Any]) -> None:
     ).lstrip(".")
     rule = f"{error.validator} {shown(error.validator_value, 120)}"
     raise InputError(
-        f"{source}: {place or 'the document'} is {shown(error.instance, 120)}; its schema asks for "
-        f"{rule}"
+        f"{source}: {place or 'the document'} is {shown(error.instance, 120)}; its schema asks "
+        f"for {rule}"
     )
 
 

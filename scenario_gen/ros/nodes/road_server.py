@@ -118,7 +118,10 @@ class RoadServer(StageNode):
         self.outputs.send("road/markings", road_markers(road.lanes, road.frame_id, stamp_ns))
         self._grid = messages["map"]
         height, width = road.drivable.shape
-        message = f"{road.name}: {width} x {height} cells of {road.resolution:.2f} m, {len(road.entries)} entries"
+        message = (
+            f"{road.name}: {width} x {height} cells of {road.resolution:.2f} m, "
+            f"{len(road.entries)} entries"
+        )
         faults = [
             str(note)
             for note in (road.lanes.notes if road.lanes is not None else ())
