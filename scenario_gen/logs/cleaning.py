@@ -398,8 +398,8 @@ def _check_clock(vehicles: Sequence[Observations], log: RawLog, config: LogConfi
     if period > max(CLEANING.max_period_s, config.longest_gap):
         unit, hint = _likely_time_unit(period)
         raise InputError(
-            f"{log.where(int(vehicles[0].fix_row[1]))}: positions are {period:g} s apart (median); "
-            f"a track needs at most {CLEANING.max_period_s:g} s; {hint}name the unit with "
+            f"{log.where(int(vehicles[0].fix_row[1]))}: positions are {period:g} s apart "
+            f"(median); a track needs at most {CLEANING.max_period_s:g} s; {hint}name the unit with "
             f"--set log.columns=time=<column>:{unit}"
         )
     spans = [int(vehicle.fix_ns[-1]) - int(vehicle.fix_ns[0]) for vehicle in vehicles]
@@ -411,8 +411,8 @@ def _check_clock(vehicles: Sequence[Observations], log: RawLog, config: LogConfi
         raise InputError(
             f"{log.where(int(longest.fix_row[row]))}: the stamp of vehicle {longest.id[:50]} is "
             f"{gap_ns * 1e-9:g} s after the previous one, so the common clock needs {n_ticks} "
-            f"ticks of {config.period:g} s (limit {config.tick_limit}): correct the stamp, cut the "
-            "log (log.start, log.end), or raise --set log.tick_limit=…"
+            f"ticks of {config.period:g} s (limit {config.tick_limit}): correct the stamp, cut "
+            "the log (log.start, log.end), or raise --set log.tick_limit=…"
         )
 
 

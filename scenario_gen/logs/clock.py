@@ -4,8 +4,8 @@
 """The clock of a log: stamps before 1970, and clocks that are set back or restart while recording.
 
 The order of the rows shows when a clock is set back: stamps restart while the vehicle drives on,
-so sorting them would put two motions into one time. The rows after such a step are moved to a later
-time, after a gap, so that no encounter spans it.
+so sorting them would put two motions into one time. The rows after such a step are moved to a
+later time, after a gap, so that no encounter spans it.
 """
 
 from collections.abc import Sequence

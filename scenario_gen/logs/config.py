@@ -29,8 +29,8 @@ class LogConfig(Parameters):
     )
     columns: str = parameter(
         "",
-        "columns of a table, e.g. vehicle=who,speed=v:kmh; y=-y flips an axis; point=front, rear or "
-        "rear_axle: the recorded point of a vehicle",
+        "columns of a table, e.g. vehicle=who,speed=v:kmh; y=-y flips an axis; point=front, rear "
+        "or rear_axle: the recorded point of a vehicle",
     )
     topics: str = parameter(
         "", "topics of a bag to read, separated by commas; empty: all that can be used"
@@ -38,7 +38,7 @@ class LogConfig(Parameters):
     vehicles: str = parameter("", "vehicles to keep, separated by commas; empty: all")
     types: str = parameter(
         "",
-        "types of road users to keep, e.g. car,van,truck,bus; `other`: of unknown type; empty: all",
+        "types of road users to keep, e.g. car,van,truck,bus; other: unknown type; empty: all",
     )
     start: float = parameter(
         0.0, "start of the time window, counted from the log's first stamp", unit="s", low=0.0
@@ -51,7 +51,7 @@ class LogConfig(Parameters):
     )
     origin: str = parameter(
         "",
-        "latitude,longitude of the local frame's origin in degrees; empty: the middle of the fixes",
+        "latitude,longitude of the local frame's origin, degrees; empty: the middle of the fixes",
     )
     strict: bool = parameter(
         False, "refuse a log with rows that need repair, instead of repairing and counting them"

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""A scenario as a bag for Autoware's planning simulator (conventions: msg_conventions/autoware.py)."""
+"""A scenario as a bag for Autoware's planning simulator; see msg_conventions/autoware.py."""
 
 from collections.abc import Iterator
 

@@ -4,7 +4,7 @@
 """What a recorder did not record, by topic.
 
 - If a topic has one publisher, by the numbers of its messages: gaps were lost; messages before the
-  first one were published before the recording began. For streams (/tf, /clock) these do not count.
+  first one were published before the recording began, which does not count for streams (/tf).
 - If a topic has several publishers, by the count of DDS.
 - Scenarios, by their entries on `scenarios/info`.
 - If a topic keeps its newest message only (a map, a route), overwritten messages do not count.

@@ -409,11 +409,11 @@ def read_scenario_set(
     Raises:
         InputError: the bag cannot be read, no request was closed, or a scenario is missing.
     """
-    found = read_recording(path, config, (SCENARIOS, INFO)).namespaces.get(namespace)
-    if found is None:
+    recorded = read_recording(path, config, (SCENARIOS, INFO)).namespaces.get(namespace)
+    if recorded is None:
         raise InputError(f"{path}: no request was closed on {namespace}/{INFO}")
     with naming_bag(path):
-        return found.scenario_set()
+        return recorded.scenario_set()
 
 
 def load(
@@ -446,15 +446,15 @@ def result_in(recording: Recording, namespace: str = "") -> GenerationResult:
         raise InputError(
             f"{recording.path}: namespace {namespace!r} has no template with scenarios; {remedy}"
         )
-    found = recording.namespaces[namespace]
+    recorded = recording.namespaces[namespace]
     with naming_bag(recording.path):
-        fit, routes = found.fit
-        generated = found.scenario_set()
+        fit, routes = recorded.fit
+        generated = recorded.scenario_set()
         seed = next((scenario.seed for scenario in generated), 0)
         return GenerationResult(
-            found.encounter,
-            found.segmentation,
-            found.road,
+            recorded.encounter,
+            recorded.segmentation,
+            recorded.road,
             fit,
             routes,
             generated,

@@ -177,7 +177,7 @@ class RequestTracker:
             self._unmatched.setdefault(entry.sha256, []).append(joined[1])
 
     def _join(self, parts: tuple[str, ...]) -> tuple[str, bytes] | None:
-        """Return SHA-256 and bytes of a scenario if all its messages have arrived; forget these."""
+        """Return SHA-256 and bytes of a scenario with all its messages; forget these."""
         *messages, sha256 = parts
         if not all(message in self._unmatched for message in messages):
             return None

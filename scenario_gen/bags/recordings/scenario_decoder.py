@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Decodes scenarios from live messages, in any order: scenarios, entries, and the egos' witnesses."""
+"""Decodes scenarios from live messages in any order: scenarios, entries, witnesses."""
 
 from typing import TypeVar
 

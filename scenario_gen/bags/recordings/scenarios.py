@@ -138,7 +138,7 @@ class RecordedScenarios:
         return self._entry_by_hash.get(self.hashes[k])
 
     def scenario(self, k: int) -> tuple[int, Scenario]:
-        """Return stamp [ns] and scenario `k` with its ego's witness; without an entry, `k` is its index.
+        """Return stamp [ns] and scenario `k`, with its ego's witness.
 
         Raises:
             InputError: its message, or that of its witness, is damaged.

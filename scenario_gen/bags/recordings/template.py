@@ -62,7 +62,7 @@ def decode_template(messages: Mapping[str, bytes]) -> GenerationResult:
     for topic, other, _ in routes:
         if {frame, other} != {road.frame_id}:
             raise InputError(
-                f"{topic}: frame {other!r}, fit {frame!r} and map {road.frame_id!r} must be the same"
+                f"{topic}: frame {other!r}, fit {frame!r} and map {road.frame_id!r} must agree"
             )
     fit = Fit(
         encounter.vehicles, (), anchor_index(encounter, segmentation.changepoints), requested, ()
@@ -128,14 +128,16 @@ def anchor_index(encounter: Encounter, changepoints: Ints) -> Ints:
 def template_statuses(
     messages: Iterable[bytes], stamp_ns: int, nodes: str = "/"
 ) -> dict[str, Mapping[str, str]]:
-    """Return the key-values of diagnostics about one template, by subject ("/planner: fit" is "fit"); the last value counts.
+    """Return the key-values of diagnostics about one template, by subject; the last ones count.
+
+    The subject of "/planner: fit" is "fit".
 
     Args:
-        messages: of /diagnostics.
-        stamp_ns: the template's stamp.
-        nodes: the beginning of the nodes' full names.
+        messages: those of /diagnostics.
+        stamp_ns: stamp of the template.
+        nodes: prefix of the full names of the nodes.
     """
-    found: dict[str, Mapping[str, str]] = {}
+    by_subject: dict[str, Mapping[str, str]] = {}
     for data in messages:
         try:
             stamp, statuses = decode_diagnostics(data)
@@ -144,5 +146,5 @@ def template_statuses(
         for status in statuses:
             if template_of(status, stamp) == stamp_ns and status.name.startswith(nodes):
                 values = {key: value for key, value in status.values.items() if key != TEMPLATE}
-                found[status.name.partition(": ")[2]] = values
-    return found
+                by_subject[status.name.partition(": ")[2]] = values
+    return by_subject

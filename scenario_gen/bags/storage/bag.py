@@ -79,7 +79,7 @@ class StoredBag:
     def messages(
         self, wanted: Callable[[str, str], bool] = lambda _topic, _type: True
     ) -> Iterator[BagMessage]:
-        """Yield the messages of all files by their stamps, of topics with a `wanted` name and type.
+        """Yield the messages of topics with a `wanted` name and type, by their stamps.
 
         Raises:
             InputError: a file is damaged, there are more messages than the bounds allow, or a
@@ -137,8 +137,8 @@ def _naming_damaged(path: Path) -> Iterator[None]:
     except DamagedError as error:
         bag = path.parent if (path.parent / METADATA).exists() else path
         raise InputError(
-            f"{path}: cut off or damaged at {error}; `scenario-gen reindex {bag}` recovers what is "
-            "whole"
+            f"{path}: cut off or damaged at {error}; `scenario-gen reindex {bag}` recovers the "
+            "whole messages"
         ) from error
     except OSError as error:
         raise InputError(f"{path}: cannot be read ({error.strerror or error})") from error

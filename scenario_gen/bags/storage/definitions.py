@@ -95,7 +95,7 @@ def stored_definitions() -> dict[str, tuple[str, str]]:
 
 @cache
 def definition(kind: str) -> tuple[str, str]:
-    """Return the ros2msg definition of a type with its nested types, and its RIHS01 hash (REP 2011).
+    """Return the ros2msg definition of a type with nested types, and its RIHS01 hash (REP 2011).
 
     Raises:
         InputError: the type is neither a standard one nor installed.

@@ -446,7 +446,7 @@ def open_mcap(file: BinaryIO, size: int, budget: ReadBudget) -> McapFile:
         raise DamagedError(len(_MAGIC), "the file has no header")
     if header.profile == "ros1":
         raise InputError(
-            f"{file.name}: an MCAP file of profile 'ros1'; name the .bag file that it was made from"
+            f"{file.name}: an MCAP file of profile 'ros1'; name the .bag file of its messages"
         )
     try:
         footer, _ = mcap.record(mcap.footer_offset())

@@ -141,7 +141,7 @@ def qos_yaml(quality: Quality) -> str:
 
 @lru_cache(maxsize=256)
 def profiles(text: str) -> list[dict[str, Any]]:
-    """Return the profiles in a YAML list; none if the text is damaged, since a bag is readable without."""
+    """Return the profiles in a YAML list; none if it is damaged, since they are not essential."""
     if not text:
         return []
     try:
@@ -162,11 +162,11 @@ def _is_profile(entry: Any) -> bool:
 
 
 def quality_of(text: str) -> Quality:
-    """Return the quality of the first profile in a YAML list; volatile, depth 10, if there is none."""
-    found = profiles(text)
-    if not found:
+    """Return the quality of the first profile in a YAML list; by default volatile, depth 10."""
+    known = profiles(text)
+    if not known:
         return Quality(depth=10, transient_local=False)
-    profile = found[0]
+    profile = known[0]
     # rosbag2 wrote rmw's numbers before Jazzy: best effort is 2, transient local is 1.
     return Quality(
         depth=max(1, profile["depth"]),

@@ -108,7 +108,7 @@ class RosbagsFile:
 
 
 def _quality(ext: Any) -> Quality:
-    """Return the quality that the first publisher offered; a latched topic keeps its last message."""
+    """Return the quality of the first publisher; a latched topic repeats its last message."""
     if isinstance(ext, ConnectionExtRosbag1):
         return Quality(1 if ext.latching else 10, transient_local=bool(ext.latching))
     if not ext.offered_qos_profiles:

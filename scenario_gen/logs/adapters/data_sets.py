@@ -110,8 +110,8 @@ DATA_SETS = {
         source="av2-api: av2.datasets.motion_forecasting.data_schema (Track, ObjectState); "
         "steps of 0.1 s",
         columns=_columns(
-            "vehicle=track_id x=position_x y=position_y vx=velocity_x vy=velocity_y heading=heading "
-            "kind=object_type",
+            "vehicle=track_id x=position_x y=position_y vx=velocity_x vy=velocity_y "
+            "heading=heading kind=object_type",
             time=("timestep", 0.1),
         ),
         signs=("scenario_id",),
