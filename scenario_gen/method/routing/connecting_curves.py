@@ -15,7 +15,6 @@ from scenario_gen.numerics.plane import ahead_and_left, angle_between, unit
 from scenario_gen.types import Road, Vehicle
 
 SPACING_M = 0.2  # between two poses of a curve
-TANGENT_RATIO = (1.0, 1.3, 0.8, 1.6)  # lengths of a Hermite curve's tangents, over its chord
 MAX_RADIUS_M = 12.0  # of an arc: a wider one cuts a junction's corner
 PARALLEL_RAD = np.radians(8.0)
 
@@ -36,7 +35,7 @@ def connecting_curves(start: Floats, end: Floats, limit: float) -> Iterator[Floa
     Each has poses (P, 3) about 0.2 m apart. Cubic Hermite curves with tangents of several lengths;
     straight lines joined by an arc, from the widest to the tightest; the Dubins curve.
     """
-    for ratio in TANGENT_RATIO:
+    for ratio in (1.0, 1.3, 0.8, 1.6):  # of the tangents' length to the chord
         poses = hermite_curve(start, end, ratio, limit)
         if poses is not None:
             yield poses

@@ -26,8 +26,6 @@ from scenario_gen.roads import footprint_fits, ground_for, own_side
 from scenario_gen.types import Fit, FittedVehicle, Road, Route, TypeLimits
 
 MIN_ROUTE_M = 0.05  # between start and end, else the vehicle has no path
-HOLD_FACTOR = (1.0, 10.0, 100.0, 1000.0)  # of a guess's weight: the band holds it ever more firmly
-ROUNDS_COUNT = (12, 12, 12, 24)  # of the band for each of these factors
 # Shares of the largest curvature that searches may use, in turn: smoothing needs the rest.
 CURVATURE_SHARE = (0.97, 0.9, 0.8)
 SEED_STEPS = 7919  # between the seeds of two vehicles
@@ -152,9 +150,12 @@ def _refuse_blocked(task: VehicleTask) -> None:
 
 
 def _smoothed(task: VehicleTask, legs: Legs) -> Curve:
-    """Return the first drivable curve near the legs; if there is none, the last curve."""
+    """Return the first drivable curve near the legs, which it follows ever more closely.
+
+    If there is none, return the last curve.
+    """
     weights = anchor_weights(task.anchors, legs.waypoints)
-    for factor, rounds in zip(HOLD_FACTOR, ROUNDS_COUNT, strict=True):
+    for factor, rounds in ((1.0, 12), (10.0, 12), (100.0, 12), (1000.0, 24)):
         stop_if_cancelled()
         guess = Guess(legs.guess.points, factor * legs.guess.hold)
         curve = smooth(task, weights, guess, rounds)

@@ -111,9 +111,9 @@ def unexplained(
 INITIAL_TOP_RATIO = (1.0, 50.0, 0.9)  # γ, α+κ, ρ
 MERGE_WEIGHT = (40.0, 0.1)  # of a row's prior for the state itself and for every other one
 # Candidates for κ0 and their log prior probabilities: log-normal about 0.1, with a factor of 4.5.
-MEAN_WEIGHT = (0.01, 0.03, 0.1, 0.3, 1.0, 3.0)
-MEAN_LOG_RATIO = (-1.2, -0.3, 0.0, -0.3, -1.2, -2.6)
-EXTRA_COUNT = (3.0, 6.0, 12.0, 25.0, 50.0, 100.0, 300.0, 1000.0)  # candidates for ν0 - D
+MEAN_WORTHS = np.array([0.01, 0.03, 0.1, 0.3, 1.0, 3.0])
+MEAN_ODDS = np.array([-1.2, -0.3, 0.0, -0.3, -1.2, -2.6])
+EXTRA_DEGREES = np.array([3.0, 6.0, 12.0, 25.0, 50.0, 100.0, 300.0, 1000.0])  # ν0 - D
 FIT_WEIGHT = 0.05  # K, in its units, where states are only described
 INITIAL_DOF_COUNT = 5.0  # of the noise, until it is estimated
 
@@ -228,8 +228,8 @@ class Problem:
             regressors=p,
             mean=mean,
             precision=np.eye(p) * (config.mean_weight if order else 1.0),
-            worths=np.array([1.0]) if order else np.array(MEAN_WEIGHT),
-            odds=np.zeros(1) if order else np.array(MEAN_LOG_RATIO),
+            worths=np.array([1.0]) if order else MEAN_WORTHS,
+            odds=np.zeros(1) if order else MEAN_ODDS,
             lead=order,
             weight=config.weight or 1.0,
             dof=0.0 if dof >= GAUSSIAN_DOF_COUNT else dof,
@@ -286,20 +286,22 @@ class Problem:
         samples = np.empty((keep, len(self.v)), np.int64)
         trace = np.empty((burn + keep, len(TRACE)))
         emissions = np.empty((len(top) - 3, self.dimensions, self.v.shape[1]))
-        extras = np.array(EXTRA_COUNT)
         chosen = np.array(
-            [np.abs(extras - prior.extra).argmin(), np.abs(self.worths - prior.worth).argmin()]
+            [
+                np.abs(EXTRA_DEGREES - prior.extra).argmin(),
+                np.abs(self.worths - prior.worth).argmin(),
+            ]
         )
         v, mass = self.v.copy(), place.mass.copy()
         run_chain(
             Data(v, np.ascontiguousarray(v.T), self.gaps, self.hidden, mass, self.ends),
-            Grid(self.mean, self.precision, prior.within, extras, self.worths, self.odds),
+            Grid(self.mean, self.precision, prior.within, EXTRA_DEGREES, self.worths, self.odds),
             Hyper(config.hyper, self.weight, self.dof, self.blur, config.moves),
             Start(place.labels, top, chosen),
             Out(samples, trace, emissions),
             seed,
         )
-        held = Prior(prior.within, float(extras[chosen[0]]), float(self.worths[chosen[1]]))
+        held = Prior(prior.within, float(EXTRA_DEGREES[chosen[0]]), float(self.worths[chosen[1]]))
         return Place(samples[-1], mass), held, samples, trace
 
     def merge(self, prior: Prior, place: Place) -> Place:
