@@ -52,6 +52,10 @@ CONCEPTS = {
         "numerics/boxes.py",
         r"def \w*(?:corners|box_gap|box_distance|footprint_gaps?)\(|abs\([^()]* \* [^()]* \+ [^()]* \* [^()]*\), abs\(",
     ),
+    "motion between two samples": (
+        "numerics/hermite.py",
+        r"CubicHermiteSpline\([^)]*position|def (?:control_points|interval_at)\(",
+    ),
     "gap of two motions in space and time": ("logs/gap.py", r"def \w*space_time_gap\("),
     "growing of groups": ("logs/growing.py", r"class Growth\b|def \w*grow_groups?\("),
     "least squares of a placement": (
