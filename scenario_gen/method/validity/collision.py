@@ -140,31 +140,57 @@ def _block_bounds(control: Floats) -> Floats:
     return bounds
 
 
+class _Motions(NamedTuple):
+    """The arguments `time`, `control`, `heading` and `half` of `first_contacts`."""
+
+    time: Floats
+    control: Floats
+    heading: Floats
+    half: Floats
+
+
 @kernel(inline=True)
-def _first_contact_in_block(
-    block: int,
-    time: Floats,
-    control: tuple[Floats, Floats],
-    heading: tuple[Floats, Floats],
-    half: tuple[Floats, Floats],
-    reach: float,
-    required: _Separation,
+def _turning(motions: _Motions, i: int, k: int) -> _Turning:
+    """Box of vehicle i in interval k."""
+    yaw = motions.heading[i, k]
+    return _Turning(motions.half[i], yaw, motions.heading[i, k + 1] - yaw)
+
+
+@kernel(inline=True)
+def _block_contact(
+    block: int, i: int, j: int, motions: _Motions, reach: float, required: _Separation
 ) -> tuple[int, float, float]:
-    """Outcome, time [s] and gap [m] of the first contact of two vehicles in a block."""
+    """Outcome, time [s] and gap [m] of the first contact of vehicles i and j in a block."""
+    time, control = motions.time, motions.control
     d = np.empty((4, 2))
     end = min(len(time) - 1, (block + 1) * _BLOCK_STEPS)
     for k in range(block * _BLOCK_STEPS, end):
         for c in range(4):
-            d[c, 0] = control[1][k, c, 0] - control[0][k, c, 0]
-            d[c, 1] = control[1][k, c, 1] - control[0][k, c, 1]
-        if not _is_near(d, reach):
-            continue
-        h = time[k + 1] - time[k]
-        a = _Turning(half[0], heading[0][k], heading[0][k + 1] - heading[0][k])
-        b = _Turning(half[1], heading[1][k], heading[1][k + 1] - heading[1][k])
-        status, u, gap = _first_contact(d, h, a, b, required)
-        if status != Proof.PROVEN.value:
-            return status, time[k] + u * h, gap
+            d[c, 0] = control[j, k, c, 0] - control[i, k, c, 0]
+            d[c, 1] = control[j, k, c, 1] - control[i, k, c, 1]
+        if _is_near(d, reach):
+            h = time[k + 1] - time[k]
+            a, b = _turning(motions, i, k), _turning(motions, j, k)
+            status, u, gap = _first_contact(d, h, a, b, required)
+            if status != Proof.PROVEN.value:
+                return status, time[k] + u * h, gap
+    return Proof.PROVEN.value, np.nan, np.nan
+
+
+@kernel(inline=True)
+def _pair_contact(
+    i: int, j: int, motions: _Motions, bounds: Floats, required: _Separation
+) -> tuple[int, float, float]:
+    """Outcome, time [s] and gap [m] of the first contact of vehicles i and j."""
+    half = motions.half
+    reach = np.hypot(half[i, 0], half[i, 1]) + np.hypot(half[j, 0], half[j, 1])
+    reach += required.clearance + _ROUNDING_M
+    for k in range(bounds.shape[1]):
+        p, q = bounds[i, k], bounds[j, k]
+        if _distance_to_origin(q[0] - p[1], q[1] - p[0], q[2] - p[3], q[3] - p[2]) <= reach:
+            status, at, gap = _block_contact(k, i, j, motions, reach, required)
+            if status != Proof.PROVEN.value:
+                return status, at, gap
     return Proof.PROVEN.value, np.nan, np.nan
 
 
@@ -190,27 +216,15 @@ def first_contacts(
         out: (N (N - 1) / 2, 3) filled with the outcome (`Proof`) and, where it is not proven, with
             the time [s] and the gap [m].
     """
-    n = control.shape[0]
+    motions = _Motions(time, control, heading, half)
     bounds = _block_bounds(control)
     required = _Separation(clearance, resolution)
-    pair = -1
-    for i in range(n):
-        for j in range(i + 1, n):
+    pair = 0
+    for i in range(len(control)):
+        for j in range(i + 1, len(control)):
+            status, at, gap = _pair_contact(i, j, motions, bounds, required)
+            out[pair, 0], out[pair, 1], out[pair, 2] = status, at, gap
             pair += 1
-            out[pair, 0] = Proof.PROVEN.value
-            reach = np.hypot(half[i, 0], half[i, 1]) + np.hypot(half[j, 0], half[j, 1])
-            reach += clearance + _ROUNDING_M
-            curves, yaws = (control[i], control[j]), (heading[i], heading[j])
-            for k in range(bounds.shape[1]):
-                p, q = bounds[i, k], bounds[j, k]
-                if _distance_to_origin(q[0] - p[1], q[1] - p[0], q[2] - p[3], q[3] - p[2]) > reach:
-                    continue
-                status, at, gap = _first_contact_in_block(
-                    k, time, curves, yaws, (half[i], half[j]), reach, required
-                )
-                if status != Proof.PROVEN.value:
-                    out[pair, 0], out[pair, 1], out[pair, 2] = status, at, gap
-                    break
 
 
 def contact_violations(
