@@ -66,7 +66,11 @@ CONCEPTS = {
         "method/routing/search/rrt_star_connect.py",
         r"def _?choose_parent\(",
     ),
-    "fit, plan, sample": ("method/chain.py", r"(?s)\A(?=.*\bfit_template\()(?=.*\bplan_routes\()"),
+    "layout of the standard normal numbers": (
+        "method/sampling/numbers.py",
+        r"class \w*Numbers\(|lateral_root\.shape\[1\] \+",
+    ),
+    "rows of the certificate": ("method/validity/dynamics.py", r"class Check\(|worst_excess\("),
     "latitude and longitude": ("logs/geodesy.py", r"(?:import|from) pyproj|6_?378_?137|6_?371_?0"),
     "folders that replace others": ("base/folders/", r"renameat2|RENAME_EXCHANGE"),
     "object stores": ("base/stores.py", r"(?:import|from) fsspec"),
