@@ -1,9 +1,10 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Encounters kept by the thousand: tables in which each is a row, with its tracks as the bytes that a bag would hold.
+"""Tables of encounters: each row has the facts and the tracks, with the bytes of a bag.
 
-The messages of those who meet are cleaned and smoothed by `logs`, as a log's are; a log of another format is read whole.
+Messages of vehicles that meet are cleaned and smoothed by `logs`, as those of a log; logs in other
+formats are read whole.
 """
 
 from collections.abc import Mapping, Sequence
@@ -38,7 +39,7 @@ from scenario_gen.method.evaluation import criticality, EvaluationConfig
 from scenario_gen.situation import Situation
 from scenario_gen.types import Encounter
 
-ROW = {  # what is read of a row, and of which kinds it is
+ROW = {  # columns that are read, and their types
     **dict.fromkeys(("name", "kind"), str),
     "count": int,
     "tracks": bytes,
@@ -51,14 +52,23 @@ COLUMNS = {  # of a table
     **dict.fromkeys(("seconds", "gap", "distance", "lat", "lon", "ttc", "pet", "speed"), "double"),
     "tracks": "binary",
 }
-MARGIN = 2_000_000  # µs of messages before and after an encounter, for smoothing
+SMOOTHING_MARGIN_US = 2_000_000  # messages before and after an encounter
 
 
 @dataclass(frozen=True)
 class CleanTask:
-    """Encounters to clean: `found` are (partition, first row, row after the last), `hours` those of their messages.
+    """Encounters to clean.
 
-    A corpus has thousands of these tasks, each of which passes through the scheduler: it holds numbers, no tables or paths.
+    A corpus has thousands of these tasks, and each passes through the scheduler: it has numbers
+    instead of tables and paths.
+
+    Attributes:
+        name: of the task.
+        corpus: of the encounters.
+        number: of the table to write.
+        found: (partition, first row, row after the last) of the encounters.
+        hours: of their messages.
+        config: the parameters.
     """
 
     name: str
@@ -76,7 +86,7 @@ class CleanTask:
 
 @dataclass(frozen=True)
 class LogTask:
-    """A log to read, of any format that `read_log` knows, and the table to write."""
+    """A log in any format that `read_log` reads, and the table to write."""
 
     name: str
     paths: tuple[Place, ...]
@@ -85,39 +95,26 @@ class LogTask:
 
 
 def clean_found(task: CleanTask) -> None:
-    """Write the table of a task: a row for each encounter that is whole after cleaning, and why others are not."""
+    """Write a row for each encounter that survives cleaning, and why others do not."""
     from pyarrow import parquet
 
     parts = [part_of(task.corpus, number) for number, _, _ in task.found]
-    with fetched(
-        [*parts, *(task.corpus / "hours" / f"hour-{hour}.rows.parquet" for hour in task.hours)]
-    ) as here:
-        listed = [
-            one
-            for path, (_, *rows) in zip(here, task.found, strict=False)
-            for one in read_found(path, *rows)
-        ]
-        first, last = (
-            min(one.start for one in listed) - MARGIN,
-            max(one.end for one in listed) + MARGIN,
-        )
-        wanted = sorted({device for one in listed for device in one.devices})
-        filters = [("t", ">=", first), ("t", "<=", last), ("device", "in", wanted)]
-        tables = [
-            parquet.read_table(path, filters=filters).to_pandas() for path in here[len(parts) :]
-        ]
-    import pandas as pd
-
-    messages = (
-        pd.concat(tables)
-        .drop_duplicates()
-        .sort_values(["device", "t", "lat", "lon"], kind="stable")
-    )
-    by_device = dict(tuple(messages.groupby("device")))
-    rows, refused = [], []
+    hours = [task.corpus / "hours" / f"hour-{hour}.rows.parquet" for hour in task.hours]
+    with fetched([*parts, *hours]) as paths:
+        listed: list[Found] = []
+        for path, (_, first, last) in zip(paths, task.found, strict=False):
+            listed += read_found(path, first, last)
+        begin = min(found.start for found in listed) - SMOOTHING_MARGIN_US
+        end = max(found.end for found in listed) + SMOOTHING_MARGIN_US
+        devices = sorted({device for found in listed for device in found.devices})
+        filters = [("t", ">=", begin), ("t", "<=", end), ("device", "in", devices)]
+        tables = [parquet.read_table(path, filters=filters) for path in paths[len(parts) :]]
+        by_device = _by_device([table.to_pandas() for table in tables])
+    rows: list[dict[str, Any]] = []
+    refused = []
     for found in listed:
         try:
-            encounters = encounters_of(_raw(found, by_device), task.config.log).encounters
+            encounters = encounters_of(_raw_log(found, by_device), task.config.log).encounters
         except InputError as error:
             refused.append({"name": found.name, "why": str(error)})
             continue
@@ -125,44 +122,51 @@ def clean_found(task: CleanTask) -> None:
     write_encounters(task.target, rows, {"refused": refused, "quality": []})
 
 
-def _raw(found: Found, by_device: Mapping[int, Any]) -> RawLog:
-    """The messages of an encounter as a log."""
-    vehicles, begin = [], 0
+def _by_device(tables: Sequence[Any]) -> dict[int, Any]:
+    """Return the messages in data frames by vehicle, ordered by time, without repeated ones."""
+    import pandas as pd
+
+    messages = pd.concat(tables).drop_duplicates()
+    messages = messages.sort_values(["device", "t", "lat", "lon"], kind="stable")
+    return dict(tuple(messages.groupby("device")))
+
+
+def _raw_log(found: Found, by_device: Mapping[int, Any]) -> RawLog:
+    """Return the messages of an encounter as a log."""
+    vehicles, count = [], 0
+    begin, end = found.start - SMOOTHING_MARGIN_US, found.end + SMOOTHING_MARGIN_US
     for device in found.devices:
-        own = by_device[device]
-        own = own[(own["t"] >= found.start - MARGIN) & (own["t"] <= found.end + MARGIN)]
-        stamps = own["t"].to_numpy(np.int64) * 1000 + SPMD_EPOCH_NS
-        numbers = np.arange(begin, begin + len(own))
-        speed = own["speed"].to_numpy(np.float64)
-        heading = np.pi / 2.0 - own["heading"].to_numpy(np.float64) * (np.pi / 180.0)
+        messages = by_device[device]
+        messages = messages[(messages["t"] >= begin) & (messages["t"] <= end)]
+        stamps = messages["t"].to_numpy(np.int64) * 1000 + SPMD_EPOCH_NS
+        numbers = np.arange(count, count + len(messages))
         vehicles.append(
             Observations(
                 label(device),
                 stamps,
-                own[["lat", "lon"]].to_numpy() / DEGREE,
+                messages[["lat", "lon"]].to_numpy() / DEGREE,
                 numbers,
-                heading,
+                np.pi / 2.0 - messages["heading"].to_numpy(np.float64) * (np.pi / 180.0),
                 stamps,
-                speed,
+                messages["speed"].to_numpy(np.float64),
                 numbers,
             )
         )
-        begin += len(own)
-    return RawLog(
-        found.name, True, tuple(vehicles), begin, (Segment(0, found.name, "message", 1),)
-    )
+        count += len(messages)
+    segment = Segment(0, found.name, "message", 1)
+    return RawLog(found.name, True, tuple(vehicles), count, (segment,))
 
 
 def read_one_log(task: LogTask) -> None:
-    """Write the table of a log's encounters; it is bounded as every log is (`LogConfig`).
+    """Write the encounters of a log; it has the bounds of every log (`LogConfig`).
 
     Raises:
         InputError: the log cannot be used; the message names file and row.
     """
     try:
-        with fetched(task.paths) as here:
-            result = read_log(here, task.config.log)
-    except (NoEncounterError, UnknownFormatError) as error:  # a result: the log is not read again
+        with fetched(task.paths) as paths:
+            result = read_log(paths, task.config.log)
+    except (NoEncounterError, UnknownFormatError) as error:  # the log is finished
         write_encounters(
             task.target, [], {"refused": [{"name": task.name, "why": str(error)}], "quality": []}
         )
@@ -173,38 +177,25 @@ def read_one_log(task: LogTask) -> None:
 
 
 def row_of(encounter: Encounter, source: str, config: CorpusConfig) -> dict[str, Any]:
-    """Return an encounter's row: its kind is that of the two vehicles that have most to do with each other."""
-    situation, pairs = Situation.of(encounter), []
-    for i, j in combinations(range(len(encounter.vehicles)), 2):
-        both = np.flatnonzero(encounter.is_present[i] & encounter.is_present[j])
-        if len(both) < 2:
-            continue
-        apart = np.linalg.norm(encounter.position[i, both] - encounter.position[j, both], axis=1)
-        near = both[apart < config.log.proximity]
-        rows = near if len(near) > 1 else both
-        gap, _, _ = space_time_gap(
-            encounter.position[i, rows], encounter.position[j, rows], encounter.dt
-        )
-        pairs.append((gap, i, j, situation.kind(i, j)))
-    pairs.sort()
+    """Return the row of an encounter; its kind is that of the two vehicles that are nearest."""
+    situation = Situation.of(encounter)
+    gaps = _space_time_gaps(encounter, config.log.proximity)
+    kinds = {pair: situation.kind(*pair) for _, pair in gaps}
+    nearest_gap, nearest = gaps[0]
+    ids = [vehicle.id for vehicle in encounter.vehicles]
     measures = criticality(encounter, EvaluationConfig().ttc_horizon)
     latitude, longitude = encounter.origin or (None, None)
     return {
         "name": encounter.name,
         "source": source,
-        "kind": pairs[0][3],
+        "kind": kinds[nearest],
         "reactions": json.dumps(situation.reactions.document(encounter.vehicles)),
-        "kinds": json.dumps(
-            {
-                f"{encounter.vehicles[i].id} {encounter.vehicles[j].id}": kind
-                for _, i, j, kind in pairs
-            }
-        ),
-        "vehicles": [vehicle.id for vehicle in encounter.vehicles],
-        "count": len(encounter.vehicles),
+        "kinds": json.dumps({f"{ids[i]} {ids[j]}": kind for (i, j), kind in kinds.items()}),
+        "vehicles": ids,
+        "count": len(ids),
         "start_ns": encounter.start_ns,
         "seconds": encounter.duration,
-        "gap": pairs[0][0],
+        "gap": nearest_gap,
         "distance": measures.min_distance,
         "lat": latitude,
         "lon": longitude,
@@ -215,10 +206,28 @@ def row_of(encounter: Encounter, source: str, config: CorpusConfig) -> dict[str,
     }
 
 
+def _space_time_gaps(
+    encounter: Encounter, proximity: float
+) -> list[tuple[float, tuple[int, int]]]:
+    """Return the space-time gap [m] of each pair while it is within `proximity` [m], ascending."""
+    gaps = []
+    for i, j in combinations(range(len(encounter.vehicles)), 2):
+        both = np.flatnonzero(encounter.is_present[i] & encounter.is_present[j])
+        if len(both) < 2:
+            continue
+        first, second = encounter.position[i, both], encounter.position[j, both]
+        near = np.linalg.norm(first - second, axis=1) < proximity
+        if near.sum() > 1:
+            first, second = first[near], second[near]
+        gap, _, _ = space_time_gap(first, second, encounter.dt)
+        gaps.append((gap, (i, j)))
+    return sorted(gaps)
+
+
 def write_encounters(
     target: Place, rows: Sequence[Mapping[str, Any]], account: Mapping[str, Any]
 ) -> None:
-    """Write a table of encounters; the account stands in its metadata."""
+    """Write a table of encounters, with the account in its metadata."""
     write_table(target, rows, COLUMNS, account=account)
 
 

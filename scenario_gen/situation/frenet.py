@@ -271,7 +271,7 @@ def _lanes(
     is_in_lane = np.stack((lateral.change < 0.5, late), axis=1)  # in the first, in the last lane
     is_in_lane &= np.stack([track.is_present for track in tracks])[:, None]
     is_in_lane &= (np.abs(lateral.swerve) < MIN_SWERVE_M / 2.0)[:, None]
-    swerves = lateral.swerve.any(axis=1)
+    swerves = np.asarray(lateral.swerve.any(axis=1))
 
     def conflicts(slot: tuple[int, int], other: tuple[int, int]) -> bool:
         if slot[0] == other[0]:
