@@ -154,14 +154,14 @@ def test_who_reacts_to_whom_is_said_in_terminal_page_and_figures(case, encounter
     free = generate(encounter, "t_intersection", config, count=2, seed=3)
     for made, kept in ((case, True), (free, False)):
         page, figures = written(made, tmp_path)
-        sentence = said if kept else f"{said}: the scenarios are not held to it"
+        sentence = said if kept else f"{said}: not enforced"
         assert sentence in [
             line.strip().removeprefix("reaction  ") for line in printed(made).splitlines()
         ]
         assert (
             said in page
-            and ("are held to it" in page) == kept
-            and ("are not held to it" in page) != kept
+            and ('class="text">enforced' in page) == kept
+            and ("not enforced" in page) != kept
         )
         assert figures["reactions"]["sentences"] == [sentence]
         (edge,) = figures["reactions"]["edges"]
@@ -186,11 +186,8 @@ def test_the_figures_of_a_reaction_that_the_road_does_not_keep_are_said(tmp_path
     assert "vehicle 2: comes within " in sentence and made.generated.reactions == ()
     page, figures = written(made, tmp_path)
     text = printed(made)
+    assert sentence in text and "and answers its speed after 1.2 s: not enforced" in text
     assert (
-        sentence in text
-        and "and answers its speed after 1.2 s: the scenarios are not held to it" in text
-    )
-    assert (
-        page.count(str(escape(sentence))) > 1 and "are not held to it" in page
+        page.count(str(escape(sentence))) > 1 and "not enforced" in page
     )  # beside the reaction, and in accounts
     assert figures["adaptations"] == list(map(str, made.generated.adaptations))

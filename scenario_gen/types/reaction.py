@@ -131,17 +131,17 @@ class ReactionGraph:
         self, vehicles: Sequence[Vehicle], kept: Sequence[Reaction] | None = None
     ) -> tuple[str, ...]:
         """Return one sentence for each edge; it says whether the edge is among the `kept`."""
-        free = "" if kept is None else ": the scenarios are not held to it"
+        free = "" if kept is None else ": not enforced"
         sentences = [
             edge.words(vehicles) if edge in (kept or ()) else f"{edge.words(vehicles)}{free}"
             for edge in self.edges
         ]
         sentences += [
-            f"{edge.words(vehicles)}: left out, for it closes a circle of reactions"
+            f"{edge.words(vehicles)}: left out, as it closes a cycle of reactions"
             for edge in self.cut
         ]
         return tuple(sentences) or (
-            f"no vehicle is seen to react to another{self.why and ': '}{self.why}",
+            f"no reactions detected{self.why and ': '}{self.why}",
         )
 
     def document(

@@ -56,7 +56,7 @@ def test_who_leaves_long_after_waits_for_something_else():
     graph = Situation.of(crossing(14.0)).reactions
     assert graph.edges == ()
     assert graph.sentences(TWO)[0].startswith(
-        "no vehicle is seen to react to another: the nearest are vehicle 2 and vehicle 1"
+        "no reactions detected: the nearest are vehicle 2 and vehicle 1"
     )
 
 
@@ -116,7 +116,7 @@ def test_the_least_sure_edge_of_a_circle_is_cut_and_said():
     graph = without_circles([edge(0, 1, 0.9), edge(1, 2, 0.4), edge(2, 0, 0.8)], 3)
     assert [(one.who, one.whom) for one in graph.cut] == [(1, 2)]
     assert graph.order == (1, 0, 2)
-    assert "left out, for it closes a circle" in graph.sentences(tuple(map(Vehicle, "abc")))[-1]
+    assert "left out, as it closes a cycle" in graph.sentences(tuple(map(Vehicle, "abc")))[-1]
 
 
 @pytest.mark.parametrize("count", [2, 3, 4])

@@ -21,7 +21,7 @@ def test_every_edge_has_a_sentence_and_what_is_doubtful_or_cut_says_so():
         "vehicle b waits for vehicle a, then passes 2.4 s behind it",
         "vehicle c follows vehicle b, 1.3 s bumper to bumper, and answers its speed after 1.2 s (doubtful)",
         "vehicle a follows vehicle c, 1.5 s bumper to bumper, and answers its speed after 0.8 s (doubtful): left out, "
-        "for it closes a circle of reactions",
+        "as it closes a cycle of reactions",
     )
 
 
@@ -52,7 +52,7 @@ def test_road_users_are_called_by_their_types():
 def test_edges_that_scenarios_do_not_keep_are_said():
     kept, free, cut = GRAPH.sentences(VEHICLES, [SURE])
     assert "held" not in kept and "held" not in cut
-    assert free.endswith("(doubtful): the scenarios are not held to it")
+    assert free.endswith("(doubtful): not enforced")
 
 
 def test_the_document_has_lag_strength_own_part_and_confidence():

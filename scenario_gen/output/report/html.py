@@ -1,11 +1,11 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Pages that hold everything they need and open offline.
+"""Self-contained HTML pages that work offline.
 
-Nothing runs in them but the scripts that we put there ourselves, named by their hashes. So a name out of a log stays text,
-whatever it looks like, even where escaping it were forgotten: no script element, no event handler and no `javascript:` address
-is run, `eval` is not to be had, and nothing is asked of any network.
+A content security policy allows only our own scripts, by their hashes. Names from a log therefore
+stay text even if escaping were forgotten: no other script element, no event handler, no
+`javascript:` URL and no `eval` runs, and nothing is loaded from a network.
 """
 
 from base64 import b64encode
@@ -35,11 +35,11 @@ def render_page(
 
     Args:
         template: name of a Jinja template among the assets.
-        scripts: names of scripts among the assets, in the order in which they run, after the libraries.
-        data: what the scripts draw, put into the page as JSON; all numbers finite.
-        libraries: scripts of others, as text.
-        folder: of further templates and scripts.
-        **values: what else the template asks for.
+        scripts: names of scripts among the assets; they run in this order, after the libraries.
+        data: input of the scripts, embedded as JSON; all numbers are finite.
+        libraries: texts of third-party scripts.
+        folder: with further templates and scripts.
+        **values: further variables of the template.
     """
     assets = files("scenario_gen.output.report") / "assets"
 
@@ -72,15 +72,15 @@ def render_page(
 
 
 def content_policy(scripts: Sequence[str]) -> str:
-    """Return the policy of a page with these inline scripts, each given as it stands between its tags.
+    """Return the policy of a page with these inline scripts, each without its tags.
 
-    Styles stay free ('unsafe-inline'): widths of bars and colours of vehicles are style attributes.
+    Inline styles are allowed, as widths of bars and colours of vehicles are style attributes.
     """
     hashes = " ".join(
         f"'sha256-{b64encode(sha256(text.encode('utf-8')).digest()).decode('ascii')}'"
         for text in scripts
     )
     return (
-        f"default-src 'none'; script-src {hashes}; style-src 'unsafe-inline'; img-src data: blob:; font-src data:; "
-        "base-uri 'none'; form-action 'none'"
+        f"default-src 'none'; script-src {hashes}; style-src 'unsafe-inline'; "
+        "img-src data: blob:; font-src data:; base-uri 'none'; form-action 'none'"
     )

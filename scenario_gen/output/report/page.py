@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The report: one HTML page that holds everything, opens offline and is a pleasure to look at."""
+"""The report: one HTML page that works offline."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -28,12 +28,10 @@ from scenario_gen.types import (
 )
 
 SIGNIFICANT = 0.03
-"""Below this, E without changepoints leaves nothing to gain and the case is not counted."""
-UNCOMPARED = (
-    "sets to compare with were not requested; `scenario-gen generate --compare` draws them"
-)
+"""A case counts in the comparison if E without changepoints is at least this."""
+UNCOMPARED = "not requested; `scenario-gen generate --compare` draws sets to compare with"
 MAX_SAMPLES = 50
-"""Scenarios of each arm that a page draws; the figures count all."""
+"""Scenarios of each set that a page draws; the figures use all."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,7 +43,7 @@ class ReportInput:
         title: heading and window title.
         quality: the log's data quality, in lines.
         provenance: log, its hash, seed, versions, parameters, by name.
-        bag: path of the bag that holds the scenarios, by which a command names them; "": none does.
+        bag: path of the bag with the scenarios, for commands on the page; "" if there is none.
     """
 
     cases: Sequence[GenerationResult]
@@ -82,12 +80,12 @@ def render(report: ReportInput) -> str:
 
 
 def _is_parameter(name: str) -> bool:
-    """Parameters have dotted names ("sampling.sigma_f"); they are many, and folded away."""
+    """Whether a provenance entry is a parameter, such as sampling.sigma_f."""
     return "." in name and " " not in name
 
 
 def _view(index: int, case: GenerationResult) -> dict[str, Any]:
-    """Return what the page's tables say about one case."""
+    """Return the contents of the page's tables for one case."""
     arms = [
         (case.row_name, case.generated),
         *((name, case.references.get(name)) for name in (WITHOUT, UNIFORM)),
@@ -159,16 +157,16 @@ def _view(index: int, case: GenerationResult) -> dict[str, Any]:
 
 
 def _in_words(case: GenerationResult) -> str:
-    """Return what the set is: how many are valid, who reacts to whom, who goes first."""
+    """Return a summary of the set: valid scenarios, reactions, passing orders, criticality."""
     orders = case.coverage.orders if case.coverage is not None else {}
-    first = f"{len(orders)} orders at the conflicts" if len(orders) > 1 else ""
+    first = f"{len(orders)} passing orders" if len(orders) > 1 else ""
     kept = "; ".join(case.reacting["sentences"])
     valid = f"{case.published} of {case.generated.requested} scenarios are valid"
     return "; ".join(filter(None, [valid, kept, first, _criticality(case)]))
 
 
 def _criticality(case: GenerationResult) -> str:
-    """Return the least time to collision and PET of all scenarios, in words; "" if nothing was measured."""
+    """Return the smallest TTC and PET of all scenarios as text; "" if nothing was measured."""
     if case.coverage is None or not case.coverage.index:
         return ""
     cap = next((metric.cap for metric in case.evaluation.metrics if metric.id == "min_ttc"), None)
@@ -183,7 +181,7 @@ def _criticality(case: GenerationResult) -> str:
 
 
 def _errors(case: GenerationResult, metric: str) -> dict[str, Any]:
-    """E of the delivered set, and what stands below it: each with its words and whether it is the best of what is compared."""
+    """E of the set, and of the rows below it: each with its name and whether it is the best."""
     best = case.best(metric)
     words = {WITHOUT: "without", UNIFORM: "uniform", NARROW: "preset narrow", REPLAY: "replay"}
     errors = {
@@ -201,7 +199,7 @@ def _errors(case: GenerationResult, metric: str) -> dict[str, Any]:
 
 
 def _verdict(views: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
-    """Return the page's first sentences in figures: how many were accepted, and where E is below what it is compared with."""
+    """Return the figures of the page's first sentences: valid scenarios, and where E is lower."""
     better: dict[str, dict[str, tuple[int, int]]] = {}
     for row, words in (
         (WITHOUT, "without changepoints"),

@@ -29,37 +29,34 @@ from scenario_gen.types import (
 
 SHORT = {WITHOUT: "without", UNIFORM: "uniform", NARROW: "narrow", REPLAY: "replay"}
 COMPARED = (
-    "; after | of sets drawn likewise, without changepoints and with K evenly spaced; in brackets, not compared: preset "
-    "narrow, replay of the recording"
+    "; after |: sets without changepoints and with K evenly spaced ones; in brackets, for "
+    "orientation only: preset narrow, replay of the recording"
 )
 UNCOMPARED = (
-    "; in brackets, not compared: replay of the recording. --compare draws sets to compare with"
+    "; in brackets, for orientation only: replay of the recording. --compare draws further sets"
 )
-VARIED = (
-    "pet",
-    "gap",
-    "speed",
-)  # figures whose range is said: PET, or where nobody crosses the least gap, and the speed
-FAILED = "yellow"
+VARIED = ("pet", "gap", "speed")
+"""Figures whose range is printed: PET, or the smallest gap if no vehicles cross, and the speed."""
+WARNING_STYLE = "yellow"
 
 
 def summary(cases: Sequence[GenerationResult], *, verbose: bool = False) -> RenderableType:
-    """Return for rich to print what a user asks first of each case: what was read, who reacts, what is valid, how varied it is.
+    """Return a summary of each case for rich: recording, reactions, validity, variety.
 
     Args:
-        cases: what was generated.
-        verbose: routes and the comparison with the recording (E), too.
+        cases: the generated sets.
+        verbose: whether to add routes and the comparison with the recording (E).
     """
     lines = [line for case in cases for line in _case(case, verbose)]
     if verbose:
         beside = COMPARED if any(case.references for case in cases) else UNCOMPARED
-        explained = f"K: changepoints. E: distance of the delivered set to the recording, lower is nearer{beside}."
+        explained = f"K: changepoints. E: distance to the recording, lower is nearer{beside}."
         lines.append(Text(explained, style="dim"))
     return Group(*lines)
 
 
 def _case(case: GenerationResult, verbose: bool) -> list[RenderableType]:
-    """The name of a case, and below it a row for each question; what is not as recorded is yellow."""
+    """The name of a case and its rows; deviations from the recording are yellow."""
     result, recorded = case.generated, case.encounter
     refused = ", ".join(f"{count} {words}" for words, count in causes_in_words(result.refused))
     tried = (
@@ -90,7 +87,11 @@ def _case(case: GenerationResult, verbose: bool) -> list[RenderableType]:
     remark = case.segmentation.remark(recorded.duration)
     unused = [loss.message for loss in losses if loss.kind == "arm"]
     for message in (*lost, *vanished, *case.lost_reactions):
-        table.add_row("", Text("not kept", style=FAILED), Text(printable(message), style=FAILED))
+        table.add_row(
+            "",
+            Text("not kept", style=WARNING_STYLE),
+            Text(printable(message), style=WARNING_STYLE),
+        )
     for message in (*unused, *case.route_remarks, *([remark] if remark else [])):
         table.add_row("", "note", printable(message))
     title: list[RenderableType] = [Text(printable(case.title), style="bold"), table]
@@ -98,7 +99,7 @@ def _case(case: GenerationResult, verbose: bool) -> list[RenderableType]:
 
 
 def _variety(case: GenerationResult) -> str:
-    """The range of the figures of a set, each with the recording's in brackets."""
+    """The ranges of the figures of a set, each with the recorded value in brackets."""
     spreads = {} if case.coverage is None else case.coverage.spreads
     ranges = []
     for spread in (spreads[name] for name in VARIED if name in spreads):
@@ -112,12 +113,13 @@ def _variety(case: GenerationResult) -> str:
 
 
 def _vanished(values: Mapping[str, Interval]) -> list[str]:
-    """Say how many of the recording's conflicts the scenarios have not."""
+    """Return a sentence on recorded conflicts that vanish in the scenarios."""
     vanished, conflicts = (
         values.get(key, Interval(math.nan)).value for key in ("vanished_conflicts", "conflicts")
     )
-    words = f"{vanished:.3g} of the recording's {vanished + conflicts:.0f} conflict(s) vanish, mean over scenarios"
-    return [words] if vanished > 0.0 else []
+    total = vanished + conflicts
+    text = f"{vanished:.3g} of {total:.0f} recorded conflict(s) vanish on average"
+    return [text] if vanished > 0.0 else []
 
 
 def _details(case: GenerationResult, row: Row | None) -> list[Text]:
@@ -132,12 +134,12 @@ def _details(case: GenerationResult, row: Row | None) -> list[Text]:
     return [
         Text(figures),
         *similar,
-        *(Text(f"  {printable(line)}", style=FAILED) for line in case.similarity()["said"]),
+        *(Text(f"  {printable(line)}", style=WARNING_STYLE) for line in case.similarity()["said"]),
     ]
 
 
 def _errors(case: GenerationResult, metric: str) -> Text:
-    """E of the delivered set, of those it is compared with and of those beside it; the best of the compared is green."""
+    """E of the set, of the sets it is compared with (the best is green), and of further rows."""
     compared, best, value = case.compared, case.best(metric), case.evaluation.value
     text = Text(f"  E {ERRORS[metric]} ")
     text.append(

@@ -52,7 +52,7 @@ def test_names_are_escaped_and_figures_are_there(page):
         "lateral acceleration",
     ):
         assert text in page
-    assert "There is no such set: no route exists." in page
+    assert "No such set: no route exists." in page
     assert "<b>16</b> of 16 requested scenarios are valid, of 26 candidates" in page
 
 

@@ -143,7 +143,7 @@ def test_the_speeds_follow_the_film_and_a_click_on_them_sets_it(tab):
 def test_a_folded_part_is_opened_by_the_contents_and_drawn(tab):
     chart = tab.page.locator('[data-case="0"] [data-role="motion"]')
     assert not chart.is_visible()
-    tab.page.get_by_role("link", name="How it is driven").first.click()
+    tab.page.get_by_role("link", name="Motion").first.click()
     tab.wait(lambda: chart.is_visible() and chart.locator("svg").bounding_box()["width"] > 600)
 
 
@@ -153,7 +153,7 @@ def test_another_case_opens(tab):
         tab.page.locator('[data-case="1"]').is_visible()
         and not tab.page.locator('[data-case="0"]').is_visible()
     )
-    assert "There is no such set" in tab.page.locator('[data-case="1"]').inner_text()
+    assert "No such set" in tab.page.locator('[data-case="1"]').inner_text()
     tab.part("scrub", 1).fill("250")
     assert tab.time(1) == 3.0 and tab.troubles == []
 
