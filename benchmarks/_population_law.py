@@ -21,7 +21,12 @@ from benchmarks.naturalness import DATA
 from scenario_gen.base.errors import InputError
 from scenario_gen.logs import LogConfig, read_log
 from scenario_gen.method.evaluation.law import SHIPPED
-from scenario_gen.method.evaluation.population import FEATURES, KINDS, Member, member_of
+from scenario_gen.method.evaluation.population import (
+    EncounterFeatures,
+    FEATURES,
+    features_of,
+    KINDS,
+)
 
 WINDOWS = "trajectories/ngsim_commonroad/USA_*_all_vehicles.csv"
 SOURCE = "NGSIM, Lankershim Boulevard and Peachtree Street (US Department of Transportation, public domain)"
@@ -30,7 +35,7 @@ POOLED = 10.0  # encounters
 DIGITS = 4
 
 
-def members() -> list[Member]:
+def members() -> list[EncounterFeatures]:
     """Return the encounters of two vehicles each."""
     found = []
     for path in sorted(DATA.glob(WINDOWS)):
@@ -39,7 +44,7 @@ def members() -> list[Member]:
                 encounters = read_log([path], LogConfig(vehicles=f"{one},{other}")).encounters
             except InputError:
                 continue  # they have too little in common
-            found += [member_of(encounter, path.stem, 0) for encounter in encounters]
+            found += [features_of(encounter, path.stem, 0) for encounter in encounters]
     gap, distance = FEATURES.index("gap"), FEATURES.index("distance")
     close = [
         abs(member.features[gap]) < CLOSE_S or member.features[distance] < CLOSE_M

@@ -90,7 +90,7 @@ def features_of(
     """
     motion = motion.resampled(PERIOD)
     figures = {own.pair: own for own in figures_of(motion) if pair in (None, own.pair)}
-    conflicts = {
+    conflicts: dict[Pair, Conflict] = {
         known: conflict
         for known, conflict in conflicts_by_pair(find_conflicts(motion)).items()
         if known in figures
