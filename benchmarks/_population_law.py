@@ -20,13 +20,13 @@ import pandas as pd
 from benchmarks.naturalness import DATA
 from scenario_gen.base.errors import InputError
 from scenario_gen.logs import LogConfig, read_log
-from scenario_gen.method.evaluation.law import SHIPPED
-from scenario_gen.method.evaluation.population import (
+from scenario_gen.method.evaluation.encounter_features import (
     EncounterFeatures,
     FEATURES,
     features_of,
-    KINDS,
 )
+from scenario_gen.method.evaluation.law import SHIPPED
+from scenario_gen.method.evaluation.population import KINDS
 
 WINDOWS = "trajectories/ngsim_commonroad/USA_*_all_vehicles.csv"
 SOURCE = "NGSIM, Lankershim Boulevard and Peachtree Street (US Department of Transportation, public domain)"
