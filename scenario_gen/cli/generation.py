@@ -19,7 +19,6 @@ from scenario_gen.cli.options import (
     warn_of_metadata,
 )
 from scenario_gen.cli.output import current, emit_json, print_, progress, status
-from scenario_gen.situation import Situation
 
 if TYPE_CHECKING:
     from scenario_gen.types import GenerationResult
@@ -209,6 +208,7 @@ def roads(
     from scenario_gen.method.suitable_roads import suitable_roads
     from scenario_gen.output.map_picture import map_picture
     from scenario_gen.roads import BUILT_IN
+    from scenario_gen.situation import Situation
 
     config = configured(parameter_file, assignments)
     template = (
@@ -217,11 +217,8 @@ def roads(
     if not road:
         names = [*BUILT_IN, "corridor"]
         if template is not None:
-            names = list(
-                suitable_roads(
-                    Situation.of(template), segment(template, config.segmentation, 0), config
-                )
-            )
+            segmentation = segment(template, config.segmentation, 0)
+            names = list(suitable_roads(Situation.of(template), segmentation, config))
         emit_json(roads=names)
         title = "roads" if template is None else f"roads that suit {template.name}"
         print_(f"{title}: {', '.join(names)}")
