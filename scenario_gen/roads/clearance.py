@@ -167,7 +167,10 @@ def _gap_squared(ax: float, ay: float, bx: float, by: float, left: float, low: f
 def _is_open(clearance: Floats, i: int, j: int) -> bool:
     """Return whether a cell is inside the grid and drivable."""
     height, width = clearance.shape
-    return 0 <= i < height and 0 <= j < width and clearance[i, j] != 0.0
+    if not (0 <= i < height and 0 <= j < width):
+        return False
+    is_open: bool = clearance[i, j] != 0.0
+    return is_open
 
 
 @kernel(inline=True)

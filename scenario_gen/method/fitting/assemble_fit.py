@@ -24,9 +24,6 @@ from scenario_gen.types import (
     Segmentation,
 )
 
-_MAX_STANDING_PATH_M = 0.5
-_PATH_STEP_M = 0.5
-
 
 def assemble_fit(
     situation: Situation,
@@ -110,11 +107,11 @@ def _with_given_ends(anchors: Floats, progress: Floats, given: Floats, *, still:
 
 
 def _path(track: Track) -> Floats:
-    """Return poses (M, 3) along the placed path from start to end."""
+    """Return poses (M, 3) every half metre along the placed path from start to end."""
     if track.still:
         return track.curve.points[:1]
     first, last = float(track.progress[0]), float(track.progress[-1])
-    count = max(int(np.ceil((last - first) / _PATH_STEP_M)), 1) + 1
+    count = max(int(np.ceil((last - first) / 0.5)), 1) + 1
     return track.curve.at(np.linspace(first, last, count))
 
 
@@ -125,7 +122,7 @@ def _standing_primitives(track: Track, index: Ints) -> Bools:
     primitives = list(pairwise(index))
     driven = np.array([track.progress[b] - track.progress[a] for a, b in primitives])
     fastest = np.array([track.speed[a : b + 1].max() for a, b in primitives])
-    slow = (driven < _MAX_STANDING_PATH_M) & (fastest < STANDING_SPEED_MPS)
+    slow = (driven < 0.5) & (fastest < STANDING_SPEED_MPS)
     stands = slow | (driven < 1e-3)
     if stands.all():  # it does move a little
         stands[int(np.argmax(driven))] = False

@@ -17,8 +17,8 @@ from scenario_gen.method.fitting.placement import (
     check_scale,
     max_repair,
     Placement,
-    SCALES,
     separated,
+    TRIED_SCALES_RATIO,
 )
 from scenario_gen.numerics import frozen
 from scenario_gen.numerics.curve import Curve
@@ -104,7 +104,7 @@ class _Scale:
             shortened = _shortened(drivers, road, config)
         if shortened != 1.0:
             return cls(shortened, (1.0,))
-        return cls(1.0, tuple(filter(config.accepts, SCALES)))
+        return cls(1.0, tuple(filter(config.accepts, TRIED_SCALES_RATIO)))
 
 
 def _placements(

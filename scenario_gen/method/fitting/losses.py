@@ -4,7 +4,9 @@
 """The parts of a recorded encounter that a fit loses: turns, conflicts, lanes, passings."""
 
 from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
 from itertools import combinations, permutations
+import math
 
 import numpy as np
 
@@ -38,18 +40,26 @@ Other losses are only reported.
 
 Tracks = tuple[Track, ...]
 
-_MIN_SIDE_BY_SIDE_S = 1.0
-_MIN_KEPT_SHARE = 0.5  # of the time side by side
-_MIN_SIDE_OFFSET_M = 1.0  # between centres of vehicles side by side,
-_MAX_SIDE_OFFSET_M = 6.0
-_LANE_WIDTH_DIFFERENCE_M = 1.5  # between recorded lanes and those of the road
-_SAME_DIRECTION_RAD = np.radians(30.0)
-_IN_LANE_M = 1.4  # offset up to which a vehicle is in another one's lane,
-_IN_LANE_ON_ROAD_M = 2.0
-_NEXT_LANE_M = 2.3  # and from which it is in another lane
-_MAX_EXTRAPOLATION_M = 30.0  # beyond the ends of a path, straight on,
-_MAX_DRIFT_M = 1.0  # if this leaves the lane by less
-_PASSING_DISTANCE_M = 2.0  # by which a passing vehicle is behind, and later ahead
+
+@dataclass(frozen=True)
+class _Limits:
+    """The bounds of lanes, passings and vehicles side by side."""
+
+    min_side_by_side_s: float = 1.0  # shorter encounters are not compared
+    min_kept_share: float = 0.5  # of the time side by side
+    min_side_offset_m: float = 1.0  # between centres of vehicles side by side,
+    max_side_offset_m: float = 6.0
+    lane_width_difference_m: float = 1.5  # between recorded lanes and those of the road
+    same_direction_rad: float = math.radians(30.0)
+    in_lane_m: float = 1.4  # offset up to which a vehicle is in another one's lane,
+    in_lane_on_road_m: float = 2.0
+    next_lane_m: float = 2.3  # and from which it is in another lane
+    max_extrapolation_m: float = 30.0  # beyond the ends of a path, straight on,
+    max_drift_m: float = 1.0  # if this leaves the lane by less
+    passing_distance_m: float = 2.0  # by which a passing vehicle is behind, and later ahead
+
+
+_LIMITS = _Limits()
 
 
 class LostEncounterError(RefusedError):
@@ -188,7 +198,7 @@ def _in_two_lanes(track: Track, other: Track) -> bool:
             for end in (0, 1)
         ]
     )
-    return bool((offsets > _IN_LANE_M).any() and not (offsets <= _IN_LANE_M).any())
+    return bool((offsets > _LIMITS.in_lane_m).any() and not (offsets <= _LIMITS.in_lane_m).any())
 
 
 def _lost_lanes(tracks: Tracks, placed: Tracks) -> Iterator[Loss]:
@@ -197,8 +207,8 @@ def _lost_lanes(tracks: Tracks, placed: Tracks) -> Iterator[Loss]:
     for i, j in permutations(drivers, 2):
         before = [_offset_at_end(tracks[i], tracks[j], end) for end in (0, 1)]
         after = [_offset_at_end(placed[i], placed[j], end) for end in (0, 1)]
-        shares_lane = any(abs(offset) < _IN_LANE_M for offset in before)
-        max_offset = np.inf if shares_lane else _MAX_SIDE_OFFSET_M
+        shares_lane = any(abs(offset) < _LIMITS.in_lane_m for offset in before)
+        max_offset = np.inf if shares_lane else _LIMITS.max_side_offset_m
         if any(map(_changes_lane, before, after, (max_offset, max_offset))):
             yield _lane_loss(tracks[i].vehicle.id, tracks[j].vehicle.id, before)
 
@@ -206,7 +216,7 @@ def _lost_lanes(tracks: Tracks, placed: Tracks) -> Iterator[Loss]:
 def _lane_loss(a: str, b: str, offsets: Sequence[float]) -> Loss:
     """Return the loss of a vehicle b with recorded offsets [m] from a at the start and the end."""
     known = [offset for offset in offsets if not np.isnan(offset)]
-    in_lane = [abs(offset) < _IN_LANE_M for offset in known]
+    in_lane = [abs(offset) < _LIMITS.in_lane_m for offset in known]
     if all(in_lane):
         message = f"vehicles {a} and {b} drive in one lane in the recording, not on this road"
         return Loss("following", (a, b), message)
@@ -224,10 +234,10 @@ def _changes_lane(recorded: float, on_road: float, max_offset: float) -> bool:
 
     Recorded offsets beyond `max_offset` [m] are not compared.
     """
-    if abs(recorded) < _IN_LANE_M:
-        return bool(np.isnan(on_road)) or abs(on_road) > _IN_LANE_ON_ROAD_M
-    is_beside = _NEXT_LANE_M < abs(recorded) < max_offset
-    return is_beside and (recorded * on_road < 0.0 or abs(on_road) < _IN_LANE_M)
+    if abs(recorded) < _LIMITS.in_lane_m:
+        return bool(np.isnan(on_road)) or abs(on_road) > _LIMITS.in_lane_on_road_m
+    is_beside = _LIMITS.next_lane_m < abs(recorded) < max_offset
+    return is_beside and (recorded * on_road < 0.0 or abs(on_road) < _LIMITS.in_lane_m)
 
 
 def _offset_at_end(track: Track, other: Track, end: int) -> float:
@@ -244,16 +254,16 @@ def _offset_at_end(track: Track, other: Track, end: int) -> float:
     if track.still or other.still:
         return np.nan
     if beyond <= 0.0:
-        leads_there = turn < _SAME_DIRECTION_RAD
+        leads_there = turn < _LIMITS.same_direction_rad
     else:
-        leads_there = beyond < _MAX_EXTRAPOLATION_M and turn * beyond < _MAX_DRIFT_M
+        leads_there = beyond < _LIMITS.max_extrapolation_m and turn * beyond < _LIMITS.max_drift_m
     return float(offset[0]) if leads_there else np.nan
 
 
 def _lost_passings(tracks: Tracks, placed: Tracks) -> Iterator[Loss]:
     for i, j in permutations(range(len(tracks)), 2):
-        side = _passing_side(tracks[i], tracks[j], _MAX_SIDE_OFFSET_M)
-        max_offset = _MAX_SIDE_OFFSET_M + _LANE_WIDTH_DIFFERENCE_M
+        side = _passing_side(tracks[i], tracks[j], _LIMITS.max_side_offset_m)
+        max_offset = _LIMITS.max_side_offset_m + _LIMITS.lane_width_difference_m
         if side and _passing_side(placed[i], placed[j], max_offset) != side:
             a, b = tracks[i].vehicle.id, tracks[j].vehicle.id
             word = "left" if side > 0 else "right"
@@ -275,30 +285,30 @@ def _passing_side(track: Track, other: Track, max_offset: float) -> int:
         return 0
     poses, others = track.poses[both], other.poses[both]
     ahead, left = ahead_and_left((others - poses)[:, :2], poses[:, 2])
-    alike = np.abs(wrap_angle(others[:, 2] - poses[:, 2])) < _SAME_DIRECTION_RAD
+    alike = np.abs(wrap_angle(others[:, 2] - poses[:, 2])) < _LIMITS.same_direction_rad
     near = (np.abs(left) < max_offset) & (other.still | alike)
-    before = np.flatnonzero(near & (ahead > _PASSING_DISTANCE_M))
-    after = np.flatnonzero(near & (ahead < -_PASSING_DISTANCE_M))
+    before = np.flatnonzero(near & (ahead > _LIMITS.passing_distance_m))
+    after = np.flatnonzero(near & (ahead < -_LIMITS.passing_distance_m))
     if not len(before) or not len(after) or before[0] > after[-1]:
         return 0
     offset = float(left[np.argmin(np.where(near, np.abs(ahead), np.inf))])
-    return -int(np.sign(offset)) if abs(offset) > _MIN_SIDE_OFFSET_M else 0
+    return -int(np.sign(offset)) if abs(offset) > _LIMITS.min_side_offset_m else 0
 
 
 def _lost_neighbours(tracks: Tracks, placed: Tracks) -> Iterator[Loss]:
     for i, j in combinations(range(len(tracks)), 2):
         reach = (tracks[i].vehicle.length + tracks[j].vehicle.length) / 2.0
         both = tracks[i].is_present & tracks[j].is_present
-        recorded = _side(tracks[i].poses, tracks[j].poses, reach, _MAX_SIDE_OFFSET_M)
-        max_offset = _MAX_SIDE_OFFSET_M + _LANE_WIDTH_DIFFERENCE_M
+        recorded = _side(tracks[i].poses, tracks[j].poses, reach, _LIMITS.max_side_offset_m)
+        max_offset = _LIMITS.max_side_offset_m + _LIMITS.lane_width_difference_m
         on_road = _side(placed[i].poses, placed[j].poses, reach, max_offset)
         for side, word in ((1, "left"), (-1, "right")):
             side_by_side: Bools = both & (recorded == side)
             seconds = float(side_by_side.sum()) * tracks[0].dt
-            if seconds < _MIN_SIDE_BY_SIDE_S:
+            if seconds < _LIMITS.min_side_by_side_s:
                 continue
             kept = float((on_road[side_by_side] == side).mean())
-            if kept < _MIN_KEPT_SHARE:
+            if kept < _LIMITS.min_kept_share:
                 a, b = tracks[i].vehicle.id, tracks[j].vehicle.id
                 message = (
                     f"vehicle {b} is to the {word} of {a} for {seconds:.1f} s in the recording, "
@@ -313,7 +323,7 @@ def _side(path: Floats, other: Floats, reach: float, max_offset: float) -> Ints:
     It is 1 for left and -1 for right, 0 where they are not side by side.
     """
     ahead, left = ahead_and_left((other - path)[:, :2], path[:, 2])
-    alike = np.abs(wrap_angle(other[:, 2] - path[:, 2])) < _SAME_DIRECTION_RAD
+    alike = np.abs(wrap_angle(other[:, 2] - path[:, 2])) < _LIMITS.same_direction_rad
     offset = np.abs(left)
-    near = (np.abs(ahead) < reach) & (offset > _MIN_SIDE_OFFSET_M) & (offset < max_offset)
+    near = (np.abs(ahead) < reach) & (offset > _LIMITS.min_side_offset_m) & (offset < max_offset)
     return np.where(alike & near, np.sign(left), 0.0).astype(np.int64)

@@ -15,7 +15,7 @@ from scenario_gen.roads import footprint_fits, ground_for, nearest_pose_with_roo
 from scenario_gen.situation import separate, smallest_gaps, Track
 from scenario_gen.types import Loss, Note, Road, Vehicle
 
-SCALES = (1.0, 0.9, 1.1, 0.8, 1.2)
+TRIED_SCALES_RATIO = (1.0, 0.9, 1.1, 0.8, 1.2)
 """The scales that are tried, the best first."""
 STANDING_SPEED_MPS = 0.3
 """A slower vehicle stands."""

@@ -22,9 +22,9 @@ from scenario_gen.method.fitting.config import FittingConfig
 from scenario_gen.method.fitting.placement import (
     max_repair,
     Placement,
-    SCALES,
     separated,
     share_with_room,
+    TRIED_SCALES_RATIO,
 )
 from scenario_gen.numerics import Floats, frozen
 from scenario_gen.numerics.curve import Curve
@@ -136,7 +136,7 @@ class _GridSearch:
 
     def candidates(self, config: FittingConfig) -> Iterator[_Similarity]:
         """Yield the best similarities with each accepted scale, the best first."""
-        for scale in filter(config.accepts, SCALES):
+        for scale in filter(config.accepts, TRIED_SCALES_RATIO):
             coarse = sorted(self._coarse(scale), key=lambda each: each.rank)
             refined = map(self._refined, coarse[:_REFINED_CANDIDATES])
             yield from sorted(refined, key=lambda each: each.rank)

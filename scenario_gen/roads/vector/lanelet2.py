@@ -34,7 +34,7 @@ from scenario_gen.roads.vector.osm_tags import tags_of, users_of_tags, value_of_
 from scenario_gen.roads.vector.signs import DraftRule, kind_of_sign
 from scenario_gen.types import CARS, DRIVERS, RuleKind
 
-_MPS_PER_KMH = 1.0 / 3.6
+_KMH_FACTOR = 1.0 / 3.6
 _DEFAULT_LIMITS_KMH = {
     ("road", "urban"): 50.0,
     ("road", "nonurban"): 100.0,
@@ -393,7 +393,7 @@ class LaneletMap:
         texts = [tags.get("sign_type", ""), tags.get("speed_limit", "")]
         for text in (*texts, *(sign.get("subtype", "") for sign in signs)):
             sign_name = re.fullmatch(r"(?:de)?274(?:\.1)?-([0-9]+)", text)
-            limit = float(sign_name[1]) * _MPS_PER_KMH if sign_name else speed_of(text, "km/h")
+            limit = float(sign_name[1]) * _KMH_FACTOR if sign_name else speed_of(text, "km/h")
             if not math.isnan(limit):
                 return limit
         return math.nan
@@ -465,5 +465,5 @@ def _speed_limit(lanelet: _Relation, limits: dict[str, float]) -> float:
     refs = [member.get("ref", "") for member in lanelet.element.findall("member")]
     signed = [limits[ref] for ref in refs if not math.isnan(limits.get(ref, math.nan))]
     place = lanelet.tags.get("subtype", "road"), lanelet.tags.get("location", "urban")
-    default = _DEFAULT_LIMITS_KMH.get(place, math.nan) * _MPS_PER_KMH
+    default = _DEFAULT_LIMITS_KMH.get(place, math.nan) * _KMH_FACTOR
     return min(signed, default=default)

@@ -36,7 +36,6 @@ from scenario_gen.situation import (
 )
 from scenario_gen.types import LaneNetwork, LEVEL, Motion, Note, NoteKind
 
-SCALES = (1.0, 0.9, 1.1)
 MATCHED_PLACEMENTS_COUNT = 15
 """Rigid placements that are matched with lanes at a time."""
 _MATCHED_STREETS_COUNT = 8
@@ -58,7 +57,7 @@ def placements(
     graph: LaneGraph,
     tracks: tuple[Track, ...],
     lanes: Sequence[int] | None = None,
-    scales: Sequence[float] = SCALES,
+    scales: Sequence[float] = (1.0, 0.9, 1.1),
 ) -> Iterator[tuple[Match, float]]:
     """Yield the ways of placing a recording on lanes, with their scales.
 
