@@ -3,7 +3,7 @@
 
 """Turn a handful of recorded vehicle encounters into any number of new, valid ones on other roads.
 
-The public names are listed in `__init__.pyi`; each is imported when it is first used, so importing the package takes no time.
+The public names are listed in `__init__.pyi`. Each is imported when it is first used.
 
     from scenario_gen import generate, read_log
 

@@ -27,7 +27,7 @@ INPUT_OPTIONS = ("log", "recording", "parameter_file", "against")
 
 
 def paths_of(command: Callable[..., None], skipped: Sequence[str]) -> dict[str, bool]:
-    """Return the path parameters of a command, except the `skipped`, and whether each is an output."""
+    """Return, for each path parameter of a command except `skipped`, whether it is an output."""
     paths = {}
     for name, annotation in get_type_hints(command, include_extras=True).items():
         kind, info = (*get_args(annotation), None, None)[:2]
