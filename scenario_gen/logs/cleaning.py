@@ -14,11 +14,10 @@ from scenario_gen.base.errors import InputError
 from scenario_gen.logs.clock import is_out_of_range
 from scenario_gen.logs.config import chosen_vehicles, LogConfig
 from scenario_gen.logs.geodesy import local_frame, middle_of, on_sphere, sites_of
-from scenario_gen.logs.kinds import usual_size
 from scenario_gen.logs.quality import Dropped
 from scenario_gen.logs.raw import Observations, RawLog
+from scenario_gen.logs.sizes import with_sizes
 from scenario_gen.numerics import Bools, Floats, Ints
-from scenario_gen.types import CAR, VEHICLE_TYPES
 
 
 @dataclass(frozen=True)
@@ -33,8 +32,6 @@ class CleaningLimits:
             for "unknown").
         jump_slack_m: distance by which a fix may exceed what the speeds allow: GPS noise.
         jump_slack_mps: possible error of a measured speed before a fix counts as a jump.
-        max_length_m: longest road vehicle.
-        max_width_m: widest road vehicle.
         moving_mps: above this speed, a vehicle changes its position between fixes.
         min_speed_share: share of a measured speed that the positions of a moving vehicle confirm
             at least, in whatever unit the speed is.
@@ -46,8 +43,6 @@ class CleaningLimits:
     max_speed_mps: float = 70.0
     jump_slack_m: float = 3.0
     jump_slack_mps: float = 10.0
-    max_length_m: float = 100.0
-    max_width_m: float = 4.0
     moving_mps: float = 1.0
     min_speed_share: float = 0.2
     relocation_count: int = 5
@@ -61,7 +56,6 @@ _TIME_UNITS = {
     "us": ("microseconds", 1e-6),
     "ns": ("nanoseconds", 1e-9),
 }
-_SIZE_UNITS = {"ft": ("feet", 0.3048), "cm": ("centimetres", 0.01), "mm": ("millimetres", 0.001)}
 
 
 class Cause(Enum):
@@ -137,7 +131,8 @@ def clean(log: RawLog, config: LogConfig) -> tuple[tuple[Observations, ...], Dro
     vehicles = [_without_repeats(vehicle, drops, log.geographic) for vehicle in vehicles]
     _check_clock(vehicles, log, config)
     vehicles = [_without_jumps(vehicle, drops, log.geographic) for vehicle in vehicles]
-    vehicles = _with_sizes(vehicles, drops, config)
+    vehicles, size_notes = with_sizes(vehicles, config)
+    drops.notes += size_notes
     if config.strict and drops.count:
         worst = drops.located(log)[0]
         raise InputError(
@@ -476,58 +471,3 @@ def _reachable(seconds: Floats, fix: Floats, speed_limit: Floats) -> Bools:
             last = i
             n_doubted = 0
     return accepted
-
-
-def _with_sizes(
-    vehicles: Sequence[Observations], drops: Drops, config: LogConfig
-) -> list[Observations]:
-    """Return the vehicles with lengths and widths; missing and impossible ones are replaced."""
-    sized = []
-    impossible = []
-    for vehicle in vehicles:
-        length, width = vehicle.length, vehicle.width  # comparisons with NaN are false
-        walks = VEHICLE_TYPES[vehicle.kind or CAR].walks  # wider than long
-        if width <= 0.0 or width > CLEANING.max_width_m or (width > length and not walks):
-            impossible.append(vehicle)
-            length = width = np.nan
-        elif length <= 0.0 or length > CLEANING.max_length_m:
-            impossible.append(vehicle)
-            length = np.nan
-        usual_length, usual_width = usual_size(vehicle.kind, config)
-        sized.append(
-            replace(
-                vehicle,
-                length=length if np.isfinite(length) else usual_length,
-                width=width if np.isfinite(width) else usual_width,
-            )
-        )
-    if impossible:
-        drops.notes.append(_size_note(impossible, config))
-    return sized
-
-
-def _size_note(impossible: Sequence[Observations], config: LogConfig) -> str:
-    """Return a note on impossible sizes, with the unit that would explain them."""
-    vehicle = impossible[0]
-    more = f" ({len(impossible)} vehicles have such sizes)" if len(impossible) > 1 else ""
-    usual_length, usual_width = usual_size(vehicle.kind, config)
-    return (
-        f"vehicle {vehicle.id}: {vehicle.length:g} m × {vehicle.width:g} m is not the size of a "
-        f"car{more}{_size_hint(vehicle.length, vehicle.width)}; used instead: "
-        f"{usual_length:g} m × {usual_width:g} m"
-    )
-
-
-def _size_hint(length: float, width: float) -> str:
-    """Return what impossible sizes look like; "" if unknown."""
-
-    def is_usual(length: float, width: float) -> bool:
-        return 2.5 < length < 20.0 and 1.2 < width < 2.7
-
-    if is_usual(width, length):
-        return ", it looks swapped (log.columns=length=…,width=…)"
-    for unit, (name, factor) in _SIZE_UNITS.items():
-        if is_usual(factor * length, factor * width):
-            columns = f"log.columns=length=…:{unit},width=…:{unit}"
-            return f", it looks like {name} (name the unit: {columns})"
-    return ""

@@ -11,12 +11,12 @@ import numpy as np
 
 from scenario_gen.logs.cleaning import CLEANING, select
 from scenario_gen.logs.config import LogConfig, points_ahead
+from scenario_gen.logs.noise import speed_of_fixes
 from scenario_gen.logs.quality import VehicleQuality
 from scenario_gen.logs.raw import Observations
 from scenario_gen.logs.smoothing import (
     Smooth,
     smooth_piece,
-    speed_of_fixes,
     standing,
     UnreconciledError,
 )

@@ -27,7 +27,7 @@ def read_raw(paths: Sequence[Path], config: LogConfig) -> RawLog:
         files = [file for path in unpacked_paths for file in log_files(path)]
         log_format = _format_of(files, config)
         with reading(files[0]):
-            log = log_format.read(files, config)
+            log: RawLog = log_format.read(files, config)
         segments = (replace(segment, label=renamed(segment.label)) for segment in log.segments)
         return replace(log, segments=tuple(segments))
 

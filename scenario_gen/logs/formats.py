@@ -8,15 +8,11 @@ from dataclasses import dataclass
 from functools import partial
 from importlib import import_module
 from pathlib import Path
-from typing import Any, TYPE_CHECKING
+from typing import Any
 
 from scenario_gen.bags.storage.files import files_of
 from scenario_gen.base.errors import needs
 from scenario_gen.base.registry import Registry
-
-if TYPE_CHECKING:
-    from scenario_gen.logs.config import LogConfig
-    from scenario_gen.logs.raw import RawLog
 
 HEAD_BYTES = 65_536
 """Part of a file in which the marks of its format are expected, from either end."""
@@ -30,7 +26,9 @@ _OSI_MARKS = (b"net.asam.osi", b"osi3.", b"ground_truth")
 _SPMD_COLUMN_COUNT = 19
 
 Predicate = Callable[[Path], bool]
-Reader = Callable[[Sequence[Path], "LogConfig"], "RawLog"]
+Reader = Callable[[Sequence[Path], Any], Any]
+"""Reads a RawLog from files, given a LogConfig, which this module cannot import: it has the names
+of the formats."""
 
 
 @dataclass(frozen=True)
@@ -107,9 +105,8 @@ def _is_of_data_set(path: Path, name: str) -> bool:
     """Return whether a table has the header of a public data set."""
     if not is_table(path):
         return False
-    from scenario_gen.logs.adapters.tracks import recognised
-
-    return recognised(path) == name
+    tracks = import_module("scenario_gen.logs.adapters.tracks")  # pandas takes long to import
+    return bool(tracks.recognised(path) == name)
 
 
 def _is_number_or_empty(text: str) -> bool:
@@ -137,11 +134,10 @@ def _lazy_reader(module: str, extra: tuple[str, ...] = (), **options: Any) -> Re
         options: keyword arguments of `read`.
     """
 
-    def read(paths: Sequence[Path], config: "LogConfig") -> "RawLog":
+    def read(paths: Sequence[Path], config: Any) -> Any:
         if extra:
             needs(*extra)
-        log: RawLog = import_module(f"scenario_gen.logs.{module}").read(paths, config, **options)
-        return log
+        return import_module(f"scenario_gen.logs.{module}").read(paths, config, **options)
 
     return read
 

@@ -17,7 +17,6 @@ import pandas as pd
 
 from scenario_gen.base.documents import shown
 from scenario_gen.base.errors import guarded, InputError, needs
-from scenario_gen.logs.cleaning import CLEANING
 from scenario_gen.logs.columns import (
     Column,
     column_notes,
@@ -27,6 +26,7 @@ from scenario_gen.logs.columns import (
 )
 from scenario_gen.logs.config import LogConfig
 from scenario_gen.logs.raw import check_size, check_vehicles, Observations, RawLog, Segment
+from scenario_gen.logs.sizes import MAX_LENGTH_M
 from scenario_gen.logs.text import Layout, layout_of
 from scenario_gen.numerics import Floats
 
@@ -456,7 +456,7 @@ def _observations(name: str, group: pd.DataFrame, position: tuple[str, str]) -> 
 def _typical_size(values: Floats) -> float:
     """Return the median of possible sizes [m], or of all if none is possible, or NaN."""
     values = values[np.isfinite(values)]
-    possible = values[(values > 0.0) & (values < CLEANING.max_length_m)]
+    possible = values[(values > 0.0) & (values < MAX_LENGTH_M)]
     if len(possible):
         return float(np.median(possible))
     return float(np.median(values)) if len(values) else math.nan

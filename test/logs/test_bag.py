@@ -374,7 +374,7 @@ def test_topics_that_cannot_be_told_apart(tmp_path):
     twice = [*lines, Line("/vehicle_a/gps", FIX, lines[0].stamp, lines[0].data)]
     with pytest.raises(InputError, match="/vehicle_a/fix and /vehicle_a/gps are both"):
         read_log(write(tmp_path / "twice", twice))
-    with pytest.raises(InputError, match="choose with --set log.topics"):
+    with pytest.raises(InputError, match=r"choose with --set log\.topics"):
         read_log(write(tmp_path / "mixed", [*lines, *odometry(crossing())]))
     with pytest.raises(InputError, match="speeds but no positions of a, b"):
         read_log(write(tmp_path / "speeds", [line for line in lines if line.type == TWIST]))
