@@ -140,9 +140,7 @@ class ReactionGraph:
             f"{edge.words(vehicles)}: left out, as it closes a cycle of reactions"
             for edge in self.cut
         ]
-        return tuple(sentences) or (
-            f"no reactions detected{self.why and ': '}{self.why}",
-        )
+        return tuple(sentences) or (f"no reactions detected{self.why and ': '}{self.why}",)
 
     def document(
         self, vehicles: Sequence[Vehicle], kept: Sequence[Reaction] | None = None
