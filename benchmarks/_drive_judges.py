@@ -26,7 +26,7 @@ from scenario_gen.output.exchange.commonroad import write_commonroad
 from scenario_gen.output.exchange.config import ExportConfig
 from scenario_gen.output.exchange.derived_lanes import lane_map_of
 from scenario_gen.roads import RoadConfig
-from scenario_gen.types.ego import split_off
+from scenario_gen.types import split_off
 
 STEP = 0.1  # s, of both
 GOAL, SLOW = 3.5, 1.0  # metres from a region's border to its middle, and some; m/s

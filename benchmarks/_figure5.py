@@ -23,11 +23,11 @@ from scenario_gen.method.segmentation import segment
 from scenario_gen.output.report.page import render, ReportInput
 from scenario_gen.roads import build_road
 from scenario_gen.situation import Situation
+from scenario_gen.types import REPLAY, UNIFORM, WITH, WITHOUT
 from scenario_gen.types.encounter import Encounter
 from scenario_gen.types.evaluation import Evaluation
 from scenario_gen.types.generation import GenerationResult
 from scenario_gen.types.road import Road
-from scenario_gen.types.row_names import REPLAY, UNIFORM, WITH, WITHOUT
 from scenario_gen.types.segmentation import Segmentation
 
 COUNT, SEEDS = sized((50, (7, 8, 9)), quick=(4, (7,)))

@@ -17,7 +17,7 @@ from scenario_gen.logs.synthetic import bundled
 from scenario_gen.method.chain import Chain
 from scenario_gen.method.config import PipelineConfig
 from scenario_gen.method.evaluation import footprint_distance
-from scenario_gen.method.evaluation.nearness import time_apart
+from scenario_gen.method.evaluation.time_shift import min_time_shift
 from scenario_gen.method.sampling import checker_of, NaturalScenarios, Plan
 from scenario_gen.method.segmentation import segment
 from scenario_gen.numerics import Floats
@@ -78,7 +78,9 @@ class LateWitness:
     def features(self, candidate: Scenario) -> tuple[float, ...]:
         """Return how far in time [s] the witness is from a collision with each of the others."""
         here = np.ones((len(candidate.vehicles), len(candidate.time)), dtype=np.bool_)
-        return tuple(time_apart(candidate, here, 0, i) for i in range(1, len(candidate.vehicles)))
+        return tuple(
+            min_time_shift(candidate, here, 0, i) for i in range(1, len(candidate.vehicles))
+        )
 
     def drive(self, candidates: Sequence[Scenario]) -> list[Response]:
         """Return how near each came to a contact [s]."""
@@ -87,7 +89,7 @@ class LateWitness:
     @staticmethod
     def _response(motion: Scenario) -> Response:
         here = np.ones((len(motion.vehicles), len(motion.time)), dtype=np.bool_)
-        apart = tuple(time_apart(motion, here, 0, i) for i in range(1, len(motion.vehicles)))
+        apart = tuple(min_time_shift(motion, here, 0, i) for i in range(1, len(motion.vehicles)))
         return (
             Response(-1.0, apart, "contact")
             if touches(motion)

@@ -12,7 +12,7 @@ import numpy as np
 from scipy import special
 
 from benchmarks._late_witness import LateWitness
-from scenario_gen.method.evaluation.nearness import APART
+from scenario_gen.method.evaluation.time_shift import MAX_SHIFT_S
 
 ROOT = Path(__file__).resolve().parents[1]
 PYTHON = ROOT / ".venv-judges-verifai" / "bin" / "python"
@@ -63,7 +63,7 @@ def first_failure(problem: LateWitness, kind: str, seed: int, most: int) -> int:
             point = np.clip(np.array(json.loads(line)), EDGE, 1.0 - EDGE)
             (scenario,) = problem.candidates(np.asarray(special.ndtri(point))[None])
             margin: float | None = (
-                None if kind == "ce" else APART
+                None if kind == "ce" else MAX_SHIFT_S
             )  # the Bayesian one needs a number
             if scenario is not None:
                 (response,) = problem.drive([scenario])

@@ -21,7 +21,7 @@ from benchmarks._figure5 import LINEAR, measure, Measured, SEEDS
 from benchmarks._size import sized
 from benchmarks.row import higher, lower, Row
 from scenario_gen.method.evaluation import dtw_distance, feature_matrix
-from scenario_gen.types.row_names import UNIFORM, WITH, WITHOUT
+from scenario_gen.types import UNIFORM, WITH, WITHOUT
 
 DATA = Path(
     os.environ.get("SCENARIO_GEN_DATA", Path(__file__).resolve().parents[2] / "shared" / "data")

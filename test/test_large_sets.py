@@ -21,7 +21,7 @@ from scenario_gen.base.errors import InputError
 from scenario_gen.logs import read_log
 from scenario_gen.logs.synthetic import bundled
 from scenario_gen.method import reference_sets
-from scenario_gen.method.evaluation import EvaluationConfig, MEASURED
+from scenario_gen.method.evaluation import EvaluationConfig, MEASURED_SCENARIOS
 from scenario_gen.method.evaluation.evaluate import measured
 from scenario_gen.method.sampling import draw, Plan, regenerate, sampler
 from scenario_gen.method.sampling.sampler import (
@@ -36,8 +36,8 @@ from scenario_gen.method.segmentation import segment
 from scenario_gen.output.report.page import render, ReportInput
 from scenario_gen.roads import build_road
 from scenario_gen.situation import Situation
+from scenario_gen.types import UNIFORM, WITH, WITHOUT
 from scenario_gen.types.request import Request
-from scenario_gen.types.row_names import UNIFORM, WITH, WITHOUT
 
 FIELDS = ("time", "position", "heading", "speed", "acceleration")
 
@@ -116,13 +116,13 @@ def test_a_level_does_not_run_out_of_candidates(chain, monkeypatch):
     assert same(regenerate(plan, chain.sampling, seed=chain.seed, index=last.index), last)
 
 
-@given(st.integers(MEASURED + 1, 10**12))
+@given(st.integers(MEASURED_SCENARIOS + 1, 10**12))
 def test_of_a_large_set_evenly_spaced_runs_are_measured(size):
     taken = np.array(measured(range(size)))
-    assert len(taken) == len(set(taken)) == MEASURED
+    assert len(taken) == len(set(taken)) == MEASURED_SCENARIOS
     assert taken[0] == 0 and taken[-1] == size - 1
     steps = Counter(np.diff(taken).tolist())
-    assert steps[1] >= MEASURED - 20
+    assert steps[1] >= MEASURED_SCENARIOS - 20
     gaps = [step for step in steps if step != 1]
     assert not gaps or max(gaps) - min(gaps) <= 1
 
@@ -152,8 +152,8 @@ def test_that_only_a_part_was_measured_is_said(chain, monkeypatch):
     """In the page and the figures; the references are made no larger than they are measured."""
     evaluating = sys.modules[measured.__module__]  # the package has a function of that name
     for module in (evaluating, reference_sets):
-        monkeypatch.setattr(module, "MEASURED", 10)
-    monkeypatch.setattr(evaluating, "RUNS", 2)
+        monkeypatch.setattr(module, "MEASURED_SCENARIOS", 10)
+    monkeypatch.setattr(evaluating, "RUN_COUNT", 2)
     config = pipeline.PipelineConfig(evaluation=EvaluationConfig(resamples=20, compare=True))
     case = pipeline.generate(chain.encounter, "t_intersection", config, count=24, seed=7)
     rows = {row["name"]: row for row in json.loads(case.evaluation.to_json())["rows"]}

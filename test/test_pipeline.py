@@ -22,8 +22,8 @@ from scenario_gen.method.sampling import SamplingConfig
 from scenario_gen.output.report.summary import summary
 from scenario_gen.output.results import write_results
 from scenario_gen.pipeline import generate, PipelineConfig
+from scenario_gen.types import NARROW, REPLAY, UNIFORM, WITH, WITHOUT
 from scenario_gen.types.request import Request
-from scenario_gen.types.row_names import NARROW, REPLAY, UNIFORM, WITH, WITHOUT
 
 QUICK = EvaluationConfig(resamples=50, compare=True)
 WORDS = {"without": WITHOUT, "uniform": UNIFORM, "narrow": NARROW, "replay": REPLAY}

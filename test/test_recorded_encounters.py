@@ -18,9 +18,8 @@ from scenario_gen.base.road_users import Dynamics
 from scenario_gen.logs import read_log
 from scenario_gen.method.evaluation import EvaluationConfig
 from scenario_gen.pipeline import generate, PipelineConfig
-from scenario_gen.types import NoteKind
+from scenario_gen.types import NoteKind, WITHOUT
 from scenario_gen.types.generation import GenerationResult
-from scenario_gen.types.row_names import WITHOUT
 
 ROADS = ("corridor", "four_way", "t_intersection", "straight")
 OWN_MAPS = ("USA_Lanker-2_13_T-1", "USA_Peach-4_2_T-1")

@@ -11,10 +11,10 @@ import numpy as np
 from scenario_gen.closed_loop.ego import Command, EgoState, Pose
 from scenario_gen.closed_loop.simulation import ClosedLoop, Observation, Task
 from scenario_gen.method.evaluation import (
-    BRAKING,
     free_acceleration,
-    PULLS_AWAY,
-    STANDS,
+    MAX_ACCELERATION_MPS2,
+    MAX_BRAKING_MPS2,
+    STANDSTILL_MPS,
     wanted_speeds,
 )
 from scenario_gen.numerics.curve import Curve
@@ -79,12 +79,16 @@ class IdmFollower(RouteFollower):
         curvature, station = self.steer(ego)
         wanted = 0.0  # without a way it is where it is to be
         if self.route is not None:
-            stops = bool(self.task.goal[3] < STANDS)  # the witness stands at its goal
+            stops = bool(self.task.goal[3] < STANDSTILL_MPS)  # the witness stands at its goal
             wanted = float(
                 wanted_speeds(self.route, np.array([station]), self.speed, stops=stops)[0]
             )
         gap, ahead = self._nearest(observation, station)
-        closing = ego.speed * (ego.speed - ahead) / (2.0 * math.sqrt(self.acceleration * BRAKING))
+        closing = (
+            ego.speed
+            * (ego.speed - ahead)
+            / (2.0 * math.sqrt(self.acceleration * MAX_BRAKING_MPS2))
+        )
         share = (self.standstill + max(0.0, ego.speed * self.headway + closing)) / max(gap, 0.1)
         acceleration = (
             free_acceleration(ego.speed, wanted, self.acceleration)
@@ -133,7 +137,7 @@ class NonReactive(IdmFollower):
     def reset(self, task: Task) -> None:
         """Take route and speed in."""
         super().reset(task)
-        self.speed, self.acceleration = task.speed, PULLS_AWAY
+        self.speed, self.acceleration = task.speed, MAX_ACCELERATION_MPS2
 
     def act(self, observation: Observation) -> Command:
         """Drive as if nobody else were there."""

@@ -9,7 +9,11 @@ from dataclasses import replace
 from scenario_gen.base.errors import RefusedError
 from scenario_gen.method.chain import Chain
 from scenario_gen.method.config import PipelineConfig
-from scenario_gen.method.evaluation import MEASURED, uniform_changepoints, without_changepoints
+from scenario_gen.method.evaluation import (
+    MEASURED_SCENARIOS,
+    uniform_changepoints,
+    without_changepoints,
+)
 from scenario_gen.situation import Situation
 from scenario_gen.types import Encounter, GenerationResult, NARROW, Request, UNIFORM, WITHOUT
 
@@ -31,7 +35,7 @@ def with_references(
         InputError: road or fit of the result are not known.
     """
     road, _ = result.road_and_fit()
-    count = min(result.generated.requested, MEASURED)
+    count = min(result.generated.requested, MEASURED_SCENARIOS)
     plain = Chain(
         situation,
         result.segmentation,

@@ -18,7 +18,7 @@ from scenario_gen.base.errors import guarded, InputError
 from scenario_gen.numerics import Bools, Floats
 from scenario_gen.roads.config import RoadConfig
 from scenario_gen.roads.openings import find_openings
-from scenario_gen.types import COARSEST, FARTHEST, FINEST, Road
+from scenario_gen.types import MAX_CELL_M, MAX_ORIGIN_M, MIN_CELL_M, Road
 
 _MODES = ("trinary", "scale", "raw")
 _PILLOW_FORMATS = ("PPM", "PNG", "BMP", "JPEG")  # PPM stands for PGM, PBM and PPM
@@ -52,7 +52,7 @@ def read_map(path: Path, config: RoadConfig) -> Road:
             f"map {path}: expected keys image, resolution, origin, negate, occupied_thresh, "
             "free_thresh"
         )
-    resolution = float(np.float32(_number(path, content, "resolution", FINEST, COARSEST)))
+    resolution = float(np.float32(_number(path, content, "resolution", MIN_CELL_M, MAX_CELL_M)))
     origin = _origin(path, content)
     mode = content.get("mode", "trinary")
     if mode not in _MODES:
@@ -105,9 +105,9 @@ def _origin(path: Path, content: dict[Any, Any]) -> Floats:
     where = f"map {path}: key origin"
     if not (isinstance(value, list) and len(value) in (2, 3) and all(map(_is_number, value))):
         raise InputError(f"{where} is {shown(value)}; a list of x, y and yaw is needed")
-    if max(abs(v) for v in value) > FARTHEST:
+    if max(abs(v) for v in value) > MAX_ORIGIN_M:
         raise InputError(
-            f"{where} is {shown(value)}; at most {FARTHEST:g} m from the frame's origin are read"
+            f"{where} is {shown(value)}; at most {MAX_ORIGIN_M:g} m from the frame's origin are read"
         )
     if len(value) == 3 and value[2] != 0.0:
         raise InputError(

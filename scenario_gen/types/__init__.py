@@ -15,10 +15,15 @@ from scenario_gen.base.road_users import (
     VehicleType,
     words,
 )
-from scenario_gen.types.body import height, rear_axle, shifted, WHEELBASE
 from scenario_gen.types.coverage import Coverage, Spread
-from scenario_gen.types.ego import join_ego, split_off, with_witness
-from scenario_gen.types.encounter import Encounter, Recombined, Recorded
+from scenario_gen.types.encounter import (
+    Encounter,
+    Recombined,
+    Recorded,
+    token,
+    tokens,
+    vehicle_index,
+)
 from scenario_gen.types.evaluation import (
     as_markdown,
     CheckCounts,
@@ -26,8 +31,14 @@ from scenario_gen.types.evaluation import (
     formatted,
     Interval,
     Metric,
+    NARROW,
+    RECORDING,
+    REPLAY,
     Row,
     SCHEMA,
+    UNIFORM,
+    WITH,
+    WITHOUT,
 )
 from scenario_gen.types.facts import (
     Facts,
@@ -46,69 +57,77 @@ from scenario_gen.types.lanes import (
     DRIVERS,
     Lane,
     LaneNetwork,
-    LEVEL,
+    LEVEL_SPACING_M,
     RuleKind,
     TrafficRule,
 )
 from scenario_gen.types.measures import Measure, Measures
-from scenario_gen.types.motion import Motion, States
-from scenario_gen.types.names import token, tokens, vehicle_index
-from scenario_gen.types.notes import Note, note_kinds, NoteKind, recorded_notes
-from scenario_gen.types.pieces import join_pieces, read_numbers, split_pieces
-from scenario_gen.types.presence import (
+from scenario_gen.types.motion import (
     ALWAYS,
     always,
     at_ends,
     canonical_presence,
     cut,
     mask,
+    Motion,
+    States,
     together,
 )
+from scenario_gen.types.notes import Note, note_kinds, NoteKind, recorded_notes
 from scenario_gen.types.qos import Quality
 from scenario_gen.types.reaction import (
     Reaction,
     ReactionGraph,
 )
 from scenario_gen.types.request import ENDS, ORDERS, read_states, Request, State
-from scenario_gen.types.road import COARSEST, FARTHEST, FINEST, Road
+from scenario_gen.types.road import MAX_CELL_M, MAX_ORIGIN_M, MIN_CELL_M, Road
 from scenario_gen.types.route import Route, routes_in_words
-from scenario_gen.types.row_names import (
-    NARROW,
-    RECORDING,
-    REPLAY,
-    UNIFORM,
-    WITH,
-    WITHOUT,
-)
-from scenario_gen.types.sample import Sample
 from scenario_gen.types.scenario import (
     BoundaryStates,
     Cause,
     causes_in_words,
     EgoSlot,
+    join_ego,
     Scenario,
     ScenarioSet,
+    split_off,
     Verdict,
     Violation,
+    with_witness,
 )
-from scenario_gen.types.segmentation import LiveChangepoints, Segmentation
-from scenario_gen.types.target import Pair, Reached, Target, UNITS
-from scenario_gen.types.vehicle import most_exposed, Vehicle
+from scenario_gen.types.segmentation import LiveChangepoints, Sample, Segmentation
+from scenario_gen.types.target import (
+    join_pieces,
+    Pair,
+    Reached,
+    read_numbers,
+    split_pieces,
+    Target,
+    UNITS,
+)
+from scenario_gen.types.vehicle import (
+    height,
+    most_exposed,
+    rear_axle,
+    shifted,
+    Vehicle,
+    WHEELBASE_SHARE,
+)
 
 __all__ = [
     "ALWAYS",
     "CAR",
     "CARS",
-    "COARSEST",
     "DRIVERS",
     "ENDS",
     "ERRORS",
-    "FARTHEST",
-    "FINEST",
     "FOLLOW",
     "LANE_USERS",
-    "LEVEL",
+    "LEVEL_SPACING_M",
+    "MAX_CELL_M",
+    "MAX_ORIGIN_M",
     "MAX_PLANNED_CURVATURE_PER_M",
+    "MIN_CELL_M",
     "NARROW",
     "ORDERS",
     "OTHER",
@@ -118,7 +137,7 @@ __all__ = [
     "UNIFORM",
     "UNITS",
     "VEHICLE_TYPES",
-    "WHEELBASE",
+    "WHEELBASE_SHARE",
     "WITH",
     "WITHOUT",
     "YIELD",

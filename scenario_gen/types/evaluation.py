@@ -16,6 +16,13 @@ from scenario_gen.base.errors import printable
 from scenario_gen.types.notes import Note, NoteKind
 from scenario_gen.types.scenario import Cause, ScenarioSet, Verdict
 
+RECORDING = "recording"
+"""The recorded encounter itself."""
+WITH, WITHOUT, UNIFORM = "with changepoints", "without changepoints", "uniform changepoints"
+NARROW = "with changepoints, narrow"
+REPLAY = "replay"
+"""The recording as fitted to the road."""
+
 Better = Literal["lower", "higher", ""]
 TEXT = {"type": "string", "maxLength": 10_000}
 METRIC_KEYS = ("id", "label", "unit", "better", "group", "meaning")

@@ -13,12 +13,11 @@ from typing import Any, TYPE_CHECKING
 from scenario_gen.base.errors import InputError
 from scenario_gen.types.coverage import Coverage
 from scenario_gen.types.encounter import Encounter
-from scenario_gen.types.evaluation import Evaluation
+from scenario_gen.types.evaluation import Evaluation, NARROW, REPLAY, UNIFORM, WITH, WITHOUT
 from scenario_gen.types.fit import Fit
 from scenario_gen.types.notes import Note, NoteKind
 from scenario_gen.types.road import Road
 from scenario_gen.types.route import Route
-from scenario_gen.types.row_names import NARROW, REPLAY, UNIFORM, WITH, WITHOUT
 from scenario_gen.types.scenario import causes_in_words, dataframe, Scenario, ScenarioSet
 from scenario_gen.types.segmentation import Segmentation
 

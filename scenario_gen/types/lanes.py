@@ -3,7 +3,7 @@
 
 """The lanes of a road: their borders, what follows what, where one may change, how fast."""
 
-from collections.abc import Sequence, Set
+from collections.abc import Mapping, Sequence, Set
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
 from functools import cached_property
@@ -17,10 +17,9 @@ from scenario_gen.numerics import Floats, freeze, frozen
 from scenario_gen.numerics.plane import edge_yaws
 from scenario_gen.types.notes import Note
 
-LEVEL = 2.5  # metres between the heights of two lanes of which one lies above the other
+LEVEL_SPACING_M = 2.5  # height difference of two lanes of which one crosses above the other
 DRIVERS = LANE_USERS - {"pedestrian"}
 CARS = frozenset((CAR,))
-_ONCOMING = -0.9  # cosine between directions of traffic
 
 
 @dataclass(frozen=True, eq=False)
@@ -237,11 +236,9 @@ class LaneNetwork:
             return self
         index = {k: n for n, k in enumerate(kept)}
 
-        def found(lanes: Sequence[int]) -> tuple[int, ...]:
-            return tuple(index[k] for k in lanes if k in index)
-
         rules = (
-            replace(rule, lanes=found(rule.lanes), over=found(rule.over)) for rule in self.rules
+            replace(rule, lanes=_renumbered(rule.lanes, index), over=_renumbered(rule.over, index))
+            for rule in self.rules
         )
         return replace(
             self,
@@ -278,7 +275,7 @@ class LaneNetwork:
             if self.lanes
             else np.zeros(0)
         )
-        return bool(len(height) and np.ptp(height) > LEVEL)
+        return bool(len(height) and np.ptp(height) > LEVEL_SPACING_M)
 
     @cached_property
     def predecessors(self) -> tuple[tuple[int, ...], ...]:
@@ -332,27 +329,29 @@ def _chosen(lanes: Sequence[Lane], kept: Sequence[int]) -> tuple[Lane, ...]:
     index = {k: n for n, k in enumerate(kept)}
     chosen = []
     for lane in (lanes[k] for k in kept):
-        after, beside = (
-            tuple(index[k] for k in names if k in index)
-            for names in (lane.successors, lane.beside)
-        )
-        same = (after, beside) == (lane.successors, lane.beside)
-        chosen.append(lane if same else replace(lane, successors=after, beside=beside))
+        successors = _renumbered(lane.successors, index)
+        neighbours = _renumbered(lane.beside, index)
+        is_same = (successors, neighbours) == (lane.successors, lane.beside)
+        changed = replace(lane, successors=successors, beside=neighbours)
+        chosen.append(lane if is_same else changed)
     return tuple(chosen)
+
+
+def _renumbered(lanes: Sequence[int], index: Mapping[int, int]) -> tuple[int, ...]:
+    """Return the new indices of those lanes that have one."""
+    return tuple(index[k] for k in lanes if k in index)
 
 
 def _shared(borders: Sequence[Floats]) -> int:
     """Count points of borders (M, 2) [m] with an opposite border in the same square metre."""
-    there: dict[tuple[int, int], list[Floats]] = {}
+    directions: dict[tuple[int, int], list[Floats]] = {}
     count = 0
     for border in borders:
         step = np.gradient(border, axis=0)
         step = step / np.maximum(np.sqrt(np.square(step).sum(axis=1)), 1e-9)[:, None]
-        own: dict[tuple[int, int], Floats] = {}
-        for cell, direction in zip(np.floor(border).astype(np.int64).tolist(), step, strict=True):
-            own[cell[0], cell[1]] = direction
-        for place, direction in own.items():
-            others = there.setdefault(place, [])
-            count += any(float((other * direction).sum()) < _ONCOMING for other in others)
+        cells = map(tuple, np.floor(border).astype(np.int64).tolist())
+        for cell, direction in dict(zip(cells, step, strict=True)).items():
+            others = directions.setdefault(cell, [])
+            count += any(float((other * direction).sum()) < -0.9 for other in others)  # cosines
             others.append(direction)
     return count

@@ -11,7 +11,7 @@ from typing import Any
 from scenario_gen.types.facts import FOLLOW, NamedReaction
 from scenario_gen.types.vehicle import Vehicle
 
-DOUBTFUL = 0.5  # confidence below which an edge is called doubtful
+DOUBTFUL_CONFIDENCE = 0.5  # confidence below which an edge is called doubtful
 
 
 @dataclass(frozen=True)
@@ -94,7 +94,7 @@ class Reaction:
     @property
     def doubtful(self) -> bool:
         """Whether the record hardly distinguishes it from none."""
-        return self.confidence < DOUBTFUL
+        return self.confidence < DOUBTFUL_CONFIDENCE
 
     def document(self, vehicles: Sequence[Vehicle]) -> dict[str, str | float | bool]:
         """Return the reaction as a flat document, with the vehicles' ids and the words."""

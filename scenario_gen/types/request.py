@@ -11,10 +11,8 @@ import numpy as np
 from scenario_gen.base.errors import InputError
 from scenario_gen.base.parameters import parameter, Parameters
 from scenario_gen.numerics import Floats
-from scenario_gen.types.encounter import Encounter
-from scenario_gen.types.names import vehicle_index
-from scenario_gen.types.pieces import join_pieces, read_numbers, split_pieces
-from scenario_gen.types.target import read_targets, Target
+from scenario_gen.types.encounter import Encounter, vehicle_index
+from scenario_gen.types.target import join_pieces, read_numbers, read_targets, split_pieces, Target
 
 State = tuple[float, ...]  # x [m], y [m], yaw [rad] and, unless it is the template's, speed [m/s]
 ENDS = ("starts", "goals")

@@ -28,8 +28,9 @@ from scenario_gen.numerics import (
 from scenario_gen.numerics.polygons import fill_slits, polygon_cells
 from scenario_gen.types.lanes import Lane, LaneNetwork
 
-FINEST, COARSEST = 0.001, 10.0  # metres of a cell: nothing is seen of a vehicle in larger ones
-FARTHEST = 1e8  # metres from the frame's origin: more than any geodetic grid has
+MIN_CELL_M = 0.001
+MAX_CELL_M = 10.0  # larger cells do not resolve a vehicle
+MAX_ORIGIN_M = 1e8  # per axis; every geodetic grid stays within it
 
 DIRECTION_COUNT = 16
 """The directions that `Road.lane_directions` tells apart."""
@@ -83,15 +84,15 @@ class Road:
         )
         if self.drivable.ndim != 2 or not self.drivable.any():
             raise InputError(f"road {self.name!r} has no drivable cell")
-        if not FINEST <= self.resolution <= COARSEST:
+        if not MIN_CELL_M <= self.resolution <= MAX_CELL_M:
             raise InputError(
                 f"road {self.name!r} has resolution {self.resolution:g} m; "
-                f"{FINEST:g} to {COARSEST:g} m are read"
+                f"{MIN_CELL_M:g} to {MAX_CELL_M:g} m are read"
             )
-        if self.origin.shape != (2,) or not (np.abs(self.origin) <= FARTHEST).all():
+        if self.origin.shape != (2,) or not (np.abs(self.origin) <= MAX_ORIGIN_M).all():
             raise InputError(
                 f"road {self.name!r} has origin {self.origin}; "
-                f"at most {FARTHEST:g} m from the frame's origin are read"
+                f"at most {MAX_ORIGIN_M:g} m from the frame's origin are read"
             )
 
     @property

@@ -10,8 +10,8 @@ from typing import Any
 
 from scenario_gen.numerics import canonical_poses, Floats, freeze, frozen, frozen_ints, Ints
 
-FAR_OFF = 1.5
-"""Metres between a route and its fitted path from which on it is reported."""
+FAR_FROM_FIT_M = 1.5
+"""A route that leaves its fitted path by more is reported."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,7 +57,7 @@ class Route:
     def remarks(self, vehicle: str) -> list[str]:
         """Return remarks for users: a large distance to the fitted path, anchors left out."""
         sentences = []
-        if self.farthest > FAR_OFF:
+        if self.farthest > FAR_FROM_FIT_M:
             sentences.append(
                 f"vehicle {vehicle}: its route passes {self.farthest:.1f} m from its fitted path"
             )

@@ -5,17 +5,16 @@
 
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from enum import StrEnum
 from typing import Any, TYPE_CHECKING
 
 import numpy as np
 
-from scenario_gen.numerics import canonical_poses, Floats, freeze, frozen
+from scenario_gen.numerics import canonical_poses, Floats, freeze, frozen, Ints
 from scenario_gen.types.facts import Facts
-from scenario_gen.types.motion import Motion
+from scenario_gen.types.motion import held, Motion
 from scenario_gen.types.notes import Note
-from scenario_gen.types.presence import held
 from scenario_gen.types.reaction import Reaction, ReactionGraph
 from scenario_gen.types.target import Reached
 from scenario_gen.types.vehicle import Vehicle
@@ -229,3 +228,51 @@ class ScenarioSet:
     def acceptance(self) -> float:
         """Share of candidates that were valid."""
         return len(self.scenarios) / self.candidates if self.candidates else 0.0
+
+
+_ROWS = ("position", "heading", "speed", "acceleration")
+
+
+def split_off(scenario: Scenario, index: int) -> tuple[Scenario, Scenario]:
+    """Return a scenario of all vehicles but one, and one of that one, both on the same clock."""
+    rows = [n for n in range(len(scenario.vehicles)) if n != index]
+    return _of(scenario, rows), _of(scenario, [index])
+
+
+def with_witness(scenario: Scenario, index: int) -> Scenario:
+    """Return the scenario without one vehicle, whose motion becomes the reference drive.
+
+    It ends when the last of the other vehicles leaves.
+    """
+    others, witness = split_off(scenario, index)
+    last = int(others.present[:, 1].max()) + 1
+    arrays = {name: getattr(others, name)[:, :last] for name in _ROWS}
+    return replace(others, time=others.time[:last], **arrays, reference_drive=witness)
+
+
+def join_ego(scenario: Scenario) -> Scenario:
+    """Return the scenario of all vehicles, that of the reference drive last, if there is one."""
+    witness = scenario.reference_drive
+    if witness is None:
+        return scenario
+    parts = (replace(scenario, reference_drive=None), witness)
+    time = np.unique(
+        np.concatenate([part.time for part in parts])
+    )  # whole nanoseconds, so equal instants are equal
+    vehicles = (*scenario.vehicles, *witness.vehicles)
+    arrays: dict[str, Any] = {
+        name: np.concatenate([getattr(part, name)[:, _held(part, time)] for part in parts])
+        for name in _ROWS
+    }
+    present = np.concatenate([np.searchsorted(time, part.time[part.present]) for part in parts])
+    return replace(parts[0], vehicles=vehicles, time=time, **arrays, present=present)
+
+
+def _held(part: Scenario, time: Floats) -> Ints:
+    """Return the sample of a part at each time (T,) [s]; arbitrary where nobody is present."""
+    return np.minimum(np.searchsorted(part.time, time), len(part.time) - 1)
+
+
+def _of(scenario: Scenario, rows: Sequence[int]) -> Scenario:
+    arrays = {name: getattr(scenario, name)[list(rows)] for name in (*_ROWS, "present")}
+    return replace(scenario, vehicles=tuple(scenario.vehicles[n] for n in rows), **arrays)

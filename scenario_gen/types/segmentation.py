@@ -9,7 +9,7 @@ import math
 from scenario_gen.numerics import Floats, freeze, frozen, frozen_ints, Ints
 from scenario_gen.types.vehicle import Vehicle
 
-LONG_WITHOUT = 15.0  # s without a changepoint that are worth a word
+LONG_SEGMENT_S = 15.0  # an encounter without changepoints that is longer is reported
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,7 +43,7 @@ class Segmentation:
 
     def remark(self, duration: float) -> str:
         """A remark for users on an encounter of `duration` s without changepoints, or ""."""
-        if len(self.changepoints) or duration <= LONG_WITHOUT:
+        if len(self.changepoints) or duration <= LONG_SEGMENT_S:
             return ""
         return (
             f"no changepoint in {duration:.0f} s: speeds and courses looked constant; "
@@ -75,3 +75,20 @@ class LiveChangepoints:
     heading: Floats
     speed: Floats
     probability: Floats
+
+
+@dataclass(frozen=True, eq=False)
+class Sample:
+    """The vehicles that are there at one tick of the common clock.
+
+    Attributes:
+        stamp_ns: the tick, a whole multiple of the period.
+        vehicles: N >= 2, in the natural order of their ids.
+        position: (N, 2) metres east and north of the streams' origin.
+        speed: (N,) m/s.
+    """
+
+    stamp_ns: int
+    vehicles: tuple[Vehicle, ...]
+    position: Floats
+    speed: Floats

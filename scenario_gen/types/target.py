@@ -3,14 +3,13 @@
 
 """Criticality figures of a scenario, and the range of one that a request asks for."""
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 import math
 
 from scenario_gen.base.errors import InputError
-from scenario_gen.types.encounter import Encounter
-from scenario_gen.types.names import vehicle_index
+from scenario_gen.types.encounter import Encounter, vehicle_index
 from scenario_gen.types.notes import Note, NoteKind
-from scenario_gen.types.pieces import join_pieces, split_pieces
 
 UNITS = {
     "pet": "s",
@@ -161,3 +160,22 @@ def read_targets(text: str) -> tuple[Target, ...]:
             raise InputError(f"target: {target.label} comes twice")
         targets.append(target)
     return tuple(targets)
+
+
+def split_pieces(text: str) -> list[str]:
+    """Return the pieces of a text that are not empty."""
+    return [piece for part in text.split(";") if (piece := part.strip())]
+
+
+def join_pieces(pieces: Iterable[object]) -> str:
+    """Return the text of some pieces."""
+    return "; ".join(map(str, pieces))
+
+
+def read_numbers(text: str) -> tuple[float, ...]:
+    """Return the numbers of a piece, separated by blanks or commas; () if one is not finite."""
+    try:
+        numbers = tuple(float(word) for word in text.replace(",", " ").split())
+    except ValueError:
+        return ()
+    return numbers if all(map(math.isfinite, numbers)) else ()

@@ -6,8 +6,12 @@
 from collections.abc import Iterable
 from dataclasses import dataclass
 
+import numpy as np
+
 from scenario_gen.base.errors import InputError
 from scenario_gen.base.road_users import CAR, OTHER, usual_type, VEHICLE_TYPES, VehicleType
+from scenario_gen.numerics import Floats
+from scenario_gen.numerics.plane import unit
 
 
 @dataclass(frozen=True)
@@ -61,3 +65,25 @@ def most_exposed(vehicles: Iterable[Vehicle]) -> str:
     """Return the type of the most exposed road user: the type with the smallest usual width."""
     types = {vehicle.type for vehicle in vehicles}
     return min(types, key=lambda name: (VEHICLE_TYPES[name].width, name))
+
+
+REAR_AXLE_SHARE = 0.3  # of the length, from the footprint's centre back: 1.44 m of a car of 4.8 m
+WHEELBASE_SHARE = 0.6  # of the length
+
+
+def height(vehicle: Vehicle) -> float:
+    """Height in metres, by type; logs do not hold it."""
+    return vehicle.kind.height
+
+
+def rear_axle(vehicle: Vehicle) -> float:
+    """Metres from the footprint's centre back to the rear axle's middle, as a share of the length.
+
+    Who walks is placed by the middle.
+    """
+    return 0.0 if vehicle.kind.walks else REAR_AXLE_SHARE * vehicle.length
+
+
+def shifted(position: Floats, heading: Floats, ahead: float) -> Floats:
+    """Return positions (..., 2) [m] shifted by `ahead` [m] along headings (...) [rad]."""
+    return np.asarray(position + ahead * unit(heading))

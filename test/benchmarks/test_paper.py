@@ -21,7 +21,7 @@ from scenario_gen.base.folders import MARKER
 from scenario_gen.logs import read_log
 from scenario_gen.logs.synthetic import bundled
 from scenario_gen.method.segmentation import segment, SegmentationConfig
-from scenario_gen.types.row_names import UNIFORM, WITH, WITHOUT
+from scenario_gen.types import UNIFORM, WITH, WITHOUT
 
 
 @pytest.fixture(scope="module")

@@ -17,8 +17,7 @@ from scenario_gen.method.segmentation import segment
 from scenario_gen.pipeline import PipelineConfig
 from scenario_gen.roads import build_road
 from scenario_gen.situation import conflict_of, lag_behind, lane_gaps, Situation, time_gaps
-from scenario_gen.types import Facts
-from scenario_gen.types.ego import join_ego, with_witness
+from scenario_gen.types import Facts, join_ego, with_witness
 
 CONFIG = PipelineConfig()
 

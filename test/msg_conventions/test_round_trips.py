@@ -41,11 +41,9 @@ from msg_conventions.cdr import decode
 from msg_conventions.layouts import POLYGON
 from scenario_gen.base.errors import InputError
 from scenario_gen.numerics.arrays import canonical_angle
-from scenario_gen.types import Note, NoteKind, Vehicle
-from scenario_gen.types.ego import with_witness
+from scenario_gen.types import Note, NoteKind, token, tokens, Vehicle, with_witness
 from scenario_gen.types.fit import Fit, FittedVehicle
 from scenario_gen.types.lanes import DrawnFor, Lane, LaneNetwork, RuleKind, TrafficRule
-from scenario_gen.types.names import token, tokens
 from scenario_gen.types.road import Road
 from scenario_gen.types.route import Route
 from scenario_gen.types.scenario import BoundaryStates, Cause, EgoSlot, ScenarioSet

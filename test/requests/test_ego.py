@@ -18,8 +18,7 @@ from scenario_gen.method.segmentation import segment
 from scenario_gen.method.validity import Checker
 from scenario_gen.roads import build_road
 from scenario_gen.situation import find_conflicts, Situation
-from scenario_gen.types import Vehicle
-from scenario_gen.types.ego import join_ego, with_witness
+from scenario_gen.types import join_ego, Vehicle, with_witness
 from scenario_gen.types.request import Request
 from scenario_gen.types.scenario import BoundaryStates, Scenario
 

@@ -18,8 +18,7 @@ from scenario_gen.output.review.validation import validate_bag
 from scenario_gen.pipeline import PipelineConfig
 from scenario_gen.roads import build_road
 from scenario_gen.situation import Situation
-from scenario_gen.types import FOLLOW
-from scenario_gen.types.ego import join_ego
+from scenario_gen.types import FOLLOW, join_ego
 from scenario_gen.types.request import Request
 
 CONFIG = PipelineConfig()

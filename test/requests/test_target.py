@@ -20,8 +20,7 @@ from scenario_gen.output.results import provenance_of
 from scenario_gen.output.review.regenerate import regenerate_scenario
 from scenario_gen.output.review.validation import validate_bag
 from scenario_gen.pipeline import generate
-from scenario_gen.types import Facts, OrderChange
-from scenario_gen.types.ego import join_ego
+from scenario_gen.types import Facts, join_ego, OrderChange
 from scenario_gen.types.request import Request
 from scenario_gen.types.target import read_targets
 

@@ -13,8 +13,8 @@ from msg_conventions.diagnostics import Level
 from msg_conventions.fits import decode_fit
 from msg_conventions.tracks import encode_tracks
 from scenario_gen.logs import read_log
+from scenario_gen.types import ALWAYS
 from scenario_gen.types.encounter import Encounter
-from scenario_gen.types.presence import ALWAYS
 
 pytestmark = pytest.mark.dds
 NODES = {

@@ -32,8 +32,7 @@ from scenario_gen.closed_loop.trials import read_trials
 from scenario_gen.closed_loop.verdict import judge
 from scenario_gen.ros.common import planner_trials
 from scenario_gen.ros.common.driving import decode_command, FIRST_STAMP_NS
-from scenario_gen.types.ego import with_witness
-from scenario_gen.types.names import token
+from scenario_gen.types import token, with_witness
 from scenario_gen.types.scenario import EgoSlot
 
 pytestmark = pytest.mark.dds

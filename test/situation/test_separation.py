@@ -8,8 +8,7 @@ import pytest
 
 from scenario_gen.situation import Situation
 from scenario_gen.situation.separation import least_gaps
-from scenario_gen.types import Encounter, Vehicle
-from scenario_gen.types.presence import ALWAYS
+from scenario_gen.types import ALWAYS, Encounter, Vehicle
 
 TIME = 0.1 * np.arange(30)
 

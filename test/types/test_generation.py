@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 from support.bag_examples import hand_made_run
 
+from scenario_gen.types import NARROW, REPLAY, UNIFORM, WITH, WITHOUT
 from scenario_gen.types.evaluation import Evaluation, Interval, Row
 from scenario_gen.types.generation import GenerationResult
-from scenario_gen.types.row_names import NARROW, REPLAY, UNIFORM, WITH, WITHOUT
 from scenario_gen.types.scenario import dataframe, ScenarioSet
 
 

@@ -8,7 +8,7 @@ import pytest
 
 from scenario_gen.base.errors import InputError
 from scenario_gen.types import Encounter, Vehicle
-from scenario_gen.types.presence import ALWAYS, canonical_presence, cut, held, mask, together
+from scenario_gen.types.motion import ALWAYS, canonical_presence, cut, held, mask, together
 from scenario_gen.types.scenario import Scenario
 
 VEHICLES = (Vehicle("a"), Vehicle("b"))

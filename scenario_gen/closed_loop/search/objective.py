@@ -12,7 +12,7 @@ import numpy as np
 from scenario_gen.base.errors import did_you_mean, InputError
 from scenario_gen.closed_loop.search.estimate import Response
 from scenario_gen.closed_loop.trials import Outcome
-from scenario_gen.method.evaluation import time_apart
+from scenario_gen.method.evaluation import min_time_shift
 
 AT_FAULT, COLLISION, OFF_ROAD, GOAL, TTC, PET = (
     "at_fault",
@@ -97,7 +97,7 @@ def _apart(outcome: Outcome) -> tuple[float, ...]:
     """Return how far in time [s] each of the others was from a collision with the ego."""
     drive = outcome.drive
     others = (i for i in range(len(drive.motion.vehicles)) if i != drive.ego)
-    return tuple(time_apart(drive.motion, drive.here, drive.ego, i) for i in others)
+    return tuple(min_time_shift(drive.motion, drive.here, drive.ego, i) for i in others)
 
 
 def _kind(outcome: Outcome, name: str) -> str:

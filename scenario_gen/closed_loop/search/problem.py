@@ -11,7 +11,7 @@ from scenario_gen.closed_loop.search.estimate import Response
 from scenario_gen.closed_loop.search.journal import Journal
 from scenario_gen.closed_loop.search.objective import Objective
 from scenario_gen.closed_loop.trials import RunTrials
-from scenario_gen.method.evaluation import time_apart
+from scenario_gen.method.evaluation import min_time_shift
 from scenario_gen.method.sampling import NaturalScenarios
 from scenario_gen.numerics import Floats
 from scenario_gen.types import mask, Road, Scenario
@@ -54,7 +54,7 @@ class DrivenScenarios:
         ids = [vehicle.id for vehicle in candidate.vehicles]
         ego = ids.index(self.ego)
         here = mask(candidate.present, len(candidate.time))
-        apart = (time_apart(candidate, here, ego, k) for k in range(len(ids)) if k != ego)
+        apart = (min_time_shift(candidate, here, ego, k) for k in range(len(ids)) if k != ego)
         return (*apart, float(candidate.speed[ego, int(candidate.present[ego, 0])]))
 
     def drive(self, candidates: Sequence[Scenario]) -> list[Response]:

@@ -19,7 +19,11 @@ from scenario_gen.method.evaluation.config import EvaluationConfig
 from scenario_gen.method.evaluation.coverage import coverage_of
 from scenario_gen.method.evaluation.criticality import criticality
 from scenario_gen.method.evaluation.dtw import dtw_distance, feature_matrix, mean_feature
-from scenario_gen.method.evaluation.evaluate import evaluate, evaluate_scenarios, MEASURED
+from scenario_gen.method.evaluation.evaluate import (
+    evaluate,
+    evaluate_scenarios,
+    MEASURED_SCENARIOS,
+)
 from scenario_gen.method.evaluation.geometry import (
     distance_and_ttc,
     footprint_distance,
@@ -28,12 +32,11 @@ from scenario_gen.method.evaluation.geometry import (
 from scenario_gen.method.evaluation.law import measures_in
 from scenario_gen.method.evaluation.measures import MEASURES
 from scenario_gen.method.evaluation.metrics import MetricGroup
-from scenario_gen.method.evaluation.nearness import time_apart
 from scenario_gen.method.evaluation.non_reactive import (
-    BRAKING,
     free_acceleration,
-    PULLS_AWAY,
-    STANDS,
+    MAX_ACCELERATION_MPS2,
+    MAX_BRAKING_MPS2,
+    STANDSTILL_MPS,
     wanted_speeds,
 )
 from scenario_gen.method.evaluation.references import uniform_changepoints, without_changepoints
@@ -44,13 +47,14 @@ from scenario_gen.method.evaluation.similarity import (
     mean_error,
     pair_similarities,
 )
+from scenario_gen.method.evaluation.time_shift import min_time_shift
 
 __all__ = [
-    "BRAKING",
-    "MEASURED",
+    "MAX_ACCELERATION_MPS2",
+    "MAX_BRAKING_MPS2",
+    "MEASURED_SCENARIOS",
     "MEASURES",
-    "PULLS_AWAY",
-    "STANDS",
+    "STANDSTILL_MPS",
     "Bootstrap",
     "Difference",
     "EvaluationConfig",
@@ -74,11 +78,11 @@ __all__ = [
     "mean_error",
     "mean_feature",
     "measures_in",
+    "min_time_shift",
     "pair_similarities",
     "paired_difference",
     "read_evaluations",
     "replay",
-    "time_apart",
     "time_to_collision",
     "uniform_changepoints",
     "wanted_speeds",

@@ -22,8 +22,16 @@ from scenario_gen.types import (
     Spread,
 )
 
-EDGES = (0.0, 0.5, 1.0, 2.0, 4.0)  # s of PET
-BINS = ("below 0 s", "0 … 0.5 s", "0.5 … 1 s", "1 … 2 s", "2 … 4 s", "4 s and more", "no crossing")
+PET_EDGES_S = (0.0, 0.5, 1.0, 2.0, 4.0)
+PET_BINS = (
+    "below 0 s",
+    "0 … 0.5 s",
+    "0.5 … 1 s",
+    "1 … 2 s",
+    "2 … 4 s",
+    "4 s and more",
+    "no crossing",
+)
 LABELS = {
     "pet": ("PET", "s"),
     "ttc": ("time to collision", "s"),
@@ -75,9 +83,9 @@ def coverage_of(encounter: Encounter, scenarios: Sequence[Scenario]) -> Coverage
     return Coverage(
         index,
         spreads,
-        BINS,
+        PET_BINS,
         {
-            kind: tuple(counts[k] for k in range(len(BINS)))
+            kind: tuple(counts[k] for k in range(len(PET_BINS)))
             for kind, counts in sorted(pairs.items())
         },
         _picks(index, rows, template),
@@ -94,7 +102,11 @@ def _row(motion: Scenario | Encounter, figures: PairFigures | None) -> dict[str,
 
 
 def _bin(pet: float) -> int:
-    return len(BINS) - 1 if math.isnan(pet) else int(np.searchsorted(EDGES, pet, side="right"))
+    return (
+        len(PET_BINS) - 1
+        if math.isnan(pet)
+        else int(np.searchsorted(PET_EDGES_S, pet, side="right"))
+    )
 
 
 def _picks(

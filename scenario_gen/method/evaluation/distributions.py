@@ -15,12 +15,12 @@ from scenario_gen.method.evaluation.geometry import footprint_distance
 from scenario_gen.numerics import Floats, Ints
 from scenario_gen.types import Motion
 
-SMOOTHING = 0.5
-"""Seconds over which acceleration is averaged before it is differentiated to jerk."""
+JERK_SMOOTHING_S = 0.5
+"""Acceleration is averaged over this time before it is differentiated to jerk."""
 
-MOST_COUNTS = 20_000_000  # bins of all samples together
-ROUNDING = 1e-6
-"""Bins: a value this little below an edge counts as above it, against rounding."""
+MAX_BIN_COUNT = 20_000_000  # over all samples
+ROUNDING_SHARE = 1e-6
+"""A value that is this share of a bin below an edge counts as above it, against rounding."""
 
 
 @dataclass(frozen=True)
@@ -49,7 +49,7 @@ def values_of(motion: Motion) -> dict[str, Floats]:
     generated motion alike; the gap is the distance between two footprints. A motion shorter than
     the smoothing has no jerk. A vehicle counts while it is there, a gap while both are.
     """
-    width = max(1, round(SMOOTHING / motion.dt))
+    width = max(1, round(JERK_SMOOTHING_S / motion.dt))
     samples: dict[str, list[Floats]] = {quantity.id: [np.zeros(0)] for quantity in QUANTITIES}
     for n in range(len(motion.vehicles)):
         own = motion.present_slice(n)
@@ -152,10 +152,10 @@ def compare(
         )
 
     def bin_of(values: Floats) -> Ints:
-        return np.asarray(np.floor(values / quantity.bin_width + ROUNDING), dtype=np.int64)
+        return np.asarray(np.floor(values / quantity.bin_width + ROUNDING_SHARE), dtype=np.int64)
 
     span = (everything.max() - everything.min()) / quantity.bin_width
-    if not span * (len(samples) + 1) < MOST_COUNTS:
+    if not span * (len(samples) + 1) < MAX_BIN_COUNT:
         raise InputError(
             f"{quantity.label} from {everything.min():g} to {everything.max():g} "
             f"{quantity.unit}: no vehicles move so; check the units"

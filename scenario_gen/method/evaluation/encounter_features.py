@@ -11,7 +11,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from scenario_gen.method.evaluation.geometry import footprint_distance
-from scenario_gen.method.evaluation.measures import figures_of, PERIOD
+from scenario_gen.method.evaluation.measures import FIGURE_PERIOD_S, figures_of
+from scenario_gen.method.evaluation.non_reactive import STANDSTILL_MPS
 from scenario_gen.numerics import Floats
 from scenario_gen.situation import (
     Conflict,
@@ -48,7 +49,6 @@ FEATURES = (
 DISTANCE = FEATURES.index("distance")
 MAX_GAP_S = 10.0  # larger time gaps are alike
 MAX_DISTANCE_M = 30.0  # larger distances are alike
-STANDSTILL_MPS = 0.5
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,7 +88,7 @@ def features_of(
     That is the crossing or merging pair with the least PET or, without one, the following pair
     with the least gap. The kind is None if the pair, or every pair, shares no area.
     """
-    motion = motion.resampled(PERIOD)
+    motion = motion.resampled(FIGURE_PERIOD_S)
     figures = {own.pair: own for own in figures_of(motion) if pair in (None, own.pair)}
     conflicts: dict[Pair, Conflict] = {
         known: conflict
@@ -148,7 +148,7 @@ def _vehicle_features(motion: Motion, n: int, entry: float) -> list[float]:
     present = motion.present_slice(n)
     speed = motion.speed[n, present]
     at = int(np.clip(round(entry / motion.dt) - present.start, 0, len(speed) - 1))
-    second = round(1.0 / PERIOD)
+    second = round(1.0 / FIGURE_PERIOD_S)
     change = speed[second:] - speed[:-second] if len(speed) > second else np.zeros(1)
     return [
         speed[0],

@@ -28,10 +28,10 @@ from scenario_gen.types import (
     ScenarioSet,
 )
 
-MEASURED = 1000
-"""Number of scenarios measured in a larger set, in RUNS evenly spaced runs."""
-RUNS = 20
-LEAST_STEPS = 20  # instants of a feature matrix, however many vehicles there are
+MEASURED_SCENARIOS = 1000
+"""Number of scenarios measured in a larger set, in RUN_COUNT evenly spaced runs."""
+RUN_COUNT = 20
+MIN_STEPS = 20  # instants of a feature matrix, for any number of vehicles
 Scenarios = Sequence[Scenario] | ScenarioSet
 
 
@@ -78,7 +78,7 @@ def evaluate_scenarios(
         encounter: the recorded template.
         sets: scenarios, or several sets of them by name, each a row: "mine", "replay". A
             `ScenarioSet` brings its account of candidates along. An empty set gives an empty row,
-            with a note. Of a set of more than MEASURED scenarios that many are measured, see
+            with a note. Of a set of more than MEASURED_SCENARIOS scenarios that many are measured, see
             `measured`.
         changepoints: their number K stands beside E, for more changepoints always fit better.
         checks: the checker's account of the candidates of a row, where its set brings none.
@@ -115,7 +115,7 @@ def evaluate_scenarios(
     steps = min(
         encounter.speed.shape[1],
         config.max_steps,
-        max(math.isqrt(config.max_entries // pairs), LEAST_STEPS),
+        max(math.isqrt(config.max_entries // pairs), MIN_STEPS),
     )
     template = Template(
         encounter, ids, steps, next(iter(rows.get(replay, ())), None), config, seed
@@ -140,16 +140,16 @@ def evaluate_scenarios(
 
 
 def measured(scenarios: Sequence[Scenario]) -> Sequence[Scenario]:
-    """Return the scenarios of a set that are measured: all, or MEASURED of a larger one.
+    """Return the scenarios of a set that are measured: all, or MEASURED_SCENARIOS of a larger one.
 
-    Those are RUNS runs of consecutive scenarios, evenly spaced from the first to the last:
+    Those are RUN_COUNT runs of consecutive scenarios, evenly spaced from the first to the last:
     whatever changes along the set is in them, and nearly every scenario has its mirror image
     beside it, as in a smaller set.
     """
-    if len(scenarios) <= MEASURED:
+    if len(scenarios) <= MEASURED_SCENARIOS:
         return scenarios
-    length = MEASURED // RUNS
-    starts = [k * (len(scenarios) - length) // (RUNS - 1) for k in range(RUNS)]
+    length = MEASURED_SCENARIOS // RUN_COUNT
+    starts = [k * (len(scenarios) - length) // (RUN_COUNT - 1) for k in range(RUN_COUNT)]
     return tuple(chain.from_iterable(scenarios[start : start + length] for start in starts))
 
 
@@ -212,7 +212,9 @@ def _notes(size: int, values: Mapping[str, Interval], samples: Samples) -> tuple
     if apart := vehicles * (vehicles - 1) // 2 - len(samples.pairs):
         notes.append(Note.of(NoteKind.PAIRS_LEFT_OUT, count=apart, time=MIN_COMMON_S))
     if measured < size:
-        notes.append(Note.of(NoteKind.SUBSET_MEASURED, measured=measured, total=size, runs=RUNS))
+        notes.append(
+            Note.of(NoteKind.SUBSET_MEASURED, measured=measured, total=size, runs=RUN_COUNT)
+        )
     if 1 < measured < enough:
         notes.append(Note.of(NoteKind.FEW_SCENARIOS, measured=measured, enough=enough))
     if np.isnan(values["min_distance"].value):

@@ -4,17 +4,17 @@
 """The distribution of recorded encounters of one kind, for `sampling.variety=population`.
 
 The law is a Gaussian of an encounter's features (FEATURES of
-`scenario_gen.method.evaluation.population`): speeds, braking and stands of both vehicles, the
-approach, their gaps at the conflict. It is learned from the template and the other recorded
-encounters of its kind, and shrunk towards a shipped one: with n of them of features x_i, sum over
-them Σ,
+`scenario_gen.method.evaluation.encounter_features`): speeds, braking and standstills of both
+vehicles, the approach, and the gaps at the conflict. It is learned from the template and the other
+recorded encounters of its kind, and shrunk towards a shipped law. With n encounters of features
+x_i,
 
     μ = (a μ₀ + Σ x_i) / (a + n),   S = (b S₀ + Σ (x_i − μ)(x_i − μ)ᵀ) / (b + n),
 
-the conjugate estimates of mean and covariance with a prior that counts as a and b encounters; the
-correlations of S are shrunk by a share c. A scenario of features x is at a distance d(x) = sqrt((x
-− μ)ᵀ S⁻¹ (x − μ) / F) from the middle, and up to 0.6 it is usual. `resources/population.json`
-holds μ₀ and S₀ of each kind; its source stands there.
+the conjugate estimates of mean and covariance with a prior that counts as a and b encounters. The
+correlations of S are shrunk by a share c. The distance of features x from the mean is
+d(x) = sqrt((x − μ)ᵀ S⁻¹ (x − μ) / F); a scenario with d ≤ 0.6 is usual.
+`resources/population.json` contains μ₀ and S₀ of each kind, and their source.
 """
 
 from collections.abc import Callable, Sequence
@@ -39,12 +39,10 @@ from scenario_gen.situation import EncounterKind
 from scenario_gen.types import Encounter, Measures, Scenario
 
 SHIPPED = Path(scenario_gen.__file__).parent / "resources" / "population.json"
-MEAN_ENCOUNTERS, SPREAD_ENCOUNTERS = (
-    2.0,
-    10.0,
-)  # a and b: that the shipped mean and covariance count as
-UNCORRELATED = 0.3  # c: share by which correlations are smaller than seen
-USUAL = 0.6  # d of usual encounters, RMS over features, in standard deviations
+MEAN_PRIOR_WEIGHT = 2.0  # a: encounters that the shipped mean counts as
+COVARIANCE_PRIOR_WEIGHT = 10.0  # b: encounters that the shipped covariance counts as
+SHRINKAGE_SHARE = 0.3  # c: reduction of the observed correlations
+USUAL_SIGMAS = 0.6  # d of usual encounters, RMS over features
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,7 +50,7 @@ class Law:
     """How encounters of a kind differ.
 
     Attributes:
-        mean: (F,) features of the middle.
+        mean: (F,) mean features.
         precision: (F, F) inverse of their covariance.
     """
 
@@ -62,11 +60,14 @@ class Law:
     @classmethod
     def of(cls, kind: EncounterKind, seen: Sequence[Floats]) -> "Law":
         """Learn the law of a kind from features (F,) of encounters and the shipped law."""
-        (mean, covariance), n = _shipped_law(kind), len(seen)
+        mean, covariance = _shipped_law(kind)
+        n = len(seen)
         rows = np.array(seen).reshape(n, len(mean))
-        mean = (MEAN_ENCOUNTERS * mean + rows.sum(axis=0)) / (MEAN_ENCOUNTERS + n)
+        mean = (MEAN_PRIOR_WEIGHT * mean + rows.sum(axis=0)) / (MEAN_PRIOR_WEIGHT + n)
         off = rows - mean
-        covariance = (SPREAD_ENCOUNTERS * covariance + off.T @ off) / (SPREAD_ENCOUNTERS + n)
+        covariance = (COVARIANCE_PRIOR_WEIGHT * covariance + off.T @ off) / (
+            COVARIANCE_PRIOR_WEIGHT + n
+        )
         return cls(mean, np.asarray(np.linalg.inv(shrunk(covariance)), dtype=np.float64))
 
     def distance(self, features: Floats) -> float:
@@ -77,23 +78,21 @@ class Law:
 
 def shrunk(covariance: Floats) -> Floats:
     """Return a covariance (F, F) with smaller correlations."""
-    return np.asarray(
-        (1.0 - UNCORRELATED) * covariance + UNCORRELATED * np.diag(np.diag(covariance))
-    )
+    diagonal = np.diag(np.diag(covariance))
+    return np.asarray((1.0 - SHRINKAGE_SHARE) * covariance + SHRINKAGE_SHARE * diagonal)
 
 
 def rarity_in(
     encounter: Encounter, population: Sequence[Encounter] = ()
 ) -> Callable[[Scenario], float]:
-    """Return the rarity of a template's scenarios: their distance from the mean over USUAL.
+    """Return the rarity of a template's scenarios: their distance from the mean over USUAL_SIGMAS.
 
-    The law is that of the scenario's own kind, which on another road may be another one than the
-    template's. Of those whose vehicles share no area nothing is known: their rarity is infinite.
+    The law is that of the scenario's kind, which may differ from the template's on another road.
+    The rarity is infinite if the vehicles share no area.
 
     Args:
-        encounter: the template; it counts once, whether it is in the population or not.
-        population: recorded encounters; those of the same features are one, whatever they are
-            called.
+        encounter: the template; it counts once, even if the population contains it.
+        population: recorded encounters; several with the same features count once.
     """
     template = features_of(encounter, encounter.name, 0)
     members = [template]
@@ -110,7 +109,7 @@ def rarity_in(
         member = scenario_features(scenario, template, encounter)
         if member.kind is None:
             return math.inf
-        return laws[member.kind].distance(member.features) / USUAL
+        return laws[member.kind].distance(member.features) / USUAL_SIGMAS
 
     return rarity
 
@@ -119,11 +118,9 @@ def measures_in(
     variety: str, encounter: Encounter, population: Sequence[Encounter] = ()
 ) -> Measures:
     """Return the measures of a template's scenarios, with rarity for variety `population`."""
-    return (
-        replace(MEASURES, rarity=rarity_in(encounter, population))
-        if variety == "population"
-        else MEASURES
-    )
+    if variety != "population":
+        return MEASURES
+    return replace(MEASURES, rarity=rarity_in(encounter, population))
 
 
 def _is_same(member: EncounterFeatures, other: EncounterFeatures) -> bool:

@@ -35,7 +35,7 @@ from scenario_gen.numerics.plane import unit
 from scenario_gen.situation import Conflict, conflict_of
 from scenario_gen.types import Measures, Motion, Pair
 
-PERIOD = 0.1  # s
+FIGURE_PERIOD_S = 0.1  # of the published samples
 
 
 @dataclass(frozen=True)
@@ -60,7 +60,7 @@ def measure(scenario: Motion, name: str, pair: Pair | None = None) -> float:
         pair: indices of two vehicles, the sign of `arrival_gap` follows their order; of one: its
             most critical pair.
     """
-    motion = scenario.resampled(PERIOD)
+    motion = scenario.resampled(FIGURE_PERIOD_S)
     ordered = permutations(range(len(motion.vehicles)), 2)
     chosen, directed = pair or (), name == "baseline_margin"
     pairs = [
@@ -76,7 +76,7 @@ def measure(scenario: Motion, name: str, pair: Pair | None = None) -> float:
 
 def figures_of(scenario: Motion) -> tuple[PairFigures, ...]:
     """Return all figures of each pair that is present together; `arrival_gap` unsigned."""
-    motion = scenario.resampled(PERIOD)
+    motion = scenario.resampled(FIGURE_PERIOD_S)
     figures = []
     for a, b in combinations(range(len(motion.vehicles)), 2):
         both = motion.present_slice(a, b)

@@ -29,7 +29,7 @@ LIMIT_CAUSES = (
     Cause.CURVATURE,
 )
 """Causes that count as a violated limit."""
-TURNS = math.radians(10.0)
+MIN_HEADING_SPREAD_RAD = math.radians(10.0)
 """E for heading is undefined for pairs whose heading differences spread by less."""
 HEADINGS = _SIMILARITY, _REALISM, _CRITICAL, _VALID, _DIVERSITY = (
     "Similarity to the recording",
@@ -123,7 +123,9 @@ def _similarity(samples: Samples) -> Estimates:
     compared = {
         "position": [pair.similarity(0, "euclidean", unit=unit) for pair in samples.pairs],
         "speed": [pair.similarity(1, "manhattan", unit=unit) for pair in samples.pairs],
-        "heading": [pair.similarity(2, "angle", TURNS, unit) for pair in samples.pairs],
+        "heading": [
+            pair.similarity(2, "angle", MIN_HEADING_SPREAD_RAD, unit) for pair in samples.pairs
+        ],
     }
     if not any(pair.template[2] for pair in compared["heading"]):
         del compared["heading"]

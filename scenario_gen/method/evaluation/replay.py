@@ -8,8 +8,8 @@ import numpy as np
 from scenario_gen.numerics import Floats
 from scenario_gen.types import cut, Encounter, Fit, FittedVehicle, Scenario
 
-MIN_CHORD = 0.5
-"""Metres: below it a chord gives no direction (eq 8) and no scale (eq 9)."""
+MIN_DIRECTED_CHORD_M = 0.5
+"""A shorter chord gives no direction (eq 8) and no scale (eq 9)."""
 
 
 def replay(encounter: Encounter, fit: Fit, frame_id: str = "map") -> Scenario:
@@ -60,7 +60,7 @@ def _replayed(
         offset = position[piece] - position[i]
         u, v = offset[-1], end[:2] - start[:2]
         chord, target = np.hypot(*u), np.hypot(*v)
-        if chord < MIN_CHORD or target < MIN_CHORD:
+        if chord < MIN_DIRECTED_CHORD_M or target < MIN_DIRECTED_CHORD_M:
             scale, turn = 1.0, start[2] - heading[i]
         else:
             scale, turn = target / chord, np.arctan2(u[0] * v[1] - u[1] * v[0], u @ v)

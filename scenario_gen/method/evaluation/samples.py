@@ -19,7 +19,7 @@ from scenario_gen.method.evaluation.similarity import pair_similarity, PairSimil
 from scenario_gen.numerics import Bools, Floats, Ints
 from scenario_gen.types import CheckCounts, Encounter, Motion, Scenario
 
-MOST_UNITS = 128  # of a bootstrap of E
+MAX_UNIT_COUNT = 128  # in a bootstrap of E
 MIN_COMMON_S = 1.0  # two vehicles that are present together for less are not compared
 
 
@@ -112,9 +112,9 @@ class Samples:
 
     @cached_property
     def pooled(self) -> Bootstrap:
-        """The bootstrap of at most MOST_UNITS units: the cost of E grows with their square."""
+        """The bootstrap of at most MAX_UNIT_COUNT units: the cost of E grows with their square."""
         unit, config = self.bootstrap.unit, self.template.config
-        size = -(-(int(unit.max(initial=0)) + 1) // MOST_UNITS)
+        size = -(-(int(unit.max(initial=0)) + 1) // MAX_UNIT_COUNT)
         return (
             self.bootstrap
             if size == 1

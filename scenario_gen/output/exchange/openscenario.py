@@ -14,7 +14,15 @@ from scenario_gen.logs import OPENSCENARIO_SPEEDS
 from scenario_gen.output.exchange.cases import Case, Exported
 from scenario_gen.output.exchange.config import ExportConfig
 from scenario_gen.output.exchange.xml import add, date_of, Element, number, serialized
-from scenario_gen.types import height, rear_axle, Scenario, shifted, token, Vehicle, WHEELBASE
+from scenario_gen.types import (
+    height,
+    rear_axle,
+    Scenario,
+    shifted,
+    token,
+    Vehicle,
+    WHEELBASE_SHARE,
+)
 
 EGO = "Ego"
 WHEEL = 0.65  # metres of diameter
@@ -102,7 +110,7 @@ def _entity(entities: Element, name: str, vehicle: Vehicle, speeds: str) -> None
         axles = add(element, "Axles")
         track = 0.85 * vehicle.width
         for tag, x, steering in (
-            ("FrontAxle", WHEELBASE * vehicle.length, STEERING),
+            ("FrontAxle", WHEELBASE_SHARE * vehicle.length, STEERING),
             ("RearAxle", 0.0, 0.0),
         ):
             add(

@@ -22,7 +22,7 @@ from scenario_gen.base.xml_reader import read_xml
 from scenario_gen.numerics import Floats, wrap_angle
 from scenario_gen.output.exchange.cases import Case, Exported
 from scenario_gen.output.exchange.xml import date_of
-from scenario_gen.types import height, rear_axle, Scenario, Vehicle, WHEELBASE
+from scenario_gen.types import height, rear_axle, Scenario, Vehicle, WHEELBASE_SHARE
 
 OBJECTS, MAP = "ground_truth", "ground_truth_map"  # omega-prime's topics
 WHEEL_RADIUS = 0.325  # metres, as in OpenSCENARIO files
@@ -195,7 +195,7 @@ def _attributes(vehicle: Vehicle) -> Any:
     rear, down = -rear_axle(vehicle), WHEEL_RADIUS - height(vehicle) / 2.0
     return osi.MovingObject.VehicleAttributes(
         bbcenter_to_rear=osi.Vector3d(x=rear, y=0.0, z=down),
-        bbcenter_to_front=osi.Vector3d(x=rear + WHEELBASE * vehicle.length, y=0.0, z=down),
+        bbcenter_to_front=osi.Vector3d(x=rear + WHEELBASE_SHARE * vehicle.length, y=0.0, z=down),
         radius_wheel=WHEEL_RADIUS,
     )
 

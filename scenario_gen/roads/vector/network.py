@@ -25,7 +25,7 @@ from scenario_gen.roads.vector.drafts import (
     SECTION_LENGTH_M,
 )
 from scenario_gen.roads.vector.signs import rules_of_pieces, with_rules
-from scenario_gen.types import CARS, DRIVERS, Lane, LaneNetwork, LEVEL, Note, NoteKind
+from scenario_gen.types import CARS, DRIVERS, Lane, LaneNetwork, LEVEL_SPACING_M, Note, NoteKind
 
 _MIN_BORDER_M = 0.05
 _CHUNK_ROWS = 64  # lanes whose neighbours are looked up at once
@@ -204,7 +204,7 @@ def _on_one_level(lane: Lane, other: Lane) -> bool:
     """Return whether two lanes have the same height where they are nearest, if it is known."""
     distances = distance.cdist(lane.centre, other.centre)
     a, b = np.unravel_index(distances.argmin(), distances.shape)
-    return not abs(lane.height[a] - other.height[b]) > LEVEL
+    return not abs(lane.height[a] - other.height[b]) > LEVEL_SPACING_M
 
 
 @dataclass(frozen=True, eq=False)

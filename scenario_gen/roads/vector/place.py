@@ -34,7 +34,7 @@ from scenario_gen.situation import (
     Track,
     track_conflicts,
 )
-from scenario_gen.types import LaneNetwork, LEVEL, Motion, Note, NoteKind
+from scenario_gen.types import LaneNetwork, LEVEL_SPACING_M, Motion, Note, NoteKind
 
 MATCHED_PLACEMENTS_COUNT = 15
 """Rigid placements that are matched with lanes at a time."""
@@ -183,7 +183,7 @@ class _JudgedMatch:
             driven.append((places, heights[centres.query(places)[1]]))
         for i, j in combinations(range(len(driven)), 2):
             (places, height), (other_places, other_height) = driven[i], driven[j]
-            on_two_levels = np.abs(height[:, None] - other_height) > LEVEL
+            on_two_levels = np.abs(height[:, None] - other_height) > LEVEL_SPACING_M
             if (on_two_levels & (cdist(places, other_places) < _OVERLAP_M)).any():
                 first, second = (self.search.tracks[n].vehicle.id for n in (i, j))
                 return (

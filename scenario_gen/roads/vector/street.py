@@ -31,7 +31,7 @@ from scenario_gen.roads.vector.match import (
     speeding_cost,
 )
 from scenario_gen.situation import FrenetTracks, to_frenet, Track, turn_of
-from scenario_gen.types import LEVEL
+from scenario_gen.types import LEVEL_SPACING_M
 
 _END_ROOM_M = 1.0  # between a footprint and the end of the road
 _TRIED_STREETS_COUNT = 40  # the straightest
@@ -129,7 +129,7 @@ class _Stretch:
         near = (
             (distance < _MAX_ROAD_WIDTH_M)
             & (np.abs(wrap_angle(graph.yaws - yaw)) < _PARALLEL_RAD)
-            & ~(np.abs(graph.height - level) > LEVEL)  # true for unknown heights
+            & ~(np.abs(graph.height - level) > LEVEL_SPACING_M)  # true for unknown heights
         )
         return [int(lane) for lane in np.unique(graph.lane_of[near])]
 

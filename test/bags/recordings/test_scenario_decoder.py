@@ -13,7 +13,7 @@ from msg_conventions.scenario_info import encode_info, scenario_entry
 from msg_conventions.scenarios import encode_scenario, messages_of
 from scenario_gen.bags.recordings.scenario_decoder import INFO, ScenarioDecoder, SCENARIOS, WITNESS
 from scenario_gen.base.errors import InputError
-from scenario_gen.types.ego import join_ego, with_witness
+from scenario_gen.types import join_ego, with_witness
 from scenario_gen.types.scenario import BoundaryStates, EgoSlot, Scenario
 
 

@@ -13,11 +13,10 @@ from support.evaluation_worlds import CARS, crossing, replayed, samples
 
 from scenario_gen.base.errors import InputError
 from scenario_gen.method.evaluation import evaluate_scenarios, EvaluationConfig, replay
-from scenario_gen.types import NoteKind
+from scenario_gen.types import ALWAYS, NoteKind
 from scenario_gen.types.encounter import Encounter
 from scenario_gen.types.evaluation import CheckCounts, Evaluation
 from scenario_gen.types.fit import Fit, FittedVehicle
-from scenario_gen.types.presence import ALWAYS
 from scenario_gen.types.scenario import BoundaryStates, Cause, ScenarioSet, Verdict, Violation
 
 T = 121

@@ -257,11 +257,11 @@ def test_motion_on_another_clock():
 def test_a_large_set_has_the_same_error_and_nearly_the_same_interval_with_pooled_units(
     monkeypatch,
 ):
-    """At most MOST_UNITS units are drawn, and the value does not depend on how they are pooled."""
+    """At most MAX_UNIT_COUNT units are drawn, and the value does not depend on how they are pooled."""
     encounter = crossing()
     scenarios = samples(encounter, 150)
     whole = evaluate_scenarios(encounter, {"set": scenarios}).row("set").values
-    monkeypatch.setattr("scenario_gen.method.evaluation.samples.MOST_UNITS", 40)
+    monkeypatch.setattr("scenario_gen.method.evaluation.samples.MAX_UNIT_COUNT", 40)
     pooled = evaluate_scenarios(encounter, {"set": scenarios}).row("set").values
     for name in ("e_position", "e_speed", "correlation_speed"):
         assert pooled[name].value == pytest.approx(whole[name].value, rel=1e-9)

@@ -13,8 +13,7 @@ from support.oracle import off_road, overlapping
 from test_validity_presence import random_case
 
 from benchmarks._recheck import Account, Recheck
-from scenario_gen.types import Encounter, Vehicle
-from scenario_gen.types.presence import ALWAYS
+from scenario_gen.types import ALWAYS, Encounter, Vehicle
 from scenario_gen.types.scenario import BoundaryStates
 
 TIME = np.arange(101) * 0.1

@@ -19,8 +19,7 @@ from benchmarks.paper import write_page
 from scenario_gen.logs import read_log
 from scenario_gen.logs.synthetic import bundled
 from scenario_gen.output.report.page import render, ReportInput, write_report
-from scenario_gen.types import Note, NoteKind
-from scenario_gen.types.row_names import UNIFORM
+from scenario_gen.types import Note, NoteKind, UNIFORM
 
 RUNS = "top.ran=1"
 PAGES = ("report.html", pytest.param("paper.html", marks=pytest.mark.long))

@@ -17,11 +17,11 @@ from scenario_gen.numerics.kernels import F2, kernel, OUT1
 from scenario_gen.types import Motion, Vehicle
 
 FINER = 4  # instants of the other vehicle for one of the ego
-APART = 5.0  # s, at most: what is farther apart, or never meets, is all the same
+MAX_SHIFT_S = 5.0  # s, at most: what is farther apart, or never meets, is all the same
 
 
-def time_apart(motion: Motion, here: Bools, ego: int, other: int) -> float:
-    """Return the least time shift [s] with which a vehicle would meet another, at most APART.
+def min_time_shift(motion: Motion, here: Bools, ego: int, other: int) -> float:
+    """Return the least time shift [s] with which a vehicle would meet another, at most MAX_SHIFT_S.
 
     Args:
         motion: as driven.
@@ -31,7 +31,7 @@ def time_apart(motion: Motion, here: Bools, ego: int, other: int) -> float:
     """
     mine = np.flatnonzero(here[ego])
     poses = np.column_stack([motion.time[mine], motion.poses[ego, mine]])
-    return least_shift(
+    return poses_time_shift(
         poses,
         timed_poses(motion, here[other], other),
         (motion.vehicles[ego], motion.vehicles[other]),
@@ -47,22 +47,22 @@ def timed_poses(motion: Motion, here: Bools, n: int) -> Floats:
     return np.column_stack([fine, motion.of_vehicles([n]).at(fine).poses[0]])
 
 
-def least_shift(a: Floats, b: Floats, vehicles: tuple[Vehicle, Vehicle]) -> float:
-    """Return the least time difference [s] of overlapping footprints, at most APART.
+def poses_time_shift(a: Floats, b: Floats, vehicles: tuple[Vehicle, Vehicle]) -> float:
+    """Return the least time difference [s] of overlapping footprints, at most MAX_SHIFT_S.
 
     Args:
         a: (S, 4) time [s], x, y [m], yaw [rad] of one.
         b: (R, 4) likewise, of the other.
         vehicles: whose footprints these are.
     """
-    out = np.array([APART])
+    out = np.array([MAX_SHIFT_S])
     if len(a) and len(b):
-        _least_shift(a, b, np.array([vehicle.half for vehicle in vehicles]), out)
+        _lower_to_shift(a, b, np.array([vehicle.half for vehicle in vehicles]), out)
     return float(out[0])
 
 
 @kernel(F2, F2, F2, OUT1)
-def _least_shift(a: Floats, b: Floats, half: Floats, out: Floats) -> None:
+def _lower_to_shift(a: Floats, b: Floats, half: Floats, out: Floats) -> None:
     """Lower `out` (1,) to the least difference of times [s] at which footprints overlap.
 
     Args:
