@@ -34,7 +34,7 @@ soak: $(TEST)
 	$(BIN)/python test/soak $(PART)
 
 # Peers that are not on this machine give no row.
-bench: $(TEST) .venv-judges-verifai/.ready
+bench: $(TEST)
 	$(LOCKED) -r requirements/bench.lock
 	$(BIN)/python -m benchmarks all
 

@@ -8,7 +8,7 @@ import os
 THREADS = dict.fromkeys(
     ("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS", "NUMEXPR_NUM_THREADS"), "1"
 )
-os.environ |= THREADS  # of ours, of every peer and of their processes; libraries read it once, as they are imported
+os.environ |= THREADS  # libraries read it once, when they are imported
 
 # ruff: noqa: E402
 import argparse
@@ -29,15 +29,31 @@ from benchmarks import row
 from benchmarks._size import QUICK
 from benchmarks.row import MADE, Row
 
-FRAME = {"__main__", "row"}
+FLAGS = {
+    "list": "print the names of the benchmarks",
+    "json": "end with one JSON object on the last line",
+    "quick": "the smallest sizes, to see that it runs; the figures mean nothing",
+    "held-out": "naturalness, interaction: the held-out encounters",
+    "full": "bridges: all of the demo's scenarios, and every file before every judge",
+}
+OPTIONS: dict[str, tuple[type, str]] = {
+    "count": (int, "number of scenarios or drives"),
+    "cases": (int, "naturalness, interaction: only the first encounters"),
+    "roads": (str, "naturalness, interaction: names of roads, separated by commas"),
+    "variety": (str, "naturalness, interaction: the sampler's preset"),
+    "out": (str, "paper: the folder of the page"),
+    "seed": (int, "paper: same seed, same page"),
+    "part": (str, "corpus: mine, store or batch; kills: a victim"),
+    "rows": (str, "a file that gets each row as it is measured, a line of JSON each"),
+}
 
 
 def names() -> list[str]:
-    """Return the names of all benchmarks: the modules of this package that define `run`."""
+    """Return the names of all benchmarks: the public modules of this package."""
     return [
         module.name
         for module in pkgutil.iter_modules(benchmarks.__path__)
-        if module.name not in FRAME and not module.name.startswith("_")
+        if module.name not in ("__main__", "row") and not module.name.startswith("_")
     ]
 
 
@@ -55,7 +71,7 @@ def machine() -> dict[str, str | int]:
 
 
 def _pools() -> list[dict[str, Any]]:
-    """Return the pools of threads of the libraries that are loaded, those of peers too; none if threadpoolctl is missing."""
+    """Return the thread pools of the loaded libraries; none if threadpoolctl is missing."""
     try:
         from threadpoolctl import threadpool_info
     except ImportError:
@@ -65,7 +81,7 @@ def _pools() -> list[dict[str, Any]]:
 
 
 def table(rows: list[Row]) -> str:
-    """Lay the rows out as a table for people."""
+    """Return the rows as a text table."""
     lines = [f"{'figure':<58} {'value':>12} {'unit':<10} {'target':>12}  met  peer"]
     for one in rows:
         sign = "≥" if one.better == "higher" else "≤"
@@ -81,67 +97,11 @@ def main() -> int:
     """Run what the command line names."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks", description=__doc__)
     parser.add_argument("name", nargs="?", help="a benchmark, or all")
-    parser.add_argument("--list", action="store_true", help="name the benchmarks")
-    parser.add_argument(
-        "--json", action="store_true", help="end with one JSON object on the last line"
-    )
-    parser.add_argument(
-        "--count",
-        type=int,
-        help="how many, where a benchmark counts something (scenarios to re-check)",
-    )
-    parser.add_argument(
-        "--cases",
-        type=int,
-        help="naturalness: the first encounters alone, on the corridor, for a look",
-    )
-    parser.add_argument(
-        "--roads",
-        help="naturalness: names of roads, separated by commas; map: the recording's own",
-    )
-    parser.add_argument(
-        "--held-out",
-        action="store_true",
-        default=None,
-        help="naturalness: the encounters that are kept apart",
-    )
-    parser.add_argument(
-        "--details", help="naturalness: a file for the figures of every case, a line of JSON each"
-    )
-    parser.add_argument(
-        "--pictures", help="naturalness: a folder for pictures of the first ten cases"
-    )
-    parser.add_argument(
-        "--checkout", help="naturalness: the folder of another checkout to be measured"
-    )
-    parser.add_argument(
-        "--variety", help="naturalness: the sampler's preset, wide (default) or narrow"
-    )
-    parser.add_argument(
-        "--full",
-        action="store_true",
-        default=None,
-        help="bridges: all of the demo's scenarios, and every file before every judge",
-    )
-    parser.add_argument("--out", help="paper: the folder of the page")
-    parser.add_argument(
-        "--log",
-        action="append",
-        help="paper: a file of a log instead of the bundled cases; repeatable",
-    )
-    parser.add_argument("--seed", type=int, help="paper: same seed, same page")
-    parser.add_argument(
-        "--part",
-        help="corpus: mine, memory, store, recorded, batch, kills, library, peers; kills: a victim; that alone",
-    )
-    parser.add_argument(
-        "--rows", help="a file that gets each row as it is measured, a line of JSON each"
-    )
-    parser.add_argument(
-        "--quick",
-        action="store_true",
-        help="next to nothing of each, to see that it runs; figures say nothing",
-    )
+    for flag, meaning in FLAGS.items():
+        parser.add_argument(f"--{flag}", action="store_true", default=None, help=meaning)
+    for option, (kind, meaning) in OPTIONS.items():
+        parser.add_argument(f"--{option}", type=kind, help=meaning)
+    parser.add_argument("--log", action="append", help="paper: a log to measure; repeatable")
     arguments = parser.parse_args()
     known = names()
     signal.signal(signal.SIGTERM, stop)
@@ -149,11 +109,7 @@ def main() -> int:
         print("\n".join(known))
         return 0
     if arguments.name != "all" and arguments.name not in known:
-        print(
-            f"unknown benchmark {arguments.name!r}; choose one of: all, {', '.join(known)}",
-            file=sys.stderr,
-        )
-        return 2
+        parser.error(f"unknown benchmark {arguments.name!r}; choose all, {', '.join(known)}")
     if arguments.quick:
         os.environ[QUICK] = "1"  # before the benchmarks are imported
     for name in known if arguments.name == "all" else [arguments.name]:
@@ -175,11 +131,11 @@ def main() -> int:
 
 
 def report(name: str, rows: list[Row], stopped: str, arguments: argparse.Namespace) -> None:
-    """Print the rows of a benchmark; of one that was stopped, those that were measured, and why it was."""
+    """Print the rows of a benchmark; of a stopped one the rows so far, and the reason."""
     if arguments.json:
         document = {
             "benchmark": name,
-            "quick": arguments.quick,
+            "quick": bool(arguments.quick),
             "rows": [one.document() for one in rows],
             "machine": machine(),
         }
@@ -192,7 +148,7 @@ def report(name: str, rows: list[Row], stopped: str, arguments: argparse.Namespa
 
 
 def stop(*_: object) -> NoReturn:
-    """End as Ctrl-C does, so that what was measured is printed."""
+    """End like Ctrl-C, so that the rows so far are printed."""
     raise KeyboardInterrupt
 
 

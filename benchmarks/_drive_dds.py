@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Lock-step over DDS: how many times faster than real time a planner of one command per step drives, and a period's spread."""
+"""Lock-step over DDS: how many times faster than real time a planner drives."""
 
 from collections.abc import Callable
 import os
@@ -9,8 +9,6 @@ from pathlib import Path
 import tempfile
 import time
 from typing import Any, TypeVar
-
-import numpy as np
 
 from benchmarks._messages_processes import environment, nodes
 from scenario_gen.bags.recordings.write import write_recording
@@ -39,23 +37,6 @@ def _cpu(pid: int) -> float:
     return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
 
 
-def real_time(made: GenerationResult, periods: int) -> float:
-    """Return the 99th percentile [ms] of what a period of 100 ms lasts too long or too short, in real time."""
-    with tempfile.TemporaryDirectory() as name, free_domain() as domain:
-        bag = write_recording(Path(name) / "bag", made)
-        os.environ.update(environment(domain))
-        parameters = [
-            "-p",
-            f"bag:={bag}",
-            "-p",
-            "wait_for_ego:=false",
-            "-p",
-            "drive.overtime:=10.0",
-        ]
-        with nodes(Path(name), domain, {"traffic": parameters}):
-            return _periods(domain, periods)
-
-
 def _calls(domain: int, steps: int, pid: int) -> tuple[float, float]:
     from std_srvs.srv import Trigger
 
@@ -80,19 +61,6 @@ def _calls(domain: int, steps: int, pid: int) -> tuple[float, float]:
             done += k >= 20 and answer.result().success
         spent = _cpu(pid) + time.process_time() - used
         return 0.1 * done / (time.perf_counter() - began), 1e3 * spent / steps
-
-    return _with_node(domain, work)
-
-
-def _periods(domain: int, periods: int) -> float:
-    from scenario_gen.ros.common.topics import create_subscription
-
-    def work(node: Any, spin: Callable[[Any], None]) -> float:
-        at: list[float] = []
-        create_subscription(node, "/clock", lambda _: at.append(time.perf_counter()))
-        while len(at) < periods + 6:
-            node.executor.spin_once(timeout_sec=0.01)
-        return float(np.quantile(np.abs(np.diff(at[5:]) - 0.1), 0.99)) * 1e3
 
     return _with_node(domain, work)
 

@@ -75,6 +75,15 @@ class Signals:
             lateral,
         )
 
+    def at_shares(self, share: Floats) -> Floats:
+        """Return positions (N, S, 2) [m] at shares (S,) of the duration."""
+        time = share * self.time[-1]
+        x, y = (
+            np.array([np.interp(time, self.time, row) for row in self.position[..., axis]])
+            for axis in (0, 1)
+        )
+        return np.stack([x, y], axis=-1)
+
 
 def sign_changes(values: Floats, band: float) -> int:
     """How often a series (T,) changes its sign; values within the band have none."""
@@ -145,11 +154,15 @@ def keeps_turn(template: Signals, sample: Signals) -> np.ndarray:
     return np.asarray(near & stands & kind)
 
 
+def arrays(motion: Any) -> dict[str, Any]:
+    """Return the motion of an encounter or a scenario as arrays by name."""
+    names = ("time", "position", "heading", "speed")
+    return {name: np.array(getattr(motion, name)) for name in names}
+
+
 def displacement(samples: list[Signals]) -> float:
-    """Mean distance [m] between the same vehicle at the same share of the duration in two samples, without the clock's part."""
+    """Return the mean distance [m] of a vehicle in two samples at the same share of the time."""
     share = np.linspace(0.0, 1.0, 101)
-    at = np.array([
-        [[np.interp(share * s.time[-1], s.time, row[:, axis]) for axis in (0, 1)] for row in s.position] for s in samples
-    ])  # fmt: skip
-    first, second = np.triu_indices(len(at), 1)
-    return float(np.hypot(*np.moveaxis(at[first] - at[second], 2, 0)).mean())
+    position = np.array([s.at_shares(share) for s in samples])
+    first, second = np.triu_indices(len(position), 1)
+    return float(np.linalg.norm(position[first] - position[second], axis=-1).mean())

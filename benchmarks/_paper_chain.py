@@ -13,7 +13,7 @@ from itertools import product
 import numpy as np
 
 from benchmarks._paper_speed_knots import speed_knots
-from benchmarks._paper_speed_profile import knots_on, SpeedBounds, SpeedProfile, SpeedProfileQP
+from benchmarks._paper_speed_profile import knots_on, SpeedProfile, SpeedProfileQP
 from scenario_gen.base.errors import InputError, RefusedError
 from scenario_gen.method.evaluation import without_changepoints
 from scenario_gen.method.fitting import fit_template, FittingConfig
@@ -272,7 +272,7 @@ def _profile(
     for factor, share in product(END_SPEEDS, KNOTS):
         asked = (factor * float(speeds[0]), factor * float(speeds[-1]))
         knots = speed_knots(times, dwells, own, encounter.time, speeds, asked, share)
-        qp = SpeedProfileQP(knots, UNLIMITED, SpeedBounds.none())
+        qp = SpeedProfileQP(knots, UNLIMITED)
         knot = knots_on(times[None], times, knots)
         reached = route.length[route.anchor]
         lengths = (reached[knots.bounds[:, 1]] - reached[knots.bounds[:, 0]])[None]

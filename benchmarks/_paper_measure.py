@@ -8,7 +8,6 @@ from itertools import pairwise
 
 import numpy as np
 
-from benchmarks._linear_pieces import linear_changepoints
 from benchmarks._paper_chain import LENGTH, NOISE, place, rotation, sample, Sampled, SIGMA
 from scenario_gen.base.errors import RefusedError
 from scenario_gen.method.evaluation import (
@@ -130,7 +129,6 @@ def trend_fits(
         "default preset": driving,
         "none": without_changepoints(paper),
         "uniform, as many as the paper preset": uniform_changepoints(paper),
-        "best possible, as many as the paper preset": linear_changepoints(encounter, paper),
     }
     return {
         name: (line_error(encounter.speed, way.changepoints), len(way.changepoints))

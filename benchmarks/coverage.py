@@ -25,8 +25,8 @@ from typing import Any
 import numpy as np
 
 from benchmarks._coverage_nulls import at_precision, jitters, joint_gain, speed_spread
+from benchmarks._sampling_cases import DATA
 from benchmarks._size import sized
-from benchmarks.naturalness import DATA
 from benchmarks.row import higher, lower, Row
 from scenario_gen.base.errors import ScenarioGenError
 from scenario_gen.logs import LogConfig, read_log

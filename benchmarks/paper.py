@@ -47,70 +47,33 @@ def write_page(
     quality: Sequence[str],
     provenance: Mapping[str, str],
 ) -> None:
-    """Write `paper.html` and `paper.json` to `folder`; the same input gives the same bytes."""
+    """Write `paper.html` and `paper.json`; the same input gives the same bytes."""
     folder.mkdir(parents=True, exist_ok=True)
-    claims = [claims_of(case) for case in cases]
-    document = {
-        "provenance": dict(provenance),
-        "cases": [_figures(case, found) for case, found in zip(cases, claims, strict=True)],
-    }
-    write_text(
-        folder / FIGURES,
-        json.dumps(document, indent=2, ensure_ascii=False, allow_nan=False) + "\n",
-    )
-    write_text(folder / PAGE, _render(cases, claims, quality, provenance))
-
-
-def refusals(case: PaperCase) -> list[str]:
-    """Say what is missing, and why."""
-    return [
-        f"{name}: {why}" if name else f"The encounter cannot be placed: {why}"
-        for name, why in case.refused.items()
-    ]
-
-
-def _figures(case: PaperCase, claims: Sequence[Claim]) -> dict[str, Any]:
-    return {
-        "encounter": case.encounter.name,
-        "road": case.road.name if case.road else None,
-        "refused": refusals(case),
-        "figures": [
-            {
-                "figure": c.number,
-                "claim": c.claim,
-                "measured": c.measured,
-                "holds": c.holds,
-                "values": c.values,
-            }
-            for c in claims
-        ],
-    }
-
-
-def _render(
-    cases: Sequence[PaperCase],
-    claims: Sequence[Sequence[Claim]],
-    quality: Sequence[str],
-    provenance: Mapping[str, str],
-) -> str:
-    views = [
+    views: list[dict[str, Any]] = [
         {
             "index": i,
             "name": case.encounter.name,
             "road": case.road.name if case.road else "",
             "refused": refusals(case),
-            "figures": found,
+            "figures": claims_of(case),
         }
-        for i, (case, found) in enumerate(zip(cases, claims, strict=True))
+        for i, case in enumerate(cases)
     ]
-    drawings = {
-        f"plot-{k}-{i}": json.loads(claim.figure.to_json())
-        for i, found in enumerate(claims)
-        for k, claim in enumerate(found)
+    drawings: dict[str, Any] = {}
+    for view in views:
+        for k, claim in enumerate(view["figures"]):
+            drawing = json.loads(claim.figure.to_json())
+            drawing["layout"].pop("template", None)
+            drawings[f"plot-{k}-{view['index']}"] = drawing
+    document = {
+        "provenance": dict(provenance),
+        "cases": [
+            view | {"figures": [_document(claim) for claim in view["figures"]]} for view in views
+        ],
     }
-    for drawing in drawings.values():
-        drawing["layout"].pop("template", None)
-    return render_page(
+    text = json.dumps(document, indent=2, ensure_ascii=False, allow_nan=False)
+    write_text(folder / FIGURES, f"{text}\n")
+    page = render_page(
         "paper.html.j2",
         ("paper.js",),
         drawings,
@@ -121,6 +84,25 @@ def _render(
         provenance=provenance,
         settings=SETTINGS,
     )
+    write_text(folder / PAGE, page)
+
+
+def refusals(case: PaperCase) -> list[str]:
+    """Return a sentence for each missing set."""
+    return [
+        f"{name}: {why}" if name else f"The encounter cannot be placed: {why}"
+        for name, why in case.refused.items()
+    ]
+
+
+def _document(claim: Claim) -> dict[str, Any]:
+    return {
+        "figure": claim.number,
+        "claim": claim.claim,
+        "measured": claim.measured,
+        "holds": claim.holds,
+        "values": claim.values,
+    }
 
 
 def reproduce(

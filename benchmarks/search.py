@@ -12,7 +12,6 @@ from time import process_time
 import numpy as np
 
 from benchmarks._late_witness import brute_force, LateWitness, natural_scenarios
-from benchmarks._search_peers import first_failure, PYTHON
 from benchmarks._size import sized
 from benchmarks.row import higher, lower, Row
 from scenario_gen.closed_loop.search.estimate import Search
@@ -24,12 +23,8 @@ PLANNERS = {  # seconds late: drives of a search, failures of brute force, share
 }
 BRUTE = 300_000
 SEEDS = 20
-MIDDLE = 0.485  # s, of the planner on which VerifAI's samplers are tried
-VERIFAI = {
-    "ce": ("cross-entropy", 5, 3000),
-    "bo": ("Bayesian", 1, 40),
-}  # seeds, drives at most: 40 Bayesian ones take 4 min
-PLAIN = 5000  # drives of plain sampling and of VerifAI's samplers until the first failure, at most
+PLAIN_COUNT = 5000
+"""Drives of plain sampling until the first failure, at most."""
 
 
 def run(seeds: int = sized(SEEDS, quick=1), brute: int = sized(0, quick=200)) -> list[Row]:
@@ -48,23 +43,6 @@ def run(seeds: int = sized(SEEDS, quick=1), brute: int = sized(0, quick=200)) ->
             sized(budget, 60),
             asked,
             seeds,
-        )
-    return rows + _verifai(LateWitness(natural, MIDDLE))
-
-
-def _verifai(problem: LateWitness) -> list[Row]:
-    """Return how soon VerifAI's samplers find a failure, where they are installed."""
-    rows = []
-    for kind, (name, seeds, limit) in VERIFAI.items() if PYTHON.exists() else ():
-        most = sized(limit, 2)
-        first = [first_failure(problem, kind, seed, most) for seed in range(sized(seeds, 1))]
-        remark = (
-            f"{seeds} seed(s); {len([k for k in first if k > most])} found none in {most} drives"
-        )
-        rows.append(
-            lower(
-                f"VerifAI {name}: drives until the first failure", median(first), "", None, remark
-            )
         )
     return rows
 
@@ -103,13 +81,13 @@ def _planner(
 
 
 def _plain(problem: LateWitness, seed: int) -> int:
-    """Return the number of the first natural drive that fails; PLAIN if none does so far."""
+    """Return the number of the first natural drive that fails; PLAIN_COUNT if none does so far."""
     generator, driven = np.random.default_rng(seed), 0
-    while driven < PLAIN:
+    while driven < PLAIN_COUNT:
         z = generator.standard_normal((256, problem.size))
         responses = problem.drive([one for one in problem.candidates(z) if one is not None])
         hits = [k for k, one in enumerate(responses) if one.failed]
         if hits:
             return driven + hits[0] + 1
         driven += len(responses)
-    return PLAIN
+    return PLAIN_COUNT

@@ -1,9 +1,9 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Start and end of the nodes, as separate processes and composed: with kernels in the cache and without, and at a load of 16.
+"""Start of the nodes, as separate processes and composed, with cached kernels and without.
 
-Figures of the clock depend on what else the machine does, so the seconds of the CPU stand beside them.
+Wall time depends on the load of the machine, so CPU time is measured, too.
 """
 
 from collections.abc import Iterator, Sequence
@@ -18,48 +18,45 @@ import time
 
 from benchmarks._messages_processes import environment
 from benchmarks._size import sized
-from benchmarks.messages import _Client, _done
-from benchmarks.row import lower, Row
+from benchmarks.messages import Client, result_of
+from benchmarks.row import higher, lower, Row
 from scenario_gen.bags.storage.bag import read_messages
 from scenario_gen.base.ros_domain import free_domain, this_host_only
 
 NODES = ("evaluator", "gp_sampler", "planner", "segmenter", "road_server", "log_player")[
     sized(0, quick=5) :
 ]
+BARE = "import rclpy\nrclpy.init()\nrclpy.spin(rclpy.create_node('bare'))"
 LOAD = sized(16, quick=1)
-LAUNCH = 5.0  # seconds that launch gives a node after Ctrl-C, and once more after SIGTERM
-BARE = "import rclpy\nrclpy.init()\nnode = rclpy.create_node('bare')\ntry:\n    rclpy.spin(node)\nexcept BaseException:\n    pass"
+LAUNCH_S = 5.0
+"""Launch gives a node this time after Ctrl-C, and once more after SIGTERM."""
+IDLE_S = sized(10.0, quick=0.1)
 Process = subprocess.Popen[bytes]
 
 
 def run() -> list[Row]:
     """Measure."""
     os.environ.update(this_host_only())
+    single = [[node] for node in NODES]
+    composed = [["suite", "--nodes", ",".join(NODES)]]
     with tempfile.TemporaryDirectory() as folder, free_domain() as domain:
         place = Path(folder)
-        peer = _peer(place, domain)
-        rows = _start("six nodes, warm", place, domain, [[node] for node in NODES], 5.0, peer)
-        rows += _start(
-            "composed suite, warm",
-            place,
-            domain,
-            [["suite", "--nodes", ",".join(NODES)]],
-            3.0,
-            peer,
-        )
+        peer = _bare_node(place, domain)
+        rows = _start("six nodes, warm", place, domain, single, 5.0, peer)
+        rows += _start("composed suite, warm", place, domain, composed, 3.0, peer)
         if sized(True, quick=False):
-            rows += _start(
-                "six nodes, cold", place, domain, [[node] for node in NODES], None, peer, cold=True
-            )
-        return rows + _exit(place, domain, peer)
+            with tempfile.TemporaryDirectory() as cache:
+                rows += _start("six nodes, cold", place, domain, single, None, peer, cache)
+        return [*rows, *_exit(place, domain)]
 
 
 @contextmanager
 def _running(
-    folder: Path, domain: int, commands: Sequence[Sequence[str]], **variables: str
+    folder: Path, domain: int, commands: Sequence[Sequence[str]], cache: str = ""
 ) -> Iterator[list[Process]]:
-    """Start processes together; whatever is left of them at the end is killed."""
-    variables = environment(domain) | {"ROS_LOG_DIR": str(folder)} | variables
+    """Start processes together; they are interrupted, and killed if they do not end."""
+    variables = environment(domain) | {"ROS_LOG_DIR": str(folder)}
+    variables |= {"NUMBA_CACHE_DIR": cache} if cache else {}
     with (folder / "nodes.log").open("ab") as log:
         processes = [
             subprocess.Popen([sys.executable, *words], stdout=log, stderr=log, env=variables)
@@ -67,20 +64,25 @@ def _running(
         ]
     try:
         yield processes
+        for process in processes:
+            process.send_signal(signal.SIGINT)
+        for process in processes:
+            process.wait(60.0)
     finally:
         for process in processes:
             process.kill()
             process.wait()
 
 
-def _cpu(pid: int) -> float:
-    """Seconds of the CPU that a process and those of its children that have ended have used."""
-    fields = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
-    return sum(map(int, fields[11:15])) / os.sysconf("SC_CLK_TCK")
+def _cpu(processes: Sequence[Process]) -> float:
+    """Return the CPU seconds that processes and their ended children have used."""
+    texts = [Path(f"/proc/{process.pid}/stat").read_text() for process in processes]
+    ticks = [int(field) for text in texts for field in text.rpartition(")")[2].split()[11:15]]
+    return sum(ticks) / os.sysconf("SC_CLK_TCK")
 
 
-def _active(client: _Client, nodes: Sequence[str]) -> None:
-    """Wait until all nodes are active; rclpy's own `wait_for_service` looks only every 0.25 s."""
+def _wait_for_active(client: Client, nodes: Sequence[str]) -> None:
+    """Wait until all nodes are active; rclpy's `wait_for_service` looks only every 0.25 s."""
     from lifecycle_msgs.srv import GetState
 
     services = {node: client.node.create_client(GetState, f"{node}/get_state") for node in nodes}
@@ -88,7 +90,7 @@ def _active(client: _Client, nodes: Sequence[str]) -> None:
     while waiting:
         for node in sorted(waiting):
             if services[node].service_is_ready():
-                state = _done(services[node].call_async(GetState.Request()))
+                state = result_of(services[node].call_async(GetState.Request()))
                 waiting -= {node} if state.current_state.label == "active" else set()
         time.sleep(0.02)
     for service in services.values():
@@ -99,88 +101,67 @@ def _start(
     name: str,
     folder: Path,
     domain: int,
-    which: list[list[str]],
+    arguments: list[list[str]],
     target: float | None,
     peer: str,
-    *,
-    cold: bool = False,
+    cache: str = "",
 ) -> list[Row]:
-    commands = [["-m", "scenario_gen.ros.common.start", *words] for words in which]
-    with tempfile.TemporaryDirectory() as cache, _Client(domain) as client:
-        variables = {"NUMBA_CACHE_DIR": cache} if cold else {}
+    """Start nodes, wait until they are active, then leave them idle."""
+    commands = [["-m", "scenario_gen.ros.common.start", *words] for words in arguments]
+    with Client(domain) as client:
         started = time.monotonic()
-        with _running(folder, domain, commands, **variables) as processes:
-            _active(client, NODES)
-            wall, used = (
-                time.monotonic() - started,
-                sum(_cpu(process.pid) for process in processes),
-            )
-            for process in processes:
-                process.send_signal(signal.SIGINT)
-            for process in processes:
-                process.wait(60.0)
+        with _running(folder, domain, commands, cache) as processes:
+            _wait_for_active(client, NODES)
+            wall, used = time.monotonic() - started, _cpu(processes)
+            time.sleep(IDLE_S)
+            idle = 100.0 * (_cpu(processes) - used) / IDLE_S
     return [
         lower(f"{name}: all active", wall, "s", target, peer),
         lower(f"{name}: CPU until all are active", used, "s", None, peer),
+        lower(f"{name}: CPU when idle", idle, "% of a core", 5.0),
     ]
 
 
-def _peer(folder: Path, domain: int) -> str:
-    """What a node of rclpy's with nothing in it takes."""
-    from rcl_interfaces.srv import ListParameters
-
-    with _Client(domain) as client:
-        service = client.node.create_client(ListParameters, "bare/list_parameters")
-        started = time.monotonic()
-        with _running(folder, domain, [["-c", BARE]]) as (process,):
-            service.wait_for_service(60.0)
-            wall, used = time.monotonic() - started, _cpu(process.pid)
-            started = time.monotonic()
-            process.send_signal(signal.SIGINT)
-            process.wait(60.0)
-            gone = time.monotonic() - started
-    return f"one bare rclpy node: there after {wall:.1f} s, {used:.2f} s of CPU; gone {gone:.2f} s after Ctrl-C"
-
-
-def _exit(folder: Path, domain: int, peer: str) -> list[Row]:
+def _exit(folder: Path, domain: int) -> list[Row]:
     """End the nodes and a recorder as launch does, beside busy loops."""
     bag = folder / "bag"
-    commands = [["-m", "scenario_gen.ros.common.start", node] for node in NODES]
-    record = [
-        "-m",
-        "scenario_gen.ros.common.start",
-        "recorder",
-        "--ros-args",
-        "-p",
-        f"bag:={bag}",
-        "-p",
-        "topics:=.*",
-    ]
-    with _running(folder, domain, [*commands, record]) as processes, _Client(domain) as client:
-        _active(client, NODES)
+    recorder = ["recorder", "--ros-args", "-p", f"bag:={bag}", "-p", "topics:=.*"]
+    started = [[node] for node in NODES]
+    commands = [["-m", "scenario_gen.ros.common.start", *words] for words in (*started, recorder)]
+    with _running(folder, domain, commands) as processes, Client(domain) as client:
+        _wait_for_active(client, NODES)
         while not list(bag.glob("*.mcap")):
             time.sleep(0.1)
-        with _running(folder, domain, [["-c", "while True: pass"]] * LOAD):
-            time.sleep(sized(3.0, quick=0.1))
-            started, used = (
-                time.monotonic(),
-                {process.pid: _cpu(process.pid) for process in processes},
-            )
-            slowest, killed = 0.0, 0
-            for number in (signal.SIGINT, signal.SIGTERM, signal.SIGKILL):
-                left = [process for process in processes if process.poll() is None]
-                killed += len(left) if number is signal.SIGKILL else 0
-                for process in left:
-                    process.send_signal(number)
-                deadline = time.monotonic() + LAUNCH
-                while (
-                    any(process.poll() is None for process in left) and time.monotonic() < deadline
-                ):
-                    time.sleep(0.01)
-                slowest = time.monotonic() - started if left else slowest
-    whole = len(list(read_messages(bag))) if killed == 0 else 0
-    words = f"{len(used)} processes at a load of {LOAD} on {os.cpu_count()} cores; {whole} messages in the bag; {peer}"
+        busy = [subprocess.Popen([sys.executable, "-c", "while True: pass"]) for _ in range(LOAD)]
+        began, alive = time.monotonic(), list[Process](processes)
+        for number in (signal.SIGINT, signal.SIGTERM):
+            for process in alive:
+                process.send_signal(number)
+            deadline = time.monotonic() + LAUNCH_S
+            while alive and time.monotonic() < deadline:
+                alive = [process for process in alive if process.poll() is None]
+                time.sleep(0.01)
+        wall = time.monotonic() - began
+        for process in busy:
+            process.kill()
+            process.wait()
+    load = f"{len(processes)} processes at a load of {LOAD} on {os.cpu_count()} cores"
+    messages = len(list(read_messages(bag))) if not alive else 0
     return [
-        lower("the slowest node ends after Ctrl-C, machine busy", slowest, "s", LAUNCH, words),
-        lower("nodes that launch would have killed, machine busy", killed, "nodes", 0.0, words),
+        lower("the slowest node ends after Ctrl-C, machine busy", wall, "s", LAUNCH_S, load),
+        lower("nodes that launch would have killed, machine busy", len(alive), "nodes", 0.0),
+        higher("messages in the readable bag after that", messages, "", 1.0),
     ]
+
+
+def _bare_node(folder: Path, domain: int) -> str:
+    """Return the start time of an empty rclpy node."""
+    from rcl_interfaces.srv import ListParameters
+
+    with Client(domain) as client:
+        service = client.node.create_client(ListParameters, "bare/list_parameters")
+        started = time.monotonic()
+        with _running(folder, domain, [["-c", BARE]]) as processes:
+            service.wait_for_service(60.0)
+            wall, used = time.monotonic() - started, _cpu(processes)
+    return f"one bare rclpy node: ready after {wall:.1f} s, {used:.2f} s of CPU"

@@ -1,15 +1,13 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""One warm command, as a user runs it: two vehicles, one road, 50 scenarios, kernels in the cache; the whole and its parts.
+"""One warm command, as a user runs it: two vehicles, one road, 50 scenarios, kernels in the cache.
 
 Seconds of the clock depend on what else the machine does, so those of the CPU stand beside them. The log is a bundled case as a
 table, since most logs are tables.
 """
 
 from collections.abc import Sequence
-import csv
-import json
 import os
 from pathlib import Path
 from statistics import median
@@ -17,6 +15,8 @@ import subprocess
 import sys
 import tempfile
 from time import perf_counter
+
+import pandas as pd
 
 from benchmarks._size import sized
 from benchmarks.row import lower, Row
@@ -31,31 +31,17 @@ def run() -> list[Row]:
     """Measure; one run before, which compiles what is not in the cache, is not counted."""
     with tempfile.TemporaryDirectory() as folder:
         log, out = _table(Path(folder)), f"{folder}/out"
-        words = [
-            "generate",
-            str(log),
-            "--road",
-            "four_way",
-            "--count",
-            str(COUNT),
-            "--seed",
-            "7",
-            "--out",
-            out,
-        ]
+        settings = f"--road four_way --count {COUNT} --seed 7 --out".split()
+        words = ["generate", str(log), *settings, out]
         command = [sys.executable, "-m", "scenario_gen", *words]
         _spent(command)
         whole = [_spent(command) for _ in range(RUNS)]
         plain = [_spent([sys.executable, "-c", "import scenario_gen"]) for _ in range(RUNS)]
         asked = [_spent([sys.executable, "-m", "scenario_gen", "--help"]) for _ in range(RUNS)]
-        parts = _parts([sys.executable, "-m", "benchmarks._warm_parts", str(log), out, str(COUNT)])
-    rows = [
+    return [
         *_both("generate", whole, TARGET),
         *_both("--help", asked),
         *_both("import scenario_gen", plain),
-    ]
-    return rows + [
-        row for name, spent in parts.items() for row in _both(f"generate, {name}", [spent])
     ]
 
 
@@ -70,30 +56,23 @@ def _both(name: str, spent: Sequence[Sequence[float]], target: float | None = No
 def _table(folder: Path) -> Path:
     """Write the bundled case of two left turners as a CSV table."""
     (encounter,) = read_log(bundled("b")).encounters
-    path = folder / "log.csv"
-    with path.open("w", newline="", encoding="utf-8") as file:
-        rows = csv.writer(file)
-        rows.writerow(
-            ["t_s", "vehicle_id", "x_m", "y_m", "speed_mps", "heading_rad", "length_m", "width_m"]
+    tables = [
+        pd.DataFrame(
+            {
+                "t_s": encounter.time,
+                "vehicle_id": vehicle.id,
+                "x_m": encounter.position[n, :, 0],
+                "y_m": encounter.position[n, :, 1],
+                "speed_mps": encounter.speed[n],
+                "heading_rad": encounter.heading[n],
+                "length_m": vehicle.length,
+                "width_m": vehicle.width,
+            }
         )
-        for n, vehicle in enumerate(encounter.vehicles):
-            columns = (
-                encounter.time,
-                encounter.position[n, :, 0],
-                encounter.position[n, :, 1],
-                encounter.speed[n],
-                encounter.heading[n],
-            )
-            for t, *values in zip(*columns, strict=True):
-                rows.writerow(
-                    [
-                        f"{t:.3f}",
-                        vehicle.id,
-                        *(f"{value:.4f}" for value in values),
-                        vehicle.length,
-                        vehicle.width,
-                    ]
-                )
+        for n, vehicle in enumerate(encounter.vehicles)
+    ]
+    path = folder / "log.csv"
+    pd.concat(tables).to_csv(path, index=False, float_format="%.4f")
     return path
 
 
@@ -106,12 +85,3 @@ def _spent(command: Sequence[str]) -> tuple[float, float]:
     if process.returncode:
         raise subprocess.CalledProcessError(process.returncode, command)
     return usage.ru_utime + usage.ru_stime, perf_counter() - started
-
-
-def _parts(command: Sequence[str]) -> dict[str, list[float]]:
-    ran = [
-        subprocess.run(command, capture_output=True, text=True, check=True).stdout.splitlines()[-1]
-        for _ in range(RUNS)
-    ]
-    told = [json.loads(line) for line in ran]
-    return {name: [median(one[name][k] for one in told) for k in (0, 1)] for name in told[0]}
