@@ -146,16 +146,14 @@ def arrival_spread(case: Prepared, scenarios: Sequence[Scenario]) -> float:
 
 
 def divergences(case: Prepared, scenarios: Sequence[Scenario]) -> dict[str, float]:
-    """Jensen-Shannon divergence [bit] of each quantity between the samples and the fitted template."""
+    """Return the Jensen-Shannon divergence [bit] of each quantity from the fitted template."""
     period = case.encounter.dt
     template = values_of(replay(case.encounter, case.fit).resampled(period))
-    samples = [values_of(s.resampled(period)) for s in scenarios]
-    ones: Floats = np.ones((1, len(scenarios)))
-    return {
-        q.id: float(
-            compare(q, template[q.id], [values[q.id] for values in samples]).jensen_shannon(ones)[
-                0
-            ]
-        )
-        for q in QUANTITIES
-    }
+    samples = [values_of(scenario.resampled(period)) for scenario in scenarios]
+    weights: Floats = np.ones((1, len(scenarios)))
+    found = {}
+    for quantity in QUANTITIES:
+        values = [sample[quantity.id] for sample in samples]
+        compared = compare(quantity, template[quantity.id], values)
+        found[quantity.id] = float(compared.jensen_shannon(weights)[0])
+    return found

@@ -8,7 +8,6 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from itertools import islice
 import json
-import os
 from pathlib import Path
 import subprocess
 import sys
@@ -19,6 +18,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from benchmarks._sampling_cases import DATA
 from benchmarks._size import sized
 from benchmarks.row import higher, lower, Row
 from scenario_gen.bags.recordings.write import write_recording
@@ -37,9 +37,16 @@ from scenario_gen.types.scenario import Scenario
 
 BEGUN = time.monotonic()
 ROOT = Path(__file__).resolve().parents[1]
-DATA = Path(os.environ.get("SCENARIO_GEN_DATA", ROOT.parent / "shared" / "data"))
-ON = ("t_intersection", "corridor", "four_way", "straight", "roundabout", "merge", "curve")
-DRIVES = 15.0  # metres that a vehicle must drive to make an ego
+ROADS_IN_TURN = (
+    "t_intersection",
+    "corridor",
+    "four_way",
+    "straight",
+    "roundabout",
+    "merge",
+    "curve",
+)
+MIN_EGO_DISTANCE_M = 15.0
 
 
 @dataclass(frozen=True)
@@ -99,25 +106,18 @@ def _say(sentence: str) -> None:
 
 
 def _bags(folder: Path, sizes: Sizes) -> Iterator[Path]:
-    """Yield a bag of each case: the demo's, recorded ones on roads in turn, and encounters cut out of whole recordings."""
+    """Yield a bag of each case: the demo's, recorded ones on roads in turn, and random cuts."""
     for case, road in ROADS.items():
         yield from _bag(folder, read_log(bundled(case)).encounters, road, sizes.demo)
     yield from _bag(folder, read_log(_all_types()).encounters, "corridor", sizes.demo)
     logs = sorted((DATA / "trajectories").glob("*/*.csv"))
-    recorded = [
-        read_log(path).encounters[0] for path in logs if path.name.startswith("encounter_")
-    ]
+    cut = [path for path in logs if path.name.startswith("encounter_")]
+    recorded = [read_log(path).encounters[0] for path in cut]
     yield from islice(_turns(folder, recorded, sizes.recorded), sizes.cases)
-    found = [
-        one
-        for path in logs
-        if path.name.endswith("_all_vehicles.csv")
-        for one in read_log(path).encounters
-    ]
-    yield from islice(
-        _turns(folder, [found[k] for k in np.random.default_rng(7).permutation(len(found))], 1),
-        sizes.cuts,
-    )
+    whole = [path for path in logs if path.name.endswith("_all_vehicles.csv")]
+    found = [encounter for path in whole for encounter in read_log(path).encounters]
+    chosen = [found[k] for k in np.random.default_rng(7).permutation(len(found))]
+    yield from islice(_turns(folder, chosen, 1), sizes.cuts)
 
 
 def _all_types() -> pd.DataFrame:
@@ -146,9 +146,11 @@ def _all_types() -> pd.DataFrame:
 
 def _turns(folder: Path, encounters: Sequence[Encounter], count: int) -> Iterator[Path]:
     """Yield bags of every encounter on one road, then of every one on another, and so on."""
-    for turn in range(len(ON)):
+    for turn in range(len(ROADS_IN_TURN)):
         for k, encounter in enumerate(encounters):
-            yield from _bag(folder, [encounter], ON[(k + turn) % len(ON)], count)
+            yield from _bag(
+                folder, [encounter], ROADS_IN_TURN[(k + turn) % len(ROADS_IN_TURN)], count
+            )
 
 
 def _bag(folder: Path, encounters: Sequence[Encounter], road: str, count: int) -> Iterator[Path]:
@@ -161,20 +163,21 @@ def _bag(folder: Path, encounters: Sequence[Encounter], road: str, count: int) -
 
 def _round_trip(folder: Path, bags: Sequence[Path], target: str) -> list[Row]:
     """Return the largest differences of positions and speeds after writing and importing."""
-    place = speed = 0.0
+    position = speed = 0.0
     for k, bag in enumerate(bags):
         entries = json.loads((folder / str(k) / "export.json").read_text())["scenarios"]
         known = {one.sha256: one.others for case in read_cases(bag) for one in case.scenarios}
         for entry in entries:
             scenario: Scenario = known[entry["sha256"]]
-            for n, track in enumerate(
-                read_raw([folder / str(k) / entry["files"][0]], LogConfig()).vehicles
-            ):
-                there = slice(int(scenario.present[n, 0]), int(scenario.present[n, 1]) + 1)
-                place = max(place, float(np.abs(track.fix - scenario.position[n, there]).max()))
-                speed = max(speed, float(np.abs(track.speed - scenario.speed[n, there]).max()))
+            tracks = read_raw([folder / str(k) / entry["files"][0]], LogConfig()).vehicles
+            for n, track in enumerate(tracks):
+                present = slice(int(scenario.present[n, 0]), int(scenario.present[n, 1]) + 1)
+                offset = np.abs(track.fix - scenario.position[n, present]).max()
+                position = max(position, float(offset))
+                difference = np.abs(track.speed - scenario.speed[n, present]).max()
+                speed = max(speed, float(difference))
     return [
-        lower(f"bridges.{target}.round_trip.position", place, "m", 1e-3),
+        lower(f"bridges.{target}.round_trip.position", position, "m", 1e-3),
         lower(f"bridges.{target}.round_trip.speed", speed, "m/s", 1e-2),
     ]
 
@@ -196,18 +199,21 @@ def judged(environment: str, program: str, *arguments: str) -> Any:
     return json.loads(lines[-1])
 
 
+def _faults(found: Any, target: str, lists: Sequence[str], peer: str) -> list[Row]:
+    """Return a row for each list of faults that a judge found."""
+    return [
+        lower(f"bridges.{target}.{name}", len(found[name]), "faults", 0, peer) for name in lists
+    ]
+
+
 def _commonroad(folder: Path) -> list[Row]:
     found = judged("commonroad", "commonroad_files.py", "check", str(folder))
     if found is None:
         return []
-    peer = f"commonroad-io 2024.3, drivability checker 2025.4.0: {found['files']} files"
-    return [
-        lower("bridges.commonroad.schema_errors", len(found["invalid"]), "files", 0, peer),
-        lower("bridges.commonroad.read_error", found["read_error"], "m", 1e-6, peer),
-        lower("bridges.commonroad.collisions", len(found["collisions"]), "files", 0, peer),
-        lower("bridges.commonroad.off_road", len(found["off_road"]), "files", 0, peer),
-        lower("bridges.commonroad.planted_not_found", len(found["not_found"]), "files", 0, peer),
-    ]
+    peer = f"commonroad-io, drivability checker: {found['files']} files"
+    lists = ("invalid", "collisions", "off_road", "not_found")
+    error = lower("bridges.commonroad.read_error", found["read_error"], "m", 1e-6, peer)
+    return [error, *_faults(found, "commonroad", lists, peer)]
 
 
 def _asam(folder: Path) -> list[Row]:
@@ -226,13 +232,8 @@ def _omega(folder: Path) -> list[Row]:
     found = judged("omega", "omega_files.py", str(folder))
     if found is None:
         return []
-    peer = (
-        f"omega-prime 0.3.7: {found['files']} files, the map of {found['maps']} of {found['of']}"
-    )
-    return [
-        lower("bridges.osi.files_with_faults", len(found["faults"]), "files", 0, peer),
-        lower("bridges.osi.planted_not_found", len(found["missed"]), "faults", 0, peer),
-    ]
+    peer = f"omega-prime: {found['files']} files, the map of {found['maps']} of {found['of']}"
+    return _faults(found, "osi", ("faults", "missed"), peer)
 
 
 def _problems(bags: Sequence[Path], folder: Path, most: int) -> int:
@@ -247,41 +248,32 @@ def _problems(bags: Sequence[Path], folder: Path, most: int) -> int:
 
 
 def _egos(bags: Sequence[Path]) -> Iterator[tuple[Case, Exported]]:
-    """Yield the first scenario of each case with each vehicle as its ego, then the second of each, and so on."""
+    """Yield the first scenario of each case with each vehicle as ego, then the second, ..."""
     groups: list[list[tuple[Case, Exported]]] = []
     for bag in bags:
-        for vehicle in [
-            v.id for case in read_cases(bag) for v in case.scenarios[0].others.vehicles
-        ]:
-            cases = read_cases(bag, ExportConfig(ego=vehicle))
-            groups.append(
-                [(case, one) for case in cases for one in case.scenarios if _drives(one)]
-            )
-            yield from groups[-1][:1]
-    for turn in range(1, max(map(len, groups), default=0)):
+        vehicles = [v for case in read_cases(bag) for v in case.scenarios[0].others.vehicles]
+        for vehicle in vehicles:
+            cases = read_cases(bag, ExportConfig(ego=vehicle.id))
+            pairs = [(case, one) for case in cases for one in case.scenarios]
+            groups.append([pair for pair in pairs if _drives(pair[1])])
+    for turn in range(max(map(len, groups), default=0)):
         yield from (group[turn] for group in groups if turn < len(group))
 
 
 def _drives(one: Exported) -> bool:
     ego = one.ego
-    return ego is not None and float(np.abs(np.diff(ego.position[0], axis=0)).sum()) >= DRIVES
+    return (
+        ego is not None
+        and float(np.abs(np.diff(ego.position[0], axis=0)).sum()) >= MIN_EGO_DISTANCE_M
+    )
 
 
 def _driven(folder: Path, problems: int) -> list[Row]:
     found = judged("commonroad", "commonroad_files.py", "drive", str(folder)) if problems else None
     if found is None:
         return []
-    peer = (
-        f"commonroad-reactive-planner 2025.1: {found['reached']} of {found['problems']} problems"
-    )
-    for name, (how, step) in found["outcomes"].items():
-        peer += "" if how == "reached" else f"; {name}: {how} at step {step}"
-    return [
-        higher(
-            "bridges.commonroad.problems_solved",
-            found["reached"] / found["problems"],
-            "share",
-            0.9,
-            peer,
-        )
-    ]
+    peer = f"commonroad-reactive-planner: {found['reached']} of {found['problems']} problems"
+    for name, (outcome, step) in found["outcomes"].items():
+        peer += "" if outcome == "reached" else f"; {name}: {outcome} at step {step}"
+    share = found["reached"] / found["problems"]
+    return [higher("bridges.commonroad.problems_solved", share, "share", 0.9, peer)]

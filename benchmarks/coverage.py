@@ -15,7 +15,6 @@ of the templates. `_coverage_nulls` compares them at equal precision.
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from importlib import import_module
-import itertools
 import json
 import math
 from pathlib import Path
@@ -38,16 +37,17 @@ from scenario_gen.method.recombination import recombinations
 from scenario_gen.method.sampling import SamplingConfig
 from scenario_gen.method.segmentation import segment
 from scenario_gen.roads import road_and_template
-from scenario_gen.situation import Situation
+from scenario_gen.situation import EncounterKind, Situation
 from scenario_gen.types import Encounter, Scenario
 
 PAIRS = Path(__file__).with_name("_coverage_pairs.json")
 SEED = 3
 COUNT, MOST = sized((50, None), (3, 12))
 TEMPLATES, MIDDLE = sized((5, 10, 20), (1,)), sized(10, 1)
-SHIFT_S, PACE = 1.0, 0.06
+SHIFT_S, PACE_RATIO = 1.0, 0.06
 TARGETS = {5: 0.48, 10: 0.65, 20: 0.78}
-OF_RECORDED = 0.95  # precision of the generated over that of the recorded, at least
+PRECISION_RATIO = 0.95
+"""The least precision of the generated over that of the recorded encounters."""
 
 
 @dataclass(frozen=True)
@@ -67,19 +67,12 @@ def run() -> list[Row]:
         (name, replace(encounter, name=str(k)))
         for k, (name, encounter) in enumerate(list(_encounters())[:MOST])
     ]
-    recombined = recombinations([encounter for _, encounter in encounters], len(encounters) ** 2)[
-        0
-    ]
+    pairs = recombinations([encounter for _, encounter in encounters], len(encounters) ** 2)[0]
+    recombined = [("recombined", encounter) for encounter in pairs]
     rows: list[Row] = []
     for variety in ("wide", "population"):
         made = list(_generated(encounters, variety, COUNT))
-        more = list(
-            _generated(
-                [("recombined", encounter) for encounter in recombined],
-                variety,
-                max(COUNT // 5, 1),
-            )
-        )
+        more = list(_generated(recombined, variety, max(COUNT // 5, 1)))
         for setting, beside in ((variety, []), (f"{variety}, recombined", more)):
             rows += _measured(setting, made, beside, np.random.default_rng(1))
     return rows
@@ -92,7 +85,7 @@ Made = tuple[str, Encounter, tuple[Scenario, ...]]
 def _measured(
     setting: str, made: Sequence[Made], recombined: Sequence[Made], rng: np.random.Generator
 ) -> Iterator[Row]:
-    """Yield all rows of a setting; its nulls, of recorded encounters alone, have as many members."""
+    """Yield all rows of a setting; its nulls, from recorded encounters alone, are as large."""
     plain, more = (sum(len(members) for _, _, members in sets) for sets in (made, recombined))
     times = round(1.0 + more / plain)
     shifted = [
@@ -100,15 +93,15 @@ def _measured(
         for name, own, members in made
     ]
     mixed = [
-        (name, own, tuple(itertools.chain(*(_mixed(members, rng) for _ in range(times)))))
+        (name, own, tuple(one for _ in range(times) for one in _mixed(members, rng)))
         for name, own, members in made
     ]
     found, *nulls = (
         members_of([(name, Set(own, members)) for name, own, members in sets])  # type: ignore[misc]
         for sets in ([*made, *recombined], shifted, mixed)
     )
-    yield higher(f"{setting}: encounters", len(found.recorded), "")
-    yield higher(f"{setting}: scenarios", len(found.made), "")
+    yield higher(f"{setting}: encounters", len(found.recorded))
+    yield higher(f"{setting}: scenarios", len(found.made))
     lost = {(member.template, member.other) for member in found.made if member.kind is None}
     yield lower(f"{setting}: sets that lose the shared area", len(lost), "", 0.0)
     yield from _curve(setting, found)
@@ -117,86 +110,55 @@ def _measured(
 
 
 def _by_kind(setting: str, found: Members) -> Iterator[Row]:
-    """Yield coverage and precision with templates of one kind, the mean over kinds by their numbers of encounters."""
+    """Yield coverage and precision with templates of one kind, the weighted mean over kinds."""
     kinds = [own for own in map(found.of_kind, KINDS) if own.recordings > 1]
     for n in TEMPLATES:
         enough = [own for own in kinds if len(own.recorded) >= 2 * n]
-        if enough:
-            shares = np.array([[share.value for share in own.shares(n)] for own in enough])
-            alone, generated, precision, recorded = np.average(
-                shares, axis=0, weights=[len(own.recorded) for own in enough]
-            )
-            message = f"{len(enough)} kinds; templates alone {alone:.2f}"
-            yield higher(
-                f"{setting}: coverage with {n} of a kind", generated, "", TARGETS.get(n), message
-            )
-            message = f"of the recorded {recorded:.2f}"
-            yield higher(
-                f"{setting}: precision with {n} of a kind",
-                precision,
-                "",
-                OF_RECORDED * recorded,
-                message,
-            )
+        if not enough:
+            continue
+        shares = np.array([[share.value for share in own.shares(n)] for own in enough])
+        weights = [len(own.recorded) for own in enough]
+        alone, generated, precision, recorded = np.average(shares, axis=0, weights=weights)
+        name, text = f"{setting}: coverage with {n} of a kind", f"templates alone {alone:.2f}"
+        yield higher(name, generated, "", TARGETS.get(n), text)
+        name, text = f"{setting}: precision with {n} of a kind", f"of the recorded {recorded:.2f}"
+        yield higher(name, precision, "", PRECISION_RATIO * recorded, text)
 
 
-def _curve(variety: str, found: Members) -> Iterator[Row]:
+def _curve(setting: str, found: Members) -> Iterator[Row]:
     """Yield the rows of the numbers of templates."""
     for point in found.curve(TEMPLATES):
         n, multiplier = point.templates, point.multiplier
-        alone = f"{in_words(point.generated)}; templates alone {in_words(point.alone)}"
-        yield higher(
-            f"{variety}: coverage with {n}", point.generated.value, "", TARGETS.get(n), alone
-        )
-        recorded = f"of the recorded {in_words(point.recorded)}"
-        least = OF_RECORDED * point.recorded.value if math.isfinite(point.recorded.value) else None
-        yield higher(f"{variety}: precision with {n}", point.precision.value, "", least, recorded)
-        name = f"{variety}: multiplier with {n} (inf: more than there are)"
-        yield higher(
-            name,
-            multiplier.value,
-            "",
-            10.0,
-            f"[{multiplier.low:.1f}, {multiplier.high:.1f}] over draws",
-        )
+        text = f"{in_words(point.generated)}; templates alone {in_words(point.alone)}"
+        name = f"{setting}: coverage with {n}"
+        yield higher(name, point.generated.value, "", TARGETS.get(n), text)
+        text, recorded = f"of the recorded {in_words(point.recorded)}", point.recorded.value
+        least = PRECISION_RATIO * recorded if math.isfinite(recorded) else None
+        yield higher(f"{setting}: precision with {n}", point.precision.value, "", least, text)
+        text = f"[{multiplier.low:.1f}, {multiplier.high:.1f}] over draws"
+        yield higher(f"{setting}: multiplier with {n}", multiplier.value, "", 10.0, text)
 
 
 def _beside(
-    variety: str, found: Members, nulls: Mapping[str, Members], rng: np.random.Generator
+    setting: str, found: Members, nulls: Mapping[str, Members], rng: np.random.Generator
 ) -> Iterator[Row]:
-    """Yield what the nulls have, as they are and at the precision of the generated ones."""
+    """Yield the coverage over that of the nulls at equal precision, and the joint features."""
     _, coverage, precision, _ = found.shares(MIDDLE)
     best: tuple[float, str] = (0.0, "")
+    label = f"{setting}: coverage with {MIDDLE} at equal precision over"
     for name, null in (*nulls.items(), *jitters(found, rng)):
-        plain, equal = null.shares(MIDDLE), at_precision(null, precision.value, MIDDLE)
-        message = f"{name} {equal[0].value:.2f} at {equal[1].value:.2f}; as it is {plain[1].value:.2f} at {plain[2].value:.2f}"
+        equal, reached = at_precision(null, precision.value, MIDDLE)
+        text = f"{name} {equal.value:.2f} at {reached.value:.2f}"
         if name in nulls:
-            gain = coverage.value - equal[0].value
-            yield higher(
-                f"{variety}: coverage with {MIDDLE} over {name} at equal precision",
-                gain,
-                "",
-                0.12,
-                message,
-            )
+            yield higher(f"{label} {name}", coverage.value - equal.value, "", 0.12, text)
         else:
-            best = max(best, (equal[0].value, message))
-    gain = coverage.value - best[0]
-    yield higher(
-        f"{variety}: coverage with {MIDDLE} over the best jitter at equal precision",
-        gain,
-        "",
-        0.25,
-        best[1],
-    )
+            best = max(best, (equal.value, text))
+    yield higher(f"{label} the best jitter", coverage.value - best[0], "", 0.25, best[1])
     for kind, joint in joint_gain(found, nulls["mixed"], MIDDLE).items():
-        target = 0.1 if kind == "following" else 0.05
-        yield higher(
-            f"{variety}: precision of joint features over mixed, {kind}", joint, "", target
-        )
-    yield higher(
-        f"{variety}: spread of speeds within a set over the recorded", speed_spread(found), "", 0.4
-    )
+        target = 0.1 if kind is EncounterKind.FOLLOWING else 0.05
+        yield higher(f"{setting}: joint precision over mixed, {kind}", joint, "", target)
+    spread = speed_spread(found)
+    yield higher(f"{setting}: spread of speeds in a set over the recorded", spread, "", 0.4)
 
 
 def _generated(
@@ -207,14 +169,9 @@ def _generated(
     for name, encounter in encounters:
         try:
             road, template = road_and_template("corridor", encounter, config.road)
-            chain = Chain(
-                Situation.of(template),
-                segment(template, config.segmentation, SEED),
-                road,
-                config,
-                count=count,
-                seed=SEED,
-            )
+            situation = Situation.of(template)
+            segmentation = segment(template, config.segmentation, SEED)
+            chain = Chain(situation, segmentation, road, config, count=count, seed=SEED)
             yield name, encounter, tuple(chain.run())
         except ScenarioGenError as error:
             print(f"{encounter.name}: {error}", file=sys.stderr)
@@ -232,19 +189,15 @@ def _encounters() -> Iterator[tuple[str, Encounter]]:
         return
     for row in json.loads(PAIRS.read_text()):
         config = LogConfig(vehicles=",".join(row["vehicles"]), start=row["start"], end=row["end"])
-        yield (
-            row["name"],
-            read_log([DATA / "trajectories" / file for file in row["files"]], config).encounters[
-                0
-            ],
-        )
+        files = [DATA / "trajectories" / file for file in row["files"]]
+        yield row["name"], read_log(files, config).encounters[0]
 
 
 def _shifted(encounter: Encounter, rng: np.random.Generator) -> Scenario:
     """Each vehicle's record, moved in time and paced."""
     time, rows = encounter.time, []
     for n in range(len(encounter.vehicles)):
-        pace = 1.0 + PACE * rng.standard_normal()
+        pace = 1.0 + PACE_RATIO * rng.standard_normal()
         at = np.clip(time * pace + SHIFT_S * rng.standard_normal(), 0.0, time[-1])
         track = np.column_stack(
             [encounter.position[n], encounter.heading[n], encounter.speed[n] * pace]
@@ -257,9 +210,8 @@ def _shifted(encounter: Encounter, rng: np.random.Generator) -> Scenario:
     )
 
 
-def _mixed(members: Sequence[Scenario], rng: np.random.Generator) -> tuple[Scenario, ...]:
-    """Each vehicle from another scenario, as long as the shorter one lasts."""
-    mixed = []
+def _mixed(members: Sequence[Scenario], rng: np.random.Generator) -> Iterator[Scenario]:
+    """Yield scenarios whose vehicles come from different members, as long as the shorter one."""
     for _ in members:
         chosen = rng.permutation(len(members))
         own = [members[chosen[n % len(members)]] for n in range(len(members[0].vehicles))]
@@ -268,8 +220,5 @@ def _mixed(members: Sequence[Scenario], rng: np.random.Generator) -> tuple[Scena
             name: np.stack([getattr(one, name)[n, :count] for n, one in enumerate(own)])
             for name in ("position", "heading", "speed", "acceleration", "present")
         }
-        rows["present"] = np.minimum(
-            np.stack([one.present[n] for n, one in enumerate(own)]), count - 1
-        )
-        mixed.append(replace(members[0], time=own[0].time[:count], reference_drive=None, **rows))
-    return tuple(mixed)
+        rows["present"] = np.minimum(rows["present"], count - 1)
+        yield replace(members[0], time=own[0].time[:count], reference_drive=None, **rows)
