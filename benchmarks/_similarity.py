@@ -8,8 +8,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from benchmarks.row import higher, lower, Row
+from scenario_gen.types import UNIFORM, WITH, WITHOUT
 from scenario_gen.types.evaluation import Evaluation
-from scenario_gen.types.row_names import UNIFORM, WITH, WITHOUT
 
 SIGNIFICANT_RATIO = 0.03
 """Below this value, E without changepoints leaves nothing to gain."""
