@@ -37,7 +37,7 @@ def braking_jerks(scenario: Scenario, drive: Drive) -> Floats:
         rate = np.divide(speed, certified, out=np.ones_like(speed), where=certified > 0.0)
         acceleration, own = np.diff(speed) / step, rate[:-1] * np.diff(certified) / step
         jerk = np.minimum(-np.diff(acceleration), -np.diff(acceleration - own)) / step
-        here = drive.here[i][:-2] & drive.here[i][1:-1] & drive.here[i][2:]
+        here = drive.present[i][:-2] & drive.present[i][1:-1] & drive.present[i][2:]
         found.append(
             jerk[here & (acceleration[1:] < -0.1) & (np.abs(acceleration - own)[1:] > 0.1)]
         )

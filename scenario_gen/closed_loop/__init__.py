@@ -1,4 +1,4 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""A planner under test among the vehicles of a certified scenario (docs/closed_loop.md); no ROS."""
+"""Tests of planners in certified scenarios (docs/closed_loop.md), without ROS."""

@@ -25,9 +25,9 @@ from scenario_gen.closed_loop.trials import (
     with_origins,
 )
 
-Progress = Callable[[int, int], None]  # of drives done, of how many
+Progress = Callable[[int, int], None]  # numbers of finished and of all drives
 RunTrials = Callable[[Sequence[Trial], str, ClosedLoopConfig, Progress], list[Outcome]]
-MAX_BASELINE_DRIVES = 200
+MAX_BASELINE_COUNT = 200
 BASELINE = "scenario_gen.closed_loop.planners:NonReactive"
 
 
@@ -40,7 +40,7 @@ class DriveCommandConfig:
 
 
 def in_processes(workers: int = 0) -> RunTrials:
-    """Return what drives trials in so many processes; 0: one for each core."""
+    """Return a function that drives trials in several processes; 0: one per core."""
     return lambda trials, planner, config, progress: run_trials(
         trials, planner, config, workers or os.cpu_count() or 1, progress
     )
@@ -48,13 +48,13 @@ def in_processes(workers: int = 0) -> RunTrials:
 
 @dataclass(frozen=True)
 class DriveRequest:
-    """Which planner drives where.
+    """The arguments of the command.
 
     Attributes:
-        bag: of this suite.
+        bag: a bag that scenario_gen recorded.
         planner: MODULE:CLASS; over DDS the command that starts its node.
-        ego: id of the vehicle in whose place it drives.
-        count: scenarios at most; 0: all.
+        ego: id of the vehicle that the planner replaces.
+        count: greatest number of scenarios; 0: all.
         assignments: parameters as name=value; those of a drive without prefix, those of the bars
             as bars.name.
         against: drives.json of an earlier planner on the same scenarios, or its folder.
@@ -71,11 +71,11 @@ class DriveRequest:
         """Return the parameters of the drives and the bars.
 
         Raises:
-            InputError: a name is unknown, or a value does not suit.
+            InputError: a name or a value is invalid.
         """
         named = (
-            one if one.startswith(("bars.", "drive.")) else f"drive.{one}"
-            for one in self.assignments
+            text if text.startswith(("bars.", "drive.")) else f"drive.{text}"
+            for text in self.assignments
         )
         return reduce(assigned, named, DriveCommandConfig())
 
@@ -88,46 +88,42 @@ def drive_bag(
     run: RunTrials | None = None,
     baseline: RunTrials | None = None,
 ) -> Drives:
-    """Drive a planner through the scenarios of a bag and write what it came to.
+    """Drive a planner through the scenarios of a bag and write the results.
 
     Args:
         request: planner and bag.
         out: folder of the results.
-        progress: called with how many are done of how many.
-        run: drives them; `in_processes()` if None, or over DDS, one after the other.
-        baseline: drives at most MAX_BASELINE_DRIVES of the scenarios with the non-reactive
-            baseline; None: it is left out.
+        progress: called with the numbers of finished and of all drives.
+        run: drives the planner; default: `in_processes()`.
+        baseline: drives the non-reactive baseline in at most MAX_BASELINE_COUNT of the scenarios;
+            None: no baseline.
 
     Raises:
-        InputError: bag, planner, folder, a parameter or the file to compare with is wrong; the
-            message names it.
+        InputError: bag, planner, folder, a parameter or the file to compare with is invalid.
     """
     config, planner = request.config(), request.planner
     earlier = read_drives(request.against) if request.against is not None else None
     trials = read_trials(request.bag, request.ego, request.count)
-    if earlier is not None:  # before there is work that could not be compared
+    if earlier is not None:  # refuses before the drives
         digests = {
             trial.name: origin.digest
             for trial, origin in zip(trials, origins_of(trials), strict=True)
         }
         refuse_others(digests, config.drive, earlier)
-    with replaced_folder(
-        out, DRIVEN, [request.bag]
-    ) as folder:  # before there is work that might not be kept
-        outcomes = with_origins(
-            (run or in_processes())(trials, planner, config.drive, progress), trials
-        )
+    run = run or in_processes()
+    with replaced_folder(out, DRIVEN, [request.bag]) as folder:  # refuses before the drives
+        outcomes = with_origins(run(trials, planner, config.drive, progress), trials)
         comparison = compared(outcomes, config.drive, earlier) if earlier is not None else None
         broken = broken_bars(rates(outcomes), config.bars)
         if comparison is not None and comparison.worse:
             broken.append(comparison.sentence())
-        blind = () if baseline is None else _baseline(trials, config.drive, baseline)
-        drives = Drives(outcomes, planner, config.drive, trials, broken, blind, comparison)
+        unreactive = () if baseline is None else _baseline(trials, config.drive, baseline)
+        drives = Drives(outcomes, planner, config.drive, trials, broken, unreactive, comparison)
         drives.write(folder)
     return drives
 
 
 def _baseline(trials: Sequence[Trial], config: ClosedLoopConfig, run: RunTrials) -> list[Outcome]:
-    """Return the drives of the non-reactive baseline: in all scenarios, or in MAX_BASELINE_DRIVES at most, spread over all."""
-    chosen = trials[:: max(1, -(-len(trials) // MAX_BASELINE_DRIVES))]
+    """Return drives of the non-reactive baseline, in every k-th scenario if there are many."""
+    chosen = trials[:: max(1, -(-len(trials) // MAX_BASELINE_COUNT))]
     return with_origins(run(chosen, BASELINE, config, lambda *_: None), chosen)

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Two planners, or two versions of one, on the same scenarios: the difference of their failures."""
+"""The difference of failures of two planners, or two versions, on the same scenarios."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -15,11 +15,11 @@ from scenario_gen.base.errors import InputError
 from scenario_gen.base.parameters import flatten
 from scenario_gen.closed_loop.config import ClosedLoopConfig
 from scenario_gen.closed_loop.origin import units_of
-from scenario_gen.closed_loop.trials import LEVEL, Outcome
+from scenario_gen.closed_loop.trials import CONFIDENCE, Outcome
 from scenario_gen.method.evaluation import paired_difference
 from scenario_gen.types import Interval
 
-LONGEST = 64 * 1024 * 1024  # bytes of a drives.json; a drive takes 2 kB
+MAX_FILE_BYTES = 64 * 1024 * 1024  # of a drives.json; a drive has about 2 kB
 _DRIVE = {
     "type": "object",
     "properties": {
@@ -38,12 +38,19 @@ DRIVES = {
     },
     "required": ["planner", "parameters", "drives"],
 }
-OF_THE_MACHINE = {"decision_time", "drive_time"}  # parameters that change no verdict
+TIME_LIMITS = {"decision_time", "drive_time"}
+"""Parameters that change no verdict."""
 
 
 @dataclass(frozen=True)
 class Earlier:
-    """What a drives.json has of another planner: its name, parameters, and by scenario the digest and whether it passed."""
+    """The drives of an earlier planner, from a drives.json.
+
+    Attributes:
+        planner: its name.
+        parameters: the parameters of the drives.
+        drives: by name of the scenario its digest, and whether the planner passed.
+    """
 
     planner: str
     parameters: dict[str, Any]
@@ -52,15 +59,16 @@ class Earlier:
 
 @dataclass(frozen=True)
 class Comparison:
-    """A planner beside an earlier one.
+    """The comparison of a planner with an earlier one.
 
     Attributes:
-        planner: the earlier one.
-        difference: share of failures less that of the earlier one, with its 95 % interval; above 0
-            is worse.
-        now_fail, now_pass: names of the scenarios that changed sides.
-        of: scenarios.
-        encounters: that they are of.
+        planner: name of the earlier planner.
+        difference: share of failures minus that of the earlier planner, with its 95 % interval;
+            positive is worse.
+        now_fail: names of scenarios in which only the earlier planner passed.
+        now_pass: names of scenarios in which only this planner passed.
+        of: number of scenarios.
+        encounters: number of encounters that the scenarios come from.
     """
 
     planner: str
@@ -72,20 +80,21 @@ class Comparison:
 
     @property
     def worse(self) -> bool:
-        """Whether it fails more often than the earlier one by more than chance explains."""
+        """Whether the planner fails significantly more often than the earlier one."""
         return self.difference.low > 0.0
 
     def sentence(self) -> str:
-        """Say it in words."""
-        value, low, high = (
-            f"{100.0 * x:+.1f}"
-            for x in (self.difference.value, self.difference.low, self.difference.high)
+        """Return the comparison in words."""
+        share = self.difference
+        interval = f"{100.0 * share.low:+.1f} to {100.0 * share.high:+.1f}"
+        return (
+            f"against {self.planner}: failures {100.0 * share.value:+.1f} % ({interval}) on the "
+            f"same {self.of} scenarios; "
+            f"{len(self.now_fail)} now fail, {len(self.now_pass)} now pass"
         )
-        changed = f"{len(self.now_fail)} now fail, {len(self.now_pass)} now pass"
-        return f"against {self.planner}: failures {value} % ({low} to {high}) on the same {self.of} scenarios; {changed}"
 
     def document(self) -> dict[str, Any]:
-        """Return it as JSON's types."""
+        """Return the comparison as JSON's types."""
         share = self.difference
         return {
             "planner": self.planner,
@@ -97,45 +106,46 @@ class Comparison:
 
 
 def read_drives(path: Path) -> Earlier:
-    """Read a drives.json, or that of a folder.
+    """Read a drives.json, or the one in a folder.
 
     Raises:
-        InputError: it is not there, or is none, or an older one without digests.
+        InputError: the file is missing or invalid, or an older one without digests.
     """
     file = path / "drives.json" if path.is_dir() else path
-    what = f"--against {file} (give a drives.json of `scenario-gen drive`)"
-    document = parse_json(read_text(file, LONGEST, what), what, DRIVES)
+    name = f"--against {file} (must be a drives.json from `scenario-gen drive`)"
+    document = parse_json(read_text(file, MAX_FILE_BYTES, name), name, DRIVES)
     drives = {drive["name"]: (drive["scenario"], drive["passed"]) for drive in document["drives"]}
     return Earlier(document["planner"], document["parameters"], drives)
 
 
 def refuse_others(digests: Mapping[str, str], config: ClosedLoopConfig, earlier: Earlier) -> None:
-    """Refuse to compare with drives of other scenarios (`digests` by name), or with other parameters.
+    """Check that earlier drives have the same scenarios (`digests` by name) and parameters.
 
     Raises:
-        InputError: they are; the message names the first.
+        InputError: they differ; the message names the first scenario, or the parameters.
     """
-    own = {name: value for name, (_, value) in flatten(config).items()}
-    names = (own.keys() | earlier.parameters.keys()) - OF_THE_MACHINE
-    differ = sorted(name for name in names if own.get(name) != earlier.parameters.get(name))
+    parameters = {name: value for name, (_, value) in flatten(config).items()}
+    names = (parameters.keys() | earlier.parameters.keys()) - TIME_LIMITS
+    differ = sorted(name for name in names if parameters.get(name) != earlier.parameters.get(name))
     if differ:
         raise InputError(
-            f"--against: driven with other parameters ({', '.join(differ)}); give the same, or drive it again"
+            f"--against: driven with other parameters ({', '.join(differ)}); "
+            "use the same ones, or drive the earlier planner again"
         )
     known = {name: digest for name, (digest, _) in earlier.drives.items()}
     if digests != known:
         both = digests.keys() | known.keys()
         wrong = sorted(name for name in both if digests.get(name) != known.get(name))
         raise InputError(
-            f"--against: {len(wrong)} of {len(both)} scenarios are not the same (first: {wrong[0]}); compare drives of "
-            "the same bag, ego and --count"
+            f"--against: {len(wrong)} of {len(both)} scenarios are not the same "
+            f"(first: {wrong[0]}); compare drives with the same bag, --ego and --count"
         )
 
 
 def compared(
     outcomes: Sequence[Outcome], config: ClosedLoopConfig, earlier: Earlier
 ) -> Comparison:
-    """Compare the outcomes of a planner with those of an earlier one, scenario by scenario.
+    """Compare the outcomes of two planners, scenario by scenario.
 
     Raises:
         InputError: as `refuse_others`.
@@ -144,18 +154,13 @@ def compared(
     before = [not earlier.drives[outcome.name][1] for outcome in outcomes]
     now = [not outcome.verdict.passed for outcome in outcomes]
     difference = np.array(now, dtype=np.float64) - np.array(before, dtype=np.float64)
-    unit, encounters = units_of(
-        [outcome.name for outcome in outcomes], [outcome.origin for outcome in outcomes]
-    )
-    sides = [
-        tuple(one.name for one, d in zip(outcomes, difference.tolist(), strict=True) if d == side)
-        for side in (1.0, -1.0)
-    ]
+    names = np.array([outcome.name for outcome in outcomes])
+    unit, encounters = units_of(names.tolist(), [outcome.origin for outcome in outcomes])
     return Comparison(
-        earlier.planner,
-        paired_difference(difference, unit, LEVEL),
-        sides[0],
-        sides[1],
-        len(outcomes),
-        encounters,
+        planner=earlier.planner,
+        difference=paired_difference(difference, unit, CONFIDENCE),
+        now_fail=tuple(names[difference > 0.0].tolist()),
+        now_pass=tuple(names[difference < 0.0].tolist()),
+        of=len(outcomes),
+        encounters=encounters,
     )

@@ -10,23 +10,27 @@ from scenario_gen.base.road_users import TypeLimits
 
 REPLAY, REACTIVE, COMMITTED = "replay", "reactive", "committed"
 FORESIGHT = {REACTIVE: 5.0, COMMITTED: 0.5}
-"""Seconds that drivers look ahead for the ego. To the committed a conflict is evident 1.5 s before it; they brake 1 s later."""
+"""Time [s] for which drivers predict the ego.
+
+A committed driver detects a conflict 1.5 s before it, and brakes 1 s later.
+"""
 TEMPLATE, NEVER = "template", "never"
 
 
 @dataclass(frozen=True)
 class ClosedLoopConfig(Parameters):
-    """How the others drive, what the ego's body can do, when a drive ends, and what the verdict counts."""
+    """The other drivers, the ego's limits, the end of a drive, and the verdict's thresholds."""
 
     step: float = parameter(0.1, "time between two decisions", unit="s", low=0.005, high=0.5)
     policy: str = parameter(
         REACTIVE,
-        "the others replay the scenario, react to the ego early, or keep their course until a conflict is evident",
+        "the others replay the scenario, react to the ego early, or only to an evident conflict",
         choices=(REPLAY, REACTIVE, COMMITTED),
     )
     yield_to_ego: str = parameter(
         TEMPLATE,
-        "at conflicts the others wait for the ego as in the recording, or never (they still brake for what is in their way)",
+        "at conflicts the others wait for the ego as in the recording, or never (they still brake "
+        "for obstacles)",
         choices=(TEMPLATE, NEVER),
     )
     reaction: float = parameter(
@@ -60,7 +64,7 @@ class ClosedLoopConfig(Parameters):
     )
     patience: float = parameter(
         5.0,
-        "time after which a vehicle that waits for an ego that hardly moves goes first",
+        "time after which a vehicle stops waiting for an ego that hardly moves",
         unit="s",
         low=0.0,
         high=1e6,
@@ -75,36 +79,40 @@ class ClosedLoopConfig(Parameters):
     )
     overtime: float = parameter(
         1.5,
-        "a drive ends after so many times the scenario's duration, and 5 s",
+        "longest drive: this multiple of the scenario's duration, plus 5 s",
         low=1.0,
         high=10.0,
     )
     goal_width: float = parameter(
-        2.0, "the goal is passed within this distance beside it", unit="m", low=0.1, high=50.0
+        2.0,
+        "greatest lateral distance at which the ego passes the goal",
+        unit="m",
+        low=0.1,
+        high=50.0,
     )
     horizon: float = parameter(
-        8.0, "longest time to collision that is counted", unit="s", low=0.1, high=60.0
+        8.0, "longest time to collision that counts", unit="s", low=0.1, high=60.0
     )
     hard_braking: float = parameter(
-        4.0, "braking that is counted as hard", unit="m/s²", low=0.1, high=20.0
+        4.0, "deceleration that counts as hard braking", unit="m/s²", low=0.1, high=20.0
     )
     off_road_depth: float = parameter(
         0.1,
-        "a footprint is off the road from this depth outside what is drivable",
+        "depth outside the drivable area from which a footprint is off the road",
         unit="m",
         low=0.0,
         high=5.0,
     )
     decision_time: float = parameter(
         1.0,
-        "a planner's decision that takes longer is counted; that changes no verdict",
+        "longer decisions of a planner are counted, without a change of the verdict",
         unit="s",
         low=0.001,
         high=600.0,
     )
     drive_time: float = parameter(
         600.0,
-        "a planner that takes longer for one drive has failed, and the command ends",
+        "longest computation of a planner for one drive; the command fails after it",
         unit="s",
         low=0.1,
         high=1e6,

@@ -3,9 +3,9 @@
 
 """The ego's body: a kinematic bicycle with limits.
 
-Its reference point is the centre of the footprint, and its velocity points along its heading, as
-everywhere in this suite: so what was certified can be driven by it. The curvature of its way
-stands for the angle of its front wheels, κ = tan(δ) / wheelbase.
+The reference point is the centre of the footprint, and the velocity points along the heading, as
+in all scenarios, so the ego can drive every certified motion. The curvature of the path represents
+the angle of the front wheels, κ = tan(δ) / wheelbase.
 """
 
 from dataclasses import dataclass
@@ -21,7 +21,16 @@ from scenario_gen.types import Dynamics
 
 
 class EgoState(NamedTuple):
-    """Centre of the footprint x, y [m], yaw [rad], speed [m/s, >= 0], curvature [1/m, left positive], acceleration [m/s²]."""
+    """The state of the ego.
+
+    Attributes:
+        x: centre of the footprint [m].
+        y: centre of the footprint [m].
+        yaw: [rad].
+        speed: at least 0 [m/s].
+        curvature: positive to the left [1/m].
+        acceleration: [m/s²].
+    """
 
     x: float
     y: float
@@ -32,14 +41,22 @@ class EgoState(NamedTuple):
 
 
 class Command(NamedTuple):
-    """What a planner asks of the body for the next step: acceleration [m/s²] and curvature [1/m, left positive]."""
+    """A planner's command for the next step.
+
+    Attributes:
+        acceleration: [m/s²].
+        curvature: positive to the left [1/m].
+    """
 
     acceleration: float
     curvature: float
 
 
 class Pose(NamedTuple):
-    """Where an ego that is moved from outside is at the end of the next step: x, y [m], yaw [rad], speed [m/s]."""
+    """A pose at the end of the next step, from a planner that moves the ego itself.
+
+    x, y [m], yaw [rad], speed [m/s].
+    """
 
     x: float
     y: float
@@ -49,15 +66,21 @@ class Pose(NamedTuple):
 
 @dataclass(frozen=True)
 class Moved:
-    """The ego after a step, and what was wrong with what was asked of it ("" if nothing)."""
+    """The ego after a step.
+
+    Attributes:
+        state: the new state.
+        fault: description of an error in the command; "" if it was correct.
+        jumped: whether no vehicle can reach the pose in one step.
+    """
 
     state: EgoState
     fault: str = ""
-    jumped: bool = False  # no body can take the pose after one step
+    jumped: bool = False
 
 
-FARTHEST = 1e8  # metres, and rad and m/s: beyond that a pose given from outside is no place in any road's frame
-JUMP = 1.0  # metres beyond what the highest speed covers in one step, from which on a pose given from outside is called a jump
+MAX_POSE_M = 1e8  # greatest coordinate of a pose; also the bound of its yaw and speed
+JUMP_TOLERANCE_M = 1.0  # a pose is a jump from so far beyond the distance at the highest speed
 
 
 def move(
@@ -65,13 +88,13 @@ def move(
 ) -> Moved:
     """Return the ego one step later.
 
-    A command is cut to the body's limits. Nothing asked, or something that is not finite, is a
-    fault: the ego then brakes at its limit and keeps its curvature; one that is moved from outside
-    stays where it is. A pose that is farther away than the highest speed allows is a fault, too,
-    but is taken, for whoever gives poses answers for them.
+    A command is limited to the body's limits. A command that is missing or not finite is a fault:
+    the ego then brakes at its limit with an unchanged curvature. A pose that is not finite is a
+    fault, too: the ego does not move. A pose farther away than the highest speed allows is a
+    fault, but the ego moves there.
 
     Raises:
-        InputError: what is asked is neither a command nor a pose, or not of numbers.
+        InputError: the planner returned neither a command nor a pose, or not numbers.
     """
     if asked is not None and not isinstance(asked, Command | Pose):
         raise InputError(
@@ -81,7 +104,7 @@ def move(
         finite = asked is not None and np.isfinite(np.array(asked, dtype=np.float64)).all()
     except (TypeError, ValueError, OverflowError) as error:
         raise InputError(
-            f"a planner's `act` returned a {type(asked).__name__} that is not of numbers: {error}"
+            f"a planner's `act` returned a {type(asked).__name__} without numbers: {error}"
         ) from error
     if isinstance(asked, Pose):
         return _placed(ego, asked, config.step, limits)
@@ -94,40 +117,50 @@ def move(
 
 def _placed(ego: EgoState, pose: Pose, step: float, limits: Dynamics) -> Moved:
     largest = np.abs(pose).max()
-    if not largest <= FARTHEST:
+    if not largest <= MAX_POSE_M:
         fault = f"pose is {'out of range' if np.isfinite(largest) else 'not finite'}"
         state = EgoState(ego.x, ego.y, ego.yaw, 0.0, 0.0, -ego.speed / step)
         return Moved(state, fault, jumped=True)
-    way = np.hypot(pose.x - ego.x, pose.y - ego.y)
-    far = way > limits.max_speed * step + JUMP
+    distance = np.hypot(pose.x - ego.x, pose.y - ego.y)
+    far = distance > limits.max_speed * step + JUMP_TOLERANCE_M
     turn = angle_between(pose.yaw, ego.yaw)  # the yaw stays continuous
-    curvature = 0.0 if far or way < 0.01 else turn / way
+    curvature = 0.0 if far or distance < 0.01 else turn / distance
     acceleration = (pose.speed - ego.speed) / step
     state = EgoState(
         pose.x, pose.y, ego.yaw + turn, max(pose.speed, 0.0), float(curvature), acceleration
     )
-    return Moved(state, f"jumped {way:.1f} m" if far else "", jumped=bool(far))
+    return Moved(state, f"jumped {distance:.1f} m" if far else "", jumped=bool(far))
 
 
 def _driven(ego: EgoState, asked: Command, config: ClosedLoopConfig, limits: Dynamics) -> EgoState:
-    """Return the ego one step later; its way is an arc, along which its speed changes evenly until it stands.
+    """Return the ego one step later.
 
-    Source: kinematic bicycle, e.g. Rajamani 2012, section 2.2, with the reference point where
-        there is no slip.
+    It moves on an arc with constant acceleration until it stands.
+
+    Source: kinematic bicycle, e.g. Rajamani 2012, section 2.2, with the reference point at the
+    point without slip.
     """
-    step, speed, change = config.step, ego.speed, config.ego_curvature_rate * config.step
-    a = min(
+    step, speed = config.step, ego.speed
+    acceleration = min(
         max(float(asked.acceleration), -limits.max_deceleration),
         limits.max_acceleration,
         (limits.max_speed - speed) / step,
     )
-    k = min(max(float(asked.curvature), ego.curvature - change), ego.curvature + change)
-    k = min(max(k, -limits.sharpest), limits.sharpest)
-    end = speed + a * step
-    way = 0.5 * (speed + end) * step
-    if end < 0.0:  # it stands before the step is over
-        end, way = 0.0, 0.5 * speed * speed / -a
-    half = 0.5 * k * way
-    chord, middle = way * float(np.sinc(half / np.pi)), ego.yaw + half
-    x, y = ego.x + chord * math.cos(middle), ego.y + chord * math.sin(middle)
-    return EgoState(x, y, ego.yaw + 2.0 * half, end, k, (end - speed) / step)
+    change = config.ego_curvature_rate * step
+    curvature = min(max(float(asked.curvature), ego.curvature - change), ego.curvature + change)
+    curvature = min(max(curvature, -limits.sharpest), limits.sharpest)
+    end_speed = speed + acceleration * step
+    distance = 0.5 * (speed + end_speed) * step
+    if end_speed < 0.0:  # the ego stops before the end of the step
+        end_speed = 0.0
+        distance = 0.5 * speed * speed / -acceleration
+    half_turn = 0.5 * curvature * distance
+    chord = distance * float(np.sinc(half_turn / np.pi))
+    return EgoState(
+        x=ego.x + chord * math.cos(ego.yaw + half_turn),
+        y=ego.y + chord * math.sin(ego.yaw + half_turn),
+        yaw=ego.yaw + 2.0 * half_turn,
+        speed=end_speed,
+        curvature=curvature,
+        acceleration=(end_speed - speed) / step,
+    )

@@ -24,7 +24,7 @@ import numpy.typing as npt
 
 from scenario_gen.base.errors import InputError
 from scenario_gen.closed_loop.config import ClosedLoopConfig
-from scenario_gen.closed_loop.ego import Command
+from scenario_gen.closed_loop.ego import Command, EgoState
 from scenario_gen.closed_loop.off_road import is_off_road
 from scenario_gen.closed_loop.origin import Trial
 from scenario_gen.closed_loop.picture import picture
@@ -36,41 +36,36 @@ from scenario_gen.numerics import Floats
 from scenario_gen.numerics.plane import ahead_and_left, angle_between, unit
 from scenario_gen.types import MAX_PLANNED_CURVATURE_PER_M
 
-OTHERS = 8  # nearest others that are seen
-AHEAD = np.array((5.0, 10.0, 15.0, 20.0, 30.0, 40.0))  # metres along the route at which it is seen
-LOOKED_AT = np.array((0.0, *AHEAD))
-OWN, EACH = 5, 7  # numbers about the ego, and about each other
-REACH = 100.0  # metres beyond which nobody is seen
-FARTHEST, LONGEST, FASTEST = (
-    1000.0,
-    50.0,
-    100.0,
-)  # bounds of what is seen: metres to the goal, metres of a length, m/s
+MAX_OTHERS_COUNT = 8
+ROUTE_STATIONS = np.array((5.0, 10.0, 15.0, 20.0, 30.0, 40.0))
+"""Distances [m] along the route to the observed points."""
+RANGE_M = 100.0  # vehicles farther away are not observed
+MAX_SPEED_MPS = 100.0
 ID = "scenario_gen/Drive-v0"
 
-Seen = npt.NDArray[np.float32]
+Array = npt.NDArray[np.float32]
 
 
-class DriveEnv(gymnasium.Env[Seen, Seen]):  # type: ignore[misc]
-    """One scenario at a time, drawn from the seed or named by its index.
+class DriveEnv(gymnasium.Env[Array, Array]):  # type: ignore[misc]
+    """Drives in one scenario at a time, drawn by the seed or selected by its index.
 
-    Observation (float32, all in the ego's frame, x ahead):
+    Observation (float32, in the ego's frame, x ahead):
 
     - the ego: speed [m/s], curvature [1/m], offset from the route [m, left positive], angle to it
       [rad], metres to the goal;
     - the route at 5, 10, 15, 20, 30 and 40 m ahead: x, y [m] each;
     - the 8 nearest others within 100 m: 1, x, y [m], cos and sin of the relative yaw, speed [m/s],
-      length [m]; zeros where there are fewer.
+      length [m]; zeros if there are fewer.
 
-    All are cut to the bounds of the space: 100 m and m/s, 1000 m to the goal, 50 m of length, the
-    body's sharpest curvature.
+    All values are limited to the bounds of the space: 100 m and m/s, 1000 m to the goal, 50 m of
+    length, the body's sharpest curvature.
 
-    Action (float32, 2): -1 to 1 of acceleration (the body's braking to its acceleration), -1 to 1
-    of its sharpest curvature.
+    Action (float32, 2): acceleration, from -1 (the body's largest deceleration) to 1 (its largest
+    acceleration), and curvature, as a share of the body's sharpest from -1 to 1.
 
-    Reward: metres driven along the route; -100 for a collision or leaving the road, +10 at the
-    goal. It terminates with each of those, and is truncated when the time is up; `info["verdict"]`
-    then holds the verdict.
+    Reward: distance driven along the route [m]; -100 for a collision or leaving the road, +10 at
+    the goal. Each of those terminates the drive; it is truncated when the time is over. Then
+    `info["verdict"]` is the verdict.
     """
 
     metadata: ClassVar[dict[str, Any]] = {"render_modes": ["rgb_array"], "render_fps": 10}
@@ -82,22 +77,28 @@ class DriveEnv(gymnasium.Env[Seen, Seen]):  # type: ignore[misc]
         ego: str = "",
         render_mode: str | None = None,
     ) -> None:
-        """Take what is driven in: trials, or the path of a bag, where `ego` names the vehicle whose place the ego takes.
+        """Prepare an environment.
+
+        Args:
+            trials: the scenarios, or the path of a bag.
+            config: the parameters.
+            ego: id of the vehicle that the ego replaces, for a bag.
+            render_mode: "rgb_array" or None.
 
         Raises:
-            InputError: the bag cannot be read, there is nothing to drive in, or the render mode is
-                not known.
+            InputError: the bag cannot be read or has no scenario, or the render mode is unknown.
         """
-        if render_mode not in (None, *self.metadata["render_modes"]):
+        modes = self.metadata["render_modes"]
+        if render_mode not in (None, *modes):
             raise InputError(
-                f"render_mode {render_mode!r} is not known; take {', '.join(self.metadata['render_modes'])} or None"
+                f"render_mode {render_mode!r} is unknown; use {', '.join(modes)} or None"
             )
         self.render_mode = render_mode
         self.trials = (
             read_trials(Path(trials), ego) if isinstance(trials, Path | str) else list(trials)
         )
         if not self.trials:
-            raise InputError("there is no scenario to drive in")
+            raise InputError("no scenario to drive: trials are empty")
         self.config = config
         self.observation_space = observation_space()
         self.action_space = Box(-1.0, 1.0, (2,), np.float32)
@@ -105,122 +106,141 @@ class DriveEnv(gymnasium.Env[Seen, Seen]):  # type: ignore[misc]
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
-    ) -> tuple[Seen, dict[str, Any]]:
-        """Begin a drive: the scenario `options["index"]`, else one drawn by the seed.
+    ) -> tuple[Array, dict[str, Any]]:
+        """Begin a drive in the scenario `options["index"]`, or else in one drawn by the seed.
 
         Raises:
-            InputError: there is no scenario of that index.
+            InputError: there is no scenario with that index.
         """
         super().reset(seed=seed)
         index = (options or {}).get("index")
         if index is None:
             index = int(self.np_random.integers(len(self.trials)))
         if not 0 <= index < len(self.trials):
-            raise InputError(f"there is no scenario {index}; there are {len(self.trials)}, from 0")
+            last = len(self.trials) - 1
+            raise InputError(f"no scenario with index {index}; use an index from 0 to {last}")
         trial = self.trials[index]
         if index not in self._loops:
             self._loops[index] = ClosedLoop(trial.scenario, trial.ego, trial.road, self.config)
         self._loop = self._loops[index]
-        self.sharpest = min(
-            self._loop.limits.sharpest, MAX_PLANNED_CURVATURE_PER_M
-        )  # 1/m, of the wheel's ends
+        # Curvature [1/m] of the action 1.
+        self.sharpest = min(self._loop.limits.sharpest, MAX_PLANNED_CURVATURE_PER_M)
         self._follower = RouteFollower()
         self._follower.reset(self._loop.task())
         self._states: list[State] = [self._loop.start()]
         self._station = 0.0
         return self._observed(), {"index": index, "name": trial.name}
 
-    def step(self, action: Seen) -> tuple[Seen, float, bool, bool, dict[str, Any]]:
+    def step(self, action: Array) -> tuple[Array, float, bool, bool, dict[str, Any]]:
         """Drive one step.
 
         Args:
-            action: (2,) pedal and wheel, -1 to 1 (shares of the body's limits); what is beyond is
-                cut.
+            action: (2,) acceleration and curvature as shares of the body's limits, limited to
+                -1 to 1.
 
         Raises:
-            InputError: a number of the action is not finite.
+            InputError: a number in the action is not finite.
         """
         if not np.isfinite(action).all():
             raise InputError(
                 f"action {np.asarray(action).tolist()}: both numbers must be finite, from -1 to 1"
             )
-        pedal, wheel = (min(max(float(value), -1.0), 1.0) for value in action)
-        config, loop, limits = self.config, self._loop, self._loop.limits
-        acceleration = pedal * (
-            limits.max_acceleration if pedal > 0.0 else limits.max_deceleration
-        )
+        loop = self._loop
+        state = loop.step(self._states[-1], self._command(action))
+        self._states.append(state)
         before = self._station
-        self._states.append(
-            loop.step(self._states[-1], Command(acceleration, wheel * self.sharpest))
-        )
-        state = self._states[-1]
-        seen, reward = self._observed(), self._station - before
+        observation = self._observed()
+        reward = self._station - before
         info: dict[str, Any] = {"time": state.time}
         at_goal = loop.at_goal(state)
-        pose, half = state.vehicles[loop.ego, :3], loop.scenario.vehicles[loop.ego].half
-        off_road = loop.road is not None and is_off_road(
-            loop.road, pose, half, config.off_road_depth
-        )
-        hit = loop.hit(state)
-        terminated = at_goal or off_road or hit
+        failed = loop.hit(state) or self._is_off_road(state)
+        terminated = at_goal or failed
         truncated = not terminated and state.step >= loop.last_step
         if terminated:
-            reward += 10.0 if at_goal and not (off_road or hit) else -100.0
+            reward += -100.0 if failed else 10.0
         if terminated or truncated:
             info["verdict"] = judge(loop, loop.record(self._states)).document()
-        return seen, reward, terminated, truncated, info
+        return observation, reward, terminated, truncated, info
+
+    def _command(self, action: Array) -> Command:
+        pedal, wheel = (min(max(float(value), -1.0), 1.0) for value in action)
+        limits = self._loop.limits
+        largest = limits.max_acceleration if pedal > 0.0 else limits.max_deceleration
+        return Command(pedal * largest, wheel * self.sharpest)
+
+    def _is_off_road(self, state: State) -> bool:
+        loop = self._loop
+        if loop.road is None:
+            return False
+        half = loop.scenario.vehicles[loop.ego].half
+        pose = state.vehicles[loop.ego, :3]
+        return is_off_road(loop.road, pose, half, self.config.off_road_depth)
 
     def render(self) -> npt.NDArray[np.uint8] | None:
-        """Return the scene (400, 400, 3) in pixels, the ego in the middle, 100 m a side; None without render_mode "rgb_array"."""
+        """Return a top view (400, 400, 3) of 100 m x 100 m; None without a render mode."""
         if self.render_mode is None:
             return None
         return picture(self._loop, self._states[-1])
 
-    def _observed(self) -> Seen:
+    def _observed(self) -> Array:
         state = self._states[-1]
+        values = np.concatenate([*self._route_values(state), self._other_values(state)])
+        space = self.observation_space
+        limited: Array = np.clip(values.astype(np.float32), space.low, space.high)
+        return limited
+
+    def _route_values(self, state: State) -> tuple[Floats, Floats]:
+        """Return (5,) the values of the ego, and (2 R,) the points of the route."""
         ego = state.ego
-
-        def local(xy: Floats) -> Floats:
-            """Positions (..., 2) in the ego's frame."""
-            return np.array(ahead_and_left(xy - ego[:2], ego.yaw)).T
-
-        ahead, offset, angle, left = np.zeros((len(AHEAD), 2)), 0.0, 0.0, 0.0
         _, self._station = self._follower.steer(ego)
-        if (route := self._follower.route) is not None:
-            poses = route.at(self._station + LOOKED_AT)
-            pose, coming = poses[0], poses[1:]
-            offset = float(ahead_and_left(ego[:2] - pose[:2], pose[2])[1])
-            angle, left = angle_between(ego.yaw, pose[2]), route.length - self._station
-            ahead = local(coming[:, :2])
-        found = self._loop.observe(state)
-        place = local(found.others[:, :2])
-        away = np.hypot(place[:, 0], place[:, 1])
-        nearest = [k for k in np.argsort(away, kind="stable")[:OTHERS] if away[k] <= REACH]
-        others = np.zeros((OTHERS, EACH))
-        facts = (
-            np.ones(len(away)),
-            place,
-            unit(found.others[:, 2] - ego.yaw),
-            found.others[:, 3],
-            found.sizes[:, 0],
+        route = self._follower.route
+        if route is None:
+            values = np.array((ego.speed, ego.curvature, 0.0, 0.0, 0.0))
+            return values, np.zeros(2 * len(ROUTE_STATIONS))
+        x, y, yaw = route.at(np.array([self._station]))[0].tolist()
+        _, offset = ahead_and_left(np.array(ego[:2]) - (x, y), yaw)
+        angle = angle_between(ego.yaw, yaw)
+        remaining = route.length - self._station
+        values = np.array((ego.speed, ego.curvature, offset, angle, remaining))
+        points = route.at(self._station + ROUTE_STATIONS)[:, :2]
+        return values, _local(points, ego).ravel()
+
+    def _other_values(self, state: State) -> Floats:
+        """Return (7 O,) the values of the nearest others."""
+        observation = self._loop.observe(state)
+        position = _local(observation.others[:, :2], state.ego)
+        distance = np.hypot(position[:, 0], position[:, 1])
+        values = np.column_stack(
+            (
+                np.ones(len(distance)),
+                position,
+                unit(observation.others[:, 2] - state.ego.yaw),
+                observation.others[:, 3],
+                observation.sizes[:, 0],
+            )
         )
-        others[: len(nearest)] = np.column_stack(facts)[nearest]
-        own = np.array((ego.speed, ego.curvature, offset, angle, left))
-        seen = np.concatenate([own, ahead.ravel(), others.ravel()]).astype(np.float32)
-        within: Seen = np.minimum(
-            np.maximum(seen, self.observation_space.low), self.observation_space.high
-        )
-        return within
+        order = np.argsort(distance, kind="stable")[:MAX_OTHERS_COUNT]
+        nearest = values[order[distance[order] <= RANGE_M]]
+        padded = np.zeros((MAX_OTHERS_COUNT, values.shape[1]))
+        padded[: len(nearest)] = nearest
+        return padded.ravel()
+
+
+def _local(positions: Floats, ego: EgoState) -> Floats:
+    """Return positions (N, 2) in the ego's frame."""
+    return np.array(ahead_and_left(positions - ego[:2], ego.yaw)).T
 
 
 def observation_space() -> Box:
-    """Return the space of what is seen, with finite bounds."""
-    own = np.array((FASTEST, MAX_PLANNED_CURVATURE_PER_M, REACH, np.pi, FARTHEST))
-    each = np.array((1.0, REACH, REACH, 1.0, 1.0, FASTEST, LONGEST))
-    high = np.concatenate([own, np.full(2 * len(AHEAD), REACH), np.tile(each, OTHERS)])
-    low = -high
-    low[[0, 4]] = 0.0, -REACH  # the speed; beyond the goal
-    low[OWN + 2 * len(AHEAD) :: EACH] = 0.0  # whether somebody is there
+    """Return the space of the observations, with finite bounds."""
+    route = np.full(2 * len(ROUTE_STATIONS), RANGE_M)
+    ego_high = (MAX_SPEED_MPS, MAX_PLANNED_CURVATURE_PER_M, RANGE_M, np.pi, 1000.0)
+    ego_low = (0.0, -MAX_PLANNED_CURVATURE_PER_M, -RANGE_M, -np.pi, -RANGE_M)
+    other_high = np.array((1.0, RANGE_M, RANGE_M, 1.0, 1.0, MAX_SPEED_MPS, 50.0))
+    other_low = -other_high
+    other_low[0] = 0.0
+    high = np.concatenate([ego_high, route, np.tile(other_high, MAX_OTHERS_COUNT)])
+    low = np.concatenate([ego_low, -route, np.tile(other_low, MAX_OTHERS_COUNT)])
     return Box(low.astype(np.float32), high.astype(np.float32), dtype=np.float32)
 
 

@@ -18,7 +18,7 @@ from typing import NamedTuple
 import numpy as np
 import shapely
 
-from scenario_gen.closed_loop.simulation import BEYOND, ClosedLoop, Drive
+from scenario_gen.closed_loop.simulation import ClosedLoop, Drive, PAST_GOAL_M
 from scenario_gen.numerics import Bools, Floats, Ints
 from scenario_gen.numerics.boxes import corners
 from scenario_gen.numerics.curve import Curve
@@ -66,7 +66,7 @@ class Reason(StrEnum):
 
 
 class VehicleState(NamedTuple):
-    """The state of a vehicle at one time: x, y [m], yaw [rad], speed [m/s], negative if it reverses."""
+    """The state of a vehicle: x, y [m], yaw [rad], speed [m/s], negative if it reverses."""
 
     x: float
     y: float
@@ -157,13 +157,13 @@ class Contact:
 
     @cached_property
     def distance_ahead(self) -> float:
-        """Distance of the other one's centre ahead of the ego's centre, along the ego's heading [m]."""
+        """Distance [m] from the ego's centre to the other one's, along the ego's heading."""
         offset = np.subtract(self.other_state[:2], self.ego_state[:2])
         return float(ahead_and_left(offset, self.ego_state.yaw)[0])
 
     @cached_property
     def cut_in(self) -> CutIn | None:
-        """How the ego entered the other one's path, if it did and both drove in the same direction."""
+        """The ego's entry into the other one's path, if both drove in the same direction."""
         if not self.same_direction:
             return None
         return find_cut_in(self.loop, self.drive, (self.drive.ego, self.other), self.time)
@@ -189,7 +189,7 @@ class Contact:
         touching = own_box.intersection(other_box.buffer(reach))
         path = self.loop.world.motion[drive.ego, :, :3]
         # The ego may pass its goal straight on.
-        beyond = place(path[-1:], np.arange(0.0, BEYOND, 1.0), 0.0)
+        beyond = place(path[-1:], np.arange(0.0, PAST_GOAL_M, 1.0), 0.0)
         straight = np.column_stack([beyond, np.full(len(beyond), path[-1, 2])])
         poses = np.concatenate([path, straight])
         swept = shapely.polygons(corners(poses, ego.length, ego.width))
@@ -216,7 +216,7 @@ class Contact:
         return self.ego_state.speed < 0.0
 
     def ego_entered_early(self) -> bool:
-        """Whether the ego, which goes second, was in the shared area before the other one had left it.
+        """Whether the ego goes second and entered the shared area before the other one left.
 
         Where both drive in the same direction, an ego behind the other one did not enter early.
         """
@@ -319,7 +319,7 @@ def find_cut_in(
     start.
     """
     motion, (entering, other) = drive.motion, pair
-    present = drive.here[entering] & drive.here[other] & (motion.time <= time + 1e-9)
+    present = drive.present[entering] & drive.present[other] & (motion.time <= time + 1e-9)
     rows = np.flatnonzero(present)
     points = loop.world.motion[other, :, :2]
     if len(rows) == 0 or edge_lengths(points).sum() < STANDSTILL_MPS:
@@ -351,9 +351,10 @@ def find_cut_in(
 
 
 def _entry(offset: Floats, half_width: float) -> int | None:
-    """Return the first row after which a footprint, by its corners' offsets (M, 4) [m], stays in a path.
+    """Return the first row from which a footprint stays inside a path.
 
-    The last row is not looked at: at the contact it touches the other vehicle. None if it was
+    `offset` (M, 4) are the offsets [m] of its corners from the centre line.
+    The last row does not count: there the footprint touches the other vehicle. None if it was
     always inside.
     """
     clear: Bools = (offset.min(axis=1) > half_width) | (offset.max(axis=1) < -half_width)

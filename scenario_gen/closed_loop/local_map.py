@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The road around the ego as a grid, with the other vehicles in it: what a planner of obstacles asks for."""
+"""An occupancy grid around the ego, with the road and the other vehicles."""
 
 from dataclasses import dataclass
 
@@ -12,12 +12,18 @@ from scenario_gen.closed_loop.simulation import ClosedLoop, State
 from scenario_gen.numerics import Bools, Floats
 from scenario_gen.numerics.plane import ahead_and_left
 
-REACH = 30.0  # metres from the ego to each side of the grid
+HALF_SIZE_M = 30.0
 
 
 @dataclass(frozen=True, eq=False)
 class LocalMap:
-    """(H, W) whether a cell is taken, its size [m], and x, y [m] of the lower-left corner; row 0 has the lowest y."""
+    """An occupancy grid.
+
+    Attributes:
+        blocked: (H, W) whether a cell is occupied; row 0 has the lowest y.
+        resolution: size of a cell [m].
+        origin: (2,) x, y [m] of the lower-left corner.
+    """
 
     blocked: Bools
     resolution: float
@@ -25,7 +31,9 @@ class LocalMap:
 
 
 def local_map(loop: ClosedLoop, state: State) -> LocalMap:
-    """Return the cells of the road's grid within REACH of the ego; a cell whose centre lies in another vehicle is taken.
+    """Return the cells of the road's grid within HALF_SIZE_M of the ego, in x and in y.
+
+    A cell with its centre in another vehicle is occupied.
 
     Raises:
         InputError: no road is known.
@@ -34,14 +42,16 @@ def local_map(loop: ClosedLoop, state: State) -> LocalMap:
     if road is None:
         raise InputError(f"scenario {loop.scenario.index}: no road is known")
     size = road.resolution
-    cells = round(2.0 * REACH / size)
-    origin = road.origin + np.floor((np.array(state.ego[:2]) - REACH - road.origin) / size) * size
+    cells = round(2.0 * HALF_SIZE_M / size)
+    origin = (
+        road.origin + np.floor((np.array(state.ego[:2]) - HALF_SIZE_M - road.origin) / size) * size
+    )
     rows, columns = np.indices((cells, cells)) + 0.5
     centres = origin + size * np.stack([columns, rows], axis=-1)
     blocked = ~road.drivable_at(centres)
-    for i in np.flatnonzero(state.here):
+    for i in np.flatnonzero(state.present):
         if i != loop.ego:
             ahead, left = ahead_and_left(centres - state.vehicles[i, :2], state.vehicles[i, 2])
-            length, width = loop.world.half[i]
-            blocked |= (np.abs(ahead) <= length) & (np.abs(left) <= width)
+            half_length, half_width = loop.world.half[i]
+            blocked |= (np.abs(ahead) <= half_length) & (np.abs(left) <= half_width)
     return LocalMap(blocked, size, origin)

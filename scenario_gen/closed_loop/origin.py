@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Where the scenarios of a set come from: their encounters, and which are copies of others."""
+"""The origins of scenarios: their encounters, and which scenarios are copies of others."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -13,19 +13,19 @@ from scenario_gen.numerics import Floats, Ints
 from scenario_gen.numerics.plane import ahead_and_left
 from scenario_gen.types import Road, Scenario
 
-ALIKE = 0.1  # metres within which all vehicles of two scenarios of one encounter are at the same places, if they are copies
-INSTANTS = 9  # at which that is looked at
+COPY_TOLERANCE_M = 0.1  # greatest difference of any vehicle's position in two copies
+COMPARED_COUNT = 9  # instants at which positions are compared
 
 
 @dataclass(frozen=True)
 class Origin:
-    """Where a scenario comes from.
+    """The origin of a scenario.
 
     Attributes:
-        encounter: the recorded one that it was made of, "" if that is not known.
-        digest: SHA-256 of its motion and of who is the ego, "" if nobody looked.
-        copy_of: name of an earlier scenario of the same encounter in which all move likewise; ""
-            if there is none.
+        encounter: name of the recorded encounter; "" if it is not known.
+        digest: SHA-256 of its motion and of the ego's index; "" if not computed.
+        copy_of: name of an earlier scenario from the same encounter with the same motion; ""
+            without one.
     """
 
     encounter: str = ""
@@ -38,11 +38,11 @@ class Trial:
     """One scenario to be driven.
 
     Attributes:
-        name: for people.
-        scenario: the witness of the ego is in it.
+        name: display name.
+        scenario: the scenario, which includes the ego's witness.
         ego: index or id of the witness.
-        road: if it is known.
-        encounter: names the recorded encounter that it was made of; "" if that is not known.
+        road: its road, if known.
+        encounter: name of the recorded encounter; "" if it is not known.
     """
 
     name: str
@@ -53,7 +53,7 @@ class Trial:
 
 
 def origins_of(trials: Sequence[Trial]) -> list[Origin]:
-    """Return where the scenarios of trials come from; each copy is named after the first of its kind."""
+    """Return the origins of the scenarios of trials; copies have the name of the first one."""
     known: dict[tuple[str, int, int], list[tuple[str, Floats]]] = {}
     result = []
     for trial in trials:
@@ -61,47 +61,41 @@ def origins_of(trials: Sequence[Trial]) -> list[Origin]:
         number = ids.index(trial.ego) if isinstance(trial.ego, str) else trial.ego
         shape = _shape(trial.scenario, number)
         group = known.setdefault((trial.encounter, len(ids), number), [])
-        same = next((one for one, other in group if np.abs(other - shape).max() <= ALIKE), "")
-        if not same:
+        copies = (name for name, other in group if np.abs(other - shape).max() <= COPY_TOLERANCE_M)
+        original = next(copies, "")
+        if not original:
             group.append((trial.name, shape))
-        result.append(Origin(trial.encounter, digest_of(trial.scenario, number), same))
+        result.append(Origin(trial.encounter, digest_of(trial.scenario, number), original))
     return result
 
 
 def _shape(scenario: Scenario, ego: int) -> Floats:
-    """Return where all are, seen from the ego's start, at some instants, and when that is [s]: two roads give one shape."""
-    when = np.linspace(0.0, float(scenario.time[-1]), INSTANTS)
+    """Return the positions at some instants, in the frame of the ego's start, and the times [s].
+
+    They are the same on every road on which the same scenario is placed.
+    """
+    when = np.linspace(0.0, float(scenario.time[-1]), COMPARED_COUNT)
     offset = scenario.at(when).position - scenario.position[ego, 0]
     ahead, left = ahead_and_left(offset, float(scenario.heading[ego, 0]))
     return np.concatenate([ahead.ravel(), left.ravel(), when])
 
 
 def digest_of(scenario: Scenario, ego: int) -> str:
-    """Return the SHA-256 of a scenario's vehicles and motion, and of who is the ego."""
-    found = hashlib.sha256(
-        repr((ego, [(v.id, v.length, v.width) for v in scenario.vehicles])).encode()
-    )
-    for part in (
-        scenario.time,
-        scenario.position,
-        scenario.heading,
-        scenario.speed,
-        scenario.present,
-    ):
-        found.update(np.ascontiguousarray(part).tobytes())
-    return found.hexdigest()
+    """Return the SHA-256 of a scenario's vehicles, its motion, and the ego's index."""
+    vehicles = [(vehicle.id, vehicle.length, vehicle.width) for vehicle in scenario.vehicles]
+    digest = hashlib.sha256(repr((ego, vehicles)).encode())
+    for name in ("time", "position", "heading", "speed", "present"):
+        digest.update(np.ascontiguousarray(getattr(scenario, name)).tobytes())
+    return digest.hexdigest()
 
 
-def units_of(names: Sequence[str], several: Sequence[Origin]) -> tuple[Ints, int]:
-    """Return the number (S,) of what each drive counts with, and of how many encounters they are.
+def units_of(names: Sequence[str], origins: Sequence[Origin]) -> tuple[Ints, int]:
+    """Return the sampling unit (S,) of each drive, and the number of encounters.
 
-    That is its encounter; where all are of one encounter, those that are no copies of another
-    count by themselves.
+    The unit is the encounter. If there is only one, each scenario with its copies is a unit.
     """
-    encounters, unit = np.unique([one.encounter for one in several], return_inverse=True)
-    if len(encounters) > 1:
-        return unit, len(encounters)
-    place = {name: k for k, name in enumerate(names)}
-    return np.array(
-        [place.get(one.copy_of, k) for k, one in enumerate(several)], dtype=np.int64
-    ), len(encounters)
+    encounters, unit = np.unique([origin.encounter for origin in origins], return_inverse=True)
+    if len(encounters) == 1:
+        numbers = {name: k for k, name in enumerate(names)}
+        unit = np.array([numbers.get(origin.copy_of, k) for k, origin in enumerate(origins)])
+    return unit, len(encounters)

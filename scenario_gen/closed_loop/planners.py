@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Planners of our own: one that keeps its distance, one that ignores all others, and the reference drive."""
+"""Built-in planners: an IDM follower, a non-reactive baseline, and the reference drive."""
 
 from dataclasses import dataclass, replace
 import math
@@ -20,14 +20,12 @@ from scenario_gen.method.evaluation import (
 from scenario_gen.numerics.curve import Curve
 from scenario_gen.numerics.plane import ahead_and_left, place
 
-SPEED_GAIN = 1.0  # 1/s, acceleration per m/s that is missing
-
 
 class RouteFollower:
     """Steers along the route towards a point ahead of the ego (pure pursuit, Coulter 1992)."""
 
     def reset(self, task: Task) -> None:
-        """Take the route in."""
+        """Begin a new drive."""
         self.task = task
         self.route = Curve.through(task.route[:, :2]) if len(task.route) > 2 else None
         self._near = 0.0
@@ -46,38 +44,43 @@ class RouteFollower:
 
 @dataclass
 class ConstantSpeed(RouteFollower):
-    """Follows its route at one speed and looks at nobody: the bad one. `speed` [m/s], or that of the start if it is higher."""
+    """Follows its route at a constant speed and ignores all others: a bad planner.
+
+    The speed is `speed` [m/s], or that at the start if it is higher.
+    """
 
     speed: float = 8.0
 
     def act(self, observation: Observation) -> Command:
-        """Steer, and keep the speed."""
+        """Return the command along the route at the speed."""
         ego = observation.ego
         curvature, _ = self.steer(ego)
         wanted = max(self.speed, float(self.task.start[3]))
-        return Command(SPEED_GAIN * (wanted - ego.speed), curvature)
+        return Command(wanted - ego.speed, curvature)  # 1 m/s² per m/s
 
 
 @dataclass
 class IdmFollower(RouteFollower):
-    """Follows its route and keeps its distance to whoever is on it, or will be if all go straight on (IDM).
+    """Follows its route at a safe distance from the vehicles on it (IDM).
 
-    Source: intelligent driver model, Treiber, Hennecke & Helbing 2000. `speed` [m/s] is driven on
-        a free and straight way.
+    It also reacts to vehicles that will be on the route if they drive straight on. `speed` [m/s]
+    is its speed on a free and straight road.
+
+    Source: intelligent driver model, Treiber, Hennecke & Helbing 2000.
     """
 
     speed: float = 10.0
     headway: float = 1.5  # s
     standstill: float = 3.0  # m
     acceleration: float = 1.5  # m/s²
-    foresight: float = 4.0  # s, for which others are expected to go straight on
-    room: float = 0.5  # m beside the ego that it keeps free
+    foresight: float = 4.0  # s, horizon of the prediction that others drive straight on
+    room: float = 0.5  # m, lateral clearance
 
     def act(self, observation: Observation) -> Command:
-        """Steer, and brake for the nearest."""
+        """Return the command along the route that brakes for the next vehicle."""
         ego = observation.ego
         curvature, station = self.steer(ego)
-        wanted = 0.0  # without a way it is where it is to be
+        wanted = 0.0  # without a route it is at its goal
         if self.route is not None:
             stops = bool(self.task.goal[3] < STANDSTILL_MPS)  # the witness stands at its goal
             wanted = float(
@@ -97,72 +100,69 @@ class IdmFollower(RouteFollower):
         return Command(max(acceleration, -self.task.limits.max_deceleration), curvature)
 
     def _nearest(self, seen: Observation, station: float) -> tuple[float, float]:
-        """Return gap [m] and speed along the route [m/s] of who is, or comes, next on the route; infinity and 0 if nobody does.
+        """Return the gap [m] to the next vehicle on the route, and its speed along it [m/s].
 
-        One that comes from aside counts where it comes onto the route, as long as it does so
-        before the ego has passed there.
+        A vehicle that enters the route from the side counts at the place of its entry, unless the
+        ego passes there first. Infinity and 0 if the route is free.
         """
-        if self.route is None or not len(seen.ids):
+        if self.route is None or not seen.ids:
             return math.inf, 0.0
-        own = 0.5 * self.task.vehicle.length
-        when = np.arange(0.0, self.foresight + 0.01, 0.5)
-        places = place(seen.others[:, None, :3], seen.others[:, 3:4] * when, 0.0)
-        at, aside = self.route.project(places.reshape(-1, 2))
-        turn = self.route.at(at)[:, 2].reshape(len(seen.ids), -1) - seen.others[:, 2:3]
+        half_length, half_width = self.task.vehicle.half
+        times = np.arange(0.0, self.foresight + 0.01, 0.5)
+        shape = (len(seen.ids), len(times))
+        places = place(seen.others[:, None, :3], seen.others[:, 3:4] * times, 0.0)
+        stations, offset = self.route.project(places.reshape(-1, 2))
+        turn = self.route.at(stations)[:, 2].reshape(shape) - seen.others[:, 2:3]
         along, across = np.abs(np.cos(turn)), np.abs(np.sin(turn))
         length, width = 0.5 * seen.sizes[:, 0:1], 0.5 * seen.sizes[:, 1:2]
-        gap = at.reshape(along.shape) - station - own - length * along - width * across
-        beside = (
-            np.abs(aside.reshape(along.shape))
-            - 0.5 * self.task.vehicle.width
-            - length * across
-            - width * along
-        )
-        same_way = np.cos(turn[:, 0])
-        comes = (when == 0.0) | (
-            (same_way[:, None] < 0.7) & (seen.ego.speed * when < gap + 4.0 * own)
-        )
-        counts = (beside < self.room) & (gap > -own) & comes
-        first = np.where(
-            counts.any(axis=1), gap[np.arange(len(gap)), counts.argmax(axis=1)], math.inf
-        )
-        k = int(first.argmin())
-        return max(float(first[k]), 0.0), float(seen.others[k, 3]) * max(float(same_way[k]), 0.0)
+        reach = half_length + length * along + width * across
+        gap = stations.reshape(shape) - station - reach
+        lateral_reach = half_width + length * across + width * along
+        lateral_gap = np.abs(offset.reshape(shape)) - lateral_reach
+        direction = np.cos(turn[:, 0])
+        crosses = direction[:, None] < 0.7
+        before_ego = seen.ego.speed * times < gap + 4.0 * half_length
+        on_route = (lateral_gap < self.room) & (gap > -half_length)
+        counts = on_route & ((times == 0.0) | (crosses & before_ego))
+        entry_gap = gap[np.arange(len(gap)), counts.argmax(axis=1)]
+        first_gap = np.where(counts.any(axis=1), entry_gap, math.inf)
+        k = int(first_gap.argmin())
+        speed = float(seen.others[k, 3]) * max(float(direction[k]), 0.0)
+        return max(float(first_gap[k]), 0.0), speed
 
 
 @dataclass
 class NonReactive(IdmFollower):
-    """The non-reactive baseline: `IdmFollower` at the reference drive's highest speed, ignoring all others."""
+    """The non-reactive baseline: ignores all others.
+
+    It drives as an `IdmFollower` with the highest speed of the reference drive.
+    """
 
     def reset(self, task: Task) -> None:
-        """Take route and speed in."""
+        """Begin a new drive."""
         super().reset(task)
         self.speed, self.acceleration = task.speed, MAX_ACCELERATION_MPS2
 
     def act(self, observation: Observation) -> Command:
-        """Drive as if nobody else were there."""
-        return super().act(
-            replace(
-                observation, ids=(), others=observation.others[:0], sizes=observation.sizes[:0]
-            )
-        )
+        """Return the command of the follower on an empty road."""
+        others, sizes = observation.others[:0], observation.sizes[:0]
+        return super().act(replace(observation, ids=(), others=others, sizes=sizes))
 
 
 class ReferenceFollower:
-    """Is where the certificate has the ego: proof that a test can be passed."""
+    """Repeats the certified motion of the ego: proof that an ego can pass the test."""
 
     def __init__(self, loop: ClosedLoop) -> None:
         self.scenario, self.ego, self.begin = loop.scenario, loop.ego, loop.begin
 
     def reset(self, task: Task) -> None:
-        """Begin."""
+        """Begin a new drive."""
         self.step = task.step
 
     def act(self, observation: Observation) -> Pose:
-        """Be where the reference drive is next."""
-        s, n = self.scenario, self.ego
-        k = min(
-            round((self.begin + observation.time + self.step) / float(s.time[1])), len(s.time) - 1
-        )
-        x, y = s.position[n, k].tolist()
-        return Pose(x, y, float(s.heading[n, k]), float(s.speed[n, k]))
+        """Return the next pose of the reference drive."""
+        scenario = self.scenario
+        time = self.begin + observation.time + self.step
+        k = min(round(time / float(scenario.time[1])), len(scenario.time) - 1)
+        x, y, yaw = scenario.poses[self.ego, k].tolist()
+        return Pose(x, y, yaw, float(scenario.speed[self.ego, k]))

@@ -1,7 +1,10 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""What a test of a planner leaves: JSON, JUnit's XML and a page, in one folder; the same drives give the same bytes."""
+"""The results of a planner test in one folder: JSON, JUnit's XML and a page.
+
+The same drives give the same bytes.
+"""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -20,7 +23,7 @@ from scenario_gen.base.parameters import flatten
 from scenario_gen.closed_loop.comparison import Comparison
 from scenario_gen.closed_loop.config import ClosedLoopConfig
 from scenario_gen.closed_loop.origin import Trial
-from scenario_gen.closed_loop.reacting import is_trivial
+from scenario_gen.closed_loop.reacting import TRIVIAL, trivial_note
 from scenario_gen.closed_loop.trials import Outcome, passed_of, rates
 from scenario_gen.output.report.data import FRAME_PERIOD, MAX_FRAMES, pack, road_data, states
 from scenario_gen.output.report.html import render_page
@@ -28,24 +31,23 @@ from scenario_gen.output.report.html import render_page
 JSON, JUNIT, PAGE = "drives.json", "junit.xml", "drives.html"
 DRIVEN = Kind("driven")
 EMPTY: Mapping[str, str] = MappingProxyType({})
-NAMED = 12  # encounters up to which each is named
-MOST_DRAWN = 100
-"""Drives that the page replays, the worst first; its table lists all."""
+MAX_REPLAYS_COUNT = 100
+"""The page replays the worst drives; its table lists all."""
 
 
 @dataclass(frozen=True, eq=False)
 class Drives:
-    """What a planner came to, and what stands beside it.
+    """The results of a planner.
 
     Attributes:
-        outcomes: of the drives.
-        planner: its name.
+        outcomes: the outcomes of the drives.
+        planner: the planner's name.
         config: the parameters of the drives.
-        trials: that were driven; without them there is no page.
-        broken: the thresholds that are not met, and, if it is worse than the planner it is
-            compared with, that.
-        baseline: drives of the non-reactive baseline.
-        comparison: with an earlier planner.
+        trials: the trials; without them there is no page.
+        broken: sentences on the thresholds that are not met, and on the comparison if the planner
+            is worse.
+        baseline: outcomes of the non-reactive baseline.
+        comparison: the comparison with an earlier planner.
     """
 
     outcomes: Sequence[Outcome]
@@ -66,58 +68,70 @@ class Drives:
     @property
     def easy(self) -> str:
         """A sentence if the non-reactive baseline passes most scenarios, else ""."""
-        return is_trivial(sum(one.verdict.passed for one in self.baseline), len(self.baseline))
+        passed = sum(outcome.verdict.passed for outcome in self.baseline)
+        return trivial_note(passed, len(self.baseline))
 
     def scores(self) -> dict[str, float]:
-        """Return the means of the terms of nuPlan's and NAVSIM's scores, and of these scores."""
+        """Return the means of nuPlan's and NAVSIM's scores and of their terms."""
         terms = [outcome.verdict.document()["terms"] for outcome in self.outcomes]
         return {
-            name: math.fsum(each[name] for each in terms) / len(terms)
+            name: math.fsum(values[name] for values in terms) / len(terms)
             for name in (terms[0] if terms else ())
         }
 
     def notes(self) -> list[str]:
-        """Return what the figures are to be read with, in sentences."""
-        encounters = sorted({outcome.origin.encounter for outcome in self.outcomes} - {""})
-        copies = len([outcome for outcome in self.outcomes if outcome.origin.copy_of])
-        messages = []
-        if len(encounters) == 1:
-            messages.append(
-                f"all scenarios are of one encounter ({encounters[0]}): the intervals hold for that encounter only"
-            )
-        elif encounters:
-            drawn = f"encounters drawn as these {len(encounters)} were"
-            messages.append(f"intervals are for {drawn}: drives of one encounter are alike")
-        if copies:
-            messages.append(
-                f"{copies} of {len(self.outcomes)} scenarios are copies of another scenario of the same encounter"
-            )
-        if self.baseline:
-            sets = {
-                name: [one for one in self.baseline if one.origin.encounter == name]
-                for name in encounters
-            }
-            each = [
-                f"{sum(one.verdict.passed for one in own)} of {len(own)} of {name}"
-                for name, own in sets.items()
-                if own
-            ]
-            parts = f": {', '.join(each)}" if 1 < len(each) <= NAMED else ""
-            hardly = "these scenarios hardly test a planner: " if self.easy else ""
-            messages.append(
-                f"{hardly}the non-reactive baseline passes {passed_of(self.baseline)}{parts}"
-            )
+        """Return sentences that qualify the figures."""
+        messages = [self._origin_note(), self._copies_note(), self._baseline_note()]
         if self.comparison is not None:
             messages.append(self.comparison.sentence())
-        if found := self.scores():
-            terms = [
-                f"{name.replace('_', ' ')} {value:.3f}"
-                for name, value in found.items()
-                if name not in ("nuplan", "pdms")
-            ]
-            scores = f"nuPlan's score {found['nuplan']:.3f}, NAVSIM's PDMS {found['pdms']:.3f}"
-            messages.append(f"{scores} (means; {', '.join(terms)})")
-        return messages
+        messages.append(self._scores_note())
+        return [message for message in messages if message]
+
+    def _encounters(self) -> list[str]:
+        return sorted({outcome.origin.encounter for outcome in self.outcomes} - {""})
+
+    def _origin_note(self) -> str:
+        encounters = self._encounters()
+        if len(encounters) == 1:
+            return f"intervals cover this one encounter only ({encounters[0]})"
+        if encounters:
+            return (
+                f"intervals cover encounters drawn like these {len(encounters)}: drives from one "
+                "encounter are similar"
+            )
+        return ""
+
+    def _copies_note(self) -> str:
+        copies = len([outcome for outcome in self.outcomes if outcome.origin.copy_of])
+        if not copies:
+            return ""
+        of_all = f"{copies} of {len(self.outcomes)} scenarios"
+        return f"{of_all} are copies of another scenario from the same encounter"
+
+    def _baseline_note(self) -> str:
+        if not self.baseline:
+            return ""
+        groups: dict[str, list[bool]] = {name: [] for name in self._encounters()}
+        for outcome in self.baseline:
+            groups.setdefault(outcome.origin.encounter, []).append(outcome.verdict.passed)
+        counts = [
+            f"{sum(passed)} of {len(passed)} from {name}"
+            for name, passed in groups.items()
+            if name and passed
+        ]
+        by_encounter = f": {', '.join(counts)}" if 1 < len(counts) <= 12 else ""
+        prefix = f"{TRIVIAL}: " if self.easy else ""
+        rate = passed_of(self.baseline)
+        return f"{prefix}the non-reactive baseline passes {rate}{by_encounter}"
+
+    def _scores_note(self) -> str:
+        scores = self.scores()
+        if not scores:
+            return ""
+        nuplan, pdms = scores.pop("nuplan"), scores.pop("pdms")
+        terms = [f"{name.replace('_', ' ')} {value:.3f}" for name, value in scores.items()]
+        totals = f"nuPlan's score {nuplan:.3f}, NAVSIM's PDMS {pdms:.3f}"
+        return f"{totals} (means; {', '.join(terms)})"
 
     def document(self) -> dict[str, Any]:
         """Return all verdicts and their summary as JSON's types."""
@@ -143,20 +157,20 @@ class Drives:
         }
 
     def json(self) -> str:
-        """Return `document` as text; no time of day and no name of a machine is in it."""
+        """Return `document` as text, without the time of day and the name of the machine."""
         return json.dumps(self.document(), indent=1, ensure_ascii=False, allow_nan=False) + "\n"
 
     def page(self) -> str:
-        """Return the page: the summary, all verdicts, the worst first, and replays of the worst."""
+        """Return the page: the summary, all verdicts, and replays of the worst."""
         order = self.by_severity()
         return render_page(
             "drives.html.j2",
             ("scene.js", "drives.js", "tables.js"),
-            drawings(self.outcomes, self.trials, order[:MOST_DRAWN]),
+            drawings(self.outcomes, self.trials, order[:MAX_REPLAYS_COUNT]),
             planner=self.planner,
-            found=rates(self.outcomes),
+            rates=rates(self.outcomes),
             rows=[
-                (number if number < MOST_DRAWN else None, self.outcomes[k])
+                (number if number < MAX_REPLAYS_COUNT else None, self.outcomes[k])
                 for number, k in enumerate(order)
             ],
             broken=self.broken,
@@ -166,20 +180,25 @@ class Drives:
         )
 
     def write(self, folder: Path) -> None:
-        """Write JSON, JUnit's XML and, with the trials, the page to a folder that is there.
+        """Write JSON, JUnit's XML and, if there are trials, the page to an existing folder.
 
         Raises:
-            OSError: the disk is full, or the folder may not be written.
+            OSError: the disk is full, or the folder is not writable.
         """
         write_text(folder / JSON, self.json())
-        facts = {"policy": self.config.policy} | ({"hardly tests": self.easy} if self.easy else {})
+        facts = {"policy": self.config.policy}
+        if self.easy:
+            facts["hardly tests"] = self.easy
         write_text(folder / JUNIT, as_junit(self.outcomes, self.planner, facts))
         if self.trials:
             write_text(folder / PAGE, self.page())
 
 
 def as_junit(outcomes: Sequence[Outcome], planner: str, facts: Mapping[str, str] = EMPTY) -> str:
-    """Return one test case per scenario, as JUnit's XML, and facts as properties; collision, off_road, jump and goal fail."""
+    """Return one test case per scenario, as JUnit's XML, and facts as properties.
+
+    Cases fail with the type collision, off_road, jump or goal.
+    """
     failed = [outcome for outcome in outcomes if not outcome.verdict.passed]
     lasted = math.fsum(outcome.verdict.duration for outcome in outcomes)
     suite = ElementTree.Element(
@@ -222,7 +241,7 @@ def as_junit(outcomes: Sequence[Outcome], planner: str, facts: Mapping[str, str]
 def drawings(
     outcomes: Sequence[Outcome], trials: Sequence[Trial], drawn: Sequence[int]
 ) -> dict[str, Any]:
-    """Return what a page replays: the drives of some indices, and their roads."""
+    """Return the page's replays: the drives with some indices, and their roads."""
     roads = {id(trials[k].road): trials[k].road for k in drawn}
     place = {key: number for number, key in enumerate(roads)}
     return {
@@ -236,7 +255,7 @@ def _drawing(outcome: Outcome, trial: Trial, road: int) -> dict[str, Any]:
     motion = drive.motion
     frames = max(2, min(MAX_FRAMES, int(np.ceil(verdict.duration / FRAME_PERIOD)) + 1))
     spans = [
-        motion.time[here][[0, -1]].tolist() if here.any() else [0.0, -1.0] for here in drive.here
+        motion.time[row][[0, -1]].tolist() if row.any() else [0.0, -1.0] for row in drive.present
     ]
     witness = trial.scenario
     return {

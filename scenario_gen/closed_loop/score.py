@@ -6,16 +6,16 @@
 Sources: nuPlan's closed-loop score (Karnchanachari et al. 2024, "Towards learning-based planning:
 the nuPlan benchmark", and the metric configurations of nuplan-devkit 1.2); NAVSIM's predictive
 driver model score, PDMS (Dauner et al. 2024, "NAVSIM: data-driven non-reactive autonomous vehicle
-simulation and benchmarking"). Both multiply what must hold and weigh the rest::
+simulation and benchmarking"). Both multiply the conditions and a weighted mean of the rest::
 
     nuPlan:  no at-fault collision · drivable area · driving direction · making progress
              · (5 TTC + 5 progress + 4 speed limit + 2 comfort) / 16
     PDMS:    no at-fault collision · drivable area · (5 TTC + 5 progress + 2 comfort) / 12
 
-A road of this suite knows neither directions nor speed limits: those terms of nuPlan are left out,
-and the sum is divided by 12. Progress is measured against the witness (nuPlan: the expert; PDMS:
-its rule-based planner). Lanes are not known either: a contact at the side counts as at fault if
-the ego was off the road, as in nuPlan, but not for being in two lanes.
+The roads here have neither directions nor speed limits: those terms of nuPlan are left out, and
+the sum is divided by 12. Progress is measured against the witness (nuPlan: the expert; PDMS: its
+rule-based planner). Lanes are not known either: the ego is at fault in a contact at its side if it
+was off the road, as in nuPlan, but not if it was in two lanes.
 """
 
 from dataclasses import dataclass
@@ -32,38 +32,57 @@ from scenario_gen.numerics.boxes import corners
 from scenario_gen.numerics.plane import ahead_and_left
 from scenario_gen.types import Vehicle
 
-OUTSIDE = 0.3  # m; nuPlan's `max_violation_threshold` of drivable_area_compliance
-LEAST_TTC = (
-    0.95  # s; nuPlan's `least_min_ttc` of time_to_collision_within_bound; PDMS looks ahead 1 s
-)
-LEAST_PROGRESS = 0.2  # nuPlan's `min_progress_threshold` of ego_is_making_progress
-STOPPED = 0.05  # m/s; nuPlan's `stopped_speed_threshold`
-BEHIND = 150.0  # degrees from the ego's heading; nuPlan's `is_agent_behind`
-BUMPER = 0.05  # metres within which a contact is at the front
-# nuPlan's ego_is_comfortable, which PDMS takes over: m/s², m/s³, rad/s, rad/s²
-SPEEDING_UP, BRAKING, SIDEWAYS = 2.40, 4.05, 4.89
-JERK, JERK_ALONG = 8.37, 4.13
-YAW_RATE, YAW_ACCELERATION = 0.95, 1.93
-SMOOTHED, DERIVED = (
-    0.4,
-    0.7,
-)  # s to each side: nuPlan's Savitzky-Golay windows of 8 and 15 samples at 0.1 s, quadratic
+MAX_STOPPED_SPEED_MPS = 0.05  # nuPlan's `stopped_speed_threshold`
 WEIGHTS = {"ttc": 5.0, "progress": 5.0, "comfort": 2.0}
 
 
 @dataclass(frozen=True)
-class Terms:
-    """Each from 0 to 1.
+class Thresholds:
+    """The thresholds of the metric configurations in nuplan-devkit 1.2.
 
     Attributes:
-        no_at_fault_collision: 0 if, as nuPlan has it, the ego hit one that stood, or hit one with
-            its front, or was off the road when it was hit at the side; not if it stood or was hit
-            from behind. `Collision.reason` has another definition.
-        drivable_area: 0 if the footprint was deeper than 0.3 m outside; 1 where no road is known.
-        making_progress: 0 below 20 % of the witness' way.
-        ttc: 0 if the time to collision with one that is not behind was less than 0.95 s.
-        progress: share of the witness' way.
-        comfort: 0 if acceleration, jerk or turning was beyond what nuPlan calls comfortable.
+        outside_m: `max_violation_threshold` of drivable_area_compliance.
+        ttc_s: `least_min_ttc` of time_to_collision_within_bound; PDMS has 1 s.
+        progress: `min_progress_threshold` of ego_is_making_progress.
+    """
+
+    outside_m: float = 0.3
+    ttc_s: float = 0.95
+    progress: float = 0.2
+
+
+@dataclass(frozen=True)
+class Comfort:
+    """The limits of nuPlan's ego_is_comfortable, which PDMS uses, too.
+
+    The windows are those of nuPlan's quadratic Savitzky-Golay filters (8 and 15 samples at 0.1 s),
+    from the centre to each side.
+    """
+
+    acceleration_mps2: float = 2.40
+    deceleration_mps2: float = 4.05
+    lateral_acceleration_mps2: float = 4.89
+    jerk_mps3: float = 8.37
+    longitudinal_jerk_mps3: float = 4.13
+    yaw_rate_radps: float = 0.95
+    yaw_acceleration_radps2: float = 1.93
+    value_window_s: float = 0.4
+    derivative_window_s: float = 0.7
+
+
+@dataclass(frozen=True)
+class Terms:
+    """The terms of the scores, each from 0 to 1.
+
+    Attributes:
+        no_at_fault_collision: 0 if, by nuPlan's definition, the ego hit a stationary vehicle, or
+            hit a vehicle with its front, or was off the road when it was hit at its side; 1 if it
+            stood or was hit from behind. `Collision.reason` has another definition.
+        drivable_area: 0 if the footprint was more than 0.3 m outside; 1 if no road is known.
+        making_progress: 0 below 20 % of the witness' path.
+        ttc: 0 if the time to collision with a vehicle that is not behind was less than 0.95 s.
+        progress: share of the witness' path.
+        comfort: 0 if acceleration, jerk or turning exceeded nuPlan's limits of comfort.
     """
 
     no_at_fault_collision: float
@@ -93,78 +112,93 @@ def terms(
     """Return the terms of a drive.
 
     Args:
-        drive: what was driven.
-        hit: with whom and when [s] the ego first met another, None if it did not.
+        drive: the drive.
+        hit: index of the first vehicle that the ego touched, and the time [s]; None without one.
         margin: least signed distance to the road's edge [m], NaN if no road is known.
-        progress: share of the witness' way.
-        ttc: least time to collision with one that is not behind [s].
+        progress: share of the witness' path.
+        ttc: least time to collision with a vehicle that is not behind [s].
     """
+    at_fault = hit is not None and _at_fault(drive, *hit, off_road=margin < 0.0)
+    thresholds = Thresholds()
     return Terms(
-        no_at_fault_collision=float(
-            hit is None or not _at_fault(drive, *hit, off_road=margin < 0.0)
-        ),
-        drivable_area=float(not margin < -OUTSIDE),
-        making_progress=float(progress >= LEAST_PROGRESS),
-        ttc=float(ttc >= LEAST_TTC),
+        no_at_fault_collision=float(not at_fault),
+        drivable_area=float(not margin < -thresholds.outside_m),
+        making_progress=float(progress >= thresholds.progress),
+        ttc=float(ttc >= thresholds.ttc_s),
         progress=progress,
         comfort=float(comfortable(drive)),
     )
 
 
 def not_behind(drive: Drive, other: int) -> Floats:
-    """Return (T,) whether another is not behind the ego: within 150 degrees of its heading."""
+    """Return (T,) whether another vehicle is not behind the ego, as nuPlan's `is_agent_behind`.
+
+    Its centre is then within 150 degrees of the ego's heading.
+    """
     motion, ego = drive.motion, drive.ego
     ahead, left = ahead_and_left(
         motion.position[other] - motion.position[ego], motion.heading[ego]
     )
-    return np.asarray(ahead >= math.cos(math.radians(BEHIND)) * np.hypot(ahead, left))
+    return np.asarray(ahead >= math.cos(math.radians(150.0)) * np.hypot(ahead, left))
 
 
-def _at_fault(drive: Drive, who: int, time: float, *, off_road: bool) -> bool:
-    ego, other = state_at(drive, drive.ego, time), state_at(drive, who, time)
-    if abs(ego.speed) <= STOPPED:
+def _at_fault(drive: Drive, other_index: int, time: float, *, off_road: bool) -> bool:
+    ego, other = state_at(drive, drive.ego, time), state_at(drive, other_index, time)
+    if abs(ego.speed) <= MAX_STOPPED_SPEED_MPS:
         return False
-    if abs(other.speed) <= STOPPED:
+    if abs(other.speed) <= MAX_STOPPED_SPEED_MPS:
         return True
     vehicles = drive.motion.vehicles
-    if _touches_front(ego, vehicles[drive.ego], other, vehicles[who]):
+    if _touches_front(ego, vehicles[drive.ego], other, vehicles[other_index]):
         return True
     k = min(int(np.searchsorted(drive.motion.time, time)), len(drive.motion.time) - 1)
-    return off_road and bool(not_behind(drive, who)[k])
+    return off_road and bool(not_behind(drive, other_index)[k])
 
 
-def _touches_front(ego: VehicleState, own: Vehicle, other: VehicleState, its: Vehicle) -> bool:
-    """Whether another touches the ego's front bumper."""
-    front, _, _, right = corners(np.array([ego]), own.length, own.width)[0]
-    body = shapely.Polygon(corners(np.array([other]), its.length, its.width)[0])
-    return bool(shapely.dwithin(shapely.LineString([front, right]), body, 2.0 * BUMPER))
+def _touches_front(
+    ego_state: VehicleState, ego: Vehicle, other_state: VehicleState, other: Vehicle
+) -> bool:
+    """Whether another vehicle is within 0.1 m of the ego's front bumper."""
+    left, _, _, right = corners(np.array([ego_state]), ego.length, ego.width)[0]
+    body = shapely.Polygon(corners(np.array([other_state]), other.length, other.width)[0])
+    return bool(shapely.dwithin(shapely.LineString([left, right]), body, 0.1))
 
 
 def comfortable(drive: Drive) -> bool:
     """Whether acceleration, jerk and turning stay within nuPlan's bounds at every instant."""
-    step, ego = float(drive.motion.time[1]) if len(drive.motion.time) > 1 else 1.0, drive.ego
-    yaw, speed = drive.motion.heading[ego], drive.motion.speed[ego]
-    along = drive.accelerations.copy()
-    along[0] = along[min(1, len(along) - 1)]  # the first instant has none yet
-    rate = smoothed(yaw, step, DERIVED, 1)
-    sideways = smoothed(speed * rate, step, SMOOTHED, 0)
-    along = smoothed(along, step, SMOOTHED, 0)
-    whole = np.asarray(np.hypot(along, sideways))
-    return bool(
-        along.max() <= SPEEDING_UP
-        and along.min() >= -BRAKING
-        and np.abs(sideways).max() <= SIDEWAYS
-        and np.abs(smoothed(along, step, DERIVED, 1)).max() <= JERK_ALONG
-        and np.abs(smoothed(whole, step, DERIVED, 1)).max() <= JERK
-        and np.abs(rate).max() <= YAW_RATE
-        and np.abs(smoothed(yaw, step, DERIVED, 2)).max() <= YAW_ACCELERATION
+    step = float(drive.motion.time[1]) if len(drive.motion.time) > 1 else 1.0
+    yaw, speed = drive.motion.heading[drive.ego], drive.motion.speed[drive.ego]
+    limits = Comfort()
+
+    def smooth(values: Floats) -> Floats:
+        return smoothed(values, step, limits.value_window_s, 0)
+
+    def derivative(values: Floats, order: int = 1) -> Floats:
+        return smoothed(values, step, limits.derivative_window_s, order)
+
+    acceleration = drive.accelerations.copy()
+    acceleration[0] = acceleration[min(1, len(acceleration) - 1)]  # the first one is not known
+    acceleration = smooth(acceleration)
+    yaw_rate = derivative(yaw)
+    lateral = smooth(speed * yaw_rate)
+    magnitude = np.asarray(np.hypot(acceleration, lateral))
+    upper_bounds = (
+        (acceleration, limits.acceleration_mps2),
+        (-acceleration, limits.deceleration_mps2),
+        (np.abs(lateral), limits.lateral_acceleration_mps2),
+        (np.abs(derivative(acceleration)), limits.longitudinal_jerk_mps3),
+        (np.abs(derivative(magnitude)), limits.jerk_mps3),
+        (np.abs(yaw_rate), limits.yaw_rate_radps),
+        (np.abs(derivative(yaw, 2)), limits.yaw_acceleration_radps2),
     )
+    return all(bool(values.max() <= bound) for values, bound in upper_bounds)
 
 
 def smoothed(values: Floats, step: float, side: float, derivative: int) -> Floats:
-    """Return values (T,), or their first or second derivative, by a quadratic fitted to `side` seconds to each side of each.
+    """Return values (T,), or their first or second derivative, by local quadratic fits.
 
-    At the ends it is that of the last window, as in nuPlan. Source: Savitzky & Golay 1964.
+    Each fit covers `side` seconds to each side of a value. At the ends it is the fit of the last
+    window, as in nuPlan. Source: Savitzky & Golay 1964.
     """
     if len(values) < 3:
         return np.zeros_like(values) if derivative else values.copy()

@@ -1,11 +1,11 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The closed loop: a certified scenario, an ego in the place of one of its vehicles, and one step after the other.
+"""The closed loop: a certified scenario in which an ego replaces one of the vehicles.
 
-`ClosedLoop` holds what does not change; `State` is one instant; `step` gives the next and changes
-nothing. So a drive can be repeated, branched and searched, and two drives with the same commands
-are the same, bit for bit.
+`ClosedLoop` has everything that is constant during a drive; `State` is one instant; `step` returns
+the next instant and changes nothing. So drives can be repeated, branched and searched. Two drives
+with the same commands are identical.
 """
 
 from collections.abc import Callable
@@ -29,34 +29,34 @@ from scenario_gen.types import Dynamics, Road, Scenario, Vehicle
 
 @dataclass(frozen=True, eq=False)
 class State:
-    """One instant of a drive; N vehicles, the ego in its witness' place.
+    """One instant of a drive with N vehicles; the ego replaces its witness.
 
     Attributes:
-        step: how many steps there were before.
+        step: number of steps since the start.
         time: seconds from the drive's start.
         ego: the ego.
-        vehicles: (N, 4) x, y [m], yaw [rad], speed [m/s] of all.
-        here: (N,) whether each is on the scene.
-        clock: (N,) certified time [s] at which each one is where it is now; for the ego, on its
-            witness' path.
-        rate: (N,) how fast the clocks run; 1 is the certified speed.
-        acceleration: (N,) of the others [m/s²], as their drivers want it.
+        vehicles: (N, 4) x, y [m], yaw [rad], speed [m/s] of all vehicles.
+        present: (N,) whether each vehicle is in the scene.
+        clock: (N,) certified time [s] of each vehicle's present place on its certified path; for
+            the ego, on its witness' path.
+        rate: (N,) rates of the clocks; 1 is the certified speed.
+        acceleration: (N,) accelerations of the others [m/s²] that their drivers choose.
         waited: (N,) patience that each driver has spent waiting for an ego that stands [s];
             infinity once it goes before the ego.
         seen: (K, 9) the ego now and before, newest first, as far back as the slowest driver's
             reaction time: `EgoState`, its clock on its witness' path [s], the rate of that clock,
             and 1 if it is on that path.
-        forced: how many times so far one of the others has braked harder than the strongest
-            braking, or more suddenly than the jerk allows, to keep the order.
-        fault: what was wrong with the last command, "" if nothing.
-        jumped: whether no body can take the ego's pose after one step.
+        forced: number of times that one of the others has braked harder than the strongest
+            braking, or more suddenly than the jerk allows, to preserve the order.
+        fault: description of an error in the last command, "" if it was correct.
+        jumped: whether no vehicle can reach the ego's pose in one step.
     """
 
     step: int
     time: float
     ego: EgoState
     vehicles: Floats
-    here: Bools
+    present: Bools
     clock: Floats
     rate: Floats
     acceleration: Floats
@@ -69,19 +69,19 @@ class State:
 
 @dataclass(frozen=True, eq=False)
 class Task:
-    """What a planner is given before it starts.
+    """The planner's input before a drive.
 
     Attributes:
         vehicle: the ego's identity and footprint.
         start: (4,) x, y [m], yaw [rad], speed [m/s].
-        goal: (4,) likewise: where the witness ends.
-        route: (M, 3) x, y [m], yaw [rad] of a way from start to goal that can be driven: the
-            witness' path, without its speeds.
-        road: what is drivable for the ego's type, if it is known.
+        goal: (4,) x, y [m], yaw [rad], speed [m/s] at the witness' end.
+        route: (M, 3) x, y [m], yaw [rad] of a drivable path from start to goal: the witness' path,
+            without its speeds.
+        road: the drivable area for the ego's type, if it is known.
         step: time between two decisions [s].
         config: the parameters of the drive.
         speed: the witness' highest speed [m/s].
-        limits: what the body can do.
+        limits: the limits of the ego's body.
     """
 
     vehicle: Vehicle
@@ -97,12 +97,12 @@ class Task:
 
 @dataclass(frozen=True, eq=False)
 class Observation:
-    """What a planner sees at one instant: the ego, and the M others that are on the scene.
+    """The planner's input at one instant: the ego, and the M other vehicles in the scene.
 
     Attributes:
         time: seconds from the drive's start.
         ego: the ego.
-        ids: of the others.
+        ids: ids of the others.
         others: (M, 4) x, y [m], yaw [rad], speed [m/s]; (x, y) is the footprint's centre.
         sizes: (M, 2) length and width [m].
     """
@@ -115,13 +115,13 @@ class Observation:
 
 
 class Planner(Protocol):
-    """What is tested: told its task, then asked at every step what to do next."""
+    """The planner under test: it gets its task, then returns a command at every step."""
 
     def reset(self, task: Task) -> None:
         """Begin a new drive."""
 
     def act(self, observation: Observation) -> Command | Pose | None:
-        """Return what the ego does until the next step; None brakes."""
+        """Return the ego's command for the next step; None brakes."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -129,21 +129,21 @@ class Drive:
     """One drive from start to end; N vehicles, T instants.
 
     Attributes:
-        motion: all vehicles, the ego in its witness' place, as they drove: a scenario like the
+        motion: the driven motion of all vehicles, the ego in its witness' row: a scenario like the
             certified one.
-        ego: its index.
-        here: (N, T) whether each was on the scene.
+        ego: index of the ego.
+        present: (N, T) whether each vehicle was in the scene.
         clock: (N, T) as in `State`.
-        accelerations: (T,) the ego's own [m/s²].
-        forced: how many times one of the others braked harder or more suddenly than drivers do, to
-            keep the order.
-        faults: what was wrong with commands, by step.
+        accelerations: (T,) accelerations of the ego [m/s²].
+        forced: number of times that one of the others braked harder or more suddenly than drivers
+            do, to preserve the order.
+        faults: steps of faulty commands, and their descriptions.
         jumps: the instants before which the ego jumped.
     """
 
     motion: Scenario
     ego: int
-    here: Bools
+    present: Bools
     clock: Floats
     accelerations: Floats
     forced: int
@@ -152,26 +152,20 @@ class Drive:
 
     @property
     def driven(self) -> int:
-        """How many instants there are before the first jump."""
+        """Number of instants before the first jump."""
         return min((*self.jumps, len(self.motion.time)))
 
 
-WAITS = 1.0  # metres; a witness that drives no farther waits throughout
-AT = 0.2  # metres before the goal that count as there
-BEYOND = 10.0  # metres beyond it, more than anyone drives in one step
-GOAL_TURN = 1.0  # rad, largest difference of heading at the goal
+PAST_GOAL_M = 10.0  # more than any vehicle drives in one step
 
 
 def reaction_time(scenario: Scenario, vehicle: str, mean: float) -> float:
-    """Draw the reaction time [s] of a vehicle's driver, evenly from half to one and a half of the mean.
+    """Draw a driver's reaction time [s], uniformly from 0.5 to 1.5 times the mean.
 
-    It follows from the scenario's seed and index and from the vehicle's id, whoever the ego is and
-    whatever it does.
+    It depends only on the scenario's seed and index and on the vehicle's id, not on the ego.
     """
-    words = [
-        number % 2**32
-        for number in (scenario.seed, scenario.seed >> 32, scenario.index, crc32(vehicle.encode()))
-    ]
+    numbers = (scenario.seed, scenario.seed >> 32, scenario.index, crc32(vehicle.encode()))
+    words = [number % 2**32 for number in numbers]
     return mean * (0.5 + float(np.random.default_rng(words).random()))
 
 
@@ -185,12 +179,12 @@ class ClosedLoop:
         road: Road | None = None,
         config: ClosedLoopConfig = ClosedLoopConfig(),
     ) -> None:
-        """Prepare.
+        """Prepare the drives of a scenario.
 
         Args:
-            scenario: certified, the ego's witness among its vehicles.
+            scenario: a certified scenario that includes the ego's witness.
             ego: index or id of the witness.
-            road: what it drives on, if it is known.
+            road: the road of the scenario, if it is known.
             config: the parameters.
 
         Raises:
@@ -198,82 +192,87 @@ class ClosedLoop:
         """
         if road is not None and road.frame_id != scenario.frame_id:
             raise InputError(
-                f"scenario {scenario.index} is in frame {scenario.frame_id!r}, its road in {road.frame_id!r}"
+                f"scenario {scenario.index} is in frame {scenario.frame_id!r}, "
+                f"its road in {road.frame_id!r}"
             )
         self.scenario, self.world = scenario, world_of(scenario, ego, config.step)
         self.ego = self.world.ego
         self.road = road and ground_for(road, scenario.vehicles[self.ego])
         self.config, self.limits = config, config.limits.of(scenario.vehicles[self.ego].type)
-        reactive = config.policy != REPLAY
-        self.reactions = np.array(
-            [
-                reaction_time(
-                    scenario, vehicle.id, config.reaction * (reactive and not vehicle.kind.walks)
-                )
-                for vehicle in scenario.vehicles
-            ]
-        )
-        self._parameters = DriverParameters(
-            config.headway,
-            config.standstill_gap,
-            config.acceleration,
-            config.comfortable_braking,
-            np.array(
-                [
-                    min(config.strongest_braking, config.limits.of(one.type).max_deceleration)
-                    for one in scenario.vehicles
-                ]
-            ),
-            config.jerk,
-            config.patience,
-            FORESIGHT.get(config.policy, 0.0),
-            config.yield_to_ego == TEMPLATE,
-            reactive,
-            np.round(self.reactions / config.step).astype(np.int64),
-        )
+        self.reactions = self._reaction_times()
+        self._parameters = self._driver_parameters()
         self._slowest = int(self._parameters.delay.max())
         self._sizes = 2.0 * self.world.half
         self._ids = tuple(vehicle.id for vehicle in scenario.vehicles)
         self._others = np.arange(len(self._ids)) != self.ego
         self.begin, end = self.world.spans[self.ego].tolist()
         self.duration = end - self.begin
-        self._waits = bool(self.world.cells[self.ego, -1, 7] < WAITS)
+        driven_distance = self.world.cells[self.ego, -1, 7]
+        self._witness_waits = bool(driven_distance < 1.0)
         self.last_step = int(np.ceil((self.duration * config.overtime + 5.0) / config.step))
 
+    def _reaction_times(self) -> Floats:
+        """Return (N,) the reaction times [s]; pedestrians, and all vehicles in a replay, have 0."""
+        config = self.config
+        times = []
+        for vehicle in self.scenario.vehicles:
+            reacts = config.policy != REPLAY and not vehicle.kind.walks
+            times.append(reaction_time(self.scenario, vehicle.id, config.reaction * reacts))
+        return np.array(times)
+
+    def _driver_parameters(self) -> DriverParameters:
+        config = self.config
+        strongest_braking = [
+            min(config.strongest_braking, config.limits.of(vehicle.type).max_deceleration)
+            for vehicle in self.scenario.vehicles
+        ]
+        return DriverParameters(
+            config.headway,
+            config.standstill_gap,
+            config.acceleration,
+            config.comfortable_braking,
+            np.array(strongest_braking),
+            config.jerk,
+            config.patience,
+            FORESIGHT.get(config.policy, 0.0),
+            config.yield_to_ego == TEMPLATE,
+            config.policy != REPLAY,
+            np.round(self.reactions / config.step).astype(np.int64),
+        )
+
     def task(self) -> Task:
-        """Return what a planner is told beforehand."""
-        own = self.world.motion[self.ego]
-        route = own[np.concatenate([[True], edge_lengths(own[:, :2]) > 1e-3]), :3]
+        """Return the planner's input before a drive."""
+        witness = self.world.motion[self.ego]
+        route = witness[np.concatenate([[True], edge_lengths(witness[:, :2]) > 1e-3]), :3]
         vehicle, config = self.scenario.vehicles[self.ego], self.config
         return Task(
             vehicle,
-            own[0, :4],
-            own[-1, :4],
+            witness[0, :4],
+            witness[-1, :4],
             route,
             self.road,
             config.step,
             config,
-            float(own[:, 3].max()),
+            float(witness[:, 3].max()),
             self.limits,
         )
 
     def start(self) -> State:
-        """Return the first instant: where everyone is when the ego's witness comes onto the scene."""
-        known = self.world
+        """Return the first instant: all vehicles when the ego's witness enters the scene."""
+        world = self.world
         first = int(self.scenario.present[self.ego, 0])
-        vehicles = known.motion[:, first, :4].copy()
+        vehicles = world.motion[:, first, :4].copy()
         n = len(vehicles)
-        here = (known.spans[:, 0] <= self.begin) & ~(
-            known.leaves & (known.spans[:, 1] <= self.begin)
-        )
+        entered, left = (world.spans <= self.begin).T
+        present = entered & ~(world.leaves & left)
         ego = EgoState(*vehicles[self.ego].tolist())
-        seen = np.array([(*ego, self.begin, 1.0, 1.0)])  # before that it drove as its witness
+        seen = np.array([(*ego, self.begin, 1.0, 1.0)])  # it has driven as its witness
         return State(
             0,
             0.0,
             ego,
             vehicles,
-            here,
+            present,
             np.full(n, self.begin),
             np.ones(n),
             np.zeros(n),
@@ -282,7 +281,13 @@ class ClosedLoop:
         )
 
     def step(self, state: State, asked: Command | Pose | None, note: str = "") -> State:
-        """Return the next instant; `state` stays what it was. `note` says what else was wrong with what was asked."""
+        """Return the next instant; `state` does not change.
+
+        Args:
+            state: the present instant.
+            asked: the planner's command.
+            note: description of another error in the command, which replaces that of `move`.
+        """
         config = self.config
         moved = move(state.ego, asked, config, self.limits)
         ego, n = moved.state, len(self._ids)
@@ -290,11 +295,12 @@ class ClosedLoop:
         time = number * config.step
         before = np.column_stack([state.clock, state.rate, state.acceleration, state.waited])
         seen = np.empty((min(len(state.seen), self._slowest) + 1, 9))
-        seen[0, :6], seen[1:] = ego, state.seen[: len(seen) - 1]
-        after, vehicles, here = np.empty((n, 5)), np.empty((n, 4)), np.empty(n, dtype=np.bool_)
-        advance(
-            self.world, self._parameters, self.begin + time, before, seen, after, vehicles, here
-        )
+        seen[0, :6] = ego
+        seen[1:] = state.seen[: len(seen) - 1]
+        after, vehicles = np.empty((n, 5)), np.empty((n, 4))
+        present = np.empty(n, dtype=np.bool_)
+        now = self.begin + time
+        advance(self.world, self._parameters, now, before, seen, after, vehicles, present)
         clock, rate, acceleration, waited, forced = after.T
         count = state.forced + int(np.count_nonzero(forced))
         return State(
@@ -302,7 +308,7 @@ class ClosedLoop:
             time,
             ego,
             vehicles,
-            here,
+            present,
             clock,
             rate,
             acceleration,
@@ -314,18 +320,18 @@ class ClosedLoop:
         )
 
     def observe(self, state: State) -> Observation:
-        """Return what a planner sees."""
-        seen = self._others & state.here
-        ids = tuple(name for name, there in zip(self._ids, seen.tolist(), strict=True) if there)
-        return Observation(state.time, state.ego, ids, state.vehicles[seen], self._sizes[seen])
+        """Return the planner's input at an instant."""
+        rows = np.flatnonzero(self._others & state.present)
+        ids = tuple(self._ids[row] for row in rows)
+        return Observation(state.time, state.ego, ids, state.vehicles[rows], self._sizes[rows])
 
     def drive(self, planner: Planner, ended: Callable[[State], bool] | None = None) -> Drive:
-        """Drive with a planner until it is over.
+        """Drive with a planner until the drive ends.
 
         Args:
-            planner: what is tested.
-            ended: says when to stop; by default at the goal, at a collision (of instants only) or
-                after the time given.
+            planner: the planner under test.
+            ended: whether the drive ends at a state; by default at the goal, at a collision (at
+                the instants only) or when the time is over.
         """
         planner.reset(self.task())
         states = [self.start()]
@@ -335,33 +341,36 @@ class ClosedLoop:
         return self.record(states)
 
     def over(self, state: State) -> bool:
-        """Whether a drive ends: at the goal, when the ego overlaps another, or after the time given."""
+        """Whether a drive ends: at the goal, at a collision, or when the time is over."""
         return state.step >= self.last_step or self.at_goal(state) or self.hit(state)
 
     def hit(self, state: State) -> bool:
-        """Whether the ego overlaps another at this instant."""
-        return bool(ego_hits(state.vehicles, self.world.half, state.here, self.ego))
+        """Whether the ego overlaps another vehicle at this instant."""
+        return bool(ego_hits(state.vehicles, self.world.half, state.present, self.ego))
 
     def at_goal(self, state: State) -> bool:
         """Whether the ego is at its goal at this instant."""
         return bool(self.reached(np.array([state.time]), state.vehicles[self.ego, None])[0])
 
     def reached(self, time: Floats, poses: Floats) -> Bools:
-        """Return (T,) whether an ego is at its goal, or has passed it, at times (T,) [s] and poses (T, 3+) x, y [m], yaw [rad].
+        """Return (T,) whether an ego is at its goal or has passed it.
 
-        If the witness waits there, only at the end.
+        An ego whose witness waits at the goal reaches it only at the end.
+
+        Args:
+            time: (T,) [s].
+            poses: (T, 3) or wider: x, y [m], yaw [rad].
         """
         goal, width = self.world.motion[self.ego, -1], self.config.goal_width
         ahead, left = ahead_and_left(poses[:, :2] - goal[:2], goal[2])
-        if self._waits:
+        if self._witness_waits:
             return np.asarray((time >= self.duration - 1e-9) & (np.hypot(ahead, left) <= width))
         turn = np.abs(wrap_angle(poses[:, 2] - goal[2]))
-        return np.asarray(
-            (ahead >= -AT) & (ahead <= BEYOND) & (np.abs(left) <= width) & (turn <= GOAL_TURN)
-        )
+        at_line = (ahead >= -0.2) & (ahead <= PAST_GOAL_M)
+        return np.asarray(at_line & (np.abs(left) <= width) & (turn <= 1.0))
 
     def record(self, states: list[State]) -> Drive:
-        """Return the drive of these instants."""
+        """Return the drive with these instants."""
         vehicles = np.stack([state.vehicles for state in states], axis=1)
         speed, step = vehicles[..., 3], self.config.step
         scenario = self.scenario
@@ -379,7 +388,7 @@ class ClosedLoop:
         return Drive(
             motion,
             self.ego,
-            np.stack([state.here for state in states], axis=1),
+            np.stack([state.present for state in states], axis=1),
             np.stack([state.clock for state in states], axis=1),
             np.array([state.ego.acceleration for state in states]),
             states[-1].forced,

@@ -1,9 +1,9 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""A planner's time: a drive that never comes to an end is ended, and decisions that take long are counted.
+"""Time limits of planners: drives that take too long are stopped, slow decisions are counted.
 
-Both are of this machine: no verdict and nothing that is written hangs on them.
+Both depend on this machine: they change no verdict and no file.
 """
 
 from collections.abc import Iterator, Sequence
@@ -20,31 +20,38 @@ from types import FrameType
 from scenario_gen.closed_loop.ego import Command, Pose
 from scenario_gen.closed_loop.simulation import Observation, Planner, Task
 
-INTERRUPT_AGAIN_S = (
-    1.0  # seconds after which a planner that goes on nevertheless is interrupted again
-)
-GRACE = 5.0  # seconds beyond the limit after which a process that no interrupt reaches is ended
+INTERRUPT_PERIOD_S = 1.0  # a planner that catches an interrupt is interrupted again
+KILL_DELAY_S = 5.0  # a process that ignores interrupts is killed so long after its time limit
 
 
 class TooLongError(BaseException):
-    """A planner has used up its time; it is no Exception, which the planner itself might catch."""
+    """A planner's time is over.
+
+    This is not an Exception, because the planner might catch that.
+    """
 
 
 @dataclass(frozen=True)
 class Decisions:
-    """How many decisions were made, how many of them took longer than the limit, and the longest [s], on this machine."""
+    """Durations of decisions on this machine.
+
+    Attributes:
+        count: number of decisions.
+        slow: number of decisions that took longer than the limit.
+        longest: longest duration [s].
+    """
 
     count: int = 0
     slow: int = 0
     longest: float = 0.0
 
     @classmethod
-    def all_of(cls, several: "Sequence[Decisions]") -> "Decisions":
-        """Return the account of several drives."""
+    def all_of(cls, drives: "Sequence[Decisions]") -> "Decisions":
+        """Return the decisions of several drives together."""
         return cls(
-            sum(one.count for one in several),
-            sum(one.slow for one in several),
-            max((one.longest for one in several), default=0.0),
+            sum(drive.count for drive in drives),
+            sum(drive.slow for drive in drives),
+            max((drive.longest for drive in drives), default=0.0),
         )
 
 
@@ -53,29 +60,27 @@ class Timed:
 
     def __init__(self, planner: Planner, limit: float) -> None:
         self._planner, self._limit = planner, limit
-        self.found = Decisions()
+        self.decisions = Decisions()
 
     def reset(self, task: Task) -> None:
-        """Begin."""
+        """Begin a new drive."""
         self._planner.reset(task)
 
     def act(self, observation: Observation) -> Command | Pose | None:
-        """Return what the planner decides."""
-        began = perf_counter()
-        asked = self._planner.act(observation)
-        took, known = perf_counter() - began, self.found
-        self.found = Decisions(
-            known.count + 1, known.slow + (took > self._limit), max(known.longest, took)
-        )
-        return asked
+        """Return the planner's decision."""
+        start = perf_counter()
+        command = self._planner.act(observation)
+        duration = perf_counter() - start
+        decision = Decisions(1, int(duration > self._limit), duration)
+        self.decisions = Decisions.all_of([self.decisions, decision])
+        return command
 
 
 @contextmanager
 def bounded(seconds: float) -> Iterator[None]:
-    """End what runs inside after some seconds of real time.
+    """Interrupt the body of a `with` statement after some seconds of real time.
 
-    In a process of its own, code that no interrupt reaches (compiled, without end) ends that
-    process a little later.
+    A worker process is killed a little later if it ignores the interrupt (compiled code).
 
     Raises:
         TooLongError: the time is over.
@@ -90,8 +95,8 @@ def bounded(seconds: float) -> Iterator[None]:
     alone = multiprocessing.parent_process() is not None
     before = signal.signal(signal.SIGALRM, end)
     if alone and sys.__stderr__ is not None:
-        faulthandler.dump_traceback_later(seconds + GRACE, exit=True, file=sys.__stderr__)
-    signal.setitimer(signal.ITIMER_REAL, seconds, INTERRUPT_AGAIN_S)
+        faulthandler.dump_traceback_later(seconds + KILL_DELAY_S, exit=True, file=sys.__stderr__)
+    signal.setitimer(signal.ITIMER_REAL, seconds, INTERRUPT_PERIOD_S)
     try:
         yield
     finally:

@@ -1,7 +1,10 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Many drives of one planner: from a bag or from scenarios, in parallel, with the same results for any number of workers."""
+"""Many drives with one planner, from a bag or from scenarios, in parallel.
+
+The results do not depend on the number of workers.
+"""
 
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
@@ -9,6 +12,7 @@ from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass, replace
 from functools import lru_cache
+from itertools import chain, islice
 import math
 import multiprocessing
 import os
@@ -22,6 +26,7 @@ import numpy as np
 
 from scenario_gen.bags.recordings.read import (
     INFO,
+    Namespace,
     read_recording,
     ScenarioEntry,
     SCENARIOS,
@@ -52,14 +57,14 @@ MakePlanner = Callable[[], Planner]
 
 @dataclass(frozen=True, eq=False)
 class Outcome:
-    """What one trial came to.
+    """The outcome of one trial.
 
     Attributes:
-        name: of the trial.
-        verdict: on the drive.
-        drive: what was driven.
-        origin: where the scenario comes from.
-        decisions: how long the planner's decisions took here; nothing that is written hangs on it.
+        name: name of the trial.
+        verdict: the verdict on the drive.
+        drive: the drive.
+        origin: the origin of the scenario.
+        decisions: durations of the planner's decisions on this machine; no file contains them.
     """
 
     name: str
@@ -71,7 +76,7 @@ class Outcome:
 
 @dataclass(frozen=True)
 class Bars(Parameters):
-    """What a planner must keep to pass."""
+    """The thresholds that a planner must meet to pass."""
 
     collisions: float = parameter(
         0.0, "largest share of drives with a collision", low=0.0, high=1.0
@@ -89,13 +94,15 @@ class Bars(Parameters):
         0.0, "largest share of drives in which the ego teleports", low=0.0, high=1.0
     )
     progress: float = parameter(
-        0.9, "smallest share of drives with progress: 20 % of the reference drive's path, as in nuPlan; who never moves has none",
-        low=0.0, high=1.0,
-    )  # fmt: skip
+        0.9,
+        "smallest share of drives with progress: 20 % of the reference drive's path, as in nuPlan",
+        low=0.0,
+        high=1.0,
+    )
 
 
 def find_planner(name: str) -> MakePlanner:
-    """Return what makes a planner, named MODULE:CLASS; modules of the current folder are found, too.
+    """Return the class of a planner, named MODULE:CLASS, also from the current folder.
 
     Raises:
         InputError: there is no such module or class.
@@ -103,30 +110,30 @@ def find_planner(name: str) -> MakePlanner:
     module, colon, attribute = name.partition(":")
     if not (colon and module and attribute):
         raise InputError(
-            f"--planner {name}: write it as MODULE:CLASS, e.g. scenario_gen.closed_loop.planners:IdmFollower"
+            f"--planner {name}: write it as MODULE:CLASS, "
+            "e.g. scenario_gen.closed_loop.planners:IdmFollower"
         )
     if str(Path.cwd()) not in sys.path:
         sys.path.insert(0, str(Path.cwd()))
     try:
-        found: Any = pkgutil.resolve_name(name)
+        planner: Any = pkgutil.resolve_name(name)
     except ImportError as error:
         raise InputError(
             f"--planner {name}: {error}; run in the folder of the module, or put it on PYTHONPATH"
         ) from error
     except AttributeError as error:
-        near = did_you_mean(
-            attribute, [one for one in vars(sys.modules[module]) if one[:1].isupper()]
-        )
+        classes = [member for member in vars(sys.modules[module]) if member[:1].isupper()]
+        near = did_you_mean(attribute, classes)
         raise InputError(
             f"--planner {name}: {error}; name a class of that module{near}"
         ) from error
     except (Exception, SystemExit) as error:  # the module runs
         raise InputError(f"--planner {name}: {type(error).__name__}: {error}") from error
-    if not callable(found):
+    if not callable(planner):
         raise InputError(
-            f"--planner {name}: that is no class; a planner has reset(task) and act(observation)"
+            f"--planner {name}: not a class; a planner has reset(task) and act(observation)"
         )
-    return found  # type: ignore[no-any-return]
+    return planner  # type: ignore[no-any-return]
 
 
 def read_trials(
@@ -135,39 +142,35 @@ def read_trials(
     """Return the scenarios of a bag, in order, each on its road.
 
     Args:
-        bag: of this suite.
-        ego: id of the vehicle in whose place the ego drives. "": that of the scenario's ego slot,
-            or the first if it has none.
-        count: how many at most; all if 0.
-        config: how much is read at most.
+        bag: a bag that scenario_gen recorded.
+        ego: id of the vehicle that the ego replaces. "": that of the scenario's ego slot, or the
+            first if it has none.
+        count: greatest number of scenarios; 0: all.
+        config: limits of reading.
 
     Raises:
-        InputError: the bag is damaged or holds no scenario, or one has no vehicle `ego`, or a slot
-            for another.
+        InputError: the bag is damaged or has no scenario, or a scenario has no vehicle `ego`, or
+            it was made for another ego.
     """
-    trials: list[Trial] = []
+    topics = ("map", "road/lanes", "fit/info", SCENARIOS, INFO)
     with naming_bag(bag):
-        for namespace in read_recording(
-            bag, config, ("map", "road/lanes", "fit/info", SCENARIOS, INFO)
-        ).namespaces.values():
-            for k in range(len(namespace.hashes)):
-                if count and len(trials) >= count:
-                    break
-                stamp, scenario = namespace.scenario(k)
-                entry = namespace.entry(k)
-                where = f"{namespace.where(SCENARIOS)}, scenario {scenario.index}"
-                name = (
-                    f"{namespace.name} {scenario.index}" if namespace.name else str(scenario.index)
-                )
-                trial = trial_of(
-                    name, scenario, entry, namespace.road_of(entry, stamp), ego, where
-                )
-                trials.append(replace(trial, encounter=_encounter_of(entry)))
+        namespaces = read_recording(bag, config, topics).namespaces.values()
+        every_trial = (_trials_in(namespace, ego) for namespace in namespaces)
+        trials = list(islice(chain.from_iterable(every_trial), count or None))
     if not trials:
-        raise InputError(
-            f"{bag}: no topic `scenarios` in any namespace; there is nothing to drive in"
-        )
+        raise InputError(f"{bag}: no scenario to drive: no namespace has a topic `scenarios`")
     return trials
+
+
+def _trials_in(namespace: Namespace, ego: str) -> Iterator[Trial]:
+    for k in range(len(namespace.hashes)):
+        stamp, scenario = namespace.scenario(k)
+        entry = namespace.entry(k)
+        name = f"{namespace.name} {scenario.index}".strip()
+        place = f"{namespace.where(SCENARIOS)}, scenario {scenario.index}"
+        road = namespace.road_of(entry, stamp)
+        trial = trial_of(name, scenario, entry, road, ego, place)
+        yield replace(trial, encounter=_encounter_of(entry))
 
 
 def trial_of(
@@ -176,90 +179,92 @@ def trial_of(
     entry: ScenarioEntry | None,
     road: Road | None,
     ego: str,
-    where: str,
+    place: str,
 ) -> Trial:
-    """Return the trial of a scenario, with its witness among the vehicles where it has one.
+    """Return the trial of a scenario, with its reference drive among the vehicles if it has one.
 
     Args:
-        name: for people.
-        scenario: as it was recorded or heard.
-        entry: its own on `scenarios/info`, if there is one.
-        road: its road, if it is known.
-        ego: id of the vehicle in whose place the ego drives; "": that of the ego slot, or the
-            first.
-        where: names it in messages.
+        name: display name.
+        scenario: the scenario, from a recording or from a message.
+        entry: its entry on `scenarios/info`, if known.
+        road: its road, if known.
+        ego: id of the vehicle that the ego replaces; "": that of the ego slot, or the first.
+        place: place of the scenario, for messages.
 
     Raises:
-        InputError: naming `where`, there is no such vehicle, the scenario was made for another, or
-            the witness is missing.
+        InputError: there is no such vehicle, the scenario was made for another ego, or the
+            reference drive is missing.
     """
-    return Trial(
-        name, join_ego(scenario), _ego_of(scenario, entry.ego if entry else "", ego, where), road
-    )
+    slot = entry.ego if entry else ""
+    return Trial(name, join_ego(scenario), _ego_of(scenario, slot, ego, place), road)
 
 
 def trials_of(result: GenerationResult, ego: str = "") -> list[Trial]:
     """Return the scenarios of a result as trials; `ego` as in `read_trials`.
 
     Raises:
-        InputError: a scenario has no vehicle `ego`, or a slot for another.
+        InputError: a scenario has no vehicle `ego`, or it was made for another ego.
     """
-    name = result.encounter.name
-    trials = [
-        trial_of(str(one.index), one, None, result.road, ego, f"scenario {one.index}")
-        for one in result
-    ]
-    return [replace(trial, encounter=name) for trial in trials]
+    trials = []
+    for scenario in result:
+        index = str(scenario.index)
+        trial = trial_of(index, scenario, None, result.road, ego, f"scenario {index}")
+        trials.append(replace(trial, encounter=result.encounter.name))
+    return trials
 
 
 def _encounter_of(entry: ScenarioEntry | None) -> str:
-    """Return the name of the template of a scenario, and what tells it from others of that name; "" if it is not known."""
-    values = entry.status.values if entry is not None else {}
-    return f"{values.get('template', '')} {(entry.template_hash or '')[:8] if entry is not None else ''}".strip()
+    """Return the name and the short hash of a scenario's template; "" if it is not known."""
+    if entry is None:
+        return ""
+    name, digest = entry.status.values.get("template", ""), entry.template_hash or ""
+    return f"{name} {digest[:8]}".strip()
 
 
 def named_vehicle(ids: Sequence[str], name: str) -> str:
-    """Return the id that is a name, or whose token it is; "" if there is none."""
-    return next((one for one in ids if name in (one, token(one))), "")
+    """Return the first id that equals a name or has it as its token; "" if there is none."""
+    return next((id_ for id_ in ids if name in (id_, token(id_))), "")
 
 
-def _ego_of(scenario: Scenario, slot: str, asked: str, where: str) -> str:
-    """Return the id of the vehicle in whose place the ego drives.
+def _ego_of(scenario: Scenario, slot: str, asked: str, place: str) -> str:
+    """Return the id of the vehicle that the ego replaces.
 
     Raises:
-        InputError: naming `where`, there is no such vehicle, the scenario was made for another, or
-            the witness is missing.
+        InputError: there is no such vehicle, the scenario was made for another ego, or the
+            reference drive is missing.
     """
     if scenario.reference_drive is not None:
-        own = scenario.reference_drive.vehicles[0].id
-        if asked and not named_vehicle([own], asked):
+        ego = scenario.reference_drive.vehicles[0].id
+        if asked and not named_vehicle([ego], asked):
             raise InputError(
-                f"{where}: it was made for ego {own!r}; leave --ego out, or name that one"
+                f"{place}: it was made for ego {ego!r}; leave --ego out, or use --ego {ego}"
             )
-        return own
+        return ego
     ids = [vehicle.id for vehicle in scenario.vehicles]
     if slot and asked in ("", slot):
         raise InputError(
-            f"{where}: it was made for ego {slot!r}, whose reference drive is not in the bag (it was recorded before 0.6, or "
-            f"without `{WITNESS}`): make it again, or name another vehicle with --ego; it has {', '.join(ids)}"
+            f"{place}: it was made for ego {slot!r}, whose reference drive is not in the bag "
+            f"(recorded before 0.6, or without `{WITNESS}`): generate it again, or name another "
+            f"vehicle with --ego; it has {', '.join(ids)}"
         )
-    wanted = named_vehicle(ids, asked or ids[0])
-    if not wanted:
+    ego = named_vehicle(ids, asked or ids[0])
+    if not ego:
         raise InputError(
-            f"{where}: no vehicle {asked!r} to be the ego; it has {', '.join(ids)}{did_you_mean(asked, ids)}"
+            f"{place}: no vehicle {asked!r} to be the ego; "
+            f"it has {', '.join(ids)}{did_you_mean(asked, ids)}"
         )
-    return wanted
+    return ego
 
 
 def with_origins(outcomes: Sequence[Outcome], trials: Sequence[Trial]) -> list[Outcome]:
-    """Return the outcomes with the whole origin of their scenarios: encounter, digest, and which are copies."""
+    """Return the outcomes with the complete origins of their scenarios."""
     return [
         replace(outcome, origin=origin)
         for outcome, origin in zip(outcomes, origins_of(trials), strict=True)
     ]
 
 
-RunTrials = Callable[[Sequence[Trial]], Iterator["Outcome"]]
+RunTrials = Callable[[Sequence[Trial]], Iterator[Outcome]]
 
 
 def run_trials(
@@ -269,15 +274,15 @@ def run_trials(
     workers: int = 1,
     progress: Callable[[int, int], None] = lambda *_: None,
 ) -> list[Outcome]:
-    """Drive every trial with a planner of its own, and judge it; results are in the order of the trials.
+    """Drive every trial with a new planner and judge it; outcomes are in the order of the trials.
 
     Args:
-        trials: what is driven.
-        planner: makes a planner, or its name as MODULE:CLASS; with several workers, a name or what
-            can be pickled.
+        trials: the trials.
+        planner: makes a planner, or its name as MODULE:CLASS; with several workers, a name or a
+            function that can be pickled.
         config: the parameters.
-        workers: processes.
-        progress: called with how many are done, and how many there are.
+        workers: number of processes.
+        progress: called with the number of finished trials and the number of all trials.
 
     Raises:
         InputError: the planner is not found, or fails; the message names the scenario.
@@ -285,7 +290,7 @@ def run_trials(
     outcomes: list[Outcome] = []
     with (
         trial_runner(planner, config, min(workers, max(len(trials), 1))) as run,
-        saying_what_was_before(outcomes),
+        summary_on_error(outcomes),
     ):
         for outcome in run(trials):
             outcomes.append(outcome)
@@ -294,22 +299,22 @@ def run_trials(
 
 
 @contextmanager
-def saying_what_was_before(outcomes: Sequence[Outcome]) -> Iterator[None]:
-    """Add to an InputError what the drives before it came to."""
+def summary_on_error(outcomes: Sequence[Outcome]) -> Iterator[None]:
+    """Add the summary of the drives before it to an InputError."""
     try:
         yield
     except InputError as error:
         if not outcomes:
             raise
-        found = ", ".join(f"{name} {rate.count}" for name, rate in rates(outcomes).items())
-        raise InputError(f"{error}\nof the {len(outcomes)} drives before: {found}") from error
+        summary = ", ".join(f"{name} {rate.count}" for name, rate in rates(outcomes).items())
+        raise InputError(f"{error}\nof the {len(outcomes)} drives before: {summary}") from error
 
 
 def too_long(trial: Trial, config: ClosedLoopConfig) -> InputError:
     """Return the error of a planner that takes too long for a drive."""
     return InputError(
-        f"scenario {trial.name}: the planner did not come to an end in {config.drive_time:g} s (drive_time): it hangs, or "
-        "needs more time for a drive"
+        f"scenario {trial.name}: the planner did not finish in {config.drive_time:g} s; "
+        "if it does not hang, increase drive_time"
     )
 
 
@@ -317,14 +322,15 @@ def too_long(trial: Trial, config: ClosedLoopConfig) -> InputError:
 def trial_runner(
     planner: MakePlanner | str, config: ClosedLoopConfig, workers: int
 ) -> Iterator[RunTrials]:
-    """Yield what drives trials, in their order, again and again with the same processes; arguments as in `run_trials`.
+    """Yield a function that drives trials in their order, always with the same processes.
+
+    Arguments are as in `run_trials`.
 
     Raises:
         InputError: as `run_trials`.
     """
     if isinstance(planner, str):
-        find_planner(planner)  # what is wrong with it is reported before there are processes
-
+        find_planner(planner)  # reports errors before any process starts
     if workers <= 1:
         yield lambda trials: map(_run, ((trial, planner, config) for trial in trials))
         return
@@ -347,16 +353,16 @@ def trial_runner(
                     done += 1
             except BrokenProcessPool as error:
                 raise InputError(
-                    f"a process that drove the planner has ended after {done} of {len(trials)} drives: it crashed, called "
-                    "os._exit, hung in compiled code for longer than drive_time, or was killed for want of memory; --workers 1 "
-                    "shows where"
+                    f"a planner process ended after {done} of {len(trials)} drives: it crashed, "
+                    "called os._exit, hung in compiled code for longer than drive_time, or was "
+                    "killed for lack of memory; use --workers 1 to see where"
                 ) from error
 
         yield run
 
 
 def _packed_roads(trials: Sequence[Trial]) -> list[bytes]:
-    """Return the pickled road of each trial, "" without one; a road that several trials share is pickled once."""
+    """Return the pickled road of each trial, b"" without one; shared roads are pickled once."""
     roads = {id(trial.road): trial.road for trial in trials}
     packed = {key: pickle.dumps(road) if road else b"" for key, road in roads.items()}
     return [packed[id(trial.road)] for trial in trials]
@@ -364,9 +370,9 @@ def _packed_roads(trials: Sequence[Trial]) -> list[bytes]:
 
 @lru_cache(maxsize=4)
 def _unpacked(road: bytes) -> Road:
-    """Return the road of a task: one object for all tasks, so that what is derived from it is derived once."""
-    known: Road = pickle.loads(road)
-    return known
+    """Return the road of a task: one object for all tasks that share its cached fields."""
+    unpacked: Road = pickle.loads(road)
+    return unpacked
 
 
 def _run_packed(task: tuple[Trial, bytes, MakePlanner | str, ClosedLoopConfig]) -> Outcome:
@@ -388,25 +394,29 @@ def _run(task: tuple[Trial, MakePlanner | str, ClosedLoopConfig]) -> Outcome:
         raise InputError(f"scenario {trial.name}: {error}") from error
     except ScenarioGenError:
         raise
-    except (
-        Exception,
-        SystemExit,
-    ) as error:  # one that leaves would take its exit code for the result
+    except (Exception, SystemExit) as error:  # an exit would hide the failure
         raise InputError(
             f"scenario {trial.name}: the planner failed: {type(error).__name__}: {error}"
         ) from error
     finally:
-        if os.getpid() != process:  # the planner has forked: there is one result of this drive
+        if os.getpid() != process:  # the planner has forked: only the parent has a result
             os._exit(1)
-    return Outcome(trial.name, judge(loop, drive), drive, Origin(trial.encounter), timed.found)
+    return Outcome(trial.name, judge(loop, drive), drive, Origin(trial.encounter), timed.decisions)
 
 
-LEVEL = 0.95  # of the intervals
+CONFIDENCE = 0.95
 
 
 @dataclass(frozen=True)
 class Rate:
-    """How many of the drives, and the share with its 95 % interval (Wilson 1927), and how many encounters they are of."""
+    """A number of drives.
+
+    Attributes:
+        count: number of drives to which something happened.
+        of: number of all drives.
+        share: their ratio, with its 95 % interval (Wilson 1927).
+        encounters: number of encounters that the drives come from.
+    """
 
     count: int
     of: int
@@ -415,7 +425,8 @@ class Rate:
 
     def __str__(self) -> str:
         low, high = 100.0 * self.share.low, 100.0 * self.share.high
-        return f"{self.count} of {self.of} ({100.0 * self.share.value:.1f} %, {low:.1f} to {high:.1f} %)"
+        share = f"{100.0 * self.share.value:.1f} %, {low:.1f} to {high:.1f} %"
+        return f"{self.count} of {self.of} ({share})"
 
     def document(self) -> dict[str, Any]:
         """Return it as JSON's types."""
@@ -424,10 +435,11 @@ class Rate:
 
 
 def rates(outcomes: Sequence[Outcome]) -> dict[str, Rate]:
-    """Return how often what happened: failures of any kind, collisions, those by the ego's fault, and so on.
+    """Return the rates of failures, of collisions, of collisions by the ego's fault, and others.
 
-    Drives of one encounter are alike, so intervals are for encounters that are drawn at random;
-    with one encounter alone they hold for that one, and copies of one scenario count as one.
+    Drives from one encounter are similar, so the intervals are for encounters that are drawn at
+    random. With a single encounter they hold for that encounter, and copies of one scenario count
+    as one.
     """
     verdicts = [outcome.verdict for outcome in outcomes]
     flags = {
@@ -444,7 +456,7 @@ def rates(outcomes: Sequence[Outcome]) -> dict[str, Rate]:
 
 
 def passed_of(outcomes: Sequence[Outcome]) -> Rate:
-    """Return how many drives passed."""
+    """Return the rate of drives that passed."""
     return _rate(outcomes, [outcome.verdict.passed for outcome in outcomes])
 
 
@@ -453,20 +465,20 @@ def _rate(outcomes: Sequence[Outcome], flags: Sequence[bool]) -> Rate:
         [outcome.name for outcome in outcomes], [outcome.origin for outcome in outcomes]
     )
     hits = np.array(flags, dtype=np.bool_)
-    return Rate(sum(flags), len(flags), clustered_wilson(hits, unit, LEVEL), encounters)
+    return Rate(sum(flags), len(flags), clustered_wilson(hits, unit, CONFIDENCE), encounters)
 
 
-LEAST = ("goals", "progress")  # shares of which a bar asks for so many at least
+LOWER_BARS = ("goals", "progress")
+"""The bars that are lower bounds."""
 
 
-def broken_bars(found: dict[str, Rate], bars: Bars) -> list[str]:
-    """Return a sentence for each bar that was not kept."""
+def broken_bars(rates_by_name: dict[str, Rate], bars: Bars) -> list[str]:
+    """Return a sentence for each bar that is not met."""
     messages = []
-    for name, wanted in asdict(bars).items():
-        value = found[name].share.value
-        if (value < wanted) if name in LEAST else (value > wanted):
-            side = "at least" if name in LEAST else "at most"
-            messages.append(
-                f"{name}: {100 * value:.1f} %; {side} {100 * wanted:.1f} % is required"
-            )
+    for name, bar in asdict(bars).items():
+        value = rates_by_name[name].share.value
+        is_lower = name in LOWER_BARS
+        if value < bar if is_lower else value > bar:
+            side = "at least" if is_lower else "at most"
+            messages.append(f"{name}: {100 * value:.1f} %; {side} {100 * bar:.1f} % is required")
     return messages

@@ -1,11 +1,12 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The verdict on one drive: what went wrong, when and by whose doing, and how close it was."""
+"""The verdict on one drive: its failures, their times and causes, and the closest approaches."""
 
 from dataclasses import asdict, dataclass
+from itertools import combinations
 import math
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -17,7 +18,7 @@ from scenario_gen.closed_loop.fault import (
     Runner,
     STANDSTILL_MPS,
 )
-from scenario_gen.closed_loop.off_road import PARTS, RESOLUTION, road_use
+from scenario_gen.closed_loop.off_road import RESOLUTION_S, road_use, SUBSTEPS_COUNT
 from scenario_gen.closed_loop.score import not_behind, Terms, terms
 from scenario_gen.closed_loop.simulation import ClosedLoop, Drive
 from scenario_gen.method.evaluation import distance_and_ttc, footprint_distance
@@ -30,10 +31,8 @@ from scenario_gen.types import Scenario
 
 __all__ = ["Collision", "DriveVerdict", "Reason", "Runner", "judge"]
 
-JERK_OVER = 0.5  # seconds over which the change of acceleration is taken
-STANDING = (
-    5.0  # seconds at its end for which a drive has stood, if that is why the goal was missed
-)
+JERK_WINDOW_S = 0.5
+MIN_STANDSTILL_S = 5.0  # an ego that stood so long at the end missed its goal for that reason
 
 
 @dataclass(frozen=True)
@@ -41,11 +40,13 @@ class Collision:
     """The first contact of the ego.
 
     Attributes:
-        time: when [s]; vehicle: with whom; speed: relative [m/s].
-        ran: who closed the gap; that says nothing of fault.
-        reason: why they met, and so whose fault it was.
-        cut_in: how the ego came into the other's way ahead of it or beside it, if it did and both
-            drove the same way.
+        time: time of the contact [s].
+        vehicle: id of the other vehicle.
+        speed: relative speed [m/s].
+        ran: the vehicle that closed the gap; it is not always at fault.
+        reason: the reason, which decides whose fault it was.
+        cut_in: how the ego entered the other one's path ahead of it or at its side, if it did and
+            both drove in the same direction.
     """
 
     time: float
@@ -57,44 +58,50 @@ class Collision:
 
     @property
     def why(self) -> str:
-        """The reason and whose fault it was, in words."""
+        """The reason and the fault, in words."""
         words = self.reason.value.replace("_", " ")
         if self.cut_in is not None and self.reason in (Reason.CUT_IN, Reason.OTHER_RAN_INTO_EGO):
-            words = f"{words}, came in {self.cut_in.gap:.1f} m ahead; RSS asks for {self.cut_in.safe_gap:.1f} m"
+            gap, safe_gap = self.cut_in.gap, self.cut_in.safe_gap
+            words = f"{words}, entered {gap:.1f} m ahead; RSS requires {safe_gap:.1f} m"
         return f"{words}; {'' if self.reason.at_fault else 'not '}at fault"
 
 
 @dataclass(frozen=True)
 class DriveVerdict:
-    """What one drive came to. Times in seconds from the drive's start; NaN where there is no such thing.
+    """The verdict on one drive.
+
+    Times are in seconds from the drive's start; a value that does not exist is NaN.
 
     Attributes:
-        index: of the scenario; seed: of its request; ego: id of the vehicle in whose place the ego
-            drove.
-        duration: length of the drive.
-        collision: first contact with another vehicle, None if there is none at any instant.
-        off_road: when the footprint was first as deep outside drivable space as counts, NaN if
-            never, or if no road is known.
-        road_margin: least signed distance [m] of the footprint to what is not drivable: positive
-            inside, negative the greatest depth outside; at most 10 m either way; NaN if no road is
-            known.
-        off_road_depth: depth [m] from which a footprint is off the road; off_road_area: greatest
-            part of it outside [m²].
-        goal: when the goal is reached; NaN if never.
-        delay: by how much later than the witness.
-        min_ttc: least time to collision, at most the horizon; min_gap: least distance of two
-            footprints [m]; min_pet: least post-encroachment time at crossings, negative if both
-            were inside.
-        hardest_braking: m/s²; hard_braking: seconds of hard braking; jerk: largest change of
-            acceleration over 0.5 s [m/s³].
-        progress: share of the witness' way that was driven, by its path.
-        faults: steps in which a command was missing, not finite, or a jump.
-        jumps: of these, poses that no vehicle can reach in a step, and those that are no place.
-        stood: seconds for which the ego stood at the end of the drive.
-        terms: those of nuPlan's and NAVSIM's scores.
-        among_others: contacts of the others among themselves; there are none.
-        forced: how many times one of the others braked harder than the strongest braking, to keep
-            the order.
+        index: index of the scenario.
+        seed: seed of its request.
+        ego: id of the vehicle that the ego replaced.
+        duration: duration of the drive.
+        collision: first contact with another vehicle; None without a contact.
+        off_road: first time at which the footprint was `off_road_depth` outside the drivable area;
+            NaN if never, or if no road is known.
+        goal: time at the goal; NaN if the ego never reached it.
+        delay: delay at the goal with respect to the witness.
+        min_ttc: least time to collision, at most the horizon.
+        min_gap: least distance of two footprints [m].
+        min_pet: least post-encroachment time at crossings, negative if both were inside.
+        hardest_braking: largest deceleration [m/s²].
+        hard_braking: duration of hard braking.
+        jerk: largest change of acceleration over 0.5 s [m/s³].
+        progress: driven share of the witness' path.
+        faults: number of steps with a jump or with a command that was missing or not finite.
+        among_others: number of contacts among the others; always 0.
+        forced: number of times that one of the others braked harder than the strongest braking, to
+            preserve the order.
+        road_known: whether the road is known.
+        road_margin: least signed distance [m] from the footprint to the area that is not drivable:
+            positive inside, negative the greatest depth outside; at most 10 m either way; NaN if
+            no road is known.
+        off_road_depth: depth [m] from which a footprint is off the road.
+        off_road_area: greatest part of the footprint outside [m²].
+        jumps: number of poses that no vehicle can reach in a step.
+        stood: duration for which the ego stood at the end of the drive.
+        terms: terms of nuPlan's and NAVSIM's scores.
     """
 
     index: int
@@ -125,7 +132,7 @@ class DriveVerdict:
 
     @property
     def passed(self) -> bool:
-        """Whether the ego came to its goal on the road, by driving there, and without a collision."""
+        """Whether the ego reached its goal without a jump, a collision or leaving the road."""
         return (
             self.collision is None
             and math.isnan(self.off_road)
@@ -135,12 +142,12 @@ class DriveVerdict:
 
     @property
     def at_fault(self) -> bool:
-        """Whether it met another by its own fault, as `Reason` says."""
+        """Whether the ego collided by its own fault, as `Reason` defines it."""
         return self.collision is not None and self.collision.reason.at_fault
 
     @property
     def failure(self) -> str:
-        """What went wrong first of these: jump, collision, off_road, goal; "" if it passed."""
+        """The first that applies: jump, collision, off_road, goal; "" if the ego passed."""
         if self.passed:
             return ""
         if self.jumps:
@@ -151,15 +158,22 @@ class DriveVerdict:
 
     @property
     def fault(self) -> str:
-        """Why it failed: jump, the reason of a collision, off_road, standing, or goal (missed otherwise); "" if it passed."""
+        """The cause of the failure; "" if the ego passed.
+
+        One of: jump, the reason of a collision, off_road, standing (at the end, before the goal),
+        goal (missed otherwise).
+        """
         if self.collision is not None and not self.jumps:
             return self.collision.reason.value
-        stands = self.failure == "goal" and self.stood >= STANDING
+        stands = self.failure == "goal" and self.stood >= MIN_STANDSTILL_S
         return "standing" if stands else self.failure
 
     @property
     def severity(self) -> tuple[float, ...]:
-        """Sorts verdicts, the worst last: collision by speed, off-road, goal not reached, then the least time to collision."""
+        """A key that sorts verdicts, the worst last.
+
+        Collisions by speed, then leaving the road, a missed goal, and the least time to collision.
+        """
         hit = self.collision.speed if self.collision else -1.0
         return (
             hit,
@@ -170,24 +184,22 @@ class DriveVerdict:
         )
 
     def sentence(self) -> str:
-        """Say in words what it came to."""
+        """Return the verdict in words."""
         messages = []
         if (hit := self.collision) is not None:
             words = {
                 Runner.EGO: f"the ego ran into {hit.vehicle}",
                 Runner.OTHER: f"{hit.vehicle} ran into the ego",
                 Runner.BOTH: f"the ego and {hit.vehicle} ran into each other",
-            }
-            messages.append(
-                f"{words[hit.ran]} at {hit.time:.2f} s and {hit.speed:.1f} m/s ({hit.why})"
-            )
+            }[hit.ran]
+            messages.append(f"{words} at {hit.time:.2f} s and {hit.speed:.1f} m/s ({hit.why})")
         if not math.isnan(self.off_road):
-            depth = f"{-self.road_margin:.2f} m deep, {self.off_road_area:.1f} m² of its footprint"
+            depth = f"by {-self.road_margin:.2f} m, {self.off_road_area:.1f} m² of its footprint"
             messages.append(f"left the road at {self.off_road:.2f} s ({depth})")
         if self.jumps:
             messages.append(f"{self.jumps} teleport(s): poses that cannot be reached in a step")
         if math.isnan(self.goal):
-            stands = ", stood at the end" if self.stood >= STANDING else ""
+            stands = ", stood at the end" if self.stood >= MIN_STANDSTILL_S else ""
             messages.append(
                 f"did not reach its goal, {100.0 * self.progress:.0f} % of the route{stands}"
             )
@@ -198,7 +210,7 @@ class DriveVerdict:
         return "; ".join(messages)
 
     def document(self) -> dict[str, Any]:
-        """Return it as JSON's types; null for what there is not."""
+        """Return the verdict as JSON's types, with null for NaN."""
         plain = asdict(self) | {
             "passed": self.passed,
             "at_fault": self.at_fault,
@@ -212,82 +224,119 @@ class DriveVerdict:
         }
 
 
+class Clearance(NamedTuple):
+    """How close the ego came to the others.
+
+    Attributes:
+        gap: least distance of two footprints [m]; NaN without others.
+        ttc: least time to collision [s], at most the horizon.
+        ttc_not_behind: least time to collision with a vehicle that is not behind the ego [s].
+    """
+
+    gap: float
+    ttc: float
+    ttc_not_behind: float
+
+
 def judge(loop: ClosedLoop, drive: Drive) -> DriveVerdict:
     """Judge one drive.
 
-    Collisions and the road are looked at in continuous time, by the motion that `Scenario` defines
-    between two instants. A jump is no motion: nobody is met on the way, and what comes after it
-    reaches no goal and leaves no road.
+    Collisions and exits from the road are detected in continuous time, on the motion that
+    `Scenario` defines between two instants. A jump is not a motion: the ego meets nobody on its
+    way, and after it the ego neither reaches its goal nor leaves the road.
     """
-    motion, ego = drive.motion, drive.ego
-    time, n = motion.time, len(motion.vehicles)
-    config, known = loop.config, loop.world
-    others = [i for i in range(n) if i != ego]
-    contacts = {(i, j): _contact(drive, i, j) for i in range(n) for j in range(i)}
-    hits = [(contacts[max(ego, i), min(ego, i)], i) for i in others]
-    first, who = min(((at, i) for at, i in hits if at is not None), default=(math.nan, -1))
+    motion, config = drive.motion, loop.config
+    contacts = _contacts(drive)
+    hit = _first_of_ego(drive, contacts)
     goal = _goal_time(loop, drive)
-    gap, ttc, close = [], [], []
-    for i in others:
-        distance, to_contact = distance_and_ttc(motion, ego, i)
-        to_contact = np.where(drive.here[i], to_contact, np.inf)
-        gap.append(float(np.where(drive.here[i], distance, np.inf).min()))
-        ttc.append(float(to_contact.min()))
-        close.append(float(np.where(not_behind(drive, i), to_contact, np.inf).min()))
+    progress = _progress(loop, drive) if math.isnan(goal) else 1.0
+    clearance = _clearance(drive, config.horizon)
     braking = np.maximum(-drive.accelerations, 0.0)
-    way = known.cells[ego, :, 7]
-    reached = float(np.interp(drive.clock[ego, -1], np.arange(len(way)) * known.cell, way))
-    whole = float(way[-1])
-    progress = 1.0 if not math.isnan(goal) or whole <= 0.0 else min(reached / whole, 1.0)
+    hard_braking_count = int(np.count_nonzero(braking[1:] >= config.hard_braking))
     road = road_use(drive, loop.road, config.off_road_depth)
     return DriveVerdict(
         index=motion.index,
         seed=motion.seed,
-        ego=motion.vehicles[ego].id,
-        duration=float(time[-1]),
-        collision=None if who < 0 else _collision(loop, drive, first, who),
+        ego=motion.vehicles[drive.ego].id,
+        duration=float(motion.time[-1]),
+        collision=None if hit is None else _collision(loop, drive, hit),
         off_road=road.time,
         goal=goal,
         delay=goal - loop.duration,
-        min_ttc=min((config.horizon, *ttc)),
-        min_gap=min(gap, default=math.nan),
+        min_ttc=clearance.ttc,
+        min_gap=clearance.gap,
         min_pet=_pet(drive),
         hardest_braking=float(braking.max()),
-        hard_braking=round(
-            int(np.count_nonzero(braking[1:] >= config.hard_braking)) * config.step, 9
-        ),
+        hard_braking=round(hard_braking_count * config.step, 9),
         jerk=_jerk(drive.accelerations, config.step),
         progress=progress,
         faults=len(drive.faults),
-        among_others=len(
-            [1 for (i, j), at in contacts.items() if ego not in (i, j) and at is not None]
-        ),
+        among_others=len([pair for pair in contacts if drive.ego not in pair]),
         forced=drive.forced,
         road_known=loop.road is not None,
         road_margin=road.margin,
         off_road_depth=config.off_road_depth,
         off_road_area=road.area,
         jumps=len(drive.jumps),
-        stood=_stood(motion.speed[ego], config.step),
-        terms=terms(
-            drive,
-            None if who < 0 else (who, first),
-            road.margin,
-            progress,
-            min(close, default=math.inf),
-        ),
+        stood=_stood(motion.speed[drive.ego], config.step),
+        terms=terms(drive, hit, road.margin, progress, clearance.ttc_not_behind),
     )
 
 
+def _contacts(drive: Drive) -> dict[tuple[int, int], float]:
+    """Return the times [s] of the first contacts of all pairs of vehicles that touch."""
+    pairs = combinations(reversed(range(len(drive.motion.vehicles))), 2)
+    times = {pair: _contact(drive, *pair) for pair in pairs}
+    return {pair: time for pair, time in times.items() if time is not None}
+
+
+def _first_of_ego(
+    drive: Drive, contacts: dict[tuple[int, int], float]
+) -> tuple[int, float] | None:
+    """Return the first vehicle that the ego touches, and the time [s]; None if there is none."""
+    hits = [(time, sum(pair) - drive.ego) for pair, time in contacts.items() if drive.ego in pair]
+    if not hits:
+        return None
+    time, other = min(hits)
+    return other, time
+
+
+def _clearance(drive: Drive, horizon: float) -> Clearance:
+    gap, ttc, ttc_not_behind = math.nan, horizon, math.inf
+    for i in range(len(drive.motion.vehicles)):
+        if i == drive.ego:
+            continue
+        distance, to_contact = distance_and_ttc(drive.motion, drive.ego, i)
+        distance = np.where(drive.present[i], distance, np.inf)
+        to_contact = np.where(drive.present[i], to_contact, np.inf)
+        gap = float(np.fmin(gap, distance.min()))
+        ttc = min(ttc, float(to_contact.min()))
+        to_contact = np.where(not_behind(drive, i), to_contact, np.inf)
+        ttc_not_behind = min(ttc_not_behind, float(to_contact.min()))
+    return Clearance(gap, ttc, ttc_not_behind)
+
+
+def _progress(loop: ClosedLoop, drive: Drive) -> float:
+    """Return the share of the witness' path that the ego has driven."""
+    distance = loop.world.cells[drive.ego, :, 7]
+    clock = np.arange(len(distance)) * loop.world.cell
+    driven = float(np.interp(drive.clock[drive.ego, -1], clock, distance))
+    length = float(distance[-1])
+    return min(driven / length, 1.0) if length > 0.0 else 1.0
+
+
 def _stood(speed: Floats, step: float) -> float:
-    """Return for how long [s] a vehicle stood at the end."""
+    """Return the duration [s] for which a vehicle stood at the end."""
     moved = np.flatnonzero(speed >= STANDSTILL_MPS)
     return round((len(speed) - 1 - (int(moved[-1]) if len(moved) else 0)) * step, 9)
 
 
 def _contact(drive: Drive, i: int, j: int) -> float | None:
-    """Time [s] of the first contact of two vehicles while both are on the scene, None if they never touch."""
-    both = np.flatnonzero(drive.here[i] & drive.here[j])
+    """Return the time [s] of the first contact of two vehicles while both are in the scene.
+
+    None if they never touch.
+    """
+    both = np.flatnonzero(drive.present[i] & drive.present[j])
     parts = np.split(both, np.searchsorted(both, drive.jumps)) if drive.ego in (i, j) else [both]
     times = (
         _contact_in(drive.motion, [i, j], slice(part[0], part[-1] + 1))
@@ -298,7 +347,10 @@ def _contact(drive: Drive, i: int, j: int) -> float | None:
 
 
 def _contact_in(motion: Scenario, pair: list[int], span: slice) -> float | None:
-    """Return the time [s] of the first contact of two vehicles in a span of instants, None if they do not touch in it."""
+    """Return the time [s] of the first contact of two vehicles in a span of instants.
+
+    None if they do not touch in it.
+    """
     vehicles = (motion.vehicles[pair[0]], motion.vehicles[pair[1]])
     if span.stop - span.start < 2:
         touches = footprint_distance(motion, *pair)[span.start] <= 0.0
@@ -308,21 +360,25 @@ def _contact_in(motion: Scenario, pair: list[int], span: slice) -> float | None:
     control, out = np.empty((2, len(time) - 1, 4, 2)), np.empty((1, 3))
     control_points(time, position, heading, speed, control)
     half = np.array([vehicle.half for vehicle in vehicles])
-    first_contacts(time, control, heading, half, 0.0, RESOLUTION, out)
+    first_contacts(time, control, heading, half, 0.0, RESOLUTION_S, out)
     if out[0, 0] == Proof.PROVEN:
         return None
-    found, step = float(out[0, 1]), float(motion.time[1])  # any instant of the contact
-    k = min(int(found / step + 1e-9), len(motion.time) - 2)
+    instant, step = float(out[0, 1]), float(motion.time[1])  # any instant of the contact
+    k = min(int(instant / step + 1e-9), len(motion.time) - 2)
     start = float(motion.time[k])
-    u = np.linspace(0.0, max(found - start, 0.0) / step, PARTS + 1)
+    u = np.linspace(0.0, max(instant - start, 0.0) / step, SUBSTEPS_COUNT + 1)
     fine = motion.of_vehicles(pair).at_times(start + u * step)
-    touch = footprint_distance(fine, 0, 1) <= 0.0  # from when on, to a PART of the step
-    return start + float(u[np.argmax(touch)]) * step if touch.any() else found
+    touch = footprint_distance(fine, 0, 1) <= 0.0
+    return start + float(u[np.argmax(touch)]) * step if touch.any() else instant
 
 
-def _collision(loop: ClosedLoop, drive: Drive, at: float, who: int) -> Collision:
-    """Say how fast they met, who closed the gap, by both speeds along the line of their centres, and why."""
-    contact = Contact(loop, drive, who, at)
+def _collision(loop: ClosedLoop, drive: Drive, hit: tuple[int, float]) -> Collision:
+    """Return the facts of a contact with a vehicle at a time [s].
+
+    The speeds along the line of the centres decide which vehicle closed the gap.
+    """
+    other_index, time = hit
+    contact = Contact(loop, drive, other_index, time)
     ego, other = contact.ego_state, contact.other_state
     velocity, other_velocity = ego.speed * unit(ego.yaw), other.speed * unit(other.yaw)
     offset = np.subtract(other[:2], ego[:2])
@@ -334,8 +390,8 @@ def _collision(loop: ClosedLoop, drive: Drive, at: float, who: int) -> Collision
     elif other_closing > 2.0 * max(closing, 0.0):
         runner = Runner.OTHER
     return Collision(
-        time=at,
-        vehicle=drive.motion.vehicles[who].id,
+        time=time,
+        vehicle=drive.motion.vehicles[other_index].id,
         speed=math.hypot(*(velocity - other_velocity)),
         ran=runner,
         reason=reason_of(contact),
@@ -344,7 +400,7 @@ def _collision(loop: ClosedLoop, drive: Drive, at: float, who: int) -> Collision
 
 
 def _goal_time(loop: ClosedLoop, drive: Drive) -> float:
-    """Time [s] of the first instant before any jump at which the ego is at its goal, NaN if it never is."""
+    """Return the time [s] of the first instant at the goal, before any jump; NaN without one."""
     motion, ego, until = drive.motion, drive.ego, slice(drive.driven)
     poses = np.column_stack([motion.position[ego, until], motion.heading[ego, until]])
     reached = loop.reached(motion.time[until], poses)
@@ -352,19 +408,23 @@ def _goal_time(loop: ClosedLoop, drive: Drive) -> float:
 
 
 def _pet(drive: Drive) -> float:
-    """Least post-encroachment time [s] of the ego at crossings; NaN without one. Source: Allen, Shin & Cooper 1978."""
-    motion, ego, found = drive.motion, drive.ego, []
+    """Return the ego's least post-encroachment time [s] at crossings; NaN without a crossing.
+
+    Source: Allen, Shin & Cooper 1978.
+    """
+    motion, ego = drive.motion, drive.ego
+    times: list[float] = []
     for i in range(len(motion.vehicles)):
-        span = np.flatnonzero(drive.here[i])
+        span = np.flatnonzero(drive.present[i])
         if i == ego or len(span) < 2:
             continue
         conflicts = find_conflicts(motion.select([ego, i], int(span[0]), int(span[-1])))
-        found += [one.encroachment for one in conflicts if not one.following]
-    return min(found, default=math.nan)
+        times += [conflict.encroachment for conflict in conflicts if not conflict.following]
+    return min(times, default=math.nan)
 
 
 def _jerk(acceleration: Floats, step: float) -> float:
-    """Largest change of acceleration [m/s³] over JERK_OVER; the first instant has none yet."""
-    over = max(round(JERK_OVER / step), 1)
+    """Return the largest jerk [m/s³] over JERK_WINDOW_S, without the first instant."""
+    over = max(round(JERK_WINDOW_S / step), 1)
     change = acceleration[1 + over :] - acceleration[1:-over]
     return float(np.abs(change).max(initial=0.0)) / (over * step)

@@ -80,7 +80,7 @@ MISTAKES = [  # words of the command line, and what the message says: what is wr
     (("generate", "my log ü.csv"), "Missing option '--road' (straight, curve, "),
     (
         (*GENERATE, "--for-testing"),
-        "--for-testing: name the vehicle in whose place the planner drives by --ego",
+        "--for-testing: name the vehicle that the planner replaces with --ego",
     ),
     (("find", "nothing"), "holds no scenarios; write them with `scenario-gen batch"),
     # numbers

@@ -156,17 +156,17 @@ def test_who_comes_late_and_leaves_early_is_there_for_that_time_only():
     loop = ClosedLoop(scenario, 0)
     drive = loop.drive(Witness(scenario, 0), lambda state: state.step >= 149)
     assert (
-        drive.here == scenario.is_present
-    ).sum() >= drive.here.size - 1  # at the very end of its presence it has gone
-    assert np.abs((drive.motion.position - scenario.position)[drive.here]).max() < 1e-9
+        drive.present == scenario.is_present
+    ).sum() >= drive.present.size - 1  # at the very end of its presence it has gone
+    assert np.abs((drive.motion.position - scenario.position)[drive.present]).max() < 1e-9
     x, y = scenario.position[1, 30].tolist()
     state = loop.start()
     for _ in range(60):
         state = loop.step(state, Pose(x, y, 0.0, 0.0))
-    assert not state.here[1] and state.clock[1] < 3.0
+    assert not state.present[1] and state.clock[1] < 3.0
     for _ in range(15):
         state = loop.step(state, FAR)
-    assert state.here[1]
+    assert state.present[1]
     late = ClosedLoop(replace(base, present=np.array([[0, 149], [30, 149]])), 1)
     assert late.start().vehicles[1].tolist() == pytest.approx(
         [*base.position[1, 30].tolist(), np.pi / 2, 8.0]

@@ -158,7 +158,7 @@ def test_a_planner_that_fails_is_said_and_never_passes(bag, tmp_path, planner, w
 def test_a_planner_that_hangs_is_ended_and_what_was_found_is_told(bag, tmp_path):
     Hangs.drives = 0
     with pytest.raises(
-        InputError, match=r"scenario 1: the planner did not come to an end in 5 s"
+        InputError, match=r"scenario 1: the planner did not finish in 5 s"
     ) as caught:
         request = DriveRequest(
             bag, f"{__name__}:Hangs", count=2, assignments=["drive_time=5", "overtime=1"]

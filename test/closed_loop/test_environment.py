@@ -15,7 +15,7 @@ from benchmarks._driving_worlds import draw_scenario
 from scenario_gen.base.errors import InputError
 from scenario_gen.closed_loop.environment import DriveEnv, ID
 from scenario_gen.closed_loop.origin import Trial
-from scenario_gen.closed_loop.picture import EGO, SIZE
+from scenario_gen.closed_loop.picture import COLOURS, SIZE_PX
 from scenario_gen.types import Road
 
 TRIALS = [Trial(str(seed), draw_scenario(seed), 0, None) for seed in (1, 2, 5)]
@@ -65,7 +65,8 @@ def test_the_picture_shows_road_route_ego_and_others():
     env = DriveEnv([replace(TRIALS[0], road=road)], render_mode="rgb_array")
     env.reset(seed=1)
     image = env.render()
-    assert image.shape == (SIZE, SIZE, 3) and tuple(image[SIZE // 2, SIZE // 2]) == EGO
+    assert image.shape == (SIZE_PX, SIZE_PX, 3)
+    assert tuple(image[SIZE_PX // 2, SIZE_PX // 2]) == COLOURS.ego
     assert DriveEnv(TRIALS).render() is None
     with pytest.raises(InputError, match="render_mode 'human'"):
         DriveEnv(TRIALS, render_mode="human")

@@ -287,7 +287,7 @@ def test_a_cut_in_says_its_gap_beside_what_is_asked_for():
         and cut_in.least_ttc > 0.35
     )
     assert (
-        "came in" in (verdict := judged(cuts_in_safely, 0)).sentence()
+        "entered" in (verdict := judged(cuts_in_safely, 0)).sentence()
         and verdict.collision.cut_in.safe
     )
     assert verdict.sentence().count("not at fault") == 1

@@ -6,7 +6,7 @@
 import numpy as np
 import pytest
 
-from scenario_gen.closed_loop.off_road import _measured, MAX_DEPTH_M
+from scenario_gen.closed_loop.off_road import _depths_and_areas, _least_room, MAX_DEPTH_M
 from scenario_gen.types.road import Road
 
 HALF = (2.0, 0.9)
@@ -38,9 +38,12 @@ def test_depth_and_room_are_those_of_points_and_cells(seed):
         [rng.uniform(-6.0, 30.0 * res + 6.0, (12, 2)), rng.uniform(-3.0, 3.0, 12)]
     )
     for outside in (True, False):
-        found = _measured(road, poses, HALF, outside=outside)[:, 0]
+        if outside:
+            measured, _ = _depths_and_areas(road, poses, HALF)
+        else:
+            measured = [_least_room(road, pose[None], HALF) for pose in poses]
         expected = [plain(drivable, res, pose, outside=outside) for pose in poses]
-        assert found == pytest.approx(expected, abs=0.1)
+        assert measured == pytest.approx(expected, abs=0.1)
         assert np.ptp(expected) > 0.5
 
 
@@ -48,7 +51,7 @@ def test_area_of_a_footprint_half_outside():
     drivable = np.zeros((40, 40), dtype=np.bool_)
     drivable[:20] = True
     road = Road("half", drivable, 0.5, np.zeros(2), np.empty((0, 3)), np.empty((0, 3)))
-    ((depth, area),) = _measured(road, np.array([[10.0, 10.0, 0.0]]), HALF, outside=True)
+    (depth,), (area,) = _depths_and_areas(road, np.array([[10.0, 10.0, 0.0]]), HALF)
     assert depth == pytest.approx(0.9) and area == pytest.approx(3.6, rel=0.06)
-    ((depth, area),) = _measured(road, np.array([[500.0, 10.0, 0.0]]), HALF, outside=True)
+    (depth,), (area,) = _depths_and_areas(road, np.array([[500.0, 10.0, 0.0]]), HALF)
     assert depth == MAX_DEPTH_M and area == pytest.approx(7.2)

@@ -107,7 +107,7 @@ def test_where_the_ego_does_not_have_to_react_who_has_to_is_said(tmp_path):
 
 def test_without_an_ego_it_is_refused(tmp_path):
     done = generated(tmp_path / "none", bundled("b"), "t_intersection")
-    assert done.exit_code != 0 and "name the vehicle in whose place the planner drives" in str(
+    assert done.exit_code != 0 and "name the vehicle that the planner replaces" in str(
         done.exception
     )
 

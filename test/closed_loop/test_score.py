@@ -93,7 +93,7 @@ def test_off_the_road_counts_from_a_depth(aside, counted):
         verdict.road_margin == pytest.approx(-aside, abs=1e-6)
         and np.isfinite(verdict.off_road) == counted
     )
-    assert verdict.passed != counted and (f"{aside:.2f} m deep" in verdict.sentence()) == counted
+    assert verdict.passed != counted and (f"by {aside:.2f} m" in verdict.sentence()) == counted
     assert (
         verdict.off_road_area == pytest.approx(4.0 * aside, abs=0.4)
         and drive.motion.position[0, -1, 1] > 1.1

@@ -146,7 +146,7 @@ def test_who_leaves_the_scene_does_not_brake_for_an_ego_that_passes_there_later(
     scenario = replace(following(10.0, 20.0), present=np.array([[0, 149], [0, 60]]))
     drive = ClosedLoop(scenario, 0).drive(Witness(scenario, 0), lambda state: state.step >= 149)
     assert np.abs(drive.motion.position[1, :61] - scenario.position[1, :61]).max() < 1e-6
-    assert drive.here[1].sum() == 61
+    assert drive.present[1].sum() == 61
 
 
 @pytest.mark.parametrize("patience", [2.0, 5.0, NEVER])

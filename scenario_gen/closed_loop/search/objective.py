@@ -97,7 +97,7 @@ def _apart(outcome: Outcome) -> tuple[float, ...]:
     """Return how far in time [s] each of the others was from a collision with the ego."""
     drive = outcome.drive
     others = (i for i in range(len(drive.motion.vehicles)) if i != drive.ego)
-    return tuple(min_time_shift(drive.motion, drive.here, drive.ego, i) for i in others)
+    return tuple(min_time_shift(drive.motion, drive.present, drive.ego, i) for i in others)
 
 
 def _kind(outcome: Outcome, name: str) -> str:

@@ -213,7 +213,7 @@ def encode_odometries(
     before, state = states[0], states[-1]
     yaw_rate = (state.vehicles[:, 2] - before.vehicles[:, 2]) / period
     stamp = stamp_of(state)
-    for i in np.flatnonzero(state.here).tolist():
+    for i in np.flatnonzero(state.present).tolist():
         rate = float(yaw_rate[i])
         yield i, encode_odometry(state.vehicles[i], rate, children[i], frame, stamp)
 
@@ -229,7 +229,7 @@ def encode_predictions(loop: ClosedLoop, states: Sequence[State]) -> bytes:
     """
     state = states[-1]
     world = loop.world
-    others = [i for i in np.flatnonzero(state.here).tolist() if i != loop.ego]
+    others = [i for i in np.flatnonzero(state.present).tolist() if i != loop.ego]
     horizon = np.arange(0.0, HORIZON_NS + 1.0, STEP_NS) * 1e-9
     paths = []
     for i in others:
@@ -299,13 +299,13 @@ def surroundings(
     for i, data in odometries.items():
         yield vehicle_topic(names[i], "odom"), data
 
-    present = np.flatnonzero(state.here)
+    present = np.flatnonzero(state.present)
     frames = [children[i] for i in present.tolist()]
     yield "/tf", encode_frames(state.vehicles[present, :3], frames, frame, stamp)
 
     if has_subscribers("traffic/markers"):
         vehicles = loop.scenario.vehicles
-        markers = vehicle_markers(vehicles, state.vehicles, state.here, loop.ego, frame, stamp)
+        markers = vehicle_markers(vehicles, state.vehicles, state.present, loop.ego, frame, stamp)
         yield "traffic/markers", markers
 
     map_steps = max(round(MAP_PERIOD_S / loop.config.step), 1)

@@ -17,7 +17,7 @@ from scenario_gen.base.errors import InputError
 from scenario_gen.closed_loop.config import ClosedLoopConfig
 from scenario_gen.closed_loop.origin import Trial
 from scenario_gen.closed_loop.simulation import State
-from scenario_gen.closed_loop.trials import Outcome, saying_what_was_before, too_long
+from scenario_gen.closed_loop.trials import Outcome, summary_on_error, too_long
 from scenario_gen.ros.common.driving import INPUTS
 from scenario_gen.ros.common.node_parameters import TrafficParameters
 from scenario_gen.ros.nodes.traffic import Traffic
@@ -120,7 +120,7 @@ def drive_trials(
         executor.add_node(node)
         try:
             _wait_for_planner(node, executor, planner, check)
-            with saying_what_was_before(node.outcomes):
+            with summary_on_error(node.outcomes):
                 task = executor.create_task(node.drive_all)
                 while not task.done():
                     check()
