@@ -147,7 +147,7 @@ def test_the_command_compares_and_says_what_a_planner_that_looks_at_nobody_passe
         and "non-reactive" not in again.output
     )
     said = (tmp_path / "two" / "drives.html").read_text()
-    assert "now fail" in said and "failures +0.0 %" in said
+    assert "Changed scenarios" in said and "failures +0.0 %" in said
     trials = read_trials(bag)
     outcomes = with_origins(
         run_trials(trials, f"{PLANNERS}:IdmFollower", ClosedLoopConfig(overtime=1.0)), trials
