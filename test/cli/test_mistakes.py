@@ -111,7 +111,7 @@ MISTAKES = [  # words of the command line, and what the message says: what is wr
     ((*GENERATE, "--params", "bad.yaml"), "bad.yaml: not YAML (line 2"),
     (
         (*DRIVE, "--against", "bad.json"),
-        "bad.json (give a drives.json of `scenario-gen drive`): not JSON",
+        "bad.json (must be a drives.json from `scenario-gen drive`): not JSON",
     ),
     (("validate", "none"), "none does not exist; name a folder"),
     (("validate", "my log ü.csv"), "is not a bag; name a folder"),

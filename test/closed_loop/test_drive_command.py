@@ -142,7 +142,7 @@ class Nowhere(Still):
         ("Wrong", 1, "scenario 0: .* returned tuple"),
         ("Leaves", 1, "scenario 0: .* SystemExit: 0"),
         ("NeverMade", 1, "scenario 0: .* RuntimeError: no model here"),
-        ("LeavesAtOnce", 2, "has ended after 0 of 2 drives"),
+        ("LeavesAtOnce", 2, "ended after 0 of 2 drives"),
     ],
 )
 def test_a_planner_that_fails_is_said_and_never_passes(bag, tmp_path, planner, workers, said):
@@ -174,7 +174,7 @@ def test_a_planner_that_hangs_is_ended_and_what_was_found_is_told(bag, tmp_path)
 def test_compiled_code_that_hangs_is_ended_with_its_process(bag, tmp_path):
     with pytest.raises(
         InputError,
-        match=r"has ended after 0 of 2 drives: .* hung in compiled code for longer than drive_time",
+        match=r"ended after 0 of 2 drives: .* hung in compiled code for longer than drive_time",
     ):
         request = DriveRequest(
             bag, f"{__name__}:HangsInCompiledCode", count=2, assignments=["drive_time=0.5"]
