@@ -41,7 +41,7 @@ def _vehicles(drive: Drive) -> list[dict[str, Any]]:
         {
             "size": [motion.vehicles[n].length, motion.vehicles[n].width],
             "poses": [
-                p if here else None for p, here in zip(poses[n], drive.here[n], strict=True)
+                p if here else None for p, here in zip(poses[n], drive.present[n], strict=True)
             ],
         }
         for n in (drive.ego, *others)
