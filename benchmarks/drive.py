@@ -256,7 +256,8 @@ def seen_at(
     first = None
     for i in range(len(motion.vehicles)):
         steps = np.setdiff1d(
-            np.flatnonzero(drive.present[i][:-1] & drive.present[i][1:]), np.subtract(drive.jumps, 1)
+            np.flatnonzero(drive.present[i][:-1] & drive.present[i][1:]),
+            np.subtract(drive.jumps, 1),
         )
         if looked_at is not None:
             steps = np.intersect1d(steps, looked_at)
