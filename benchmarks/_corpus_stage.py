@@ -60,14 +60,8 @@ def main() -> None:
         begun = time.process_time()
         task()
         found.append(time.process_time() - begun)
-    print(
-        json.dumps(
-            {
-                "tasks": found,
-                "mebibytes": resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024.0,
-            }
-        )
-    )
+    mebibytes = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024.0
+    print(json.dumps({"tasks": found, "mebibytes": mebibytes}))
 
 
 if __name__ == "__main__":

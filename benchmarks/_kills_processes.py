@@ -15,16 +15,9 @@ import sys
 import time
 from typing import Any, TypeAlias
 
-KEYS = {
-    "AWS_ACCESS_KEY_ID": "any",
-    "AWS_SECRET_ACCESS_KEY": "any",
-    "AWS_DEFAULT_REGION": "us-east-1",
-}
-QUIET: Any = {
-    "stdin": subprocess.DEVNULL,
-    "stdout": subprocess.DEVNULL,
-    "stderr": subprocess.DEVNULL,
-}
+from benchmarks._corpus_store import KEYS
+
+QUIET: Any = dict.fromkeys(("stdin", "stdout", "stderr"), subprocess.DEVNULL)
 BUCKET = "kills"
 Process: TypeAlias = subprocess.Popen[bytes]
 
@@ -59,16 +52,11 @@ class Processes:
     def __init__(self, folder: Path) -> None:
         self.folder, self.temporary = folder, folder / "tmp"
         self.server_port, self.port = free_port(), free_port()
-        self.environment = {
-            **os.environ,
-            **KEYS,
-            "AWS_ENDPOINT_URL": f"http://127.0.0.1:{self.port}",
-        }
+        self.environment = os.environ | KEYS
         self.environment |= {
+            "AWS_ENDPOINT_URL": f"http://127.0.0.1:{self.port}",
             "TMPDIR": str(self.temporary),
             "DASK_DISTRIBUTED__SCHEDULER__WORKER_SATURATION": "1.0",
-        }
-        self.environment |= {
             "DASK_DISTRIBUTED__NANNY__PRE_SPAWN_ENVIRON": "{}",
             "OMP_NUM_THREADS": "1",
         }
@@ -81,40 +69,22 @@ class Processes:
     def start(self) -> None:
         """Start all but clients."""
         self.temporary.mkdir()
-        words = [sys.executable, "-m", "moto.server", "-p", str(self.server_port)]
-        self.server = subprocess.Popen(words, start_new_session=True, **QUIET)
+        self.server = self._start(f"moto.server -p {self.server_port}")
         wait_for_port(self.server_port)
         self.start_forwarder()
         self.start_cluster()
 
     def start_forwarder(self) -> None:
         """Start what forwards to the server."""
-        words = [
-            sys.executable,
-            "-m",
-            "benchmarks._kills_forwarder",
-            str(self.port),
-            str(self.server_port),
-        ]
-        self.forwarder = subprocess.Popen(words, start_new_session=True, **QUIET)
+        self.forwarder = self._start(f"benchmarks._kills_forwarder {self.port} {self.server_port}")
         wait_for_port(self.port)
 
     def start_cluster(self) -> None:
         """Start a scheduler, at another address than earlier ones, and two workers."""
         self.count += 1
         known = self.folder / f"scheduler-{self.count}.json"
-        words = [
-            sys.executable,
-            "-m",
-            "distributed.cli.dask_scheduler",
-            "--port",
-            "0",
-            "--no-dashboard",
-        ]
-        words += ["--scheduler-file", str(known)]
-        self.scheduler = subprocess.Popen(
-            words, start_new_session=True, env=self.environment, **QUIET
-        )
+        scheduler = "distributed.cli.dask_scheduler --port 0 --no-dashboard --scheduler-file"
+        self.scheduler = self._start(scheduler, str(known), env=self.environment)
         while not known.exists() or not known.read_text().endswith("}"):
             time.sleep(0.05)
         self.address = json.loads(known.read_text())["address"]
@@ -122,30 +92,23 @@ class Processes:
 
     def start_worker(self) -> Process:
         """Start a nanny, which starts a worker."""
-        words = [
-            sys.executable,
-            "-m",
-            "distributed.cli.dask_worker",
-            self.address,
-            "--nworkers",
-            "1",
-            "--nthreads",
-            "1",
-        ]
-        words += ["--no-dashboard", "--memory-limit", "0", "--local-directory", str(self.folder)]
-        return subprocess.Popen(words, start_new_session=True, env=self.environment, **QUIET)
+        counts = "--nworkers 1 --nthreads 1 --no-dashboard --memory-limit 0 --local-directory"
+        worker = f"distributed.cli.dask_worker {self.address} {counts}"
+        return self._start(worker, str(self.folder), env=self.environment)
+
+    @staticmethod
+    def _start(module: str, *paths: str, env: dict[str, str] | None = None) -> Process:
+        """Start a Python module with its arguments in its own session."""
+        words = [sys.executable, "-m", *module.split(), *paths]
+        return subprocess.Popen(words, start_new_session=True, env=env, **QUIET)
 
     def start_client(self, words: list[str], log: Path) -> Process:
         """Start the command line; what it prints goes to a file, after what is there."""
         with log.open("ab") as output:
             command = [sys.executable, "-m", "scenario_gen", *words, "--scheduler", self.address]
+            streams: Any = QUIET | {"stdout": output, "stderr": output}
             return subprocess.Popen(
-                command,
-                start_new_session=True,
-                env=self.environment,
-                stdin=subprocess.DEVNULL,
-                stdout=output,
-                stderr=output,
+                command, start_new_session=True, env=self.environment, **streams
             )
 
     def end_cluster(self) -> None:

@@ -61,14 +61,7 @@ def nodes(folder: Path, domain: int, arguments: Mapping[str, Sequence[str]]) -> 
     """Run nodes, each a process with its ROS arguments and a log in the folder; they are ended at the end."""
     processes = []
     for node, own in arguments.items():
-        command = [
-            sys.executable,
-            "-m",
-            "scenario_gen.ros.common.start",
-            node,
-            "--ros-args",
-            *own,
-        ]
+        command = [sys.executable, "-m", "scenario_gen.ros.common.start", node, "--ros-args", *own]
         with (folder / f"{node}.log").open("wb") as log:
             variables = environment(domain) | {"ROS_LOG_DIR": str(folder)}
             processes.append(subprocess.Popen(command, stdout=log, stderr=log, env=variables))

@@ -143,22 +143,12 @@ def told_apart(
     if len(names) < FOLDS:
         return None
     columns = [k for k, name in enumerate(FEATURES) if name.split(":")[0] in series]
-    data = np.concatenate([part for one in sets for part in (one.recorded, one.generated)])[
-        :, columns
-    ]
-    label = np.concatenate(
-        [np.repeat((0, 1), (len(one.recorded), len(one.generated))) for one in sets]
-    )
-    group = np.concatenate(
-        [np.full(len(one.recorded) + len(one.generated), names.index(one.name)) for one in sets]
-    )
-    weight = np.concatenate(
-        [
-            np.full(len(part), 1.0 / len(part))
-            for one in sets
-            for part in (one.recorded, one.generated)
-        ]
-    )
+    parts = [part for one in sets for part in (one.recorded, one.generated)]
+    sizes = [len(part) for part in parts]
+    data = np.concatenate(parts)[:, columns]
+    label = np.repeat(np.tile((0, 1), len(sets)), sizes)
+    group = np.repeat(np.repeat([names.index(one.name) for one in sets], 2), sizes)
+    weight = np.repeat(1.0 / np.array(sizes), sizes)
     weight *= len(weight) / weight.sum()
     areas: list[float] = []
     falls: dict[str, list[float]] = {FEATURES[k]: [] for k in columns}

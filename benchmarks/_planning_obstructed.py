@@ -47,40 +47,23 @@ def obstructed(seed: int) -> Obstructed | None:
     rng = np.random.default_rng(seed)
     y = (np.arange(int((WIDTH + 2.0 * WALL) / CELL)) + 0.5) * CELL
     drivable = np.repeat(((y > WALL) & (y < WALL + WIDTH))[:, None], int(LENGTH / CELL), axis=1)
-    there = []
+    obstacles = []
     if seed % 2 == 0:
         for _ in range(int(rng.integers(2, 6))):
             place = rng.uniform((15.0, WALL), (LENGTH - 15.0, WALL + WIDTH))
-            there.append(
-                Obstacle(
-                    *map(
-                        float,
-                        (
-                            *place,
-                            rng.uniform(0.0, np.pi),
-                            rng.uniform(3.8, 5.0),
-                            rng.uniform(1.7, 2.0),
-                        ),
-                    )
-                )
-            )
+            shape = rng.uniform((0.0, 3.8, 1.7), (np.pi, 5.0, 2.0))
+            obstacles.append(Obstacle(*place.tolist(), *shape.tolist()))
     else:
-        gap, count, pitch, side = (
-            rng.uniform(2.6, 4.0),
-            int(rng.integers(2, 5)),
-            rng.uniform(9.0, 16.0),
-            int(rng.integers(2)),
-        )
-        depth = WIDTH - gap
+        depth = WIDTH - rng.uniform(2.6, 4.0)
+        count = int(rng.integers(2, 5))
+        pitch = rng.uniform(9.0, 16.0)
+        side = int(rng.integers(2))
         for k in range(count):
             middle = WALL + 0.5 * depth if (k + side) % 2 == 0 else WALL + WIDTH - 0.5 * depth
             angle = 0.5 * np.pi + rng.uniform(-0.2, 0.2)
-            there.append(
-                Obstacle(
-                    *map(float, (20.0 + k * pitch, middle, angle, depth, rng.uniform(1.0, 2.0)))
-                )
-            )
-    road = with_obstacles(road_of(f"obstructed {seed}", drivable, CELL), tuple(there))
+            thickness = rng.uniform(1.0, 2.0)
+            obstacles.append(Obstacle(20.0 + k * pitch, middle, angle, depth, thickness))
+    road = with_obstacles(road_of(f"obstructed {seed}", drivable, CELL), tuple(obstacles))
     ends = np.array([[4.0, WALL + 0.25 * WIDTH, 0.0], [LENGTH - 4.0, WALL + 0.25 * WIDTH, 0.0]])
     ends[:, 1] += rng.uniform(-0.5, 0.5, 2)
     if not footprint_fits(road, ends, *CAR).all():

@@ -28,7 +28,7 @@ class Labelled:
         return np.flatnonzero(np.diff(self.labels)) + 1
 
 
-CELLS = {"A": (300, 6, 4), "B": (3000, 6, 6), "C": (3000, 24, 8), "M": (12_000, 6, 30)}
+CELLS = {"A": (300, 6, 4), "B": (3000, 6, 6), "C": (3000, 24, 8)}
 DWELL = 40.0
 DISTANCE = 2.0
 

@@ -59,16 +59,8 @@ def run(part: str = "all") -> list[Row]:
     with tempfile.TemporaryDirectory() as scratch:
         folder = Path(scratch)
         archive = write_archive(folder / "archive", 5, **ARCHIVE)
-        words = [
-            sys.executable,
-            "-m",
-            "scenario_gen",
-            "mine",
-            str(archive),
-            "--out",
-            str(folder / "whole"),
-            *SETTINGS,
-        ]
+        words = [sys.executable, "-m", "scenario_gen", "mine", str(archive), *SETTINGS]
+        words += ["--out", str(folder / "whole")]
         subprocess.run(words, check=True, capture_output=True)
         whole = {
             f"{path.parent.name}/{path.name}": path.read_bytes()

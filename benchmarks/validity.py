@@ -54,40 +54,18 @@ def _rechecked(count: int) -> list[Row]:
     """What an independent checker finds in published scenarios."""
     account, planned = recheck_published(count)
     if not account.scenarios:
-        return [
-            higher(
-                "published scenarios re-checked",
-                0.0,
-                "",
-                1.0,
-                "no recorded data, or none can be planned",
-            )
-        ]
+        return [higher("scenarios re-checked independently", 0.0, "", 1.0, "no recorded data")]
     wrong, moving = account.found.pop("passing_order", 0), account.found.pop("stop_not_kept", 0)
     causes = ", ".join(f"{n} × {cause}" for cause, n in account.found.most_common())
+    size = (
+        f"{planned} encounters × roads, {account.vehicles} vehicles, {account.instants} instants"
+    )
+    orders = f"{account.orders} orders, {account.ties} ties, {account.absent} without a conflict"
     return [
-        higher(
-            "published scenarios re-checked independently",
-            float(account.scenarios),
-            "",
-            float(count),
-            f"{planned} encounters × roads, {account.vehicles} vehicles, {account.instants} instants of the advancement",
-        ),
-        lower(
-            "violations found by the re-check",
-            float(account.found.total()),
-            "",
-            0.0,
-            causes or None,
-        ),
-        lower(
-            "wrong passing orders",
-            float(wrong),
-            "",
-            0.0,
-            f"{account.orders} orders, {account.ties} ties, {account.absent} conflicts that the road keeps apart",
-        ),
-        lower("moving waits", float(moving), "", 0.0, f"{account.waits} waits"),
+        higher("scenarios re-checked independently", account.scenarios, "", count, size),
+        lower("violations found by the re-check", account.found.total(), "", 0.0, causes),
+        lower("wrong passing orders", wrong, "", 0.0, orders),
+        lower("moving waits", moving, "", 0.0, f"{account.waits} waits"),
     ]
 
 
@@ -136,11 +114,5 @@ def _t_intersection() -> Road:
     drivable = np.zeros((1000, 1000), dtype=np.bool_)
     drivable[482:518] = True
     drivable[:500, 482:518] = True
-    return Road(
-        "T, 0.2 m cells",
-        drivable,
-        0.2,
-        np.array((-100.0, -100.0)),
-        np.empty((0, 3)),
-        np.empty((0, 3)),
-    )
+    origin, none = np.array((-100.0, -100.0)), np.empty((0, 3))
+    return Road("T, 0.2 m cells", drivable, 0.2, origin, none, none)
