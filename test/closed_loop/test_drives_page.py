@@ -73,6 +73,6 @@ def test_the_page_of_a_search_without_a_failure_raises_no_error(browser, tmp_pat
     tab = Tab(browser, file, DESKTOP)
     assert (
         tab.troubles == []
-        and "a failure is a collision by its fault" in tab.page.locator("header").inner_text()
+        and "a failure is a collision that is its fault" in tab.page.locator("header").inner_text()
     )
     tab.page.close()
