@@ -13,8 +13,7 @@ import numpy as np
 
 from scenario_gen.numerics import Floats, runs
 from scenario_gen.situation import conflict_of, departure, lane_gaps, passing, time_gaps
-from scenario_gen.situation.conflicts import Motion
-from scenario_gen.types import Reaction
+from scenario_gen.types import Motion, Reaction
 
 EARLY, _ROUNDED = (
     0.5,

@@ -41,8 +41,7 @@ from scenario_gen.numerics.arrays import Floats
 from scenario_gen.pipeline import PipelineConfig
 from scenario_gen.roads import build_road
 from scenario_gen.situation import Situation
-from scenario_gen.situation.conflicts import Motion
-from scenario_gen.types import FOLLOW, Reaction
+from scenario_gen.types import FOLLOW, Motion, Reaction
 from scenario_gen.types.encounter import Encounter
 from scenario_gen.types.scenario import Scenario
 

@@ -1,14 +1,14 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Object stores (s3, gs, abfs) and the web, by URL, through fsspec: what is there, objects to files, and files to objects.
+"""Object stores (s3, gs, abfs) and the web, by URL, through fsspec.
 
-A `Remote` has the few names of `Path` that commands need, so the same lines ask either what is there; a reader takes a `Path`
-alone, and mypy says where an object has to be fetched first.
+A `Remote` has those methods of `Path` that the commands need, so the same code lists folders and
+stores. A reader accepts only a `Path`: mypy reports where an object has to be fetched first.
 
-A store has no locks and no names that change places. What a result is of is therefore its first object, which is created only
-where there is none yet: whoever comes second agrees with it or is refused. All else is a function of it, so that two writers
-write the same bytes.
+A store has neither locks nor an atomic rename. The first object of a result is therefore its
+manifest, which is created only if there is none yet; a second writer has to agree with it. All
+other objects follow from the manifest, so that two writers write the same bytes.
 """
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -25,25 +25,27 @@ from scenario_gen.base.errors import describe, guarded, InputError, needs, Scena
 from scenario_gen.base.folders import naming, scratch
 
 Result = TypeVar("Result")
-URL = re.compile(
-    r"([A-Za-z][A-Za-z0-9+.-]+):/+(.*)", re.DOTALL
-)  # one slash: a Path drops the second
-WRITTEN, READ = ("s3", "gs", "gcs", "abfs", "abfss", "az"), ("http", "https")
+
+# One slash is enough, since a Path drops the second one.
+URL = re.compile(r"([A-Za-z][A-Za-z0-9+.-]+):/+(.*)", re.DOTALL)
+WRITABLE_SCHEMES = ("s3", "gs", "gcs", "abfs", "abfss", "az")
+READ_ONLY_SCHEMES = ("http", "https")
 S3 = {
-    "max_concurrency": 2,  # parts of a long object in memory at a time, 50 MiB each
+    "max_concurrency": 2,  # parts of a long object in memory at the same time, 50 MiB each
     "config_kwargs": {"retries": {"mode": "standard", "total_max_attempts": 8}},
 }
-BLOCK_BYTES, REQUESTS = 4 << 20, 16  # that are in memory at once
-TOGETHER = 64  # files that `each_fetched` keeps
+BLOCK_BYTES = 4 << 20
+MAX_REQUEST_COUNT = 16  # blocks in memory at the same time
+FETCHED_FILE_COUNT = 64  # files on disk at the same time in `each_fetched`
 
 
 @dataclass(frozen=True, order=True)
 class Remote:
-    """An object of a store, or all objects below it, as a folder; nothing is looked up before it is asked for.
+    """An object in a store, or a folder of objects; creating one makes no request.
 
     Attributes:
-        url: without a slash at its end.
-        size: bytes of the object, -1 where nobody has looked.
+        url: without a trailing slash.
+        size: bytes of the object; -1 if it is unknown.
     """
 
     url: str
@@ -57,29 +59,31 @@ class Remote:
 
     @property
     def name(self) -> str:
-        """The last part; of a web address without its query."""
+        """The last part of the path; the query of a web address is left out."""
         scheme, _, path = self.url.partition("://")
-        return PurePosixPath(path.partition("?")[0] if scheme in READ else path).name
+        if scheme in READ_ONLY_SCHEMES:
+            path = path.partition("?")[0]
+        return PurePosixPath(path).name
 
     @property
     def stem(self) -> str:
-        """The last part without its suffix."""
+        """The last part of the path without its suffix."""
         return PurePosixPath(self.name).stem
 
     @property
     def parent(self) -> "Remote":
-        """What the object lies in."""
+        """The folder of the object."""
         return Remote(self.url.rpartition("/")[0])
 
     def with_suffix(self, suffix: str) -> "Remote":
-        """Return the object of that ending beside this one."""
+        """Return the object in the same folder with another suffix."""
         return self.parent / f"{self.stem}{suffix}"
 
-    def there(self) -> tuple[Any, str]:
-        """Return fsspec's file system, without what it remembers of others' doings, and the path in it.
+    def file_system(self) -> tuple[Any, str]:
+        """Return fsspec's file system, with its listing cache cleared, and the path in it.
 
         Raises:
-            InputError: the library of the store is not installed, or lacks a setting.
+            InputError: the library for the store is not installed, or a setting is missing.
         """
         needs("stores", "fsspec")
         from fsspec.core import url_to_fs
@@ -89,20 +93,20 @@ class Remote:
             system.invalidate_cache()
         return system, path
 
-    def asked(
+    def call(
         self, operation: Callable[[Any, str], Result], missing: Callable[[], Result] | None = None
     ) -> Result:
-        """Return what an operation on file system and path returns; the library of the store tries again what fails for a while.
+        """Return the result of an operation; the store's library repeats failed requests.
 
         Args:
-            operation: calls the file system and nothing else.
-            missing: makes the answer where there is no such object.
+            operation: calls the file system, given the file system and the path.
+            missing: returns the result if there is no such object.
 
         Raises:
-            InputError: there is no such object, the store lets nobody in, or it goes on failing.
-            FileExistsError: the operation's own.
+            InputError: there is no such object, access is denied, or the store keeps failing.
+            FileExistsError: raised by the operation.
         """
-        system, path = self.there()
+        system, path = self.file_system()
         try:
             return operation(system, path)
         except FileExistsError:
@@ -112,58 +116,55 @@ class Remote:
                 return missing()
             raise InputError(f"{self} does not exist; check bucket and name") from error
         except Exception as error:
-            advice = "check address and credentials; the same command goes on where it stopped"
+            advice = "check address and credentials; the same command resumes where it stopped"
             raise InputError(f"{self}: {describe(error)}; {advice}") from error
 
     def exists(self) -> bool:
-        """Return whether there is an object of that name, or objects below it."""
-        return bool(self.asked(lambda system, path: system.exists(path)))
+        """Return whether there is an object with this name, or a folder of objects."""
+        return bool(self.call(lambda system, path: system.exists(path)))
 
-    def looked_up(self) -> "Remote":
-        """Return the object with its size; of a folder it stays unknown.
+    def with_size(self) -> "Remote":
+        """Return the object with its size; the size of a folder stays unknown.
 
         Raises:
-            InputError: there is nothing of that name.
+            InputError: there is no such object, or the server does not report its size.
         """
         if self.size >= 0:
             return self
-        facts: dict[str, Any] = self.asked(lambda system, path: system.info(path))
-        if facts.get("type") == "directory" or str(facts.get("mimetype")).startswith(
-            "text/html"
-        ):  # the list of a web server
+        info: dict[str, Any] = self.call(lambda system, path: system.info(path))
+        # A web server describes a folder by a page with links.
+        is_index = str(info.get("mimetype")).startswith("text/html")
+        if is_index or info.get("type") == "directory":
             return self
-        if facts.get("size") is None:
-            raise InputError(f"{self}: the server does not say how long it is; download it first")
-        return Remote(self.url, int(facts["size"]))
+        if info.get("size") is None:
+            raise InputError(f"{self}: the server does not report its size; download it first")
+        return Remote(self.url, int(info["size"]))
 
     def rglob(self, pattern: str) -> Iterator["Remote"]:
-        """Yield the objects below, at any depth, whose names match, in order; none where there is nothing."""
-        root = self.there()[1]
-        listed: dict[str, Any] = self.asked(
+        """Yield the objects at any depth whose names match, sorted; none if there is no folder."""
+        root = self.file_system()[1]
+        listing: dict[str, Any] = self.call(
             lambda system, path: system.find(path, detail=True), missing=dict
         )
-        for path, facts in sorted(listed.items()):
-            own = path.removeprefix(root).lstrip("/")
-            if (
-                own
-                and facts.get("type") != "directory"
-                and not path.endswith("/")
-                and fnmatch(PurePosixPath(path).name, pattern)
-            ):
-                size = facts.get("size")
-                yield Remote(f"{self}/{own}", -1 if size is None else int(size)).looked_up()
+        for path, info in sorted(listing.items()):
+            relative = path.removeprefix(root).lstrip("/")
+            is_folder = info.get("type") == "directory" or path.endswith("/")
+            if is_folder or not relative or not fnmatch(PurePosixPath(path).name, pattern):
+                continue
+            size = info.get("size")
+            yield Remote(f"{self}/{relative}", -1 if size is None else int(size)).with_size()
 
     def glob(self, pattern: str) -> Iterator["Remote"]:
-        """Yield those of `rglob` that are no deeper."""
-        return (found for found in self.rglob(pattern) if found.parent == self)
+        """Yield the objects directly in this folder whose names match, sorted."""
+        return (entry for entry in self.rglob(pattern) if entry.parent == self)
 
 
 Place = Path | Remote
-"""Where something is, or will be: in the file system or in a store."""
+"""A file or folder in the file system or in a store."""
 
 
 class Part(NamedTuple):
-    """Bytes of an object, and the file that takes them, at the same offsets."""
+    """Bytes of an object, and the file that they are copied to at the same offsets."""
 
     source: Remote
     begin: int
@@ -172,149 +173,159 @@ class Part(NamedTuple):
 
 
 def url_of(text: object) -> str:
-    """Return the URL that a text or a Path was, "" if it is none; one slash may have been dropped."""
-    found = URL.fullmatch(str(text))
-    return f"{found[1].lower()}://{found[2].rstrip('/')}" if found else ""
+    """Return the URL in a text or a Path, "" if it is none; a Path has dropped one slash."""
+    match = URL.fullmatch(str(text))
+    return f"{match[1].lower()}://{match[2].rstrip('/')}" if match else ""
 
 
 def place(text: str | Path, *, to_write: bool = False) -> Place:
-    """Return the place that a URL or a path names; `file://` is a path.
+    """Return the place with a URL or a path; `file://` is a path.
 
     Raises:
-        InputError: the scheme is not known, or is to be written and cannot be.
+        InputError: the scheme is unknown, or it cannot be written although `to_write` is set.
     """
     url = url_of(text)
-    scheme, _, rest = url.partition("://")
-    if not url or scheme == "file":
-        return Path("/" + rest.lstrip("/")) if url else Path(text)
-    if not rest or scheme not in WRITTEN + (() if to_write else READ):
-        why = (
-            f"{scheme} is only read"
-            if scheme in READ
-            else f"{scheme} is not read or written, or a bucket's name is missing"
-        )
-        raise InputError(f"{url}: {why}; name a file or folder, or a place in s3, gs or abfs")
-    return Remote(url)
+    if not url:
+        return Path(text)
+    scheme, _, path = url.partition("://")
+    if scheme == "file":
+        return Path("/" + path.lstrip("/"))
+    schemes = WRITABLE_SCHEMES if to_write else WRITABLE_SCHEMES + READ_ONLY_SCHEMES
+    if path and scheme in schemes:
+        return Remote(url)
+    if scheme in READ_ONLY_SCHEMES:
+        why = f"{scheme} is read-only"
+    else:
+        why = f"{scheme} is not supported, or the bucket name is missing"
+    raise InputError(f"{url}: {why}; name a file or folder, or a place in s3, gs or abfs")
 
 
-def local(path: Path, use: str) -> Path:
-    """Return a path that is no URL.
+def require_local(path: Path, use: str) -> Path:
+    """Return a path that is not a URL.
 
     Raises:
-        InputError: it is one, and `use` takes files and folders alone.
+        InputError: it is a URL, and `use` reads only files and folders.
     """
     if url := url_of(path):
         raise InputError(f"{url}: {use} takes a file or folder; copy it first")
     return path
 
 
-def temporary() -> Path:
-    """Return the folder in which fetched objects lie meanwhile: TMPDIR."""
+def temp_folder() -> Path:
+    """Return the folder for fetched objects: TMPDIR."""
     return Path(tempfile.gettempdir())
 
 
-def below(path: Place, above: Place) -> str:
-    """Return the name of a file or an object within a folder, with slashes."""
+def relative_name(path: Place, folder: Place) -> str:
+    """Return the name of a file or an object relative to a folder, with slashes."""
     if isinstance(path, Remote):
-        return path.url.removeprefix(str(above)).lstrip("/")
-    return path.relative_to(str(above)).as_posix()
+        return path.url.removeprefix(str(folder)).lstrip("/")
+    return path.relative_to(str(folder)).as_posix()
 
 
 def workplace(folder: Place) -> Path:
-    """Return where intermediate files of results in `folder` lie: there, or for a store on this machine."""
-    return temporary() if isinstance(folder, Remote) else folder
+    """Return the folder for intermediate files: `folder` itself, or TMPDIR for a store."""
+    return temp_folder() if isinstance(folder, Remote) else folder
 
 
 def size_of(path: Place) -> int:
     """Return the size of a file or an object in bytes."""
-    return path.looked_up().size if isinstance(path, Remote) else path.stat().st_size
+    return path.with_size().size if isinstance(path, Remote) else path.stat().st_size
 
 
 def download(parts: Iterable[Part]) -> None:
-    """Copy parts of objects to files, in blocks, some at once.
+    """Copy parts of objects to files, in blocks, several at the same time.
 
     Raises:
-        InputError: an object is not there, has changed its size, or cannot be read.
-        OSError: the disk is full; it names the file.
+        InputError: an object is missing, has changed its size, or cannot be read.
+        OSError: the disk is full; the message names the file.
     """
     blocks = []
     for part in parts:
         part.target.parent.mkdir(parents=True, exist_ok=True)
         with naming(part.target):
             part.target.touch()
-        starts = range(part.begin, part.end, BLOCK_BYTES)
-        blocks += [
-            part._replace(begin=begin, end=min(begin + BLOCK_BYTES, part.end)) for begin in starts
-        ]
-    with ThreadPoolExecutor(REQUESTS) as pool:
-        for _ in pool.map(_copy, blocks):  # the first that fails ends the others
+        begins = range(part.begin, part.end, BLOCK_BYTES)
+        blocks += [part._replace(begin=k, end=min(k + BLOCK_BYTES, part.end)) for k in begins]
+    with ThreadPoolExecutor(MAX_REQUEST_COUNT) as pool:
+        # The first error ends the other downloads.
+        for _ in pool.map(_copy, blocks):
             pass
 
 
 def _copy(part: Part) -> None:
-    source, begin, end, target = part
-    whole = (
-        begin == 0 and end == source.size
-    )  # is read without a range, which not all servers know
-    bounds = {} if whole else {"start": begin, "end": end}
-    data = source.asked(lambda system, path: bytes(system.cat_file(path, **bounds)))
-    if len(data) != end - begin:
-        why = "it has changed, or the server reads no parts of files; start again, or download it first"
-        raise InputError(
-            f"{source} gave {len(data)} bytes where {end - begin} were asked for: {why}"
-        )
-    with naming(target), target.open("r+b") as file:
-        file.seek(begin)
+    source = part.source
+    # A whole object is read without a range, since some servers do not support ranges.
+    is_whole = part.begin == 0 and part.end == source.size
+    bounds = {} if is_whole else {"start": part.begin, "end": part.end}
+    data = source.call(lambda system, path: bytes(system.cat_file(path, **bounds)))
+    expected = part.end - part.begin
+    if len(data) != expected:
+        why = "it has changed, or the server does not support ranges"
+        remedy = "start again, or download it first"
+        raise InputError(f"{source}: got {len(data)} bytes, not {expected}: {why}; {remedy}")
+    with naming(part.target), part.target.open("r+b") as file:
+        file.seek(part.begin)
         file.write(data)
 
 
 def each_fetched(places: Sequence[Place]) -> Iterator[tuple[Place, Path]]:
-    """Yield each place with its file, as `fetched` gives it, a few at a time: each file is gone after those that follow it."""
-    for first in range(0, len(places), TOGETHER):
-        own = places[first : first + TOGETHER]
-        with fetched(own) as here:
-            yield from zip(own, here, strict=True)
+    """Yield each place with its local file; a copy is removed when its batch has been read."""
+    for first in range(0, len(places), FETCHED_FILE_COUNT):
+        batch = places[first : first + FETCHED_FILE_COUNT]
+        with fetched(batch) as files:
+            yield from zip(batch, files, strict=True)
 
 
 @contextmanager
 def fetched(places: Sequence[Place]) -> Iterator[list[Path]]:
-    """Give files as they are, and objects as files of the same names in folders of the same names; messages name the objects.
+    """Give the local files of places: objects are copied, files and folders are used directly.
+
+    A copy has the object's name, in a folder with the name of the object's folder. Error messages
+    name the object, not the copy.
 
     Args:
-        places: files, objects, or folders of either. Objects of one folder come to lie in one folder.
+        places: files, objects, or folders. Objects from one folder are copied to one folder.
 
     Raises:
-        InputError: an object is not there or cannot be read.
+        InputError: an object is missing or cannot be read.
         OSError: the disk is full.
     """
-    remote = [found.looked_up() for found in places if isinstance(found, Remote)]
-    if not remote:
-        yield [found for found in places if isinstance(found, Path)]
+    remotes = [entry.with_size() for entry in places if isinstance(entry, Remote)]
+    if not remotes:
+        yield [entry for entry in places if isinstance(entry, Path)]
         return
-    with scratch(temporary()) as own:
-        folders: dict[str, Path] = {}
-        local: dict[Remote, Path] = {}
+    with scratch(temp_folder()) as root:
+        copies = _copy_paths(remotes, root)
         parts: list[Part] = []
-        for found in remote:
-            folder = folders.setdefault(
-                found.parent.url, own / str(len(folders)) / (found.parent.name or "store")
-            )
-            local[found] = folder / found.name
-            objects = [found] if found.size >= 0 else found.rglob("*")
-            parts += [Part(one, 0, one.size, local[found] / below(one, found)) for one in objects]
-        with naming_objects({str(path): found.url for found, path in local.items()}):
+        for remote, copy in copies.items():
+            objects = [remote] if remote.size >= 0 else remote.rglob("*")
+            parts += [
+                Part(entry, 0, entry.size, copy / relative_name(entry, remote))
+                for entry in objects
+            ]
+        with naming_objects({str(copy): remote.url for remote, copy in copies.items()}):
             download(parts)
-            yield [local[found] if isinstance(found, Remote) else found for found in places]
+            yield [copies[entry] if isinstance(entry, Remote) else entry for entry in places]
 
 
-_copies: dict[
-    str, str
-] = {}  # {path: URL} of files that stand for objects; paths are never used twice
+def _copy_paths(remotes: Sequence[Remote], root: Path) -> dict[Remote, Path]:
+    """Return the path of each object's copy in `root`."""
+    folders: dict[str, Path] = {}
+    copies = {}
+    for remote in remotes:
+        parent = remote.parent
+        folder = root / str(len(folders)) / (parent.name or "store")
+        copies[remote] = folders.setdefault(parent.url, folder) / remote.name
+    return copies
+
+
+_copies: dict[str, str] = {}  # {path of a copy: URL of its object}; a path is never reused
 
 
 @contextmanager
 def naming_objects(names: dict[str, str]) -> Iterator[None]:
-    """Let errors, and texts that are `renamed`, name objects instead of the files {path: URL} that stand for them."""
+    """Let errors, and texts that pass `renamed`, name the objects of copies {path: URL}."""
     _copies.update(names)
     try:
         yield
@@ -327,34 +338,37 @@ def naming_objects(names: dict[str, str]) -> Iterator[None]:
 
 
 def renamed(text: str) -> str:
-    """Return a text with URLs instead of the paths of copies; longer paths first, for one may begin with another."""
-    for path in sorted(_copies, key=len, reverse=True) if _copies else ():
+    """Return a text with the paths of copies replaced by the URLs of their objects."""
+    # Longer paths first, since one path may begin with another one.
+    for path in sorted(_copies, key=len, reverse=True):
         text = text.replace(path, _copies.get(path, path))
     return text
 
 
 def upload(source: Path, target: Remote) -> None:
-    """Copy a file to an object, or all files of a folder: each object is whole or not there, whoever is killed.
+    """Copy a file or all files of a folder to a store; an object is never partly written.
 
     Raises:
-        InputError: the store refuses it or goes on failing.
+        InputError: the store refuses an object or keeps failing.
     """
     if source.is_dir():
-        for inside in sorted(source.iterdir()):
-            upload(inside, target / inside.name)
+        for entry in sorted(source.iterdir()):
+            upload(entry, target / entry.name)
     else:
-        target.asked(lambda system, path: system.put_file(str(source), path))
+        target.call(lambda system, path: system.put_file(str(source), path))
 
 
 def create(target: Remote, data: bytes) -> bool:
-    """Write a small object where there is none; return False if there is one, from another writer or from a try of ours.
+    """Write a small object if there is none; return False if one exists already.
+
+    An existing object comes from another writer, or from an earlier attempt of this one.
 
     Raises:
-        InputError: the store refuses it or goes on failing.
+        InputError: the store refuses it or keeps failing.
     """
     try:
         if not target.exists():
-            target.asked(lambda system, path: system.pipe_file(path, data, mode="create"))
+            target.call(lambda system, path: system.pipe_file(path, data, mode="create"))
             return True
     except FileExistsError:
         pass

@@ -17,7 +17,7 @@ from scenario_gen.base.stores import (
     naming_objects,
     place,
     Remote,
-    temporary,
+    temp_folder,
     upload,
     url_of,
 )
@@ -70,7 +70,7 @@ def as_files(values: Mapping[str, Any], outputs: Mapping[str, bool]) -> Iterator
                 raise InputError(
                     f"{remote} exists, and objects are never overwritten; choose another place"
                 )
-            file = stack.enter_context(scratch(temporary())) / remote.name
+            file = stack.enter_context(scratch(temp_folder())) / remote.name
             stack.enter_context(naming_objects({str(file): remote.url}))
             uploads.append((file, remote))
             return file

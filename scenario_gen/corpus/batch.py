@@ -1,13 +1,16 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""`batch`: templates × roads × samples. A task generates all scenarios of ten templates on one road, and writes three files.
+"""`batch`: templates × roads × scenarios.
 
-    bags/road=NAME/part-00000/              a bag as `generate` writes it, a namespace for each template
-    scenarios/road=NAME/part-00000.parquet  a row for each scenario: where it is, and how critical
-    cases/road=NAME/part-00000.parquet      a row for each template: how many there are, and why not more
+A task generates the scenarios of ten templates on one road, and writes three files:
 
-The table of cases is written last, so a part is done where that table is; no other record of progress is kept.
+    bags/road=NAME/part-00000/              a bag as from `generate`, a namespace per template
+    scenarios/road=NAME/part-00000.parquet  a row per scenario: its place and its criticality
+    cases/road=NAME/part-00000.parquet      a row per template: counts, and the causes of refusals
+
+The table of cases is written last, so a part is finished if that table exists. There is no other
+record of progress.
 """
 
 from collections import Counter
@@ -40,22 +43,33 @@ from scenario_gen.roads import build_road, road_and_template
 from scenario_gen.situation import Situation
 from scenario_gen.types import GenerationResult, most_exposed
 
-BATCH = "batch.json"
-TEMPLATES = 10  # of one task
-LONGEST_CAUSE = 80  # characters under which refusals are counted
-LOST_CONFLICT = (
-    "lost conflict"  # the cause of every case whose encounter is lost, whatever the road
-)
+MANIFEST = "batch.json"
+TASK_TEMPLATE_COUNT = 10
+MAX_CAUSE_CHARACTERS = 80
+LOST_CONFLICT = "lost conflict"  # the cause of a case whose encounter is lost, on any road
+SCENARIO_COLUMNS = {
+    **dict.fromkeys(("template", "kind", "namespace", "sha256", "type"), "string"),
+    "types": "string[]",
+    **dict.fromkeys(("vehicles", "part", "index", "seed"), "int64"),
+    **dict.fromkeys(("seconds", "distance", "ttc", "pet", "speed", "braking"), "double"),
+}
+CASE_COLUMNS = {
+    **dict.fromkeys(("template", "kind", "namespace", "refused", "cause", "why"), "string"),
+    **dict.fromkeys(
+        ("vehicles", "seed", "wanted", "published", "candidates", "part", "changepoints"), "int64"
+    ),
+}
 
 
 @dataclass(frozen=True)
 class BatchRequest:
-    """What is generated from each template on each road.
+    """The scenarios to generate from each template on each road.
 
     Attributes:
-        config: of the pipeline.
-        count: scenarios of each template on each road.
-        seed: of all; each case has its own seed, which follows from this one, its template's name and its road.
+        config: the parameters of every stage.
+        count: number of scenarios per template and road.
+        seed: seed of the batch; the seed of a case follows from it, the template's name and the
+            road.
     """
 
     config: PipelineConfig = PipelineConfig()
@@ -65,7 +79,10 @@ class BatchRequest:
 
 @dataclass(frozen=True)
 class PartTask:
-    """Templates (table, row) to place on a road, and where the three files go: `out`/…/road=`token`/part-`number`."""
+    """Templates (table, row) to place on one road.
+
+    The three files are `out`/…/road=`token`/part-`number`.
+    """
 
     templates: tuple[tuple[Place, int], ...]
     road: str
@@ -84,9 +101,9 @@ class PartTask:
         """The table of cases, which is written last."""
         return self.file("cases")
 
-    def file(self, what: str, ending: str = ".parquet") -> Place:
-        """Return where one of the three goes."""
-        return self.out / what / f"road={self.token}" / f"part-{self.number:05}{ending}"
+    def file(self, folder: str, suffix: str = ".parquet") -> Place:
+        """Return one of the three files."""
+        return self.out / folder / f"road={self.token}" / f"part-{self.number:05}{suffix}"
 
 
 @dataclass(frozen=True)
@@ -110,18 +127,15 @@ class Batch:
     failed: list[str]
 
     def lines(self) -> list[str]:
-        """Return the summary for people."""
+        """Return the summary in words."""
         lines = [
-            f"{self.scenarios} of {self.requested} scenarios of {self.cases} cases (encounter and road)"
+            f"{self.scenarios} of {self.requested} scenarios"
+            f" from {self.cases} cases (encounter and road)"
         ]
-        lines += [
-            f"{count} cases without any: {cause}"
-            for cause, count in Counter(self.failures).most_common()
-        ]
-        lines += [
-            f"{count} candidates refused: {cause}"
-            for cause, count in Counter(self.refused).most_common()
-        ]
+        for cause, count in Counter(self.failures).most_common():
+            lines.append(f"{count} cases without any: {cause}")
+        for cause, count in Counter(self.refused).most_common():
+            lines.append(f"{count} candidates refused: {cause}")
         return lines + self.failed
 
 
@@ -134,32 +148,33 @@ def run_batch(
     templates: int = 0,
     workers: Workers = Workers(),
 ) -> Batch:
-    """Generate scenarios of all templates of a corpus on all roads.
+    """Generate scenarios from all templates of a corpus on all roads.
 
     Args:
-        corpus: that `mine` wrote.
-        roads: names or paths, as `build_road` takes them.
-        out: of the tables and bags; an unfinished batch of the same corpus, roads and parameters is continued.
-        request: what is generated from each template on each road.
-        templates: the first so many of the corpus; 0 takes all.
-        workers: who does it.
+        corpus: written by `mine`.
+        roads: names or paths, as for `build_road`.
+        out: folder of the tables and bags; an unfinished batch with the same corpus, roads and
+            parameters is continued.
+        request: the scenarios to generate from each template on each road.
+        templates: number of templates, the first ones of the corpus; 0 uses all.
+        workers: the processes.
 
     Raises:
-        InputError: the corpus has no encounters, a road is none, or `out` is of something else.
+        InputError: the corpus has no encounters, a road is unknown, or `out` has other content.
     """
     needs("corpus", "duckdb", "pyarrow")
     check_out(out, [corpus])
-    tables = tables_of(corpus)
     rows: list[tuple[Place, int]] = []
     hashes = []
-    for table, here in each_fetched(tables):
-        rows += [(table, k) for k, _ in enumerate(rows_of([here], ["name"]))]
-        hashes.append(sha256_of(here))
+    for table, path in each_fetched(tables_of(corpus)):
+        rows += [(table, k) for k, _ in enumerate(rows_of([path], ["name"]))]
+        hashes.append(sha256_of(path))
     rows = rows[: templates or None]
     if not rows:
         raise InputError(f"{corpus} holds no encounter")
     first = next(encounter_of(row, table) for row, table in _rows(rows[:1]))
-    for road in roads:  # an unknown name ends the batch; it is no cause of single cases
+    # An unknown road ends the batch; a road that does not fit one encounter does not.
+    for road in roads:
         with suppress(RefusedError):
             build_road(road, first, request.config.road)
     document = {
@@ -171,43 +186,45 @@ def run_batch(
         "templates": len(rows),
         "parameters": parameter_texts(request.config),
     }
-    with held(out), spread(workers) as go:
-        agree(out, BATCH, document, "batch")
-        return summary(out, go(generate_part, undone(parts(rows, roads, out, request))))
+    with held(out), spread(workers) as run:
+        agree(out, MANIFEST, document, "batch")
+        return summary(out, run(generate_part, undone(parts(rows, roads, out, request))))
 
 
 def parts(
     rows: Sequence[tuple[Place, int]], roads: Sequence[str], out: Place, request: BatchRequest
 ) -> list[PartTask]:
-    """Return the tasks: ten templates on one road each, whatever the number of workers."""
+    """Return the tasks: ten templates on one road each, for any number of workers."""
     tokens = tokens_of(roads)
-    return [
-        PartTask(tuple(templates), road, token, number, out, request)
-        for number, templates in enumerate(
-            rows[k : k + TEMPLATES] for k in range(0, len(rows), TEMPLATES)
-        )
-        for road, token in zip(roads, tokens, strict=True)
-    ]
+    tasks = []
+    for first in range(0, len(rows), TASK_TEMPLATE_COUNT):
+        templates = tuple(rows[first : first + TASK_TEMPLATE_COUNT])
+        number = first // TASK_TEMPLATE_COUNT
+        for road, token in zip(roads, tokens, strict=True):
+            tasks.append(PartTask(templates, road, token, number, out, request))
+    return tasks
 
 
 def tokens_of(roads: Sequence[str]) -> list[str]:
-    """Return a name for each road that a folder can bear, no two the same."""
+    """Return a unique name for each road that is valid as the name of a folder."""
     stems = ["".join(c if c.isalnum() else "_" for c in Path(road).stem) for road in roads]
     return [stem if stems.count(stem) == 1 else f"{stem}_{k}" for k, stem in enumerate(stems)]
 
 
 def seed_of(seed: int, template: str, road: str) -> int:
-    """Return a case's own seed, below 2^32: of all randomness of one template on one road."""
+    """Return the seed of one template on one road, below 2^32."""
     return int.from_bytes(sha256(f"{seed}\n{template}\n{road}".encode()).digest()[:4], "big")
 
 
 def generate_part(task: PartTask) -> None:
-    """Generate a part's scenarios and write its bag and its two tables.
+    """Generate the scenarios of a part; write its bag and its two tables.
 
     Raises:
-        OSError: the disk is full, or fails.
+        OSError: the disk is full or fails.
     """
-    cases, scenarios, results = [], [], dict[str, GenerationResult]()
+    cases = []
+    scenarios: list[dict[str, Any]] = []
+    results: dict[str, GenerationResult] = {}
     for k, (row, table) in enumerate(_rows(task.templates)):
         case, result = _generate_case(row, table, f"/case_{k}", task)
         cases.append(case)
@@ -222,21 +239,39 @@ def generate_part(task: PartTask) -> None:
 
 
 def _rows(templates: Sequence[tuple[Place, int]]) -> Iterator[tuple[dict[str, Any], Place]]:
-    """Yield the rows (table, number) of encounters, each with its table; a table is opened once for those that follow."""
-    for table, own in groupby(templates, key=lambda template: template[0]):
-        yield from ((row, table) for row in rows_at(table, [number for _, number in own]))
+    """Yield the rows of encounters (table, number) with their tables.
+
+    A table is opened once for consecutive rows.
+    """
+    for table, group in groupby(templates, key=lambda template: template[0]):
+        for row in rows_at(table, [number for _, number in group]):
+            yield row, table
 
 
 def _generate_case(
     row: Mapping[str, Any], table: Place, namespace: str, task: PartTask
 ) -> tuple[dict[str, Any], GenerationResult | None]:
-    """Generate one template's scenarios; a refusal is a case without any, with the reason."""
-    request, seed = task.request, seed_of(task.request.seed, row["name"], task.road)
+    """Generate the scenarios of one template; return the case's row and the result.
+
+    A refused template has no result, and the reason is in its row.
+    """
+    request = task.request
+    seed = seed_of(request.seed, row["name"], task.road)
     case = {
-        "template": row["name"], "kind": row["kind"], "vehicles": row["count"], "namespace": namespace, "seed": seed,
-        "wanted": request.count, "published": 0, "candidates": 0, "refused": "{}", "cause": "", "why": "", "part": task.number,
+        "template": row["name"],
+        "kind": row["kind"],
+        "vehicles": row["count"],
+        "namespace": namespace,
+        "seed": seed,
+        "wanted": request.count,
+        "published": 0,
+        "candidates": 0,
+        "refused": "{}",
+        "cause": "",
+        "why": "",
+        "part": task.number,
         "changepoints": 0,
-    }  # fmt: skip
+    }
     try:
         encounter = encounter_of(row, table)
         road, encounter = road_and_template(task.road, encounter, request.config.road)
@@ -250,9 +285,7 @@ def _generate_case(
             seed=seed,
         ).run()
     except (RefusedError, InputError) as error:
-        message = LOST_CONFLICT if isinstance(error, LostEncounterError) else str(error)
-        cause = message if isinstance(error, RefusedError) else "input"
-        return case | {"cause": _cause(cause), "why": str(error)}, None
+        return case | {"cause": _cause(error), "why": str(error)}, None
     generated = result.generated
     facts = {
         "template": row["name"],
@@ -260,17 +293,15 @@ def _generate_case(
         "seed": str(seed),
         "count": str(request.count),
     }
-    provenance = facts | versions() | parameter_texts(request.config)
-    finished = case | {
+    refused = {str(cause): number for cause, number in sorted(generated.refused.items()) if number}
+    case |= {
         "published": len(generated.scenarios),
         "candidates": generated.candidates,
-        "refused": json.dumps(
-            {str(cause): number for cause, number in sorted(generated.refused.items()) if number}
-        ),
+        "refused": json.dumps(refused),
         "changepoints": len(segmentation.changepoints),
         "cause": "" if len(generated.scenarios) else "no valid candidate",
     }
-    return finished, GenerationResult(
+    return case, GenerationResult(
         encounter,
         segmentation,
         road,
@@ -278,61 +309,64 @@ def _generate_case(
         result.routes,
         generated,
         seed,
-        provenance=provenance,
+        provenance=facts | versions() | parameter_texts(request.config),
     )
 
 
-def _cause(text: str) -> str:
-    """A reason without the numbers and names that make each its own, and without what explains it."""
+def _cause(error: RefusedError | InputError) -> str:
+    """Return the cause under which an error is counted: its message without numbers and details.
+
+    Words with digits differ from case to case, and the text after a colon explains the error.
+    """
+    if isinstance(error, LostEncounterError):
+        return LOST_CONFLICT
+    if isinstance(error, InputError):
+        return "input"
     words = [
-        word if not any(c.isdigit() for c in word) else "…"
-        for word in re.split(r"[:;(]", text)[0].split()
+        "…" if any(c.isdigit() for c in word) else word
+        for word in re.split(r"[:;(]", str(error))[0].split()
     ]
-    return shorten(" ".join(words), LONGEST_CAUSE, placeholder=" …")
+    return shorten(" ".join(words), MAX_CAUSE_CHARACTERS, placeholder=" …")
 
 
 def _scenario_rows(
     case: Mapping[str, Any], result: GenerationResult, task: PartTask
 ) -> list[dict[str, Any]]:
-    """A row for each scenario of a case."""
+    """Return a row for each scenario of a case."""
+    config = task.request.config.evaluation
     rows = []
     for scenario in result.generated.scenarios:
-        motion = scenario.resampled(task.request.config.evaluation.period)
-        measures = criticality(motion, task.request.config.evaluation.ttc_horizon)
-        rows.append({
-            "template": case["template"], "kind": case["kind"], "vehicles": case["vehicles"], "namespace": case["namespace"],
-            "part": task.number, "index": scenario.index, "seed": scenario.seed,
-            "sha256": scenario_bytes(scenario, result.encounter)[1], "seconds": float(scenario.time[-1]),
-            "distance": measures.min_distance, "ttc": measures.min_ttc, "pet": measures.pet,
-            "speed": float(scenario.speed.max()), "braking": float(-scenario.acceleration.min()),
-            "type": most_exposed(scenario.vehicles), "types": [vehicle.type for vehicle in scenario.vehicles],
-        })  # fmt: skip
+        measures = criticality(scenario.resampled(config.period), config.ttc_horizon)
+        row = {
+            "template": case["template"],
+            "kind": case["kind"],
+            "vehicles": case["vehicles"],
+            "namespace": case["namespace"],
+            "part": task.number,
+            "index": scenario.index,
+            "seed": scenario.seed,
+            "sha256": scenario_bytes(scenario, result.encounter)[1],
+            "seconds": float(scenario.time[-1]),
+            "distance": measures.min_distance,
+            "ttc": measures.min_ttc,
+            "pet": measures.pet,
+            "speed": float(scenario.speed.max()),
+            "braking": float(-scenario.acceleration.min()),
+            "type": most_exposed(scenario.vehicles),
+            "types": [vehicle.type for vehicle in scenario.vehicles],
+        }
+        rows.append(row)
     return rows
 
 
-SCENARIO_COLUMNS = {
-    **dict.fromkeys(("template", "kind", "namespace", "sha256", "type"), "string"),
-    "types": "string[]",
-    **dict.fromkeys(("vehicles", "part", "index", "seed"), "int64"),
-    **dict.fromkeys(("seconds", "distance", "ttc", "pet", "speed", "braking"), "double"),
-}
-CASE_COLUMNS = {
-    **dict.fromkeys(("template", "kind", "namespace", "refused", "cause", "why"), "string"),
-    **dict.fromkeys(
-        ("vehicles", "seed", "wanted", "published", "candidates", "part", "changepoints"), "int64"
-    ),
-}
-
-
 def summary(out: Place, failed: list[str]) -> Batch:
-    """Return the figures of the parts that are done."""
+    """Return the figures of the finished parts."""
     tables: list[Place] = sorted((out / "cases").rglob("*.parquet"), key=str)
     cases = list(rows_of(tables))
     refused: Counter[str] = Counter()
     for case in cases:
         refused.update(json.loads(case["refused"]))
-    scenarios, requested = (
-        sum(int(case[name]) for case in cases) for name in ("published", "wanted")
-    )
+    scenarios = sum(int(case["published"]) for case in cases)
+    requested = sum(int(case["wanted"]) for case in cases)
     failures = Counter(case["cause"] for case in cases if not case["published"])
     return Batch(len(cases), scenarios, requested, dict(failures), dict(refused), failed)

@@ -21,8 +21,8 @@ from scenario_gen.base.documents import parse_json, shown
 from scenario_gen.base.errors import guarded, InputError
 from scenario_gen.base.stores import fetched, Place
 from scenario_gen.corpus.config import CorpusConfig
-from scenario_gen.corpus.grouping import Found, label, part_of, read_found
-from scenario_gen.corpus.messages import DEGREE
+from scenario_gen.corpus.grouping import FoundEncounter, label, part_of, read_found
+from scenario_gen.corpus.messages import UNITS_PER_DEGREE
 from scenario_gen.corpus.tables import write_table
 from scenario_gen.logs import (
     encounters_of,
@@ -101,22 +101,22 @@ def clean_found(task: CleanTask) -> None:
     parts = [part_of(task.corpus, number) for number, _, _ in task.found]
     hours = [task.corpus / "hours" / f"hour-{hour}.rows.parquet" for hour in task.hours]
     with fetched([*parts, *hours]) as paths:
-        listed: list[Found] = []
+        listed: list[FoundEncounter] = []
         for path, (_, first, last) in zip(paths, task.found, strict=False):
             listed += read_found(path, first, last)
-        begin = min(found.start for found in listed) - SMOOTHING_MARGIN_US
-        end = max(found.end for found in listed) + SMOOTHING_MARGIN_US
-        devices = sorted({device for found in listed for device in found.devices})
+        begin = min(entry.start for entry in listed) - SMOOTHING_MARGIN_US
+        end = max(entry.end for entry in listed) + SMOOTHING_MARGIN_US
+        devices = sorted({device for entry in listed for device in entry.devices})
         filters = [("t", ">=", begin), ("t", "<=", end), ("device", "in", devices)]
         tables = [parquet.read_table(path, filters=filters) for path in paths[len(parts) :]]
         by_device = _by_device([table.to_pandas() for table in tables])
     rows: list[dict[str, Any]] = []
     refused = []
-    for found in listed:
+    for entry in listed:
         try:
-            encounters = encounters_of(_raw_log(found, by_device), task.config.log).encounters
+            encounters = encounters_of(_raw_log(entry, by_device), task.config.log).encounters
         except InputError as error:
-            refused.append({"name": found.name, "why": str(error)})
+            refused.append({"name": entry.name, "why": str(error)})
             continue
         rows += [row_of(encounter, "messages", task.config) for encounter in encounters]
     write_encounters(task.target, rows, {"refused": refused, "quality": []})
@@ -131,11 +131,11 @@ def _by_device(tables: Sequence[Any]) -> dict[int, Any]:
     return dict(tuple(messages.groupby("device")))
 
 
-def _raw_log(found: Found, by_device: Mapping[int, Any]) -> RawLog:
+def _raw_log(entry: FoundEncounter, by_device: Mapping[int, Any]) -> RawLog:
     """Return the messages of an encounter as a log."""
     vehicles, count = [], 0
-    begin, end = found.start - SMOOTHING_MARGIN_US, found.end + SMOOTHING_MARGIN_US
-    for device in found.devices:
+    begin, end = entry.start - SMOOTHING_MARGIN_US, entry.end + SMOOTHING_MARGIN_US
+    for device in entry.devices:
         messages = by_device[device]
         messages = messages[(messages["t"] >= begin) & (messages["t"] <= end)]
         stamps = messages["t"].to_numpy(np.int64) * 1000 + SPMD_EPOCH_NS
@@ -144,7 +144,7 @@ def _raw_log(found: Found, by_device: Mapping[int, Any]) -> RawLog:
             Observations(
                 label(device),
                 stamps,
-                messages[["lat", "lon"]].to_numpy() / DEGREE,
+                messages[["lat", "lon"]].to_numpy() / UNITS_PER_DEGREE,
                 numbers,
                 np.pi / 2.0 - messages["heading"].to_numpy(np.float64) * (np.pi / 180.0),
                 stamps,
@@ -153,8 +153,8 @@ def _raw_log(found: Found, by_device: Mapping[int, Any]) -> RawLog:
             )
         )
         count += len(messages)
-    segment = Segment(0, found.name, "message", 1)
-    return RawLog(found.name, True, tuple(vehicles), count, (segment,))
+    segment = Segment(0, entry.name, "message", 1)
+    return RawLog(entry.name, True, tuple(vehicles), count, (segment,))
 
 
 def read_one_log(task: LogTask) -> None:
@@ -237,16 +237,19 @@ def tables_of(corpus: Place) -> list[Place]:
     Raises:
         InputError: there is none.
     """
-    found: list[Place] = sorted((corpus / "encounters").glob("*.parquet"), key=str)
-    if not found:
+    tables: list[Place] = sorted((corpus / "encounters").glob("*.parquet"), key=str)
+    if not tables:
         raise InputError(
-            f"{corpus} holds no encounters/*.parquet; write it with `scenario-gen mine ARCHIVE --out {corpus}`"
+            f"{corpus} holds no encounters/*.parquet;"
+            f" write it with `scenario-gen mine ARCHIVE --out {corpus}`"
         )
-    return found
+    return tables
 
 
 def account_of(table: Path, name: Place) -> dict[str, Any]:
-    """Return what a table says of the encounters that are not in it, and of its log's quality; `name` is for messages.
+    """Return a table's account: the refused encounters and the quality of its log.
+
+    `name` names the table in messages.
 
     Raises:
         InputError: the table is damaged.

@@ -1,10 +1,10 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Who is joined to whom: meetings of two vehicles -> encounters of two to twelve, by the rule of every log (`logs.growing`).
+"""Meetings of two vehicles -> encounters of two to twelve, with the rule for logs (`logs.Growth`).
 
-Only meetings that overlap in time influence each other. An instant that no meeting spans therefore divides the archive, and each
-task groups the meetings between two such instants.
+Only meetings that overlap in time influence each other. An instant without a meeting therefore
+divides the archive, and each task groups the meetings between two of these instants.
 """
 
 from collections.abc import Sequence
@@ -18,11 +18,13 @@ from scenario_gen.base.stores import fetched, Place
 from scenario_gen.corpus.config import CorpusConfig
 from scenario_gen.corpus.tables import write_table
 from scenario_gen.logs import Growth, LogConfig
-from scenario_gen.logs import Meeting as Met
+from scenario_gen.logs import Meeting as LogMeeting
 from scenario_gen.numerics import Ints
 
-START = datetime(2004, 1, 1, tzinfo=UTC)
-PARTITION = 5000  # meetings that one task groups, at least
+EPOCH = datetime(2004, 1, 1, tzinfo=UTC)
+PARTITION_ROWS = 5000  # least number of meetings in a partition
+SHARED_ID_STEP_COUNT = 1 << 40  # added to a shared id for each further vehicle
+MEETING_COLUMNS = ("gap", "start", "a", "b", "end", "distance", "lat", "lon")
 COLUMNS = {
     "name": "string",
     "devices": "int64[]",
@@ -32,8 +34,8 @@ COLUMNS = {
 
 
 @dataclass(frozen=True, order=True)
-class Meeting(Met):
-    """Two vehicles near each other, times in µs since 2004, with what the table says of them."""
+class Meeting(LogMeeting):
+    """Two vehicles near each other, as in the table; times in µs since 2004."""
 
     distance: float
     lat: float
@@ -41,10 +43,14 @@ class Meeting(Met):
 
 
 @dataclass(frozen=True)
-class Found:
-    """An encounter in the table: its vehicles, its time [µs since 2004], and the meetings it is made of, strongest first.
+class FoundEncounter:
+    """An encounter of messages.
 
-    What is read from a table has no meetings.
+    Attributes:
+        devices: its vehicles.
+        start: µs since 2004.
+        end: µs since 2004.
+        meetings: its meetings, the closest first; none if it was read from a table.
     """
 
     devices: tuple[int, ...]
@@ -54,14 +60,18 @@ class Found:
 
     @property
     def name(self) -> str:
-        """A name that no other encounter of the archive has: when, and who."""
-        when = START + timedelta(microseconds=self.start)
-        return f"{when:%Y%m%dT%H%M%S}{when.microsecond // 100_000}_{'_'.join(label(device) for device in self.devices[:3])}"
+        """A unique name: the time, and the first three vehicles."""
+        time = EPOCH + timedelta(microseconds=self.start)
+        vehicles = "_".join(label(device) for device in self.devices[:3])
+        return f"{time:%Y%m%dT%H%M%S}{time.microsecond // 100_000}_{vehicles}"
 
 
 @dataclass(frozen=True)
 class GroupTask:
-    """A partition: the meetings from `begin` to before `end` [µs since 2004], which lie in the tables of `hours`."""
+    """A partition: the meetings from `begin` to before `end` [µs since 2004].
+
+    The meetings are in the tables of `hours`.
+    """
 
     name: str
     corpus: Place
@@ -83,71 +93,80 @@ def part_of(corpus: Place, number: int) -> Place:
 
 
 def partitions(start: Ints, end: Ints, least: int = 0) -> list[tuple[int, int]]:
-    """Return spans of time, in order, that no meeting crosses: (begin, end) [µs since 2004], the end excluded.
+    """Return spans of time (begin, end) [µs since 2004] such that each meeting is in one span.
+
+    The end is excluded.
 
     Args:
         start: (M,) of the meetings, in any order.
-        end: (M,)
-        least: meetings in each span but the last; 0: `PARTITION`.
+        end: (M,) of the meetings.
+        least: meetings in each span but the last; 0: `PARTITION_ROWS`.
     """
     if not len(start):
         return []
     order = np.argsort(start, kind="stable")
     start, until = start[order], np.maximum.accumulate(end[order])
-    free = np.flatnonzero(start[1:] >= until[:-1]) + 1
+    cuts = np.flatnonzero(start[1:] >= until[:-1]) + 1
     first = [0]
-    while (k := int(np.searchsorted(free, first[-1] + (least or PARTITION)))) < len(free):
-        first.append(int(free[k]))
+    while (k := int(np.searchsorted(cuts, first[-1] + (least or PARTITION_ROWS)))) < len(cuts):
+        first.append(int(cuts[k]))
     begins = start[first].tolist()
     return list(zip(begins, [*begins[1:], int(until[-1]) + 1], strict=True))
 
 
 def label(device: int) -> str:
-    """Return a vehicle's name: of one whose id others bear too, with the number that tells it from them."""
-    return str(device) if device < 1 << 40 else f"{device & ((1 << 40) - 1)}x{device >> 40}"
+    """Return the name of a vehicle; vehicles that share an id are numbered."""
+    number, shared_id = divmod(device, SHARED_ID_STEP_COUNT)
+    return f"{shared_id}x{number}" if number else str(device)
 
 
-def group(meetings: Sequence[Meeting], config: LogConfig) -> list[Found]:
-    """Return the encounters, in order of time."""
+def group(meetings: Sequence[Meeting], config: LogConfig) -> list[FoundEncounter]:
+    """Return the encounters, sorted by time."""
     growth = Growth[Meeting](
         round(config.min_duration * 1e6), round(config.min_presence * 1e6), config.max_vehicles
     )
-    found = [
-        Found(tuple(sorted(one.spans)), one.start, one.end, one.meetings)
-        for one in growth.groups(meetings)
+    encounters = [
+        FoundEncounter(tuple(sorted(entry.spans)), entry.start, entry.end, entry.meetings)
+        for entry in growth.groups(meetings)
     ]
-    return sorted(found, key=lambda one: (one.start, one.devices))
+    return sorted(encounters, key=lambda encounter: (encounter.start, encounter.devices))
 
 
 def group_partition(task: GroupTask) -> None:
-    """Write the table of a partition's encounters, in order of time; `earliest` is the start of the first of its meetings."""
+    """Write the table of a partition's encounters, sorted by time.
+
+    The column `earliest` is the start of the first meeting of an encounter.
+    """
     from pyarrow import parquet
 
-    names = ("gap", "start", "a", "b", "end", "distance", "lat", "lon")
-    inside = [("start", ">=", task.begin), ("start", "<", task.end)]
-    with fetched([task.corpus / "hours" / f"hour-{hour}.parquet" for hour in task.hours]) as here:
-        tables = [
-            parquet.read_table(path, columns=list(names), filters=inside).to_pylist()
-            for path in here
-        ]
-    rows = [
-        {
-            "name": one.name, "devices": list(one.devices), "start": one.start, "end": one.end,
-            "gap": one.meetings[0].gap, "distance": min(meeting.distance for meeting in one.meetings),
-            "lat": one.meetings[0].lat, "lon": one.meetings[0].lon, "earliest": min(meeting.start for meeting in one.meetings),
+    filters = [("start", ">=", task.begin), ("start", "<", task.end)]
+    meetings = []
+    with fetched([task.corpus / "hours" / f"hour-{hour}.parquet" for hour in task.hours]) as paths:
+        for path in paths:
+            table = parquet.read_table(path, columns=list(MEETING_COLUMNS), filters=filters)
+            meetings += [Meeting(**row) for row in table.to_pylist()]
+    rows = []
+    for encounter in group(meetings, task.config.log):
+        closest = encounter.meetings[0]
+        row = {
+            "name": encounter.name,
+            "devices": list(encounter.devices),
+            "start": encounter.start,
+            "end": encounter.end,
+            "gap": closest.gap,
+            "distance": min(meeting.distance for meeting in encounter.meetings),
+            "lat": closest.lat,
+            "lon": closest.lon,
+            "earliest": min(meeting.start for meeting in encounter.meetings),
         }
-        for one in group([Meeting(*(row[name] for name in names)) for table in tables for row in table], task.config.log)
-    ]  # fmt: skip
+        rows.append(row)
     write_table(task.target, rows, COLUMNS)
 
 
-def read_found(table: Path, first: int, last: int) -> list[Found]:
-    """Return the encounters in rows `first` to before `last` of a table, without their meetings."""
+def read_found(table: Path, first: int, last: int) -> list[FoundEncounter]:
+    """Return the encounters in rows `first` to before `last` of a table, without meetings."""
     from pyarrow import parquet
 
-    rows = (
-        parquet.read_table(table, columns=["devices", "start", "end"])
-        .slice(first, last - first)
-        .to_pylist()
-    )
-    return [Found(tuple(row["devices"]), row["start"], row["end"]) for row in rows]
+    columns = parquet.read_table(table, columns=["devices", "start", "end"])
+    rows = columns.slice(first, last - first).to_pylist()
+    return [FoundEncounter(tuple(row["devices"]), row["start"], row["end"]) for row in rows]

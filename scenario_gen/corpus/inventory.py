@@ -11,13 +11,13 @@ from typing import Generic, NamedTuple, TypeVar
 from scenario_gen.base.errors import InputError
 from scenario_gen.base.folders import scratch
 from scenario_gen.base.stores import (
-    below,
     download,
     naming_objects,
     Part,
     Place,
+    relative_name,
     Remote,
-    temporary,
+    temp_folder,
 )
 from scenario_gen.logs import is_bag, is_log, is_spmd, is_table, LOG_FORMATS
 
@@ -64,14 +64,15 @@ def inventory(archives: Sequence[Place]) -> Inventory[Place]:
 
 def _inventory_of_store(archive: Remote) -> Inventory[Place]:
     """Return the contents of a store, from copies of the beginnings of its objects."""
-    single = archive.looked_up()
+    single = archive.with_size()
     objects = [single] if single.size >= 0 else list(archive.rglob("*"))
     if not objects:
         raise InputError(f"{archive} does not exist, or is empty")
-    with scratch(temporary()) as folder:
+    with scratch(temp_folder()) as folder:
         root = folder / archive.name
         places: dict[Path, Place] = {
-            root if item is single else root / below(item, archive): item for item in objects
+            root if item is single else root / relative_name(item, archive): item
+            for item in objects
         }
         parts = [
             Part(item, 0, min(item.size, HEAD_BYTES), path)
@@ -79,11 +80,7 @@ def _inventory_of_store(archive: Remote) -> Inventory[Place]:
         ]
         download(parts)
         for path in list(places):
-            for parent in path.parents:
-                if parent.is_relative_to(root):
-                    places[parent] = archive
-                    if parent != root:
-                        places[parent] = archive / parent.relative_to(root).as_posix()
+            places |= _folder_places(path, root, archive)
         with naming_objects({str(root): archive.url}):
             files = _inventory_of_folder(root)
         return Inventory(
@@ -91,6 +88,17 @@ def _inventory_of_store(archive: Remote) -> Inventory[Place]:
             [[places[path] for path in log] for log in files.logs],
             [places[path] for path in files.others],
         )
+
+
+def _folder_places(path: Path, root: Path, archive: Remote) -> dict[Path, Place]:
+    """Return the folders with a file, up to the root, with their places in the store."""
+    places: dict[Path, Place] = {}
+    for folder in path.parents:
+        if folder == root:
+            places[folder] = archive
+        elif folder.is_relative_to(root):
+            places[folder] = archive / folder.relative_to(root).as_posix()
+    return places
 
 
 def _inventory_of_folder(archive: Path) -> Inventory[Path]:

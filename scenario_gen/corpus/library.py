@@ -66,9 +66,9 @@ KINDS_COUNT = 4  # kinds that the page names
 SUCCESSORS_COUNT = 3
 VERBS = {FOLLOW: "follows", YIELD: "yields"}
 SHARED = replace(DEFAULT, sampler=replace(DEFAULT.sampler, weight=0.1))
-"""Accelerations are means over 1 s, so ten samples of 0.1 s contain as much as one. With a weight of
-0.5, at which the changepoints of one encounter are best, states multiply with the hours: 118 for 181
-recorded pairs, and two seeds differ."""
+"""Accelerations are means over 1 s, so ten samples of 0.1 s contain as much as one. With a
+weight of 0.5, at which the changepoints of one encounter are best, the number of states grows with
+the recorded time: 118 states for 181 recorded pairs, and two seeds differ."""
 
 
 @dataclass(frozen=True)
@@ -374,7 +374,13 @@ def _samples_in(segments: Sequence[_Segment]) -> int:
 def _lines_of(
     segments: Sequence[_Segment], total: int, following: Sequence[tuple[int, int]]
 ) -> list[str]:
-    """Return the lines about a primitive; `total` are samples of all, `following` counts and successors."""
+    """Return the lines about a primitive.
+
+    Args:
+        segments: of the primitive.
+        total: samples of all primitives.
+        following: (count, successor).
+    """
     dt = segments[0].pair.dt
     count, samples = len(segments), _samples_in(segments)
     kinds = Counter(segment.kind for segment in segments).most_common(KINDS_COUNT)

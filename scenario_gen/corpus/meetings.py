@@ -3,11 +3,11 @@
 
 """From an hour of messages to meetings of two vehicles.
 
-Vehicles are not sampled at the same instants, so nothing is joined by exact time. All messages of a
-vehicle within half a second give one row, moved to the middle of it with speed and heading. Rows of
-the same half second are joined in cells as wide as the proximity and the distance driven meanwhile:
-each looks into its own cell and into half of its neighbours. The database only proposes candidates;
-the decision is computed from the messages, every 0.1 s.
+Vehicles are not sampled at the same instants, so nothing is joined by exact time. All messages
+of a vehicle within a bin (half a second) give one row, moved to the middle of the bin with speed
+and heading. The rows of a bin are joined in cells as wide as the proximity plus the distance
+driven within a bin: each row is compared with its cell and with half of the neighbouring cells.
+The database only proposes candidates; the decision is computed from the messages, every 0.1 s.
 """
 
 from collections.abc import Mapping, Sequence
@@ -20,12 +20,13 @@ import numpy as np
 
 from scenario_gen.base.stores import fetched, Place, workplace
 from scenario_gen.corpus.config import CorpusConfig
+from scenario_gen.corpus.grouping import SHARED_ID_STEP_COUNT
 from scenario_gen.corpus.messages import (
     database,
-    DEGREE,
     GROUP_ROWS,
     HOUR_US,
     quoted,
+    UNITS_PER_DEGREE,
     write_messages,
 )
 from scenario_gen.corpus.tasks import arriving
@@ -54,7 +55,6 @@ CELLS_PER_ROW_COUNT = 1 << 24  # at most, around the globe
 MIN_SPREAD_COUNT = 3  # bins with too large a spread, from which on an id may be shared
 MIN_COMMON_COUNT = 10  # bins in which several vehicles send; fewer are fixes that jump
 SENDERS_RATIO = 1.4  # of the messages of one vehicle in a bin, from which on two are sending
-SHARED_ID_STEP_COUNT = 1 << 40  # added to a shared id for each further vehicle
 EXCERPT_MARGIN_US = 3_000_000  # messages that are kept before and after a meeting
 MAX_GAP_COUNT = 4  # bins without candidates, between which a meeting is one
 
@@ -121,22 +121,23 @@ def _search(
     names = quoted([str(path) for path in files])
     base.execute(f"""
         CREATE TEMP TABLE messages AS
-        SELECT device, t, lat / {DEGREE} AS lat, lon / {DEGREE} AS lon, speed, heading
+        SELECT device, t, lat / {UNITS_PER_DEGREE} AS lat, lon / {UNITS_PER_DEGREE} AS lon,
+               speed, heading
         FROM read_parquet([{names}])
         WHERE t >= {begin} AND t < {end} AND cause = 0""")
     shared = _fill_bins(base)
     pairs = _candidates(base, config)
     rows = _messages(base, "separated" if shared else "messages")
-    found = _meetings_in_hour(pairs, tracks_of(rows), hour, config)
+    in_hour = _meetings_in_hour(pairs, tracks_of(rows), hour, config)
     schema = [
         *((name, pa.int64()) for name in ("a", "b", "start", "end")),
         *((name, pa.float64()) for name in ("gap", "distance", "travel", "lat", "lon")),
     ]
-    table = pa.Table.from_pylist(found, schema=pa.schema(schema))
-    wanted = _excerpt(rows, found)
+    table = pa.Table.from_pylist(in_hour, schema=pa.schema(schema))
+    wanted = _excerpt(rows, in_hour)
     excerpt = {name: values[wanted] for name, values in rows.items()}
     for name in ("lat", "lon"):  # exactly the recorded numbers
-        excerpt[name] = np.rint(excerpt[name] * DEGREE).astype(np.int32)
+        excerpt[name] = np.rint(excerpt[name] * UNITS_PER_DEGREE).astype(np.int32)
     with arriving(target.with_suffix(".rows.parquet")) as part:
         write_messages(pa.table(excerpt).to_reader(GROUP_ROWS), part)
     with arriving(target) as part:
@@ -149,14 +150,14 @@ def _meetings_in_hour(
 ) -> list[dict[str, Any]]:
     """Return the meetings of candidate pairs that begin in an hour, in order of time."""
     columns = (pairs[name].tolist() for name in ("a", "b", "first", "last"))
-    found = []
+    candidates = []
     for a, b, first, last in zip(*columns, strict=True):
         if a in tracks and b in tracks:
             span = ((first - 2) * BIN_US, (last + 3) * BIN_US)
-            found += meetings(tracks[a], tracks[b], span, config)
+            candidates += meetings(tracks[a], tracks[b], span, config)
     begin, end = hour * HOUR_US, (hour + 1) * HOUR_US
-    found = [meeting for meeting in found if begin <= meeting["start"] < end]
-    return sorted(found, key=lambda meeting: (meeting["start"], meeting["a"], meeting["b"]))
+    in_hour = [meeting for meeting in candidates if begin <= meeting["start"] < end]
+    return sorted(in_hour, key=lambda meeting: (meeting["start"], meeting["a"], meeting["b"]))
 
 
 def _messages(base: Any, source: str) -> Columns:
@@ -187,11 +188,11 @@ def in_order(rows: Columns) -> Ints:
     return order
 
 
-def _excerpt(rows: Columns, found: Sequence[Mapping[str, Any]]) -> Bools:
+def _excerpt(rows: Columns, meetings_in_hour: Sequence[Mapping[str, Any]]) -> Bools:
     """(M,) which messages belong to a meeting, from 3 s before to 3 s after it."""
     wanted = np.zeros(len(rows["t"]), dtype=bool)
     spans = {int(rows["device"][first]): (first, last) for first, last in runs_of(rows["device"])}
-    for meeting in found:
+    for meeting in meetings_in_hour:
         window = [meeting["start"] - EXCERPT_MARGIN_US, meeting["end"] + EXCERPT_MARGIN_US + 1]
         for device in (meeting["a"], meeting["b"]):
             first, last = spans[device]
@@ -212,7 +213,7 @@ def _means_of(source: str) -> str:
 
 
 def _fill_bins(base: Any) -> dict[str, int]:
-    """Create the tables `binned` and `cells`; return the shared ids and how many vehicles share them."""
+    """Create the tables `binned` and `cells`; return {shared id: number of its vehicles}."""
     base.execute(f"CREATE TEMP TABLE means AS {_means_of('messages')}")
     ids = base.execute(f"""
         SELECT device FROM means WHERE spread > {SPREAD_DEG}
@@ -242,7 +243,7 @@ def _fill_bins(base: Any) -> dict[str, int]:
 
 
 def _separate_shared(base: Any, ids: Ints) -> dict[str, int]:
-    """Give vehicles that share an id different ones; return the ids with their numbers of vehicles."""
+    """Give vehicles that share an id different ids; return {id: number of its vehicles}."""
     import pyarrow as pa
 
     listed = f"({', '.join(map(str, ids.tolist()))})"
@@ -271,7 +272,7 @@ def _separate_shared(base: Any, ids: Ints) -> dict[str, int]:
 
 
 def _common_bins(t: Ints, sender: Ints) -> int:
-    """Return in how many bins several vehicles with one id send more messages than one vehicle does.
+    """Return the number of bins in which an id sends more messages than one vehicle does.
 
     Fixes of one vehicle that jump do not add messages. `t` (M,) is in µs, `sender` (M,) a number.
     """
@@ -365,7 +366,7 @@ _SENT = named(_Sent, I1, F1, F1)
 
 @kernel(_SENT, _SENT, F, I, I, I)
 def _least_square(a: _Sent, b: _Sent, degree: float, first: int, last: int, steps: int) -> float:
-    """Least square distance [m²] of a, in bins from first to last, to b, at most `steps` bins away.
+    """Least square distance [m²] of a, from bin first to last, to b, at most `steps` bins away.
 
     `degree` is the length of a degree of longitude [m].
     """

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Several encounters on several roads at once, in the library; `scenario-gen batch` does the same for archives."""
+"""Scenarios from several encounters on several roads; for archives see `scenario-gen batch`."""
 
 from collections.abc import Iterable
 import os
@@ -23,22 +23,28 @@ def generate_many(
     seed: int = 0,
     workers: int = 0,
 ) -> list[Answer]:
-    """Generate each case in a process of its own; the number of workers does not change the results.
+    """Generate the scenarios of several cases in parallel processes.
 
-    Call it below `if __name__ == "__main__":` in a script, for its workers import that script.
+    The number of workers does not change the results. In a script, call this function below
+    `if __name__ == "__main__":`, since the workers import the script.
 
     Args:
-        cases: (encounter, road) as `generate` takes them, e.g. `itertools.product(log.encounters, ["straight", "curve"])`.
+        cases: pairs (encounter, road) of arguments for `generate`,
+            e.g. `itertools.product(log.encounters, ["straight", "curve"])`.
         config: the parameters of every stage.
-        count: valid scenarios wanted of each case.
-        seed: of all randomness.
-        workers: processes; 0: as many as there are cores.
+        count: number of valid scenarios for each case.
+        seed: seed of every case.
+        workers: number of processes; 0 starts one per core.
 
     Returns:
-        For each case in order its result, or the error that refused it.
+        For each case, in order, its result or the error that refused it.
 
     Raises:
-        InputError: a road or a parameter cannot be used.
+        InputError: a road or a parameter is invalid.
+
+    Example:
+        >>> answers = generate_many([(encounter, "straight"), (encounter, "curve")], count=20)
+        >>> results = [answer for answer in answers if not isinstance(answer, RefusedError)]
     """
     from concurrent.futures import ProcessPoolExecutor
     from multiprocessing import get_context

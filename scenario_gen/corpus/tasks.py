@@ -1,10 +1,11 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Tasks: pure functions that each write one file, mapped over processes; what is done is what is there.
+"""Tasks: pure functions that write one file each, distributed over processes.
 
-A task writes to a temporary name, syncs and renames, so a file that is there is whole, whoever was killed. Dask does the
-distribution, nothing else: it holds no state that a killed run would lose.
+A task writes to a temporary name, syncs and renames. A file that exists is therefore complete,
+even if a run was killed, and the existing files are the only record of progress. Dask only
+distributes the tasks; it holds no state that a killed run would lose.
 """
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -18,7 +19,6 @@ import multiprocessing
 import os
 from pathlib import Path
 import shutil
-import tempfile
 import traceback
 from typing import Any, Protocol, TypeVar
 from uuid import uuid4
@@ -28,12 +28,11 @@ from scenario_gen.base.errors import describe, InputError, needs, of_system, Sce
 from scenario_gen.base.folders import naming, scratch, sync, sync_tree, write_text
 from scenario_gen.base.folders.scratch import claimed, PREFIX, sweep_tree
 from scenario_gen.base.signals import cleaned_up, ctrl_c_blocked
-from scenario_gen.base.stores import create, fetched, Place, Remote, upload
-from scenario_gen.base.stores import temporary as scratch_folder
+from scenario_gen.base.stores import create, fetched, Place, Remote, temp_folder, upload
 
 
 class _Task(Protocol):
-    """What writes one file."""
+    """A task that writes one file."""
 
     @property
     def target(self) -> Place:
@@ -43,66 +42,71 @@ class _Task(Protocol):
 Task = TypeVar("Task")
 Target = TypeVar("Target", bound=_Task)
 Progress = Callable[[int, int], None]
-"""Called with how many tasks are done, of how many."""
-WORKERS = {  # their environment: one thread each; Dask's own has them return every freed array to the system, a fifth of all CPU
-    **dict.fromkeys(("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS"), "1"),
+"""Called with the number of finished tasks and the number of all tasks."""
+
+# Environment of a worker: one thread, and the allocator's default thresholds. With Dask's own
+# environment, a worker returns every freed array to the system, which costs a fifth of all CPU.
+WORKER_ENVIRONMENT = {
+    "OMP_NUM_THREADS": "1",
+    "MKL_NUM_THREADS": "1",
+    "OPENBLAS_NUM_THREADS": "1",
     "DASK_LOGGING__DISTRIBUTED": "critical",
 }
 
 
 @contextmanager
 def arriving(target: Place) -> Iterator[Path]:
-    """Give a temporary path beside `target`; at the end what was written there, file or folder, takes its name, synced.
+    """Give a temporary path; at the end its file or folder is synced and renamed to `target`.
 
-    To a store it is copied: each object is whole or not there.
+    The temporary path is in the folder of `target`. For a store it is in TMPDIR, and copied at the
+    end; an object is never partly written.
 
     Raises:
-        OSError: the disk is full, or fails; it names the file.
-        InputError: the store refuses it or goes on failing.
+        OSError: the disk is full or fails; the message names the file.
+        InputError: the store refuses an object or keeps failing.
     """
     if isinstance(target, Remote):
-        with scratch(scratch_folder()) as place:
-            yield place / target.name
-            upload(place / target.name, target)
+        with scratch(temp_folder()) as folder:
+            yield folder / target.name
+            upload(folder / target.name, target)
         return
     target.parent.mkdir(parents=True, exist_ok=True)
-    with scratch(target.parent) as place:
-        temporary = place / target.name  # for a bag's files are called as its folder is
+    with scratch(target.parent) as folder:
+        temporary = folder / target.name  # the files of a bag are named after its folder
         yield temporary
         sync_tree(temporary)
         with naming(target):
-            if target.is_dir():  # of a task that was killed before its last file
+            if target.is_dir():  # from a task that was killed before it wrote its last file
                 shutil.rmtree(target)
             temporary.replace(target)
         sync(target.parent)
 
 
-def check_out(out: Place, read: Sequence[Place]) -> None:
-    """Refuse a file as the folder of results, and a folder in what is read.
+def check_out(out: Place, inputs: Sequence[Place]) -> None:
+    """Refuse a file as the folder for results, and a folder within an input.
 
     Raises:
-        InputError: it is one.
+        InputError: `out` is one of these.
     """
     if isinstance(out, Path) and out.exists() and not out.is_dir():
         raise InputError(f"--out {out} is a file; name a folder")
-    own, *others = (
-        f"{place.resolve() if isinstance(place, Path) else place}/" for place in (out, *read)
-    )
-    for source, other in zip(read, others, strict=True):
-        if own.startswith(other):
-            raise InputError(
-                f"{out} lies in {source}, of which it would become a part; name a folder outside of it"
-            )
+    for source in inputs:
+        if _absolute(out).startswith(_absolute(source)):
+            raise InputError(f"{out} is within the input {source}; name a folder outside of it")
+
+
+def _absolute(place: Place) -> str:
+    return f"{place.resolve() if isinstance(place, Path) else place}/"
 
 
 @contextmanager
 def held(out: Place) -> Iterator[None]:
-    """Keep other runs out of a folder of results, and remove at the end what runs have left there.
+    """Lock a folder of results against other runs, and remove temporary files at the end.
 
-    A store has no locks: there two runs that `agreed` write the same bytes, each object whole.
+    A store has no locks. Two runs with the same manifest (`agree`) write the same bytes there.
 
     Raises:
-        InputError: another run is at work there.
+        InputError: another run uses the folder.
     """
     if isinstance(out, Remote):
         yield
@@ -114,94 +118,105 @@ def held(out: Place) -> Iterator[None]:
 
 
 def agree(out: Place, name: str, document: Mapping[str, Any], kind: str) -> None:
-    """Write down what results are of, or see that what was written there before is the same.
+    """Write the manifest of results, or check that an existing one is the same.
 
     Args:
         out: folder of the results.
-        name: of the file.
+        name: file name of the manifest.
         document: its content.
-        kind: of results, in messages.
+        kind: the kind of results, for messages.
 
     Raises:
-        InputError: the folder holds something else.
+        InputError: the folder has other content.
     """
-    place, text = out / name, json.dumps(document, indent=1) + "\n"
-    if not place.exists():
-        if (
-            out.exists()
-            if isinstance(out, Remote)
-            else any(not path.name.startswith(".") for path in out.iterdir())
-        ):
+    manifest = out / name
+    text = json.dumps(document, indent=1) + "\n"
+    if not manifest.exists():
+        if _has_entries(out):
             raise InputError(f"{out} is not empty and no {kind}; name another folder")
-        if isinstance(place, Path):
-            with arriving(place) as part:
+        if isinstance(manifest, Path):
+            with arriving(manifest) as part:
                 write_text(part, text)
             return
-        if create(place, text.encode()):
+        if create(manifest, text.encode()):
             return
-    with fetched([place]) as (here,):
-        before = read_json(here, {"type": "object"})
-    if other := [key for key in document if before.get(key) != document[key]]:
+    with fetched([manifest]) as (path,):
+        existing = read_json(path, {"type": "object"})
+    changed = [key for key in document if existing.get(key) != document[key]]
+    if changed:
         raise InputError(
-            f"{out} is a {kind} of other {', '.join(other)}; name another folder, or remove this one"
+            f"{out} is a {kind} with other {', '.join(changed)};"
+            " name another folder, or remove this one"
         )
 
 
+def _has_entries(folder: Place) -> bool:
+    """Whether a folder has entries; hidden files do not count."""
+    if isinstance(folder, Remote):
+        return folder.exists()
+    return any(not path.name.startswith(".") for path in folder.iterdir())
+
+
 def undone(tasks: Sequence[Target]) -> list[Target]:
-    """Return the tasks whose file is not there; each folder is listed once."""
-    there = {
-        str(path) for folder in {task.target.parent for task in tasks} for path in folder.glob("*")
-    }
-    return [task for task in tasks if str(task.target) not in there]
+    """Return the tasks whose file does not exist; each folder is listed once."""
+    folders = {task.target.parent for task in tasks}
+    existing: set[str] = set()
+    for folder in folders:
+        existing.update(str(path) for path in folder.glob("*"))
+    return [task for task in tasks if str(task.target) not in existing]
 
 
 @dataclass(frozen=True)
 class Workers:
-    """Who does the tasks of a command.
+    """The processes that run the tasks of a command.
 
     Attributes:
-        count: processes; 1 runs in this one, 0 takes one for each core.
-        scheduler: address of a Dask scheduler, instead of `count`.
-        told: called with how far it is.
+        count: number of processes; 1 uses only this process, 0 starts one per core.
+        scheduler: address of a Dask scheduler, which replaces `count`.
+        on_progress: called when a task has finished.
     """
 
     count: int = 1
     scheduler: str = ""
-    told: Progress = lambda *_: None
+    on_progress: Progress = lambda *_: None
 
 
 class Spread:
-    """Runs a function on each of many tasks: in this process, in processes of this machine, or on a cluster.
+    """Runs a function on many tasks: in this process, in local processes, or on a cluster.
 
-    A cluster of this machine is started when the first task needs it, and serves until the end.
+    A local cluster is started when the first task needs it, and is used until the end.
     """
 
     def __init__(self, workers: Workers, stack: ExitStack) -> None:
         self._workers = workers.count or os.cpu_count() or 1
-        self._scheduler, self._told, self._stack = workers.scheduler, workers.told, stack
+        self._scheduler = workers.scheduler
+        self._on_progress = workers.on_progress
+        self._stack = stack
         self._client: Any = None
 
     def __call__(self, function: Callable[[Task], Any], tasks: Sequence[Task]) -> list[str]:
-        """Run tasks, none of which depends on another.
+        """Run independent tasks.
 
         Args:
-            function: of a module, pure: it writes its task's file, and may be run again where that file is.
+            function: module-level and pure: it writes the file of its task, and may be repeated
+                when that file exists.
             tasks: each has a name.
 
         Returns:
-            A sentence for each task that failed; the others are done.
+            A sentence for each task that failed; the others are finished.
 
         Raises:
-            InputError: the scheduler was lost.
+            InputError: the connection to the scheduler was lost.
         """
         failed = []
-        for done, message in enumerate(self._outcomes(function, tasks), start=1):
-            failed += [message] if message else []
-            self._told(done, len(tasks))
+        for count, message in enumerate(self._outcomes(function, tasks), start=1):
+            if message:
+                failed.append(message)
+            self._on_progress(count, len(tasks))
         return sorted(failed)
 
     def _outcomes(self, function: Callable[[Task], Any], tasks: Sequence[Task]) -> Iterator[str]:
-        """Yield for each task, as it ends, why it failed, "" if it did not."""
+        """Yield the error message of each task as it finishes, "" for success."""
         if not tasks or (self._workers == 1 and not self._scheduler):
             yield from (_guarded(function, task) for task in tasks)
             return
@@ -212,22 +227,22 @@ class Spread:
             yield from self._distributed(function, tasks)
         except (OSError, TimeoutError, CancelledError) as error:
             lost = f"{self._scheduler or 'Dask'} is lost or does not answer: {describe(error)}"
-            raise InputError(f"{lost}; the same command goes on where it stopped") from error
+            raise InputError(f"{lost}; the same command resumes where it stopped") from error
 
     def _distributed(
         self, function: Callable[[Task], Any], tasks: Sequence[Task]
     ) -> Iterator[str]:
-        """Yield as `_outcomes` does.
+        """Yield the outcomes of tasks on a cluster.
 
-        Tasks whose workers died are run again one at a time at the end, so that only the one that ends them fails.
+        Tasks whose workers died are repeated one at a time at the end, so that only the task that
+        kills its worker fails.
         """
         from distributed import as_completed
 
-        group = uuid4().hex  # one group of keys, which Dask queues
+        group = uuid4().hex  # Dask queues tasks only if their keys form one group
         keys = [(group, k) for k in range(len(tasks))]
-        running = dict(
-            zip(self._client.map(partial(_guarded, function), tasks, key=keys), tasks, strict=True)
-        )
+        futures = self._client.map(partial(_guarded, function), tasks, key=keys)
+        running = dict(zip(futures, tasks, strict=True))
         suspects = []
         for future in as_completed(running):
             if future.status != "error":
@@ -242,67 +257,70 @@ class Spread:
 
 @contextmanager
 def spread(workers: Workers) -> Iterator[Spread]:
-    """Give what runs tasks."""
+    """Give a runner of tasks; its processes end with the block."""
     with ExitStack() as stack:
         yield Spread(workers, stack)
 
 
 def _guarded(function: Callable[[Any], Any], task: Any) -> str:
-    """Run one task; an error of its own input is a sentence, and does not end the others."""
+    """Run one task; return the message of an error, so that the other tasks continue."""
+    name = getattr(task, "name", task)
     try:
         function(task)
     except OSError as error:
-        return f"{getattr(task, 'name', task)}: {of_system(error)}"
+        return f"{name}: {of_system(error)}"
     except (ScenarioGenError, MemoryError) as error:
-        return f"{getattr(task, 'name', task)}: {describe(error)}"
-    except Exception as error:  # a fault of ours, or of a library: of this case, and its place is said for who mends it
+        return f"{name}: {describe(error)}"
+    except Exception as error:  # a bug here or in a library: report its place in the source
         *_, (frame, line) = traceback.walk_tb(error.__traceback__)
         place = f"{Path(frame.f_code.co_filename).name}:{line}"
-        return (
-            f"{getattr(task, 'name', task)}: {type(error).__name__} at {place}: {describe(error)}"
-        )
+        return f"{name}: {type(error).__name__} at {place}: {describe(error)}"
     return ""
 
 
 @contextmanager
 def _client(workers: int, scheduler: str) -> Iterator[Any]:
-    """A client of a cluster of processes on this machine, or of one that runs."""
-    import dask
-    from distributed import Client, LocalCluster
+    """Give a client of a running scheduler, or of a new cluster of local processes."""
+    from distributed import Client
 
-    for name in ("distributed", "distributed.client"):  # each has a level of its own
-        logging.getLogger(name).setLevel(
-            logging.CRITICAL
-        )  # workers that die and a lost scheduler are named here
+    # Dead workers and a lost scheduler are reported by the tasks. Each logger has its own level.
+    for name in ("distributed", "distributed.client"):
+        logging.getLogger(name).setLevel(logging.CRITICAL)
     with ExitStack() as stack:
-        cluster: Any = scheduler
-        if not scheduler:
-            settings = {
-                "temporary-directory": str(
-                    stack.enter_context(scratch(Path(tempfile.gettempdir())))
-                ),
-                "distributed.scheduler.worker-saturation": 1.0,  # who is at work takes no further task
-                "distributed.worker.daemon": True,
-                "distributed.worker.profile.enabled": False,
-                "distributed.admin.tick.interval": "500ms",
-                "distributed.nanny.pre-spawn-environ": WORKERS,
-            }
-            sizes = {"n_workers": workers, "threads_per_worker": 1, "memory_limit": 0}
-            stack.enter_context(dask.config.set(settings))
-            with ctrl_c_blocked():
-                cluster = stack.enter_context(
-                    LocalCluster(**sizes, processes=True, dashboard_address="127.0.0.1:0")
-                )
-                stack.enter_context(cleaned_up(partial(_end, cluster)))
+        cluster: Any = scheduler or stack.enter_context(_local_cluster(workers))
         yield stack.enter_context(Client(cluster))
 
 
+@contextmanager
+def _local_cluster(workers: int) -> Iterator[Any]:
+    """Give a cluster of processes on this machine."""
+    import dask
+    from distributed import LocalCluster
+
+    with ExitStack() as stack:
+        settings = {
+            "temporary-directory": str(stack.enter_context(scratch(temp_folder()))),
+            "distributed.scheduler.worker-saturation": 1.0,  # no queue at a busy worker
+            "distributed.worker.daemon": True,
+            "distributed.worker.profile.enabled": False,
+            "distributed.admin.tick.interval": "500ms",
+            "distributed.nanny.pre-spawn-environ": WORKER_ENVIRONMENT,
+        }
+        sizes = {"n_workers": workers, "threads_per_worker": 1, "memory_limit": 0}
+        stack.enter_context(dask.config.set(settings))
+        with ctrl_c_blocked():
+            cluster = stack.enter_context(
+                LocalCluster(**sizes, processes=True, dashboard_address="127.0.0.1:0")
+            )
+            stack.enter_context(cleaned_up(partial(_end, cluster)))
+        yield cluster
+
+
 def _end(cluster: Any) -> None:
-    """End the processes of a cluster at once, so that they write nothing more, and nobody starts them again."""
+    """Kill the processes of a cluster at once, so that they write no more and are not restarted."""
     cluster.loop.add_callback(cluster.loop.stop)
     for process in multiprocessing.active_children():
         process.kill()
-        with suppress(
-            ChildProcessError
-        ):  # Dask was told already, and else is to be told: it fails where another takes the news
+        # Dask waits for the same process, and fails if the exit status is consumed here.
+        with suppress(ChildProcessError):
             os.waitid(os.P_PID, process.pid or 0, os.WEXITED | os.WNOWAIT)

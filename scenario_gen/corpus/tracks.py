@@ -49,7 +49,7 @@ class Motion:
 
 @dataclass(frozen=True, eq=False)
 class Track:
-    """Messages (M,) of a vehicle in order of time: t [µs since 2004], degrees, m/s, rad from east."""
+    """Messages (M,) of a vehicle by time: t [µs since 2004], degrees, m/s, rad from east."""
 
     device: int
     t: Ints

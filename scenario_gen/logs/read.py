@@ -13,7 +13,7 @@ import numpy as np
 
 from scenario_gen.base.errors import InputError
 from scenario_gen.base.folders.scratch import scratch
-from scenario_gen.base.stores import naming_objects, temporary
+from scenario_gen.base.stores import naming_objects, temp_folder
 from scenario_gen.logs.cleaning import clean, Drops
 from scenario_gen.logs.clock import check_unit, retimed
 from scenario_gen.logs.config import chosen_vehicles, LogConfig
@@ -75,7 +75,7 @@ def read_log(
         2
     """
     if hasattr(path, "to_csv"):
-        with scratch(temporary()) as folder:
+        with scratch(temp_folder()) as folder:
             file = folder / _DATAFRAME_FILE
             with naming_objects({str(file): "the DataFrame"}):
                 path.to_csv(file, index=False)

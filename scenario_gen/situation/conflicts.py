@@ -11,7 +11,7 @@ of b. Therefore two box tests replace polygon clipping.
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import combinations
-from typing import NamedTuple, Protocol
+from typing import NamedTuple
 
 import numpy as np
 
@@ -20,47 +20,18 @@ from scenario_gen.numerics import Floats, Ints
 from scenario_gen.numerics.boxes import Box, box_gap
 from scenario_gen.numerics.kernels import F1, F2, kernel, OUT1
 from scenario_gen.situation.tracks import Track
-from scenario_gen.types import Motion as RecordedMotion
-from scenario_gen.types import together, Vehicle
+from scenario_gen.types import Motion, together
 
 POSE_STEP_M = 1.0  # longest distance between two neighbouring poses of a sweep
 POSE_TURN_RAD = 0.1  # largest turn between them
 STANDSTILL_STEP_M = 0.01  # samples that move less add nothing to a sweep
 BLOCK_POSES = 16  # poses that share one bounding circle
-CONTACT_DEPTH = 1e-6  # metres; footprints that meet less deeply only touch
+CONTACT_DEPTH_M = 1e-6  # footprints that meet less deeply only touch
 BISECTION_STEPS = 10  # to find when a footprint enters the shared area
 SAME_WAY_RAD = 0.5  # largest difference of headings on a shared path
 FOLLOWING_LENGTHS = 3.0  # vehicle lengths of shared path from which on a conflict is following
 
 HalfSize = tuple[float, float]  # half length, half width [m] of a footprint
-
-
-class Motion(Protocol):
-    """What encounters and scenarios have in common."""
-
-    @property
-    def vehicles(self) -> tuple[Vehicle, ...]:
-        """N identities and footprints."""
-
-    @property
-    def time(self) -> Floats:
-        """(T,) seconds."""
-
-    @property
-    def position(self) -> Floats:
-        """(N, T, 2) metres."""
-
-    @property
-    def heading(self) -> Floats:
-        """(N, T) rad."""
-
-    @property
-    def speed(self) -> Floats:
-        """(N, T) m/s."""
-
-    @property
-    def present(self) -> Ints:
-        """(N, 2) first and last sample of each."""
 
 
 @dataclass(frozen=True)
@@ -137,7 +108,7 @@ def conflicts_by_pair(conflicts: Iterable[Conflict]) -> PairConflicts:
 def track_conflicts(tracks: Sequence[Track]) -> PairConflicts:
     """Return the conflicts between tracks by their vehicles, the lower index first."""
     poses = np.stack([track.poses for track in tracks])
-    motion = RecordedMotion.sampled(
+    motion = Motion.sampled(
         tuple(track.vehicle for track in tracks),
         tracks[0].dt,
         poses[..., :2],
@@ -269,10 +240,10 @@ def _block_circles(poses: Floats) -> Floats:
 
 @kernel(inline=True)
 def _boxes_meet(a: Floats, half_a: HalfSize, b: Floats, half_b: HalfSize) -> bool:
-    """True if two boxes at poses (t, x, y, cos, sin) overlap by more than CONTACT_DEPTH."""
+    """True if two boxes at poses (t, x, y, cos, sin) overlap by more than CONTACT_DEPTH_M."""
     box_a = Box(a[1], a[2], a[3], a[4], half_a[0], half_a[1])
     box_b = Box(b[1], b[2], b[3], b[4], half_b[0], half_b[1])
-    return box_gap(box_a, box_b) < -CONTACT_DEPTH
+    return box_gap(box_a, box_b) < -CONTACT_DEPTH_M
 
 
 @kernel(inline=True)
@@ -321,7 +292,7 @@ def _crossing_time(
 def _occupancy(
     vehicle: Floats, half: HalfSize, poses: Floats, circles: Floats, other: HalfSize
 ) -> tuple[float, float]:
-    """(first entry, last exit) [s] of a vehicle's poses into a sweep; entry inf if they never meet."""
+    """(first entry, last exit) [s] of a vehicle into a sweep; entry inf if they never meet."""
     count = vehicle.shape[0]
     first = 0
     while first < count and not _meets_sweep(vehicle[first], half, poses, circles, other):

@@ -108,7 +108,7 @@ LIMITS = ReactionThresholds()
 
 @dataclass(frozen=True)
 class Evidence:
-    """What a pair shows: a reaction, if it is certain enough, and how many seconds they are apart."""
+    """The evidence from a pair: its time gap, and a reaction if it is certain enough."""
 
     who: int
     whom: int

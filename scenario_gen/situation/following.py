@@ -23,7 +23,7 @@ from scenario_gen.types import FOLLOW, Reaction
 
 
 def following_evidence(recording: Recording) -> list[Evidence]:
-    """Return the evidence of all vehicles that drive behind another one, with the nearest ahead."""
+    """Return the evidence of all vehicles that follow another one, with the nearest one ahead."""
     encounter = recording.encounter
     evidence = []
     for who in range(len(recording.tracks)):

@@ -3,10 +3,11 @@
 
 """An encounter along one road in path coordinates: a reference line, stations, offsets and lanes.
 
-Vehicles that follow, meet or pass each other on one road are compared on one line, however it bends.
-So the gaps between them survive when the line is laid out straight.
+Vehicles that follow, meet or pass each other on one road are compared on one line, even if it
+bends. The gaps between them are therefore preserved when the line is straightened.
 """
 
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
@@ -29,6 +30,8 @@ MAX_FIT_OFFSET_M = 30.0  # between oncoming vehicles on the widest road
 QUEUE_OVERLAP_M = 0.5  # by which recorded footprints in one lane may overlap
 MIN_SWERVE_M = 1.5  # by which a vehicle leaves its lane and returns
 MAX_FREE_LANES_COUNT = 4  # between oncoming vehicles
+
+_Slot = tuple[int, int]  # a vehicle, and 0 or 1: its first or its last lane
 
 
 @dataclass(frozen=True, eq=False)
@@ -267,13 +270,14 @@ def _lanes(
     tracks: tuple[Track, ...], direction: Ints, station: Floats, lateral: _LateralMotion
 ) -> Ints:
     """(N, 2) lanes of each direction by clustering offsets, from the driver's left."""
-    late = (lateral.change >= 0.5) | ~lateral.changes[:, None]
-    is_in_lane = np.stack((lateral.change < 0.5, late), axis=1)  # in the first, in the last lane
+    in_first = lateral.change < 0.5
+    in_last = (lateral.change >= 0.5) | ~lateral.changes[:, None]
+    is_in_lane = np.stack((in_first, in_last), axis=1)
     is_in_lane &= np.stack([track.is_present for track in tracks])[:, None]
     is_in_lane &= (np.abs(lateral.swerve) < MIN_SWERVE_M / 2.0)[:, None]
     swerves = np.asarray(lateral.swerve.any(axis=1))
 
-    def conflicts(slot: tuple[int, int], other: tuple[int, int]) -> bool:
+    def conflicts(slot: _Slot, other: _Slot) -> bool:
         if slot[0] == other[0]:
             return False
         rows = is_in_lane[slot] & is_in_lane[other]
@@ -285,20 +289,38 @@ def _lanes(
         members = np.flatnonzero(direction == sign).tolist()
         slots = [(i, k) for i in members for k in (0, 1) if k == 0 or lateral.changes[i]]
         slots.sort(key=lambda slot: (lateral.ends[slot], slot))
-        current = 0
-        cluster: list[tuple[int, int]] = []
-        for slot in slots:
-            if cluster:
-                mean = float(np.mean([lateral.ends[other] for other in cluster]))
-                gap = float(lateral.ends[slot]) - mean
-                if gap > SAME_LANE_M or any(conflicts(slot, other) for other in cluster):
-                    current += max(1, round(gap / (2.0 * SAME_LANE_M)))
-                    cluster = []
-            cluster.append(slot)
-            lane[slot] = current
+        numbers = _number_lanes(slots, lateral.ends, conflicts)
+        for slot, number in zip(slots, numbers, strict=True):
+            lane[slot] = number
             if not lateral.changes[slot[0]]:
-                lane[slot[0], 1] = current
+                lane[slot[0], 1] = number
     return lane
+
+
+def _number_lanes(
+    slots: Sequence[_Slot], offset: Floats, conflicts: Callable[[_Slot, _Slot], bool]
+) -> list[int]:
+    """Return the lane of each slot.
+
+    A new lane begins at a gap between offsets, or if two vehicles cannot share a lane.
+
+    Args:
+        slots: sorted by offset.
+        offset: (N, 2) of each slot [m].
+        conflicts: whether two slots cannot share a lane.
+    """
+    numbers = []
+    number = 0
+    cluster: list[_Slot] = []
+    for slot in slots:
+        if cluster:
+            gap = float(offset[slot]) - float(np.mean([offset[other] for other in cluster]))
+            if gap > SAME_LANE_M or any(conflicts(slot, other) for other in cluster):
+                number += max(1, round(gap / (2.0 * SAME_LANE_M)))
+                cluster = []
+        cluster.append(slot)
+        numbers.append(number)
+    return numbers
 
 
 def _into_oncoming(direction: Ints, ends: Floats) -> Bools:

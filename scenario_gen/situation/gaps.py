@@ -12,8 +12,8 @@ from scipy.spatial import distance
 from scenario_gen.numerics import Bools, Floats, wrap_angle
 from scenario_gen.numerics.boxes import footprint_gaps
 from scenario_gen.numerics.plane import ahead_and_left
-from scenario_gen.situation.conflicts import Conflict, Motion
-from scenario_gen.types import together
+from scenario_gen.situation.conflicts import Conflict
+from scenario_gen.types import Motion, together
 
 MAX_FOLLOWING_M = 60.0  # a leader is nearer
 HALF_LANE_M = 2.2  # a follower is nearer to its leader's path
@@ -114,7 +114,7 @@ def is_behind(motion: Motion, follower: int, leader: int) -> Bools:
 def _steps_ahead(
     path: Floats, path_heading: Floats, position: Floats, heading: Floats, step: int
 ) -> tuple[Floats, Bools]:
-    """How many samples later the nearest place of a path is driven, and whether it is near, (T,) each.
+    """(T,) how many samples later the nearest point of a path is driven, and (T,) if it is near.
 
     The path (T, 2) is compared at every `step`-th sample.
     """

@@ -32,8 +32,7 @@ from scenario_gen.numerics.plane import (
     meeting_shares,
     unit,
 )
-from scenario_gen.situation.conflicts import Motion
-from scenario_gen.types import together
+from scenario_gen.types import Motion, together
 
 
 class EncounterKind(StrEnum):

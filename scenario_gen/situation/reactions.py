@@ -90,11 +90,17 @@ def _why_none(encounter: Encounter, evidence: Sequence[Evidence]) -> str:
         return f"{why}; {' and '.join(standing)} stands throughout" if standing else why
     who, whom = (encounter.vehicles[n].label for n in (nearest.who, nearest.whom))
     seconds = math.floor(10.0 * nearest.time_gap) / 10.0
-    return f"the nearest are {who} and {whom}, and they are never within {seconds:.1f} s of each other"
+    return (
+        f"the nearest are {who} and {whom}, and they are never within {seconds:.1f} s of each"
+        " other"
+    )
 
 
 def without_circles(edges: Sequence[Reaction], count: int) -> ReactionGraph:
-    """Return the graph of these reactions of `count` vehicles; circles are cut at the least certain one."""
+    """Return the graph of reactions of `count` vehicles.
+
+    Cycles are broken at their least certain reaction.
+    """
     kept: list[Reaction] = []
     cut: list[Reaction] = []
     reacts_to: list[set[int]] = [set() for _ in range(count)]  # directly or through others

@@ -85,23 +85,21 @@ def separate(
     gaps: dict[tuple[int, int], _Gap] = {}
     for _ in range(MAX_CORRECTIONS_COUNT):
         gaps |= {pair: _least_gap(tracks, poses, pair) for pair in pairs if pair not in gaps}
-        if not gaps:
-            break
-        worst = min(gaps.values(), key=lambda gap: gap.size)
-        if worst.size >= clearance - GAP_TOLERANCE_M:
-            break
+        worst = min(gaps.values(), key=lambda gap: gap.size, default=None)
+        if worst is None or worst.size >= clearance - GAP_TOLERANCE_M:
+            placed = tuple(_shifted(track, shift[k]) for k, track in enumerate(tracks))
+            return Separation(placed, frozen(np.hypot(*shift.T)), _shift_notes(tracks, shift))
+        fault = _too_close(tracks, worst, clearance, max_shift)
         change = _correction(worst, poses, clearance, mobility)
-        if change is not None:
-            shift[list(worst.pair)] += change
-        if change is None or np.hypot(*shift.T).max() > max_shift:
-            raise RefusedError(_too_close(tracks, worst, clearance, max_shift))
+        if change is None:
+            break
+        shift[list(worst.pair)] += change
+        if np.hypot(*shift.T).max() > max_shift:
+            break
         for k in worst.pair:
             poses[k] = _shifted(tracks[k], shift[k]).poses
         gaps = {pair: gap for pair, gap in gaps.items() if not set(pair) & set(worst.pair)}
-    else:
-        raise RefusedError(_too_close(tracks, worst, clearance, max_shift))
-    placed = tuple(_shifted(track, shift[k]) for k, track in enumerate(tracks))
-    return Separation(placed, frozen(np.hypot(*shift.T)), _shift_notes(tracks, shift))
+    raise RefusedError(fault)
 
 
 def separate_recorded(tracks: Sequence[Track]) -> Separation:
@@ -162,7 +160,7 @@ def _least_gap(tracks: Sequence[Track], poses: Sequence[Floats], pair: tuple[int
 def _correction(
     gap: _Gap, poses: Sequence[Floats], clearance: float, mobility: Floats
 ) -> Floats | None:
-    """The shift (2, 2) of a pair along and across its paths that widens a gap; None if none does."""
+    """The shift (2, 2) of a pair along and across its paths that widens a gap; None without one."""
     i, j = gap.pair
     levers = np.array(
         [

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The situation: everything that is derived from a recorded encounter, computed once and passed on."""
+"""The situation: everything that is derived from a recorded encounter, computed once."""
 
 from dataclasses import dataclass
 from functools import cached_property

@@ -12,7 +12,7 @@ from scenario_gen.numerics.plane import ahead_and_left
 from scenario_gen.types import Encounter
 
 MAX_VEHICLES = 64  # the largest encounter that is cut from a log
-MAX_VEHICLE_SECONDS = 4000.0  # two vehicles for 1,000 s take two minutes and 1 GB
+MAX_VEHICLE_TIME_S = 4000.0  # two vehicles for 1,000 s take two minutes and 1 GB
 MAX_DURATION_S = 1000.0  # memory grows with the square of the duration
 MAX_SAMPLES = 45_000  # of all vehicles; the segmentation needs 16 kB for each
 MAX_DISTANCE_M = 2000.0  # to the nearest vehicle, the limit of `log.proximity`
@@ -36,15 +36,15 @@ def refuse_too_large(encounter: Encounter) -> None:
             f"{name}: {count} vehicles, {MAX_VEHICLES} are possible; use fewer with"
             f" --set log.max_vehicles={MAX_VEHICLES}, or choose with --set log.vehicles=ID,ID"
         )
-    if count * seconds > MAX_VEHICLE_SECONDS or seconds > MAX_DURATION_S:
-        longest = int(min(MAX_VEHICLE_SECONDS / count, MAX_DURATION_S))
-        fewer = int(MAX_VEHICLE_SECONDS / seconds)
+    if count * seconds > MAX_VEHICLE_TIME_S or seconds > MAX_DURATION_S:
+        longest = int(min(MAX_VEHICLE_TIME_S / count, MAX_DURATION_S))
+        fewer = int(MAX_VEHICLE_TIME_S / seconds)
         alternative = ""
         if fewer >= 2 and seconds <= MAX_DURATION_S:
             alternative = f", or use {fewer} vehicles: --set log.max_vehicles={fewer}"
         raise RefusedError(
             f"{name}: {count} vehicles for {seconds:.0f} s are {count * seconds:.0f} vehicle"
-            f" seconds, {MAX_VEHICLE_SECONDS:.0f}, and {MAX_DURATION_S:.0f} s, are possible;"
+            f" seconds, {MAX_VEHICLE_TIME_S:.0f}, and {MAX_DURATION_S:.0f} s, are possible;"
             f" cut it to {longest} s: --set log.max_duration={longest}{alternative}"
         )
     if encounter.speed.size > MAX_SAMPLES:

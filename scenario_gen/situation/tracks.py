@@ -3,8 +3,8 @@
 
 """The recorded motion, cleaned: one smooth, drivable path per vehicle, and the progress along it.
 
-Positions are noisy (GPS staircases of a metre, kinks from a video tracker), speeds much less. So the
-position is smoothed as a function of the distance u = ∫ v dt that the speed claims: a penalised
+Positions are noisy (GPS staircases of a metre, kinks from a video tracker), speeds much less. The
+position is therefore smoothed as a function of the distance u = ∫ v dt that the speed claims: a penalised
 spline f(u) that minimises ∫ |f(u) - p|² du + λ ∫ |f''|² du (Eilers & Marx 1996). The smallest λ is
 used for which the lateral acceleration is drivable, or the one with the smallest violation of this
 and of the deviation from the recording. Bends that are too sharp are then eased; they turn as far
@@ -58,7 +58,7 @@ class Track:
         present: (2,) first and last sample; before and after, progress and speed are constant.
         recorded_turn: how far [rad, left positive] the recorded heading turns; NaN if it stands.
         dt: seconds between samples.
-        lane: the centre line of its lanes on a road, before and beyond its path too; None: unknown.
+        lane: the centre line of its lanes on a road, beyond both ends of its path; None: unknown.
     """
 
     vehicle: Vehicle

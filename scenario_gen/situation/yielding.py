@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Yielding: who passes second at a conflict, or slows for a vehicle that it does not pass behind."""
+"""Yielding: a vehicle passes second at a conflict, or slows for one that it does not follow."""
 
 from collections.abc import Sequence
 import math
@@ -145,7 +145,7 @@ def giving_way(recording: Recording, who: int, whom: int) -> Reaction | None:
 def _slowing(
     recording: Recording, who: int, clears: float, enters: float
 ) -> tuple[float, float, bool]:
-    """When [s] a vehicle begins to slow or stand before it enters, when it departs, and whether it stands.
+    """Return when [s] a vehicle begins to slow before it enters, when it departs, and if it stands.
 
     A vehicle that does not stand departs when it is slowest. Both times are its entry if it does
     not slow either.

@@ -13,7 +13,7 @@ import boto3
 import pytest
 from support.object_store import new_bucket, reached, read, serving
 
-from scenario_gen.base.stores import below, place, upload
+from scenario_gen.base.stores import place, relative_name, upload
 from scenario_gen.logs.synthetic import bundled
 
 pytestmark = pytest.mark.xdist_group("places")
@@ -38,7 +38,7 @@ def bucket(server, monkeypatch, request, tmp_path):
 
 
 def objects(url):
-    return {below(one, place(url)): read(one) for one in place(url).rglob("*")}
+    return {relative_name(one, place(url)): read(one) for one in place(url).rglob("*")}
 
 
 def test_what_is_written_to_a_store_is_what_is_written_to_a_folder_and_is_read_there(

@@ -97,7 +97,7 @@ def test_scenarios_are_found_by_what_they_are_and_made_again_alone(
         sum(count for *_, count in found.coverage) == made.scenarios
         and "coverage" in coverage_lines(found, out)[0]
     )
-    with pytest.raises(ScenarioGenError, match="is not that of the table"):
+    with pytest.raises(ScenarioGenError, match="differs from that in the table"):
         make_again(out, found.rows[0] | {"sha256": "0"})
     with pytest.raises(InputError, match="the columns are"):
         find(out, "colour = 'red'")
@@ -127,7 +127,9 @@ def test_recorded_encounters_are_found_by_their_figures(corpus):
         assert row["pet"] == pytest.approx(measures.pet, abs=1e-6) and row["ttc"] == pytest.approx(
             measures.min_ttc, abs=1e-6
         )
-    with pytest.raises(InputError, match="holds recordings; for a bag write scenarios with"):
+    with pytest.raises(
+        InputError, match="holds recordings; to get a bag, generate scenarios with"
+    ):
         make_again(corpus[0], found.rows[0])
 
 

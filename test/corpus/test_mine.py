@@ -249,7 +249,7 @@ def test_partitions_of_meetings_give_the_encounters_of_all(rows, least):
 def test_small_partitions_give_the_same_corpus_by_small_tasks(
     archive, corpus, tmp_path, monkeypatch
 ):
-    monkeypatch.setattr(grouping, "PARTITION", 2)
+    monkeypatch.setattr(grouping, "PARTITION_ROWS", 2)
     config = CorpusConfig(task_encounters=3)
     mine([archive], tmp_path / "out", config)
     assert len(list((tmp_path / "out" / "found").glob("*"))) > 3

@@ -23,7 +23,7 @@ from typer.testing import CliRunner
 
 from scenario_gen.bags.recordings.read import read_recording
 from scenario_gen.base.errors import InputError
-from scenario_gen.base.stores import below, place, upload
+from scenario_gen.base.stores import place, relative_name, upload
 from scenario_gen.cli.commands import app
 from scenario_gen.corpus.batch import BatchRequest, run_batch
 from scenario_gen.corpus.find import coverage_lines, export_hits, find, make_again
@@ -64,12 +64,12 @@ def contents(out):
             for path in out.rglob("[!.]*")
             if path.is_file()
         }
-    return {below(one, out): read(one) for one in out.rglob("[!.]*")}
+    return {relative_name(one, out): read(one) for one in out.rglob("[!.]*")}
 
 
 def written(one):
     """When an object was written."""
-    system, path = one.there()
+    system, path = one.file_system()
     return system.info(path)["LastModified"]
 
 
@@ -119,7 +119,7 @@ def test_a_batch_and_what_it_finds_are_the_same_in_a_store(bucket, corpus, tmp_p
 
 
 def remove(one):
-    system, path = one.there()
+    system, path = one.file_system()
     system.rm_file(path)
 
 

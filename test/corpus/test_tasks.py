@@ -51,7 +51,7 @@ def test_a_scheduler_that_is_lost_is_named(tmp_path):
         address = cluster.scheduler_address
         assert go(write_once, [Counted("a", tmp_path)]) == []
         cluster.close()
-        with pytest.raises(InputError, match=f"{address} is lost .*goes on where it stopped"):
+        with pytest.raises(InputError, match=f"{address} is lost .*resumes where it stopped"):
             go(write_once, [Counted("b", tmp_path)])
 
 

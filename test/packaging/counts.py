@@ -74,7 +74,7 @@ BUDGET = {
 }
 
 UNITS = {
-    "M", "M2", "MM", "KM", "S", "MS", "NS", "RAD", "DEG", "MPS", "MPS2", "MPS3", "RADPS", "HZ",
+    "M", "M2", "MM", "KM", "S", "MS", "US", "NS", "RAD", "DEG", "MPS", "MPS2", "MPS3", "RADPS", "HZ",
     "PX", "BYTES", "KIB", "MIB", "GIB", "COLUMNS", "PER_M", "PER_S", "PER_MPS",
 }  # fmt: skip
 WORDS = {

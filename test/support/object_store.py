@@ -70,5 +70,5 @@ def new_bucket(name: str) -> str:
 
 def read(found):
     """The content of an object."""
-    system, path = found.there()
+    system, path = found.file_system()
     return system.cat_file(path)
