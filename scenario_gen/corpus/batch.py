@@ -287,12 +287,8 @@ def _generate_case(
     except (RefusedError, InputError) as error:
         return case | {"cause": _cause(error), "why": str(error)}, None
     generated = result.generated
-    facts = {
-        "template": row["name"],
-        "roads": task.road,
-        "seed": str(seed),
-        "count": str(request.count),
-    }
+    facts = {"template": row["name"], "roads": task.road, "seed": str(seed)}
+    facts["count"] = str(request.count)
     refused = {str(cause): number for cause, number in sorted(generated.refused.items()) if number}
     case |= {
         "published": len(generated.scenarios),

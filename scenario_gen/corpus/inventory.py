@@ -106,8 +106,7 @@ def _inventory_of_folder(archive: Path) -> Inventory[Path]:
     if not archive.exists():
         raise InputError(f"{archive} does not exist")
     if archive.is_file() or is_bag(archive):
-        is_messages = is_spmd(archive)
-        return Inventory([archive] if is_messages else [], [] if is_messages else [[archive]], [])
+        return _inventory_of_file(archive)
     messages, rest = _split(_visible_files(archive), is_spmd)
     folders = {path.parent for path in rest if path.name == "metadata.yaml"}
     bags = {folder for folder in folders if is_bag(folder)}
@@ -126,6 +125,13 @@ def _inventory_of_folder(archive: Path) -> Inventory[Path]:
 def _is_one_log(files: Sequence[Path], folder: Path) -> bool:
     """Whether the files of a folder are the tables of one log."""
     return bool(files) and all(path.parent == folder and is_table(path) for path in files)
+
+
+def _inventory_of_file(path: Path) -> Inventory[Path]:
+    """Return the inventory of one file or bag."""
+    if is_spmd(path):
+        return Inventory([path], [], [])
+    return Inventory([], [[path]], [])
 
 
 def _visible_files(folder: Path) -> list[Path]:

@@ -39,7 +39,7 @@ ACCOUNT = {  # of a range of text: rows left out by file, and rows by hour
 
 
 def least_rows(config: CorpusConfig) -> int:
-    """Return the least number of messages in a meeting: two vehicles, long enough, without gaps."""
+    """Return the least number of messages of two vehicles in a meeting that is long enough."""
     log = config.log
     seconds = min(log.min_presence, log.min_duration)
     return 2 * (int(seconds / max(log.longest_gap, log.period)) + 1)

@@ -317,7 +317,7 @@ def _local_cluster(workers: int) -> Iterator[Any]:
 
 
 def _end(cluster: Any) -> None:
-    """Kill the processes of a cluster at once, so that they write no more and are not restarted."""
+    """Kill the processes of a cluster at once; they write no more and are not restarted."""
     cluster.loop.add_callback(cluster.loop.stop)
     for process in multiprocessing.active_children():
         process.kill()

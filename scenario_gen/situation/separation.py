@@ -3,7 +3,7 @@
 
 """Separation of vehicles that are too close to each other in a recording or on a road."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations
 from typing import NamedTuple
@@ -85,7 +85,7 @@ def separate(
     gaps: dict[tuple[int, int], _Gap] = {}
     for _ in range(MAX_CORRECTIONS_COUNT):
         gaps |= {pair: _least_gap(tracks, poses, pair) for pair in pairs if pair not in gaps}
-        worst = min(gaps.values(), key=lambda gap: gap.size, default=None)
+        worst = _smallest(gaps)
         if worst is None or worst.size >= clearance - GAP_TOLERANCE_M:
             placed = tuple(_shifted(track, shift[k]) for k, track in enumerate(tracks))
             return Separation(placed, frozen(np.hypot(*shift.T)), _shift_notes(tracks, shift))
@@ -98,8 +98,19 @@ def separate(
             break
         for k in worst.pair:
             poses[k] = _shifted(tracks[k], shift[k]).poses
-        gaps = {pair: gap for pair, gap in gaps.items() if not set(pair) & set(worst.pair)}
+        gaps = _without_pair(gaps, worst.pair)
     raise RefusedError(fault)
+
+
+def _smallest(gaps: Mapping[tuple[int, int], _Gap]) -> _Gap | None:
+    return min(gaps.values(), key=lambda gap: gap.size, default=None)
+
+
+def _without_pair(
+    gaps: Mapping[tuple[int, int], _Gap], moved: tuple[int, int]
+) -> dict[tuple[int, int], _Gap]:
+    """Return the gaps that do not change when two vehicles are moved."""
+    return {pair: gap for pair, gap in gaps.items() if not set(pair) & set(moved)}
 
 
 def separate_recorded(tracks: Sequence[Track]) -> Separation:
@@ -160,7 +171,7 @@ def _least_gap(tracks: Sequence[Track], poses: Sequence[Floats], pair: tuple[int
 def _correction(
     gap: _Gap, poses: Sequence[Floats], clearance: float, mobility: Floats
 ) -> Floats | None:
-    """The shift (2, 2) of a pair along and across its paths that widens a gap; None without one."""
+    """The shift (2, 2) of a pair along and across its paths that widens a gap, or None."""
     i, j = gap.pair
     levers = np.array(
         [

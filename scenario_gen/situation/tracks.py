@@ -4,7 +4,7 @@
 """The recorded motion, cleaned: one smooth, drivable path per vehicle, and the progress along it.
 
 Positions are noisy (GPS staircases of a metre, kinks from a video tracker), speeds much less. The
-position is therefore smoothed as a function of the distance u = ∫ v dt that the speed claims: a penalised
+position is therefore smoothed as a function of the distance u = ∫ v dt from the speed: a penalised
 spline f(u) that minimises ∫ |f(u) - p|² du + λ ∫ |f''|² du (Eilers & Marx 1996). The smallest λ is
 used for which the lateral acceleration is drivable, or the one with the smallest violation of this
 and of the deviation from the recording. Bends that are too sharp are then eased; they turn as far

@@ -145,7 +145,7 @@ def giving_way(recording: Recording, who: int, whom: int) -> Reaction | None:
 def _slowing(
     recording: Recording, who: int, clears: float, enters: float
 ) -> tuple[float, float, bool]:
-    """Return when [s] a vehicle begins to slow before it enters, when it departs, and if it stands.
+    """Return when [s] a vehicle begins to slow before it enters, when it departs, if it stands.
 
     A vehicle that does not stand departs when it is slowest. Both times are its entry if it does
     not slow either.

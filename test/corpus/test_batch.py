@@ -101,7 +101,7 @@ def test_scenarios_are_found_by_what_they_are_and_made_again_alone(
         make_again(out, found.rows[0] | {"sha256": "0"})
     with pytest.raises(InputError, match="the columns are"):
         find(out, "colour = 'red'")
-    with pytest.raises(InputError, match="no scenario meets the condition"):
+    with pytest.raises(InputError, match="no scenario matches; nothing exported"):
         export_hits(out, [], tmp_path / "none")
     for hostile in (
         "sha256 in (select content from read_text('/etc/hostname'))",
