@@ -145,11 +145,11 @@ def tokens(vehicle_ids: Iterable[str]) -> tuple[str, ...]:
     return tuple(owner)
 
 
-def vehicle_index(encounter: Encounter, name: str, what: str) -> int:
+def vehicle_index(encounter: Encounter, name: str, parameter: str) -> int:
     """Return the index of the vehicle with the id `name`, written as in the log or as a ROS name.
 
     Raises:
-        InputError: there is no such vehicle; the message names the parameter `what` and lists the
+        InputError: there is no such vehicle; the message names the parameter `parameter` and lists the
             ids that there are.
     """
     ids = [vehicle.id for vehicle in encounter.vehicles]
@@ -157,6 +157,6 @@ def vehicle_index(encounter: Encounter, name: str, what: str) -> int:
         if name in known:
             return known.index(name)
     raise InputError(
-        f"{what}: no vehicle {name!r} in {encounter.name}; "
+        f"{parameter}: no vehicle {name!r} in {encounter.name}; "
         f"there are: {', '.join(ids)}{did_you_mean(name, ids)}"
     )

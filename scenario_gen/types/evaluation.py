@@ -211,14 +211,14 @@ class Evaluation:
         return json.dumps(document, indent=indent, ensure_ascii=False, allow_nan=False)
 
     @classmethod
-    def from_json(cls, text: str, what: str = "not an evaluation") -> "Evaluation":
+    def from_json(cls, text: str, title: str = "not an evaluation") -> "Evaluation":
         """Read what `to_json` wrote.
 
         Raises:
-            InputError: the text is not such a document; the message names `what` and the path
+            InputError: the text is not such a document; the message begins with `title` and names the path
                 inside it.
         """
-        return cls.from_document(parse_json(text, what, SCHEMA))
+        return cls.from_document(parse_json(text, title, SCHEMA))
 
     @classmethod
     def from_document(cls, document: Mapping[str, Any]) -> "Evaluation":

@@ -176,38 +176,38 @@ class GenerationResult:
         sentences = []
         for row in self.compared[1:]:
             better = []
-            for metric, what in ERRORS.items():
-                own, other = (self.evaluation.value(name, metric) for name in (self.row_name, row))
-                if math.isfinite(own - other) and round(other, 3) < round(own, 3):
-                    better.append(f"E {what} {other:.3f} against {own:.3f}")
+            for metric, quantity in ERRORS.items():
+                generated = self.evaluation.value(self.row_name, metric)
+                reference = self.evaluation.value(row, metric)
+                is_known = math.isfinite(generated - reference)
+                if is_known and round(reference, 3) < round(generated, 3):
+                    better.append(f"E {quantity} {reference:.3f} against {generated:.3f}")
             if better:
                 sentences.append(f"{_WORDS[row]} it better here: {', '.join(better)}")
         return tuple(sentences)
 
     def similarity(self) -> dict[str, Any]:
         """Return E of `generated` and of the other rows, the best row, and remarks."""
-
-        def figures(row: str) -> dict[str, float | None]:
-            values = {metric: self.evaluation.value(row, metric) for metric in ERRORS}
-            return {
-                metric: float(f"{value:.6g}") if math.isfinite(value) else None
-                for metric, value in values.items()
-            }
-
-        rows = [row.name for row in self.evaluation.rows]
-        beside = [
-            row
-            for row in (WITHOUT, UNIFORM, NARROW, REPLAY)
-            if row in rows and row not in self.compared
-        ]
+        rows = {row.name for row in self.evaluation.rows}
+        compared = [row for row in self.compared if row in rows]
+        references = [row for row in (WITHOUT, UNIFORM, NARROW, REPLAY) if row in rows]
+        best = {metric: self.best(metric) for metric in ERRORS}
+        remarks = list(self.better_references())
+        if self.not_compared:
+            remarks.append(f"nothing is compared: {self.not_compared}")
         return {
-            "compared": {row: figures(row) for row in self.compared if row in rows},
-            "beside": {row: figures(row) for row in beside},
-            "best": {metric: best for metric in ERRORS if (best := self.best(metric))},
-            "said": [
-                *self.better_references(),
-                *([f"nothing is compared: {self.not_compared}"] if self.not_compared else []),
-            ],
+            "compared": {row: self._errors(row) for row in compared},
+            "beside": {row: self._errors(row) for row in references if row not in self.compared},
+            "best": {metric: row for metric, row in best.items() if row},
+            "said": remarks,
+        }
+
+    def _errors(self, row: str) -> dict[str, float | None]:
+        """Return E of one row by metric, rounded to six digits; None where it is unknown."""
+        values = {metric: self.evaluation.value(row, metric) for metric in ERRORS}
+        return {
+            metric: float(f"{value:.6g}") if math.isfinite(value) else None
+            for metric, value in values.items()
         }
 
     def road_and_fit(self) -> tuple[Road, Fit]:

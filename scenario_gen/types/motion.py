@@ -58,12 +58,11 @@ def canonical_presence(present: Ints, count: int, samples: int, name: str) -> In
 
 def at_ends(present: Ints, samples: int) -> Bools:
     """Return (N, 2) whether each vehicle is present at the first and the last of T `samples`."""
-    there: Bools = present == (0, samples - 1)
-    return there
+    return np.asarray(present == (0, samples - 1))
 
 
 def always(present: Ints, samples: int) -> bool:
-    """Return whether everybody (N, 2) is there at all T `samples`."""
+    """Return whether all vehicles (N, 2) are present at all T `samples`."""
     return bool(at_ends(present, samples).all())
 
 
@@ -77,10 +76,9 @@ def held(values: Floats, present: Ints) -> Floats:
 
 
 def mask(present: Ints, samples: int) -> Bools:
-    """Return (N, T) whether each vehicle is there at each sample, of presence (N, 2)."""
+    """Return (N, T) whether each vehicle is present at each sample, of presence (N, 2)."""
     at = np.arange(samples)
-    there: Bools = (at >= present[:, :1]) & (at <= present[:, 1:])
-    return there
+    return np.asarray((at >= present[:, :1]) & (at <= present[:, 1:]))
 
 
 def together(present: Ints, *rows: int) -> slice:

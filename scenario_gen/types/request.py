@@ -103,7 +103,7 @@ class Request(Parameters):
         return vehicle_index(encounter, self.ego, "ego") if self.ego else None
 
 
-def read_states(text: str, what: str) -> dict[str, State]:
+def read_states(text: str, end: str) -> dict[str, State]:
     """Return {vehicle id: state} of a text such as `1: 10.5 -1.75 0.0 8.0; 2: 3 4 1.57`.
 
     Raises:
@@ -116,12 +116,12 @@ def read_states(text: str, what: str) -> dict[str, State]:
         name, state = name.strip(), read_numbers(numbers)
         if not name or len(state) not in (3, 4):
             raise InputError(
-                f"{what}: {piece!r} is not of the form `{_FORM}` with finite numbers, "
+                f"{end}: {piece!r} is not of the form `{_FORM}` with finite numbers, "
                 "e.g. `1: 10.5 -1.75 0.0 8.0`"
             )
         if len(state) == 4 and state[3] < 0.0:
-            raise InputError(f"{what}: {piece!r} asks for a negative speed")
+            raise InputError(f"{end}: {piece!r} asks for a negative speed")
         if name in states:
-            raise InputError(f"{what}: vehicle {name!r} comes twice")
+            raise InputError(f"{end}: vehicle {name!r} comes twice")
         states[name] = state
     return states

@@ -6,6 +6,7 @@
 from collections.abc import Iterable
 from dataclasses import dataclass
 import math
+import re
 
 from scenario_gen.base.errors import InputError
 from scenario_gen.types.encounter import Encounter, vehicle_index
@@ -22,6 +23,7 @@ UNITS = {
 """Figures that a target can be set on, with units; see `method.evaluation.measures`."""
 Pair = tuple[int, ...]  # of vehicle indices; one: with whom it is the most critical
 _FORM = "NAME=LOW..HIGH, NAME[a]=LOW..HIGH or NAME[a,b]=LOW..HIGH"
+_TARGET = re.compile(r"([^=\[]*)(?:\[([^=]*)\]\s*)?=(.*)", re.DOTALL)
 _EXAMPLE = "pet=0.5..1.5; ttc[1,2]=1..2"
 
 
@@ -130,36 +132,37 @@ def read_targets(text: str) -> tuple[Target, ...]:
     """
     targets: list[Target] = []
     for piece in split_pieces(text):
-        head, _, bounds = piece.partition("=")
-        name, bracket, inside = head.strip().partition("[")
-        name = name.strip()
-        ids = tuple(word.strip() for word in inside.rstrip("] ").split(",")) if bracket else ()
-        words = bounds.split("..")
-        if len(words) != 2 or (
-            bracket and not (head.strip().endswith("]") and len(ids) in (1, 2) and all(ids))
-        ):
-            raise InputError(f"target: {piece!r} is not of the form `{_FORM}`, e.g. `{_EXAMPLE}`")
-        if name not in UNITS:
-            raise InputError(f"target: {name!r} is none of {', '.join(UNITS)}")
-        try:
-            low, high = (
-                float(word) if word.strip() else bound
-                for word, bound in zip(words, (-math.inf, math.inf), strict=True)
-            )
-        except ValueError:
-            raise InputError(
-                f"target: {piece!r}: the bounds must be numbers, as in `{_EXAMPLE}`"
-            ) from None
-        if not low < high or (math.isinf(low) and math.isinf(high)):
-            raise InputError(
-                f"target: {piece!r}: the lower bound must be below the upper one, "
-                "and one of them finite"
-            )
-        target = Target(name, low, high, ids)
+        target = _read_target(piece)
         if target.label in {other.label for other in targets}:
             raise InputError(f"target: {target.label} comes twice")
         targets.append(target)
     return tuple(targets)
+
+
+def _read_target(piece: str) -> Target:
+    """Return the target in a text such as `ttc[1,2]=1..2`."""
+    match = _TARGET.fullmatch(piece)
+    name, ids, bounds = match.groups() if match else ("", None, "")
+    name = name.strip()
+    vehicles = () if ids is None else tuple(word.strip() for word in ids.split(","))
+    words = [word.strip() for word in bounds.split("..")]
+    if len(words) != 2 or len(vehicles) > 2 or not all(vehicles):
+        raise InputError(f"target: {piece!r} is not of the form `{_FORM}`, e.g. `{_EXAMPLE}`")
+    if name not in UNITS:
+        raise InputError(f"target: {name!r} is none of {', '.join(UNITS)}")
+    try:
+        low = float(words[0] or -math.inf)
+        high = float(words[1] or math.inf)
+    except ValueError:
+        raise InputError(
+            f"target: {piece!r}: the bounds must be numbers, as in `{_EXAMPLE}`"
+        ) from None
+    if not low < high or (math.isinf(low) and math.isinf(high)):
+        raise InputError(
+            f"target: {piece!r}: the lower bound must be below the upper one, "
+            "and one of them finite"
+        )
+    return Target(name, low, high, vehicles)
 
 
 def split_pieces(text: str) -> list[str]:

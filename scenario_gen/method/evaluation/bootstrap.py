@@ -119,8 +119,8 @@ def clustered_wilson(hits: Bools, unit: Ints, level: float) -> Interval:
     share = count / total
     if count in (0, total):
         return _wilson(share, float(units), float(special.ndtri(0.5 + 0.5 * level)))
-    apart = np.bincount(member, weights=hits - share)
-    between = float(np.sum(apart * apart)) * units / (units - 1)
+    excess = np.bincount(member, weights=hits - share)
+    between = float(np.sum(excess * excess)) * units / (units - 1)
     effect = max(between / (total * share * (1.0 - share)), 1.0)
     return _wilson(share, total / effect, float(special.stdtrit(units - 1, 0.5 + 0.5 * level)))
 
@@ -141,10 +141,10 @@ def paired_difference(differences: Floats, unit: Ints, level: float) -> Interval
     if not differences.any():
         high = _wilson(0.0, float(units), float(special.ndtri(0.5 + 0.5 * level))).high
         return Interval(0.0, -high, high)
-    apart = np.bincount(member, weights=differences - mean)
+    excess = np.bincount(member, weights=differences - mean)
     half = (
         float(special.stdtrit(units - 1, 0.5 + 0.5 * level))
-        * float(np.sqrt(np.sum(apart * apart) * units / (units - 1)))
+        * float(np.sqrt(np.sum(excess * excess) * units / (units - 1)))
         / total
     )
     return Interval(mean, max(mean - half, -1.0), min(mean + half, 1.0))

@@ -69,25 +69,27 @@ def compare(
     Raises:
         InputError: the sets have no case in common, or one has none of that row.
     """
-    others = {(evaluation.encounter, evaluation.road): evaluation for evaluation in second}
+    others = {(other.encounter, other.road): other for other in second}
     differences: list[Difference] = []
-    for own in first:
-        other = others.get((own.encounter, own.road))
+    for evaluation in first:
+        other = others.get((evaluation.encounter, evaluation.road))
         if other is None:
             continue
-        mine, theirs = own.row(row), other.row(row)
-        if mine is None or theirs is None:
-            raise InputError(f"{own.encounter} on {own.road} has no row {row!r} in both sets")
-        for metric in own.metrics:
-            pair = mine.values.get(metric.id), theirs.values.get(metric.id)
+        first_row, second_row = evaluation.row(row), other.row(row)
+        if first_row is None or second_row is None:
+            raise InputError(
+                f"{evaluation.encounter} on {evaluation.road} has no row {row!r} in both sets"
+            )
+        for metric in evaluation.metrics:
+            pair = first_row.values.get(metric.id), second_row.values.get(metric.id)
             if any(pair):
                 differences.append(
                     Difference(
-                        own.encounter,
-                        own.road,
+                        evaluation.encounter,
+                        evaluation.road,
                         metric,
                         *pair,
-                        (own.changepoints, other.changepoints),
+                        (evaluation.changepoints, other.changepoints),
                     )
                 )
     if not differences:

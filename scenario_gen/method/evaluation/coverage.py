@@ -57,45 +57,46 @@ def coverage_of(encounter: Encounter, scenarios: Sequence[Scenario]) -> Coverage
     nearest to the medians of the set, each figure in units of its spread; most different the one
     farthest from the template.
     """
-    whole = [join_ego(scenario) for scenario in measured(scenarios)]
-    each = [figures_of(scenario) for scenario in whole]
-    rows = [
-        _row(scenario, most_critical(figures))
-        for scenario, figures in zip(whole, each, strict=True)
-    ]
+    joined = [join_ego(scenario) for scenario in measured(scenarios)]
+    figures = [figures_of(scenario) for scenario in joined]
+    rows = [_row(*each) for each in zip(joined, map(most_critical, figures), strict=True)]
     template = _row(encounter, most_critical(figures_of(encounter)))
     spreads = {
         name: Spread(label, unit, tuple(row[name] for row in rows), template[name])
         for name, (label, unit) in LABELS.items()
     }
-    pairs: dict[str, Counter[int]] = {}
-    for scenario, figures in zip(whole, each, strict=True):
-        names = [manoeuvre_of(float(heading[-1] - heading[0])) for heading in scenario.heading]
-        for figure in figures:
-            kind = " and ".join(sorted(names[n] for n in figure.pair))
-            pairs.setdefault(kind, Counter())[_bin(figure.pet)] += 1
     orders = Counter(
         join_pieces(scenario.facts.passing_order)
-        for scenario in whole
+        for scenario in joined
         if scenario.facts.passing_order
     )
-    index = tuple(scenario.index for scenario in whole)
+    index = tuple(scenario.index for scenario in joined)
     return Coverage(
         index,
         spreads,
         PET_BINS,
-        {
-            kind: tuple(counts[k] for k in range(len(PET_BINS)))
-            for kind, counts in sorted(pairs.items())
-        },
+        _pairs_by_manoeuvres(joined, figures),
         _picks(index, rows, template),
         dict(sorted(orders.items())),
     )
 
 
+def _pairs_by_manoeuvres(
+    scenarios: Sequence[Scenario], figures: Sequence[Sequence[PairFigures]]
+) -> dict[str, tuple[int, ...]]:
+    """Return the number of pairs in each bin of PET, by the pair's manoeuvres."""
+    counts: dict[str, list[int]] = {}
+    for scenario, pairs in zip(scenarios, figures, strict=True):
+        names = [manoeuvre_of(float(heading[-1] - heading[0])) for heading in scenario.heading]
+        for pair in pairs:
+            kind = " and ".join(sorted(names[n] for n in pair.pair))
+            counts.setdefault(kind, [0] * len(PET_BINS))[_bin(pair.pet)] += 1
+    return {kind: tuple(counts[kind]) for kind in sorted(counts)}
+
+
 def _row(motion: Scenario | Encounter, figures: PairFigures | None) -> dict[str, float]:
-    there = motion.is_present
-    row = dict.fromkeys(LABELS, math.nan) | {"speed": float(motion.speed[there].mean())}
+    speed = float(motion.speed[motion.is_present].mean())
+    row = dict.fromkeys(LABELS, math.nan) | {"speed": speed}
     if figures is not None:
         row |= {name: getattr(figures, name) for name in LABELS if name != "speed"}
     return row
@@ -112,32 +113,24 @@ def _bin(pet: float) -> int:
 def _picks(
     index: Sequence[int], rows: Sequence[dict[str, float]], template: dict[str, float]
 ) -> dict[str, int]:
-    """Index of the scenarios that stand out."""
+    """Return the indices of the notable scenarios."""
     if not rows:
         return {}
     table = np.array([[row[name] for name in ALIKE] for row in rows])
-    own = np.array([template[name] for name in ALIKE])
+    target = np.array([template[name] for name in ALIKE])
     critical = table[:, 0] if np.isfinite(table[:, 0]).any() else table[:, 2]
-    middle = np.array(
-        [
-            float(np.median(column[np.isfinite(column)])) if np.isfinite(column).any() else 0.0
-            for column in table.T
-        ]
-    )
-    spread = np.maximum(
-        np.array(
-            [float(np.nanstd(column)) if np.isfinite(column).any() else 1.0 for column in table.T]
-        ),
-        1e-3,
-    )
+    columns = [column[np.isfinite(column)] for column in table.T]
+    median = np.array([np.median(known) if known.size else 0.0 for known in columns])
+    deviation = np.array([known.std() if known.size else 1.0 for known in columns])
+    spread = np.maximum(deviation, 1e-3)
     return {
         "most critical": index[int(np.argmin(np.where(np.isfinite(critical), critical, np.inf)))],
-        "most typical": index[int(np.argmin(_from(table, middle, spread)))],
-        "most different": index[int(np.argmax(_from(table, own, spread)))],
+        "most typical": index[int(np.argmin(_squared_distance(table, median, spread)))],
+        "most different": index[int(np.argmax(_squared_distance(table, target, spread)))],
     }
 
 
-def _from(table: Floats, centre: Floats, spread: Floats) -> Floats:
-    """Squared distances (S,) of rows to a centre in spreads; a missing value counts as 1."""
+def _squared_distance(table: Floats, centre: Floats, spread: Floats) -> Floats:
+    """Return squared distances (S,) of rows to a centre in spreads; a missing value counts as 1."""
     step = (table - centre) / spread
     return np.asarray(np.square(np.where(np.isfinite(step), step, 1.0)).sum(axis=1))

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Distributions of what vehicles do, and how far two of them are apart."""
+"""Distributions of what vehicles do, and how far two of them are difference."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -52,8 +52,8 @@ def values_of(motion: Motion) -> dict[str, Floats]:
     width = max(1, round(JERK_SMOOTHING_S / motion.dt))
     samples: dict[str, list[Floats]] = {quantity.id: [np.zeros(0)] for quantity in QUANTITIES}
     for n in range(len(motion.vehicles)):
-        own = motion.present_slice(n)
-        speed, heading = motion.speed[n, own], motion.heading[n, own]
+        present = motion.present_slice(n)
+        speed, heading = motion.speed[n, present], motion.heading[n, present]
         acceleration = np.gradient(speed, motion.dt)
         sums = np.concatenate([np.zeros(1), np.cumsum(acceleration)])
         smooth = (sums[width:] - sums[:-width]) / width
@@ -95,12 +95,12 @@ class Comparison:
     def wasserstein_near(self, weights: Floats) -> Floats:
         """Return Wasserstein distances (B,) under weights (B, S), integrated over the grid."""
         with np.errstate(invalid="ignore"):
-            apart = weights @ self.sample_cdf[:, :-1]
-            apart /= (weights @ self.sizes)[
+            difference = weights @ self.sample_cdf[:, :-1]
+            difference /= (weights @ self.sizes)[
                 :, None
             ]  # in place: new arrays of this size cost more than their numbers
-        apart -= self.template_cdf[:-1]
-        return np.abs(apart, out=apart) @ np.diff(self.grid)
+        difference -= self.template_cdf[:-1]
+        return np.abs(difference, out=difference) @ np.diff(self.grid)
 
     def coverage(self, weights: Floats) -> Floats:
         """Return the share (B,) of the template's values in bins that the set visits, too."""
@@ -135,7 +135,7 @@ def compare(
         points: numbers of values at which the cumulative distributions are given, at most.
 
     Raises:
-        InputError: the values lie so far apart that there would be too many bins.
+        InputError: the values lie so far difference that there would be too many bins.
     """
     pooled = np.concatenate(list(samples))
     everything = np.concatenate([template, pooled])

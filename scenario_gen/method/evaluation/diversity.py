@@ -8,18 +8,18 @@ import numpy as np
 from scenario_gen.numerics import Bools, Floats
 
 
-def displacements(position: Floats, there: Bools | None = None) -> Floats:
+def displacements(position: Floats, counted: Bools | None = None) -> Floats:
     """Return (S, S): mean distance in metres between samples r and s, over vehicles and instants.
 
     Args:
         position: (S, N, T, 2) metres, at the same share of each sample's duration.
-        there: (N, T) vehicles and instants that count; None: all.
+        counted: (N, T) vehicles and instants that count; None: all.
     """
     samples = position.shape[0]
     table = np.zeros((samples, samples))
     for s in range(samples - 1):
         step = position[s + 1 :] - position[s]
-        table[s, s + 1 :] = _mean(np.hypot(step[..., 0], step[..., 1]), there)
+        table[s, s + 1 :] = _mean(np.hypot(step[..., 0], step[..., 1]), counted)
     return table + table.T
 
 
@@ -34,24 +34,24 @@ def diversity(table: Floats, weights: Floats) -> Floats:
         return np.asarray(total / pairs)
 
 
-def _mean(distance: Floats, there: Bools | None) -> Floats:
+def _mean(distance: Floats, counted: Bools | None) -> Floats:
     """Mean (S,) of distances (S, N, T) over the vehicles and instants that count."""
     return np.asarray(
         distance.mean(axis=(1, 2))
-        if there is None or there.all()
-        else distance[:, there].mean(axis=1)
+        if counted is None or counted.all()
+        else distance[:, counted].mean(axis=1)
     )
 
 
-def displacement_to(position: Floats, target: Floats, there: Bools | None = None) -> Floats:
+def displacement_to(position: Floats, target: Floats, counted: Bools | None = None) -> Floats:
     """Return the mean distance (S,) [m] of samples (S, N, T, 2) to a target (N, T, 2) (ADE).
 
-    Those that count, if `there` (N, T) says so.
+    Only vehicles and instants in `counted` (N, T) enter; None: all.
 
     Source: the average displacement error (Pellegrini et al. 2009).
     """
     step = position - target
-    return _mean(np.hypot(step[..., 0], step[..., 1]), there)
+    return _mean(np.hypot(step[..., 0], step[..., 1]), counted)
 
 
 def weighted_min(values: Floats, weights: Floats) -> Floats:

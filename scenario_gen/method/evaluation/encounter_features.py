@@ -89,7 +89,7 @@ def features_of(
     with the least gap. The kind is None if the pair, or every pair, shares no area.
     """
     motion = motion.resampled(FIGURE_PERIOD_S)
-    figures = {own.pair: own for own in figures_of(motion) if pair in (None, own.pair)}
+    figures = {figure.pair: figure for figure in figures_of(motion) if pair in (None, figure.pair)}
     conflicts: dict[Pair, Conflict] = {
         known: conflict
         for known, conflict in conflicts_by_pair(find_conflicts(motion)).items()

@@ -38,7 +38,7 @@ Scenarios = Sequence[Scenario] | ScenarioSet
 def evaluate(
     result: GenerationResult, config: EvaluationConfig = EvaluationConfig()
 ) -> Evaluation:
-    """Measure what was generated, beside its references and the fitted template replayed.
+    """Measure quantity was generated, beside its references and the fitted template replayed.
 
     Args:
         result: as `generate` returns it.
@@ -89,7 +89,7 @@ def evaluate_scenarios(
         seed: of the bootstrap.
 
     A vehicle that a scenario lacks (one left out for an ego) is left out of every row, the
-    template's too; with one vehicle left, what needs two is not a number.
+    template's too; with one vehicle left, quantity needs two is not a number.
 
     Returns:
         One row for the recorded template and one for each set.
@@ -98,31 +98,21 @@ def evaluate_scenarios(
         InputError: a scenario has a vehicle that the encounter has not.
     """
     named = sets if isinstance(sets, Mapping) else {"scenarios": sets}
-    accounts = {
-        name: CheckCounts.of_set(given)
-        for name, given in named.items()
-        if isinstance(given, ScenarioSet)
-    }
-    counts = accounts | dict(checks or {})
-    rows = {
-        name: given.scenarios if isinstance(given, ScenarioSet) else given
-        for name, given in named.items()
-    }
-    sizes = {name: len(scenarios) for name, scenarios in rows.items()}
-    rows = {name: measured(scenarios) for name, scenarios in rows.items()}
+    counts: dict[str, CheckCounts] = {}
+    rows: dict[str, Sequence[Scenario]] = {}
+    for name, scenarios in named.items():
+        if isinstance(scenarios, ScenarioSet):
+            counts[name] = CheckCounts.of_set(scenarios)
+            rows[name] = measured(scenarios.scenarios)
+        else:
+            rows[name] = measured(scenarios)
+    counts |= checks or {}
     ids = shared_vehicles(encounter, rows)
-    pairs = max(math.comb(len(ids), 2), 1)
-    steps = min(
-        encounter.speed.shape[1],
-        config.max_steps,
-        max(math.isqrt(config.max_entries // pairs), MIN_STEPS),
-    )
-    template = Template(
-        encounter, ids, steps, next(iter(rows.get(replay, ())), None), config, seed
-    )
-    own = _template_row(template)
+    replayed = next(iter(rows.get(replay, ())), None)
+    steps = _steps(encounter, len(ids), config)
+    template = Template(encounter, ids, steps, replayed, config, seed)
     evaluated = [
-        _row(name, sizes[name], Samples(scenarios, counts.get(name), template))
+        _row(name, len(named[name]), Samples(scenarios, counts.get(name), template))
         for name, scenarios in rows.items()
     ]
     return Evaluation(
@@ -135,8 +125,15 @@ def evaluate_scenarios(
         resamples=config.resamples,
         seed=seed,
         metrics=catalogue(config),
-        rows=(own, *evaluated),
+        rows=(_template_row(template), *evaluated),
     )
+
+
+def _steps(encounter: Encounter, vehicles: int, config: EvaluationConfig) -> int:
+    """Return the number of instants of each feature matrix."""
+    pairs = max(math.comb(vehicles, 2), 1)
+    affordable = max(math.isqrt(config.max_entries // pairs), MIN_STEPS)
+    return min(encounter.speed.shape[1], config.max_steps, affordable)
 
 
 def measured(scenarios: Sequence[Scenario]) -> Sequence[Scenario]:
@@ -162,23 +159,23 @@ def shared_vehicles(
         InputError: a scenario has a vehicle that the encounter has not, or none is left.
     """
     ids = [vehicle.id for vehicle in encounter.vehicles]
-    shared = ids
+    shared = set(ids)
     for name, scenarios in rows.items():
         for scenario in scenarios:
-            own = {vehicle.id for vehicle in scenario.vehicles}
-            if len(own) != len(scenario.vehicles) or not own <= set(ids):
+            present = {vehicle.id for vehicle in scenario.vehicles}
+            if len(present) != len(scenario.vehicles) or not present <= set(ids):
                 raise InputError(
                     f"row {name!r}: scenario {scenario.index} has {len(scenario.vehicles)} "
-                    f"vehicles ({', '.join(sorted(own))}), "
+                    f"vehicles ({', '.join(sorted(present))}), "
                     f"the encounter {encounter.name!r} has {len(ids)} ({', '.join(ids)})"
                 )
-            shared = [known for known in shared if known in own]
+            shared &= present
     if not shared:
         raise InputError(
             f"no vehicle of {encounter.name!r} is in all scenarios; "
             "measure requests with different egos one by one"
         )
-    return tuple(shared)
+    return tuple(known for known in ids if known in shared)
 
 
 def _template_row(template: Template) -> Row:
@@ -204,13 +201,11 @@ def _row(name: str, size: int, samples: Samples) -> Row:
 
 def _notes(size: int, values: Mapping[str, Interval], samples: Samples) -> tuple[Note, ...]:
     notes = []
-    measured, vehicles, enough = (
-        len(samples.scenarios),
-        len(samples.template.ids),
-        samples.template.config.enough,
-    )
-    if apart := vehicles * (vehicles - 1) // 2 - len(samples.pairs):
-        notes.append(Note.of(NoteKind.PAIRS_LEFT_OUT, count=apart, time=MIN_COMMON_S))
+    measured = len(samples.scenarios)
+    enough = samples.template.config.enough
+    left_out = math.comb(len(samples.template.ids), 2) - len(samples.pairs)
+    if left_out:
+        notes.append(Note.of(NoteKind.PAIRS_LEFT_OUT, count=left_out, time=MIN_COMMON_S))
     if measured < size:
         notes.append(
             Note.of(NoteKind.SUBSET_MEASURED, measured=measured, total=size, runs=RUN_COUNT)
@@ -220,9 +215,9 @@ def _notes(size: int, values: Mapping[str, Interval], samples: Samples) -> tuple
     if np.isnan(values["min_distance"].value):
         return (*notes, Note.of(NoteKind.ONE_VEHICLE))
     notes += [
-        Note.of(NoteKind.E_UNDEFINED, quantity=what)
-        for what in ("position", "speed")
-        if not np.isfinite(values[f"e_{what}"].value)
+        Note.of(NoteKind.E_UNDEFINED, quantity=quantity)
+        for quantity in ("position", "speed")
+        if not np.isfinite(values[f"e_{quantity}"].value)
     ]
     if values["vanished_conflicts"].value > 0.0:
         vanished, kept = (values[key].value for key in ("vanished_conflicts", "conflicts"))

@@ -30,12 +30,12 @@ def time_to_collision(motion: Motion, a: int, b: int) -> Floats:
 def distance_and_ttc(motion: Motion, a: int, b: int) -> tuple[Floats, Floats]:
     """Return the distance [m] of two footprints and the time to collision [s], (T,) each."""
     ahead = unit(motion.heading)
-    one, other = (
+    first, second = (
         _Driven(motion.position[n], ahead[n], motion.speed[n], *motion.vehicles[n].half)
         for n in (a, b)
     )
-    distance, time = np.empty_like(one.speed), np.empty_like(one.speed)
-    _fill_nearness(one, other, distance, time)
+    distance, time = np.empty_like(first.speed), np.empty_like(first.speed)
+    _fill_nearness(first, second, distance, time)
     return distance, time
 
 
@@ -62,10 +62,8 @@ def _box(driven: _Driven, t: int) -> Box:
 def _fill_nearness(a: _Driven, b: _Driven, distance: Floats, time: Floats) -> None:
     """Fill `distance` (T,) [m] and `time` (T,) [s]."""
     for t in range(len(time)):
-        one, other = _box(a, t), _box(b, t)
-        distance[t] = box_distance(one, other)
-        vx, vy = (
-            b.speed[t] * other.cos - a.speed[t] * one.cos,
-            b.speed[t] * other.sin - a.speed[t] * one.sin,
-        )
-        time[t] = time_to_touch(one, other, vx, vy)
+        first, second = _box(a, t), _box(b, t)
+        distance[t] = box_distance(first, second)
+        vx = b.speed[t] * second.cos - a.speed[t] * first.cos
+        vy = b.speed[t] * second.sin - a.speed[t] * first.sin
+        time[t] = time_to_touch(first, second, vx, vy)

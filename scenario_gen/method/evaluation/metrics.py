@@ -31,13 +31,12 @@ LIMIT_CAUSES = (
 """Causes that count as a violated limit."""
 MIN_HEADING_SPREAD_RAD = math.radians(10.0)
 """E for heading is undefined for pairs whose heading differences spread by less."""
-HEADINGS = _SIMILARITY, _REALISM, _CRITICAL, _VALID, _DIVERSITY = (
-    "Similarity to the recording",
-    "Distributions against the recording",
-    "Criticality",
-    "Validity of the candidates",
-    "Diversity",
-)
+_SIMILARITY = "Similarity to the recording"
+_REALISM = "Distributions against the recording"
+_CRITICAL = "Criticality"
+_VALID = "Validity of the candidates"
+_DIVERSITY = "Diversity"
+HEADINGS = (_SIMILARITY, _REALISM, _CRITICAL, _VALID, _DIVERSITY)
 Estimates = dict[str, Interval]
 
 
@@ -50,7 +49,7 @@ class MetricGroup:
     """Metrics that are computed together.
 
     Attributes:
-        metrics: what they are called; a heading (`group`) of their own stands below the others.
+        metrics: quantity they are called; a heading (`group`) of their own stands below the others.
         measure: returns the estimate of each by its id, of one or more scenarios; one that cannot
             be had is left out or NaN.
         of_template: returns those that the recorded encounter has, too.
@@ -117,7 +116,7 @@ VALIDITY = MetricGroup(
 def _similarity(samples: Samples) -> Estimates:
     """E and correlation: Euclidean for position, Manhattan for speed; headings are wrapped.
 
-    Where nobody turns there is nothing of headings.
+    Headings have no figures if no vehicle turns.
     """
     unit = samples.pooled.unit
     compared = {
@@ -130,17 +129,13 @@ def _similarity(samples: Samples) -> Estimates:
     if not any(pair.template[2] for pair in compared["heading"]):
         del compared["heading"]
     interval = samples.pooled.of_units().interval
-    return {
-        **{
-            f"e_{what}": interval(partial(similarity.mean_error, of))
-            for what, of in compared.items()
-        },
-        **{
-            f"correlation_{what}": interval(partial(similarity.mean_correlation, of))
-            for what, of in compared.items()
-        },
-        "turn_kept": samples.bootstrap.mean(_turn_kept(samples)),
-    }
+    estimates = {"turn_kept": samples.bootstrap.mean(_turn_kept(samples))}
+    for quantity, pairs in compared.items():
+        estimates[f"e_{quantity}"] = interval(partial(similarity.mean_error, pairs))
+        estimates[f"correlation_{quantity}"] = interval(
+            partial(similarity.mean_correlation, pairs)
+        )
+    return estimates
 
 
 def _turn_kept(samples: Samples) -> Floats:
@@ -171,14 +166,14 @@ SIMILARITY = MetricGroup(
         ),
         *(
             Metric(
-                f"correlation_{what}",
-                f"correlation {what}",
+                f"correlation_{quantity}",
+                f"correlation {quantity}",
                 "",
                 "higher",
                 _SIMILARITY,
                 "of the mean matrix with the recording's",
             )
-            for what in ("position", "speed", "heading")
+            for quantity in ("position", "speed", "heading")
         ),
         Metric(
             "turn_kept",
@@ -198,10 +193,8 @@ def _distributions(samples: Samples) -> Estimates:
     """Compare the values of each quantity; coverage is counted in the same bins."""
     values = [values_of(motion) for motion in samples.periodic]
     bootstrap, template = samples.bootstrap, samples.template.values
-    units, drawn = (
-        [np.flatnonzero(bootstrap.unit == k) for k in range(bootstrap.unit.max() + 1)],
-        bootstrap.of_units(),
-    )
+    units = [np.flatnonzero(bootstrap.unit == k) for k in range(bootstrap.unit.max() + 1)]
+    drawn = bootstrap.of_units()
     result: Estimates = {}
     covered = []
     for quantity in QUANTITIES:
@@ -264,12 +257,12 @@ def _criticality(samples: Samples) -> Estimates:
 
 
 def _criticality_of(template: Template) -> Mapping[str, float]:
-    own = template.critical
+    critical = template.critical
     return {
-        "min_distance": own.min_distance,
-        "min_ttc": own.min_ttc,
-        "pet": own.pet,
-        "conflicts": float(len(own.order)),
+        "min_distance": critical.min_distance,
+        "min_ttc": critical.min_ttc,
+        "pet": critical.pet,
+        "conflicts": float(len(critical.order)),
     }
 
 
@@ -332,10 +325,8 @@ CRITICALITY = MetricGroup(
 
 def _diversity(samples: Samples) -> Estimates:
     position = np.stack([motion.position for motion in samples.motions])
-    table, interval = (
-        diversity.displacements(position, samples.is_present),
-        samples.bootstrap.interval,
-    )
+    table = diversity.displacements(position, samples.is_present)
+    interval = samples.bootstrap.interval
     result = {"diversity": interval(partial(diversity.diversity, table))}
     if samples.template.fitted is not None:
         error = diversity.displacement_to(

@@ -48,8 +48,8 @@ def baseline_margin(motion: Motion, a: int, b: int) -> float:
 
     0: it would meet b. At most MAX_SHIFT_S.
     """
-    own = motion.present_slice(a)
-    position, speed = motion.position[a, own], motion.speed[a, own]
+    present = motion.present_slice(a)
+    position, speed = motion.position[a, present], motion.speed[a, present]
     position = position[np.concatenate([[True], edge_lengths(position) > 1e-3])]
     if len(position) < 3:
         return MAX_SHIFT_S
@@ -69,7 +69,7 @@ def baseline_margin(motion: Motion, a: int, b: int) -> float:
         stations.append(stations[-1] + 0.5 * (now + after) * dt)
         now = after
     poses = np.column_stack(
-        [motion.time[own.start] + dt * np.arange(len(stations)), route.at(np.array(stations))]
+        [motion.time[present.start] + dt * np.arange(len(stations)), route.at(np.array(stations))]
     )
     return poses_time_shift(
         poses,

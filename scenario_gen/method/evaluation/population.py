@@ -79,36 +79,36 @@ def population_of(
     Raises:
         InputError: fewer than two recordings, or none whose vehicles share an area.
     """
-    found = members_of(results)
-    if found.recordings < 2:
+    every = members_of(results)
+    if every.recordings < 2:
         raise InputError(
             "encounters of at least two recordings are needed; give results of more logs"
         )
-    drawn = [n for n in sorted(set(counts)) if n <= MAX_TEMPLATE_SHARE * len(found.recorded)]
+    drawn = [n for n in sorted(set(counts)) if n <= MAX_TEMPLATE_SHARE * len(every.recorded)]
     if not drawn:
-        known, most = len(found.recorded), int(MAX_TEMPLATE_SHARE * len(found.recorded))
+        known, most = len(every.recorded), int(MAX_TEMPLATE_SHARE * len(every.recorded))
         raise InputError(
             f"{known} encounters share an area: at most {most} templates can be drawn; "
             "ask for fewer, or give more logs"
         )
-    near, points = found.near, found.curve(drawn, draws=draws, seed=seed)
+    near, points = every.near, every.curve(drawn, draws=draws, seed=seed)
     counted, generated = (
         dict(Counter(member.kind_name for member in members))
-        for members in (found.recorded, found.made)
+        for members in (every.recorded, every.made)
     )
     by_kind: dict[str, tuple[CoveragePoint, ...]] = {}
     for kind in KINDS:
-        own = found.of_kind(kind)
-        few = [n for n in drawn if n <= MAX_TEMPLATE_SHARE * len(own.recorded)]
-        if few and own.recordings > 1:
-            by_kind[kind] = own.curve(few, draws=draws, seed=seed)
+        of_kind = every.of_kind(kind)
+        few = [n for n in drawn if n <= MAX_TEMPLATE_SHARE * len(of_kind.recorded)]
+        if few and of_kind.recordings > 1:
+            by_kind[kind] = of_kind.curve(few, draws=draws, seed=seed)
     return Population(
         counted,
         generated,
         points,
         by_kind,
-        tuple(near.unreached(found.names)),
-        near.farthest(found),
+        tuple(near.unreached(every.names)),
+        near.farthest(every),
         _needed(points),
     )
 
@@ -138,23 +138,18 @@ class Members:
 
     def of_kind(self, kind: str) -> "Members":
         """Return the recorded encounters of a kind, and everything generated from them."""
-        places = {
-            n: k
-            for k, n in enumerate(n for n, own in enumerate(self.recorded) if own.kind == kind)
-        } | {-1: -1}
+        chosen = [n for n, member in enumerate(self.recorded) if member.kind == kind]
+        index = {n: k for k, n in enumerate(chosen)} | {-1: -1}
 
-        def own(members: Sequence[EncounterFeatures]) -> list[EncounterFeatures]:
+        def renumbered(members: Sequence[EncounterFeatures]) -> list[EncounterFeatures]:
             return [
-                replace(member, template=places[member.template], other=places[member.other])
+                replace(member, template=index[member.template], other=index[member.other])
                 for member in members
-                if member.template in places
+                if member.template in index
             ]
 
-        return Members(
-            own(self.recorded),
-            own(self.made),
-            [self.names[n] for n in places if 0 <= n < len(self.names)],
-        )
+        names = [self.names[n] for n in chosen if n < len(self.names)]
+        return Members(renumbered(self.recorded), renumbered(self.made), names)
 
     def shares(
         self, count: int, *, draws: int = 200, seed: int = 0
@@ -164,15 +159,9 @@ class Members:
         Arguments as of `population_of`.
         """
         near, rng = self.near, np.random.default_rng(seed)
-        alone, generated, precision, recorded = zip(
-            *(near.judged(near.chosen(rng, count)) for _ in range(draws)), strict=True
-        )
-        return (
-            _over_draws(alone),
-            _over_draws(generated),
-            _over_draws(precision),
-            _over_draws(recorded),
-        )
+        shares = zip(*(near.judged(near.chosen(rng, count)) for _ in range(draws)), strict=True)
+        coverage_alone, coverage, precision, recorded = map(_over_draws, shares)
+        return coverage_alone, coverage, precision, recorded
 
     def curve(
         self, counts: Sequence[int], *, draws: int = 200, seed: int = 0
@@ -210,16 +199,17 @@ def members_of(results: Iterable[tuple[str, GenerationResult]]) -> Members:
     names: list[str] = []
     recombined: list[tuple[Recombined, list[EncounterFeatures]]] = []
     for recording, result in results:
-        own = features_of(result.encounter, recording, len(recorded))
-        if own.kind is None:
+        template = features_of(result.encounter, recording, len(recorded))
+        if template.kind is None:
             continue
         generated = [
-            scenario_features(join_ego(scenario), own, result.encounter) for scenario in result
+            scenario_features(join_ego(scenario), template, result.encounter)
+            for scenario in result
         ]
         if isinstance(result.encounter.source, Recombined):
             recombined.append((result.encounter.source, generated))
         else:
-            recorded.append(own)
+            recorded.append(template)
             names.append(result.encounter.name)
             made += generated
     for source, generated in recombined:
@@ -257,14 +247,14 @@ class _Near:
         template: (M, 2) indices of each generated member's templates, twice the same but for
             recombined ones.
         scaled: (R + M, F) features in standard deviations of the kind, recorded ones first.
-        apart: (R + M, R) distances to recorded members in units of r, inf between kinds.
+        distances: (R + M, R) distances to recorded members in units of r, inf between kinds.
     """
 
     members: Sequence[EncounterFeatures]
     recording: Ints
     template: Ints
     scaled: Floats
-    apart: Floats
+    distances: Floats
 
     @classmethod
     def of(
@@ -277,12 +267,10 @@ class _Near:
             [-1 if member.kind is None else KINDS.index(member.kind) for member in every]
         )
         scaled = np.array([member.features for member in every])
-        apart = np.full((len(every), len(recorded)), math.inf)
+        distances = np.full((len(every), len(recorded)), math.inf)
         for kind in np.unique(kinds[: len(recorded)]):
-            rows, columns = (
-                np.flatnonzero(kinds == kind),
-                np.flatnonzero(kinds[: len(recorded)] == kind),
-            )
+            rows = np.flatnonzero(kinds == kind)
+            columns = np.flatnonzero(kinds[: len(recorded)] == kind)
             spread = scaled[columns].std(axis=0)
             scaled[rows] /= np.maximum(spread, max(MIN_SPREAD_RATIO * float(spread.max()), 1e-9))
             between = distance.cdist(scaled[rows], scaled[columns]) / math.sqrt(scaled.shape[1])
@@ -292,7 +280,7 @@ class _Near:
             nearest = others.min(axis=1)
             known = nearest[np.isfinite(nearest)]
             if len(known):
-                apart[np.ix_(rows, columns)] = between / max(
+                distances[np.ix_(rows, columns)] = between / max(
                     float(np.median(known)), MIN_RADIUS_RATIO
                 )
         template = [
@@ -300,7 +288,11 @@ class _Near:
             for member in made
         ]
         return cls(
-            recorded, recording, np.array(template, dtype=np.int64).reshape(-1, 2), scaled, apart
+            recorded,
+            recording,
+            np.array(template, dtype=np.int64).reshape(-1, 2),
+            scaled,
+            distances,
         )
 
     def chosen(self, rng: np.random.Generator, count: int) -> Ints:
@@ -320,11 +312,11 @@ class _Near:
         if not unseen.any():
             return (math.nan,) * 4
         members = len(self.recording) + np.flatnonzero(np.isin(self.template, chosen).all(axis=1))
-        own = self.recording[self.template[members - len(self.recording)]]
+        sources = self.recording[self.template[members - len(self.recording)]]
         return (
             self._covered(chosen, unseen),
             self._covered(np.concatenate([chosen, members]), unseen),
-            self._precision(members, own),
+            self._precision(members, sources),
             self._precision(chosen, self.recording[chosen, None]),
         )
 
@@ -335,29 +327,30 @@ class _Near:
     def _covered(self, members: Ints, unseen: Bools) -> float:
         """The share of unseen encounters within r of a member."""
         return (
-            float((self.apart[members][:, unseen].min(axis=0) <= 1.0).mean())
+            float((self.distances[members][:, unseen].min(axis=0) <= 1.0).mean())
             if unseen.any()
             else math.nan
         )
 
-    def _precision(self, members: Ints, own: Ints) -> float:
+    def _precision(self, members: Ints, sources: Ints) -> float:
         """The share of members within r of an encounter from another recording (K, 1 or 2)."""
-        there = np.where(
-            (own[..., None] == self.recording).any(axis=1), math.inf, self.apart[members]
-        )
-        return float((there.min(axis=1) <= 1.0).mean()) if len(members) else math.nan
+        is_source = (sources[..., None] == self.recording).any(axis=1)
+        others = np.where(is_source, math.inf, self.distances[members])
+        return float((others.min(axis=1) <= 1.0).mean()) if len(members) else math.nan
 
     def unreached(self, names: Sequence[str]) -> list[Unreached]:
         """Return recorded encounters that no other recording comes near, the farthest first."""
         source = np.concatenate(
             [np.repeat(self.recording[:, None], 2, axis=1), self.recording[self.template]]
         )
-        found = []
+        unreached = []
         for n, member in enumerate(self.members):
-            far = np.where((source == self.recording[n]).any(axis=1), math.inf, self.apart[:, n])
+            far = np.where(
+                (source == self.recording[n]).any(axis=1), math.inf, self.distances[:, n]
+            )
             nearest = int(far.argmin())
             if far[nearest] > 1.0:
-                found.append(
+                unreached.append(
                     Unreached(
                         names[n],
                         member.kind_name,
@@ -365,20 +358,20 @@ class _Near:
                         self._differ(nearest, n, far[nearest]),
                     )
                 )
-        return sorted(found, key=lambda one: -one.distance)
+        return sorted(unreached, key=lambda entry: -entry.distance)
 
-    def farthest(self, found: Members) -> tuple[Unreached, ...]:
+    def farthest(self, everything: Members) -> tuple[Unreached, ...]:
         """Return the generated members that are farthest from all recorded ones."""
-        away = self.apart[len(self.members) :]
+        away = self.distances[len(self.members) :]
         nearest = away.min(axis=1, initial=math.inf)
         farthest = []
         for n in np.argsort(-nearest, kind="stable")[:SHOWN_COUNT].tolist():
-            member = found.made[n]
+            member = everything.made[n]
             closest = int(away[n].argmin())
             feature = self._differ(len(self.members) + n, closest, nearest[n])
             farthest.append(
                 Unreached(
-                    found.name_of(member),
+                    everything.name_of(member),
                     member.kind_name,
                     float(nearest[n]),
                     feature,
@@ -387,8 +380,8 @@ class _Near:
             )
         return tuple(farthest)
 
-    def _differ(self, n: int, recorded: int, apart: float) -> str:
-        """In which feature a member differs most from a recorded one, which is so far apart."""
-        if not math.isfinite(apart):
+    def _differ(self, n: int, recorded: int, distances: float) -> str:
+        """In which feature a member differs most from a recorded one, which is at a distance."""
+        if not math.isfinite(distances):
             return "no other of its kind"
         return FEATURES[int(np.abs(self.scaled[n] - self.scaled[recorded]).argmax())]

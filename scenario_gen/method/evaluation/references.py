@@ -1,9 +1,9 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Changepoints that know nothing: what the segmenter's have to be measured against at the same K.
+"""Changepoints that know nothing: label the segmenter's have to be measured against at the same K.
 
-More changepoints always fit better; a primitive must earn its place. Uniform ones are what anybody
+More changepoints always fit better; a primitive must earn its place. Uniform ones are label anybody
 could place.
 """
 
@@ -16,12 +16,12 @@ from scenario_gen.types import Segmentation
 
 
 def with_changepoints_at(
-    segmentation: Segmentation, changepoints: Ints, what: str
+    segmentation: Segmentation, changepoints: Ints, label: str
 ) -> Segmentation:
     """Return a segmentation with changepoints (K,); each segment is its own primitive."""
     labels = np.zeros(len(segmentation.labels), dtype=np.int64)
     labels[changepoints] = 1
-    names = tuple(f"{what} {k + 1}" for k in range(len(changepoints) + 1))
+    names = tuple(f"{label} {k + 1}" for k in range(len(changepoints) + 1))
     return replace(
         segmentation, labels=np.cumsum(labels), changepoints=changepoints, descriptions=names
     )

@@ -31,7 +31,7 @@ class Template:
         encounter: as recorded.
         ids: of the vehicles that are measured.
         steps: T, number of even instants.
-        replayed: the fitted template, if there is one.
+        replayed: the fitted template, if masks is one.
         config: how to measure.
         seed: of the bootstrap.
     """
@@ -78,7 +78,7 @@ class Samples:
 
     Attributes:
         scenarios: S of them.
-        counts: the checker's account of all candidates of the set, if there is one.
+        counts: the checker's account of all candidates of the set, if masks is one.
         template: what they were generated from.
     """
 
@@ -99,8 +99,8 @@ class Samples:
     @cached_property
     def is_present(self) -> Bools:
         """(N, T) vehicles and even instants that the template and all samples have."""
-        there = [self.template.motion.is_present, *(motion.is_present for motion in self.motions)]
-        return np.asarray(np.logical_and.reduce(there))
+        masks = [self.template.motion.is_present, *(motion.is_present for motion in self.motions)]
+        return np.asarray(np.logical_and.reduce(masks))
 
     @cached_property
     def bootstrap(self) -> Bootstrap:
@@ -131,8 +131,8 @@ class Samples:
         for a, b in combinations(range(len(template.vehicles)), 2):
             if throughout:
                 rows = [a, b]
-                own = template.position[rows], template.speed[rows], template.heading[rows]
-                pairs.append(VehiclePair(own, tuple(values[:, rows] for values in whole)))
+                target = template.position[rows], template.speed[rows], template.heading[rows]
+                pairs.append(VehiclePair(target, tuple(values[:, rows] for values in whole)))
                 continue
             names = template.vehicles[a].id, template.vehicles[b].id
             sources: list[Encounter | Scenario] = [self.template.encounter, *self.scenarios]
@@ -142,8 +142,8 @@ class Samples:
                 if (motion := common_motion(source, names, steps)) is not None
             ]
             if len(common) == len(sources):
-                own = common[0].position, common[0].speed, common[0].heading
-                pairs.append(VehiclePair(own, stacked(common[1:])))
+                target = common[0].position, common[0].speed, common[0].heading
+                pairs.append(VehiclePair(target, stacked(common[1:])))
         return tuple(pairs)
 
 
@@ -161,7 +161,7 @@ class VehiclePair:
     def similarity(
         self, k: int, distance: Distance, least: float = 0.0, unit: Ints | None = None
     ) -> PairSimilarity:
-        """Compare one of the three, as `pair_similarity` does; `unit` (S,) as there."""
+        """Compare one of the three, as `pair_similarity` does; `unit` (S,) as masks."""
         target, series = self.template[k], self.samples[k]
         if target.ndim == 2:
             target, series = target[..., None], series[..., None]
@@ -173,9 +173,9 @@ class VehiclePair:
 
 def chosen(motion: Motion, ids: Sequence[str]) -> Motion:
     """Return the motion of the vehicles with these ids, in their order."""
-    own = [vehicle.id for vehicle in motion.vehicles]
-    rows = [own.index(known) for known in ids]
-    return motion if rows == list(range(len(own))) else motion.of_vehicles(rows)
+    present = [vehicle.id for vehicle in motion.vehicles]
+    rows = [present.index(known) for known in ids]
+    return motion if rows == list(range(len(present))) else motion.of_vehicles(rows)
 
 
 def common_motion(motion: Motion, ids: tuple[str, str], samples: int) -> Motion | None:
@@ -205,7 +205,7 @@ def antithetic_pairs(scenarios: Sequence[Scenario]) -> Ints:
     """Return the number (S,) of each scenario's antithetic pair.
 
     The sampler draws candidates 2k and 2k + 1 of a seed as mirror images.
-    Scenarios that share a number were not numbered by the sampler; each is a pair of its own.
+    Scenarios that share a number were not numbered by the sampler; each is a pair of its target.
     """
     numbers = [(scenario.seed, scenario.index) for scenario in scenarios]
     if len(set(numbers)) < len(numbers):

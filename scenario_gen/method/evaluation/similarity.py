@@ -82,27 +82,30 @@ def pair_similarity(
         distance: of the feature; the paper takes Euclidean for position, Manhattan for speed.
         least: a template whose distances spread by less counts as constant: scaled to [0, 1] it
             would show its noise.
-        unit: (S,) the number, from 0, of the unit of each sample; None: each is one of its own.
+        unit: (S,) the number, from 0, of the unit of each sample; None: each is one of its template_extents.
     """
     a, b = (np.ascontiguousarray(series) for series in generated)
     left, right = (np.ascontiguousarray(series)[None] for series in template)
-    extents, own = feature_extents(a, b, distance), feature_extents(left, right, distance)
+    extents, template_extents = (
+        feature_extents(a, b, distance),
+        feature_extents(left, right, distance),
+    )
     samples, _, steps = a.shape
     unit = np.arange(samples) if unit is None else unit
     units = int(unit.max()) + 1 if samples else 0
     gram, cross, total = np.zeros((units, units)), np.zeros(units), np.zeros(units)
     count = np.bincount(unit, minlength=units).astype(np.float64)
     first = second = 0.0
-    if own[0, 1] - own[0, 0] < least:
+    if template_extents[0, 1] - template_extents[0, 0] < least:
         return PairSimilarity(gram, cross, total, (steps * steps, first, second), count)
     for rows in blocks(steps, samples * steps):
-        target = feature_rows(left, right, own, rows, distance)[0]
+        target = feature_rows(left, right, template_extents, rows, distance)[0]
         difference = feature_rows(a, b, extents, rows, distance)
         difference -= target
         if units < samples:
             pooled = np.zeros((units, difference.shape[1]))
-            for own_unit, row in zip(unit, difference, strict=True):
-                pooled[own_unit] += row
+            for n, row in zip(unit, difference, strict=True):
+                pooled[n] += row
             difference = pooled
         gram += difference @ difference.T
         cross += difference @ target

@@ -1,12 +1,12 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The time by which two vehicles missed a collision; it falls smoothly to 0.
+"""The smallest time shift after which two vehicles would collide; 0 if they do.
 
-It is by how much one of them would have had to be earlier or later on its way for their footprints
-to meet. At a crossing that is the post-encroachment time (Allen, Shin & Cooper 1978), behind
-another the time gap. Least distances do not do: vehicles that pass each other in their lanes are
-always near, and never meet.
+It is the time by which one of them would have to be earlier or later on its path for their
+footprints to meet. At a crossing that is the post-encroachment time (Allen, Shin & Cooper 1978),
+behind another vehicle the time gap. The minimum distance is no substitute: vehicles that pass each
+other in their lanes are always near, and never meet.
 """
 
 import numpy as np
@@ -16,44 +16,45 @@ from scenario_gen.numerics.boxes import boxes_meet, fill_box
 from scenario_gen.numerics.kernels import F2, kernel, OUT1
 from scenario_gen.types import Motion, Vehicle
 
-FINER = 4  # instants of the other vehicle for one of the ego
-MAX_SHIFT_S = 5.0  # s, at most: what is farther apart, or never meets, is all the same
+DENSITY_FACTOR = 4  # poses of the other vehicle for one pose of the ego
+MAX_SHIFT_S = 5.0  # larger shifts, and vehicles that never meet, are equally uncritical
 
 
-def min_time_shift(motion: Motion, here: Bools, ego: int, other: int) -> float:
+def min_time_shift(motion: Motion, is_present: Bools, ego: int, other: int) -> float:
     """Return the least time shift [s] with which a vehicle would meet another, at most MAX_SHIFT_S.
 
     Args:
         motion: as driven.
-        here: (N, T) who is on the scene.
+        is_present: (N, T) whether each vehicle is on the scene.
         ego: index.
         other: index.
     """
-    mine = np.flatnonzero(here[ego])
-    poses = np.column_stack([motion.time[mine], motion.poses[ego, mine]])
-    return poses_time_shift(
-        poses,
-        timed_poses(motion, here[other], other),
-        (motion.vehicles[ego], motion.vehicles[other]),
-    )
+    samples = np.flatnonzero(is_present[ego])
+    poses = np.column_stack([motion.time[samples], motion.poses[ego, samples]])
+    vehicles = (motion.vehicles[ego], motion.vehicles[other])
+    return poses_time_shift(poses, timed_poses(motion, is_present[other], other), vehicles)
 
 
-def timed_poses(motion: Motion, here: Bools, n: int) -> Floats:
-    """Return (R, 4) time [s], x, y [m], yaw [rad] while a vehicle is here (T,), FINER as dense."""
-    its = np.flatnonzero(here)
-    if len(its) < 2:
+def timed_poses(motion: Motion, is_present: Bools, n: int) -> Floats:
+    """Return (R, 4) time [s], x, y [m], yaw [rad] of a vehicle while it is present (T,).
+
+    There are DENSITY_FACTOR poses for each sampling period.
+    """
+    samples = np.flatnonzero(is_present)
+    if len(samples) < 2:
         return np.empty((0, 4))
-    fine = np.linspace(motion.time[its[0]], motion.time[its[-1]], FINER * (len(its) - 1) + 1)
-    return np.column_stack([fine, motion.of_vehicles([n]).at(fine).poses[0]])
+    first, last = motion.time[samples[[0, -1]]]
+    time = np.linspace(first, last, DENSITY_FACTOR * (len(samples) - 1) + 1)
+    return np.column_stack([time, motion.of_vehicles([n]).at(time).poses[0]])
 
 
 def poses_time_shift(a: Floats, b: Floats, vehicles: tuple[Vehicle, Vehicle]) -> float:
     """Return the least time difference [s] of overlapping footprints, at most MAX_SHIFT_S.
 
     Args:
-        a: (S, 4) time [s], x, y [m], yaw [rad] of one.
-        b: (R, 4) likewise, of the other.
-        vehicles: whose footprints these are.
+        a: (S, 4) time [s], x, y [m], yaw [rad] of the first vehicle.
+        b: (R, 4) the same of the second vehicle.
+        vehicles: the two vehicles.
     """
     out = np.array([MAX_SHIFT_S])
     if len(a) and len(b):
@@ -61,35 +62,44 @@ def poses_time_shift(a: Floats, b: Floats, vehicles: tuple[Vehicle, Vehicle]) ->
     return float(out[0])
 
 
+@kernel(inline=True)
+def _distance(a: Floats, b: Floats) -> float:
+    """Return the distance [m] of two poses (4,) with times."""
+    return float(np.sqrt((a[1] - b[1]) ** 2 + (a[2] - b[2]) ** 2))
+
+
+@kernel(inline=True)
+def _overlaps(b: Floats, half: Floats, boxes: Floats) -> bool:
+    """Return whether the second vehicle at a pose (4,) overlaps the first, which is `boxes[0]`."""
+    fill_box(b[1], b[2], b[3], half[1, 0], half[1, 1], boxes[1])
+    return boxes_meet(boxes[0], boxes[1])
+
+
 @kernel(F2, F2, F2, OUT1)
 def _lower_to_shift(a: Floats, b: Floats, half: Floats, out: Floats) -> None:
     """Lower `out` (1,) to the least difference of times [s] at which footprints overlap.
 
     Args:
-        a: (S, 4) time [s], x, y [m], yaw [rad] of one.
-        b: (R, 4) likewise, of the other.
+        a: (S, 4) time [s], x, y [m], yaw [rad] of the first vehicle.
+        b: (R, 4) the same of the second vehicle.
         half: (2, 2) half lengths and widths [m].
         out: (1,) seconds, at first the greatest that counts.
     """
     count = b.shape[0]
-    farthest = 0.0  # that the other moves from one of its instants to the next
+    longest_step = 0.0  # of the second vehicle between two of its poses
     for k in range(1, count):
-        farthest = max(
-            farthest, np.sqrt((b[k, 1] - b[k - 1, 1]) ** 2 + (b[k, 2] - b[k - 1, 2]) ** 2)
-        )
+        longest_step = max(longest_step, _distance(b[k], b[k - 1]))
     reach = np.sqrt(half[0, 0] ** 2 + half[0, 1] ** 2) + np.sqrt(half[1, 0] ** 2 + half[1, 1] ** 2)
-    box, its = np.empty(7), np.empty(7)
+    boxes = np.empty((2, 7))
     for i in range(a.shape[0]):
-        fill_box(a[i, 1], a[i, 2], a[i, 3], half[0, 0], half[0, 1], box)
+        fill_box(a[i, 1], a[i, 2], a[i, 3], half[0, 0], half[0, 1], boxes[0])
         k = 0
         while k < count:
-            away = np.sqrt((a[i, 1] - b[k, 1]) ** 2 + (a[i, 2] - b[k, 2]) ** 2) - reach
-            if away > 0.0:  # it cannot be there before it has moved so far
-                k = count if farthest == 0.0 else k + max(int(away / farthest), 1)
+            clearance = _distance(a[i], b[k]) - reach
+            shift = abs(a[i, 0] - b[k, 0])
+            if clearance > 0.0:  # skip the poses before it can have come near enough
+                k = count if longest_step == 0.0 else k + max(int(clearance / longest_step), 1)
                 continue
-            apart = abs(a[i, 0] - b[k, 0])
-            if apart < out[0]:
-                fill_box(b[k, 1], b[k, 2], b[k, 3], half[1, 0], half[1, 1], its)
-                if boxes_meet(box, its):
-                    out[0] = apart
+            if shift < out[0] and _overlaps(b[k], half, boxes):
+                out[0] = shift
             k += 1
