@@ -76,7 +76,7 @@ def _document(network: LaneNetwork) -> dict[str, Any]:
             "id": lane.id,
             "points": len(lane.left),
             "successors": lane.successors,
-            "beside": lane.beside,
+            "beside": lane.neighbours,
         }
         | {
             "speed_limit": None if math.isnan(lane.speed_limit) else lane.speed_limit,

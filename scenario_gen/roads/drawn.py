@@ -244,7 +244,9 @@ class _RoadDrawing:
             left, right = borders if self._sign > 0.0 else borders[::-1]
             neighbours = tuple(first + m for m in (n - 1, n + 1) if 0 <= m < count)
             self._lane_index[k, inward, n] = first + n
-            self.lanes.append(Lane(lane_id(k, n, inward=inward), left, right, beside=neighbours))
+            self.lanes.append(
+                Lane(lane_id(k, n, inward=inward), left, right, neighbours=neighbours)
+            )
 
     def _add_routes(self) -> None:
         """Add the lanes through the junction, and the ground that they need."""

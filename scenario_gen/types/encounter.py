@@ -149,8 +149,7 @@ def vehicle_index(encounter: Encounter, name: str, parameter: str) -> int:
     """Return the index of the vehicle with the id `name`, written as in the log or as a ROS name.
 
     Raises:
-        InputError: there is no such vehicle; the message names the parameter `parameter` and lists the
-            ids that there are.
+        InputError: there is no such vehicle; the message names `parameter` and lists the ids.
     """
     ids = [vehicle.id for vehicle in encounter.vehicles]
     for known in (ids, list(tokens(ids))):

@@ -215,7 +215,7 @@ class Evaluation:
         """Read what `to_json` wrote.
 
         Raises:
-            InputError: the text is not such a document; the message begins with `title` and names the path
+            InputError: the text is not such a document; the message names `title` and the path
                 inside it.
         """
         return cls.from_document(parse_json(text, title, SCHEMA))

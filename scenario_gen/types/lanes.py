@@ -31,7 +31,7 @@ class Lane:
         left: (M, 2) metres, its left border from begin to end, M >= 2.
         right: (M, 2) metres, its right border; left[k] and right[k] are one cross-section.
         successors: indices of the lanes that its traffic drives into.
-        beside: indices of the lanes of the same direction to which its traffic may change.
+        neighbours: indices of the lanes of the same direction to which its traffic may change.
         speed_limit: m/s; NaN where the map does not say.
         junction: the junction that it is part of, "" if none.
         height: (M,) metres, of each cross-section; NaN where it is not known, as where none is
@@ -44,7 +44,7 @@ class Lane:
     left: Floats
     right: Floats
     successors: tuple[int, ...] = ()
-    beside: tuple[int, ...] = ()
+    neighbours: tuple[int, ...] = ()
     speed_limit: float = math.nan
     junction: str = ""
     height: Floats = field(default_factory=lambda: np.zeros(0))
@@ -163,7 +163,7 @@ class LaneNetwork:
 
     Attributes:
         name: of the map, for people.
-        lanes: the lanes; `Lane.successors` and `Lane.beside` count in here.
+        lanes: the lanes; `Lane.successors` and `Lane.neighbours` count in here.
         notes: how it was read: projection, what was left out, which part it is.
         rules: its signs, lights and rights of way.
         rules_kept: whether scenarios keep to the rules.
@@ -173,7 +173,7 @@ class LaneNetwork:
         origin: latitude and longitude [degrees] about which the frame is `geodesy`'s; (): the map
             says metres.
         of_all: the lanes of all users, those of cars first, in the order of `lanes`; their
-            `successors` and `beside` count in here. (): no lane is closed to cars.
+            `successors` and `neighbours` count in here. (): no lane is closed to cars.
     """
 
     name: str
@@ -199,7 +199,7 @@ class LaneNetwork:
                 )
         for lanes in (self.lanes, self.of_all):
             for lane in lanes:
-                if any(not 0 <= k < len(lanes) for k in (*lane.successors, *lane.beside)):
+                if any(not 0 <= k < len(lanes) for k in (*lane.successors, *lane.neighbours)):
                     raise InputError(
                         f"lane {lane.id} of {self.name!r} leads to a lane that is not there"
                     )
@@ -330,9 +330,9 @@ def _chosen(lanes: Sequence[Lane], kept: Sequence[int]) -> tuple[Lane, ...]:
     chosen = []
     for lane in (lanes[k] for k in kept):
         successors = _renumbered(lane.successors, index)
-        neighbours = _renumbered(lane.beside, index)
-        is_same = (successors, neighbours) == (lane.successors, lane.beside)
-        changed = replace(lane, successors=successors, beside=neighbours)
+        neighbours = _renumbered(lane.neighbours, index)
+        is_same = (successors, neighbours) == (lane.successors, lane.neighbours)
+        changed = replace(lane, successors=successors, neighbours=neighbours)
         chosen.append(lane if is_same else changed)
     return tuple(chosen)
 

@@ -216,7 +216,7 @@ class Road:
         return cells
 
     def cells(self, points: Floats) -> tuple[Ints, Ints, Bools]:
-        """Return rows and columns (...) of cells nearest to points (..., 2) [m]; whether inside."""
+        """Return rows, columns (...) of cells nearest to points (..., 2) [m]; whether inside."""
         cell = np.floor((points - self.origin) / self.resolution).astype(np.int64)
         height, width = self.drivable.shape
         column, row = np.clip(cell[..., 0], 0, width - 1), np.clip(cell[..., 1], 0, height - 1)

@@ -64,8 +64,8 @@ class Route:
         if self.left_out:
             which = ", ".join(str(k) for k in self.left_out)
             sentences.append(
-                f"vehicle {vehicle}: no free route leads through its changepoint {which} as fitted; "
-                "its route passes beside"
+                f"vehicle {vehicle}: no free route leads through its changepoint {which} "
+                "as fitted; its route passes beside"
             )
         return sentences
 

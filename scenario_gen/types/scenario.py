@@ -82,11 +82,11 @@ def dataframe(scenarios: Iterable[Scenario]) -> "DataFrame":
 
     tables = [
         pd.DataFrame(
-            {"scenario": one.index}
-            | one.columns()
-            | {"acceleration": one.acceleration[one.is_present]}
+            {"scenario": scenario.index}
+            | scenario.columns()
+            | {"acceleration": scenario.acceleration[scenario.is_present]}
         )
-        for one in scenarios
+        for scenario in scenarios
     ]
     names = ("scenario", "vehicle", "time", "x", "y", "heading", "speed", "acceleration")
     return pd.concat(tables, ignore_index=True) if tables else pd.DataFrame(columns=list(names))

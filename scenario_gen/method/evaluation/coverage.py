@@ -131,6 +131,6 @@ def _picks(
 
 
 def _squared_distance(table: Floats, centre: Floats, spread: Floats) -> Floats:
-    """Return squared distances (S,) of rows to a centre in spreads; a missing value counts as 1."""
+    """Return squared distances (S,) of rows to a centre in spreads; a missing value adds 1."""
     step = (table - centre) / spread
     return np.asarray(np.square(np.where(np.isfinite(step), step, 1.0)).sum(axis=1))

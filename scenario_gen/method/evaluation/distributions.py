@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Distributions of what vehicles do, and how far two of them are difference."""
+"""Distributions of speed, acceleration, jerk, yaw rate and gap, and their distances."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -135,7 +135,7 @@ def compare(
         points: numbers of values at which the cumulative distributions are given, at most.
 
     Raises:
-        InputError: the values lie so far difference that there would be too many bins.
+        InputError: the values are so different that there would be too many bins.
     """
     pooled = np.concatenate(list(samples))
     everything = np.concatenate([template, pooled])

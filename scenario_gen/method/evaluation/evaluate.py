@@ -38,7 +38,7 @@ Scenarios = Sequence[Scenario] | ScenarioSet
 def evaluate(
     result: GenerationResult, config: EvaluationConfig = EvaluationConfig()
 ) -> Evaluation:
-    """Measure quantity was generated, beside its references and the fitted template replayed.
+    """Measure the generated set, its references and the replay of the fitted template.
 
     Args:
         result: as `generate` returns it.
@@ -78,10 +78,10 @@ def evaluate_scenarios(
         encounter: the recorded template.
         sets: scenarios, or several sets of them by name, each a row: "mine", "replay". A
             `ScenarioSet` brings its account of candidates along. An empty set gives an empty row,
-            with a note. Of a set of more than MEASURED_SCENARIOS scenarios that many are measured, see
+            with a note. A larger set is measured on MEASURED_SCENARIOS of its scenarios, see
             `measured`.
-        changepoints: their number K stands beside E, for more changepoints always fit better.
-        checks: the checker's account of the candidates of a row, where its set brings none.
+        changepoints: their number K, shown with E, since more changepoints always fit better.
+        checks: counts of the checked candidates by row, for sets without such counts.
         replay: the row whose first scenario is the fitted template, to which displacements are
             measured.
         road: name of the road, for the heading.

@@ -49,7 +49,7 @@ class MetricGroup:
     """Metrics that are computed together.
 
     Attributes:
-        metrics: quantity they are called; a heading (`group`) of their own stands below the others.
+        metrics: their descriptions; new headings (`group`) come after the known ones.
         measure: returns the estimate of each by its id, of one or more scenarios; one that cannot
             be had is left out or NaN.
         of_template: returns those that the recorded encounter has, too.

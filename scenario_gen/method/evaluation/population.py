@@ -381,7 +381,7 @@ class _Near:
         return tuple(farthest)
 
     def _differ(self, n: int, recorded: int, distances: float) -> str:
-        """In which feature a member differs most from a recorded one, which is at a distance."""
+        """Return the feature in which a member differs most from a recorded one."""
         if not math.isfinite(distances):
             return "no other of its kind"
         return FEATURES[int(np.abs(self.scaled[n] - self.scaled[recorded]).argmax())]

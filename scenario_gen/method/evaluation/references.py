@@ -1,10 +1,9 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Changepoints that know nothing: label the segmenter's have to be measured against at the same K.
+"""Uninformed changepoints: the baselines of the segmenter at the same K.
 
-More changepoints always fit better; a primitive must earn its place. Uniform ones are label anybody
-could place.
+More changepoints always fit better, so the segmenter must fit better than evenly spaced ones.
 """
 
 from dataclasses import replace

@@ -31,7 +31,7 @@ class Template:
         encounter: as recorded.
         ids: of the vehicles that are measured.
         steps: T, number of even instants.
-        replayed: the fitted template, if masks is one.
+        replayed: the fitted template, or None.
         config: how to measure.
         seed: of the bootstrap.
     """
@@ -78,7 +78,7 @@ class Samples:
 
     Attributes:
         scenarios: S of them.
-        counts: the checker's account of all candidates of the set, if masks is one.
+        counts: the checker's counts over all candidates of the set, or None.
         template: what they were generated from.
     """
 
@@ -161,7 +161,7 @@ class VehiclePair:
     def similarity(
         self, k: int, distance: Distance, least: float = 0.0, unit: Ints | None = None
     ) -> PairSimilarity:
-        """Compare one of the three, as `pair_similarity` does; `unit` (S,) as masks."""
+        """Compare one of the three arrays, as `pair_similarity` does."""
         target, series = self.template[k], self.samples[k]
         if target.ndim == 2:
             target, series = target[..., None], series[..., None]
@@ -205,7 +205,7 @@ def antithetic_pairs(scenarios: Sequence[Scenario]) -> Ints:
     """Return the number (S,) of each scenario's antithetic pair.
 
     The sampler draws candidates 2k and 2k + 1 of a seed as mirror images.
-    Scenarios that share a number were not numbered by the sampler; each is a pair of its target.
+    Scenarios that share a number were not numbered by the sampler; each gets its own number.
     """
     numbers = [(scenario.seed, scenario.index) for scenario in scenarios]
     if len(set(numbers)) < len(numbers):

@@ -82,7 +82,7 @@ def pair_similarity(
         distance: of the feature; the paper takes Euclidean for position, Manhattan for speed.
         least: a template whose distances spread by less counts as constant: scaled to [0, 1] it
             would show its noise.
-        unit: (S,) the number, from 0, of the unit of each sample; None: each is one of its template_extents.
+        unit: (S,) the number, from 0, of the unit of each sample; None: each sample is a unit.
     """
     a, b = (np.ascontiguousarray(series) for series in generated)
     left, right = (np.ascontiguousarray(series)[None] for series in template)

@@ -21,7 +21,7 @@ MAX_SHIFT_S = 5.0  # larger shifts, and vehicles that never meet, are equally un
 
 
 def min_time_shift(motion: Motion, is_present: Bools, ego: int, other: int) -> float:
-    """Return the least time shift [s] with which a vehicle would meet another, at most MAX_SHIFT_S.
+    """Return the least time shift [s] of a vehicle to meet another, at most MAX_SHIFT_S.
 
     Args:
         motion: as driven.
@@ -97,7 +97,7 @@ def _lower_to_shift(a: Floats, b: Floats, half: Floats, out: Floats) -> None:
         while k < count:
             clearance = _distance(a[i], b[k]) - reach
             shift = abs(a[i, 0] - b[k, 0])
-            if clearance > 0.0:  # skip the poses before it can have come near enough
+            if clearance > 0.0:  # skip the poses at which it cannot be near enough
                 k = count if longest_step == 0.0 else k + max(int(clearance / longest_step), 1)
                 continue
             if shift < out[0] and _overlaps(b[k], half, boxes):

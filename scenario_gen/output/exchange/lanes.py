@@ -84,7 +84,7 @@ class LaneMap:
         """The lanes "left" and "right" of lane k, and whether they have its direction."""
         lane, sides = self.network.lanes[k], dict[str, tuple[int, bool]]()
         across = lane.left[0] - lane.right[0]
-        for other in lane.beside:
+        for other in lane.neighbours:
             gap = self.network.lanes[other].centre - lane.centre[0]
             nearest = gap[int(np.argmin(np.square(gap).sum(axis=1)))]
             sides["left" if float((nearest * across).sum()) > 0.0 else "right"] = (other, True)

@@ -65,7 +65,7 @@ def own_side(road: Road, path: Floats, vehicle: Vehicle) -> Road:
         return road
     lanes = road.map_lanes.lanes
     driven = {k for k, lane in enumerate(lanes) if on_lane(lane, path, every=2)}
-    driven |= {neighbour for k in driven for neighbour in lanes[k].beside}
+    driven |= {neighbour for k in driven for neighbour in lanes[k].neighbours}
     cells = road.cells_in(lanes[k] for k in sorted(driven))
     if not cells.any():
         return road

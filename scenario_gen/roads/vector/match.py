@@ -337,7 +337,7 @@ def _change_sample(before: Floats, after: Floats) -> tuple[int, float]:
 
 def _may_change(network: LaneNetwork, chain: LaneChain, other: LaneChain) -> bool:
     """Return whether traffic may change from a chain to another."""
-    return any(k in network.lanes[lane].beside for lane in chain for k in other)
+    return any(k in network.lanes[lane].neighbours for lane in chain for k in other)
 
 
 def lane_change_curve(first: Curve, second: Curve, at: Floats) -> Curve | None:

@@ -55,7 +55,7 @@ def network_of(name: str, map_lanes: MapLanes) -> LaneNetwork:
             left=left[:, :2],
             right=right[:, :2],
             successors=indices(draft.successors),
-            beside=indices(draft.neighbours),
+            neighbours=indices(draft.neighbours),
             speed_limit=draft.speed_limit,
             junction=draft.junction,
             height=(left[:, 2] + right[:, 2]) / 2.0 if has_height else np.zeros(0),
@@ -255,7 +255,7 @@ def part_of(network: LaneNetwork, box: Floats, note: Note) -> LaneNetwork:
             right=piece.columns[:, 2:4],
             height=piece.columns[:, 4],
             successors=tuple(successors),
-            beside=tuple(of_lane[k][0] for k in lane.beside if k in of_lane),
+            neighbours=tuple(of_lane[k][0] for k in lane.neighbours if k in of_lane),
         )
         lanes.append(cut)
     part = replace(network, rules=()).with_lanes(lanes)

@@ -65,7 +65,9 @@ def test_lanes_for_cars_their_order_and_limits_are_those_of_the_routing_graph(la
             str(other.id) for other in graph.following(one)
         }, name
         beside = [other for other in (graph.left(one), graph.right(one)) if other]
-        assert {names[k] for k in own[name].beside} == {str(other.id) for other in beside}, name
+        assert {names[k] for k in own[name].neighbours} == {str(other.id) for other in beside}, (
+            name
+        )
         assert own[name].speed_limit * 3.6 == pytest.approx(
             float(str(rules.speedLimit(one).speedLimit).split()[0])
         ), name

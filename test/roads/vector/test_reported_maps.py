@@ -194,7 +194,7 @@ def test_a_mark_may_be_crossed_one_way_only(tmp_path, mark, side, outwards, inwa
     sign = 1 if side == "left" else -1
     lanes = lane(sign, more=f'<roadMark sOffset="0" {mark}/>') + lane(2 * sign)
     found = by_id(read(tmp_path, road(section(**{side: lanes}))))
-    assert (bool(found[f"1.0.{sign}"].beside), bool(found[f"1.0.{2 * sign}"].beside)) == (
+    assert (bool(found[f"1.0.{sign}"].neighbours), bool(found[f"1.0.{2 * sign}"].neighbours)) == (
         outwards,
         inwards,
     )
