@@ -133,7 +133,7 @@ def _steps(encounter: Encounter, vehicles: int, config: EvaluationConfig) -> int
     """Return the number of instants of each feature matrix."""
     pairs = max(math.comb(vehicles, 2), 1)
     affordable = max(math.isqrt(config.max_entries // pairs), MIN_STEPS)
-    return min(encounter.speed.shape[1], config.max_steps, affordable)
+    return min(len(encounter.time), config.max_steps, affordable)
 
 
 def measured(scenarios: Sequence[Scenario]) -> Sequence[Scenario]:
