@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""One driver's speed: how it changes in a step, and how it brakes behind who is ahead on its path."""
+"""The speed of one driver: its change in one step, and braking behind a vehicle ahead."""
 
 from typing import NamedTuple
 
@@ -12,32 +12,95 @@ from scenario_gen.numerics import Floats, Ints
 from scenario_gen.numerics.boxes import boxes_meet, fill_box
 from scenario_gen.numerics.kernels import B, F, F1, I1, kernel, named
 
-AHEAD = 60.0  # metres of its path that it looks along for who is ahead
-HALVINGS = 4  # of a cell in which a vehicle meets what is ahead
-FREE = -1e3  # m/s²; a braking that does not hinder at all
-STAND = 0.02  # m/s, certified speed of a stand, which passes whatever there is
-NEARER = 0.1  # metres by which a gap must be smaller than the certified one to be minded
+NO_BRAKING_MPS2 = -1e3  # a braking that limits nothing: the driver accelerates as it likes
+GAP_BISECTION_STEPS = 4  # within a cell of the clock, so that the gap does not jump
 
+
+class DriverModel(NamedTuple):
+    """Constants of the driver model. `ClosedLoopConfig` has what users may change.
+
+    Attributes:
+        lookahead_m: a driver ignores vehicles that are farther ahead on its path.
+        min_moving_speed_mps: a certified speed below it counts as standing, and the rate is 1.
+        min_gap_reduction_m: a driver brakes for a vehicle ahead only if the gap is smaller than
+            the certified one by this.
+        min_divisor_mps: floor of a speed that divides a distance.
+        clearance_m: a driver that brakes for the ego leaves this distance.
+        lateral_clearance_m: distance to an ego that has left the path of its witness.
+        clock_tolerance_s: uncertainty of the clock of the ego.
+        extra_braking_mps2: an ego that brakes harder than its witness by this goes on braking.
+        ego_response_s: delay of an ego that brakes for a pedestrian on its lane.
+        max_ego_rate_ratio: an ego that is faster than its witness by this does not slow down.
+        walker_braking_mps2: deceleration of a pedestrian: 1.4 m/s to 0 within a step of 0.7 m.
+        creep_speed_mps: the prediction lets every driver creep, so that no two drivers wait for
+            each other.
+        max_blocking_speed_mps: a slower ego blocks a driver that waits for it.
+        min_lead_s: a driver whose clock may run ahead by this does not wait for another one.
+        approach_s: time in which a creeping driver reaches the end of its permitted way.
+        entry_gap_m: free distance ahead of and behind a vehicle that enters the scene.
+        braking_tolerance_mps: change of speed in a step beyond the strongest braking.
+        jerk_tolerance_mps: change of speed in a step beyond the jerk limit.
+    """
+
+    lookahead_m: float = 60.0
+    min_moving_speed_mps: float = 0.02
+    min_gap_reduction_m: float = 0.1
+    min_divisor_mps: float = 0.2
+    clearance_m: float = 0.3
+    lateral_clearance_m: float = 0.5
+    clock_tolerance_s: float = 0.05
+    extra_braking_mps2: float = 1.0
+    ego_response_s: float = 1.0
+    max_ego_rate_ratio: float = 1.05
+    walker_braking_mps2: float = 1.5
+    creep_speed_mps: float = 0.5
+    max_blocking_speed_mps: float = 1.5
+    min_lead_s: float = 1.0
+    approach_s: float = 1.0
+    entry_gap_m: float = 3.0
+    braking_tolerance_mps: float = 0.2
+    jerk_tolerance_mps: float = 0.05
+
+
+MODEL = DriverModel()
 
 CLOCK, RATE, ACCELERATION, WAITED, HELD = range(5)
-"""Columns of what drivers do in a step: `State`'s and, after it, 1 where the order held one back."""
+"""Columns of the drivers: those of `State`, then 1 where the order held a driver back."""
 EGO_CLOCK, EGO_RATE, ON_PATH = range(6, 9)
 """Columns of `State.seen` behind those of `EgoState`."""
 
 
 class DriverState(NamedTuple):
-    """A driver at the begin of a step: which, its clock [s], the clock's rate and its acceleration in the step before [m/s²]."""
+    """A driver at the start of a step.
 
-    i: int
+    Attributes:
+        index: of its vehicle.
+        clock: certified time [s] at which its vehicle is where it is now.
+        rate: of that clock.
+        acceleration: in the previous step [m/s²].
+    """
+
+    index: int
     clock: float
     rate: float
-    was: float
+    acceleration: float
 
 
 class DriverParameters(NamedTuple):
-    """How the others drive: fields of `ClosedLoopConfig`; how far they look ahead [s]; whether, and after (N,) how many steps.
+    """Parameters of the other drivers; most are fields of `ClosedLoopConfig`.
 
-    The strongest braking (N,) is that of each one's type, if less.
+    Attributes:
+        headway: [s].
+        standstill: gap at standstill [m].
+        acceleration: largest acceleration [m/s²].
+        comfortable: comfortable braking [m/s²].
+        strongest: (N,) strongest braking [m/s²], at most that of the vehicle's type.
+        jerk: largest jerk [m/s³].
+        patience: waiting time [s] before a driver goes ahead of a standing ego.
+        foresight: prediction horizon [s].
+        yields: whether drivers wait for the ego where the template did.
+        reacts: whether drivers react at all.
+        delay: (N,) reaction times in steps.
     """
 
     headway: float
@@ -57,135 +120,199 @@ DRIVER_PARAMETERS = named(DriverParameters, F, F, F, F, F1, F, F, F, B, B, I1)
 
 
 @kernel(inline=True)
-def _eased(short: float, jerk: float, h: float) -> float:
-    """Largest change of speed [m/s²] towards a speed that is `short` [m/s] away, so that the jerk lets it end evenly there."""
-    if short <= 0.5 * jerk * h * h:
-        return max(short, 0.0) / h
-    return float(np.sqrt(2.0 * jerk * short)) - 0.5 * jerk * h
+def _smooth_acceleration(difference: float, jerk: float, h: float) -> float:
+    """Return the largest acceleration [m/s²] towards a speed that is `difference` [m/s] away.
+
+    From it the jerk [m/s³] can bring the acceleration to 0 when the speed is reached.
+    """
+    if difference <= 0.5 * jerk * h * h:
+        return max(difference, 0.0) / h
+    return float(np.sqrt(2.0 * jerk * difference)) - 0.5 * jerk * h
 
 
 @kernel(inline=True)
-def rate_after(
+def next_rate(
     parameters: DriverParameters,
-    r: float,
-    v: float,
-    a: float,
-    was: float,
+    driver: DriverState,
+    pose: Floats,
     braking: float,
     floor: float,
     h: float,
 ) -> float:
-    """Rate of a clock after a step in which its driver brakes, as far as its foot gets: acceleration changes by the jerk at most.
+    """Return the rate of a clock after a step in which its driver brakes.
 
-    With nothing in the way the rate goes back to 1; at 1 the motion is the certified one, whatever
-    jerk that has.
+    The acceleration changes by the jerk at most. Without an obstacle the rate returns to 1. At 1
+    the motion is the certified one, whatever its jerk is.
 
     Args:
-        parameters: how it drives.
-        r: rate of its clock; its speed is r v.
-        v: certified speed there [m/s].
-        a: certified acceleration there [m/s²].
-        was: its acceleration in the step before [m/s²].
-        braking: m/s²; below 0 it speeds up by no more than that, FREE goes on.
-        floor: m/s; braking ends there.
-        h: the step [s].
+        parameters: of the drivers.
+        driver: at the start of the step.
+        pose: (5,) its certified pose, with speed [m/s] and acceleration [m/s²].
+        braking: deceleration [m/s²]; a negative one limits the acceleration; NO_BRAKING_MPS2 does
+            not limit it.
+        floor: speed [m/s] at which braking ends.
+        h: duration of the step [s].
     """
-    if v < STAND:
+    v = pose[3]
+    a = pose[4]
+    r = driver.rate
+    previous = driver.acceleration
+    jerk = parameters.jerk
+    if v < MODEL.min_moving_speed_mps:
         return 1.0
-    u, jerk = r * v, parameters.jerk
-    end = max(v + r * a * h, STAND)  # certified speed where the step ends, about
-    on = 1.0
+    speed = r * v
+    end_speed = max(v + r * a * h, MODEL.min_moving_speed_mps)  # certified, approximate
+    free_rate = 1.0
     if r < 1.0:
-        gain = min(
-            max(parameters.acceleration, r * r * a), r * a + _eased(v - u, jerk, h), was + jerk * h
-        )
-        on = min(max((u + gain * h) / end, 0.0), 1.0)
-    if braking <= FREE:
-        return on
-    wanted = -min(braking, _eased(u - floor, jerk, h)) if u > floor or braking <= 0.0 else 0.0
-    least = max(u + max(wanted, was - jerk * h) * h, floor)
-    first = min(least / end, on)
-    return min(least / max(v + 0.5 * (r + first) * a * h, STAND), on)
+        wanted = r * a + _smooth_acceleration(v - speed, jerk, h)
+        gain = min(max(parameters.acceleration, r * r * a), wanted, previous + jerk * h)
+        free_rate = min(max((speed + gain * h) / end_speed, 0.0), 1.0)
+    if braking <= NO_BRAKING_MPS2:
+        return free_rate
+    change = 0.0
+    if speed > floor or braking <= 0.0:
+        change = -min(braking, _smooth_acceleration(speed - floor, jerk, h))
+    new_speed = max(speed + max(change, previous - jerk * h) * h, floor)
+    first = min(new_speed / end_speed, free_rate)
+    mean_speed = max(v + 0.5 * (r + first) * a * h, MODEL.min_moving_speed_mps)
+    return min(new_speed / mean_speed, free_rate)
 
 
 @kernel(inline=True)
-def gap_ahead(world: World, i: int, clock: float, box: Floats, here: Floats) -> tuple[float, int]:
-    """Way [m] that vehicle i can drive on its path from a clock until it meets a box (7,), and the cell of its clock there.
+def drive_step(
+    world: World,
+    parameters: DriverParameters,
+    driver: DriverState,
+    pose: Floats,
+    braking: float,
+) -> DriverState:
+    """Return a driver after a step of braking [m/s²]; update its certified pose (5,)."""
+    h = world.step
+    speed = driver.rate * pose[3]
+    rate = next_rate(parameters, driver, pose, braking, 0.0, h)
+    clock = driver.clock + 0.5 * (driver.rate + rate) * h
+    pose_at(world.time, world.motion[driver.index], clock, pose)
+    return DriverState(driver.index, clock, rate, (rate * pose[3] - speed) / h)
 
-    Infinity and -1 if it does not within AHEAD, or if the box lies behind it; `here` is its pose
-    (5,).
+
+@kernel(inline=True)
+def _distance_at(cells: Floats, k: int, share: float) -> float:
+    """Return the driven way [m] at a share of cell k of the cells (K, 8) of one vehicle."""
+    start = cells[k, 7]
+    end = cells[k + 1, 7] if k + 1 < cells.shape[0] else start
+    return float(start + (end - start) * share)
+
+
+@kernel(inline=True)
+def _contact_clock(world: World, i: int, k: int, clock: float, box: Floats) -> float:
+    """Return the clock [s] in cell k, `clock` or later, at which vehicle i meets a box (7,)."""
+    pose = np.empty(5)
+    footprint = np.empty(7)
+    low = max(k * world.cell, clock)
+    high = (k + 1) * world.cell
+    for _ in range(GAP_BISECTION_STEPS):
+        middle = 0.5 * (low + high)
+        pose_at(world.time, world.motion[i], middle, pose)
+        fill_box(pose[0], pose[1], pose[2], world.half[i, 0], world.half[i, 1], footprint)
+        if boxes_meet(footprint, box):
+            high = middle
+        else:
+            low = middle
+    return high
+
+
+@kernel(inline=True)
+def gap_ahead(world: World, i: int, clock: float, box: Floats, pose: Floats) -> tuple[float, int]:
+    """Return the gap [m] from vehicle i to a box on its path, and the cell in which they meet.
+
+    Infinity and -1 if they do not meet within the lookahead, or if the box is behind.
+
+    Args:
+        world: the scenario.
+        i: index of the vehicle.
+        clock: its clock [s].
+        box: (7,) the box.
+        pose: (5,) the certified pose at the clock.
     """
-    cells, cell = world.cells[i], world.cell
-    count = cells.shape[0]
-    first = min(int(clock / cell), count - 1)
-    after = cells[first + 1, 7] if first + 1 < count else cells[first, 7]
-    start = cells[first, 7] + (after - cells[first, 7]) * min(clock / cell - first, 1.0)
-    for k in range(first, count):
-        if cells[k, 7] - start > AHEAD:
+    cells = world.cells[i]
+    cell = world.cell
+    first = min(int(clock / cell), cells.shape[0] - 1)
+    start = _distance_at(cells, first, min(clock / cell - first, 1.0))
+    for k in range(first, cells.shape[0]):
+        if cells[k, 7] - start > MODEL.lookahead_m:
             break
         if boxes_meet(cells[k], box):
-            c, s = cells[first, 2], cells[first, 3]
-            if (box[0] - here[0]) * c + (box[1] - here[1]) * s <= 0.0:
+            along = (box[0] - pose[0]) * cells[k, 2] + (box[1] - pose[1]) * cells[k, 3]
+            if along <= 0.0:
                 break
-            low, high = max(k * cell, clock), (k + 1) * cell
-            pose, mine = np.empty(5), np.empty(7)
-            for _ in range(
-                HALVINGS
-            ):  # where in the cell, so that the gap does not change by leaps
-                middle = 0.5 * (low + high)
-                pose_at(world.time, world.motion[i], middle, pose)
-                fill_box(pose[0], pose[1], pose[2], world.half[i, 0], world.half[i, 1], mine)
-                if boxes_meet(mine, box):
-                    high = middle
-                else:
-                    low = middle
-            end = cells[k + 1, 7] if k + 1 < count else cells[k, 7]
-            way = cells[k, 7] + (end - cells[k, 7]) * (high / cell - k)
-            return float(max(way - start, 0.0)), k
+            share = _contact_clock(world, i, k, clock, box) / cell - k
+            return float(max(_distance_at(cells, k, share) - start, 0.0)), k
     return np.inf, -1
 
 
 @kernel(inline=True)
-def _idm(gap: float, u: float, ahead: float, parameters: DriverParameters) -> float:
-    """Braking [m/s²] behind one at `gap` [m] whose speed along the path is `ahead` [m/s]; none where the gap is wide enough.
+def _idm_braking(
+    gap: float, speed: float, leader_speed: float, parameters: DriverParameters
+) -> float:
+    """Return the braking [m/s²] of the intelligent driver model, 0 where the gap is wide enough.
 
-    Source: intelligent driver model, Treiber, Hennecke & Helbing 2000; its braking term, for the
-        free one is the certificate.
+    The free term of the model is not used: the certificate replaces it.
+    Source: Treiber, Hennecke & Helbing 2000.
+
+    Args:
+        gap: to the leader [m].
+        speed: of the driver [m/s].
+        leader_speed: along the path of the driver [m/s].
+        parameters: of the drivers.
     """
-    a, b = parameters.acceleration, parameters.comfortable
-    wanted = parameters.standstill + max(
-        0.0, u * parameters.headway + u * (u - ahead) / (2.0 * np.sqrt(a * b))
-    )
-    share = wanted / max(gap, 0.1)
+    a = parameters.acceleration
+    b = parameters.comfortable
+    closing = speed * (speed - leader_speed) / (2.0 * np.sqrt(a * b))
+    wanted_gap = parameters.standstill + max(0.0, speed * parameters.headway + closing)
+    share = wanted_gap / max(gap, 0.1)
     return float(min(max(a * (share * share - 1.0), 0.0), b))
 
 
 @kernel(inline=True)
-def minded(
+def following_braking(
     world: World,
     parameters: DriverParameters,
-    me: DriverState,
+    driver: DriverState,
     pose: Floats,
     j: int,
     box: Floats,
     speed: float,
-    later: float,
+    offset: float,
 ) -> float:
-    """Braking [m/s²] of a driver at its certified pose (5,) for j, whose box (7,) and speed [m/s] are given, if on its path.
+    """Return the braking [m/s²] of a driver behind vehicle j on its path.
 
-    FREE if j is no nearer than in the certified execution at the same clock; `later` [s] than its
-    own is what is given of j.
+    NO_BRAKING_MPS2 if the gap is not smaller than in the certified execution at the same clock.
+
+    Args:
+        world: the scenario.
+        parameters: of the drivers.
+        driver: the follower.
+        pose: (5,) its certified pose.
+        j: index of the leader.
+        box: (7,) footprint of the leader.
+        speed: of the leader [m/s].
+        offset: time [s] from the clock of the driver to that of the leader's footprint.
     """
-    i, clock = me.i, me.clock
-    gap, at = gap_ahead(world, i, clock, box, pose)
-    if at < 0:
-        return FREE
-    ahead = speed * max(box[2] * world.cells[i, at, 2] + box[3] * world.cells[i, at, 3], 0.0)
-    braking = _idm(gap, me.rate * pose[3], ahead, parameters)
+    i = driver.index
+    gap, cell = gap_ahead(world, i, driver.clock, box, pose)
+    if cell < 0:
+        return NO_BRAKING_MPS2
+    cos = world.cells[i, cell, 2]
+    sin = world.cells[i, cell, 3]
+    leader_speed = speed * max(box[2] * cos + box[3] * sin, 0.0)
+    braking = _idm_braking(gap, driver.rate * pose[3], leader_speed, parameters)
     if braking <= 0.0:
-        return FREE
-    certain, there = np.empty(5), np.empty(7)
-    pose_at(world.time, world.motion[j], clock + later, certain)
-    fill_box(certain[0], certain[1], certain[2], world.half[j, 0], world.half[j, 1], there)
-    usual, _ = gap_ahead(world, i, clock, there, pose)
-    return braking if gap < usual - NEARER else FREE
+        return NO_BRAKING_MPS2
+    certified = np.empty(5)
+    certified_box = np.empty(7)
+    pose_at(world.time, world.motion[j], driver.clock + offset, certified)
+    half = world.half[j]
+    fill_box(certified[0], certified[1], certified[2], half[0], half[1], certified_box)
+    certified_gap, _ = gap_ahead(world, i, driver.clock, certified_box, pose)
+    is_closer = gap < certified_gap - MODEL.min_gap_reduction_m
+    return braking if is_closer else NO_BRAKING_MPS2

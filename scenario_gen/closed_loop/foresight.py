@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""What a driver foresees: where the ego will be, seen a reaction time ago, and the weakest braking that keeps clear of it."""
+"""The prediction of a driver: the ego after a reaction time, and the weakest safe braking."""
 
 from typing import NamedTuple
 
@@ -9,208 +9,258 @@ import numpy as np
 
 from scenario_gen.closed_loop.coordination_space import pose_at, World
 from scenario_gen.closed_loop.driver import (
+    drive_step,
     DriverParameters,
     DriverState,
     EGO_CLOCK,
     EGO_RATE,
-    FREE,
+    MODEL,
+    NO_BRAKING_MPS2,
     ON_PATH,
-    rate_after,
 )
-from scenario_gen.closed_loop.order import limit, PARTS
+from scenario_gen.closed_loop.order import clock_limit, SUBSTEP_COUNT
 from scenario_gen.numerics import Floats
 from scenario_gen.numerics.boxes import boxes_meet, fill_box
 from scenario_gen.numerics.kernels import kernel
 
-SLOW = 0.2  # m/s; a certified speed below it counts as this one where it divides
-SPARE = 0.3  # metres that a driver who brakes for the ego leaves
-HALVINGS = 5  # of the range that holds the braking it looks for
-LATE = 0.05  # seconds by which the ego's clock is uncertain
-HARDER = 1.0  # m/s² by which an ego on its witness' path must brake harder than that one to be foreseen to go on so
+BRAKING_BISECTION_STEPS = 5  # accuracy: a 32nd of the range of braking
 
 
-class Foreseen(NamedTuple):
-    """What one driver, or all, expect of the steps to come.
+class Prediction(NamedTuple):
+    """The next M steps, as a driver predicts them.
 
     Attributes:
-        ego: (M, 4) the ego's x, y [m], yaw [rad], speed [m/s] at the end of this step and of the
-            following ones.
-        clock: of the ego on its witness' path at the end of this step [s].
+        ego: (M, 4) x, y [m], yaw [rad], speed [m/s] of the ego at the ends of the steps.
+        clock: of the ego on the path of its witness, at the end of the first step [s].
         rate: of that clock; negative if the ego is not on that path.
-        coming: (N, M) clocks of the others at the step's begin and at the end of each [s].
-        aside: metres that it leaves beside the ego if nothing makes it brake.
-        heeds: whether it keeps clear of the ego all the way; who is on foot decides at the kerb.
+        others: (N, M) clocks of the others at the start and at the end of each step [s].
+        clearance: distance [m] to the ego of a driver that does not brake.
+        avoids_ego: whether the driver keeps clear of the ego; a pedestrian decides at the kerb.
     """
 
     ego: Floats
     clock: float
     rate: float
-    coming: Floats
-    aside: float
-    heeds: bool
+    others: Floats
+    clearance: float
+    avoids_ego: bool
 
 
 @kernel(inline=True)
-def foresee_ego(world: World, seen: Floats, ago: int, out: Floats) -> None:
-    """Fill `out` (M, 4) with the ego's x, y, yaw and speed at the end of this step and of the following ones.
+def _keeps_rate(world: World, seen: Floats) -> bool:
+    """Return whether an ego (9,) brakes no harder than its witness in this step and the next."""
+    pose = np.empty(5)
+    usual = 0.0
+    for k in range(3):
+        clock = seen[EGO_CLOCK] - (1.0 - 0.5 * k) * world.step * seen[EGO_RATE]
+        pose_at(world.time, world.motion[world.ego], clock, pose)
+        usual = min(usual, pose[4])
+    rate = seen[EGO_RATE]
+    return bool(seen[5] > rate * rate * usual - MODEL.extra_braking_mps2)
 
-    On its witness' path it goes on as the witness did, at its own rate; else straight on. If it
-    brakes, on that path harder than the witness, it goes on braking.
+
+@kernel(inline=True)
+def _brake(speed: float, braking: float, h: float) -> tuple[float, float]:
+    """Return the way [m] in a step of h [s] of braking [m/s²], and the speed [m/s] after it."""
+    end_speed = max(speed - braking * h, 0.0)
+    if end_speed > 0.0 or braking == 0.0:
+        return 0.5 * (speed + end_speed) * h, end_speed
+    return 0.5 * speed * speed / braking, end_speed
+
+
+@kernel(inline=True)
+def predict_ego(world: World, seen: Floats, ago: int, out: Floats) -> None:
+    """Write x, y, yaw and speed (M, 4) of the ego at the end of this step and of the next ones.
+
+    On the path of its witness the ego continues at its rate, otherwise straight on. An ego that
+    brakes continues to brake; on that path, only if it brakes harder than its witness.
 
     Args:
         world: the scenario.
         seen: (9,) the ego as in `State.seen`.
-        ago: how many steps ago that was.
+        ago: age of that observation in steps.
         out: (M, 4).
     """
-    h, time, motion, pose, s = (
-        world.step,
-        world.time,
-        world.motion[world.ego],
-        np.empty(5),
-        seen[3],
-    )
-    cos, sin = np.cos(seen[2]), np.sin(seen[2])
-    usual = 0.0  # the witness' own braking there, in the step that is over and after it
-    for back in range(3):
-        pose_at(time, motion, seen[EGO_CLOCK] - (1.0 - 0.5 * back) * h * seen[EGO_RATE], pose)
-        usual = min(usual, pose[4])
+    h = world.step
+    motion = world.motion[world.ego]
+    speed = seen[3]
+    clock = seen[EGO_CLOCK]
+    braking = max(-seen[5], 0.0)
     on_path = seen[ON_PATH] > 0.0
-    keeps = on_path and seen[5] > seen[EGO_RATE] * seen[EGO_RATE] * usual - HARDER
-    braking, way, clock = max(-seen[5], 0.0), 0.0, seen[EGO_CLOCK]
+    keeps_rate = on_path and _keeps_rate(world, seen)
+    cos = np.cos(seen[2])
+    sin = np.sin(seen[2])
+    way = 0.0
+    pose = np.empty(5)
+    pose_at(world.time, motion, clock, pose)
     if ago == 0:
         out[0] = seen[:4]
     for m in range(1 - ago, out.shape[0]):
-        after = max(s - braking * h, 0.0)
-        moved = 0.5 * (s + after) * h if after > 0.0 or braking == 0.0 else 0.5 * s * s / braking
-        s = after
-        if on_path:
-            clock += seen[EGO_RATE] * h if keeps else min(moved / max(pose[3], SLOW), h)
-            pose_at(time, motion, clock, pose)
+        moved, speed = _brake(speed, braking, h)
         way += moved
-        if m < 0:
-            continue
         if on_path:
-            out[m, :3], out[m, 3] = pose[:3], seen[EGO_RATE] * pose[3] if keeps else s
+            delay = min(moved / max(pose[3], MODEL.min_divisor_mps), h)
+            clock += seen[EGO_RATE] * h if keeps_rate else delay
+            pose_at(world.time, motion, clock, pose)
         else:
-            out[m, 0], out[m, 1], out[m, 2], out[m, 3] = (
-                seen[0] + way * cos,
-                seen[1] + way * sin,
-                seen[2],
-                s,
-            )
+            pose[0] = seen[0] + way * cos
+            pose[1] = seen[1] + way * sin
+            pose[2] = seen[2]
+        if m >= 0:
+            out[m, :3] = pose[:3]
+            out[m, 3] = seen[EGO_RATE] * pose[3] if keeps_rate else speed
 
 
 @kernel(inline=True)
-def weakest(
+def weakest_safe_braking(
     world: World,
     parameters: DriverParameters,
-    me: DriverState,
+    driver: DriverState,
     least: float,
-    foreseen: Foreseen,
+    prediction: Prediction,
     others: bool,
 ) -> float:
-    """The weakest braking [m/s²], `least` or more, with which a driver meets nothing that it foresees; the strongest if none.
+    """Return the weakest braking [m/s²], `least` or more, with which a driver stays clear.
 
-    Looked for between a few brakings first, for more is not always better: who brakes more may be
-    there when the ego is.
+    The strongest braking if none does. More braking is not always safer: a slower driver may be
+    at a crossing together with the ego. So a few values are tried before the bisection.
     """
-    if _clear(world, parameters, me, least, foreseen, others):
+    if _is_clear(world, parameters, driver, least, prediction, others):
         return least
     low = max(least, -parameters.acceleration)
-    comfortable, strongest = parameters.comfortable, parameters.strongest[me.i]
-    for tried in (0.0, 0.5 * comfortable, comfortable, 0.5 * (comfortable + strongest), strongest):
-        if tried <= low:
+    comfortable = parameters.comfortable
+    strongest = parameters.strongest[driver.index]
+    for high in (0.0, 0.5 * comfortable, comfortable, 0.5 * (comfortable + strongest), strongest):
+        if high <= low:
             continue
-        if _clear(world, parameters, me, tried, foreseen, others):
-            high = tried
-            for _ in range(HALVINGS):
-                middle = 0.5 * (low + high)
-                if _clear(world, parameters, me, middle, foreseen, others):
-                    high = middle
-                else:
-                    low = middle
-            return high
-        low = tried
+        if _is_clear(world, parameters, driver, high, prediction, others):
+            return _bisect_braking(world, parameters, driver, (low, high), prediction, others)
+        low = high
     return float(max(strongest, least))
 
 
 @kernel(inline=True)
-def _clear(
+def _bisect_braking(
     world: World,
     parameters: DriverParameters,
-    me: DriverState,
+    driver: DriverState,
+    bounds: tuple[float, float],
+    prediction: Prediction,
+    others: bool,
+) -> float:
+    """Return the weakest safe braking [m/s²] between an unsafe and a safe one."""
+    low, high = bounds
+    for _ in range(BRAKING_BISECTION_STEPS):
+        middle = 0.5 * (low + high)
+        if _is_clear(world, parameters, driver, middle, prediction, others):
+            high = middle
+        else:
+            low = middle
+    return high
+
+
+@kernel(inline=True)
+def _is_clear(
+    world: World,
+    parameters: DriverParameters,
+    driver: DriverState,
     braking: float,
-    foreseen: Foreseen,
+    prediction: Prediction,
     others: bool,
 ) -> bool:
-    """Whether a driver, braking so, stays clear of the ego ahead of it, and keeps to what the order is foreseen to let it do."""
-    h, time, motion, cell, order = (
-        world.step,
-        world.time,
-        world.motion[me.i],
-        world.cell,
-        world.order[me.i],
-    )
-    pose, mine, ego, half = np.empty(5), np.empty(7), np.empty(7), world.half
-    t, r, was = me.clock, me.rate, me.was
-    spare = max(foreseen.aside, SPARE) if braking > FREE else foreseen.aside
-    length, width = half[me.i, 0] + spare, half[me.i, 1] + spare
-    reach = np.sqrt(length**2 + width**2) + np.sqrt(
-        half[world.ego, 0] ** 2 + half[world.ego, 1] ** 2
-    )
-    pose_at(time, motion, t, pose)
-    for m in range(foreseen.ego.shape[0] - 1):
-        u = r * pose[3]
-        after = rate_after(parameters, r, pose[3], pose[4], was, braking, 0.0, h)
-        t += 0.5 * (r + after) * h
-        r = after
-        pose_at(time, motion, t, pose)
-        was = (r * pose[3] - u) / h
-        if world.leaves[me.i] and t >= world.spans[me.i, 1]:
-            return True
-        there = foreseen.ego[m]
-        dx, dy = there[0] - pose[0], there[1] - pose[1]
-        if foreseen.heeds and dx * dx + dy * dy < reach * reach:
-            fill_box(pose[0], pose[1], pose[2], length, width, mine)
-            fill_box(there[0], there[1], there[2], half[world.ego, 0], half[world.ego, 1], ego)
-            if dx * mine[2] + dy * mine[3] > 0.0 and boxes_meet(mine, ego):
-                return False
-        passed = foreseen.clock + foreseen.rate * m * h
-        if (
-            parameters.yields
-            and foreseen.rate >= 0.0
-            and t > limit(order[world.ego], cell, passed) + LATE
-        ):
+    """Return whether a driver that brakes stays clear of the ego and respects the order."""
+    i = driver.index
+    pose = np.empty(5)
+    brakes = braking > NO_BRAKING_MPS2
+    clearance = max(prediction.clearance, MODEL.clearance_m * brakes)
+    half = (world.half[i, 0] + clearance, world.half[i, 1] + clearance)
+    ego_half = world.half[world.ego]
+    reach = np.sqrt(half[0] ** 2 + half[1] ** 2) + np.sqrt(ego_half[0] ** 2 + ego_half[1] ** 2)
+    leave_clock = world.spans[i, 1] if world.leaves[i] else np.inf
+    pose_at(world.time, world.motion[i], driver.clock, pose)
+    for m in range(prediction.ego.shape[0] - 1):
+        driver = drive_step(world, parameters, driver, pose, braking)
+        if driver.clock >= leave_clock:
+            break
+        if prediction.avoids_ego and _hits_ego(world, pose, prediction.ego[m], half, reach):
             return False
-        if others:
-            for j in range(foreseen.coming.shape[0]):
-                if j not in (me.i, world.ego):
-                    end = foreseen.coming[j, m + 1]
-                    before = end - (end - foreseen.coming[j, m]) / PARTS
-                    if t > max(limit(order[j], cell, before), end) + 1e-09:
-                        return False
-        if braking > 0.0 and r == 0.0:
-            return True
+        if precedes_ego(world, parameters, i, driver.clock, prediction, m):
+            return False
+        if others and _precedes_others(world, i, driver.clock, prediction.others, m):
+            return False
+        if braking > 0.0 and driver.rate == 0.0:
+            break
     return True
 
 
 @kernel(inline=True)
-def foresee_self(
-    world: World, parameters: DriverParameters, me: DriverState, braking: float, out: Floats
+def _hits_ego(
+    world: World, pose: Floats, ego: Floats, half: tuple[float, float], reach: float
+) -> bool:
+    """Return whether a footprint at a pose (5,) meets an ego (4,) that is not behind it.
+
+    The half sizes of the footprint are `half` [m]; beyond `reach` [m] the two cannot meet.
+    """
+    dx = ego[0] - pose[0]
+    dy = ego[1] - pose[1]
+    if dx * dx + dy * dy >= reach * reach:
+        return False
+    footprint = np.empty(7)
+    ego_box = np.empty(7)
+    ego_half = world.half[world.ego]
+    fill_box(pose[0], pose[1], pose[2], half[0], half[1], footprint)
+    fill_box(ego[0], ego[1], ego[2], ego_half[0], ego_half[1], ego_box)
+    is_ahead = dx * footprint[2] + dy * footprint[3] > 0.0
+    return is_ahead and boxes_meet(footprint, ego_box)
+
+
+@kernel(inline=True)
+def precedes_ego(
+    world: World,
+    parameters: DriverParameters,
+    i: int,
+    clock: float,
+    prediction: Prediction,
+    m: int,
+) -> bool:
+    """Return whether vehicle i at a clock [s] goes ahead of an ego that the template let pass.
+
+    The ego is that of step m; False if the drivers do not yield to it.
+    """
+    if not parameters.yields or prediction.rate < 0.0:
+        return False
+    ego_clock = prediction.clock + prediction.rate * m * world.step
+    limit = clock_limit(world.order[i, world.ego], world.cell, ego_clock)
+    return bool(clock > limit + MODEL.clock_tolerance_s)
+
+
+@kernel(inline=True)
+def _precedes_others(world: World, i: int, clock: float, others: Floats, m: int) -> bool:
+    """Return whether vehicle i at a clock [s] violates its order with the clocks (N, M)."""
+    for j in range(others.shape[0]):
+        if j in (i, world.ego):
+            continue
+        end = others[j, m + 1]
+        last_substep = end - (end - others[j, m]) / SUBSTEP_COUNT
+        limit = clock_limit(world.order[i, j], world.cell, last_substep)
+        if clock > max(limit, end) + 1e-09:
+            return True
+    return False
+
+
+@kernel(inline=True)
+def predict_clock(
+    world: World, parameters: DriverParameters, driver: DriverState, braking: float, out: Floats
 ) -> None:
-    """Fill `out` (M,) with a driver's clocks [s] at the step's begin and at the end of each, if it brakes so."""
-    h, time, motion, pose = world.step, world.time, world.motion[me.i], np.empty(5)
-    t, r, was = me.clock, me.rate, me.was
-    out[0] = t
+    """Write the clocks (M,) [s] of a braking driver at the start and the end of each step."""
+    pose = np.empty(5)
+    pose_at(world.time, world.motion[driver.index], driver.clock, pose)
+    clock = driver.clock
+    out[0] = clock
     for m in range(1, out.shape[0]):
-        if r < 1.0 or braking > FREE:
-            pose_at(time, motion, t, pose)
-            after = rate_after(parameters, r, pose[3], pose[4], was, braking, 0.0, h)
-            u = r * pose[3]
-            t += 0.5 * (r + after) * h
-            pose_at(time, motion, t, pose)
-            was, r = (after * pose[3] - u) / h, after
+        if driver.rate < 1.0 or braking > NO_BRAKING_MPS2:
+            driver = drive_step(world, parameters, driver, pose, braking)
+            clock = driver.clock
         else:
-            t += h
-        out[m] = t
+            clock += world.step
+        out[m] = clock

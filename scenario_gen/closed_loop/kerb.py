@@ -1,69 +1,65 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Who is on foot, before it steps onto a lane: it waits at the kerb for an ego that would meet it and cannot stop before it.
+"""Pedestrians at the kerb: they wait for an ego that would meet them and cannot stop.
 
-It waits, too, where the template waited for the ego. Once it is on the lane it goes on. It looks
-before it steps, so no reaction time passes, and it stops late, as walkers do, not from afar as
-drivers do.
+They also wait where the template waited for the ego. On the lane they go on. A pedestrian looks
+before it steps onto the lane, so it has no reaction time. It stops late, as pedestrians do.
 """
 
 import numpy as np
 
 from scenario_gen.closed_loop.coordination_space import pose_at, World
 from scenario_gen.closed_loop.driver import (
+    drive_step,
     DriverParameters,
     DriverState,
     EGO_CLOCK,
     EGO_RATE,
-    FREE,
+    MODEL,
+    NO_BRAKING_MPS2,
     ON_PATH,
-    rate_after,
 )
-from scenario_gen.closed_loop.foresight import Foreseen, LATE, SPARE
-from scenario_gen.closed_loop.order import limit
+from scenario_gen.closed_loop.foresight import precedes_ego, Prediction
 from scenario_gen.numerics import Floats
 from scenario_gen.numerics.boxes import boxes_meet, fill_box
 from scenario_gen.numerics.kernels import kernel
 
-RESPONSE = 1.0  # seconds until an ego brakes comfortably for one who steps onto its lane
-TOO_FAST = 1.05  # times its witness' speed, from which on an ego is not expected to slow down where that one does
-STOPS = 1.5  # m/s² with which one on foot stops at the kerb: from 1.4 m/s within a step of 0.7 m
+
+@kernel(inline=True)
+def _kerb_clock(world: World, walker: DriverState) -> float:
+    """Return the clock [s] of the next step onto a lane, now or earlier if it is on a lane."""
+    kerbs = world.kerbs[walker.index]
+    return float(kerbs[min(int(walker.clock / world.cell), kerbs.shape[0] - 1)])
 
 
 @kernel(inline=True)
-def _next_kerb(world: World, me: DriverState) -> float:
-    """Clock [s] at which one next steps onto a lane; no later than now if it is on one."""
-    kerbs = world.kerbs[me.i]
-    return float(kerbs[min(int(me.clock / world.cell), kerbs.shape[0] - 1)])
+def _kerb_cell(world: World, walker: DriverState) -> int:
+    """Return the cell that begins where a pedestrian steps onto a lane."""
+    return int(_kerb_clock(world, walker) / world.cell + 0.5)
 
 
 @kernel(inline=True)
-def _cell(world: World, clock: float) -> int:
-    """The cell that begins at a clock [s]."""
-    return int(clock / world.cell + 0.5)
+def is_before_kerb(world: World, walker: DriverState) -> bool:
+    """Return whether this is a pedestrian that has not yet stepped onto its next lane."""
+    return walker.clock + 1e-9 < _kerb_clock(world, walker) < np.inf
 
 
 @kernel(inline=True)
-def before_kerb(world: World, me: DriverState) -> bool:
-    """Whether one is on foot and has not stepped yet onto the lane that it comes to."""
-    return me.clock + 1e-9 < _next_kerb(world, me) < np.inf
-
-
-@kernel(inline=True)
-def foresee_fast_ego(world: World, seen: Floats, out: Floats) -> None:
-    """Change `out` (M, 4), the ego as `foresee_ego` has it, if it is faster on its witness' path: it keeps its speed there.
+def predict_fast_ego(world: World, seen: Floats, out: Floats) -> None:
+    """Replace a prediction (M, 4) of the ego if it is faster than its witness: it stays so.
 
     Args:
         world: the scenario.
         seen: (9,) the ego as in `State.seen`, at the end of this step.
-        out: (M, 4).
+        out: (M, 4) as `predict_ego` wrote it.
     """
-    if seen[ON_PATH] == 0.0 or seen[EGO_RATE] <= TOO_FAST:
+    if seen[ON_PATH] == 0.0 or seen[EGO_RATE] <= MODEL.max_ego_rate_ratio:
         return
-    way, pose, k = world.cells[world.ego, :, 7], np.empty(5), int(seen[EGO_CLOCK] / world.cell)
+    way = world.cells[world.ego, :, 7]
+    pose = np.empty(5)
     last = way.shape[0] - 1
-    k = min(k, last)
+    k = min(int(seen[EGO_CLOCK] / world.cell), last)
     driven = way[k] + (way[min(k + 1, last)] - way[k]) * (seen[EGO_CLOCK] / world.cell - k)
     for m in range(1, out.shape[0]):
         driven += seen[3] * world.step
@@ -71,84 +67,108 @@ def foresee_fast_ego(world: World, seen: Floats, out: Floats) -> None:
             k += 1
         share = (driven - way[k]) / (way[k + 1] - way[k]) if k < last else 0.0
         pose_at(world.time, world.motion[world.ego], (k + share) * world.cell, pose)
-        out[m, :3], out[m, 3] = pose[:3], seen[3]
+        out[m, :3] = pose[:3]
+        out[m, 3] = seen[3]
 
 
 @kernel(inline=True)
-def beyond_kerb(world: World, me: DriverState, foreseen: Foreseen) -> Foreseen:
-    """What one expects who waits for the ego at the kerb, not where the order ends its way on the lane."""
-    rate = -1.0 if before_kerb(world, me) else foreseen.rate
-    return Foreseen(
-        foreseen.ego, foreseen.clock, rate, foreseen.coming, foreseen.aside, foreseen.heeds
+def without_ego_order(world: World, walker: DriverState, prediction: Prediction) -> Prediction:
+    """Return a prediction in which a pedestrian waits for the ego at the kerb, not on the lane."""
+    rate = -1.0 if is_before_kerb(world, walker) else prediction.rate
+    return Prediction(
+        prediction.ego,
+        prediction.clock,
+        rate,
+        prediction.others,
+        prediction.clearance,
+        prediction.avoids_ego,
     )
 
 
 @kernel(inline=True)
 def braking_at_kerb(
-    world: World, parameters: DriverParameters, me: DriverState, pose: Floats, foreseen: Foreseen
+    world: World,
+    parameters: DriverParameters,
+    walker: DriverState,
+    pose: Floats,
+    prediction: Prediction,
 ) -> float:
-    """Braking [m/s²] of one before the kerb, at its certified pose (5,); FREE if it need not wait, or not brake yet."""
-    if not _must_wait(world, parameters, me, foreseen):
-        return FREE
-    way, cell, k, onto = (
-        world.cells[me.i, :, 7],
-        world.cell,
-        int(me.clock / world.cell),
-        _cell(world, _next_kerb(world, me)),
-    )
-    walked = way[k] + (way[k + 1] - way[k]) * (me.clock / cell - k)
-    room, u = way[onto] - walked - SPARE, me.rate * pose[3]
-    reached = min(u + parameters.acceleration * world.step, pose[3])
-    if room > reached * world.step + reached * reached / (2.0 * STOPS):
-        return FREE
-    return float(min(u * u / (2.0 * max(room, 0.01)), parameters.strongest[me.i]))
+    """Return the braking [m/s²] of a pedestrian before the kerb, at its certified pose (5,).
+
+    NO_BRAKING_MPS2 if it need not wait, or need not brake yet.
+    """
+    if not _must_wait(world, parameters, walker, prediction):
+        return NO_BRAKING_MPS2
+    way = world.cells[walker.index, :, 7]
+    k = int(walker.clock / world.cell)
+    walked = way[k] + (way[k + 1] - way[k]) * (walker.clock / world.cell - k)
+    room = way[_kerb_cell(world, walker)] - walked - MODEL.clearance_m
+    speed = walker.rate * pose[3]
+    reached = min(speed + parameters.acceleration * world.step, pose[3])
+    stopping_way = reached * reached / (2.0 * MODEL.walker_braking_mps2)
+    if room > reached * world.step + stopping_way:
+        return NO_BRAKING_MPS2
+    return float(min(speed * speed / (2.0 * max(room, 0.01)), parameters.strongest[walker.index]))
 
 
 @kernel(inline=True)
 def _must_wait(
-    world: World, parameters: DriverParameters, me: DriverState, foreseen: Foreseen
+    world: World, parameters: DriverParameters, walker: DriverState, prediction: Prediction
 ) -> bool:
-    """Whether one that goes on would go before an ego that the template let pass, or meet one that cannot stop."""
-    h, order, half, ego = world.step, world.order[me.i, world.ego], world.half, world.ego
-    pose, mine, its = np.empty(5), np.empty(7), np.empty(7)
-    t, r, was, meets = me.clock, me.rate, me.was, False
-    pose_at(world.time, world.motion[me.i], t, pose)
-    for m in range(foreseen.ego.shape[0] - 1):
-        u = r * pose[3]
-        after = rate_after(parameters, r, pose[3], pose[4], was, FREE, 0.0, h)
-        t += 0.5 * (r + after) * h
-        r = after
-        pose_at(world.time, world.motion[me.i], t, pose)
-        was = (r * pose[3] - u) / h
-        if (
-            parameters.yields
-            and foreseen.rate >= 0.0
-            and t > limit(order, world.cell, foreseen.clock + foreseen.rate * m * h) + LATE
-        ):
+    """Return whether a pedestrian must not go on.
+
+    It would go ahead of an ego that the template let pass, or meet one that cannot stop.
+    """
+    i = walker.index
+    clearance = prediction.clearance
+    half = world.half[i]
+    ego_half = world.half[world.ego]
+    pose = np.empty(5)
+    footprint = np.empty(7)
+    ego_box = np.empty(7)
+    state = walker
+    meets = False
+    pose_at(world.time, world.motion[i], state.clock, pose)
+    for m in range(prediction.ego.shape[0] - 1):
+        state = drive_step(world, parameters, state, pose, NO_BRAKING_MPS2)
+        if precedes_ego(world, parameters, i, state.clock, prediction, m):
             return True
-        there, aside = foreseen.ego[m], foreseen.aside
-        fill_box(pose[0], pose[1], pose[2], half[me.i, 0] + aside, half[me.i, 1] + aside, mine)
-        fill_box(there[0], there[1], there[2], half[ego, 0], half[ego, 1], its)
-        meets = meets or boxes_meet(mine, its)
-    return meets and not _stops(world, parameters, me, foreseen)
+        ego = prediction.ego[m]
+        fill_box(pose[0], pose[1], pose[2], half[0] + clearance, half[1] + clearance, footprint)
+        fill_box(ego[0], ego[1], ego[2], ego_half[0], ego_half[1], ego_box)
+        meets = meets or boxes_meet(footprint, ego_box)
+    return meets and not _ego_stops(world, parameters, walker, prediction)
 
 
 @kernel(inline=True)
-def _stops(
-    world: World, parameters: DriverParameters, me: DriverState, foreseen: Foreseen
+def _ego_stops(
+    world: World, parameters: DriverParameters, walker: DriverState, prediction: Prediction
 ) -> bool:
-    """Whether the ego, where it is foreseen to drive, stops comfortably before the way of one on foot across the lane."""
-    there, box, cells, half = foreseen.ego, np.empty(7), world.cells[me.i], world.half[world.ego]
-    speed, way, onto = there[0, 3], 0.0, _cell(world, _next_kerb(world, me))
-    for m in range(there.shape[0]):
+    """Return whether the ego can stop comfortably before the crossing of a pedestrian."""
+    ego = prediction.ego
+    box = np.empty(7)
+    half = world.half[world.ego]
+    speed = ego[0, 3]
+    stopping_way = speed * MODEL.ego_response_s + speed * speed / (2.0 * parameters.comfortable)
+    way = 0.0
+    for m in range(ego.shape[0]):
         if m > 0:
-            way += np.hypot(there[m, 0] - there[m - 1, 0], there[m, 1] - there[m - 1, 1])
-        if way > speed * RESPONSE + speed * speed / (2.0 * parameters.comfortable):
+            way += np.hypot(ego[m, 0] - ego[m - 1, 0], ego[m, 1] - ego[m - 1, 1])
+        if way > stopping_way:
             return True
-        fill_box(there[m, 0], there[m, 1], there[m, 2], half[0], half[1], box)
-        for k in range(onto, cells.shape[0]):
-            if world.kerbs[me.i, k] > (k + 0.5) * world.cell:
-                break
-            if boxes_meet(cells[k], box):
-                return False
+        fill_box(ego[m, 0], ego[m, 1], ego[m, 2], half[0], half[1], box)
+        if _crosses(world, walker, box):
+            return False
     return True
+
+
+@kernel(inline=True)
+def _crosses(world: World, walker: DriverState, box: Floats) -> bool:
+    """Return whether the crossing of a pedestrian on its next lane meets a box (7,)."""
+    cells = world.cells[walker.index]
+    for k in range(_kerb_cell(world, walker), cells.shape[0]):
+        if world.kerbs[walker.index, k] > (k + 0.5) * world.cell:
+            break
+        if boxes_meet(cells[k], box):
+            return True
+    return False

@@ -1,7 +1,9 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""One step of the closed loop, compiled: where the ego is on its witness' path, how the others react, where all are then."""
+"""One compiled step of the closed loop: the ego on the path of its witness, and the reactions."""
+
+from typing import NamedTuple
 
 import numpy as np
 
@@ -13,6 +15,7 @@ from scenario_gen.closed_loop.driver import (
     DriverParameters,
     EGO_CLOCK,
     HELD,
+    MODEL,
     RATE,
     WAITED,
 )
@@ -21,80 +24,164 @@ from scenario_gen.numerics import Bools, Floats
 from scenario_gen.numerics.boxes import boxes_meet, fill_box
 from scenario_gen.numerics.kernels import B1, F, F2, I, kernel, OUT2, OUTB1
 
-WINDOW = 5.0  # metres beyond what the ego has moved in which its place on the witness' path is looked for
-BESIDE = 1.5  # metres beside that path at which the ego has left it
-ASKEW = 0.5  # rad against that path, likewise
-HURRY = 1.5  # times the witness' speed at which it is not on it either: it will not do what the witness did
-ON = 0.05  # metres and m/s by which an ego that keeps to its witness differs from it
-HARDER = 0.2  # m/s of a step beyond the strongest braking that are counted
-SUDDEN = 0.05  # m/s of a step beyond what the jerk allows that are counted
-PUNCTUAL = 0.15  # seconds by which an ego that stands with its witness may be late
+
+class WitnessMatching(NamedTuple):
+    """Constants that match the ego to the path of its witness.
+
+    Attributes:
+        window_m: search distance beyond the way that the ego has moved.
+        search_step_s: time between two candidates of the search.
+        min_moving_speed_mps: a slower witness stands, so speed ratios are meaningless.
+        same_m: position difference of an ego that drives as its witness.
+        same_mps: speed difference of such an ego.
+        max_delay_s: delay of an ego that stands together with its witness.
+        max_offset_m: lateral distance at which the ego has left the path.
+        max_heading_error_rad: heading error at which it has left the path.
+        max_rate_ratio: a faster ego will not do what its witness did.
+    """
+
+    window_m: float = 5.0
+    search_step_s: float = 0.05
+    min_moving_speed_mps: float = 0.3
+    same_m: float = 0.05
+    same_mps: float = 0.05
+    max_delay_s: float = 0.15
+    max_offset_m: float = 1.5
+    max_heading_error_rad: float = 0.5
+    max_rate_ratio: float = 1.5
+
+
+MATCHING = WitnessMatching()
 
 
 @kernel(inline=True)
-def locate(
-    now: float, time: Floats, motion: Floats, body: Floats, before: float, out: Floats
+def _nearest_clock(
+    now: float, time: Floats, motion: Floats, body: Floats, previous: float
+) -> float:
+    """Return the clock [s], `previous` or later, at which the witness is nearest to a body (6,).
+
+    Of equally near ones the last that is not after `now` [s].
+    """
+    step = MATCHING.search_step_s
+    pose = np.empty(5)
+    pose_at(time, motion, previous, pose)
+    x = pose[0]
+    y = pose[1]
+    reach = np.hypot(body[0] - x, body[1] - y) + MATCHING.window_m
+    way = 0.0
+    best_gap = np.inf
+    best = previous
+    t = previous
+    while t <= time[-1] and way <= reach:
+        pose_at(time, motion, t, pose)
+        way += np.hypot(pose[0] - x, pose[1] - y)
+        x = pose[0]
+        y = pose[1]
+        gap = np.hypot(body[0] - x, body[1] - y)
+        if gap < best_gap - 1e-6 or (gap < best_gap + 1e-6 and t <= now):
+            best_gap = min(gap, best_gap)
+            best = t
+        t += step
+    pose_at(time, motion, best, pose)
+    if pose[3] > 0.5:
+        along = (body[0] - pose[0]) * np.cos(pose[2]) + (body[1] - pose[1]) * np.sin(pose[2])
+        best += min(max(along / pose[3], -step), step)
+    return float(min(max(best, previous), time[-1]))
+
+
+@kernel(inline=True)
+def _clock_rate(now: float, clock: float, speed: float, witness_speed: float) -> float:
+    """Return the rate of the clock [s] of an ego from its speed and that of its witness [m/s]."""
+    witness_moves = witness_speed > MATCHING.min_moving_speed_mps
+    if abs(speed - witness_speed) < MATCHING.same_mps:
+        is_punctual = clock >= now - MATCHING.max_delay_s
+        return 1.0 if witness_moves or is_punctual else 0.0
+    if witness_moves:
+        return speed / witness_speed
+    return 1.0 if speed > 0.1 else 0.0
+
+
+@kernel(inline=True)
+def locate_ego(
+    now: float, time: Floats, motion: Floats, body: Floats, previous: float, out: Floats
 ) -> None:
-    """Write the ego's clock on its witness' path, the rate at which it runs, and whether it is on that path (1 or 0).
+    """Write the clock of the ego on the path of its witness, its rate, and 1 if it is on the path.
 
     Args:
-        now: seconds.
+        now: certified time [s].
         time: (T,) of the scenario.
         motion: (T, 6) of the witness, as in `World`.
         body: (6,) the ego, as in `EgoState`.
-        before: its clock one step ago [s]; it never runs back.
+        previous: its clock one step ago [s]; a clock never runs back.
         out: (3,).
     """
-    pose, last = np.empty(5), time[-1]
+    pose = np.empty(5)
     pose_at(time, motion, now, pose)
-    out[0], out[1], out[2] = before, 1.0, 1.0
-    if before <= now <= last and np.hypot(body[0] - pose[0], body[1] - pose[1]) < ON:
+    offset = np.hypot(body[0] - pose[0], body[1] - pose[1])
+    if previous <= now <= time[-1] and offset < MATCHING.same_m:
         out[0] = now
     else:
-        way, best, at, step = 0.0, np.inf, before, 0.05
-        pose_at(time, motion, before, pose)
-        x, y = pose[0], pose[1]
-        reach = np.hypot(body[0] - x, body[1] - y) + WINDOW
-        t = before
-        while t <= last and way <= reach:
-            pose_at(time, motion, t, pose)
-            way += np.hypot(pose[0] - x, pose[1] - y)
-            x, y = pose[0], pose[1]
-            gap = np.hypot(body[0] - x, body[1] - y)
-            if gap < best - 1e-6 or (gap < best + 1e-6 and t <= now):
-                best, at = min(gap, best), t
-            t += step
-        pose_at(time, motion, at, pose)
-        if pose[3] > 0.5:
-            along = (body[0] - pose[0]) * np.cos(pose[2]) + (body[1] - pose[1]) * np.sin(pose[2])
-            at += min(max(along / pose[3], -step), step)
-        out[0] = min(max(at, before), last)
+        out[0] = _nearest_clock(now, time, motion, body, previous)
     pose_at(time, motion, out[0], pose)
-    c, s = np.cos(pose[2]), np.sin(pose[2])
-    turn = (body[2] - pose[2] + np.pi) % (2.0 * np.pi) - np.pi
-    aside = abs((body[1] - pose[1]) * c - (body[0] - pose[0]) * s)
-    if abs(body[3] - pose[3]) < ON:
-        out[1] = 1.0 if pose[3] > 0.3 or out[0] >= now - PUNCTUAL else 0.0
-    elif pose[3] > 0.3:
-        out[1] = body[3] / pose[3]
-    else:
-        out[1] = 1.0 if body[3] > 0.1 else 0.0
-    if aside > BESIDE or abs(turn) > ASKEW or out[1] > HURRY:
-        out[2] = 0.0
+    cos = np.cos(pose[2])
+    sin = np.sin(pose[2])
+    heading_error = (body[2] - pose[2] + np.pi) % (2.0 * np.pi) - np.pi
+    lateral = abs((body[1] - pose[1]) * cos - (body[0] - pose[0]) * sin)
+    out[1] = _clock_rate(now, out[0], body[3], pose[3])
+    has_left = lateral > MATCHING.max_offset_m
+    has_turned = abs(heading_error) > MATCHING.max_heading_error_rad
+    out[2] = 0.0 if has_left or has_turned or out[1] > MATCHING.max_rate_ratio else 1.0
 
 
 @kernel(inline=True)
-def place(time: Floats, motion: Floats, drivers: Floats, out: Floats) -> None:
-    """Write x, y [m], yaw [rad], speed [m/s] (N, 4) of motions (N, T, 6); rows (N, 5) begin with clock [s] and rate."""
+def fill_vehicles(time: Floats, motion: Floats, drivers: Floats, out: Floats) -> None:
+    """Write x, y [m], yaw [rad], speed [m/s] (N, 4) of motions (N, T, 6).
+
+    The rows of the drivers (N, 5) begin with clock [s] and rate.
+    """
     pose = np.empty(5)
     for i in range(out.shape[0]):
         pose_at(time, motion[i], drivers[i, CLOCK], pose)
-        out[i, 0], out[i, 1], out[i, 2], out[i, 3] = (
-            pose[0],
-            pose[1],
-            pose[2],
-            pose[3] * drivers[i, RATE],
+        out[i, :3] = pose[:3]
+        out[i, 3] = pose[3] * drivers[i, RATE]
+
+
+@kernel(inline=True)
+def _update_acceleration(
+    world: World,
+    parameters: DriverParameters,
+    i: int,
+    before: Floats,
+    after: Floats,
+    speed: float,
+) -> None:
+    """Write whether the order forced vehicle i, and the acceleration of its driver.
+
+    Args:
+        world: the scenario and the step.
+        parameters: of the drivers.
+        i: index of the vehicle.
+        before: (4,) its driver before the step.
+        after: (5,) its driver after the step; HELD and ACCELERATION are changed.
+        speed: of the vehicle after the step [m/s].
+    """
+    h = world.step
+    pose = np.empty(5)
+    pose_at(world.time, world.motion[i], before[CLOCK], pose)
+    strongest = parameters.strongest[i]
+    gained = (speed - before[RATE] * pose[3]) / h
+    if after[HELD] > 0.0:
+        hard = gained + strongest + MODEL.braking_tolerance_mps / h
+        sudden = (
+            gained
+            - min(before[ACCELERATION], 0.0)
+            + parameters.jerk * h
+            + MODEL.jerk_tolerance_mps / h
         )
+        after[HELD] = 1.0 if min(hard, sudden) < 0.0 else 0.0
+    if after[HELD] == 0.0 or speed == 0.0:
+        after[ACCELERATION] = gained if speed > 0.0 else 0.0
+    after[ACCELERATION] = min(max(after[ACCELERATION], -strongest), parameters.acceleration)
 
 
 @kernel(WORLD, DRIVER_PARAMETERS, F, F2, OUT2, OUT2, OUT2, OUTB1)
@@ -106,69 +193,66 @@ def advance(
     seen: Floats,
     after: Floats,
     vehicles: Floats,
-    here: Bools,
+    present: Bools,
 ) -> None:
-    """Move everyone one step on.
+    """Advance all vehicles by one step.
 
     Args:
         world: the scenario and the step.
-        parameters: how the others drive.
-        now: certified time at the step's end [s].
+        parameters: of the other drivers.
+        now: certified time at the end of the step [s].
         before: (N, 4) columns CLOCK … of `driver`.
-        seen: (K, 9) as in `State`, at the end of the step; the ego's clock, its rate and whether
-            it is on its path are written.
-        after: (N, 5) output, at the end of the step; HELD is 1 where the order makes one of the
-            others brake harder than the strongest, or more suddenly than the jerk allows.
-        vehicles: (N, 4) output, x, y [m], yaw [rad], speed [m/s] then.
-        here: (N,) output, who is on the scene then.
+        seen: (K, 9) as in `State`, at the end of the step; the clock of the ego, its rate and
+            whether it is on the path are written.
+        after: (N, 5) output, at the end of the step; HELD is 1 where the order makes a driver
+            brake harder than the strongest braking, or more suddenly than the jerk limit.
+        vehicles: (N, 4) output, x, y [m], yaw [rad], speed [m/s] at the end of the step.
+        present: (N,) output, whether each vehicle is on the scene then.
     """
-    h, time, motion, ego = world.step, world.time, world.motion, world.ego
-    pose, body, witness = np.empty(5), seen[0, :EGO_CLOCK], seen[0, EGO_CLOCK:]
-    locate(now, time, motion[ego], body, before[ego, CLOCK], witness)
+    time = world.time
+    ego = world.ego
+    body = seen[0, :EGO_CLOCK]
+    matched = seen[0, EGO_CLOCK:]
+    locate_ego(now, time, world.motion[ego], body, before[ego, CLOCK], matched)
     if parameters.reacts:
         react(world, parameters, seen, before, after)
     else:
         after[:] = 0.0
-        after[:, CLOCK], after[:, RATE] = min(now, time[-1]), 1.0
-    after[ego, CLOCK], after[ego, RATE], after[ego, WAITED], after[ego, HELD] = (
-        witness[0],
-        witness[1],
-        0.0,
-        0.0,
-    )
-    place(time, motion, after, vehicles)
+        after[:, CLOCK] = min(now, time[-1])
+        after[:, RATE] = 1.0
+    after[ego, CLOCK] = matched[0]
+    after[ego, RATE] = matched[1]
+    after[ego, WAITED] = 0.0
+    after[ego, HELD] = 0.0
+    fill_vehicles(time, world.motion, after, vehicles)
     vehicles[ego] = body[:4]
-    for i in range(len(motion)):
-        pose_at(time, motion[i], before[i, CLOCK], pose)
+    for i in range(len(world.motion)):
         if i != ego and not world.leaves[i] and after[i, CLOCK] >= time[-1]:
-            vehicles[i, 3] = 0.0  # it stays where its motion ended
-        speed, was, clock = vehicles[i, 3], before[i, ACCELERATION], after[i, CLOCK]
-        gained = (speed - before[i, RATE] * pose[3]) / h
-        if after[i, HELD] > 0.0:
-            hard, sudden = (
-                gained + parameters.strongest[i] + HARDER / h,
-                gained - min(was, 0.0) + parameters.jerk * h + SUDDEN / h,
-            )
-            after[i, HELD] = 1.0 if min(hard, sudden) < 0.0 else 0.0
-        if after[i, HELD] == 0.0 or speed == 0.0:
-            after[i, ACCELERATION] = gained if speed > 0.0 else 0.0
-        after[i, ACCELERATION] = min(
-            max(after[i, ACCELERATION], -parameters.strongest[i]), parameters.acceleration
-        )
+            vehicles[i, 3] = 0.0  # it stands where its motion ended
+        _update_acceleration(world, parameters, i, before[i], after[i], vehicles[i, 3])
         begin, end = world.spans[i]
-        here[i] = i == ego or (clock >= begin and not (world.leaves[i] and clock >= end))
+        clock = after[i, CLOCK]
+        present[i] = i == ego or (clock >= begin and not (world.leaves[i] and clock >= end))
 
 
 @kernel(F2, F2, B1, I)
-def ego_hits(vehicles: Floats, half: Floats, here: Bools, ego: int) -> bool:
-    """Whether the ego overlaps another that is here; vehicles (N, 4) x, y, yaw, speed, half sizes (N, 2)."""
-    mine, other = np.empty(7), np.empty(7)
-    fill_box(
-        vehicles[ego, 0], vehicles[ego, 1], vehicles[ego, 2], half[ego, 0], half[ego, 1], mine
-    )
+def ego_hits(vehicles: Floats, half: Floats, present: Bools, ego: int) -> bool:
+    """Return whether the ego overlaps another vehicle that is present.
+
+    Args:
+        vehicles: (N, 4) x, y [m], yaw [rad], speed [m/s].
+        half: (N, 2) half lengths and widths [m].
+        present: (N,) whether each vehicle is on the scene.
+        ego: index of the ego.
+    """
+    ego_box = np.empty(7)
+    box = np.empty(7)
+    pose = vehicles[ego]
+    fill_box(pose[0], pose[1], pose[2], half[ego, 0], half[ego, 1], ego_box)
     for i in range(vehicles.shape[0]):
-        if i != ego and here[i]:
-            fill_box(vehicles[i, 0], vehicles[i, 1], vehicles[i, 2], half[i, 0], half[i, 1], other)
-            if boxes_meet(mine, other):
+        if i != ego and present[i]:
+            pose = vehicles[i]
+            fill_box(pose[0], pose[1], pose[2], half[i, 0], half[i, 1], box)
+            if boxes_meet(ego_box, box):
                 return True
     return False

@@ -1,20 +1,20 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The others in one step: how fast each clock runs, so that they stay clear of the ego and never meet each other.
+"""The other vehicles in one step: the rate of each clock, so that they stay clear of the ego.
 
-Each vehicle keeps its certified path and never exceeds its certified speed there: its clock runs
-at a rate of 0 to 1. Three things slow it down, the strongest counts:
+Each vehicle stays on its certified path and never exceeds its certified speed there: its clock
+runs at a rate from 0 to 1. Three things slow it down, and the strongest one counts:
 
-- who is ahead on its path, the ego included (IDM), but only if nearer than in the certified
-  execution at the same place;
-- the weakest braking that keeps it clear of where the ego will be if it goes on as it does, and
-  behind what the order of events lets it do; its acceleration changes by the jerk at most;
+- a vehicle ahead on its path, the ego included (IDM), but only if it is nearer than in the
+  certified execution at the same place;
+- the weakest braking that avoids the predicted ego and respects the predicted order of events;
+  the acceleration changes by the jerk at most;
 - the order itself, without exception: see order.py.
 
-Each driver sees the ego as it was one reaction time ago, and goes before one that stands when it
-has waited long enough. Who is on foot goes on whatever the ego does, but does not step onto a lane
-before one that cannot stop: see kerb.py.
+Each driver sees the ego as it was one reaction time ago, and goes ahead of a standing ego after
+its patience. A pedestrian on a lane goes on, but does not step onto a lane in front of an ego that
+cannot stop: see kerb.py.
 """
 
 from typing import NamedTuple
@@ -29,126 +29,143 @@ from scenario_gen.closed_loop.driver import (
     DriverState,
     EGO_CLOCK,
     EGO_RATE,
-    FREE,
+    following_braking,
     gap_ahead,
     HELD,
-    minded,
+    MODEL,
+    next_rate,
+    NO_BRAKING_MPS2,
     ON_PATH,
     RATE,
-    rate_after,
-    STAND,
     WAITED,
 )
-from scenario_gen.closed_loop.foresight import foresee_ego, foresee_self, Foreseen, weakest
-from scenario_gen.closed_loop.kerb import (
-    before_kerb,
-    beyond_kerb,
-    braking_at_kerb,
-    foresee_fast_ego,
+from scenario_gen.closed_loop.foresight import (
+    predict_clock,
+    predict_ego,
+    Prediction,
+    weakest_safe_braking,
 )
-from scenario_gen.closed_loop.order import Clocks, keep_order, limit
+from scenario_gen.closed_loop.kerb import (
+    braking_at_kerb,
+    is_before_kerb,
+    predict_fast_ego,
+    without_ego_order,
+)
+from scenario_gen.closed_loop.order import clock_limit, Clocks, enforce_order
 from scenario_gen.numerics import Bools, Floats, Ints
 from scenario_gen.numerics.boxes import boxes_meet, fill_box
 from scenario_gen.numerics.kernels import kernel
 
-CREEP = 0.5  # m/s; the foresight lets everyone creep, so that nobody waits for one who waits for it; who is slower waits
-BEHIND = 1.0  # seconds that the order must leave to one so that it does not wait for another
-APPROACH = 1.0  # seconds in which a creeping driver would drive what the order leaves it
-CREEPS = 1.5  # m/s below which the ego is seen to hold up who waits for it
-ASIDE = 0.5  # metres that a driver leaves beside an ego that is not on its way
-ENTRY = 3.0  # metres ahead of and behind its place that the ego must leave free for one who comes onto the scene
-
 
 class StepState(NamedTuple):
-    """All vehicles at the begin of a step, and what their drivers expect.
+    """All vehicles at the start of a step, and the predictions of their drivers.
 
     Attributes:
         drivers: (N, 4) clock [s], its rate, acceleration [m/s²] and patience spent [s], as in
             `State`.
         pose: (N, 5) x, y [m], yaw [rad], certified speed [m/s] and acceleration [m/s²] there.
-        goes: (N,) whose clock runs.
-        here: (N,) who is on the scene.
+        moving: (N,) whether the clock of each vehicle runs.
+        present: (N,) whether each vehicle is on the scene.
         seen: (K, 9) the ego as in `State.seen`, at the end of the step and before.
         delay: (N,) reaction time of each driver in steps.
-        ahead: (N, M, 4) the ego as each driver expects it, as in `Foreseen`.
-        coming: (N, M) clocks of all, as in `Foreseen`.
+        ego: (N, M, 4) the ego as each driver predicts it, as in `Prediction`.
+        clocks: (N, M) predicted clocks of all, as in `Prediction.others`.
     """
 
     drivers: Floats
     pose: Floats
-    goes: Bools
-    here: Bools
+    moving: Bools
+    present: Bools
     seen: Floats
     delay: Ints
-    ahead: Floats
-    coming: Floats
+    ego: Floats
+    clocks: Floats
 
 
 @kernel(inline=True)
 def react(
     world: World, parameters: DriverParameters, seen: Floats, drivers: Floats, after: Floats
 ) -> None:
-    """Write what becomes of all drivers in a step; the row of the ego is left to the caller.
+    """Write the reaction of all drivers in a step; the caller writes the row of the ego.
 
     Args:
         world: the scenario and the step.
-        parameters: how they drive.
+        parameters: of the drivers.
         seen: (K, 9) the ego as in `State.seen`, at the end of this step and before.
         drivers: (N, 4) as in `StepState`.
         after: (N, 5) clock [s], rate, acceleration that the driver wanted [m/s²], patience spent
-            [s], and 1 where the order held it back.
+            [s], and 1 where the order held the driver back.
     """
     n = drivers.shape[0]
-    now = _begin(world, parameters, drivers, seen)
-    level, rate = np.full(n, FREE), drivers[:, RATE].copy()
-    _regard_ego(world, parameters, now, level, rate, after)
+    now = _step_state(world, parameters, drivers, seen)
+    braking = np.full(n, NO_BRAKING_MPS2)
+    rate = drivers[:, RATE].copy()
+    _react_to_ego(world, parameters, now, braking, rate, after)
     if n > 2:
         for i in range(n):
-            if i != world.ego and now.goes[i]:
-                foresee_self(world, parameters, _me(now, i), level[i], now.coming[i])
+            if i != world.ego and now.moving[i]:
+                predict_clock(world, parameters, _driver(now, i), braking[i], now.clocks[i])
         for i in range(n):
-            if i != world.ego and now.here[i]:
-                rate[i] = _regard_others(
-                    world, parameters, now, i, level[i], rate[i], after[i, WAITED]
-                )
-    _move(world, now, rate, after)
+            if i != world.ego and now.present[i]:
+                patience = after[i, WAITED]
+                others_rate = _rate_for_others(world, parameters, now, i, braking[i], patience)
+                rate[i] = min(rate[i], others_rate)
+    _advance_clocks(world, now, rate, after)
 
 
 @kernel(inline=True)
-def _begin(world: World, parameters: DriverParameters, drivers: Floats, seen: Floats) -> StepState:
-    """Where everyone is."""
-    n, steps = drivers.shape[0], int(np.ceil(parameters.foresight / world.step))
-    pose, goes, here = np.empty((n, 5)), np.empty(n, dtype=np.bool_), np.empty(n, dtype=np.bool_)
+def _step_state(
+    world: World, parameters: DriverParameters, drivers: Floats, seen: Floats
+) -> StepState:
+    """Return the state of all vehicles at the start of a step; predictions are not filled."""
+    n = drivers.shape[0]
+    steps = int(np.ceil(parameters.foresight / world.step))
+    pose = np.empty((n, 5))
+    moving = np.empty(n, dtype=np.bool_)
+    present = np.empty(n, dtype=np.bool_)
     for i in range(n):
         clock = drivers[i, CLOCK]
-        goes[i] = not (world.leaves[i] and clock >= world.spans[i, 1])
-        here[i] = goes[i] and clock >= world.spans[i, 0]
+        moving[i] = not (world.leaves[i] and clock >= world.spans[i, 1])
+        present[i] = moving[i] and clock >= world.spans[i, 0]
         pose_at(world.time, world.motion[i], clock, pose[i])
-    coming = np.empty((n, steps + 1))
+    clocks = np.empty((n, steps + 1))
     for m in range(steps + 1):
-        coming[:, m] = drivers[:, CLOCK] + m * world.step  # of those who have left
-    return StepState(
-        drivers, pose, goes, here, seen, parameters.delay, np.empty((n, steps + 1, 4)), coming
-    )
+        clocks[:, m] = drivers[:, CLOCK] + m * world.step  # of vehicles that have left
+    ego = np.empty((n, steps + 1, 4))
+    return StepState(drivers, pose, moving, present, seen, parameters.delay, ego, clocks)
 
 
 @kernel(inline=True)
-def _me(now: StepState, i: int) -> DriverState:
-    return DriverState(
-        i, now.drivers[i, CLOCK], now.drivers[i, RATE], now.drivers[i, ACCELERATION]
-    )
+def _driver(now: StepState, i: int) -> DriverState:
+    driver = now.drivers[i]
+    return DriverState(i, driver[CLOCK], driver[RATE], driver[ACCELERATION])
 
 
 @kernel(inline=True)
-def _come(world: World, seen: Floats, clock: float, rate: float, i: int) -> float:
-    """Rate of one who is not on the scene yet: it comes when it is due, unless the ego is in its place."""
-    if clock + 0.5 * (rate + 1.0) * world.step < world.spans[i, 0]:
+def _observation_age(now: StepState, i: int) -> int:
+    """Return how old the ego is that driver i sees, in steps."""
+    return int(min(now.delay[i], now.seen.shape[0] - 1))
+
+
+@kernel(inline=True)
+def _entry_rate(world: World, now: StepState, i: int) -> float:
+    """Return the rate of a vehicle that is not yet on the scene.
+
+    It enters when it is due, unless the ego is in its place.
+    """
+    clock = now.drivers[i, CLOCK]
+    rate = now.drivers[i, RATE]
+    begin = world.spans[i, 0]
+    if clock + 0.5 * (rate + 1.0) * world.step < begin:
         return 1.0
-    pose, place, box, half = np.empty(5), np.empty(7), np.empty(7), world.half[i]
-    pose_at(world.time, world.motion[i], world.spans[i, 0], pose)
-    fill_box(pose[0], pose[1], pose[2], half[0] + ENTRY, half[1], place)
-    _fill_ego(world, seen, box)
-    return 0.0 if boxes_meet(place, box) else 1.0
+    pose = np.empty(5)
+    entry = np.empty(7)
+    ego = np.empty(7)
+    half = world.half[i]
+    pose_at(world.time, world.motion[i], begin, pose)
+    fill_box(pose[0], pose[1], pose[2], half[0] + MODEL.entry_gap_m, half[1], entry)
+    _fill_ego(world, now.seen[0], ego)
+    return 0.0 if boxes_meet(entry, ego) else 1.0
 
 
 @kernel(inline=True)
@@ -158,153 +175,176 @@ def _fill_ego(world: World, pose: Floats, out: Floats) -> None:
 
 
 @kernel(inline=True)
-def _expected(world: World, now: StepState, i: int, spent: float) -> Foreseen:
-    """What driver i expects; it does not wait for the ego where the template did if its patience is spent for good."""
-    ago = min(now.delay[i], now.seen.shape[0] - 1)
+def _prediction(world: World, now: StepState, i: int, patience: float) -> Prediction:
+    """Return the prediction of driver i.
+
+    It ignores the order with the ego if its spent patience [s] is infinite.
+    """
+    ago = _observation_age(now, i)
     ego = now.seen[ago]
-    rate = ego[EGO_RATE] if ego[ON_PATH] > 0.0 and spent < np.inf else -1.0
-    aside = ASIDE if ego[ON_PATH] == 0.0 and spent < np.inf else 0.0
-    clock, walks = ego[EGO_CLOCK] + ego[EGO_RATE] * ago * world.step, world.walks[i]
-    return Foreseen(now.ahead[i], clock, rate, now.coming, aside, not walks)
+    is_patient = patience < np.inf
+    on_path = ego[ON_PATH] > 0.0
+    rate = ego[EGO_RATE] if on_path and is_patient else -1.0
+    clearance = MODEL.lateral_clearance_m if ego[ON_PATH] == 0.0 and is_patient else 0.0
+    clock = ego[EGO_CLOCK] + ego[EGO_RATE] * ago * world.step
+    return Prediction(now.ego[i], clock, rate, now.clocks, clearance, not world.walks[i])
 
 
 @kernel(inline=True)
-def _spent(world: World, parameters: DriverParameters, now: StepState, i: int) -> float:
-    """Patience [s] that driver i has spent waiting for an ego that hardly moves; infinity once it goes before the ego.
+def _is_blocked(now: StepState, i: int) -> bool:
+    """Return whether driver i stands or creeps because of an ego that hardly moves."""
+    rate = now.drivers[i, RATE]
+    certified_speed = now.pose[i, 3]
+    creeps = rate * certified_speed <= MODEL.creep_speed_mps and rate < 1.0
+    waits = creeps and certified_speed >= MODEL.min_moving_speed_mps
+    return waits and now.ego[i, 0, 3] <= MODEL.max_blocking_speed_mps
 
-    That it does when its patience is over and its path is free of the ego, where it expects it to
-    be now and as far as it looks.
+
+@kernel(inline=True)
+def _patience_spent(world: World, parameters: DriverParameters, now: StepState, i: int) -> float:
+    """Return how long [s] driver i has waited for an ego that hardly moves.
+
+    Infinity once it goes ahead of the ego: its patience is spent, and the ego is predicted off its
+    path, both now and at the end of the prediction.
     """
-    spent: float = now.drivers[i, WAITED]
-    u, box = now.drivers[i, RATE] * now.pose[i, 3], np.empty(7)
+    spent = float(now.drivers[i, WAITED])
     if spent == np.inf:
         return spent
-    if (
-        u > CREEP
-        or now.drivers[i, RATE] >= 1.0
-        or now.pose[i, 3] < STAND
-        or now.ahead[i, 0, 3] > CREEPS
-    ):
+    if not _is_blocked(now, i):
         return 0.0
     spent += world.step
-    for m in (0, now.ahead.shape[1] - 1):
-        _fill_ego(world, now.ahead[i, m], box)
-        _, at = gap_ahead(world, i, now.drivers[i, CLOCK], box, now.pose[i])
-        if spent < parameters.patience or at >= 0:
+    box = np.empty(7)
+    for m in (0, now.ego.shape[1] - 1):
+        _fill_ego(world, now.ego[i, m], box)
+        _, cell = gap_ahead(world, i, now.drivers[i, CLOCK], box, now.pose[i])
+        if spent < parameters.patience or cell >= 0:
             return spent
     return float(np.inf)
 
 
 @kernel(inline=True)
-def _regard_ego(
+def _react_to_ego(
     world: World,
     parameters: DriverParameters,
     now: StepState,
-    level: Floats,
+    braking: Floats,
     rate: Floats,
     after: Floats,
 ) -> None:
-    """Write each driver's braking with regard to the ego alone [m/s²], its rate after the step, and its patience spent."""
-    last, box = -1, np.empty(7)
-    for i in range(level.shape[0]):
+    """Write the braking for the ego [m/s²], the rate after the step, and the patience spent."""
+    last = -1  # the last driver whose prediction others with the same delay can reuse
+    for i in range(braking.shape[0]):
         after[i, WAITED] = now.drivers[i, WAITED]
-        if i == world.ego or not now.goes[i]:
+        if i == world.ego or not now.moving[i]:
             continue
-        if not now.here[i]:
-            rate[i] = _come(world, now.seen[0], now.drivers[i, CLOCK], rate[i], i)
+        if not now.present[i]:
+            rate[i] = _entry_rate(world, now, i)
             continue
-        ago, me, ahead = min(now.delay[i], now.seen.shape[0] - 1), _me(now, i), now.ahead[i]
         if last >= 0 and now.delay[last] == now.delay[i]:
-            now.ahead[i] = now.ahead[last]
+            now.ego[i] = now.ego[last]
         else:
-            foresee_ego(world, now.seen[ago], ago, ahead)
-        last = last if world.walks[i] else i  # one on foot expects something else
-        after[i, WAITED] = _spent(world, parameters, now, i)
-        v, a = now.pose[i, 3], now.pose[i, 4]
-        _fill_ego(world, ahead[0], box)
-        least = minded(world, parameters, me, now.pose[i], world.ego, box, ahead[0, 3], world.step)
-        level[i] = _for_ego(world, parameters, now, i, least, after[i, WAITED])
-        rate[i] = rate_after(parameters, me.rate, v, a, me.was, level[i], 0.0, world.step)
+            ago = _observation_age(now, i)
+            predict_ego(world, now.seen[ago], ago, now.ego[i])
+        if not world.walks[i]:  # the prediction of a pedestrian differs
+            last = i
+        after[i, WAITED] = _patience_spent(world, parameters, now, i)
+        braking[i] = _braking_for_ego(world, parameters, now, i, after[i, WAITED])
+        driver = _driver(now, i)
+        rate[i] = next_rate(parameters, driver, now.pose[i], braking[i], 0.0, world.step)
 
 
 @kernel(inline=True)
-def _for_ego(
-    world: World, parameters: DriverParameters, now: StepState, i: int, least: float, spent: float
+def _braking_for_ego(
+    world: World, parameters: DriverParameters, now: StepState, i: int, patience: float
 ) -> float:
-    """Braking [m/s²] of driver i for the ego, `least` or more."""
-    me, expected = _me(now, i), _expected(world, now, i, spent)
-    if before_kerb(world, me):
-        foresee_fast_ego(world, now.seen[0], now.ahead[i])
-        return max(least, braking_at_kerb(world, parameters, me, now.pose[i], expected))
-    return weakest(world, parameters, me, least, expected, False)
+    """Return the braking [m/s²] of driver i for the ego, with its patience spent [s]."""
+    driver = _driver(now, i)
+    pose = now.pose[i]
+    box = np.empty(7)
+    ego = now.ego[i, 0]
+    _fill_ego(world, ego, box)
+    following = following_braking(
+        world, parameters, driver, pose, world.ego, box, ego[3], world.step
+    )
+    prediction = _prediction(world, now, i, patience)
+    if is_before_kerb(world, driver):
+        predict_fast_ego(world, now.seen[0], now.ego[i])
+        return max(following, braking_at_kerb(world, parameters, driver, pose, prediction))
+    return weakest_safe_braking(world, parameters, driver, following, prediction, False)
 
 
 @kernel(inline=True)
-def _regard_others(
+def _rate_for_others(
     world: World,
     parameters: DriverParameters,
     now: StepState,
     i: int,
-    level: float,
-    rate: float,
-    spent: float,
+    ego_braking: float,
+    patience: float,
 ) -> float:
-    """Rate of driver i after the step with regard to the others, too; `rate` is that with its braking for the ego, `level`."""
-    me, v, a, box, least = _me(now, i), now.pose[i, 3], now.pose[i, 4], np.empty(7), level
+    """Return the rate of driver i after the step with regard to the others.
+
+    Infinity if it need not brake harder than for the ego [m/s²].
+    """
+    driver = _driver(now, i)
+    box = np.empty(7)
+    braking = ego_braking
     for j in range(now.pose.shape[0]):
-        if j not in (i, world.ego) and now.here[j] and now.drivers[j, CLOCK] < me.clock:
-            other, speed = now.pose[j], now.drivers[j, RATE] * now.pose[j, 3]
-            fill_box(other[0], other[1], other[2], world.half[j, 0], world.half[j, 1], box)
-            least = max(least, minded(world, parameters, me, now.pose[i], j, box, speed, 0.0))
-    least = weakest(
-        world, parameters, me, least, beyond_kerb(world, me, _expected(world, now, i, spent)), True
-    )
-    if least <= level:
-        return rate
-    return min(
-        rate,
-        rate_after(parameters, me.rate, v, a, me.was, least, _creep(world, now, i), world.step),
-    )
+        is_behind = now.present[j] and now.drivers[j, CLOCK] < driver.clock
+        if j not in (i, world.ego) and is_behind:
+            pose = now.pose[j]
+            speed = now.drivers[j, RATE] * pose[3]
+            fill_box(pose[0], pose[1], pose[2], world.half[j, 0], world.half[j, 1], box)
+            following = following_braking(
+                world, parameters, driver, now.pose[i], j, box, speed, 0.0
+            )
+            braking = max(braking, following)
+    prediction = without_ego_order(world, driver, _prediction(world, now, i, patience))
+    braking = weakest_safe_braking(world, parameters, driver, braking, prediction, True)
+    if braking <= ego_braking:
+        return np.inf
+    floor = _creep_speed(world, now, i)
+    return next_rate(parameters, driver, now.pose[i], braking, floor, world.step)
 
 
 @kernel(inline=True)
-def _creep(world: World, now: StepState, i: int) -> float:
-    """Speed [m/s] to which driver i brakes for the order at most.
+def _creep_speed(world: World, now: StepState, i: int) -> float:
+    """Return the speed [m/s] at which driver i stops braking for the order.
 
-    It creeps, so that nobody waits for one who waits for it. For one whose clock is behind and who
-    does not wait for it, it comes to a stand where the order ends its way. The one with the
-    earliest clock creeps in any case.
+    Drivers creep, so that no two wait for each other. Where a vehicle with an earlier clock does
+    not wait for driver i, driver i stops where the order ends its way. The driver with the
+    earliest clock always creeps.
     """
-    clock, speed = now.drivers[i, CLOCK], CREEP
+    clock = now.drivers[i, CLOCK]
+    speed = MODEL.creep_speed_mps
     for j in range(now.pose.shape[0]):
         other = now.drivers[j, CLOCK]
-        if j in (i, world.ego) or not now.goes[j] or other >= clock:
+        if j in (i, world.ego) or not now.moving[j] or other >= clock:
             continue
-        if limit(world.order[j, i], world.cell, clock) > other + BEHIND:
-            room = limit(world.order[i, j], world.cell, other) - clock
-            speed = min(speed, max(room * now.pose[i, 3] / APPROACH, 0.0))
-    return speed if speed > STAND else 0.0
+        if clock_limit(world.order[j, i], world.cell, clock) > other + MODEL.min_lead_s:
+            room = clock_limit(world.order[i, j], world.cell, other) - clock
+            speed = min(speed, max(room * now.pose[i, 3] / MODEL.approach_s, 0.0))
+    return speed if speed > MODEL.min_moving_speed_mps else 0.0
 
 
 @kernel(inline=True)
-def _move(world: World, now: StepState, rate: Floats, after: Floats) -> None:
-    """Move the clocks as the drivers want, as far as the order lets them."""
-    n, h, clock, before = (
-        rate.shape[0],
-        world.step,
-        now.drivers[:, CLOCK].copy(),
-        now.drivers[:, RATE].copy(),
-    )
-    clocks = Clocks(now.goes, clock, before, clock.copy(), rate.copy(), np.zeros(n))
+def _advance_clocks(world: World, now: StepState, rate: Floats, after: Floats) -> None:
+    """Advance the clocks at the wanted rates (N,), as far as the order permits."""
+    n = rate.shape[0]
+    h = world.step
+    begin = now.drivers[:, CLOCK].copy()
+    begin_rate = now.drivers[:, RATE].copy()
+    cut = np.zeros(n, dtype=np.bool_)
+    clocks = Clocks(now.moving, begin, begin_rate, begin.copy(), rate.copy(), cut)
     for i in range(n):
-        if i != world.ego and now.goes[i] and (now.here[i] or rate[i] > 0.0):
-            clocks.end[i] = clock[i] + 0.5 * (before[i] + rate[i]) * h
-    keep_order(world, clocks)
+        if i != world.ego and now.moving[i] and (now.present[i] or rate[i] > 0.0):
+            clocks.end[i] = begin[i] + 0.5 * (begin_rate[i] + rate[i]) * h
+    enforce_order(world, clocks)
     for i in range(n):
-        end = max(now.pose[i, 3] + before[i] * now.pose[i, 4] * h, 0.0)
-        after[i, CLOCK] = min(clocks.end[i], world.time[-1]) if now.goes[i] else clocks.end[i]
-        after[i, RATE], after[i, ACCELERATION] = (
-            clocks.end_rate[i],
-            (rate[i] * end - before[i] * now.pose[i, 3]) / h,
-        )
-        after[i, HELD] = 1.0 if clocks.end_rate[i] < rate[i] or clocks.forced[i] > 0.0 else 0.0
+        speed = now.pose[i, 3]
+        end_speed = max(speed + begin_rate[i] * now.pose[i, 4] * h, 0.0)
+        end = clocks.end[i]
+        after[i, CLOCK] = min(end, world.time[-1]) if now.moving[i] else end
+        after[i, RATE] = clocks.end_rate[i]
+        after[i, ACCELERATION] = (rate[i] * end_speed - begin_rate[i] * speed) / h
+        after[i, HELD] = 1.0 if clocks.end_rate[i] < rate[i] or cut[i] else 0.0

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The work of `scenario-gen search`: a template on its road and a planner in; its failures and their rate out."""
+"""The command `scenario-gen search`: find the failures of a planner and estimate their rate."""
 
 from collections import Counter
 from collections.abc import Callable, Sequence
@@ -23,7 +23,7 @@ from scenario_gen.base.parameters import assigned, flatten
 from scenario_gen.base.provenance import parameter_texts, versions
 from scenario_gen.closed_loop.config import ClosedLoopConfig
 from scenario_gen.closed_loop.results import as_junit, drawings, JUNIT
-from scenario_gen.closed_loop.search.estimate import Estimate, LEVEL, Search
+from scenario_gen.closed_loop.search.estimate import Estimate, Search, SETTINGS
 from scenario_gen.closed_loop.search.findings import Finding, findings_of
 from scenario_gen.closed_loop.search.journal import open_journal
 from scenario_gen.closed_loop.search.objective import AT_FAULT, COLLISION, Objective
@@ -44,24 +44,28 @@ from scenario_gen.types import (
     with_witness,
 )
 
-JSON, PAGE, BAG = "search.json", "search.html", "bag"
+JSON = "search.json"
+PAGE = "search.html"
+BAG = "bag"
 SEARCHED = Kind("searched")
-JOURNAL = ".journal.jsonl"  # behind the name of the results' folder
+JOURNAL = ".journal.jsonl"  # suffix to the name of the folder of results
 
 
 @dataclass(frozen=True, eq=False)
 class SearchRequest:
-    """What is searched, and how.
+    """The parameters of a search.
 
     Attributes:
-        planned: a template on its road, with no scenarios.
-        request: of the scenarios; sampling, limits: the parameters of scenarios.
+        planned: a template on its road, without scenarios.
+        request: conditions on the scenarios.
+        sampling: parameters of the sampler.
+        limits: limits of valid scenarios.
         planner: MODULE:CLASS.
-        ego: id of the vehicle in whose place it drives; "": that of the request, or the first.
-        objective: what counts as a failure.
-        budget: drives at most.
-        seed: of the search; by it, planner and scenarios everything is determined.
-        worst: look for the worst failure, not for the rate.
+        ego: id of the vehicle that the planner replaces; "": that of the request, or the first.
+        objective: definition of a failure.
+        budget: largest number of drives.
+        seed: of the search. Seed, planner and scenarios determine the result.
+        worst: search for the worst failures instead of the rate.
         assignments: parameters of a drive as name=value.
     """
 
@@ -78,22 +82,22 @@ class SearchRequest:
     assignments: Sequence[str] = ()
 
     def ego_id(self) -> str:
-        """Return the id of the vehicle in whose place the planner drives.
+        """Return the id of the vehicle that the planner replaces.
 
         Raises:
             InputError: there is no such vehicle.
         """
         ids = [vehicle.id for vehicle in self.planned.encounter.vehicles]
         wanted = self.ego or self.request.ego or ids[0]
-        found = named_vehicle(ids, wanted)
-        if not found:
+        vehicle = named_vehicle(ids, wanted)
+        if not vehicle:
             raise InputError(
                 f"--ego {wanted}: there is no such vehicle; there are {', '.join(ids)}"
             )
-        return found
+        return vehicle
 
     def identity(self) -> dict[str, Any]:
-        """Return what the drives hang on; the budget does not change them."""
+        """Return everything that determines the drives; the budget does not change them."""
         make = find_planner(self.planner)
         source = Path(getattr(__import__(make.__module__, fromlist=["_"]), "__file__", None) or "")
         return {
@@ -117,14 +121,14 @@ class SearchRequest:
         """Return the parameters of a drive.
 
         Raises:
-            InputError: a name is unknown, or a value does not suit.
+            InputError: a name is unknown, or a value is not valid.
         """
         return reduce(assigned, self.assignments, ClosedLoopConfig(limits=self.limits))
 
 
 @dataclass(frozen=True, eq=False)
 class SearchResult:
-    """What a search came to, and the files written."""
+    """The result of a search, and the files with it."""
 
     estimate: Estimate
     findings: Sequence[Finding]
@@ -133,69 +137,75 @@ class SearchResult:
 
     @property
     def kinds(self) -> dict[str, list[Finding]]:
-        """Findings by kind, the kind with the greatest share of the rate first."""
+        """Findings by kind, the kind with the largest share of the rate first."""
         kinds: dict[str, list[Finding]] = {}
-        for one in self.findings:
-            kinds.setdefault(one.kind, []).append(one)
-        return dict(
-            sorted(
-                kinds.items(), key=lambda item: -math.fsum(one.weight or 0.0 for one in item[1])
-            )
-        )
+        for finding in self.findings:
+            kinds.setdefault(finding.kind, []).append(finding)
+
+        def weight(kind: str) -> float:
+            return math.fsum(finding.weight or 0.0 for finding in kinds[kind])
+
+        return {kind: kinds[kind] for kind in sorted(kinds, key=weight, reverse=True)}
 
     @property
     def plain(self) -> Rate:
-        """The rate by natural drives alone."""
+        """The rate from the natural drives alone."""
         hits, total = self.estimate.plain
-        return Rate(hits, total, wilson(hits, total, LEVEL))
+        return Rate(hits, total, wilson(hits, total, SETTINGS.confidence))
 
     @property
     def equal_plain(self) -> float:
-        """Natural drives that would give an interval as narrow; NaN where no failure was found."""
+        """Natural drives that would give an equally narrow interval; NaN without a failure."""
         rate = self.estimate.rate
-        half = 0.5 * (rate.high - rate.low)
-        z = float(special.ndtri(0.5 + 0.5 * LEVEL))
-        return (
-            z * z * rate.value * (1.0 - rate.value) / (half * half)
-            if rate.value > 0.0 and half > 0.0
-            else math.nan
-        )
+        half_width = 0.5 * (rate.high - rate.low)
+        if not (rate.value > 0.0 and half_width > 0.0):
+            return math.nan
+        z = float(special.ndtri(0.5 + 0.5 * SETTINGS.confidence))
+        return z * z * rate.value * (1.0 - rate.value) / (half_width * half_width)
 
     def sentences(self) -> list[str]:
-        """Return what it came to, in sentences."""
-        e, rate = self.estimate, self.estimate.rate
+        """Return the result in sentences."""
+        drives = self.estimate.drives
         if self.worst:
             return [
-                f"{len(self.findings)} failure(s) kept of {e.drives} drives; a search for the worst gives no rate"
+                f"{len(self.findings)} failure(s) shown, from {drives} drives; a search for the"
+                " worst gives no rate"
             ]
-        messages = [
-            f"no failure in {e.drives} drives; by the natural ones the rate is at most {_share(rate.high)} (95 %)"
-        ]
-        if e.first:
-            interval = f"95 % interval {_share(rate.low)} to {_share(rate.high)}"
+        rate = self.estimate.rate
+        if self.estimate.first:
             messages = [
-                f"failure rate {_share(rate.value)} ({interval})",
-                f"first failure: drive {e.first} of {e.drives}",
+                f"failure rate {_share(rate.value)} (95 % interval {_share(rate.low)} to"
+                f" {_share(rate.high)})",
+                f"first failure: drive {self.estimate.first} of {drives}",
             ]
-        for name, share in e.events.items():
-            words = "collisions by the ego's fault" if name == AT_FAULT else "collisions"
-            messages.append(
-                f"{words}: {_share(share.value)} ({_share(share.low)} to {_share(share.high)})"
-            )
+        else:
+            messages = [
+                f"no failure in {drives} drives; the natural drives bound the rate by"
+                f" {_share(rate.high)} (95 %)"
+            ]
+        for name, share in self.estimate.events.items():
+            event = "collisions by the ego's fault" if name == AT_FAULT else "collisions"
+            interval = f"{_share(share.low)} to {_share(share.high)}"
+            messages.append(f"{event}: {_share(share.value)} ({interval})")
         messages.append(f"natural drives alone: {self.plain}")
         if not math.isnan(self.equal_plain):
             messages.append(
-                f"plain sampling would need {self.equal_plain:,.0f} drives for an interval as narrow"
+                f"plain sampling would need {self.equal_plain:,.0f} drives for an equally narrow"
+                " interval"
             )
-        if e.first and not math.isnan(e.unexpected):
+        if self.estimate.first and not math.isnan(self.estimate.unexpected):
             messages.append(
-                f"failures that the regression does not expect: at most {_share(e.unexpected)} (95 %)"
+                "failures that the regression does not expect: at most"
+                f" {_share(self.estimate.unexpected)} (95 %)"
             )
         return messages
 
 
 def _share(value: float) -> str:
-    return "–" if math.isnan(value) else f"{100.0 * value if value > 1e-9 else 0.0:.3g} %"
+    """Return a share in percent."""
+    if math.isnan(value):
+        return "–"
+    return f"{100.0 * value if value > 1e-9 else 0.0:.3g} %"
 
 
 def search_failures(
@@ -207,19 +217,19 @@ def search_failures(
 ) -> SearchResult:
     """Search, and write search.json, search.html, junit.xml and a bag of the failures.
 
-    Every drive is kept in a journal beside the folder: the same search goes on where it was
-    stopped, and with a larger budget.
+    A journal next to the folder has every drive. From it a stopped search continues, and a search
+    with a larger budget, too.
 
     Args:
-        request: what is searched.
+        request: the parameters of the search.
         out: folder of the results.
-        workers: processes; 0: one for each core.
-        progress: called with how many drives are done, of how many.
+        workers: number of processes; 0: one for each core.
+        progress: called with the number of completed drives and the budget.
 
     Raises:
-        InputError: the planner fails, a vehicle or parameter is wrong, the journal is of another
-            search, or a file cannot be written; the message names it.
-        RefusedError: no scenario can be drawn.
+        InputError: the planner fails, a vehicle or parameter is wrong, the journal belongs to
+            another search, or a file cannot be written; the message names it.
+        RefusedError: no scenario can be sampled.
     """
     if request.budget < 1:
         raise InputError(f"--budget {request.budget}: at least one drive is needed")
@@ -231,9 +241,7 @@ def search_failures(
     measures = measures_in(request.sampling.variety, plan.encounter)
     natural = NaturalScenarios.of(plan, check, request.sampling, request.planned.seed, measures)
     if not natural.size:
-        raise InputError(
-            "the scenarios have no freedom: all are the same, so there is nothing to search"
-        )
+        raise InputError("all scenarios of this template are equal, so there is nothing to search")
     journal_path = out.with_name(out.name + JOURNAL)
     with replaced_folder(out, SEARCHED) as folder, open_journal(journal_path, identity) as journal:
         with trial_runner(request.planner, config, workers or os.cpu_count() or 1) as run:
@@ -247,7 +255,11 @@ def search_failures(
                 lambda done: progress(done, request.budget),
             )
             search = Search(
-                problem, request.seed, request.budget, request.worst, told=(COLLISION, AT_FAULT)
+                problem,
+                request.seed,
+                request.budget,
+                request.worst,
+                event_names=(COLLISION, AT_FAULT),
             )
             estimate = search.run()
             findings = findings_of(search, problem, config)
@@ -264,91 +276,98 @@ def _write(
     result: SearchResult,
     request: SearchRequest,
     identity: dict[str, Any],
-    asked: Any,
+    requested: Any,
 ) -> None:
+    """Write the files of a search into a folder."""
     document = _document(result, request, identity)
-    write_text(
-        folder / JSON, json.dumps(document, indent=1, ensure_ascii=False, allow_nan=False) + "\n"
-    )
-    write_text(
-        folder / JUNIT,
-        as_junit([one.outcome for one in result.findings], request.planner, _facts(request)),
-    )
+    text = json.dumps(document, indent=1, ensure_ascii=False, allow_nan=False)
+    write_text(folder / JSON, text + "\n")
+    outcomes = [finding.outcome for finding in result.findings]
+    write_text(folder / JUNIT, as_junit(outcomes, request.planner, _facts(request)))
     write_text(folder / PAGE, _page(result, request))
     if result.findings:
-        encounter, fit = request.planned.encounter, request.planned.road_and_fit()[1]
-        scenarios = tuple(
-            one.scenario() for one in sorted(result.findings, key=lambda one: one.drive)
-        )
-        ego = request.request.ego_of(encounter)
-        slot = None
-        if ego is not None:  # the request left it out
-            slot = EgoSlot(encounter.vehicles[ego], asked.start[ego], asked.end[ego])
-            scenarios = tuple(with_witness(one, ego) for one in scenarios)
-        note = Note.of(NoteKind.SEARCHED, planner=request.planner)
-        drawn = ScenarioSet(len(scenarios), scenarios, len(scenarios), Counter(), (note,), slot)
-        texts = (
-            value if isinstance(value, str) else json.dumps(value, ensure_ascii=False)
-            for value in identity.values()
-        )
-        provenance = (
-            dict(zip((f"search.{name}" for name in identity), texts, strict=True)) | versions()
-        )
-        delivered = replace(
-            request.planned,
-            fit=replace(fit, requested=asked),
-            generated=drawn,
-            provenance=provenance,
-        )
         with BagWriter(folder / BAG) as bag:
-            add_results(bag, {"": delivered})
+            add_results(bag, {"": _failures(result, request, identity, requested)})
+
+
+def _failures(
+    result: SearchResult, request: SearchRequest, identity: dict[str, Any], requested: Any
+) -> GenerationResult:
+    """Return the failures as the scenarios of a generation, in the order of their drives."""
+    encounter = request.planned.encounter
+    fit = request.planned.road_and_fit()[1]
+    ordered = sorted(result.findings, key=lambda finding: finding.drive)
+    scenarios = tuple(finding.scenario() for finding in ordered)
+    ego = request.request.ego_of(encounter)
+    slot = None
+    if ego is not None:  # the request left it out
+        slot = EgoSlot(encounter.vehicles[ego], requested.start[ego], requested.end[ego])
+        scenarios = tuple(with_witness(scenario, ego) for scenario in scenarios)
+    count = len(scenarios)
+    note = Note.of(NoteKind.SEARCHED, planner=request.planner)
+    provenance = {
+        f"search.{name}": value
+        if isinstance(value, str)
+        else json.dumps(value, ensure_ascii=False)
+        for name, value in identity.items()
+    }
+    return replace(
+        request.planned,
+        fit=replace(fit, requested=requested),
+        generated=ScenarioSet(count, scenarios, count, Counter(), (note,), slot),
+        provenance=provenance | versions(),
+    )
 
 
 def _facts(request: SearchRequest) -> dict[str, str]:
     return {"policy": request.drive_config().policy}
 
 
+def _rounded(value: float) -> float | None:
+    return None if math.isnan(value) else float(f"{value:.6g}")
+
+
+def _interval(share: Interval) -> dict[str, float | None]:
+    return {name: _rounded(value) for name, value in asdict(share).items()}
+
+
 def _document(
     result: SearchResult, request: SearchRequest, identity: dict[str, Any]
 ) -> dict[str, Any]:
-    e = result.estimate
-
-    def rounded(value: float) -> float | None:
-        return None if math.isnan(value) else float(f"{value:.6g}")
-
-    def interval(share: Interval) -> dict[str, float | None]:
-        return {name: rounded(value) for name, value in asdict(share).items()}
-
+    """Return the content of search.json."""
+    estimate = result.estimate
     plain = result.plain
+    rates = {name: _interval(rate) for name, rate in estimate.events.items()}
+    plain_drives = _rounded(result.equal_plain)
+    kinds = [
+        {"kind": kind, "kept": len(findings), "likeliest": findings[0].trial.name}
+        for kind, findings in result.kinds.items()
+    ]
     return {
-        "rate": None if request.worst else interval(e.rate),
-        "plain": {"failures": plain.count, "drives": plain.of, **interval(plain.share)},
-        "drives": e.drives,
-        "first_failure": e.first or None,
-        "plain_drives_for_the_same_interval": None
-        if request.worst
-        else rounded(result.equal_plain),
-        "rates": None
-        if request.worst
-        else {name: interval(each) for name, each in e.events.items()},
-        "unexpected_at_most": rounded(e.unexpected),
-        "bound": None if request.worst else rounded(e.bound),
-        "natural_scenarios": e.seen,
-        "valid_share_of_candidates": rounded(e.valid),
-        "shares": {kind: rounded(value) for kind, value in sorted(e.shares.items())},
-        "kinds": [
-            {"kind": kind, "kept": len(own), "likeliest": own[0].trial.name}
-            for kind, own in result.kinds.items()
-        ],
-        "findings": [one.document() for one in result.findings],
+        "rate": None if request.worst else _interval(estimate.rate),
+        "plain": {"failures": plain.count, "drives": plain.of, **_interval(plain.share)},
+        "drives": estimate.drives,
+        "first_failure": estimate.first or None,
+        "plain_drives_for_the_same_interval": None if request.worst else plain_drives,
+        "rates": None if request.worst else rates,
+        "unexpected_at_most": _rounded(estimate.unexpected),
+        "bound": None if request.worst else _rounded(estimate.bound),
+        "natural_scenarios": estimate.seen,
+        "valid_share_of_candidates": _rounded(estimate.valid),
+        "shares": {kind: _rounded(share) for kind, share in sorted(estimate.shares.items())},
+        "kinds": kinds,
+        "findings": [finding.document() for finding in result.findings],
         "sentences": result.sentences(),
         "search": {**identity, "budget": request.budget},
     }
 
 
 def _page(result: SearchResult, request: SearchRequest) -> str:
-    ordered = [one for own in result.kinds.values() for one in own]
-    outcomes, trials = [one.outcome for one in ordered], [one.trial for one in ordered]
+    """Return search.html."""
+    kinds = result.kinds
+    ordered = [finding for kind in kinds for finding in kinds[kind]]
+    outcomes = [finding.outcome for finding in ordered]
+    trials = [finding.trial for finding in ordered]
     return render_page(
         "search.html.j2",
         ("scene.js", "drives.js", "tables.js"),
@@ -358,7 +377,7 @@ def _page(result: SearchResult, request: SearchRequest) -> str:
         ego=request.ego_id(),
         title=request.planned.title,
         sentences=result.sentences(),
-        kinds=result.kinds,
+        kinds=kinds,
         shares=result.estimate.shares,
         rows=list(enumerate(ordered)),
         parameters={name: value for name, (_, value) in flatten(request.drive_config()).items()},

@@ -1,18 +1,19 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""How rare is a failure, and where is it? A drive is dear, a certified scenario is cheap: so most scenarios are not driven.
+"""The failure rate of a planner, and the scenarios in which it fails.
 
-Two steps take turns, so that any budget is a prefix of a larger one:
+A drive is expensive and a certified scenario is cheap, so most scenarios are not driven. Two steps
+alternate. A search with a larger budget begins with the drives of a smaller one.
 
-- Exploration by small runs of subset simulation (Au & Beck 2001) with preconditioned
-  Crank-Nicolson moves (Cotter et al. 2013). Of many moves the one is driven that a regression
-  predicts to be the nearest to failure. Runs start anew, so that they find the first failure
-  early, and different failures.
-- Estimation by two-phase sampling (Neyman 1938). Natural scenarios are drawn; each is driven with
-  a probability that is the higher the nearer to failure it is predicted to be, and counts by the
-  inverse of that (Horvitz & Thompson 1952). So the rate is unbiased whatever the regression is
-  worth, and no weight exceeds the inverse of the least probability.
+- Exploration: small runs of subset simulation (Au & Beck 2001) with preconditioned Crank-Nicolson
+  moves (Cotter et al. 2013). Of many moves only the one is driven that a regression predicts to be
+  the nearest to failure. Each run starts anew, so that the first failure is found early, and so
+  are different failures.
+- Estimation: two-phase sampling (Neyman 1938). Natural scenarios are drawn; the probability that
+  one is driven increases with its predicted nearness to failure, and it counts by the inverse of
+  that probability (Horvitz & Thompson 1952). So the rate is unbiased whatever the quality of the
+  regression, and no weight exceeds the inverse of the least probability.
 """
 
 from collections.abc import Sequence
@@ -28,38 +29,67 @@ from scenario_gen.method.evaluation import wilson
 from scenario_gen.numerics import Floats
 from scenario_gen.types import Interval
 
-POPULATION, LARGEST = (
-    24,
-    96,
-)  # drives of a level of an exploration; it grows with the drives so far, up to the largest
-GROWTH = 25  # one drive of a level for so many drives so far
-SEEDS = 4  # one in so many of a population starts a chain
-MOVES = 24  # of a chain, of which one is driven
-LEVELS = 12  # of one exploration at most
-EXPLORED = 0.2  # share of the drives that explore
-BATCH = 256  # natural candidates of which some are driven
-REFIT = 1.1  # times as many drives as at the last regression ask for a new one
-EXPLORING = 0.4  # share of a batch's drives that are chosen evenly
-LEAST, MOST = 0.005, 0.1  # bounds of the probability with which every scenario is driven
-OFTEN = 1.5  # times the share of natural drives that fail is driven, where that is above MOST: frequent failures need no choice
-WIDER = 3.0  # factor on the error of the regression: the wider, the more is driven, and the smaller are the weights
-LEVEL = 0.95  # of the intervals
-_STEP, _ACCEPTED = (
-    0.5,
-    0.4,
-)  # first step of a chain, and the share of accepted moves that it is adapted to
+
+@dataclass(frozen=True)
+class SearchSettings:
+    """Constants of a search; they change its cost, but not the validity of its intervals.
+
+    Attributes:
+        confidence: of all intervals.
+        explored_share: share of the drives that explore.
+        min_population: drives of one level of an exploration.
+        max_population: bound of its growth.
+        drives_per_member: a level grows by one drive for this number of drives so far.
+        members_per_seed: the best of this number of drives start the chains of the next level.
+        moves: candidates of one step of a chain, of which one is driven.
+        max_levels: of one exploration.
+        first_step: standard deviation of the noise of the first moves, in that of a candidate.
+        accepted_share: of the moves, to which the step is adapted.
+        batch: natural candidates that are drawn at once.
+        refit_ratio: growth of the number of drives that asks for a new regression.
+        even_share: share of the drives of a batch that are chosen evenly.
+        first_even_probability: probability that each scenario of the first batch is driven.
+        min_even_probability: lower bound of that of later batches.
+        max_even_probability: upper bound of it.
+        frequent_ratio: if failures are more frequent than that upper bound, this multiple of their
+            rate is driven: they need no choice.
+        error_factor: on the error of the regression; a larger one means more drives and smaller
+            weights.
+    """
+
+    confidence: float = 0.95
+    explored_share: float = 0.2
+    min_population: int = 24
+    max_population: int = 96
+    drives_per_member: int = 25
+    members_per_seed: int = 4
+    moves: int = 24
+    max_levels: int = 12
+    first_step: float = 0.5
+    accepted_share: float = 0.4
+    batch: int = 256
+    refit_ratio: float = 1.1
+    even_share: float = 0.4
+    first_even_probability: float = 0.02
+    min_even_probability: float = 0.005
+    max_even_probability: float = 0.1
+    frequent_ratio: float = 1.5
+    error_factor: float = 3.0
+
+
+SETTINGS = SearchSettings()
 
 
 @dataclass(frozen=True)
 class Response:
-    """What one drive came to.
+    """The result of one drive.
 
     Attributes:
-        margin: 0 or less if it failed; the smaller, the nearer to failure.
-        parts: figures whose least is the margin where it did not fail; as many for every drive, or
-            none.
-        kind: which failure it is, "" for none.
-        events: what happened whose rates are told, too.
+        margin: distance to failure; 0 or less if the drive failed.
+        parts: figures whose minimum is the margin of a drive that did not fail; the same number
+            for every drive, or none.
+        kind: of the failure, "" for none.
+        events: names of events during the drive, whose rates are estimated, too.
     """
 
     margin: float
@@ -69,7 +99,7 @@ class Response:
 
     @property
     def failed(self) -> bool:
-        """Whether it is a failure."""
+        """Whether the planner failed."""
         return self.margin <= 0.0
 
 
@@ -77,33 +107,34 @@ Candidate = TypeVar("Candidate")
 
 
 class Problem(Protocol[Candidate]):
-    """What is searched."""
+    """A planner among the candidates of a search."""
 
     @property
     def size(self) -> int:
-        """Standard normal numbers of a candidate."""
+        """Number of standard normal numbers of a candidate."""
 
     def candidates(self, z: Floats) -> list[Candidate | None]:
-        """Return the certified scenarios of numbers (S, size), None where a number gives none."""
+        """Return the certified scenarios of numbers (S, size), None for rejected ones."""
 
     def features(self, candidate: Candidate) -> tuple[float, ...]:
-        """Return figures of a scenario that the drive may hang on, as many for each."""
+        """Return figures of a scenario that may influence its drive, the same number for each."""
 
     def drive(self, candidates: Sequence[Candidate]) -> list[Response]:
-        """Drive the planner in each."""
+        """Drive the planner in each candidate."""
 
 
 @dataclass(frozen=True, eq=False)
 class Estimate:
-    """What a search came to.
+    """The result of a search.
 
     Attributes:
         rate: share of certified natural scenarios in which the planner fails, with its interval.
-        plain: the same by natural drives alone: failures, drives.
-        drives: how many; first: number of the first that failed, counted from 1, 0 if none did.
-        seen: certified natural scenarios that the rate is of, driven or not; valid: their share of
-            the candidates.
-        unexpected: upper end (95 %) of the rate of failures that the regression does not expect.
+        plain: failures and drives of the natural scenarios that the exploration drove.
+        drives: number of drives.
+        first: number of the first failed drive, counted from 1; 0 if none failed.
+        seen: number of certified natural scenarios behind the rate, driven or not.
+        valid: share of the natural candidates that are certified.
+        unexpected: upper bound (95 %) of the rate of failures that the regression does not expect.
         shares: of the rate, by kind of failure.
         events: rates of the events of the responses, by name, with their intervals.
     """
@@ -120,7 +151,7 @@ class Estimate:
 
     @property
     def bound(self) -> float:
-        """Upper end (95 %) of the rate, whatever the regression is worth."""
+        """Upper bound (95 %) of the rate, whatever the quality of the regression."""
         return max(self.rate.high, self.unexpected) if self.unexpected >= 0.0 else self.rate.high
 
 
@@ -129,7 +160,7 @@ class _SpentError(Exception):
 
 
 class _Drawn(NamedTuple):
-    """A certified scenario: its numbers (d,), itself, and its features."""
+    """A certified scenario with its numbers (d,) and its features."""
 
     z: Floats
     candidate: Any
@@ -138,18 +169,17 @@ class _Drawn(NamedTuple):
 
 @dataclass(eq=False)
 class Search:
-    """The account of one search; `run` fills it.
+    """One search; `run` fills it.
 
     Attributes:
-        problem: what is searched.
-        seed: of all randomness.
-        budget: drives at most.
-        worst: explore on beyond the first failures, for the worst, and estimate no rate.
+        problem: the planner among the candidates.
+        seed: of all random numbers.
+        budget: largest number of drives.
+        worst: search for the worst failures only, and estimate no rate.
         z: (d,) numbers of each drive.
         responses: of each drive.
-        weights: of drives of natural scenarios that count for the rate: for how many of these each
-            stands.
-        told: names of events whose rates are told.
+        weights: number of natural scenarios that a drive represents in the rate, by drive.
+        event_names: events whose rates are estimated.
     """
 
     problem: Problem  # type: ignore[type-arg]
@@ -159,53 +189,50 @@ class Search:
     z: list[Floats] = field(default_factory=list)
     responses: list[Response] = field(default_factory=list)
     weights: dict[int, float] = field(default_factory=dict)
+    event_names: Sequence[str] = ()
+
+    # Features of each drive.
     _features: list[tuple[float, ...]] = field(default_factory=list)
-    _natural: list[int] = field(
-        default_factory=list
-    )  # drives of natural scenarios that nobody chose
-    _sampled: list[int] = field(
-        default_factory=list
-    )  # drives of natural scenarios that the regression chose
-    told: Sequence[str] = ()
-    _even: list[tuple[int, float]] = field(
-        default_factory=list
-    )  # of each batch: scenarios, least probability to be driven
-    _drawn: int = 0  # numbers drawn for natural scenarios
+    # Drives of natural scenarios: those without any choice, those that the regression chose, and
+    # those of the latter that were chosen evenly, because no failure was expected.
+    _natural: list[int] = field(default_factory=list)
+    _sampled: list[int] = field(default_factory=list)
+    _unexpected: list[int] = field(default_factory=list)
+    # Of each batch: number of scenarios, and the least probability that one is driven.
+    _batches: list[tuple[int, float]] = field(default_factory=list)
+    _batch_count: int = 0
+    _run_count: int = 0
+    _drawn: int = 0  # natural candidates
     _certified: int = 0  # of these
-    _floor: list[int] = field(
-        default_factory=list
-    )  # drives of scenarios that were chosen evenly: no failure was expected
-    _explored: int = 0
-    _runs: int = 0
-    _batches: int = 0
-    _known: "tuple[int, _Predictor] | None" = (
-        None  # the last regression, and from how many drives it is
-    )
-    _evenly: float = (
-        0.02  # probability with which each scenario of the next batch is driven at least
-    )
+    _explored: int = 0  # drives of the exploration
+    # The last regression, and the number of drives that it was fitted to.
+    _regression: "tuple[int, _Predictor] | None" = None
+    _even_probability: float = SETTINGS.first_even_probability
 
     def run(self) -> Estimate:
-        """Search until the budget is spent, or nothing certified is found."""
+        """Search until the budget is spent, or no candidate can be certified."""
         try:
-            while self.worst or self._explored <= EXPLORED * len(self.z) or self._estimate():
-                if (
-                    self.worst or self._explored <= EXPLORED * len(self.z)
-                ) and not self._explore():
+            while self._explores() or self._estimate():
+                if self._explores() and not self._explore():
                     break
         except _SpentError:
             pass
         return self._result()
 
-    def _generator(self, *place: int) -> np.random.Generator:
-        return np.random.Generator(np.random.PCG64(np.random.SeedSequence([self.seed, 7, *place])))
+    def _explores(self) -> bool:
+        """Return whether the next step is an exploration."""
+        return self.worst or self._explored <= SETTINGS.explored_share * len(self.z)
+
+    def _generator(self, *key: int) -> np.random.Generator:
+        return np.random.Generator(np.random.PCG64(np.random.SeedSequence([self.seed, 7, *key])))
 
     def _drive(self, drawn: Sequence[_Drawn]) -> list[int]:
-        """Drive in certified scenarios, as many as the budget allows; return the numbers of these drives."""
-        first, driven = len(self.z), drawn[: self.budget - len(self.z)]
-        self.responses += self.problem.drive([one.candidate for one in driven])
-        self.z += [one.z for one in driven]
-        self._features += [one.features for one in driven]
+        """Drive in certified scenarios within the budget; return the numbers of the drives."""
+        first = len(self.z)
+        driven = drawn[: self.budget - first]
+        self.responses += self.problem.drive([scenario.candidate for scenario in driven])
+        self.z += [scenario.z for scenario in driven]
+        self._features += [scenario.features for scenario in driven]
         return list(range(first, len(self.z)))
 
     def _check_budget(self) -> None:
@@ -213,239 +240,295 @@ class Search:
             raise _SpentError
 
     def _certify(self, z: Floats) -> list[_Drawn]:
-        """Return the certified scenarios among those of numbers (S, d)."""
-        pairs = zip(z, self.problem.candidates(z), strict=True)
+        """Return the certified scenarios among the candidates of numbers (S, d)."""
         return [
-            _Drawn(row, one, self.problem.features(one)) for row, one in pairs if one is not None
+            _Drawn(numbers, candidate, self.problem.features(candidate))
+            for numbers, candidate in zip(z, self.problem.candidates(z), strict=True)
+            if candidate is not None
         ]
 
     def _draw(self, generator: np.random.Generator) -> list[_Drawn]:
-        """Return the certified scenarios of a batch of natural ones."""
-        drawn = self._certify(generator.standard_normal((BATCH, self.problem.size)))
-        self._drawn += BATCH
+        """Return the certified scenarios of a batch of natural candidates."""
+        drawn = self._certify(generator.standard_normal((SETTINGS.batch, self.problem.size)))
+        self._drawn += SETTINGS.batch
         self._certified += len(drawn)
         return drawn
 
     def _explore(self) -> bool:
-        """Run one small subset simulation, towards any failure or by one part; False if nothing is certified."""
-        run, self._runs = self._runs, self._runs + 1
+        """Run one subset simulation towards any failure, or towards that of one part.
+
+        Return False if no candidate can be certified.
+        """
         before = len(self.z)
-        count = min(max(POPULATION, before // GROWTH // SEEDS * SEEDS), LARGEST)
-        generator = self._generator(1, run)
+        generator = self._generator(1, self._run_count)
         try:
-            population = self._natural_drives(generator, count)
+            population = self._natural_drives(generator, self._population_size())
             if not population:
                 return False
-            towards, step = run % (1 + len(self.responses[0].parts)), _STEP
-            for _ in range(LEVELS):
-                order = sorted(population, key=lambda k: (self._distance(k, towards), k))
-                seeds = order[: count // SEEDS]
-                threshold = self._distance(seeds[-1], towards)
-                if threshold >= self._distance(order[-1], towards):
-                    break
-                goal = threshold if self.worst else max(threshold, 0.0)
-                population, step = self._chains(generator, seeds, (towards, goal), step)
-                if threshold <= 0.0 and not self.worst:
-                    break
+            target = self._run_count % (1 + len(self.responses[0].parts))
+            self._simulate(generator, population, target)
         finally:
+            self._run_count += 1
             self._explored += len(self.z) - before
         return True
 
-    def _distance(self, k: int, towards: int) -> float:
-        """Return the margin of a drive, or one of its parts."""
+    def _population_size(self) -> int:
+        """Return the number of drives of a level: a multiple of the members per seed."""
+        members = SETTINGS.members_per_seed
+        grown = len(self.z) // SETTINGS.drives_per_member // members * members
+        return min(max(SETTINGS.min_population, grown), SETTINGS.max_population)
+
+    def _simulate(
+        self, generator: np.random.Generator, population: list[int], target: int
+    ) -> None:
+        """Run the levels of a subset simulation from a population of natural drives."""
+        seed_count = len(population) // SETTINGS.members_per_seed
+        step = SETTINGS.first_step
+        for _ in range(SETTINGS.max_levels):
+            order = sorted(population, key=lambda k: (self._distance(k, target), k))
+            seeds = order[:seed_count]
+            threshold = self._distance(seeds[-1], target)
+            if threshold >= self._distance(order[-1], target):
+                break
+            goal = threshold if self.worst else max(threshold, 0.0)
+            population, step = self._chains(generator, seeds, (target, goal), step)
+            if threshold <= 0.0 and not self.worst:
+                break
+
+    def _distance(self, k: int, target: int) -> float:
+        """Return the margin of a drive, or one of its parts, counted from 1."""
         response = self.responses[k]
-        return response.margin if towards == 0 else response.parts[towards - 1]
+        return response.margin if target == 0 else response.parts[target - 1]
 
     def _natural_drives(self, generator: np.random.Generator, count: int) -> list[int]:
-        """Drive in `count` certified natural scenarios; none are returned if hardly any can be certified."""
-        found: list[int] = []
-        while len(found) < count:
+        """Drive in `count` natural scenarios; return none if a whole batch is rejected."""
+        drives: list[int] = []
+        while len(drives) < count:
             drawn = self._draw(generator)
             if not drawn:
                 return []
-            new = self._drive(drawn[: count - len(found)])
+            new = self._drive(drawn[: count - len(drives)])
             self._natural += new
-            found += new
+            drives += new
             self._check_budget()
-        return found
+        return drives
 
     def _chains(
         self,
         generator: np.random.Generator,
         seeds: list[int],
-        below: tuple[int, float],
+        goal: tuple[int, float],
         step: float,
     ) -> tuple[list[int], float]:
-        """Return the population of the next level, and the next step: from each seed a chain, below a threshold."""
-        towards, threshold = below
-        population, heads, accepted = list(seeds), list(seeds), 0
-        for _ in range(SEEDS - 1):
-            predict = self._predictor()
-            chosen: dict[int, _Drawn] = {}
-            for place, head in enumerate(heads):
-                noise = generator.standard_normal((MOVES, self.problem.size))
-                drawn = self._certify(math.sqrt(1.0 - step * step) * self.z[head] + step * noise)
-                if drawn:
-                    predicted = predict(drawn)[0]
-                    best = np.argmin(
-                        predicted[:, towards - 1] if towards else predicted.min(axis=1)
-                    )
-                    chosen[place] = drawn[best]
-            for place, k in zip(chosen, self._drive(list(chosen.values())), strict=False):
-                if self._distance(k, towards) <= threshold:
+        """Return the population of the next level, and the next step.
+
+        Each seed starts a chain that stays below a threshold of a target, the goal.
+        """
+        target, threshold = goal
+        population = list(seeds)
+        heads = list(seeds)
+        accepted = 0
+        rounds = SETTINGS.members_per_seed - 1
+        for _ in range(rounds):
+            moves = self._best_moves(generator, heads, target, step)
+            for place, k in zip(moves, self._drive(list(moves.values())), strict=False):
+                if self._distance(k, target) <= threshold:
                     heads[place] = k
                     accepted += 1
             self._check_budget()
             population += heads
-        share = accepted / (len(seeds) * (SEEDS - 1))
-        return population, min(max(step * float(np.exp(share - _ACCEPTED)), 0.05), 1.0)
+        share = accepted / (len(seeds) * rounds)
+        adapted = step * float(np.exp(share - SETTINGS.accepted_share))
+        return population, min(max(adapted, 0.05), 1.0)
+
+    def _best_moves(
+        self, generator: np.random.Generator, heads: list[int], target: int, step: float
+    ) -> dict[int, _Drawn]:
+        """Return the move of each chain that is predicted to be nearest to failure, by place.
+
+        A chain without a certified move is left out.
+        """
+        predict = self._predictor()
+        best: dict[int, _Drawn] = {}
+        for place, head in enumerate(heads):
+            noise = generator.standard_normal((SETTINGS.moves, self.problem.size))
+            drawn = self._certify(math.sqrt(1.0 - step * step) * self.z[head] + step * noise)
+            if drawn:
+                predicted = predict(drawn)[0]
+                distance = predicted[:, target - 1] if target else predicted.min(axis=1)
+                best[place] = drawn[np.argmin(distance)]
+        return best
 
     def _predictor(self) -> "_Predictor":
-        """Return what predicts the parts of a drive from what was driven so far."""
-        if self._known is not None and len(self.z) < REFIT * self._known[0]:
-            return self._known[1]
+        """Return a regression of the parts of the drives so far."""
+        if self._regression is not None:
+            fitted, predictor = self._regression
+            if len(self.z) < SETTINGS.refit_ratio * fitted:
+                return predictor
         columns = np.column_stack([self.z, self._features])
-        figures = np.array([one.parts or (one.margin,) for one in self.responses])
-        failed = np.array([one.failed for one in self.responses])
+        figures = np.array([response.parts or (response.margin,) for response in self.responses])
+        failed = np.array([response.failed for response in self.responses])
         natural = np.isin(np.arange(len(failed)), [*self._natural, *self._sampled])
-        for part in figures.T:  # a failure is one of the least part
+        for part in figures.T:  # a failure is a failure of its least part
             part[failed & (part == figures.min(axis=1))] = -math.inf
-        count = len(self._features[0])
-        self._known = (
-            len(self.z),
-            _Predictor([Surrogate.fit(columns, part, count, natural) for part in figures.T]),
-        )
-        return self._known[1]
+        features = len(self._features[0])
+        surrogates = [Surrogate.fit(columns, part, features, natural) for part in figures.T]
+        predictor = _Predictor(surrogates)
+        self._regression = (len(self.z), predictor)
+        return predictor
 
     def _estimate(self) -> bool:
-        """Draw one batch of natural scenarios and drive in some of them; False if none can be certified.
+        """Draw one batch of natural scenarios and drive in some of them.
 
-        The batch is drawn whole and weighed before anything is driven, so that the rate is
-        unbiased. One that the budget cuts off does not count.
+        The whole batch is drawn and weighted before the first drive, so that the rate is unbiased.
+        A batch that the budget cuts short does not count. Return False if none can be certified.
         """
-        generator = self._generator(2, self._batches)
-        self._batches += 1
+        generator = self._generator(2, self._batch_count)
+        self._batch_count += 1
         drawn = self._draw(generator)
-        choosing = generator.random(len(drawn))
+        uniform = generator.random(len(drawn))
         if not drawn:
             return False
-        frequent = self._failed(self._natural) / len(self._natural)
-        evenly = max(self._evenly, min(OFTEN * frequent, 1.0) if frequent > MOST else 0.0)
+        least = self._least_probability()
         predicted, error = self._predictor()(drawn)
-        near = np.clip(2.0 * special.ndtr(-predicted / (WIDER * error)).max(axis=1), 0.0, 1.0)
-        probability = np.maximum(near, evenly)
-        chosen = np.flatnonzero(choosing < probability).tolist()
+        tail = special.ndtr(-predicted / (SETTINGS.error_factor * error)).max(axis=1)
+        near = np.clip(2.0 * tail, 0.0, 1.0)
+        probability = np.maximum(near, least)
+        chosen = np.flatnonzero(uniform < probability).tolist()
         driven = self._drive([drawn[place] for place in chosen])
         self._sampled += driven
         if len(driven) == len(chosen):
-            self._even.append((len(drawn), evenly))
+            self._batches.append((len(drawn), least))
             for place, k in zip(chosen, driven, strict=True):
                 self.weights[k] = float(1.0 / probability[place])
-                if probability[place] <= evenly:
-                    self._floor.append(k)
-            likely = float(near.mean())
-            self._evenly = min(max(EXPLORING / (1.0 - EXPLORING) * likely, LEAST), MOST)
+                if probability[place] <= least:
+                    self._unexpected.append(k)
+            ratio = SETTINGS.even_share / (1.0 - SETTINGS.even_share)
+            self._even_probability = min(
+                max(ratio * float(near.mean()), SETTINGS.min_even_probability),
+                SETTINGS.max_even_probability,
+            )
         self._check_budget()
         return True
 
-    def _failed(self, drives: Sequence[int]) -> int:
-        """Return how many of some drives failed."""
+    def _least_probability(self) -> float:
+        """Return the least probability that a scenario of the next batch is driven."""
+        failure_rate = self._failure_count(self._natural) / len(self._natural)
+        if failure_rate <= SETTINGS.max_even_probability:
+            return self._even_probability
+        return max(self._even_probability, min(SETTINGS.frequent_ratio * failure_rate, 1.0))
+
+    def _failure_count(self, drives: Sequence[int]) -> int:
+        """Return the number of failures among some drives."""
         return sum(self.responses[k].failed for k in drives)
 
+    def _natural_rate(self, hits: int) -> Interval:
+        """Return the rate of `hits` among the natural drives of the exploration."""
+        if not self._natural:
+            return Interval(math.nan, 0.0, 1.0)
+        return wilson(hits, len(self._natural), SETTINGS.confidence)
+
     def _result(self) -> Estimate:
-        hits, natural = self._failed(self._natural), len(self._natural)
-        plain = wilson(hits, natural, LEVEL) if natural else Interval(math.nan, 0.0, 1.0)
-        shares: dict[str, float] = {}
+        hits = self._failure_count(self._natural)
+        rate = self._natural_rate(hits)
+        unexpected = math.nan
         failed = [k for k in self.weights if self.responses[k].failed]
+        shares: dict[str, float] = {}
         for k in failed:
-            shares[self.responses[k].kind] = (
-                shares.get(self.responses[k].kind, 0.0) + self.weights[k]
-            )
-        seen = sum(count for count, _ in self._even)
+            kind = self.responses[k].kind
+            shares[kind] = shares.get(kind, 0.0) + self.weights[k]
+        seen = sum(count for count, _ in self._batches)
+        if seen:
+            rate = self._rate(failed, also_natural=not hits)
+            surprises = [k for k in self._unexpected if self.responses[k].failed]
+            unexpected = self._rate(surprises, also_natural=not hits).high
+        numbers = enumerate(self.responses, start=1)
         return Estimate(
-            rate=self._rate(failed, also=not hits) if seen else plain,
-            plain=(hits, natural),
+            rate=rate,
+            plain=(hits, len(self._natural)),
             drives=len(self.z),
-            first=next((k for k, one in enumerate(self.responses, start=1) if one.failed), 0),
+            first=next((number for number, response in numbers if response.failed), 0),
             seen=seen,
             valid=self._certified / max(self._drawn, 1),
-            unexpected=self._rate(
-                [k for k in self._floor if self.responses[k].failed], also=not hits
-            ).high
-            if seen
-            else math.nan,
+            unexpected=unexpected,
             shares={kind: part / math.fsum(shares.values()) for kind, part in shares.items()},
-            events={name: self._event(name) for name in self.told},
+            events={name: self._event_rate(name) for name in self.event_names},
         )
 
-    def _event(self, name: str) -> Interval:
+    def _event_rate(self, name: str) -> Interval:
         """Return the rate of an event."""
-        if self._even:
-            never = not any(name in self.responses[k].events for k in self._natural)
-            return self._rate(
-                [k for k in self.weights if name in self.responses[k].events], also=never
-            )
         hits = sum(name in self.responses[k].events for k in self._natural)
-        return (
-            wilson(hits, len(self._natural), LEVEL)
-            if self._natural
-            else Interval(math.nan, 0.0, 1.0)
-        )
+        if not self._batches:
+            return self._natural_rate(hits)
+        drives = [k for k in self.weights if name in self.responses[k].events]
+        return self._rate(drives, also_natural=not hits)
 
     def deviation(self, k: int) -> float:
-        """Return how far a drive's scenario is from the mean, in standard deviations along what the regression goes by."""
-        parts = self.responses[k].parts
-        slope = (
-            self._predictor()
-            .surrogates[int(np.argmin(parts)) if parts else 0]
-            .direction(self.problem.size)
-        )
-        return abs(float(slope @ self.z[k]))
+        """Return the distance of a scenario from the mean, in standard deviations.
 
-    def _rate(self, hits: Sequence[int], *, also: bool) -> Interval:
-        """Return the rate over the batches of what happened in some drives, with its interval.
-
-        That is the gamma interval of a sum of weights (Fay & Feuer 1997). If it never happened,
-        the upper end is the rate at which that has a probability of 2.5 %: in batch b each of n
-        scenarios is driven with a probability of e at least, which is fixed before they are drawn,
-        so it is Π (1 - rate · e)^n at most. `also`: nor in any natural drive of the exploration.
+        It is measured along the slope of the regression of the least part.
         """
-        w = np.array([self.weights[k] for k in hits])
-        if not len(w):
-            count, evenly = np.array([*self._even, (len(self._natural) * also, 1.0)]).T
-            tail, most = math.log(0.5 - 0.5 * LEVEL), 1.0 - 1e-12
-            if count @ np.log1p(-most * evenly) > tail:
-                return Interval(0.0, 0.0, 1.0)
-            return Interval(
-                0.0,
-                0.0,
-                float(
-                    optimize.brentq(
-                        lambda rate: count @ np.log1p(-rate * evenly) - tail, 0.0, most
-                    )
-                ),
-            )
-        seen = sum(count for count, _ in self._even)
-        total, square = float(w.sum()), float((w * (w - w.sum() / seen)).sum())
-        low = _gamma_quantile(total, max(square, total * 1e-9), 0.5 - 0.5 * LEVEL)
-        most = float(w.max())
-        high = _gamma_quantile(total + most, square + most * most, 0.5 + 0.5 * LEVEL)
+        parts = self.responses[k].parts
+        surrogate = self._predictor().surrogates[int(np.argmin(parts)) if parts else 0]
+        return abs(float(surrogate.direction(self.problem.size) @ self.z[k]))
+
+    def _rate(self, hits: Sequence[int], *, also_natural: bool) -> Interval:
+        """Return the rate of some drives over the batches, with its interval.
+
+        That is the gamma interval of a sum of weights (Fay & Feuer 1997).
+
+        Args:
+            hits: drives that have a weight.
+            also_natural: the natural drives of the exploration have no hit, either.
+        """
+        weights = np.array([self.weights[k] for k in hits])
+        if not len(weights):
+            return self._rate_without_hits(also_natural=also_natural)
+        half_confidence = 0.5 * SETTINGS.confidence
+        seen = sum(count for count, _ in self._batches)
+        total = float(weights.sum())
+        variance = float((weights * (weights - total / seen)).sum())
+        largest = float(weights.max())
+        low = _gamma_quantile(total, max(variance, total * 1e-9), 0.5 - half_confidence)
+        upper_variance = variance + largest * largest
+        high = _gamma_quantile(total + largest, upper_variance, 0.5 + half_confidence)
         return Interval(min(total / seen, 1.0), min(low / seen, 1.0), min(high / seen, 1.0))
+
+    def _rate_without_hits(self, *, also_natural: bool) -> Interval:
+        """Return the interval of a rate of 0.
+
+        Its upper end is the rate at which no hit has a probability of 2.5 %. In a batch each of n
+        scenarios is driven with a probability of e at least, which is fixed before they are drawn.
+        So that probability is Π (1 - rate · e)^n at most, over the batches.
+        """
+        natural = (len(self._natural) * also_natural, 1.0)
+        count, probability = np.array([*self._batches, natural]).T
+        log_tail = math.log(0.5 - 0.5 * SETTINGS.confidence)
+
+        def excess(rate: float) -> float:
+            return float(count @ np.log1p(-rate * probability) - log_tail)
+
+        largest = 1.0 - 1e-12
+        if excess(largest) > 0.0:
+            return Interval(0.0, 0.0, 1.0)
+        return Interval(0.0, 0.0, float(optimize.brentq(excess, 0.0, largest)))
 
 
 def _gamma_quantile(mean: float, variance: float, share: float) -> float:
-    """The quantile at a share of the gamma distribution with this mean and variance."""
+    """Return the quantile at a share of the gamma distribution with a mean and a variance."""
     return float(special.gammaincinv(mean * mean / variance, share)) * variance / mean
 
 
 @dataclass(frozen=True, eq=False)
 class _Predictor:
-    """Predicts the parts of a drive."""
+    """A regression of the parts of a drive, one surrogate each."""
 
     surrogates: list[Surrogate]
 
     def __call__(self, drawn: Sequence[_Drawn]) -> tuple[Floats, Floats]:
         """Return predictions (S, parts) and their errors (parts,) for scenarios (S,)."""
-        columns = np.column_stack([[one.z for one in drawn], [one.features for one in drawn]])
-        predicted = np.column_stack([one.predict(columns) for one in self.surrogates])
-        return predicted, np.array([one.error for one in self.surrogates])
+        z = [scenario.z for scenario in drawn]
+        features = [scenario.features for scenario in drawn]
+        columns = np.column_stack([z, features])
+        predicted = np.column_stack([each.predict(columns) for each in self.surrogates])
+        return predicted, np.array([each.error for each in self.surrogates])

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The failures that a search found: certified scenarios, sorted into kinds, the likeliest of each kind first."""
+"""The failures of a search: certified scenarios by kind, the most likely of each kind first."""
 
 from collections import Counter
 from collections.abc import Sequence
@@ -19,15 +19,11 @@ from scenario_gen.closed_loop.simulation import ClosedLoop
 from scenario_gen.closed_loop.trials import Outcome
 from scenario_gen.closed_loop.verdict import judge
 from scenario_gen.numerics.plane import edge_lengths
-from scenario_gen.types import (
-    Facts,
-    Failure,
-    Scenario,
-)
+from scenario_gen.types import Facts, Failure, Scenario
 
-SHOWN = 100  # failures that are kept as scenarios, at most
-OF_ONE_KIND = 30  # of these, at most of one kind
-SAME_PLACE = 8.0  # metres of the ego's way; failures farther apart are of different kinds
+MAX_FINDINGS_COUNT = 100  # each is driven again and saved
+MAX_PER_KIND_COUNT = 30
+KIND_SPACING_M = 8.0  # along the way of the ego; a larger distance separates two kinds
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,14 +32,14 @@ class Finding:
 
     Attributes:
         drive: its number in the search, from 0.
-        kind: who, how and where.
-        weight: for how many natural scenarios it stands in the rate; None where the exploration
-            found it.
-        deviation: from the mean scenario, in standard deviations along the direction that the
-            regression goes by.
-        trial: the scenario, of all vehicles.
+        kind: of the failure, with the other vehicle and the place.
+        weight: number of natural scenarios that it represents in the rate; None in the
+            exploration.
+        deviation: from the mean scenario, in standard deviations along the slope of the
+            regression.
+        trial: the scenario of all vehicles.
         outcome: the drive.
-        passed: whether the ego's witness passes it.
+        passed: whether the witness of the ego passes the scenario.
     """
 
     drive: int
@@ -55,7 +51,7 @@ class Finding:
     passed: bool
 
     def document(self) -> dict[str, Any]:
-        """Return it as JSON's types."""
+        """Return the finding in the types of JSON."""
         return {
             "name": self.trial.name,
             "kind": self.kind,
@@ -66,7 +62,7 @@ class Finding:
         }
 
     def scenario(self) -> Scenario:
-        """Return the scenario of all vehicles, with what the search says of it."""
+        """Return the scenario of all vehicles, with the facts of the failure."""
         failure = Failure(self.kind, self.deviation, self.weight)
         return replace(self.trial.scenario, facts=Facts(failure=failure))
 
@@ -74,37 +70,50 @@ class Finding:
 def findings_of(
     search: Search, problem: DrivenScenarios, config: ClosedLoopConfig
 ) -> list[Finding]:
-    """Drive again in the failures of a search, and sort them: the likeliest of each kind first; the worst first, if it asked."""
-    failures = [k for k, one in enumerate(search.responses) if one.failed]
-    deviation = {k: search.deviation(k) for k in failures}
-    order = {k: search.responses[k].margin if search.worst else deviation[k] for k in failures}
-    counts: Counter[str] = Counter()
-    chosen: list[int] = []
-    for k in sorted(failures, key=lambda k: (order[k], k)):
-        counts[search.responses[k].kind] += 1
-        if counts[search.responses[k].kind] <= OF_ONE_KIND and len(chosen) < SHOWN:
-            chosen.append(k)
-    scenarios = (
-        problem.natural.scenarios(np.stack([search.z[k] for k in chosen])) if chosen else []
-    )
+    """Drive the failures of a search again and sort them.
+
+    The most likely of each kind are first, or the worst if the search was for the worst.
+    """
+    chosen = _choose(search)
+    if not chosen:
+        return []
+    scenarios = problem.natural.scenarios(np.stack([search.z[k] for k in chosen]))
     trials = [
-        problem.trial(k, one) for k, one in zip(chosen, scenarios, strict=True) if one is not None
+        problem.trial(k, scenario)
+        for k, scenario in zip(chosen, scenarios, strict=True)
+        if scenario is not None
     ]
     outcomes = list(problem.run(trials))
-    places = [_station(one) for one in outcomes]
-    kinds = _kinds([search.responses[k].kind for k in chosen], places)
+    stations = [_station(outcome) for outcome in outcomes]
+    kinds = _split_kinds([search.responses[k].kind for k in chosen], stations)
     return [
         Finding(
-            k,
-            kind,
-            search.weights.get(k),
-            deviation[k],
-            trial,
-            outcome,
-            _witness_passes(trial, config),
+            drive=k,
+            kind=kind,
+            weight=search.weights.get(k),
+            deviation=search.deviation(k),
+            trial=trial,
+            outcome=outcome,
+            passed=_witness_passes(trial, config),
         )
         for k, kind, trial, outcome in zip(chosen, kinds, trials, outcomes, strict=True)
     ]
+
+
+def _choose(search: Search) -> list[int]:
+    """Return the drives of the failures to show, in their order."""
+    rank: dict[int, float] = {}
+    for k, response in enumerate(search.responses):
+        if response.failed:
+            rank[k] = response.margin if search.worst else search.deviation(k)
+    counts: Counter[str] = Counter()
+    chosen: list[int] = []
+    for k in sorted(rank, key=lambda k: (rank[k], k)):
+        kind = search.responses[k].kind
+        counts[kind] += 1
+        if counts[kind] <= MAX_PER_KIND_COUNT:
+            chosen.append(k)
+    return chosen[:MAX_FINDINGS_COUNT]
 
 
 def _witness_passes(trial: Trial, config: ClosedLoopConfig) -> bool:
@@ -113,7 +122,7 @@ def _witness_passes(trial: Trial, config: ClosedLoopConfig) -> bool:
 
 
 def _station(outcome: Outcome) -> float:
-    """Return how far [m] the ego had come when it failed."""
+    """Return the way [m] of the ego until its failure."""
     drive, verdict = outcome.drive, outcome.verdict
     times = [
         verdict.collision.time if verdict.collision else np.nan,
@@ -124,18 +133,17 @@ def _station(outcome: Outcome) -> float:
     return float(np.interp(np.nanmin(times), drive.motion.time, way))
 
 
-def _kinds(kinds: Sequence[str], places: Sequence[float]) -> list[str]:
-    """Return the kinds with their places: those of one kind are split where SAME_PLACE of the way lie between two."""
+def _split_kinds(kinds: Sequence[str], stations: Sequence[float]) -> list[str]:
+    """Return the kinds with their places; a kind is split at gaps between its stations [m]."""
     result = list(kinds)
     for kind in set(kinds):
-        rows = np.array(
-            sorted((k for k, each in enumerate(kinds) if each == kind), key=lambda k: places[k])
-        )
-        for group in np.split(
-            rows, np.flatnonzero(np.diff(np.array(places)[rows]) > SAME_PLACE) + 1
-        ):
-            low, high = (round(places[k]) for k in group[[0, -1]])
-            where = f"{low} m" if low == high else f"{low} to {high} m"
+        members = [k for k, each in enumerate(kinds) if each == kind]
+        rows = np.array(sorted(members, key=lambda k: stations[k]))
+        gaps = np.diff(np.array(stations)[rows])
+        for group in np.split(rows, np.flatnonzero(gaps > KIND_SPACING_M) + 1):
+            low = round(stations[group[0]])
+            high = round(stations[group[-1]])
+            place = f"{low} m" if low == high else f"{low} to {high} m"
             for k in group:
-                result[k] = f"{kind}, {where} after its start"
+                result[k] = f"{kind}, {place} after its start"
     return result

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The drives of a search in a file, a line each, written as they end; a search that goes on reads them again."""
+"""The journal of a search: one line for each drive. A search that is continued reads it."""
 
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
@@ -16,7 +16,7 @@ from scenario_gen.base.errors import InputError, of_system
 from scenario_gen.base.folders import write_text
 from scenario_gen.closed_loop.search.estimate import Response
 
-LARGEST = 1 << 30  # bytes of a journal; a drive takes some 100
+MAX_JOURNAL_BYTES = 1 << 30  # some 10 million drives
 REMEDY = "; move it away, or give another --out"
 _TEXT = {"type": "string"}
 _RESPONSE = [NUMBER, {"type": "array", "items": NUMBER}, _TEXT, {"type": "array", "items": _TEXT}]
@@ -29,41 +29,41 @@ class Journal:
     """The drives of a search.
 
     Attributes:
-        known: responses of the drives that the file had.
-        file: where further ones go.
+        known: responses of the drives in the file.
+        file: open for further drives.
     """
 
     known: list[Response]
     file: TextIO
 
     def add(self, response: Response) -> None:
-        """Write one drive."""
+        """Append the response of a drive."""
         self.known.append(response)
         self.file.write(_line(len(self.known), response))
         self.file.flush()
 
 
 def _line(number: int, response: Response) -> str:
-    """Return the line of a drive, counted from 1: number, margin, parts, kind, events, and the checksum of all these."""
+    """Return the line of a drive: number from 1, margin, parts, kind, events and checksum."""
     values = [number, response.margin, list(response.parts), response.kind, list(response.events)]
     text = json.dumps(values)
     return f"{text[:-1]}, {crc32(text.encode())}]\n"
 
 
 def read_journal(path: Path) -> tuple[dict[str, Any], list[Response], bool]:
-    """Return what the drives of a journal hang on, the drives, and whether its last line is whole; a cut one is left out.
+    """Return the identity of the search, its drives, and whether the last line is complete.
+
+    An incomplete last line is left out.
 
     Raises:
-        InputError: it is a link, or no regular file, or no journal, or was changed.
+        InputError: it is a link, no regular file, no journal, or was changed.
     """
-    what = f"{path} is no journal of a search"
+    invalid = f"{path} is no journal of a search"
     if path.is_symlink():
         raise InputError(f"{path} is a link{REMEDY}")
-    lines = read_text(path, LARGEST, what).split(
-        "\n"
-    )  # as they were written: other characters end no line
+    lines = read_text(path, MAX_JOURNAL_BYTES, invalid).split("\n")  # not at other line ends
     try:
-        head, *drives = parse_json(f"[{','.join(lines[:-1])}]", what, LINES)
+        head, *drives = parse_json(f"[{','.join(lines[:-1])}]", invalid, LINES)
     except InputError as error:
         raise InputError(f"{error}{REMEDY}") from error
     known = [
@@ -78,32 +78,33 @@ def read_journal(path: Path) -> tuple[dict[str, Any], list[Response], bool]:
 
 @contextmanager
 def open_journal(path: Path, identity: Mapping[str, Any]) -> Iterator[Journal]:
-    """Yield the journal at a path, made if it is not there; `identity` says what the drives hang on.
+    """Yield the journal at a path; create it if it does not exist.
+
+    Args:
+        path: of the journal.
+        identity: everything that determines the drives.
 
     Raises:
-        InputError: the file is of another search, is no journal, or cannot be written.
+        InputError: the file belongs to another search, is no journal, or cannot be written.
     """
     head = json.loads(json.dumps(identity))
     known: list[Response] = []
     try:
         if path.is_symlink() or (path.exists() and (not path.is_file() or path.stat().st_size)):
-            before, known, whole = read_journal(path)
-            differ = sorted(
-                name for name in head.keys() | before.keys() if before.get(name) != head.get(name)
-            )
-            if differ:
+            saved, known, is_complete = read_journal(path)
+            names = head.keys() | saved.keys()
+            different = sorted(name for name in names if saved.get(name) != head.get(name))
+            if different:
                 raise InputError(
-                    f"{path} has the drives of another search ({', '.join(differ)} differ){REMEDY}"
+                    f"{path} has the drives of another search ({', '.join(different)} differ)"
+                    f"{REMEDY}"
                 )
         else:
             path.parent.mkdir(parents=True, exist_ok=True)
-            whole = False
-        if not whole:
-            first = json.dumps(head, sort_keys=True)
-            write_text(
-                path,
-                f"{first}\n{''.join(_line(number, one) for number, one in enumerate(known, start=1))}",
-            )
+            is_complete = False
+        if not is_complete:
+            lines = [_line(number, drive) for number, drive in enumerate(known, start=1)]
+            write_text(path, f"{json.dumps(head, sort_keys=True)}\n{''.join(lines)}")
         file = path.open("a", encoding="utf-8")
     except OSError as error:
         raise of_system(error, path, "; give another --out") from error

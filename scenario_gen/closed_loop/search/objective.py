@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""What counts as a failure of a planner, and how near to one a drive was."""
+"""The definition of a failure of a planner, and the distance of a drive to it."""
 
 from dataclasses import dataclass
 import math
@@ -12,20 +12,19 @@ import numpy as np
 from scenario_gen.base.errors import did_you_mean, InputError
 from scenario_gen.closed_loop.search.estimate import Response
 from scenario_gen.closed_loop.trials import Outcome
+from scenario_gen.closed_loop.verdict import DriveVerdict
 from scenario_gen.method.evaluation import min_time_shift
 
-AT_FAULT, COLLISION, OFF_ROAD, GOAL, TTC, PET = (
-    "at_fault",
-    "collision",
-    "off_road",
-    "goal",
-    "ttc",
-    "pet",
-)
+AT_FAULT = "at_fault"
+COLLISION = "collision"
+OFF_ROAD = "off_road"
+GOAL = "goal"
+TTC = "ttc"
+PET = "pet"
 NAMES = (AT_FAULT, COLLISION, OFF_ROAD, GOAL)
-CONTACT = 0.1  # added to the speed of an impact, so that every contact is a failure
-LEAST = 1e-3  # s, margin of a drive in which footprints met at no instant that counts
-NO_MARGIN = 100.0  # margin where a figure does not exist and nothing says how near it is
+CONTACT_SPEED_MPS = 0.1  # added to the impact speed, so that every contact has a negative margin
+MIN_MARGIN_S = 1e-3  # of a drive without a contact that counts
+UNKNOWN_MARGIN_S = 100.0  # of a drive for which the figure does not exist
 
 
 @dataclass(frozen=True)
@@ -56,66 +55,82 @@ class Objective:
         return f"{self.name}<{self.limit:g}" if self.limit else self.name
 
     def response(self, outcome: Outcome) -> Response:
-        """Return how near to failure a drive was; for collisions by how far in time [s] each of the others was."""
+        """Return the distance of a drive to failure.
+
+        The parts of an objective of collisions are the time gaps [s] to the other vehicles.
+        """
         verdict = outcome.verdict
-        apart = _apart(outcome)
+        gaps = _time_shifts(outcome)
+        margin = self._margin(outcome, min(gaps, default=UNKNOWN_MARGIN_S))
+        if math.isnan(margin):
+            margin = UNKNOWN_MARGIN_S
+        parts = gaps if self.name in (AT_FAULT, COLLISION) else ()
+        kind = _kind(outcome, self.name) if margin <= 0.0 else ""
+        events = []
+        if verdict.collision is not None:
+            events.append(COLLISION)
+        if verdict.at_fault:
+            events.append(AT_FAULT)
+        return Response(float(margin), parts, kind, tuple(events))
+
+    def _margin(self, outcome: Outcome, nearest: float) -> float:
+        """Return the margin of a drive whose least time gap to another vehicle is `nearest` [s].
+
+        It is NaN if the verdict has no such figure.
+        """
+        verdict = outcome.verdict
+        if self.name == OFF_ROAD:
+            return verdict.road_margin + verdict.off_road_depth
+        if self.name == GOAL:
+            return _goal_margin(verdict)
+        if self.name == PET:
+            if math.isnan(verdict.min_pet):
+                return UNKNOWN_MARGIN_S + nearest
+            return verdict.min_pet - self.limit
         hit = verdict.collision
-        contact = -math.inf if hit is None else -(CONTACT + hit.speed)
-        nearest = min(apart, default=NO_MARGIN)
-        if self.name in (AT_FAULT, COLLISION):
-            counts = hit is not None and (self.name == COLLISION or verdict.at_fault)
-            margin = contact if counts else max(nearest, LEAST)
-        elif self.name == OFF_ROAD:
-            margin = verdict.road_margin + verdict.off_road_depth
-        elif self.name == GOAL:
-            margin = (
-                verdict.progress - 1.0 - 1e-3
-                if math.isnan(verdict.goal)
-                else 1.0 / (1.0 + max(verdict.delay, 0.0))
-            )
-        elif self.name == TTC:
-            margin = verdict.min_ttc - self.limit if hit is None else contact
-            if margin > 0.0:
-                margin += (
-                    0.1 * nearest
-                )  # many drives have no time to collision: the nearer, the better
-        else:
-            margin = (
-                NO_MARGIN + nearest
-                if math.isnan(verdict.min_pet)
-                else verdict.min_pet - self.limit
-            )
-        margin = NO_MARGIN if math.isnan(margin) else float(margin)
-        parts = apart if self.name in (AT_FAULT, COLLISION) else ()
-        events = ((COLLISION,) if hit is not None else ()) + (
-            (AT_FAULT,) if verdict.at_fault else ()
-        )
-        return Response(margin, parts, _kind(outcome, self.name) if margin <= 0.0 else "", events)
+        counts = hit is not None and (self.name != AT_FAULT or verdict.at_fault)
+        if hit is not None and counts:
+            return -(CONTACT_SPEED_MPS + hit.speed)
+        if self.name != TTC:
+            return max(nearest, MIN_MARGIN_S)
+        margin = verdict.min_ttc - self.limit
+        # Many drives have the same time to collision, or none: then the nearer one is better.
+        return margin + 0.1 * nearest if margin > 0.0 else margin
 
 
-def _apart(outcome: Outcome) -> tuple[float, ...]:
-    """Return how far in time [s] each of the others was from a collision with the ego."""
+def _goal_margin(verdict: DriveVerdict) -> float:
+    """Return the margin of the goal: negative if it is missed, smaller with a larger delay."""
+    if math.isnan(verdict.goal):
+        return verdict.progress - 1.0 - 1e-3
+    return 1.0 / (1.0 + max(verdict.delay, 0.0))
+
+
+def _others(outcome: Outcome) -> list[int]:
+    """Return the indices of the vehicles except the ego."""
     drive = outcome.drive
-    others = (i for i in range(len(drive.motion.vehicles)) if i != drive.ego)
-    return tuple(min_time_shift(drive.motion, drive.present, drive.ego, i) for i in others)
+    return [i for i in range(len(drive.motion.vehicles)) if i != drive.ego]
+
+
+def _time_shifts(outcome: Outcome) -> tuple[float, ...]:
+    """Return the time gap [s] of each other vehicle to the ego."""
+    drive = outcome.drive
+    return tuple(min_time_shift(drive.motion, drive.present, drive.ego, i) for i in _others(outcome))
 
 
 def _kind(outcome: Outcome, name: str) -> str:
-    """Return which failure it was: who and how."""
+    """Return the kind of a failure: its way and the other vehicle."""
     hit = outcome.verdict.collision
     if name in (AT_FAULT, COLLISION, TTC) and hit is not None:
         return f"the ego and {hit.vehicle} meet: {hit.reason.value.replace('_', ' ')}"
     if name == OFF_ROAD:
         return "the ego leaves the road"
     if name == GOAL:
-        why = (
-            " after a collision"
-            if hit is not None
-            else ": it stands"
-            if outcome.verdict.fault == "standing"
-            else ""
-        )
-        return f"the ego does not come to its goal{why}"
-    others = [i for i in range(len(outcome.drive.motion.vehicles)) if i != outcome.drive.ego]
-    nearest = others[int(np.argmin(_apart(outcome)))] if others else 0
+        reason = ""
+        if hit is not None:
+            reason = " after a collision"
+        elif outcome.verdict.fault == "standing":
+            reason = ": it stands"
+        return f"the ego does not come to its goal{reason}"
+    others = _others(outcome)
+    nearest = others[int(np.argmin(_time_shifts(outcome)))] if others else 0
     return f"{name} too short with {outcome.drive.motion.vehicles[nearest].id}"

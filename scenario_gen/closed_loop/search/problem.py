@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""A planner among the scenarios of one template, as a function of the sampler's numbers; each drive is written to a journal."""
+"""A planner among the scenarios of one template; every drive is written to a journal."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -19,16 +19,17 @@ from scenario_gen.types import mask, Road, Scenario
 
 @dataclass(eq=False)
 class DrivenScenarios:
-    """The problem of a search: candidates are scenarios, and a planner drives in the place of one of their vehicles.
+    """The problem of a search: candidates are scenarios, in which a planner replaces a vehicle.
 
     Attributes:
-        natural: makes scenarios of numbers.
-        ego: id of the vehicle in whose place the planner drives.
+        natural: decodes numbers to scenarios.
+        ego: id of the vehicle that the planner replaces.
         road: of the scenarios.
-        objective: what counts as a failure.
+        objective: definition of a failure.
         run: drives trials.
         journal: of the drives.
         progress: called with the number of drives.
+        driven: number of drives so far.
     """
 
     natural: NaturalScenarios
@@ -42,27 +43,28 @@ class DrivenScenarios:
 
     @property
     def size(self) -> int:
-        """Standard normal numbers of a scenario."""
+        """Number of standard normal numbers of a scenario."""
         return self.natural.size
 
     def candidates(self, z: Floats) -> list[Scenario | None]:
-        """Return the certified scenarios of numbers (S, size)."""
+        """Return the certified scenarios of numbers (S, size), None for rejected ones."""
         return self.natural.scenarios(z)
 
     def features(self, candidate: Scenario) -> tuple[float, ...]:
-        """Return how far in time [s] the witness is from a collision with each of the others, and its first speed [m/s]."""
+        """Return the time gaps [s] of the witness to the others, and its first speed [m/s]."""
         ids = [vehicle.id for vehicle in candidate.vehicles]
         ego = ids.index(self.ego)
-        here = mask(candidate.present, len(candidate.time))
-        apart = (min_time_shift(candidate, here, ego, k) for k in range(len(ids)) if k != ego)
-        return (*apart, float(candidate.speed[ego, int(candidate.present[ego, 0])]))
+        present = mask(candidate.present, len(candidate.time))
+        gaps = (min_time_shift(candidate, present, ego, k) for k in range(len(ids)) if k != ego)
+        return (*gaps, float(candidate.speed[ego, int(candidate.present[ego, 0])]))
 
     def drive(self, candidates: Sequence[Scenario]) -> list[Response]:
-        """Drive in each, unless the journal knows how that ended."""
+        """Drive in each candidate, unless the journal has its response."""
         first = self.driven
         known = self.journal.known[first : first + len(candidates)]
         results = list(known)
-        trials = [self.trial(first + k, one) for k, one in enumerate(candidates)][len(known) :]
+        numbered = list(enumerate(candidates, start=first))
+        trials = [self.trial(number, scenario) for number, scenario in numbered[len(known) :]]
         for outcome in self.run(trials):
             results.append(self.objective.response(outcome))
             self.journal.add(results[-1])

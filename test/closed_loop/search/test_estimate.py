@@ -10,7 +10,7 @@ import pytest
 from scipy.stats import norm
 from support.lengths import LONG
 
-from scenario_gen.closed_loop.search.estimate import LEAST, Response, Search
+from scenario_gen.closed_loop.search.estimate import Response, Search, SETTINGS
 
 DIMENSIONS = 24
 SEEDS = 20 if LONG else 6
@@ -115,7 +115,7 @@ def test_weights_add_up_to_the_natural_scenarios():
     found = search.run()
     assert found.first == 1 and found.rate.high > 0.95 and found.rate.low > 0.6
     assert sum(search.weights.values()) == pytest.approx(found.seen, rel=0.2)
-    assert max(search.weights.values()) <= 1.0 / LEAST
+    assert max(search.weights.values()) <= 1.0 / SETTINGS.min_even_probability
 
 
 def test_a_smaller_budget_is_the_beginning_of_a_larger_one():
