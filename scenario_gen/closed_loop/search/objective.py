@@ -57,14 +57,14 @@ class Objective:
     def response(self, outcome: Outcome) -> Response:
         """Return the distance of a drive to failure.
 
-        The parts of an objective of collisions are the time gaps [s] to the other vehicles.
+        The parts of an objective of collisions are the time shifts [s] that would meet the others.
         """
         verdict = outcome.verdict
-        gaps = _time_shifts(outcome)
-        margin = self._margin(outcome, min(gaps, default=UNKNOWN_MARGIN_S))
+        shifts = _time_shifts(outcome)
+        margin = self._margin(outcome, min(shifts, default=UNKNOWN_MARGIN_S))
         if math.isnan(margin):
             margin = UNKNOWN_MARGIN_S
-        parts = gaps if self.name in (AT_FAULT, COLLISION) else ()
+        parts = shifts if self.name in (AT_FAULT, COLLISION) else ()
         kind = _kind(outcome, self.name) if margin <= 0.0 else ""
         events = []
         if verdict.collision is not None:
@@ -74,7 +74,7 @@ class Objective:
         return Response(float(margin), parts, kind, tuple(events))
 
     def _margin(self, outcome: Outcome, nearest: float) -> float:
-        """Return the margin of a drive whose least time gap to another vehicle is `nearest` [s].
+        """Return the margin of a drive whose least time shift to a collision is `nearest` [s].
 
         It is NaN if the verdict has no such figure.
         """
@@ -112,7 +112,7 @@ def _others(outcome: Outcome) -> list[int]:
 
 
 def _time_shifts(outcome: Outcome) -> tuple[float, ...]:
-    """Return the time gap [s] of each other vehicle to the ego."""
+    """Return the least time shift [s] with which each other vehicle would meet the ego."""
     drive = outcome.drive
     return tuple(min_time_shift(drive.motion, drive.present, drive.ego, i) for i in _others(outcome))
 

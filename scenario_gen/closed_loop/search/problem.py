@@ -51,12 +51,12 @@ class DrivenScenarios:
         return self.natural.scenarios(z)
 
     def features(self, candidate: Scenario) -> tuple[float, ...]:
-        """Return the time gaps [s] of the witness to the others, and its first speed [m/s]."""
+        """Return the time shifts [s] to collisions of the witness, and its first speed [m/s]."""
         ids = [vehicle.id for vehicle in candidate.vehicles]
         ego = ids.index(self.ego)
         present = mask(candidate.present, len(candidate.time))
-        gaps = (min_time_shift(candidate, present, ego, k) for k in range(len(ids)) if k != ego)
-        return (*gaps, float(candidate.speed[ego, int(candidate.present[ego, 0])]))
+        shifts = (min_time_shift(candidate, present, ego, k) for k in range(len(ids)) if k != ego)
+        return (*shifts, float(candidate.speed[ego, int(candidate.present[ego, 0])]))
 
     def drive(self, candidates: Sequence[Scenario]) -> list[Response]:
         """Drive in each candidate, unless the journal has its response."""

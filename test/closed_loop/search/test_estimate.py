@@ -18,16 +18,14 @@ HELD = 17 if LONG else 4  # at 95 % fewer have a probability of 0.003
 
 
 class Plane:
-    """Fails where a sum of numbers is large: with a probability that is given. Candidates of a large 8th number are refused."""
+    """Fails where a weighted sum is large; candidates with a large eighth number are rejected."""
 
     def __init__(self, rate, allowed=math.inf):
         direction = np.zeros(DIMENSIONS)
         direction[[3, 10, 20]] = 0.6, 0.5, 0.624
-        self.direction, self.rate, self.allowed = (
-            direction / np.linalg.norm(direction),
-            rate,
-            allowed,
-        )
+        self.direction = direction / np.linalg.norm(direction)
+        self.rate = rate
+        self.allowed = allowed
         self.driven = []
 
     size = DIMENSIONS
@@ -50,7 +48,7 @@ class Plane:
 
 
 class TwoPlanes(Plane):
-    """Fails in either of two ways, of equal probability."""
+    """Fails in two ways of equal probability."""
 
     def margins(self, row):
         return self.margin(row), float(-norm.ppf(self.rate) - row[15])
@@ -68,7 +66,7 @@ class TwoPlanes(Plane):
 
 
 class Unforeseen(Plane):
-    """Fails by a number that no regression makes anything of."""
+    """Fails by a digit of a number that no regression can predict."""
 
     def margin(self, row):
         return -1.0 if abs(row[5]) * 1e6 % 1.0 < self.rate else 0.5 + abs(row[5])
@@ -79,12 +77,12 @@ def test_the_interval_holds_the_rate_and_costs_fewer_drives_than_plain_sampling(
     held, share = 0, []
     for seed in range(SEEDS):
         search = Search(Plane(rate, allowed=1.0), seed, budget)
-        found = search.run()
-        held += found.rate.low <= rate <= found.rate.high <= found.bound
-        half = 0.5 * (found.rate.high - found.rate.low)
-        share.append(found.drives * half * half / (1.96**2 * rate * (1.0 - rate)))
+        estimate = search.run()
+        held += estimate.rate.low <= rate <= estimate.rate.high <= estimate.bound
+        half = 0.5 * (estimate.rate.high - estimate.rate.low)
+        share.append(estimate.drives * half * half / (1.96**2 * rate * (1.0 - rate)))
         assert (
-            found.drives == len(search.z) == budget and 0.8 < found.valid < 0.88
+            estimate.drives == len(search.z) == budget and 0.8 < estimate.valid < 0.88
         )  # norm.cdf(1) is 0.84
     assert held >= HELD
     assert np.median(share) < 1 / 3
@@ -92,10 +90,11 @@ def test_the_interval_holds_the_rate_and_costs_fewer_drives_than_plain_sampling(
 
 @pytest.mark.parametrize(("rate", "budget"), [(0.0, 200), (1e-3, 300), (5e-3, 150), (2e-2, 150)])
 def test_the_bound_holds_failures_that_nothing_foretells(rate, budget):
-    """Also without one: then it is what the evenly chosen drives say, and no less than as many drives of all would."""
-    found = [Search(Unforeseen(rate), seed, budget).run() for seed in range(SEEDS)]
-    assert sum(rate <= one.bound for one in found) >= HELD
-    assert all(one.rate.high >= 1.0 - 0.025 ** (1.0 / budget) for one in found if not one.first)
+    """Without a failure it comes from the evenly chosen drives."""
+    estimates = [Search(Unforeseen(rate), seed, budget).run() for seed in range(SEEDS)]
+    assert sum(rate <= each.bound for each in estimates) >= HELD
+    highs = [each.rate.high for each in estimates if not each.first]
+    assert all(high >= 1.0 - 0.025 ** (1.0 / budget) for high in highs)
 
 
 def test_both_of_two_kinds_are_found():
@@ -112,9 +111,9 @@ def test_weights_add_up_to_the_natural_scenarios():
             return -1.0
 
     search = Search(Always(1e-2), 0, 300)
-    found = search.run()
-    assert found.first == 1 and found.rate.high > 0.95 and found.rate.low > 0.6
-    assert sum(search.weights.values()) == pytest.approx(found.seen, rel=0.2)
+    estimate = search.run()
+    assert estimate.first == 1 and estimate.rate.high > 0.95 and estimate.rate.low > 0.6
+    assert sum(search.weights.values()) == pytest.approx(estimate.seen, rel=0.2)
     assert max(search.weights.values()) <= 1.0 / SETTINGS.min_even_probability
 
 
@@ -133,15 +132,15 @@ def test_a_smaller_budget_is_the_beginning_of_a_larger_one():
 )
 def test_little_budget_no_failure_and_nothing_valid_give_what_they_can(rate, allowed, budget):
     problem = Plane(rate, allowed)
-    found = Search(problem, 0, budget).run()
+    estimate = Search(problem, 0, budget).run()
     if allowed == -math.inf:
-        assert found.drives == 0 and math.isnan(found.rate.value)
+        assert estimate.drives == 0 and math.isnan(estimate.rate.value)
         return
-    assert found.drives == len(problem.driven) == budget and all(
+    assert estimate.drives == len(problem.driven) == budget and all(
         row[7] < allowed for row in problem.driven
     )
-    assert 0.0 <= found.rate.low <= found.rate.high <= (0.2 if rate < 1e-9 else 1.0) and (
-        found.first == 0 or rate > 1e-9
+    assert 0.0 <= estimate.rate.low <= estimate.rate.high <= (0.2 if rate < 1e-9 else 1.0) and (
+        estimate.first == 0 or rate > 1e-9
     )
 
 
