@@ -74,13 +74,13 @@ class DriverState(NamedTuple):
     """A driver at the start of a step.
 
     Attributes:
-        index: of its vehicle.
+        vehicle: index of its vehicle.
         clock: certified time [s] at which its vehicle is where it is now.
         rate: of that clock.
         acceleration: in the previous step [m/s²].
     """
 
-    index: int
+    vehicle: int
     clock: float
     rate: float
     acceleration: float
@@ -175,7 +175,7 @@ def next_rate(
     new_speed = max(speed + max(change, previous - jerk * h) * h, floor)
     first = min(new_speed / end_speed, free_rate)
     mean_speed = max(v + 0.5 * (r + first) * a * h, MODEL.min_moving_speed_mps)
-    return min(new_speed / mean_speed, free_rate)
+    return float(min(new_speed / mean_speed, free_rate))
 
 
 @kernel(inline=True)
@@ -191,8 +191,8 @@ def drive_step(
     speed = driver.rate * pose[3]
     rate = next_rate(parameters, driver, pose, braking, 0.0, h)
     clock = driver.clock + 0.5 * (driver.rate + rate) * h
-    pose_at(world.time, world.motion[driver.index], clock, pose)
-    return DriverState(driver.index, clock, rate, (rate * pose[3] - speed) / h)
+    pose_at(world.time, world.motion[driver.vehicle], clock, pose)
+    return DriverState(driver.vehicle, clock, rate, (rate * pose[3] - speed) / h)
 
 
 @kernel(inline=True)
@@ -298,7 +298,7 @@ def following_braking(
         speed: of the leader [m/s].
         offset: time [s] from the clock of the driver to that of the leader's footprint.
     """
-    i = driver.index
+    i = driver.vehicle
     gap, cell = gap_ahead(world, i, driver.clock, box, pose)
     if cell < 0:
         return NO_BRAKING_MPS2

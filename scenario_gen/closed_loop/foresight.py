@@ -129,7 +129,7 @@ def weakest_safe_braking(
         return least
     low = max(least, -parameters.acceleration)
     comfortable = parameters.comfortable
-    strongest = parameters.strongest[driver.index]
+    strongest = parameters.strongest[driver.vehicle]
     for high in (0.0, 0.5 * comfortable, comfortable, 0.5 * (comfortable + strongest), strongest):
         if high <= low:
             continue
@@ -169,7 +169,7 @@ def _is_clear(
     others: bool,
 ) -> bool:
     """Return whether a driver that brakes stays clear of the ego and respects the order."""
-    i = driver.index
+    i = driver.vehicle
     pose = np.empty(5)
     brakes = braking > NO_BRAKING_MPS2
     clearance = max(prediction.clearance, MODEL.clearance_m * brakes)
@@ -254,7 +254,7 @@ def predict_clock(
 ) -> None:
     """Write the clocks (M,) [s] of a braking driver at the start and the end of each step."""
     pose = np.empty(5)
-    pose_at(world.time, world.motion[driver.index], driver.clock, pose)
+    pose_at(world.time, world.motion[driver.vehicle], driver.clock, pose)
     clock = driver.clock
     out[0] = clock
     for m in range(1, out.shape[0]):

@@ -29,7 +29,7 @@ from scenario_gen.numerics.kernels import kernel
 @kernel(inline=True)
 def _kerb_clock(world: World, walker: DriverState) -> float:
     """Return the clock [s] of the next step onto a lane, now or earlier if it is on a lane."""
-    kerbs = world.kerbs[walker.index]
+    kerbs = world.kerbs[walker.vehicle]
     return float(kerbs[min(int(walker.clock / world.cell), kerbs.shape[0] - 1)])
 
 
@@ -99,7 +99,7 @@ def braking_at_kerb(
     """
     if not _must_wait(world, parameters, walker, prediction):
         return NO_BRAKING_MPS2
-    way = world.cells[walker.index, :, 7]
+    way = world.cells[walker.vehicle, :, 7]
     k = int(walker.clock / world.cell)
     walked = way[k] + (way[k + 1] - way[k]) * (walker.clock / world.cell - k)
     room = way[_kerb_cell(world, walker)] - walked - MODEL.clearance_m
@@ -108,7 +108,9 @@ def braking_at_kerb(
     stopping_way = reached * reached / (2.0 * MODEL.walker_braking_mps2)
     if room > reached * world.step + stopping_way:
         return NO_BRAKING_MPS2
-    return float(min(speed * speed / (2.0 * max(room, 0.01)), parameters.strongest[walker.index]))
+    return float(
+        min(speed * speed / (2.0 * max(room, 0.01)), parameters.strongest[walker.vehicle])
+    )
 
 
 @kernel(inline=True)
@@ -119,7 +121,7 @@ def _must_wait(
 
     It would go ahead of an ego that the template let pass, or meet one that cannot stop.
     """
-    i = walker.index
+    i = walker.vehicle
     clearance = prediction.clearance
     half = world.half[i]
     ego_half = world.half[world.ego]
@@ -165,9 +167,9 @@ def _ego_stops(
 @kernel(inline=True)
 def _crosses(world: World, walker: DriverState, box: Floats) -> bool:
     """Return whether the crossing of a pedestrian on its next lane meets a box (7,)."""
-    cells = world.cells[walker.index]
+    cells = world.cells[walker.vehicle]
     for k in range(_kerb_cell(world, walker), cells.shape[0]):
-        if world.kerbs[walker.index, k] > (k + 0.5) * world.cell:
+        if world.kerbs[walker.vehicle, k] > (k + 0.5) * world.cell:
             break
         if boxes_meet(cells[k], box):
             return True

@@ -197,7 +197,7 @@ def _is_blocked(now: StepState, i: int) -> bool:
     certified_speed = now.pose[i, 3]
     creeps = rate * certified_speed <= MODEL.creep_speed_mps and rate < 1.0
     waits = creeps and certified_speed >= MODEL.min_moving_speed_mps
-    return waits and now.ego[i, 0, 3] <= MODEL.max_blocking_speed_mps
+    return bool(waits and now.ego[i, 0, 3] <= MODEL.max_blocking_speed_mps)
 
 
 @kernel(inline=True)
