@@ -114,7 +114,9 @@ def _others(outcome: Outcome) -> list[int]:
 def _time_shifts(outcome: Outcome) -> tuple[float, ...]:
     """Return the least time shift [s] with which each other vehicle would meet the ego."""
     drive = outcome.drive
-    return tuple(min_time_shift(drive.motion, drive.present, drive.ego, i) for i in _others(outcome))
+    return tuple(
+        min_time_shift(drive.motion, drive.present, drive.ego, i) for i in _others(outcome)
+    )
 
 
 def _kind(outcome: Outcome, name: str) -> str:
