@@ -91,7 +91,7 @@ def test_the_same_seed_gives_the_same_drive():
         and all(env.observation_space.contains(row) for row in one)
     )
     assert env.reset(options={"index": 2})[1]["name"] == "5"
-    with pytest.raises(InputError, match="no scenario 3; there are 3"):
+    with pytest.raises(InputError, match="no scenario with index 3"):
         env.reset(options={"index": 3})
 
 
