@@ -72,7 +72,7 @@ def drawn_on(encounter: Encounter, name: str, count: int, picture: str) -> Gener
 def sentences(result: GenerationResult) -> list[str]:
     """Return who reacts to whom, in words."""
     return [str(sentence) for sentence in result.reacting["sentences"]] or [
-        "No vehicle is seen to react to another"
+        "No reactions detected"
     ]
 
 

@@ -15,7 +15,7 @@ from scenario_gen.types.markings import Marking, markings
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-_MOST = 200  # scenarios drawn: with more, one hides the other
+_MAX_SCENARIOS = 200  # scenarios drawn: with more, one hides the other
 
 
 def plot(
@@ -39,7 +39,7 @@ def plot(
 
     axes = plt.subplots()[1] if ax is None else ax
     drawn: Sequence[Motion] = (
-        list(shown)[:_MOST] if isinstance(shown, GenerationResult) else [shown]
+        list(shown)[:_MAX_SCENARIOS] if isinstance(shown, GenerationResult) else [shown]
     )
     road = shown.road if isinstance(shown, GenerationResult) and road is None else road
     if road is not None:
@@ -97,6 +97,6 @@ def _draw_road(axes: "Axes", road: Road) -> None:
 def _title(shown: GenerationResult | Motion) -> str:
     if isinstance(shown, GenerationResult):
         return f"{len(shown)} scenarios, {shown.title}" + (
-            f" (the first {_MOST})" if len(shown) > _MOST else ""
+            f" (the first {_MAX_SCENARIOS})" if len(shown) > _MAX_SCENARIOS else ""
         )
     return shown.title

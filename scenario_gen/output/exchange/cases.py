@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""What of a bag is exported: every scenario with its road's lanes and its ego, case by case."""
+"""The cases of a bag for export: scenarios with the lanes of their road and their ego."""
 
 from collections.abc import Collection, Iterator, Sequence
 from contextlib import suppress
@@ -34,12 +34,12 @@ class Exported:
     """One scenario to be exported.
 
     Attributes:
-        index: as in `scenarios/info`; without an entry its place in the bag.
-        seed: of its request.
-        sha256: of its message in the bag.
-        others: the vehicles around the ego; all of them where there is none.
-        ego: the ego's track, a scenario of one vehicle that begins at the same instant.
-        driven: whether the ego's track is a part of the scenario, so that it and the others are proven valid together.
+        index: index in `scenarios/info`, otherwise its position in the bag.
+        seed: seed of its request.
+        sha256: SHA-256 of its message in the bag.
+        others: the vehicles around the ego; all vehicles without an ego.
+        ego: the ego's track, a scenario of one vehicle with the same first instant.
+        driven: whether the ego's track is a part of the scenario, validated with the others.
     """
 
     index: int
@@ -56,20 +56,21 @@ class Exported:
 
     @property
     def duration(self) -> float:
-        """Seconds until the last vehicle, or the ego, is at its end."""
+        """The duration [s] until the last vehicle or the ego reaches its end."""
         return float(self.everybody.time[-1])
 
     def refuse_late_ego(self) -> None:
-        """Refuse an ego that arrives late: a controller under test is there from the first instant on.
+        """Refuse an ego that arrives late: a planner under test starts at the first instant.
 
         Raises:
-            RefusedError: it arrives late.
+            RefusedError: the ego arrives late.
         """
         if self.ego is not None and self.ego.present[0, 0] > 0:
             begin = float(self.ego.time[self.ego.present[0, 0]])
             raise RefusedError(
-                f"scenario {self.index}: the ego, vehicle {self.ego.vehicles[0].id}, arrives {begin:.1f} s late, and a planner "
-                "under test begins at 0; choose a vehicle with --ego that is there from the start"
+                f"scenario {self.index}: the ego, vehicle {self.ego.vehicles[0].id}, arrives "
+                f"{begin:.1f} s late, and a planner under test begins at 0; choose a vehicle with "
+                "--ego that is there from the start"
             )
 
 
@@ -78,13 +79,13 @@ class Case:
     """The scenarios of one template on one road.
 
     Attributes:
-        number: from 1, among all cases of the bag.
-        namespace: in the bag; "" is the root.
-        road_name: for people.
-        start_ns: the template's stamp.
-        scenarios: those asked for.
-        lane_map: of the road; the same whichever scenarios are asked for.
-        origin: of the frame, as of `LaneNetwork`.
+        number: number of the case in the bag, from 1.
+        namespace: namespace in the bag; "" is the root.
+        road_name: name of the road, for people.
+        start_ns: stamp of the template [ns].
+        scenarios: the requested scenarios.
+        lane_map: the lanes of the road; they do not depend on the requested scenarios.
+        origin: origin of the frame, as in `LaneNetwork`.
     """
 
     number: int
@@ -94,6 +95,11 @@ class Case:
     scenarios: tuple[Exported, ...]
     lane_map: LaneMap
     origin: tuple[float, ...] = ()
+
+
+def scenario_source(case: Case, exported: Exported) -> str:
+    """Return the source of an exported scenario: index, namespace and hash."""
+    return f"scenario {exported.index} of {case.namespace or '/'}, sha256 {exported.sha256}"
 
 
 @dataclass(frozen=True, eq=False)
@@ -113,17 +119,40 @@ def read_cases(
     namespace: str | None = None,
     indices: Collection[int] = (),
 ) -> tuple[Case, ...]:
-    """Return what is to be exported of a bag, ours or not.
+    """Return the cases of any bag with the conventions of this suite.
 
     Args:
-        bag: its folder.
+        bag: folder of the bag.
         export: ego and lanes.
-        config: what is read of the bag at most.
-        namespace: only this one.
-        indices: only scenarios of these, as in `scenarios/info`; all if none is given.
+        config: limits on the size of the bag.
+        namespace: read only this namespace.
+        indices: read only scenarios with these indices in `scenarios/info`; empty: all.
 
     Raises:
-        InputError: the bag cannot be read, holds no scenario that is asked for, or an ego is none of the vehicles.
+        InputError: the bag cannot be read, has none of the requested scenarios, or no vehicle with
+            the id of the ego.
+    """
+    spaces = _spaces(bag, config, namespace)
+    with naming_bag(bag):
+        groups = [(space, group) for space in spaces for group in _groups(space, export)]
+        cases = [
+            _case(k, space, group, export, indices) for k, (space, group) in enumerate(groups, 1)
+        ]
+    cases = [case for case in cases if case.scenarios]
+    if not cases:
+        known = sorted({entry.index for _, group in groups for entry in group.scenarios})
+        raise InputError(
+            f"{bag}: no scenario {', '.join(map(str, sorted(indices)))}; there are {known[0]} to "
+            f"{known[-1]}"
+        )
+    return tuple(cases)
+
+
+def _spaces(bag: Path, config: BagConfig, namespace: str | None) -> list[Namespace]:
+    """Return the namespaces of a bag that have scenarios, or only the requested one.
+
+    Raises:
+        InputError: there is none, or the bag cannot be read.
     """
     namespaces = read_recording(bag, config, TOPICS).namespaces
     spaces = [entry for entry in namespaces.values() if SCENARIOS in entry.messages]
@@ -136,20 +165,10 @@ def read_cases(
         spaces = [entry for entry in spaces if entry.name == full_name]
         if not spaces:
             raise InputError(
-                f"{bag}: no scenarios in namespace {namespace!r}; there are: {', '.join(n or '/' for n in namespaces)}"
+                f"{bag}: no scenarios in namespace {namespace!r}; there are: "
+                f"{', '.join(name or '/' for name in namespaces)}"
             )
-    with naming_bag(bag):
-        groups = [(space, group) for space in spaces for group in _groups(space, export)]
-        cases = [
-            _case(k + 1, space, group, export, indices) for k, (space, group) in enumerate(groups)
-        ]
-    cases = [case for case in cases if case.scenarios]
-    if not cases:
-        known = sorted({entry.index for _, group in groups for entry in group.scenarios})
-        raise InputError(
-            f"{bag}: no scenario {', '.join(map(str, sorted(indices)))}; there are {known[0]} to {known[-1]}"
-        )
-    return tuple(cases)
+    return spaces
 
 
 def _groups(space: Namespace, export: ExportConfig) -> Iterator[_Group]:
@@ -171,10 +190,11 @@ def _groups(space: Namespace, export: ExportConfig) -> Iterator[_Group]:
 def _with_ego(
     space: Namespace, entry: ScenarioEntry | None, scenario: Scenario, requested: str
 ) -> tuple[Scenario, Scenario | None, bool]:
-    """Return the vehicles around the ego, its track, and whether that is a part of the scenario.
+    """Return the vehicles around the ego, its track, and whether it is a part of the scenario.
 
     Raises:
-        InputError: the ego asked for is none of the vehicles, or alone; another was left out; its track is not in the bag.
+        InputError: the requested ego is not a vehicle of the scenario or its only one, another ego
+            was left out, or the ego's track is not in the bag.
     """
     slot = entry.ego if entry else ""
     ids = list(tokens(vehicle.id for vehicle in scenario.vehicles))
@@ -215,17 +235,6 @@ def _case(
     road: Road | None = space.road_of(group.entry, group.stamp)
     if road is None and space.data("map"):
         road = space.road
-    width = RoadConfig.lane_width
-    values = next(
-        (
-            s.values
-            for s in reversed(space.summaries)
-            if group.entry and s.request == group.entry.request
-        ),
-        {},
-    )
-    with suppress(InputError):  # a bag of others says nothing of our parameters
-        width = read_parameters(RoadConfig(), values, "road.", "export").lane_width
     everybody: Sequence[Scenario] = [
         s for exported in group.scenarios for s in (exported.others, exported.ego) if s is not None
     ]
@@ -238,6 +247,18 @@ def _case(
         scenarios=tuple(
             exported for exported in group.scenarios if not indices or exported.index in indices
         ),
-        lane_map=lane_map_of(road, everybody, width, export.run_out),
+        lane_map=lane_map_of(road, everybody, _lane_width(space, group.entry), export.run_out),
         origin=road.lanes.origin if road and road.lanes else (),
     )
+
+
+def _lane_width(space: Namespace, entry: ScenarioEntry | None) -> float:
+    """Return the lane width [m] of a scenario's request; the default for other bags."""
+    if entry is not None:
+        for summary in reversed(space.summaries):
+            if summary.request == entry.request:
+                with suppress(InputError):  # not recorded
+                    values = summary.values
+                    return read_parameters(RoadConfig(), values, "road.", "export").lane_width
+                break
+    return RoadConfig.lane_width

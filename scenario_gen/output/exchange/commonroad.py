@@ -3,9 +3,10 @@
 
 """CommonRoad 2020a: one XML file per scenario, with lanelets, obstacles and a planning problem.
 
-Obstacles and the planning problem are posed at the centre of their shape, as the format defines it. Times are whole steps of
-`timeStepSize`. The date is that of the template's stamp, so that the same bag gives the same bytes. Without an ego there is a
-placeholder problem, for the format's schema demands one; a comment in the file says so.
+Poses of obstacles and of the planning problem refer to the centre of the shape, as the format
+defines it. Times are multiples of `timeStepSize`. The date is the date of the template's stamp, so
+that the same bag gives the same bytes. Without an ego, the file has a placeholder problem, as the
+schema of the format requires one; a comment in the file says so.
 """
 
 from collections.abc import Sequence
@@ -17,30 +18,28 @@ import numpy as np
 from scenario_gen.base.errors import RefusedError
 from scenario_gen.numerics import Floats
 from scenario_gen.numerics.curve import Curve
-from scenario_gen.output.exchange.cases import Case, Exported
+from scenario_gen.output.exchange.cases import Case, Exported, scenario_source
 from scenario_gen.output.exchange.config import ExportConfig
 from scenario_gen.output.exchange.lanes import LaneMap, SIGN_IDS
 from scenario_gen.output.exchange.motion import even_step
 from scenario_gen.output.exchange.xml import add, comment, date_of, Element, number, serialized
 from scenario_gen.types import DRIVERS, Lane, LaneNetwork, Scenario
 
-OBSTACLES, PROBLEM, INTERSECTION, SIGNS = (
-    100_000,
-    200_000,
-    300_000,
-    400_000,
-)  # ids from here on; lanelets count from 1
+FIRST_OBSTACLE_ID = 100_000  # the ids of lanelets start from 1
+FIRST_PROBLEM_ID = 200_000
+FIRST_INTERSECTION_ID = 300_000
+FIRST_SIGN_ID = 400_000
 MAX_SPEED = "274"
-GOAL_TURN = 0.3  # rad by which an ego may be turned at its goal
+MAX_GOAL_HEADING_ERROR_RAD = 0.3
 AUTHOR = "scenario_gen"
-_FOR_ONE = {
+_EXCLUSIVE_TYPES = {  # types of lanelets with one type of users
     "bicycleLane": frozenset(("bicycle",)),
     "busLane": frozenset(("bus",)),
-}  # types of lanelets of one type of users
+}
 
 
 def benchmark_id(case: Case, exported: Exported) -> str:
-    """Return the scenario's name in CommonRoad's manner, which is its file's name too."""
+    """Return the benchmark id of a scenario, which is also the name of its file."""
     words = re.findall(r"[0-9A-Za-z]+", case.road_name)
     name = "".join(word[:1].upper() + word[1:] for word in words) or "Road"
     return f"ZAM_{name}-{case.number}_{exported.index + 1}_T-1"
@@ -49,51 +48,33 @@ def benchmark_id(case: Case, exported: Exported) -> str:
 def write_commonroad(
     case: Case, exported: Exported, export: ExportConfig = ExportConfig()
 ) -> tuple[bytes, tuple[str, ...]]:
-    """Return a scenario as the bytes of a CommonRoad file, and sentences on what was changed for it.
+    """Return a scenario as the bytes of a CommonRoad file, and notes on changes made for it.
 
     Raises:
-        RefusedError: a vehicle arrives late, for which the schema has no form, or the ego does.
+        RefusedError: a vehicle arrives late, which the schema does not allow, or the ego does.
     """
     exported.refuse_late_ego()
     scenario, notes = _even(exported.others, export)
-    late = [
+    late_ids = [
         v.id
         for v, (first, _) in zip(scenario.vehicles, scenario.present.tolist(), strict=True)
         if first > 0
     ]
-    if late and export.late == "refused":
+    if late_ids and export.late == "refused":
         raise RefusedError(
-            f"scenario {exported.index}: vehicle {', '.join(late)} arrives late, and CommonRoad's schema has obstacles "
-            "from the first step on only; `--set late=written` writes the step at which it arrives, which commonroad-io "
-            "reads; or export it to openscenario or autoware"
+            f"scenario {exported.index}: vehicle {', '.join(late_ids)} arrives late, but "
+            "CommonRoad's schema requires obstacles from the first step; `--set late=written` "
+            "writes the step of its arrival, which commonroad-io reads; or export to openscenario "
+            "or autoware"
         )
-    if late:
+    if late_ids:
         notes += (
-            f"vehicle {', '.join(late)} arrives late: its initial time step is not 0, which the schema does not allow",
+            f"vehicle {', '.join(late_ids)} arrives late: its initial time step is not 0, which "
+            "the schema does not allow",
         )
     step = even_step(scenario) or export.step
-    root = Element(
-        "commonRoad",
-        {
-            "commonRoadVersion": "2020a",
-            "benchmarkID": benchmark_id(case, exported),
-            "date": date_of(case.start_ns).partition("T")[0],
-            "author": AUTHOR,
-            "affiliation": AUTHOR,
-            "source": f"scenario {exported.index} of {case.namespace or '/'}, sha256 {exported.sha256}",
-            "timeStepSize": f"{step:.9f}".rstrip("0"),
-        },
-    )
-    comment(root, f"lanelets: {case.lane_map.origin}")
-    location = add(root, "location")
-    add(location, "geoNameId", "-999")  # the format's value for unknown, as 999 below
-    add(location, "gpsLatitude", "999")
-    add(location, "gpsLongitude", "999")
-    tags = add(root, "scenarioTags")
-    add(tags, "simulated")
+    root = _header(case, exported, step)
     lane_map = case.lane_map
-    if any(map(lane_map.turn, range(len(lane_map.network.lanes)))):
-        add(tags, "intersection")
     signs = _signs(lane_map.network)
     for k in range(len(lane_map.network.lanes)):
         _lanelet(root, lane_map, k, [sign for sign in signs if k in sign.lanes])
@@ -106,7 +87,8 @@ def write_commonroad(
     if exported.ego is None:
         comment(
             root,
-            "a placeholder: nobody is left out of this scenario, and the format demands a planning problem",
+            "a placeholder: nobody is left out of this scenario, and the format demands a "
+            "planning problem",
         )
         _placeholder(root, lane_map.network.lanes[0], len(scenario.time))
     else:
@@ -115,13 +97,42 @@ def write_commonroad(
     return serialized(root), notes
 
 
+def _header(case: Case, exported: Exported, step: float) -> Element:
+    """Return the root element with the location and the tags of a scenario."""
+    root = Element(
+        "commonRoad",
+        {
+            "commonRoadVersion": "2020a",
+            "benchmarkID": benchmark_id(case, exported),
+            "date": date_of(case.start_ns).partition("T")[0],
+            "author": AUTHOR,
+            "affiliation": AUTHOR,
+            "source": scenario_source(case, exported),
+            "timeStepSize": f"{step:.9f}".rstrip("0"),
+        },
+    )
+    lane_map = case.lane_map
+    comment(root, f"lanelets: {lane_map.origin}")
+    location = add(root, "location")
+    add(location, "geoNameId", "-999")  # the format's value for unknown, as 999 below
+    add(location, "gpsLatitude", "999")
+    add(location, "gpsLongitude", "999")
+    tags = add(root, "scenarioTags")
+    add(tags, "simulated")
+    if any(map(lane_map.turn, range(len(lane_map.network.lanes)))):
+        add(tags, "intersection")
+    return root
+
+
 def _even(scenario: Scenario, export: ExportConfig) -> tuple[Scenario, tuple[str, ...]]:
+    """Return a scenario with a constant time step, and a note if it was resampled."""
     if even_step(scenario) is not None:
         return scenario, ()
     result = scenario.resampled(export.step)
     lost = float(scenario.time[-1] - result.time[-1])
     return result, (
-        f"its uneven instants were resampled at {export.step:g} s; its last {lost:.3f} s are left out",
+        f"its uneven instants were resampled at {export.step:g} s; its last {lost:.3f} s are "
+        "left out",
     )
 
 
@@ -139,7 +150,10 @@ def _point(parent: Element, x: float, y: float, tag: str = "point") -> None:
 
 @dataclass(frozen=True, eq=False)
 class _Sign:
-    """A sign or a light: of which lanes, with its number and value; a light has none. `line` (K, 2) [m] is its stop line."""
+    """A sign or a light with its lanes; `line` (K, 2) [m] is its stop line.
+
+    `number` is the traffic sign's number, "" for a light.
+    """
 
     id: int
     lanes: frozenset[int]
@@ -149,32 +163,32 @@ class _Sign:
 
     @property
     def tag(self) -> str:
-        """Of an element that refers to it."""
+        """The tag of an element that refers to the sign."""
         return "trafficSignRef" if self.number else "trafficLightRef"
 
 
 def _signs(network: LaneNetwork) -> list[_Sign]:
-    """Return the signs of a road, one for each of its speed limits, and its lights."""
+    """Return the signs of a road, one sign per speed limit, and its lights."""
     limits: dict[float, set[int]] = {}
     for k, lane in enumerate(network.lanes):
         if lane.speed_limit > 0.0:
             limits.setdefault(lane.speed_limit, set()).add(k)
-    found = [
+    signs = [
         (frozenset(rule.lanes), SIGN_IDS.get(rule.kind, ""), "", rule.line)
         for rule in network.rules
     ]
-    found += [
+    signs += [
         (frozenset(lanes), MAX_SPEED, number(limit), np.zeros((0, 2)))
         for limit, lanes in limits.items()
     ]
     return sorted(
-        (_Sign(SIGNS + k, *sign) for k, sign in enumerate(found, 1)),
+        (_Sign(FIRST_SIGN_ID + k, *sign) for k, sign in enumerate(signs, 1)),
         key=lambda sign: not sign.number,
     )
 
 
 def _sign(root: Element, sign: _Sign) -> None:
-    """Append a sign, or a light that is off: no state of it is known."""
+    """Append a sign, or an inactive light, as its states are unknown."""
     if sign.number:
         element = add(add(root, "trafficSign", id=sign.id), "trafficSignElement")
         add(element, "trafficSignID", sign.number)
@@ -218,19 +232,17 @@ def _lanelet(root: Element, lane_map: LaneMap, k: int, signs: Sequence[_Sign]) -
 
 
 def _lanelet_type(lane: Lane) -> str:
-    """Return the type of a lanelet, by its users."""
+    """Return the type of a lanelet, from its users."""
     if not lane.open_to(DRIVERS):
         return "crosswalk" if lane.crossing else "sidewalk"
-    own = [
-        kind
-        for kind, users in _FOR_ONE.items()
-        if lane.users and not lane.open_to(DRIVERS - users)
-    ]
-    return own[0] if own else "urban"
+    for kind, users in _EXCLUSIVE_TYPES.items():
+        if lane.users and not lane.open_to(DRIVERS - users):
+            return kind
+    return "urban"
 
 
 def _intersection(root: Element, lane_map: LaneMap) -> None:
-    """Say of every strip that leads into the junction where one can go from it."""
+    """Append the intersection with the incoming lanelets of each arm, if there is a junction."""
     lanes, turn = lane_map.network.lanes, lane_map.turn
     arms = [
         [k for k in side if any(map(turn, lanes[k].successors))]
@@ -240,19 +252,23 @@ def _intersection(root: Element, lane_map: LaneMap) -> None:
     arms = [incoming for incoming in arms if incoming]
     if not arms:
         return
-    intersection = add(root, "intersection", id=INTERSECTION)
+    intersection = add(root, "intersection", id=FIRST_INTERSECTION_ID)
     for n, incoming in enumerate(arms):
-        element = add(intersection, "incoming", id=INTERSECTION + 1 + n)
+        element = add(intersection, "incoming", id=FIRST_INTERSECTION_ID + 1 + n)
         for k in incoming:
             add(element, "incomingLanelet", ref=k + 1)
-        for way in ("right", "straight", "left"):
-            for other in (
-                other
-                for k in incoming
-                for other in sorted(lanes[k].successors)
-                if turn(other) == way
-            ):
-                add(element, f"successors{way.title()}", ref=other + 1)
+        successors = [other for k in incoming for other in sorted(lanes[k].successors)]
+        for direction in ("right", "straight", "left"):
+            _successors(element, lane_map, direction, successors)
+
+
+def _successors(
+    incoming: Element, lane_map: LaneMap, direction: str, successors: Sequence[int]
+) -> None:
+    """Append the successors of an arm that turn in one direction."""
+    for k in successors:
+        if lane_map.turn(k) == direction:
+            add(incoming, f"successors{direction.title()}", ref=k + 1)
 
 
 def _exact(parent: Element, tag: str, value: float) -> None:
@@ -266,7 +282,7 @@ def _interval(parent: Element, tag: str, low: float, high: float) -> None:
 
 
 def _state(parent: Element, tag: str, scenario: Scenario, n: int, k: int) -> Element:
-    """Append position, orientation, time, velocity and acceleration of vehicle `n` at instant `k`."""
+    """Append the state of vehicle `n` at instant `k`."""
     state = add(parent, tag)
     _point(add(state, "position"), *scenario.position[n, k].tolist())
     _exact(state, "orientation", float(scenario.heading[n, k]))
@@ -278,7 +294,7 @@ def _state(parent: Element, tag: str, scenario: Scenario, n: int, k: int) -> Ele
 
 def _obstacle(root: Element, scenario: Scenario, n: int) -> None:
     vehicle = scenario.vehicles[n]
-    obstacle = add(root, "dynamicObstacle", id=OBSTACLES + n + 1)
+    obstacle = add(root, "dynamicObstacle", id=FIRST_OBSTACLE_ID + n + 1)
     add(obstacle, "type", vehicle.kind.commonroad)
     rectangle = add(add(obstacle, "shape"), "rectangle")
     add(rectangle, "length", vehicle.length)
@@ -291,8 +307,8 @@ def _obstacle(root: Element, scenario: Scenario, n: int) -> None:
 
 
 def _problem(root: Element, ego: Scenario, step: float, export: ExportConfig) -> None:
-    """Append the ego's problem: from its start to a region about its end, within a wide window of time."""
-    problem = add(root, "planningProblem", id=PROBLEM + 1)
+    """Append the ego's planning problem: from its first state to a region around its last one."""
+    problem = add(root, "planningProblem", id=FIRST_PROBLEM_ID + 1)
     start = _state(problem, "initialState", ego, 0, 0)
     rate = (ego.heading[0, 1] - ego.heading[0, 0]) / (ego.time[1] - ego.time[0])
     _exact(start, "yawRate", float(rate))
@@ -317,16 +333,18 @@ def _goal(
     add(rectangle, "width", size[1])
     add(rectangle, "orientation", yaw)
     _point(rectangle, x, y, "center")
-    _interval(goal, "orientation", yaw - GOAL_TURN, yaw + GOAL_TURN)
+    _interval(
+        goal, "orientation", yaw - MAX_GOAL_HEADING_ERROR_RAD, yaw + MAX_GOAL_HEADING_ERROR_RAD
+    )
 
 
 def _placeholder(root: Element, lane: Lane, steps: int) -> None:
-    """Append a problem that is solved by standing still, near the beginning of the first lane, on its run-out."""
+    """Append a problem that a stationary vehicle solves, near the start of the first lane."""
     middle = lane.centre
     at = min(int(np.searchsorted(Curve.through(middle).station, 5.0)), len(middle) - 2)
     yaw = float(lane.yaw[at])
     x, y = middle[at].tolist()
-    problem = add(root, "planningProblem", id=PROBLEM)
+    problem = add(root, "planningProblem", id=FIRST_PROBLEM_ID)
     state = add(problem, "initialState")
     _point(add(state, "position"), x, y)
     for tag, value in (

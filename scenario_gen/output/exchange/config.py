@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""What an export is asked for."""
+"""Parameters of exports."""
 
 from dataclasses import dataclass
 

@@ -4,8 +4,7 @@
 """`scenario-gen export`: a folder of files for other software, with notes on them."""
 
 from collections.abc import Callable, Collection, Mapping, Sequence
-from dataclasses import dataclass, replace
-from itertools import count
+from dataclasses import dataclass, field, replace
 import json
 from pathlib import Path
 from typing import Any
@@ -19,6 +18,7 @@ from scenario_gen.bags.storage.writer import BagWriter
 from scenario_gen.base.errors import InputError, RefusedError
 from scenario_gen.base.folders import Kind, replaced_folder, sha256_of, write_text
 from scenario_gen.base.registry import Registry
+from scenario_gen.numerics import Floats
 from scenario_gen.output.exchange.cases import Case, Exported, read_cases
 from scenario_gen.output.exchange.commonroad import benchmark_id, write_commonroad
 from scenario_gen.output.exchange.config import ExportConfig
@@ -29,19 +29,17 @@ from scenario_gen.output.exchange.osi import write_osi
 from scenario_gen.output.exchange.projection import projection_of
 from scenario_gen.output.exchange.scenarionet import dataset_files, description, file_name, pickled
 from scenario_gen.roads import read_network
+from scenario_gen.types import Scenario
 
 EXPORTED = Kind("exported")
 MANIFEST = "export.json"
-MAPS = (
-    ".xodr",
-    ".osm",
-)  # endings of the names of maps that OpenSCENARIO can name: OpenDRIVE, Lanelet2
-ON_LANES = 0.9  # share of positions that lie on lanes of the map on which they were made, at least
+MAPS = (".xodr", ".osm")  # suffixes of maps that OpenSCENARIO can reference
+MIN_ON_LANES_SHARE = 0.9  # of positions, on the lanes of the map of the scenarios
 
 
 @dataclass(frozen=True)
 class Export:
-    """What was written: the number of scenarios, and sentences on lanes, changes and what was left out."""
+    """The number of exported scenarios, and notes on lanes, changes and omissions."""
 
     scenarios: int
     notes: tuple[str, ...]
@@ -49,7 +47,7 @@ class Export:
 
 @dataclass(frozen=True)
 class Written:
-    """Names of the files of one scenario, in the folder of the export, with notes on it, and what `closing` is to know of it."""
+    """The files of one exported scenario, notes on it, and its content for `closing`."""
 
     names: tuple[str, ...]
     notes: tuple[str, ...] = ()
@@ -61,12 +59,15 @@ class ExportFormat:
     """A format of other software. The same case must give the same bytes.
 
     Attributes:
-        write: writes one scenario of a case into the folder; it raises RefusedError for what the format cannot hold.
-        shared: files that all scenarios of a case have in common, by name.
-        closing: files about all scenarios, by name: of the first file and the `content` of each.
-        takes_map: whether `ExportConfig.map` is written in place of lanes.
-        maps: endings of the names of such maps.
-        projected_from: latitude and longitude about which positions are, if they are to be projected as a map is; else ().
+        write: writes one scenario of a case into the folder; raises RefusedError if the format
+            cannot represent it.
+        shared: returns the files that all scenarios of a case share, by name.
+        closing: returns the files about all scenarios, by name, from the first file and the
+            `content` of each scenario.
+        takes_map: whether `ExportConfig.map` can replace the lanes.
+        maps: suffixes of such maps.
+        projected_from: returns the latitude and longitude of the origin if positions need a
+            projection, else ().
     """
 
     write: Callable[[Path, Case, Exported, ExportConfig], Written]
@@ -88,53 +89,36 @@ def export_bag(
     indices: Collection[int] = (),
     progress: Callable[[int, int], None] = lambda *_: None,
 ) -> Export:
-    """Write the scenarios of a bag to a folder, in another format: the same bytes for the same bag.
+    """Write the scenarios of a bag to a folder in another format.
+
+    The same bag gives the same bytes.
 
     Args:
-        bag: of this suite's conventions.
-        out: the folder; an earlier export there is replaced.
+        bag: a bag with the conventions of this suite.
+        out: the folder; an earlier export in it is replaced.
         target: a name in `EXPORTS`.
         export: ego, lanes, time windows.
-        config: what is read of the bag at most.
-        namespace: only this one.
-        indices: only scenarios of these, as in `scenarios/info`.
-        progress: called with the number of scenarios written, and of all.
+        config: limits on the size of the bag.
+        namespace: export only this namespace.
+        indices: export only scenarios with these indices in `scenarios/info`.
+        progress: called with the number of exported scenarios and their total.
 
     Raises:
-        InputError: the bag cannot be read, or not what is asked for of it; `out` may not be replaced.
+        InputError: the bag or a requested part of it cannot be read, or `out` must not be
+            replaced.
         RefusedError: no scenario can be written in that format.
     """
     to = _format(target, export.map)
     cases = read_cases(bag, export, config, namespace=namespace, indices=indices)
-    notes: list[str] = []
-    entries: list[dict[str, object]] = []
-    contents: list[tuple[str, Any]] = []
-    done, total = count(), sum(len(case.scenarios) for case in cases)
+    total = sum(len(case.scenarios) for case in cases)
     with replaced_folder(out, EXPORTED, [bag]) as folder:
+        exporting = _Exporting(folder, to, export, lambda done: progress(done, total))
         for case in cases:
-            about = f"case {case.number}, {case.road_name}{f' in {case.namespace}' if case.namespace else ''}"
-            frame, moved = projection_of(to.projected_from(case, export), export)
-            said = "; ".join(filter(None, (_origin(case, export), frame)))
-            notes.append(f"{about}: {len(case.scenarios)} scenarios; {said}")
-            for name, data in to.shared(case, export).items():
-                (folder / name).write_bytes(data)
-            for exported in case.scenarios:
-                progress(next(done), total)
-                try:
-                    ego = None if exported.ego is None else moved(exported.ego)
-                    placed = replace(exported, others=moved(exported.others), ego=ego)
-                    written = to.write(folder, case, placed, export)
-                except RefusedError as error:
-                    notes.append(f"{about}: left out: {error}")
-                    continue
-                notes += [
-                    f"{about}, scenario {exported.index}: {sentence}" for sentence in written.notes
-                ]
-                entries.append(_entry(case, exported, written.names, export))
-                contents.append((written.names[0], written.content))
+            exporting.add_case(case)
+        notes, entries = exporting.notes, exporting.entries
         if not entries:
             raise RefusedError("nothing could be exported:\n" + "\n".join(notes))
-        for name, data in to.closing(contents).items():
+        for name, data in to.closing(exporting.contents).items():
             (folder / name).write_bytes(data)
         digests = {
             str(p.relative_to(folder)): sha256_of(p)
@@ -146,20 +130,68 @@ def export_bag(
     return Export(len(entries), tuple(notes))
 
 
+@dataclass(eq=False)
+class _Exporting:
+    """An export in progress: notes, entries of the manifest, and contents for `closing`."""
+
+    folder: Path
+    to: ExportFormat
+    export: ExportConfig
+    progress: Callable[[int], None]
+    done: int = 0
+    notes: list[str] = field(default_factory=list)
+    entries: list[dict[str, object]] = field(default_factory=list)
+    contents: list[tuple[str, Any]] = field(default_factory=list)
+
+    def add_case(self, case: Case) -> None:
+        """Write the shared files and the scenarios of a case."""
+        place = f" in {case.namespace}" if case.namespace else ""
+        title = f"case {case.number}, {case.road_name}{place}"
+        frame, moved = projection_of(self.to.projected_from(case, self.export), self.export)
+        origins = "; ".join(filter(None, (_origin(case, self.export), frame)))
+        self.notes.append(f"{title}: {len(case.scenarios)} scenarios; {origins}")
+        for name, data in self.to.shared(case, self.export).items():
+            (self.folder / name).write_bytes(data)
+        for exported in case.scenarios:
+            self.progress(self.done)
+            self.done += 1
+            self._add_scenario(title, case, exported, moved)
+
+    def _add_scenario(
+        self,
+        title: str,
+        case: Case,
+        exported: Exported,
+        moved: Callable[[Scenario], Scenario],
+    ) -> None:
+        """Write one scenario, moved into the frame of the export; note why it was refused."""
+        try:
+            ego = None if exported.ego is None else moved(exported.ego)
+            placed = replace(exported, others=moved(exported.others), ego=ego)
+            written = self.to.write(self.folder, case, placed, self.export)
+        except RefusedError as error:
+            self.notes.append(f"{title}: left out: {error}")
+            return
+        self.notes += [f"{title}, scenario {exported.index}: {note}" for note in written.notes]
+        self.entries.append(_entry(case, exported, written.names, self.export))
+        self.contents.append((written.names[0], written.content))
+
+
 def _format(target: str, road: str) -> ExportFormat:
-    """Return a format of `EXPORTS`, if it takes the map that is given ("": none).
+    """Return a format of `EXPORTS`; `road` is a map, or "".
 
     Raises:
-        InputError: it does not.
+        InputError: the format does not support this map.
     """
     to = EXPORTS[target]
     if road and not to.takes_map:
         raise InputError(
-            f"map: --to {target} writes lanes of its own; a map can be given with --to openscenario or osi"
+            f"map: --to {target} writes lanes of its own; a map can be given with --to "
+            "openscenario or osi"
         )
     if road and Path(road).suffix.lower() not in to.maps:
         known = "OpenDRIVE (.xodr)" + (" or Lanelet2 (.osm)" if ".osm" in to.maps else "")
-        raise InputError(f"map {road}: --to {target} takes a road of {known}")
+        raise InputError(f"map {road}: --to {target} needs a map in {known}")
     return to
 
 
@@ -173,7 +205,7 @@ def _origin(case: Case, export: ExportConfig) -> str:
 def _entry(
     case: Case, exported: Exported, names: tuple[str, ...], export: ExportConfig
 ) -> dict[str, object]:
-    """Return what the manifest says of a scenario; obstacles and entities of a file are in the order of `vehicles`."""
+    """Return the manifest's entry of a scenario; `vehicles` has the order of the file."""
     return {
         "files": list(names),
         "namespace": case.namespace,
@@ -246,20 +278,25 @@ def _origin_of_map(_: Case, export: ExportConfig) -> tuple[float, ...]:
 
 
 def refuse_other_map(case: Case, path: Path) -> None:
-    """Refuse a map that is not the one on which the scenarios of a case drive.
+    """Refuse a map that is not the map of a case.
 
     Raises:
-        InputError: it cannot be read, or more than a tenth of the positions lie on none of its lanes.
+        InputError: the map cannot be read, or too few positions lie on its lanes.
     """
     lanes = area_of(read_network(path).whole)
     prepare(lanes)
-    places = np.concatenate([one.others.position[one.others.is_present] for one in case.scenarios])
+    places = np.concatenate([_positions(exported.others) for exported in case.scenarios])
     share = float(contains_xy(lanes, places).mean())
-    if share < ON_LANES:
+    if share < MIN_ON_LANES_SHARE:
         raise InputError(
-            f"map {path}: {100.0 * share:.0f} % of the positions of {case.road_name} lie on its lanes; name the map that the "
-            "scenarios were made on"
+            f"map {path}: {100.0 * share:.0f} % of the positions of {case.road_name} lie on its "
+            "lanes; name the map that the scenarios were made on"
         )
+
+
+def _positions(scenario: Scenario) -> Floats:
+    """Return the positions (P, 2) [m] of all vehicles while they are present."""
+    return scenario.position[scenario.is_present]
 
 
 EXPORTS = Registry[ExportFormat](

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Lanes as other formats want them: numbered, with their neighbours, and gathered into strips of lanes that lie side by side."""
+"""Lanes for other formats: numbered, with neighbours, and grouped into strips."""
 
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -17,7 +17,7 @@ SIGN_IDS = {
     RuleKind.GIVE_WAY: "205",
     RuleKind.PRIORITY: "301",
 }  # German numbers
-STRAIGHT_ON = 0.52  # rad, 30°: a way through a junction that turns by less goes straight on
+MAX_STRAIGHT_TURN_RAD = 0.52  # 30°: a junction lane that turns by less counts as straight
 
 
 @dataclass(frozen=True, eq=False)
@@ -26,8 +26,8 @@ class LaneMap:
 
     Attributes:
         network: the lanes, of all users.
-        added: how many at the end are derived: along what is driven, and no lane of the road.
-        origin: what the lanes are: true ones of a road, or derived from what; for people.
+        added: number of derived lanes, at the end, which follow driven paths.
+        origin: origin of the lanes, for people.
     """
 
     network: LaneNetwork
@@ -36,11 +36,11 @@ class LaneMap:
 
     @property
     def derived(self) -> bool:
-        """Whether all are derived."""
+        """Whether all lanes are derived."""
         return self.added == len(self.network.lanes)
 
     def is_derived(self, k: int) -> bool:
-        """Whether lane k is."""
+        """Whether lane k is derived."""
         return k >= len(self.network.lanes) - self.added
 
     @cached_property
@@ -49,29 +49,36 @@ class LaneMap:
         return self.network.open_to(CARS).traffic_side or "right"
 
     def turn(self, k: int) -> str:
-        """Where lane k leads through the junction of a drawn road, "left", "straight" or "right"; "" elsewhere."""
+        """Return the turn of lane k in the junction of a drawn road: left, straight or right.
+
+        Other lanes have the turn "".
+        """
         lane = self.network.lanes[k]
         if not (self.network.drawn and lane.junction):
             return ""
         first, last = np.unwrap(lane.yaw)[[0, -1]].tolist()
         turn = last - first
-        return "straight" if abs(turn) < STRAIGHT_ON else "left" if turn > 0.0 else "right"
+        if abs(turn) < MAX_STRAIGHT_TURN_RAD:
+            return "straight"
+        return "left" if turn > 0.0 else "right"
 
     @cached_property
     def strips(self) -> tuple[tuple[tuple[int, ...], tuple[int, ...]], ...]:
-        """The lanes of each arm of a drawn road, in and out, from the middle outwards; of a road through, in both directions.
+        """The strips: pairs of the lanes in each direction, from the road centre outwards.
 
-        Every other lane is alone; crossings are in none.
+        Each arm of a drawn road is a strip; every other lane is a strip of its own. Crossings are
+        in no strip.
         """
-        lanes, strips = self.network.lanes, dict[int, tuple[tuple[int, ...], tuple[int, ...]]]()
+        lanes = self.network.lanes
+        strips: dict[int, tuple[tuple[int, ...], tuple[int, ...]]] = {}
         for arm in self.network.arms.values():
             inward = tuple(k for k in arm if ".-" in lanes[k].id)
             if inward:
                 strips[inward[0]] = inward, tuple(k for k in arm if k not in inward)
-        taken = {k for strip in strips.values() for side in strip for k in side}
-        strips |= {
-            k: ((k,), ()) for k in range(len(lanes)) if k not in taken and not lanes[k].crossing
-        }
+        grouped = {k for inward, outward in strips.values() for k in (*inward, *outward)}
+        for k, lane in enumerate(lanes):
+            if k not in grouped and not lane.crossing:
+                strips[k] = ((k,), ())
         return tuple(strips[k] for k in sorted(strips))
 
     @cached_property
@@ -81,7 +88,7 @@ class LaneMap:
         return dict(pairs) | {b: a for a, b in pairs}
 
     def neighbours(self, k: int) -> dict[str, tuple[int, bool]]:
-        """The lanes "left" and "right" of lane k, and whether they have its direction."""
+        """Return the lanes "left" and "right" of lane k, and whether they have its direction."""
         lane, sides = self.network.lanes[k], dict[str, tuple[int, bool]]()
         across = lane.left[0] - lane.right[0]
         for other in lane.neighbours:
@@ -94,7 +101,7 @@ class LaneMap:
 
 
 def with_run_out(network: LaneNetwork, metres: float) -> LaneNetwork:
-    """Return a network whose lanes go on straight before the road's entries and beyond its exits."""
+    """Return a network with lanes extended straight before entries and beyond exits."""
     if metres <= 0.0:
         return network
     lanes = list(network.lanes)

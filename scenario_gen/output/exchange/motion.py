@@ -7,10 +7,10 @@ import numpy as np
 
 from scenario_gen.types import Scenario
 
-EVEN = 1e-9  # seconds by which steps may differ and still be one
+EVEN_TOLERANCE_S = 1e-9  # difference of time steps that count as equal
 
 
 def even_step(scenario: Scenario) -> float | None:
     """Return the one step [s] between the scenario's instants; None if there are several."""
     steps = np.diff(scenario.time)
-    return float(np.round(steps[0], 9)) if np.ptp(steps) <= EVEN else None
+    return float(np.round(steps[0], 9)) if np.ptp(steps) <= EVEN_TOLERANCE_S else None

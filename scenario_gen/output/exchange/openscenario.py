@@ -1,17 +1,19 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""OpenSCENARIO XML 1.2: one file per scenario, every vehicle on a timed polyline, beside the OpenDRIVE file of its road.
+"""OpenSCENARIO XML 1.2: one file per scenario, next to the OpenDRIVE file of its road.
 
-A vehicle's reference point is the middle of its rear axle on the ground, x ahead, as the standard defines it; its bounding box
-says where the footprint lies about it. Trajectories are in absolute time from the start of the simulation: their start condition
-(simulation time at least 0) has no edge: a rising one would wait for a change that never comes, or comes a step late.
-A vehicle that arrives late is added to the simulation then, and one that leaves is deleted. The ego, if there is one, is placed,
-has its speed, and is left to the controller under test; its goal is a routing action.
+Every vehicle follows a timed polyline. Its reference point is the centre of its rear axle on the
+ground, x ahead, as the standard defines it; its bounding box gives the footprint. Trajectories use
+absolute time from the start of the simulation. Their start condition (simulation time at least 0)
+has no edge: a rising edge would wait for a change that never happens, or happens a step late. A
+vehicle that arrives late is added to the simulation at that time, and one that leaves is deleted.
+The ego, if any, has an initial pose and speed and a routing action to its goal; the controller
+under test drives it.
 """
 
 from scenario_gen.logs import OPENSCENARIO_SPEEDS
-from scenario_gen.output.exchange.cases import Case, Exported
+from scenario_gen.output.exchange.cases import Case, Exported, scenario_source
 from scenario_gen.output.exchange.config import ExportConfig
 from scenario_gen.output.exchange.xml import add, date_of, Element, number, serialized
 from scenario_gen.types import (
@@ -25,20 +27,20 @@ from scenario_gen.types import (
 )
 
 EGO = "Ego"
-WHEEL = 0.65  # metres of diameter
-LIMITS = {
+WHEEL_DIAMETER_M = 0.65
+LIMITS = {  # beyond those of any published scenario
     "maxSpeed": 70.0,
     "maxAcceleration": 10.0,
     "maxDeceleration": 10.0,
-}  # beyond what any published scenario does
-STEERING = 0.7  # rad
-MASS_KG = 75.0  # of who walks
+}
+MAX_STEERING_RAD = 0.7
+PEDESTRIAN_MASS_KG = 75.0
 
 
 def write_openscenario(
     case: Case, exported: Exported, road_file: str, export: ExportConfig = ExportConfig()
 ) -> bytes:
-    """Return a scenario as the bytes of an OpenSCENARIO file; `road_file` names its OpenDRIVE file, beside it.
+    """Return a scenario as the bytes of an OpenSCENARIO file; `road_file` is its OpenDRIVE file.
 
     Raises:
         RefusedError: the ego arrives late.
@@ -51,7 +53,7 @@ def write_openscenario(
         revMajor="1",
         revMinor="2",
         date=date_of(case.start_ns),
-        description=f"{case.road_name}, scenario {exported.index} of {case.namespace or '/'}, sha256 {exported.sha256}",
+        description=f"{case.road_name}, {scenario_source(case, exported)}",
         author="scenario_gen",
     )
     add(root, "ParameterDeclarations")
@@ -78,12 +80,12 @@ def write_openscenario(
 
 
 def entity_name(vehicle: Vehicle) -> str:
-    """Return how a vehicle is called in the file."""
+    """Return the name of a vehicle in the file."""
     return f"vehicle_{token(vehicle.id)}"
 
 
 def _speeds(scenario: Scenario, n: int) -> str:
-    """Return the speeds at a vehicle's vertices, which the format has no place for, as the text of a property."""
+    """Return the speeds at a vehicle's vertices as text: the format has no element for them."""
     first, last = scenario.present[n].tolist()
     return " ".join(map(number, scenario.speed[n, first : last + 1].tolist()))
 
@@ -95,7 +97,7 @@ def _entity(entities: Element, name: str, vehicle: Vehicle, speeds: str) -> None
             entity,
             "Pedestrian",
             name=vehicle.type,
-            mass=MASS_KG,
+            mass=PEDESTRIAN_MASS_KG,
             model=vehicle.type,
             pedestrianCategory=kind,
         )
@@ -110,17 +112,17 @@ def _entity(entities: Element, name: str, vehicle: Vehicle, speeds: str) -> None
         axles = add(element, "Axles")
         track = 0.85 * vehicle.width
         for tag, x, steering in (
-            ("FrontAxle", WHEELBASE_SHARE * vehicle.length, STEERING),
+            ("FrontAxle", WHEELBASE_SHARE * vehicle.length, MAX_STEERING_RAD),
             ("RearAxle", 0.0, 0.0),
         ):
             add(
                 axles,
                 tag,
                 maxSteering=steering,
-                wheelDiameter=WHEEL,
+                wheelDiameter=WHEEL_DIAMETER_M,
                 trackWidth=track,
                 positionX=x,
-                positionZ=WHEEL / 2.0,
+                positionZ=WHEEL_DIAMETER_M / 2.0,
             )
     properties = add(element, "Properties")
     if speeds:
@@ -128,7 +130,7 @@ def _entity(entities: Element, name: str, vehicle: Vehicle, speeds: str) -> None
 
 
 def _pose(parent: Element, scenario: Scenario, n: int, k: int) -> None:
-    """Append where the reference point of vehicle `n` is at instant `k`; without z, the player puts it onto the road."""
+    """Append the reference point of vehicle `n` at instant `k`, without z: players find it."""
     axle = shifted(
         scenario.position[n, k], scenario.heading[n, k], -rear_axle(scenario.vehicles[n])
     )
@@ -171,14 +173,14 @@ def _start(act: Element) -> None:
 
 
 def _at(trigger: Element, name: str, seconds: float, rule: str) -> None:
-    """Append a condition on the simulation's time; it holds by its value, no edge is waited for."""
+    """Append a condition on the simulation time, without an edge."""
     group = add(trigger, "ConditionGroup")
     condition = add(group, "Condition", name=name, delay=0.0, conditionEdge="none")
     add(add(condition, "ByValueCondition"), "SimulationTimeCondition", value=seconds, rule=rule)
 
 
 def _follow(act: Element, scenario: Scenario, n: int, mode: str) -> None:
-    """Append a vehicle's maneuver: it arrives, if it arrives late, follows its trajectory, and leaves, if it leaves early."""
+    """Append a vehicle's maneuver: a late arrival, its trajectory, and an early departure."""
     vehicle = scenario.vehicles[n]
     name = entity_name(vehicle)
     first, last = scenario.present[n].tolist()

@@ -1,11 +1,13 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""ASAM OSI 3.8: one MCAP file per scenario, a GroundTruth message per instant and the road as OpenDRIVE, as omega-prime reads it.
+"""ASAM OSI 3.8: one MCAP file per scenario, for omega-prime.
 
-Sources: OSI 3.8 (GroundTruth, MovingObject, and the trace file format for MCAP); omega-prime 0.3.7 (`Recording`, `MapOdr`), which
-names the topics. Positions are those of the middle of the bounding box, half a height above the ground, in the scenarios' frame;
-accelerations are vectors, with the part across the heading. Times begin at 0. A vehicle is in the messages while it is there.
+A file has one GroundTruth message per instant, and the road as OpenDRIVE. Sources: OSI 3.8
+(GroundTruth, MovingObject, and the trace file format for MCAP); omega-prime 0.3.7 (`Recording`,
+`MapOdr`), which defines the topics. Positions refer to the centre of the bounding box, half a
+height above the ground, in the frame of the scenarios. Accelerations are vectors and include the
+lateral part. Times start at 0. A vehicle is in the messages while it is present.
 """
 
 from collections.abc import Iterator
@@ -20,19 +22,24 @@ import numpy as np
 from scenario_gen.base.errors import InputError, needs
 from scenario_gen.base.xml_reader import read_xml
 from scenario_gen.numerics import Floats, wrap_angle
-from scenario_gen.output.exchange.cases import Case, Exported
+from scenario_gen.output.exchange.cases import Case, Exported, scenario_source
 from scenario_gen.output.exchange.xml import date_of
 from scenario_gen.types import height, rear_axle, Scenario, Vehicle, WHEELBASE_SHARE
 
 OBJECTS, MAP = "ground_truth", "ground_truth_map"  # omega-prime's topics
-WHEEL_RADIUS = 0.325  # metres, as in OpenSCENARIO files
-LARGEST_ID = 2**63 - 1  # that readers with signed numbers can hold
+WHEEL_RADIUS_M = 0.325  # as in OpenSCENARIO files
+MAX_ID = 2**63 - 1  # that readers with signed numbers can hold
 NS = 1_000_000_000
 
 
 @dataclass(frozen=True)
 class Frame:
-    """How OpenDRIVE's coordinates lie on the earth: a PROJ text ("" if unknown); x, y, z [m] and yaw [rad] of their origin."""
+    """The geodetic frame of an OpenDRIVE file.
+
+    Attributes:
+        projection: PROJ string, "" if unknown.
+        offset: x, y, z [m] and yaw [rad] of the origin.
+    """
 
     projection: str
     offset: tuple[float, float, float, float] | None
@@ -40,7 +47,7 @@ class Frame:
 
 @dataclass(frozen=True, eq=False)
 class _Moving:
-    """All vehicles, the ego last: their motion, numbers, and rates of yaw (N, T) [rad/s]."""
+    """All vehicles, the ego last: their motion, numbers, and yaw rates (N, T) [rad/s]."""
 
     motion: Scenario
     numbers: tuple[int, ...]
@@ -68,10 +75,9 @@ def write_osi(path: Path, case: Case, exported: Exported, road: Path) -> tuple[s
     moving = _Moving(motion, numbers, _yaw_rates(motion))
     host = numbers[-1] if exported.ego is not None else numbers[0]
     text, frame = _text(road), _frame(road)
-    about = f"{case.road_name}, scenario {exported.index} of {case.namespace or '/'}, sha256 {exported.sha256}"
     metadata = {
         "creation_time": f"{date_of(case.start_ns)}Z",
-        "description": about,
+        "description": f"{case.road_name}, {scenario_source(case, exported)}",
         "authors": "scenario_gen",
     }
     with betterosi.Writer(
@@ -95,7 +101,7 @@ def object_numbers(exported: Exported) -> tuple[tuple[int, ...], tuple[str, ...]
     """
     ids = [vehicle.id for vehicle in exported.everybody.vehicles]
     if all(
-        name.isascii() and name.isdigit() and str(int(name)) == name and int(name) <= LARGEST_ID
+        name.isascii() and name.isdigit() and str(int(name)) == name and int(name) <= MAX_ID
         for name in ids
     ):
         return tuple(int(name) for name in ids), ()
@@ -105,23 +111,23 @@ def object_numbers(exported: Exported) -> tuple[tuple[int, ...], tuple[str, ...]
 
 
 def _yaw_rates(motion: Scenario) -> Floats:
-    """Return rates of yaw (N, T) [rad/s], by central differences while the vehicle is there."""
+    """Return yaw rates (N, T) [rad/s], by central differences while a vehicle is present."""
     rates: Floats = np.zeros(motion.heading.shape)
     for n, (first, last) in enumerate(motion.present.tolist()):
-        own = slice(first, last + 1)
+        present = slice(first, last + 1)
         if last > first:
-            rates[n, own] = np.gradient(motion.heading[n, own], motion.time[own])
+            rates[n, present] = np.gradient(motion.heading[n, present], motion.time[present])
     return rates
 
 
 def _ground_truth(
     moving: _Moving, k: int, stamp: int, host: int, road_file: str, frame: Frame
 ) -> Any:
-    """Return the message of instant `k`; the host is named while it is there."""
+    """Return the message of instant `k`; it names the host while that is present."""
     import betterosi as osi
 
     objects = list(_objects(moving, k))
-    there = any(one.id.value == host for one in objects)
+    has_host = any(item.id.value == host for item in objects)
     major, minor, patch = map(int, osi.DEFAULT_VERSION.split("."))
     offset = None
     if frame.offset is not None:
@@ -132,7 +138,7 @@ def _ground_truth(
             version_major=major, version_minor=minor, version_patch=patch
         ),
         timestamp=osi.Timestamp(seconds=stamp // NS, nanos=stamp % NS),
-        host_vehicle_id=osi.Identifier(value=host) if there else None,
+        host_vehicle_id=osi.Identifier(value=host) if has_host else None,
         moving_object=objects,
         map_reference=road_file,
         proj_string=frame.projection or None,
@@ -141,7 +147,7 @@ def _ground_truth(
 
 
 def _objects(moving: _Moving, k: int) -> Iterator[Any]:
-    """Yield the vehicles that are there at instant `k`."""
+    """Yield the vehicles that are present at instant `k`."""
     import betterosi as osi
 
     motion = moving.motion
@@ -192,11 +198,11 @@ def _attributes(vehicle: Vehicle) -> Any:
     """Return where the axles are, from the middle of the bounding box, and the wheels."""
     import betterosi as osi
 
-    rear, down = -rear_axle(vehicle), WHEEL_RADIUS - height(vehicle) / 2.0
+    rear, down = -rear_axle(vehicle), WHEEL_RADIUS_M - height(vehicle) / 2.0
     return osi.MovingObject.VehicleAttributes(
         bbcenter_to_rear=osi.Vector3d(x=rear, y=0.0, z=down),
         bbcenter_to_front=osi.Vector3d(x=rear + WHEELBASE_SHARE * vehicle.length, y=0.0, z=down),
-        radius_wheel=WHEEL_RADIUS,
+        radius_wheel=WHEEL_RADIUS_M,
     )
 
 
@@ -205,12 +211,13 @@ def _text(road: Path) -> str:
         return road.read_bytes().decode("utf-8-sig")
     except UnicodeDecodeError as error:
         raise InputError(
-            f"map {road.name}: not UTF-8 (byte {error.start}), as a trace of OSI holds its map; save it as UTF-8"
+            f"map {road.name}: not UTF-8 (byte {error.start}), as a trace of OSI holds its map; "
+            "save it as UTF-8"
         ) from error
 
 
 def _frame(road: Path) -> Frame:
-    """Return how an OpenDRIVE file says that its coordinates lie on the earth."""
+    """Return the geodetic frame of an OpenDRIVE file."""
     header = read_xml(road, road.name).find("header")
     reference = header.find("geoReference") if header is not None else None
     offset = header.find("offset") if header is not None else None
@@ -227,7 +234,7 @@ def _frame(road: Path) -> Frame:
 
 @cache
 def _definitions() -> bytes:
-    """Return the definitions of OSI's messages without comments, an eighth of all: a FileDescriptorSet."""
+    """Return the FileDescriptorSet of OSI's messages, without comments (an eighth of the size)."""
     import betterosi
     from protobuf.wkt import FileDescriptorSet
 

@@ -26,7 +26,7 @@ from scenario_gen.types import DRIVERS, height, Scenario, Vehicle
 
 VERSION = "MetaDrive v0.4.3"  # the description's, not the simulator's
 DATASET = "scenario_gen"
-MOVES = 1.0  # metres that make an object a moving one
+MIN_MOVING_DISTANCE_M = 1.0  # of an object that counts as moving
 SUMMARY, MAPPING = "dataset_summary.pkl", "dataset_mapping.pkl"
 
 
@@ -70,14 +70,13 @@ def description(case: Case, exported: Exported, export: ExportConfig) -> dict[st
 
 
 def _track(motion: Scenario, n: int, vehicle: Vehicle) -> dict[str, Any]:
-    """Return the states of one vehicle; zeros while it is not there."""
-    there = motion.is_present[n]
+    """Return the states of one vehicle; zeros while it is absent."""
+    present = motion.is_present[n]
     steps = len(motion.time)
 
     def masked(values: Any) -> Any:
-        return np.where(there if np.ndim(values) == 1 else there[:, None], values, 0.0).astype(
-            np.float32
-        )
+        mask = present if np.ndim(values) == 1 else present[:, None]
+        return np.where(mask, values, 0.0).astype(np.float32)
 
     heading, speed = motion.heading[n], motion.speed[n]
     velocity = speed[:, None] * unit(heading)
@@ -88,7 +87,7 @@ def _track(motion: Scenario, n: int, vehicle: Vehicle) -> dict[str, Any]:
         "length": masked(np.full(steps, vehicle.length)),
         "width": masked(np.full(steps, vehicle.width)),
         "height": masked(np.full(steps, height(vehicle))),
-        "valid": there.copy(),
+        "valid": present.copy(),
     }
     kind = vehicle.kind.scenarionet
     metadata = {"type": kind, "object_id": vehicle.id, "track_length": steps, "dataset": DATASET}
@@ -115,7 +114,7 @@ def _numbers(tracks: Mapping[str, Any]) -> dict[str, Any]:
     moving = Counter(
         track["type"]
         for name, track in tracks.items()
-        if _summary(track, name)["moving_distance"] > MOVES
+        if _summary(track, name)["moving_distance"] > MIN_MOVING_DISTANCE_M
     )
     each = Counter(track["type"] for track in tracks.values())
     return {
@@ -134,7 +133,7 @@ def _lane(lane_map: LaneMap, k: int) -> dict[str, Any]:
     """Return lane k as a feature of the map."""
     network, sides = lane_map.network, lane_map.neighbours(k)
     lane = network.lanes[k]
-    beside = {side: [str(other + 1)] for side, (other, same) in sides.items() if same}
+    neighbours = {side: [str(other + 1)] for side, (other, same) in sides.items() if same}
     if not lane.open_to(DRIVERS):
         return {
             "type": "CROSSWALK" if lane.crossing else "SIDEWALK",
@@ -148,8 +147,8 @@ def _lane(lane_map: LaneMap, k: int) -> dict[str, Any]:
         "polygon": lane.outline.astype(np.float32),
         "entry_lanes": [str(other + 1) for other in sorted(network.predecessors[k])],
         "exit_lanes": [str(other + 1) for other in sorted(lane.successors)],
-        "left_neighbor": beside.get("left", []),
-        "right_neighbor": beside.get("right", []),
+        "left_neighbor": neighbours.get("left", []),
+        "right_neighbor": neighbours.get("right", []),
     }
 
 
