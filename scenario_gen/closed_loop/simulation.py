@@ -212,7 +212,7 @@ class ClosedLoop:
         self.last_step = int(np.ceil((self.duration * config.overtime + 5.0) / config.step))
 
     def _reaction_times(self) -> Floats:
-        """Return (N,) the reaction times [s]; pedestrians, and all vehicles in a replay, have 0."""
+        """Return (N,) reaction times [s]; 0 for pedestrians and for all vehicles in a replay."""
         config = self.config
         times = []
         for vehicle in self.scenario.vehicles:

@@ -394,8 +394,8 @@ def _check_clock(vehicles: Sequence[Observations], log: RawLog, config: LogConfi
         unit, hint = _likely_time_unit(period)
         raise InputError(
             f"{log.where(int(vehicles[0].fix_row[1]))}: positions are {period:g} s apart "
-            f"(median); a track needs at most {CLEANING.max_period_s:g} s; {hint}name the unit with "
-            f"--set log.columns=time=<column>:{unit}"
+            f"(median); a track needs at most {CLEANING.max_period_s:g} s; {hint}name the unit "
+            f"with --set log.columns=time=<column>:{unit}"
         )
     spans = [int(vehicle.fix_ns[-1]) - int(vehicle.fix_ns[0]) for vehicle in vehicles]
     n_ticks = round(sum(spans) / (config.period * 1e9))

@@ -86,7 +86,7 @@ def suggest_nearest(
     cancelled: Cancelled = lambda: False,
     forms: Mapping[str, str] = PARAMETER_FORMS,
 ) -> RefusedError:
-    """Return a refusal that names possible requests or roads, for a command or node to answer with.
+    """Return a refusal that names possible requests or roads, for the answer of a node.
 
     Args:
         error: the refusal.
@@ -158,7 +158,7 @@ class _Search:
         self._placement = self._find_placement()
 
     def run(self) -> Iterator[Suggestion]:
-        """Yield the smallest repair if it suffices, else single changes, else all changes at once."""
+        """Yield the smallest sufficient repair, else single changes, else all changes at once."""
         repaired = self._repair()
         if repaired != self._requested.request and self._is_possible(repaired):
             yield Suggestion(repaired, self._describe(repaired))
@@ -173,7 +173,7 @@ class _Search:
             yield suggestion
 
     def _find_placement(self) -> dict[str, Floats]:
-        """The states (N, 4) at both ends without a request; empty if that is not possible either."""
+        """The states (N, 4) at both ends without a request; empty if that is impossible too."""
         try:
             _, fit = replace(self._requested, request=Request()).plan().road_and_fit()
         except ScenarioGenError:
@@ -216,7 +216,7 @@ class _Search:
         return request
 
     def _separate(self, request: Request, key: StateKey) -> Request:
-        """Move a footprint along its heading until it does not overlap others, if that is possible."""
+        """Move a footprint along its heading until it overlaps no other, if that is possible."""
         end, name = key
         n = vehicle_index(self._requested.encounter, name, end)
         vehicle = self._vehicles[n]

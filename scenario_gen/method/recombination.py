@@ -152,7 +152,7 @@ def recombined(one: Encounter, other: Encounter) -> Encounter:
 def recombinations(
     encounters: Sequence[Encounter], most: int, seed: int = 0
 ) -> tuple[list[Encounter], Counter[str]]:
-    """Return new encounters from pairs of recorded ones, and how often pairs were refused, by reason.
+    """Return new encounters from pairs of recorded ones, and the refused pairs by reason.
 
     Pairs of the same kind are tried in random order, up to forty for each requested encounter.
 
@@ -231,7 +231,7 @@ def _refuse_unlike(created: Encounter, a: InteractingPair, b: InteractingPair) -
 
 
 def _meeting(a: InteractingPair, b: InteractingPair) -> tuple[float, Floats]:
-    """Return the begin [s], and the states (T, 4) of b's second vehicle, moved to a's first one."""
+    """Return the begin [s] and the states (T, 4) of b's second vehicle, moved to a's first."""
     second, delay = b.conflict.second, a.clears - b.clears
     time = _common_times(a, a.presence(a.conflict.first), b.presence(second) + delay)
     states = b.states(second, time - delay)
@@ -309,7 +309,7 @@ def _leader_speed(pair: InteractingPair, dt: float) -> Floats:
 
 
 def _poses_behind(pair: InteractingPair, station: Floats) -> Floats:
-    """(T, 3) poses at stations (T,) of the second vehicle's path, which the first one's continues."""
+    """(T, 3) poses at stations (T,) of the second path, which the first path continues."""
     leader, follower = (track.curve for track in pair.tracks)
     poses, beyond = follower.at(station), station - follower.length
     join, left = (float(value[0]) for value in leader.project(follower.points[-1:, :2]))

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The built-in roads that fit an encounter: `road="auto"` uses the first one, refusals name them."""
+"""The built-in roads that fit an encounter: `road="auto"` uses the first, refusals name all."""
 
 from collections.abc import Callable, Iterator
 from contextlib import suppress

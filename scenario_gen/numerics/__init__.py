@@ -20,7 +20,17 @@ from scenario_gen.numerics.arrays import (
 )
 
 __all__ = [
-    "Bools", "Counts", "Floats", "Ints", "canonical_heading", "canonical_poses", "freeze", "frozen",
+    "Bools",
+    "Counts",
+    "Floats",
+    "Ints",
+    "canonical_heading",
+    "canonical_poses",
+    "freeze",
+    "frozen",
     "frozen_bools",
-    "frozen_ints", "runs", "sealed", "wrap_angle",
-]  # fmt: skip
+    "frozen_ints",
+    "runs",
+    "sealed",
+    "wrap_angle",
+]

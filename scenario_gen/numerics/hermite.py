@@ -36,7 +36,7 @@ def interval_at(time: Floats, t: float) -> int:
 
 @kernel(inline=True)
 def cubic(p: float, v: float, q: float, w: float, h: float, u: float) -> float:
-    """Return one coordinate [m] at the share u of an interval of h [s], from p [m] with v [m/s] to q with w."""
+    """Return a coordinate [m] at share u of h [s], from p [m] with v [m/s] to q with w."""
     rest = 1.0 - u
     blend = u * u * (3.0 - 2.0 * u)
     return float(p + blend * (q - p) + h * u * rest * (rest * v - u * w))
@@ -79,7 +79,7 @@ def fill_states(
     at: Floats,
     out: Floats,
 ) -> None:
-    """Write the state of every vehicle at each requested time; before and after its presence its first and last state.
+    """Write the state of every vehicle at each time; outside its presence its nearest state.
 
     Args:
         time: (T,) seconds.

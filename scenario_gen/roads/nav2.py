@@ -107,7 +107,8 @@ def _origin(path: Path, content: dict[Any, Any]) -> Floats:
         raise InputError(f"{where} is {shown(value)}; a list of x, y and yaw is needed")
     if max(abs(v) for v in value) > MAX_ORIGIN_M:
         raise InputError(
-            f"{where} is {shown(value)}; at most {MAX_ORIGIN_M:g} m from the frame's origin are read"
+            f"{where} is {shown(value)}; at most {MAX_ORIGIN_M:g} m from the frame's origin "
+            "are read"
         )
     if len(value) == 3 and value[2] != 0.0:
         raise InputError(

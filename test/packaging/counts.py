@@ -58,19 +58,28 @@ MAX_PARAMETERS, MAX_FUNCTION_LINES = 8, 60
 BEFORE = {
     "tokens": 495_999,
     "long lines": 7_237,
-}
-# A change that needs more deletes something, or says why in the commit.
-BUDGET = {
-    "tokens": 499_000,
-    "long lines": 3_599,
     "complex functions": 161,
     "branching functions": 76,
     "nested functions": 56,
-    "long functions": 33,
+    "long functions": 0,
     "crowded functions": 1,
     "constants": 1_299,
     "constants without a unit": 917,
     "banned names": 1_014,
+}
+# A change that needs more tokens deletes something, or says why in the commit. Splitting dense
+# code into plain steps has cost 13,000 tokens so far; 435,000 are wanted.
+BUDGET = {
+    "tokens": 509_300,
+    "long lines": 109,
+    "complex functions": 20,
+    "branching functions": 14,
+    "nested functions": 10,
+    "long functions": 12,
+    "crowded functions": 1,
+    "constants": 945,
+    "constants without a unit": 23,
+    "banned names": 54,
 }
 
 UNITS = {
