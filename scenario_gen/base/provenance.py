@@ -20,6 +20,24 @@ RECORDING = (
 )
 
 
+_LOG_PREFIX = "log "
+_HASH_PREFIX = "sha256 "
+
+
+def log_texts(hashes: Mapping[str, str]) -> dict[str, str]:
+    """Return the provenance entries of logs, from their SHA-256 by name."""
+    return {_LOG_PREFIX + name: _HASH_PREFIX + sha256 for name, sha256 in hashes.items()}
+
+
+def read_log_hashes(texts: Mapping[str, str]) -> dict[str, str]:
+    """Return the SHA-256 of each log by its name, from `log_texts`."""
+    return {
+        name.removeprefix(_LOG_PREFIX): text.removeprefix(_HASH_PREFIX)
+        for name, text in texts.items()
+        if name.startswith(_LOG_PREFIX)
+    }
+
+
 def versions() -> dict[str, str]:
     """Return the versions that can change the last digits of a scenario."""
     result = {"scenario_gen": scenario_gen.__version__, "python": platform.python_version()}

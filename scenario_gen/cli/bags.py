@@ -7,7 +7,7 @@ from contextlib import nullcontext
 from functools import partial
 import json
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, TYPE_CHECKING
 
 import typer
 
@@ -28,6 +28,9 @@ from scenario_gen.cli.output import (
     print_table,
     progress,
 )
+
+if TYPE_CHECKING:
+    from scenario_gen.output.review.validation import Validation
 
 commands = Commands("Look at a bag of scenarios")
 
@@ -113,36 +116,43 @@ def validate(
     parameter_file: ParametersOption = None,
 ) -> None:
     """Check every scenario of a bag in continuous time. Exit code 1: a scenario is invalid."""
-    from scenario_gen.bags.recordings.read import NO_ENTRY
     from scenario_gen.output.review.validation import validate_bag
 
     config = configured(parameter_file, assignments)
     warn_of_metadata(bag)
     with progress() as advance:
-        found = validate_bag(
+        validations = validate_bag(
             bag, config.limits, config.bag, progress=partial(advance, "scenarios")
         )
-    emit_json(valid=not any(one.invalid for one in found), namespaces=found)
-    for one in found:
-        valid = one.scenarios - one.invalid
-        print_(f"{one.namespace or '/'}: {valid} of {one.scenarios} scenarios are valid")
-        if one.found:
-            rows = [
-                (cause, str(entry.count), str(entry.scenario), entry.message)
-                for cause, entry in one.found.items()
-            ]
-            print_table(("cause", "scenarios", "first", "violation"), rows)
-        if one.unaccounted:
-            print_(f"  {one.unaccounted} without an entry: {NO_ENTRY}")
-        for sentence in (
-            *(f"{message}: {count} scenarios" for message, count in one.proven.items()),
-            *one.missing,
-        ):
-            print_(f"  {sentence}")
-        for sentence, count in one.left_out.items():
-            print_(f"  not checked in {count}: {sentence}")
-    if any(one.invalid for one in found):
+    is_valid = not any(validation.invalid for validation in validations)
+    emit_json(valid=is_valid, namespaces=validations)
+    for validation in validations:
+        _print_validation(validation)
+    if not is_valid:
         raise typer.Exit(1)
+
+
+def _print_validation(validation: "Validation") -> None:
+    """Print the violations, the kept reactions and the skipped checks of a namespace."""
+    from scenario_gen.bags.recordings.read import NO_ENTRY
+
+    valid = validation.scenarios - validation.invalid
+    name = validation.namespace or "/"
+    print_(f"{name}: {valid} of {validation.scenarios} scenarios are valid")
+    if validation.found:
+        rows = [
+            (cause, str(entry.count), str(entry.scenario), entry.message)
+            for cause, entry in validation.found.items()
+        ]
+        print_table(("cause", "scenarios", "first", "violation"), rows)
+    if validation.unaccounted:
+        print_(f"  {validation.unaccounted} without an entry: {NO_ENTRY}")
+    for message, count in validation.proven.items():
+        print_(f"  {message}: {count} scenarios")
+    for message in validation.missing:
+        print_(f"  {message}")
+    for message, count in validation.left_out.items():
+        print_(f"  not checked in {count}: {message}")
 
 
 @commands.command("export", panel="Other formats")

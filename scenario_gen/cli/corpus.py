@@ -3,7 +3,7 @@
 
 """The commands for archives with many encounters."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import partial
@@ -90,7 +90,7 @@ def mine(
 
     config, corpus = assigned_all(CorpusConfig(), assignments), place(out, to_write=True)
     with workers_of(workers, scheduler) as who:
-        result = mined([place(one) for one in archive], corpus, config, workers=who)
+        result = mined([place(path) for path in archive], corpus, config, workers=who)
     conclude(result.lines(), result.failed, corpus, page=corpus / PAGE)
 
 
@@ -182,35 +182,38 @@ def find(
     if report is not None and bag is None:
         raise InputError("--report needs --bag, the bag that the page describes; give both")
     source = place(batch)
-    found = finding.find(source, condition)
-    emit_json(scenarios=found.rows, coverage=finding.coverage_lines(found, source))
-    listed = found.rows[: limit or None]
-    titles = [
-        f"{name} [{finding.UNITS[name]}]" if name in finding.UNITS else name
-        for name in finding.COLUMNS
-    ]
-    print_table(
-        titles, [[shown(row[name]) for name in finding.COLUMNS] for row in listed], names=3
-    )
-    summary = f"{len(found.rows)} scenarios" if found.rows else "no scenario matches"
-    if len(listed) < len(found.rows):
-        summary += f"; the first {len(listed)} are listed, --limit 0 lists all"
-    if found.rows:
-        summary += "; ttc is capped at evaluation.ttc_horizon (10 s)"
-    print_(summary)
-    print_(*finding.coverage_lines(found, source), sep="\n")
+    matches = finding.find(source, condition)
+    lines = finding.coverage_lines(matches, source)
+    emit_json(scenarios=matches.rows, coverage=lines)
+    _print_matches(matches.rows, limit)
+    print_(*lines, sep="\n")
     if again:
-        for row in found.rows:
+        for row in matches.rows:
             finding.make_again(source, row)
-        print_(f"{len(found.rows)} scenarios generated again: all byte-identical")
+        print_(f"{len(matches.rows)} scenarios generated again: all byte-identical")
     if bag is not None:
-        finding.export_hits(source, found.rows, bag)
+        finding.export_hits(source, matches.rows, bag)
         emit_json(bag=bag)
         print_(f"bag: {bag}")
         if report is not None:
             write_page(bag, report)
             emit_json(report=report)
             print_(f"report: {report}")
+
+
+def _print_matches(rows: Sequence[Mapping[str, object]], limit: int) -> None:
+    """Print a table of the first matching scenarios, and a summary; limit 0 prints all."""
+    from scenario_gen.corpus.find import COLUMNS, UNITS
+
+    listed = rows[: limit or None]
+    titles = [f"{name} [{UNITS[name]}]" if name in UNITS else name for name in COLUMNS]
+    print_table(titles, [[shown(row[name]) for name in COLUMNS] for row in listed], names=3)
+    summary = f"{len(rows)} scenarios" if rows else "no scenario matches"
+    if len(listed) < len(rows):
+        summary += f"; the first {len(listed)} are listed, --limit 0 lists all"
+    if rows:
+        summary += "; ttc is capped at evaluation.ttc_horizon (10 s)"
+    print_(summary)
 
 
 @commands.command(urls=("corpus",))
@@ -271,9 +274,9 @@ def coverage(
     ):
         raise InputError(f"--out {out}: name a new .html file, or a page to replace")
     results = results_of(bags)
-    found = population_of(results, templates or (5, 10, 20), draws=draws, seed=seed)
-    write_coverage(out, results, found)
-    emit_json(population=found, page=out)
-    print_(found.lead)
-    print_table(*found.table())
-    print_(*found.remarks(), f"page: {out}", sep="\n")
+    population = population_of(results, templates or (5, 10, 20), draws=draws, seed=seed)
+    write_coverage(out, results, population)
+    emit_json(population=population, page=out)
+    print_(population.lead)
+    print_table(*population.table())
+    print_(*population.remarks(), f"page: {out}", sep="\n")

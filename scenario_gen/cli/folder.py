@@ -221,15 +221,23 @@ def read_logs(
     with progress() as advance:
         for k, (group, roads) in enumerate(requested.jobs):
             advance("logs read", k, len(requested.jobs))
-            try:
-                readings.append((read_log(group, requested.config.log), roads))
-            except NoEncounterError as error:
-                if len(requested.jobs) == 1:
-                    raise
-                notify(f"no encounter: {error}")
+            log = _read_job(group, requested, notify)
+            if log is not None:
+                readings.append((log, roads))
     for line in log_notes([log for log, _ in readings]):
         notify(line)
     return readings
+
+
+def _read_job(group: Sequence[Path], requested: FolderRequest, notify: Notify) -> LogResult | None:
+    """Return a log; None, with a notification, if one of several logs has no encounter."""
+    try:
+        return read_log(group, requested.config.log)
+    except NoEncounterError as error:
+        if len(requested.jobs) == 1:
+            raise
+        notify(f"no encounter: {error}")
+        return None
 
 
 def map_faults(cases: Sequence[GenerationResult]) -> list[str]:

@@ -59,6 +59,11 @@ def json_value(value: Any) -> Any:
         return [json_value(item) for item in value]
     if hasattr(value, "tolist"):  # NumPy arrays and scalars
         return json_value(value.tolist())
+    return _json_scalar(value)
+
+
+def _json_scalar(value: Any) -> bool | int | float | str | None:
+    """Return a scalar for JSON; anything but a number or None becomes text."""
     if isinstance(value, float):
         return value if math.isfinite(value) else None
     if value is None or isinstance(value, (bool, int)):

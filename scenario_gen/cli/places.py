@@ -5,6 +5,7 @@
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, ExitStack
+from functools import partial
 from pathlib import Path
 from typing import Any, get_args, get_type_hints
 
@@ -43,6 +44,15 @@ def _members(kind: Any) -> set[Any]:
     return {*arguments, *(inner for argument in arguments for inner in get_args(argument))}
 
 
+def _converted(value: Any, convert: Callable[[Path], Path]) -> Any:
+    """Return a parameter with its path, or each path of its list, converted; None stays None."""
+    if value is None:
+        return None
+    if isinstance(value, list):
+        return [convert(path) for path in value]
+    return convert(value)
+
+
 @contextmanager
 def as_files(values: Mapping[str, Any], outputs: Mapping[str, bool]) -> Iterator[dict[str, Any]]:
     """Yield a command's values with files in place of URLs; upload its outputs afterwards.
@@ -77,11 +87,7 @@ def as_files(values: Mapping[str, Any], outputs: Mapping[str, bool]) -> Iterator
 
         files = dict(values)
         for name, is_output in outputs.items():
-            value = values[name]
-            if isinstance(value, list):
-                files[name] = [local(path, is_output=is_output) for path in value]
-            elif value is not None:
-                files[name] = local(value, is_output=is_output)
+            files[name] = _converted(values[name], partial(local, is_output=is_output))
         refused: Exception | None = None
         try:
             yield files

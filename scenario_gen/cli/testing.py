@@ -18,6 +18,7 @@ from scenario_gen.cli.output import emit_json, print_, print_table, progress
 if TYPE_CHECKING:
     from scenario_gen.closed_loop.command import RunTrials
     from scenario_gen.closed_loop.results import Drives
+    from scenario_gen.closed_loop.search.command import SearchResult
     from scenario_gen.output.review.regenerate import Replanned
 
 commands = Commands("Test a planner")
@@ -302,18 +303,7 @@ def search(options: Search) -> None:
         sentences=result.sentences(),
         files=result.written,
     )
-    print_(*result.sentences(), sep="\n")
-    if result.findings:
-        rows = [
-            (
-                kind,
-                str(len(own)),
-                f"drive {own[0].trial.name}: {own[0].outcome.verdict.sentence()}",
-            )
-            for kind, own in result.kinds.items()
-        ]
-        print_table(("kind of failure", "shown", "most likely"), rows)
-    print_(*map(str, result.written), sep="\n")
+    _print_findings(result)
     if result.findings:
         print_(
             f"as a regression test: scenario-gen drive {options.out / 'bag'} "
@@ -325,3 +315,19 @@ def search(options: Search) -> None:
             f"{result.estimate.bound:.3g} (95 %)"
         )
         raise typer.Exit(1)
+
+
+def _print_findings(result: "SearchResult") -> None:
+    """Print the estimate, the kinds of failures and the written files."""
+    print_(*result.sentences(), sep="\n")
+    if result.findings:
+        rows = [
+            (
+                kind,
+                str(len(findings)),
+                f"drive {findings[0].trial.name}: {findings[0].outcome.verdict.sentence()}",
+            )
+            for kind, findings in result.kinds.items()
+        ]
+        print_table(("kind of failure", "shown", "most likely"), rows)
+    print_(*map(str, result.written), sep="\n")

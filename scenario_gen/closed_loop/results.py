@@ -25,7 +25,13 @@ from scenario_gen.closed_loop.config import ClosedLoopConfig
 from scenario_gen.closed_loop.origin import Trial
 from scenario_gen.closed_loop.reacting import TRIVIAL, trivial_note
 from scenario_gen.closed_loop.trials import Outcome, passed_of, rates
-from scenario_gen.output.report.data import FRAME_PERIOD, MAX_FRAMES, pack, road_data, states
+from scenario_gen.output.report.data import (
+    FRAME_PERIOD_S,
+    MAX_FRAMES_COUNT,
+    pack,
+    road_data,
+    states,
+)
 from scenario_gen.output.report.html import render_page
 
 JSON, JUNIT, PAGE = "drives.json", "junit.xml", "drives.html"
@@ -253,7 +259,7 @@ def drawings(
 def _drawing(outcome: Outcome, trial: Trial, road: int) -> dict[str, Any]:
     drive, verdict = outcome.drive, outcome.verdict
     motion = drive.motion
-    frames = max(2, min(MAX_FRAMES, int(np.ceil(verdict.duration / FRAME_PERIOD)) + 1))
+    frames = max(2, min(MAX_FRAMES_COUNT, int(np.ceil(verdict.duration / FRAME_PERIOD_S)) + 1))
     spans = [
         motion.time[row][[0, -1]].tolist() if row.any() else [0.0, -1.0] for row in drive.present
     ]

@@ -14,7 +14,7 @@ from scenario_gen.bags.recordings.write import add_results
 from scenario_gen.bags.storage.config import BagConfig
 from scenario_gen.bags.storage.writer import BagWriter
 from scenario_gen.base.folders import Kind, replaced_folder, sha256_of, write_text
-from scenario_gen.base.provenance import what_makes_it_again
+from scenario_gen.base.provenance import log_texts, what_makes_it_again
 from scenario_gen.output.report.page import ReportInput, write_report
 from scenario_gen.pipeline import PipelineConfig
 from scenario_gen.types import as_markdown, GenerationResult, Request
@@ -47,7 +47,7 @@ def write_results(
     """Write bag, report and figures of all cases to `folder`.
 
     Args:
-        folder: that `replaced_folder` gives; if it has a bag already, which was recorded, that one stays.
+        folder: a folder from `replaced_folder`; a recorded bag that it has already is kept.
         cases: one per encounter and road; with several, each has its own namespace in the bag.
         title: heading of the report.
         quality: the log's data-quality summary, in lines.
@@ -59,15 +59,17 @@ def write_results(
     if not (folder / BAG).exists():
         names = namespaces(len(cases))
         with BagWriter(folder / BAG) as bag:
-            own = [replace(case, provenance={**provenance, **case.provenance}) for case in cases]
-            add_results(bag, dict(zip(names, own, strict=True)))
+            results = [
+                replace(case, provenance={**provenance, **case.provenance}) for case in cases
+            ]
+            add_results(bag, dict(zip(names, results, strict=True)))
     write_report(folder / REPORT, ReportInput(cases, title, quality, provenance, BAG))
     figures = {"provenance": dict(provenance), "cases": [_figures(case) for case in cases]}
     write_text(folder / FIGURES, json.dumps(figures, indent=2) + "\n")
 
 
 def _figures(case: GenerationResult) -> dict[str, Any]:
-    """Return a case's E beside what it is compared with, who reacts to whom, its evaluation, and what the stages did."""
+    """Return a case's similarity, reactions, evaluation and figures of the stages."""
     vehicles = zip(case.encounter.vehicles, case.routes, strict=True) if case.routes else ()
     figures: dict[str, Any] = {"similarity": case.similarity(), "reactions": case.reacting}
     figures |= json.loads(case.evaluation.to_json()) | {
@@ -91,7 +93,7 @@ def _figures(case: GenerationResult) -> dict[str, Any]:
 def write_evaluation(
     folder: Path, cases: Sequence[GenerationResult], bag: Path, config: BagConfig
 ) -> None:
-    """Write report, figures and table of what a bag was found to hold to `folder`, which `replaced_folder` gives.
+    """Write report, figures and table about a bag to a `folder` from `replaced_folder`.
 
     Raises:
         OSError: the disk is full, or fails.
@@ -133,11 +135,11 @@ def provenance_of(
     config: PipelineConfig,
     request: Request = Request(),
 ) -> dict[str, str]:
-    """Return everything needed to do it again: log hashes, seed, versions, the request and all parameters."""
+    """Return log hashes, seed, versions, request and parameters, to generate the results again."""
     names = [path.name for path in logs]
-    facts = {
-        f"log {path if names.count(path.name) > 1 else path.name}": f"sha256 {sha256_of(path)}"
-        for path in logs
+    hashes = {
+        str(path) if names.count(path.name) > 1 else path.name: sha256_of(path) for path in logs
     }
+    facts = log_texts(hashes)
     facts |= {"roads": ", ".join(roads), "seed": str(seed), "count": str(count)}
     return facts | what_makes_it_again(config, request)

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""What the report draws, made small: trajectories as 16-bit integers, matrices as bytes, the road as runs of cells."""
+"""Compact data of the report: trajectories as 16-bit integers, matrices as bytes."""
 
 from base64 import b64encode
 from collections.abc import Mapping, Sequence
@@ -26,52 +26,28 @@ from scenario_gen.types import (
 )
 from scenario_gen.types.markings import markings
 
-FRAME_PERIOD = 0.2
-"""Seconds between the frames that are stored; the page interpolates between them."""
-MAX_FRAMES, MAX_CELLS, MATRIX_SIZE, MAX_PAIRS, MAX_ROUTE_POINTS, MAX_LINES = (
-    240,
-    900,
-    72,
-    10,
-    200,
-    400,
-)
-MOTION_PERIOD, MAX_MOTION_FRAMES, MAX_MOTION_SAMPLES = 0.1, 400, 12
-"""Speed and accelerations over time are stored more finely than the animation, of fewer samples."""
+FRAME_PERIOD_S = 0.2
+"""Period of the stored frames; the page interpolates between them."""
+MAX_FRAMES_COUNT = 240
+MAX_CELLS = 900
+MATRIX_SIZE_CELLS = 72
+MAX_PAIRS_COUNT = 10
+MAX_ROUTE_POINTS = 200
+MAX_LINES = 400
+MOTION_PERIOD_S = 0.1
+"""Period of speeds and accelerations: shorter than that of the animation, for fewer samples."""
+MAX_MOTION_FRAMES_COUNT = 400
+MAX_MOTION_SAMPLES = 12
 
 
 def case_data(case: GenerationResult, samples: int) -> dict[str, Any]:
-    """Return all that one case draws, ready for JSON; at most `samples` scenarios of each arm."""
-    sets = {
-        "with": case.generated,
-        "without": case.references.get(WITHOUT),
-        "uniform": case.references.get(UNIFORM),
-    }
-    arms = {
-        name: tuple(result.scenarios[:samples])
-        for name, result in sets.items()
-        if result is not None
-    }
-    covered = case.coverage
-    if covered is not None:  # the scenarios that stand out are always drawn
-        shown = {scenario.index for scenario in arms["with"]}
-        extra = {index for index in covered.picks.values() if index not in shown}
-        arms["with"] += (
-            tuple(
-                scenario
-                for scenario in case.generated.scenarios[samples:]
-                if scenario.index in extra
-            )
-            if extra
-            else ()
-        )
+    """Return the drawings of one case for JSON, with at most `samples` scenarios per set."""
+    arms = _arms(case, samples)
     ids = [vehicle.id for vehicle in case.encounter.vehicles]
-    if case.replay is not None:
-        arms["replay"] = (case.replay,)
     longest = max(
         [case.encounter.duration, *(float(s.time[-1]) for group in arms.values() for s in group)]
     )
-    frames = min(MAX_FRAMES, int(np.ceil(longest / FRAME_PERIOD)) + 1)
+    frames = min(MAX_FRAMES_COUNT, int(np.ceil(longest / FRAME_PERIOD_S)) + 1)
     return {
         "row": case.row_name,
         "vehicles": [
@@ -86,13 +62,35 @@ def case_data(case: GenerationResult, samples: int) -> dict[str, Any]:
         "arms": {name: _trajectories(group, frames, ids) for name, group in arms.items() if group},
         "turn": _turn(case.encounter, case.fit),
         "motion": _motion(case.encounter, case.generated.scenarios[:MAX_MOTION_SAMPLES]),
-        "coverage": None if covered is None else covered.document(),
+        "coverage": None if case.coverage is None else case.coverage.document(),
         "features": _features(case.encounter, arms, case.evaluation.vehicles),
     }
 
 
+def _arms(case: GenerationResult, samples: int) -> dict[str, tuple[Scenario, ...]]:
+    """Return the drawn scenarios of each set; picks of the coverage are always drawn."""
+    sets = {
+        "with": case.generated,
+        "without": case.references.get(WITHOUT),
+        "uniform": case.references.get(UNIFORM),
+    }
+    arms = {
+        name: tuple(result.scenarios[:samples])
+        for name, result in sets.items()
+        if result is not None
+    }
+    if case.coverage is not None:
+        shown = {scenario.index for scenario in arms["with"]}
+        picks = set(case.coverage.picks.values()) - shown
+        rest = case.generated.scenarios[samples:] if picks else ()
+        arms["with"] += tuple(scenario for scenario in rest if scenario.index in picks)
+    if case.replay is not None:
+        arms["replay"] = (case.replay,)
+    return arms
+
+
 def pack(values: Floats) -> dict[str, Any]:
-    """Pack an array (..., K), any unit, as 16-bit integers, each of its K columns with its own offset and step."""
+    """Pack an array (..., K) of any unit as 16-bit integers, with offset and step per column."""
     flat = values.reshape(-1, values.shape[-1])
     low, high = flat.min(axis=0), flat.max(axis=0)
     step = np.maximum((high - low) / 65535.0, 1e-9)
@@ -106,7 +104,7 @@ def pack(values: Floats) -> dict[str, Any]:
 
 
 def runs(mask: Bools) -> list[int]:
-    """Return the lengths of the runs of equal cells of a grid (H, W) in row order, the first of them False (possibly 0)."""
+    """Return the run lengths of a grid (H, W) in row order; the first run is False (may be 0)."""
     flat = mask.ravel()
     edges = np.flatnonzero(np.diff(flat)) + 1
     lengths = np.diff(np.concatenate([[0], edges, [flat.size]]))
@@ -118,9 +116,10 @@ def _short(value: float, digits: int = 3) -> float:
 
 
 def road_data(road: Road) -> dict[str, Any]:
-    """Return the grid with cells merged until its longer side has at most MAX_CELLS; a merged cell is drivable by majority.
+    """Return the grid, merged until its longer side has at most MAX_CELLS.
 
-    What is drivable for some types alone, as a cycle lane, is drivable.
+    A merged cell is drivable by majority. Cells for some types only, as of cycle lanes, count as
+    drivable.
     """
     factor = max(1, -(-max(road.drivable.shape) // MAX_CELLS))
     height, width = (-(-side // factor) for side in road.drivable.shape)
@@ -143,7 +142,7 @@ def road_data(road: Road) -> dict[str, Any]:
 
 
 def _markings(road: Road) -> dict[str, list[list[float]]]:
-    """Return what is painted on the road, each line x, y, x, y … [m] by its kind; of a large map's lines only some."""
+    """Return road markings by kind, each as x, y, x, y, … [m]; a subset on large maps."""
     drawn = {}
     for kind, lines in (markings(road.lanes) if road.lanes is not None else {}).items():
         some = lines[:: max(1, -(-len(lines) // MAX_LINES))]
@@ -156,7 +155,7 @@ def _markings(road: Road) -> dict[str, list[list[float]]]:
 
 
 def _turn(encounter: Encounter, fit: Fit | None) -> float:
-    """Return the angle [rad] that turns the record as it lies on the road: the mean over its vehicles' first headings."""
+    """Return the angle [rad] from the recording to the road: the mean over first headings."""
     if fit is None or not fit.fitted:
         return 0.0
     turned = np.array(
@@ -169,7 +168,7 @@ def _turn(encounter: Encounter, fit: Fit | None) -> float:
 
 
 def states(source: Encounter | Scenario, frames: int) -> Floats:
-    """Return (N, frames, 4) x, y [m], yaw [rad], speed [m/s] at instants spread evenly from start to end."""
+    """Return (N, frames, 4) x, y [m], yaw [rad], speed [m/s] at evenly spaced instants."""
     at = source.at(np.linspace(0.0, source.time[-1], frames))
     return np.concatenate([at.poses, at.speed[..., None]], axis=-1)
 
@@ -179,45 +178,50 @@ def _trajectories(
 ) -> dict[str, Any]:
     return {
         "states": pack(np.stack([_whole(scenario, frames, ids) for scenario in scenarios])),
-        "there": [_there(scenario, ids) for scenario in scenarios],
+        "there": [_presence(scenario, ids) for scenario in scenarios],
         "durations": [_short(scenario.time[-1]) for scenario in scenarios],
         "index": [scenario.index for scenario in scenarios],
     }
 
 
-def _there(source: Encounter | Scenario, ids: Sequence[str]) -> list[list[float]]:
-    """Return from which to which share of the duration each vehicle is there; one that is left out, throughout."""
-    own = [vehicle.id for vehicle in source.vehicles]
+def _presence(source: Encounter | Scenario, ids: Sequence[str]) -> list[list[float]]:
+    """Return the first and last instant of each vehicle, as shares of the duration.
+
+    A vehicle that is left out counts as present throughout.
+    """
     shares = source.time[source.present] / source.time[-1]
-    return [
-        [_short(v, 5) for v in shares[own.index(known)]] if known in own else [0.0, 1.0]
-        for known in ids
-    ]
+    present = {
+        vehicle.id: [_short(share, 5) for share in interval]
+        for vehicle, interval in zip(source.vehicles, shares, strict=True)
+    }
+    return [present.get(name, [0.0, 1.0]) for name in ids]
 
 
 def _whole(scenario: Scenario, frames: int, ids: Sequence[str]) -> Floats:
-    """Return the states of all vehicles; in place of one that was left out stands the ego's witness.
+    """Return the states of all vehicles; a left-out vehicle has those of the reference drive.
 
-    Without a witness it is drawn where the first vehicle is, underneath it.
+    Without a reference drive, it is drawn under the first vehicle.
     """
-    own = {
+    known = {
         vehicle.id: state
         for vehicle, state in zip(scenario.vehicles, states(scenario, frames), strict=True)
     }
     track = (
-        next(iter(own.values()))
+        next(iter(known.values()))
         if scenario.reference_drive is None
         else states(scenario.reference_drive, frames)[0]
     )
-    return np.stack([own.get(known, track) for known in ids])
+    return np.stack([known.get(name, track) for name in ids])
 
 
 def _motion(encounter: Encounter, scenarios: Sequence[Scenario]) -> list[dict[str, Any]]:
-    """Return for each vehicle speed, acceleration and lateral acceleration of the template and of the scenarios that have it."""
+    """Return speed and accelerations of each vehicle, in the template and in the scenarios."""
     motions = []
     for n, vehicle in enumerate(encounter.vehicles):
         rows = [
-            (s, k) for s in scenarios for k, own in enumerate(s.vehicles) if own.id == vehicle.id
+            (scenario, _index(scenario, vehicle.id))
+            for scenario in scenarios
+            if any(other.id == vehicle.id for other in scenario.vehicles)
         ]
         samples = [_over_time(scenario, k) for scenario, k in rows]
         index = [scenario.index for scenario, _ in rows]
@@ -225,10 +229,18 @@ def _motion(encounter: Encounter, scenarios: Sequence[Scenario]) -> list[dict[st
     return motions
 
 
+def _index(scenario: Scenario, name: str) -> int:
+    """Return the index of a vehicle in a scenario."""
+    return [vehicle.id for vehicle in scenario.vehicles].index(name)
+
+
 def _over_time(source: Encounter | Scenario, n: int) -> dict[str, Any]:
-    """Speed [m/s], acceleration and lateral acceleration (speed times yaw rate) [m/s²] of one vehicle while it is there."""
+    """Return the motion of one vehicle while it is present.
+
+    Columns: speed [m/s], acceleration, and lateral acceleration (speed times yaw rate) [m/s²].
+    """
     first, last = source.time[source.present[n]].tolist()
-    frames = min(MAX_MOTION_FRAMES, max(3, round((last - first) / MOTION_PERIOD) + 1))
+    frames = min(MAX_MOTION_FRAMES_COUNT, max(3, round((last - first) / MOTION_PERIOD_S) + 1))
     time = np.linspace(first, last, frames)
     states = source.at(time)
     speed = states.speed[n]
@@ -277,7 +289,7 @@ def _fit(fit: Fit, routes: Sequence[Route]) -> list[dict[str, Any]]:
 
 
 def _reactions(case: GenerationResult) -> list[dict[str, Any]]:
-    """Return who reacts to whom, as indices of vehicles, and from which to which share of the recording."""
+    """Return the reactions between vehicles, with their interval as shares of the recording."""
     duration = case.encounter.duration
     return [
         {
@@ -294,26 +306,36 @@ def _reactions(case: GenerationResult) -> list[dict[str, Any]]:
 def _features(
     encounter: Encounter, arms: Mapping[str, Sequence[Scenario]], shared: Sequence[str]
 ) -> list[dict[str, Any]]:
-    """Return the paper's figure 5 for each pair of the `shared` vehicles: matrices of MATRIX_SIZE² bytes, 255 = 1."""
+    """Return the paper's figure 5 for pairs of `shared` vehicles: bytes, 255 = 1."""
     groups: dict[str, Sequence[Encounter | Scenario]] = {"template": [encounter], **arms}
     pairs = []
     rows = [n for n, vehicle in enumerate(encounter.vehicles) if vehicle.id in shared]
-    for pair in list(combinations(rows, 2))[:MAX_PAIRS]:
+    for pair in list(combinations(rows, 2))[:MAX_PAIRS_COUNT]:
         names = encounter.vehicles[pair[0]].id, encounter.vehicles[pair[1]].id
         entry: dict[str, Any] = {"pair": list(pair), "position": {}, "speed": {}}
         for name, group in groups.items():
-            common = [common_motion(source, names, MATRIX_SIZE) for source in group]
-            motions = [motion for motion in common if motion is not None]
-            if not motions:
-                continue
-            place = [
-                np.ascontiguousarray(np.stack([m.position[k].T for m in motions])) for k in (0, 1)
-            ]
-            pace = [np.stack([m.speed[k][None] for m in motions]) for k in (0, 1)]
-            entry["position"][name] = _bytes(mean_feature(place[0], place[1], "euclidean"))
-            entry["speed"][name] = _bytes(mean_feature(pace[0], pace[1], "manhattan"))
+            matrices = _matrices(group, names)
+            if matrices is not None:
+                entry["position"][name], entry["speed"][name] = matrices
         pairs.append(entry)
     return pairs
+
+
+def _matrices(
+    group: Sequence[Encounter | Scenario], names: tuple[str, str]
+) -> tuple[str, str] | None:
+    """Return the mean matrices of positions and speeds of a pair; None without common motion."""
+    common = [common_motion(source, names, MATRIX_SIZE_CELLS) for source in group]
+    motions = [motion for motion in common if motion is not None]
+    if not motions:
+        return None
+    first, second = (
+        np.ascontiguousarray(np.stack([motion.position[k].T for motion in motions]))
+        for k in (0, 1)
+    )
+    speeds = [np.stack([motion.speed[k][None] for motion in motions]) for k in (0, 1)]
+    position_matrix = _bytes(mean_feature(first, second, "euclidean"))
+    return position_matrix, _bytes(mean_feature(speeds[0], speeds[1], "manhattan"))
 
 
 def _bytes(matrix: Floats) -> str:

@@ -1,9 +1,10 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""One published scenario again from what its bag says: template, road, parameters, seed and index.
+"""Regenerate a published scenario from its bag: template, road, parameters, seed and index.
 
-On the same machine and versions the bytes are mostly the same; on another CPU the places are, within a centimetre.
+With the same machine and versions, the bytes are mostly identical; on another CPU, positions agree
+within a centimetre.
 """
 
 from collections.abc import Sequence
@@ -24,9 +25,8 @@ from scenario_gen.bags.storage.config import BagConfig
 from scenario_gen.bags.storage.writer import atomic_bag
 from scenario_gen.base.errors import InputError, ScenarioGenError
 from scenario_gen.base.folders import Kind, sha256_of
-from scenario_gen.base.provenance import read_parameters, versions
+from scenario_gen.base.provenance import read_log_hashes, read_parameters, versions
 from scenario_gen.logs import LogConfig, read_log
-from scenario_gen.method.config import PipelineConfig
 from scenario_gen.method.evaluation import MEASURES
 from scenario_gen.method.fitting import fit_template, FittingConfig
 from scenario_gen.method.routing import plan_routes, PlanningConfig
@@ -43,14 +43,15 @@ TEMPLATE = ("tracks", "changepoints", "map", "fit")
 
 @dataclass(frozen=True, eq=False)
 class Regenerated:
-    """A scenario made again.
+    """A regenerated scenario.
 
     Attributes:
-        scenario: that of the bag, its reference drive too.
-        data: its CDR bytes as they are in the bag, whose SHA-256 is that in `scenarios/info`.
-        messages: those of the bag that belong to it (template, road, routes, its own, its entry), for a bag of its own.
-        sha256: of `data`.
-        distance: largest distance [m] of what was made from what is in the bag; None if the bytes are the same.
+        scenario: the scenario with its reference drive.
+        data: its CDR bytes in the bag, whose SHA-256 is in `scenarios/info`.
+        messages: its messages in the bag: template, road, routes, scenario and entry.
+        sha256: SHA-256 of `data`.
+        distance: largest distance [m] between the regenerated and the recorded positions; None if
+            the bytes are identical.
     """
 
     scenario: Scenario
@@ -61,12 +62,10 @@ class Regenerated:
 
     @property
     def comparison(self) -> str:
-        """Which of the two was seen."""
-        return (
-            "the same bytes"
-            if self.distance is None
-            else f"the same within {max(self.distance * 1e3, 0.001):.3f} mm"
-        )
+        """The comparison with the recorded scenario in words."""
+        if self.distance is None:
+            return "the same bytes"
+        return f"the same within {max(self.distance * 1e3, 0.001):.3f} mm"
 
 
 def regenerate_scenario(
@@ -78,65 +77,79 @@ def regenerate_scenario(
     log: Path | None = None,
     config: BagConfig = BagConfig(),
 ) -> Regenerated:
-    """Make scenario `index` of a bag again and compare it with the recorded one: its bytes, or its places within 1 cm.
+    """Regenerate scenario `index` of a bag and compare it with the recorded one.
 
-    Everything is taken from the bag; where `log` is given, tracks and changepoints are made from that file instead, so that
-    the whole chain is repeated.
+    The bytes must be identical, or the positions equal within 1 cm. All inputs come from the bag;
+    with `log`, tracks and changepoints come from that file, so that the whole chain is repeated.
 
     Args:
-        bag: its folder.
-        index: as in `scenarios/info`.
-        namespace: where several hold such an index.
-        request: id, likewise.
+        bag: folder of the bag.
+        index: index of the scenario in `scenarios/info`.
+        namespace: its namespace, needed if several have such an index.
+        request: id of its request, needed if several have such an index.
         log: the raw log.
-        config: what is read of the bag at most.
+        config: limits on the size of the bag.
 
     Raises:
-        InputError: the bag, the index, or something that is needed is not there or ambiguous; the log is another one.
-        ScenarioGenError: it comes out differently (another version); the message names what differs.
+        InputError: the bag, the index or a required message is missing or ambiguous, or the log is
+            not the one of the bag.
+        ScenarioGenError: the result differs, for example with another version; the message names
+            the differing versions.
     """
     with naming_bag(bag):
-        found = _find(bag, index, namespace, request, config)
-        return _regenerate(found, f"{bag}: request {found.entry.request}", log)
+        published = _find(bag, index, namespace, request, config)
+        return _regenerate(published, f"{bag}: request {published.entry.request}", log)
 
 
-def _regenerate(found: "_Found", what: str, log: Path | None) -> Regenerated:
-    """Make the scenario that was found; `what` names bag and request in messages."""
-    values, seed, index = found.summary.values, found.entry.seed, found.entry.index
-    known = _replan(found, what, log)
-    encounter, requested, sampling = known.planned.encounter, known.request, known.sampling
-    plan = Plan.of(known.planned, sampling, known.limits, requested)
+def _regenerate(published: "_Published", origin: str, log: Path | None) -> Regenerated:
+    """Regenerate a published scenario; `origin` names bag and request in messages."""
+    entry = published.entry
+    source = _replan(published, origin, log)
+    requested, sampling = source.request, source.sampling
+    plan = Plan.of(source.planned, sampling, source.limits, requested)
     check = None
-    if requested.target or requested.order == "swap":  # a proposal is found again with them
-        check = checker_of(plan, sampling, known.limits, requested).check
+    if requested.target or requested.order == "swap":  # these proposals depend on the checks
+        check = checker_of(plan, sampling, source.limits, requested).check
     scenario = regenerate(
-        plan, sampling, seed=seed, index=index, request=requested, check=check, measures=MEASURES
+        plan,
+        sampling,
+        seed=entry.seed,
+        index=entry.index,
+        request=requested,
+        check=check,
+        measures=MEASURES,
     )
-    recorded, witness = found.namespace.published(found.entry)
-    pairs = [] if scenario is None else [(scenario, recorded)]
-    if scenario is not None and scenario.reference_drive is not None:
+    recorded, witness = published.namespace.published(entry)
+    if scenario is None or bool(witness) != (scenario.reference_drive is not None):
+        raise _differs(published, origin)
+    pairs = [(scenario, recorded)]
+    if scenario.reference_drive is not None:
         pairs.append((scenario.reference_drive, witness))
+    encounter = source.planned.encounter
     distances = [distance_apart(made, encounter, data) for made, data in pairs]
-    distance = max((each for each in distances if each is not None), default=None)
-    if (
-        scenario is None
-        or bool(witness) != (scenario.reference_drive is not None)
-        or (distance or 0.0) > MOST_APART_M
-    ):
-        now = versions()
-        other = [
-            f"{name} {values[name]} there, {now[name]} here"
-            for name in now
-            if values.get(name, now[name]) != now[name]
-        ]
-        why = ", ".join(other) or "the versions agree, so the bag was changed"
-        raise ScenarioGenError(f"{what}: scenario {index} comes out differently: {why}")
-    return Regenerated(scenario, recorded, found.messages, found.entry.sha256, distance)
+    known = [distance for distance in distances if distance is not None]
+    distance = max(known, default=None)
+    if distance is not None and distance > MOST_APART_M:
+        raise _differs(published, origin)
+    return Regenerated(scenario, recorded, published.messages, entry.sha256, distance)
+
+
+def _differs(published: "_Published", origin: str) -> ScenarioGenError:
+    """Return the error for a scenario that differs from the published one."""
+    recorded, current = published.summary.values, versions()
+    changes = [
+        f"{name} {recorded[name]} there, {current[name]} here"
+        for name in current
+        if recorded.get(name, current[name]) != current[name]
+    ]
+    why = ", ".join(changes) or "the versions agree, so the bag was changed"
+    index = published.entry.index
+    return ScenarioGenError(f"{origin}: scenario {index} comes out differently: {why}")
 
 
 @dataclass(frozen=True, eq=False)
 class Replanned:
-    """What the scenarios of a recorded request were drawn from: the template on its road, the request and the parameters."""
+    """The source of the scenarios of a request: template on its road, request, parameters."""
 
     planned: GenerationResult
     request: Request
@@ -147,36 +160,36 @@ class Replanned:
 def replanned(
     bag: Path, namespace: str | None = None, config: BagConfig = BagConfig()
 ) -> Replanned:
-    """Return what the scenarios of a bag were drawn from; those of its first request, if there are several.
+    """Return the source of the scenarios of a bag; of its first request, if it has several.
 
     Args:
-        bag: its folder.
-        namespace: where several hold scenarios.
-        config: what is read of the bag at most.
+        bag: folder of the bag.
+        namespace: needed if several namespaces have scenarios.
+        config: limits on the size of the bag.
 
     Raises:
-        InputError: the bag or something that is needed is not there, or several namespaces hold scenarios.
+        InputError: the bag or a required message is missing, or several namespaces have scenarios.
     """
     with naming_bag(bag):
         entries = _entries(bag, config)
         names = sorted({where.name for where, _, _ in entries})
         if namespace is None and len(names) > 1:
             raise InputError(
-                f"{bag}: {len(names)} namespaces hold scenarios; choose one: --namespace {' or '.join(names)}"
+                f"{bag}: {len(names)} namespaces hold scenarios; choose one: --namespace "
+                f"{' or '.join(names)}"
             )
-        own = [entry for where, entry, _ in entries if namespace in (None, where.name)]
-        if not own:
+        matching = [entry for where, entry, _ in entries if namespace in (None, where.name)]
+        if not matching:
             raise InputError(
                 f"{bag}: no namespace {namespace!r}; there is {', '.join(map(repr, names))}"
             )
-        found = _find(bag, own[0].index, namespace, own[0].request, config)
-        known = _replan(found, f"{bag}: request {found.entry.request}", None)
-        facts, planned = found.entry.status.values, known.planned
+        first = matching[0]
+        published = _find(bag, first.index, namespace, first.request, config)
+        source = _replan(published, f"{bag}: request {published.entry.request}", None)
+        facts, planned = published.entry.status.values, source.planned
         road, placed = planned.road_and_fit()
-        fit = found.namespace.fit[
-            0
-        ]  # with what was decided, which the messages of one request do not hold
-        if fit is not None and not known.request.moves:
+        fit = published.namespace.fit[0]  # has decisions that a request's messages lack
+        if fit is not None and not source.request.moves:
             placed = replace(fit, requested=placed.requested)
         encounter = replace(planned.encounter, name=facts.get("template", planned.encounter.name))
         planned = replace(
@@ -185,48 +198,46 @@ def replanned(
             road=replace(road, name=facts.get("road", road.name)),
             fit=placed,
         )
-        return replace(known, planned=planned)
+        return replace(source, planned=planned)
 
 
-def _replan(found: "_Found", what: str, log: Path | None) -> Replanned:
-    """Return what a scenario was drawn from; `what` names bag and request in messages."""
-    values, seed = found.summary.values, found.entry.seed
+def _replan(published: "_Published", origin: str, log: Path | None) -> Replanned:
+    """Return the source of a scenario; `origin` names bag and request in messages."""
+    values, seed = published.summary.values, published.entry.seed
     requested = Request(
         **{entry.name: values.get(entry.name, str(entry.default)) for entry in fields(Request)}
     )
-    template = found.template(what)
-    config = PipelineConfig(sampling=read_parameters(SamplingConfig(), values, "sampling.", what))
-    config = replace(config, limits=read_parameters(Limits(), values, "limits.", what))
+    template = published.template(origin)
+    sampling = read_parameters(SamplingConfig(), values, "sampling.", origin)
+    limits = read_parameters(Limits(), values, "limits.", origin)
     planned = replace(template, seed=seed)
-    if requested.moves or log is not None:  # what the bag has on `fit` need not be this request's
-        encounter, segmentation, road = (
-            template.encounter,
-            template.segmentation,
-            template.road_and_fit()[0],
-        )
+    if requested.moves or log is not None:  # the bag's fit may belong to another request
+        encounter = template.encounter
+        segmentation = template.segmentation
+        road, _ = template.road_and_fit()
         if log is not None:
-            encounter, segmentation = _from_log(log, encounter, found.summary, seed, what)
-        fitting = read_parameters(FittingConfig(), values, "fitting.", what)
-        planning = read_parameters(PlanningConfig(), values, "planning.", what)
-        situation, limits = Situation.of(encounter), config.limits
+            encounter, segmentation = _from_log(log, encounter, published.summary, seed, origin)
+        fitting = read_parameters(FittingConfig(), values, "fitting.", origin)
+        planning = read_parameters(PlanningConfig(), values, "planning.", origin)
+        situation = Situation.of(encounter)
         fit = fit_template(
             situation, segmentation, road, fitting, request=requested, limits=limits
         )
         routes = plan_routes(road, fit, planning, seed, limits)
         planned = GenerationResult(encounter, segmentation, road, fit, routes, seed=seed)
-    return Replanned(planned, requested, config.sampling, config.limits)
+    return Replanned(planned, requested, sampling, limits)
 
 
 def write_regenerated(regenerated: Regenerated, folder: Path, inputs: Sequence[Path] = ()) -> Path:
-    """Write the scenario, its entry and its template to a bag of its own; return `folder`.
+    """Write the scenario, its entry and its template to a new bag; return `folder`.
 
     Args:
         regenerated: the scenario.
-        folder: of the bag; one that this function wrote there earlier is replaced.
-        inputs: the bag, and the log, it was made from.
+        folder: folder of the bag; an earlier output of this function is replaced.
+        inputs: the bag and the log from which it was generated.
 
     Raises:
-        InputError: the folder is there and is something else, holds an input, or cannot be written.
+        InputError: the folder has other contents or an input, or cannot be written.
     """
     with atomic_bag(folder, REGENERATED, inputs) as bag:
         for message in regenerated.messages:
@@ -235,19 +246,19 @@ def write_regenerated(regenerated: Regenerated, folder: Path, inputs: Sequence[P
 
 
 @dataclass(frozen=True, eq=False)
-class _Found:
-    """A scenario's entry in a bag, the summary of its request, and the messages that belong to it, its own among them."""
+class _Published:
+    """A scenario in a bag: its entry, the summary of its request, and its messages."""
 
     namespace: Namespace
     entry: ScenarioEntry
     summary: RequestSummary
     messages: tuple[BagMessage, ...]
 
-    def template(self, what: str) -> GenerationResult:
-        """Return the template.
+    def template(self, origin: str) -> GenerationResult:
+        """Return the template; `origin` names bag and request in messages.
 
         Raises:
-            InputError: a message that is needed is damaged, or not in the bag.
+            InputError: a required message is damaged, or not in the bag.
         """
         newest = {
             message.topic.removeprefix(self.namespace.where("")): message.data
@@ -256,7 +267,8 @@ class _Found:
         missing = missing_topics(newest)
         if missing:
             raise InputError(
-                f"{what} cannot be made again: the bag has no {', '.join(missing)} with the scenario's stamp"
+                f"{origin} cannot be made again: the bag has no {', '.join(missing)} with the "
+                "scenario's stamp"
             )
         return decode_template(newest)
 
@@ -278,31 +290,32 @@ def _entries(bag: Path, config: BagConfig) -> list[tuple[Namespace, ScenarioEntr
         ]
     if not entries:
         raise InputError(
-            f"{bag}: no scenario has an entry on `{INFO}`; only what this suite published can be made again"
+            f"{bag}: no scenario has an entry on `{INFO}`; only what this suite published can be "
+            "made again"
         )
     return entries
 
 
 def _find(
     bag: Path, index: int, namespace: str | None, request: str | None, config: BagConfig
-) -> _Found:
-    """Find the one scenario of that index.
+) -> _Published:
+    """Find the only scenario with this index.
 
     Raises:
-        InputError: there is none, several, or its request was not closed.
+        InputError: there is none, there are several, or its request was not closed.
     """
-    entries = _entries(bag, config)
-    own = [
-        found
-        for found in entries
-        if namespace in (None, found[0].name) and request in (None, found[1].request)
+    candidates = [
+        (where, entry, message)
+        for where, entry, message in _entries(bag, config)
+        if namespace in (None, where.name) and request in (None, entry.request)
     ]
-    same = [found for found in own if found[1].index == index]
+    same = [candidate for candidate in candidates if candidate[1].index == index]
     if not same:
-        known = sorted({entry.index for _, entry, _ in own})
+        known = sorted({entry.index for _, entry, _ in candidates})
         some = ", ".join(map(str, known[:20])) + (", …" if len(known) > 20 else "")
         raise InputError(
-            f"{bag}: no scenario {index}; there are: {some or 'none in that namespace and request'}"
+            f"{bag}: no scenario {index}; there are: "
+            f"{some or 'none in that namespace and request'}"
         )
     if len(same) > 1:
         places = "; ".join(
@@ -320,49 +333,42 @@ def _find(
     )
     if summary is None:
         raise InputError(
-            f"{bag}: request {entry.request} was not closed on {where.where(INFO)}: its parameters are missing"
+            f"{bag}: request {entry.request} was not closed on {where.where(INFO)}: its "
+            "parameters are missing"
         )
-    return _Found(where, entry, summary, where.messages_of(info, entry, summary))
+    return _Published(where, entry, summary, where.messages_of(info, entry, summary))
 
 
 def _from_log(
-    log: Path, recorded: Encounter, summary: RequestSummary, seed: int, what: str
+    log: Path, recorded: Encounter, summary: RequestSummary, seed: int, origin: str
 ) -> tuple[Encounter, Segmentation]:
-    """The template and its changepoints from the raw log.
+    """Return the template and its changepoints from the raw log.
 
     Raises:
-        InputError: it is not the log that the bag was made from, or the bag does not say which that was.
+        InputError: the bag was made from another log, or does not name its log.
     """
-    known = {
-        name: text.removeprefix("sha256 ")
-        for name, text in summary.values.items()
-        if name.startswith("log ")
-    }
+    known = read_log_hashes(summary.values)
     if not known:
         raise InputError(
-            f"{what}: the bag does not say which log it was made from (nodes do not know it); leave --log out"
+            f"{origin}: the bag does not say which log it was made from (nodes do not know it); "
+            "leave --log out"
         )
-    own = sha256_of(log) if log.exists() else ""
-    if own not in known.values():
-        there = ", ".join(
-            f"{name.removeprefix('log ')} (sha256 {text})" for name, text in known.items()
-        )
-        is_missing = (
-            "is not there" if not own else f"has sha256 {own}: it is another file, or was changed"
-        )
-        raise InputError(f"{log} {is_missing}; the bag was made from {there}")
-    config = read_parameters(LogConfig(), summary.values, "log.", what)
-    images = (
-        each
-        for e in read_log(log, config).encounters
-        if e.start_ns == recorded.start_ns
-        for each in (e, mirrored(e))
-    )
-    same = [e for e in images if same_tracks(e, recorded)]
-    if not same:
-        raise InputError(
-            f"{log}: no encounter in it is the one on the bag's tracks, though the file is the same"
-        )
-    return same[0], segment(
-        same[0], read_parameters(SegmentationConfig(), summary.values, "segmentation.", what), seed
+    sha256 = sha256_of(log) if log.exists() else ""
+    if sha256 not in known.values():
+        listed = ", ".join(f"{name} (sha256 {text})" for name, text in known.items())
+        fault = "is not there"
+        if sha256:
+            fault = f"has sha256 {sha256}: it is another file, or was changed"
+        raise InputError(f"{log} {fault}; the bag was made from {listed}")
+    config = read_parameters(LogConfig(), summary.values, "log.", origin)
+    for encounter in read_log(log, config).encounters:
+        if encounter.start_ns != recorded.start_ns:
+            continue
+        for candidate in (encounter, mirrored(encounter)):
+            if same_tracks(candidate, recorded):
+                values = summary.values
+                parameters = read_parameters(SegmentationConfig(), values, "segmentation.", origin)
+                return candidate, segment(candidate, parameters, seed)
+    raise InputError(
+        f"{log}: no encounter in it is the one on the bag's tracks, though the file is the same"
     )

@@ -1,18 +1,20 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Is every scenario of a bag valid? For any bag of the conventions, ours or not.
+"""Validate the scenarios of any bag with the conventions of this suite.
 
-A scenario is checked against what bears its stamp in its own namespace: the states asked of it and how far they may be left
-(its own in `scenarios/info`), the conflicts and waits of its template (`tracks`; waits if there are `changepoints`), in the
-order that was asked, and the road: the `map` that its entry on `scenarios/info` names by hash, else the newest one of the
-stamp, or of all. What is not there is not checked, and said. Vehicles are matched by id, so one may be left out for an ego;
-with its witness, all are checked together. Where there are entries, a scenario is not to stand in the place of another that was
-published; one without any entry is counted, and checked as far as that goes.
+A scenario is checked against the messages with its stamp in its namespace: the requested states
+and their tolerances (its entry on `scenarios/info`); the conflicts of its template (`tracks`) in
+the requested order; the waits of its template (if there are `changepoints`); and the road. The
+road is the `map` that its entry names by hash, otherwise the newest map with its stamp, or the
+newest of all. Checks without data are skipped and reported. Vehicles are matched by id, so an ego
+may be missing; with a reference drive of the ego, all vehicles are checked together. If the bag
+has entries, no scenario may replace a published one; scenarios without an entry are counted, and
+checked as far as possible.
 """
 
 from collections import Counter
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import count
 from pathlib import Path
@@ -50,14 +52,14 @@ from scenario_gen.types import (
     tokens,
 )
 
-UNUSABLE = "unusable_message"  # damaged, not finite, in another frame than its road: beside the checker's causes
+UNUSABLE = "unusable_message"  # damaged, not finite, or in a frame other than the road's
 NO_WITNESS = f"the ego: its reference drive is not on {WITNESS}"
-ALTERED = "altered_message"  # not the bytes that scenarios/info has an entry for
+ALTERED = "altered_message"  # its bytes differ from those in its entry on scenarios/info
 
 
 @dataclass
-class Found:
-    """How many scenarios have violations of one cause, and the first of them."""
+class CauseSummary:
+    """The number of scenarios with violations of one cause, and the first of them."""
 
     count: int
     scenario: int
@@ -66,17 +68,25 @@ class Found:
 
 @dataclass
 class Validation:
-    """What was found in one namespace: `found` by cause; `left_out` says what could not be checked, and of how many scenarios.
+    """The validation of one namespace.
 
-    `unaccounted` scenarios have no entry on `scenarios/info`, though others have; they are valid if nothing else is wrong.
-    `missing` says which requests are not there whole, `proven` how many scenarios keep each reaction that their entries name.
+    Attributes:
+        namespace: its name.
+        scenarios: number of checked scenarios.
+        invalid: number of invalid scenarios.
+        unaccounted: number of scenarios without an entry on `scenarios/info`, though others have
+            one; they are valid if nothing else is wrong.
+        found: violations by cause.
+        left_out: number of scenarios by each check that was skipped.
+        missing: notes on incomplete requests.
+        proven: number of scenarios that keep each reaction in their entries.
     """
 
     namespace: str
     scenarios: int = 0
     invalid: int = 0
     unaccounted: int = 0
-    found: dict[str, Found] = field(default_factory=dict)
+    found: dict[str, CauseSummary] = field(default_factory=dict)
     left_out: dict[str, int] = field(default_factory=dict)
     missing: tuple[str, ...] = ()
     proven: Counter[str] = field(default_factory=Counter)
@@ -87,20 +97,29 @@ class Validation:
         """Count one scenario with its violations (cause, sentence)."""
         self.scenarios += 1
         self.invalid += bool(violations)
-        for cause in dict.fromkeys(cause for cause, _ in violations):
-            first = next(message for other, message in violations if other == cause)
-            self.found.setdefault(cause, Found(0, index, first)).count += 1
+        messages: dict[str, str] = {}
+        for cause, message in violations:
+            messages.setdefault(cause, message)
+        for cause, message in messages.items():
+            self.found.setdefault(cause, CauseSummary(0, index, message)).count += 1
         for sentence in left_out:
             self.left_out[sentence] = self.left_out.get(sentence, 0) + 1
 
 
 @dataclass(frozen=True, eq=False)
 class Reference:
-    """What the scenarios of one stamp are held against.
+    """The requirements on the scenarios with one stamp.
 
-    `first` says who must go first at each conflict, by index in `template`, None for anyone; nothing: as in the template.
-    `reactions` are those of the template that the entry says are kept. `ends` (N, 2) says who of `template` is there at its first
-    and last instant, `lane_gaps` how near they come to one ahead of them.
+    Attributes:
+        road: the road; None if the bag has none.
+        template: ids of the template's vehicles.
+        conflicts: conflicts of the template.
+        waits: waits of the template; None if they are unknown.
+        first: index in `template` of the vehicle that must pass each conflict first, None for
+            either; empty: the order of the template.
+        reactions: reactions of the template that the scenarios must keep.
+        ends: (N, 2) whether each vehicle is present at the first and at the last instant.
+        lane_gaps: the template's smallest gaps to leaders.
     """
 
     road: Road | None
@@ -120,7 +139,10 @@ class Reference:
         road: Road | None,
         entry: ScenarioEntry | None,
     ) -> "Reference":
-        """Return what a scenario with this entry is held against; without a segmentation its waits are not known."""
+        """Return the requirements on a scenario with this entry.
+
+        Without a segmentation, waits are unknown.
+        """
         encounter, conflicts = situation.encounter, situation.conflicts
         waits: tuple[Wait, ...] | None = None
         if segmentation is not None:
@@ -139,37 +161,54 @@ class Reference:
     def checker(
         self, scenario: Scenario, limits: Limits | None, requested: BoundaryStates | None
     ) -> Checker:
-        """Return the checker of scenarios with the same vehicles as this one, which must meet the states `requested`."""
+        """Return the checker for scenarios with the vehicles of `scenario`.
+
+        They must meet the `requested` boundary states.
+        """
         ids = tokens(vehicle.id for vehicle in scenario.vehicles)
         if self.template is None or not set(ids) <= set(self.template):
             return Checker(self.road, requested, None, None, limits)
-        at = {self.template.index(name): k for k, name in enumerate(ids)}
-        known = [k for k, c in enumerate(self.conflicts) if {c.first, c.second} <= set(at)]
-        conflicts = [
-            replace(c, first=at[c.first], second=at[c.second])
-            for c in (self.conflicts[k] for k in known)
+        rows = {self.template.index(name): k for k, name in enumerate(ids)}
+        conflicts, first = self._conflicts_of(rows)
+        waits = self._waits_of(rows)
+        reactions = [
+            replace(edge, who=rows[edge.who], whom=rows[edge.whom])
+            for edge in self.reactions
+            if {edge.who, edge.whom} <= rows.keys()
         ]
-        required_first = self.first or tuple(c.first for c in self.conflicts)
-        first = [
-            None if leader is None else at[leader] for leader in (required_first[k] for k in known)
-        ]
-        waits = (
-            None
-            if self.waits is None
-            else [replace(w, vehicle=at[w.vehicle]) for w in self.waits if w.vehicle in at]
-        )
-        edges = [
-            replace(e, who=at[e.who], whom=at[e.whom])
-            for e in self.reactions
-            if {e.who, e.whom} <= set(at)
-        ]
-        ends = None if self.ends is None else self.ends[list(at)]
+        ends = None if self.ends is None else self.ends[list(rows)]
         gaps = {
-            (at[who], at[whom]): found
-            for (who, whom), found in self.lane_gaps.items()
-            if {who, whom} <= set(at)
+            (rows[who], rows[whom]): gap
+            for (who, whom), gap in self.lane_gaps.items()
+            if {who, whom} <= rows.keys()
         }
-        return Checker(self.road, requested, conflicts, waits, limits, first, edges, ends, gaps)
+        return Checker(
+            self.road, requested, conflicts, waits, limits, first, reactions, ends, gaps
+        )
+
+    def _conflicts_of(self, rows: Mapping[int, int]) -> tuple[list[Conflict], list[int | None]]:
+        """Return the conflicts between vehicles in `rows`, and who must pass each one first.
+
+        `rows` maps indices in the template to indices in the scenario.
+        """
+        required = self.first or tuple(conflict.first for conflict in self.conflicts)
+        conflicts: list[Conflict] = []
+        first: list[int | None] = []
+        for conflict, leader in zip(self.conflicts, required, strict=True):
+            if {conflict.first, conflict.second} <= rows.keys():
+                renumbered = replace(
+                    conflict, first=rows[conflict.first], second=rows[conflict.second]
+                )
+                conflicts.append(renumbered)
+                first.append(None if leader is None else rows[leader])
+        return conflicts, first
+
+    def _waits_of(self, rows: Mapping[int, int]) -> list[Wait] | None:
+        """Return the waits of the vehicles in `rows`; None if they are unknown."""
+        if self.waits is None:
+            return None
+        known = [wait for wait in self.waits if wait.vehicle in rows]
+        return [replace(wait, vehicle=rows[wait.vehicle]) for wait in known]
 
 
 def validate_bag(
@@ -179,16 +218,17 @@ def validate_bag(
     *,
     progress: Callable[[int, int], None] = lambda *_: None,
 ) -> tuple[Validation, ...]:
-    """Check every scenario of every namespace that holds any.
+    """Check every scenario in every namespace of a bag.
 
     Args:
         path: the bag.
-        limits: of validity.
-        config: says how much is read at most.
-        progress: called with the number of scenarios checked, and of all.
+        limits: limits of validity.
+        config: limits on the size of the bag.
+        progress: called with the number of checked scenarios and their total.
 
     Raises:
-        InputError: the bag is missing or damaged, holds no scenarios, or one of its tracks, maps, … cannot be read.
+        InputError: the bag is missing or damaged, has no scenarios, or one of its tracks or maps
+            cannot be read.
     """
     namespaces = read_recording(
         path,
@@ -210,7 +250,7 @@ def validate_bag(
 
 
 class Checkers:
-    """The checkers of the scenarios of a namespace; those that are held against the same share one."""
+    """The checkers of a namespace; scenarios with the same requirements share one."""
 
     def __init__(self, namespace: Namespace, limits: Limits | None) -> None:
         self._namespace, self._limits = namespace, limits
@@ -218,15 +258,21 @@ class Checkers:
         self._checkers: dict[tuple[object, ...], Checker] = {}
 
     def of(self, k: int, stamp: int, scenario: Scenario, states: BoundaryStates | None) -> Checker:
-        """Return the checker of scenario `k`, its ego among its vehicles, which must meet the `states`, if they are known.
+        """Return the checker of scenario `k`, which must meet the `states` if they are known.
+
+        Args:
+            k: number of the scenario in the namespace.
+            stamp: its stamp [ns].
+            scenario: the scenario, its ego among its vehicles.
+            states: the requested boundary states.
 
         Raises:
-            InputError: a message of what it is held against is damaged.
+            InputError: a message with its requirements is damaged.
         """
         entry = self._namespace.entry(k) or self._namespace.unknown.get(k)
         is_lost = k in self._namespace.unknown and entry is None
         facts = Facts() if entry is None else entry.facts
-        place = (
+        source = (
             stamp,
             is_lost,
             entry and entry.template_hash,
@@ -235,76 +281,84 @@ class Checkers:
             facts.reactions,
             facts.lost_reactions,
         )
-        of_these = b"" if states is None else states.start.tobytes() + states.end.tobytes()
-        key = (place, tuple(vehicle.id for vehicle in scenario.vehicles), of_these)
+        state_bytes = b"" if states is None else states.start.tobytes() + states.end.tobytes()
+        key = (source, tuple(vehicle.id for vehicle in scenario.vehicles), state_bytes)
         if key not in self._checkers:
-            if place not in self._references:
-                self._references[place] = _reference(self._namespace, stamp, entry, is_lost)
-            self._checkers[key] = self._references[place].checker(scenario, self._limits, states)
+            if source not in self._references:
+                self._references[source] = _reference(self._namespace, stamp, entry, is_lost)
+            self._checkers[key] = self._references[source].checker(scenario, self._limits, states)
         return self._checkers[key]
 
 
 def _validate(namespace: Namespace, limits: Limits | None, tick: Callable[[], None]) -> Validation:
+    """Check every scenario of a namespace."""
     namespace.check_infos()
     result = Validation(namespace.name, missing=namespace.missing)
-    message = () if namespace.entries else (f"sha256: there is no entry on {INFO}",)
     checkers = Checkers(namespace, limits)
-    for k, sha256 in enumerate(namespace.hashes):
+    for k in range(len(namespace.hashes)):
         tick()
-        wrong, entry = [], namespace.unknown.get(k)
-        if entry is not None:
-            wrong = [(ALTERED, _altered(k, sha256, entry))]
-        elif k in namespace.unknown:
+        if k in namespace.unknown and namespace.unknown[k] is None:
             result.unaccounted += 1
-        entry = namespace.entry(k) or entry
-        silent = message
-        if entry is not None and namespace.without_witness(entry):
-            if namespace.strange_witnesses:
-                wrong.append(
-                    (
-                        ALTERED,
-                        f"the ego's reference drive is not what was published for scenario {entry.index}",
-                    )
-                )
-            silent = (*message, NO_WITNESS)
-        try:
-            stamp, scenario = namespace.scenario(k)
-        except InputError as error:
-            result.add(k, [*wrong, (UNUSABLE, str(error))], ())
-            continue
-        states = None
-        if entry is not None:
-            states = entry.asked(
-                namespace.where(INFO), witness=scenario.reference_drive is not None
-            )
-        scenario = join_ego(scenario)
-        checker = checkers.of(k, stamp, scenario, states)
-        try:
-            (verdict,) = checker.check([scenario])
-        except InputError as error:
-            result.add(k, [*wrong, (UNUSABLE, str(error))], ())
-            continue
-        wrong += [(violation.cause.value, violation.message) for violation in verdict.violations]
-        result.add(k, wrong, (*silent, *checker.not_applicable))
-        broken = {
-            violation.vehicles
-            for violation in verdict.violations
-            if violation.cause == Cause.REACTION
-        }
-        for edge in checker.reactions:
-            result.proven[edge.words(scenario.vehicles)] += (edge.who, edge.whom) not in broken
+        _validate_scenario(namespace, k, checkers, result)
     return result
 
 
+def _validate_scenario(
+    namespace: Namespace, k: int, checkers: Checkers, result: Validation
+) -> None:
+    """Check scenario `k` of a namespace and add it to the result."""
+    entry = namespace.entry(k) or namespace.unknown.get(k)
+    violations = _alterations(namespace, k)
+    skipped = [] if namespace.entries else [f"sha256: there is no entry on {INFO}"]
+    if entry is not None and namespace.without_witness(entry):
+        skipped.append(NO_WITNESS)
+    try:
+        stamp, scenario = namespace.scenario(k)
+    except InputError as error:
+        result.add(k, [*violations, (UNUSABLE, str(error))], ())
+        return
+    states = None
+    if entry is not None:
+        has_witness = scenario.reference_drive is not None
+        states = entry.asked(namespace.where(INFO), witness=has_witness)
+    scenario = join_ego(scenario)
+    checker = checkers.of(k, stamp, scenario, states)
+    try:
+        (verdict,) = checker.check([scenario])
+    except InputError as error:
+        result.add(k, [*violations, (UNUSABLE, str(error))], ())
+        return
+    violations += [(violation.cause.value, violation.message) for violation in verdict.violations]
+    result.add(k, violations, (*skipped, *checker.not_applicable))
+    broken = {
+        violation.vehicles for violation in verdict.violations if violation.cause == Cause.REACTION
+    }
+    for edge in checker.reactions:
+        result.proven[edge.words(scenario.vehicles)] += (edge.who, edge.whom) not in broken
+
+
+def _alterations(namespace: Namespace, k: int) -> list[tuple[str, str]]:
+    """Return the violations of scenario `k` whose message or reference drive was replaced."""
+    violations = []
+    published = namespace.unknown.get(k)
+    if published is not None:
+        violations.append((ALTERED, _altered(k, namespace.hashes[k], published)))
+    entry = namespace.entry(k) or published
+    if entry is not None and namespace.without_witness(entry) and namespace.strange_witnesses:
+        message = f"the ego's reference drive is not what was published for scenario {entry.index}"
+        violations.append((ALTERED, message))
+    return violations
+
+
 def kept_reactions(situation: Situation, entry: ScenarioEntry | None) -> tuple[Reaction, ...]:
-    """Return the reactions of a template that an entry says its scenario keeps."""
+    """Return the template's reactions that the scenario keeps, according to its entry."""
     names = tokens(vehicle.id for vehicle in situation.encounter.vehicles)
     kept = entry.facts.reactions if entry else ()
     return tuple(edge for edge in situation.reactions.edges if edge.named(names) in kept)
 
 
 def kept_gaps(situation: Situation, entry: ScenarioEntry | None) -> LaneGaps:
-    """Return the template's gaps in a lane; zeros for the pairs that an entry says its scenario is not held to."""
+    """Return the template's gaps in a lane; zero for the lost reactions in the entry."""
     names = tokens(vehicle.id for vehicle in situation.encounter.vehicles)
     lost = entry.facts.lost_reactions if entry else ()
     return {
@@ -314,7 +368,7 @@ def kept_gaps(situation: Situation, entry: ScenarioEntry | None) -> LaneGaps:
 
 
 def _altered(k: int, sha256: str, entry: ScenarioEntry) -> str:
-    """Return the sentence for a message that stands where another one was published."""
+    """Return the message for a scenario that replaces a published one."""
     published = (
         f"scenario {entry.index} of request {entry.request} was published as {entry.sha256[:12]}…"
     )
@@ -324,10 +378,10 @@ def _altered(k: int, sha256: str, entry: ScenarioEntry) -> str:
 def _reference(
     namespace: Namespace, stamp: int, entry: ScenarioEntry | None, is_lost: bool
 ) -> Reference:
-    """Return what a scenario of the stamp and entry is held against; if its entry is lost, only what is beyond doubt.
+    """Return the requirements on a scenario; if its entry is lost, only the certain ones.
 
     Raises:
-        InputError: a message of it is damaged.
+        InputError: a message with the requirements is damaged.
     """
     road = namespace.road_of(entry, stamp)
     if is_lost and namespace.roads_differ:

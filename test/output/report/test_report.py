@@ -20,7 +20,7 @@ from support.evaluation_worlds import cross_road, report_case
 
 from scenario_gen.bags.recordings.read import read_recording
 from scenario_gen.method.evaluation import coverage_of, feature_matrix
-from scenario_gen.output.report.data import case_data, MATRIX_SIZE, pack, runs
+from scenario_gen.output.report.data import case_data, MATRIX_SIZE_CELLS, pack, runs
 from scenario_gen.output.report.page import render, ReportInput, write_report
 from scenario_gen.output.report.summary import summary
 from scenario_gen.output.results import write_results
@@ -97,11 +97,11 @@ def test_matrices_are_the_mean_feature():
     entry = case_data(case, 50)["features"][0]
     found = (
         np.frombuffer(b64decode(entry["position"]["with"]), np.uint8).reshape(
-            MATRIX_SIZE, MATRIX_SIZE
+            MATRIX_SIZE_CELLS, MATRIX_SIZE_CELLS
         )
         / 255
     )
-    motions = [scenario.with_samples(MATRIX_SIZE) for scenario in case.generated.scenarios]
+    motions = [scenario.with_samples(MATRIX_SIZE_CELLS) for scenario in case.generated.scenarios]
     np.testing.assert_allclose(
         found, np.mean([feature_matrix(*m.position) for m in motions], axis=0), atol=0.003
     )
