@@ -141,7 +141,8 @@ def test_recordings_are_recombined_and_what_is_generated_from_them_counts_for_bo
     )
     assert (
         code == 0
-        and "recombined encounters: 0 of 9 (no more pairs are of one kind; --recording adds some)"
+        and "recombined encounters: 0 of 9 (no more pairs of the same kind; add recordings with "
+        "--recording)"
         in said
     )
 

@@ -105,7 +105,7 @@ MISTAKES = [  # words of the command line, and what the message says: what is wr
     ),
     (("generate", "nothing", *ROAD), "nothing is an empty folder; name a folder with a recording"),
     (("generate", "letter.docx", *ROAD), "name the format: --set log.format=table"),
-    (("generate", "numbers.csv", *ROAD), "put a line such as t,id,x,y,speed above it"),
+    (("generate", "numbers.csv", *ROAD), "insert a line such as t,id,x,y,speed above it"),
     (("generate", "disorder.csv", *ROAD, "--set", "log.strict=true"), "disorder.csv, line "),
     (("generate", "columns.csv", *ROAD), "--set log.columns=time=…; is it tyme?"),
     ((*GENERATE, "--params", "bad.yaml"), "bad.yaml: not YAML (line 2"),

@@ -32,7 +32,7 @@ GOOD = {
         ("xosc", b"WorldPosition", b"LanePosition", "<Position> has no <WorldPosition>"),
         ("xosc", b'time="0.5"', b'time="nan"', "<Vertex>, attribute time"),
         ("xosc", b'time="0.5"', b'time="$start"', "'$start'"),
-        ("xosc", b"BoundingBox", b"Box", "no road user with a bounding box"),
+        ("xosc", b"BoundingBox", b"Box", "it is not a road user with a bounding box"),
     ],
 )
 def test_what_is_broken_is_named_with_its_place(tmp_path, kind, old, new, said):

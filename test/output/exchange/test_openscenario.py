@@ -150,9 +150,8 @@ def test_trailers_are_named(tmp_path):
     made = observed(path)
     assert len(made.vehicles) == 2
     said = [note for note in made.notes if note.startswith("trailer")]
-    assert any("trailer 1 belongs to " in note for note in said) and any(
-        "trailer box of " in note for note in said
-    )
+    assert any("trailer 1 belongs to " in note for note in said)
+    assert any("trailer box left out: it is part of " in note for note in said)
 
 
 THEIRS = {  # what others write in place of what we write, and by how many seconds it is later

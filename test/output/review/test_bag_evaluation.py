@@ -152,7 +152,7 @@ def test_the_page_of_our_own_bag_shows_the_template_as_that_of_the_run(tmp_path)
     )
     assert case.road.name == run.road.name
     page = render(ReportInput([case]))
-    assert "Fitted to the road" in page and run.segmentation.descriptions[0] in page
+    assert "<h2>Fit and routes</h2>" in page and run.segmentation.descriptions[0] in page
 
 
 def test_that_page_in_a_browser(browser, tmp_path):
@@ -229,7 +229,7 @@ def test_a_bag_with_half_of_it_shows_what_it_has(tmp_path):
     (case,) = bag_results(only(bag, tmp_path / "half", topics), QUICK)
     assert case.fit is None and case.routes == ()
     assert case.segmentation.descriptions[0] == "segment 0"
-    assert "Fitted to the road" not in render(ReportInput([case]))
+    assert "<h2>Fit and routes</h2>" not in render(ReportInput([case]))
 
 
 def test_what_a_bag_does_not_hold_is_left_out_and_said(tmp_path):
