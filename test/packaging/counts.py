@@ -68,18 +68,18 @@ BEFORE = {
     "banned names": 1_014,
 }
 # A change that needs more tokens deletes something, or says why in the commit. Splitting dense
-# code into plain steps has cost 13,000 tokens so far; 435,000 are wanted.
+# code into plain steps has cost 14,000 tokens so far; 435,000 are wanted.
 BUDGET = {
-    "tokens": 509_300,
-    "long lines": 109,
-    "complex functions": 20,
-    "branching functions": 14,
-    "nested functions": 10,
-    "long functions": 12,
+    "tokens": 509_850,
+    "long lines": 52,
+    "complex functions": 13,
+    "branching functions": 10,
+    "nested functions": 9,
+    "long functions": 10,
     "crowded functions": 1,
     "constants": 945,
-    "constants without a unit": 23,
-    "banned names": 54,
+    "constants without a unit": 17,
+    "banned names": 24,
 }
 
 UNITS = {
