@@ -227,7 +227,7 @@ def test_the_command_searches_a_log_on_a_road_and_says_what_it_found(tmp_path):
     done = CliRunner().invoke(app, [*words, "--max-rate", "0.0", "--objective", "collision"])
     assert (
         done.exit_code == 1
-        and "the failure rate may be above 0" in done.output
+        and "the failure rate may exceed 0" in done.output
         and "by the ego's fault:" in done.output
     ), done.output
     assert (
