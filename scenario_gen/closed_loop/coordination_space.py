@@ -171,7 +171,7 @@ def _add_wait(scenario: Scenario, yielder: int, other: int, order: Floats) -> No
     order[before] = np.minimum(order[before], limit)
 
 
-@kernel(inline=True)
+@kernel(inline=True, forced=True)
 def pose_at(time: Floats, motion: Floats, clock: float, out: Floats) -> None:
     """Write x, y, yaw, speed and acceleration (5,) of a motion (T, 6) at a clock [s].
 

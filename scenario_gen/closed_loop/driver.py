@@ -119,7 +119,7 @@ class DriverParameters(NamedTuple):
 DRIVER_PARAMETERS = named(DriverParameters, F, F, F, F, F1, F, F, F, B, B, I1)
 
 
-@kernel(inline=True)
+@kernel(inline=True, forced=True)
 def _smooth_acceleration(difference: float, jerk: float, h: float) -> float:
     """Return the largest acceleration [m/s²] towards a speed that is `difference` [m/s] away.
 
@@ -130,7 +130,7 @@ def _smooth_acceleration(difference: float, jerk: float, h: float) -> float:
     return float(np.sqrt(2.0 * jerk * difference)) - 0.5 * jerk * h
 
 
-@kernel(inline=True)
+@kernel(inline=True, forced=True)
 def next_rate(
     parameters: DriverParameters,
     driver: DriverState,
@@ -178,24 +178,28 @@ def next_rate(
     return float(min(new_speed / mean_speed, free_rate))
 
 
-@kernel(inline=True)
+@kernel(inline=True, forced=True)
 def drive_step(
-    world: World,
     parameters: DriverParameters,
     driver: DriverState,
+    time: Floats,
+    motion: Floats,
     pose: Floats,
     braking: float,
+    h: float,
 ) -> DriverState:
-    """Return a driver after a step of braking [m/s²]; update its certified pose (5,)."""
-    h = world.step
+    """Return a driver after a step of h [s] of braking [m/s²]; update its certified pose (5,).
+
+    Times (T,) and motion (T, 6) are those of its vehicle.
+    """
     speed = driver.rate * pose[3]
     rate = next_rate(parameters, driver, pose, braking, 0.0, h)
     clock = driver.clock + 0.5 * (driver.rate + rate) * h
-    pose_at(world.time, world.motion[driver.vehicle], clock, pose)
+    pose_at(time, motion, clock, pose)
     return DriverState(driver.vehicle, clock, rate, (rate * pose[3] - speed) / h)
 
 
-@kernel(inline=True)
+@kernel(inline=True, forced=True)
 def _distance_at(cells: Floats, k: int, share: float) -> float:
     """Return the driven way [m] at a share of cell k of the cells (K, 8) of one vehicle."""
     start = cells[k, 7]

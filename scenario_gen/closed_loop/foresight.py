@@ -31,17 +31,14 @@ class Prediction(NamedTuple):
 
     Attributes:
         ego: (M, 4) x, y [m], yaw [rad], speed [m/s] of the ego at the ends of the steps.
-        clock: of the ego on the path of its witness, at the end of the first step [s].
-        rate: of that clock; negative if the ego is not on that path.
-        others: (N, M) clocks of the others at the start and at the end of each step [s].
+        limits: (M,) clock [s] that the driver may not pass by the end of each step, because of the
+            order of events; infinity if nothing limits it.
         clearance: distance [m] to the ego of a driver that does not brake.
         avoids_ego: whether the driver keeps clear of the ego; a pedestrian decides at the kerb.
     """
 
     ego: Floats
-    clock: float
-    rate: float
-    others: Floats
+    limits: Floats
     clearance: float
     avoids_ego: bool
 
@@ -118,14 +115,13 @@ def weakest_safe_braking(
     driver: DriverState,
     least: float,
     prediction: Prediction,
-    others: bool,
 ) -> float:
     """Return the weakest braking [m/s²], `least` or more, with which a driver stays clear.
 
     The strongest braking if none does. More braking is not always safer: a slower driver may be
     at a crossing together with the ego. So a few values are tried before the bisection.
     """
-    if _is_clear(world, parameters, driver, least, prediction, others):
+    if _is_clear(world, parameters, driver, least, prediction):
         return least
     low = max(least, -parameters.acceleration)
     comfortable = parameters.comfortable
@@ -133,26 +129,25 @@ def weakest_safe_braking(
     for high in (0.0, 0.5 * comfortable, comfortable, 0.5 * (comfortable + strongest), strongest):
         if high <= low:
             continue
-        if _is_clear(world, parameters, driver, high, prediction, others):
-            return _bisect_braking(world, parameters, driver, (low, high), prediction, others)
+        if _is_clear(world, parameters, driver, high, prediction):
+            return _bisect_braking(world, parameters, driver, (low, high), prediction)
         low = high
     return float(max(strongest, least))
 
 
-@kernel(inline=True)
+@kernel(inline=True, forced=True)
 def _bisect_braking(
     world: World,
     parameters: DriverParameters,
     driver: DriverState,
     bounds: tuple[float, float],
     prediction: Prediction,
-    others: bool,
 ) -> float:
     """Return the weakest safe braking [m/s²] between an unsafe and a safe one."""
     low, high = bounds
     for _ in range(BRAKING_BISECTION_STEPS):
         middle = 0.5 * (low + high)
-        if _is_clear(world, parameters, driver, middle, prediction, others):
+        if _is_clear(world, parameters, driver, middle, prediction):
             high = middle
         else:
             low = middle
@@ -166,7 +161,6 @@ def _is_clear(
     driver: DriverState,
     braking: float,
     prediction: Prediction,
-    others: bool,
 ) -> bool:
     """Return whether a driver that brakes stays clear of the ego and respects the order."""
     i = driver.vehicle
@@ -174,19 +168,23 @@ def _is_clear(
     brakes = braking > NO_BRAKING_MPS2
     clearance = max(prediction.clearance, MODEL.clearance_m * brakes)
     half = (world.half[i, 0] + clearance, world.half[i, 1] + clearance)
-    ego_half = world.half[world.ego]
+    ego_half = (world.half[world.ego, 0], world.half[world.ego, 1])
     reach = np.sqrt(half[0] ** 2 + half[1] ** 2) + np.sqrt(ego_half[0] ** 2 + ego_half[1] ** 2)
     leave_clock = world.spans[i, 1] if world.leaves[i] else np.inf
-    pose_at(world.time, world.motion[i], driver.clock, pose)
+    time = world.time
+    motion = world.motion[i]
+    pose_at(time, motion, driver.clock, pose)
     for m in range(prediction.ego.shape[0] - 1):
-        driver = drive_step(world, parameters, driver, pose, braking)
+        driver = drive_step(parameters, driver, time, motion, pose, braking, world.step)
         if driver.clock >= leave_clock:
             break
-        if prediction.avoids_ego and _hits_ego(world, pose, prediction.ego[m], half, reach):
+        ego = prediction.ego[m]
+        dx = ego[0] - pose[0]
+        dy = ego[1] - pose[1]
+        is_near = prediction.avoids_ego and dx * dx + dy * dy < reach * reach
+        if is_near and _hits_ego(pose, half, ego, ego_half):
             return False
-        if precedes_ego(world, parameters, i, driver.clock, prediction, m):
-            return False
-        if others and _precedes_others(world, i, driver.clock, prediction.others, m):
+        if driver.clock > prediction.limits[m]:
             return False
         if braking > 0.0 and driver.rate == 0.0:
             break
@@ -195,57 +193,41 @@ def _is_clear(
 
 @kernel(inline=True)
 def _hits_ego(
-    world: World, pose: Floats, ego: Floats, half: tuple[float, float], reach: float
+    pose: Floats, half: tuple[float, float], ego: Floats, ego_half: tuple[float, float]
 ) -> bool:
-    """Return whether a footprint at a pose (5,) meets an ego (4,) that is not behind it.
-
-    The half sizes of the footprint are `half` [m]; beyond `reach` [m] the two cannot meet.
-    """
-    dx = ego[0] - pose[0]
-    dy = ego[1] - pose[1]
-    if dx * dx + dy * dy >= reach * reach:
-        return False
+    """Return whether a footprint at a pose (5,) meets an ego (4,) that is not behind it."""
     footprint = np.empty(7)
     ego_box = np.empty(7)
-    ego_half = world.half[world.ego]
     fill_box(pose[0], pose[1], pose[2], half[0], half[1], footprint)
     fill_box(ego[0], ego[1], ego[2], ego_half[0], ego_half[1], ego_box)
-    is_ahead = dx * footprint[2] + dy * footprint[3] > 0.0
-    return is_ahead and boxes_meet(footprint, ego_box)
+    along = (ego[0] - pose[0]) * footprint[2] + (ego[1] - pose[1]) * footprint[3]
+    return along > 0.0 and boxes_meet(footprint, ego_box)
 
 
 @kernel(inline=True)
-def precedes_ego(
-    world: World,
-    parameters: DriverParameters,
-    i: int,
-    clock: float,
-    prediction: Prediction,
-    m: int,
-) -> bool:
-    """Return whether vehicle i at a clock [s] goes ahead of an ego that the template let pass.
+def limit_by_ego(world: World, i: int, clock: float, rate: float, limits: Floats) -> None:
+    """Write the limits (M,) [s] of vehicle i that an ego sets which the template let pass.
 
-    The ego is that of step m; False if the drivers do not yield to it.
+    The ego starts at a clock [s] and continues at a rate.
     """
-    if not parameters.yields or prediction.rate < 0.0:
-        return False
-    ego_clock = prediction.clock + prediction.rate * m * world.step
-    limit = clock_limit(world.order[i, world.ego], world.cell, ego_clock)
-    return bool(clock > limit + MODEL.clock_tolerance_s)
+    order = world.order[i, world.ego]
+    for m in range(limits.shape[0]):
+        limit = clock_limit(order, world.cell, clock + rate * m * world.step)
+        limits[m] = limit + MODEL.clock_tolerance_s
 
 
 @kernel(inline=True)
-def _precedes_others(world: World, i: int, clock: float, others: Floats, m: int) -> bool:
-    """Return whether vehicle i at a clock [s] violates its order with the clocks (N, M)."""
-    for j in range(others.shape[0]):
+def limit_by_others(world: World, i: int, clocks: Floats, limits: Floats) -> None:
+    """Lower the limits (M,) [s] of vehicle i to those that the clocks (N, M) of the others set."""
+    for j in range(clocks.shape[0]):
         if j in (i, world.ego):
             continue
-        end = others[j, m + 1]
-        last_substep = end - (end - others[j, m]) / SUBSTEP_COUNT
-        limit = clock_limit(world.order[i, j], world.cell, last_substep)
-        if clock > max(limit, end) + 1e-09:
-            return True
-    return False
+        order = world.order[i, j]
+        for m in range(limits.shape[0] - 1):
+            end = clocks[j, m + 1]
+            last_substep = end - (end - clocks[j, m]) / SUBSTEP_COUNT
+            limit = max(clock_limit(order, world.cell, last_substep), end)
+            limits[m] = min(limits[m], limit + 1e-09)
 
 
 @kernel(inline=True)
@@ -254,12 +236,14 @@ def predict_clock(
 ) -> None:
     """Write the clocks (M,) [s] of a braking driver at the start and the end of each step."""
     pose = np.empty(5)
-    pose_at(world.time, world.motion[driver.vehicle], driver.clock, pose)
+    time = world.time
+    motion = world.motion[driver.vehicle]
+    pose_at(time, motion, driver.clock, pose)
     clock = driver.clock
     out[0] = clock
     for m in range(1, out.shape[0]):
         if driver.rate < 1.0 or braking > NO_BRAKING_MPS2:
-            driver = drive_step(world, parameters, driver, pose, braking)
+            driver = drive_step(parameters, driver, time, motion, pose, braking, world.step)
             clock = driver.clock
         else:
             clock += world.step

@@ -20,7 +20,7 @@ from scenario_gen.closed_loop.driver import (
     NO_BRAKING_MPS2,
     ON_PATH,
 )
-from scenario_gen.closed_loop.foresight import precedes_ego, Prediction
+from scenario_gen.closed_loop.foresight import Prediction
 from scenario_gen.numerics import Floats
 from scenario_gen.numerics.boxes import boxes_meet, fill_box
 from scenario_gen.numerics.kernels import kernel
@@ -72,20 +72,6 @@ def predict_fast_ego(world: World, seen: Floats, out: Floats) -> None:
 
 
 @kernel(inline=True)
-def without_ego_order(world: World, walker: DriverState, prediction: Prediction) -> Prediction:
-    """Return a prediction in which a pedestrian waits for the ego at the kerb, not on the lane."""
-    rate = -1.0 if is_before_kerb(world, walker) else prediction.rate
-    return Prediction(
-        prediction.ego,
-        prediction.clock,
-        rate,
-        prediction.others,
-        prediction.clearance,
-        prediction.avoids_ego,
-    )
-
-
-@kernel(inline=True)
 def braking_at_kerb(
     world: World,
     parameters: DriverParameters,
@@ -130,10 +116,12 @@ def _must_wait(
     ego_box = np.empty(7)
     state = walker
     meets = False
-    pose_at(world.time, world.motion[i], state.clock, pose)
+    time = world.time
+    motion = world.motion[i]
+    pose_at(time, motion, state.clock, pose)
     for m in range(prediction.ego.shape[0] - 1):
-        state = drive_step(world, parameters, state, pose, NO_BRAKING_MPS2)
-        if precedes_ego(world, parameters, i, state.clock, prediction, m):
+        state = drive_step(parameters, state, time, motion, pose, NO_BRAKING_MPS2, world.step)
+        if state.clock > prediction.limits[m]:
             return True
         ego = prediction.ego[m]
         fill_box(pose[0], pose[1], pose[2], half[0] + clearance, half[1] + clearance, footprint)

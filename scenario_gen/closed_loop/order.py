@@ -17,7 +17,7 @@ from scenario_gen.numerics.kernels import kernel
 SUBSTEP_COUNT = 4  # parts of a step, in each of which the order is proven
 
 
-@kernel(inline=True)
+@kernel(inline=True, forced=True)
 def clock_limit(order: Floats, cell: float, clock: float) -> float:
     """Return the clock [s] that a vehicle may not pass while another clock is at `clock` [s].
 
@@ -46,7 +46,7 @@ class Clocks(NamedTuple):
     cut: Bools
 
 
-@kernel(inline=True)
+@kernel(inline=True, forced=True)
 def _clock_at(c: Clocks, i: int, h: float, part: float) -> float:
     """Return clock i [s] at a share of a step of h [s]; its rate changes evenly."""
     if c.cut[i] or part == 1.0:
@@ -54,7 +54,7 @@ def _clock_at(c: Clocks, i: int, h: float, part: float) -> float:
     return float(c.begin[i] + h * part * (c.rate[i] + 0.5 * part * (c.end_rate[i] - c.rate[i])))
 
 
-@kernel(inline=True)
+@kernel(inline=True, forced=True)
 def _rate_at(c: Clocks, i: int, h: float, part: float) -> float:
     """Return the rate of clock i at a share of a step of h [s]."""
     if c.cut[i]:
@@ -62,7 +62,7 @@ def _rate_at(c: Clocks, i: int, h: float, part: float) -> float:
     return float(c.rate[i] + part * (c.end_rate[i] - c.rate[i]))
 
 
-@kernel(inline=True)
+@kernel(inline=True, forced=True)
 def _keeps_order(world: World, c: Clocks, i: int, j: int) -> bool:
     """Return whether vehicle i respects its order with j throughout the step.
 
@@ -93,7 +93,7 @@ def _keeps_order(world: World, c: Clocks, i: int, j: int) -> bool:
     return True
 
 
-@kernel(inline=True)
+@kernel(inline=True, forced=True)
 def _match_rate(world: World, c: Clocks, i: int, j: int) -> bool:
     """Slow vehicle i down to the rate of j; return whether the order is respected then."""
     if not c.end_rate[i] > c.end_rate[j] > 0.0:
@@ -116,7 +116,7 @@ def _cut_way(world: World, c: Clocks, i: int) -> None:
     c.cut[i] = True
 
 
-@kernel(inline=True)
+@kernel(inline=True, forced=True)
 def _hold_back(world: World, c: Clocks, i: int) -> bool:
     """Slow vehicle i down where it violates its order; return whether anything changed."""
     changed = False
@@ -165,7 +165,7 @@ def _earliest_clocks(world: World, c: Clocks) -> tuple[float, float]:
     return earliest, later
 
 
-@kernel(inline=True)
+@kernel(inline=True, forced=True)
 def _blocked(world: World, c: Clocks, group: Bools, i: int, until: float) -> bool:
     """Return whether a vehicle with the same clock, outside the group (N,), stops vehicle i."""
     clock = c.begin[i]

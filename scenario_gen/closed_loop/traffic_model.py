@@ -40,6 +40,8 @@ from scenario_gen.closed_loop.driver import (
     WAITED,
 )
 from scenario_gen.closed_loop.foresight import (
+    limit_by_ego,
+    limit_by_others,
     predict_clock,
     predict_ego,
     Prediction,
@@ -49,7 +51,6 @@ from scenario_gen.closed_loop.kerb import (
     braking_at_kerb,
     is_before_kerb,
     predict_fast_ego,
-    without_ego_order,
 )
 from scenario_gen.closed_loop.order import clock_limit, Clocks, enforce_order
 from scenario_gen.numerics import Bools, Floats, Ints
@@ -69,7 +70,7 @@ class StepState(NamedTuple):
         seen: (K, 9) the ego as in `State.seen`, at the end of the step and before.
         delay: (N,) reaction time of each driver in steps.
         ego: (N, M, 4) the ego as each driver predicts it, as in `Prediction`.
-        clocks: (N, M) predicted clocks of all, as in `Prediction.others`.
+        clocks: (N, M) predicted clocks [s] of all, at the start and at the end of each step.
     """
 
     drivers: Floats
@@ -135,13 +136,13 @@ def _step_state(
     return StepState(drivers, pose, moving, present, seen, parameters.delay, ego, clocks)
 
 
-@kernel(inline=True)
+@kernel(inline=True, forced=True)
 def _driver(now: StepState, i: int) -> DriverState:
     driver = now.drivers[i]
     return DriverState(i, driver[CLOCK], driver[RATE], driver[ACCELERATION])
 
 
-@kernel(inline=True)
+@kernel(inline=True, forced=True)
 def _observation_age(now: StepState, i: int) -> int:
     """Return how old the ego is that driver i sees, in steps."""
     return int(min(now.delay[i], now.seen.shape[0] - 1))
@@ -175,22 +176,26 @@ def _fill_ego(world: World, pose: Floats, out: Floats) -> None:
 
 
 @kernel(inline=True)
-def _prediction(world: World, now: StepState, i: int, patience: float) -> Prediction:
-    """Return the prediction of driver i.
+def _prediction(
+    world: World, parameters: DriverParameters, now: StepState, i: int, patience: float
+) -> Prediction:
+    """Return the prediction of driver i, with the limits that the ego sets.
 
-    It ignores the order with the ego if its spent patience [s] is infinite.
+    There are none if its spent patience [s] is infinite.
     """
     ago = _observation_age(now, i)
     ego = now.seen[ago]
     is_patient = patience < np.inf
     on_path = ego[ON_PATH] > 0.0
-    rate = ego[EGO_RATE] if on_path and is_patient else -1.0
-    clearance = MODEL.lateral_clearance_m if ego[ON_PATH] == 0.0 and is_patient else 0.0
-    clock = ego[EGO_CLOCK] + ego[EGO_RATE] * ago * world.step
-    return Prediction(now.ego[i], clock, rate, now.clocks, clearance, not world.walks[i])
+    limits = np.full(now.clocks.shape[1], np.inf)
+    if parameters.yields and on_path and is_patient and ego[EGO_RATE] >= 0.0:
+        clock = ego[EGO_CLOCK] + ego[EGO_RATE] * ago * world.step
+        limit_by_ego(world, i, clock, ego[EGO_RATE], limits)
+    clearance = MODEL.lateral_clearance_m if not on_path and is_patient else 0.0
+    return Prediction(now.ego[i], limits, clearance, not world.walks[i])
 
 
-@kernel(inline=True)
+@kernel(inline=True, forced=True)
 def _is_blocked(now: StepState, i: int) -> bool:
     """Return whether driver i stands or creeps because of an ego that hardly moves."""
     rate = now.drivers[i, RATE]
@@ -266,11 +271,11 @@ def _braking_for_ego(
     following = following_braking(
         world, parameters, driver, pose, world.ego, box, ego[3], world.step
     )
-    prediction = _prediction(world, now, i, patience)
+    prediction = _prediction(world, parameters, now, i, patience)
     if is_before_kerb(world, driver):
         predict_fast_ego(world, now.seen[0], now.ego[i])
         return max(following, braking_at_kerb(world, parameters, driver, pose, prediction))
-    return weakest_safe_braking(world, parameters, driver, following, prediction, False)
+    return weakest_safe_braking(world, parameters, driver, following, prediction)
 
 
 @kernel(inline=True)
@@ -299,8 +304,11 @@ def _rate_for_others(
                 world, parameters, driver, now.pose[i], j, box, speed, 0.0
             )
             braking = max(braking, following)
-    prediction = without_ego_order(world, driver, _prediction(world, now, i, patience))
-    braking = weakest_safe_braking(world, parameters, driver, braking, prediction, True)
+    prediction = _prediction(world, parameters, now, i, patience)
+    if is_before_kerb(world, driver):
+        prediction.limits[:] = np.inf  # it waits for the ego at the kerb, not on the lane
+    limit_by_others(world, i, now.clocks, prediction.limits)
+    braking = weakest_safe_braking(world, parameters, driver, braking, prediction)
     if braking <= ego_braking:
         return np.inf
     floor = _creep_speed(world, now, i)

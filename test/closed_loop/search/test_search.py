@@ -235,7 +235,7 @@ def test_the_command_searches_a_log_on_a_road_and_says_what_it_found(tmp_path):
         and json.loads((tmp_path / "out" / "search.json").read_text())["drives"] == 12
     )
     refused = CliRunner().invoke(app, [*words, "--max-rate", "0.1", "--worst"])
-    assert "a search for the worst gives no rate" in str(refused.exception)
+    assert "a search for the worst failure estimates no rate" in str(refused.exception)
     refused = CliRunner().invoke(app, [*words, "--encounter", "none"])
     assert isinstance(refused.exception, InputError) and "has no encounter 'none'" in str(
         refused.exception
