@@ -70,7 +70,7 @@ BEFORE = {
 # A change that needs more tokens deletes something, or says why in the commit. Splitting dense
 # code into plain steps has cost 14,000 tokens so far; 435,000 are wanted.
 BUDGET = {
-    "tokens": 509_850,
+    "tokens": 509_910,
     "long lines": 52,
     "complex functions": 13,
     "branching functions": 10,
