@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from scenario_gen.closed_loop.search.estimate import Response
+from scenario_gen.closed_loop.search.response import Response
 from scenario_gen.logs import read_log
 from scenario_gen.logs.synthetic import bundled
 from scenario_gen.method.chain import Chain

@@ -30,8 +30,8 @@ from scenario_gen.base.errors import ScenarioGenError
 from scenario_gen.base.parameters import assigned, flatten, loaded
 from scenario_gen.closed_loop.comparison import read_drives, refuse_others
 from scenario_gen.closed_loop.config import ClosedLoopConfig
-from scenario_gen.closed_loop.search.estimate import Response
 from scenario_gen.closed_loop.search.journal import open_journal, read_journal
+from scenario_gen.closed_loop.search.response import Response
 from scenario_gen.logs import read_log
 from scenario_gen.logs.synthetic import bundled
 from scenario_gen.method.evaluation import (

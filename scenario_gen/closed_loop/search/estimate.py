@@ -19,11 +19,12 @@ alternate. A search with a larger budget begins with the drives of a smaller one
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 import math
-from typing import Any, NamedTuple, Protocol, TypeVar
+from typing import Any, NamedTuple
 
 import numpy as np
 from scipy import optimize, special
 
+from scenario_gen.closed_loop.search.response import Problem, Response
 from scenario_gen.closed_loop.search.surrogate import Surrogate
 from scenario_gen.method.evaluation import wilson
 from scenario_gen.numerics import Floats
@@ -78,49 +79,6 @@ class SearchSettings:
 
 
 SETTINGS = SearchSettings()
-
-
-@dataclass(frozen=True)
-class Response:
-    """The result of one drive.
-
-    Attributes:
-        margin: distance to failure; 0 or less if the drive failed.
-        parts: figures whose minimum is the margin of a drive that did not fail; the same number
-            for every drive, or none.
-        kind: of the failure, "" for none.
-        events: names of events during the drive, whose rates are estimated, too.
-    """
-
-    margin: float
-    parts: tuple[float, ...] = ()
-    kind: str = ""
-    events: tuple[str, ...] = ()
-
-    @property
-    def failed(self) -> bool:
-        """Whether the planner failed."""
-        return self.margin <= 0.0
-
-
-Candidate = TypeVar("Candidate")
-
-
-class Problem(Protocol[Candidate]):
-    """A planner among the candidates of a search."""
-
-    @property
-    def size(self) -> int:
-        """Number of standard normal numbers of a candidate."""
-
-    def candidates(self, z: Floats) -> list[Candidate | None]:
-        """Return the certified scenarios of numbers (S, size), None for rejected ones."""
-
-    def features(self, candidate: Candidate) -> tuple[float, ...]:
-        """Return figures of a scenario that may influence its drive, the same number for each."""
-
-    def drive(self, candidates: Sequence[Candidate]) -> list[Response]:
-        """Drive the planner in each candidate."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -14,7 +14,7 @@ from zlib import crc32
 from scenario_gen.base.documents import COUNT, NUMBER, parse_json, read_text
 from scenario_gen.base.errors import InputError, of_system
 from scenario_gen.base.folders import write_text
-from scenario_gen.closed_loop.search.estimate import Response
+from scenario_gen.closed_loop.search.response import Response
 
 MAX_JOURNAL_BYTES = 1 << 30  # some 10 million drives
 REMEDY = "; move it away, or give another --out"

@@ -10,7 +10,7 @@ import re
 import numpy as np
 
 from scenario_gen.base.errors import did_you_mean, InputError
-from scenario_gen.closed_loop.search.estimate import Response
+from scenario_gen.closed_loop.search.response import Response
 from scenario_gen.closed_loop.trials import Outcome
 from scenario_gen.closed_loop.verdict import DriveVerdict
 from scenario_gen.method.evaluation import min_time_shift

@@ -7,9 +7,9 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 from scenario_gen.closed_loop.origin import Trial
-from scenario_gen.closed_loop.search.estimate import Response
 from scenario_gen.closed_loop.search.journal import Journal
 from scenario_gen.closed_loop.search.objective import Objective
+from scenario_gen.closed_loop.search.response import Response
 from scenario_gen.closed_loop.trials import RunTrials
 from scenario_gen.method.evaluation import min_time_shift
 from scenario_gen.method.sampling import NaturalScenarios

@@ -10,7 +10,8 @@ import pytest
 from scipy.stats import norm
 from support.lengths import LONG
 
-from scenario_gen.closed_loop.search.estimate import Response, Search, SETTINGS
+from scenario_gen.closed_loop.search.estimate import Search, SETTINGS
+from scenario_gen.closed_loop.search.response import Response
 
 DIMENSIONS = 24
 SEEDS = 20 if LONG else 6
