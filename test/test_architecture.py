@@ -206,7 +206,7 @@ def test_the_command_line_loads_no_library_before_a_command_needs_it():
 
 def test_no_file_needs_a_map():
     for path in PYTHON_FILES:
-        assert len(path.read_text().splitlines()) <= 600, path  # 500 lines of 130 columns before
+        assert len(path.read_text().splitlines()) <= 500, path
 
 
 def test_nothing_of_this_machine_and_no_registry_is_named():

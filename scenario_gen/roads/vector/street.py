@@ -21,15 +21,14 @@ from scenario_gen.base.errors import RefusedError
 from scenario_gen.numerics import Floats, wrap_angle
 from scenario_gen.numerics.curve import Curve
 from scenario_gen.roads.vector.lane_graph import LaneChain, LaneGraph, LEAD_M
-from scenario_gen.roads.vector.match import (
+from scenario_gen.roads.vector.lane_path import (
     bend_cost,
-    lane_change_curve,
     LanePath,
     lateral_acceleration,
-    Match,
     off_reserved_cost,
     speeding_cost,
 )
+from scenario_gen.roads.vector.match import lane_change_curve, Match
 from scenario_gen.situation import FrenetTracks, to_frenet, Track, turn_of
 from scenario_gen.types import LEVEL_SPACING_M
 
