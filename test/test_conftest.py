@@ -12,8 +12,9 @@ import sys
 
 def test_a_worker_that_crashes_ends_the_run_and_its_test_is_named(tmp_path):
     """With the words of the Makefile: without one of them the others wait for ever."""
-    for name in ("conftest.py", "lengths.py", "skips.py"):
-        (tmp_path / name).write_text(Path(__file__).with_name(name).read_text())
+    tests = Path(__file__).parent
+    (tmp_path / "conftest.py").write_text((tests / "conftest.py").read_text())
+    (tmp_path / "support").symlink_to(tests / "support")
     (tmp_path / "pytest.ini").write_text("[pytest]\nmarkers =\n  recorded\n  spread\n  long\n")
     (tmp_path / "test_crash.py").write_text("import os\ndef test_crash(): os.abort()\n")
     (tmp_path / "test_skip.py").write_text(
