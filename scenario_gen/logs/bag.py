@@ -30,7 +30,7 @@ from scenario_gen.types import Encounter
 
 _AT_ORIGIN_M = 0.5  # within it, two vehicles cannot be at the same time
 _SAME_START_NS = 1e9  # a later vehicle may start at the origin, too
-_READABLE_TYPES = (FIX, TWIST, ODOMETRY, TRACKS, TRACKED)
+READABLE_TYPES = (FIX, TWIST, ODOMETRY, TRACKS, TRACKED)
 
 
 @dataclass
@@ -66,8 +66,16 @@ def read(paths: Sequence[Path], config: LogConfig) -> RawLog:
     Raises:
         InputError: a bag is damaged or too large, or its topics do not give positions.
     """
-    topics = _read_topics(paths, config)
     name = paths[0].stem if paths[0].is_file() else paths[0].name
+    return log_of(_read_topics(paths, config), name, config)
+
+
+def log_of(topics: Sequence[Topic], name: str, config: LogConfig) -> RawLog:
+    """Return the log that the messages of known topics make up.
+
+    Raises:
+        InputError: a message is damaged, or the topics do not give positions.
+    """
     tracks = [topic for topic in topics if topic.type == TRACKS]
     tracked = [topic for topic in topics if topic.type == TRACKED]
     if tracks:
@@ -99,9 +107,9 @@ def _read_topics(paths: Sequence[Path], config: LogConfig) -> list[Topic]:
 
     def is_used(topic: str, kind: str) -> bool:
         if requested:
-            return topic in requested and kind in _READABLE_TYPES
+            return topic in requested and kind in READABLE_TYPES
         is_other_trajectory = kind == TRACKS and topic.rpartition("/")[2] != "tracks"
-        return kind in _READABLE_TYPES and not is_other_trajectory
+        return kind in READABLE_TYPES and not is_other_trajectory
 
     for path in paths:
         with open_bag(path, bounds, "log.size_limit") as bag:
@@ -133,10 +141,10 @@ def _check_requested(requested: Sequence[str], types: Mapping[str, str], path: P
             raise InputError(
                 f"parameter topics: {path} has no topic {name!r}; it has {_listing(types)}"
             )
-        if types[name] not in _READABLE_TYPES:
+        if types[name] not in READABLE_TYPES:
             raise InputError(
                 f"{path}, topic {name}: type {types[name]} is not one of "
-                f"{', '.join(_READABLE_TYPES)}"
+                f"{', '.join(READABLE_TYPES)}"
             )
 
 

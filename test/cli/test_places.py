@@ -97,7 +97,7 @@ def test_nothing_in_a_store_is_replaced_and_what_fails_writes_nothing(bucket, ru
     code, text = run(
         "generate", f"{bucket}/logs/synthetic_c", *GENERATE, "--out", "https://127.0.0.1/made"
     )
-    assert code == 2 and "https is only read" in text
+    assert code == 2 and "https is read-only" in text
     assert objects(bucket) == before and not list((tmp_path / "copies").iterdir())
 
 

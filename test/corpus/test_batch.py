@@ -218,7 +218,7 @@ def test_a_batch_of_two_processes_that_is_ended_leaves_only_what_is_done(corpus,
 
 @pytest.mark.parametrize(
     ("inside", "said"),
-    [("", "of which it would"), ("batch", "of which it would"), ("archive.json", "is a file")],
+    [("", "is within the input"), ("batch", "is within the input"), ("archive.json", "is a file")],
 )
 def test_a_batch_is_written_beside_its_corpus(corpus, inside, said):
     before = sorted(corpus[0].rglob("*"))

@@ -87,7 +87,7 @@ def test_the_corpus_is_the_same_wherever_archive_and_corpus_lie(
         before = {one.url: written(one) for one in out.rglob("*.parquet")}
         mine([place(f"{bucket}/spmd")], out)
         assert {one.url: written(one) for one in out.rglob("*.parquet")} == before
-        with pytest.raises(InputError, match="corpus of other files"):
+        with pytest.raises(InputError, match="corpus with other files"):
             mine([archive], out)
 
 
@@ -109,7 +109,7 @@ def test_a_batch_and_what_it_finds_are_the_same_in_a_store(bucket, corpus, tmp_p
     assert make_again(out, row).sha256 == row["sha256"]
     namespaces = read_recording(export_hits(out, [row], tmp_path / "hits")).namespaces
     assert [one.hashes for one in namespaces.values()] == [(row["sha256"],)]
-    with pytest.raises(InputError, match="batch of other count"):
+    with pytest.raises(InputError, match="batch with other count"):
         run_batch(stored, ["corridor"], out, BatchRequest(count=3, seed=5), templates=2)
     remove(
         out / "cases" / "road=corridor" / "part-00000.parquet"
@@ -130,7 +130,7 @@ def test_a_library_is_the_same_in_a_store(bucket, corpus, tmp_path):
     assert build(stored, most=4) == build(local, most=4)
     in_store = contents(stored / "library")
     assert in_store.pop("request.json") and in_store == contents(local / "library")
-    with pytest.raises(InputError, match="library of other most"):
+    with pytest.raises(InputError, match="library with other most"):
         build(stored, most=5)
 
 
@@ -219,8 +219,8 @@ def test_a_killed_run_is_gone_on_with(bucket, corpus, seconds):
             ("mine", "s3://no-such-bucket/a", "--out", "BUCKET/out"),
             "s3://no-such-bucket/a does not exist; check bucket and name",
         ),
-        (("mine", "BUCKET/spmd", "--out", "https://example.org/x"), "https is only read"),
-        (("mine", "ftp://host/a", "--out", "BUCKET/out"), "ftp is not read or written"),
+        (("mine", "BUCKET/spmd", "--out", "https://example.org/x"), "https is read-only"),
+        (("mine", "ftp://host/a", "--out", "BUCKET/out"), "ftp is not supported"),
         (("batch", "BUCKET/out", "--roads", "straight", "--out", "x"), "out holds no encounters/"),
         (("library", "BUCKET/out"), "out holds no encounters/"),
         (("find", "BUCKET/out"), "out holds no scenarios"),

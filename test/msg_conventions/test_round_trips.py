@@ -175,7 +175,7 @@ def test_lanes(seed, count):
     for one, other in zip(sent.rules, got.rules, strict=True):
         assert_same(one, other, "id", "kind", "lanes", "over", "line")
     for one, other in zip(sent.lanes, got.lanes, strict=True):
-        assert_same(one, other, "id", "left", "right", "successors", "beside", "junction")
+        assert_same(one, other, "id", "left", "right", "successors", "neighbours", "junction")
         assert np.array_equal(one.speed_limit, other.speed_limit, equal_nan=True)
         assert np.array_equal(
             other.height, one.height if sent.has_levels else np.nan * one.height, equal_nan=True

@@ -59,7 +59,7 @@ def test_built_in_roads_are_listed_and_those_that_suit(tmp_path):
         run("roads")
         == "roads: straight, curve, t_intersection, four_way, merge, roundabout, corridor\n"
     )
-    assert run("roads", "--log", log) == "roads that take my_log: four_way, corridor\n"
+    assert run("roads", "--log", log) == "roads that suit my_log: four_way, corridor\n"
     assert run("roads", "four_way", "--out", tmp_path / "four.svg").startswith("four_way: ")
     assert ET.parse(tmp_path / "four.svg").getroot().tag == f"{SVG}svg"
 

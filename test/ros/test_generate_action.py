@@ -110,9 +110,15 @@ def suite(environment, tmp_path_factory):
 
 def ask(environment, *goals):
     """Send goals at once; return how each went, by its place, and what was heard of scenarios."""
-    command = [sys.executable, ROOT / "test" / "ros" / "action_client.py", json.dumps(goals)]
+    command = [sys.executable, "-m", "support.action_client", json.dumps(goals)]
     run = subprocess.run(
-        command, env=environment, capture_output=True, text=True, check=False, timeout=550.0
+        command,
+        cwd=ROOT / "test",
+        env=environment,
+        capture_output=True,
+        text=True,
+        check=False,
+        timeout=550.0,
     )
     assert run.returncode == 0, run.stderr[-3000:]
     *ended, heard = json.loads(run.stdout.splitlines()[-1])

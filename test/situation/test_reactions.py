@@ -12,8 +12,7 @@ from support.textbook_motions import CHANCE, labelled, NOTHING, REACTIONS
 
 from scenario_gen.situation import Situation
 from scenario_gen.situation.reactions import without_circles
-from scenario_gen.types import Vehicle
-from scenario_gen.types.reaction import FOLLOW, Reaction, YIELD
+from scenario_gen.types import FOLLOW, Reaction, Vehicle, YIELD
 
 TWO, AB = (tuple(map(Vehicle, names)) for names in ("12", "ab"))
 

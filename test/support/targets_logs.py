@@ -25,7 +25,7 @@ from scenario_gen.bags.storage.definitions import TRACKED, type_store
 from scenario_gen.bags.vehicles import FIX, ODOMETRY, TWIST
 from scenario_gen.base.errors import ScenarioGenError
 from scenario_gen.logs import encounters_of, LogConfig, read_log, Streams
-from scenario_gen.logs.bag import read_streams, read_tracked, read_tracks, Topic, USED
+from scenario_gen.logs.bag import log_of, READABLE_TYPES, Topic
 from scenario_gen.logs.synthetic import bundled
 from scenario_gen.logs.tables import SPMD_COLUMNS
 from scenario_gen.types.encounter import Encounter
@@ -256,27 +256,21 @@ def payloads(_folder: Path) -> list[bytes]:
     """A number of a type, and CDR bytes of that type."""
     return [
         bytes([k]) + message
-        for k, kind in enumerate(USED)
+        for k, kind in enumerate(READABLE_TYPES)
         for _, _, message in recorded()[kind][:3]
     ]
 
 
 def decode(data: bytes, _folder: Path) -> None:
     """Read a log of sound messages, among which some are the input."""
-    kind = USED[data[0] % len(USED)] if data else USED[0]
+    kind = READABLE_TYPES[data[0] % len(READABLE_TYPES)] if data else READABLE_TYPES[0]
     topics: dict[tuple[str, str], Topic] = {}
     for used in (kind,) if kind in (ODOMETRY, TRACKS, TRACKED) else (FIX, TWIST):
         for number, (name, stamp, message) in enumerate(recorded()[used]):
             topic = topics.setdefault((used, name), Topic(name, used, "log.mcap"))
             topic.stamps.append(stamp)
             topic.data.append(data[1:] if used == kind and number % 7 == 0 else message)
-    if kind == TRACKS:
-        log = read_tracks(list(topics.values()), "log", [])
-    elif kind == TRACKED:
-        log = read_tracked(list(topics.values()), "log", [])
-    else:
-        log = read_streams(list(topics.values()), "log", SHORT)
-    encounters_of(log, SHORT)
+    encounters_of(log_of(list(topics.values()), "log", SHORT), SHORT)
 
 
 def put(data: bytes, _folder: Path) -> None:

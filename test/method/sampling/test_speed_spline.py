@@ -10,9 +10,10 @@ import pytest
 from scipy.interpolate import BSpline
 from scipy.optimize import minimize
 
-from benchmarks._paper_speed_knots import speed_knots
+from benchmarks._paper_speed_knots import speed_knots as paper_speed_knots
 from scenario_gen.method.sampling.nominal_clock import clock_from_rate, slowed_clock, SLOWING_S
 from scenario_gen.method.sampling.speed_profile import mean as mean_module
+from scenario_gen.method.sampling.speed_profile.knots import speed_knots
 from scenario_gen.method.sampling.speed_profile.mean import (
     Bounds,
     fixed_coefficients,
@@ -139,10 +140,20 @@ def test_lines_once_rounded_fit_better_than_lines_alone():
     speed = np.interp(TIME, CLOCK, [8.0, 11.0, 4.0, 4.0, 9.0])
     smooth = np.convolve(np.pad(speed, 6, mode="edge"), np.ones(13) / 13.0, mode="valid")
     basis = spline([])
-    knots = speed_knots(CLOCK, np.zeros(4, dtype=bool), [], TIME, smooth, (8.0, 9.0), 0.0)
-    lines = rounded_lines(basis, knots, TIME, smooth, (8.0, 9.0))
-    means = [mean_speed(basis, Target(knots.knot, v, np.zeros(0), np.zeros(0), (8.0, 9.0), float(smooth[:-1].sum() * 0.1)),
-                        plain(basis), loose(basis, jerk=1e3)) for v in (lines, knots.lines)]  # fmt: skip
+    ends, moves = (8.0, 9.0), np.zeros(4, dtype=bool)
+    knots = speed_knots(CLOCK, moves, [], ends, [])
+    rounded = rounded_lines(basis, knots, TIME, smooth, ends)
+    straight = paper_speed_knots(CLOCK, moves, [], TIME, smooth, ends, 0.0).lines
+    none, length = np.zeros(0), float(smooth[:-1].sum() * 0.1)
+    means = [
+        mean_speed(
+            basis,
+            Target(knots.knot, speeds, none, none, ends, length),
+            plain(basis),
+            loose(basis, jerk=1e3),
+        )
+        for speeds in (rounded, straight)
+    ]
     off = [np.sqrt(np.square(basis.design(TIME) @ c - smooth).mean()) for c in means]
     assert off[0] < off[1]
 
