@@ -41,7 +41,7 @@ class Subject(StrEnum):
 class Status:
     """One diagnostic_msgs/DiagnosticStatus.
 
-    Its name is the node's full name, `: ` and the subject.
+    Its name is the node's full name, a colon and the subject.
     """
 
     name: str

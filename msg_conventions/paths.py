@@ -4,11 +4,10 @@
 """Route ⇄ `vehicle_<id>/route`, and plain paths (nav_msgs/Path).
 
 Frame: the road's. `header.stamp`: the template's. A pose's stamp is the planned time: the
-    template's stamp at every anchor
-(start, changepoints, end), between anchors in proportion to arc length. Equal consecutive poses
-are a dwell.
+template's stamp at every anchor (start, changepoints, end), between anchors in proportion to arc
+length. Equal consecutive poses are a dwell.
 QoS: reliable, transient_local, depth 1. Arc length is not in the message; it is the sum of the
-    chords.
+chords.
 """
 
 from collections.abc import Sequence

@@ -4,11 +4,10 @@
 """Road ⇄ `map` (nav_msgs/OccupancyGrid), `road/entries`, `road/exits` (PoseArray).
 
 Map: 0 free, 100 occupied, 99 occupied by an obstacle on the road, -1 unknown; a known cell below
-    65
-(nav2's occupied threshold) is drivable. `info.origin` is the lower-left corner of cell (0, 0), not
-rotated; row 0 has the lowest y. Entries head into the road, exits out of it. Stamp: that of the
-road's template, or 0 for any template. QoS: reliable, transient_local, depth 1. The road's name is
-not in the messages, because nothing is computed from it.
+65 (nav2's occupied threshold) is drivable. `info.origin` is the lower-left corner of cell (0, 0),
+not rotated; row 0 has the lowest y. Entries head into the road, exits out of it. Stamp: that of
+the road's template, or 0 for any template. QoS: reliable, transient_local, depth 1. The road's
+name is not in the messages, because nothing is computed from it.
 """
 
 from types import SimpleNamespace

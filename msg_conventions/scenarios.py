@@ -6,9 +6,8 @@
 There are several if vehicles arrive late or leave early.
 
 Frame: the road's. Stamp: the template's, so that the bytes depend on the request alone. A
-    scenario's
-SHA-256 joins it with its `scenarios/info`, which also has seed and index. QoS: reliable,
-transient_local, depth 1000.
+scenario's SHA-256 joins it with its `scenarios/info`, which also has seed and index. QoS:
+reliable, transient_local, depth 1000.
 
 A vehicle is present from the first to the last point of its message. So neighbouring vehicles with
 the same presence share a message, and a scenario in which all are present throughout is one

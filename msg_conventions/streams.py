@@ -4,7 +4,7 @@
 """A vehicle's state ⇄ `vehicle_<id>/fix` (NavSatFix), `vehicle_<id>/speed` (TwistStamped).
 
 Stamp: the sample's, on the template's clock. Frame: `vehicle_<id>`. Speed: linear.x, m/s, of the
-    body frame.
+body frame.
 QoS: reliable, volatile, depth 1000.
 """
 

@@ -5,14 +5,15 @@
 
 A new type is an entry here or in a plugin.
 
-Sources: sizes: the defaults of SUMO's vehicle classes (Vehicle Type Parameter Defaults), a car's
-as of a European estate.
-Motion: limits, not what is usual. Turning: a bus and a truck keep to the annulus of 12.5 m and 5.3
-    m of UN Regulation 107 and
-Regulation (EU) 1230/2012, so that the middle of the footprint turns with 8 m; a car's turning
-circle between kerbs is 10.5 m.
-Walking: Weidmann 1993 (1.34 m/s, to 2 m/s); running ends at 5 m/s. Bicycles: 45 km/h (L1e-B) is
-    the fastest that is one.
+Sources:
+
+- Sizes: the defaults of SUMO's vehicle classes (Vehicle Type Parameter Defaults), a car's as of a
+  European estate.
+- Motion: limits, not what is usual. Turning: a bus and a truck keep to the annulus of 12.5 m and
+  5.3 m of UN Regulation 107 and Regulation (EU) 1230/2012, so that the middle of the footprint
+  turns with 8 m; a car's turning circle between kerbs is 10.5 m.
+- Walking: Weidmann 1993 (1.34 m/s, to 2 m/s); running ends at 5 m/s. Bicycles: 45 km/h (L1e-B) is
+  the fastest that is one.
 """
 
 from collections.abc import Mapping

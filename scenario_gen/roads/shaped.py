@@ -106,6 +106,8 @@ def main_axis(name: str, main: MainLine, config: RoadConfig) -> Curve:
 class MergeLayout:
     """The layout of a main road and a ramp; lengths in metres.
 
+    The main road from above::
+
                         before_m                        after_m
         |--------------------------------------|-------------------------|
         ------------------------------------------------------------------
