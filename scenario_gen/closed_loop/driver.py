@@ -27,6 +27,7 @@ class DriverModel(NamedTuple):
         min_divisor_mps: floor of a speed that divides a distance.
         clearance_m: a driver that brakes for the ego leaves this distance.
         lateral_clearance_m: distance to an ego that has left the path of its witness.
+        same_direction_ratio: least cosine of the angle between two headings of one direction.
         clock_tolerance_s: uncertainty of the clock of the ego.
         extra_braking_mps2: an ego that brakes harder than its witness by this goes on braking.
         ego_response_s: delay of an ego that brakes for a pedestrian on its lane.
@@ -48,6 +49,7 @@ class DriverModel(NamedTuple):
     min_divisor_mps: float = 0.2
     clearance_m: float = 0.3
     lateral_clearance_m: float = 0.5
+    same_direction_ratio: float = 0.7
     clock_tolerance_s: float = 0.05
     extra_braking_mps2: float = 1.0
     ego_response_s: float = 1.0

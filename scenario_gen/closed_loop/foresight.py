@@ -69,8 +69,8 @@ def _brake(speed: float, braking: float, h: float) -> tuple[float, float]:
 def predict_ego(world: World, seen: Floats, ago: int, out: Floats) -> None:
     """Write x, y, yaw and speed (M, 4) of the ego at the end of this step and of the next ones.
 
-    On the path of its witness the ego continues at its rate, otherwise straight on. An ego that
-    brakes continues to brake; on that path, only if it brakes harder than its witness.
+    On the path of its witness the ego continues at its rate, otherwise, and beyond the end of that
+    path, straight on. An ego that brakes continues to brake; on that path, only if it brakes harder than its witness.
 
     Args:
         world: the scenario.
@@ -83,7 +83,8 @@ def predict_ego(world: World, seen: Floats, ago: int, out: Floats) -> None:
     speed = seen[3]
     clock = seen[EGO_CLOCK]
     braking = max(-seen[5], 0.0)
-    on_path = seen[ON_PATH] > 0.0
+    end = world.spans[world.ego, 1] if world.leaves[world.ego] else np.inf
+    on_path = seen[ON_PATH] > 0.0 and clock < end
     keeps_rate = on_path and _keeps_rate(world, seen)
     cos = np.cos(seen[2])
     sin = np.sin(seen[2])
@@ -99,6 +100,9 @@ def predict_ego(world: World, seen: Floats, ago: int, out: Floats) -> None:
             delay = min(moved / max(pose[3], MODEL.min_divisor_mps), h)
             clock += seen[EGO_RATE] * h if keeps_rate else delay
             pose_at(world.time, motion, clock, pose)
+            beyond = max(clock - end, 0.0) * pose[3]
+            pose[0] += beyond * np.cos(pose[2])
+            pose[1] += beyond * np.sin(pose[2])
         else:
             pose[0] = seen[0] + way * cos
             pose[1] = seen[1] + way * sin
@@ -162,7 +166,10 @@ def _is_clear(
     braking: float,
     prediction: Prediction,
 ) -> bool:
-    """Return whether a driver that brakes stays clear of the ego and respects the order."""
+    """Return whether a driver that brakes stays clear of the ego and respects the order.
+
+    An ego that reaches it from behind is ignored from then on.
+    """
     i = driver.vehicle
     pose = np.empty(5)
     brakes = braking > NO_BRAKING_MPS2
@@ -171,6 +178,7 @@ def _is_clear(
     ego_half = (world.half[world.ego, 0], world.half[world.ego, 1])
     reach = np.sqrt(half[0] ** 2 + half[1] ** 2) + np.sqrt(ego_half[0] ** 2 + ego_half[1] ** 2)
     leave_clock = world.spans[i, 1] if world.leaves[i] else np.inf
+    avoids_ego = prediction.avoids_ego
     time = world.time
     motion = world.motion[i]
     pose_at(time, motion, driver.clock, pose)
@@ -181,9 +189,11 @@ def _is_clear(
         ego = prediction.ego[m]
         dx = ego[0] - pose[0]
         dy = ego[1] - pose[1]
-        is_near = prediction.avoids_ego and dx * dx + dy * dy < reach * reach
-        if is_near and _hits_ego(pose, half, ego, ego_half):
-            return False
+        is_near = avoids_ego and dx * dx + dy * dy < reach * reach
+        if is_near and _meets_ego(pose, half, ego, ego_half):
+            if dx * np.cos(pose[2]) + dy * np.sin(pose[2]) > 0.0:
+                return False
+            avoids_ego = np.cos(ego[2] - pose[2]) < MODEL.same_direction_ratio
         if driver.clock > prediction.limits[m]:
             return False
         if braking > 0.0 and driver.rate == 0.0:
@@ -192,16 +202,15 @@ def _is_clear(
 
 
 @kernel(inline=True)
-def _hits_ego(
+def _meets_ego(
     pose: Floats, half: tuple[float, float], ego: Floats, ego_half: tuple[float, float]
 ) -> bool:
-    """Return whether a footprint at a pose (5,) meets an ego (4,) that is not behind it."""
+    """Return whether a footprint at a pose (5,) meets an ego (4,)."""
     footprint = np.empty(7)
     ego_box = np.empty(7)
     fill_box(pose[0], pose[1], pose[2], half[0], half[1], footprint)
     fill_box(ego[0], ego[1], ego[2], ego_half[0], ego_half[1], ego_box)
-    along = (ego[0] - pose[0]) * footprint[2] + (ego[1] - pose[1]) * footprint[3]
-    return along > 0.0 and boxes_meet(footprint, ego_box)
+    return bool(boxes_meet(footprint, ego_box))
 
 
 @kernel(inline=True)
@@ -211,7 +220,10 @@ def limit_by_ego(world: World, i: int, clock: float, rate: float, limits: Floats
     The ego starts at a clock [s] and continues at a rate.
     """
     order = world.order[i, world.ego]
+    end = world.spans[world.ego, 1] if world.leaves[world.ego] else np.inf
     for m in range(limits.shape[0]):
+        if clock + rate * m * world.step >= end:
+            break  # it has left the scene
         limit = clock_limit(order, world.cell, clock + rate * m * world.step)
         limits[m] = limit + MODEL.clock_tolerance_s
 

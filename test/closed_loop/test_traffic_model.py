@@ -184,6 +184,37 @@ def test_nobody_overtakes_a_slower_ego_in_its_lane_by_a_hand(beside, passes):
     assert (drive[-1].vehicles[0, 0] > drive[-1].ego.x) == passes
 
 
+@pytest.mark.parametrize("faster", [2.0, 6.0, 12.0])
+def test_nobody_brakes_for_an_ego_that_comes_from_behind(faster):
+    """The ego speeds up behind a vehicle on its path, up to the contact."""
+    loop = ClosedLoop(following(8.0, 12.0), 0)
+    drive = loop.drive(Pushes(8.0 + faster), lambda state: loop.hit(state) or state.step >= 100)
+    assert np.abs(drive.motion.speed[1] - 8.0).max() < 1e-6
+
+
+@pytest.mark.parametrize("late", [0.0, 2.0])
+def test_nobody_stops_for_an_ego_at_the_end_of_its_reference(late):
+    """The reference of the ego ends at 6 s before a vehicle that follows; the ego goes on."""
+    scenario = replace(following(10.0, 15.0), present=np.array([[0, 149], [0, 60]]))
+    drive = ClosedLoop(scenario, 1).drive(Pushes(10.0, late), lambda state: state.step >= 140)
+    assert drive.motion.speed[0, 40:].min() > 8.0 - late and drive.motion.speed[0, -1] > 9.9
+
+
+class Pushes:
+    """Drives straight on to a speed [m/s]; brakes lightly for a time [s] before."""
+
+    def __init__(self, speed, late=0.0):
+        self.speed, self.late = speed, late
+
+    def reset(self, task):
+        """Begin."""
+
+    def act(self, seen):
+        if seen.time < self.late:
+            return Command(-1.0, 0.0)
+        return Command(min(2.0 * (self.speed - seen.ego.speed), 3.0), 0.0)
+
+
 def test_who_stands_at_its_end_has_no_speed():
     time = 0.1 * np.arange(60)
     zero, slow = np.zeros_like(time), np.full_like(time, 0.4)
