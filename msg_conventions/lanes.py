@@ -9,8 +9,9 @@ before the right one. `text` is a JSON object with these members:
 - `name`, `notes`, `note_kinds`
 - `lanes`, each with its `id`, the number of `points` of a border, `successors` and `beside`
   (indices of lanes), `speed_limit` [m/s, null: unknown], `junction`; also `users` if it is not for
-  all vehicles, `crossing` true for crossings, and `height` [m] of its points if lanes lie above
-  others. Lanes closed to cars come last.
+  all vehicles, `crossing` true for crossings, `arm` (from 1) and `inward` if it belongs to an arm
+  of a built-in road, and `height` [m] of its points if lanes lie above others. Lanes closed to cars
+  come last.
 - `rules`, if the map has traffic rules, each with `id`, `kind`, `lanes`, `over` (indices of lanes)
   and `line` (points of the stop line), and `rules_kept`
 - `origin`: latitude and longitude of the frame's origin, if the map has it
@@ -22,7 +23,7 @@ Action 2 (delete) means that the road has no lanes. Stamp and frame: the map's. 
 transient_local, depth 1.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 import json
 import math
 from typing import Any
@@ -71,49 +72,54 @@ def encode_lanes(network: LaneNetwork | None, frame_id: str, stamp_ns: int) -> b
 
 
 def _document(network: LaneNetwork) -> dict[str, Any]:
-    lanes = [
-        {
-            "id": lane.id,
-            "points": len(lane.left),
-            "successors": lane.successors,
-            "beside": lane.neighbours,
-        }
-        | {
-            "speed_limit": None if math.isnan(lane.speed_limit) else lane.speed_limit,
-            "junction": lane.junction,
-        }
-        | ({"users": sorted(lane.users)} if lane.users else {})
-        | ({"crossing": True} if lane.crossing else {})
-        for lane in network.every_lane
-    ]
-    for lane, entry in zip(network.every_lane, lanes if network.has_levels else (), strict=False):
-        entry["height"] = [
-            None if math.isnan(height) else round(height, 2) for height in lane.height.tolist()
-        ]
-    rules = [
-        {
-            "id": rule.id,
-            "kind": rule.kind,
-            "lanes": rule.lanes,
-            "over": rule.over,
-            "line": rule.line.tolist(),
-        }
-        for rule in network.rules
-    ]
     document: dict[str, Any] = {
         "name": network.name,
         "notes": list(map(str, network.notes)),
         "note_kinds": note_kinds(network.notes),
-        "lanes": lanes,
+        "lanes": [_lane_document(lane, network.has_levels) for lane in network.every_lane],
     }
-    document |= {"rules": rules, "rules_kept": network.rules_kept} if rules else {}
-    document |= ({"drawn": True} if network.drawn else {}) | (
-        {"origin": network.origin} if network.origin else {}
-    )
-    aim = network.drawn_for
-    return document | (
-        {} if aim is None else {"drawn_for": {"frame": aim.frame.tolist(), "lanes": aim.lanes}}
-    )
+    if network.rules:
+        document["rules"] = [
+            {
+                "id": rule.id,
+                "kind": rule.kind,
+                "lanes": rule.lanes,
+                "over": rule.over,
+                "line": rule.line.tolist(),
+            }
+            for rule in network.rules
+        ]
+        document["rules_kept"] = network.rules_kept
+    if network.drawn:
+        document["drawn"] = True
+    if network.origin:
+        document["origin"] = network.origin
+    if network.drawn_for is not None:
+        placed = network.drawn_for
+        document["drawn_for"] = {"frame": placed.frame.tolist(), "lanes": placed.lanes}
+    return document
+
+
+def _lane_document(lane: Lane, has_levels: bool) -> dict[str, Any]:
+    document = {
+        "id": lane.id,
+        "points": len(lane.left),
+        "successors": lane.successors,
+        "beside": lane.neighbours,
+        "speed_limit": None if math.isnan(lane.speed_limit) else lane.speed_limit,
+        "junction": lane.junction,
+    }
+    if lane.users:
+        document["users"] = sorted(lane.users)
+    if lane.crossing:
+        document["crossing"] = True
+    if lane.arm:
+        document |= {"arm": lane.arm, "inward": lane.inward}
+    if has_levels:
+        document["height"] = [
+            None if math.isnan(height) else round(height, 2) for height in lane.height.tolist()
+        ]
+    return document
 
 
 def decode_lanes(data: bytes, source: str = TOPIC) -> tuple[str, LaneNetwork | None]:
@@ -141,13 +147,16 @@ def decode_lanes(data: bytes, source: str = TOPIC) -> tuple[str, LaneNetwork | N
         lanes = tuple(_lanes(document["lanes"], points, source))
         notes = recorded_notes(map(str, document["notes"]), str(document.get("note_kinds", "")))
         rules = tuple(map(_rule, document.get("rules", ())))
-        kept, drawn = (
-            document.get("rules_kept", True) is not False,
-            document.get("drawn", False) is True,
+        network = LaneNetwork(
+            str(document["name"]),
+            lanes,
+            notes,
+            rules,
+            rules_kept=document.get("rules_kept", True) is not False,
+            drawn=document.get("drawn", False) is True,
+            drawn_for=_drawn_for(document["drawn_for"]) if "drawn_for" in document else None,
+            origin=tuple(map(float, document.get("origin", ()))),
         )
-        aim = _drawn_for(document["drawn_for"]) if "drawn_for" in document else None
-        origin = tuple(map(float, document.get("origin", ())))
-        network = LaneNetwork(str(document["name"]), lanes, notes, rules, kept, drawn, aim, origin)
         return frame_id, network.with_lanes(lanes)
     except (KeyError, TypeError, ValueError, OverflowError, RecursionError) as error:
         raise InputError(
@@ -163,32 +172,41 @@ def _drawn_for(document: dict[str, Any]) -> DrawnFor:
 
 
 def _rule(document: dict[str, Any]) -> TrafficRule:
-    lanes, over = (tuple(int(k) for k in document[key]) for key in ("lanes", "over"))
+    lanes, over = _indices(document["lanes"]), _indices(document["over"])
     line = np.array([(float(x), float(y)) for x, y in document["line"]]).reshape(-1, 2)
     return TrafficRule(str(document["id"]), RuleKind(document["kind"]), lanes, over, line)
 
 
 def _lanes(documents: list[dict[str, Any]], points: Floats, source: str) -> Iterator[Lane]:
-    """Yield the lanes of their documents, with borders out of pairs of points (P, 2) [m]."""
-    at = 0
+    """Yield the lanes of their documents, with borders from pairs of points (P, 2) [m]."""
+    start = 0
     for document in documents:
-        pairs = 2 * (int(document["points"]) - 1)
-        if pairs < 2 or at + 2 * pairs > len(points):
+        count = 2 * (int(document["points"]) - 1)
+        if count < 2 or start + 2 * count > len(points):
             raise InputError(
                 f"{source}: lane {document['id']!r} has borders of {document['points']} points, "
-                f"and {len(points) - at} are left"
+                f"and {len(points) - start} are left"
             )
-        borders = [points[start : start + pairs] for start in (at, at + pairs)]
-        left, right = (np.concatenate((border[:1], border[1::2])) for border in borders)
-        limit = math.nan if document["speed_limit"] is None else float(document["speed_limit"])
-        after, beside = (tuple(int(k) for k in document[key]) for key in ("successors", "beside"))
-        height = np.array(document.get("height", ()), dtype=np.float64)
-        users, crossing = (
-            frozenset(map(str, document.get("users", ()))),
-            document.get("crossing", False) is True,
+        left, right = points[start : start + 2 * count].reshape(2, count, 2)
+        limit = document["speed_limit"]
+        yield Lane(
+            str(document["id"]),
+            np.concatenate((left[:1], left[1::2])),
+            np.concatenate((right[:1], right[1::2])),
+            successors=_indices(document["successors"]),
+            neighbours=_indices(document["beside"]),
+            speed_limit=math.nan if limit is None else float(limit),
+            junction=str(document["junction"]),
+            height=np.array(document.get("height", ()), dtype=np.float64),
+            users=frozenset(map(str, document.get("users", ()))),
+            crossing=document.get("crossing", False) is True,
+            arm=int(document.get("arm", 0)),
+            inward=document.get("inward", False) is True,
         )
-        name, junction = str(document["id"]), str(document["junction"])
-        yield Lane(name, left, right, after, beside, limit, junction, height, users, crossing)
-        at += 2 * pairs
-    if at != len(points):
-        raise InputError(f"{source}: {len(points) - at} points belong to no lane")
+        start += 2 * count
+    if start != len(points):
+        raise InputError(f"{source}: {len(points) - start} points belong to no lane")
+
+
+def _indices(numbers: Iterable[Any]) -> tuple[int, ...]:
+    return tuple(int(number) for number in numbers)

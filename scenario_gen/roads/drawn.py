@@ -193,7 +193,7 @@ class _RoadDrawing:
                 left, right = borders if self._sign > 0.0 else borders[::-1]
                 index[k, inward] = len(lanes)
                 name = lane_id(k, count, inward=inward)
-                lanes.append(Lane(name, left, right, users=_CYCLIST))
+                lanes.append(Lane(name, left, right, users=_CYCLIST, arm=k + 1, inward=inward))
         if not self._plan.has_junction:
             return lanes
         first = len(self.lanes)
@@ -244,8 +244,9 @@ class _RoadDrawing:
             left, right = borders if self._sign > 0.0 else borders[::-1]
             neighbours = tuple(first + m for m in (n - 1, n + 1) if 0 <= m < count)
             self._lane_index[k, inward, n] = first + n
+            name = lane_id(k, n, inward=inward)
             self.lanes.append(
-                Lane(lane_id(k, n, inward=inward), left, right, neighbours=neighbours)
+                Lane(name, left, right, neighbours=neighbours, arm=k + 1, inward=inward)
             )
 
     def _add_routes(self) -> None:

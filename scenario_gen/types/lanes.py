@@ -38,6 +38,8 @@ class Lane:
             given.
         users: who may use it, of `LANE_USERS`; (): all that drive.
         crossing: it leads people across the lanes of others, as a zebra crossing does.
+        arm: number of its arm of a drawn road, from 1; a through road has one arm; 0: in no arm.
+        inward: whether it leads from the end of its arm inwards.
     """
 
     id: str
@@ -50,6 +52,8 @@ class Lane:
     height: Floats = field(default_factory=lambda: np.zeros(0))
     users: frozenset[str] = frozenset()
     crossing: bool = False
+    arm: int = 0
+    inward: bool = False
 
     def __post_init__(self) -> None:
         height = (
@@ -297,13 +301,12 @@ class LaneNetwork:
         return tuple(k for k, lane in enumerate(self.lanes) if not lane.successors)
 
     @cached_property
-    def arms(self) -> dict[str, tuple[int, ...]]:
-        """The lanes of each arm of a drawn road, named arm.lane; a through road is one arm."""
-        arms: dict[str, tuple[int, ...]] = {}
+    def arms(self) -> dict[int, tuple[int, ...]]:
+        """The lanes of each arm of a drawn road."""
+        arms: dict[int, tuple[int, ...]] = {}
         for k, lane in enumerate(self.lanes):
-            if self.drawn and not lane.junction and not lane.crossing:
-                name = lane.id.partition(".")[0]
-                arms[name] = (*arms.get(name, ()), k)
+            if lane.arm:
+                arms[lane.arm] = (*arms.get(lane.arm, ()), k)
         return arms
 
     @cached_property

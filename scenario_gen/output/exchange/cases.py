@@ -8,6 +8,8 @@ from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+import numpy as np
+
 from scenario_gen.bags.recordings.read import (
     INFO,
     Namespace,
@@ -25,6 +27,9 @@ from scenario_gen.output.exchange.derived_lanes import lane_map_of
 from scenario_gen.output.exchange.lanes import LaneMap
 from scenario_gen.roads import RoadConfig
 from scenario_gen.types import join_ego, Road, Scenario, split_off, tokens
+
+STEP_TOLERANCE_S = 1e-9
+"""Difference of time steps that count as equal."""
 
 TOPICS = ("tracks", "map", "road/lanes", "fit/info", SCENARIOS, INFO)
 
@@ -69,8 +74,8 @@ class Exported:
             begin = float(self.ego.time[self.ego.present[0, 0]])
             raise RefusedError(
                 f"scenario {self.index}: the ego, vehicle {self.ego.vehicles[0].id}, arrives "
-                f"{begin:.1f} s late, and a planner under test begins at 0; choose a vehicle with "
-                "--ego that is there from the start"
+                f"{begin:.1f} s late, but a planner under test starts at 0 s; use --ego with a "
+                "vehicle that is present from the start"
             )
 
 
@@ -95,6 +100,13 @@ class Case:
     scenarios: tuple[Exported, ...]
     lane_map: LaneMap
     origin: tuple[float, ...] = ()
+
+
+def evenly_sampled(scenario: Scenario, step: float) -> Scenario:
+    """Return a scenario with a constant time step: itself, or sampled every `step` [s]."""
+    if np.ptp(np.diff(scenario.time)) <= STEP_TOLERANCE_S:
+        return scenario
+    return scenario.resampled(step)
 
 
 def scenario_source(case: Case, exported: Exported) -> str:
@@ -142,7 +154,7 @@ def read_cases(
     if not cases:
         known = sorted({entry.index for _, group in groups for entry in group.scenarios})
         raise InputError(
-            f"{bag}: no scenario {', '.join(map(str, sorted(indices)))}; there are {known[0]} to "
+            f"{bag}: no scenario {', '.join(map(str, sorted(indices)))}; it has {known[0]} to "
             f"{known[-1]}"
         )
     return tuple(cases)
@@ -158,14 +170,14 @@ def _spaces(bag: Path, config: BagConfig, namespace: str | None) -> list[Namespa
     spaces = [entry for entry in namespaces.values() if SCENARIOS in entry.messages]
     if not spaces:
         raise InputError(
-            f"{bag}: no topic `{SCENARIOS}` in any namespace; there is nothing to export"
+            f"{bag}: no topic `{SCENARIOS}` in any namespace, so there is nothing to export"
         )
     if namespace is not None:
         full_name = namespace if not namespace or namespace.startswith("/") else f"/{namespace}"
         spaces = [entry for entry in spaces if entry.name == full_name]
         if not spaces:
             raise InputError(
-                f"{bag}: no scenarios in namespace {namespace!r}; there are: "
+                f"{bag}: no scenarios in namespace {namespace!r}; its namespaces: "
                 f"{', '.join(name or '/' for name in namespaces)}"
             )
     return spaces
@@ -202,23 +214,23 @@ def _with_ego(
     if slot:
         if requested not in ("", slot):
             raise InputError(
-                f"{where} was made for ego {slot!r}; leave --ego out, or name that one"
+                f"{where} was generated for ego {slot!r}; omit --ego, or name that vehicle"
             )
         track = scenario.reference_drive
         if track is None or tokens(vehicle.id for vehicle in track.vehicles) != (slot,):
             raise InputError(
-                f"{where} was made for ego {slot!r}, whose track is not on {space.where(WITNESS)}"
+                f"{where} was generated for ego {slot!r}, but {space.where(WITNESS)} lacks its track"
             )
         return replace(scenario, reference_drive=None), track, True
     if not requested:
         return scenario, None, False
     if requested not in ids:
         raise InputError(
-            f"{where} has no vehicle {requested!r} to be the ego; there are: {', '.join(ids)}"
+            f"{where} has no vehicle {requested!r} for --ego; it has: {', '.join(ids)}"
         )
     if len(ids) == 1:
         raise InputError(
-            f"{where} has no vehicle but {requested!r}: there would be nobody around the ego"
+            f"{where} has only vehicle {requested!r}, so there would be none around the ego"
         )
     others, ego = split_off(scenario, ids.index(requested))
     return others, ego, True
@@ -253,12 +265,14 @@ def _case(
 
 
 def _lane_width(space: Namespace, entry: ScenarioEntry | None) -> float:
-    """Return the lane width [m] of a scenario's request; the default for other bags."""
-    if entry is not None:
-        for summary in reversed(space.summaries):
-            if summary.request == entry.request:
-                with suppress(InputError):  # not recorded
-                    values = summary.values
-                    return read_parameters(RoadConfig(), values, "road.", "export").lane_width
-                break
+    """Return the lane width [m] of a scenario's request; the default if it was not recorded."""
+    requests = [
+        summary
+        for summary in space.summaries
+        if entry is not None and summary.request == entry.request
+    ]
+    if requests:
+        with suppress(InputError):
+            values = requests[-1].values
+            return read_parameters(RoadConfig(), values, "road.", "export").lane_width
     return RoadConfig.lane_width

@@ -18,10 +18,14 @@ import numpy as np
 from scenario_gen.base.errors import RefusedError
 from scenario_gen.numerics import Floats
 from scenario_gen.numerics.curve import Curve
-from scenario_gen.output.exchange.cases import Case, Exported, scenario_source
+from scenario_gen.output.exchange.cases import (
+    Case,
+    evenly_sampled,
+    Exported,
+    scenario_source,
+)
 from scenario_gen.output.exchange.config import ExportConfig
 from scenario_gen.output.exchange.lanes import LaneMap, SIGN_IDS
-from scenario_gen.output.exchange.motion import even_step
 from scenario_gen.output.exchange.xml import add, comment, date_of, Element, number, serialized
 from scenario_gen.types import DRIVERS, Lane, LaneNetwork, Scenario
 
@@ -54,25 +58,16 @@ def write_commonroad(
         RefusedError: a vehicle arrives late, which the schema does not allow, or the ego does.
     """
     exported.refuse_late_ego()
-    scenario, notes = _even(exported.others, export)
-    late_ids = [
-        v.id
-        for v, (first, _) in zip(scenario.vehicles, scenario.present.tolist(), strict=True)
-        if first > 0
-    ]
-    if late_ids and export.late == "refused":
-        raise RefusedError(
-            f"scenario {exported.index}: vehicle {', '.join(late_ids)} arrives late, but "
-            "CommonRoad's schema requires obstacles from the first step; `--set late=written` "
-            "writes the step of its arrival, which commonroad-io reads; or export to openscenario "
-            "or autoware"
+    scenario = evenly_sampled(exported.others, export.step)
+    notes: list[str] = []
+    if scenario is not exported.others:
+        omitted = float(exported.others.time[-1] - scenario.time[-1])
+        notes.append(
+            f"uneven time steps were resampled at {export.step:g} s; the last {omitted:.3f} s are "
+            "left out"
         )
-    if late_ids:
-        notes += (
-            f"vehicle {', '.join(late_ids)} arrives late: its initial time step is not 0, which "
-            "the schema does not allow",
-        )
-    step = even_step(scenario) or export.step
+    notes += _late_arrivals(exported.index, scenario, export)
+    step = float(np.round(scenario.time[1] - scenario.time[0], 9))
     root = _header(case, exported, step)
     lane_map = case.lane_map
     signs = _signs(lane_map.network)
@@ -87,14 +82,36 @@ def write_commonroad(
     if exported.ego is None:
         comment(
             root,
-            "a placeholder: nobody is left out of this scenario, and the format demands a "
-            "planning problem",
+            "a placeholder: the scenario has no ego, but the format requires a planning problem",
         )
         _placeholder(root, lane_map.network.lanes[0], len(scenario.time))
     else:
         comment(root, f"vehicle {exported.ego.vehicles[0].id}")
         _problem(root, exported.ego, step, export)
-    return serialized(root), notes
+    return serialized(root), tuple(notes)
+
+
+def _late_arrivals(index: int, scenario: Scenario, export: ExportConfig) -> list[str]:
+    """Return a note on vehicles that arrive late.
+
+    Raises:
+        RefusedError: a vehicle arrives late, and `export.late` refuses that.
+    """
+    late_ids = [
+        vehicle.id
+        for vehicle, first in zip(scenario.vehicles, scenario.present[:, 0], strict=True)
+        if first > 0
+    ]
+    if not late_ids:
+        return []
+    vehicles = f"vehicle {', '.join(late_ids)} arrives late"
+    if export.late == "refused":
+        raise RefusedError(
+            f"scenario {index}: {vehicles}, but CommonRoad's schema requires obstacles from the "
+            "first step; `--set late=written` writes the step of its arrival, which commonroad-io "
+            "reads; or export to openscenario or autoware"
+        )
+    return [f"{vehicles}: its initial time step is not 0, which the schema does not allow"]
 
 
 def _header(case: Case, exported: Exported, step: float) -> Element:
@@ -122,18 +139,6 @@ def _header(case: Case, exported: Exported, step: float) -> Element:
     if any(map(lane_map.turn, range(len(lane_map.network.lanes)))):
         add(tags, "intersection")
     return root
-
-
-def _even(scenario: Scenario, export: ExportConfig) -> tuple[Scenario, tuple[str, ...]]:
-    """Return a scenario with a constant time step, and a note if it was resampled."""
-    if even_step(scenario) is not None:
-        return scenario, ()
-    result = scenario.resampled(export.step)
-    lost = float(scenario.time[-1] - result.time[-1])
-    return result, (
-        f"its uneven instants were resampled at {export.step:g} s; its last {lost:.3f} s are "
-        "left out",
-    )
 
 
 def _points(parent: Element, tag: str, points: Floats) -> None:
@@ -243,32 +248,29 @@ def _lanelet_type(lane: Lane) -> str:
 
 def _intersection(root: Element, lane_map: LaneMap) -> None:
     """Append the intersection with the incoming lanelets of each arm, if there is a junction."""
-    lanes, turn = lane_map.network.lanes, lane_map.turn
-    arms = [
-        [k for k in side if any(map(turn, lanes[k].successors))]
-        for strip in lane_map.strips
-        for side in strip
-    ]
-    arms = [incoming for incoming in arms if incoming]
-    if not arms:
+    lanes = lane_map.network.lanes
+    arms = [side for strip in lane_map.strips for side in strip]
+    incoming = [[k for k in arm if any(map(lane_map.turn, lanes[k].successors))] for arm in arms]
+    incoming = [lanelets for lanelets in incoming if lanelets]
+    if not incoming:
         return
     intersection = add(root, "intersection", id=FIRST_INTERSECTION_ID)
-    for n, incoming in enumerate(arms):
-        element = add(intersection, "incoming", id=FIRST_INTERSECTION_ID + 1 + n)
-        for k in incoming:
+    for n, lanelets in enumerate(incoming, 1):
+        element = add(intersection, "incoming", id=FIRST_INTERSECTION_ID + n)
+        for k in lanelets:
             add(element, "incomingLanelet", ref=k + 1)
-        successors = [other for k in incoming for other in sorted(lanes[k].successors)]
         for direction in ("right", "straight", "left"):
-            _successors(element, lane_map, direction, successors)
+            _successors(element, lane_map, direction, lanelets)
 
 
 def _successors(
-    incoming: Element, lane_map: LaneMap, direction: str, successors: Sequence[int]
+    incoming: Element, lane_map: LaneMap, direction: str, lanelets: Sequence[int]
 ) -> None:
-    """Append the successors of an arm that turn in one direction."""
-    for k in successors:
-        if lane_map.turn(k) == direction:
-            add(incoming, f"successors{direction.title()}", ref=k + 1)
+    """Append the successors of an arm's lanelets that turn in one direction."""
+    for k in lanelets:
+        for successor in sorted(lane_map.network.lanes[k].successors):
+            if lane_map.turn(successor) == direction:
+                add(incoming, f"successors{direction.title()}", ref=successor + 1)
 
 
 def _exact(parent: Element, tag: str, value: float) -> None:

@@ -70,16 +70,18 @@ class LaneMap:
         in no strip.
         """
         lanes = self.network.lanes
-        strips: dict[int, tuple[tuple[int, ...], tuple[int, ...]]] = {}
+        strips = []
         for arm in self.network.arms.values():
-            inward = tuple(k for k in arm if ".-" in lanes[k].id)
+            inward = tuple(k for k in arm if lanes[k].inward)
+            outward = tuple(k for k in arm if not lanes[k].inward)
             if inward:
-                strips[inward[0]] = inward, tuple(k for k in arm if k not in inward)
-        grouped = {k for inward, outward in strips.values() for k in (*inward, *outward)}
-        for k, lane in enumerate(lanes):
-            if k not in grouped and not lane.crossing:
-                strips[k] = ((k,), ())
-        return tuple(strips[k] for k in sorted(strips))
+                strips.append((inward, outward))
+            else:  # a ramp
+                strips += [((k,), ()) for k in outward]
+        strips += [
+            ((k,), ()) for k, lane in enumerate(lanes) if not lane.arm and not lane.crossing
+        ]
+        return tuple(sorted(strips))
 
     @cached_property
     def _across(self) -> dict[int, int]:

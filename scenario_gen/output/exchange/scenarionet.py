@@ -1,12 +1,14 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""ScenarioNet's description of a scenario (MetaDrive): pickled dictionaries, and the two files that make a folder a data set.
+"""ScenarioNet's scenario description (MetaDrive): pickled dictionaries, and two index files.
 
-Source: metadrive.scenario.scenario_description of MetaDrive 0.4, whose `sanity_check` says what is needed.
+Source: metadrive.scenario.scenario_description of MetaDrive 0.4, whose `sanity_check` lists the
+required keys.
 
-Pickles are written, never read: a pickle runs what it holds. They hold nothing but Python's own types and arrays, which are
-written so that every version of NumPy reads them and the same scenario has the same bytes.
+We only write pickles and never read any, as reading one can run code. They contain Python's types
+and arrays, encoded so that every version of NumPy can read them and the same scenario has the same
+bytes.
 """
 
 from collections import Counter
@@ -18,16 +20,16 @@ from typing import Any
 import numpy as np
 
 from scenario_gen.numerics.plane import edge_lengths, unit
-from scenario_gen.output.exchange.cases import Case, Exported
+from scenario_gen.output.exchange.cases import Case, evenly_sampled, Exported
 from scenario_gen.output.exchange.config import ExportConfig
 from scenario_gen.output.exchange.lanes import LaneMap
-from scenario_gen.output.exchange.motion import even_step
 from scenario_gen.types import DRIVERS, height, Scenario, Vehicle
 
-VERSION = "MetaDrive v0.4.3"  # the description's, not the simulator's
+VERSION = "MetaDrive v0.4.3"  # of the description, not of the simulator
 DATASET = "scenario_gen"
-MIN_MOVING_DISTANCE_M = 1.0  # of an object that counts as moving
-SUMMARY, MAPPING = "dataset_summary.pkl", "dataset_mapping.pkl"
+MIN_MOVING_DISTANCE_M = 1.0
+SUMMARY_FILE = "dataset_summary.pkl"
+MAPPING_FILE = "dataset_mapping.pkl"
 
 
 def file_name(case: Case, exported: Exported) -> str:
@@ -36,36 +38,46 @@ def file_name(case: Case, exported: Exported) -> str:
 
 
 def description(case: Case, exported: Exported, export: ExportConfig) -> dict[str, Any]:
-    """Return a scenario as ScenarioNet describes it: tracks, lanes, the self-driving car (the ego, else the first vehicle).
+    """Return ScenarioNet's description of a scenario: tracks, map, and self-driving car.
+
+    The self-driving car is the ego, or else the first vehicle.
 
     Args:
-        case: with the lanes of its road.
+        case: the case, with the lanes of its road.
         exported: the scenario.
-        export: `step` is the time step where the scenario has uneven ones.
+        export: its `step` is the time step for a scenario with uneven steps.
     """
-    motion = exported.everybody
-    if even_step(motion) is None:
-        motion = motion.resampled(export.step)
+    motion = evenly_sampled(exported.everybody, export.step)
     tracks = {vehicle.id: _track(motion, n, vehicle) for n, vehicle in enumerate(motion.vehicles)}
-    ego = exported.ego.vehicles[0].id if exported.ego is not None else motion.vehicles[0].id
-    steps = len(motion.time)
+    summaries = {name: _summary(name, track) for name, track in tracks.items()}
+    ego = exported.ego.vehicles[0] if exported.ego is not None else motion.vehicles[0]
     name = f"case_{case.number}_{exported.index}"
     metadata = {
-        "id": name, "scenario_id": name, "dataset": DATASET, "metadrive_processed": False, "coordinate": "metadrive",
-        "ts": motion.time.astype(np.float32), "track_length": steps, "sdc_id": ego, "map": case.road_name,
-        "sha256": exported.sha256, "seed": exported.seed, "tracks_to_predict": {}, "objects_of_interest": [],
-        "object_summary": {vehicle.id: _summary(tracks[vehicle.id], vehicle.id) for vehicle in motion.vehicles},
-        "number_summary": _numbers(tracks),
-    }  # fmt: skip
-    lanes = {str(k + 1): _lane(case.lane_map, k) for k in range(len(case.lane_map.network.lanes))}
+        "id": name,
+        "scenario_id": name,
+        "dataset": DATASET,
+        "metadrive_processed": False,
+        "coordinate": "metadrive",
+        "ts": motion.time.astype(np.float32),
+        "track_length": len(motion.time),
+        "sdc_id": ego.id,
+        "map": case.road_name,
+        "sha256": exported.sha256,
+        "seed": exported.seed,
+        "tracks_to_predict": {},
+        "objects_of_interest": [],
+        "object_summary": summaries,
+        "number_summary": _counts(summaries),
+    }
+    lanes = range(len(case.lane_map.network.lanes))
     return {
         "id": name,
         "version": VERSION,
-        "length": steps,
+        "length": len(motion.time),
         "metadata": metadata,
         "tracks": tracks,
         "dynamic_map_states": {},
-        "map_features": lanes,
+        "map_features": {str(k + 1): _map_feature(case.lane_map, k) for k in lanes},
     }
 
 
@@ -78,12 +90,11 @@ def _track(motion: Scenario, n: int, vehicle: Vehicle) -> dict[str, Any]:
         mask = present if np.ndim(values) == 1 else present[:, None]
         return np.where(mask, values, 0.0).astype(np.float32)
 
-    heading, speed = motion.heading[n], motion.speed[n]
-    velocity = speed[:, None] * unit(heading)
+    heading = motion.heading[n]
     state = {
         "position": masked(np.column_stack([motion.position[n], np.zeros(steps)])),
         "heading": masked(heading),
-        "velocity": masked(velocity),
+        "velocity": masked(motion.speed[n, :, None] * unit(heading)),
         "length": masked(np.full(steps, vehicle.length)),
         "width": masked(np.full(steps, vehicle.width)),
         "height": masked(np.full(steps, height(vehicle))),
@@ -94,96 +105,97 @@ def _track(motion: Scenario, n: int, vehicle: Vehicle) -> dict[str, Any]:
     return {"type": kind, "state": state, "metadata": metadata}
 
 
-def _summary(track: Mapping[str, Any], name: str) -> dict[str, Any]:
-    """Return what ScenarioNet's filters ask of a track."""
-    valid, position = track["state"]["valid"], track["state"]["position"][:, :2].astype(np.float64)
-    driven = position[valid]
-    moved = float(edge_lengths(driven).sum())
+def _summary(name: str, track: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the summary of a track that ScenarioNet's filters use."""
+    valid = track["state"]["valid"]
+    positions = track["state"]["position"][valid, :2].astype(np.float64)
+    distance = round(float(edge_lengths(positions).sum()), 3)
     return {
         "type": track["type"],
         "object_id": name,
         "track_length": len(valid),
-        "moving_distance": round(moved, 3),
-        "distance": round(moved, 3),
+        "moving_distance": distance,
+        "distance": distance,
         "valid_length": int(valid.sum()),
         "continuous_valid_length": int(valid.sum()),
     }
 
 
-def _numbers(tracks: Mapping[str, Any]) -> dict[str, Any]:
+def _counts(summaries: Mapping[str, Mapping[str, Any]]) -> dict[str, Any]:
+    """Return the numbers of objects and of moving objects, in all and by type."""
     moving = Counter(
-        track["type"]
-        for name, track in tracks.items()
-        if _summary(track, name)["moving_distance"] > MIN_MOVING_DISTANCE_M
+        summary["type"]
+        for summary in summaries.values()
+        if summary["moving_distance"] > MIN_MOVING_DISTANCE_M
     )
-    each = Counter(track["type"] for track in tracks.values())
+    total = Counter(summary["type"] for summary in summaries.values())
     return {
         "num_moving_objects": moving.total(),
-        "num_moving_objects_each_type": {kind: moving[kind] for kind in sorted(each)},
-        "num_objects": len(tracks),
-        "object_types": sorted(each),
-        "num_objects_each_type": dict(sorted(each.items())),
+        "num_moving_objects_each_type": {kind: moving[kind] for kind in sorted(total)},
+        "num_objects": len(summaries),
+        "object_types": sorted(total),
+        "num_objects_each_type": dict(sorted(total.items())),
         "num_traffic_lights": 0,
         "num_traffic_light_types": [],
         "num_traffic_lights_each_step": {},
     }
 
 
-def _lane(lane_map: LaneMap, k: int) -> dict[str, Any]:
+def _map_feature(lane_map: LaneMap, k: int) -> dict[str, Any]:
     """Return lane k as a feature of the map."""
-    network, sides = lane_map.network, lane_map.neighbours(k)
+    network = lane_map.network
     lane = network.lanes[k]
-    neighbours = {side: [str(other + 1)] for side, (other, same) in sides.items() if same}
+    polygon = lane.outline.astype(np.float32)
     if not lane.open_to(DRIVERS):
-        return {
-            "type": "CROSSWALK" if lane.crossing else "SIDEWALK",
-            "polygon": lane.outline.astype(np.float32),
-        }
+        return {"type": "CROSSWALK" if lane.crossing else "SIDEWALK", "polygon": polygon}
+    is_bike_lane = bool(lane.users) and not lane.open_to(DRIVERS - {"bicycle"})
+    adjacent = {
+        side: [str(other + 1)]
+        for side, (other, has_same_direction) in lane_map.neighbours(k).items()
+        if has_same_direction
+    }
     return {
-        "type": "LANE_BIKE_LANE"
-        if lane.users and not lane.open_to(DRIVERS - {"bicycle"})
-        else "LANE_SURFACE_STREET",
+        "type": "LANE_BIKE_LANE" if is_bike_lane else "LANE_SURFACE_STREET",
         "polyline": lane.centre.astype(np.float32),
-        "polygon": lane.outline.astype(np.float32),
+        "polygon": polygon,
         "entry_lanes": [str(other + 1) for other in sorted(network.predecessors[k])],
         "exit_lanes": [str(other + 1) for other in sorted(lane.successors)],
-        "left_neighbor": neighbours.get("left", []),
-        "right_neighbor": neighbours.get("right", []),
+        "left_neighbor": adjacent.get("left", []),
+        "right_neighbor": adjacent.get("right", []),
     }
 
 
 def dataset_files(described: Sequence[tuple[str, Mapping[str, Any]]]) -> dict[str, bytes]:
-    """Return the files that make a folder a data set: the metadata of each scenario, and in which folder it lies.
+    """Return the files that make a folder a data set: metadata and subfolder of each scenario.
 
     Args:
         described: file name and description of each scenario.
     """
+    metadata = {name: content["metadata"] for name, content in described}
     return {
-        SUMMARY: pickled({name: whole["metadata"] for name, whole in described}),
-        MAPPING: pickled(dict.fromkeys((name for name, _ in described), "")),
+        SUMMARY_FILE: pickled(metadata),
+        MAPPING_FILE: pickled(dict.fromkeys(metadata, "")),
     }
 
 
 def pickled(value: Any) -> bytes:
-    """Return a value as a pickle that any NumPy reads."""
+    """Return a value as a pickle that every version of NumPy can read."""
     stream = io.BytesIO()
     pickler = _Pickler(stream, protocol=4)
-    pickler.fast = (
-        True  # no references to what was written before: they depend on which texts are one object
-    )
+    pickler.fast = True  # no memo: its references depend on which strings are the same object
     pickler.dump(value)
     return stream.getvalue()
 
 
 class _Pickler(pickle.Pickler):
-    """Writes arrays as calls of `numpy.ndarray`: NumPy's own form names modules that differ between its versions."""
+    """Pickles arrays as calls of `numpy.ndarray`.
+
+    NumPy's default form names modules that differ between its versions.
+    """
 
     def reducer_override(self, value: Any) -> Any:
-        """Return how an array is made; anything else is written as usual."""
+        """Return the constructor call of an array; other values are pickled as usual."""
         if isinstance(value, np.ndarray):
-            return np.ndarray, (
-                value.shape,
-                value.dtype.str,
-                bytearray(np.ascontiguousarray(value).tobytes()),
-            )
+            data = bytearray(np.ascontiguousarray(value).tobytes())
+            return np.ndarray, (value.shape, value.dtype.str, data)
         return NotImplemented

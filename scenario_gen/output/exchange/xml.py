@@ -1,30 +1,26 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""XML, and what it holds, written the same each time."""
+"""XML documents that are the same bytes for the same content."""
 
 from datetime import datetime, UTC
+import math
 import xml.etree.ElementTree as ET
-
-import numpy as np
 
 from scenario_gen.base.errors import InputError
 
 Element = ET.Element
-DECIMALS = 9
 
 
 def number(value: float) -> str:
-    """Return a number as xs:decimal and xs:double take it: no exponent, at most nine decimals, no trailing zeros.
+    """Return a number as xs:decimal and xs:double allow it: no exponent, at most nine decimals.
 
     Raises:
         InputError: it is not finite.
     """
-    if not np.isfinite(value):
-        raise InputError(
-            f"{value} cannot be exported: a number that is not finite has no decimal form"
-        )
-    text = f"{float(value):.{DECIMALS}f}".rstrip("0").rstrip(".")
+    if not math.isfinite(value):
+        raise InputError(f"cannot export {value}: XML files need finite numbers")
+    text = f"{value:.9f}".rstrip("0").rstrip(".")
     return "0" if text == "-0" else text
 
 
@@ -50,12 +46,12 @@ def comment(parent: Element, text: str) -> None:
 
 
 def date_of(start_ns: int) -> str:
-    """Return the instant of a stamp, so that the same bag gives the same file."""
+    """Return a stamp as UTC date and time: the same bag gives the same file."""
     return datetime.fromtimestamp(start_ns // 10**9, UTC).strftime("%Y-%m-%dT%H:%M:%S")
 
 
 def serialized(root: Element) -> bytes:
-    """Return the document as UTF-8 bytes, indented."""
+    """Return the document as indented UTF-8 bytes."""
     ET.indent(root)
     document: bytes = ET.tostring(root, encoding="UTF-8", xml_declaration=True)
     return document + b"\n"

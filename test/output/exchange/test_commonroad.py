@@ -114,7 +114,7 @@ def test_the_ego_has_a_problem_with_a_wide_window_of_time(tmp_path):
 def test_without_an_ego_the_placeholder_says_so_and_is_in_nobodys_way(tmp_path):
     scenario = crossing()
     path, root, _ = written(tmp_path, scenario)
-    assert "a placeholder: nobody is left out" in path.read_text()
+    assert "a placeholder: the scenario has no ego" in path.read_text()
     (problem,) = root.iter("planningProblem")
     place = [number(problem, f"initialState/position/point/{axis}") for axis in "xy"]
     assert number(problem, "initialState/velocity/exact") == 0.0

@@ -131,9 +131,9 @@ def test_round_trips_close(small_bag, tmp_path):
         ),
         (
             ["--to", "commonroad", "--ego", "9"],
-            "has no vehicle '9' to be the ego; there are: 1, 2",
+            "has no vehicle '9' for --ego; it has: 1, 2",
         ),
-        (["--to", "commonroad", "--index", "77"], "no scenario 77; there are"),
+        (["--to", "commonroad", "--index", "77"], "no scenario 77; it has 0 to 2"),
         (["--to", "commonroad", "--namespace", "x"], "no scenarios in namespace 'x'"),
         (["--to", "commonroad", "--set", "run_out=-1"], "run_out"),
     ],
@@ -249,7 +249,7 @@ def test_autoware_gets_the_frame_of_the_map_without_being_given_it(geographic_to
     )
     first = geodetic(read_cases(bag)[0].scenarios[0].others.position[0, 0], ORIGIN)
     assert np.allclose((latitude, longitude), first, atol=1e-8)
-    with pytest.raises(InputError, match="projection_origin: the squares of MGRS"):
+    with pytest.raises(InputError, match="projection_origin: MGRS squares"):
         export_bag(bag, tmp_path / "other", "autoware", ExportConfig(projection_origin="60, 5"))
 
 

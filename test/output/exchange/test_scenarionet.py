@@ -11,7 +11,7 @@ import pytest
 
 from scenario_gen.output.exchange.cases import read_cases
 from scenario_gen.output.exchange.export import export_bag
-from scenario_gen.output.exchange.scenarionet import DATASET, MAPPING, pickled, SUMMARY
+from scenario_gen.output.exchange.scenarionet import DATASET, MAPPING_FILE, pickled, SUMMARY_FILE
 
 
 @pytest.fixture
@@ -70,7 +70,7 @@ def test_the_motion_is_that_of_the_bag(small_bag, exported):
 def test_the_folder_is_a_data_set(exported):
     names = sorted(described(exported))
     summary, mapping = (
-        pickle.loads((exported / name).read_bytes()) for name in (SUMMARY, MAPPING)
+        pickle.loads((exported / name).read_bytes()) for name in (SUMMARY_FILE, MAPPING_FILE)
     )
     assert sorted(summary) == sorted(mapping) == names
     assert all(
