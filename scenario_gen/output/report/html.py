@@ -44,10 +44,9 @@ def render_page(
     assets = files("scenario_gen.output.report") / "assets"
 
     def asset(name: str) -> str:
-        own = folder / name if folder is not None else None
-        return (own if own is not None and own.is_file() else assets / name).read_text(
-            encoding="utf-8"
-        )
+        if folder is not None and (folder / name).is_file():
+            return (folder / name).read_text(encoding="utf-8")
+        return (assets / name).read_text(encoding="utf-8")
 
     environment = jinja2.Environment(
         loader=jinja2.FunctionLoader(asset),

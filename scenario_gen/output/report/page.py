@@ -3,7 +3,7 @@
 
 """The report: one HTML page that works offline."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 import math
 from pathlib import Path
@@ -27,8 +27,8 @@ from scenario_gen.types import (
     WITHOUT,
 )
 
-SIGNIFICANT = 0.03
-"""A case counts in the comparison if E without changepoints is at least this."""
+MIN_COMPARED_ERROR_RATIO = 0.03
+"""Least E of a reference for a case to count in the comparison."""
 UNCOMPARED = "not requested; `scenario-gen generate --compare` draws sets to compare with"
 MAX_SAMPLES = 50
 """Scenarios of each set that a page draws; the figures use all."""
@@ -69,7 +69,7 @@ def render(report: ReportInput) -> str:
         views=views,
         verdict=_verdict(views),
         bag=shlex.quote(report.bag) if report.bag else "",
-        significant=SIGNIFICANT,
+        significant=MIN_COMPARED_ERROR_RATIO,
         compared=any(case.references for case in report.cases),
         uncompared=next(
             (why for case in report.cases for why in case.refusals.values()), UNCOMPARED
@@ -86,20 +86,10 @@ def _is_parameter(name: str) -> bool:
 
 def _view(index: int, case: GenerationResult) -> dict[str, Any]:
     """Return the contents of the page's tables for one case."""
-    arms = [
-        (case.row_name, case.generated),
-        *((name, case.references.get(name)) for name in (WITHOUT, UNIFORM)),
-    ]
+    sets = [(name, case.references.get(name)) for name in (WITHOUT, UNIFORM)]
     evaluation = case.evaluation
     duration = case.encounter.duration
-    bounds = [
-        *(float(case.encounter.time[i]) for i in (0, *case.segmentation.changepoints)),
-        duration,
-    ]
-    routes: Sequence[Route | None] = case.routes or [None] * len(case.encounter.vehicles)
-    vehicles = (
-        zip(case.encounter.vehicles, case.fit.fitted, routes, strict=True) if case.fit else ()
-    )
+    changepoints = len(case.segmentation.changepoints)
     return {
         "index": index,
         "case": case,
@@ -108,52 +98,61 @@ def _view(index: int, case: GenerationResult) -> dict[str, Any]:
         "refused": [case.refusals.get(name, "") for name in (WITHOUT, UNIFORM)],
         "arms": [
             (name, result, causes_in_words(result.refused))
-            for name, result in arms
+            for name, result in [(case.row_name, case.generated), *sets]
             if result is not None
         ],
         "rows": [*evaluation.rows[1:], evaluation.rows[0]],
         "metrics": evaluation.metrics,
         "ego": case.generated.ego.vehicle.id if case.generated.ego else "",
-        "k": len(case.segmentation.changepoints),
+        "k": changepoints,
         "remark": case.segmentation.remark(duration),
-        "rate": len(case.segmentation.changepoints) / duration,
+        "rate": changepoints / duration,
         "errors": {key: _errors(case, key) for key in ERRORS},
         "best": {key: case.best(key) for key in ERRORS},
         "verdict": _in_words(case),
         "reactions": case.reacting,
         "not_kept": case.lost_reactions,
         "nearer": case.similarity()["said"],
-        "segments": [
-            {
-                "from": bounds[k],
-                "to": bounds[k + 1],
-                "label": int(case.segmentation.labels[start]),
-                "text": text,
-            }
-            for k, (start, text) in enumerate(
-                zip(
-                    (0, *case.segmentation.changepoints),
-                    case.segmentation.descriptions,
-                    strict=True,
-                )
-            )
-        ],
-        "vehicles": [
-            {
-                "id": v.id,
-                "manoeuvre": f.manoeuvre,
-                "scale": f.scale,
-                "moved": float(f.moved.max()),
-                "turned": f.figures(),
-                "dwells": int(sum(f.stands)),
-                "route": r.figures() if r else {},
-            }
-            for v, f, r in vehicles
-        ],
+        "segments": _segments(case),
+        "vehicles": _vehicles(case),
         "remarks": case.route_remarks,
         "lost": case.losses,
         "planned": routes_in_words(case.routes),
     }
+
+
+def _segments(case: GenerationResult) -> list[dict[str, Any]]:
+    """Return interval [s], label and description of each segment of the recording."""
+    segmentation = case.segmentation
+    starts = [0, *segmentation.changepoints]
+    bounds = [*case.encounter.time[starts].tolist(), case.encounter.duration]
+    return [
+        {"from": bounds[k], "to": bounds[k + 1], "label": int(label), "text": text}
+        for k, (label, text) in enumerate(
+            zip(segmentation.labels[starts], segmentation.descriptions, strict=True)
+        )
+    ]
+
+
+def _vehicles(case: GenerationResult) -> list[dict[str, Any]]:
+    """Return the fit and the route of each vehicle; nothing without a fit."""
+    if case.fit is None:
+        return []
+    routes: Sequence[Route | None] = case.routes or [None] * len(case.encounter.vehicles)
+    return [
+        {
+            "id": vehicle.id,
+            "manoeuvre": fitted.manoeuvre,
+            "scale": fitted.scale,
+            "moved": float(fitted.moved.max()),
+            "turned": fitted.figures(),
+            "dwells": int(sum(fitted.stands)),
+            "route": route.figures() if route else {},
+        }
+        for vehicle, fitted, route in zip(
+            case.encounter.vehicles, case.fit.fitted, routes, strict=True
+        )
+    ]
 
 
 def _in_words(case: GenerationResult) -> str:
@@ -170,54 +169,67 @@ def _criticality(case: GenerationResult) -> str:
     if case.coverage is None or not case.coverage.index:
         return ""
     cap = next((metric.cap for metric in case.evaluation.metrics if metric.id == "min_ttc"), None)
-    said = []
-    for name, words in (("ttc", "time to collision"), ("pet", "PET")):
-        least = min(filter(math.isfinite, case.coverage.spreads[name].values), default=math.nan)
-        if least < (math.inf if name == "pet" or cap is None else cap):
-            said.append(f"minimum {words} {least:.1f} s")
-        elif name == "ttc" and cap is not None:
-            said.append(f"{words}: none below {cap:g} s")
-    return ", ".join(said)
+    ttc = _smallest(case.coverage.spreads["ttc"].values)
+    pet = _smallest(case.coverage.spreads["pet"].values)
+    parts = []
+    if ttc < (math.inf if cap is None else cap):
+        parts.append(f"minimum time to collision {ttc:.1f} s")
+    elif cap is not None:
+        parts.append(f"time to collision: none below {cap:g} s")
+    if not math.isnan(pet):
+        parts.append(f"minimum PET {pet:.1f} s")
+    return ", ".join(parts)
+
+
+def _smallest(values: Iterable[float]) -> float:
+    """Return the smallest finite value; NaN if there is none."""
+    return min(filter(math.isfinite, values), default=math.nan)
 
 
 def _errors(case: GenerationResult, metric: str) -> dict[str, Any]:
-    """E of the set, and of the rows below it: each with its name and whether it is the best."""
+    """Return E of the set, and of the sets below it with whether each is the best."""
     best = case.best(metric)
     words = {WITHOUT: "without", UNIFORM: "uniform", NARROW: "preset narrow", REPLAY: "replay"}
-    errors = {
-        row: formatted(Interval(case.evaluation.value(row, metric)), "")
-        for row in words
-        if case.evaluation.row(row)
-    }
+    others = []
+    for row, name in words.items():
+        value = case.evaluation.value(row, metric)
+        if math.isfinite(value):
+            others.append((f"{formatted(Interval(value), '')} {name}", row == best))
+    outcome = ""
+    if best:
+        outcome = "good" if best == case.row_name else "bad"
     return {
-        "own": formatted(Interval(case.evaluation.value(case.row_name, metric)), ""),
-        "kind": "" if not best else "good" if best == case.row_name else "bad",
-        "beside": [
-            (f"{value} {words[row]}", row == best) for row, value in errors.items() if value != "–"
-        ],
+        "value": formatted(Interval(case.evaluation.value(case.row_name, metric)), ""),
+        "kind": outcome,
+        "others": others,
     }
 
 
 def _verdict(views: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
     """Return the figures of the page's first sentences: valid scenarios, and where E is lower."""
-    better: dict[str, dict[str, tuple[int, int]]] = {}
-    for row, words in (
-        (WITHOUT, "without changepoints"),
-        (UNIFORM, "with as many evenly spaced ones"),
-    ):
-        cases = [view["case"] for view in views if row in view["case"].compared]
-        for key, what in ERRORS.items():
-            pairs = [
-                (case.evaluation.value(case.row_name, key), case.evaluation.value(row, key))
-                for case in cases
-            ]
-            known = [value < other for value, other in pairs if other >= SIGNIFICANT]
-            if known:
-                better.setdefault(words, {})[what] = (sum(known), len(known))
-    sets = [view["case"].generated for view in views]
+    cases = [view["case"] for view in views]
+    better = {
+        "without changepoints": _wins(cases, WITHOUT),
+        "with as many evenly spaced ones": _wins(cases, UNIFORM),
+    }
+    sets = [case.generated for case in cases]
     return {
-        "published": sum(view["case"].published for view in views),
+        "published": sum(case.published for case in cases),
         "requested": sum(result.requested for result in sets),
         "candidates": sum(result.candidates for result in sets),
-        "better": better,
+        "better": {words: wins for words, wins in better.items() if wins},
     }
+
+
+def _wins(cases: Sequence[GenerationResult], row: str) -> dict[str, tuple[int, int]]:
+    """Return in how many cases, and of how many, E is lower than that of `row`, by quantity."""
+    wins: dict[str, tuple[int, int]] = {}
+    for metric, quantity in ERRORS.items():
+        is_lower = []
+        for case in cases:
+            reference = case.evaluation.value(row, metric)
+            if row in case.compared and reference >= MIN_COMPARED_ERROR_RATIO:
+                is_lower.append(case.evaluation.value(case.row_name, metric) < reference)
+        if is_lower:
+            wins[quantity] = (sum(is_lower), len(is_lower))
+    return wins

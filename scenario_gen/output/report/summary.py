@@ -3,7 +3,7 @@
 
 """The end of a run on one screen of the terminal."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 import math
 
 from rich.console import Group, RenderableType
@@ -14,25 +14,26 @@ from scenario_gen.base.errors import printable
 from scenario_gen.types import (
     CAR,
     causes_in_words,
+    Encounter,
     ERRORS,
     formatted,
     GenerationResult,
-    Interval,
     NARROW,
     REPLAY,
     routes_in_words,
     Row,
+    ScenarioSet,
     UNIFORM,
     WITH,
     WITHOUT,
 )
 
-SHORT = {WITHOUT: "without", UNIFORM: "uniform", NARROW: "narrow", REPLAY: "replay"}
+SHORT_NAMES = {WITHOUT: "without", UNIFORM: "uniform", NARROW: "narrow", REPLAY: "replay"}
 COMPARED = (
     "; after |: sets without changepoints and with K evenly spaced ones; in brackets, for "
     "orientation only: preset narrow, replay of the recording"
 )
-UNCOMPARED = (
+NOT_COMPARED = (
     "; in brackets, for orientation only: replay of the recording. --compare draws further sets"
 )
 VARIED = ("pet", "gap", "speed")
@@ -49,114 +50,120 @@ def summary(cases: Sequence[GenerationResult], *, verbose: bool = False) -> Rend
     """
     lines = [line for case in cases for line in _case(case, verbose)]
     if verbose:
-        beside = COMPARED if any(case.references for case in cases) else UNCOMPARED
-        explained = f"K: changepoints. E: distance to the recording, lower is nearer{beside}."
+        references = COMPARED if any(case.references for case in cases) else NOT_COMPARED
+        explained = f"K: changepoints. E: distance to the recording, lower is nearer{references}."
         lines.append(Text(explained, style="dim"))
     return Group(*lines)
 
 
 def _case(case: GenerationResult, verbose: bool) -> list[RenderableType]:
-    """The name of a case and its rows; deviations from the recording are yellow."""
-    result, recorded = case.generated, case.encounter
-    refused = ", ".join(f"{count} {words}" for words, count in causes_in_words(result.refused))
-    tried = (
-        f"{result.refused.total()} of {result.candidates} candidates were refused: {refused}"
-        if refused
-        else "no candidate was refused"
-    )
-    complete = len(result) >= result.requested
+    """Return the title of a case and its table; deviations from the recording are yellow."""
+    row = case.evaluation.row(WITH)
+    losses = case.fit.losses if case.fit else ()
+    not_kept = [loss.message for loss in losses if loss.kind != "arm"]
+    not_kept += _vanished(row)
+    not_kept += case.lost_reactions
+    notes = [loss.message for loss in losses if loss.kind == "arm"]
+    notes += case.route_remarks
+    notes += filter(None, [case.segmentation.remark(case.encounter.duration)])
     table = Table.grid(padding=(0, 1))
-    types = sorted({vehicle.type for vehicle in recorded.vehicles})
-    users = "vehicles" if types == [CAR] else f"road users ({', '.join(types)})"
-    table.add_row(
-        "", "recording", f"{len(recorded.vehicles)} {users} for {recorded.duration:.1f} s"
-    )
+    table.add_row("", "recording", _recording(case.encounter))
     for sentence in case.reacting["sentences"]:
         table.add_row("", "reaction", printable(sentence))
-    valid = Text.assemble(
-        (f"{len(result)} of {result.requested} scenarios", "green" if complete else "red"),
-        f"; {tried}",
-    )
-    table.add_row("", "valid", valid)
-    if varied := _variety(case):
-        table.add_row("", "variety", varied)
-    row = case.evaluation.row(WITH)
-    vanished = [] if row is None else _vanished(row.values)
-    losses = case.fit.losses if case.fit else ()
-    lost = [loss.message for loss in losses if loss.kind != "arm"]
-    remark = case.segmentation.remark(recorded.duration)
-    unused = [loss.message for loss in losses if loss.kind == "arm"]
-    for message in (*lost, *vanished, *case.lost_reactions):
-        table.add_row(
-            "",
-            Text("not kept", style=WARNING_STYLE),
-            Text(printable(message), style=WARNING_STYLE),
-        )
-    for message in (*unused, *case.route_remarks, *([remark] if remark else [])):
+    table.add_row("", "valid", _validity(case.generated))
+    if variety := _variety(case):
+        table.add_row("", "variety", variety)
+    for message in not_kept:
+        table.add_row("", Text("not kept", WARNING_STYLE), Text(printable(message), WARNING_STYLE))
+    for message in notes:
         table.add_row("", "note", printable(message))
-    title: list[RenderableType] = [Text(printable(case.title), style="bold"), table]
-    return [*title, *_details(case, row)] if verbose else title
+    title = Text(printable(case.title), style="bold")
+    return [title, table, *(_details(case, row) if verbose else ())]
+
+
+def _recording(encounter: Encounter) -> str:
+    """Return number and types of the recorded road users, and the duration."""
+    types = sorted({vehicle.type for vehicle in encounter.vehicles})
+    users = "vehicles" if types == [CAR] else f"road users ({', '.join(types)})"
+    return f"{len(encounter.vehicles)} {users} for {encounter.duration:.1f} s"
+
+
+def _validity(result: ScenarioSet) -> Text:
+    """Return the number of valid scenarios and the causes of refusals."""
+    style = "green" if len(result) >= result.requested else "red"
+    causes = [f"{count} {words}" for words, count in causes_in_words(result.refused)]
+    refusals = "no candidate was refused"
+    if causes:
+        refused = f"{result.refused.total()} of {result.candidates} candidates were refused"
+        refusals = f"{refused}: {', '.join(causes)}"
+    valid = f"{len(result)} of {result.requested} scenarios"
+    return Text.assemble((valid, style), f"; {refusals}")
 
 
 def _variety(case: GenerationResult) -> str:
-    """The ranges of the figures of a set, each with the recorded value in brackets."""
+    """Return the ranges of the figures of a set, each with the recorded value in brackets."""
     spreads = {} if case.coverage is None else case.coverage.spreads
     ranges = []
-    for spread in (spreads[name] for name in VARIED if name in spreads):
-        values = [value for value in spread.values if math.isfinite(value)]
-        own = f" (recorded {spread.template:.1f})" if math.isfinite(spread.template) else ""
-        if values and (own or spread is spreads["speed"]):
-            ranges.append(
-                f"{spread.label} {min(values):.1f} to {max(values):.1f} {spread.unit}{own}"
-            )
+    for name in VARIED:
+        spread = spreads.get(name)
+        values = [] if spread is None else [v for v in spread.values if math.isfinite(v)]
+        if spread is None or not values:
+            continue
+        figures = f"{spread.label} {min(values):.1f} to {max(values):.1f} {spread.unit}"
+        if math.isfinite(spread.template):
+            ranges.append(f"{figures} (recorded {spread.template:.1f})")
+        elif name == "speed":
+            ranges.append(figures)
     return ", ".join(ranges)
 
 
-def _vanished(values: Mapping[str, Interval]) -> list[str]:
+def _vanished(row: Row | None) -> list[str]:
     """Return a sentence on recorded conflicts that vanish in the scenarios."""
-    vanished, conflicts = (
-        values.get(key, Interval(math.nan)).value for key in ("vanished_conflicts", "conflicts")
-    )
-    total = vanished + conflicts
+    if row is None or not {"vanished_conflicts", "conflicts"} <= row.values.keys():
+        return []
+    vanished = row.values["vanished_conflicts"].value
+    total = vanished + row.values["conflicts"].value
     text = f"{vanished:.3g} of {total:.0f} recorded conflict(s) vanish on average"
     return [text] if vanished > 0.0 else []
 
 
 def _details(case: GenerationResult, row: Row | None) -> list[Text]:
-    """Changepoints, order, routes and E of a case."""
+    """Return changepoints, order, routes and E of a case."""
     order = formatted(row.values.get("order_kept"), "%", bounds=False) if row else "–"
-    figures = f"  K {len(case.segmentation.changepoints)}  order {order if order == '–' else order + ' %'}"
+    unit = "" if order == "–" else " %"
+    figures = f"  K {len(case.segmentation.changepoints)}  order {order}{unit}"
     if row and row.samples < len(case.generated):
         figures += f" (of {row.samples:,}, evenly spaced)"
     if planned := routes_in_words(case.routes):
         figures += f"  routes: {planned}"
-    similar = [_errors(case, metric) for metric in ERRORS if row and metric in row.values]
+    metrics = [metric for metric in ERRORS if row and metric in row.values]
+    remarks = [f"  {printable(line)}" for line in case.similarity()["said"]]
     return [
         Text(figures),
-        *similar,
-        *(Text(f"  {printable(line)}", style=WARNING_STYLE) for line in case.similarity()["said"]),
+        *(_errors(case, metric) for metric in metrics),
+        *(Text(line, WARNING_STYLE) for line in remarks),
     ]
 
 
 def _errors(case: GenerationResult, metric: str) -> Text:
-    """E of the set, of the sets it is compared with (the best is green), and of further rows."""
-    compared, best, value = case.compared, case.best(metric), case.evaluation.value
+    """Return E of the set, of the sets it is compared with (the best is green), and of others."""
+    compared, best = case.compared, case.best(metric)
+
+    def figure(row: str) -> str:
+        value = case.evaluation.value(row, metric)
+        return f"{value:.3f}" if math.isfinite(value) else "–"
+
     text = Text(f"  E {ERRORS[metric]} ")
-    text.append(
-        _figure(value(case.row_name, metric)),
-        style="bold green" if best == case.row_name else "bold",
-    )
+    style = "bold green" if best == case.row_name else "bold"
+    text.append(figure(case.row_name), style=style)
     for k, row in enumerate(compared[1:]):
-        text.append(" | " if k == 0 else ", ").append(f"{SHORT[row]} ")
-        text.append(_figure(value(row, metric)), style="green" if best == row else "")
-    beside = [row for row in SHORT if row not in compared and case.evaluation.row(row) is not None]
-    if beside:
-        text.append(
-            f" ({', '.join(f'{SHORT[row]} {_figure(value(row, metric))}' for row in beside)})",
-            style="dim",
-        )
+        text.append(" | " if k == 0 else ", ").append(f"{SHORT_NAMES[row]} ")
+        text.append(figure(row), style="green" if best == row else "")
+    others = [
+        f"{name} {figure(row)}"
+        for row, name in SHORT_NAMES.items()
+        if row not in compared and case.evaluation.row(row) is not None
+    ]
+    if others:
+        text.append(f" ({', '.join(others)})", style="dim")
     return text
-
-
-def _figure(value: float) -> str:
-    return f"{value:.3f}" if math.isfinite(value) else "–"

@@ -1,10 +1,10 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The evaluation of any bag that keeps the conventions of the suite, ours or not."""
+"""Evaluation of any bag that has the conventions of the suite."""
 
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from itertools import count
 from pathlib import Path
@@ -24,10 +24,12 @@ from scenario_gen.situation import Situation
 from scenario_gen.types import (
     CheckCounts,
     EgoSlot,
+    Evaluation,
     GenerationResult,
     join_ego,
     Note,
     NoteKind,
+    Scenario,
     ScenarioSet,
     Verdict,
     WITHOUT,
@@ -43,11 +45,19 @@ def bag_results(
     *,
     progress: Callable[[int, int], None] = lambda *_: None,
 ) -> tuple[GenerationResult, ...]:
-    """Evaluate every namespace of a bag that holds both `tracks` and `scenarios`, ready for the report.
+    """Evaluate every namespace of a bag that has `tracks` and `scenarios`, for the report.
 
-    The scenarios are checked again, on the bag's map if it has one, but not for start and end states. What the bag lacks is
-    left out: without `changepoints` K counts as 0; fit and routes are shown if both are there, with what the fitting decided.
-    `progress` is called with the number of scenarios checked, and of all.
+    The scenarios are checked again, on the bag's map if it has one, but not for the requested
+    boundary states. Data that the bag lacks are left out: without `changepoints`, K is 0; fit and
+    routes are shown if both are present.
+
+    Args:
+        path: the bag.
+        config: parameters of the evaluation.
+        limits: limits of validity.
+        seed: seed of the confidence intervals.
+        bag: limits on the size of the bag.
+        progress: called with the number of checked scenarios and their total.
 
     Raises:
         InputError: the bag is missing or damaged, or no namespace has both topics.
@@ -58,16 +68,19 @@ def bag_results(
     ]
     if not complete:
         raise InputError(
-            f"{path}: no namespace holds both `tracks` and `scenarios`; there is nothing to compare"
+            f"{path}: no namespace has both `tracks` and `scenarios`, so there is nothing to compare"
         )
     with naming_bag(path):
-        total, done = sum(len(namespace.hashes) for namespace in complete), count(1)
-
-        def tick() -> None:
-            progress(next(done), total)
-
+        total = sum(len(namespace.hashes) for namespace in complete)
+        done = count(1)
         return tuple(
-            _result(namespace, config or EvaluationConfig(), limits, seed, tick)
+            _result(
+                namespace,
+                config or EvaluationConfig(),
+                limits,
+                seed,
+                lambda: progress(next(done), total),
+            )
             for namespace in complete
         )
 
@@ -75,10 +88,10 @@ def bag_results(
 def write_page(
     bag: Path, folder: Path, *, progress: Callable[[int, int], None] = lambda *_: None
 ) -> None:
-    """Write the report of a bag; `progress` as of `bag_results`.
+    """Write the report on a bag; `progress` as in `bag_results`.
 
     Raises:
-        InputError: the bag is damaged, or the folder may not be replaced.
+        InputError: the bag is damaged, or the folder must not be replaced.
     """
     with replaced_folder(folder, EVALUATED, [bag]) as place:
         write_evaluation(place, bag_results(bag, progress=progress), bag, BagConfig())
@@ -91,57 +104,32 @@ def _result(
     seed: int,
     tick: Callable[[], None],
 ) -> GenerationResult:
+    """Check and evaluate the scenarios of a namespace."""
     encounter, segmentation, road = namespace.encounter, namespace.segmentation, namespace.road
     fit, routes = namespace.fit
     situation = Situation.of(encounter)
-    graph = situation.reactions
-    checkers, scenarios, verdicts = Checkers(namespace, limits), [], list[Verdict]()
-    for k in range(len(namespace.hashes)):
-        stamp, scenario = namespace.scenario(k)
-        whole = join_ego(scenario)
-        verdicts += checkers.of(k, stamp, whole, None).check([whole])
-        scenarios.append(scenario)
-        tick()
-    counts = CheckCounts.of_verdicts(verdicts)
+    scenarios, counts = _checked(namespace, limits, tick)
     evaluation = evaluate_scenarios(
         encounter,
-        {SCENARIOS: tuple(scenarios)},
+        {SCENARIOS: scenarios},
         changepoints=len(segmentation.changepoints),
         checks={SCENARIOS: counts},
         road=road.name if road else "",
         config=config,
         seed=seed,
     )
-    notes = [Note.of(NoteKind.TEXT, text=text) for text in namespace.missing]
-    lost = sum(entry is None for entry in namespace.unknown.values())
-    if lost:
-        total = len(scenarios)
-        notes.append(Note.of(NoteKind.UNACCOUNTED, count=lost, total=total, reason=NO_ENTRY))
-    rows = [
-        replace(row, notes=(*row.notes, *notes)) if row.name == SCENARIOS else row
-        for row in evaluation.rows
-    ]
-    evaluation = replace(evaluation, rows=tuple(rows))
-    ego = None
-    witness = next(
-        (
-            scenario.reference_drive
-            for scenario in scenarios
-            if scenario.reference_drive is not None
-        ),
-        None,
-    )
-    if witness is not None:
-        first, last = (
-            np.array([*witness.position[0, k], witness.heading[0, k], witness.speed[0, k]])
-            for k in (0, -1)
-        )
-        ego = EgoSlot(witness.vehicles[0], first, last)
-    held = [kept_reactions(situation, namespace.entry(k)) for k in range(len(scenarios))]
+    kept = [kept_reactions(situation, namespace.entry(k)) for k in range(len(scenarios))]
+    graph = situation.reactions
     generated = ScenarioSet(
-        len(scenarios), tuple(scenarios), counts.candidates, Counter(counts.refused), _left_out(namespace), ego,
-        reactions=tuple(edge for edge in graph.edges if all(edge in kept for kept in held)), graph=graph,
-    )  # fmt: skip
+        len(scenarios),
+        scenarios,
+        counts.candidates,
+        Counter(counts.refused),
+        _remarks(namespace),
+        _ego_slot(scenarios),
+        reactions=tuple(edge for edge in graph.edges if all(edge in edges for edges in kept)),
+        graph=graph,
+    )
     return GenerationResult(
         encounter,
         segmentation,
@@ -149,20 +137,59 @@ def _result(
         fit=fit,
         routes=routes,
         generated=generated,
-        evaluation=evaluation,
-        refusals={WITHOUT: "the bag holds one set of scenarios"},
+        evaluation=_with_notes(evaluation, namespace, len(scenarios)),
+        refusals={WITHOUT: "the bag has one set of scenarios"},
         row_name=SCENARIOS,
         valid=counts.candidates - sum(counts.refused.values()),
         coverage=coverage_of(encounter, scenarios),
     )
 
 
-def _left_out(namespace: Namespace) -> tuple[Note, ...]:
+def _checked(
+    namespace: Namespace, limits: Limits | None, tick: Callable[[], None]
+) -> tuple[tuple[Scenario, ...], CheckCounts]:
+    """Return the scenarios of a namespace and the counts of their checks."""
+    checkers = Checkers(namespace, limits)
+    scenarios: list[Scenario] = []
+    verdicts: list[Verdict] = []
+    for k in range(len(namespace.hashes)):
+        stamp, scenario = namespace.scenario(k)
+        joined = join_ego(scenario)
+        verdicts += checkers.of(k, stamp, joined, None).check([joined])
+        scenarios.append(scenario)
+        tick()
+    return tuple(scenarios), CheckCounts.of_verdicts(verdicts)
+
+
+def _ego_slot(scenarios: Sequence[Scenario]) -> EgoSlot | None:
+    """Return the ego slot of a set, from its first reference drive; None without one."""
+    for scenario in scenarios:
+        drive = scenario.reference_drive
+        if drive is not None:
+            states = np.column_stack([drive.position[0], drive.heading[0], drive.speed[0]])
+            return EgoSlot(drive.vehicles[0], states[0], states[-1])
+    return None
+
+
+def _with_notes(evaluation: Evaluation, namespace: Namespace, total: int) -> Evaluation:
+    """Return an evaluation with notes on incomplete requests and scenarios without an entry."""
+    notes = [Note.of(NoteKind.TEXT, text=text) for text in namespace.missing]
+    lost = sum(entry is None for entry in namespace.unknown.values())
+    if lost:
+        notes.append(Note.of(NoteKind.UNACCOUNTED, count=lost, total=total, reason=NO_ENTRY))
+    rows = tuple(
+        replace(row, notes=(*row.notes, *notes)) if row.name == SCENARIOS else row
+        for row in evaluation.rows
+    )
+    return replace(evaluation, rows=rows)
+
+
+def _remarks(namespace: Namespace) -> tuple[Note, ...]:
     """Return notes on the checks that a bag lacks data for, and on the outcomes of its requests."""
     notes = [Note.of(NoteKind.BAG_MEASURED)]
     if "map" not in namespace.messages:
         notes.append(Note.of(NoteKind.BAG_WITHOUT_MAP))
     if "changepoints" not in namespace.messages:
         notes.append(Note.of(NoteKind.BAG_WITHOUT_CHANGEPOINTS))
-    outcomes = (summary.sentence() for summary in namespace.summaries)
+    outcomes = [summary.sentence() for summary in namespace.summaries]
     return (*notes, *(Note.of(NoteKind.TEXT, text=text) for text in outcomes))
