@@ -19,9 +19,9 @@ import numpy.typing as npt
 
 from msg_conventions.layouts import Layout
 from scenario_gen.base.errors import InputError
+from scenario_gen.numerics import NS_PER_S
 
 HEADER = b"\x00\x01\x00\x00"  # encapsulation: CDR, little-endian, no options
-NANOSECONDS = 1_000_000_000
 
 
 @cache
@@ -94,7 +94,7 @@ class CdrWriter:
             self._count(len(data))
             self.body += data
         elif kind == "time":
-            seconds, nanoseconds = divmod(value or 0, NANOSECONDS)
+            seconds, nanoseconds = divmod(value or 0, NS_PER_S)
             if not -(2**31) <= seconds < 2**31:
                 raise InputError(
                     f"stamp {value} ns does not fit a ROS time (32-bit seconds, until 2038)"
@@ -190,7 +190,7 @@ class CdrReader:
     def stamp(self) -> int:
         """Read a Time or Duration in nanoseconds."""
         seconds, nanoseconds = struct.unpack("<iI", self._read(8, 4))
-        return int(seconds) * NANOSECONDS + int(nanoseconds)
+        return int(seconds) * NS_PER_S + int(nanoseconds)
 
     def aligned(self, dtype: npt.DTypeLike, count: int) -> npt.NDArray[Any] | None:
         """Read `count` structures (n,) that end at multiples of 8 bytes.

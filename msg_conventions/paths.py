@@ -16,11 +16,11 @@ from functools import lru_cache
 import numpy as np
 
 from msg_conventions import layouts
-from msg_conventions.cdr import CdrReader, encode, HEADER, NANOSECONDS
+from msg_conventions.cdr import CdrReader, encode, HEADER
 from msg_conventions.poses import poses_of
 from msg_conventions.yaw import half_angle
 from scenario_gen.base.errors import InputError
-from scenario_gen.numerics import Floats, Ints
+from scenario_gen.numerics import Floats, Ints, NS_PER_S
 from scenario_gen.types import Route
 
 TYPE = "nav_msgs/msg/Path"
@@ -38,7 +38,7 @@ def encode_path(poses: Floats, stamps_ns: Ints, frame_id: str, stamp_ns: int) ->
         return encode(BEGIN, stamp=stamp_ns, frame_id=frame_id)
     if not np.isfinite(poses).all():
         raise InputError("a path with a value that is not finite cannot be sent")
-    seconds, nanoseconds = np.divmod(stamps_ns, NANOSECONDS)
+    seconds, nanoseconds = np.divmod(stamps_ns, NS_PER_S)
     if np.abs(seconds).max() >= 2**31:
         raise InputError(
             f"a path of stamp {stamp_ns} ns cannot be sent: a stamp does not fit a ROS time "

@@ -19,7 +19,7 @@ from scenario_gen.types import LaneNetwork, Scenario, tokens, Vehicle
 from scenario_gen.types.markings import Marking, markings
 
 FOOTPRINT_TYPE = "geometry_msgs/msg/PolygonStamped"
-COLOURS = (
+COLOURS_RGB = (
     (0.12, 0.47, 0.71),
     (0.84, 0.15, 0.16),
     (0.17, 0.63, 0.17),
@@ -27,8 +27,8 @@ COLOURS = (
     (0.58, 0.4, 0.74),
     (0.55, 0.34, 0.29),
 )
-EGO_COLOUR = (0.06, 0.09, 0.16)
-EXPOSED_COLOUR = (1.0, 0.84, 0.0)  # for types narrower than this
+EGO_RGB = (0.06, 0.09, 0.16)
+EXPOSED_RGB = (1.0, 0.84, 0.0)  # for types narrower than this
 MAX_EXPOSED_WIDTH_M = 1.0
 PAINT = {
     Marking.EDGE: (0.15,),
@@ -64,8 +64,8 @@ def body(
     Exposed road users are yellow.
     """
     kind = vehicle.kind
-    if kind.width < MAX_EXPOSED_WIDTH_M and colour != EGO_COLOUR:
-        colour = EXPOSED_COLOUR
+    if kind.width < MAX_EXPOSED_WIDTH_M and colour != EGO_RGB:
+        colour = EXPOSED_RGB
     red, green, blue = colour
     return Marker(
         f"box_{name}",
@@ -85,7 +85,7 @@ def scenario_markers(scenario: Scenario, stamp_ns: int) -> bytes:
     names = tokens(vehicle.id for vehicle in scenario.vehicles)
     for k, (name, vehicle) in enumerate(zip(names, scenario.vehicles, strict=True)):
         first, last = scenario.present[k].tolist()
-        colour = COLOURS[k % len(COLOURS)]
+        colour = COLOURS_RGB[k % len(COLOURS_RGB)]
         path = scenario.position[k, first : last + 1]
         x, y = path[0].tolist()
         markers.append(
@@ -117,7 +117,7 @@ def vehicle_markers(
     markers = [_delete_all()]
     for k in np.flatnonzero(present).tolist():
         x, y, yaw = states[k, :3].tolist()
-        colour = EGO_COLOUR if k == ego else COLOURS[k % len(COLOURS)]
+        colour = EGO_RGB if k == ego else COLOURS_RGB[k % len(COLOURS_RGB)]
         markers.append(body(names[k], vehicles[k], (x, y, yaw), colour, 0.9))
     return encode_markers(markers, frame_id, stamp_ns)
 

@@ -27,7 +27,7 @@ _PASSING_ORDER = re.compile(r"(\S+) before (\S+), (.+)")
 
 
 def fact_values(facts: Facts) -> dict[str, str]:
-    """Return the key-values of facts; what is not known is left out."""
+    """Return the key-values of facts; unknown facts are left out."""
     numbers = {key: getattr(facts, name) for key, name in _NUMBERS.items()}
     values = {key: f"{number:.3f}" for key, number in numbers.items() if number is not None}
     if facts.weight is not None:
@@ -49,12 +49,12 @@ def fact_values(facts: Facts) -> dict[str, str]:
     return values
 
 
-def decode_facts(values: Mapping[str, str], what: str) -> Facts:
+def decode_facts(values: Mapping[str, str], origin: str) -> Facts:
     """Return the facts among the key-values of an entry; names without a meaning here are skipped.
 
     Args:
         values: of the entry.
-        what: names the entry in messages.
+        origin: names the entry in messages.
 
     Raises:
         InputError: a number or the order is damaged.
@@ -65,12 +65,12 @@ def decode_facts(values: Mapping[str, str], what: str) -> Facts:
         try:
             return None if text is None else float(text)
         except ValueError:
-            raise InputError(f"{what}: {key} is {text!r}; a number is needed") from None
+            raise InputError(f"{origin}: {key} is {text!r}; a number is needed") from None
 
     targets = {key.removeprefix(_TARGET): number(key) for key in values if key.startswith(_TARGET)}
     order = values.get("order", "keep")
     if order not in ORDERS:
-        raise InputError(f"{what}: order is {order!r}; choose one of {', '.join(ORDERS)}")
+        raise InputError(f"{origin}: order is {order!r}; choose one of {', '.join(ORDERS)}")
     failure = None
     if "search.kind" in values:
         deviation = number("search.deviation") or 0.0

@@ -25,10 +25,10 @@ from itertools import pairwise
 import numpy as np
 
 from msg_conventions import trajectory
-from msg_conventions.cdr import HEADER, NANOSECONDS
+from msg_conventions.cdr import HEADER
 from msg_conventions.trajectory import Trajectory
 from scenario_gen.base.errors import InputError
-from scenario_gen.numerics import Ints
+from scenario_gen.numerics import Ints, NS_PER_S
 from scenario_gen.types import Scenario
 
 
@@ -39,7 +39,7 @@ def encode_scenario(scenario: Scenario, stamp_ns: int) -> bytes:
 
 def _parts(scenario: Scenario, stamp_ns: int) -> Iterator[Trajectory]:
     """Yield the content of each message: neighbouring vehicles with the same presence."""
-    time_ns = np.rint(scenario.time * NANOSECONDS).astype(np.int64)
+    time_ns = np.rint(scenario.time * NS_PER_S).astype(np.int64)
     changes = (np.diff(scenario.present, axis=0) != 0).any(axis=1)
     edges = [0, *(1 + np.flatnonzero(changes)).tolist(), len(scenario.vehicles)]
     for begin, end in pairwise(edges):
@@ -158,7 +158,7 @@ def _joined(
     states = (np.stack((x, y), axis=-1), heading, speed, acceleration)
     return Scenario(
         vehicles,
-        time_ns / NANOSECONDS,
+        time_ns / NS_PER_S,
         *states,
         seed,
         index,

@@ -25,11 +25,11 @@ from typing import Any
 import numpy as np
 
 from msg_conventions import layouts
-from msg_conventions.cdr import CdrReader, HEADER, NANOSECONDS
+from msg_conventions.cdr import CdrReader, HEADER
 from msg_conventions.cdr import encode as encode_fields
 from msg_conventions.yaw import check_quaternions, quaternion, yaw
 from scenario_gen.base.errors import InputError
-from scenario_gen.numerics import Bools, Floats, Ints
+from scenario_gen.numerics import Bools, Floats, Ints, NS_PER_S
 from scenario_gen.types import tokens, usual_type, Vehicle
 
 TYPE = "trajectory_msgs/msg/MultiDOFJointTrajectory"
@@ -37,7 +37,7 @@ MAX_COORDINATE_M = 1e8  # more than any geodetic grid has
 MAX_SPEED_MPS = 1e4  # no vehicle is faster, and sums of squares stay finite
 MAX_COMPONENT_RATIO = 2.0  # of a quaternion
 MAX_TABLE_VEHICLES = 10_000  # in a message that is decoded as one array
-MAX_DURATION_NS = 7200 * NANOSECONDS  # of an encounter or a scenario
+MAX_DURATION_NS = 7200 * NS_PER_S  # of an encounter or a scenario
 MIN_SIZE_M = 0.01  # of a footprint
 MAX_SIZE_M = 1000.0
 ABSENT_Z_M = -1000.0  # z of an absent vehicle
@@ -143,7 +143,7 @@ def encode(trajectory: Trajectory) -> bytes:
     points["transforms"][..., 3:] = quaternion(trajectory.heading).swapaxes(0, 1)
     points["velocities"][..., 0] = trajectory.speed.T
     points["accelerations"][..., 0] = trajectory.acceleration.T
-    points["sec"], points["nanosec"] = np.divmod(trajectory.time_ns, NANOSECONDS)
+    points["sec"], points["nanosec"] = np.divmod(trajectory.time_ns, NS_PER_S)
     body = points.tobytes()
     # At an odd multiple of 4 the first point needs no padding after its first length.
     if (len(begin) - len(HEADER)) % 8:
@@ -228,7 +228,7 @@ def _read_table(reader: CdrReader, n: int, count: int) -> Points | None:
         reader.place = place
         return None
     pose, velocity, acceleration = (np.ascontiguousarray(points[name]) for name in SEQUENCES)
-    time_ns = points["sec"].astype(np.int64) * NANOSECONDS + points["nanosec"]
+    time_ns = points["sec"].astype(np.int64) * NS_PER_S + points["nanosec"]
     return time_ns, pose, velocity, acceleration
 
 

@@ -15,18 +15,16 @@ from typing import Any, NoReturn
 
 from scenario_gen.base.errors import guarded, InputError
 
-MAX_YAML_BYTES = (
-    512 * 1024
-)  # all parameters have 9 kB, the metadata of a bag of 1000 topics 500 kB
+MAX_YAML_BYTES = 512 * 1024  # parameters have 9 kB, the metadata of a bag of 1000 topics 500 kB
 MAX_JSON_BYTES = 8 * 1024 * 1024  # the figures of one case have 9 kB
 MAX_NESTING_LEVELS = 32  # nested lists and mappings
-WHOLE = 2**63  # bound of the integers that parameters and stamps can be
+MAX_INTEGER_BITS = 63  # of parameters and stamps
 MAX_NUMBER_FACTOR = 1e300  # of a number in JSON: finite, also after some arithmetic
 PLAIN = frozenset(
     f"tag:yaml.org,2002:{kind}" for kind in ("null", "bool", "int", "float", "str", "seq", "map")
 )
 NUMBER = {"type": "number", "minimum": -MAX_NUMBER_FACTOR, "maximum": MAX_NUMBER_FACTOR}
-COUNT = {"type": "integer", "minimum": 0, "maximum": WHOLE - 1}
+COUNT = {"type": "integer", "minimum": 0, "maximum": 2**MAX_INTEGER_BITS - 1}
 
 
 @cache
@@ -50,7 +48,7 @@ def _loader() -> Any:
 
         def construct_yaml_int(self, node: Any) -> int:
             value: int = super().construct_yaml_int(node)
-            if not -WHOLE <= value < WHOLE:
+            if value.bit_length() > MAX_INTEGER_BITS:
                 raise yaml.constructor.ConstructorError(
                     None, None, "an integer of more than 64 bits", node.start_mark
                 )

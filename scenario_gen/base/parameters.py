@@ -1,10 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Declarations of parameters for the command line, the nodes and docs/.
-
-Default, unit, range and meaning.
-"""
+"""Declarations of parameters (default, unit, range, meaning) for commands, nodes and docs/."""
 
 from collections.abc import Iterable, Mapping
 from contextlib import suppress
@@ -13,7 +10,7 @@ import math
 from pathlib import Path
 from typing import Any, TypeVar
 
-from scenario_gen.base.documents import parse_yaml, read_yaml, shown, WHOLE
+from scenario_gen.base.documents import MAX_INTEGER_BITS, parse_yaml, read_yaml, shown
 from scenario_gen.base.errors import did_you_mean, InputError
 from scenario_gen.base.registry import installed
 
@@ -55,7 +52,7 @@ def parameter(
 
 @dataclass(frozen=True)
 class Parameters:
-    """Base of every configuration, which checks its values on creation.
+    """Base class of configurations, which check their values on creation.
 
     Raises:
         InputError: a value has the wrong type or is out of range.
@@ -63,10 +60,7 @@ class Parameters:
 
     @property
     def of_plugins(self) -> "Mapping[str, Parameters]":
-        """Configurations nested in it that installed packages add, by name.
-
-        They are kept in the field `plugins`.
-        """
+        """Nested configurations from installed packages by name, kept in the field `plugins`."""
         return {}
 
     def __post_init__(self) -> None:
@@ -78,7 +72,7 @@ class Parameters:
 def check_value(name: str, entry: "Field[Any]", value: Any) -> None:
     """Raise InputError naming `name` if `value` does not satisfy the declaration `entry`."""
     kind: type[Any] = type(entry.default)
-    if isinstance(value, int) and not -WHOLE <= value < WHOLE:
+    if isinstance(value, int) and value.bit_length() > MAX_INTEGER_BITS:
         raise InputError(f"parameter {name} is an integer of more than 64 bits")
     if kind is float and isinstance(value, int) and not isinstance(value, bool):
         value = float(value)
@@ -116,10 +110,7 @@ def _check_range(name: str, meta: Mapping[str, Any], value: float) -> None:
 
 
 def flatten(config: Any, prefix: str = "") -> dict[str, tuple["Field[Any]", Any]]:
-    """Return {dotted name.
-
-    (declaration, value)} of a configuration and the configurations nested in it.
-    """
+    """Return {dotted name: (declaration, value)} of a configuration and those nested in it."""
     flat: dict[str, tuple[Field[Any], Any]] = {}
     for entry in fields(config):
         value = getattr(config, entry.name)
@@ -137,7 +128,7 @@ def _of_plugins(config: Any) -> Mapping[str, Parameters]:
 
 
 def _unknown(config: Any, name: str, prefix: str = "") -> str:
-    """Return the message on a name that is no parameter of a configuration."""
+    """Return the message on an unknown name of a parameter."""
     near = did_you_mean(name, flatten(config))
     return f"unknown parameter {prefix}{shown(name)}; `scenario-gen parameters` lists them{near}"
 
@@ -156,18 +147,19 @@ def updated(config: Config, values: dict[str, Any], prefix: str = "") -> Config:
         head, _, rest = name.partition(".")
         if rest and head in nested:
             inner.setdefault(head, {})[rest] = value
-        elif not rest and head not in nested and head in declared and declared[head].metadata:
-            check_value(prefix + head, declared[head], value)
-            changes[head] = float(value) if isinstance(declared[head].default, float) else value
+        elif name in declared and name not in nested and declared[name].metadata:
+            check_value(prefix + name, declared[name], value)
+            changes[name] = float(value) if isinstance(declared[name].default, float) else value
         else:
             raise InputError(_unknown(config, name, prefix))
 
-    parts = {
-        head: updated(nested[head], part_values, f"{prefix}{head}.")
-        for head, part_values in inner.items()
-    }
-    changes |= {head: part for head, part in parts.items() if head in declared}
-    plugins = tuple((head, part) for head, part in parts.items() if head not in declared)
+    plugins = []
+    for head, part_values in inner.items():
+        part = updated(nested[head], part_values, f"{prefix}{head}.")
+        if head in declared:
+            changes[head] = part
+        else:
+            plugins.append((head, part))
     if plugins:
         changes["plugins"] = (*getattr(config, "plugins", ()), *plugins)
     return replace(config, **changes)  # type: ignore[type-var]
@@ -196,12 +188,23 @@ def assigned(config: Config, assignment: str) -> Config:
     known = flatten(config)
     if name not in known:
         raise InputError(_unknown(config, name))
-    is_text = isinstance(known[name][0].default, str)  # the vehicle "007" is no number
-    value = text if is_text else parse_yaml(text, f"--set {name}={shown(text)}")
-    if isinstance(known[name][0].default, float) and isinstance(value, str):
-        with suppress(ValueError):
-            value = float(value)  # 1e9 and nan are texts in YAML
+    value = parsed(known[name][0], text, f"--set {name}={shown(text)}")
     return updated(config, {name: value})
+
+
+def parsed(entry: "Field[Any]", text: str, source: str) -> Any:
+    """Return the value of a text for a declared parameter; `source` names it in messages.
+
+    Raises:
+        InputError: the text is not YAML.
+    """
+    if isinstance(entry.default, str):  # the vehicle "007" is not a number
+        return text
+    value = parse_yaml(text, source)
+    if isinstance(entry.default, float) and isinstance(value, str):
+        with suppress(ValueError):
+            return float(value)  # YAML reads 1e9 and nan as texts
+    return value
 
 
 def loaded(config: Config, path: Path) -> Config:

@@ -8,17 +8,13 @@ from importlib import metadata
 import platform
 from typing import Any, TypeVar
 
-import yaml
-
 import scenario_gen
 from scenario_gen.base.errors import InputError
-from scenario_gen.base.parameters import flatten, updated
+from scenario_gen.base.parameters import flatten, parsed, updated
 
 Config = TypeVar("Config")
-RECORDING = (
-    "recording"  # the name of the recording that a template is of; of a recombined one of both
-)
-
+RECORDING = "recording"
+"""Key of the name of a template's recording; of both recordings if it was recombined."""
 
 _LOG_PREFIX = "log "
 _HASH_PREFIX = "sha256 "
@@ -55,36 +51,19 @@ def what_makes_it_again(config: Any, request: Any) -> dict[str, str]:
     return asked | versions() | parameter_texts(config)
 
 
-def read_parameters(config: Config, texts: Mapping[str, str], prefix: str, what: str) -> Config:
+def read_parameters(config: Config, texts: Mapping[str, str], prefix: str, origin: str) -> Config:
     """Return `config` with the values that `texts` has under `prefix`, e.g. "sampling.".
 
     Raises:
         InputError: a parameter is missing there, or its text is no such value; the message names
-            `what`.
+            `origin`.
     """
     values: dict[str, Any] = {}
     for name, (entry, _) in flatten(config).items():
-        text = texts.get(
-            prefix + name, texts.get(prefix + name.rpartition(".")[2])
-        )  # older bags: a limit of all types
+        text = texts.get(prefix + name)
         if text is None:
             raise InputError(
-                f"{what}: parameter {prefix}{name} is not there, so it cannot be made again"
+                f"{origin}: parameter {prefix}{name} is missing, so it cannot be regenerated"
             )
-        kind = type(entry.default)
-        values[name] = (
-            text
-            if kind is str
-            else yaml.safe_load(text.lower())
-            if kind is bool
-            else _number(kind, text)
-        )
+        values[name] = parsed(entry, text, f"{origin}: parameter {prefix}{name}")
     return updated(config, values)
-
-
-def _number(kind: type, text: str) -> Any:
-    """Return the number in a text; the text itself if it is none, for `updated` to refuse."""
-    try:
-        return kind(text)
-    except ValueError:
-        return text

@@ -30,7 +30,7 @@ class Element(etree.ElementBase):  # type: ignore[misc]  # lxml has no type stub
     Compare with None (`element is not None`): an element without children is false.
     """
 
-    if TYPE_CHECKING:  # types of what lxml defines
+    if TYPE_CHECKING:  # lxml's types
 
         def __iter__(self) -> Iterator["Element"]: ...
         def find(self, path: str) -> "Element | None": ...  # noqa: D102
@@ -117,27 +117,27 @@ def to_number(text: str, where: str) -> float:
     return number
 
 
-def read_xml(path: Path, what: str) -> Element:
+def read_xml(path: Path, label: str) -> Element:
     """Return the root element of an XML file.
 
     Args:
         path: the file.
-        what: its name in messages.
+        label: its name in messages.
 
     Raises:
         InputError: the file cannot be read, or as `parse_xml`.
     """
-    data = read_bytes(path, MAX_XML_BYTES, what, ": cut the map")
+    data = read_bytes(path, MAX_XML_BYTES, label, ": cut the map")
     if not data.strip():
-        raise InputError(f"{what} is empty")
+        raise InputError(f"{label} is empty")
 
     misplaced = _DECLARATION_BELOW_COMMENTS.match(data)
     if misplaced:  # the declaration moves to the beginning; lines keep their numbers
         data = misplaced[2] + misplaced[1] + data[misplaced.end() :]
-    return parse_xml(data, what)
+    return parse_xml(data, label)
 
 
-def parse_xml(data: bytes, what: str) -> Element:
+def parse_xml(data: bytes, label: str) -> Element:
     """Return the root element of an XML document; tags and attributes lose their namespaces.
 
     Raises:
@@ -145,7 +145,7 @@ def parse_xml(data: bytes, what: str) -> Element:
             well-formed; the message names line and column.
     """
     if data.count(b"<") > 2 * MAX_ELEMENT_COUNT:  # a start tag and an end tag
-        raise InputError(f"{what}: more than {MAX_ELEMENT_COUNT} elements; cut the map")
+        raise InputError(f"{label}: more than {MAX_ELEMENT_COUNT} elements; cut the map")
 
     parser = etree.XMLParser(  # collect_ids must stay True: False loads external DTDs
         resolve_entities=False,
@@ -156,16 +156,16 @@ def parse_xml(data: bytes, what: str) -> Element:
     )
     parser.set_element_class_lookup(etree.ElementDefaultClassLookup(element=Element))
     try:
-        root: Element = etree.fromstring(data, parser, base_url=what)
+        root: Element = etree.fromstring(data, parser, base_url=label)
     except etree.XMLSyntaxError as error:
         line, column = error.position
         problem = str(error.msg).partition(f", line {line}")[0].strip()
-        raise InputError(f"{what}, line {line}, column {column}: not XML ({problem})") from error
+        raise InputError(f"{label}, line {line}, column {column}: not XML ({problem})") from error
 
     if root.getroottree().docinfo.doctype:
         line = data[: data.find(b"<!DOCTYPE")].count(b"\n") + 1
         raise InputError(
-            f"{what}, line {line}: document types can define entities and are not read; "
+            f"{label}, line {line}: document types can define entities and are not read; "
             "delete <!DOCTYPE …>"
         )
     if b"xmlns" in data:

@@ -139,10 +139,10 @@ def _print_validation(validation: "Validation") -> None:
     valid = validation.scenarios - validation.invalid
     name = validation.namespace or "/"
     print_(f"{name}: {valid} of {validation.scenarios} scenarios are valid")
-    if validation.found:
+    if validation.causes:
         rows = [
             (cause, str(entry.count), str(entry.scenario), entry.message)
-            for cause, entry in validation.found.items()
+            for cause, entry in validation.causes.items()
         ]
         print_table(("cause", "scenarios", "first", "violation"), rows)
     if validation.unaccounted:

@@ -66,7 +66,7 @@ class CleanTask:
         name: of the task.
         corpus: of the encounters.
         number: of the table to write.
-        found: (partition, first row, row after the last) of the encounters.
+        row_ranges: (partition, first row, row after the last) of the encounters.
         hours: of their messages.
         config: the parameters.
     """
@@ -74,7 +74,7 @@ class CleanTask:
     name: str
     corpus: Place
     number: int
-    found: tuple[tuple[int, int, int], ...]
+    row_ranges: tuple[tuple[int, int, int], ...]
     hours: tuple[int, ...]
     config: CorpusConfig
 
@@ -98,11 +98,11 @@ def clean_found(task: CleanTask) -> None:
     """Write a row for each encounter that survives cleaning, and why others do not."""
     from pyarrow import parquet
 
-    parts = [part_of(task.corpus, number) for number, _, _ in task.found]
+    parts = [part_of(task.corpus, number) for number, _, _ in task.row_ranges]
     hours = [task.corpus / "hours" / f"hour-{hour}.rows.parquet" for hour in task.hours]
     with fetched([*parts, *hours]) as paths:
         listed: list[FoundEncounter] = []
-        for path, (_, first, last) in zip(paths, task.found, strict=False):
+        for path, (_, first, last) in zip(paths, task.row_ranges, strict=False):
             listed += read_found(path, first, last)
         begin = min(entry.start for entry in listed) - SMOOTHING_MARGIN_US
         end = max(entry.end for entry in listed) + SMOOTHING_MARGIN_US

@@ -29,17 +29,17 @@ _TICKS_PER_CLEANING_COUNT = 2
 class Streams:
     """Buffers the newest `max_duration` seconds of streams and samples them, in bounded memory.
 
-    Messages may come in any order, twice, or not at all, if they are less than `late` seconds
-    behind the newest one; the samples are then those of messages in order. Later messages still
-    count in `take`.
+    Messages may come in any order, twice, or not at all, if they are at most `max_delay`
+    seconds behind the newest one; the samples are then those of messages in order. Later messages
+    still count in `flush`.
     """
 
-    def __init__(self, config: LogConfig = LogConfig(), late: float = 0.5) -> None:
+    def __init__(self, config: LogConfig = LogConfig(), max_delay: float = 0.5) -> None:
         """Begin empty; of `config`, `start`, `end` and `strict` do not apply."""
         self.origin = config.origin
         self._config = replace(config, start=0.0, end=0.0, strict=False, vehicles="")
         self._dt_ns = round(config.period * 1e9)
-        self._late_ns = round(late * 1e9)
+        self._max_delay_ns = round(max_delay * 1e9)
         self._clear()
 
     def _clear(self) -> None:
@@ -53,7 +53,7 @@ class Streams:
 
     @property
     def config(self) -> LogConfig:
-        """Configuration for the log of `take`: all of it, in the frame of the samples."""
+        """Configuration for the log of `flush`: all of it, in the frame of the samples."""
         return replace(self._config, origin=self.origin)
 
     @property
@@ -111,7 +111,7 @@ class Streams:
         if self._newest_ns < 0:
             return []
         group = _TICKS_PER_CLEANING_COUNT
-        last_tick = (self._newest_ns - self._late_ns) // self._dt_ns // group * group
+        last_tick = (self._newest_ns - self._max_delay_ns) // self._dt_ns // group * group
         first_tick = self._first_ns // self._dt_ns if self._next_tick < 0 else self._next_tick
         if last_tick < first_tick:
             return []
@@ -150,7 +150,7 @@ class Streams:
     def _is_awaited(self, track: Observations, stamp_ns: int) -> bool:
         """Return whether a vehicle's next fix may still come from a slower source."""
         last_ns = int(track.fix_ns[-1])
-        silent_s = (self._newest_ns - self._late_ns - last_ns) * 1e-9
+        silent_s = (self._newest_ns - self._max_delay_ns - last_ns) * 1e-9
         longest_s = longest_bridge(np.diff(track.fix_ns) * 1e-9, self._config)
         return last_ns < stamp_ns and silent_s <= longest_s
 
@@ -182,7 +182,7 @@ class Streams:
             segments=(Segment(1, "the streams", "message", 1),),
         )
 
-    def take(self, name: str) -> RawLog | None:
+    def flush(self, name: str) -> RawLog | None:
         """Return the buffer as a log, and clear it; None without any position."""
         positioned = {vehicle: rows for vehicle, rows in self._all.items() if rows.fixes}
         log = self._log(name, positioned) if positioned else None

@@ -37,7 +37,6 @@ ROUNDING_M = 0.02  # poses are rounded to centimetres; this much more keeps thei
 SHARES = tuple(
     k / 10.0 for k in range(1, 11)
 )  # of the way from a requested state to the road's own placement
-STRETCHES = (0.25, 0.5, 0.75, 1.0)  # of the clock
 
 PARAMETER_FORMS = {
     "starts": "starts:='{}'",
@@ -268,7 +267,7 @@ class _Search:
         """Keep the states, and let scenarios last longer."""
         current = self._requested.config.sampling.max_stretch
         duration = self._requested.encounter.duration
-        for stretch in STRETCHES:
+        for stretch in (0.25, 0.5, 0.75, 1.0):  # of the recorded duration
             if stretch > current and self._is_possible(request, stretch):
                 longer = f"up to {duration * (1.0 + stretch):.1f} s instead of {duration:.1f} s"
                 message = f"{self._forms['max_stretch'].format(stretch)} ({longer})"

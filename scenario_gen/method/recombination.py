@@ -127,11 +127,11 @@ def pair_of(encounter: Encounter) -> InteractingPair | None:
     return InteractingPair(situation, member.kind, member.features, conflict, reactions)
 
 
-def recombined(one: Encounter, other: Encounter) -> Encounter:
+def recombined(first: Encounter, second: Encounter) -> Encounter:
     """Return the first vehicle of one encounter with the second vehicle of another.
 
-    The clock and the frame are those of `one`. Of more than two vehicles, those that interact most
-    are used.
+    The clock and the frame are those of `first`. Of more than two vehicles, those that interact
+    most are used.
 
     Raises:
         RefusedError: they are of different kinds, or the result is of another kind, overlaps,
@@ -143,10 +143,10 @@ def recombined(one: Encounter, other: Encounter) -> Encounter:
         >>> recombined(first, second).source.name
         'crossings-1 + crossings-2'
     """
-    a, b = pair_of(one), pair_of(other)
-    if a is None or b is None or a.kind != b.kind:
+    leader, follower = pair_of(first), pair_of(second)
+    if leader is None or follower is None or leader.kind != follower.kind:
         raise RefusedError("they are of different kinds")
-    return _combined(a, b)
+    return _combined(leader, follower)
 
 
 def recombinations(
@@ -315,7 +315,7 @@ def _poses_behind(pair: InteractingPair, station: Floats) -> Floats:
     join, left = (float(value[0]) for value in leader.project(follower.points[-1:, :2]))
     if abs(left) < ON_PATH_M:
         rows = beyond > 0.0
-        poses[rows] = leader.beside(join + beyond[rows], left)
+        poses[rows] = leader.at_offset(join + beyond[rows], left)
     return poses
 
 

@@ -14,12 +14,14 @@ from scenario_gen.numerics.arrays import (
     frozen_bools,
     frozen_ints,
     Ints,
+    NS_PER_S,
     runs,
     sealed,
     wrap_angle,
 )
 
 __all__ = [
+    "NS_PER_S",
     "Bools",
     "Counts",
     "Floats",

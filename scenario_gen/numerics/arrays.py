@@ -14,6 +14,7 @@ Bools = npt.NDArray[np.bool_]
 Counts = npt.NDArray[np.int32]
 Array = TypeVar("Array", bound=npt.NDArray[Any])
 
+NS_PER_S = 1_000_000_000
 MAX_ANGLE_RAD = 3.141592653  # the last whole nanoradian below pi, so that rounding stays inside
 
 

@@ -60,7 +60,7 @@ class Curve:
         pose[..., 1] += beyond * np.sin(pose[..., 2])
         return pose
 
-    def beside(self, station: Floats, offset: Floats | float) -> Floats:
+    def at_offset(self, station: Floats, offset: Floats | float) -> Floats:
         """Return the poses (..., 3) at arc lengths and lateral offsets [m, left positive]."""
         pose = self.at(station)
         pose[..., 0] -= offset * np.sin(pose[..., 2])

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""What a request leaves behind: a bag, a report and the figures."""
+"""The outputs of a request: a bag, a report and the figures."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
@@ -24,10 +24,12 @@ GENERATED, EVALUATED = Kind("generated"), Kind("evaluated")
 
 
 def report(folder: Path | str, *cases: GenerationResult, title: str = "") -> Path:
-    """Write bag, page and figures of results to a folder, as `scenario-gen generate` does; return the page.
+    """Write bag, report and figures of results to a folder, like `scenario-gen generate`.
+
+    Returns the path of the report.
 
     Raises:
-        InputError: the folder holds something else.
+        InputError: the folder has other contents.
     """
     with replaced_folder(Path(folder), GENERATED) as place:
         write_results(
@@ -47,11 +49,11 @@ def write_results(
     """Write bag, report and figures of all cases to `folder`.
 
     Args:
-        folder: a folder from `replaced_folder`; a recorded bag that it has already is kept.
+        folder: a folder from `replaced_folder`; a bag that it already has is kept.
         cases: one per encounter and road; with several, each has its own namespace in the bag.
         title: heading of the report.
         quality: the log's data-quality summary, in lines.
-        provenance: what is needed to do it again.
+        provenance: inputs, versions and parameters by name, to generate the results again.
 
     Raises:
         OSError: the disk is full, or fails.

@@ -34,5 +34,5 @@ def _runs_in(path: Curve, lane: Curve) -> bool:
 
 def lane_along(name: str, path: Curve, half_width: Floats | float) -> Lane:
     """Return the lane with half widths (M,) [m], or one for all, along the points of a path."""
-    left, right = (path.beside(path.station, side * half_width)[:, :2] for side in (1.0, -1.0))
+    left, right = (path.at_offset(path.station, side * half_width)[:, :2] for side in (1.0, -1.0))
     return Lane(name, left, right)

@@ -320,7 +320,7 @@ class _RoadDrawing:
         wider = np.zeros(len(along), dtype=np.bool_)
         for side, count in ((-self._sign, arm.inward), (self._sign, arm.outward)):
             edge = side * (count * self._width + _WIDER_THAN_LANES_M)
-            wider |= self._drivable(line.beside(along, edge)[:, :2])
+            wider |= self._drivable(line.at_offset(along, edge)[:, :2])
         mouth = float(along[int(np.argmax(wider))]) if wider.any() else line.length
         for connection, route in self._driven.items():
             if connection.from_arm == k:
@@ -336,7 +336,7 @@ class _RoadDrawing:
         """
         line = self._lines[k].cut(0.0, self._mouths[k], _ARM_STEP_M)
         side = -self._sign if inward else self._sign
-        lines = [line.beside(line.station, side * offset)[:, :2] for offset in offsets]
+        lines = [line.at_offset(line.station, side * offset)[:, :2] for offset in offsets]
         return lines if inward else [points[::-1] for points in lines]
 
     def _straight_connections(self) -> Iterator[Connection]:
@@ -416,7 +416,7 @@ class _RoadDrawing:
         assert self._plan.axis is not None
         line = self._plan.axis if a == 0 else self._plan.axis.reversed()
         line = line.cut(self._mouths[a], line.length - self._mouths[1 - a], _ROUTE_STEP_M)
-        return Curve(line.beside(line.station, -self._sign * offset))
+        return Curve(line.at_offset(line.station, -self._sign * offset))
 
     def _clothoid(
         self,
@@ -428,8 +428,8 @@ class _RoadDrawing:
     ) -> Curve | None:
         """Return the route between the mouths of two arms, with offsets [m] from their lines."""
         at_a, at_b = np.array([self._mouths[a]]), np.array([self._mouths[b]])
-        start = self._lines[a].beside(at_a, -self._sign * start_offset)[0]
-        goal = reverse(self._lines[b].beside(at_b, self._sign * goal_offset)[0])
+        start = self._lines[a].at_offset(at_a, -self._sign * start_offset)[0]
+        goal = reverse(self._lines[b].at_offset(at_b, self._sign * goal_offset)[0])
         if abs(angle_between(goal[2], start[2])) > _MAX_TURN_RAD:
             return None
         route = draw_route(start, goal, max_curvature=max_curvature)
@@ -460,7 +460,7 @@ class _RoadDrawing:
         half = self._width / 2.0 + widening
 
         def border(side: float, begin: Floats, end: Floats) -> Floats:
-            line = route.beside(route.station, side * half)[:, :2]
+            line = route.at_offset(route.station, side * half)[:, :2]
             line = line + (1.0 - share) * (begin - line[0]) + share * (end - line[-1])
             line[[0, -1]] = begin, end
             return np.asarray(line)
@@ -487,5 +487,5 @@ def crossing_lane(
 ) -> Lane:
     """Return the crossing between two stations [m], with a reach [m] to the right and left."""
     offsets = np.array([-reach[0], reach[1]])
-    behind, ahead = (line.beside(np.full(2, station), offsets)[:, :2] for station in stations)
+    behind, ahead = (line.at_offset(np.full(2, station), offsets)[:, :2] for station in stations)
     return Lane(name, behind, ahead, users=frozenset(("pedestrian",)), crossing=True)

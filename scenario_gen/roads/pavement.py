@@ -37,7 +37,7 @@ _QUARTER_CIRCLE_POINTS = 16
 def strip(line: Curve, right: float, left: float) -> Polygon:
     """Return the area between `right` and `left` [m] to the left of a line (right < left)."""
     dense = line if len(line.points) == 2 else line.cut(0.0, line.length, _STATION_STEP_M)
-    edges = [dense.beside(dense.station, offset)[:, :2] for offset in (right, left)]
+    edges = [dense.at_offset(dense.station, offset)[:, :2] for offset in (right, left)]
     return shapely.make_valid(Polygon(np.concatenate((edges[0], edges[1][::-1]))))
 
 
@@ -90,6 +90,6 @@ def drivable_width(
     """
     distance = np.arange(0.0, max_width, step)
     station = np.repeat(line.station[:, None], len(distance), axis=1)
-    is_drivable = drivable(line.beside(station, side * distance[None, :])[..., :2])
+    is_drivable = drivable(line.at_offset(station, side * distance[None, :])[..., :2])
     width = np.logical_and.accumulate(is_drivable, axis=1).sum(axis=1) * step
     return np.asarray(np.minimum(width, max_width))

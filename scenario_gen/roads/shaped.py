@@ -161,7 +161,7 @@ class MergeLayout:
         fastest = max(float(tracks[i].speed[k]) for i, k in samples.items())
         sharpest = max(sharpness_of(tracks[i]) for i in merging)
         offset = float(np.mean(frenet.offset[merging, -1]))
-        pose = frenet.line.beside(np.array(sign * join), offset)
+        pose = frenet.line.at_offset(np.array(sign * join), offset)
         pose[2] += 0.0 if sign > 0.0 else np.pi
         rows = driver_rows(situation.encounter)
         yields = [

@@ -194,7 +194,7 @@ def _shifted(track: Track, shift: Floats) -> Track:
         step = 1.0 if track.still else 0.5
         curve = curve.cut(shift[0], shift[0] + max(curve.length, step), step)
     if abs(shift[1]) > 0.0:
-        parallel = Curve(curve.beside(curve.station, shift[1]))
+        parallel = Curve(curve.at_offset(curve.station, shift[1]))
         progress = np.interp(progress, curve.station, parallel.station)
         curve = parallel
     return replace(track, curve=curve, progress=frozen(progress))

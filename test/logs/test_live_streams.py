@@ -80,7 +80,7 @@ def test_disorder_and_repetition_change_nothing(encounter):
     expected, streams = fed(messages)
     got, again = fed(mixed)
     assert same(got, expected)
-    one, two = (encounters_of(s.take("live"), s.config).encounters[0] for s in (streams, again))
+    one, two = (encounters_of(s.flush("live"), s.config).encounters[0] for s in (streams, again))
     assert np.array_equal(one.position, two.position) and one.start_ns == two.start_ns
 
 
@@ -110,7 +110,7 @@ def test_lost_and_wrong_messages_are_bridged(encounter):
         np.abs(np.diff(s.position - by_stamp[s.stamp_ns].position, axis=0)).max() for s in samples
     ]
     assert max(errors) < 1.0
-    (again,) = encounters_of(streams.take("live"), streams.config).encounters
+    (again,) = encounters_of(streams.flush("live"), streams.config).encounters
     assert again.duration > encounter.duration - 1.0
 
 
@@ -122,8 +122,8 @@ def test_nothing_but_nonsense_gives_no_sample():
             streams.put_speed(vehicle, k * TICK, -5.0)
         assert streams.samples() == []
     with pytest.raises(InputError, match="no usable position"):
-        encounters_of(streams.take("live"), streams.config)
-    assert streams.take("live") is None
+        encounters_of(streams.flush("live"), streams.config)
+    assert streams.flush("live") is None
 
 
 def test_a_first_fix_off_the_globe_is_no_origin():

@@ -16,7 +16,8 @@ All figures are those of scenario_gen/ and msg_conventions/, compiled kernels in
 * constants: single numbers in constants of modules;
 * constants without a unit: those whose name does not end with a unit, or with a word that says
   what the number is (`_RATIO`, `_COUNT`, ...);
-* banned names: names that a reader has to decode (`own`, `found`, `one`, ...).
+* banned names: names that a reader has to decode (`own`, `found`, `one`, ...); names of parameters
+  are interfaces and stay.
 
 With `--list NAME`, the places that one figure counts; with paths, only those files.
 """
@@ -71,20 +72,20 @@ BEFORE = {
 # code into plain steps has cost 14,000 tokens so far; 435,000 are wanted.
 BUDGET = {
     "tokens": 509_910,
-    "long lines": 52,
-    "complex functions": 13,
-    "branching functions": 10,
-    "nested functions": 9,
-    "long functions": 10,
+    "long lines": 3,
+    "complex functions": 11,
+    "branching functions": 7,
+    "nested functions": 8,
+    "long functions": 8,
     "crowded functions": 1,
-    "constants": 945,
-    "constants without a unit": 17,
-    "banned names": 24,
+    "constants": 925,
+    "constants without a unit": 0,
+    "banned names": 0,
 }
 
 UNITS = {
     "M", "M2", "MM", "KM", "S", "MS", "US", "NS", "RAD", "DEG", "MPS", "MPS2", "MPS3", "RADPS", "HZ",
-    "PX", "BYTES", "KIB", "MIB", "GIB", "COLUMNS", "PER_M", "PER_S", "PER_MPS",
+    "PX", "BYTES", "KIB", "MIB", "GIB", "COLUMNS", "PER_M", "PER_S", "PER_MPS", "RGB", "RGBA",
 }  # fmt: skip
 WORDS = {
     "RATIO", "SHARE", "COUNT", "WEIGHT", "FACTOR", "ROWS", "STEPS", "ITERATIONS", "PERCENT",
@@ -279,11 +280,24 @@ def defined_names(node: ast.AST) -> Iterator[str]:
         yield node.name
 
 
+def is_parameter(node: ast.AST) -> bool:
+    """Return whether a node declares a parameter that users set by its name."""
+    value = getattr(node, "value", None)
+    return (
+        isinstance(node, ast.AnnAssign)
+        and isinstance(value, ast.Call)
+        and isinstance(value.func, ast.Name)
+        and value.func.id == "parameter"
+    )
+
+
 def banned_names(path: Path) -> Iterator[str]:
     """Yield the places where a name is defined that a reader has to decode."""
-    for node in ast.walk(tree_of(path)):
+    nodes = list(ast.walk(tree_of(path)))
+    interfaces = {node.target for node in nodes if is_parameter(node)}
+    for node in nodes:
         for name in defined_names(node):
-            if re.sub(r"^_+", "", name).lower() in BANNED:
+            if node not in interfaces and re.sub(r"^_+", "", name).lower() in BANNED:
                 yield f"{name_of(path)}:{getattr(node, 'lineno', 0)} {name}"
 
 

@@ -85,11 +85,11 @@ def test_an_ego_slot_before_a_follower_or_behind_a_leader(ego, tmp_path):
     assert_kept(result, ["2 follows 1"])
     bag = write_recording(tmp_path / "bag", result)
     (found,) = validate_bag(bag)
-    assert found.found == {} and list(found.proven.values()) == [
+    assert found.causes == {} and list(found.proven.values()) == [
         30
     ]  # proven with the witness, from the bag alone
     (strict,) = validate_bag(bag, Limits(headway_share=0.01))
-    assert set(strict.found) == {"reaction"}
+    assert set(strict.causes) == {"reaction"}
 
 
 def test_an_ego_slot_inside_a_platoon():

@@ -114,7 +114,7 @@ def test_another_order_is_named_and_only_then_allowed(chain, tmp_path):
         scenarios=tuple(replace(one, facts=Facts()) for one in made.generated.scenarios),
     )
     (found,) = validate_bag(write_recording(tmp_path / "kept", replace(made, generated=kept)))
-    assert "passing_order" in found.found and found.invalid == 3, (
+    assert "passing_order" in found.causes and found.invalid == 3, (
         "and signs, which a swapped order does not keep"
     )
 

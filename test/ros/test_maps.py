@@ -153,7 +153,7 @@ def test_the_bag_is_valid_with_each_scenario_on_its_own_map(suite):
     assert suite.end() == dict.fromkeys(NODES, 0)
     bag = suite.folder / "bag"
     (found,) = validate_bag(bag)
-    assert (found.invalid, found.unaccounted, found.found) == (0, 0, {}), json.dumps(
+    assert (found.invalid, found.unaccounted, found.causes) == (0, 0, {}), json.dumps(
         found.left_out
     )
     assert not any("off_road" in sentence for sentence in found.left_out)

@@ -138,7 +138,7 @@ def test_all_of_it_is_in_the_bag(suite, client):
     suite.end()
     bag = suite.folder / "bag"
     (found,) = validate_bag(bag)
-    assert (found.invalid, found.found, found.left_out) == (0, {}, {})
+    assert (found.invalid, found.causes, found.left_out) == (0, {}, {})
     for result, own in zip(results, digests, strict=True):
         request = re.match(r"request (\d+)", result.reason)[1]
         assert [regenerate_scenario(bag, k, request=request).sha256 for k in range(2)] == own

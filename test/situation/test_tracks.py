@@ -60,7 +60,7 @@ def test_projection_undoes_placing_beside_a_curve(radius, sign, yaw, length, off
         if radius > 40.0
         else np.linspace(0.1, curve.length - 0.1, 37)
     )
-    poses = curve.beside(at, np.full(37, offset))
+    poses = curve.at_offset(at, np.full(37, offset))
     station, found = curve.project(poses[:, :2])
     assert np.abs(station - at).max() < 0.06
     assert np.abs(found - offset).max() < 0.02

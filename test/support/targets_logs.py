@@ -288,7 +288,7 @@ def put(data: bytes, _folder: Path) -> None:
         if number % 16 == 0:
             with contextlib.suppress(ScenarioGenError):  # said, and survived
                 streams.samples()
-    log = streams.take("live")
+    log = streams.flush("live")
     if log is not None:
         encounters_of(log, streams.config)
 

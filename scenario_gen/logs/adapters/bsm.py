@@ -40,8 +40,8 @@ _EVENT_INTERVAL_S = 100.0  # between the starts of two events of New York
 _MINUTE_MS = 60_000
 _MAX_SECOND_MARK_MS = 61_000  # a leap second
 _NEXT_DOCUMENT = re.compile(r"[^\s,]")
-_UNKNOWN_SPEED = 8191
-_UNKNOWN_HEADING = 28800
+_UNKNOWN_SPEED_CODE = 8191
+_UNKNOWN_HEADING_CODE = 28800
 _SPEED_UNIT_MPS = 0.02
 _HEADING_UNIT_DEG = 0.0125
 
@@ -109,8 +109,8 @@ def _document(row: dict[str, str]) -> Row:
     if abs(latitude) > 90.0:  # in the units of the messages
         core["lat"] = latitude
         core["long"] = longitude
-        core["speed"] = core["speed"] or _UNKNOWN_SPEED
-        core["heading"] = core["heading"] or _UNKNOWN_HEADING
+        core["speed"] = core["speed"] or _UNKNOWN_SPEED_CODE
+        core["heading"] = core["heading"] or _UNKNOWN_HEADING_CODE
     else:
         core["position"] = {"latitude": latitude, "longitude": longitude}
     return {
@@ -137,8 +137,8 @@ def _rows_of(record: Any, number: int) -> list[Row]:
     row = {
         "lat": float(core["lat"]) * 1e-7,
         "lon": float(core["long"]) * 1e-7,
-        "speed": None if speed == _UNKNOWN_SPEED else speed * _SPEED_UNIT_MPS,
-        "heading": None if heading == _UNKNOWN_HEADING else heading * _HEADING_UNIT_DEG,
+        "speed": None if speed == _UNKNOWN_SPEED_CODE else speed * _SPEED_UNIT_MPS,
+        "heading": None if heading == _UNKNOWN_HEADING_CODE else heading * _HEADING_UNIT_DEG,
     }
     return [_row(core, seconds, row)]
 

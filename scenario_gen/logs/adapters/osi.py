@@ -37,6 +37,7 @@ from scenario_gen.logs.adapters import tracks
 from scenario_gen.logs.adapters.data_sets import DataSet
 from scenario_gen.logs.config import listed, LogConfig
 from scenario_gen.logs.raw import check_size, RawLog
+from scenario_gen.numerics import NS_PER_S
 
 _MESSAGE_TYPES = ("osi3.GroundTruth", "GroundTruth")
 _MAX_STAMP_S = 9_000_000_000  # in 64 bits of nanoseconds
@@ -159,7 +160,7 @@ def _rows(message: Any, place: str) -> Iterator[Row]:
     if stamp is None or not 0 <= stamp.seconds < _MAX_STAMP_S:
         problem = "no timestamp" if stamp is None else f"a timestamp of {stamp.seconds} s"
         raise InputError(f"{place}: {problem}; 0 to 9e9 s can be read")
-    nanoseconds = stamp.seconds * 1_000_000_000 + stamp.nanos
+    nanoseconds = stamp.seconds * NS_PER_S + stamp.nanos
     for number, moving in enumerate(message.moving_object, 1):
         base = moving.base
         if moving.id is None or base is None or base.position is None:

@@ -219,7 +219,7 @@ def _with_ego(
         track = scenario.reference_drive
         if track is None or tokens(vehicle.id for vehicle in track.vehicles) != (slot,):
             raise InputError(
-                f"{where} was generated for ego {slot!r}, but {space.where(WITNESS)} lacks its track"
+                f"{where} was generated for ego {slot!r}, whose track is not on {space.where(WITNESS)}"
             )
         return replace(scenario, reference_drive=None), track, True
     if not requested:

@@ -34,7 +34,6 @@ LIMITS = {  # beyond those of any published scenario
     "maxDeceleration": 10.0,
 }
 MAX_STEERING_RAD = 0.7
-PEDESTRIAN_MASS_KG = 75.0
 
 
 def write_openscenario(
@@ -97,7 +96,7 @@ def _entity(entities: Element, name: str, vehicle: Vehicle, speeds: str) -> None
             entity,
             "Pedestrian",
             name=vehicle.type,
-            mass=PEDESTRIAN_MASS_KG,
+            mass=75.0,
             model=vehicle.type,
             pedestrianCategory=kind,
         )

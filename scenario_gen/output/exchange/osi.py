@@ -21,7 +21,7 @@ import numpy as np
 
 from scenario_gen.base.errors import InputError, needs
 from scenario_gen.base.xml_reader import read_xml
-from scenario_gen.numerics import Floats, wrap_angle
+from scenario_gen.numerics import Floats, NS_PER_S, wrap_angle
 from scenario_gen.output.exchange.cases import Case, Exported, scenario_source
 from scenario_gen.output.exchange.xml import date_of
 from scenario_gen.types import height, rear_axle, Scenario, Vehicle, WHEELBASE_SHARE
@@ -29,7 +29,6 @@ from scenario_gen.types import height, rear_axle, Scenario, Vehicle, WHEELBASE_S
 OBJECTS, MAP = "ground_truth", "ground_truth_map"  # omega-prime's topics
 WHEEL_RADIUS_M = 0.325  # as in OpenSCENARIO files
 MAX_ID = 2**63 - 1  # that readers with signed numbers can hold
-NS = 1_000_000_000
 
 
 @dataclass(frozen=True)
@@ -85,7 +84,7 @@ def write_osi(path: Path, case: Case, exported: Exported, road: Path) -> tuple[s
     ) as trace:
         drawn = betterosi.MapAsamOpenDrive(map_reference=road.name, open_drive_xml_content=text)
         trace.add(drawn, topic=MAP, log_time=0)
-        for k, stamp in enumerate(np.round(motion.time * NS).astype(np.int64).tolist()):
+        for k, stamp in enumerate(np.round(motion.time * NS_PER_S).astype(np.int64).tolist()):
             trace.add(
                 _ground_truth(moving, k, stamp, host, road.name, frame),
                 topic=OBJECTS,
@@ -95,9 +94,9 @@ def write_osi(path: Path, case: Case, exported: Exported, road: Path) -> tuple[s
 
 
 def object_numbers(exported: Exported) -> tuple[tuple[int, ...], tuple[str, ...]]:
-    """Return the numbers of the vehicles in the file, the ego's last, and a note where these are not their ids.
+    """Return the numbers of the vehicles, the ego's last, and a note if they are not their ids.
 
-    OSI's ids are numbers: if one id is none, the vehicles are numbered from 1.
+    OSI's ids are numbers: if any id is not a number, all vehicles are numbered from 1.
     """
     ids = [vehicle.id for vehicle in exported.everybody.vehicles]
     if all(
@@ -137,7 +136,7 @@ def _ground_truth(
         version=osi.InterfaceVersion(
             version_major=major, version_minor=minor, version_patch=patch
         ),
-        timestamp=osi.Timestamp(seconds=stamp // NS, nanos=stamp % NS),
+        timestamp=osi.Timestamp(seconds=stamp // NS_PER_S, nanos=stamp % NS_PER_S),
         host_vehicle_id=osi.Identifier(value=host) if has_host else None,
         moving_object=objects,
         map_reference=road_file,

@@ -27,7 +27,7 @@ def number(value: float) -> str:
 def add(
     parent: Element, tag: str, text: str | float | None = None, **attributes: str | float
 ) -> Element:
-    """Append an element with attributes and text, and return it; numbers are written by `number`."""
+    """Append an element with attributes and text, and return it; see `number` for numbers."""
     element = ET.SubElement(parent, tag, {key: _text(value) for key, value in attributes.items()})
     if text is not None:
         element.text = _text(text)

@@ -68,7 +68,7 @@ def bag_results(
     ]
     if not complete:
         raise InputError(
-            f"{path}: no namespace has both `tracks` and `scenarios`, so there is nothing to compare"
+            f"{path}: no namespace has both `tracks` and `scenarios`: nothing to compare"
         )
     with naming_bag(path):
         total = sum(len(namespace.hashes) for namespace in complete)
@@ -185,7 +185,7 @@ def _with_notes(evaluation: Evaluation, namespace: Namespace, total: int) -> Eva
 
 
 def _remarks(namespace: Namespace) -> tuple[Note, ...]:
-    """Return notes on the checks that a bag lacks data for, and on the outcomes of its requests."""
+    """Return notes on checks that a bag lacks data for, and on the outcomes of its requests."""
     notes = [Note.of(NoteKind.BAG_MEASURED)]
     if "map" not in namespace.messages:
         notes.append(Note.of(NoteKind.BAG_WITHOUT_MAP))

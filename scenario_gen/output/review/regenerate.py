@@ -37,7 +37,7 @@ from scenario_gen.situation import mirrored, Situation
 from scenario_gen.types import Encounter, GenerationResult, Request, Scenario, Segmentation
 
 REGENERATED = Kind("regenerated bag")
-MOST_APART_M = 0.01  # of the same scenario on two CPUs
+MAX_DISTANCE_M = 0.01  # between the same scenario on two CPUs
 TEMPLATE = ("tracks", "changepoints", "map", "fit")
 
 
@@ -129,7 +129,7 @@ def _regenerate(published: "_Published", origin: str, log: Path | None) -> Regen
     distances = [distance_apart(made, encounter, data) for made, data in pairs]
     known = [distance for distance in distances if distance is not None]
     distance = max(known, default=None)
-    if distance is not None and distance > MOST_APART_M:
+    if distance is not None and distance > MAX_DISTANCE_M:
         raise _differs(published, origin)
     return Regenerated(scenario, recorded, published.messages, entry.sha256, distance)
 
@@ -138,13 +138,13 @@ def _differs(published: "_Published", origin: str) -> ScenarioGenError:
     """Return the error for a scenario that differs from the published one."""
     recorded, current = published.summary.values, versions()
     changes = [
-        f"{name} {recorded[name]} there, {current[name]} here"
+        f"{name} was {recorded[name]}, is {current[name]}"
         for name in current
         if recorded.get(name, current[name]) != current[name]
     ]
-    why = ", ".join(changes) or "the versions agree, so the bag was changed"
+    reason = ", ".join(changes) or "the versions agree, so the bag was changed"
     index = published.entry.index
-    return ScenarioGenError(f"{origin}: scenario {index} comes out differently: {why}")
+    return ScenarioGenError(f"{origin}: regenerated scenario {index} differs: {reason}")
 
 
 @dataclass(frozen=True, eq=False)
@@ -267,7 +267,7 @@ class _Published:
         missing = missing_topics(newest)
         if missing:
             raise InputError(
-                f"{origin} cannot be made again: the bag has no {', '.join(missing)} with the "
+                f"{origin} cannot be regenerated: the bag has no {', '.join(missing)} with the "
                 "scenario's stamp"
             )
         return decode_template(newest)
@@ -290,8 +290,8 @@ def _entries(bag: Path, config: BagConfig) -> list[tuple[Namespace, ScenarioEntr
         ]
     if not entries:
         raise InputError(
-            f"{bag}: no scenario has an entry on `{INFO}`; only what this suite published can be "
-            "made again"
+            f"{bag}: no scenario has an entry on `{INFO}`; only scenarios from this suite can be "
+            "regenerated"
         )
     return entries
 
@@ -314,8 +314,7 @@ def _find(
         known = sorted({entry.index for _, entry, _ in candidates})
         some = ", ".join(map(str, known[:20])) + (", …" if len(known) > 20 else "")
         raise InputError(
-            f"{bag}: no scenario {index}; there are: "
-            f"{some or 'none in that namespace and request'}"
+            f"{bag}: no scenario {index}; it has: {some or 'none in that namespace and request'}"
         )
     if len(same) > 1:
         places = "; ".join(
@@ -350,16 +349,15 @@ def _from_log(
     known = read_log_hashes(summary.values)
     if not known:
         raise InputError(
-            f"{origin}: the bag does not say which log it was made from (nodes do not know it); "
-            "leave --log out"
+            f"{origin}: the bag does not name its log (ROS nodes do not know it); omit --log"
         )
     sha256 = sha256_of(log) if log.exists() else ""
     if sha256 not in known.values():
         listed = ", ".join(f"{name} (sha256 {text})" for name, text in known.items())
-        fault = "is not there"
+        fault = "does not exist"
         if sha256:
             fault = f"has sha256 {sha256}: it is another file, or was changed"
-        raise InputError(f"{log} {fault}; the bag was made from {listed}")
+        raise InputError(f"{log} {fault}; the bag is from {listed}")
     config = read_parameters(LogConfig(), summary.values, "log.", origin)
     for encounter in read_log(log, config).encounters:
         if encounter.start_ns != recorded.start_ns:
@@ -370,5 +368,5 @@ def _from_log(
                 parameters = read_parameters(SegmentationConfig(), values, "segmentation.", origin)
                 return candidate, segment(candidate, parameters, seed)
     raise InputError(
-        f"{log}: no encounter in it is the one on the bag's tracks, though the file is the same"
+        f"{log}: none of its encounters is on the bag's tracks, although the file is the same"
     )

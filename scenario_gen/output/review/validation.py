@@ -76,7 +76,7 @@ class Validation:
         invalid: number of invalid scenarios.
         unaccounted: number of scenarios without an entry on `scenarios/info`, though others have
             one; they are valid if nothing else is wrong.
-        found: violations by cause.
+        causes: summaries of the violations by cause.
         left_out: number of scenarios by each check that was skipped.
         missing: notes on incomplete requests.
         proven: number of scenarios that keep each reaction in their entries.
@@ -86,7 +86,7 @@ class Validation:
     scenarios: int = 0
     invalid: int = 0
     unaccounted: int = 0
-    found: dict[str, CauseSummary] = field(default_factory=dict)
+    causes: dict[str, CauseSummary] = field(default_factory=dict)
     left_out: dict[str, int] = field(default_factory=dict)
     missing: tuple[str, ...] = ()
     proven: Counter[str] = field(default_factory=Counter)
@@ -101,7 +101,7 @@ class Validation:
         for cause, message in violations:
             messages.setdefault(cause, message)
         for cause, message in messages.items():
-            self.found.setdefault(cause, CauseSummary(0, index, message)).count += 1
+            self.causes.setdefault(cause, CauseSummary(0, index, message)).count += 1
         for sentence in left_out:
             self.left_out[sentence] = self.left_out.get(sentence, 0) + 1
 

@@ -315,7 +315,7 @@ def _swerving(chain: LaneChain, lane: Curve, places: Floats, swerve: Floats) -> 
     at = np.maximum.accumulate(lane.project(places)[0])
     s = np.linspace(0.0, lane.length, max(math.ceil(2.0 * lane.length), 1) + 1)
     moves = np.concatenate(([True], np.diff(at) > 0.0))
-    curve = Curve.through(lane.beside(s, np.interp(s, at[moves], swerve[moves]))[:, :2])
+    curve = Curve.through(lane.at_offset(s, np.interp(s, at[moves], swerve[moves]))[:, :2])
     driven = np.interp(at, s, curve.station)
     return LanePath(chain, curve, float(driven[0]), driven - driven[0])
 

@@ -17,7 +17,8 @@ import subprocess
 import sys
 
 OK, WARNING, ERROR = "ok", "warning", "error"
-PYTHONS = ((3, 11), (3, 13))
+MIN_PYTHON_VERSION = (3, 11)
+MAX_PYTHON_VERSION = (3, 13)
 MODULES = (
     "numpy", "scipy", "numba", "ompl", "daqp", "clarabel", "mcap", "rosbags", "pandas", "pyarrow",
     "shapely", "PIL", "yaml", "jinja2", "typer", "rich",
@@ -98,8 +99,9 @@ def examine(environment: Mapping[str, str] | None = None) -> Iterator[Finding]:
 
 def python(version: tuple[int, ...]) -> Finding:
     """Check the version of Python."""
-    low, high, text = (".".join(map(str, numbers)) for numbers in (*PYTHONS, version))
-    if PYTHONS[0] <= tuple(version) <= PYTHONS[1]:
+    supported = (MIN_PYTHON_VERSION, MAX_PYTHON_VERSION)
+    low, high, text = (".".join(map(str, numbers)) for numbers in (*supported, version))
+    if MIN_PYTHON_VERSION <= tuple(version) <= MAX_PYTHON_VERSION:
         return Finding(OK, "Python", f"{text} in {sys.prefix}")
     return Finding(ERROR, "Python", f"{text} is not supported; {low} to {high} is")
 

@@ -144,7 +144,7 @@ class LiveStreams:
 
     def end(self) -> bool:
         """Hand the buffered log over; return whether there was one."""
-        log = self._streams.take("live")
+        log = self._streams.flush("live")
         if log is None:
             return False
         for topic in self._topics:

@@ -17,7 +17,7 @@ from rclpy.clock import Clock, ClockType
 from msg_conventions.fits import decode_fit
 from msg_conventions.frames import encode_frames
 from msg_conventions.markers import Action, Kind, Marker
-from msg_conventions.pictures import body, COLOURS, encode_markers
+from msg_conventions.pictures import body, COLOURS_RGB, encode_markers
 from msg_conventions.scenario_info import ScenarioEntry
 from scenario_gen.bags.recordings.scenario_decoder import ScenarioDecoder, TOPICS
 from scenario_gen.base.parameters import parameter, Parameters
@@ -29,7 +29,7 @@ from scenario_gen.types import Scenario, tokens
 
 LETTER_HEIGHT_M = 1.2
 CONFLICT_SIZE_M = (2.0, 2.0, 0.1)
-CONFLICT_COLOUR = (0.9, 0.1, 0.1, 0.5)
+CONFLICT_RGBA = (0.9, 0.1, 0.1, 0.5)
 CHANGEPOINT_SIZE_M = (0.6, 0.6, 0.2)
 
 
@@ -114,7 +114,9 @@ class Preview(StageNode):
         markers = [Marker("", Kind.CUBE, Action.DELETE_ALL)]
         for n, (x, y, yaw), speed in zip(present, poses.tolist(), speeds.tolist(), strict=True):
             vehicle = scenario.vehicles[n]
-            markers.append(body(names[n], vehicle, (x, y, yaw), COLOURS[n % len(COLOURS)], 0.9))
+            markers.append(
+                body(names[n], vehicle, (x, y, yaw), COLOURS_RGB[n % len(COLOURS_RGB)], 0.9)
+            )
             text = f"{shown.reactions.get(names[n], names[n])}, {speed:.1f} m/s"
             markers.append(text_marker(f"text_{names[n]}", (x, y + vehicle.length, 0.0), text))
         for k, (pose, text) in enumerate(shown.conflicts):
@@ -124,7 +126,7 @@ class Preview(StageNode):
                     Kind.CUBE,
                     pose=pose,
                     scale=CONFLICT_SIZE_M,
-                    colour=CONFLICT_COLOUR,
+                    colour=CONFLICT_RGBA,
                 )
             )
             markers.append(text_marker(f"conflict_text_{k}", pose, text))
@@ -141,7 +143,7 @@ def changepoint_markers(anchors: Floats) -> list[Marker]:
     """Return a box for each changepoint; `anchors` (N, K, 3) x, y [m], yaw [rad]."""
     markers = []
     for n, poses in enumerate(anchors):
-        colour = (*COLOURS[n % len(COLOURS)], 0.6)
+        colour = (*COLOURS_RGB[n % len(COLOURS_RGB)], 0.6)
         for k, (x, y, yaw) in enumerate(poses.tolist()):
             markers.append(
                 Marker(

@@ -132,7 +132,7 @@ def test_damaged_messages_are_named_or_found(tmp_path, topic, damage):
     )
     if topic == "/scenarios":
         (found,) = validate_bag(broken)
-        assert found.invalid == found.scenarios == 5 and UNUSABLE in found.found
+        assert found.invalid == found.scenarios == 5 and UNUSABLE in found.causes
     elif topic == "/scenarios/info" or damage == "cut":
         assert is_refused(lambda: validate_bag(broken), topic)
     is_refused(lambda: bag_results(broken))

@@ -124,8 +124,7 @@ def test_a_bag_becomes_a_page_with_all_its_scenarios_valid_or_not(tmp_path):
     page = render(ReportInput([case]))
     assert "<b>0</b> of 5 requested scenarios" in page and ">0 / 5</td>" in page
     assert (
-        "the bag has one set of scenarios" in page
-        and "<h3>Without changepoints</h3>" not in page
+        "the bag has one set of scenarios" in page and "<h3>Without changepoints</h3>" not in page
     )
     assert "<h3>Scenarios</h3>" in page
 

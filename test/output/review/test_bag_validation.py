@@ -72,7 +72,7 @@ def rewritten(bag, target, change=lambda _, data: data, without=()):
 def test_what_is_published_is_valid(run, tmp_path):
     (found,) = validate_bag(write_recording(tmp_path / "run", {"/here": run}))
     assert (found.namespace, found.scenarios, found.invalid) == ("/here", 4, 0)
-    assert found.left_out == {} and found.found == {}
+    assert found.left_out == {} and found.causes == {}
 
 
 def test_each_fault_is_found_with_its_cause_and_place(run, tmp_path):
@@ -94,11 +94,11 @@ def test_each_fault_is_found_with_its_cause_and_place(run, tmp_path):
     )
     (found,) = validate_bag(bag)
     assert (found.scenarios, found.invalid) == (4, 3)
-    assert found.found["off_road"].scenario == 1
-    assert found.found["boundary_state"].count == 2
-    assert found.found["overlap"].scenario == 2
-    assert found.found[UNUSABLE].scenario == 3
-    assert "elsewhere" in found.found[UNUSABLE].message
+    assert found.causes["off_road"].scenario == 1
+    assert found.causes["boundary_state"].count == 2
+    assert found.causes["overlap"].scenario == 2
+    assert found.causes[UNUSABLE].scenario == 3
+    assert "elsewhere" in found.causes[UNUSABLE].message
 
 
 def test_the_reactions_that_an_entry_names_are_proven_again(tmp_path):
@@ -118,10 +118,12 @@ def test_the_reactions_that_an_entry_names_are_proven_again(tmp_path):
     bag = write_recording(tmp_path / "b", {"/here": made})
     (kept,) = validate_bag(bag)
     (edge,) = made.generated.reactions
-    assert kept.found == {} and kept.proven == {edge.words(made.encounter.vehicles): 4}
+    assert kept.causes == {} and kept.proven == {edge.words(made.encounter.vehicles): 4}
     (found,) = validate_bag(bag, Limits(anticipation=0.0, patience=0.0))
-    assert set(found.found) == {"reaction"}
-    assert found.proven == {edge.words(made.encounter.vehicles): 4 - found.found["reaction"].count}
+    assert set(found.causes) == {"reaction"}
+    assert found.proven == {
+        edge.words(made.encounter.vehicles): 4 - found.causes["reaction"].count
+    }
     (measured,) = bag_results(bag)  # evaluate holds them to the same
     assert measured.published == 4 and measured.generated.reactions == (edge,)
     assert measured.reacting["edges"] == [edge.document(made.encounter.vehicles) | {"kept": True}]
@@ -133,7 +135,7 @@ def test_the_reactions_that_an_entry_names_are_proven_again(tmp_path):
     )
     (summary,) = read_recording(bag).namespaces["/here"].summaries
     assert summary.reactions == tuple(made.reacting["edges"])
-    assert "has cleared; " in found.found["reaction"].message
+    assert "has cleared; " in found.causes["reaction"].message
 
 
 def test_what_the_bag_does_not_say_is_said(run, tmp_path):
@@ -162,13 +164,13 @@ def test_a_scenario_is_held_against_what_was_asked_of_itself(run, tmp_path):
         ),
     )
     (found,) = validate_bag(write_recording(tmp_path / "other", replace(run, fit=fit)))
-    assert found.found["boundary_state"].count == 4
+    assert found.causes["boundary_state"].count == 4
     without_fit = rewritten(tmp_path / "other", tmp_path / "info", without=("fit",))
-    assert validate_bag(without_fit)[0].found["boundary_state"].count == 4
+    assert validate_bag(without_fit)[0].causes["boundary_state"].count == 4
     own = rewritten(
         write_recording(tmp_path / "run", {"/here": run}), tmp_path / "own", without=("fit",)
     )
-    assert validate_bag(own)[0].found == {} and validate_bag(own)[0].left_out == {}
+    assert validate_bag(own)[0].causes == {} and validate_bag(own)[0].left_out == {}
 
 
 def test_a_vehicle_may_be_left_out_and_the_order_of_the_others_is_free(run, tmp_path):
@@ -192,7 +194,7 @@ def test_a_vehicle_may_be_left_out_and_the_order_of_the_others_is_free(run, tmp_
         "sha256: there is no entry on scenarios/info",
         "boundary_state: the requested states are not known",
     )
-    assert found.found == {} and found.left_out == dict.fromkeys(unknown, 4)
+    assert found.causes == {} and found.left_out == dict.fromkeys(unknown, 4)
 
 
 def test_scenarios_that_are_not_as_published_are_named(run, tmp_path):
@@ -208,14 +210,14 @@ def test_scenarios_that_are_not_as_published_are_named(run, tmp_path):
     )
     (found,) = validate_bag(changed)
     assert (found.scenarios, found.invalid) == (4, 1)
-    assert list(found.found) == [ALTERED]
-    assert (found.found[ALTERED].count, found.found[ALTERED].scenario) == (1, 2)
+    assert list(found.causes) == [ALTERED]
+    assert (found.causes[ALTERED].count, found.causes[ALTERED].scenario) == (1, 2)
     index = run.generated.scenarios[2].index
     assert (
         f"message 2 has SHA-256 {digest(encode_scenario(other, run.encounter.start_ns))[:12]}"
-        in found.found[ALTERED].message
+        in found.causes[ALTERED].message
     )
-    assert f"scenario {index} of request 1 was published as" in found.found[ALTERED].message
+    assert f"scenario {index} of request 1 was published as" in found.causes[ALTERED].message
     answer = CliRunner().invoke(app, ["validate", str(changed)])
     assert answer.exit_code == 1 and ALTERED in answer.output
 
@@ -254,7 +256,7 @@ def test_a_scenario_whose_entry_was_lost_is_unaccounted(run, tmp_path):
     infos = [m.data for m in read_messages(bag) if m.topic.endswith("/scenarios/info")]
     cut = without_infos(bag, tmp_path / "cut", infos[-3:])
     (found,) = validate_bag(cut)
-    assert (found.scenarios, found.invalid, found.unaccounted, found.found) == (4, 0, 2, {})
+    assert (found.scenarios, found.invalid, found.unaccounted, found.causes) == (4, 0, 2, {})
     answer = CliRunner().invoke(app, ["validate", str(cut)])
     assert answer.exit_code == 0 and "2 without an entry" in answer.output
     (case,) = bag_results(cut)
@@ -272,7 +274,7 @@ def test_a_scenario_whose_entry_was_lost_is_unaccounted(run, tmp_path):
     (found,) = validate_bag(
         rewritten(first, tmp_path / "altered", lambda k, data: other if k == 2 else data)
     )
-    assert (found.unaccounted, found.found[ALTERED].count, found.found[ALTERED].scenario) == (
+    assert (found.unaccounted, found.causes[ALTERED].count, found.causes[ALTERED].scenario) == (
         1,
         1,
         2,
@@ -321,7 +323,7 @@ def test_an_ego_is_checked_with_its_witness(run, tmp_path):
         seed=4,
     ).run()
     whole = validate_bag(write_recording(tmp_path / "whole", slot))[0]
-    assert (whole.scenarios, whole.found, whole.left_out) == (3, {}, {})
+    assert (whole.scenarios, whole.causes, whole.left_out) == (3, {}, {})
 
     def bag_with(name, change):
         return copied(
@@ -331,9 +333,9 @@ def test_an_ego_is_checked_with_its_witness(run, tmp_path):
         )
 
     (lost,) = validate_bag(bag_with("lost", lambda _: None))
-    assert (lost.found, lost.left_out) == ({}, {NO_WITNESS: 3})
+    assert (lost.causes, lost.left_out) == ({}, {NO_WITNESS: 3})
     (altered,) = validate_bag(bag_with("altered", lambda data: data[:-8] + bytes(8)))
-    assert altered.found[ALTERED].count == 3
+    assert altered.causes[ALTERED].count == 3
     with pytest.raises(InputError, match="the reference drive with SHA-256"):
         regenerate_scenario(tmp_path / "lost", slot.generated.scenarios[0].index)
     with pytest.raises(InputError, match="whose reference drive is not in the bag"):
@@ -346,7 +348,7 @@ def test_an_ego_is_checked_with_its_witness(run, tmp_path):
             tmp_path / "hit", replace(slot, generated=replace(slot.generated, scenarios=hitting))
         )
     )
-    assert hit.found["overlap"].count == 3
+    assert hit.causes["overlap"].count == 3
 
 
 def on_top_of(scenario):

@@ -34,7 +34,7 @@ def test_a_wrong_way_driver_is_seen_in_a_bag(tmp_path, directions, wrong):
     run = run_on(*directions)
     bag = write_recording(tmp_path / "bag", run)
     (found,) = validate_bag(bag)
-    assert (found.found[Cause.WRONG_WAY].count if Cause.WRONG_WAY in found.found else 0) == wrong
+    assert (found.causes[Cause.WRONG_WAY].count if Cause.WRONG_WAY in found.causes else 0) == wrong
     road = read_recording(bag).namespaces[""].road
     assert [lane.id for lane in road.lanes.lanes] == ["0", "1"] and road.lanes.lanes[
         0

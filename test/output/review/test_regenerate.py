@@ -125,7 +125,7 @@ def test_what_is_ambiguous_or_missing_is_said(bag, tmp_path):
         InputError, match="3 scenarios have number 0; choose one: --namespace '/ego' --request 1; "
     ):
         regenerate_scenario(bag, 0)
-    with pytest.raises(InputError, match="no scenario 77; there are: 0, 1, 2"):
+    with pytest.raises(InputError, match="no scenario 77; it has: 0, 1, 2"):
         regenerate_scenario(bag, 77)
     with pytest.raises(InputError, match="has no fit, vehicle_2/route with"):
         bare = copied(
@@ -163,21 +163,19 @@ def test_other_parameters_or_versions_are_said(bag, tmp_path):
     other = with_summary(
         lambda values: values | {"sampling.lateral_sigma": "0.31", "numpy": "1.0"}
     )
-    with pytest.raises(
-        ScenarioGenError, match=r"scenario 1 comes out differently: numpy 1\.0 there"
-    ):
+    with pytest.raises(ScenarioGenError, match=r"scenario 1 differs: numpy was 1\.0"):
         regenerate_scenario(copied(bag, tmp_path / "other", other), 1, namespace="/plain")
     less = with_summary(
         lambda values: {
             name: text for name, text in values.items() if name != "sampling.time_sigma"
         }
     )
-    with pytest.raises(InputError, match=r"parameter sampling\.time_sigma is not there"):
+    with pytest.raises(InputError, match=r"parameter sampling\.time_sigma is missing"):
         regenerate_scenario(copied(bag, tmp_path / "less", less), 1, namespace="/plain")
 
 
 def test_a_missing_or_changed_log_is_said(bag, tmp_path):
-    with pytest.raises(InputError, match="is not there; the bag was made from synthetic_b"):
+    with pytest.raises(InputError, match="does not exist; the bag is from synthetic_b"):
         regenerate_scenario(bag, 0, namespace="/plain", log=tmp_path / "none.csv")
     (tmp_path / "other.csv").write_text("t,x\n")
     with pytest.raises(InputError, match="it is another file, or was changed"):
