@@ -147,12 +147,8 @@ def updated(config: Config, values: dict[str, Any], prefix: str = "") -> Config:
         head, _, rest = name.partition(".")
         if rest and head in nested:
             inner.setdefault(head, {})[rest] = value
-        elif name in declared and name not in nested and declared[name].metadata:
-            check_value(prefix + name, declared[name], value)
-            changes[name] = float(value) if isinstance(declared[name].default, float) else value
         else:
-            raise InputError(_unknown(config, name, prefix))
-
+            changes[name] = _checked(config, declared.get(name), name, value, prefix)
     plugins = []
     for head, part_values in inner.items():
         part = updated(nested[head], part_values, f"{prefix}{head}.")
@@ -163,6 +159,20 @@ def updated(config: Config, values: dict[str, Any], prefix: str = "") -> Config:
     if plugins:
         changes["plugins"] = (*getattr(config, "plugins", ()), *plugins)
     return replace(config, **changes)  # type: ignore[type-var]
+
+
+def _checked(
+    config: Any, entry: "Field[Any] | None", name: str, value: Any, prefix: str
+) -> object:
+    """Return a value of a parameter, a whole number as a float where floats are declared.
+
+    Raises:
+        InputError: there is no such parameter, or it must not have this value.
+    """
+    if entry is None or not entry.metadata:
+        raise InputError(_unknown(config, name, prefix))
+    check_value(prefix + name, entry, value)
+    return float(value) if isinstance(entry.default, float) else value
 
 
 def _nested(config: Any, names: Iterable[str]) -> dict[str, Any]:

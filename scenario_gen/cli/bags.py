@@ -3,6 +3,7 @@
 
 """The commands that work on bags of scenarios."""
 
+from collections.abc import Sequence
 from contextlib import nullcontext
 from functools import partial
 import json
@@ -30,6 +31,8 @@ from scenario_gen.cli.output import (
 )
 
 if TYPE_CHECKING:
+    from scenario_gen.bags.storage.config import BagConfig
+    from scenario_gen.output.exchange.config import ExportConfig
     from scenario_gen.output.review.validation import Validation
 
 commands = Commands("Look at a bag of scenarios")
@@ -155,6 +158,19 @@ def _print_validation(validation: "Validation") -> None:
         print_(f"  not checked in {count}: {message}")
 
 
+def _export_configs(
+    ego: str, road_map: str, options: Sequence[str]
+) -> tuple["ExportConfig", "BagConfig"]:
+    """Return the parameters of an export and of reading its bag."""
+    from scenario_gen.bags.storage.config import BagConfig
+    from scenario_gen.output.exchange.config import ExportConfig
+
+    of_bag = [option for option in options if option.startswith("bag.")]
+    of_export = [option for option in options if option not in of_bag]
+    bag_config = assigned_all(BagConfig(), [option.removeprefix("bag.") for option in of_bag])
+    return assigned_all(ExportConfig(ego=ego, map=road_map), of_export), bag_config
+
+
 @commands.command("export", panel="Other formats")
 def export_scenarios(
     bag: Annotated[
@@ -203,31 +219,18 @@ def export_scenarios(
     ] = None,
 ) -> None:
     """Export scenarios: CommonRoad, OpenSCENARIO with OpenDRIVE, Autoware, ScenarioNet."""
-    from scenario_gen.bags.storage.config import BagConfig
-    from scenario_gen.output.exchange.config import ExportConfig
     from scenario_gen.output.exchange.export import export_bag, EXPORTS
 
     if to not in EXPORTS:
         known = EXPORTS.names()
         raise InputError(f"--to {to}: choose one of {', '.join(known)}{did_you_mean(to, known)}")
-    of_bag = [option for option in options or [] if option.startswith("bag.")]
-    bag_config = assigned_all(BagConfig(), [option.removeprefix("bag.") for option in of_bag])
-    config = assigned_all(
-        ExportConfig(ego=ego, map=road_map),
-        [option for option in options or [] if option not in of_bag],
-    )
+    configs = _export_configs(ego, road_map, options or [])
     warn_of_metadata(bag)
     folder = out or default_output(bag, f"{bag.resolve().name}_{to}")
     with progress() as advance:
+        counted = partial(advance, "scenarios")
         result = export_bag(
-            bag,
-            folder,
-            to,
-            config,
-            bag_config,
-            namespace=namespace,
-            indices=index or (),
-            progress=partial(advance, "scenarios"),
+            bag, folder, to, *configs, namespace=namespace, indices=index or (), progress=counted
         )
     emit_json(scenarios=result.scenarios, folder=folder, notes=result.notes)
     print_("\n".join((*result.notes, f"{result.scenarios} scenarios: {folder}")))

@@ -21,7 +21,7 @@ from scenario_gen.cli.options import (
 from scenario_gen.cli.output import current, emit_json, print_, progress, status
 
 if TYPE_CHECKING:
-    from scenario_gen.types import GenerationResult
+    from scenario_gen.types import GenerationResult, Request
 
 commands = Commands("Generate scenarios")
 MAX_COUNT = 100_000  # scenarios of one request
@@ -137,6 +137,18 @@ class Generate:
     parameter_file: ParametersOption = None
 
 
+def _request(options: Generate) -> "Request":
+    from scenario_gen.types import join_pieces, Request
+
+    return Request(
+        options.ego,
+        join_pieces(options.start or []),
+        join_pieces(options.goal or []),
+        join_pieces(options.target or []),
+        options.order,
+    )
+
+
 @commands.command()
 @takes(Generate)
 def generate(options: Generate) -> None:
@@ -144,12 +156,12 @@ def generate(options: Generate) -> None:
     from scenario_gen.base.parameters import updated
     from scenario_gen.cli.folder import FolderRequest, generate_folder
     from scenario_gen.roads import read_obstacles
-    from scenario_gen.types import join_pieces, Request
+    from scenario_gen.types import join_pieces
 
     config = configured(options.parameter_file, options.assignments)
     for text in options.obstacle or []:
         read_obstacles(text, "--obstacle")
-    obstacles = [text for text in (config.road.obstacles, *(options.obstacle or [])) if text]
+    obstacles = filter(None, [config.road.obstacles, *(options.obstacle or [])])
     config = updated(
         config,
         {
@@ -165,13 +177,7 @@ def generate(options: Generate) -> None:
         count=options.count,
         seed=options.seed,
         encounters=options.encounter or [],
-        request=Request(
-            options.ego,
-            join_pieces(options.start or []),
-            join_pieces(options.goal or []),
-            join_pieces(options.target or []),
-            options.order,
-        ),
+        request=_request(options),
         also_read=[options.parameter_file] if options.parameter_file else [],
         for_testing=options.for_testing,
         recombine=options.recombine,

@@ -108,13 +108,10 @@ def _inventory_of_folder(archive: Path) -> Inventory[Path]:
     if archive.is_file() or is_bag(archive):
         return _inventory_of_file(archive)
     messages, rest = _split(_visible_files(archive), is_spmd)
-    folders = {path.parent for path in rest if path.name == "metadata.yaml"}
-    bags = {folder for folder in folders if is_bag(folder)}
-    rest = [path for path in rest if bags.isdisjoint(path.parents)]
-    bag_files, rest = _split(rest, is_bag)
+    bags, rest = _split_bags(rest)
     files, others = _split(rest, is_log)
-    logs = [[path] for path in (*files, *sorted(bags), *bag_files)]
-    if not (messages or bags or bag_files) and _is_one_log(files, archive):
+    logs = [[path] for path in (*files, *bags)]
+    if not messages and not bags and _is_one_log(files, archive):
         logs = [files]
     if not messages and not logs:
         names = ", ".join(LOG_FORMATS.names())
@@ -132,6 +129,14 @@ def _inventory_of_file(path: Path) -> Inventory[Path]:
     if is_spmd(path):
         return Inventory([path], [], [])
     return Inventory([], [[path]], [])
+
+
+def _split_bags(paths: Iterable[Path]) -> tuple[list[Path], list[Path]]:
+    """Return the bags among files (folders and single files), and the files outside of them."""
+    parents = {path.parent for path in paths if path.name == "metadata.yaml"}
+    folders = {folder for folder in parents if is_bag(folder)}
+    files, rest = _split([path for path in paths if folders.isdisjoint(path.parents)], is_bag)
+    return [*sorted(folders), *files], rest
 
 
 def _visible_files(folder: Path) -> list[Path]:

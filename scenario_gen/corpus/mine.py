@@ -227,30 +227,28 @@ def _summary(
     others: Sequence[Place],
 ) -> MiningSummary:
     """Return the summary of a corpus; `others` are files of the archive in no known format."""
+    least = least_rows(config)
     files: dict[str, Counter[str]] = {}
     notes: list[str] = []
-    strays, least = 0, least_rows(config)
-    accounts: list[Place] = sorted((out / "messages").glob("*.json"), key=str)
-    for _, local in each_fetched(accounts):
+    strays = 0
+    paths: list[Place] = sorted((out / "messages").glob("*.json"), key=str)
+    for _, local in each_fetched(paths):
         account = read_json(local, ACCOUNT)
         notes += account["notes"]
         strays += sum(int(count) for count in account["hours"].values() if count < least)
         for file, causes in account["files"].items():
             files.setdefault(file, Counter()).update(causes)
-    total: Counter[str] = Counter()
-    for causes in files.values():
-        total.update(causes)
-    reports = {
-        file: {cause: n for cause, n in causes.items() if n and cause != "rows"}
-        for file, causes in files.items()
-    }
+    total = sum(files.values(), Counter[str]())
+    faults = {file: dict(+causes) for file, causes in files.items()}
+    for causes_of_file in faults.values():
+        causes_of_file.pop("rows", None)
     refused = chain.from_iterable(account.get("refused", ()) for account in contents.accounts)
     quality = chain.from_iterable(account.get("quality", ()) for account in contents.accounts)
     return MiningSummary(
         encounters=contents.kinds.total(),
         kinds=dict(contents.kinds),
-        account={cause: count for cause, count in total.items() if count},
-        files={file: causes for file, causes in reports.items() if causes},
+        account=dict(+total),
+        files={file: causes for file, causes in faults.items() if causes},
         refused=list(refused),
         failed=failed,
         notes=[*notes, *_notes(others, strays, least), *_shared_ids(out), *quality],

@@ -307,21 +307,27 @@ def _similar(header: Sequence[str], aliases: Collection[str]) -> str:
     return ""
 
 
+def _kind_column(name: str, kinds: str) -> Column:
+    """Return the column of the types of road users, whose numbers in the file are in `kinds`."""
+    numbered = _NUMBERED_KIND.findall(kinds)
+    return Column(name, types=tuple((float(number), kind or "car") for kind, number in numbered))
+
+
 def as_column(quantity: str, name: str, unit: str = "") -> Column:
     """Return the column in a unit; by default, its suffix names the unit."""
-    lower = normalized(name)
     if quantity == "kind":
-        kinds = _NUMBERED_KIND.findall(unit)
-        return Column(name, types=tuple((float(number), kind or "car") for kind, number in kinds))
+        return _kind_column(name, unit)
+    lower = normalized(name)
     frame_rate = _FRAME_RATE.fullmatch(unit) if quantity == "time" else None
     if frame_rate:
         return Column(name, 1.0 / max(float(frame_rate[1]), 1e-3))
     suffixes = [known for known in UNITS[quantity] if lower.endswith(f"_{known}")]
     unit = unit or max(suffixes, key=len, default="")
-    if quantity == "heading":
-        is_clockwise = lower.removesuffix(f"_{unit}") in _CLOCKWISE_NAMES
-        if is_clockwise or unit in ("north_deg", "cw_deg"):
-            return Column(name, 1.0 if unit == "rad" else math.pi / 180.0, clockwise=True)
+    is_clockwise = quantity == "heading" and (
+        unit in ("north_deg", "cw_deg") or lower.removesuffix(f"_{unit}") in _CLOCKWISE_NAMES
+    )
+    if is_clockwise:
+        return Column(name, 1.0 if unit == "rad" else math.pi / 180.0, clockwise=True)
     if quantity == "time" and not unit and lower == "gentime":
         return Column(name, 1e-6)
     return Column(name, UNITS[quantity].get(unit, 1.0), minutes=unit == "ddmm")

@@ -10,7 +10,7 @@ members are then used up, except for their parts outside the group's time.
 """
 
 from collections import defaultdict
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable
 from dataclasses import dataclass, field, replace
 import heapq
 from typing import Generic, TypeVar
@@ -151,13 +151,21 @@ class Growth(Generic[M]):
             groups.append(group)
             for meeting in used:
                 unused.remove(meeting)
-                for start, end in (
-                    (meeting.start, min(meeting.end, group.start)),
-                    (max(meeting.start, group.end), meeting.end),
-                ):
-                    if end - start >= self.least:
-                        unused.add(replace(meeting, start=start, end=end))
+                for rest in self._outside(group, meeting):
+                    unused.add(rest)
         return groups
+
+    def _outside(self, group: Group[M], meeting: M) -> list[M]:
+        """Return the parts of a meeting before and after a group that are long enough."""
+        spans = [
+            (meeting.start, min(meeting.end, group.start)),
+            (max(meeting.start, group.end), meeting.end),
+        ]
+        return [
+            replace(meeting, start=start, end=end)
+            for start, end in spans
+            if end - start >= self.least
+        ]
 
     def _grow(self, seed: M, by_member: dict[int, set[M]]) -> Group[M]:
         """Return the group that grows from a meeting."""
@@ -168,20 +176,12 @@ class Growth(Generic[M]):
             if len(group.spans) >= self.most:
                 self.full(group, near)
                 break
-            spans = {
-                other: max(map(group.common_span, meetings), key=_by_length)
-                for other, meetings in near.items()
-            }
-            ranks = {
-                other: min(meeting.rank for meeting in meetings)
-                for other, meetings in near.items()
-            }
-            best = min(near, key=lambda other: (-_by_length(spans[other])[0], ranks[other], other))
-            start, end = spans[best]
+            best = min(near, key=lambda other: (*_preference(group, near[other]), other))
+            start, end = span = _longest_span(group, near[best])
             n_present = sum(begin < end and start < last for begin, last in group.spans.values())
             n_met = len({meeting.other(best) for meeting in near[best]})
             if n_met >= self.share * n_present:
-                self.join(group, best, spans[best])
+                self.join(group, best, span)
             considered.add(best)
         return group
 
@@ -202,3 +202,14 @@ class Growth(Generic[M]):
 def _by_length(span: Span) -> Span:
     """Sort key: by length, then the earlier one."""
     return span[1] - span[0], -span[0]
+
+
+def _longest_span(group: Group[M], meetings: Iterable[M]) -> Span:
+    """Return the longest part of a meeting in a group's time."""
+    return max(map(group.common_span, meetings), key=_by_length)
+
+
+def _preference(group: Group[M], meetings: Collection[M]) -> tuple[int, tuple[int, ...]]:
+    """Return the order in which vehicles with some meetings are considered; the least is first."""
+    start, end = _longest_span(group, meetings)
+    return start - end, min(meeting.rank for meeting in meetings)

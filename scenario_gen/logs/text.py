@@ -38,22 +38,32 @@ class Layout:
     notes: tuple[str, ...] = ()
 
 
+def _first_lines(path: Path) -> tuple[str, list[str]]:
+    """Return the encoding and the first lines of a file.
+
+    Raises:
+        UnknownFormatError: it is not text.
+    """
+    with path.open("rb") as file:
+        start = file.read(4 * _MAX_HEADER_BYTES)
+    encoding = "utf-8-sig"
+    if start.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
+        encoding = "utf-16"
+    elif b"\0" in start:
+        raise UnknownFormatError(
+            f"{path} is not a text file (or UTF-16 without a byte order mark); save the table as "
+            "UTF-8 text"
+        )
+    return encoding, start.decode(encoding, errors="replace").splitlines()
+
+
 def layout_of(path: Path) -> Layout:
     """Return the layout of a text table.
 
     Raises:
         UnknownFormatError: it is not text, its first line is too long, or has no column names.
     """
-    with path.open("rb") as file:
-        start = file.read(4 * _MAX_HEADER_BYTES)
-    is_utf16 = start.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE))
-    if not is_utf16 and b"\0" in start:
-        raise UnknownFormatError(
-            f"{path} is not a text file (or UTF-16 without a byte order mark); save the table as "
-            "UTF-8 text"
-        )
-    encoding = "utf-16" if is_utf16 else "utf-8-sig"
-    lines = start.decode(encoding, errors="replace").splitlines()
+    encoding, lines = _first_lines(path)
     above = next((k for k, line in enumerate(lines) if not _is_comment(line)), 0)
     header, *rows = lines[above : above + _SAMPLE_LINE_COUNT + 1] or [""]
     if len(header) >= _MAX_HEADER_BYTES:
@@ -68,8 +78,9 @@ def layout_of(path: Path) -> Layout:
 
     fields = [field.strip() for row in rows for field in re.split(pattern, row)]
     has_comma = separator != "," and any(map(_NUMBER_WITH_COMMA.fullmatch, fields))
-    notes = ["the file is UTF-16"] if is_utf16 else []
-    notes += ["its numbers have a decimal comma"] if has_comma else []
+    notes = ["the file is UTF-16"] if encoding == "utf-16" else []
+    if has_comma:
+        notes.append("its numbers have a decimal comma")
     return Layout(encoding, separator, "," if has_comma else ".", above, tuple(notes))
 
 

@@ -168,11 +168,11 @@ def _swap_factors(origin: tuple[float, float] | None) -> Floats:
     return np.array([1.0 / max(np.cos(latitude), 0.01), abs(np.cos(longitude))])
 
 
-def _speed_remark(travels: Sequence[_Travel], is_geographic: bool) -> str:
-    """Return a sentence on measured speeds that contradict the positions; "" if they fit."""
-    n_wrong = sum(_deviation(travel.ratio) > _WRONG_RATIO for travel in travels)
-    if not travels or n_wrong < len(travels) / 2.0:
-        return ""
+def _speed_ratio(travels: Sequence[_Travel], is_geographic: bool) -> tuple[float, str]:
+    """Return the ratio of measured speeds to those by positions, and the unit that explains it.
+
+    Of three estimates, the first one that a unit explains is used; "" if none is explained.
+    """
     total_speed = sum(travel.by_speed for travel in travels)
     total_position = sum(travel.by_position for travel in travels)
     whole = [travel.by_speed / max(travel.by_position, 1e-3) for travel in travels]
@@ -182,7 +182,15 @@ def _speed_remark(travels: Sequence[_Travel], is_geographic: bool) -> str:
         float(np.median(whole)),
     )
     likely = [(ratio, _likely_unit(ratio, is_geographic)) for ratio in estimates]
-    ratio, unit = next((pair for pair in likely if pair[1]), likely[0])
+    return next((pair for pair in likely if pair[1]), likely[0])
+
+
+def _speed_remark(travels: Sequence[_Travel], is_geographic: bool) -> str:
+    """Return a sentence on measured speeds that contradict the positions; "" if they fit."""
+    n_wrong = sum(_deviation(travel.ratio) > _WRONG_RATIO for travel in travels)
+    if not travels or n_wrong < len(travels) / 2.0:
+        return ""
+    ratio, unit = _speed_ratio(travels, is_geographic)
     fact = (
         f"the recorded speeds are {ratio:.2f} times those of the positions in {n_wrong} of "
         f"{len(travels)} vehicles"

@@ -194,15 +194,13 @@ def registered() -> list[Kernel]:
 
 
 def import_all(packages: Sequence[str] = ()) -> None:
-    """Import the modules with kernels, of all or some packages.
-
-    Skip those whose extra is missing.
-    """
+    """Import the modules with kernels of all or some packages, unless their extra is missing."""
     for file in sources():
         parts = file.relative_to(PACKAGE.parent).with_suffix("").parts
-        if not packages or parts[1] in packages:
-            try:
-                importlib.import_module(".".join(parts))
-            except ImportError as error:
-                if (error.name or "scenario_gen").startswith("scenario_gen"):
-                    raise
+        if packages and parts[1] not in packages:
+            continue
+        try:
+            importlib.import_module(".".join(parts))
+        except ImportError as error:
+            if (error.name or "scenario_gen").startswith("scenario_gen"):
+                raise

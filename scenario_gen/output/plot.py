@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from scenario_gen.base.errors import needs
+from scenario_gen.numerics import Floats
 from scenario_gen.types import DRIVERS, GenerationResult, Motion, Road
 from scenario_gen.types.markings import Marking, markings
 
@@ -49,15 +50,7 @@ def plot(
             title += f" (the first {_MAX_SCENARIOS_COUNT})"
     if road is not None:
         _draw_road(axes, road)
-    opacity = max(0.1, 1.0 / np.sqrt(max(len(motions), 1)))
-    paths = []
-    for k, motion in enumerate(motions):
-        for n, vehicle in enumerate(motion.vehicles):
-            path = motion.position[n, motion.is_present[n]]
-            label = f"vehicle {vehicle.id}" if k == 0 else "_"
-            axes.plot(*path.T, color=f"C{n}", alpha=opacity, label=label)
-            axes.plot(*path[0], "o", color=f"C{n}", markersize=4)
-            paths.append(path)
+    paths = _draw_paths(axes, motions)
     axes.set(aspect="equal", xlabel="x [m]", ylabel="y [m]", title=title)
     if paths:
         points = np.concatenate(paths)
@@ -67,6 +60,20 @@ def plot(
         for line in axes.legend().get_lines():
             line.set_alpha(1.0)
     return axes
+
+
+def _draw_paths(axes: "Axes", motions: Sequence[Motion]) -> list[Floats]:
+    """Draw the paths of all vehicles; return them, (P, 2) [m]."""
+    opacity = max(0.1, 1.0 / np.sqrt(max(len(motions), 1)))
+    paths = []
+    for k, motion in enumerate(motions):
+        for n, vehicle in enumerate(motion.vehicles):
+            path = motion.position[n, motion.is_present[n]]
+            label = f"vehicle {vehicle.id}" if k == 0 else "_"
+            axes.plot(*path.T, color=f"C{n}", alpha=opacity, label=label)
+            axes.plot(*path[0], "o", color=f"C{n}", markersize=4)
+            paths.append(path)
+    return paths
 
 
 def _draw_road(axes: "Axes", road: Road) -> None:

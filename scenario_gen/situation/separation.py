@@ -84,11 +84,11 @@ def separate(
     pairs = _near_pairs(tracks, recorded, clearance + 2.0 * max_shift)
     gaps: dict[tuple[int, int], _Gap] = {}
     for _ in range(MAX_CORRECTIONS_COUNT):
-        gaps |= {pair: _least_gap(tracks, poses, pair) for pair in pairs if pair not in gaps}
-        worst = _smallest(gaps)
+        changed = [pair for pair in pairs if pair not in gaps]
+        gaps |= {pair: _least_gap(tracks, poses, pair) for pair in changed}
+        worst = min(gaps.values(), key=lambda gap: gap.size, default=None)
         if worst is None or worst.size >= clearance - GAP_TOLERANCE_M:
-            placed = tuple(_shifted(track, shift[k]) for k, track in enumerate(tracks))
-            return Separation(placed, frozen(np.hypot(*shift.T)), _shift_notes(tracks, shift))
+            return _separation(tracks, shift)
         fault = _too_close(tracks, worst, clearance, max_shift)
         change = _correction(worst, poses, clearance, mobility)
         if change is None:
@@ -96,14 +96,25 @@ def separate(
         shift[list(worst.pair)] += change
         if np.hypot(*shift.T).max() > max_shift:
             break
-        for k in worst.pair:
-            poses[k] = _shifted(tracks[k], shift[k]).poses
+        poses = _with_shifted(tracks, poses, shift, worst.pair)
         gaps = _without_pair(gaps, worst.pair)
     raise RefusedError(fault)
 
 
-def _smallest(gaps: Mapping[tuple[int, int], _Gap]) -> _Gap | None:
-    return min(gaps.values(), key=lambda gap: gap.size, default=None)
+def _separation(tracks: Sequence[Track], shift: Floats) -> Separation:
+    """Return the shifted tracks, with their distances and notes."""
+    placed = tuple(_shifted(track, shift[k]) for k, track in enumerate(tracks))
+    return Separation(placed, frozen(np.hypot(*shift.T)), _shift_notes(tracks, shift))
+
+
+def _with_shifted(
+    tracks: Sequence[Track], poses: Sequence[Floats], shift: Floats, pair: tuple[int, int]
+) -> list[Floats]:
+    """Return all poses, newly computed for two shifted tracks."""
+    return [
+        _shifted(track, shift[k]).poses if k in pair else poses[k]
+        for k, track in enumerate(tracks)
+    ]
 
 
 def _without_pair(

@@ -12,7 +12,8 @@ All figures are those of scenario_gen/ and msg_conventions/, compiled kernels in
 * complex functions: functions whose cognitive complexity (complexipy) is above 15;
 * branching functions: functions whose cyclomatic complexity is above 15;
 * nested functions: functions with more than three nested blocks;
-* long functions and crowded functions: more than 60 lines, more than 8 parameters;
+* long functions: more than 60 lines without the docstring;
+* crowded functions: more than 8 parameters, except parameters of a scikit-learn estimator;
 * constants: single numbers in constants of modules;
 * constants without a unit: those whose name does not end with a unit, or with a word that says
   what the number is (`_RATIO`, `_COUNT`, ...);
@@ -27,6 +28,7 @@ import ast
 from collections.abc import Iterable, Iterator
 from functools import cache
 import io
+from operator import attrgetter
 from pathlib import Path
 import re
 import sys
@@ -73,12 +75,12 @@ BEFORE = {
 BUDGET = {
     "tokens": 509_910,
     "long lines": 3,
-    "complex functions": 11,
-    "branching functions": 7,
-    "nested functions": 8,
-    "long functions": 8,
-    "crowded functions": 1,
-    "constants": 925,
+    "complex functions": 3,
+    "branching functions": 0,
+    "nested functions": 0,
+    "long functions": 0,
+    "crowded functions": 0,
+    "constants": 924,
     "constants without a unit": 0,
     "banned names": 0,
 }
@@ -205,7 +207,10 @@ def nested_functions(path: Path) -> Iterator[str]:
 def long_functions(path: Path) -> Iterator[str]:
     """Yield the functions of too many lines."""
     for function in functions(path):
-        if (lines := (function.end_lineno or 0) - function.lineno) > MAX_FUNCTION_LINES:
+        lines = (function.end_lineno or 0) - function.lineno
+        if ast.get_docstring(function, clean=False) is not None:
+            lines -= (function.body[0].end_lineno or 0) - function.body[0].lineno + 1
+        if lines > MAX_FUNCTION_LINES:
             yield f"{name_of(path)}: {function.name} {lines}"
 
 
@@ -213,6 +218,11 @@ def crowded_functions(path: Path) -> Iterator[str]:
     """Yield the functions of too many parameters, `self` and `cls` included."""
     for function in functions(path):
         given = function.args
+        is_estimator = function.name == "__init__" and "random_state" in map(
+            attrgetter("arg"), given.kwonlyargs
+        )
+        if is_estimator:  # scikit-learn reads its parameters from the signature
+            continue
         parameters = len(given.posonlyargs) + len(given.args) + len(given.kwonlyargs)
         if parameters > MAX_PARAMETERS:
             yield f"{name_of(path)}: {function.name} {parameters}"

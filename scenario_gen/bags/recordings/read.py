@@ -232,12 +232,7 @@ class Namespace(RecordedScenarios):
         Raises:
             InputError: a message is damaged.
         """
-        hashes: dict[str, str] = {}
-        for message in self.messages.get("fit/info", ()):
-            named = decode_hashes(message.data, message.topic)
-            inputs = (named.get("map"), named.get("tracks"))
-            if inputs == (entry.map_hash, entry.template_hash):
-                hashes = named
+        hashes = self._fit_hashes(entry)
         inputs_by_topic: dict[str, BagMessage] = {}
         for topic, messages in self.messages.items():
             if not _TEMPLATE_TOPIC.fullmatch(topic):
@@ -249,6 +244,16 @@ class Namespace(RecordedScenarios):
             if stamped:
                 inputs_by_topic[topic] = stamped[-1]
         return inputs_by_topic
+
+    def _fit_hashes(self, entry: ScenarioEntry) -> dict[str, str]:
+        """Return the hashes by topic in the last `fit/info` with a scenario's map and template."""
+        hashes: dict[str, str] = {}
+        for message in self.messages.get("fit/info", ()):
+            named = decode_hashes(message.data, message.topic)
+            inputs = (named.get("map"), named.get("tracks"))
+            if inputs == (entry.map_hash, entry.template_hash):
+                hashes = named
+        return hashes
 
     def published(self, entry: ScenarioEntry) -> tuple[bytes, bytes]:
         """Return the bytes of a scenario and of its witness; empty if missing."""
@@ -350,50 +355,45 @@ class Namespace(RecordedScenarios):
     @cached_property
     def fit(self) -> tuple[Fit | None, tuple[Route, ...]]:
         """Fit and routes of the newest template; None and no routes unless both are complete."""
-        encounter, changepoints = self.encounter, self.segmentation.changepoints
-        stamps = fits.anchor_stamps(encounter, changepoints)
         try:
-            topics = [topic for topic in self.messages if topic.endswith(("fit", "/route"))]
-            messages = {
-                topic: data for topic in topics if (data := self.newest(topic, encounter.start_ns))
-            }
-            if "fit" not in messages:
-                return None, ()
-            _, _, requested, anchors = fits.decode_fit(messages["fit"])
-            if anchors.shape[:2] != (len(encounter.vehicles), len(stamps)):
-                return None, ()
-            fitted = tuple(
-                fits.decode_fitted(poses, self.statuses, vehicle.id)
-                for poses, vehicle in zip(anchors, encounter.vehicles, strict=True)
-            )
-            routes = tuple(
-                fits.with_figures(route, self.statuses, vehicle.id)
-                for vehicle, (_, _, route) in zip(
-                    encounter.vehicles, decode_routes(messages, encounter, stamps), strict=True
-                )
-            )
-            lost = fits.decode_losses(self.statuses.get("fit", {}))
+            return self._decoded_fit()
         except InputError:
             return None, ()
-        remarks = {
-            text
-            for vehicle, route in zip(encounter.vehicles, routes, strict=True)
-            for text in route.remarks(vehicle.id)
-        }
-        noted = tuple(
-            text for key, text in self.statuses.get("fit", {}).items() if key.startswith("note.")
+
+    def _decoded_fit(self) -> tuple[Fit | None, tuple[Route, ...]]:
+        encounter, changepoints = self.encounter, self.segmentation.changepoints
+        vehicles = encounter.vehicles
+        stamps = fits.anchor_stamps(encounter, changepoints)
+        topics = [topic for topic in self.messages if topic.endswith(("fit", "/route"))]
+        newest = {topic: self.newest(topic, encounter.start_ns) for topic in topics}
+        messages = {topic: data for topic, data in newest.items() if data}
+        if "fit" not in messages:
+            return None, ()
+        _, _, requested, anchors = fits.decode_fit(messages["fit"])
+        if anchors.shape[:2] != (len(vehicles), len(stamps)):
+            return None, ()
+        fitted = tuple(
+            fits.decode_fitted(poses, self.statuses, vehicle.id)
+            for poses, vehicle in zip(anchors, vehicles, strict=True)
         )
-        notes = tuple(
-            Note(NoteKind.TEXT, recorded=text) for text in noted if text not in remarks
-        )  # the remarks come from the routes themselves
-        return Fit(
-            encounter.vehicles,
-            fitted,
-            anchor_index(encounter, changepoints),
-            requested,
-            notes,
-            lost,
-        ), routes
+        decoded = decode_routes(messages, encounter, stamps)
+        routes = tuple(
+            fits.with_figures(route, self.statuses, vehicle.id)
+            for vehicle, (_, _, route) in zip(vehicles, decoded, strict=True)
+        )
+        status = self.statuses.get("fit", {})
+        losses = fits.decode_losses(status)
+        notes = self._fit_notes(status, routes)
+        anchor_indices = anchor_index(encounter, changepoints)
+        return Fit(vehicles, fitted, anchor_indices, requested, notes, losses), routes
+
+    def _fit_notes(self, status: Mapping[str, str], routes: Sequence[Route]) -> tuple[Note, ...]:
+        """Return the recorded notes on a fit, without the remarks that the routes repeat."""
+        remarks: set[str] = set()
+        for vehicle, route in zip(self.encounter.vehicles, routes, strict=True):
+            remarks.update(route.remarks(vehicle.id))
+        texts = [text for key, text in status.items() if key.startswith("note.")]
+        return tuple(Note(NoteKind.TEXT, recorded=text) for text in texts if text not in remarks)
 
 
 def _has_hash(message: BagMessage, topic: str, wanted: str | None) -> bool:

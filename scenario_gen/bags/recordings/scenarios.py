@@ -175,13 +175,14 @@ class RecordedScenarios:
         """
         if not self.entries:
             return {}
-        entry_keys = list(_numbered(entry.sha256 for entry in self.entries))
-        entry_index = {key: k for k, key in enumerate(entry_keys)}
         keys = list(_numbered(self.hashes))
-        present = set(keys)
-        lost = [k for k, key in enumerate(entry_keys) if key not in present]
+        entry_index = {
+            key: k for k, key in enumerate(_numbered(entry.sha256 for entry in self.entries))
+        }
+        lost = [entry_index[key] for key in entry_index.keys() - set(keys)]
+        lost.sort()
         matched = [(k, entry_index[key]) for k, key in enumerate(keys) if key in entry_index]
-        matched = [(-1, -1), *matched, (len(keys), len(entry_keys))]
+        matched = [(-1, -1), *matched, (len(keys), len(entry_index))]
         unknown: dict[int, ScenarioEntry | None] = {}
         for (scenario, entry), (next_scenario, next_entry) in pairwise(matched):
             between = (self.entries[k] for k in lost if entry < k < next_entry)

@@ -66,17 +66,22 @@ def claimed(folder: Path, purpose: Path, timeout_s: float = LOCK_TIMEOUT_S) -> I
     with cleaned_up(clean_up):
         try:
             with signals_deferred():
-                _acquire(lock, folder, purpose, timeout_s)
-                if not _emptied(folder):
-                    raise InputError(
-                        f"{folder / OLD} is an earlier result, in whose place {purpose} now is; "
-                        "move one of them away"
-                    )
-                (folder / NEW).mkdir()
+                _prepare(lock, folder, purpose, timeout_s)
             yield folder / NEW
         finally:
             with signals_deferred():
                 clean_up()
+
+
+def _prepare(lock: FileLock, folder: Path, purpose: Path, timeout_s: float) -> None:
+    """Lock and empty a folder, and create the folder of the new result in it."""
+    _acquire(lock, folder, purpose, timeout_s)
+    if not _emptied(folder):
+        raise InputError(
+            f"{folder / OLD} is an earlier result, in whose place {purpose} now is; "
+            "move one of them away"
+        )
+    (folder / NEW).mkdir()
 
 
 def _acquire(lock: FileLock, folder: Path, purpose: Path, timeout_s: float) -> None:

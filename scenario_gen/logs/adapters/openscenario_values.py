@@ -63,10 +63,15 @@ def _catalog_entries(root: Element, folder: Path) -> Iterator[tuple[tuple[str, s
     for directory in root.findall("CatalogLocations/*/Directory"):
         files = sorted((folder / directory.get("path", "")).glob("*.xosc"))
         for file in files[:_MAX_CATALOG_FILE_COUNT]:
-            with suppress(InputError):  # the folder may also hold files that are not needed
-                for catalog in read_xml(file, str(file)).findall("Catalog"):
-                    for entry in catalog:
-                        yield (catalog.attribute("name"), entry.attribute("name")), entry
+            with suppress(InputError):  # the folder may have other files, too
+                yield from _entries_in(read_xml(file, str(file)))
+
+
+def _entries_in(root: Element) -> Iterator[tuple[tuple[str, str], Element]]:
+    """Yield the entries of the catalogs in a file, with the names of catalog and entry."""
+    for catalog in root.findall("Catalog"):
+        for entry in catalog:
+            yield (catalog.attribute("name"), entry.attribute("name")), entry
 
 
 def _resolve(

@@ -103,6 +103,11 @@ def _table(
     return frame.drop(columns=["vel_x", "vel_y"]) if frame["vel_x"].isna().all() else frame
 
 
+def _decoded(data: bytes, source: str) -> Any:
+    with guarded(f"{source} is not a GroundTruth"):
+        return betterosi.GroundTruth.from_binary(data)
+
+
 def _messages(path: Path, config: LogConfig) -> Iterator[Any]:
     """Yield the GroundTruth messages of one channel by their stamps in the file."""
     size = path.stat().st_size
@@ -115,9 +120,7 @@ def _messages(path: Path, config: LogConfig) -> Iterator[Any]:
             channel = _channel(file, path, config)
             for number, logged in enumerate(file.messages([channel]), 1):
                 budget.spend_message(len(logged.data))
-                with guarded(f"{path}, message {number} is not a GroundTruth"):
-                    message = betterosi.GroundTruth.from_binary(logged.data)
-                yield message
+                yield _decoded(logged.data, f"{path}, message {number}")
     except DamagedError as error:
         raise InputError(f"{path}: cut off or damaged at {error}; copy it again") from error
 

@@ -71,17 +71,15 @@ class LaneMap:
         """
         lanes = self.network.lanes
         strips = []
+        single = [k for k, lane in enumerate(lanes) if not lane.arm and not lane.crossing]
         for arm in self.network.arms.values():
             inward = tuple(k for k in arm if lanes[k].inward)
             outward = tuple(k for k in arm if not lanes[k].inward)
             if inward:
                 strips.append((inward, outward))
-            else:  # a ramp
-                strips += [((k,), ()) for k in outward]
-        strips += [
-            ((k,), ()) for k, lane in enumerate(lanes) if not lane.arm and not lane.crossing
-        ]
-        return tuple(sorted(strips))
+            else:
+                single += outward  # a ramp
+        return tuple(sorted([*strips, *(((k,), ()) for k in single)]))
 
     @cached_property
     def _across(self) -> dict[int, int]:

@@ -226,29 +226,36 @@ def _signals(
 ) -> None:
     """Append the signs of a road at their stop lines, or else at its end."""
     members = [k for side in strip.lanes.values() for k in side]
-    group = None
-    for n, rule in enumerate(network.rules, 1):
-        governed = [places[k] for k in members if k in rule.lanes]
-        if not governed or rule.kind not in SIGN_IDS:
-            continue
-        group = add(road, "signals") if group is None else group
-        first = governed[0]
+    governed = {
+        n: [places[k] for k in members if k in rule.lanes]
+        for n, rule in enumerate(network.rules)
+        if rule.kind in SIGN_IDS
+    }
+    governed = {n: lanes for n, lanes in governed.items() if lanes}
+    if not governed:
+        return
+    group = add(road, "signals")
+    for n, lanes in governed.items():
+        rule, first = network.rules[n], lanes[0]
+        position = strip.reference[-1 if first.along else 0, :2]
         if len(rule.line):
             position = rule.line.mean(axis=0)
-        else:
-            position = strip.reference[-1 if first.along else 0, :2]
         nearest = int(np.argmin(np.hypot(*(strip.reference[:, :2] - position).T)))
-        s = float(station[nearest])
-        sign = {
-            "type": SIGN_IDS[rule.kind],
-            "subtype": "-1",
-            "country": "DE",
-            "name": rule.id,
-            "dynamic": "no",
-        }
-        heading = {"orientation": "+" if first.along else "-", "zOffset": 2.0}
-        signal = add(group, "signal", id=f"{n}.{first.road}", s=s, t=0.0, **sign, **heading)
-        numbers = [place.lane_id for place in governed]
+        signal = add(
+            group,
+            "signal",
+            id=f"{n + 1}.{first.road}",
+            s=float(station[nearest]),
+            t=0.0,
+            type=SIGN_IDS[rule.kind],
+            subtype="-1",
+            country="DE",
+            name=rule.id,
+            dynamic="no",
+            orientation="+" if first.along else "-",
+            zOffset=2.0,
+        )
+        numbers = [place.lane_id for place in lanes]
         add(signal, "validity", fromLane=min(numbers), toLane=max(numbers))
 
 

@@ -33,7 +33,6 @@ LIMITS = {  # beyond those of any published scenario
     "maxAcceleration": 10.0,
     "maxDeceleration": 10.0,
 }
-MAX_STEERING_RAD = 0.7
 
 
 def write_openscenario(
@@ -111,7 +110,7 @@ def _entity(entities: Element, name: str, vehicle: Vehicle, speeds: str) -> None
         axles = add(element, "Axles")
         track = 0.85 * vehicle.width
         for tag, x, steering in (
-            ("FrontAxle", WHEELBASE_SHARE * vehicle.length, MAX_STEERING_RAD),
+            ("FrontAxle", WHEELBASE_SHARE * vehicle.length, 0.7),
             ("RearAxle", 0.0, 0.0),
         ):
             add(

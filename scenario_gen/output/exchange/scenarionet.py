@@ -27,7 +27,6 @@ from scenario_gen.types import DRIVERS, height, Scenario, Vehicle
 
 VERSION = "MetaDrive v0.4.3"  # of the description, not of the simulator
 DATASET = "scenario_gen"
-MIN_MOVING_DISTANCE_M = 1.0
 SUMMARY_FILE = "dataset_summary.pkl"
 MAPPING_FILE = "dataset_mapping.pkl"
 
@@ -126,7 +125,7 @@ def _counts(summaries: Mapping[str, Mapping[str, Any]]) -> dict[str, Any]:
     moving = Counter(
         summary["type"]
         for summary in summaries.values()
-        if summary["moving_distance"] > MIN_MOVING_DISTANCE_M
+        if summary["moving_distance"] > 1.0  # m
     )
     total = Counter(summary["type"] for summary in summaries.values())
     return {

@@ -92,6 +92,18 @@ class TrialTraffic(Traffic):
             )
 
 
+def _drive_all(
+    node: TrialTraffic, executor: SingleThreadedExecutor, check: Callable[[], None]
+) -> None:
+    """Drive all trials, and call `check` meanwhile."""
+    task = executor.create_task(node.drive_all)
+    while not task.done():
+        check()
+        # rclpy's spin_until_future_complete (7.1) leaves a task behind at each call.
+        executor.spin_once(timeout_sec=1.0)
+    task.result()
+
+
 def drive_trials(
     trials: Sequence[Trial],
     config: ClosedLoopConfig,
@@ -121,12 +133,7 @@ def drive_trials(
         try:
             _wait_for_planner(node, executor, planner, check)
             with summary_on_error(node.outcomes):
-                task = executor.create_task(node.drive_all)
-                while not task.done():
-                    check()
-                    # rclpy's spin_until_future_complete (7.1) leaves a task behind at each call.
-                    executor.spin_once(timeout_sec=1.0)
-                task.result()
+                _drive_all(node, executor, check)
             return node.outcomes
         finally:
             node.destroy_node()

@@ -6,7 +6,7 @@
 The recorder in one process, all other nodes in another.
 """
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from functools import partial
@@ -233,12 +233,17 @@ def _processes(
     }
     with cleaned_up(partial(_end, list(processes.values()))):
         try:
-            with ctrl_c_blocked():
-                for process in processes.values():
-                    process.start()
+            _start_all(processes.values())
             yield processes
         finally:
             _end(list(processes.values()))
+
+
+def _start_all(processes: Iterable[BaseProcess]) -> None:
+    """Start processes that ignore Ctrl-C until they handle it."""
+    with ctrl_c_blocked():
+        for process in processes:
+            process.start()
 
 
 def _become(words: list[str], log: str) -> None:

@@ -165,6 +165,12 @@ class Player(Node):  # type: ignore[misc]
         if not config.stay and not self._ended.is_set():
             self._end_when_acknowledged()
 
+    def _wait_for_acknowledgement(self, publisher: Any, deadline: float) -> None:
+        """Wait until the subscribers have all messages, the deadline [s] or the node's end."""
+        while not publisher.wait_for_all_acked(Duration()):
+            if monotonic() >= deadline or self._ended.wait(TICK_S):
+                return
+
     def _end_when_acknowledged(self) -> None:
         """Let `run_nodes` end the node once the subscribers have all messages."""
         for offered in self._offered.values():
@@ -172,9 +178,7 @@ class Player(Node):  # type: ignore[misc]
         deadline = monotonic() + END_PATIENCE_S
         with suppress(InvalidHandle):  # the node is ending already
             for offered in self._offered.values():
-                while not offered.publisher.wait_for_all_acked(Duration()):
-                    if monotonic() >= deadline or self._ended.wait(TICK_S):
-                        break
+                self._wait_for_acknowledgement(offered.publisher, deadline)
         self.executor.create_task(self._finish)  # waking the executor alone has no effect
 
     def _finish(self) -> None:
