@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""What the evaluation answers: rows of metrics with intervals, as JSON and as Markdown."""
+"""Results of the evaluation: rows of metrics with intervals, as JSON and as Markdown."""
 
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
@@ -11,7 +11,7 @@ import math
 import re
 from typing import Any, Literal
 
-from scenario_gen.base.documents import COUNT, NUMBER, parse_json
+from scenario_gen.base.documents import COUNT, NUMBER
 from scenario_gen.base.errors import printable
 from scenario_gen.types.notes import Note, NoteKind
 from scenario_gen.types.scenario import Cause, ScenarioSet, Verdict
@@ -211,18 +211,8 @@ class Evaluation:
         return json.dumps(document, indent=indent, ensure_ascii=False, allow_nan=False)
 
     @classmethod
-    def from_json(cls, text: str, title: str = "not an evaluation") -> "Evaluation":
-        """Read what `to_json` wrote.
-
-        Raises:
-            InputError: the text is not such a document; the message names `title` and the path
-                inside it.
-        """
-        return cls.from_document(parse_json(text, title, SCHEMA))
-
-    @classmethod
     def from_document(cls, document: Mapping[str, Any]) -> "Evaluation":
-        """Return the evaluation that a document says, which keeps `SCHEMA`."""
+        """Return the evaluation in a document from `to_json` that satisfies `SCHEMA`."""
         fields = {name: document[_KEYS.get(name, name)] for name in cls.__dataclass_fields__}
         fields["vehicles"] = tuple(document["vehicles"])
         fields["metrics"] = tuple(

@@ -200,7 +200,7 @@ def _sign(root: Element, sign: _Sign) -> None:
         if sign.value:
             add(element, "additionalValue", sign.value)
         return
-    state = add(add(add(root, "trafficLight", id=sign.id), "cycle"), "cycleElement")
+    state = add(add(root, "trafficLight", id=sign.id), "cycle/cycleElement")
     add(state, "duration", 1)
     add(state, "color", "inactive")
 
@@ -273,10 +273,6 @@ def _successors(
                 add(incoming, f"successors{direction.title()}", ref=successor + 1)
 
 
-def _exact(parent: Element, tag: str, value: float) -> None:
-    add(add(parent, tag), "exact", value)
-
-
 def _interval(parent: Element, tag: str, low: float, high: float) -> None:
     element = add(parent, tag)
     add(element, "intervalStart", low)
@@ -287,10 +283,10 @@ def _state(parent: Element, tag: str, scenario: Scenario, n: int, k: int) -> Ele
     """Append the state of vehicle `n` at instant `k`."""
     state = add(parent, tag)
     _point(add(state, "position"), *scenario.position[n, k].tolist())
-    _exact(state, "orientation", float(scenario.heading[n, k]))
-    add(add(state, "time"), "exact", k)
-    _exact(state, "velocity", float(scenario.speed[n, k]))
-    _exact(state, "acceleration", float(scenario.acceleration[n, k]))
+    add(state, "orientation/exact", float(scenario.heading[n, k]))
+    add(state, "time/exact", k)
+    add(state, "velocity/exact", float(scenario.speed[n, k]))
+    add(state, "acceleration/exact", float(scenario.acceleration[n, k]))
     return state
 
 
@@ -298,7 +294,7 @@ def _obstacle(root: Element, scenario: Scenario, n: int) -> None:
     vehicle = scenario.vehicles[n]
     obstacle = add(root, "dynamicObstacle", id=FIRST_OBSTACLE_ID + n + 1)
     add(obstacle, "type", vehicle.kind.commonroad)
-    rectangle = add(add(obstacle, "shape"), "rectangle")
+    rectangle = add(obstacle, "shape/rectangle")
     add(rectangle, "length", vehicle.length)
     add(rectangle, "width", vehicle.width)
     first, last = scenario.present[n].tolist()
@@ -313,8 +309,8 @@ def _problem(root: Element, ego: Scenario, step: float, export: ExportConfig) ->
     problem = add(root, "planningProblem", id=FIRST_PROBLEM_ID + 1)
     start = _state(problem, "initialState", ego, 0, 0)
     rate = (ego.heading[0, 1] - ego.heading[0, 0]) / (ego.time[1] - ego.time[0])
-    _exact(start, "yawRate", float(rate))
-    _exact(start, "slipAngle", 0.0)
+    add(start, "yawRate/exact", float(rate))
+    add(start, "slipAngle/exact", 0.0)
     end = int(ego.present[0, 1])
     (x, y), yaw = ego.position[0, end].tolist(), float(ego.heading[0, end])
     last = int(np.ceil(export.goal_late * ego.time[end] / step))
@@ -330,7 +326,7 @@ def _goal(
     add(time, "intervalEnd", last)
     x, y, yaw = pose
     yaw = float((yaw + np.pi) % (2.0 * np.pi) - np.pi)
-    rectangle = add(add(goal, "position"), "rectangle")
+    rectangle = add(goal, "position/rectangle")
     add(rectangle, "length", size[0])
     add(rectangle, "width", size[1])
     add(rectangle, "orientation", yaw)
@@ -355,6 +351,6 @@ def _placeholder(root: Element, lane: Lane, steps: int) -> None:
         ("yawRate", 0.0),
         ("slipAngle", 0.0),
     ):
-        _exact(state, tag, value)
-    add(add(state, "time"), "exact", 0)
+        add(state, f"{tag}/exact", value)
+    add(state, "time/exact", 0)
     _goal(problem, (x, y, yaw), (1.0, 1.0), max(steps - 1, 1))

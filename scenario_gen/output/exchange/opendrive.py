@@ -212,7 +212,7 @@ def _crosswalks(
             width=float(np.ptp(left)),
             height=0.0,
         )
-        outline = add(add(walk, "outlines"), "outline", id=0, closed="true")
+        outline = add(walk, "outlines/outline", id=0, closed="true")
         for u, v in zip(ahead.tolist(), (left - t).tolist(), strict=True):
             add(outline, "cornerLocal", u=u, v=v, z=0.0, height=0.0)
 

@@ -56,23 +56,23 @@ def write_openscenario(
     )
     add(root, "ParameterDeclarations")
     add(root, "CatalogLocations")
-    add(add(root, "RoadNetwork"), "LogicFile", filepath=road_file)
+    add(root, "RoadNetwork/LogicFile", filepath=road_file)
     entities = add(root, "Entities")
     for n, vehicle in enumerate(exported.others.vehicles):
         _entity(entities, entity_name(vehicle), vehicle, _speeds(exported.others, n))
     if exported.ego is not None:
         _entity(entities, EGO, exported.ego.vehicles[0], "")
     storyboard = add(root, "Storyboard")
-    actions = add(add(storyboard, "Init"), "Actions")
-    for n in range(len(exported.others.vehicles)):
+    actions = add(storyboard, "Init/Actions")
+    for n, vehicle in enumerate(exported.others.vehicles):
         if exported.others.present[n, 0] == 0:
-            _placed(actions, entity_name(exported.others.vehicles[n]), exported.others, n)
+            _placed(actions, entity_name(vehicle), exported.others, n)
     if exported.ego is not None:
         _ego(actions, exported.ego)
-    act = _story(storyboard)
+    act = add(add(storyboard, "Story", name="story"), "Act", name="act")
     for n in range(len(exported.others.vehicles)):
         _follow(act, exported.others, n, export.following)
-    _start(act)
+    _at(add(act, "StartTrigger"), "start", 0.0, "greaterOrEqual")
     _at(add(storyboard, "StopTrigger"), "end", exported.duration, "greaterThan")
     return serialized(root)
 
@@ -109,10 +109,8 @@ def _entity(entities: Element, name: str, vehicle: Vehicle, speeds: str) -> None
         add(element, "Performance", **LIMITS)
         axles = add(element, "Axles")
         track = 0.85 * vehicle.width
-        for tag, x, steering in (
-            ("FrontAxle", WHEELBASE_SHARE * vehicle.length, 0.7),
-            ("RearAxle", 0.0, 0.0),
-        ):
+        wheelbase = WHEELBASE_SHARE * vehicle.length
+        for tag, x, steering in (("FrontAxle", wheelbase, 0.7), ("RearAxle", 0.0, 0.0)):
             add(
                 axles,
                 tag,
@@ -132,87 +130,68 @@ def _pose(parent: Element, scenario: Scenario, n: int, k: int) -> None:
     axle = shifted(
         scenario.position[n, k], scenario.heading[n, k], -rear_axle(scenario.vehicles[n])
     )
-    add(
-        add(parent, "Position"),
-        "WorldPosition",
-        x=float(axle[0]),
-        y=float(axle[1]),
-        h=float(scenario.heading[n, k]),
-    )
+    x, y = axle.tolist()
+    add(parent, "Position/WorldPosition", x=x, y=y, h=float(scenario.heading[n, k]))
 
 
 def _placed(actions: Element, name: str, scenario: Scenario, n: int) -> Element:
     """Append a vehicle's place and speed at its first instant; return its initial actions."""
     first = int(scenario.present[n, 0])
     private = add(actions, "Private", entityRef=name)
-    _pose(add(add(private, "PrivateAction"), "TeleportAction"), scenario, n, first)
-    _speed(add(private, "PrivateAction"), float(scenario.speed[n, first]))
+    _pose(add(private, "PrivateAction/TeleportAction"), scenario, n, first)
+    speed = add(private, "PrivateAction/LongitudinalAction/SpeedAction")
+    add(speed, "SpeedActionDynamics", dynamicsShape="step", value=0.0, dynamicsDimension="time")
+    target = "SpeedActionTarget/AbsoluteTargetSpeed"
+    add(speed, target, value=float(scenario.speed[n, first]))
     return private
-
-
-def _speed(action: Element, speed: float) -> None:
-    change = add(add(action, "LongitudinalAction"), "SpeedAction")
-    add(change, "SpeedActionDynamics", dynamicsShape="step", value=0.0, dynamicsDimension="time")
-    add(add(change, "SpeedActionTarget"), "AbsoluteTargetSpeed", value=speed)
 
 
 def _ego(actions: Element, ego: Scenario) -> None:
     private = _placed(actions, EGO, ego, 0)
-    goal = add(add(add(private, "PrivateAction"), "RoutingAction"), "AcquirePositionAction")
+    goal = add(private, "PrivateAction/RoutingAction/AcquirePositionAction")
     _pose(goal, ego, 0, int(ego.present[0, 1]))
-
-
-def _story(storyboard: Element) -> Element:
-    return add(add(storyboard, "Story", name="story"), "Act", name="act")
-
-
-def _start(act: Element) -> None:
-    _at(add(act, "StartTrigger"), "start", 0.0, "greaterOrEqual")
 
 
 def _at(trigger: Element, name: str, seconds: float, rule: str) -> None:
     """Append a condition on the simulation time, without an edge."""
     group = add(trigger, "ConditionGroup")
     condition = add(group, "Condition", name=name, delay=0.0, conditionEdge="none")
-    add(add(condition, "ByValueCondition"), "SimulationTimeCondition", value=seconds, rule=rule)
+    add(condition, "ByValueCondition/SimulationTimeCondition", value=seconds, rule=rule)
 
 
 def _follow(act: Element, scenario: Scenario, n: int, mode: str) -> None:
     """Append a vehicle's maneuver: a late arrival, its trajectory, and an early departure."""
-    vehicle = scenario.vehicles[n]
-    name = entity_name(vehicle)
+    name = entity_name(scenario.vehicles[n])
     first, last = scenario.present[n].tolist()
+    begin, end = scenario.time[[first, last]].tolist()
     group = add(act, "ManeuverGroup", name=f"{name}_group", maximumExecutionCount=1)
     add(add(group, "Actors", selectTriggeringEntities="false"), "EntityRef", entityRef=name)
     maneuver = add(group, "Maneuver", name=f"{name}_maneuver")
-    begin, end = float(scenario.time[first]), float(scenario.time[last])
     if first > 0:
         event = add(maneuver, "Event", name=f"{name}_arrives", priority="parallel")
-        action = add(add(event, "Action", name=f"{name}_added"), "GlobalAction")
-        _pose(
-            add(add(action, "EntityAction", entityRef=name), "AddEntityAction"), scenario, n, first
-        )
+        arrival = _entity_action(event, f"{name}_added", name)
+        _pose(add(arrival, "AddEntityAction"), scenario, n, first)
         _at(add(event, "StartTrigger"), f"{name}_arrival", begin, "greaterOrEqual")
-    event = add(
-        maneuver, "Event", name=f"{name}_drives", priority="parallel" if first > 0 else "override"
-    )
-    routing = add(
-        add(add(event, "Action", name=f"{name}_follows"), "PrivateAction"), "RoutingAction"
-    )
-    follow = add(routing, "FollowTrajectoryAction")
-    trajectory = add(
-        add(follow, "TrajectoryRef"), "Trajectory", name=f"{name}_trajectory", closed="false"
-    )
+    priority = "parallel" if first > 0 else "override"
+    event = add(maneuver, "Event", name=f"{name}_drives", priority=priority)
+    action = add(event, "Action", name=f"{name}_follows")
+    follow = add(action, "PrivateAction/RoutingAction/FollowTrajectoryAction")
+    reference = add(follow, "TrajectoryRef")
+    trajectory = add(reference, "Trajectory", name=f"{name}_trajectory", closed="false")
     add(trajectory, "ParameterDeclarations")
-    polyline = add(add(trajectory, "Shape"), "Polyline")
+    polyline = add(trajectory, "Shape/Polyline")
     for k in range(first, last + 1):
         _pose(add(polyline, "Vertex", time=float(scenario.time[k])), scenario, n, k)
-    reference = add(follow, "TimeReference")
-    add(reference, "Timing", domainAbsoluteRelative="absolute", scale=1.0, offset=0.0)
+    timing = "TimeReference/Timing"
+    add(follow, timing, domainAbsoluteRelative="absolute", scale=1.0, offset=0.0)
     add(follow, "TrajectoryFollowingMode", followingMode=mode)
     _at(add(event, "StartTrigger"), f"{name}_start", begin, "greaterOrEqual")
     if last < len(scenario.time) - 1:
         event = add(maneuver, "Event", name=f"{name}_leaves", priority="parallel")
-        action = add(add(event, "Action", name=f"{name}_deleted"), "GlobalAction")
-        add(add(action, "EntityAction", entityRef=name), "DeleteEntityAction")
+        add(_entity_action(event, f"{name}_deleted", name), "DeleteEntityAction")
         _at(add(event, "StartTrigger"), f"{name}_departure", end, "greaterOrEqual")
+
+
+def _entity_action(event: Element, action_name: str, entity: str) -> Element:
+    action = add(event, "Action", name=action_name)
+    return add(add(action, "GlobalAction"), "EntityAction", entityRef=entity)

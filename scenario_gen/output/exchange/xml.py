@@ -27,7 +27,13 @@ def number(value: float) -> str:
 def add(
     parent: Element, tag: str, text: str | float | None = None, **attributes: str | float
 ) -> Element:
-    """Append an element with attributes and text, and return it; see `number` for numbers."""
+    """Append an element with attributes and text, and return it; see `number` for numbers.
+
+    Of a path of tags, all elements are appended, each to the one before.
+    """
+    *outer, tag = tag.split("/")
+    for name in outer:
+        parent = ET.SubElement(parent, name)
     element = ET.SubElement(parent, tag, {key: _text(value) for key, value in attributes.items()})
     if text is not None:
         element.text = _text(text)
