@@ -36,8 +36,6 @@ OBJECTS, TRACKS = (
 EGO, BASE_LINK = "/localization/kinematic_state", "base_link"
 QUALITY = Quality(depth=1, transient_local=False)
 STEP_NS, HORIZON_NS = 500_000_000, 10_000_000_000
-BOUNDING_BOX_CODE = 0  # type of Shape
-ORIENTATION_CODE = 2  # TrackedObjectKinematics.AVAILABLE
 
 
 def uuid_of(vehicle: Vehicle) -> bytes:
@@ -80,7 +78,8 @@ class AutowareEncoder:
         """Return instant `k` as TrackedObjects."""
         objects = [
             _object(self.scenario.vehicles[n], self.states[n, k])
-            | {"orientation": ORIENTATION_CODE, "is_stationary": self.scenario.speed[n, k] == 0.0}
+            # TrackedObjectKinematics.AVAILABLE
+            | {"orientation": 2, "is_stationary": self.scenario.speed[n, k] == 0.0}
             for n in self.present_at(k)
         ]
         return encode(TRACKED, stamp=stamp_ns, frame_id=self.scenario.frame_id, objects=objects)
@@ -150,7 +149,7 @@ def _object(vehicle: Vehicle, state: Floats) -> dict[str, Any]:
         "twist": (speed, 0.0, 0.0, 0.0, 0.0, rate),
         "acceleration": (acceleration, 0.0, 0.0, 0.0, 0.0, 0.0),
         "shape": {
-            "type": BOUNDING_BOX_CODE,
+            "type": 0,  # Shape.BOUNDING_BOX
             "dimensions": (vehicle.length, vehicle.width, height(vehicle)),
         },
     }

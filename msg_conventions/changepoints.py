@@ -28,9 +28,6 @@ from scenario_gen.base.errors import InputError
 from scenario_gen.types import Encounter, LiveChangepoints, Segmentation
 
 POSTERIOR_TYPE = "sensor_msgs/msg/PointCloud2"
-UINT16_CODE = 4  # sensor_msgs/PointField datatypes
-FLOAT32_CODE = 7
-FLOAT64_CODE = 8
 POINT = np.dtype(
     [
         ("x", "<f4"),
@@ -42,7 +39,7 @@ POINT = np.dtype(
         ("p", "<f8"),
     ]
 )
-DATATYPES = {"<f4": FLOAT32_CODE, "<u2": UINT16_CODE, "<f8": FLOAT64_CODE}
+DATATYPES = {"<f4": 7, "<u2": 4, "<f8": 8}  # of sensor_msgs/PointField
 
 
 def encode_changepoints(encounter: Encounter, segmentation: Segmentation) -> bytes:

@@ -28,8 +28,6 @@ COLOURS_RGB = (
     (0.55, 0.34, 0.29),
 )
 EGO_RGB = (0.06, 0.09, 0.16)
-EXPOSED_RGB = (1.0, 0.84, 0.0)  # for types narrower than this
-MAX_EXPOSED_WIDTH_M = 1.0
 PAINT = {
     Marking.EDGE: (0.15,),
     Marking.LANE: (0.12, 3.0, 4.5),
@@ -64,8 +62,8 @@ def body(
     Exposed road users are yellow.
     """
     kind = vehicle.kind
-    if kind.width < MAX_EXPOSED_WIDTH_M and colour != EGO_RGB:
-        colour = EXPOSED_RGB
+    if kind.width < 1.0 and colour != EGO_RGB:
+        colour = (1.0, 0.84, 0.0)
     red, green, blue = colour
     return Marker(
         f"box_{name}",

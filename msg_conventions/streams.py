@@ -16,14 +16,14 @@ from msg_conventions.cdr import decode, encode
 from msg_conventions.layouts import FIX, VELOCITY_STAMPED
 
 FIX_CODE = 0  # NavSatStatus.STATUS_FIX
-GPS_CODE = 1  # NavSatStatus.SERVICE_GPS
 
 
 def encode_fix(latitude: float, longitude: float, stamp_ns: int, frame_id: str) -> bytes:
     """Return a NavSatFix of degrees as CDR bytes."""
     place = (latitude, longitude, 0.0)
+    gps = 1  # NavSatStatus.SERVICE_GPS
     return encode(
-        FIX, stamp=stamp_ns, frame_id=frame_id, status=FIX_CODE, service=GPS_CODE, place=place
+        FIX, stamp=stamp_ns, frame_id=frame_id, status=FIX_CODE, service=gps, place=place
     )
 
 

@@ -14,12 +14,10 @@ import numpy as np
 from msg_conventions import trajectory
 from msg_conventions.trajectory import Trajectory
 from scenario_gen.base.errors import InputError
-from scenario_gen.numerics import Bools, Ints, runs
+from scenario_gen.numerics import Bools, Ints, NS_PER_S, runs
 from scenario_gen.types import ALWAYS, Encounter, Vehicle
 
 FRAME = "local_enu"
-MIN_STEP_NS = 1_000_000
-MAX_STEP_NS = 10_000_000_000
 
 
 def encode_tracks(encounter: Encounter) -> bytes:
@@ -76,7 +74,7 @@ def decode_tracks(data: bytes, name: str = "tracks") -> Encounter:
             "time_from_start must count in even steps; resample the tracks (10 Hz is usual)"
         )
     if (
-        not MIN_STEP_NS <= steps[0] <= MAX_STEP_NS
+        not 1_000_000 <= steps[0] <= 10 * NS_PER_S
         or message.time_ns[-1] > trajectory.MAX_DURATION_NS
     ):
         raise InputError(

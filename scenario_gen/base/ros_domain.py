@@ -16,13 +16,11 @@ from scenario_gen.base.errors import RefusedError
 
 DOMAINS = range(1, 102)  # higher domains would use ephemeral ports
 CHECKED_PARTICIPANTS_COUNT = 20  # the first participants may have ended while a later one lives
-FIRST_UNICAST_PORT = 7410  # RTPS: 7400 + 250 · domain + 10 + 2 · participant
-PORTS_PER_DOMAIN_COUNT = 250
 
 
 def _quiet(domain: int) -> bool:
     """Return whether the ports of a domain's first participants are free."""
-    first = FIRST_UNICAST_PORT + PORTS_PER_DOMAIN_COUNT * domain
+    first = 7410 + 250 * domain  # RTPS: 7400 + 250 · domain + 10 + 2 · participant
     with suppress(OSError):
         for port in range(first, first + 2 * CHECKED_PARTICIPANTS_COUNT, 2):
             with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:

@@ -35,7 +35,6 @@ S3 = {
     "config_kwargs": {"retries": {"mode": "standard", "total_max_attempts": 8}},
 }
 BLOCK_BYTES = 4 << 20
-MAX_REQUEST_COUNT = 16  # blocks in memory at the same time
 FETCHED_FILE_COUNT = 64  # files on disk at the same time in `each_fetched`
 
 
@@ -247,7 +246,7 @@ def download(parts: Iterable[Part]) -> None:
             part.target.touch()
         begins = range(part.begin, part.end, BLOCK_BYTES)
         blocks += [part._replace(begin=k, end=min(k + BLOCK_BYTES, part.end)) for k in begins]
-    with ThreadPoolExecutor(MAX_REQUEST_COUNT) as pool:
+    with ThreadPoolExecutor(16) as pool:  # at most 16 blocks are in memory
         # The first error ends the other downloads.
         for _ in pool.map(_copy, blocks):
             pass

@@ -24,9 +24,6 @@ from scenario_gen.closed_loop.origin import Trial
 from scenario_gen.closed_loop.trials import Outcome
 from scenario_gen.ros.common.planner_trials import drive_trials
 
-SHUTDOWN_S = 10.0  # in which the planner's node has to end by itself
-LAST_LINES_COUNT = 8  # of the planner's output, in an error message
-
 
 def drive_over_dds(
     trials: Sequence[Trial],
@@ -62,7 +59,7 @@ def drive_over_dds(
         def check() -> None:
             if process.poll() is not None:
                 output.seek(0)
-                lines = output.read().decode(errors="replace").splitlines()[-LAST_LINES_COUNT:]
+                lines = output.read().decode(errors="replace").splitlines()[-8:]
                 raise InputError(
                     f"--planner {command}: the command ended with code {process.returncode}; "
                     f"its last output: {' | '.join(lines)}"
@@ -81,4 +78,4 @@ def _end(process: "subprocess.Popen[bytes]") -> None:
         with suppress(ProcessLookupError):
             os.killpg(process.pid, number)
         with suppress(subprocess.TimeoutExpired):
-            process.wait(SHUTDOWN_S)
+            process.wait(10.0)

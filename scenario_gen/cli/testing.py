@@ -23,7 +23,6 @@ if TYPE_CHECKING:
 
 commands = Commands("Test a planner")
 MAX_NAMES_COUNT = 12  # of changed scenarios, on the terminal
-MAX_FAILURES_COUNT = 5  # on the terminal
 
 
 @dataclass(frozen=True)
@@ -133,7 +132,7 @@ def _report(drives: "Drives", out: Path) -> None:
         )
     outcomes = [drives.outcomes[k] for k in drives.by_severity()]
     failures = [outcome for outcome in outcomes if not outcome.verdict.passed]
-    for outcome in failures[:MAX_FAILURES_COUNT]:
+    for outcome in failures[:5]:
         print_(f"scenario {outcome.name}: {outcome.verdict.sentence()}")
     print_(*map(str, files), sep="\n")
 

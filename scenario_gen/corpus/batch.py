@@ -45,7 +45,6 @@ from scenario_gen.types import GenerationResult, most_exposed
 
 MANIFEST = "batch.json"
 TASK_TEMPLATE_COUNT = 10
-MAX_CAUSE_CHARACTERS = 80
 LOST_CONFLICT = "lost conflict"  # the cause of a case whose encounter is lost, on any road
 SCENARIO_COLUMNS = {
     **dict.fromkeys(("template", "kind", "namespace", "sha256", "type"), "string"),
@@ -322,7 +321,7 @@ def _cause(error: RefusedError | InputError) -> str:
         "…" if any(c.isdigit() for c in word) else word
         for word in re.split(r"[:;(]", str(error))[0].split()
     ]
-    return shorten(" ".join(words), MAX_CAUSE_CHARACTERS, placeholder=" …")
+    return shorten(" ".join(words), 80, placeholder=" …")
 
 
 def _scenario_rows(

@@ -19,7 +19,6 @@ from scenario_gen.base.stores import fetched, Place, relative_name, workplace
 from scenario_gen.corpus.messages import database, quoted
 from scenario_gen.output.review.regenerate import regenerate_scenario, Regenerated
 
-MEMORY_MIB = 500
 COLUMNS = (
     "template", "kind", "road", "vehicles", "index", "type", "seconds", "distance", "ttc", "pet",
     "speed", "braking",
@@ -89,7 +88,7 @@ def find(batch: Place, condition: str = "true") -> Hits:
     if not generated:
         remedy += "; if the corpus is from an older version, mine it again"
     task = f"{batch}: condition {condition!r}"
-    with fetched(tables) as paths, database(workplace(batch), MEMORY_MIB, task, remedy) as base:
+    with fetched(tables) as paths, database(workplace(batch), 500, task, remedy) as base:
         base.execute(
             f"CREATE TABLE scenarios AS SELECT {'*' if generated else RECORDED}"
             f" FROM read_parquet([{quoted([str(path) for path in paths])}],"

@@ -62,8 +62,6 @@ LEGEND = (
     " vehicle 0 is the first of a pair (blue)."
 )
 EXAMPLES_COUNT = 2  # of a primitive on the page
-KINDS_COUNT = 4  # kinds that the page names
-SUCCESSORS_COUNT = 3
 VERBS = {FOLLOW: "follows", YIELD: "yields"}
 SHARED = replace(DEFAULT, sampler=replace(DEFAULT.sampler, weight=0.1))
 """Accelerations are means over 1 s, so ten samples of 0.1 s contain as much as one. With a
@@ -383,11 +381,11 @@ def _lines_of(
     """
     dt = segments[0].pair.dt
     count, samples = len(segments), _samples_in(segments)
-    kinds = Counter(segment.kind for segment in segments).most_common(KINDS_COUNT)
+    kinds = Counter(segment.kind for segment in segments).most_common(4)
     reactions: Counter[str] = Counter()
     for segment in segments:
         reactions.update(_reactions_of(segment.pair))
-    after = sorted(following, reverse=True)[:SUCCESSORS_COUNT]
+    after = sorted(following, reverse=True)[:3]
     successors = ", ".join(f"primitive {primitive} ({n} ×)" for n, primitive in after)
     return [
         f"{count} segments, {100.0 * samples / total:.1f} % of the time,"

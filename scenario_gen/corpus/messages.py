@@ -60,7 +60,6 @@ PARQUET_OPTIONS: dict[str, Any] = {
 UNITS_PER_DEGREE = 1e7
 MAX_LINE_BYTES = 65_536  # a longer line is not a row
 MAX_TASK_FILES = 65_536  # file numbers in a table have two bytes
-COPY_BYTES = 1 << 24
 
 
 @dataclass(frozen=True)
@@ -179,7 +178,7 @@ def _extract(path: Path, begin: int, end: int, target: Path) -> Path:
         if begin:
             source.readline()  # this line begins in the previous range
         left = end - source.tell()
-        while left > 0 and (block := source.read(min(left, COPY_BYTES))):
+        while left > 0 and (block := source.read(min(left, 1 << 24))):
             copy.write(block)
             left -= len(block)
         if source.tell() and left <= 0:

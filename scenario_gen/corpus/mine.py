@@ -54,10 +54,8 @@ LEGEND = (
     "Lines are paths, dots their starts. Space-time gap: smallest distance between two paths,"
     " plus 2 m for each second between."
 )
-TABLE_FORMAT_VERSION = 3
 DRAWN_COUNT = 20  # encounters of a kind on the page
 NAMED_COUNT = 20  # failures and files that are named; the corpus contains all
-NAMED_NOTE_COUNT = 10  # ids that a note names
 NAMED_FILES_COUNT = 5  # files that a note names
 UNLISTED = ("memory", "task_rows")  # parameters that do not change results
 
@@ -206,7 +204,7 @@ def _agree_on_archive(out: Place, files: Sequence[Place], config: CorpusConfig) 
     """
     parameters = {name: value for name, (_, value) in flatten(config).items()}
     document = {
-        "format": TABLE_FORMAT_VERSION,
+        "format": 3,
         "files": [_name_and_size(path) for path in files],
         "parameters": {n: value for n, value in parameters.items() if n not in UNLISTED},
     }
@@ -283,7 +281,7 @@ def _shared_ids(out: Place) -> list[str]:
         shared.update(json.loads(metadata.get(b"shared", b"{}")))
     if not shared:
         return []
-    names = ", ".join(sorted(shared)[:NAMED_NOTE_COUNT])
+    names = ", ".join(sorted(shared)[:10])
     return [
         f"{len(shared)} ids are shared by several vehicles at once, and separated by place:"
         f" {names} …"

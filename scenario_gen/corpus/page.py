@@ -20,7 +20,6 @@ WIDTH_PX = 240.0
 HEIGHT_PX = 160.0
 BORDER_PX = 12.0
 COLOURS = ("#1f6feb", "#d1242f", "#1a7f37", "#9a6700", "#8250df", "#bf3989")
-TRACK_POINTS = 60
 MIN_EXTENT_M = 10.0  # a smaller motion is not enlarged to fill the drawing
 SCALE_BAR_M = 10.0
 
@@ -48,7 +47,7 @@ def sketch(motion: Encounter | Scenario, span: tuple[int, int] | None = None) ->
         first, last = motion.present[n].tolist()
         path = motion.position[n, first : last + 1]
         colour = COLOURS[n % len(COLOURS)]
-        drawn = path[np.unique(np.linspace(0, len(path) - 1, TRACK_POINTS).astype(int))]
+        drawn = path[np.unique(np.linspace(0, len(path) - 1, 60).astype(int))]
         parts.append(_polyline(pixels(drawn), colour, 'stroke-width="1.5"'))
         if span is not None:
             marked = motion.position[n, max(span[0], first) : min(span[1], last + 1)]

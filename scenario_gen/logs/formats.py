@@ -23,7 +23,6 @@ _MCAP_MAGIC = b"\x89MCAP0\r\n\x01"
 _MCAP_PROFILE = slice(17, 25)  # after the magic, the header's opcode and its length
 _ROS2_PROFILE = b"\x04\0\0\0ros2"
 _OSI_MARKS = (b"net.asam.osi", b"osi3.", b"ground_truth")
-_SPMD_COLUMN_COUNT = 19
 
 Predicate = Callable[[Path], bool]
 Reader = Callable[[Sequence[Path], Any], Any]
@@ -80,7 +79,7 @@ def is_spmd(path: Path) -> bool:
         return False
     with path.open(encoding="utf-8-sig", errors="replace") as file:
         fields = file.readline(HEAD_BYTES).split(",")
-    return len(fields) == _SPMD_COLUMN_COUNT and all(map(_is_number_or_empty, fields))
+    return len(fields) == 19 and all(map(_is_number_or_empty, fields))
 
 
 def is_bsm(path: Path) -> bool:

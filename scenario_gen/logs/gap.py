@@ -15,7 +15,6 @@ INTERACTS_M = 6.0
 """Gap up to which two vehicles interact."""
 
 _CHORD_S = 0.3  # of straight and steady motion: at 4 m/s² lateral acceleration, 5 cm off
-_SEARCH_STEPS = 10  # of golden section: a chord at 40 m/s becomes 10 cm
 _GOLDEN_RATIO = 0.6180339887498949
 
 
@@ -76,7 +75,7 @@ def _chord_gap(a: Floats, b: Floats) -> tuple[float, float, float]:
     second = low + _GOLDEN_RATIO * (high - low)
     first_gap = _gap_to_chord(a, first, b)[0]
     second_gap = _gap_to_chord(a, second, b)[0]
-    for _ in range(_SEARCH_STEPS):
+    for _ in range(10):  # golden section: a chord at 40 m/s shrinks to 10 cm
         if first_gap <= second_gap:
             high = second
             second = first

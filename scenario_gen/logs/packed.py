@@ -18,7 +18,6 @@ from scenario_gen.logs.config import LogConfig
 from scenario_gen.logs.formats import is_packed, without_packing
 from scenario_gen.logs.raw import check_size
 
-_MAX_FILE_COUNT = 10_000  # in a .zip
 _BLOCK_BYTES = 1 << 20
 _DAMAGE = (
     OSError,
@@ -82,7 +81,7 @@ def _unpack_zip(path: Path, target: Path, left_bytes: int) -> int:
             for member in archive.infolist()
             if not member.is_dir() and not _is_hidden(member.filename)
         ]
-        for member in members[:_MAX_FILE_COUNT]:
+        for member in members[:10_000]:
             file = target / Path(member.filename).name
             if file.exists():
                 raise InputError(

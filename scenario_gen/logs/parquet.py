@@ -19,8 +19,6 @@ from scenario_gen.logs.columns import Column, find_columns, UNITS
 from scenario_gen.logs.config import LogConfig
 from scenario_gen.logs.raw import check_size
 
-_BATCH_ROW_COUNT = 1 << 16
-
 
 def read_columns(
     path: Path, rows_before: int, config: LogConfig
@@ -100,7 +98,7 @@ def _read_batches(
         file = parquet.ParquetFile(path, read_dictionary=texts)
         declared_bytes = _declared_bytes(file.metadata, names)
         declared_rows = file.metadata.num_rows
-        source = file.iter_batches(_BATCH_ROW_COUNT, columns=list(names), use_threads=False)
+        source = file.iter_batches(1 << 16, columns=list(names), use_threads=False)
     check_size(str(path), declared_bytes, rows_before + declared_rows, config)
     batches: list[Any] = []
     n_rows = 0

@@ -23,7 +23,6 @@ from scenario_gen.types import Sample, Vehicle
 _WINDOW_NS = 3_000_000_000  # cleaned again for every sample: tells a jump from a new place
 FAR_NS = 10_000_000_000  # stamps farther from the newest one are of another time, or wrong
 _MAX_RATE_HZ = 100  # messages of one kind per vehicle
-_TICKS_PER_CLEANING_COUNT = 2
 
 
 class Streams:
@@ -110,7 +109,7 @@ class Streams:
         """
         if self._newest_ns < 0:
             return []
-        group = _TICKS_PER_CLEANING_COUNT
+        group = 2  # ticks per cleaning
         last_tick = (self._newest_ns - self._max_delay_ns) // self._dt_ns // group * group
         first_tick = self._first_ns // self._dt_ns if self._next_tick < 0 else self._next_tick
         if last_tick < first_tick:

@@ -19,7 +19,6 @@ _SAME_RATIO = 0.03  # tolerance of a ratio of speeds
 _WRONG_RATIO = 1.2  # a ratio of speeds, or its inverse, that no sensor error explains
 _MIN_SAMPLE_COUNT = 5  # of a moving vehicle
 _MIN_TRAVEL_M = 2.0  # by speeds or positions; less does not give a ratio
-_FRAME_RATES_HZ = (10, 15, 20, 24, 25, 30, 50, 60)
 
 
 @dataclass(frozen=True)
@@ -48,7 +47,7 @@ _UNITS = (
         _Unit(
             rate, f"m/s, and the time in frames, {rate} per second (log.columns=time=…:{rate}fps)"
         )
-        for rate in _FRAME_RATES_HZ
+        for rate in (10, 15, 20, 24, 25, 30, 50, 60)
     ),
 )
 

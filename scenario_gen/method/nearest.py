@@ -29,7 +29,6 @@ from scenario_gen.roads import (
 from scenario_gen.situation import Situation
 from scenario_gen.types import Encounter, ENDS, Request, Road, State, vehicle_index
 
-MAX_ROADS_COUNT = 2  # roads that a refusal names
 MAX_SCENARIOS = 10  # valid scenarios by which a request counts as possible
 SEARCH_RADIUS_M = 30.0  # within which a pose with room is searched
 LENGTH_STEP_M = 0.25  # between the poses that are tried along a vehicle's heading
@@ -106,7 +105,7 @@ def suggest_nearest(
         return ImpossibleError(str(error), () if cancelled() else suggestions)
     if isinstance(error, LostEncounterError):
         names = suitable_roads(requested.situation, requested.segmentation, requested.config)
-        roads = list(islice(names, MAX_ROADS_COUNT)) or [CORRIDOR]
+        roads = list(islice(names, 2)) or [CORRIDOR]
         offers = " or ".join(f"road {name}" for name in roads)
         return LostEncounterError(f"{error}. Nearest possible: {offers}")
     return error

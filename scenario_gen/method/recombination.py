@@ -40,7 +40,6 @@ USUAL_TIME_GAP_S = 1.2  # of a follower that was never recorded in its leader's 
 MAX_TIME_GAP_S = 2.5
 MIN_OVERLAP_S = 8.0  # of the recordings of two leaders, unless one is shorter
 NO_OVERLAP_COST = 1.5  # in m/s, for recordings that do not overlap
-SHIFT_STEPS = 2  # samples between the shifts that are tried
 ON_PATH_M = 2.2  # from the follower's path, within which its leader is on it
 MAX_REVERSE_MPS = 0.5  # a follower that drives backwards faster is refused
 
@@ -289,7 +288,7 @@ def _alignment(a: InteractingPair, b: InteractingPair) -> float:
     shorter = min(len(speed), len(other))
     least = min(round(MIN_OVERLAP_S / dt), shorter)
     smallest, best = math.inf, 0
-    for shift in range(least - len(other), len(speed) - least + 1, SHIFT_STEPS):
+    for shift in range(least - len(other), len(speed) - least + 1, 2):
         begin, end = max(0, shift), min(len(speed), len(other) + shift)
         difference = speed[begin:end] - other[begin - shift : end - shift]
         missing = 1.0 - (end - begin) / shorter

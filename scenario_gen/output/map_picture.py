@@ -19,7 +19,6 @@ from scenario_gen.situation import Situation
 from scenario_gen.types import DRIVERS, Encounter, LaneNetwork, Road
 from scenario_gen.types.markings import markings
 
-MAX_PLACES_COUNT = 8
 WIDTH_PX = 1200.0
 TITLE_HEIGHT_PX = 70.0
 SCALE_HEIGHT_PX = 45.0
@@ -70,7 +69,7 @@ def map_picture(name: str, encounter: Encounter | None = None) -> tuple[str, lis
     if encounter is not None:
         try:
             drivers = Situation.of(encounter).drivers
-            shown = list(islice(_separate(places(network, drivers)), MAX_PLACES_COUNT))
+            shown = list(islice(_separate(places(network, drivers)), 8))
         except RefusedError as error:
             lines.append(f"no place for {encounter.name}: {error}")
         for number, place in enumerate(shown, 1):

@@ -24,7 +24,6 @@ MAX_CAR_CURVATURE_PER_M = 0.2
 _STEP_M = 0.25
 _PARALLEL_RAD = np.radians(8.0)
 _MAX_BLENDED_TURN_RAD = np.radians(35.0)  # while changing to the line of the exit
-_DEFAULT_CURVATURE_PER_M = 0.09
 _MAX_SHIFT_CURVATURE_PER_M = 0.05  # of a lane change on the way
 _MAX_SHIFT_M = 12.0  # sideways
 _ENTRY_RADIUS_M = 14.0  # of the bends into a roundabout and out of it
@@ -61,7 +60,7 @@ def draw_route(
 
     from_intersection = left / np.sin(turn)  # of the lines of entry and exit, to the exit
     to_intersection = ahead - from_intersection * np.cos(turn)
-    for curvature, ramp in _bend_shapes(sharpness or _DEFAULT_CURVATURE_PER_M, max_curvature):
+    for curvature, ramp in _bend_shapes(sharpness or 0.09, max_curvature):
         bend = _bend(round(turn, 9), round(curvature, 9), ramp)
         tangent = float(bend[-1, 1]) / np.sin(turn)
         if tangent <= min(to_intersection, from_intersection) - 0.5:

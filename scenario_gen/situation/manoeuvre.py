@@ -15,8 +15,6 @@ SURELY_SAME_TURN_RAD: Final = np.radians(15.0)  # even if their names differ
 MIN_NAMED_TURN_RAD = np.radians(30.0)
 MIN_NAMED_U_TURN_RAD = np.radians(150.0)
 BEND_WINDOW_M = 8.0
-MIN_CURVATURE_PER_M = 0.005
-MAX_CURVATURE_PER_M = 0.17
 
 
 def turn_of(track: Track) -> float:
@@ -57,7 +55,7 @@ def sharpness_of(track: Track) -> float:
     """The curvature [1/m] of the sharpest bend over 8 m, within the range of cars."""
     window = min(BEND_WINDOW_M, max(track.curve.length, 1.0))
     bend = abs(track.turning(BEND_WINDOW_M)) / window
-    return float(np.clip(bend, MIN_CURVATURE_PER_M, MAX_CURVATURE_PER_M))
+    return float(np.clip(bend, 0.005, 0.17))
 
 
 def describe_turn(turn: float) -> str:

@@ -18,7 +18,6 @@ from scenario_gen.numerics.plane import ahead_and_left
 from scenario_gen.situation.tracks import Track
 from scenario_gen.types import Encounter, Note, NoteKind, together
 
-MAX_CORRECTIONS_COUNT = 400
 LENGTHWISE_WEIGHT = 0.3  # how readily a vehicle is moved along its path
 GAP_TOLERANCE_M = 1e-3
 MIN_MOBILITY_RATIO = 1e-6  # below it, no allowed shift widens a gap
@@ -83,7 +82,7 @@ def separate(
     poses = list(recorded)
     pairs = _near_pairs(tracks, recorded, clearance + 2.0 * max_shift)
     gaps: dict[tuple[int, int], _Gap] = {}
-    for _ in range(MAX_CORRECTIONS_COUNT):
+    for _ in range(400):
         changed = [pair for pair in pairs if pair not in gaps]
         gaps |= {pair: _least_gap(tracks, poses, pair) for pair in changed}
         worst = min(gaps.values(), key=lambda gap: gap.size, default=None)

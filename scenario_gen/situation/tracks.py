@@ -28,7 +28,6 @@ from scenario_gen.numerics.plane import polyline_of, unit
 from scenario_gen.types import Encounter, mask, MAX_PLANNED_CURVATURE_PER_M, Vehicle
 
 # wavelengths that the smoothing halves
-WAVELENGTHS_M = (8.0, 12.0, 16.0, 24.0, 32.0, 48.0, 64.0, 96.0, 128.0)
 CURVATURE_SHARE = (
     0.8  # of the sharpest curve of a type; for a car 0.2 1/m, nearly its tightest turn
 )
@@ -41,7 +40,6 @@ U_TURN_WINDOW_M = 45.0
 MIN_PATH_M = 0.5  # a vehicle with a shorter path stands
 PATH_STEP_M = 0.5
 EASING_SHARE = 0.95  # of the allowed curvature, to which bends are eased
-MAX_EASING_STEPS = 2000
 
 
 @dataclass(frozen=True, eq=False)
@@ -190,7 +188,7 @@ def _standing(record: _Record) -> _Path:
 def _smoothed(record: _Record, max_curvature: float, max_lateral: float) -> _Path:
     """The drivable path of a record; the limits are in 1/m and m/s²."""
     smallest = math.inf
-    for wavelength in WAVELENGTHS_M:
+    for wavelength in (8.0, 12.0, 16.0, 24.0, 32.0, 48.0, 64.0, 96.0, 128.0):
         stop_if_cancelled()
         grid, smooth = smoothing_spline(record.distance, record.position, wavelength)
         curve = Curve.through(smooth)
@@ -235,7 +233,7 @@ def _eased(curve: Curve, max_curvature: float) -> Curve:
     even = curve.at(np.linspace(0.0, curve.length, count + 1))
     bend = np.diff(even[:, 2])
     limit = EASING_SHARE * max_curvature * step
-    for _ in range(MAX_EASING_STEPS):
+    for _ in range(2000):
         excess = np.sign(bend) * np.maximum(np.abs(bend) - limit, 0.0)
         if not excess.any():
             break

@@ -17,7 +17,6 @@ from msg_conventions.scenarios import digest
 from scenario_gen.base.errors import InputError
 
 _MAX_ENTRY_COUNT = 300_000  # of open requests; the oldest requests are dropped
-_MAX_UNMATCHED_COUNT = 10_000  # scenarios without an entry; the oldest are dropped
 _MAX_COMPLETE_COUNT = 1000  # remembered complete requests
 _NO_STATUS = Status("", Level.OK, "")  # entries wait without their long texts
 
@@ -90,7 +89,7 @@ Match = tuple[TrackedRequest, ScenarioEntry, bytes]
 class RequestTracker:
     """The requests of one namespace; `open` are those that are not complete, by id."""
 
-    def __init__(self, max_unmatched: int = _MAX_UNMATCHED_COUNT) -> None:
+    def __init__(self, max_unmatched: int = 10_000) -> None:
         self.open: dict[str, TrackedRequest] = {}
         self._max_unmatched = max_unmatched
         self._n_entries = 0  # of all open requests

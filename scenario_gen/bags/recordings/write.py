@@ -27,9 +27,6 @@ from scenario_gen.bags.storage.metadata import qos_yaml
 from scenario_gen.bags.storage.writer import atomic_bag, BagWriter
 from scenario_gen.types import Encounter, GenerationResult, Scenario, tokens
 
-SCENARIO_STEP_NS = 100_000_000
-"""Time between the log stamps of scenarios, so that a player shows them one after the other."""
-
 
 def result_messages(
     result: GenerationResult, request: str = "1"
@@ -89,7 +86,7 @@ def result_messages(
         for topic, data in messages.of_scenario(scenario, fit.requested, ego):
             yield topic, data, logged
         yield "markers", scenario_markers(scenario, stamp), logged
-        logged += SCENARIO_STEP_NS
+        logged += 100_000_000  # players show one scenario after the other
     provenance = {**result.provenance, **hashes, **source_values(encounter.source)}
     summary = request_summary(
         result.generated,

@@ -15,7 +15,6 @@ NOT_RECORDED = "scenario_gen.lost:"
 """Prefix of the keys in custom_data that say what of a topic was not recorded."""
 
 _SUFFIXES = (".mcap", ".db3", ".bag")
-_MAX_NAME_BYTES = 255
 
 
 @dataclass(frozen=True)
@@ -105,7 +104,7 @@ def _listed(information: dict[str, Any], metadata: Path) -> BagFiles:
 def _is_file_name(name: Any) -> bool:
     if not isinstance(name, str) or "\0" in name:
         return False
-    return 0 < len(Path(name).name.encode()) <= _MAX_NAME_BYTES
+    return 0 < len(Path(name).name.encode()) <= 255
 
 
 def metadata_warnings(path: Path) -> tuple[str, ...]:

@@ -50,7 +50,6 @@ _MAGIC = b"\x89MCAP0\r\n"
 _PREFIX_BYTES = 9  # opcode and length of a record
 _FOOTER_BYTES = 29  # with its prefix
 _EXTRA_RECORD_BYTES = 1024  # beside the data of a chunk
-_ZSTD_WINDOW_BYTES = 128 * 1024**2  # zstd's own default
 _MESSAGE_OPCODE = int(Opcode.MESSAGE)
 _MESSAGE = struct.Struct("<HIQQ")  # channel, sequence, log time, publish time
 _CHUNK_START = re.compile(rb"(?=\x06.{4}\x00{4})", re.DOTALL)  # of less than 4 GiB
@@ -118,7 +117,7 @@ class LoggedMessage(NamedTuple):
 
 def decompress_zstd(data: bytes, max_bytes: int) -> bytes:
     """Return the first `max_bytes` + 1 decompressed bytes at most."""
-    decompressor = zstandard.ZstdDecompressor(max_window_size=_ZSTD_WINDOW_BYTES)
+    decompressor = zstandard.ZstdDecompressor(max_window_size=128 * 1024**2)  # zstd's default
     with decompressor.stream_reader(io.BytesIO(data), read_across_frames=True) as reader:
         return bytes(reader.read(max_bytes + 1))
 

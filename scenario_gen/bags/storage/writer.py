@@ -18,7 +18,6 @@ from scenario_gen.bags.storage.metadata import BagInfo, FileInfo, metadata_yaml,
 from scenario_gen.base.errors import InputError
 from scenario_gen.base.folders import Kind, naming, replaced_folder, sync, write_text
 
-_CHUNK_BYTES = 1024 * 1024
 _WRITTEN = Kind("bag")
 
 
@@ -42,7 +41,7 @@ class BagWriter:
         *,
         compress: bool = True,
         split: Split = Split(),
-        chunk_bytes: int = _CHUNK_BYTES,
+        chunk_bytes: int = 1024 * 1024,
     ) -> None:
         """Create the folder and its first file.
 

@@ -32,12 +32,10 @@ LOCK = "lock"
 NEW = "new"
 OLD = "old"
 NESTED = ("*/", "*/*/")  # where a corpus and a batch write inside of their folder
-LOCK_TIMEOUT_S = 1.0  # for a process that is about to release a folder
-LOCK_POLL_S = 0.02
 
 
 @contextmanager
-def claimed(folder: Path, purpose: Path, timeout_s: float = LOCK_TIMEOUT_S) -> Iterator[Path]:
+def claimed(folder: Path, purpose: Path, timeout_s: float = 1.0) -> Iterator[Path]:
     """Lock a folder of intermediate files, created with its parents; remove it at the end.
 
     Args:
@@ -94,7 +92,7 @@ def _acquire(lock: FileLock, folder: Path, purpose: Path, timeout_s: float) -> N
             )
         try:
             with suppress(FileNotFoundError):  # another process has just removed the folder
-                lock.acquire(timeout=timeout_s, poll_interval=LOCK_POLL_S)
+                lock.acquire(timeout=timeout_s, poll_interval=0.02)
         except Timeout as error:
             with suppress(OSError):
                 owner = (folder / LOCK).read_text(encoding="utf-8")

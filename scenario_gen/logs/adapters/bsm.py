@@ -36,14 +36,11 @@ from scenario_gen.logs.config import LogConfig
 from scenario_gen.logs.raw import check_size, RawLog, Segment
 from scenario_gen.logs.tables import from_frame, MAX_STAMP_S
 
-_EVENT_INTERVAL_S = 100.0  # between the starts of two events of New York
 _MINUTE_MS = 60_000
 _MAX_SECOND_MARK_MS = 61_000  # a leap second
 _NEXT_DOCUMENT = re.compile(r"[^\s,]")
 _UNKNOWN_SPEED_CODE = 8191
 _UNKNOWN_HEADING_CODE = 28800
-_SPEED_UNIT_MPS = 0.02
-_HEADING_UNIT_DEG = 0.0125
 
 Row = dict[str, Any]
 
@@ -137,8 +134,8 @@ def _rows_of(record: Any, number: int) -> list[Row]:
     row = {
         "lat": float(core["lat"]) * 1e-7,
         "lon": float(core["long"]) * 1e-7,
-        "speed": None if speed == _UNKNOWN_SPEED_CODE else speed * _SPEED_UNIT_MPS,
-        "heading": None if heading == _UNKNOWN_HEADING_CODE else heading * _HEADING_UNIT_DEG,
+        "speed": None if speed == _UNKNOWN_SPEED_CODE else speed * 0.02,  # m/s
+        "heading": None if heading == _UNKNOWN_HEADING_CODE else heading * 0.0125,  # degrees
     }
     return [_row(core, seconds, row)]
 
@@ -151,7 +148,8 @@ def _event_row(core: Any, number: int) -> Row:
         "speed": core["speed_mps"],
         "heading": core["heading_deg"],
     }
-    return _row(core, core["T_s"] + number * _EVENT_INTERVAL_S, row)
+    seconds = core["T_s"] + number * 100.0  # events of New York start 100 s apart
+    return _row(core, seconds, row)
 
 
 def _row(core: Any, seconds: float, state: Row) -> Row:

@@ -39,7 +39,6 @@ from scenario_gen.logs.raw import (
 )
 from scenario_gen.numerics import Floats
 
-_STEP_NS = 100_000_000
 _MOVING_MPS = 2.0  # a faster vehicle has the direction of its velocity
 _MAX_SPEED_MPS = 1000.0  # higher values mark absence
 
@@ -104,7 +103,7 @@ def _observations(
     columns = np.column_stack([states[:, :2], heading, speed])
     return Observations.of_rows(
         name,
-        steps * _STEP_NS,
+        steps * 100_000_000,  # 10 Hz
         columns[steps],
         first_row + steps,
         (_positive(item, "length"), _positive(item, "width")),

@@ -18,7 +18,6 @@ import re
 from scenario_gen.base.errors import InputError
 from scenario_gen.base.xml_reader import Element, read_xml
 
-_MAX_CATALOG_FILE_COUNT = 100
 _OPERATORS: dict[type[ast.AST], Callable[..., float]] = {
     ast.Add: operator.add,
     ast.Sub: operator.sub,
@@ -62,7 +61,7 @@ def _catalog_entries(root: Element, folder: Path) -> Iterator[tuple[tuple[str, s
     """Yield the entries of the catalogs in all folders that the file names."""
     for directory in root.findall("CatalogLocations/*/Directory"):
         files = sorted((folder / directory.get("path", "")).glob("*.xosc"))
-        for file in files[:_MAX_CATALOG_FILE_COUNT]:
+        for file in files[:100]:
             with suppress(InputError):  # the folder may have other files, too
                 yield from _entries_in(read_xml(file, str(file)))
 

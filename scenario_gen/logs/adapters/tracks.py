@@ -27,7 +27,6 @@ from scenario_gen.logs.tables import (
 
 _INTERACTION = "interaction"
 _PEDESTRIAN_COLUMNS = {"track_id", "timestamp_ms", "agent_type"}
-_MAX_COMPANION_ROW_COUNT = 1_000_000
 _MIN_HEADING_MPS = 0.1  # a slower vehicle has no direction of travel
 
 Load = Callable[[Path, DataSet, int, LogConfig], pd.DataFrame]
@@ -167,7 +166,7 @@ def _read_companion(
             f"{path}: {data_set.title} also needs {file.name} in the same folder; copy it there"
         )
     with guarded(f"{file} cannot be read as a table"):
-        frame = pd.read_csv(file, nrows=_MAX_COMPANION_ROW_COUNT)
+        frame = pd.read_csv(file, nrows=1_000_000)
     missing = [column for column in columns if column not in frame.columns]
     if missing or frame.empty:
         raise InputError(

@@ -22,7 +22,6 @@ from scenario_gen.types import (
     Spread,
 )
 
-PET_EDGES_S = (0.0, 0.5, 1.0, 2.0, 4.0)
 PET_BINS = (
     "below 0 s",
     "0 … 0.5 s",
@@ -106,7 +105,7 @@ def _bin(pet: float) -> int:
     return (
         len(PET_BINS) - 1
         if math.isnan(pet)
-        else int(np.searchsorted(PET_EDGES_S, pet, side="right"))
+        else int(np.searchsorted((0.0, 0.5, 1.0, 2.0, 4.0), pet, side="right"))
     )
 
 

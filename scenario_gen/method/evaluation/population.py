@@ -50,7 +50,6 @@ KINDS = tuple(EncounterKind)
 MIN_RADIUS_RATIO = 0.05  # of a standard deviation: two files may hold the same encounter
 MIN_SPREAD_RATIO = 0.05  # of the largest spread: a constant feature does not decide alone
 MAX_TEMPLATE_SHARE = 0.5  # of the encounters; the other recordings stay unseen
-SHOWN_COUNT = 10  # scenarios that resemble no recorded encounter
 MAX_EXTRAPOLATION_FACTOR = 100.0  # of the largest measured number of templates
 
 
@@ -365,7 +364,7 @@ class _Near:
         away = self.distances[len(self.members) :]
         nearest = away.min(axis=1, initial=math.inf)
         farthest = []
-        for n in np.argsort(-nearest, kind="stable")[:SHOWN_COUNT].tolist():
+        for n in np.argsort(-nearest, kind="stable")[:10].tolist():
             member = everything.made[n]
             closest = int(away[n].argmin())
             feature = self._differ(len(self.members) + n, closest, nearest[n])

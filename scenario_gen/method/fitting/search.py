@@ -35,7 +35,6 @@ from scenario_gen.types import Note, NoteKind, Road
 
 _COARSE_CELL_M = 1.0
 _ROTATION_COUNT = 72
-_REFINED_CANDIDATES = 10
 _DISC_SPACING_M = 1.5  # along a path
 _MIN_ROOM_SHARE = 0.8  # of footprints with room
 _COMFORT_M = 0.7  # of room beyond the margin that is preferred
@@ -138,7 +137,7 @@ class _GridSearch:
         """Yield the best similarities with each accepted scale, the best first."""
         for scale in filter(config.accepts, TRIED_SCALES_RATIO):
             coarse = sorted(self._coarse(scale), key=lambda each: each.rank)
-            refined = map(self._refined, coarse[:_REFINED_CANDIDATES])
+            refined = map(self._refined, coarse[:10])
             yield from sorted(refined, key=lambda each: each.rank)
 
     def moved(self, tracks: tuple[Track, ...], similarity: _Similarity) -> tuple[Track, ...]:

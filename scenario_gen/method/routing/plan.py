@@ -28,7 +28,6 @@ from scenario_gen.types import Fit, FittedVehicle, Road, Route, TypeLimits
 MIN_ROUTE_M = 0.05  # between start and end, else the vehicle has no path
 # Shares of the largest curvature that searches may use, in turn: smoothing needs the rest.
 CURVATURE_SHARE = (0.97, 0.9, 0.8)
-SEED_STEPS = 7919  # between the seeds of two vehicles
 
 
 def plan_routes(
@@ -66,9 +65,7 @@ def plan_routes(
     for n, (vehicle, fitted) in enumerate(zip(fit.vehicles, fit.fitted, strict=True)):
         curvature = limits.of(vehicle.type).planned.max_curvature
         ground = ground_for(road, vehicle)
-        task = VehicleTask(
-            ground, vehicle, fitted, config, planner, seed + SEED_STEPS * n, curvature
-        )
+        task = VehicleTask(ground, vehicle, fitted, config, planner, seed + 7919 * n, curvature)
         routes.append(_route_on_lanes(task))
     return tuple(routes)
 

@@ -28,9 +28,6 @@ from scenario_gen.output.exchange.lanes import LaneMap
 from scenario_gen.roads import RoadConfig
 from scenario_gen.types import join_ego, Road, Scenario, split_off, tokens
 
-STEP_TOLERANCE_S = 1e-9
-"""Difference of time steps that count as equal."""
-
 TOPICS = ("tracks", "map", "road/lanes", "fit/info", SCENARIOS, INFO)
 
 
@@ -104,7 +101,7 @@ class Case:
 
 def evenly_sampled(scenario: Scenario, step: float) -> Scenario:
     """Return a scenario with a constant time step: itself, or sampled every `step` [s]."""
-    if np.ptp(np.diff(scenario.time)) <= STEP_TOLERANCE_S:
+    if np.ptp(np.diff(scenario.time)) <= 1e-9:  # equal but for rounding
         return scenario
     return scenario.resampled(step)
 

@@ -31,13 +31,9 @@ FRAME_PERIOD_S = 0.2
 MAX_FRAMES_COUNT = 240
 MAX_CELLS = 900
 MATRIX_SIZE_CELLS = 72
-MAX_PAIRS_COUNT = 10
-MAX_ROUTE_POINTS = 200
 MAX_LINES = 400
 MOTION_PERIOD_S = 0.1
 """Period of speeds and accelerations: shorter than that of the animation, for fewer samples."""
-MAX_MOTION_FRAMES_COUNT = 400
-MAX_MOTION_SAMPLES = 12
 
 
 def case_data(case: GenerationResult, samples: int) -> dict[str, Any]:
@@ -61,7 +57,7 @@ def case_data(case: GenerationResult, samples: int) -> dict[str, Any]:
         "reactions": _reactions(case),
         "arms": {name: _trajectories(group, frames, ids) for name, group in arms.items() if group},
         "turn": _turn(case.encounter, case.fit),
-        "motion": _motion(case.encounter, case.generated.scenarios[:MAX_MOTION_SAMPLES]),
+        "motion": _motion(case.encounter, case.generated.scenarios[:12]),
         "coverage": None if case.coverage is None else case.coverage.document(),
         "features": _features(case.encounter, arms, case.evaluation.vehicles),
     }
@@ -240,7 +236,7 @@ def _over_time(source: Encounter | Scenario, n: int) -> dict[str, Any]:
     Columns: speed [m/s], acceleration, and lateral acceleration (speed times yaw rate) [m/s²].
     """
     first, last = source.time[source.present[n]].tolist()
-    frames = min(MAX_MOTION_FRAMES_COUNT, max(3, round((last - first) / MOTION_PERIOD_S) + 1))
+    frames = min(400, max(3, round((last - first) / MOTION_PERIOD_S) + 1))
     time = np.linspace(first, last, frames)
     states = source.at(time)
     speed = states.speed[n]
@@ -272,7 +268,7 @@ def _fit(fit: Fit, routes: Sequence[Route]) -> list[dict[str, Any]]:
     vehicles = []
     for fitted, route in zip(fit.fitted, routes, strict=True):
         keep = (
-            np.linspace(0, len(route.points) - 1, min(len(route.points), MAX_ROUTE_POINTS))
+            np.linspace(0, len(route.points) - 1, min(len(route.points), 200))
             .round()
             .astype(np.int64)
         )
@@ -310,7 +306,7 @@ def _features(
     groups: dict[str, Sequence[Encounter | Scenario]] = {"template": [encounter], **arms}
     pairs = []
     rows = [n for n, vehicle in enumerate(encounter.vehicles) if vehicle.id in shared]
-    for pair in list(combinations(rows, 2))[:MAX_PAIRS_COUNT]:
+    for pair in list(combinations(rows, 2))[:10]:
         names = encounter.vehicles[pair[0]].id, encounter.vehicles[pair[1]].id
         entry: dict[str, Any] = {"pair": list(pair), "position": {}, "speed": {}}
         for name, group in groups.items():

@@ -25,12 +25,10 @@ LaneChain = tuple[int, ...]
 
 _MAX_START_DISTANCE_M = 8.0  # between a vehicle's start and the lane on which its chain begins
 _MAX_START_TURN_RAD = math.radians(60.0)
-_MAX_CHAINS_FROM_LANE_COUNT = 48
 _POINT_SPACING_M = 0.5  # of a lane path
 _SMOOTHING_POINTS = 3  # to each side of a point that is averaged: polylines have corners
 _MIN_CROSSING_ANGLE_RAD = math.radians(15.0)
 
-_FIELD_CELL_M = 1.0
 _MAX_FIELD_CELLS = 30_000_000  # of a map; a larger one gets larger cells
 _MAX_SECTIONS_COUNT = 300_000  # a metre of lane each, of a map that is searched as a whole
 _CHUNK_ROWS = 20_000  # sections that are rasterised at once
@@ -137,7 +135,7 @@ class LaneGraph:
         lead = self._lead_to(first, closed)
         enough = travelled + self.length[first] + LEAD_M
         unfinished: list[tuple[LaneChain, float]] = [((first,), self.length[first])]
-        for _ in range(_MAX_CHAINS_FROM_LANE_COUNT):
+        for _ in range(48):
             if not unfinished:
                 break
             chain, length = unfinished.pop(0)
@@ -218,7 +216,7 @@ class LaneField:
             )
         low = points.min(axis=0) - _MAX_FIELD_DISTANCE_M
         high = points.max(axis=0) + _MAX_FIELD_DISTANCE_M
-        cell = max(_FIELD_CELL_M, math.sqrt(float(np.prod(high - low)) / _MAX_FIELD_CELLS))
+        cell = max(1.0, math.sqrt(float(np.prod(high - low)) / _MAX_FIELD_CELLS))
         size = np.ceil((high - low) / cell).astype(np.int64) + 1
         chunks = [slice(k, k + _CHUNK_ROWS) for k in range(0, len(points), _CHUNK_ROWS)]
 

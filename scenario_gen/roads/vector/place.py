@@ -39,7 +39,6 @@ from scenario_gen.types import LaneNetwork, LEVEL_SPACING_M, Motion, Note, NoteK
 
 MATCHED_PLACEMENTS_COUNT = 15
 """Rigid placements that are matched with lanes at a time."""
-_MATCHED_STREETS_COUNT = 8
 _HOME_COST_M2 = 1.0  # of a rigid placement that is where the recording was made
 _MAX_COST_M2 = 40.0  # of a match
 _MAX_FORCED_LATERAL_MPS2 = (
@@ -87,7 +86,7 @@ def placements(
 
     streets = street_matches(graph, tracks, lanes)
     for candidates in search.batches(lanes):
-        for placed in search.near(candidates, list(islice(streets, _MATCHED_STREETS_COUNT))):
+        for placed in search.near(candidates, list(islice(streets, 8))):
             has_place = True
             yield placed
         if not has_place:

@@ -25,7 +25,6 @@ from scenario_gen.situation import pair_crossings, Track
 _KEPT_CANDIDATES = 60
 _MIN_DISTANCE_M = 15.0  # between placements that count as different,
 _MIN_TURN_RAD = math.radians(30.0)  # unless one is turned by this
-_CROSSING_PAIRS_COUNT = 3  # recorded crossings that are put onto crossings of lanes
 _MAX_CROSSING_ANGLE_ERROR_RAD = math.radians(50.0)
 _CHUNK_POSES = 2_000_000  # looked up at once
 
@@ -136,7 +135,7 @@ def crossing_placements(graph: LaneGraph, tracks: tuple[Track, ...]) -> list[Rig
     """
     point, yaw = graph.crossings
     frames = [np.zeros((0, 3))]
-    for a, b, crossing in islice(pair_crossings(tracks), _CROSSING_PAIRS_COUNT):
+    for a, b, crossing in islice(pair_crossings(tracks), 3):
         first, second = tracks[a].curve.at(crossing.first), tracks[b].curve.at(crossing.second)
         turn = wrap_angle(yaw - np.array([first[2], second[2]]))
         error = wrap_angle(turn[:, 1] - turn[:, 0])

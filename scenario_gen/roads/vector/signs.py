@@ -37,7 +37,6 @@ _SIGNS_BY_NAME = {
 }
 _COUNTRY_CODES = {"deu": "de", "germany": "de", "usa": "us", "esp": "es", "spain": "es"}
 _SPEED_LIMIT_SIGNS = ("274", "274.1", "r2-1", "maxspeed")
-_MAX_LANES_TO_JUNCTION_COUNT = 6  # from a sign
 
 
 @dataclass(frozen=True, eq=False)
@@ -177,7 +176,7 @@ def _mouths(network: LaneNetwork, first: int) -> list[int]:
     """Return the lanes by which traffic from a lane enters the next junction."""
     mouths: list[int] = []
     level = [first]
-    for _ in range(_MAX_LANES_TO_JUNCTION_COUNT):
+    for _ in range(6):  # lanes from a sign to its junction
         mouths += [k for k in level if _junctions_after(network, [k])]
         level = [
             following

@@ -44,7 +44,6 @@ INPUTS = ("ego/cmd_vel", "ego/cmd_vel_stamped", "ego/trajectory", "ego/path", "e
 TIMED_INPUTS = ("ego/trajectory", "ego/path")  # their points have times, so they may be old
 FIRST_STAMP_NS = 1_000_000_000  # a drive's clock at its start; ROS regards a time of 0 as unknown
 MAP_PERIOD_S = 0.2  # time of the drive between two local maps
-MAX_FAULTS_COUNT = 5  # in a verdict message
 
 
 @dataclass(frozen=True, eq=False)
@@ -266,7 +265,7 @@ def encode_verdict(node: str, outcome: Outcome, stamp_ns: int) -> bytes:
     verdict = outcome.verdict
     values = {key: json.dumps(value) for key, value in verdict.document().items()}
     if outcome.drive.faults:
-        values["first_faults"] = json.dumps(outcome.drive.faults[:MAX_FAULTS_COUNT])
+        values["first_faults"] = json.dumps(outcome.drive.faults[:5])
     level = Level.OK if verdict.passed else Level.ERROR
     status = Status(f"{node}: scenario {outcome.name}", level, verdict.sentence(), values)
     return encode_diagnostics([status], stamp_ns)

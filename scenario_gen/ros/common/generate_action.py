@@ -24,8 +24,6 @@ from scenario_gen.ros.common.requests import Code, OpenRequest, OpenRequests, Ou
 from scenario_gen.ros.common.services import REQUESTS
 
 NAME = "~/generate_scenarios"
-FEEDBACK_PERIOD_S = 0.1
-RESULT_TIMEOUT_S = 900  # for which a result can be fetched
 
 
 @dataclass
@@ -55,10 +53,10 @@ class Goals:
             result_service_qos_profile=REQUESTS,
             cancel_service_qos_profile=REQUESTS,
             feedback_pub_qos_profile=QoSProfile(depth=100),
-            result_timeout=RESULT_TIMEOUT_S,
+            result_timeout=900,
         )
         steady = Clock(clock_type=ClockType.STEADY_TIME)
-        self._timer = node.create_timer(FEEDBACK_PERIOD_S, self._send_feedback, clock=steady)
+        self._timer = node.create_timer(0.1, self._send_feedback, clock=steady)
 
     def destroy(self) -> None:
         """Withdraw the action."""

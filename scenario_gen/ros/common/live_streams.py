@@ -20,7 +20,6 @@ from scenario_gen.ros.common.topics import adapted_quality
 from scenario_gen.situation import MAX_VEHICLES
 from scenario_gen.types import Sample, token
 
-CHECK_PERIOD_S = 0.2  # between two checks for new streams, and for silence
 TYPES = {"fix": FIX_TYPE, "speed": TWIST_TYPE}
 
 
@@ -67,7 +66,7 @@ class LiveStreams:
         self._topics: dict[str, tuple[str, str]] = {}  # full name -> vehicle, kind
         self._refused: set[str] = set()  # topics with an error on /diagnostics
         steady = Clock(clock_type=ClockType.STEADY_TIME)
-        self._timer = node.create_timer(CHECK_PERIOD_S, self._check, clock=steady)
+        self._timer = node.create_timer(0.2, self._check, clock=steady)
 
     def _check(self) -> None:
         """Forget ended streams, subscribe to new ones, and end the log after silence."""

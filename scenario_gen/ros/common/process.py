@@ -39,7 +39,6 @@ from scenario_gen.numerics.kernels import registered
 from scenario_gen.ros.common.ros_parameters import help_of, USAGE
 
 REPORT_PERIOD_S = 5.0  # between two reports of how many kernels are compiled
-SIGNAL_CHECK_S = 0.2  # longest wait of the executor, which no signal ends
 NODE_END_S = 5.0  # in which a node reacts to a signal, and again leaves its ROS domain
 REMEDY = (
     "write -r FROM:=TO and -p NAME:=VALUE, an empty text as -p \"NAME:=''\", "
@@ -107,7 +106,8 @@ class NodeProcess:
                 self._nodes.append(make(namespace))
                 self._executor.add_node(self._nodes[-1])
         steady = Clock(clock_type=ClockType.STEADY_TIME)
-        self._nodes[0].create_timer(SIGNAL_CHECK_S, lambda: None, clock=steady)
+        # The longest wait of the executor, which signals do not end.
+        self._nodes[0].create_timer(0.2, lambda: None, clock=steady)
 
     def spin(self) -> int:
         """Start the nodes once their kernels are compiled, and spin them; return the exit code."""

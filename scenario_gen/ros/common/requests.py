@@ -52,7 +52,6 @@ from scenario_gen.types import (
 )
 
 MAX_NAMED_COUNT = 20  # waiting requests in a message
-LOG_PERIOD_S = 5.0  # between two progress lines on the terminal
 POLL_S = 0.1  # between two checks whether waiting requests can be served
 NAME = re.compile(r"[A-Za-z][A-Za-z0-9_.-]{0,63}")
 Answer = tuple[GenerationResult, RequestSummary]
@@ -231,7 +230,7 @@ class OpenRequests:
             f"request {running.name}: {running.accepted} of {running.n_requested} scenarios "
             f"from {running.candidates} candidates, {running.seconds():.0f} s"
         )
-        log = monotonic() - running.logged_at >= LOG_PERIOD_S
+        log = monotonic() - running.logged_at >= 5.0
         if log:
             running.logged_at = monotonic()
         self._node.diagnostics.status(

@@ -29,8 +29,6 @@ from scenario_gen.base.errors import InputError
 from scenario_gen.base.parameters import flatten, updated
 
 Config = TypeVar("Config")
-MAX_INT64_COUNT = 2**63 - 1
-MAX_FLOAT_FACTOR = 1e300  # bound of a range without one
 USAGE = "usage: {name} [--namespace NAME]... [--ros-args -p PARAMETER:=VALUE ...]"
 # `param load` would read `1: 10.5 -1.75` as a mapping, so it is stored as `1:10.5 -1.75`.
 STATE_PARAMETERS = ("starts", "goals")
@@ -51,7 +49,7 @@ def descriptor(entry: "Field[Any]") -> ParameterDescriptor:
     low, high = meta["low"], meta["high"]
     if low is None and high is None:
         return result
-    bound = MAX_FLOAT_FACTOR if isinstance(entry.default, float) else MAX_INT64_COUNT
+    bound = 1e300 if isinstance(entry.default, float) else 2**63 - 1
     low = -bound if low is None else low
     high = bound if high is None else high
     if isinstance(entry.default, float):

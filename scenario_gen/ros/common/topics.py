@@ -49,9 +49,7 @@ SHARED_SUFFIXES = (
 """Ends of the names of topics that many nodes publish."""
 TRACKS_PARTNERS = {"log_player": "segmenter", "segmenter": "log_player"}
 """Both publish `tracks`: one from a log, the other from streams."""
-MIN_SUBSCRIPTION_DEPTH = 1000
 POLL_S = 0.002  # between two checks for acknowledgements
-UNPACED_PERIOD_S = 0.001  # per message to subscribers that are not waited for, for the others
 
 
 def message_class(kind: str) -> Any:
@@ -98,7 +96,7 @@ def adapted_quality(topic: str, offers: Sequence[QoSProfile]) -> tuple[Quality, 
     with suppress(KeyError):
         declared = topic_entry(topic)[1]
     subscribed = Quality(
-        max(MIN_SUBSCRIPTION_DEPTH, offered_depth),
+        max(1000, offered_depth),
         reliable,
         transient_local,
         keep_all=reliable and declared is not None,
@@ -294,7 +292,7 @@ class Pace:
                 sleep(POLL_S)
         if self._ignoring:
             self._unacknowledged += 1
-            sleep(UNPACED_PERIOD_S)
+            sleep(0.001)  # leaves time for other subscribers
         self._pending += 1
 
     def end(self) -> None:

@@ -29,7 +29,6 @@ Entries = Sequence[tuple[bytes, ScenarioEntry]]
 """Scenarios with their entries in `scenarios/info`."""
 SCENARIOS = ("scenarios", INFO)
 QUIET_S = 5.0  # without messages, after which a closed request's missing ones are reported
-REPORT_CHECK_S = 1.0
 
 
 @dataclass(frozen=True)
@@ -66,7 +65,7 @@ class Evaluator(StageNode):
         self._newest: dict[str, bytes] = {}
         self._requests = RequestTracker()
         self._last_message = math.inf  # time of the last message [s]
-        self.create_timer(REPORT_CHECK_S, self._report_missing)
+        self.create_timer(1.0, self._report_missing)
 
     def started(self) -> None:
         """Subscribe to scenarios with a quality for which paced publishers wait."""

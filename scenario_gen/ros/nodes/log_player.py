@@ -28,8 +28,6 @@ from scenario_gen.ros.common.stage_node import StageNode
 from scenario_gen.types import Encounter, tokens
 
 DISCOVERY_S = 1.0  # for subscribers to find the streams, which are not latched
-SUBSCRIBER_POLL_S = 0.05
-MAX_SLEEP_S = 0.1  # between two checks for cancellation
 
 
 @dataclass(frozen=True)
@@ -108,7 +106,7 @@ class LogPlayer(StageNode):
         for topic in topics:
             self.outputs.advertise(topic)
         while min(map(self.count_subscribers, topics)) < count and not cancelled():
-            time.sleep(SUBSCRIBER_POLL_S)
+            time.sleep(0.05)
 
     def _play_again(self) -> str:
         if not (self.active and self.config.log_path):
@@ -120,4 +118,4 @@ class LogPlayer(StageNode):
 def _sleep_until(due: float, cancelled: Callable[[], bool]) -> None:
     """Sleep until a time [s] on the monotonic clock, or a cancellation."""
     while (remaining := due - time.monotonic()) > 0.0 and not cancelled():
-        time.sleep(min(remaining, MAX_SLEEP_S))
+        time.sleep(min(remaining, 0.1))

@@ -27,11 +27,6 @@ from scenario_gen.ros.common.topics import create_frames_publisher
 from scenario_gen.situation import find_conflicts
 from scenario_gen.types import Scenario, tokens
 
-LETTER_HEIGHT_M = 1.2
-CONFLICT_SIZE_M = (2.0, 2.0, 0.1)
-CONFLICT_RGBA = (0.9, 0.1, 0.1, 0.5)
-CHANGEPOINT_SIZE_M = (0.6, 0.6, 0.2)
-
 
 @dataclass(frozen=True)
 class Config(Parameters):
@@ -125,8 +120,8 @@ class Preview(StageNode):
                     f"conflict_{k}",
                     Kind.CUBE,
                     pose=pose,
-                    scale=CONFLICT_SIZE_M,
-                    colour=CONFLICT_RGBA,
+                    scale=(2.0, 2.0, 0.1),
+                    colour=(0.9, 0.1, 0.1, 0.5),
                 )
             )
             markers.append(text_marker(f"conflict_text_{k}", pose, text))
@@ -136,7 +131,7 @@ class Preview(StageNode):
 
 def text_marker(name: str, pose: tuple[float, float, float], text: str) -> Marker:
     """Return a text at a pose [m, m, rad]."""
-    return Marker(name, Kind.TEXT, pose=pose, scale=(0.0, 0.0, LETTER_HEIGHT_M), text=text)
+    return Marker(name, Kind.TEXT, pose=pose, scale=(0.0, 0.0, 1.2), text=text)
 
 
 def changepoint_markers(anchors: Floats) -> list[Marker]:
@@ -150,7 +145,7 @@ def changepoint_markers(anchors: Floats) -> list[Marker]:
                     f"changepoint_{n}_{k}",
                     Kind.CUBE,
                     pose=(x, y, yaw),
-                    scale=CHANGEPOINT_SIZE_M,
+                    scale=(0.6, 0.6, 0.2),
                     colour=colour,
                 )
             )

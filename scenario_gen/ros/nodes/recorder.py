@@ -36,8 +36,6 @@ from scenario_gen.ros.common.topics import adapted_quality, message_class, qos
 
 DRAIN_S = 30.0  # at most, at the end, for messages that have arrived
 BATCH_MESSAGES = 50  # of one topic, before others have their turn
-FLUSH_PERIOD_S = 4.0  # after which an incomplete chunk is written
-LOOK_PERIOD_S = 0.1  # between two looks for new topics
 DOMAIN_TOPICS = r"diagnostics|clock|tf|tf_static"  # of a whole ROS domain, in any namespace
 SUITE_TOPICS = (
     r"map|road/(entries|exits|info|lanes|markings)|"
@@ -88,8 +86,8 @@ class Recorder(Node):  # type: ignore[misc]
         self._refused: set[str] = set()
         offer_trigger(self, "~/start", self._start_now)
         offer_trigger(self, "~/stop", self._stop_now)
-        self.create_timer(LOOK_PERIOD_S, self._subscribe_to_new)
-        self.create_timer(FLUSH_PERIOD_S, self._flush)
+        self.create_timer(0.1, self._subscribe_to_new)
+        self.create_timer(4.0, self._flush)  # writes incomplete chunks
         self._losses = MessageLoss(self.count_publishers)
         self._warned: dict[str, TopicLoss] = {}
         self.diagnostics = NodeDiagnostics(self, self._report_counts)
