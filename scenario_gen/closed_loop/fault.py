@@ -3,9 +3,11 @@
 
 """Whose fault a contact with the ego was.
 
-The others keep their certified paths, speeds and order. A contact is therefore the fault of the
-vehicle that was at a place, or at a time, where the certificate does not have it. `RULES` lists
-the reasons; the first one that applies is the reason of the contact.
+The others keep their certified paths and speeds, and their order among themselves. A contact is
+therefore the fault of the vehicle that was at a place, or at a time, where the certificate does
+not have it. The order of the ego and another vehicle is that of the drive: an ego that lets the
+other one go first has lost its turn. `RULES` lists the reasons; the first one that applies is the
+reason of the contact. Without a reason that acquits the ego, the contact counts as its fault.
 """
 
 from collections.abc import Callable
@@ -46,22 +48,23 @@ class Runner(StrEnum):
 
 
 class Reason(StrEnum):
-    """The reason of a contact; from STANDING on it was not the ego's fault."""
+    """The reason of a contact."""
 
     JUMP = "jump"  # the ego had been at a place that no vehicle can reach in a step
     REVERSING = "reversing"  # the ego drove backwards
-    OUT_OF_ORDER = "out_of_order"  # the ego entered before the vehicle that goes first had left
+    OUT_OF_ORDER = "out_of_order"  # the ego entered when it was the other one's turn
     HEAD_ON = "head_on"  # the ego was off its reference path, against the other's direction
     OUT_OF_PATH = "out_of_path"  # the ego was off its reference path otherwise
-    CUT_IN = "cut_in"  # the ego cut in and never left the safe gap
+    CUT_IN = "cut_in"  # the ego entered beside or ahead of the other one, without the safe gap
     REAR_END = "rear_end"  # the ego hit a vehicle that stood or drove ahead of it
     STANDING = "standing"  # the ego stood, on its path and in its turn
     PRIORITY = "priority"  # the ego goes first by the certificate
-    OTHER_RAN_INTO_EGO = "other_ran_into_ego"  # none of these
+    OTHER_RAN_INTO_EGO = "other_ran_into_ego"  # the other one drove into the ego from behind
+    UNDECIDED = "undecided"  # none of these
 
     @property
     def at_fault(self) -> bool:
-        """Whether it was the ego's fault."""
+        """Whether it counts as the ego's fault."""
         return self not in (Reason.STANDING, Reason.PRIORITY, Reason.OTHER_RAN_INTO_EGO)
 
 
@@ -197,13 +200,40 @@ class Contact:
         inside = touching.intersection(shapely.union_all(near))
         return bool(inside.area < 0.5 * touching.area)
 
+    @cached_property
+    def lost_turn(self) -> bool:
+        """Whether the ego, which goes first by the certificate, has let the other one go first.
+
+        The other one entered the shared area before the ego, and at that time the ego could still
+        have stopped before the area.
+        """
+        conflict, ego = self.conflict, self.drive.ego
+        if conflict is None or conflict.first != ego or conflict.following:
+            return False
+        instant = self._entry(conflict.second, conflict.entry_second)
+        if instant is None or instant > (self._entry(ego, conflict.entry_first) or math.inf):
+            return False
+        world = self.loop.world
+        distances = world.cells[ego, :, 7]
+        clocks = np.array([self.drive.clock[ego, instant], conflict.entry_first])
+        station, area = np.interp(clocks, np.arange(len(distances)) * world.cell, distances)
+        speed = float(self.drive.motion.speed[ego, instant])
+        return bool(station + speed * RSS_RESPONSE_S + braking_distance(speed) <= area)
+
+    def _entry(self, vehicle: int, clock: float) -> int | None:
+        """Return the first instant before the contact at which a vehicle's clock is reached."""
+        before = self.drive.motion.time <= self.time + 1e-9
+        entered = np.flatnonzero(before & (self.drive.clock[vehicle] >= clock))
+        return int(entered[0]) if len(entered) else None
+
     @property
     def ego_has_turn(self) -> bool:
-        """Whether the ego goes first at the conflict and is on its path."""
+        """Whether the ego goes first at the conflict, is on its path and has not lost its turn."""
         return (
             self.conflict is not None
             and self.conflict.first == self.drive.ego
             and not self.off_path
+            and not self.lost_turn
         )
 
     def follows_jump(self) -> bool:
@@ -216,16 +246,18 @@ class Contact:
         return self.ego_state.speed < 0.0
 
     def ego_entered_early(self) -> bool:
-        """Whether the ego goes second and entered the shared area before the other one left.
+        """Whether the ego entered the shared area in the other one's turn, before that one left.
 
         Where both drive in the same direction, an ego behind the other one did not enter early.
         """
         conflict = self.conflict
-        if conflict is None or conflict.second != self.drive.ego:
+        if conflict is None:
             return False
         half_length = 0.5 * self.drive.motion.vehicles[self.drive.ego].length
         if self.same_direction and self.distance_ahead >= half_length:
             return False
+        if conflict.first == self.drive.ego:
+            return self.lost_turn and not self.ego_stands()
         if conflict.following:  # a follower from the start on has no place to enter
             return bool(conflict.entry_second > self.loop.begin + self.loop.scenario.time[1])
         clock = np.interp(self.time, self.drive.motion.time, self.drive.clock[conflict.first])
@@ -241,9 +273,11 @@ class Contact:
         return self.off_path and not (self.entered_ahead and moves)
 
     def ego_cut_in(self) -> bool:
-        """Whether the ego cut in without a safe gap, and it was not its turn."""
-        unsafe = self.cut_in is not None and not self.cut_in.safe
-        return self.entered_ahead and unsafe and not self.ego_has_turn
+        """Whether the ego cut in, ahead or beside, without a safe gap, and it was not its turn."""
+        if self.cut_in is None or self.cut_in.safe or self.ego_has_turn:
+            return False
+        vehicles = self.drive.motion.vehicles
+        return self.cut_in.gap > -(vehicles[self.drive.ego].length + vehicles[self.other].length)
 
     def ego_closed_gap(self) -> bool:
         """Whether the ego drove into the vehicle ahead of it."""
@@ -266,9 +300,13 @@ class Contact:
         """Whether the ego stood."""
         return self.ego_state.speed < STANDSTILL_MPS
 
+    def other_hit_rear(self) -> bool:
+        """Whether the other one drove into the ego from behind."""
+        return self.same_direction and self.distance_ahead < 0.0
+
     def ego_has_priority(self) -> bool:
-        """Whether the paths cross or merge and the ego goes first."""
-        return self.ego_has_turn and not self.same_direction
+        """Whether the ego goes first, and did."""
+        return self.ego_has_turn
 
 
 def _always(_: Contact) -> bool:
@@ -285,8 +323,9 @@ RULES: tuple[tuple[Reason, Callable[[Contact], bool]], ...] = (
     (Reason.REAR_END, Contact.ego_hit_rear),
     (Reason.PRIORITY, Contact.ego_closed_gap),  # the other one had cut in
     (Reason.STANDING, Contact.ego_stands),
+    (Reason.OTHER_RAN_INTO_EGO, Contact.other_hit_rear),
     (Reason.PRIORITY, Contact.ego_has_priority),
-    (Reason.OTHER_RAN_INTO_EGO, _always),
+    (Reason.UNDECIDED, _always),
 )
 """Reasons and their conditions; the first one that holds is the reason of a contact."""
 
@@ -305,9 +344,14 @@ def safe_gap(behind: Floats | float, ahead: Floats | float) -> Floats:
 
     The vehicle behind can then stop behind one that brakes as hard as it can.
     """
-    stopping = np.square(behind) / (2.0 * REAR_BRAKING_MPS2)
     lead_stopping = np.square(ahead) / (2.0 * LEAD_BRAKING_MPS2)
-    return np.maximum(np.asarray(behind) * RSS_RESPONSE_S + stopping - lead_stopping, 0.0)
+    stopping = np.asarray(behind) * RSS_RESPONSE_S + braking_distance(behind)
+    return np.maximum(stopping - lead_stopping, 0.0)
+
+
+def braking_distance(speed: Floats | float) -> Floats:
+    """Return the distance [m] in which a vehicle at a speed [m/s] stops once it brakes."""
+    return np.square(speed) / (2.0 * REAR_BRAKING_MPS2)
 
 
 def find_cut_in(

@@ -187,6 +187,30 @@ def has_priority_and_is_hit(rng):
     return witness, other, ego
 
 
+def lets_go_and_rams(rng):
+    """The ego stands in its turn until the other is in the area, then drives into its flank."""
+    fast, slow, when = rng.uniform(6.0, 9.0), rng.uniform(4.0, 6.0), rng.uniform(6.0, 7.5)
+    other = to_pass(lane(0.0), 150.0, when, fast)
+    stands = 150.0 - 0.5 * (LENGTH + WIDTH) - rng.uniform(0.2, 0.5)
+    starts = when - 0.5 * (LENGTH + WIDTH) / fast + PERIOD
+    speed = np.where(TIME < 2.0, slow, 0.0)
+    speed = np.where(starts <= TIME, 4.0 * (TIME - starts), speed)
+    driven = float(np.sum(0.5 * (speed[1:] + speed[:-1])[TIME[1:] <= 2.1]) * PERIOD)
+    witness = to_pass(up(), 150.0, when - 3.0, (150.0 - stands + driven) / (when - 3.0))
+    return witness, other, drive_along(up(), speed, stands - driven)
+
+
+def merges_early_into_flank(rng):
+    """The ego merges before its turn, beside a faster car that it touches with its front."""
+    fast, slow, when = rng.uniform(10.0, 14.0), rng.uniform(6.0, 9.0), rng.uniform(4.0, 5.0)
+    ramp = over(-20.0, 0.0, 0.0, 60.0)
+    other = to_pass(lane(0.0), 165.0, when, fast)
+    station = float(Curve.through(ramp).project(np.array([[15.0, 0.0]]))[0][0])
+    early = when + rng.uniform(0.05, 0.25)
+    witness, ego = both_to_pass(ramp, station, (when + 4.0, early), slow)
+    return witness, other, ego
+
+
 def teleports(rng):
     speed, when = rng.uniform(8.0, 14.0), 20
     other = drive_along(lane(0.0), speed, 20.0)
@@ -215,7 +239,9 @@ SITUATIONS = {
     turns_left_across_oncoming: {"out_of_order"},
     cuts_in_unsafely: {"cut_in"},
     cuts_in_safely: {"other_ran_into_ego"},
+    lets_go_and_rams: {"out_of_order"},
     merges_before_its_turn: {"out_of_order"},
+    merges_early_into_flank: {"cut_in", "out_of_order"},
     drifts_sideways: {"out_of_path"},
     head_on_in_the_wrong_lane: {"head_on"},
     stops_in_the_oncoming_lane: {"head_on"},
