@@ -12,8 +12,12 @@ alternate. A search with a larger budget begins with the drives of a smaller one
   are different failures.
 - Estimation: two-phase sampling (Neyman 1938). Natural scenarios are drawn; the probability that
   one is driven increases with its predicted nearness to failure, and it counts by the inverse of
-  that probability (Horvitz & Thompson 1952). So the rate is unbiased whatever the quality of the
-  regression, and no weight exceeds the inverse of the least probability.
+  that probability (Horvitz & Thompson 1952). The least probability follows from the failures that
+  the regression did not expect (Neyman's allocation): a regression that misses failures leads to
+  plain sampling. The rate is the mean of the batches' rates, weighted by the number of drives that
+  was expected of each before it was drawn. So it is unbiased whatever the quality of the
+  regression. The drives of a batch are in random order: a batch that the budget cuts short counts
+  with the share that was driven.
 """
 
 from collections.abc import Sequence
@@ -44,16 +48,25 @@ class SearchSettings:
         members_per_seed: the best of this number of drives start the chains of the next level.
         moves: candidates of one step of a chain, of which one is driven.
         max_levels: of one exploration.
+        first_explored: drives of the first exploration, after which it is cut; later ones are cut
+            when they have used `explored_share` of all drives.
         first_step: standard deviation of the noise of the first moves, in that of a candidate.
         accepted_share: of the moves, to which the step is adapted.
         batch: natural candidates that are drawn at once.
         refit_ratio: growth of the number of drives that asks for a new regression.
-        even_share: share of the drives of a batch that are chosen evenly.
-        first_even_probability: probability that each scenario of the first batch is driven.
-        min_even_probability: lower bound of that of later batches.
-        max_even_probability: upper bound of it.
-        frequent_ratio: if failures are more frequent than that upper bound, this multiple of their
-            rate is driven: they need no choice.
+        even_share: share of the drives of a batch that are chosen evenly, until a drive fails.
+        min_even_probability: lower bound of the probability that each scenario of a batch is
+            driven.
+        max_even_probability: its upper bound while failures are rare and expected.
+        prior_surprises: unexpected failures that are assumed before the first drive.
+        prior_precision: share of failures among the drives near to failure, assumed likewise.
+        frequent_ratio: if failures are more frequent than `max_even_probability`, this multiple of
+            their rate is driven: they need no choice.
+        extra_even_ratio: weight of the hit that the upper end of an interval allows for, over that
+            of an evenly chosen drive. With 0 the intervals of 300 drives hold the rate of a planner
+            that fails in two opposite regions in 90 % of the searches, with 0.4 in 95 %.
+        extra_rate_ratio: bound of that weight over the rate: rare failures that are all foreseen
+            keep narrow intervals.
         error_factor: on the error of the regression; a larger one means more drives and smaller
             weights.
     """
@@ -66,15 +79,19 @@ class SearchSettings:
     members_per_seed: int = 4
     moves: int = 24
     max_levels: int = 12
+    first_explored: int = 110
     first_step: float = 0.5
     accepted_share: float = 0.4
     batch: int = 256
     refit_ratio: float = 1.1
-    even_share: float = 0.4
-    first_even_probability: float = 0.02
+    even_share: float = 0.95
     min_even_probability: float = 0.005
     max_even_probability: float = 0.1
+    prior_surprises: float = 0.02
+    prior_precision: float = 0.5
     frequent_ratio: float = 1.5
+    extra_even_ratio: float = 0.4
+    extra_rate_ratio: float = 0.7
     error_factor: float = 3.0
 
 
@@ -117,6 +134,20 @@ class _SpentError(Exception):
     """The budget is spent."""
 
 
+class _Batch(NamedTuple):
+    """A batch of natural scenarios, or the share of it that was driven.
+
+    Attributes:
+        scenarios: number of certified scenarios.
+        least: least probability that one is driven.
+        expected: number of drives that was expected before it was drawn.
+    """
+
+    scenarios: float
+    least: float
+    expected: float
+
+
 class _Drawn(NamedTuple):
     """A certified scenario with its numbers (d,) and its features."""
 
@@ -151,21 +182,20 @@ class Search:
 
     # Features of each drive.
     _features: list[tuple[float, ...]] = field(default_factory=list)
-    # Drives of natural scenarios: those without any choice, those that the regression chose, and
-    # those of the latter that were chosen evenly, because no failure was expected.
+    # Drives of natural scenarios: those without any choice, those of the batches, and those of the
+    # latter that were chosen evenly, because no failure was expected.
     _natural: list[int] = field(default_factory=list)
-    _sampled: list[int] = field(default_factory=list)
-    _unexpected: list[int] = field(default_factory=list)
-    # Of each batch: number of scenarios, and the least probability that one is driven.
-    _batches: list[tuple[int, float]] = field(default_factory=list)
+    _even: list[int] = field(default_factory=list)
+    _batches: list[_Batch] = field(default_factory=list)
+    _batch_of: dict[int, int] = field(default_factory=dict)
     _batch_count: int = 0
+    _nearness: Floats = field(default_factory=lambda: np.zeros(1))  # (S,) of the last batch
     _run_count: int = 0
     _drawn: int = 0  # natural candidates
     _certified: int = 0  # of these
     _explored: int = 0  # drives of the exploration
     # The last regression, and the number of drives that it was fitted to.
     _regression: "tuple[int, _Predictor] | None" = None
-    _even_probability: float = SETTINGS.first_even_probability
 
     def run(self) -> Estimate:
         """Search until the budget is spent, or no candidate can be certified."""
@@ -240,6 +270,8 @@ class Search:
         self, generator: np.random.Generator, population: list[int], target: int
     ) -> None:
         """Run the levels of a subset simulation from a population of natural drives."""
+        allowed = max(SETTINGS.first_explored, SETTINGS.explored_share * len(self.z))
+        last = len(self.z) - len(population) + allowed  # number of drives at which it is cut
         seed_count = len(population) // SETTINGS.members_per_seed
         step = SETTINGS.first_step
         for _ in range(SETTINGS.max_levels):
@@ -250,7 +282,7 @@ class Search:
                 break
             goal = threshold if self.worst else max(threshold, 0.0)
             population, step = self._chains(generator, seeds, (target, goal), step)
-            if threshold <= 0.0 and not self.worst:
+            if (threshold <= 0.0 or len(self.z) >= last) and not self.worst:
                 break
 
     def _distance(self, k: int, target: int) -> float:
@@ -326,7 +358,7 @@ class Search:
         columns = np.column_stack([self.z, self._features])
         figures = np.array([response.parts or (response.margin,) for response in self.responses])
         failed = np.array([response.failed for response in self.responses])
-        natural = np.isin(np.arange(len(failed)), [*self._natural, *self._sampled])
+        natural = np.isin(np.arange(len(failed)), [*self._natural, *self._batch_of])
         for part in figures.T:  # a failure is a failure of its least part
             part[failed & (part == figures.min(axis=1))] = -math.inf
         features = len(self._features[0])
@@ -338,43 +370,61 @@ class Search:
     def _estimate(self) -> bool:
         """Draw one batch of natural scenarios and drive in some of them.
 
-        The whole batch is drawn and weighted before the first drive, so that the rate is unbiased.
-        A batch that the budget cuts short does not count. Return False if none can be certified.
+        The whole batch is drawn and weighted before the first drive. Return False if none can be
+        certified.
         """
         generator = self._generator(2, self._batch_count)
         self._batch_count += 1
+        if not self._batches:
+            natural = [_Drawn(self.z[k], None, self._features[k]) for k in self._natural]
+            self._nearness = self._near(natural)
+        least, near_factor = self._design()
+        expected = SETTINGS.batch * np.maximum(near_factor * self._nearness, least).mean()
         drawn = self._draw(generator)
-        uniform = generator.random(len(drawn))
         if not drawn:
             return False
-        least = self._least_probability()
-        predicted, error = self._predictor()(drawn)
-        tail = special.ndtr(-predicted / (SETTINGS.error_factor * error)).max(axis=1)
-        near = np.clip(2.0 * tail, 0.0, 1.0)
-        probability = np.maximum(near, least)
-        chosen = np.flatnonzero(uniform < probability).tolist()
+        self._nearness = self._near(drawn)
+        probability = np.maximum(near_factor * self._nearness, least)
+        chosen = np.flatnonzero(generator.random(len(drawn)) < probability)
+        chosen = generator.permutation(chosen)
         driven = self._drive([drawn[place] for place in chosen])
-        self._sampled += driven
-        if len(driven) == len(chosen):
-            self._batches.append((len(drawn), least))
-            for place, k in zip(chosen, driven, strict=True):
-                self.weights[k] = float(1.0 / probability[place])
-                if probability[place] <= least:
-                    self._unexpected.append(k)
-            ratio = SETTINGS.even_share / (1.0 - SETTINGS.even_share)
-            self._even_probability = min(
-                max(ratio * float(near.mean()), SETTINGS.min_even_probability),
-                SETTINGS.max_even_probability,
-            )
+        share = len(driven) / len(chosen) if len(chosen) else 1.0
+        if share > 0.0:
+            self._batches.append(_Batch(share * len(drawn), least, share * float(expected)))
+        for place, k in zip(chosen, driven, strict=False):
+            self._batch_of[k] = len(self._batches) - 1
+            self.weights[k] = float(1.0 / probability[place])
+            if probability[place] <= least:
+                self._even.append(k)
         self._check_budget()
         return True
 
-    def _least_probability(self) -> float:
-        """Return the least probability that a scenario of the next batch is driven."""
+    def _near(self, drawn: Sequence[_Drawn]) -> Floats:
+        """Return the probabilities (S,) of being driven for the predicted nearness to failure."""
+        predicted, error = self._predictor()(drawn)
+        tail = special.ndtr(-predicted / (SETTINGS.error_factor * error)).max(axis=1)
+        return np.clip(2.0 * tail, 0.0, 1.0)
+
+    def _design(self) -> tuple[float, float]:
+        """Return the least probability of the next batch, and the factor on nearness.
+
+        Until a drive fails, most drives are chosen evenly, since they alone bound the rate.
+        Afterwards the least probability is that of Neyman's allocation: the root of the ratio of
+        unexpected failures per even drive to expected ones per drive near to failure.
+        """
+        low, high = SETTINGS.min_even_probability, SETTINGS.max_even_probability
+        if not self._failure_count(range(len(self.z))):
+            ratio = (1.0 - SETTINGS.even_share) / SETTINGS.even_share
+            return high, min(1.0, ratio * high / max(float(self._nearness.mean()), 1e-9))
+        near = [k for k in self._batch_of if k not in set(self._even)]
+        surprises = self._failure_count(self._even) + SETTINGS.prior_surprises
+        surprise_rate = surprises / (len(self._even) + 1.0)
+        precision = (self._failure_count(near) + SETTINGS.prior_precision) / (len(near) + 1.0)
+        least = max(math.sqrt(surprise_rate / precision), low)
         failure_rate = self._failure_count(self._natural) / len(self._natural)
-        if failure_rate <= SETTINGS.max_even_probability:
-            return self._even_probability
-        return max(self._even_probability, min(SETTINGS.frequent_ratio * failure_rate, 1.0))
+        if failure_rate > high:
+            least = max(least, SETTINGS.frequent_ratio * failure_rate)
+        return min(least, 1.0), 1.0
 
     def _failure_count(self, drives: Sequence[int]) -> int:
         """Return the number of failures among some drives."""
@@ -395,10 +445,10 @@ class Search:
         for k in failed:
             kind = self.responses[k].kind
             shares[kind] = shares.get(kind, 0.0) + self.weights[k]
-        seen = sum(count for count, _ in self._batches)
+        seen = sum(batch.scenarios for batch in self._batches)
         if seen:
             rate = self._rate(failed, also_natural=not hits)
-            surprises = [k for k in self._unexpected if self.responses[k].failed]
+            surprises = [k for k in self._even if self.responses[k].failed]
             unexpected = self._rate(surprises, also_natural=not hits).high
         numbers = enumerate(self.responses, start=1)
         return Estimate(
@@ -406,7 +456,7 @@ class Search:
             plain=(hits, len(self._natural)),
             drives=len(self.z),
             first=next((number for number, response in numbers if response.failed), 0),
-            seen=seen,
+            seen=round(seen),
             valid=self._certified / max(self._drawn, 1),
             unexpected=unexpected,
             shares={kind: part / math.fsum(shares.values()) for kind, part in shares.items()},
@@ -433,24 +483,35 @@ class Search:
     def _rate(self, hits: Sequence[int], *, also_natural: bool) -> Interval:
         """Return the rate of some drives over the batches, with its interval.
 
-        That is the gamma interval of a sum of weights (Fay & Feuer 1997).
+        That is the gamma interval of a sum of weights (Fay & Feuer 1997). Its upper end allows for
+        one more hit, which has at least the weight of `extra_even_ratio` evenly chosen drives, or
+        `extra_rate_ratio` of the rate if that is less.
 
         Args:
             hits: drives that have a weight.
             also_natural: the natural drives of the exploration have no hit, either.
         """
-        weights = np.array([self.weights[k] for k in hits])
-        if not len(weights):
+        if not hits:
             return self._rate_without_hits(also_natural=also_natural)
+        expected = sum(batch.expected for batch in self._batches)
+        weights = np.array([self.weights[k] / self._batch(k).scenarios for k in hits])
+        weights *= np.array([self._batch(k).expected for k in hits]) / expected
+        even = sum(batch.scenarios * batch.least for batch in self._batches)
         half_confidence = 0.5 * SETTINGS.confidence
-        seen = sum(count for count, _ in self._batches)
-        total = float(weights.sum())
-        variance = float((weights * (weights - total / seen)).sum())
-        largest = float(weights.max())
-        low = _gamma_quantile(total, max(variance, total * 1e-9), 0.5 - half_confidence)
+        rate = float(weights.sum())
+        variance = float(weights @ weights)
+        largest = max(
+            float(weights.max()),
+            min(SETTINGS.extra_even_ratio / even, SETTINGS.extra_rate_ratio * rate),
+        )
+        low = _gamma_quantile(rate, variance, 0.5 - half_confidence)
         upper_variance = variance + largest * largest
-        high = _gamma_quantile(total + largest, upper_variance, 0.5 + half_confidence)
-        return Interval(min(total / seen, 1.0), min(low / seen, 1.0), min(high / seen, 1.0))
+        high = _gamma_quantile(rate + largest, upper_variance, 0.5 + half_confidence)
+        return Interval(min(rate, 1.0), min(low, 1.0), min(high, 1.0))
+
+    def _batch(self, k: int) -> _Batch:
+        """Return the batch of a drive."""
+        return self._batches[self._batch_of[k]]
 
     def _rate_without_hits(self, *, also_natural: bool) -> Interval:
         """Return the interval of a rate of 0.
@@ -459,8 +520,8 @@ class Search:
         scenarios is driven with a probability of e at least, which is fixed before they are drawn.
         So that probability is Π (1 - rate · e)^n at most, over the batches.
         """
-        natural = (len(self._natural) * also_natural, 1.0)
-        count, probability = np.array([*self._batches, natural]).T
+        natural = _Batch(len(self._natural) * also_natural, 1.0, 0.0)
+        count, probability, _ = np.array([*self._batches, natural]).T
         log_tail = math.log(0.5 - 0.5 * SETTINGS.confidence)
 
         def excess(rate: float) -> float:

@@ -73,8 +73,10 @@ class Unforeseen(Plane):
         return -1.0 if abs(row[5]) * 1e6 % 1.0 < self.rate else 0.5 + abs(row[5])
 
 
-@pytest.mark.parametrize(("rate", "budget"), [(1e-2, 300), (1e-3, 400)])
-def test_the_interval_holds_the_rate_and_costs_fewer_drives_than_plain_sampling(rate, budget):
+@pytest.mark.parametrize(("rate", "budget", "most"), [(1e-2, 300, 1 / 2), (1e-3, 400, 1 / 3)])
+def test_the_interval_holds_the_rate_and_costs_fewer_drives_than_plain_sampling(
+    rate, budget, most
+):
     held, share = 0, []
     for seed in range(SEEDS):
         search = Search(Plane(rate, allowed=1.0), seed, budget)
@@ -86,7 +88,49 @@ def test_the_interval_holds_the_rate_and_costs_fewer_drives_than_plain_sampling(
             estimate.drives == len(search.z) == budget and 0.8 < estimate.valid < 0.88
         )  # norm.cdf(1) is 0.84
     assert held >= HELD
-    assert np.median(share) < 1 / 3
+    assert np.median(share) < most
+
+
+class Opposite(Plane):
+    """Fails at both ends of one direction, so that a regression sees no slope."""
+
+    def margin(self, row):
+        return float(-norm.ppf(0.5 * self.rate) - abs(self.direction @ row))
+
+
+class Step(Plane):
+    """Fails in two regions, of which one gives no warning."""
+
+    def margin(self, row):
+        sudden = -1.0 if row[15] > norm.isf(0.5 * self.rate) else 1.0
+        return min(float(-norm.ppf(0.5 * self.rate) - self.direction @ row), sudden)
+
+
+@pytest.mark.parametrize("kind", [Opposite, Step, TwoPlanes, Unforeseen])
+def test_the_rate_is_unbiased_and_held_where_the_regression_sees_half_of_the_failures(kind):
+    rate, seeds = 1.2e-2, 3 * SEEDS
+    total = 2.0 * rate if kind is TwoPlanes else rate
+    rates = [Search(kind(rate), seed, 300).run().rate for seed in range(seeds)]
+    held = sum(each.low <= total <= each.high for each in rates)
+    assert held >= 0.8 * seeds  # 14 of 18 have a probability of 0.01 at 95 %
+    error = 1.5 * math.sqrt(total / 300 / seeds)  # of the mean, 1.5 times that of plain sampling
+    assert abs(np.mean([each.value for each in rates]) - total) < 3.0 * error
+
+
+def test_without_a_failure_the_bound_is_near_that_of_plain_sampling():
+    plain = 1.0 - 0.025 ** (1.0 / 300)
+    for seed in range(SEEDS):
+        estimate = Search(Unforeseen(0.0), seed, 300).run()
+        assert plain <= estimate.rate.high <= estimate.bound <= 1.5 * plain
+
+
+def test_a_batch_that_the_budget_cuts_short_counts_with_the_driven_share():
+    """Whatever the budget, the drives of the batches stand for the scenarios that they count."""
+    for budget in range(200, 216, 5):
+        search = Search(Unforeseen(5e-2), 3, budget)
+        estimate = search.run()
+        assert estimate.drives == budget
+        assert sum(search.weights.values()) == pytest.approx(estimate.seen, rel=0.15)
 
 
 @pytest.mark.parametrize(("rate", "budget"), [(0.0, 200), (1e-3, 300), (5e-3, 150), (2e-2, 150)])
