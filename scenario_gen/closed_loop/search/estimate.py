@@ -63,8 +63,8 @@ class SearchSettings:
         frequent_ratio: if failures are more frequent than `max_even_probability`, this multiple of
             their rate is driven: they need no choice.
         extra_even_ratio: weight of the hit that the upper end of an interval allows for, over that
-            of an evenly chosen drive. With 0 the intervals of 300 drives hold the rate of a planner
-            that fails in two opposite regions in 90 % of the searches, with 0.4 in 95 %.
+            of an evenly chosen drive. With 0, 90 % of the intervals of 300 drives hold the rate of
+            a planner that fails in two opposite regions; with 0.4, 95 %.
         extra_rate_ratio: bound of that weight over the rate: rare failures that are all foreseen
             keep narrow intervals.
         error_factor: on the error of the regression; a larger one means more drives and smaller
