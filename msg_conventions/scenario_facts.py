@@ -4,10 +4,12 @@
 """Facts about a scenario ⇄ the key-values of its entry in `scenarios/info`."""
 
 from collections.abc import Mapping
+import json
 import re
 
-from scenario_gen.base.errors import InputError
+from scenario_gen.base.errors import guarded, InputError
 from scenario_gen.types import (
+    Decision,
     Facts,
     Failure,
     FOLLOW,
@@ -41,6 +43,8 @@ def fact_values(facts: Facts) -> dict[str, str]:
     if facts.lost_reactions:
         pairs = [f"{who}>{whom}" for who, whom in facts.lost_reactions]
         values["reactions_lost"] = join_pieces(pairs)
+    if facts.decision is not None:
+        values["decision"] = json.dumps(facts.decision.document())
     if facts.failure is not None:
         values["search.kind"] = facts.failure.kind
         values["search.deviation"] = f"{facts.failure.deviation:.4g}"
@@ -84,7 +88,18 @@ def decode_facts(values: Mapping[str, str], origin: str) -> Facts:
         reactions=_reactions(values.get("reactions", "")),
         lost_reactions=_pairs(values.get("reactions_lost", "")),
         failure=failure,
+        decision=decode_decision(values["decision"], what) if "decision" in values else None,
     )
+
+
+def decode_decision(text: str, what: str) -> Decision:
+    """Return a decision of JSON.
+
+    Raises:
+        InputError: naming `what`, it is damaged.
+    """
+    with guarded(f"{what}: decision"):
+        return Decision.of_document(json.loads(text))
 
 
 def _passing_orders(text: str) -> tuple[PassingOrder, ...]:

@@ -22,7 +22,7 @@ from msg_conventions.cdr import stamp_of
 from msg_conventions.diagnostics import decode_diagnostics, encode_diagnostics, Level, Status
 from msg_conventions.ego import ego_values
 from msg_conventions.hashes import MAP_HASH, TEMPLATE_HASH
-from msg_conventions.scenario_facts import decode_facts, fact_values
+from msg_conventions.scenario_facts import decode_decision, decode_facts, fact_values
 from msg_conventions.scenarios import digest, encode_scenario, messages_of
 from scenario_gen.base.documents import parse_json
 from scenario_gen.base.errors import guarded, InputError
@@ -30,6 +30,7 @@ from scenario_gen.numerics import Floats
 from scenario_gen.types import (
     BoundaryStates,
     Cause,
+    Decided,
     EgoSlot,
     Facts,
     note_kinds,
@@ -44,6 +45,7 @@ from scenario_gen.types import (
 INFO = "scenarios/info"
 REFUSED, ADAPTATION, TARGET = "refused.", "adaptation.", "target."
 RECOMBINED = ("recombined.first", "recombined.second")  # encounters that the vehicles come from
+DECIDED = ("decided.encounter", "decided.decision")  # recording, and the decision as JSON
 KINDS = f"{ADAPTATION}kinds"  # of the adaptations, in their order
 REACTION, CUT = (
     "reaction.",
@@ -192,13 +194,16 @@ class RequestSummary:
             key: value
             for key, value in self.values.items()
             if key not in known
-            and key not in RECOMBINED
+            and key not in RECOMBINED + DECIDED
             and not key.startswith((REFUSED, ADAPTATION, TARGET, REACTION, "ego"))
         }
 
     @property
-    def source(self) -> Recorded | Recombined:
-        """Whether the vehicles of the template were recorded together."""
+    def source(self) -> Recorded | Recombined | Decided:
+        """Whether the vehicles of the template were recorded together, as they drive here."""
+        decided = [self.values[key] for key in DECIDED if key in self.values]
+        if len(decided) == len(DECIDED):
+            return Decided(decided[0], decode_decision(decided[1], INFO))
         names = [self.values[key] for key in RECOMBINED if key in self.values]
         return Recombined(*names) if len(names) == len(RECOMBINED) else Recorded()
 
@@ -278,10 +283,13 @@ class RequestSummary:
 Info = ScenarioEntry | RequestSummary
 
 
-def source_values(source: Recorded | Recombined) -> dict[str, str]:
-    """Return the values of a summary that name the encounters of a recombined template."""
+def source_values(source: Recorded | Recombined | Decided) -> dict[str, str]:
+    """Return the values of a summary that name the encounters a template was made from."""
     if isinstance(source, Recorded):
         return {}
+    if isinstance(source, Decided):
+        decision = json.dumps(source.decision.document())
+        return dict(zip(DECIDED, (source.encounter, decision), strict=True))
     return dict(zip(RECOMBINED, (source.first, source.second), strict=True))
 
 

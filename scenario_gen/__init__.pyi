@@ -19,6 +19,7 @@ from scenario_gen.logs import LogConfig as LogConfig, read_log as read_log
 from scenario_gen.logs.read import LogResult as LogResult
 from scenario_gen.logs.synthetic import bundled as bundled
 from scenario_gen.method.config import PipelineConfig as PipelineConfig
+from scenario_gen.method.decisions import decided as decided, decisions_of as decisions_of
 from scenario_gen.method.evaluation import (
     evaluate as evaluate,
     evaluate_scenarios as evaluate_scenarios,
@@ -52,7 +53,10 @@ from scenario_gen.output.plot import plot as plot
 from scenario_gen.output.results import report as report
 from scenario_gen.output.review.regenerate import regenerate_scenario as regenerate_scenario
 from scenario_gen.output.table import filter_scenarios as filter_scenarios, measures as measures
-from scenario_gen.pipeline import generate as generate
+from scenario_gen.pipeline import (
+    generate as generate,
+    generate_outcomes as generate_outcomes,
+)
 from scenario_gen.roads import build_road as build_road, RoadConfig as RoadConfig
 from scenario_gen.types.encounter import Encounter as Encounter
 from scenario_gen.types.evaluation import Evaluation as Evaluation

@@ -12,6 +12,7 @@ from scenario_gen.base.provenance import what_makes_it_again
 from scenario_gen.method.config import PipelineConfig
 from scenario_gen.method.evaluation import coverage_of, evaluate, measures_in, replay
 from scenario_gen.method.fitting import fit_template
+from scenario_gen.method.outcome_sets import outcome_sets, swapped_order
 from scenario_gen.method.reference_sets import with_references
 from scenario_gen.method.routing import plan_routes
 from scenario_gen.method.sampling import Callbacks, Plan, Progress, sample_scenarios
@@ -31,7 +32,7 @@ from scenario_gen.types import (
     Scenario,
 )
 
-__all__ = ["PipelineConfig", "generate"]
+__all__ = ["PipelineConfig", "generate", "generate_outcomes"]
 
 
 def generate(
@@ -86,6 +87,9 @@ def generate(
             accepts=accepts,
         )
         return on_first_suitable_road(on_road, encounter, config, seed)
+    swapped = swapped_order(encounter, config.sampling) if request.order == "swap" else None
+    if swapped is not None:
+        encounter, request = swapped, replace(request, order="keep")
     road, encounter = road_and_template(road, encounter, config.road)
 
     situation = Situation.of(encounter)
@@ -119,6 +123,57 @@ def generate(
         coverage=coverage_of(encounter, result.generated.scenarios),
         provenance=what_makes_it_again(config, request),
     )
+
+
+def generate_outcomes(
+    encounter: Encounter | Sequence[Encounter],
+    road: Road | str,
+    config: PipelineConfig = PipelineConfig(),
+    *,
+    count: int = 50,
+    seed: int = 0,
+    request: Request = Request(),
+    progress: Progress = lambda *_: None,
+) -> list[GenerationResult]:
+    """Generate one set for each outcome of the encounter's decision, the recorded one first.
+
+    With `sampling.decisions=recorded` there is one set, that of `generate`.
+
+    Args:
+        encounter: the template and further encounters, as for `generate`.
+        road: the target.
+        config: the parameters of every stage; `sampling` has the law of decisions.
+        count: valid scenarios wanted in all sets.
+        seed: of all randomness.
+        request: as for `generate`.
+        progress: as for `generate`, for each set.
+
+    Raises:
+        InputError, RefusedError: as `generate`, for the recorded outcome.
+
+    Examples:
+        >>> import scenario_gen as sg
+        >>> encounter = sg.read_log("my_log.csv").encounters[0]
+        >>> config = sg.PipelineConfig(sampling=sg.SamplingConfig(decisions="drawn"))
+        >>> sum(map(len, sg.generate_outcomes(encounter, "four_way", config)))
+        50
+    """
+    encounter, *population = [encounter] if isinstance(encounter, Encounter) else encounter
+    undecided = replace(config, sampling=replace(config.sampling, decisions="recorded"))
+
+    def generate_set(template: Encounter, size: int) -> GenerationResult:
+        """Generate the scenarios of one outcome."""
+        return generate(
+            [template, *population],
+            road,
+            undecided if template.decision is None else config,
+            count=size,
+            seed=seed,
+            request=request,
+            progress=progress,
+        )
+
+    return outcome_sets(generate_set, encounter, config.sampling, request, count, seed)
 
 
 def _refuse_empty(result: GenerationResult) -> None:

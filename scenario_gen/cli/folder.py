@@ -18,7 +18,7 @@ from scenario_gen.logs import LogResult, NoEncounterError, read_log
 from scenario_gen.method.nearest import answer_refusal
 from scenario_gen.method.recombination import recombinations
 from scenario_gen.output.results import BAG, GENERATED, provenance_of, write_results
-from scenario_gen.pipeline import generate, PipelineConfig
+from scenario_gen.pipeline import generate_outcomes, PipelineConfig
 from scenario_gen.types import (
     Encounter,
     GenerationResult,
@@ -160,7 +160,7 @@ def generate_folder(
 
 
 def _with_recording(case: GenerationResult, sources: dict[str, Source]) -> GenerationResult:
-    recording = {RECORDING: sources[case.encounter.name].recording}
+    recording = {RECORDING: sources[case.encounter.recording].recording}
     return replace(case, provenance={**case.provenance, **recording})
 
 
@@ -281,27 +281,28 @@ def generate_all(
         name = f"{encounter.name} on {Path(road).stem}"
         advance(name, 0, requested.count)
         try:
-            case = _generate_case(encounter, road, requested, recorded, partial(advance, name))
+            sets = _generate_sets(encounter, road, requested, recorded, partial(advance, name))
         except RefusedError as error:
             refusals.append(f"{encounter.name} on {road}: {error}")
             continue
-        cases.append(case)
-        if len(case) < requested.count:
-            refusals.append(
-                f"{encounter.name} on {road}: only {len(case)} of {requested.count} scenarios: "
-                f"{_shortage(case, requested)}"
-            )
+        cases += sets
+        refusals += [
+            f"{case.encounter.name} on {road}: only {len(case)} of {case.generated.requested} "
+            f"scenarios: {_shortage(case, requested)}"
+            for case in sets
+            if len(case) < case.generated.requested
+        ]
     return cases, refusals
 
 
-def _generate_case(
+def _generate_sets(
     encounter: Encounter,
     road: str,
     requested: FolderRequest,
     recorded: Sequence[Encounter],
     advance: Callable[[int, int], None],
-) -> GenerationResult:
-    """Generate scenarios for one encounter and road.
+) -> list[GenerationResult]:
+    """Generate scenarios for one encounter and road, a set for each outcome of its decision.
 
     Raises:
         RefusedError: nothing could be generated; the message names the nearest possible request.
@@ -321,8 +322,8 @@ def _generate_case(
         if request.ego == EGO_AUTO:
             request = replace(request, ego=testing(request).who_reacts_most())
         if requested.for_testing:
-            return testing(request).run(count, report)
-        return generate(
+            return [testing(request).run(count, report)]
+        return generate_outcomes(
             [encounter, *recorded],
             road,
             config,

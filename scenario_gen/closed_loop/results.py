@@ -33,6 +33,7 @@ from scenario_gen.output.report.data import (
     states,
 )
 from scenario_gen.output.report.html import render_page
+from scenario_gen.types import Decision
 
 JSON, JUNIT, PAGE = "drives.json", "junit.xml", "drives.html"
 DRIVEN = Kind("driven")
@@ -87,7 +88,12 @@ class Drives:
 
     def notes(self) -> list[str]:
         """Return sentences that qualify the figures."""
-        messages = [self._origin_note(), self._copies_note(), self._baseline_note()]
+        messages = [
+            self._origin_note(),
+            self._outcomes_note(),
+            self._copies_note(),
+            self._baseline_note(),
+        ]
         if self.comparison is not None:
             messages.append(self.comparison.sentence())
         messages.append(self._scores_note())
@@ -106,6 +112,27 @@ class Drives:
                 "encounter are similar"
             )
         return ""
+
+    def _outcomes_note(self) -> str:
+        """Return how many drives pass with each outcome of the decisions, if they were drawn."""
+        passed: dict[tuple[str, Decision], list[bool]] = {}
+        for trial, outcome in zip(self.trials, self.outcomes, strict=False):
+            decision = trial.scenario.facts.decision
+            if decision is not None:
+                key = trial.encounter, decision
+                passed.setdefault(key, []).append(outcome.verdict.passed)
+        if not passed:
+            return ""
+        by_outcome: dict[str, list[bool]] = {}
+        for (_, decision), drives in passed.items():
+            by_outcome.setdefault(decision.outcome, []).extend(drives)
+        counts = [f"{name}: {sum(each)} of {len(each)}" for name, each in by_outcome.items()]
+        shares = [sum(drives) / len(drives) for drives in passed.values()]
+        share = np.average(shares, weights=[decision.probability for _, decision in passed])
+        return (
+            f"passed by outcome of the decision: {', '.join(counts)}; "
+            f"{share:.0%} weighted by its probability"
+        )
 
     def _copies_note(self) -> str:
         copies = len([outcome for outcome in self.outcomes if outcome.origin.copy_of])

@@ -209,15 +209,20 @@ def trials_of(result: GenerationResult, ego: str = "") -> list[Trial]:
     for scenario in result:
         index = str(scenario.index)
         trial = trial_of(index, scenario, None, result.road, ego, f"scenario {index}")
-        trials.append(replace(trial, encounter=result.encounter.name))
+        trials.append(replace(trial, encounter=result.encounter.recording))
     return trials
 
 
 def _encounter_of(entry: ScenarioEntry | None) -> str:
-    """Return the name and the short hash of a scenario's template; "" if it is not known."""
+    """Return the name and the short hash of a scenario's template; "" if it is not known.
+
+    The outcomes of a decision come from one encounter, and have its name alone.
+    """
     if entry is None:
         return ""
     name, digest = entry.status.values.get("template", ""), entry.template_hash or ""
+    if entry.facts.decision is not None:
+        return name
     return f"{name} {digest[:8]}".strip()
 
 

@@ -19,7 +19,7 @@ from scenario_gen.situation.conflicts import Conflict
 from scenario_gen.situation.gaps import MIN_HEADWAY_SPEED_MPS
 from scenario_gen.situation.tracks import Track
 from scenario_gen.situation.waits import Wait
-from scenario_gen.types import Encounter, Reaction
+from scenario_gen.types import Encounter, Outcome, Reaction, tokens
 
 
 class Range(NamedTuple):
@@ -129,6 +129,21 @@ class Recording:
     def pairs(self) -> list[tuple[int, int]]:
         """All ordered pairs of vehicles."""
         return list(permutations(range(len(self.tracks)), 2))
+
+    @property
+    def decided_yield(self) -> tuple[int, int] | None:
+        """Who yields to whom by the decision that the encounter was made with, if it has one.
+
+        A vehicle that goes second without slowing down does not yield.
+        """
+        decision = self.encounter.decision
+        if decision is None or decision.outcome is Outcome.GOES_SECOND:
+            return None
+        names = tokens(vehicle.id for vehicle in self.encounter.vehicles)
+        first, second = decision.first, decision.second
+        if not {first, second} <= set(names):
+            return None
+        return names.index(second), names.index(first)
 
 
 def closeness_confidence(time_gap: float, limits: Range) -> float:

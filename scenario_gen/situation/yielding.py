@@ -35,13 +35,11 @@ def yielding_evidence(recording: Recording, conflict: Conflict) -> Evidence | No
     """Return the evidence of the second vehicle at a conflict.
 
     None if it drives behind the first one before and after, or enters when it is first recorded.
+    The reaction that an encounter was made with is certain.
     """
     encounter, who, whom = recording.encounter, conflict.second, conflict.first
-    k = max(int(np.searchsorted(encounter.time, conflict.entry_second)) - 1, 0)
-    if k <= encounter.present[who, 0]:
-        return None
-    behind = conflict.following or is_behind(encounter, who, whom)[k]
-    if behind and not _enters_from_beside(recording, conflict):
+    is_decided = recording.decided_yield == (who, whom)
+    if not is_decided and not _comes_from_beside(recording, conflict):
         return None
 
     clears, enters = passing(encounter, conflict, merges=conflict.following)
@@ -59,7 +57,7 @@ def yielding_evidence(recording: Recording, conflict: Conflict) -> Evidence | No
         need,
         _answers_clearing(lag, encounter.duration) if departs else 0.0,
     )
-    if confidence < LIMITS.min_confidence:
+    if confidence < LIMITS.min_confidence and not is_decided:
         return Evidence(who, whom, time_gap)
     reaction = Reaction(
         YIELD,
@@ -68,7 +66,7 @@ def yielding_evidence(recording: Recording, conflict: Conflict) -> Evidence | No
         lag,
         1.0,
         LIMITS.yield_sigma_s,
-        confidence,
+        1.0 if is_decided else confidence,
         since,
         until,
         gap=gap,
@@ -87,6 +85,16 @@ def _answers_clearing(lag: float, duration: float) -> float:
     deviation = (lag - LIMITS.departure_lag_s) / sigma
     density = math.exp(-0.5 * deviation * deviation) / (sigma * math.sqrt(2.0 * math.pi))
     return density / (density + 1.0 / max(duration, 1.0))
+
+
+def _comes_from_beside(recording: Recording, conflict: Conflict) -> bool:
+    """Whether the second vehicle enters after it is first recorded, and not behind the first."""
+    encounter, who = recording.encounter, conflict.second
+    k = max(int(np.searchsorted(encounter.time, conflict.entry_second)) - 1, 0)
+    if k <= encounter.present[who, 0]:
+        return False
+    behind = conflict.following or is_behind(encounter, who, conflict.first)[k]
+    return not behind or _enters_from_beside(recording, conflict)
 
 
 def _enters_from_beside(recording: Recording, conflict: Conflict) -> bool:

@@ -16,7 +16,9 @@ from scenario_gen.base.road_users import (
     words,
 )
 from scenario_gen.types.coverage import Coverage, Spread
+from scenario_gen.types.decision import Decision, Outcome
 from scenario_gen.types.encounter import (
+    Decided,
     Encounter,
     Recombined,
     Recorded,
@@ -145,6 +147,8 @@ __all__ = [
     "Cause",
     "CheckCounts",
     "Coverage",
+    "Decided",
+    "Decision",
     "DrawnFor",
     "Dynamics",
     "EgoSlot",
@@ -168,6 +172,7 @@ __all__ = [
     "Note",
     "NoteKind",
     "OrderChange",
+    "Outcome",
     "Pair",
     "PassingOrder",
     "Quality",

@@ -12,6 +12,7 @@ import numpy as np
 
 from scenario_gen.base.errors import did_you_mean, InputError
 from scenario_gen.numerics import Floats, freeze
+from scenario_gen.types.decision import Decision
 from scenario_gen.types.motion import Motion
 
 MAX_UNEVEN_S = 1e-6  # a time may differ by this from a whole multiple of the period
@@ -40,6 +41,19 @@ class Recombined:
         return f"{self.first} + {self.second}"
 
 
+@dataclass(frozen=True)
+class Decided:
+    """Source of an encounter: two recorded vehicles with the outcome of a decision.
+
+    Attributes:
+        encounter: name of the recorded encounter.
+        decision: its outcome here, as recorded or another one.
+    """
+
+    encounter: str
+    decision: Decision
+
+
 @dataclass(frozen=True, eq=False)
 class Encounter(Motion):
     """The evenly sampled, finite motion of N >= 2 vehicles in a local east-north frame.
@@ -59,7 +73,7 @@ class Encounter(Motion):
     name: str
     start_ns: int = 0
     origin: tuple[float, float] | None = None
-    source: Recorded | Recombined = Recorded()
+    source: Recorded | Recombined | Decided = Recorded()
 
     def __post_init__(self) -> None:
         _check_arrays(self)
@@ -81,6 +95,16 @@ class Encounter(Motion):
     def title(self) -> str:
         """Its name in messages."""
         return f"encounter {self.name}"
+
+    @property
+    def decision(self) -> Decision | None:
+        """The decision with which it was made; None unless its source is `Decided`."""
+        return self.source.decision if isinstance(self.source, Decided) else None
+
+    @property
+    def recording(self) -> str:
+        """Name of the recorded encounter that it is an outcome of; else its own name."""
+        return self.source.encounter if isinstance(self.source, Decided) else self.name
 
     @property
     def dt_ns(self) -> int:

@@ -7,6 +7,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import StrEnum
 
+from scenario_gen.types.decision import Decision
+
 FOLLOW, YIELD = "follow", "yield"
 
 
@@ -74,6 +76,7 @@ class Facts:
         reactions: those that the scenario keeps.
         lost_reactions: pairs (who, whom) to whose reaction the scenario is not held.
         failure: of a planner under test, in scenarios that a search found.
+        decision: the outcome that the scenario has, if decisions were drawn.
     """
 
     closest_approach_m: float | None = None
@@ -86,3 +89,4 @@ class Facts:
     reactions: tuple[NamedReaction, ...] = ()
     lost_reactions: tuple[tuple[str, str], ...] = ()
     failure: Failure | None = None
+    decision: Decision | None = None

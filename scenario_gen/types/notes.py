@@ -61,6 +61,9 @@ class NoteKind(Enum):
     # Sampling.
     AUTO_ROAD = "road auto: {road}, the first built-in road on which the encounter is unchanged"
     RECOMBINED = "recombined from {first} and {second}: this encounter was not recorded"
+    OUTCOMES = "outcomes of the decision: {mix}"
+    OUTCOME_REFUSED = "{decision} is not possible on this road: {reason}"
+    NOTHING_DECIDED = "decisions: only the recorded outcome: {reason}"
     NOT_DRIVABLE = "{reasons}"
     SLOWED = (
         "slowed by up to {percent:.0f} % before bends, most for vehicle {vehicle} at {time:.1f} s "

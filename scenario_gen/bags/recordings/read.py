@@ -39,6 +39,7 @@ from scenario_gen.bags.storage.bag import BagMessage, naming_bag, read_messages
 from scenario_gen.bags.storage.config import BagConfig
 from scenario_gen.base.errors import InputError
 from scenario_gen.types import (
+    Decided,
     Encounter,
     Fit,
     GenerationResult,
@@ -177,7 +178,13 @@ class Namespace(RecordedScenarios):
         wanted = entry.template_hash if entry else None
         named = [data for data in self.data("tracks") if wanted == hash_of("tracks", data)]
         data = named[0] if named else self.newest("tracks", stamp_ns)
-        return decode_tracks(data, self.where("tracks")) if data else None
+        if not data:
+            return None
+        encounter = decode_tracks(data, self.where("tracks"))
+        decision = entry.facts.decision if entry else None
+        if decision is not None:
+            encounter = replace(encounter, source=Decided(encounter.name, decision))
+        return encounter
 
     def road_of(self, entry: ScenarioEntry | None, stamp_ns: int) -> Road | None:
         """Return the road that an entry names, else the newest with the stamp, or of all.

@@ -79,7 +79,7 @@ def result_messages(
         encounter,
         request,
         "/gp_sampler",
-        {"template": encounter.name, "road": road.name, **hashes},
+        {"template": encounter.recording, "road": road.name, **hashes},
     )
     logged = stamp
     for scenario in result.generated.scenarios:

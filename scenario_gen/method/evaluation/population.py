@@ -40,6 +40,7 @@ from scenario_gen.method.evaluation.population_result import (
 from scenario_gen.numerics import Bools, Floats, Ints
 from scenario_gen.situation import EncounterKind
 from scenario_gen.types import (
+    Encounter,
     GenerationResult,
     Interval,
     join_ego,
@@ -189,14 +190,14 @@ class Members:
 def members_of(results: Iterable[tuple[str, GenerationResult]]) -> Members:
     """Return the members of recordings and generated sets; arguments as in `population_of`.
 
-    An encounter that is called as two others are together, "A + B", is recombined of these: it is
-    no recorded one, and what is generated from it is of both. It is left out where one of these is
+    An encounter with vehicles of two others, or with another outcome of a decision, is not a
+    recorded one: what is generated from it belongs to those. It is left out where one of these is
     not among the results.
     """
     recorded: list[EncounterFeatures] = []
     made: list[EncounterFeatures] = []
     names: list[str] = []
-    recombined: list[tuple[Recombined, list[EncounterFeatures]]] = []
+    derived: list[tuple[tuple[str, ...], list[EncounterFeatures]]] = []
     for recording, result in results:
         template = features_of(result.encounter, recording, len(recorded))
         if template.kind is None:
@@ -205,21 +206,34 @@ def members_of(results: Iterable[tuple[str, GenerationResult]]) -> Members:
             scenario_features(join_ego(scenario), template, result.encounter)
             for scenario in result
         ]
-        if isinstance(result.encounter.source, Recombined):
-            recombined.append((result.encounter.source, generated))
+        parents = _parents(result.encounter)
+        if parents:
+            derived.append((parents, generated))
         else:
             recorded.append(template)
             names.append(result.encounter.name)
             made += generated
-    for source, generated in recombined:
-        if {source.first, source.second} <= set(names):
-            first = recorded[names.index(source.first)]
-            second = names.index(source.second)
+    for parents, generated in derived:
+        if set(parents) <= set(names):
+            first, *others = [names.index(name) for name in parents]
             made += [
-                replace(member, recording=first.recording, template=first.template, other=second)
+                replace(
+                    member,
+                    recording=recorded[first].recording,
+                    template=first,
+                    other=others[0] if others else -1,
+                )
                 for member in generated
             ]
     return Members(recorded, made, names)
+
+
+def _parents(encounter: Encounter) -> tuple[str, ...]:
+    """Return the names of the recorded encounters that another one was made from."""
+    source = encounter.source
+    if isinstance(source, Recombined):
+        return source.first, source.second
+    return () if encounter.recording == encounter.name else (encounter.recording,)
 
 
 def _needed(points: Sequence[CoveragePoint]) -> float:

@@ -76,6 +76,28 @@ class SamplingConfig(Parameters):
         "`none`: no vehicle reacts",
         choices=("keep", "none"),
     )
+    decisions: str = parameter(
+        "recorded",
+        "`recorded`: who goes first stays as recorded; `drawn`: other outcomes that drivers would "
+        "have chosen get sets of their own, with counts by their probability",
+        choices=("recorded", "drawn"),
+    )
+    decision_rate: float = parameter(
+        0.8,
+        "drawn: β of P(goes first) = 1 / (1 + exp(-β lag)), fitted to 67 recorded left turns and "
+        "crossings (0.86 ± 0.21)",
+        unit="1/s",
+        low=0.0,
+        high=10.0,
+    )
+    offered_lag_sigma: float = parameter(
+        3.0,
+        "drawn: standard deviation of the offered lag, by which the other vehicle would arrive "
+        "later if nobody slowed down",
+        unit="s",
+        low=0.1,
+        high=10.0,
+    )
     freedom: float = parameter(
         2.5, "wide: standard deviations at which variations are truncated", low=0.5, high=4.0
     )

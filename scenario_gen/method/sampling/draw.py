@@ -403,6 +403,7 @@ def label_of(
             passing_order=tuple(_passing_order(names, each, whole) for each in conflicts),
             reactions=kept,
             lost_reactions=lost_names,
+            decision=situation.encounter.decision,
         )
 
     return label

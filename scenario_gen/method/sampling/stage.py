@@ -5,6 +5,7 @@
 
 from dataclasses import replace
 
+from scenario_gen.base.errors import InputError
 from scenario_gen.method.sampling.build_model import kept_reactions
 from scenario_gen.method.sampling.config import SamplingConfig
 from scenario_gen.method.sampling.draw import draw_scenarios
@@ -39,9 +40,14 @@ def sample_scenarios(
         measures: measures scenarios for a target.
 
     Raises:
-        InputError: road or fit are not known.
+        InputError: road or fit are not known, or decisions are to be drawn.
         RefusedError: as `draw_scenarios`.
     """
+    if sampling.decisions == "drawn" and planned.encounter.decision is None:
+        raise InputError(
+            "sampling.decisions=drawn gives a set for each outcome: "
+            "use `scenario-gen generate`, or `generate_outcomes` of the library"
+        )
     plan = plan or Plan.of(planned, sampling, limits, request)
     generated = draw_scenarios(
         plan,

@@ -19,6 +19,7 @@ from scenario_gen.types import (
     formatted,
     GenerationResult,
     NARROW,
+    NoteKind,
     REPLAY,
     routes_in_words,
     Row,
@@ -38,6 +39,7 @@ NOT_COMPARED = (
 )
 VARIED = ("pet", "gap", "speed")
 """Figures whose range is printed: PET, or the smallest gap if no vehicles cross, and the speed."""
+DECISION_NOTES = (NoteKind.OUTCOMES, NoteKind.OUTCOME_REFUSED, NoteKind.NOTHING_DECIDED)
 WARNING_STYLE = "yellow"
 
 
@@ -71,6 +73,9 @@ def _case(case: GenerationResult, verbose: bool) -> list[RenderableType]:
     for sentence in case.reacting["sentences"]:
         table.add_row("", "reaction", printable(sentence))
     table.add_row("", "valid", _validity(case.generated))
+    for note in case.generated.adaptations:
+        if note.kind in DECISION_NOTES:
+            table.add_row("", "decision", printable(str(note)))
     if variety := _variety(case):
         table.add_row("", "variety", variety)
     for message in not_kept:

@@ -270,7 +270,9 @@ class _Published:
                 f"{origin} cannot be regenerated: the bag has no {', '.join(missing)} with the "
                 "scenario's stamp"
             )
-        return decode_template(newest)
+        template = decode_template(newest)
+        encounter = replace(template.encounter, source=self.summary.source)
+        return replace(template, encounter=encounter)
 
 
 def _entries(bag: Path, config: BagConfig) -> list[tuple[Namespace, ScenarioEntry, BagMessage]]:
