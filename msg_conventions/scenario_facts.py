@@ -88,17 +88,17 @@ def decode_facts(values: Mapping[str, str], origin: str) -> Facts:
         reactions=_reactions(values.get("reactions", "")),
         lost_reactions=_pairs(values.get("reactions_lost", "")),
         failure=failure,
-        decision=decode_decision(values["decision"], what) if "decision" in values else None,
+        decision=decode_decision(values["decision"], origin) if "decision" in values else None,
     )
 
 
-def decode_decision(text: str, what: str) -> Decision:
-    """Return a decision of JSON.
+def decode_decision(text: str, origin: str) -> Decision:
+    """Return a decision from JSON; `origin` names it in messages.
 
     Raises:
-        InputError: naming `what`, it is damaged.
+        InputError: it is damaged.
     """
-    with guarded(f"{what}: decision"):
+    with guarded(f"{origin}: decision"):
         return Decision.of_document(json.loads(text))
 
 

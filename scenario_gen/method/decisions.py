@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Decisions: encounters in which a driver goes first, rolls or stops although he was recorded otherwise.
+"""Decisions: encounters in which a driver goes first, rolls or stops, but did not when recorded.
 
 A decision belongs to a conflict whose recorded first vehicle is i and whose second vehicle is j.
 The *offered lag* x is the time from the instant at which j could enter the shared area to the
@@ -62,12 +62,12 @@ class DecisionMargins:
         horizon_s: time before the shared area at which a driver decides.
         min_together_s: time for which both vehicles are present.
         max_merge_lag_s: in a merge a larger lag leaves nothing to decide.
-        min_gap_s, usual_gap_s, max_gap_s: from the first vehicle's exit to the second one's entry.
+        min_gap_s: from the first vehicle's exit to the second one's entry.
+        free_gap_s: a driver who would enter later than this does not slow down.
         approach_s: time before the first entry at which a new encounter begins.
-        free_delay_s: a driver who is later by less does not slow down.
         max_braking_mps2: of any driver.
         min_courtesy_ratio: share of its speed that a driver keeps who lets another one go first.
-        usual_sigmas: RMS distance from the mean of a kind that four in five recordings do not reach.
+        usual_sigmas: RMS distance from the mean of a kind; four in five recordings are nearer.
         behind_s: after its entry, when a vehicle has its free speed again.
     """
 
@@ -75,10 +75,8 @@ class DecisionMargins:
     min_together_s: float = 2.0
     max_merge_lag_s: float = 1.5
     min_gap_s: float = 1.0
-    usual_gap_s: float = 1.5
-    max_gap_s: float = 3.0
+    free_gap_s: float = 1.2
     approach_s: float = 5.0
-    free_delay_s: float = 0.3
     max_braking_mps2: float = 3.5
     min_courtesy_ratio: float = 0.5
     usual_sigmas: float = 1.5
@@ -125,7 +123,7 @@ def decisions_of(encounter: Encounter, sampling: SamplingConfig = SamplingConfig
         >>> from scenario_gen import decisions_of, read_log
         >>> (encounter,) = read_log("my_log.csv").encounters
         >>> [str(decision.outcome) for decision in decisions_of(encounter).possible]
-        ['rolls', 'goes first', 'goes first']
+        ['rolls', 'goes first', 'stops']
     """
     try:
         conflict = DecidedConflict.of(encounter)
@@ -193,7 +191,7 @@ def _offered(conflict: "DecidedConflict", sampling: SamplingConfig) -> Iterator[
 
 
 class Meeting(NamedTuple):
-    """Two vehicles, and what the one that decides does."""
+    """Two vehicles, the one that goes first first, and what the one that decides does."""
 
     encounter: Encounter
     outcome: Outcome
@@ -272,24 +270,12 @@ class DecidedConflict:
         """
         other = recorded_drive(self.pair.tracks[0])
         if decision.outcome is Outcome.GOES_FIRST:
-            meeting = _meeting(
-                self.free, other, decision.lag, MARGINS.usual_gap_s, MARGINS.min_courtesy_ratio
-            )
+            meeting = _meeting(self.free, other, decision.lag, MARGINS.min_courtesy_ratio)
             meeting = meeting._replace(outcome=Outcome.GOES_FIRST)
         else:
-            meeting = _meeting(other, self.free, -decision.lag, self._gap)
+            meeting = _meeting(other, self.free, -decision.lag)
         self._refuse_inhuman(meeting.encounter)
-        is_first = decision.outcome is Outcome.GOES_FIRST
-        in_order = is_first == (self.pair.conflict.second < self.pair.conflict.first)
-        rows = (0, 1) if in_order else (1, 0)
-        return meeting._replace(encounter=meeting.encounter.select(rows))
-
-    @property
-    def _gap(self) -> float:
-        """The time [s] from the first vehicle's exit to the second one's entry."""
-        conflict = self.pair.conflict
-        clears, enters = passing(self.pair.encounter, conflict, merges=conflict.following)
-        return min(max(enters - clears, MARGINS.usual_gap_s), MARGINS.max_gap_s)
+        return meeting
 
     def _refuse_inhuman(self, encounter: Encounter) -> None:
         """Refuse two vehicles, the one that goes first first, that no drivers would be.
@@ -332,14 +318,13 @@ def _free_entry(free: Drive, entry: float, time: Floats) -> float:
     return float(time[row]) + enters - free.time_at(decides)
 
 
-def _meeting(first: Drive, second: Drive, later: float, gap: float, least: float = 0.0) -> Meeting:
+def _meeting(first: Drive, second: Drive, later: float, least: float = 0.0) -> Meeting:
     """Return the motion of two drives; the second one slows down if it is too early.
 
     Args:
         first: the drive that goes first.
         second: the other one.
         later: seconds from the first one's entry to the second one's, if it did not slow down.
-        gap: seconds from the first one's exit to the second one's entry if it slows down.
         least: share of its speed that the second one keeps.
 
     Raises:
@@ -347,18 +332,18 @@ def _meeting(first: Drive, second: Drive, later: float, gap: float, least: float
     """
     dt = first.track.dt
     after = int(first.time[-1] / dt) + 1
-    apart = _together(first, second, after)
-    conflict = conflict_of(apart, 0, 1)
+    consecutive = _together(first, second, after)
+    conflict = conflict_of(consecutive, 0, 1)
     if conflict is None or conflict.first != 0:
         raise RefusedError("they would not meet")
-    clears, enters = passing(apart, conflict, merges=conflict.following)
+    clears, enters = passing(consecutive, conflict, merges=conflict.following)
     enters -= after * dt
     arrives = conflict.entry_first + later
     outcome = Outcome.GOES_SECOND
-    if clears + gap - arrives > MARGINS.free_delay_s:
+    if clears + MARGINS.free_gap_s > arrives:
         entry = float(np.interp(enters, second.time, second.station))
         free = second
-        second = delayed_drive(free, entry, clears + gap - arrives)
+        second = delayed_drive(free, entry, enters + clears - arrives)
         if (second.speed < least * free.speed).any():
             raise RefusedError("the other one would have to slow down too much")
         outcome = Outcome.STOPS if second.stand else Outcome.ROLLS

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""New speeds on a recorded path: a drive without its brake, and a drive that waits for another one.
+"""New speeds on a recorded path: without the recorded brake, or waiting for another vehicle.
 
 Speeds belong to stations, so that a drive is on its recorded path however late it is. Human
 accelerations limit them (`DrivingMargins`).
@@ -35,6 +35,8 @@ class DrivingMargins:
         max_lateral_mps2: in bends.
         min_rolling_mps: a driver who would have to be slower stops.
         stop_distance_m: from the standing place to where the shared area is entered.
+        gap_s: from the other vehicle's exit to the entry of a driver who rolls.
+        departure_lag_s: from the other vehicle's exit to the departure of a driver who stands.
         min_stand_s: duration of a stop.
         first_stand_s: before a driver departs who stands when the recording begins.
         carried_s: time by which a recording is carried backwards at its first speed.
@@ -46,6 +48,8 @@ class DrivingMargins:
     max_lateral_mps2: float = 3.0
     min_rolling_mps: float = 1.5
     stop_distance_m: float = 2.5
+    gap_s: float = 1.5
+    departure_lag_s: float = 0.8
     min_stand_s: float = 1.5
     first_stand_s: float = 2.0
     carried_s: float = 4.0
@@ -153,16 +157,16 @@ def _limited(speed: Floats) -> Floats:
     return np.sqrt(squares)
 
 
-def delayed_drive(drive: Drive, entry: float, delay: float) -> Drive:
-    """Return a drive that enters a shared area later; it rolls if it can, else it stops.
+def delayed_drive(drive: Drive, entry: float, clears: float) -> Drive:
+    """Return a drive that lets another one go first; it rolls if it can, else it stops.
 
     Args:
-        drive: without the delay.
-        entry: station [m] at which it enters the area.
-        delay: seconds.
+        drive: as if it were alone.
+        entry: station [m] at which it enters the shared area.
+        clears: when [s] the other vehicle has left the area; 0 s is when the drive begins.
 
     Raises:
-        RefusedError: it would have to brake too hard.
+        RefusedError: it would have to brake too hard, or to stop after the other one has left.
     """
     line = int(np.searchsorted(drive.station, entry - MARGINS.stop_distance_m))
     distance = drive.station - drive.station[line]
@@ -173,19 +177,21 @@ def delayed_drive(drive: Drive, entry: float, delay: float) -> Drive:
         speed = np.sqrt(least * least + 2.0 * slope * distance)
         return drive._replace(speed=np.minimum(drive.speed, speed))
 
-    def gained(least: float) -> float:
-        """Return by how much [s] it is later with this speed [m/s] at the line."""
-        return slowed(least).time_at(entry) - drive.time_at(entry)
-
     low, high = MARGINS.min_rolling_mps, float(drive.speed[line])
-    if low < high and gained(low) >= delay:
+    enters = clears + MARGINS.gap_s
+    if low < high and slowed(low).time_at(entry) >= enters:
         for _ in range(BISECTION_STEPS):
             middle = 0.5 * (low + high)
-            low, high = (middle, high) if gained(middle) > delay else (low, middle)
+            is_late = slowed(middle).time_at(entry) > enters
+            low, high = (middle, high) if is_late else (low, middle)
         later = slowed(low)
     else:
-        stand = max(delay - gained(0.0), MARGINS.min_stand_s)
-        later = slowed(0.0)._replace(stand=stand, line=line)
+        later = slowed(0.0)
+        arrives = float(later.time[line])
+        if arrives > clears:
+            raise RefusedError("it would stop after the other one has left")
+        stand = max(clears + MARGINS.departure_lag_s - arrives, MARGINS.min_stand_s)
+        later = later._replace(stand=stand, line=line)
     if drive.stand or line == 0 or later.speed[0] < drive.speed[0]:
         raise RefusedError(f"vehicle {drive.track.vehicle.id} is too near to slow down")
     return later

@@ -23,8 +23,6 @@ from scenario_gen.types import (
     token,
 )
 
-SIZES_STREAM = 58  # of the random numbers for the sizes, besides the seed
-
 
 def outcome_sets(
     generate: Callable[[Encounter, int], GenerationResult],
@@ -93,8 +91,8 @@ def requested_decisions(
 def drawn_sizes(decisions: Sequence[Decision], count: int, seed: int) -> list[int]:
     """Return the sizes of the sets, drawn by the probabilities of the decisions."""
     shares = np.array([decision.probability for decision in decisions])
-    rng = np.random.default_rng([seed, SIZES_STREAM])
-    return [int(size) for size in rng.multinomial(count, shares / shares.sum())]
+    sizes = np.random.default_rng(seed).multinomial(count, shares / shares.sum())
+    return [int(size) for size in sizes]
 
 
 def outcome_mix(results: Sequence[GenerationResult]) -> str:
@@ -106,9 +104,11 @@ def outcome_mix(results: Sequence[GenerationResult]) -> str:
         if decision is not None:
             who = decision.who
             sizes[decision.outcome] += len(result)
-    return f"vehicle {who} " + " and ".join(
-        f"{outcome} in {size} scenarios" for outcome, size in sizes.items()
-    )
+    parts = [f"{outcome} in {size}" for outcome, size in sizes.items()]
+    parts[0] += " scenarios"
+    *others, last = parts
+    mix = f"{', '.join(others)} and {last}" if others else last
+    return f"vehicle {who} {mix}"
 
 
 def swapped_order(encounter: Encounter, sampling: SamplingConfig) -> Encounter | None:

@@ -31,7 +31,7 @@ def recorded(kind=WAITS, seed=0):
 @pytest.fixture(scope="module")
 def sets():
     """The sets of a crossing whose recorded second vehicle stops."""
-    return sg.generate_outcomes(recorded(), "corridor", DRAWN, count=12, seed=3)
+    return sg.generate_outcomes(recorded(), "corridor", DRAWN, count=12, seed=4)
 
 
 def first_to_enter(scenario):
@@ -100,10 +100,12 @@ def test_a_decided_driver_goes_first_as_people_do():
     assert made.vehicles[conflict.first].id == first.who and conflict.encroachment >= 1.0
     assert -np.diff(made.speed).min() / made.dt < 3.5
     assert made.source == Decided(encounter.name, first)
-    path = encounter.position[1]
-    away = np.hypot(*(made.position[1][:, None] - path).transpose(2, 0, 1)).min(axis=1)
-    inside = made.present_slice(1)
-    assert np.quantile(away[inside], 0.5) < 0.6, "it stays on its recorded path"
+    row, recorded_row = (
+        [vehicle.id for vehicle in each.vehicles].index(first.who) for each in (made, encounter)
+    )
+    to_path = made.position[row][:, None] - encounter.position[recorded_row]
+    away = np.hypot(*to_path.transpose(2, 0, 1)).min(axis=1)
+    assert np.median(away[made.present_slice(row)]) < 0.6, "it stays on its recorded path"
 
 
 def test_the_recorded_outcome_is_the_recording():
@@ -146,7 +148,7 @@ def test_one_set_has_one_outcome():
 
 
 def test_one_seed_gives_the_same_scenarios(sets):
-    again = sg.generate_outcomes(recorded(), "corridor", DRAWN, count=12, seed=3)
+    again = sg.generate_outcomes(recorded(), "corridor", DRAWN, count=12, seed=4)
     for result, other in zip(sets, again, strict=True):
         assert [s.facts for s in result] == [s.facts for s in other]
         for scenario, same in zip(result, other, strict=True):
@@ -169,5 +171,5 @@ def test_the_summary_states_the_mix(sets):
     console.print(summary(sets))
     text = console.export_text()
     sizes = {result.encounter.decision.outcome: len(result) for result in sets}
-    assert f"goes first in {sizes[Outcome.GOES_FIRST]} scenarios" in text
-    assert f"vehicle 2 stops in {sizes[Outcome.STOPS]}" in text
+    assert f"and goes first in {sizes[Outcome.GOES_FIRST]}" in text
+    assert f"vehicle 2 stops in {sizes[Outcome.STOPS]} scenarios" in text

@@ -10,11 +10,13 @@ import pytest
 from msg_conventions.scenario_facts import decode_facts, fact_values
 from scenario_gen.base.errors import InputError
 from scenario_gen.types import (
+    Decision,
     Facts,
     Failure,
     FOLLOW,
     NamedReaction,
     OrderChange,
+    Outcome,
     PassingOrder,
     YIELD,
 )
@@ -30,6 +32,7 @@ FACTS = Facts(
     reactions=(NamedReaction(YIELD, "2", "1"), NamedReaction(FOLLOW, "3", "2")),
     lost_reactions=(("3", "1"),),
     failure=Failure("rear-end", 2.5, 0.01),
+    decision=Decision("2", "1", Outcome.GOES_FIRST, 2.9, 0.25),
 )
 
 
@@ -53,3 +56,5 @@ def test_unknown_facts_are_left_out():
 def test_damaged_values_are_refused(key, text):
     with pytest.raises(InputError, match=f"entry: {key} is '{text}'"):
         decode_facts({key: text}, "entry")
+    with pytest.raises(InputError, match="entry: decision"):
+        decode_facts({"decision": '{"who": "2"}'}, "entry")

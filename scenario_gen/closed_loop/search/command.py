@@ -34,7 +34,6 @@ from scenario_gen.method.sampling import checker_of, NaturalScenarios, Plan, Sam
 from scenario_gen.method.validity import Limits
 from scenario_gen.output.report.html import render_page
 from scenario_gen.types import (
-    Decision,
     EgoSlot,
     GenerationResult,
     Interval,
@@ -135,7 +134,6 @@ class SearchResult:
     findings: Sequence[Finding]
     worst: bool
     written: Sequence[Path]
-    decision: Decision | None = None  # whose outcome all drives have
 
     @property
     def kinds(self) -> dict[str, list[Finding]]:
@@ -190,10 +188,6 @@ class SearchResult:
             interval = f"{_share(share.low)} to {_share(share.high)}"
             messages.append(f"{event}: {_share(share.value)} ({interval})")
         messages.append(f"natural drives alone: {self.plain}")
-        if self.decision is not None:
-            messages.append(
-                f"in all drives {self.decision}: {_share(self.decision.probability)} of scenarios"
-            )
         if not math.isnan(self.equal_plain):
             messages.append(
                 f"plain sampling would need {self.equal_plain:,.0f} drives for an equally narrow"
@@ -271,11 +265,7 @@ def search_failures(
             findings = findings_of(search, problem, config)
         names = (JSON, PAGE, JUNIT, *((BAG,) if findings else ()))
         result = SearchResult(
-            estimate,
-            findings,
-            request.worst,
-            (*(out / name for name in names), journal_path),
-            plan.encounter.decision,
+            estimate, findings, request.worst, (*(out / name for name in names), journal_path)
         )
         _write(folder, result, request, identity, plan.requested)
     return result

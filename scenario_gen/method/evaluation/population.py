@@ -197,7 +197,7 @@ def members_of(results: Iterable[tuple[str, GenerationResult]]) -> Members:
     recorded: list[EncounterFeatures] = []
     made: list[EncounterFeatures] = []
     names: list[str] = []
-    derived: list[tuple[tuple[str, ...], list[EncounterFeatures]]] = []
+    derived: list[tuple[tuple[str, str], list[EncounterFeatures]]] = []
     for recording, result in results:
         template = features_of(result.encounter, recording, len(recorded))
         if template.kind is None:
@@ -207,33 +207,34 @@ def members_of(results: Iterable[tuple[str, GenerationResult]]) -> Members:
             for scenario in result
         ]
         parents = _parents(result.encounter)
-        if parents:
+        if parents is not None:
             derived.append((parents, generated))
         else:
             recorded.append(template)
             names.append(result.encounter.name)
             made += generated
-    for parents, generated in derived:
-        if set(parents) <= set(names):
-            first, *others = [names.index(name) for name in parents]
+    index = {name: k for k, name in enumerate(names)} | {"": -1}
+    for (first, second), generated in derived:
+        if first in index and second in index:
+            parent, other = recorded[index[first]], index[second]
             made += [
                 replace(
-                    member,
-                    recording=recorded[first].recording,
-                    template=first,
-                    other=others[0] if others else -1,
+                    member, recording=parent.recording, template=parent.template, other=other
                 )
                 for member in generated
             ]
     return Members(recorded, made, names)
 
 
-def _parents(encounter: Encounter) -> tuple[str, ...]:
-    """Return the names of the recorded encounters that another one was made from."""
+def _parents(encounter: Encounter) -> tuple[str, str] | None:
+    """Return the names of the recorded encounters that another one was made from.
+
+    The second is "" if there is one only; None: it was recorded.
+    """
     source = encounter.source
     if isinstance(source, Recombined):
         return source.first, source.second
-    return () if encounter.recording == encounter.name else (encounter.recording,)
+    return None if encounter.recording == encounter.name else (encounter.recording, "")
 
 
 def _needed(points: Sequence[CoveragePoint]) -> float:
