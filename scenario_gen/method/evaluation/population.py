@@ -218,9 +218,7 @@ def members_of(results: Iterable[tuple[str, GenerationResult]]) -> Members:
         if first in index and second in index:
             parent, other = recorded[index[first]], index[second]
             made += [
-                replace(
-                    member, recording=parent.recording, template=parent.template, other=other
-                )
+                replace(member, recording=parent.recording, template=parent.template, other=other)
                 for member in generated
             ]
     return Members(recorded, made, names)
