@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Vehicles in messages of other programs: fixes, twists, odometry, and tracked objects.
+"""Vehicles in messages of other programs: fixes, twists, odometry, poses, and tracked objects.
 
 TrackedObjects of Autoware's perception (autoware_perception_msgs):
 
@@ -31,6 +31,9 @@ from scenario_gen.base.errors import guarded
 from scenario_gen.types import Encounter
 
 FIX, TWIST, ODOMETRY, TRACKS = topics.FIX_TYPE, topics.TWIST_TYPE, odometry.TYPE, trajectory.TYPE
+POSE = "geometry_msgs/msg/PoseStamped"
+POSE_WITH_COVARIANCE = "geometry_msgs/msg/PoseWithCovarianceStamped"
+TRANSFORMS = "tf2_msgs/msg/TFMessage"
 KINDS = [
     "unknown",
     "car",
@@ -62,6 +65,7 @@ class Sample:
         heading: [rad], or NaN.
         speed: [m/s], or None.
         frame: of the position, or "".
+        child: frame whose pose it is, or "".
     """
 
     stamp_ns: int
@@ -69,6 +73,7 @@ class Sample:
     heading: float = math.nan
     speed: float | None = None
     frame: str = ""
+    child: str = ""
 
 
 @dataclass(frozen=True)
@@ -83,8 +88,30 @@ class TrackedObject:
     size: tuple[float, float]
 
 
+def decode_samples(data: bytes, kind: str, place: str) -> list[Sample]:
+    """Return the states in a message of any type of `decode_sample`, or TRANSFORMS.
+
+    Raises:
+        InputError: it is damaged; names `place`.
+    """
+    if kind != TRANSFORMS:
+        return [decode_sample(data, kind, place)]
+    with guarded(f"{place}: not a {kind}"):
+        message = type_store().deserialize_cdr(data, kind)
+    return [
+        Sample(
+            entry.header.stamp.sec * 10**9 + entry.header.stamp.nanosec,
+            (entry.transform.translation.x, entry.transform.translation.y),
+            _yaw(entry.transform.rotation),
+            frame=entry.header.frame_id,
+            child=entry.child_frame_id,
+        )
+        for entry in message.transforms
+    ]
+
+
 def decode_sample(data: bytes, kind: str, place: str) -> Sample:
-    """Return the state in a message of type FIX, TWIST or ODOMETRY.
+    """Return the state in a message of type FIX, TWIST, ODOMETRY, POSE or POSE_WITH_COVARIANCE.
 
     Raises:
         InputError: it is damaged; names `place`.
@@ -96,7 +123,10 @@ def decode_sample(data: bytes, kind: str, place: str) -> Sample:
         return Sample(stamp, position)
     if kind == TWIST:
         return Sample(stamp, speed=speed_of(message.twist.linear.x, message.twist.linear.y))
-    pose = message.pose.pose
+    pose = message.pose if kind == POSE else message.pose.pose
+    if kind in (POSE, POSE_WITH_COVARIANCE):
+        position = (pose.position.x, pose.position.y)
+        return Sample(stamp, position, _heading(pose), frame=message.header.frame_id)
     linear = message.twist.twist.linear  # in the body frame
     return Sample(
         stamp,
@@ -104,6 +134,7 @@ def decode_sample(data: bytes, kind: str, place: str) -> Sample:
         _heading(pose),
         np.hypot(linear.x, linear.y),
         message.header.frame_id,
+        message.child_frame_id,
     )
 
 
@@ -135,7 +166,10 @@ def _decode(data: bytes, kind: str, place: str) -> tuple[Any, int]:
 
 
 def _heading(pose: Any) -> float:
-    turn = pose.orientation
+    return _yaw(pose.orientation)
+
+
+def _yaw(turn: Any) -> float:
     return float(yaw(np.array([turn.x, turn.y, turn.z, turn.w])))
 
 

@@ -76,6 +76,9 @@ def mine(
     ],
     workers: WorkersOption = 0,
     scheduler: SchedulerOption = "",
+    allow: Annotated[
+        str, typer.Option(help="doubt: read logs although the result contradicts their data.")
+    ] = "",
     assignments: Annotated[
         list[str] | None,
         typer.Option(
@@ -88,7 +91,9 @@ def mine(
     from scenario_gen.corpus.mine import mine as mined
     from scenario_gen.corpus.mine import PAGE
 
-    config, corpus = assigned_all(CorpusConfig(), assignments), place(out, to_write=True)
+    allowed = [f"log.allow={allow}"] if allow else []
+    config = assigned_all(CorpusConfig(), [*allowed, *(assignments or [])])
+    corpus = place(out, to_write=True)
     with workers_of(workers, scheduler) as who:
         result = mined([place(path) for path in archive], corpus, config, workers=who)
     conclude(result.lines(), result.failed, corpus, page=corpus / PAGE)

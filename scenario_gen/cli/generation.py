@@ -123,8 +123,9 @@ class Generate:
     allow: Annotated[
         str,
         typer.Option(
-            help="Losses to accept on the road, separated by commas: lost_conflict, lost_order, "
-            "lost_following, lost_merge, lost_lane_change, lost_overtaking, lost_stand, lost_turn."
+            help="What to accept, separated by commas. On the road: lost_conflict, lost_order, "
+            "lost_following, lost_merge, lost_lane_change, lost_overtaking, lost_stand, lost_turn. "
+            "In the log: doubt (read it although the result contradicts its data)."
         ),
     ] = ""
     obstacle: Annotated[
@@ -155,17 +156,21 @@ def generate(options: Generate) -> None:
     """Generate scenarios from a log; write a bag, a report and figures to one folder."""
     from scenario_gen.base.parameters import updated
     from scenario_gen.cli.folder import FolderRequest, generate_folder
+    from scenario_gen.logs.doubts import ALLOWED
     from scenario_gen.roads import read_obstacles
     from scenario_gen.types import join_pieces
 
     config = configured(options.parameter_file, options.assignments)
+    accepted = [name.strip() for name in options.allow.split(",") if name.strip()]
+    losses = [name for name in accepted if name != ALLOWED]
     for text in options.obstacle or []:
         read_obstacles(text, "--obstacle")
     obstacles = filter(None, [config.road.obstacles, *(options.obstacle or [])])
     config = updated(
         config,
         {
-            "fitting.allow": options.allow or config.fitting.allow,
+            "fitting.allow": ",".join(losses) or config.fitting.allow,
+            "log.allow": ALLOWED if ALLOWED in accepted else config.log.allow,
             "evaluation.compare": options.compare or config.evaluation.compare,
             "road.obstacles": join_pieces(obstacles),
         },

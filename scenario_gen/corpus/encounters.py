@@ -34,6 +34,7 @@ from scenario_gen.logs import (
     space_time_gap,
     UnknownFormatError,
 )
+from scenario_gen.logs.doubts import DoubtError
 from scenario_gen.logs.tables import SPMD_EPOCH_NS
 from scenario_gen.method.evaluation import criticality, EvaluationConfig
 from scenario_gen.situation import Situation
@@ -166,7 +167,7 @@ def read_one_log(task: LogTask) -> None:
     try:
         with fetched(task.paths) as paths:
             result = read_log(paths, task.config.log)
-    except (NoEncounterError, UnknownFormatError) as error:  # the log is finished
+    except (NoEncounterError, UnknownFormatError, DoubtError) as error:  # the log is finished
         write_encounters(
             task.target, [], {"refused": [{"name": task.name, "why": str(error)}], "quality": []}
         )

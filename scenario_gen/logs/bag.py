@@ -4,9 +4,9 @@
 """Bags of rosbag2 and ROS 1: fixes, speeds, odometry, tracked objects or encounters."""
 
 from collections import Counter
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-import math
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -15,22 +15,34 @@ from scenario_gen.bags.storage.bag import open_bag
 from scenario_gen.bags.storage.config import BagConfig
 from scenario_gen.bags.storage.definitions import TRACKED
 from scenario_gen.bags.vehicles import (
-    decode_sample,
+    decode_samples,
     decode_tracked,
     decode_tracks,
     FIX,
     ODOMETRY,
+    POSE,
+    POSE_WITH_COVARIANCE,
+    Sample,
     TRACKS,
+    TRANSFORMS,
     TWIST,
 )
 from scenario_gen.base.errors import InputError
+from scenario_gen.logs.bag_clock import clock_doubt, stamp_factor, TopicClock
+from scenario_gen.logs.bag_frames import base_frames, check_fixed_frame, check_frames
+from scenario_gen.logs.bag_names import child_vehicle, find_owners, without_duplicates
 from scenario_gen.logs.config import listed, LogConfig
+from scenario_gen.logs.doubts import Doubt
+from scenario_gen.logs.file_names import file_names
 from scenario_gen.logs.raw import check_size, check_vehicles, Observations, RawLog, Rows, Segment
 from scenario_gen.types import Encounter
 
-_AT_ORIGIN_M = 0.5  # within it, two vehicles cannot be at the same time
-_SAME_START_NS = 1e9  # a later vehicle may start at the origin, too
-READABLE_TYPES = (FIX, TWIST, ODOMETRY, TRACKS, TRACKED)
+_CLOCK_SAMPLES_COUNT = 1_000  # messages of a topic whose stamps are compared
+_FIRST_MESSAGES_COUNT = 50  # show whether a topic has several vehicles
+_RECORDINGS = (FIX, TWIST, ODOMETRY, TRACKS, TRACKED)
+_POSES = (POSE, POSE_WITH_COVARIANCE)
+READABLE_TYPES = (*_RECORDINGS, *_POSES, TRANSFORMS)
+_REQUESTED_POSES = ("goal_pose", "initialpose", "clicked_point")  # of a person, not of a vehicle
 
 
 @dataclass
@@ -41,6 +53,7 @@ class Topic:
         name: full name.
         type: of the messages.
         label: the log's name in messages to the user.
+        bag: name of the bag, if several have the topic at one time; else "".
         stamps: log stamps [ns].
         data: CDR bytes.
     """
@@ -48,6 +61,7 @@ class Topic:
     name: str
     type: str
     label: str
+    bag: str = ""
     stamps: list[int] = field(default_factory=list)
     data: list[bytes] = field(default_factory=list)
 
@@ -78,14 +92,16 @@ def log_of(topics: Sequence[Topic], name: str, config: LogConfig) -> RawLog:
     """
     tracks = [topic for topic in topics if topic.type == TRACKS]
     tracked = [topic for topic in topics if topic.type == TRACKED]
+    used: set[str] = set()
     if tracks:
         log = _read_encounters(tracks, name)
     elif tracked:
-        log = _read_tracked(tracked, name)
+        odometries = [topic for topic in topics if topic.type == ODOMETRY]
+        log, used = _read_tracked(tracked, odometries, name, config)
     else:
         return _read_streams(topics, name, config)
     kind = TRACKS if tracks else TRACKED
-    others = [topic.name for topic in topics if topic.type != kind]
+    others = [topic.name for topic in topics if topic.type != kind and topic.name not in used]
     if not others:
         return log
     note = f"not read: {', '.join(others)}; choose topics with --set log.topics=…"
@@ -101,23 +117,22 @@ def _read_topics(paths: Sequence[Path], config: LogConfig) -> list[Topic]:
     requested = listed(config.topics)
     label = str(paths[0]) if len(paths) == 1 else f"{paths[0]} and {len(paths) - 1} more"
     bounds = BagConfig(most_bytes=config.size_limit << 20)
-    topics: dict[str, Topic] = {}
+    bags = file_names([path.resolve() for path in paths])
+    topics: dict[tuple[str, str], Topic] = {}
     types: dict[str, str] = {}
-    n_rows = 0
-
-    def is_used(topic: str, kind: str) -> bool:
-        if requested:
-            return topic in requested and kind in READABLE_TYPES
-        is_other_trajectory = kind == TRACKS and topic.rpartition("/")[2] != "tracks"
-        return kind in READABLE_TYPES and not is_other_trajectory
-
     for path in paths:
         with open_bag(path, bounds, "log.size_limit") as bag:
             types |= {topic.name: topic.type for topic in bag.topics()}
+    is_used = _usable(requested, types)
+    n_rows = 0
+    for path, name in zip(paths, bags, strict=True):
+        with open_bag(path, bounds, "log.size_limit") as bag:
             for message in bag.messages(is_used):
                 n_rows += 1
                 check_size(str(path), 0, n_rows, config)
-                topic = topics.setdefault(message.topic, Topic(message.topic, message.type, label))
+                topic = topics.setdefault(
+                    (message.topic, name), Topic(message.topic, message.type, label, name)
+                )
                 topic.stamps.append(message.stamp_ns)
                 topic.data.append(message.data)
     _check_requested(requested, types, paths[0])
@@ -127,7 +142,52 @@ def _read_topics(paths: Sequence[Path], config: LogConfig) -> list[Topic]:
             f"with {TWIST}, or {ODOMETRY}; or a topic named tracks of {TRACKED} or {TRACKS}; "
             "choose others by name with --set log.topics=…"
         )
-    return [topics[name] for name in sorted(topics)]
+    return _joined([topics[key] for key in sorted(topics)])
+
+
+def _usable(requested: Sequence[str], types: Mapping[str, str]) -> Callable[[str, str], bool]:
+    """Return a function that chooses topics by name and type.
+
+    Poses count if there are no recordings of other types, and transforms if there are no poses.
+    """
+    known = [kind for name, kind in types.items() if not _is_other_trajectory(name, kind)]
+    poses = [n for n, kind in types.items() if kind in _POSES and not n.endswith(_REQUESTED_POSES)]
+    kinds: Sequence[str] = _RECORDINGS
+    if not set(known) & set(_RECORDINGS):
+        kinds = _POSES if poses else (TRANSFORMS,)
+
+    def is_used(topic: str, kind: str) -> bool:
+        if requested:
+            return topic in requested and kind in READABLE_TYPES
+        is_excluded = _is_other_trajectory(topic, kind) or topic.endswith(_REQUESTED_POSES)
+        return kind in kinds and not is_excluded
+
+    return is_used
+
+
+def _is_other_trajectory(topic: str, kind: str) -> bool:
+    return kind == TRACKS and topic.rpartition("/")[2] != "tracks"
+
+
+def _joined(topics: Sequence[Topic]) -> list[Topic]:
+    """Return topics of several bags: one that bags have in turn is one, else each is its bag's."""
+    by_name: dict[str, list[Topic]] = {}
+    for topic in topics:
+        by_name.setdefault(topic.name, []).append(topic)
+    joined: list[Topic] = []
+    for parts in by_name.values():
+        parts.sort(key=lambda part: part.stamps[0])
+        overlaps = any(after.stamps[0] < before.stamps[-1] for before, after in pairwise(parts))
+        if overlaps and parts[0].type != TRACKS:
+            joined += sorted(parts, key=lambda part: part.bag)
+            continue
+        first = parts[0]
+        for part in parts[1:]:
+            first.stamps += part.stamps
+            first.data += part.data
+        first.bag = ""
+        joined.append(first)
+    return joined
 
 
 def _check_requested(requested: Sequence[str], types: Mapping[str, str], path: Path) -> None:
@@ -164,29 +224,30 @@ def _read_streams(topics: Sequence[Topic], name: str, config: LogConfig) -> RawL
         InputError: a message is damaged, positions have two types, or a vehicle has none.
     """
     label = topics[0].label
-    if len({topic.type == ODOMETRY for topic in topics if topic.type != TWIST}) > 1:
+    if len({topic.type == FIX for topic in topics if topic.type != TWIST}) > 1:
         raise InputError(
             f"{label} has both {FIX} and {ODOMETRY} ({_listing_of(topics)}); choose with "
             "--set log.topics=…"
         )
-    owners = _find_owners(topics)
-    check_vehicles(label, len(set(owners.values())), config)
+    topics, notes = without_duplicates(topics, ODOMETRY)
+    owners = find_owners(topics)
     vehicles: dict[str, Rows] = {}
-    odometry_frames: dict[str, str] = {}
+    frames: dict[str, str] = {}
+    clocks: list[TopicClock] = []
     segments = []
-    unstamped = []
     n_rows = 0
-    for topic in topics:
-        owner = owners[topic.name]
+    for topic, owner in zip(topics, owners, strict=True):
         segments.append(topic.segment(n_rows))
-        frame, has_stamps = _collect(topic, vehicles.setdefault(owner, Rows()), n_rows)
-        if topic.type == ODOMETRY:
-            odometry_frames[owner] = frame
-        if not has_stamps:
-            unstamped.append(topic.name)
+        clock = _collect(topic, owner, vehicles, frames, n_rows, config)
+        clocks.append(clock)
         n_rows += len(topic.data)
+    if all(topic.type == TRANSFORMS for topic in topics):
+        vehicles, frames = base_frames(label, vehicles, frames)
+    check_vehicles(label, len(vehicles), config)
     _check_positions(topics, owners, vehicles)
-    notes = _check_frames(label, odometry_frames, vehicles)
+    notes += check_frames(label, frames, vehicles)
+    vehicles, doubts = _checked_clocks(vehicles, clocks, notes, config)
+    unstamped = [clock.topic for clock in clocks if not clock.has_stamps]
     if unstamped:
         notes.append(
             f"{len(unstamped)} topic(s) have no header stamps; the time of reception is used: "
@@ -204,18 +265,42 @@ def _read_streams(topics: Sequence[Topic], name: str, config: LogConfig) -> RawL
         rows=n_rows,
         segments=tuple(segments),
         notes=tuple(notes),
+        doubts=doubts,
     )
 
 
+def _checked_clocks(
+    vehicles: dict[str, Rows], clocks: Sequence[TopicClock], notes: list[str], config: LogConfig
+) -> tuple[dict[str, Rows], tuple[Doubt, ...]]:
+    """Return the vehicles with stamps in seconds, and a doubt if their clocks differ."""
+    if config.stamps != "header":
+        return vehicles, ()
+    factor = stamp_factor(clocks)
+    if factor == 1.0:
+        doubt = clock_doubt(clocks)
+        return vehicles, (doubt,) if doubt else ()
+    notes.append(f"header stamps advance {1 / factor:g} times too fast: they are scaled")
+    return {name: _scaled(rows, factor) for name, rows in vehicles.items()}, ()
+
+
+def _scaled(rows: Rows, factor: float) -> Rows:
+    """Return rows with scaled stamps."""
+    fixes = [(round(fix[0] * factor), *fix[1:]) for fix in rows.fixes]
+    speeds = [(round(speed[0] * factor), *speed[1:]) for speed in rows.speeds]
+    return Rows(fixes, speeds)
+
+
 def _check_positions(
-    topics: Sequence[Topic], owners: Mapping[str, str], vehicles: Mapping[str, Rows]
+    topics: Sequence[Topic], owners: Sequence[str], vehicles: Mapping[str, Rows]
 ) -> None:
     """Check that each vehicle with speeds has positions.
 
     Raises:
         InputError: one has none.
     """
-    owners_of_speeds = [owners[topic.name] for topic in topics if topic.type == TWIST]
+    owners_of_speeds = [
+        owner for topic, owner in zip(topics, owners, strict=True) if topic.type == TWIST
+    ]
     without = [vehicle for vehicle in owners_of_speeds if not vehicles[vehicle].fixes]
     if without:
         raise InputError(
@@ -224,108 +309,59 @@ def _check_positions(
         )
 
 
-def _find_owners(topics: Sequence[Topic]) -> dict[str, str]:
-    """Return the vehicle of each topic: its namespace, or the first level in which topics differ.
+def _collect(
+    topic: Topic,
+    owner: str,
+    vehicles: dict[str, Rows],
+    frames: dict[str, str],
+    first_row: int,
+    config: LogConfig,
+) -> TopicClock:
+    """Add the messages of a topic, rows from `first_row` on, to its vehicles.
 
-    Raises:
-        InputError: two topics of one type share a namespace.
-    """
-    owners = {topic.name: _vehicle_of(topic.name) for topic in topics}
-    levels = {topic.name: topic.name.strip("/").split("/")[:-1] for topic in topics}
-    for level in range(min(map(len, levels.values()))):
-        if len({(owners[topic.name], topic.type) for topic in topics}) == len(topics):
-            break
-        owners = {
-            name: parts[level].removeprefix("vehicle_") or name for name, parts in levels.items()
-        }
-    taken: dict[tuple[str, str], str] = {}
-    for topic in topics:
-        owner = owners[topic.name]
-        other = taken.setdefault((owner, topic.type), topic.name)
-        if other != topic.name:
-            raise InputError(
-                f"{topic.label}: {other} and {topic.name} are both {topic.type} of vehicle "
-                f"{owner}; choose one with --set log.topics=…, or record each vehicle in its own "
-                "namespace"
-            )
-    return owners
-
-
-def _vehicle_of(topic: str) -> str:
-    """Return the namespace of a topic, without the prefix `vehicle_` that this project writes."""
-    namespace = topic.strip("/").rpartition("/")[0]
-    return namespace.rpartition("/")[2].removeprefix("vehicle_") or topic.strip("/")
-
-
-def _collect(topic: Topic, vehicle: Rows, first_row: int) -> tuple[str, bool]:
-    """Add the messages of a topic, rows from `first_row` on, to a vehicle.
+    Args:
+        topic: the messages.
+        owner: the vehicle, if all messages have one child frame; else child frames name vehicles.
+        vehicles: receives the rows.
+        frames: receives the first frame of each vehicle with a pose.
+        first_row: number of rows of other topics.
+        config: chooses stamps.
 
     Returns:
-        The frame, and whether all headers have stamps.
+        The stamps of the headers against the time of reception.
 
     Raises:
         InputError: a message is damaged.
     """
-    frame = ""
-    has_stamps = True
-    for row, (received_ns, data) in enumerate(
-        zip(topic.stamps, topic.data, strict=True), first_row
-    ):
-        sample = decode_sample(data, topic.type, topic.where(row - first_row + 1))
-        frame = frame or sample.frame
-        has_stamps = has_stamps and sample.stamp_ns != 0
-        stamp_ns = sample.stamp_ns or received_ns
-        if sample.position is not None:
-            vehicle.fixes.append((stamp_ns, row, *sample.position, sample.heading))
-        if sample.speed is not None:
-            vehicle.speeds.append((stamp_ns, row, sample.speed))
-    return frame, has_stamps
+    clock = TopicClock(topic.name, owner, max(len(topic.data) // _CLOCK_SAMPLES_COUNT, 1))
+    by_child = topic.type == TRANSFORMS or _has_several_children(topic)
+    for number, (received_ns, data) in enumerate(zip(topic.stamps, topic.data, strict=True)):
+        for sample in decode_samples(data, topic.type, topic.where(number + 1)):
+            name = child_vehicle(sample.child) if by_child else owner
+            clock.add(number, sample.stamp_ns, received_ns)
+            uses_header = sample.stamp_ns and config.stamps == "header"
+            stamp_ns = sample.stamp_ns if uses_header else received_ns
+            _add_sample(vehicles.setdefault(name, Rows()), sample, stamp_ns, first_row + number)
+            if sample.frame:
+                frames.setdefault(name, sample.frame)
+    return clock
 
 
-def _check_frames(
-    label: str, frames: Mapping[str, str], vehicles: Mapping[str, Rows]
-) -> list[str]:
-    """Return notes on the frames of odometries, by vehicle.
-
-    Raises:
-        InputError: a frame moves, or each odometry starts at its vehicle's start: they have no
-            common frame.
-    """
-    for vehicle, frame in frames.items():
-        _check_fixed_frame(frame, f"{label}: the odometry of vehicle {vehicle}")
-    first_fixes = {
-        vehicle: min(vehicles[vehicle].fixes) for vehicle in frames if vehicles[vehicle].fixes
-    }
-    at_origin = [
-        vehicle
-        for vehicle, (_, _, x, y, _) in first_fixes.items()
-        if math.hypot(x, y) < _AT_ORIGIN_M
-    ]
-    starts_ns = [first_fixes[vehicle][0] for vehicle in at_origin]
-    start_together = len(at_origin) >= 2 and np.ptp(starts_ns) < _SAME_START_NS
-    names = ", ".join(f"{vehicle} in {frame!r}" for vehicle, frame in frames.items())
-    if start_together or len({frames[vehicle] for vehicle in at_origin}) >= 2:
-        raise InputError(
-            f"{label}: the odometries of {' and '.join(at_origin)} begin at 0, 0, each where its "
-            f"vehicle started ({names}); record positions in one frame, such as map, or choose "
-            "with --set log.topics=…"
-        )
-    if len(set(frames.values())) > 1:
-        return [f"the odometries name several frames ({names}); they are read as one"]
-    return []
+def _has_several_children(topic: Topic) -> bool:
+    """Return whether the first odometries of a topic are those of several body frames."""
+    if topic.type != ODOMETRY:
+        return False
+    first = enumerate(topic.data[:_FIRST_MESSAGES_COUNT], 1)
+    samples = [s for k, data in first for s in decode_samples(data, topic.type, topic.where(k))]
+    return len({sample.child for sample in samples}) > 1
 
 
-def _check_fixed_frame(frame: str, place: str) -> None:
-    """Check that positions are not in the frame of a moving vehicle.
-
-    Raises:
-        InputError: they are.
-    """
-    if frame.rpartition("/")[2].startswith("base_"):
-        raise InputError(
-            f"{place} is in frame {frame!r}, which moves with its vehicle; record it in a fixed "
-            "frame, such as map"
-        )
+def _add_sample(vehicle: Rows, sample: Sample, stamp_ns: int, row: int) -> None:
+    """Add a state to a vehicle."""
+    if sample.position is not None:
+        vehicle.fixes.append((stamp_ns, row, *sample.position, sample.heading))
+    if sample.speed is not None:
+        vehicle.speeds.append((stamp_ns, row, sample.speed))
 
 
 def _read_encounters(topics: Sequence[Topic], name: str) -> RawLog:
@@ -363,8 +399,13 @@ class _TrackedVehicle:
         return replace(self.rows.observations(name), length=length, width=width, kind=kind)
 
 
-def _read_tracked(topics: Sequence[Topic], name: str) -> RawLog:
-    """Read the objects that a perception tracks.
+def _read_tracked(
+    topics: Sequence[Topic], odometries: Sequence[Topic], name: str, config: LogConfig
+) -> tuple[RawLog, set[str]]:
+    """Read the objects that a perception tracks, and the ego by its odometry in the same frame.
+
+    Returns:
+        The log, and the topics of odometry that were read.
 
     Raises:
         InputError: a message is damaged, or there are several topics or frames.
@@ -379,7 +420,7 @@ def _read_tracked(topics: Sequence[Topic], name: str) -> RawLog:
     for row, (received_ns, data) in enumerate(zip(topic.stamps, topic.data, strict=True)):
         where = topic.where(row + 1)
         header_ns, frame, objects = decode_tracked(data, where)
-        _check_fixed_frame(frame, where)
+        check_fixed_frame(frame, where)
         first_frame = frame if row == 0 else first_frame
         if frame != first_frame:
             raise InputError(f"{where}: frame {frame!r} differs from {first_frame!r} before")
@@ -390,6 +431,24 @@ def _read_tracked(topics: Sequence[Topic], name: str) -> RawLog:
             vehicle.rows.speeds.append((stamp_ns, row, tracked.speed))
             vehicle.sizes.append(tracked.size)
             vehicle.kinds[tracked.kind] += 1
-    observations = tuple(vehicle.observations(key) for key, vehicle in vehicles.items())
-    note = f"read from {topic.name} in frame {first_frame!r}"
-    return RawLog(name, False, observations, len(topic.data), (topic.segment(0),), (note,))
+    observations = [vehicle.observations(key) for key, vehicle in vehicles.items()]
+    notes = [f"read from {topic.name} in frame {first_frame!r}"]
+    segments = [topic.segment(0)]
+    n_rows = len(topic.data)
+    used = set()
+    for odometry in odometries:
+        rows: dict[str, Rows] = {}
+        frames: dict[str, str] = {}
+        owner = "ego" if len(odometries) == 1 else find_owners([odometry])[0]
+        _collect(odometry, owner, rows, frames, n_rows, config)
+        if frames.get(owner) != first_frame:
+            continue
+        used.add(odometry.name)
+        observations.append(rows[owner].observations(owner))
+        segments.append(odometry.segment(n_rows))
+        n_rows += len(odometry.data)
+        notes.append(
+            f"vehicle {owner} is read from {odometry.name}: positions are those of its child frame"
+        )
+    log = RawLog(name, False, (*observations,), n_rows, (*segments,), (*notes,))
+    return log, used

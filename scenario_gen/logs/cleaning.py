@@ -6,13 +6,16 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from enum import Enum
+from itertools import chain
 from typing import Any
 
 import numpy as np
+from scipy.ndimage import median_filter
 
 from scenario_gen.base.errors import InputError
-from scenario_gen.logs.clock import is_out_of_range
+from scenario_gen.logs.clock import is_out_of_range, time_option
 from scenario_gen.logs.config import chosen_vehicles, LogConfig
+from scenario_gen.logs.degree_hints import degree_hint
 from scenario_gen.logs.geodesy import local_frame, middle_of, on_sphere, sites_of
 from scenario_gen.logs.quality import Dropped
 from scenario_gen.logs.raw import Observations, RawLog
@@ -74,16 +77,25 @@ class Cause(Enum):
     SPEED_TOO_HIGH = f"speed is above {CLEANING.max_speed_mps:g} m/s"
 
 
+@dataclass(frozen=True)
+class StampConflict:
+    """`count` rows with the stamp of another row elsewhere; `is_coarse` if they continue it."""
+
+    count: int
+    is_coarse: bool
+
+
 @dataclass
 class Drops:
     """Dropped rows by cause: their number, and the first of them; notes on what was replaced.
 
-    The causes of readers are texts.
+    The causes of readers are texts. Stamps that repeat at other places are listed by vehicle.
     """
 
     count: dict[Cause | str, int] = field(default_factory=dict)
     first: dict[Cause | str, int] = field(default_factory=dict)
     notes: list[str] = field(default_factory=list)
+    conflicts: dict[str, StampConflict] = field(default_factory=dict)
 
     def add(self, cause: Cause | str, rows: Ints) -> None:
         """Count rows (K,) of the log as dropped."""
@@ -116,9 +128,12 @@ def clean(log: RawLog, config: LogConfig) -> tuple[tuple[Observations, ...], Dro
     drops = Drops()
     for cause, row in log.dropped:
         drops.add(cause, np.array([row]))
-    by_id = {vehicle.id: vehicle for vehicle in log.vehicles}
+    by_id: dict[str, list[Observations]] = {}
+    for vehicle in log.vehicles:
+        by_id.setdefault(vehicle.id, []).append(vehicle)
     names = chosen_vehicles(list(by_id), config, log.name)
-    vehicles = [_without_invalid(by_id[name], log.geographic, drops) for name in names]
+    tracks = chain.from_iterable(by_id[name] for name in names)
+    vehicles = [_without_invalid(track, log.geographic, drops) for track in tracks]
 
     first_ns, last_ns = _time_window(vehicles, log, drops, config)
     vehicles = [_in_window(vehicle, first_ns, last_ns) for vehicle in vehicles]
@@ -217,7 +232,7 @@ def _time_window(
         raise InputError(
             f"{log.segments[0].label}: no usable position in {log.rows} rows"
             + (f" ({causes})" if causes else "")
-            + _unit_hint(log)
+            + degree_hint(log, config)
             + "; check the columns and their units, or name them with --set log.columns=…"
         )
     first_ns = int(stamps.min())
@@ -233,27 +248,6 @@ def _time_window(
         )
     end_ns = first_ns + round(config.end * 1e9) if config.end else last_ns
     return first_ns + round(config.start * 1e9), end_ns
-
-
-def _unit_hint(log: RawLog) -> str:
-    """Return what unusable latitudes and longitudes look like; "" if unknown."""
-    if not log.geographic:
-        return ""
-    fix = np.concatenate([vehicle.fix for vehicle in log.vehicles] or [np.zeros((0, 2))])
-    fix = np.abs(fix[np.isfinite(fix).all(axis=1)])
-    if not len(fix):
-        return "; the receivers had no fix, or the fields are empty"
-    latitude, longitude = np.median(fix, axis=0)
-    if 90.0 < latitude <= 180.0:
-        return "; lat and lon may be swapped: --set log.columns=lat=…,lon=…"
-    if max(latitude, longitude) > 180.0 and latitude <= 9_000.0 and longitude <= 18_000.0:
-        return (
-            "; they look like degrees and minutes, as of NMEA: "
-            "--set log.columns=lat=…:ddmm,lon=…:ddmm"
-        )
-    if max(latitude, longitude) > 180.0 and latitude <= 9e8 and longitude <= 1.8e9:
-        return "; they look like 1e-7 degrees: --set log.columns=lat=…:e7,lon=…:e7"
-    return ""
 
 
 def _in_window(vehicle: Observations, first_ns: int, last_ns: int) -> Observations:
@@ -338,7 +332,31 @@ def _in_order(vehicle: Observations, log: RawLog, drops: Drops) -> Observations:
     _, first_speeds = np.unique(vehicle.speed_ns, return_index=True)
     repeated = np.delete(np.arange(len(vehicle.fix_ns)), first_fixes)
     drops.add(Cause.STAMP_REPEATED, vehicle.fix_row[repeated])
+    if len(repeated):
+        _note_conflicts(vehicle, first_fixes, repeated, drops, geographic=log.geographic)
     return select(vehicle, first_fixes, first_speeds)
+
+
+def _note_conflicts(
+    vehicle: Observations, kept: Ints, repeated: Ints, drops: Drops, *, geographic: bool
+) -> None:
+    """Note the repeated stamps at whose time the vehicle is elsewhere.
+
+    Args:
+        vehicle: observations in the order of the log.
+        kept: rows (K,) of the different stamps, in order of the stamps.
+        repeated: rows of the others.
+        drops: receives the note.
+        geographic: whether positions are degrees.
+    """
+    places = on_sphere(vehicle.fix) if geographic else vehicle.fix
+    first = kept[np.searchsorted(vehicle.fix_ns[kept], vehicle.fix_ns[repeated])]
+    offset = np.linalg.norm(places[repeated] - places[first], axis=1)
+    count = int((offset > CLEANING.jump_slack_m).sum())
+    if count:
+        advance = np.linalg.norm(places[repeated] - places[repeated - 1], axis=1)
+        is_coarse = bool(np.median(advance) < CLEANING.jump_slack_m)
+        drops.conflicts[vehicle.id] = StampConflict(count, is_coarse)
 
 
 def _without_repeats(vehicle: Observations, drops: Drops, geographic: bool) -> Observations:
@@ -394,8 +412,8 @@ def _check_clock(vehicles: Sequence[Observations], log: RawLog, config: LogConfi
         unit, hint = _likely_time_unit(period)
         raise InputError(
             f"{log.where(int(vehicles[0].fix_row[1]))}: positions are {period:g} s apart "
-            f"(median); a track needs at most {CLEANING.max_period_s:g} s; {hint}name the unit "
-            f"with --set log.columns=time=<column>:{unit}"
+            f"(median); a track needs at most {CLEANING.max_period_s:g} s; {hint}"
+            + (f"name the unit with {time_option(log, unit, config)}" if log.columns else "")
         )
     spans = [int(vehicle.fix_ns[-1]) - int(vehicle.fix_ns[0]) for vehicle in vehicles]
     n_ticks = round(sum(spans) / (config.period * 1e9))
@@ -422,11 +440,11 @@ def _likely_time_unit(period: float) -> tuple[str, str]:
 
 def _without_jumps(vehicle: Observations, drops: Drops, geographic: bool) -> Observations:
     """Drop fixes that the measured speeds do not allow, except several in a row that agree."""
-    speed_limit = _max_speeds(vehicle)
     places = on_sphere(vehicle.fix) if geographic else vehicle.fix
     step = np.linalg.norm(np.diff(places, axis=0), axis=1)
     seconds = vehicle.fix_ns.astype(np.float64) * 1e-9
     step_s = np.diff(vehicle.fix_ns) * 1e-9
+    speed_limit = _max_speeds(vehicle, step / step_s)
     if not (step > CLEANING.jump_slack_m + speed_limit[1:] * step_s).any():
         return vehicle
     reachable = _reachable(seconds, places, speed_limit)
@@ -434,12 +452,15 @@ def _without_jumps(vehicle: Observations, drops: Drops, geographic: bool) -> Obs
     return select(vehicle, reachable)
 
 
-def _max_speeds(vehicle: Observations) -> Floats:
-    """Return the highest possible speeds (F,) [m/s] at the fixes."""
+def _max_speeds(vehicle: Observations, rates: Floats) -> Floats:
+    """Return the highest possible speeds (F,) [m/s] at the fixes, by speeds or agreeing fixes."""
     if len(vehicle.speed_ns) < 2:
         return np.full(len(vehicle.fix_ns), CLEANING.max_speed_mps)
     measured = np.interp(vehicle.fix_ns, vehicle.speed_ns, vehicle.speed)
-    return 1.5 * measured + CLEANING.jump_slack_mps
+    usual_rate = median_filter(np.append(rates, rates[-1:]), CLEANING.relocation_count)
+    believed = np.maximum(measured, np.minimum(usual_rate, CLEANING.max_speed_mps))
+    limits: Floats = 1.5 * believed + CLEANING.jump_slack_mps
+    return limits
 
 
 def _reachable(seconds: Floats, fix: Floats, speed_limit: Floats) -> Bools:

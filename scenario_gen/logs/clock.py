@@ -14,6 +14,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from scenario_gen.base.errors import InputError
+from scenario_gen.logs.columns import with_columns
 from scenario_gen.logs.config import LogConfig
 from scenario_gen.logs.geodesy import on_sphere
 from scenario_gen.logs.raw import Observations, RawLog
@@ -40,6 +41,10 @@ class StepLimits:
         min_distance_m: distance of two places at one time that one vehicle cannot have.
         continuation_share: share of that distance within which the next row lies if the vehicle
             drives on and its clock does not.
+        replay_share: share of the time before a step that is recorded again, as a new scene.
+        min_replay_m: distance of a second drive from the first; nearer rows are copies.
+        shared_share: share of the parts between steps in which several vehicles are recorded, if
+            the rows are sorted by time.
     """
 
     min_row_count: int = 5
@@ -49,6 +54,9 @@ class StepLimits:
     max_standing_count: int = 3
     min_distance_m: float = 3.0
     continuation_share: float = 0.5
+    replay_share: float = 0.5
+    min_replay_m: float = 0.01
+    shared_share: float = 0.5
 
 
 _STEP = StepLimits()
@@ -56,10 +64,11 @@ _STEP = StepLimits()
 
 @dataclass(frozen=True)
 class _ClockStep:
-    """The stamps [ns] before and after a step of the clock, and the row of the log after it."""
+    """The stamps [ns] before and after a step of the clock, and the rows of the log around it."""
 
     before: int
     after: int
+    previous_row: int
     row: int
 
     def matches(self, before: int, after: int) -> bool:
@@ -76,10 +85,15 @@ def is_out_of_range(stamps: Ints) -> Bools:
 def retimed(log: RawLog, config: LogConfig) -> tuple[RawLog, list[str]]:
     """Return the log on a clock that increases, from 1970 on; and notes on what was shifted."""
     notes = []
-    steps = _clock_steps(log)
-    if steps:
-        log = _without_steps(log, steps, config)
-        more = f" and {len(steps) - 1} more times" if len(steps) > 1 else ""
+    by_vehicle = [_vehicle_steps(vehicle, log) for vehicle in log.vehicles]
+    if any(by_vehicle):
+        parts = _parts_by_row(log, by_vehicle) or _parts_by_vehicle(log, by_vehicle)
+        log, n_parts = _parts_in_turn(log, parts, config)
+        steps = sorted(
+            (step for vehicle_steps in by_vehicle for step in vehicle_steps),
+            key=lambda step: step.row,
+        )
+        more = f" and {n_parts - 2} more times" if n_parts > 2 else ""
         notes.append(
             f"the clock steps from {steps[0].before / _S_TO_NS:.10g} to "
             f"{steps[0].after / _S_TO_NS:.10g} s at {log.where(steps[0].row)}{more}: later rows "
@@ -114,9 +128,15 @@ def check_unit(log: RawLog, config: LogConfig) -> None:
         if is_usual and config.min_duration < span * factor:
             raise InputError(
                 f"{log.segments[0].label}: the log lasts {span:g} s, positions are {period:g} s "
-                f"apart (median); the time may be in {unit}: "
-                f"--set log.columns=time=<column>:{unit}"
+                f"apart (median); the time may be in {unit}: {time_option(log, unit, config)}"
             )
+
+
+def time_option(log: RawLog, unit: str, config: LogConfig) -> str:
+    """Return the option that reads the time in a unit."""
+    column = log.columns.get("time")
+    name = column.option(unit) if column is not None else f"<column>:{unit}"
+    return with_columns(config.columns, {"time": name})
 
 
 def _shifted(log: RawLog, shifts: Sequence[tuple[Ints, Ints]]) -> RawLog:
@@ -136,16 +156,6 @@ def _shifted(log: RawLog, shifts: Sequence[tuple[Ints, Ints]]) -> RawLog:
     return replace(log, vehicles=vehicles)
 
 
-def _clock_steps(log: RawLog) -> list[_ClockStep]:
-    """Return the different steps of the log's clock, by row."""
-    steps: list[_ClockStep] = []
-    for vehicle in log.vehicles:
-        for step in _vehicle_steps(vehicle, log):
-            if not any(known.matches(step.before, step.after) for known in steps):
-                steps.append(step)
-    return sorted(steps, key=lambda step: step.row)
-
-
 def _vehicle_steps(vehicle: Observations, log: RawLog) -> list[_ClockStep]:
     """Return where a vehicle's stamps go back while it is not where it was at those stamps."""
     valid = np.isfinite(vehicle.fix).all(axis=1) & ~is_out_of_range(vehicle.fix_ns)
@@ -160,7 +170,8 @@ def _vehicle_steps(vehicle: Observations, log: RawLog) -> list[_ClockStep]:
         if not is_long or log.segment(int(rows[row])) != log.segment(int(rows[row - 1])):
             continue
         if _is_clock_step(stamps[begin:end], places[begin:end], row - begin, np.diff(stamps)):
-            steps.append(_ClockStep(int(stamps[row - 1]), int(stamps[row]), int(rows[row])))
+            before, after = int(stamps[row - 1]), int(stamps[row])
+            steps.append(_ClockStep(before, after, int(rows[row - 1]), int(rows[row])))
     return steps
 
 
@@ -189,6 +200,9 @@ def _is_clock_step(stamps: Ints, places: Floats, row: int, all_steps: Ints) -> b
     advance = float(np.linalg.norm(places[row] - places[row - 1]))
     if distance > _STEP.min_distance_m:
         return True
+    is_replay = len(repeated) >= _STEP.replay_share * len(before)
+    if is_replay and row > 2 * _STEP.min_row_count and distance > _STEP.min_replay_m:
+        return True
     drives_on = advance < _STEP.continuation_share * distance
     return distance > _STEP.min_distance_m / 4.0 and drives_on
 
@@ -208,50 +222,101 @@ def _interpolate(stamps: Ints, places: Floats, wanted: Ints) -> Floats:
     return np.column_stack([np.interp(wanted_s, seconds, axis) for axis in places.T])
 
 
-def _without_steps(log: RawLog, steps: Sequence[_ClockStep], config: LogConfig) -> RawLog:
-    """Return the log with the rows after each step moved later, by more than a bridged gap."""
-    parts = [
+_Parts = list[tuple[Ints, Ints]]
+"""Numbers of the parts between steps, for the fixes and the speeds of each vehicle."""
+
+
+def _parts_by_row(log: RawLog, by_vehicle: Sequence[Sequence[_ClockStep]]) -> _Parts | None:
+    """Return the parts if the log is sorted by time between steps of a common clock, else None.
+
+    A step is then a row, for all vehicles, wherever each of them is recorded next.
+    """
+    rows = np.concatenate([vehicle.fix_row for vehicle in log.vehicles])
+    stamps = np.concatenate([vehicle.fix_ns for vehicle in log.vehicles])
+    owner = np.repeat(
+        np.arange(len(log.vehicles)), [len(vehicle.fix_row) for vehicle in log.vehicles]
+    )
+    order = np.argsort(rows, kind="stable")
+    steps = [step for vehicle_steps in by_vehicle for step in vehicle_steps]
+    least_ns = min(step.before - step.after for step in steps) / 2
+    backward = np.flatnonzero(np.diff(stamps[order]) < -max(least_ns, 0)) + 1
+    part = np.searchsorted(backward, np.arange(len(order)), side="right")
+    pairs = np.unique(np.column_stack([part, owner[order]]), axis=0)
+    n_vehicles = np.bincount(pairs[:, 0])
+    if (n_vehicles > 1).mean() < _STEP.shared_share:
+        return None
+    edges = rows[order][backward]
+    is_step = np.zeros(len(edges), dtype=bool)
+    for step in steps:
+        first, last = np.searchsorted(edges, (step.previous_row, step.row), side="right")
+        if first == last:
+            return None
+        is_step[first:last] = True
+    starts = edges[is_step]
+    return [
         (
-            _part_of_rows(vehicle.fix_ns, vehicle.fix_row, steps),
-            _part_of_rows(vehicle.speed_ns, vehicle.speed_row, steps),
+            np.searchsorted(starts, vehicle.fix_row, side="right"),
+            np.searchsorted(starts, vehicle.speed_row, side="right"),
         )
         for vehicle in log.vehicles
     ]
-    gap_ns = round((2.5 * config.longest_gap + 15.0) * _S_TO_NS)
-    shifts = [0]
-    last_ns: int | None = None
-    for k in range(len(steps) + 1):
-        stamps = np.concatenate(
-            [
-                vehicle.fix_ns[(part == k) & ~is_out_of_range(vehicle.fix_ns)]
-                for vehicle, (part, _) in zip(log.vehicles, parts, strict=True)
-            ]
-        )
-        if last_ns is not None:
-            lag_ns = last_ns + gap_ns - int(stamps.min(initial=last_ns + gap_ns))
-            whole_seconds = -(-lag_ns // _S_TO_NS)
-            shifts.append(whole_seconds * _S_TO_NS if lag_ns > 0 else shifts[-1])
-        if len(stamps):
-            last_ns = int(stamps.max()) + shifts[-1]
-    by_part = np.array(shifts)
-    return _shifted(log, [(by_part[fixes], by_part[speeds]) for fixes, speeds in parts])
 
 
-def _part_of_rows(stamps: Ints, rows: Ints, steps: Sequence[_ClockStep]) -> Ints:
-    """Return for each stamp (T,) of a vehicle how many steps of the clock precede it.
+def _parts_by_vehicle(log: RawLog, by_vehicle: Sequence[Sequence[_ClockStep]]) -> _Parts:
+    """Return the parts if each vehicle has rows of its own: its steps are counted.
 
     A vehicle whose stamps show none of the steps is divided by the rows of the steps.
     """
-    starts = []
+    steps = sorted(
+        (step for vehicle_steps in by_vehicle for step in vehicle_steps), key=lambda step: step.row
+    )
+    distinct: list[_ClockStep] = []
     for step in steps:
-        matching = (
-            row
-            for row in _backward_rows(stamps).tolist()
-            if step.matches(int(stamps[row - 1]), int(stamps[row]))
+        if not any(known.matches(step.before, step.after) for known in distinct):
+            distinct.append(step)
+    rows = [step.row for step in distinct]
+
+    def part_of(stamps: Ints, row: Ints) -> Ints:
+        starts = [
+            k
+            for k in _backward_rows(stamps).tolist()
+            if any(step.matches(int(stamps[k - 1]), int(stamps[k])) for step in distinct)
+        ]
+        if starts:
+            return np.searchsorted(starts, np.arange(len(stamps)), side="right")
+        return np.searchsorted(rows, row, side="right")
+
+    return [
+        (
+            part_of(vehicle.fix_ns, vehicle.fix_row),
+            part_of(vehicle.speed_ns, vehicle.speed_row),
         )
-        start = next(matching, None)
-        if start is not None:
-            starts.append(start)
-    if starts:
-        return np.searchsorted(np.unique(starts), np.arange(len(stamps)), side="right")
-    return np.searchsorted([step.row for step in steps], rows, side="right")
+        for vehicle in log.vehicles
+    ]
+
+
+def _parts_in_turn(log: RawLog, parts: _Parts, config: LogConfig) -> tuple[RawLog, int]:
+    """Return the log with each part moved later, by more than a bridged gap; and their number."""
+    gap_ns = round((2.5 * config.longest_gap + 15.0) * _S_TO_NS)
+    n_parts = 1 + max(int(fixes.max(initial=0)) for fixes, _ in parts)
+    n_parts = max(n_parts, 1 + max(int(speeds.max(initial=0)) for _, speeds in parts))
+    firsts = np.full(n_parts, np.iinfo(np.int64).max)
+    lasts = np.full(n_parts, np.iinfo(np.int64).min)
+    for vehicle, (part, _) in zip(log.vehicles, parts, strict=True):
+        valid = ~is_out_of_range(vehicle.fix_ns)
+        np.minimum.at(firsts, part[valid], vehicle.fix_ns[valid])
+        np.maximum.at(lasts, part[valid], vehicle.fix_ns[valid])
+    shifts = [0]
+    last_ns: int | None = None
+    for k, (first, last) in enumerate(zip(firsts.tolist(), lasts.tolist(), strict=True)):
+        if k:
+            shifts.append(shifts[-1])
+        if first > last:
+            continue  # no fix is in this part
+        if last_ns is not None:
+            lag_ns = last_ns + gap_ns - first
+            whole_seconds = -(-lag_ns // _S_TO_NS)
+            shifts[-1] = whole_seconds * _S_TO_NS if lag_ns > 0 else shifts[-1]
+        last_ns = last + shifts[-1]
+    by_part = np.array(shifts)
+    return _shifted(log, [(by_part[fixes], by_part[speeds]) for fixes, speeds in parts]), n_parts

@@ -16,15 +16,22 @@ from scenario_gen.logs.raw import UnknownFormatError
 NAMES: dict[str, tuple[str, ...]] = {
     quantity: tuple(names.split())
     for quantity, names in {
-        "time": "utc stamp unix gentime clock t time timestamp global_time",
+        "scene": "case_id scenario_id scene scene_id run run_id run_index episode episode_id",
+        "date": "date utc_date day",
+        "time": "utc stamp unix gentime clock t time timestamp global_time epoch utc_time "
+        "gps_time time_of_day sim_time frame frame_id frame_number frame_no frame_idx",
         "vehicle": "vehicle vehicle_id vehicle_name txdevice track_id id name agent_id object_id "
-        "car car_id veh veh_id trackid actor_id obj_id",
-        "lat": "lat latitude",
-        "lon": "lon lng longitude",
-        "x": "x e east easting pos_x position_x",
-        "y": "y n north northing pos_y position_y",
-        "speed": "speed v velocity vel",
-        "heading": "heading yaw theta course bearing",
+        "car car_id veh veh_id trackid actor_id obj_id vehicleid objectid agent track",
+        "lat": "lat latitude gps_lat gps_latitude",
+        "lon": "lon lng longitude long gps_lon gps_longitude",
+        "x": "x e east easting pos_x position_x x_utm utm_x utm_e utm_east utm_easting xcenter "
+        "x_center center_x tx p_rs_r_x px",
+        "y": "y n north northing pos_y position_y y_utm utm_y utm_n utm_north utm_northing "
+        "ycenter y_center center_y ty p_rs_r_y py",
+        "speed": "speed v velocity vel vehicle_speed ground_speed speed_over_ground sog",
+        "vx": "vx v_x velocity_x vel_x xvelocity x_velocity speed_x",
+        "vy": "vy v_y velocity_y vel_y yvelocity y_velocity speed_y",
+        "heading": "heading yaw theta course bearing psi hdg cog course_over_ground",
         "length": "length len vehicle_length",
         "width": "width vehicle_width",
         "kind": "type kind class vehicle_type object_type agent_type actor_type obj_type category "
@@ -38,7 +45,13 @@ Clocks that all files share precede those that start with the file.
 
 _LENGTHS_M = {"m": 1.0, "km": 1e3, "ft": 0.3048, "cm": 0.01}
 _SIZES_M = {"m": 1.0, "ft": 0.3048, "cm": 0.01, "mm": 0.001}
-_DEGREES = {"deg": 1.0, "rad": math.degrees(1.0), "e7": 1e-7, "ddmm": 1.0}
+_DEGREES = {
+    "deg": 1.0,
+    "rad": math.degrees(1.0),
+    "e7": 1e-7,
+    "min": 1 / 60.0,
+    "ddmm": 1.0,
+}
 _SPEEDS_MPS = {
     "mps": 1.0,
     "ms": 1.0,
@@ -59,9 +72,12 @@ _TIMES_S = {
     "min": 60.0,
     "h": 3600.0,
     "d": 86400.0,
+    "hhmmss": 1.0,
 }
 UNITS: dict[str, dict[str, float]] = {
     "time": _TIMES_S,
+    "date": {},
+    "scene": {},
     "vehicle": {},
     "kind": {},
     "lat": _DEGREES,
@@ -71,11 +87,14 @@ UNITS: dict[str, dict[str, float]] = {
     "length": _SIZES_M,
     "width": _SIZES_M,
     "speed": _SPEEDS_MPS,
+    "vx": _SPEEDS_MPS,
+    "vy": _SPEEDS_MPS,
     "heading": {"rad": 1.0, "deg": math.pi / 180.0, "north_deg": math.nan, "cw_deg": math.nan},
 }
 """Factors of units to seconds, metres, m/s, radians, or degrees (lat, lon).
 
-A column without a suffix has the first unit; `ddmm` means degrees and minutes (ddmm.mmmm).
+A column without a suffix has the first unit; `ddmm` means degrees and minutes (ddmm.mmmm), and
+`hhmmss` a time of the day (hhmmss.ss).
 """
 
 MAX_LISTED_COUNT = 12
@@ -107,7 +126,13 @@ _NGSIM = {
 _FRAME_RATE = re.compile(r"(\d+(?:\.\d+)?)fps")  # unit of a time in frames
 _NUMBERED_KIND = re.compile(r"([a-z_]*)(\d+)(?:\+|$)")  # type and number, car2
 _NUMBERED_KINDS = re.compile(r"[a-z_]*\d+(?:\+[a-z_]*\d+)*")
-_CLOCKWISE_NAMES = ("course", "bearing")  # by convention degrees clockwise from north
+_FRAME_NAMES = ("frame", "frame_id", "frame_number", "frame_no", "frame_idx")
+_CLOCKWISE_NAMES = (
+    "course",
+    "bearing",
+    "cog",
+    "course_over_ground",
+)  # by convention degrees clockwise from north
 
 
 @dataclass(frozen=True)
@@ -120,6 +145,7 @@ class Column:
         clockwise: a heading clockwise from north.
         minutes: degrees and minutes, as receivers of NMEA write them.
         types: (number, type) of a column of kinds that are numbers; a car if no type is named.
+        unit: as it is written in the parameter `columns` or in the name; "" if neither names one.
     """
 
     name: str
@@ -127,6 +153,19 @@ class Column:
     clockwise: bool = False
     minutes: bool = False
     types: tuple[tuple[float, str], ...] = ()
+    unit: str = ""
+
+    @property
+    def counts_frames(self) -> bool:
+        """Whether a time is a number of frames by its name, at an unknown rate."""
+        return not self.unit and normalized(self.name) in _FRAME_NAMES
+
+    def option(self, unit: str = "", *, flipped: bool = False) -> str:
+        """Return the column as in the parameter `columns`, in a unit or in its own one."""
+        if not unit and not normalized(self.name).endswith(f"_{self.unit}"):
+            unit = self.unit
+        sign = "-" if flipped != (self.factor < 0.0) else ""
+        return f"{sign}{self.name}:{unit}" if unit else f"{sign}{self.name}"
 
 
 def find_columns(header: Sequence[str], path: Path, option: str) -> dict[str, Column]:
@@ -236,6 +275,19 @@ def _check_unit(quantity: str, unit: str) -> None:
     )
 
 
+def with_columns(option: str, changes: Mapping[str, str]) -> str:
+    """Return the parameter `columns` with some quantities changed, as an option of the commands.
+
+    Args:
+        option: the parameter's value.
+        changes: by quantity, columns as in the parameter.
+    """
+    parts = dict(part.split("=", 1) for part in listed(option) if "=" in part)
+    text = ",".join(f"{quantity}={column}" for quantity, column in {**parts, **changes}.items())
+    assignment = f"log.columns={text}"
+    return f"--set '{assignment}'" if re.search(r"[\s()\[\]&;]", text) else f"--set {assignment}"
+
+
 def normalized(name: str) -> str:
     """Return a column's name in lower case, its unit as a suffix: `Speed [m/s]` is `speed_mps`."""
     name = name.strip().lower()
@@ -256,7 +308,7 @@ def column_notes(columns: dict[str, Column], option: str, header: Sequence[str])
         n_more = len(unused) - MAX_LISTED_COUNT
         more = f" and {n_more} more" if n_more > 0 else ""
         notes.append(f"columns read: {sources}; not read: {names}{more}")
-    if "speed" not in columns and "speed" not in option:
+    if not columns.keys() & {"speed", "vx"} and "speed" not in option:
         notes.append("no speed column: speeds are derived from the positions")
     if columns.get("x", Column("")).name.strip().lower() == _NGSIM["x"][0]:
         notes.append(
@@ -280,9 +332,13 @@ def _complete(columns: dict[str, Column], path: Path, header: Sequence[str]) -> 
         raise _missing_column(
             "position (x and y, or lat and lon)", "x=…,y=…", missing, path, header
         )
+    if "time" not in columns and "date" in columns:
+        columns = {**columns, "time": columns.pop("date")}
     if "time" not in columns:
         raise _missing_column("time", "time=…", ["time"], path, header)
-    ignored = ("x", "y") if is_geographic else ("lat", "lon")
+    ignored = ["x", "y"] if is_geographic else ["lat", "lon"]
+    if "speed" in columns or not {"vx", "vy"} <= columns.keys():
+        ignored += ["vx", "vy"]
     return {quantity: column for quantity, column in columns.items() if quantity not in ignored}
 
 
@@ -310,7 +366,8 @@ def _similar(header: Sequence[str], aliases: Collection[str]) -> str:
 def _kind_column(name: str, kinds: str) -> Column:
     """Return the column of the types of road users, whose numbers in the file are in `kinds`."""
     numbered = _NUMBERED_KIND.findall(kinds)
-    return Column(name, types=tuple((float(number), kind or "car") for kind, number in numbered))
+    types = tuple((float(number), kind or "car") for kind, number in numbered)
+    return Column(name, types=types, unit=kinds)
 
 
 def as_column(quantity: str, name: str, unit: str = "") -> Column:
@@ -320,14 +377,15 @@ def as_column(quantity: str, name: str, unit: str = "") -> Column:
     lower = normalized(name)
     frame_rate = _FRAME_RATE.fullmatch(unit) if quantity == "time" else None
     if frame_rate:
-        return Column(name, 1.0 / max(float(frame_rate[1]), 1e-3))
+        return Column(name, 1.0 / max(float(frame_rate[1]), 1e-3), unit=unit)
     suffixes = [known for known in UNITS[quantity] if lower.endswith(f"_{known}")]
     unit = unit or max(suffixes, key=len, default="")
     is_clockwise = quantity == "heading" and (
         unit in ("north_deg", "cw_deg") or lower.removesuffix(f"_{unit}") in _CLOCKWISE_NAMES
     )
     if is_clockwise:
-        return Column(name, 1.0 if unit == "rad" else math.pi / 180.0, clockwise=True)
+        factor = 1.0 if unit == "rad" else math.pi / 180.0
+        return Column(name, factor, clockwise=True, unit=unit or "north_deg")
     if quantity == "time" and not unit and lower == "gentime":
-        return Column(name, 1e-6)
-    return Column(name, UNITS[quantity].get(unit, 1.0), minutes=unit == "ddmm")
+        return Column(name, 1e-6, unit="us")
+    return Column(name, UNITS[quantity].get(unit, 1.0), minutes=unit == "ddmm", unit=unit)

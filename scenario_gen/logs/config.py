@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 from scenario_gen.base.errors import did_you_mean, InputError
 from scenario_gen.base.parameters import parameter, Parameters
+from scenario_gen.logs.doubts import ALLOWED
 from scenario_gen.logs.formats import LOG_FORMATS
 
 _POINTS = {"centre": 0.0, "front": -0.5, "rear": 0.5, "rear_axle": 0.3}
@@ -35,6 +36,11 @@ class LogConfig(Parameters):
     topics: str = parameter(
         "", "topics of a bag to read, separated by commas; empty: all that can be used"
     )
+    stamps: str = parameter(
+        "header",
+        "stamps of a bag's messages: those of their headers, or the time of reception",
+        choices=("header", "received"),
+    )
     vehicles: str = parameter("", "vehicles to keep, separated by commas; empty: all")
     types: str = parameter(
         "",
@@ -55,6 +61,11 @@ class LogConfig(Parameters):
     )
     strict: bool = parameter(
         False, "refuse a log with rows that need repair, instead of repairing and counting them"
+    )
+    allow: str = parameter(
+        "",
+        "doubt: read a log although the result contradicts its data; empty: stop and say so",
+        choices=("", ALLOWED),
     )
     period: float = parameter(0.1, "period of the common clock", unit="s", low=0.01, high=1.0)
     longest_gap: float = parameter(

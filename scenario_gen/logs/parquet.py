@@ -36,8 +36,8 @@ def read_columns(
     columns = find_columns(header, path, config.columns)
     for quantity, column in list(columns.items()):
         kind = _value_type(schema.field(column.name).type)
-        if quantity == "kind" and not _is_text(kind):
-            del columns[quantity]  # numbers of unknown meaning
+        if quantity in ("kind", "date") and not _is_text(kind):
+            del columns[quantity]  # numbers of unknown meaning, or whole days
             continue
         unit_s = _time_unit_s(kind)
         is_time = quantity == "time" and unit_s is not None

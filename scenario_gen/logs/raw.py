@@ -7,14 +7,19 @@ from bisect import bisect_right
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from scenario_gen.base.errors import InputError
 from scenario_gen.base.stores import renamed
 from scenario_gen.logs.config import LogConfig
+from scenario_gen.logs.doubts import Doubt
 from scenario_gen.numerics import Floats, Ints
 from scenario_gen.types import Encounter
+
+if TYPE_CHECKING:
+    from scenario_gen.logs.columns import Column
 
 
 class UnknownFormatError(InputError):
@@ -137,6 +142,9 @@ class RawLog:
         notes: for people, on how it was read.
         dropped: rows that the reader left out: (cause, row).
         excluded: number of road users left out, by what the log calls their type.
+        separators: further columns that tell apart rows of one vehicle with the same stamp.
+        columns: of a table, by quantity; they tell whether a unit is named or assumed.
+        doubts: of the reader.
         encounters: those of a recorded `tracks` topic, used unchanged; then without vehicles.
     """
 
@@ -149,6 +157,9 @@ class RawLog:
     dropped: tuple[tuple[str, int], ...] = ()
     encounters: tuple[Encounter, ...] = ()
     excluded: Mapping[str, int] = field(default_factory=dict)
+    separators: tuple[str, ...] = ()
+    columns: "Mapping[str, Column]" = field(default_factory=dict)
+    doubts: tuple[Doubt, ...] = ()
 
     def segment(self, row: int) -> Segment:
         """Return where a row comes from."""

@@ -14,9 +14,11 @@ import numpy as np
 from scenario_gen.base.errors import InputError
 from scenario_gen.base.folders.scratch import scratch
 from scenario_gen.base.stores import naming_objects, temp_folder
+from scenario_gen.logs.checks import copies_in, doubts_of_pieces, doubts_of_rows
 from scenario_gen.logs.cleaning import clean, Drops
 from scenario_gen.logs.clock import check_unit, retimed
 from scenario_gen.logs.config import chosen_vehicles, LogConfig
+from scenario_gen.logs.doubts import check_doubts, Doubt
 from scenario_gen.logs.encounters import Piece, pieces_of, plausible
 from scenario_gen.logs.extract import cut_encounter, encounter_quality, recorded_encounters
 from scenario_gen.logs.files import read_raw
@@ -31,8 +33,7 @@ from scenario_gen.logs.no_encounter import (
 )
 from scenario_gen.logs.quality import Quality, VehicleQuality
 from scenario_gen.logs.raw import natural, Observations, RawLog
-from scenario_gen.logs.smoothing import DOUBTED_MPS
-from scenario_gen.logs.units import remarks_on_units
+from scenario_gen.logs.units import interpret
 from scenario_gen.types import Encounter
 
 if TYPE_CHECKING:
@@ -45,10 +46,11 @@ _MANY_DROPS_SHARE = 0.02  # of the rows; the user is told at once
 
 @dataclass(frozen=True)
 class LogResult:
-    """The encounters of a log by time, and the quality of the recording."""
+    """The encounters of a log by time, the recording's quality, and doubts about reading it."""
 
     encounters: tuple[Encounter, ...]
     quality: Quality
+    doubts: tuple[Doubt, ...] = ()
 
 
 def read_log(
@@ -94,6 +96,8 @@ def encounters_of(log: RawLog, config: LogConfig) -> LogResult:
     if log.encounters:
         return LogResult(*recorded_encounters(log, config))
     check_unit(log, config)
+    log, unit_notes, unit_doubts = interpret(log, config)
+    check_doubts(log.segments[0].label, [*log.doubts, *unit_doubts], config.allow)
     log = typed(log, config)
     log, clock_notes = retimed(log, config)
     tracks, drops = clean(log, config)
@@ -104,37 +108,36 @@ def encounters_of(log: RawLog, config: LogConfig) -> LogResult:
     origin_ns = _first_tick_ns(tracks, config)
     pieces, vehicles = _smooth_pieces(log, tracks, origin_ns, config)
     pieces, doubts = plausible(pieces, config)
-    groups, group_notes = find_groups(pieces, config)
-    if not groups:
-        reasons = (explain_no_encounter(log, pieces, config), *doubts)
-        raise NoEncounterError("; ".join(reasons))
-
-    encounters = []
-    cut_notes: list[str] = []
-    width = len(str(len(groups)))
-    for number, group in enumerate(groups, 1):
-        name = log.name if len(groups) == 1 else f"{log.name}-{number:0{width}d}"
-        encounter, notes = cut_encounter(name, group, pieces, origin_ns, config)
-        encounters.append(encounter)
-        cut_notes += notes
-
-    in_encounters = {pieces[member].track.id for group in groups for member in group.spans}
+    grouping = _find_encounters(log, pieces, doubts, origin_ns, config)
+    copies = copies_in(grouping.encounters)
+    if copies:
+        doubts += [str(doubt) for doubt in copies.values()]
+        pieces = [piece for piece in pieces if piece.track.id not in copies]
+        grouping = _find_encounters(log, pieces, doubts, origin_ns, config)
+    contradictions = [
+        *doubts_of_rows(log, drops, config),
+        *doubts_of_pieces(pieces, origin_ns),
+    ]
+    check_doubts(log.segments[0].label, contradictions, config.allow)
+    all_doubts = (*log.doubts, *unit_doubts, *contradictions, *copies.values())
     excluded = (f"left out: {counted(log.excluded)}",) if log.excluded else ()
     notes_by_vehicle = (
-        *group_notes,
+        *grouping.group_notes,
         *doubts,
+        *map(str, contradictions),
         *_origin_notes(tracks, config),
-        *_vehicle_notes(vehicles, _unusable(log, tracks, config), in_encounters, config),
-        *cut_notes,
+        *_vehicle_notes(vehicles, _unusable(log, tracks, config), grouping.members, config),
+        *grouping.cut_notes,
     )
     quality = Quality(
         name=log.name,
         rows=log.rows,
         dropped=drops.located(log),
         vehicles=tuple(vehicles),
-        encounters=tuple(map(encounter_quality, encounters)),
+        encounters=tuple(map(encounter_quality, grouping.encounters)),
         notes=(
-            *remarks_on_units(pieces, origin_ns, config),
+            *unit_notes,
+            *map(str, unit_doubts),
             *clock_notes,
             *_drop_notes(log, drops),
             *drops.notes,
@@ -143,7 +146,41 @@ def encounters_of(log: RawLog, config: LogConfig) -> LogResult:
             *dict.fromkeys(notes_by_vehicle),
         ),
     )
-    return LogResult(tuple(encounters), quality)
+    return LogResult(grouping.encounters, quality, all_doubts)
+
+
+@dataclass(frozen=True)
+class _Grouping:
+    """Encounters of a log, the ids of their vehicles, and notes on groups and cuts."""
+
+    encounters: tuple[Encounter, ...]
+    members: set[str]
+    group_notes: list[str]
+    cut_notes: list[str]
+
+
+def _find_encounters(
+    log: RawLog, pieces: Sequence[Piece], doubts: Sequence[str], origin_ns: int, config: LogConfig
+) -> _Grouping:
+    """Return the encounters of smooth pieces.
+
+    Raises:
+        NoEncounterError: there is none.
+    """
+    groups, group_notes = find_groups(pieces, config)
+    if not groups:
+        reasons = (explain_no_encounter(log, pieces, config), *doubts)
+        raise NoEncounterError("; ".join(reasons))
+    encounters = []
+    cut_notes: list[str] = []
+    width = len(str(len(groups)))
+    for number, group in enumerate(groups, 1):
+        name = log.name if len(groups) == 1 else f"{log.name}-{number:0{width}d}"
+        encounter, notes = cut_encounter(name, group, pieces, origin_ns, config)
+        encounters.append(encounter)
+        cut_notes += notes
+    members = {pieces[member].track.id for group in groups for member in group.spans}
+    return _Grouping(tuple(encounters), members, group_notes, cut_notes)
 
 
 def _first_tick_ns(tracks: Sequence[Observations], config: LogConfig) -> int:
@@ -226,10 +263,5 @@ def _vehicle_notes(
         "its positions"
         for vehicle in vehicles
         if vehicle.lost
-    ]
-    notes += [
-        f"vehicle {vehicle.id}: speed column ignored, since it contradicts the positions"
-        for vehicle in vehicles
-        if vehicle.changed > DOUBTED_MPS
     ]
     return notes

@@ -59,6 +59,7 @@ class SmoothingModel:
         straight_m: a shorter path has no shape.
         round_count: fits of path and motion in turn.
         speed_noise_mps: bounds of the estimated noise of speeds.
+        min_doubted_s: a stretch of speeds that contradict the fixes for longer is not used.
     """
 
     standing_mps: float = 0.3
@@ -69,6 +70,7 @@ class SmoothingModel:
     straight_m: float = 3.0
     round_count: int = 3
     speed_noise_mps: tuple[float, float] = (0.3, 3.0)
+    min_doubted_s: float = 0.5
 
 
 _MODEL = SmoothingModel()
@@ -228,6 +230,7 @@ class Smooth:
         noise: standard deviation of the fixes [m], estimated or given.
         turned: (H,) recorded minus smooth headings [rad] while the vehicle moves.
         headings: (H',) whether each recorded heading was used.
+        believed: (S,) whether each measured speed was used.
     """
 
     first: int
@@ -241,6 +244,7 @@ class Smooth:
     noise: float
     turned: Floats
     headings: Bools
+    believed: Bools
 
 
 class _Fit(NamedTuple):
@@ -298,8 +302,14 @@ def smooth_piece(piece: Observations, origin_ns: int, config: LogConfig) -> Smoo
     if not deviation:
         deviation = float(np.clip(white_equivalent(difference), *_MODEL.speed_noise_mps))
     max_difference = max(DOUBTED_MPS, 5.0 * noise)
-    is_trusted = len(piece.speed) > 0 and np.median(np.abs(difference)) <= max_difference
-    measured = [(speed_t, speed, deviation * np.ones(len(speed)), True)] if is_trusted else []
+    agrees = _agreeing(speed_t, difference, max_difference)
+    is_trusted = len(piece.speed) > 0 and agrees.sum() > len(agrees) / 2.0
+    believed = agrees if is_trusted else np.zeros(len(speed), dtype=bool)
+    n_believed = int(believed.sum())
+    measured = []
+    if n_believed:
+        deviations = np.full(n_believed, deviation)
+        measured = [(speed_t[believed], speed[believed], deviations, True)]
     tick_speed = np.interp(ticks, speed_t, speed)
     tick_fix_speed = np.interp(ticks, fix_t, fix_speed)
     guess = _first_distances(ticks, stands, tick_speed, tick_fix_speed, fix_t)
@@ -330,7 +340,23 @@ def smooth_piece(piece: Observations, origin_ns: int, config: LogConfig) -> Smoo
         noise=fit.noise,
         turned=wrap_angle(piece.heading[rolling] - np.interp(fix_t[rolling], ticks, heading)),
         headings=is_used[is_known],
+        believed=believed[: len(piece.speed)],
     )
+
+
+def _agreeing(seconds: Floats, difference: Floats, limit: float) -> Bools:
+    """Return which speeds (S,) agree with the fixes: those of a stretch in which most do.
+
+    Args:
+        seconds: (S,) stamps [s].
+        difference: (S,) measured speed minus that of the fixes [m/s].
+        limit: largest difference of agreeing speeds [m/s].
+    """
+    agrees = np.abs(difference) <= limit
+    result = np.ones(len(agrees), dtype=bool)
+    for begin, end in runs(~agrees):
+        result[begin:end] = seconds[end - 1] - seconds[begin] < _MODEL.min_doubted_s
+    return result
 
 
 def _fit_in_turn(

@@ -15,23 +15,25 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from scenario_gen.base.documents import shown
 from scenario_gen.base.errors import guarded, InputError, needs
 from scenario_gen.logs.columns import (
     Column,
     column_notes,
     find_columns,
     MAX_LISTED_COUNT,
-    UNITS,
 )
 from scenario_gen.logs.config import LogConfig
 from scenario_gen.logs.raw import check_size, check_vehicles, Observations, RawLog, Segment
 from scenario_gen.logs.sizes import MAX_LENGTH_M
+from scenario_gen.logs.stamps import read_stamps, reals
+from scenario_gen.logs.table_parts import (
+    apart_by_scene,
+    named_by_file,
+    tracks_of,
+    with_hemispheres,
+)
 from scenario_gen.logs.text import Layout, layout_of
 from scenario_gen.numerics import Floats
-
-MAX_STAMP_S = 9e9
-"""Latest stamp since 1970 in 64 bits of nanoseconds."""
 
 SPMD_EPOCH_NS = 1_072_915_200 * 10**9
 """2004-01-01 UTC in Unix time, from which Gentime of SPMD counts microseconds."""
@@ -60,17 +62,15 @@ SPMD_COLUMNS = [
 
 _SPMD_QUANTITIES = {
     "vehicle": Column("TxDevice"),
-    "lat": Column("Latitude"),
-    "lon": Column("Longitude"),
-    "speed": Column("Speed"),
+    "lat": Column("Latitude", unit="deg"),
+    "lon": Column("Longitude", unit="deg"),
+    "speed": Column("Speed", unit="mps"),
     "heading": Column("Heading", math.pi / 180.0, clockwise=True),
 }
 _MAX_SPMD_STAMP_US = 8e15
 _PARQUET_SUFFIXES = (".parquet", ".pq")
-_UNIX_TIME_S = (3e8, 4e9)  # from 1979 to 2096
 _FEW_ROW_COUNT = 10  # each of them may belong to another vehicle
 _STANDING_M = 0.05  # no vehicle of an encounter drives less
-_MAX_NUMBER_LENGTH_COUNT = 300  # characters; pandas fails on a number beyond float64
 
 
 def read(paths: Sequence[Path], config: LogConfig, *, spmd: bool = False) -> RawLog:
@@ -85,6 +85,8 @@ def read(paths: Sequence[Path], config: LogConfig, *, spmd: bool = False) -> Raw
         InputError: a file is damaged or too large, or a column is missing or unsuitable.
     """
     frames: list[pd.DataFrame] = []
+    columns: dict[str, Column] = {}
+    separators: dict[str, None] = {}
     segments = []
     notes: list[str] = []
     n_rows = 0
@@ -96,8 +98,8 @@ def read(paths: Sequence[Path], config: LogConfig, *, spmd: bool = False) -> Raw
             frame = _read_spmd(path, n_rows, config)
             header_lines = 0
         else:
-            frame, lines_above = _read_named(path, n_rows, config, notes)
-            header_lines = lines_above + 1
+            frame, columns, header_lines, names = _read_named(path, n_rows, config, notes)
+            separators |= dict.fromkeys(names)
         if "vehicle" not in frame:
             frame["vehicle"] = "0" if len(paths) == 1 else path.stem
         frames.append(frame)
@@ -107,20 +109,28 @@ def read(paths: Sequence[Path], config: LogConfig, *, spmd: bool = False) -> Raw
         raise InputError(
             f"{paths[0]} and the other files mix latitude/longitude and x/y; read them separately"
         )
+    if not spmd:
+        notes += named_by_file(frames, paths)
     log = from_frame(pd.concat(frames, ignore_index=True), paths, tuple(segments), config)
-    return replace(log, notes=(*dict.fromkeys(notes), *log.notes))
+    return replace(
+        log, notes=(*dict.fromkeys(notes), *log.notes), columns=columns, separators=(*separators,)
+    )
 
 
 def _read_named(
     path: Path, rows_before: int, config: LogConfig, notes: list[str]
-) -> tuple[pd.DataFrame, int]:
-    """Read the needed columns of one table in our units; return also the lines above its header.
+) -> tuple[pd.DataFrame, dict[str, Column], int, list[str]]:
+    """Read the needed columns of one table in our units.
 
     Args:
         path: the table.
         rows_before: number of rows from other files.
         config: names columns, and bounds sizes.
         notes: notes on the table are appended.
+
+    Returns:
+        The table, its columns by quantity, the number of lines above its first row, and further
+        columns that tell apart rows of one vehicle with the same stamp.
 
     Raises:
         InputError: as `read`, or stamps repeat and no column names the vehicle.
@@ -141,7 +151,7 @@ def _read_named(
     if "vehicle=none" not in config.columns.replace(" ", ""):
         _check_vehicle_column(frame, columns, numbers, path)
     _check_metres(numbers, columns, path)
-    return numbers, layout.above
+    return numbers, columns, layout.above + 1, _separating_columns(frame, columns, numbers)
 
 
 def _read_text_columns(
@@ -154,12 +164,15 @@ def _read_text_columns(
         "decimal": layout.decimal,
         "skiprows": layout.above,
     }
+    if layout.names:
+        options |= {"skiprows": layout.above + 1, "names": list(layout.names), "header": None}
     header = [str(name) for name in read_text(path, rows_before, config, **options, nrows=0)]
     columns = find_columns(header, path, config.columns)
     # Numbers of 64 bits, or in hexadecimal, are not float64.
-    names = [columns[quantity].name for quantity in ("vehicle", "kind") if quantity in columns]
+    texts = ("vehicle", "kind", "scene", "date")
+    names = [columns[quantity].name for quantity in texts if quantity in columns]
     frame = read_text(path, rows_before, config, **options, dtype=dict.fromkeys(names, object))
-    return frame, columns, header
+    return with_hemispheres(frame, columns), columns, header
 
 
 def _ignore_unknown_numbers(
@@ -209,6 +222,22 @@ def _check_vehicle_column(
             f"it could be {' or '.join(candidates)}: --set log.columns=vehicle={candidates[0]}"
         )
     raise InputError(f"{path}: {fault}; {remedy}")
+
+
+def _separating_columns(
+    frame: pd.DataFrame, columns: dict[str, Column], numbers: pd.DataFrame
+) -> list[str]:
+    """Return the unused columns that tell apart rows of one vehicle with the same stamp."""
+    if "vehicle" not in numbers or not numbers.duplicated(["time", "vehicle"]).any():
+        return []
+    used = {column.name for column in columns.values()}
+    return [
+        str(name)
+        for name in frame.columns
+        if name not in used
+        and 2 <= frame[name].nunique() <= len(frame) / _FEW_ROW_COUNT
+        and not numbers.assign(part=frame[name]).duplicated(["time", "vehicle", "part"]).any()
+    ]
 
 
 def _may_name_vehicles(values: "pd.Series[Any]", time: "pd.Series[int]") -> bool:
@@ -269,8 +298,10 @@ def to_numbers(frame: pd.DataFrame, columns: dict[str, Column], path: Path) -> p
         values = frame[column.name]
         if isinstance(values, pd.DataFrame):
             raise InputError(f"{path} has several columns {column.name!r}; rename all but one")
-        if quantity == "vehicle":
-            numbers["vehicle"] = vehicle_names(values)
+        if quantity in ("vehicle", "scene"):
+            numbers[quantity] = vehicle_names(values)
+        elif quantity == "date":
+            continue
         elif quantity == "kind":
             numbers["kind"] = _kind_names(values, column)
         elif pd.api.types.is_bool_dtype(values):
@@ -279,16 +310,20 @@ def to_numbers(frame: pd.DataFrame, columns: dict[str, Column], path: Path) -> p
                 "name another column"
             )
         elif quantity == "time":
-            numbers["time"], numbers["time_ok"] = _nanoseconds(values, column.factor)
-            _check_stamps(values, numbers, column, path)
+            dates = frame[columns["date"].name] if "date" in columns else None
+            place = f"{path}, column {column.name!r} (time)"
+            stamps = read_stamps(values, column, dates, place)
+            numbers["time"], numbers["time_ok"] = stamps
         else:
             numbers[quantity] = _in_our_unit(reals(values), column)
+    if {"vx", "vy"} <= set(numbers) and "speed" not in numbers:
+        numbers["speed"] = np.hypot(numbers["vx"], numbers["vy"])
     return numbers
 
 
 def _kind_names(values: "pd.Series[Any]", column: Column) -> "pd.Series[Any]":
     """Return what a table calls the types of its road users."""
-    words = values.astype(str)
+    words = values.astype(str).where(values.notna(), "")
     if not column.types:
         return words
     return reals(values).map(dict(column.types)).fillna("unnamed " + words)
@@ -303,13 +338,6 @@ def _in_our_unit(values: "pd.Series[float]", column: Column) -> "pd.Series[float
     if column.clockwise:
         values = math.pi / 2.0 - values
     return math.copysign(1.0, column.factor) * values
-
-
-def reals(values: "pd.Series[Any]") -> "pd.Series[float]":
-    """Return numbers, or texts that are numbers, as float64; NaN for others."""
-    if not pd.api.types.is_numeric_dtype(values):
-        values = values.where(values.astype(str).str.len() < _MAX_NUMBER_LENGTH_COUNT)
-    return pd.to_numeric(values, errors="coerce").astype(float)
 
 
 def vehicle_name(value: Any) -> str:
@@ -329,32 +357,6 @@ def vehicle_names(values: "pd.Series[Any]") -> "pd.Series[Any]":
     if not is_whole.all():
         return names
     return names.map({name: name and str(int(name.partition(".")[0])) for name in unique})
-
-
-def _check_stamps(
-    values: "pd.Series[Any]", numbers: pd.DataFrame, column: Column, path: Path
-) -> None:
-    """Check that a column has stamps, and a plausible unit.
-
-    Raises:
-        InputError: it has not; the message shows a value, and what it looks like.
-    """
-    first = shown(next(iter(values.dropna()), ""))
-    place = f"{path}, column {column.name!r} (time)"
-    if not numbers["time_ok"].any():
-        raise InputError(
-            f"{place}: {first!r} is neither a number nor a date such as 2022-08-31T12:00:00.5"
-        )
-    is_out_of_range = numbers["time"].abs() >= round(MAX_STAMP_S * 1e9)
-    if is_out_of_range.mean() <= 0.5 or column.factor != 1.0:
-        return
-    median = float(reals(values).abs().median())
-    for unit in ("ms", "us", "ns"):
-        if _UNIX_TIME_S[0] < median * UNITS["time"][unit] < _UNIX_TIME_S[1]:
-            raise InputError(
-                f"{place}: {first} looks like {unit} since 1970: "
-                f"--set log.columns=time={column.name}:{unit}"
-            )
 
 
 def _check_metres(frame: pd.DataFrame, columns: dict[str, Column], path: Path) -> None:
@@ -380,30 +382,6 @@ def _check_metres(frame: pd.DataFrame, columns: dict[str, Column], path: Path) -
         )
 
 
-def _nanoseconds(
-    values: "pd.Series[Any]", factor: float
-) -> tuple["pd.Series[int]", "pd.Series[bool]"]:
-    """Return stamps as integer nanoseconds within `MAX_STAMP_S`, and which of them are valid.
-
-    Args:
-        values: numbers, or texts that are numbers or dates.
-        factor: of their unit to seconds.
-    """
-    if pd.api.types.is_integer_dtype(values):
-        is_inside = (values.astype(float).abs() * factor < MAX_STAMP_S).astype(bool)
-        bounded = values.where(is_inside, int(MAX_STAMP_S / factor)).astype(np.int64)
-        return bounded * round(factor * 1e9), values.notna().astype(bool)
-    numbers = reals(values)
-    if numbers.isna().all():
-        dates = pd.to_datetime(values, errors="coerce", utc=True, format="ISO8601")
-        ticks = dates.fillna(pd.Timestamp(0, tz="UTC")).astype(np.int64)
-        stamps, _ = _nanoseconds(ticks, UNITS["time"][dates.dt.unit])
-        return stamps, dates.notna()
-    is_inside = numbers.abs() * factor < MAX_STAMP_S
-    bounded = numbers.where(is_inside, MAX_STAMP_S / factor)
-    return (bounded * (factor * 1e9)).round().astype(np.int64), numbers.notna()
-
-
 def from_frame(
     frame: pd.DataFrame, paths: Sequence[Path], segments: tuple[Segment, ...], config: LogConfig
 ) -> RawLog:
@@ -419,9 +397,12 @@ def from_frame(
     is_usable = frame["time_ok"] & (frame["vehicle"] != "")
     unusable = zip(cause[~is_usable], frame["row"][~is_usable], strict=True)
     position = ("lat", "lon") if "lat" in frame else ("x", "y")
+    usable, notes = apart_by_scene(frame[is_usable])
+    keys = ["scene", "vehicle"] if "scene" in usable else ["vehicle"]
     vehicles = tuple(
-        _observations(str(name), group, position)
-        for name, group in frame[is_usable].groupby("vehicle", sort=False)
+        _observations(str(names[-1]), track, position)
+        for names, group in usable.groupby(keys, sort=False)
+        for track in tracks_of(group)
     )
     return RawLog(
         name=paths[0].stem if len(paths) == 1 else paths[0].parent.name,
@@ -429,6 +410,7 @@ def from_frame(
         vehicles=vehicles,
         rows=len(frame),
         segments=segments,
+        notes=tuple(notes),
         dropped=tuple((str(why), int(row)) for why, row in unusable),
     )
 

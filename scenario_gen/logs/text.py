@@ -28,6 +28,7 @@ class Layout:
         separator: between fields.
         decimal: sign before decimals.
         above: number of lines above the header.
+        names: of the columns, if a comment has them; the comment is then the header.
         notes: on what is unusual.
     """
 
@@ -35,6 +36,7 @@ class Layout:
     separator: str = ","
     decimal: str = "."
     above: int = 0
+    names: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
 
 
@@ -74,14 +76,37 @@ def layout_of(path: Path) -> Layout:
     if separator not in header and len(header.split()) > 1:
         separator = _WHITE_SPACE
     pattern = separator if separator == _WHITE_SPACE else re.escape(separator)
-    _check_names(re.split(pattern, header.strip()), path, above + 1)
+    first = re.split(pattern, header.strip())
+    names = _names_in_comment(lines[above - 1], pattern, first) if above else ()
+    if names:
+        above -= 1
+        rows = [header, *rows]
+    else:
+        _check_names(first, path, above + 1)
 
     fields = [field.strip() for row in rows for field in re.split(pattern, row)]
     has_comma = separator != "," and any(map(_NUMBER_WITH_COMMA.fullmatch, fields))
     notes = ["the file is UTF-16"] if encoding == "utf-16" else []
     if has_comma:
         notes.append("its numbers have a decimal comma")
-    return Layout(encoding, separator, "," if has_comma else ".", above, tuple(notes))
+    return Layout(encoding, separator, "," if has_comma else ".", above, names, tuple(notes))
+
+
+def _names_in_comment(line: str, pattern: str, first: list[str]) -> tuple[str, ...]:
+    """Return the names in the comment above a first row of numbers, if there is one per field."""
+    if not _are_numbers(first):
+        return ()
+    text = line.strip().lstrip("#/%").strip()
+    for separator in (pattern, ",", _WHITE_SPACE):
+        names = [name.strip() for name in re.split(separator, text)]
+        if len(names) == len(first) and all(names) and not _are_numbers(names):
+            return tuple(names)
+    return ()
+
+
+def _are_numbers(fields: list[str]) -> bool:
+    """Return whether most fields are numbers."""
+    return sum(bool(_NUMBER.fullmatch(field.strip())) for field in fields) > len(fields) / 2
 
 
 def _is_comment(line: str) -> bool:
@@ -96,8 +121,7 @@ def _check_names(names: list[str], path: Path, line: int) -> None:
     Raises:
         UnknownFormatError: they are numbers.
     """
-    numbers = [name for name in names if _NUMBER.fullmatch(name.strip())]
-    if len(numbers) > len(names) / 2:
+    if _are_numbers(names):
         raise UnknownFormatError(
             f"{path}: line {line} has numbers instead of column names; insert a line such as "
             "t,id,x,y,speed above it"

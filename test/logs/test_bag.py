@@ -17,9 +17,10 @@ from support.synthetic_cases import fix_message, nanoseconds_to_time, twist_mess
 from msg_conventions.tracks import encode_tracks
 from scenario_gen.bags.storage.bag import bag_topics, read_messages
 from scenario_gen.bags.storage.definitions import definition, type_store
-from scenario_gen.bags.vehicles import FIX, ODOMETRY, TWIST
+from scenario_gen.bags.vehicles import FIX, ODOMETRY, POSE, TRANSFORMS, TWIST
 from scenario_gen.base.errors import InputError
 from scenario_gen.logs import LogConfig, read_log
+from scenario_gen.logs.doubts import DoubtError
 from scenario_gen.types import Encounter, Vehicle
 
 STORES = type_store()
@@ -55,13 +56,13 @@ def streams(rows, stamped=True, prefix=""):
     return lines
 
 
-def odometry(rows, topic="/{}/odom", frame="map"):
-    """nav_msgs/Odometry per vehicle."""
+def odometry(rows, topic="/{}/odom", frame="map", child="base_link", late=0.0):
+    """nav_msgs/Odometry per vehicle, received `late` seconds after its stamp."""
     types = STORES.types
     vector, zero = types["geometry_msgs/msg/Vector3"], {"x": 0.0, "y": 0.0, "z": 0.0}
     lines = []
     for row in rows.itertuples():
-        yaw = 0.0 if row.vehicle_id == "a" else np.pi / 2.0
+        yaw = getattr(row, "yaw", 0.0 if row.vehicle_id == "a" else np.pi / 2.0)
         turn = types["geometry_msgs/msg/Quaternion"](
             x=0.0, y=0.0, z=np.sin(yaw / 2.0), w=np.cos(yaw / 2.0)
         )
@@ -73,7 +74,7 @@ def odometry(rows, topic="/{}/odom", frame="map"):
         )
         message = types[ODOMETRY](
             header=header(round(row.t_s * 1e9), frame.format(row.vehicle_id)),
-            child_frame_id="base_link",
+            child_frame_id=child.format(row.vehicle_id),
             pose=types["geometry_msgs/msg/PoseWithCovariance"](pose, np.zeros(36)),
             twist=types["geometry_msgs/msg/TwistWithCovariance"](twist, np.zeros(36)),
         )
@@ -81,7 +82,7 @@ def odometry(rows, topic="/{}/odom", frame="map"):
             Line(
                 topic.format(row.vehicle_id),
                 ODOMETRY,
-                round(row.t_s * 1e9),
+                round((row.t_s + late) * 1e9),
                 bytes(STORES.serialize_cdr(message, ODOMETRY)),
             )
         )
@@ -260,6 +261,7 @@ def test_the_level_in_which_topics_differ_names_the_vehicle(tmp_path, topic):
     [
         (True, "{}/odom", r"begin at 0, 0.*a in 'a/odom', b in 'b/odom'.*one frame"),
         (True, "odom", "begin at 0, 0"),
+        ("late", "odom", "each is on the x axis of its frame and faces along it"),
         (False, "{}/odom", None),
         (False, "a/base_link", "moves with its vehicle"),
     ],
@@ -268,12 +270,100 @@ def test_odometries_have_one_frame_that_stands(tmp_path, own, frame, said):
     rows = crossing()
     if own:
         rows[["x_m", "y_m"]] -= rows.groupby("vehicle_id")[["x_m", "y_m"]].transform("first")
+    if own == "late":  # each drives along its own x axis, and was recorded later
+        rows = rows.assign(x_m=rows.x_m + rows.y_m + 7.0, y_m=0.0, yaw=0.0)
     bag = write(tmp_path / "drive", odometry(rows, frame=frame))
     if said is None:
         assert "name several frames" in " ".join(read_log(bag).quality.notes)
     else:
         with pytest.raises(InputError, match=said):
             read_log(bag)
+
+
+def of(rows, name):
+    return rows[rows.vehicle_id == name]
+
+
+def transforms(rows):
+    """The rows as transforms of body frames in map."""
+    types = STORES.types
+    lines = []
+    for row in rows.itertuples():
+        turn = types["geometry_msgs/msg/Quaternion"](x=0.0, y=0.0, z=0.0, w=1.0)
+        entries = [
+            types["geometry_msgs/msg/TransformStamped"](
+                header(round(row.t_s * 1e9), parent),
+                child,
+                types["geometry_msgs/msg/Transform"](
+                    types["geometry_msgs/msg/Vector3"](x, y, 0.0), turn
+                ),
+            )
+            for parent, child, x, y in (
+                ("map", f"{row.vehicle_id}/base_link", row.x_m, row.y_m),
+                (f"{row.vehicle_id}/base_link", f"{row.vehicle_id}/lidar", 1.0, 0.0),
+            )
+        ]
+        data = STORES.serialize_cdr(types[TRANSFORMS](entries), TRANSFORMS)
+        lines.append(Line("/tf", TRANSFORMS, round(row.t_s * 1e9), bytes(data)))
+    return lines
+
+
+def poses(rows):
+    lines = []
+    for line in odometry(rows, "/{}/pose"):
+        message = STORES.deserialize_cdr(line.data, ODOMETRY)
+        pose = STORES.types[POSE](message.header, message.pose.pose)
+        lines.append(Line(line.topic, POSE, line.stamp, bytes(STORES.serialize_cdr(pose, POSE))))
+    return lines
+
+
+WAYS = {  # of recording two vehicles in one bag
+    "child frames": lambda rows: odometry(rows, "/odom", child="{}/base_link"),
+    "raw and filtered": lambda rows: [*odometry(rows), *odometry(rows, "/{}/odometry/filtered")],
+    "transforms": transforms,
+    "poses": poses,
+}
+
+
+@pytest.mark.parametrize("way", WAYS.values(), ids=WAYS)
+def test_ways_of_recording_two_vehicles(tmp_path, way):
+    (plain,) = read_log(save(crossing(), tmp_path)).encounters
+    (encounter,) = read_log(write(tmp_path / "bag", way(crossing()))).encounters
+    assert [vehicle.id for vehicle in encounter.vehicles] == ["a", "b"]
+    np.testing.assert_allclose(encounter.position, plain.position, atol=0.3)
+
+
+def test_one_topic_in_each_bag_is_named_by_its_bag(tmp_path):
+    rows = crossing()
+    bags = [write(tmp_path / f"bag_{name}", odometry(of(rows, name), "/odom")) for name in "ab"]
+    (encounter,) = read_log(bags).encounters
+    assert [vehicle.id for vehicle in encounter.vehicles] == ["bag_a", "bag_b"]
+
+
+def test_header_clocks_that_differ_stop_and_those_of_the_recorder_agree(tmp_path):
+    (plain,) = read_log(save(crossing(), tmp_path)).encounters
+    rows = crossing()
+    ahead = of(rows, "a").assign(t_s=lambda own: own.t_s + 2.0)
+    lines = [*odometry(ahead, late=-2.0), *odometry(of(rows, "b"))]
+    bag = write(tmp_path / "bag", sorted(lines, key=lambda line: line.stamp))
+    with pytest.raises(DoubtError, match=r"clocks differ by 2\.0 s.*--set log\.stamps=received"):
+        read_log(bag)
+    (encounter,) = read_log(bag, LogConfig(stamps="received")).encounters
+    np.testing.assert_allclose(encounter.position, plain.position, atol=0.02)
+
+
+def test_stamps_in_milliseconds_are_scaled(tmp_path):
+    lines = odometry(crossing().assign(t_s=lambda own: own.t_s * 1000.0))
+    for line in lines:
+        line.stamp //= 1000
+    assert read_log(write(tmp_path / "bag", lines)).encounters[0].speed.max() < 8.5
+
+
+def test_two_odometries_of_one_robot_are_one_vehicle(tmp_path):
+    rows = of(crossing(), "a")
+    lines = [*odometry(rows, "/odom"), *odometry(rows, "/odometry/filtered")]
+    with pytest.raises(InputError, match="both are read as one vehicle"):
+        read_log(write(tmp_path / "bag", lines))
 
 
 def test_recorded_tracks_are_the_same_encounter_bit_for_bit(tmp_path, plain):

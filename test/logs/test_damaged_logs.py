@@ -34,17 +34,22 @@ def test_the_clock_of_all_vehicles_counts(tmp_path):
         read_log(path, LogConfig(tick_limit=239))
 
 
-@pytest.mark.parametrize(
-    ("factor", "name", "unit"),
-    [(1e3, "milliseconds", "ms"), (1e6, "microseconds", "us"), (1e9, "nanoseconds", "ns")],
-)
-def test_another_unit_of_time_is_recognised(tmp_path, factor, name, unit):
+@pytest.mark.parametrize(("factor", "unit"), [(1e3, "ms"), (1e6, "us"), (1e9, "ns")])
+def test_another_unit_of_time_is_recognised(tmp_path, factor, unit):
     rows = crossing(start=0.0)
     rows["t_s"] = (rows["t_s"] * factor).round()
     path = save(rows, tmp_path)
-    with pytest.raises(InputError, match=f"this looks like {name} .*:{unit}"):
+    with pytest.raises(InputError, match=f"time=t_s:{unit}"):
         read_log(path)
     assert len(read_log(path, LogConfig(columns=f"time=t_s:{unit}")).encounters) == 1
+    unnamed = save(rows.rename(columns={"t_s": "t"}), tmp_path)
+    if unit == "ns":  # beyond the stamps that 64 bits have
+        with pytest.raises(InputError, match=r"--set log\.columns=time=t:ns"):
+            read_log(unnamed)
+        return
+    result = read_log(unnamed)
+    assert len(result.encounters) == 1
+    assert f"--set log.columns=time=t:{unit}" in " ".join(result.quality.notes)
 
 
 @pytest.mark.parametrize(

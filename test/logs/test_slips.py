@@ -3,6 +3,8 @@
 
 """Slips in tables, common ones and those that were reported: what can be read is read, and said; the rest says what to do."""
 
+from dataclasses import replace
+import re
 import zipfile
 
 import numpy as np
@@ -12,6 +14,7 @@ from support.log_builders import crossing, geographic, save
 
 from scenario_gen.base.errors import InputError
 from scenario_gen.logs import LogConfig, read_log
+from scenario_gen.logs.doubts import DoubtError
 
 FOOT = 0.3048
 LONG = 9007199254740992
@@ -156,7 +159,7 @@ READ = {  # name: what is changed, columns, what is said (None: nothing), how th
     "headings in degrees": (
         lambda rows: with_headings(rows).assign(heading=lambda own: np.degrees(own.heading)),
         "",
-        "if they were in degrees (name the column heading_deg)",
+        "read as in degrees: --set log.columns=heading=heading:deg",
     ),
     "headings clockwise from north": (
         lambda rows: with_headings(rows).assign(heading=lambda own: np.pi / 2.0 - own.heading),
@@ -198,18 +201,13 @@ def test_it_is_read_as_it_was_driven(tmp_path, change, columns, said, options):
 
 
 SAID = {  # what is read, but looks otherwise
-    "swapped": (swapped, "if lat and lon were swapped"),
-    "frames": (
-        lambda rows: rows.assign(t_s=(rows.t_s - 1000.0) * 24, speed_mps=rows.speed_mps),
-        "24fps",
-    ),
     "knots": (
         lambda rows: rows.assign(speed_mps=rows.speed_mps * 3600 / 1852),
-        "knots (speed_kn)",
+        "knots; --set log.columns=speed=speed_mps:kn",
     ),
     "overlaps": (
         lambda rows: rows.assign(
-            x_m=rows.x_m.where(rows.vehicle_id == "a", rows.x_m.shift(1) + 2.0), y_m=0.0
+            x_m=rows.x_m.where(rows.vehicle_id == "a", 1.05 * rows.x_m.shift(1) + 2.0), y_m=0.0
         ),
         "overlap",
     ),
@@ -217,17 +215,13 @@ SAID = {  # what is read, but looks otherwise
         lambda rows: rows.assign(type=1),
         "column type has numbers (1) of unknown meaning",
     ),
-    "y down": (
-        lambda rows: mirrored(rows).assign(yaw_deg=np.where(rows.vehicle_id == "a", 0.0, 90.0)),
-        "y=-…",
-    ),
     "swapped axes": (
         lambda rows: with_headings(rows).rename(columns={"x": "y", "y": "x"}),
         "if x and y are swapped (log.columns=x=…,y=…)",
     ),
     "km/h": (
         lambda rows: plain(rows).assign(speed=lambda own: own.speed * 3.6),
-        "positions in 2 of 2 vehicles; they look like km/h (name",
+        "read with speeds in km/h: --set log.columns=speed=speed:kmh",
     ),
 }
 
@@ -236,6 +230,26 @@ SAID = {  # what is read, but looks otherwise
 def test_what_looks_otherwise_is_said_once(tmp_path, change, said):
     notes = read_log(save(change(crossing()), tmp_path), LogConfig(travel=0.0)).quality.remarks()
     assert sum(said in note for note in notes) == 1
+
+
+DOUBTED = {  # what contradicts itself, and the columns that read it right
+    "swapped": (swapped, "lat=lon_deg,lon=lat_deg"),
+    "frames": (lambda rows: rows.assign(t_s=((rows.t_s - 1e3) * 24).round()), "time=t_s:24fps"),
+    "y down": (
+        lambda rows: mirrored(rows).assign(yaw_deg=np.where(rows.vehicle_id == "a", 0.0, 90.0)),
+        "y=-y_m",
+    ),
+}
+
+
+@pytest.mark.parametrize(("change", "columns"), DOUBTED.values(), ids=DOUBTED)
+def test_a_doubt_stops_and_its_remedy_reads_on(tmp_path, change, columns):
+    path = save(change(crossing(rate=12.0)), tmp_path)
+    config = LogConfig(travel=0.0)
+    with pytest.raises(DoubtError, match=re.escape(f"--set log.columns={columns}")):
+        read_log(path, config)
+    assert read_log(path, replace(config, allow="doubt")).doubts
+    assert not read_log(path, replace(config, columns=columns)).doubts
 
 
 @pytest.mark.parametrize(
@@ -338,8 +352,8 @@ REFUSED = {  # name: what is changed, what is said, how the file is written
         "looks like ms since 1970: --set log.columns=time=t_s:ms",
     ),
     "dates of another order": (
-        lambda rows: rows.assign(t_s="31.08.2022 12:00"),
-        "'31.08.2022 12:00' is neither a number nor a date",
+        lambda rows: rows.assign(t_s="31.08.2022 at noon"),
+        "'31.08.2022 at noon' is neither a number nor a date",
     ),
     "x, y in degrees": (
         lambda rows: geographic(rows).rename(columns={"lat_deg": "Y", "lon_deg": "X"}),
@@ -351,12 +365,12 @@ REFUSED = {  # name: what is changed, what is said, how the file is written
     ),
     "hours": (
         lambda rows: rows.assign(t_s=(rows.t_s - 1000.0) / 3600.0),
-        "the time may be in h: --set log.columns=time=",
+        "the time may be in h: --set log.columns=time=t_s:h",
     ),
-    "degrees and minutes": (nmea, "lat=…:ddmm"),
+    "degrees and minutes": (nmea, "lat=lat_deg:ddmm,lon=lon_deg:ddmm"),
     "1e-7 degrees": (
         lambda rows: geographic(rows).assign(lat_deg=4.8e8, lon_deg=1.1e8),
-        "lat=…:e7",
+        "lat=lat_deg:e7,lon=lon_deg:e7",
     ),
     "a dog": (
         lambda rows: rows.assign(type=rows.vehicle_id.map({"a": "car", "b": "dog"})),

@@ -34,7 +34,8 @@ import pandas as pd
 from scenario_gen.base.errors import guarded, InputError
 from scenario_gen.logs.config import LogConfig
 from scenario_gen.logs.raw import check_size, RawLog, Segment
-from scenario_gen.logs.tables import from_frame, MAX_STAMP_S
+from scenario_gen.logs.stamps import MAX_STAMP_S
+from scenario_gen.logs.tables import from_frame
 
 _MINUTE_MS = 60_000
 _MAX_SECOND_MARK_MS = 61_000  # a leap second

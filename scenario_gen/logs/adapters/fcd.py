@@ -30,7 +30,8 @@ from scenario_gen.base.xml_reader import Element, read_xml
 from scenario_gen.logs.config import LogConfig
 from scenario_gen.logs.kinds import type_called, usual_size
 from scenario_gen.logs.raw import check_size, only_file, RawLog, Segment
-from scenario_gen.logs.tables import from_frame, MAX_STAMP_S
+from scenario_gen.logs.stamps import MAX_STAMP_S
+from scenario_gen.logs.tables import from_frame
 
 _MOVING_MPS = 1.0
 _MIN_SPEED_RATIO = 0.05  # of x, y over the speed column; less means that x, y are degrees

@@ -16,10 +16,10 @@ from scenario_gen.base.errors import guarded, InputError, needs
 from scenario_gen.logs.adapters.data_sets import Companions, DATA_SETS, DataSet
 from scenario_gen.logs.config import LogConfig
 from scenario_gen.logs.raw import check_size, RawLog
+from scenario_gen.logs.stamps import reals
 from scenario_gen.logs.tables import (
     from_frame,
     read_text,
-    reals,
     segment_of,
     to_numbers,
     vehicle_name,

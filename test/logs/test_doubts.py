@@ -1,0 +1,223 @@
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""How people really record: what a log does not name is found, or stops with the option that reads it right."""
+
+from dataclasses import replace
+import re
+
+import numpy as np
+import pandas as pd
+import pytest
+from support.meeting import degrees, distance, meeting, north_degrees, START_S
+
+from scenario_gen.base.errors import InputError
+from scenario_gen.logs import LogConfig, read_log
+from scenario_gen.logs.doubts import DoubtError, Quantity
+
+ROWS = meeting()
+NAMES = {"h": "heading", "v": "speed"}
+
+
+def with_zero_speeds(rows):
+    """Speeds that are 0 for three seconds, where they are unknown."""
+    return rows.assign(v=rows.v.where((rows.t < START_S + 5.0) | (rows.t >= START_S + 8.0), 0.0))
+
+
+def clock_time(rows, first):
+    """Times of the day as hhmmss.ss from `first` [s since midnight] on."""
+    seconds = (rows.t - START_S).round(2) + first
+    hours, minutes = seconds // 3600, seconds // 60 % 60
+    return hours * 10_000 + minutes * 100 + (seconds % 60)
+
+
+def nmea(values):
+    whole = np.trunc(values)
+    return 100.0 * whole + (values - whole) * 60.0
+
+
+READ = {  # name: rows as they are written, what a note says
+    "a speed of 0": (with_zero_speeds(ROWS).drop(columns="h"), "speed column ignored"),
+    "hhmmss": (ROWS.assign(t=clock_time(ROWS, 31_953.0))[["t", "id", "x", "y"]], ""),
+    "time of the day": (
+        ROWS.assign(t=pd.to_datetime(ROWS.t.round(2), unit="s").dt.strftime("%H:%M:%S.%f"))[
+            ["t", "id", "x", "y"]
+        ],
+        "",
+    ),
+    "date and time": (
+        ROWS.assign(
+            date="09.10.2025", t=pd.to_datetime(ROWS.t.round(2), unit="s").dt.time.astype(str)
+        )[["date", "t", "id", "x", "y"]],
+        "",
+    ),
+    "headings from north": (
+        degrees(ROWS).assign(h=north_degrees(ROWS)),
+        "log.columns=heading=heading:north_deg",
+    ),
+    "headings in degrees": (
+        ROWS.assign(h=np.degrees(ROWS.h)),
+        "log.columns=heading=heading:deg",
+    ),
+    "frames": (
+        meeting(25.0)
+        .assign(t=lambda own: ((own.t - START_S) * 25).round())
+        .drop(columns="h")
+        .rename(columns={"t": "frame"}),
+        "log.columns=time=frame:25fps",
+    ),
+    "feet": (
+        ROWS.assign(x=ROWS.x / 0.3048, y=ROWS.y / 0.3048).drop(columns="h"),
+        "log.columns=x=x:ft,y=y:ft",
+    ),
+    "hemispheres": (
+        degrees(ROWS)
+        .assign(lat=lambda own: nmea(own.lat), ns="N", lon=lambda own: nmea(own.lon), ew="E")
+        .drop(columns=["h", "v"]),
+        "",
+    ),
+    "an empty type": (
+        ROWS.assign(type=ROWS.id.map({"A": "car", "B": ""})).drop(columns=["h"]),
+        "",
+    ),
+    "two antennas": (
+        pd.concat(
+            [
+                ROWS[["t", "id", "x", "y"]],
+                ROWS[ROWS.id == "A"].assign(
+                    id="rear",
+                    x=lambda own: own.x - np.cos(own.h),
+                    y=lambda own: own.y - np.sin(own.h),
+                )[["t", "id", "x", "y"]],
+            ]
+        ),
+        "vehicle rear, never farther than 1.",
+    ),
+}
+
+
+@pytest.mark.parametrize(("rows", "said"), READ.values(), ids=READ)
+def test_it_is_read_as_it_was_driven(tmp_path, rows, said):
+    rows.rename(columns=NAMES).to_csv(tmp_path / "log.csv", index=False)
+    result = read_log(tmp_path / "log.csv")
+    (encounter,) = result.encounters
+    start = None if encounter.start_ns > 1e18 else 2.0
+    errors = [distance(encounter, start_s=start)]
+    if start is not None:  # the encounter begins when the vehicles are near
+        errors = [distance(encounter, start_s=s) for s in np.arange(0.0, 3.0, 0.1)]
+    assert min(errors) < 0.5
+    assert said in " ".join(result.quality.notes)
+    assert all(not doubt.stops for doubt in result.doubts)
+
+
+DOUBTED = {  # name: rows as they are written, the option that reads them right
+    "west is positive": (
+        degrees(ROWS)
+        .assign(lon=lambda own: -own.lon, heading_north_deg=north_degrees(ROWS))
+        .drop(columns="h"),
+        "--set log.columns=lon=-lon",
+    ),
+    "minutes, west is positive": (
+        degrees(ROWS)
+        .assign(
+            lat=lambda own: own.lat * 60,
+            lon=lambda own: -own.lon * 60,
+            heading_north_deg=north_degrees(ROWS),
+        )
+        .drop(columns="h"),
+        "--set log.columns=lat=lat:min,lon=-lon:min",
+    ),
+    "swapped": (
+        degrees(ROWS).rename(columns={"lat": "lon", "lon": "lat"}).drop(columns="h"),
+        "--set log.columns=lat=lon,lon=lat",
+    ),
+    "y points down": (ROWS.assign(y=-ROWS.y), "--set log.columns=y=-y"),
+    "frames without speeds": (
+        meeting(25.0)
+        .assign(t=lambda own: ((own.t - START_S) * 25).round())[["t", "id", "x", "y"]]
+        .rename(columns={"t": "frame"}),
+        "--set log.columns=time=frame:25fps",
+    ),
+}
+
+
+@pytest.mark.parametrize(("rows", "option"), DOUBTED.values(), ids=DOUBTED)
+def test_a_doubt_stops_with_the_option_that_reads_it_right(tmp_path, rows, option):
+    path = tmp_path / "log.csv"
+    rows.rename(columns=NAMES).to_csv(path, index=False)
+    with pytest.raises(DoubtError, match=re.escape(option)):
+        read_log(path)
+    with pytest.raises(DoubtError, match="--allow doubt"):
+        read_log(path)
+    config = LogConfig(columns=option.partition("log.columns=")[2])
+    (encounter,) = read_log(path, config).encounters
+    start = None if encounter.start_ns > 1e18 else np.arange(0.0, 3.0, 0.04)
+    errors = [distance(encounter, start_s=s) for s in ([None] if start is None else start)]
+    assert min(errors) < 0.5
+    allowed = read_log(path, LogConfig(allow="doubt", travel=0.0, min_duration=1.0))
+    assert any(doubt.stops for doubt in allowed.doubts)
+
+
+def test_a_stretch_of_wrong_speeds_is_a_doubt_that_does_not_stop(tmp_path):
+    with_zero_speeds(ROWS)[["t", "id", "x", "y", "v"]].to_csv(tmp_path / "log.csv", index=False)
+    doubts = read_log(tmp_path / "log.csv").doubts
+    assert {doubt.vehicle for doubt in doubts} == {"A", "B"}
+    for doubt in doubts:
+        assert doubt.quantity is Quantity.SPEED and doubt.unit == "m/s" and not doubt.stops
+        assert abs(doubt.start - 5.0) < 0.6 and abs(doubt.end - 8.0) < 0.6
+
+
+@pytest.mark.parametrize("order", ["by time", "by vehicle", "column"])
+def test_every_restart_of_the_clock_is_a_scene(tmp_path, order):
+    scenes = []
+    for k in range(4):
+        scene = ROWS.assign(t=ROWS.t - START_S, x=ROWS.x + 0.3 * k).drop(columns="h")
+        if order == "by vehicle":
+            scene = scene.sort_values(["id", "t"])
+        scenes.append(scene.assign(case_id=k) if order == "column" else scene)
+    rows = pd.concat(scenes)
+    if order == "column":
+        rows = rows.sort_values("t", kind="stable")
+    rows.rename(columns=NAMES).to_csv(tmp_path / "log.csv", index=False)
+    result = read_log(tmp_path / "log.csv")
+    assert len(result.encounters) == 4
+    assert not result.quality.dropped
+    for encounter in result.encounters:
+        assert min(distance(encounter, start_s=s) for s in np.arange(0.0, 3.0, 0.1)) < 0.5
+
+
+@pytest.mark.parametrize("names", [("car_a.csv", "car_b.csv"), ("car_a/gps.csv", "car_b/gps.csv")])
+def test_one_id_in_two_files_at_one_time_is_named_by_its_file(tmp_path, names):
+    paths = [tmp_path / name for name in names]
+    for path, name in zip(paths, "AB", strict=True):
+        path.parent.mkdir(exist_ok=True)
+        ROWS[ROWS.id == name].assign(id="ego").rename(columns=NAMES).to_csv(path, index=False)
+    (encounter,) = read_log(paths).encounters
+    assert distance(encounter, ("car_a", "car_b")) < 0.5
+
+
+def test_sizes_and_types_belong_to_a_track(tmp_path):
+    car = ROWS.assign(length=4.4, width=1.8, type="car")
+    lorry = car.assign(t=car.t + 90.0)
+    lorry.loc[lorry.id == "A", ["length", "width", "type"]] = [16.5, 2.5, "truck"]
+    pd.concat([car, lorry]).rename(columns=NAMES).to_csv(tmp_path / "log.csv", index=False)
+    first, second = read_log(tmp_path / "log.csv").encounters
+    assert (first.vehicles[0].length, second.vehicles[0].length) == (4.4, 16.5)
+    assert first.vehicles[0].kind != second.vehicles[0].kind
+
+
+def test_stamps_of_whole_seconds_stop(tmp_path):
+    rows = ROWS.assign(t=np.floor(ROWS.t))
+    rows.rename(columns=NAMES).to_csv(tmp_path / "log.csv", index=False)
+    with pytest.raises(DoubtError, match="the clock is too coarse"):
+        read_log(tmp_path / "log.csv")
+
+
+def test_rows_that_share_id_and_stamp_name_the_column_that_tells_them_apart(tmp_path):
+    moved = pd.concat([ROWS.assign(lap=k, x=ROWS.x + 40.0 * k) for k in (1, 2)])
+    path = tmp_path / "log.csv"
+    moved.sort_values("t", kind="stable").rename(columns=NAMES).to_csv(path, index=False)
+    with pytest.raises(InputError, match=r"--set log\.columns=scene=lap"):
+        read_log(path)
+    config = replace(LogConfig(), columns="scene=lap")
+    assert len(read_log(path, config).encounters) == 2
