@@ -5,15 +5,12 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from scenario_gen.logs.doubts import Quantity
+from scenario_gen.logs.reading import Reading
 from scenario_gen.numerics import Floats, wrap_angle
-
-if TYPE_CHECKING:
-    from scenario_gen.logs.units import Reading
 
 _FIT_RAD = float(np.radians(15.0))  # a heading in the right convention is nearer to the course
 _CONTRADICTION_RAD = float(np.radians(25.0))
@@ -48,7 +45,7 @@ _MIRRORS: dict[str, Callable[[Floats], Floats]] = {
 }
 
 
-def interpret_headings(reading: "Reading") -> None:
+def interpret_headings(reading: Reading) -> None:
     """Convert headings whose convention is assumed and wrong; add a doubt for mirrored axes."""
     legs = reading.legs()
     length = np.hypot(*legs.step.T)
@@ -95,7 +92,7 @@ def _hint(explains: Callable[[_Convention, Floats], bool], course: Floats) -> st
     return ""
 
 
-def _convert(reading: "Reading", fact: str, convention: _Convention) -> None:
+def _convert(reading: Reading, fact: str, convention: _Convention) -> None:
     """Convert the headings of all vehicles."""
     option = ""
     if convention.unit:
@@ -108,7 +105,7 @@ def _convert(reading: "Reading", fact: str, convention: _Convention) -> None:
 
 
 def _mirrored_axis(
-    reading: "Reading", course: Floats, explains: Callable[[_Convention, Floats], bool]
+    reading: Reading, course: Floats, explains: Callable[[_Convention, Floats], bool]
 ) -> str:
     """Return the axis that, mirrored, makes headings fit: x or y; "" if there is none."""
     order = ("x", "y") if reading.log.geographic else ("y", "x")
@@ -122,7 +119,7 @@ def _mirrored_axis(
     return ""
 
 
-def _doubt_axis(reading: "Reading", fact: str, axis: str, share: float) -> None:
+def _doubt_axis(reading: Reading, fact: str, axis: str, share: float) -> None:
     """Add a doubt about an axis that is mirrored by the headings."""
     quantity = axis
     text = f"{axis} points the other way"

@@ -8,16 +8,16 @@ data contradicts what the log names, or if several explanations remain, there is
 """
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from scenario_gen.logs.columns import Column, with_columns
 from scenario_gen.logs.config import LogConfig
 from scenario_gen.logs.doubts import Doubt, Quantity
 from scenario_gen.logs.headings import interpret_headings
 from scenario_gen.logs.legs import Legs, legs_of, median_period
 from scenario_gen.logs.raw import Observations, RawLog
+from scenario_gen.logs.reading import counts_steps, Reading
 from scenario_gen.numerics import Floats, Ints
 
 _SAME_RATIO = 0.03  # tolerance of a ratio of speeds
@@ -33,7 +33,6 @@ _MAX_SPEED_MPS = 70.0  # of road vehicles
 _MIN_FRAMES_COUNT = 50  # of a vehicle: whole numbers in shorter logs may be seconds
 _MAX_CRAWL_MPS = 3.0  # no vehicle is faster: whole numbers may be frames
 _MIN_CRAWL_M = 20.0
-_FRAMES_PER_LEG_COUNT = 10
 _FRAME_RATES_HZ = (10, 12.5, 15, 20, 24, 25, 30, 29.97, 50, 60, 100)
 _SPEED_UNITS = {
     "kmh": 3.6,
@@ -51,65 +50,6 @@ _SLOWEST_PERIOD_S = 5.0
 _DEGREE_UNITS = {"e7": 1e-7, "ddmm": 1.0, "min": 1 / 60.0}
 _RADIAN_TOLERANCE_RATIO = 1.15
 _SCALED_POSITIONS = ("x", "y")
-
-
-@dataclass
-class Reading:
-    """A log while its units are determined.
-
-    Attributes:
-        log: with the units found so far.
-        config: names columns.
-        changes: columns as in the parameter `columns`, by quantity, for units that were found.
-        notes: on what was found.
-        doubts: contradictions that remain.
-    """
-
-    log: RawLog
-    config: LogConfig
-    changes: dict[str, str] = field(default_factory=dict)
-    notes: list[str] = field(default_factory=list)
-    doubts: list[Doubt] = field(default_factory=list)
-
-    def column(self, quantity: str) -> Column | None:
-        """Return the column of a quantity, if the log is a table that has it."""
-        return self.log.columns.get(quantity)
-
-    def is_assumed(self, quantity: str) -> bool:
-        """Return whether neither the name of a column nor the parameter names its unit."""
-        column = self.column(quantity)
-        return column is not None and not column.unit
-
-    def is_column(self, quantity: str) -> bool:
-        """Return whether the log is a table with a column of a quantity."""
-        return self.column(quantity) is not None
-
-    def option(self, **changes: str) -> str:
-        """Return the option of the commands with all units found, and further changes."""
-        return with_columns(self.config.columns, self.changes | changes)
-
-    def use_unit(self, unit: str, *quantities: str) -> None:
-        """Note the unit of some columns for the option."""
-        for quantity in quantities:
-            column = self.column(quantity)
-            if column is not None:
-                self.changes[quantity] = column.option(unit)
-
-    def change(self, function: Callable[[Observations], Observations]) -> None:
-        """Replace each vehicle."""
-        self.log = replace(self.log, vehicles=tuple(map(function, self.log.vehicles)))
-
-    def legs(self) -> Legs:
-        """Return the legs in the units found so far."""
-        counts_frames = self.is_assumed("time") and "time" not in self.changes
-        counts_frames = counts_frames and _counts_steps(self.log.vehicles)
-        least_steps = _FRAMES_PER_LEG_COUNT if counts_frames else 1
-        vehicles = self.log.vehicles
-        return legs_of(vehicles, geographic=self.log.geographic, least_steps=least_steps)
-
-    def add_doubt(self, quantity: Quantity, size: float, cause: str, remedy: str) -> None:
-        """Add a doubt about the whole log."""
-        self.doubts.append(Doubt("", 0.0, 0.0, quantity, size, "", cause, remedy))
 
 
 def interpret(log: RawLog, config: LogConfig) -> tuple[RawLog, list[str], list[Doubt]]:
@@ -373,7 +313,7 @@ def _explanations(
     by_position = float(np.median(legs.rate[known]))
     by_speed = float(np.median(legs.speed[known]))
     column = reading.column("time")
-    if may_change("time") and _counts_steps(reading.log.vehicles):
+    if may_change("time") and counts_steps(reading.log.vehicles):
         yield from _frame_rates(reading, ratio)
         if column is not None and column.counts_frames:
             return
@@ -422,11 +362,6 @@ def _is_near(ratio: float, factor: float) -> bool:
     return abs(ratio / factor - 1.0) < _SAME_RATIO
 
 
-def _counts_steps(vehicles: Sequence[Observations]) -> bool:
-    """Return whether all stamps are whole numbers of seconds, as a number of frames is."""
-    return all((vehicle.fix_ns % 10**9 == 0).all() for vehicle in vehicles)
-
-
 def _apply(reading: Reading, fact: str, explanations: Sequence[_Explanation]) -> None:
     """Convert the units of the only explanation; of several, use none and add a doubt."""
     first = explanations[0]
@@ -455,7 +390,7 @@ def _find_frame_rate(reading: Reading) -> None:
         return
     vehicles = reading.log.vehicles
     if not time.counts_frames:
-        if not (_counts_steps(vehicles) and _crawls(reading)):
+        if not (counts_steps(vehicles) and _crawls(reading)):
             return
         cause = (
             f"column {time.name} counts in steps of 1 and no vehicle is faster than "
