@@ -4,12 +4,13 @@
 """The columns of a table by quantity, with their units: by option, or by name and suffix."""
 
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 import math
 from pathlib import Path
 import re
 
 from scenario_gen.base.errors import did_you_mean, InputError
+from scenario_gen.logs.column import Column, normalized
 from scenario_gen.logs.config import listed
 from scenario_gen.logs.raw import UnknownFormatError
 
@@ -100,17 +101,6 @@ A column without a suffix has the first unit; `ddmm` means degrees and minutes (
 MAX_LISTED_COUNT = 12
 """Names in a note."""
 
-_BRACKETED_UNIT = re.compile(r"(.+?)\s*[\[(]\s*([^\])]+?)\s*[\])]")  # x [m]
-_UNIT_SUFFIXES = {
-    "m/s": "mps",
-    "km/h": "kmh",
-    "°": "deg",
-    "degrees": "deg",
-    "seconds": "s",
-    "metres": "m",
-    "meters": "m",
-    "feet": "ft",
-}
 _NGSIM = {
     "time": ("global_time", "ms"),
     "vehicle": ("vehicle_id", ""),
@@ -126,46 +116,12 @@ _NGSIM = {
 _FRAME_RATE = re.compile(r"(\d+(?:\.\d+)?)fps")  # unit of a time in frames
 _NUMBERED_KIND = re.compile(r"([a-z_]*)(\d+)(?:\+|$)")  # type and number, car2
 _NUMBERED_KINDS = re.compile(r"[a-z_]*\d+(?:\+[a-z_]*\d+)*")
-_FRAME_NAMES = ("frame", "frame_id", "frame_number", "frame_no", "frame_idx")
 _CLOCKWISE_NAMES = (
     "course",
     "bearing",
     "cog",
     "course_over_ground",
 )  # by convention degrees clockwise from north
-
-
-@dataclass(frozen=True)
-class Column:
-    """A column of a table.
-
-    Attributes:
-        name: of the column.
-        factor: to our unit; negative if the axis is flipped.
-        clockwise: a heading clockwise from north.
-        minutes: degrees and minutes, as receivers of NMEA write them.
-        types: (number, type) of a column of kinds that are numbers; a car if no type is named.
-        unit: as it is written in the parameter `columns` or in the name; "" if neither names one.
-    """
-
-    name: str
-    factor: float = 1.0
-    clockwise: bool = False
-    minutes: bool = False
-    types: tuple[tuple[float, str], ...] = ()
-    unit: str = ""
-
-    @property
-    def counts_frames(self) -> bool:
-        """Whether a time is a number of frames by its name, at an unknown rate."""
-        return not self.unit and normalized(self.name) in _FRAME_NAMES
-
-    def option(self, unit: str = "", *, flipped: bool = False) -> str:
-        """Return the column as in the parameter `columns`, in a unit or in its own one."""
-        if not unit and not normalized(self.name).endswith(f"_{self.unit}"):
-            unit = self.unit
-        sign = "-" if flipped != (self.factor < 0.0) else ""
-        return f"{sign}{self.name}:{unit}" if unit else f"{sign}{self.name}"
 
 
 def find_columns(header: Sequence[str], path: Path, option: str) -> dict[str, Column]:
@@ -286,13 +242,6 @@ def with_columns(option: str, changes: Mapping[str, str]) -> str:
     text = ",".join(f"{quantity}={column}" for quantity, column in {**parts, **changes}.items())
     assignment = f"log.columns={text}"
     return f"--set '{assignment}'" if re.search(r"[\s()\[\]&;]", text) else f"--set {assignment}"
-
-
-def normalized(name: str) -> str:
-    """Return a column's name in lower case, its unit as a suffix: `Speed [m/s]` is `speed_mps`."""
-    name = name.strip().lower()
-    match = _BRACKETED_UNIT.fullmatch(name)
-    return f"{match[1]}_{_UNIT_SUFFIXES.get(match[2], match[2])}" if match else name
 
 
 def column_notes(columns: dict[str, Column], option: str, header: Sequence[str]) -> list[str]:

@@ -15,7 +15,8 @@ import pyarrow as pa
 from pyarrow import compute, parquet
 
 from scenario_gen.base.errors import guarded, InputError
-from scenario_gen.logs.columns import Column, find_columns, UNITS
+from scenario_gen.logs.column import Column
+from scenario_gen.logs.columns import find_columns, UNITS
 from scenario_gen.logs.config import LogConfig
 from scenario_gen.logs.raw import check_size
 

@@ -7,19 +7,16 @@ from bisect import bisect_right
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from scenario_gen.base.errors import InputError
 from scenario_gen.base.stores import renamed
+from scenario_gen.logs.column import Column
 from scenario_gen.logs.config import LogConfig
 from scenario_gen.logs.doubts import Doubt
 from scenario_gen.numerics import Floats, Ints
 from scenario_gen.types import Encounter
-
-if TYPE_CHECKING:
-    from scenario_gen.logs.columns import Column
 
 
 class UnknownFormatError(InputError):
@@ -158,7 +155,7 @@ class RawLog:
     encounters: tuple[Encounter, ...] = ()
     excluded: Mapping[str, int] = field(default_factory=dict)
     separators: tuple[str, ...] = ()
-    columns: "Mapping[str, Column]" = field(default_factory=dict)
+    columns: Mapping[str, Column] = field(default_factory=dict)
     doubts: tuple[Doubt, ...] = ()
 
     def segment(self, row: int) -> Segment:

@@ -6,7 +6,8 @@
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 
-from scenario_gen.logs.columns import Column, with_columns
+from scenario_gen.logs.column import Column
+from scenario_gen.logs.columns import with_columns
 from scenario_gen.logs.config import LogConfig
 from scenario_gen.logs.doubts import Doubt, Quantity
 from scenario_gen.logs.legs import Legs, legs_of

@@ -10,7 +10,8 @@ import pandas as pd
 
 from scenario_gen.base.documents import shown
 from scenario_gen.base.errors import InputError
-from scenario_gen.logs.columns import Column, UNITS
+from scenario_gen.logs.column import Column
+from scenario_gen.logs.columns import UNITS
 from scenario_gen.numerics import Bools
 
 MAX_STAMP_S = 9e9

@@ -11,7 +11,8 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from scenario_gen.logs.columns import Column, MAX_LISTED_COUNT
+from scenario_gen.logs.column import Column
+from scenario_gen.logs.columns import MAX_LISTED_COUNT
 from scenario_gen.logs.file_names import file_names
 from scenario_gen.numerics import Bools, Floats
 

@@ -16,8 +16,8 @@ import numpy as np
 import pandas as pd
 
 from scenario_gen.base.errors import guarded, InputError, needs
+from scenario_gen.logs.column import Column
 from scenario_gen.logs.columns import (
-    Column,
     column_notes,
     find_columns,
     MAX_LISTED_COUNT,

@@ -11,7 +11,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 import math
 
-from scenario_gen.logs.columns import Column
+from scenario_gen.logs.column import Column
 
 
 @dataclass(frozen=True)
