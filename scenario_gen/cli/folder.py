@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 
 from scenario_gen.base.errors import did_you_mean, InputError, RefusedError
 from scenario_gen.base.folders import replaced_folder
+from scenario_gen.base.parameters import updated
 from scenario_gen.base.provenance import RECORDING
 from scenario_gen.logs import LogResult, NoEncounterError, read_log
 from scenario_gen.method.nearest import answer_refusal
@@ -308,11 +309,12 @@ def _generate_sets(
         RefusedError: nothing could be generated; the message names the nearest possible request.
     """
     config, count, seed = requested.config, requested.count, requested.seed
+    one_outcome = updated(config, {"sampling.decisions": "recorded"})
 
     def report(done: int, total: int, _candidates: int) -> None:
         advance(done, total)
 
-    def testing(request: Request) -> "Testing":
+    def testing(request: Request, config: PipelineConfig) -> "Testing":
         from scenario_gen.closed_loop.reacting import Testing
 
         return Testing(encounter, road, config, request, seed)
@@ -320,9 +322,9 @@ def _generate_sets(
     request = requested.request
     try:
         if request.ego == EGO_AUTO:
-            request = replace(request, ego=testing(request).who_reacts_most())
+            request = replace(request, ego=testing(request, one_outcome).who_reacts_most())
         if requested.for_testing:
-            return [testing(request).run(count, report)]
+            return [testing(request, config).run(count, report)]
         return generate_outcomes(
             [encounter, *recorded],
             road,
@@ -334,7 +336,7 @@ def _generate_sets(
         )
     except RefusedError as error:
         named = replace(request, ego="") if request.ego == EGO_AUTO else request
-        raise answer_refusal(error, encounter, road, config, named, count, seed) from error
+        raise answer_refusal(error, encounter, road, one_outcome, named, count, seed) from error
 
 
 def _shortage(case: GenerationResult, requested: FolderRequest) -> str:

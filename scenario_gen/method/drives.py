@@ -19,9 +19,6 @@ from scenario_gen.situation import Track
 from scenario_gen.situation.evidence import smoothed_speed
 
 STATION_STEP_M = 0.25
-SMOOTHING_SAMPLES = 5  # of new speeds, twice
-BISECTION_STEPS = 20
-MIN_MEAN_SPEED_MPS = 0.01  # between two stations
 
 
 @dataclass(frozen=True)
@@ -78,7 +75,7 @@ class Drive(NamedTuple):
     @property
     def time(self) -> Floats:
         """(S,) when [s] it leaves each station; it begins at 0 s."""
-        mean = np.maximum(0.5 * (self.speed[1:] + self.speed[:-1]), MIN_MEAN_SPEED_MPS)
+        mean = np.maximum(0.5 * (self.speed[1:] + self.speed[:-1]), 0.01)
         time = np.concatenate([[0.0], np.cumsum(np.diff(self.station) / mean)])
         time[self.line :] += self.stand
         return time
@@ -96,7 +93,7 @@ class Drive(NamedTuple):
         dt = self.track.dt
         speed = np.interp(np.arange(int(nodes[-1] / dt) + 1) * dt, nodes, speeds)
         for _ in range(2):
-            speed = ndimage.uniform_filter1d(speed, SMOOTHING_SAMPLES, mode="nearest")
+            speed = ndimage.uniform_filter1d(speed, 5, mode="nearest")
         steps = 0.5 * (speed[1:] + speed[:-1]) * dt
         station = self.station[0] + np.concatenate([[0.0], np.cumsum(steps)])
         return np.column_stack([self.track.curve.at(station), np.maximum(speed, 0.0)])
@@ -177,14 +174,11 @@ def delayed_drive(drive: Drive, entry: float, clears: float) -> Drive:
         speed = np.sqrt(least * least + 2.0 * slope * distance)
         return drive._replace(speed=np.minimum(drive.speed, speed))
 
-    low, high = MARGINS.min_rolling_mps, float(drive.speed[line])
+    speeds = np.linspace(MARGINS.min_rolling_mps, drive.speed[line], 20)
+    entries = np.array([slowed(speed).time_at(entry) for speed in speeds])  # later if slower
     enters = clears + MARGINS.gap_s
-    if low < high and slowed(low).time_at(entry) >= enters:
-        for _ in range(BISECTION_STEPS):
-            middle = 0.5 * (low + high)
-            is_late = slowed(middle).time_at(entry) > enters
-            low, high = (middle, high) if is_late else (low, middle)
-        later = slowed(low)
+    if entries[0] >= enters:
+        later = slowed(float(np.interp(-enters, -entries, speeds)))
     else:
         later = slowed(0.0)
         arrives = float(later.time[line])

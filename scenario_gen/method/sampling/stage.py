@@ -46,7 +46,7 @@ def sample_scenarios(
     if sampling.decisions == "drawn" and planned.encounter.decision is None:
         raise InputError(
             "sampling.decisions=drawn gives a set for each outcome: "
-            "use `scenario-gen generate`, or `generate_outcomes` of the library"
+            "use `generate_outcomes`, or `scenario-gen generate` without --for-testing"
         )
     plan = plan or Plan.of(planned, sampling, limits, request)
     generated = draw_scenarios(
