@@ -41,6 +41,12 @@ class UnforeseenError(InputError):
     """A reader failed on a file in an unforeseen way: a bug in the reader."""
 
 
+class BugError(ScenarioGenError):
+    """A command failed in an unforeseen way; the message names the file with the traceback."""
+
+    exit_code = 1
+
+
 class MissingExtraError(ScenarioGenError, ImportError):
     """An optional library is not installed; the message names the extra that installs it."""
 
@@ -186,7 +192,8 @@ def reading(path: object) -> Iterator[None]:
         raise
     except Exception as error:
         raise UnforeseenError(
-            f"{path} cannot be read: {describe(error)}; it is damaged, or in an unknown format"
+            f"{path} cannot be read: this is a bug in scenario_gen, even if the file is damaged "
+            f"({describe(error)}); report it and attach {path}"
         ) from error
 
 

@@ -7,11 +7,20 @@ from contextlib import suppress
 from importlib import metadata
 import os
 import sys
+import tempfile
+import traceback
 from typing import Annotated, Any
 
 import typer
 
-from scenario_gen.base.errors import InputError, of_system, ScenarioGenError, shown_error
+from scenario_gen.base.errors import (
+    BugError,
+    describe,
+    InputError,
+    of_system,
+    ScenarioGenError,
+    shown_error,
+)
 from scenario_gen.cli import bags, corpus, generation, output, testing
 from scenario_gen.cli.options import Commands
 
@@ -134,7 +143,7 @@ def run(words: list[str]) -> int:
     """Run a command; return its exit code.
 
     Raises:
-        ScenarioGenError: the command failed.
+        ScenarioGenError: the command failed; BugError if it did so unexpectedly.
     """
     try:
         code = app(arguments(words) or ["--help"], standalone_mode=False, prog_name=PROGRAM)
@@ -149,7 +158,22 @@ def run(words: list[str]) -> int:
     except OSError as error:
         name = error.filename or "standard output or an unnamed file"
         raise of_system(error, name) from error
+    except (ScenarioGenError, typer.Abort):
+        raise
+    except Exception as error:
+        raise _bug(error) from error
     return code if isinstance(code, int) else 0
+
+
+def _bug(error: Exception) -> BugError:
+    """Return an unexpected exception as an error, with its traceback in a file."""
+    place = "the traceback could not be written"
+    with suppress(OSError):
+        descriptor, name = tempfile.mkstemp(".txt", "scenario_gen_bug_")
+        with os.fdopen(descriptor, "w", encoding="utf-8") as file:
+            file.write("".join(traceback.format_exception(error)))
+        place = f"attach {name} and the input"
+    return BugError(f"this is a bug in scenario_gen ({describe(error)}); report it: {place}")
 
 
 def main() -> None:

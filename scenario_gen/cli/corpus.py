@@ -88,15 +88,16 @@ def mine(
 ) -> None:
     """Find the encounters in an archive of any size."""
     from scenario_gen.corpus.config import CorpusConfig
+    from scenario_gen.corpus.mine import DETAILS, PAGE
     from scenario_gen.corpus.mine import mine as mined
-    from scenario_gen.corpus.mine import PAGE
 
     allowed = [f"log.allow={allow}"] if allow else []
     config = assigned_all(CorpusConfig(), [*allowed, *(assignments or [])])
     corpus = place(out, to_write=True)
     with workers_of(workers, scheduler) as who:
         result = mined([place(path) for path in archive], corpus, config, workers=who)
-    conclude(result.lines(), result.failed, corpus, page=corpus / PAGE)
+    files = {"page": corpus / PAGE, "details": corpus / DETAILS}
+    conclude(result.lines(), result.failed, corpus, **files)
 
 
 @dataclass(frozen=True)

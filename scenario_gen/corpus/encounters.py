@@ -117,7 +117,7 @@ def clean_found(task: CleanTask) -> None:
         try:
             encounters = encounters_of(_raw_log(entry, by_device), task.config.log).encounters
         except InputError as error:
-            refused.append({"name": entry.name, "why": str(error)})
+            refused.append(_refusal(entry.name, error))
             continue
         rows += [row_of(encounter, "messages", task.config) for encounter in encounters]
     write_encounters(task.target, rows, {"refused": refused, "quality": []})
@@ -168,13 +168,22 @@ def read_one_log(task: LogTask) -> None:
         with fetched(task.paths) as paths:
             result = read_log(paths, task.config.log)
     except (NoEncounterError, UnknownFormatError, DoubtError) as error:  # the log is finished
-        write_encounters(
-            task.target, [], {"refused": [{"name": task.name, "why": str(error)}], "quality": []}
-        )
+        account = {"refused": [_refusal(task.name, error)], "quality": []}
+        write_encounters(task.target, [], account)
         return
     source = ", ".join(path.name for path in task.paths)
     rows = [row_of(encounter, source, task.config) for encounter in result.encounters]
     write_encounters(task.target, rows, {"refused": [], "quality": list(result.quality.lines())})
+
+
+def _refusal(name: str, error: InputError) -> dict[str, str]:
+    """Return the name of what is left out, the group of the cause, and the reason."""
+    causes: dict[type[InputError], str] = {
+        NoEncounterError: "no encounter",
+        UnknownFormatError: "not in a known format",
+        DoubtError: "in doubt",
+    }
+    return {"name": name, "cause": causes.get(type(error), "not usable"), "why": str(error)}
 
 
 def row_of(encounter: Encounter, source: str, config: CorpusConfig) -> dict[str, Any]:

@@ -13,7 +13,7 @@ An existing file is finished, so a killed run continues where it stopped.
 
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from itertools import chain
 import json
 from pathlib import Path
@@ -21,6 +21,7 @@ from typing import Any
 
 from scenario_gen.base.documents import read_json
 from scenario_gen.base.errors import needs
+from scenario_gen.base.folders import write_text
 from scenario_gen.base.parameters import flatten
 from scenario_gen.base.stores import each_fetched, Place, Remote, size_of
 from scenario_gen.corpus.config import CorpusConfig
@@ -49,7 +50,7 @@ from scenario_gen.corpus.tables import rows_at, rows_of
 from scenario_gen.corpus.tasks import agree, arriving, check_out, held, spread, undone, Workers
 from scenario_gen.situation import Situation
 
-ARCHIVE, PAGE = "archive.json", "encounters.html"
+ARCHIVE, PAGE, DETAILS = "archive.json", "encounters.html", "mine.json"
 LEGEND = (
     "Lines are paths, dots their starts. Space-time gap: smallest distance between two paths,"
     " plus 2 m for each second between."
@@ -69,7 +70,7 @@ class MiningSummary:
         kinds: number of encounters of each kind.
         account: number of rows left out, by cause.
         files: the same by file, without files that have none.
-        refused: encounters that cleaning refused: name and reason.
+        refused: encounters and logs that are left out: name, cause (a group) and reason.
         failed: a sentence for each task that failed.
         notes: further remarks.
     """
@@ -83,9 +84,29 @@ class MiningSummary:
     notes: list[str]
 
     def lines(self) -> list[str]:
-        """Return the summary for people."""
+        """Return the summary for people: groups with counts and causes, in at most five lines."""
+        lines = [self._first_line()]
+        if self.account:
+            causes = ", ".join(f"{count} {cause}" for cause, count in sorted(self.account.items()))
+            lines.append(f"rows: {causes} (in {len(self.files)} files)")
+        if self.refused:
+            groups = Counter(row.get("cause", "not usable") for row in self.refused)
+            causes = ", ".join(f"{count} × {cause}" for cause, count in groups.most_common())
+            first = self.refused[0]
+            lines.append(f"left out: {causes}; the first, {first['name']}: {first['why']}")
+        if self.notes:
+            lines.append(f"notes: {len(self.notes)}; the first: {self.notes[0].strip()}")
+        if self.failed:
+            lines.append(f"failed tasks: {len(self.failed)}; the first: {self.failed[0]}")
+        return lines
+
+    def _first_line(self) -> str:
         kinds = ", ".join(f"{count} {kind}" for kind, count in sorted(self.kinds.items()))
-        lines = [f"{self.encounters} encounters: {kinds or 'none'}"]
+        return f"{self.encounters} encounters: {kinds or 'none'}"
+
+    def details(self) -> list[str]:
+        """Return the summary with all causes and notes, for the page."""
+        lines = [self._first_line()]
         lines += [f"{count} {cause}" for cause, count in sorted(self.account.items())]
         for file, causes in list(self.files.items())[:NAMED_COUNT]:
             lines.append(f"{file}: " + ", ".join(f"{n} {cause}" for cause, n in causes.items()))
@@ -142,6 +163,8 @@ def mine(
         result = _summary(out, config, contents, failed, others)
         with arriving(out / PAGE) as part:
             _write_gallery(part, contents, result)
+        with arriving(out / DETAILS) as part:
+            write_text(part, json.dumps(asdict(result), indent=1) + "\n")
         return result
 
 
@@ -192,7 +215,7 @@ def _write_gallery(path: Path, contents: _Contents, result: MiningSummary) -> No
         ]
         title = f"{row['kind']}: {row['name']}"
         cards.append({"title": title, "lines": lines, "pictures": [sketch(encounter)]})
-    first, *rest = result.lines()
+    first, *rest = result.details()
     write_page(path, "Encounters mined", f"{first}. {LEGEND}", cards, rest)
 
 
@@ -288,4 +311,4 @@ def _shared_ids(out: Place) -> list[str]:
     ]
 
 
-__all__ = ["ARCHIVE", "PAGE", "MiningSummary", "mine", "tables_of"]
+__all__ = ["ARCHIVE", "DETAILS", "PAGE", "MiningSummary", "mine", "tables_of"]

@@ -10,7 +10,14 @@ from pathlib import Path
 from scenario_gen.base.errors import did_you_mean, guarded, InputError, reading
 from scenario_gen.base.stores import renamed, require_local
 from scenario_gen.logs.config import LogConfig
-from scenario_gen.logs.formats import is_bag, is_table, LOG_FORMATS, LogFormat, without_packing
+from scenario_gen.logs.formats import (
+    is_bag,
+    is_table,
+    is_trajectory,
+    LOG_FORMATS,
+    LogFormat,
+    without_packing,
+)
 from scenario_gen.logs.packed import unpacked
 from scenario_gen.logs.raw import RawLog, UnknownFormatError
 
@@ -82,7 +89,8 @@ def log_files(path: Path) -> list[Path]:
     _check_exists(path)
     if path.is_file() or is_bag(path):
         return [path]
-    tables = {file for file in path.iterdir() if is_table(file) and file.stat().st_size}
+    names = (file for file in path.iterdir() if is_table(file) or is_trajectory(file))
+    tables = {file for file in names if file.stat().st_size}
     packed_again = {
         file
         for file in tables

@@ -8,10 +8,11 @@ from dataclasses import dataclass
 from functools import partial
 from importlib import import_module
 from pathlib import Path
+import re
 from typing import Any
 
 from scenario_gen.bags.storage.files import files_of
-from scenario_gen.base.errors import needs
+from scenario_gen.base.errors import InputError, needs
 from scenario_gen.base.registry import Registry
 
 HEAD_BYTES = 65_536
@@ -88,6 +89,58 @@ def is_bsm(path: Path) -> bool:
         return b"coredata_position_lat" in _head(path).lower()
     is_json = path.suffix.lower() in (".json", ".jsonl", ".ndjson", ".txt")
     return is_json and b'"coredata"' in _head(path).lower()
+
+
+def is_nmea(path: Path) -> bool:
+    """Return whether a file has NMEA's sentences RMC."""
+    is_text = path.suffix.lower() in (".nmea", ".txt", ".log", ".csv")
+    return is_text and re.search(rb"^\$[A-Z]{2}RMC,", _head(path), re.MULTILINE) is not None
+
+
+def is_tum(path: Path) -> bool:
+    """Return whether the lines of a text have a stamp, a position and a unit quaternion."""
+    numbers = _first_numbers(path)
+    return len(numbers) == 8 and _is_unit(numbers[4:])
+
+
+def is_kitti(path: Path) -> bool:
+    """Return whether the lines of a text have the 3 x 4 matrix of a pose."""
+    numbers = _first_numbers(path)
+    return len(numbers) == 12 and all(_is_unit(numbers[k : k + 3]) for k in (0, 4, 8))
+
+
+def _is_unit(vector: Sequence[float]) -> bool:
+    return abs(sum(part * part for part in vector) - 1.0) < 0.01
+
+
+def _first_numbers(path: Path) -> list[float]:
+    """Return the numbers of the first line of a text that is no comment; none of other files."""
+    if path.suffix.lower() not in (".txt", ".tum", ".csv"):
+        return []
+    lines = _head(path).decode("ascii", errors="replace").splitlines()
+    first = next((line for line in lines if line.strip() and not line.startswith("#")), "")
+    try:
+        return [float(text) for text in first.split()]
+    except ValueError:
+        return []
+
+
+def _refuse_kitti(paths: Sequence[Path], _: Any) -> Any:
+    """Refuse poses without times.
+
+    Raises:
+        InputError: always; the message names a conversion.
+    """
+    raise InputError(
+        f"{paths[0]}: poses of KITTI have no time and no common frame of several vehicles; join "
+        "them with their times.txt to TUM's format in one frame with x east and y north (evo: "
+        "kitti_poses_and_timestamps_to_trajectory.py)"
+    )
+
+
+def is_trajectory(path: Path) -> bool:
+    """Return whether a name is that of a trajectory of one vehicle, possibly packed."""
+    return without_packing(path).suffix.lower() in (".tum", ".gpx", ".nmea")
 
 
 def is_table(path: Path) -> bool:
@@ -172,6 +225,13 @@ LOG_FORMATS = Registry[LogFormat](
             lambda path: _starts_with(path, b'"objects"', ".json"),
             _lazy_reader("adapters.nocturne"),
         ),
+        "gpx": LogFormat(
+            lambda path: _starts_with(path, b"<gpx", ".gpx", ".xml"),
+            _lazy_reader("adapters.trajectories", kind="gpx"),
+        ),
+        "nmea": LogFormat(is_nmea, _lazy_reader("adapters.trajectories", kind="nmea")),
+        "tum": LogFormat(is_tum, _lazy_reader("adapters.trajectories", kind="tum")),
+        "kitti": LogFormat(is_kitti, _refuse_kitti),
         "spmd": LogFormat(is_spmd, _lazy_reader("tables", spmd=True)),
         "argoverse2": _data_set("argoverse2"),
         "interaction": _data_set("interaction"),

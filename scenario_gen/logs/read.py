@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from scenario_gen.base.errors import InputError
+from scenario_gen.base.errors import InputError, reading
 from scenario_gen.base.folders.scratch import scratch
 from scenario_gen.base.stores import naming_objects, temp_folder
 from scenario_gen.logs.checks import copies_in, doubts_of_pieces, doubts_of_rows
@@ -82,8 +82,10 @@ def read_log(
             with naming_objects({str(file): "the DataFrame"}):
                 path.to_csv(file, index=False)
                 return read_log(file, config)
-    paths = [path] if isinstance(path, (str, Path)) else path
-    return encounters_of(read_raw([Path(name) for name in paths], config), config)
+    paths = [Path(name) for name in ([path] if isinstance(path, (str, Path)) else path)]
+    log = read_raw(paths, config)
+    with reading(paths[0]):
+        return encounters_of(log, config)
 
 
 def encounters_of(log: RawLog, config: LogConfig) -> LogResult:

@@ -12,7 +12,7 @@
 | heading | heading, degrees | heading, 0.0125 degrees; 28800: unknown | heading_deg |
 | length, width | size, cm | the same | the same |
 
-Headings are clockwise from north. The tables of Wyoming and Tampa on data.transportation.gov have
+Headings are clockwise from north. If recordGeneratedAt is empty, odeReceivedAt has the date. The tables of Wyoming and Tampa on data.transportation.gov have
 the same values, in columns such as coreData_position_lat. A file has one message a line, a list,
 or messages one after the other. Each event of New York has its own clock and frame, and is read
 100 s later than the previous one.
@@ -124,7 +124,9 @@ def _rows_of(record: Any, number: int) -> list[Row]:
         return [_event_row(core, number) for core in cores]
     data = record["payload"]["data"]
     core = (data.get("value", {}).get("BasicSafetyMessage") or data)["coreData"]
-    seconds = _seconds(str(record["metadata"]["recordGeneratedAt"]), core.get("secMark"))
+    metadata = record["metadata"]
+    date = metadata.get("recordGeneratedAt") or metadata["odeReceivedAt"]
+    seconds = _seconds(str(date), core.get("secMark"))
     if "lat" not in core:
         position = core["position"]
         row = {"lat": position["latitude"], "lon": position["longitude"]}

@@ -121,10 +121,11 @@ DATA_SETS = {
         source="Zhan et al. 2019, and the README of INTERACTION's tools",
         columns=_columns(
             "vehicle=track_id x=x y=y vx=vx vy=vy heading=psi_rad length=length width=width "
-            "kind=agent_type",
+            "kind=agent_type scene=case_id",
             time=("timestamp_ms", 1e-3),
         ),
         signs=("frame_id",),
+        optional=frozenset(("scene",)),
     ),
     "ind": DataSet(
         title="inD, rounD",
