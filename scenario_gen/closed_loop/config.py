@@ -10,10 +10,7 @@ from scenario_gen.base.road_users import TypeLimits
 
 REPLAY, REACTIVE, COMMITTED = "replay", "reactive", "committed"
 FORESIGHT = {REACTIVE: 5.0, COMMITTED: 0.5}
-"""Time [s] for which drivers predict the ego.
-
-A committed driver detects a conflict 1.5 s before it, and brakes 1 s later.
-"""
+"""Time [s] for which drivers predict an ego that they need not wait for."""
 TEMPLATE, NEVER = "template", "never"
 
 
@@ -41,13 +38,17 @@ class ClosedLoopConfig(Parameters):
         high=5.0,
     )
     headway: float = parameter(
-        1.2, "time gap that reactive vehicles keep (IDM)", unit="s", low=0.0, high=5.0
+        1.2,
+        "median time gap of drivers that follow nobody in the recording; others keep theirs (IDM)",
+        unit="s",
+        low=0.0,
+        high=5.0,
     )
     standstill_gap: float = parameter(
         2.0, "gap at which the others stop behind another (IDM)", unit="m", low=0.0, high=20.0
     )
     acceleration: float = parameter(
-        2.0, "acceleration back to their certified speed", unit="m/s²", low=0.1, high=10.0
+        2.0, "largest acceleration of the others", unit="m/s²", low=0.1, high=10.0
     )
     comfortable_braking: float = parameter(
         3.0, "braking of the others where it suffices", unit="m/s²", low=0.1, high=10.0
@@ -57,14 +58,14 @@ class ClosedLoopConfig(Parameters):
     )
     jerk: float = parameter(
         9.8,
-        "largest jerk of the others, unless the order needs more",
+        "largest jerk of the others, where comfortable braking does not suffice",
         unit="m/s³",
         low=1.0,
         high=1e6,
     )
     patience: float = parameter(
-        5.0,
-        "time after which a vehicle stops waiting for an ego that hardly moves",
+        3.5,
+        "median time after which a vehicle stops waiting for one that hardly moves",
         unit="s",
         low=0.0,
         high=1e6,

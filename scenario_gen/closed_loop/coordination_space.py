@@ -32,6 +32,10 @@ BOX_MARGIN_M = 0.05  # for the curvature between the poses of a cell, and some d
 LANE_MARGIN_M = 0.75  # a lane is wider than the footprints on it by this: 3.4 m for a car
 MIN_LANE_WAY_M = 1.0  # a vehicle that drives less occupies no lane
 MAX_STANDING_SPEED_MPS = 0.5  # a faster vehicle leaves the scene at the end of its motion
+MAX_REACTION_GAP_S = 3.0  # longer after the other one a vehicle does not react to it
+FREE_SPEED_RATIO = 1.15  # free speed of a driver, of its highest recorded one
+LATERAL_MPS2 = 3.0  # lateral acceleration of a driver that hurries through a bend
+BRAKING_MPS2 = 2.0  # its braking before a bend
 FAR_AWAY_M = 1e15  # place of the boxes of a vehicle that is not on the scene
 
 
@@ -54,6 +58,11 @@ class World(NamedTuple):
             j is in cell k, unless the clock of j has passed it, too; infinity if nothing limits i.
             It includes the waits of the template.
         ego: index of the witness of the ego.
+        meets: (N, K, 2) clocks [s] of the ego at the start of its first and at the end of its last
+            cell whose box meets that of a vehicle's cell; infinity and -infinity if none does.
+        reacts: (N, N) clock [s] until which vehicle i reacts to vehicle j: it follows j, or lets j
+            pass shortly before itself; 0 if it does not.
+        free: (N, K) speed [m/s] at which each vehicle hurries to one that it reacts to.
         walks: (N,) whether each is a pedestrian.
         kerbs: (N, K) clock [s] at which a pedestrian, in each cell, next steps onto a lane that a
             vehicle uses: the start of the cell on a lane; infinity if never, and for vehicles.
@@ -69,11 +78,14 @@ class World(NamedTuple):
     cell: float
     order: Floats
     ego: int
+    meets: Floats
+    reacts: Floats
+    free: Floats
     walks: Bools
     kerbs: Floats
 
 
-WORLD = named(World, F, F1, F3, F2, F2, B1, F3, F, F3, I, B1, F2)
+WORLD = named(World, F, F1, F3, F2, F2, B1, F3, F, F3, I, F3, F2, F2, B1, F2)
 
 
 def _ego_index(scenario: Scenario, ego: int | str) -> int:
@@ -124,7 +136,11 @@ def world_of(scenario: Scenario, ego: int | str, step: float = 0.1) -> World:
     fill_cells(time, motion, half, spans, CELL_S, cells)
     order = np.empty((n, n, count))
     fill_order(cells, CELL_S, order)
-    _add_waits(scenario, ego, order)
+    reacts = _add_reactions(scenario, ego, order)
+    meets = np.empty((n, count, 2))
+    fill_meetings(cells, ego, CELL_S, meets)
+    free = np.empty((n, count))
+    fill_free_speeds(time, motion, reacts.max(axis=1), CELL_S, free)
     walks = np.array([vehicle.kind.walks for vehicle in scenario.vehicles])
     kerbs = np.full((n, count), np.inf)
     fill_kerbs(cells, walks, CELL_S, kerbs)
@@ -139,33 +155,44 @@ def world_of(scenario: Scenario, ego: int | str, step: float = 0.1) -> World:
         cell=CELL_S,
         order=frozen(order),
         ego=ego,
+        meets=frozen(meets),
+        reacts=frozen(reacts),
+        free=frozen(free),
         walks=walks,
         kerbs=frozen(kerbs),
     )
 
 
-def _add_waits(scenario: Scenario, ego: int, order: Floats) -> None:
-    """Add the waits among the other vehicles to the `order` (N, N, K)."""
+def _add_reactions(scenario: Scenario, ego: int, order: Floats) -> Floats:
+    """Add the waits among the other vehicles to the `order` (N, N, K); return `World.reacts`."""
     names = tokens([vehicle.id for vehicle in scenario.vehicles])
+    n = len(names)
+    reacts = np.zeros((n, n))
+    shortest = {(who, ego): MAX_REACTION_GAP_S for who in range(n) if who != ego}
     for reaction in scenario.facts.reactions:
-        if reaction.kind != YIELD or not {reaction.who, reaction.whom} <= set(names):
+        if not {reaction.who, reaction.whom} <= set(names):
             continue
-        yielder = names.index(reaction.who)
-        other = names.index(reaction.whom)
-        if ego not in (yielder, other):
-            _add_wait(scenario, yielder, other, order[yielder, other])
+        pair = names.index(reaction.who), names.index(reaction.whom)
+        shortest[pair] = np.inf
+        reacts[pair] = 0.0 if reaction.kind == YIELD else np.inf
+    for (who, whom), gap in shortest.items():
+        conflict = conflict_of(scenario, who, whom)
+        if reacts[who, whom] > 0.0 or conflict is None or conflict.second != who:
+            continue
+        cleared, enters = passing(scenario, conflict, merges=conflict.following)
+        if enters - cleared < gap:
+            reacts[who, whom] = np.inf if conflict.following else enters
+        if ego not in (who, whom):
+            _add_wait(order[who, whom], cleared, enters)
+    return reacts
 
 
-def _add_wait(scenario: Scenario, yielder: int, other: int, order: Floats) -> None:
+def _add_wait(order: Floats, cleared: float, enters: float) -> None:
     """Lower the `order` (K,) of a yielder: it does not enter before the other has cleared.
 
-    Its limit is its clock when the other clears, or when it enters, if that is earlier. So the
+    Its limit is its clock when the other clears, or when it enters, if that is earlier [s]. So the
     yielder keeps its time gap to the other.
     """
-    conflict = conflict_of(scenario, yielder, other)
-    if conflict is None or conflict.second != yielder:
-        return
-    cleared, enters = passing(scenario, conflict, merges=conflict.following)
     limit = np.floor(min(cleared, enters) / CELL_S) * CELL_S
     before = np.arange(len(order)) * CELL_S < cleared
     order[before] = np.minimum(order[before], limit)
@@ -275,6 +302,54 @@ def fill_order(cells: Floats, cell: float, out: Floats) -> None:
                 last = meeting
                 limit = meeting * cell
             out[i, j, k] = limit
+
+
+@kernel(F3, I, F, OUT3)
+def fill_meetings(cells: Floats, ego: int, cell: float, out: Floats) -> None:
+    """Fill the `meets` (N, K, 2) of `World` from the cells (N, K, 8) and their length [s]."""
+    count = out.shape[1]
+    out[:, :, 0] = np.inf
+    out[:, :, 1] = -np.inf
+    for place in range(out.shape[0] * count):
+        i = place // count
+        k = place % count
+        for m in range(count):
+            if i != ego and boxes_meet(cells[i, k], cells[ego, m]):
+                out[i, k, 0] = min(out[i, k, 0], m * cell)
+                out[i, k, 1] = (m + 1) * cell
+
+
+@kernel(F1, F3, F1, F, OUT2)
+def fill_free_speeds(
+    time: Floats, motion: Floats, until: Floats, cell: float, out: Floats
+) -> None:
+    """Fill the `free` (N, K) of `World`.
+
+    Until the end of its reactions a vehicle drives as fast as it ever does, but slows down in
+    bends; then it drives at its certified speed.
+
+    Args:
+        time: (T,) instants [s].
+        motion: (N, T, 6) as in `World`.
+        until: (N,) clocks [s] at which the reactions end.
+        cell: length of a cell [s].
+        out: (N, K).
+    """
+    a = np.empty(5)
+    b = np.empty(5)
+    for i in range(out.shape[0]):
+        fastest = FREE_SPEED_RATIO * motion[i, :, 3].max()
+        following = np.inf
+        for k in range(out.shape[1] - 1, -1, -1):
+            pose_at(time, motion[i], k * cell, a)
+            pose_at(time, motion[i], (k + 1) * cell, b)
+            way = np.hypot(b[0] - a[0], b[1] - a[1])
+            free = max(a[3], b[3])
+            if k * cell < until[i]:
+                bend = abs(b[2] - a[2]) / max(way, 0.01)
+                free = max(free, min(fastest, np.sqrt(LATERAL_MPS2 / max(bend, 1e-6))))
+            following = min(free, np.sqrt(following * following + 2.0 * BRAKING_MPS2 * way))
+            out[i, k] = following
 
 
 @kernel(inline=True)

@@ -1,7 +1,11 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The speed of one driver: its change in one step, and braking behind a vehicle ahead."""
+"""The longitudinal law of one driver: free driving, following, and approach to a limit.
+
+Source: intelligent driver model, Treiber, Hennecke & Helbing 2000. The smaller of its free and
+its interaction acceleration counts, as in IDM+ (Schakel, Knoop & van Arem 2012).
+"""
 
 from typing import NamedTuple
 
@@ -12,7 +16,6 @@ from scenario_gen.numerics import Floats, Ints
 from scenario_gen.numerics.boxes import boxes_meet, fill_box
 from scenario_gen.numerics.kernels import B, F, F1, I1, kernel, named
 
-NO_BRAKING_MPS2 = -1e3  # a braking that limits nothing: the driver accelerates as it likes
 GAP_BISECTION_STEPS = 4  # within a cell of the clock, so that the gap does not jump
 
 
@@ -24,20 +27,20 @@ class DriverModel(NamedTuple):
         min_moving_speed_mps: a certified speed below it counts as standing, and the rate is 1.
         min_gap_reduction_m: a driver brakes for a vehicle ahead only if the gap is smaller than
             the certified one by this.
-        min_divisor_mps: floor of a speed that divides a distance.
-        clearance_m: a driver that brakes for the ego leaves this distance.
-        lateral_clearance_m: distance to an ego that has left the path of its witness.
+        comfortable_jerk_mps3: largest jerk where comfortable braking suffices; it rises to the
+            largest one of all where twice as much is needed.
+        foot_time_s: mean delay of braking while the foot moves.
+        braking_margin_ratio: of the braking of a driver, to the braking that just suffices.
+        clock_tolerance_s: uncertainty of a clock.
+        closing_time_s: time in which a driver closes up to the clock that it reacts to.
+        clearance_m: distance that a driver leaves to the ego.
+        stopping_margin_m: distance from a place that the ego passes first.
         same_direction_ratio: least cosine of the angle between two headings of one direction.
-        clock_tolerance_s: uncertainty of the clock of the ego.
         extra_braking_mps2: an ego that brakes harder than its witness by this goes on braking.
-        ego_response_s: delay of an ego that brakes for a pedestrian on its lane.
         max_ego_rate_ratio: an ego that is faster than its witness by this does not slow down.
+        ego_response_s: delay of an ego that brakes for a pedestrian on its lane.
         walker_braking_mps2: deceleration of a pedestrian: 1.4 m/s to 0 within a step of 0.7 m.
-        creep_speed_mps: the prediction lets every driver creep, so that no two drivers wait for
-            each other.
-        max_blocking_speed_mps: a slower ego blocks a driver that waits for it.
-        min_lead_s: a driver whose clock may run ahead by this does not wait for another one.
-        approach_s: time in which a creeping driver reaches the end of its permitted way.
+        max_blocking_speed_mps: patience counts for a slower driver behind a slower ego.
         entry_gap_m: free distance ahead of and behind a vehicle that enters the scene.
         braking_tolerance_mps: change of speed in a step beyond the strongest braking.
         jerk_tolerance_mps: change of speed in a step beyond the jerk limit.
@@ -46,19 +49,19 @@ class DriverModel(NamedTuple):
     lookahead_m: float = 60.0
     min_moving_speed_mps: float = 0.02
     min_gap_reduction_m: float = 0.1
-    min_divisor_mps: float = 0.2
+    comfortable_jerk_mps3: float = 4.0
+    foot_time_s: float = 0.4
+    braking_margin_ratio: float = 1.25
+    clock_tolerance_s: float = 0.1
+    closing_time_s: float = 2.0
     clearance_m: float = 0.3
-    lateral_clearance_m: float = 0.5
+    stopping_margin_m: float = 1.0
     same_direction_ratio: float = 0.7
-    clock_tolerance_s: float = 0.05
     extra_braking_mps2: float = 1.0
-    ego_response_s: float = 1.0
     max_ego_rate_ratio: float = 1.05
+    ego_response_s: float = 1.0
     walker_braking_mps2: float = 1.5
-    creep_speed_mps: float = 0.5
     max_blocking_speed_mps: float = 1.5
-    min_lead_s: float = 1.0
-    approach_s: float = 1.0
     entry_gap_m: float = 3.0
     braking_tolerance_mps: float = 0.2
     jerk_tolerance_mps: float = 0.05
@@ -89,36 +92,132 @@ class DriverState(NamedTuple):
 
 
 class DriverParameters(NamedTuple):
-    """Parameters of the other drivers; most are fields of `ClosedLoopConfig`.
+    """Parameters of N drivers, from `ClosedLoopConfig`, their recorded motion and draws.
 
     Attributes:
-        headway: [s].
+        headway: (N,) desired time gaps [s].
         standstill: gap at standstill [m].
-        acceleration: largest acceleration [m/s²].
-        comfortable: comfortable braking [m/s²].
+        acceleration: (N,) largest accelerations [m/s²].
+        comfortable: (N,) comfortable braking [m/s²].
         strongest: (N,) strongest braking [m/s²], at most that of the vehicle's type.
         jerk: largest jerk [m/s³].
-        patience: waiting time [s] before a driver goes ahead of a standing ego.
+        patience: (N,) waiting times [s] before a driver goes ahead of a vehicle that stands.
+        margin: (N,) least time [s] between a driver that goes ahead of the ego, and the ego.
         foresight: prediction horizon [s].
         yields: whether drivers wait for the ego where the template did.
         reacts: whether drivers react at all.
         delay: (N,) reaction times in steps.
     """
 
-    headway: float
+    headway: Floats
     standstill: float
-    acceleration: float
-    comfortable: float
+    acceleration: Floats
+    comfortable: Floats
     strongest: Floats
     jerk: float
-    patience: float
+    patience: Floats
+    margin: Floats
     foresight: float
     yields: bool
     reacts: bool
     delay: Ints
 
 
-DRIVER_PARAMETERS = named(DriverParameters, F, F, F, F, F1, F, F, F, B, B, I1)
+DRIVER_PARAMETERS = named(DriverParameters, F1, F, F1, F1, F1, F, F1, F1, F, B, B, I1)
+
+
+@kernel(inline=True, forced=True)
+def _cell_way(cells: Floats, k: int) -> float:
+    """Return the way [m] in cell k of the cells (K, 8) of one vehicle; the last one goes on."""
+    last = cells.shape[0] - 1
+    k = min(k, last - 1)
+    return float(cells[k + 1, 7] - cells[k, 7]) if k >= 0 else 0.0
+
+
+@kernel(inline=True)
+def way_at(world: World, i: int, clock: float) -> float:
+    """Return the way [m] that vehicle i has driven at a clock [s]."""
+    cells = world.cells[i]
+    k = min(int(clock / world.cell), cells.shape[0] - 1)
+    return float(cells[k, 7] + _cell_way(cells, k) * (clock / world.cell - k))
+
+
+@kernel(inline=True)
+def clock_after(world: World, i: int, clock: float, distance: float, skips: bool) -> float:
+    """Return the clock [s] of vehicle i after a distance [m] on its path.
+
+    It ends where the vehicle stands in the certified motion, unless it skips its waits.
+    """
+    if distance <= 0.0:
+        return clock
+    cells = world.cells[i]
+    last = cells.shape[0] - 1
+    least = MODEL.min_moving_speed_mps * world.cell
+    goal = way_at(world, i, clock) + distance
+    k = min(int(clock / world.cell), last)
+    while k < last and cells[k + 1, 7] < goal:
+        k += 1
+        if not skips and _cell_way(cells, k) < least:
+            return float(k * world.cell)
+    way = _cell_way(cells, k)
+    if way < least:
+        return float(max(clock, (k + 1) * world.cell))
+    return float(max(clock, (k + (goal - cells[k, 7]) / way) * world.cell))
+
+
+@kernel(inline=True)
+def following_acceleration(
+    parameters: DriverParameters,
+    i: int,
+    gap: float,
+    speed: float,
+    leader_speed: float,
+    leader_braking: float,
+) -> float:
+    """Return the acceleration [m/s²] of driver i behind a leader: the interaction term of IDM.
+
+    It is no harder than comfortable braking, or than the braking with which the driver stops behind
+    the leader if that is harder, with a margin.
+
+    Args:
+        parameters: of the drivers.
+        i: index of the driver.
+        gap: to the leader [m].
+        speed: of the driver [m/s].
+        leader_speed: along the path of the driver [m/s].
+        leader_braking: deceleration [m/s²] with which the leader may stop.
+    """
+    a = parameters.acceleration[i]
+    b = parameters.comfortable[i]
+    closing = speed * (speed - leader_speed) / (2.0 * np.sqrt(a * b))
+    wanted = parameters.standstill + max(0.0, speed * parameters.headway[i] + closing)
+    share = wanted / max(gap, 0.1)
+    wish = a * (1.0 - share * share)
+    stopping_way = leader_speed * leader_speed / (2.0 * max(leader_braking, b))
+    room = gap + stopping_way - speed * MODEL.foot_time_s
+    needed = speed * speed / (2.0 * max(room, 0.1))
+    return float(max(wish, -max(b, MODEL.braking_margin_ratio * needed)))
+
+
+@kernel(inline=True)
+def approach_acceleration(
+    parameters: DriverParameters, i: int, way: float, speed: float, wait: float
+) -> float:
+    """Return the acceleration [m/s²] of driver i towards a place that is free after a wait.
+
+    It arrives when the wait is over. It brakes no harder than for a vehicle that stands.
+
+    Args:
+        parameters: of the drivers.
+        i: index of the driver.
+        way: to the place [m].
+        speed: of the driver [m/s].
+        wait: time until the place is free [s].
+    """
+    behind = following_acceleration(parameters, i, way + parameters.standstill, speed, 0.0, 0.0)
+    if speed * wait < 2.0 * way:
+        return max(behind, 2.0 * (way - speed * wait) / (wait * wait))
+    return max(behind, -speed * speed / (2.0 * max(way, 0.01)))
 
 
 @kernel(inline=True, forced=True)
@@ -132,81 +231,75 @@ def _smooth_acceleration(difference: float, jerk: float, h: float) -> float:
     return float(np.sqrt(2.0 * jerk * difference)) - 0.5 * jerk * h
 
 
-@kernel(inline=True, forced=True)
-def next_rate(
+@kernel(inline=True)
+def _free_acceleration(
+    world: World, a: float, driver: DriverState, pose: Floats, target: float
+) -> float:
+    """Return the free acceleration [m/s²] of a driver towards its certified speed.
+
+    Towards a later `target` clock [s] it drives as fast as its path allows.
+    """
+    i = driver.vehicle
+    rate = driver.rate
+    if target <= driver.clock + MODEL.clock_tolerance_s:
+        return float(a * (1.0 - rate**4) + rate * rate * pose[4])
+    k = min(int(driver.clock / world.cell), world.free.shape[1] - 1)
+    behind = way_at(world, i, target) - way_at(world, i, driver.clock)
+    wanted = min(world.free[i, k], pose[3] + behind / MODEL.closing_time_s)
+    ratio = rate * pose[3] / max(wanted, pose[3], 0.1)
+    return float(a * (1.0 - ratio**4))
+
+
+@kernel(inline=True)
+def drive_step(
+    world: World,
     parameters: DriverParameters,
     driver: DriverState,
     pose: Floats,
-    braking: float,
-    floor: float,
-    h: float,
-) -> float:
-    """Return the rate of a clock after a step in which its driver brakes.
+    bound: float,
+    target: float,
+) -> DriverState:
+    """Return a driver after a step, at its certified pose (5,), which is changed.
 
-    The acceleration changes by the jerk at most. Without an obstacle the rate returns to 1. At 1
-    the motion is the certified one, whatever its jerk is.
+    On the record, with nothing in the way, the motion is the certified one, whatever its jerk is.
 
     Args:
+        world: the scenario and the step.
         parameters: of the drivers.
         driver: at the start of the step.
         pose: (5,) its certified pose, with speed [m/s] and acceleration [m/s²].
-        braking: deceleration [m/s²]; a negative one limits the acceleration; NO_BRAKING_MPS2 does
-            not limit it.
-        floor: speed [m/s] at which braking ends.
-        h: duration of the step [s].
+        bound: largest acceleration [m/s²] that the situation ahead permits.
+        target: clock [s] up to which the driver may hurry.
     """
-    v = pose[3]
-    a = pose[4]
-    r = driver.rate
-    previous = driver.acceleration
+    i = driver.vehicle
+    h = world.step
+    rate = driver.rate
+    hurries = target > driver.clock + MODEL.clock_tolerance_s
+    stands = pose[3] < MODEL.min_moving_speed_mps
+    if not hurries and (stands or (rate == 1.0 and bound >= pose[4])):
+        return DriverState(i, driver.clock + h, 1.0, pose[4] * (not stands))
+    speed = rate * pose[3]
+    comfortable = parameters.comfortable[i]
+    free = _free_acceleration(world, parameters.acceleration[i], driver, pose, target)
     jerk = parameters.jerk
-    if v < MODEL.min_moving_speed_mps:
-        return 1.0
-    speed = r * v
-    end_speed = max(v + r * a * h, MODEL.min_moving_speed_mps)  # certified, approximate
-    free_rate = 1.0
-    if r < 1.0:
-        wanted = r * a + _smooth_acceleration(v - speed, jerk, h)
-        gain = min(max(parameters.acceleration, r * r * a), wanted, previous + jerk * h)
-        free_rate = min(max((speed + gain * h) / end_speed, 0.0), 1.0)
-    if braking <= NO_BRAKING_MPS2:
-        return free_rate
-    change = 0.0
-    if speed > floor or braking <= 0.0:
-        change = -min(braking, _smooth_acceleration(speed - floor, jerk, h))
-    new_speed = max(speed + max(change, previous - jerk * h) * h, floor)
-    first = min(new_speed / end_speed, free_rate)
-    mean_speed = max(v + 0.5 * (r + first) * a * h, MODEL.min_moving_speed_mps)
-    return float(min(new_speed / mean_speed, free_rate))
-
-
-@kernel(inline=True, forced=True)
-def drive_step(
-    parameters: DriverParameters,
-    driver: DriverState,
-    time: Floats,
-    motion: Floats,
-    pose: Floats,
-    braking: float,
-    h: float,
-) -> DriverState:
-    """Return a driver after a step of h [s] of braking [m/s²]; update its certified pose (5,).
-
-    Times (T,) and motion (T, 6) are those of its vehicle.
-    """
-    speed = driver.rate * pose[3]
-    rate = next_rate(parameters, driver, pose, braking, 0.0, h)
-    clock = driver.clock + 0.5 * (driver.rate + rate) * h
-    pose_at(time, motion, clock, pose)
-    return DriverState(driver.vehicle, clock, rate, (rate * pose[3] - speed) / h)
-
-
-@kernel(inline=True, forced=True)
-def _distance_at(cells: Floats, k: int, share: float) -> float:
-    """Return the driven way [m] at a share of cell k of the cells (K, 8) of one vehicle."""
-    start = cells[k, 7]
-    end = cells[k + 1, 7] if k + 1 < cells.shape[0] else start
-    return float(start + (end - start) * share)
+    if not world.walks[i]:
+        urgency = min(max(-bound / comfortable - 1.0, 0.0), 1.0)
+        calm = min(jerk, MODEL.comfortable_jerk_mps3)
+        jerk = calm + urgency * (jerk - calm)
+    gain = min(max(free, -comfortable), bound, driver.acceleration + jerk * h)
+    least = max(-parameters.strongest[i], driver.acceleration - jerk * h)
+    gain = max(gain, least, -_smooth_acceleration(speed, jerk, h))
+    new_speed = max(speed + gain * h, 0.0)
+    clock = clock_after(world, i, driver.clock, 0.5 * (speed + new_speed) * h, hurries)
+    if hurries:
+        clock = min(clock, target)
+    pose_at(world.time, world.motion[i], clock, pose)
+    if pose[3] < MODEL.min_moving_speed_mps:
+        return DriverState(i, clock, 1.0 if new_speed > 0.0 else 0.0, gain)
+    joins = not hurries and rate <= 1.0
+    if joins and new_speed >= pose[3] - 0.5 * jerk * h * h:
+        return DriverState(i, clock, 1.0, gain)
+    return DriverState(i, clock, new_speed / pose[3], gain)
 
 
 @kernel(inline=True)
@@ -241,46 +334,21 @@ def gap_ahead(world: World, i: int, clock: float, box: Floats, pose: Floats) -> 
         pose: (5,) the certified pose at the clock.
     """
     cells = world.cells[i]
-    cell = world.cell
-    first = min(int(clock / cell), cells.shape[0] - 1)
-    start = _distance_at(cells, first, min(clock / cell - first, 1.0))
-    for k in range(first, cells.shape[0]):
+    start = way_at(world, i, clock)
+    for k in range(min(int(clock / world.cell), cells.shape[0] - 1), cells.shape[0]):
         if cells[k, 7] - start > MODEL.lookahead_m:
             break
         if boxes_meet(cells[k], box):
             along = (box[0] - pose[0]) * cells[k, 2] + (box[1] - pose[1]) * cells[k, 3]
             if along <= 0.0:
                 break
-            share = _contact_clock(world, i, k, clock, box) / cell - k
-            return float(max(_distance_at(cells, k, share) - start, 0.0)), k
+            contact = _contact_clock(world, i, k, clock, box)
+            return max(way_at(world, i, contact) - start, 0.0), k
     return np.inf, -1
 
 
 @kernel(inline=True)
-def _idm_braking(
-    gap: float, speed: float, leader_speed: float, parameters: DriverParameters
-) -> float:
-    """Return the braking [m/s²] of the intelligent driver model, 0 where the gap is wide enough.
-
-    The free term of the model is not used: the certificate replaces it.
-    Source: Treiber, Hennecke & Helbing 2000.
-
-    Args:
-        gap: to the leader [m].
-        speed: of the driver [m/s].
-        leader_speed: along the path of the driver [m/s].
-        parameters: of the drivers.
-    """
-    a = parameters.acceleration
-    b = parameters.comfortable
-    closing = speed * (speed - leader_speed) / (2.0 * np.sqrt(a * b))
-    wanted_gap = parameters.standstill + max(0.0, speed * parameters.headway + closing)
-    share = wanted_gap / max(gap, 0.1)
-    return float(min(max(a * (share * share - 1.0), 0.0), b))
-
-
-@kernel(inline=True)
-def following_braking(
+def leader_acceleration(
     world: World,
     parameters: DriverParameters,
     driver: DriverState,
@@ -288,11 +356,12 @@ def following_braking(
     j: int,
     box: Floats,
     speed: float,
-    offset: float,
+    braking: float,
 ) -> float:
-    """Return the braking [m/s²] of a driver behind vehicle j on its path.
+    """Return the largest acceleration [m/s²] of a driver behind vehicle j on its path.
 
-    NO_BRAKING_MPS2 if the gap is not smaller than in the certified execution at the same clock.
+    Infinity if the gap is not smaller than in the certified execution at the same clock. A driver
+    that the record shows nearer than the model wants keeps that habit.
 
     Args:
         world: the scenario.
@@ -302,23 +371,25 @@ def following_braking(
         j: index of the leader.
         box: (7,) footprint of the leader.
         speed: of the leader [m/s].
-        offset: time [s] from the clock of the driver to that of the leader's footprint.
+        braking: deceleration of the leader [m/s²].
     """
     i = driver.vehicle
     gap, cell = gap_ahead(world, i, driver.clock, box, pose)
     if cell < 0:
-        return NO_BRAKING_MPS2
+        return np.inf
     cos = world.cells[i, cell, 2]
     sin = world.cells[i, cell, 3]
-    leader_speed = speed * max(box[2] * cos + box[3] * sin, 0.0)
-    braking = _idm_braking(gap, driver.rate * pose[3], leader_speed, parameters)
-    if braking <= 0.0:
-        return NO_BRAKING_MPS2
-    certified = np.empty(5)
+    along = speed * max(box[2] * cos + box[3] * sin, 0.0)
+    bound = following_acceleration(parameters, i, gap, driver.rate * pose[3], along, braking)
+    leader = np.empty(5)
     certified_box = np.empty(7)
-    pose_at(world.time, world.motion[j], driver.clock + offset, certified)
+    clock = driver.clock + world.step * (j == world.ego)  # the ego has already moved
+    pose_at(world.time, world.motion[j], clock, leader)
     half = world.half[j]
-    fill_box(certified[0], certified[1], certified[2], half[0], half[1], certified_box)
+    fill_box(leader[0], leader[1], leader[2], half[0], half[1], certified_box)
     certified_gap, _ = gap_ahead(world, i, driver.clock, certified_box, pose)
-    is_closer = gap < certified_gap - MODEL.min_gap_reduction_m
-    return braking if is_closer else NO_BRAKING_MPS2
+    if gap >= certified_gap - MODEL.min_gap_reduction_m:
+        return np.inf
+    along = leader[3] * max(certified_box[2] * cos + certified_box[3] * sin, 0.0)
+    certified = following_acceleration(parameters, i, certified_gap, pose[3], along, 0.0)
+    return float(bound + max(pose[4] - certified, 0.0))

@@ -31,6 +31,7 @@ from scenario_gen.types import Vehicle
 STANDSTILL_MPS = 0.5
 SAME_DIRECTION_RATIO = 0.7  # least cosine of the angle between two headings of one direction
 CONTACT_MARGIN_M = 0.02  # the part of the ego within this of the other is the place of the contact
+PATH_MARGIN_M = 0.2  # an ego that is less far beside its reference path is on it
 # Responsibility-sensitive safety (Shalev-Shwartz, Shammah & Shashua 2017), equation 2.
 # The vehicle behind does not accelerate during its response.
 RSS_RESPONSE_S = 1.0
@@ -180,21 +181,26 @@ class Contact:
     def off_path(self) -> bool:
         """Whether the touching part of the ego is mostly where its reference drive never is.
 
-        Without a conflict the reference drive is never at the place of the contact.
+        The ego is beside its path then by PATH_MARGIN_M at least. Without a conflict the reference
+        drive is never at the place of the contact.
         """
-        if self.conflict is None:
-            return True
         drive = self.drive
-        ego, other = drive.motion.vehicles[drive.ego], drive.motion.vehicles[self.other]
-        own_box = _footprint(self.ego_state, ego)
-        other_box = _footprint(self.other_state, other)
-        reach = own_box.distance(other_box) + CONTACT_MARGIN_M
-        touching = own_box.intersection(other_box.buffer(reach))
         path = self.loop.world.motion[drive.ego, :, :3]
         # The ego may pass its goal straight on.
         beyond = place(path[-1:], np.arange(0.0, PAST_GOAL_M, 1.0), 0.0)
         straight = np.column_stack([beyond, np.full(len(beyond), path[-1, 2])])
         poses = np.concatenate([path, straight])
+        offset = poses[:, :2] - self.ego_state[:2]
+        nearest = int(np.hypot(*offset.T).argmin())
+        if abs(ahead_and_left(offset[nearest], poses[nearest, 2])[1]) < PATH_MARGIN_M:
+            return False
+        if self.conflict is None:
+            return True
+        ego, other = drive.motion.vehicles[drive.ego], drive.motion.vehicles[self.other]
+        own_box = _footprint(self.ego_state, ego)
+        other_box = _footprint(self.other_state, other)
+        reach = own_box.distance(other_box) + CONTACT_MARGIN_M
+        touching = own_box.intersection(other_box.buffer(reach))
         swept = shapely.polygons(corners(poses, ego.length, ego.width))
         near = swept[shapely.intersects(swept, touching)]
         inside = touching.intersection(shapely.union_all(near))

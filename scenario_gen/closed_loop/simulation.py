@@ -11,7 +11,6 @@ with the same commands are identical.
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Protocol
-from zlib import crc32
 
 import numpy as np
 
@@ -19,6 +18,7 @@ from scenario_gen.base.errors import InputError
 from scenario_gen.closed_loop.config import ClosedLoopConfig, FORESIGHT, REPLAY, TEMPLATE
 from scenario_gen.closed_loop.coordination_space import world_of
 from scenario_gen.closed_loop.driver import DriverParameters
+from scenario_gen.closed_loop.driver_traits import driver_traits, reaction_time
 from scenario_gen.closed_loop.ego import Command, EgoState, move, Pose
 from scenario_gen.closed_loop.step import advance, ego_hits
 from scenario_gen.numerics import Bools, Floats, wrap_angle
@@ -41,11 +41,11 @@ class State:
             the ego, on its witness' path.
         rate: (N,) rates of the clocks; 1 is the certified speed.
         acceleration: (N,) accelerations of the others [m/s²] that their drivers choose.
-        waited: (N,) patience that each driver has spent waiting for an ego that stands [s];
-            infinity once it goes before the ego.
+        waited: (N,) times for which each driver has waited for a vehicle that stands [s].
         seen: (K, 9) the ego now and before, newest first, as far back as the slowest driver's
             reaction time: `EgoState`, its clock on its witness' path [s], the rate of that clock,
             and 1 if it is on that path.
+        passes: (N, N) whether vehicle i goes ahead of vehicle j, against the certified order.
         forced: number of times that one of the others has braked harder than the strongest
             braking, or more suddenly than the jerk allows, to preserve the order.
         fault: description of an error in the last command, "" if it was correct.
@@ -62,6 +62,7 @@ class State:
     acceleration: Floats
     waited: Floats
     seen: Floats
+    passes: Bools
     forced: int = 0
     fault: str = ""
     jumped: bool = False
@@ -159,16 +160,6 @@ class Drive:
 PAST_GOAL_M = 10.0  # more than any vehicle drives in one step
 
 
-def reaction_time(scenario: Scenario, vehicle: str, mean: float) -> float:
-    """Draw a driver's reaction time [s], uniformly from 0.5 to 1.5 times the mean.
-
-    It depends only on the scenario's seed and index and on the vehicle's id, not on the ego.
-    """
-    numbers = (scenario.seed, scenario.seed >> 32, scenario.index, crc32(vehicle.encode()))
-    words = [number % 2**32 for number in numbers]
-    return mean * (0.5 + float(np.random.default_rng(words).random()))
-
-
 class ClosedLoop:
     """A scenario that can be driven."""
 
@@ -200,6 +191,7 @@ class ClosedLoop:
         self.road = road and ground_for(road, scenario.vehicles[self.ego])
         self.config, self.limits = config, config.limits.of(scenario.vehicles[self.ego].type)
         self.reactions = self._reaction_times()
+        self.traits = driver_traits(scenario, config)
         self._parameters = self._driver_parameters()
         self._slowest = int(self._parameters.delay.max())
         self._sizes = 2.0 * self.world.half
@@ -222,18 +214,20 @@ class ClosedLoop:
 
     def _driver_parameters(self) -> DriverParameters:
         config = self.config
+        traits = self.traits
         strongest_braking = [
             min(config.strongest_braking, config.limits.of(vehicle.type).max_deceleration)
             for vehicle in self.scenario.vehicles
         ]
         return DriverParameters(
-            config.headway,
+            traits.headway,
             config.standstill_gap,
-            config.acceleration,
-            config.comfortable_braking,
+            traits.acceleration,
+            traits.braking,
             np.array(strongest_braking),
             config.jerk,
-            config.patience,
+            traits.patience,
+            traits.margin,
             FORESIGHT.get(config.policy, 0.0),
             config.yield_to_ego == TEMPLATE,
             config.policy != REPLAY,
@@ -278,6 +272,7 @@ class ClosedLoop:
             np.zeros(n),
             np.zeros(n),
             seen,
+            np.zeros((n, n), dtype=np.bool_),
         )
 
     def step(self, state: State, asked: Command | Pose | None, note: str = "") -> State:
@@ -297,23 +292,24 @@ class ClosedLoop:
         seen = np.empty((min(len(state.seen), self._slowest) + 1, 9))
         seen[0, :6] = ego
         seen[1:] = state.seen[: len(seen) - 1]
-        after, vehicles = np.empty((n, 5)), np.empty((n, 4))
-        present = np.empty(n, dtype=np.bool_)
+        after, vehicles = np.empty((n, 5)), np.empty((n, 5))
+        passes = state.passes.copy()
         now = self.begin + time
-        advance(self.world, self._parameters, now, before, seen, after, vehicles, present)
+        advance(self.world, self._parameters, now, before, seen, passes, after, vehicles)
         clock, rate, acceleration, waited, forced = after.T
         count = state.forced + int(np.count_nonzero(forced))
         return State(
             number,
             time,
             ego,
-            vehicles,
-            present,
+            vehicles[:, :4],
+            vehicles[:, 4] > 0.0,
             clock,
             rate,
             acceleration,
             waited,
             seen,
+            passes,
             count,
             note or moved.fault,
             moved.jumped,

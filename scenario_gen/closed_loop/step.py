@@ -22,7 +22,7 @@ from scenario_gen.closed_loop.driver import (
 from scenario_gen.closed_loop.traffic_model import react
 from scenario_gen.numerics import Bools, Floats
 from scenario_gen.numerics.boxes import boxes_meet, fill_box
-from scenario_gen.numerics.kernels import B1, F, F2, I, kernel, OUT2, OUTB1
+from scenario_gen.numerics.kernels import B1, F, F2, I, kernel, OUT2, OUTB2
 
 
 class WitnessMatching(NamedTuple):
@@ -37,7 +37,6 @@ class WitnessMatching(NamedTuple):
         max_delay_s: delay of an ego that stands together with its witness.
         max_offset_m: lateral distance at which the ego has left the path.
         max_heading_error_rad: heading error at which it has left the path.
-        max_rate_ratio: a faster ego will not do what its witness did.
     """
 
     window_m: float = 5.0
@@ -48,7 +47,6 @@ class WitnessMatching(NamedTuple):
     max_delay_s: float = 0.15
     max_offset_m: float = 1.5
     max_heading_error_rad: float = 0.5
-    max_rate_ratio: float = 1.5
 
 
 MATCHING = WitnessMatching()
@@ -130,12 +128,12 @@ def locate_ego(
     out[1] = _clock_rate(now, out[0], body[3], pose[3])
     has_left = lateral > MATCHING.max_offset_m
     has_turned = abs(heading_error) > MATCHING.max_heading_error_rad
-    out[2] = 0.0 if has_left or has_turned or out[1] > MATCHING.max_rate_ratio else 1.0
+    out[2] = 0.0 if has_left or has_turned else 1.0
 
 
 @kernel(inline=True)
 def fill_vehicles(time: Floats, motion: Floats, drivers: Floats, out: Floats) -> None:
-    """Write x, y [m], yaw [rad], speed [m/s] (N, 4) of motions (N, T, 6).
+    """Write x, y [m], yaw [rad], speed [m/s] (N, 5) of motions (N, T, 6).
 
     The rows of the drivers (N, 5) begin with clock [s] and rate.
     """
@@ -171,29 +169,26 @@ def _update_acceleration(
     strongest = parameters.strongest[i]
     gained = (speed - before[RATE] * pose[3]) / h
     if after[HELD] > 0.0:
-        hard = gained + strongest + MODEL.braking_tolerance_mps / h
         sudden = (
-            gained
-            - min(before[ACCELERATION], 0.0)
-            + parameters.jerk * h
-            + MODEL.jerk_tolerance_mps / h
+            min(before[ACCELERATION], 0.0) - parameters.jerk * h - MODEL.jerk_tolerance_mps / h
         )
-        after[HELD] = 1.0 if min(hard, sudden) < 0.0 else 0.0
+        hardest = max(sudden, -strongest - MODEL.braking_tolerance_mps / h)
+        after[HELD] = 1.0 if gained < hardest else 0.0
     if after[HELD] == 0.0 or speed == 0.0:
         after[ACCELERATION] = gained if speed > 0.0 else 0.0
-    after[ACCELERATION] = min(max(after[ACCELERATION], -strongest), parameters.acceleration)
+    after[ACCELERATION] = min(max(after[ACCELERATION], -strongest), parameters.acceleration[i])
 
 
-@kernel(WORLD, DRIVER_PARAMETERS, F, F2, OUT2, OUT2, OUT2, OUTB1)
+@kernel(WORLD, DRIVER_PARAMETERS, F, F2, OUT2, OUTB2, OUT2, OUT2)
 def advance(
     world: World,
     parameters: DriverParameters,
     now: float,
     before: Floats,
     seen: Floats,
+    passes: Bools,
     after: Floats,
     vehicles: Floats,
-    present: Bools,
 ) -> None:
     """Advance all vehicles by one step.
 
@@ -204,10 +199,11 @@ def advance(
         before: (N, 4) columns CLOCK … of `driver`.
         seen: (K, 9) as in `State`, at the end of the step; the clock of the ego, its rate and
             whether it is on the path are written.
+        passes: (N, N) as in `State`; pairs whose order is drawn again are added.
         after: (N, 5) output, at the end of the step; HELD is 1 where the order makes a driver
             brake harder than the strongest braking, or more suddenly than the jerk limit.
-        vehicles: (N, 4) output, x, y [m], yaw [rad], speed [m/s] at the end of the step.
-        present: (N,) output, whether each vehicle is on the scene then.
+        vehicles: (N, 5) output, x, y [m], yaw [rad], speed [m/s] at the end of the step, and 1 if
+            the vehicle is on the scene then.
     """
     time = world.time
     ego = world.ego
@@ -215,7 +211,7 @@ def advance(
     matched = seen[0, EGO_CLOCK:]
     locate_ego(now, time, world.motion[ego], body, before[ego, CLOCK], matched)
     if parameters.reacts:
-        react(world, parameters, seen, before, after)
+        react(world, parameters, seen, before, passes, after)
     else:
         after[:] = 0.0
         after[:, CLOCK] = min(now, time[-1])
@@ -225,14 +221,15 @@ def advance(
     after[ego, WAITED] = 0.0
     after[ego, HELD] = 0.0
     fill_vehicles(time, world.motion, after, vehicles)
-    vehicles[ego] = body[:4]
+    vehicles[ego, :4] = body[:4]
     for i in range(len(world.motion)):
         if i != ego and not world.leaves[i] and after[i, CLOCK] >= time[-1]:
             vehicles[i, 3] = 0.0  # it stands where its motion ended
         _update_acceleration(world, parameters, i, before[i], after[i], vehicles[i, 3])
         begin, end = world.spans[i]
         clock = after[i, CLOCK]
-        present[i] = i == ego or (clock >= begin and not (world.leaves[i] and clock >= end))
+        has_left = world.leaves[i] and clock >= end
+        vehicles[i, 4] = i == ego or (clock >= begin and not has_left)
 
 
 @kernel(F2, F2, B1, I)

@@ -127,7 +127,8 @@ def test_a_pedestrian_waits_for_an_ego_that_goes_first_in_the_template_until_its
     drive = loop.drive(Accelerates(lambda seen: -4.0), lambda state: state.step >= 230)
     stands = drive.motion.speed[1] < 0.05
     assert (
-        0.1 * stands.sum() == pytest.approx(4.0, abs=1.0) and drive.motion.position[1, -1, 1] > 3.0
+        0.1 * stands.sum() == pytest.approx(loop.traits.patience[1], abs=1.0)
+        and drive.motion.position[1, -1, 1] > 3.0
     )
     assert (drive.motion.position[1, stands, 1] < -LANE - 0.5).all()
 
