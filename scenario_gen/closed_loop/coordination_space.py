@@ -25,7 +25,7 @@ from scenario_gen.numerics.hermite import cubic, interval_at
 from scenario_gen.numerics.kernels import B1, F, F1, F2, F3, I, kernel, named, OUT2, OUT3
 from scenario_gen.numerics.plane import unit
 from scenario_gen.situation import conflict_of, passing
-from scenario_gen.types import Scenario, tokens, YIELD
+from scenario_gen.types import FOLLOW, Scenario, tokens
 
 CELL_S = 0.1  # length of a cell of the clock; events within a cell are not distinguished
 BOX_MARGIN_M = 0.05  # for the curvature between the poses of a cell, and some distance
@@ -165,26 +165,33 @@ def world_of(scenario: Scenario, ego: int | str, step: float = 0.1) -> World:
 
 def _add_reactions(scenario: Scenario, ego: int, order: Floats) -> Floats:
     """Add the waits among the other vehicles to the `order` (N, N, K); return `World.reacts`."""
-    names = tokens([vehicle.id for vehicle in scenario.vehicles])
-    n = len(names)
+    n = len(scenario.vehicles)
     reacts = np.zeros((n, n))
-    shortest = {(who, ego): MAX_REACTION_GAP_S for who in range(n) if who != ego}
-    for reaction in scenario.facts.reactions:
-        if not {reaction.who, reaction.whom} <= set(names):
-            continue
-        pair = names.index(reaction.who), names.index(reaction.whom)
-        shortest[pair] = np.inf
-        reacts[pair] = 0.0 if reaction.kind == YIELD else np.inf
-    for (who, whom), gap in shortest.items():
+    known = _known_reactions(scenario)
+    others = [(who, ego) for who in range(n) if who != ego]
+    for who, whom in {*known, *others}:
         conflict = conflict_of(scenario, who, whom)
-        if reacts[who, whom] > 0.0 or conflict is None or conflict.second != who:
+        if known.get((who, whom)) == FOLLOW:
+            reacts[who, whom] = np.inf
+            continue
+        if conflict is None or conflict.second != who:
             continue
         cleared, enters = passing(scenario, conflict, merges=conflict.following)
-        if enters - cleared < gap:
+        if (who, whom) in known or enters - cleared < MAX_REACTION_GAP_S:
             reacts[who, whom] = np.inf if conflict.following else enters
-        if ego not in (who, whom):
+        if whom != ego != who:
             _add_wait(order[who, whom], cleared, enters)
     return reacts
+
+
+def _known_reactions(scenario: Scenario) -> dict[tuple[int, int], str]:
+    """Return the kinds of the reactions of a scenario, by the indices of who reacts to whom."""
+    names = tokens([vehicle.id for vehicle in scenario.vehicles])
+    return {
+        (names.index(reaction.who), names.index(reaction.whom)): reaction.kind
+        for reaction in scenario.facts.reactions
+        if {reaction.who, reaction.whom} <= set(names)
+    }
 
 
 def _add_wait(order: Floats, cleared: float, enters: float) -> None:

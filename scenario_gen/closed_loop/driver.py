@@ -176,8 +176,8 @@ def following_acceleration(
 ) -> float:
     """Return the acceleration [m/s²] of driver i behind a leader: the interaction term of IDM.
 
-    It is no harder than comfortable braking, or than the braking with which the driver stops behind
-    the leader if that is harder, with a margin.
+    It is no harder than comfortable braking, or than the braking with which the driver stops
+    behind the leader if that is harder, with a margin.
 
     Args:
         parameters: of the drivers.

@@ -57,7 +57,7 @@ def _end_limit(
         return np.inf
     order = world.order[i, j]
     limit = max(begin[j], order[min(int(begin[j] / world.cell), order.shape[0] - 1)])
-    return max(limit, end[j]) if begin[i] <= begin[j] else limit
+    return float(max(limit, end[j]) if begin[i] <= begin[j] else limit)
 
 
 @kernel(inline=True)

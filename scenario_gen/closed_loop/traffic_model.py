@@ -233,20 +233,25 @@ def _bound_by_others(
             continue
         if now.present[j] and clocks[j] < driver.clock:
             bound = min(bound, _bound_by_leader(world, parameters, now, driver, j))
-        if now.passes[i, j] or now.passes[j, i]:
-            continue
-        rate = now.drivers[j, RATE]
-        order = world.order[i, j]
-        limit, wait = place_to_wait(order, world.cell, driver.clock, clocks[j], rate)
+        limit, wait = _place_to_wait(world, now, i, j)
         bound = min(bound, _bound_by_limit(world, parameters, now, driver, limit, wait))
-        if wait == np.inf:
-            blocker = j
+        blocker = j if wait == np.inf else blocker
     if blocker >= 0 and _is_slow(driver, driver.rate * now.pose[i, 3]):
         after[i, WAITED] = max(now.drivers[i, WAITED] + world.step, after[i, WAITED])
         if after[i, WAITED] >= parameters.patience[i]:
             after[i, WAITED] = 0.0
             now.passes[i, blocker] = may_pass(world, now.moving, clocks, now.passes, i, blocker)
     return bound
+
+
+@kernel(inline=True)
+def _place_to_wait(world: World, now: Traffic, i: int, j: int) -> tuple[float, float]:
+    """Return the clock [s] of the place where driver i waits for vehicle j, and how long."""
+    if now.passes[i, j] or now.passes[j, i]:
+        return np.inf, 0.0
+    other = now.drivers[j]
+    order = world.order[i, j]
+    return place_to_wait(order, world.cell, now.drivers[i, CLOCK], other[CLOCK], other[RATE])
 
 
 @kernel(inline=True)
