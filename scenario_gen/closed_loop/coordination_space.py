@@ -167,17 +167,17 @@ def _add_reactions(scenario: Scenario, ego: int, order: Floats) -> Floats:
     """Add the waits among the other vehicles to the `order` (N, N, K); return `World.reacts`."""
     n = len(scenario.vehicles)
     reacts = np.zeros((n, n))
-    known = _known_reactions(scenario)
-    others = [(who, ego) for who in range(n) if who != ego]
-    for who, whom in {*known, *others}:
+    kinds = dict.fromkeys(((who, ego) for who in range(n) if who != ego), "")
+    kinds |= _known_reactions(scenario)
+    for (who, whom), kind in kinds.items():
         conflict = conflict_of(scenario, who, whom)
-        if known.get((who, whom)) == FOLLOW:
+        if kind == FOLLOW:
             reacts[who, whom] = np.inf
             continue
         if conflict is None or conflict.second != who:
             continue
         cleared, enters = passing(scenario, conflict, merges=conflict.following)
-        if (who, whom) in known or enters - cleared < MAX_REACTION_GAP_S:
+        if kind or enters - cleared < MAX_REACTION_GAP_S:
             reacts[who, whom] = np.inf if conflict.following else enters
         if whom != ego != who:
             _add_wait(order[who, whom], cleared, enters)
