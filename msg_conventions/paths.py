@@ -21,6 +21,7 @@ from msg_conventions.poses import poses_of
 from msg_conventions.yaw import half_angle
 from scenario_gen.base.errors import InputError
 from scenario_gen.numerics import Floats, Ints, NS_PER_S
+from scenario_gen.numerics.plane import arc_lengths
 from scenario_gen.types import Route
 
 TYPE = "nav_msgs/msg/Path"
@@ -114,11 +115,6 @@ def read_path(
     return head.stamp, head.frame_id, stamps, frames, rows
 
 
-def chord_length(points: Floats) -> Floats:
-    """Return (M,) metres along (M, 2+) points."""
-    return np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(points[:, :2], axis=0).T))])
-
-
 def encode_route(route: Route, anchors_ns: Sequence[int], frame_id: str) -> bytes:
     """Return the route as CDR bytes.
 
@@ -173,5 +169,5 @@ def decode_route(
         )
     points = poses[moved]
     return frame_id, Route(
-        points=points, anchor=(np.cumsum(moved) - 1)[at], length=chord_length(points)
+        points=points, anchor=(np.cumsum(moved) - 1)[at], length=arc_lengths(points[:, :2])
     )

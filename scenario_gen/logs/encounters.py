@@ -21,6 +21,7 @@ from scenario_gen.logs.smoothing import (
     UnreconciledError,
 )
 from scenario_gen.numerics import Bools, Floats, runs
+from scenario_gen.numerics.plane import edge_lengths, unit
 from scenario_gen.types import CAR, OTHER, VEHICLE_TYPES
 
 
@@ -129,7 +130,7 @@ def pieces_of(
 def _find_cuts(track: Observations, config: LogConfig) -> _Cuts:
     """Return where a track is cut."""
     seconds = np.diff(track.fix_ns) * 1e-9
-    distance = np.hypot(*np.diff(track.fix, axis=0).T)
+    distance = edge_lengths(track.fix)
     gaps = (seconds > longest_bridge(seconds, config)) | _is_relocation(seconds, distance)
     reversals = np.zeros_like(gaps)
     if not VEHICLE_TYPES[track.kind or CAR].walks:
@@ -249,8 +250,7 @@ def _driven_forwards(pieces: Sequence[Piece], config: LogConfig) -> tuple[list[P
 def _moved_ahead(smooth: Smooth, distance: float) -> Smooth:
     """Return the motion of a point `distance` [m] ahead; unknown headings are taken as east."""
     heading = np.nan_to_num(smooth.heading)
-    forward = np.stack([np.cos(heading), np.sin(heading)], axis=-1)
-    return replace(smooth, position=smooth.position + distance * forward)
+    return replace(smooth, position=smooth.position + distance * unit(heading))
 
 
 def _steerable(
@@ -270,7 +270,7 @@ def _steerable(
     max_curvature = max(
         _LIMITS.max_car_curvature_per_m, _LIMITS.curvature_factor * kind.dynamics.sharpest
     )
-    distance = np.hypot(*np.diff(smooth.position, axis=0).T)
+    distance = edge_lengths(smooth.position)
     excess = np.abs(np.diff(smooth.heading)) - max_curvature * distance
     if not (excess > 1e-6).any():
         return [(part, smooth)]

@@ -18,6 +18,7 @@ from scipy.spatial import cKDTree
 
 from scenario_gen.base.errors import InputError
 from scenario_gen.numerics import Floats, Ints, wrap_angle
+from scenario_gen.numerics.plane import unit
 from scenario_gen.types import Encounter
 
 EARTH_RADIUS_M = 6_371_000.0
@@ -144,9 +145,8 @@ def reprojected(
         latitude, longitude = geodetic(places, origin)
         return np.stack(into(longitude, latitude), axis=-1)
 
-    forward = np.stack([np.cos(heading), np.sin(heading)], axis=-1)
     projected = project(position)
-    lever = project(position + _LEVER_M * forward) - projected
+    lever = project(position + _LEVER_M * unit(heading)) - projected
     course = np.arctan2(lever[..., 1], lever[..., 0])
     return projected, heading + wrap_angle(course - heading)
 

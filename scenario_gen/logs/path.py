@@ -16,7 +16,7 @@ from scipy import linalg
 from scipy.interpolate import BSpline
 from scipy.ndimage import uniform_filter1d
 
-from scenario_gen.numerics import Floats, Ints, wrap_angle
+from scenario_gen.numerics import Floats, Ints, running_sum, wrap_angle
 
 
 @dataclass(frozen=True)
@@ -237,7 +237,7 @@ def _tabulate(curve: BSpline, low: float, high: float) -> Path:
     """Measure the curve's arc length."""
     u = np.linspace(low, high, int(np.ceil((high - low) / _PATH.table_step_m)) + 1)
     rate = np.hypot(*curve(u, 1).T)
-    length = low + np.concatenate([[0.0], np.cumsum((rate[1:] + rate[:-1]) / 2.0 * np.diff(u))])
+    length = low + running_sum((rate[1:] + rate[:-1]) / 2.0 * np.diff(u))
     return Path(curve, u, length)
 
 

@@ -39,7 +39,7 @@ from scenario_gen.logs.path import (
     straight_path,
 )
 from scenario_gen.logs.raw import Observations
-from scenario_gen.numerics import Bools, Floats, Ints, runs, wrap_angle
+from scenario_gen.numerics import Bools, Floats, Ints, running_sum, runs, wrap_angle
 
 DOUBTED_MPS = 3.0
 """A speed that differs more from that of the fixes is not used in the first estimate; if most
@@ -428,7 +428,7 @@ def _first_distances(
     is_doubted = np.abs(speed - fix_speed) > DOUBTED_MPS
     rate = np.where(stands, 0.0, np.where(is_doubted, fix_speed, speed))
     steps = (rate[1:] + rate[:-1]) / 2.0 * np.diff(ticks)
-    distance: Floats = np.interp(fix_t, ticks, np.concatenate([[0.0], np.cumsum(steps)]))
+    distance: Floats = np.interp(fix_t, ticks, running_sum(steps))
     return distance
 
 

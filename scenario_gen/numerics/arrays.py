@@ -45,6 +45,11 @@ def freeze(record: object, **fields: Any) -> None:
         object.__setattr__(record, name, value)
 
 
+def running_sum(values: npt.ArrayLike) -> Floats:
+    """Return the sums (M + 1,) of the first 0, 1, ... M of some values (M,)."""
+    return np.concatenate([[0.0], np.cumsum(values)])
+
+
 def wrap_angle(angle: Floats) -> Floats:
     """Wrap angles [rad], any shape, to [-pi, pi)."""
     return (angle + np.pi) % (2.0 * np.pi) - np.pi

@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 
 from scenario_gen.numerics.arrays import Floats, frozen, Ints
-from scenario_gen.numerics.plane import edge_lengths, edge_yaws, meeting_shares
+from scenario_gen.numerics.plane import arc_lengths, edge_lengths, edge_yaws, meeting_shares
 
 BATCH_POINTS = 64  # positions that are projected at once
 EXTENSION_M = 1e4  # length of the straight extensions in a projection: farther than any map
@@ -42,7 +42,7 @@ class Curve:
     @cached_property
     def station(self) -> Floats:
         """(M,) arc length [m] of each point."""
-        return frozen(np.concatenate(([0.0], np.cumsum(edge_lengths(self.points[:, :2])))))
+        return frozen(arc_lengths(self.points[:, :2]))
 
     @property
     def length(self) -> float:

@@ -5,7 +5,7 @@
 
 import numpy as np
 
-from scenario_gen.numerics.arrays import Floats, wrap_angle
+from scenario_gen.numerics.arrays import Floats, running_sum, wrap_angle
 
 
 def unit(yaw: Floats | float) -> Floats:
@@ -47,6 +47,11 @@ def edge_lengths(points: Floats) -> Floats:
     """Return the lengths (M - 1,) [m] of the edges of a polyline (M, 2) [m]."""
     step = np.diff(points, axis=0)
     return np.hypot(step[:, 0], step[:, 1])
+
+
+def arc_lengths(points: Floats) -> Floats:
+    """Return the lengths (M,) [m] of a polyline (M, 2) [m] up to each of its points."""
+    return running_sum(edge_lengths(points))
 
 
 def edge_yaws(points: Floats) -> Floats:

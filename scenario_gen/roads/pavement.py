@@ -11,7 +11,7 @@ import shapely
 from shapely import Polygon
 from shapely.geometry.base import BaseGeometry
 
-from scenario_gen.numerics import Bools, Floats
+from scenario_gen.numerics import Bools, Floats, running_sum
 from scenario_gen.numerics.boxes import corners
 from scenario_gen.numerics.curve import Curve
 
@@ -47,7 +47,7 @@ def swept(line: Curve, length: float, width: float) -> BaseGeometry:
     It is the union of the hulls of two footprints each, which are at most 10 m and 0.05 rad apart.
     """
     dense = line.cut(0.0, line.length, _STATION_STEP_M)
-    turned = np.concatenate(([0.0], np.cumsum(np.abs(np.diff(dense.points[:, 2])))))
+    turned = running_sum(np.abs(np.diff(dense.points[:, 2])))
     interval = np.floor(turned / 0.05 + dense.station / 10.0)
     _, first = np.unique(interval, return_index=True)
     boxes = corners(dense.points[[*first, -1]], length, width)

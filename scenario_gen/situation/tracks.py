@@ -22,7 +22,15 @@ import numpy as np
 from scipy import linalg
 
 from scenario_gen.base.cancelling import stop_if_cancelled
-from scenario_gen.numerics import Bools, Floats, frozen, frozen_ints, Ints, wrap_angle
+from scenario_gen.numerics import (
+    Bools,
+    Floats,
+    frozen,
+    frozen_ints,
+    Ints,
+    running_sum,
+    wrap_angle,
+)
 from scenario_gen.numerics.curve import Curve
 from scenario_gen.numerics.plane import polyline_of, unit
 from scenario_gen.types import Encounter, mask, MAX_PLANNED_CURVATURE_PER_M, Vehicle
@@ -153,7 +161,7 @@ def _clean(encounter: Encounter, n: int) -> Track:
         encounter.position[n, rows],
         encounter.heading[n, rows],
         speed,
-        np.concatenate(([0.0], np.cumsum(steps))),
+        running_sum(steps),
     )
     extent = float(np.hypot(*np.ptp(record.position, axis=0)))
     still = bool(record.distance[-1] < MIN_PATH_M or extent < MIN_PATH_M)
@@ -240,7 +248,7 @@ def _eased(curve: Curve, max_curvature: float) -> Curve:
         bend = bend - excess
         bend[1:] += excess[:-1] / 2.0
         bend[:-1] += excess[1:] / 2.0
-    yaw = even[0, 2] + np.concatenate(([0.0], np.cumsum(bend)))
+    yaw = even[0, 2] + running_sum(bend)
     xy = polyline_of(yaw, step)
     xy += (even[:, :2] - xy).mean(axis=0)
     return Curve(np.column_stack((xy, yaw)))

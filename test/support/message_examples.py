@@ -6,7 +6,7 @@
 from hypothesis import strategies as st
 import numpy as np
 
-from msg_conventions.paths import chord_length
+from scenario_gen.numerics.plane import arc_lengths
 from scenario_gen.types import Encounter, Vehicle
 from scenario_gen.types.route import Route
 from scenario_gen.types.scenario import Scenario
@@ -75,7 +75,9 @@ def route(seed: int) -> Route:
     points = np.column_stack(
         [np.cumsum(rng.uniform(0.1, 0.5, 30)), rng.normal(0.0, 0.1, 30), headings(rng, 1, 30)[0]]
     )
-    return Route(points=points, anchor=np.array([0, 12, 12, 12, 29]), length=chord_length(points))
+    return Route(
+        points=points, anchor=np.array([0, 12, 12, 12, 29]), length=arc_lengths(points[:, :2])
+    )
 
 
 seeds = st.integers(0, 2**32 - 1)

@@ -39,7 +39,7 @@ from scenario_gen.logs.raw import (
     Segment,
 )
 from scenario_gen.numerics import Floats
-from scenario_gen.numerics.plane import edge_lengths, place
+from scenario_gen.numerics.plane import arc_lengths, place
 from scenario_gen.types import VEHICLE_TYPES
 
 OPENSCENARIO_SPEEDS = "speed_mps"
@@ -238,7 +238,7 @@ def _times(follower: _Follower, time: Floats, xy: Floats, first_speed: float) ->
         origin = timing.number("offset") + (follower.start_s if is_relative else 0.0)
         time = time * timing.number("scale") + origin
     elif first_speed > 0.0:
-        distance = np.concatenate(([0.0], np.cumsum(edge_lengths(xy))))
+        distance = arc_lengths(xy)
         time = follower.start_s + distance / first_speed
     if not np.isfinite(time).all():
         raise InputError(

@@ -21,7 +21,7 @@ from scenario_gen.method.routing.smooth import Curve, Guess, smooth
 from scenario_gen.method.routing.task import VehicleTask
 from scenario_gen.method.routing.waypoints import anchor_weights, choose_waypoints
 from scenario_gen.numerics import Floats
-from scenario_gen.numerics.plane import edge_lengths, edge_yaws
+from scenario_gen.numerics.plane import arc_lengths, edge_yaws
 from scenario_gen.roads import footprint_fits, ground_for, own_side
 from scenario_gen.types import Fit, FittedVehicle, Road, Route, TypeLimits
 
@@ -171,7 +171,7 @@ def _polyline(task: VehicleTask, waypoints: list[int]) -> Route:
         leg = Leg(a, b, task.anchors[a], task.anchors[b], task.max_curvature, len(waypoints) == 2)
         paths.append(Guess.even(search_disc_path(task, leg), 1.0))
     path = Guess.joined(paths).points
-    corners = np.concatenate(([0.0], np.cumsum(edge_lengths(path))))
+    corners = arc_lengths(path)
     yaw = np.unwrap(edge_yaws(path))
 
     def poses_at(length: Floats) -> Floats:

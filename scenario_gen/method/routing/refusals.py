@@ -8,7 +8,7 @@ import numpy as np
 from scenario_gen.method.routing.smooth import Curve
 from scenario_gen.method.routing.task import VehicleTask
 from scenario_gen.numerics import wrap_angle
-from scenario_gen.numerics.plane import edge_lengths
+from scenario_gen.numerics.plane import arc_lengths
 from scenario_gen.roads import footprint_fits
 
 WINDOW_STEPS = 4  # of a path, over which its curvature is measured
@@ -24,7 +24,7 @@ def too_tight(task: VehicleTask) -> str:
     vehicle, path = task.vehicle, task.fitted.path
     if len(path) <= WINDOW_STEPS:
         return ""
-    length = np.cumsum(np.concatenate(([0.0], edge_lengths(path[:, :2]))))
+    length = arc_lengths(path[:, :2])
     window = np.maximum(length[WINDOW_STEPS:] - length[:-WINDOW_STEPS], MIN_WINDOW_M)
     curvature = np.abs(wrap_angle(path[WINDOW_STEPS:, 2] - path[:-WINDOW_STEPS, 2])) / window
     middle = path[WINDOW_STEPS // 2 :][: len(window)]

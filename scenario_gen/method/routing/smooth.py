@@ -20,8 +20,8 @@ from scenario_gen.method.routing.matching import monotone_matching, squared_dist
 from scenario_gen.method.routing.search.planner import path_length
 from scenario_gen.method.routing.search.sweep import sweep_is_free
 from scenario_gen.method.routing.task import VehicleTask
-from scenario_gen.numerics import Floats, wrap_angle
-from scenario_gen.numerics.plane import edge_lengths, unit
+from scenario_gen.numerics import Floats, running_sum, wrap_angle
+from scenario_gen.numerics.plane import arc_lengths, edge_lengths, unit
 
 ROUND_STEPS = 8  # of the band, before it is resampled
 CHECK_ROUNDS_COUNT = 4  # after so many the spline is verified
@@ -55,7 +55,7 @@ class Guess:
 
     def resampled(self, spacing: float, count: int | None = None) -> "Guess":
         """Return the guess at equal distances of about `spacing` [m], or with `count` points."""
-        length = np.concatenate(([0.0], np.cumsum(edge_lengths(self.points))))
+        length = arc_lengths(self.points)
         s = np.linspace(0.0, length[-1], count or _count(length[-1], spacing))
         points = [np.interp(s, length, self.points[:, axis]) for axis in range(2)]
         return Guess(np.column_stack(points), np.interp(s, length, self.hold))
@@ -192,7 +192,7 @@ def _anchors_of(points: Floats, anchors: Floats, weight: Floats) -> tuple[Floats
 def _verified(task: VehicleTask, points: Floats) -> Curve:
     """Lay the clamped spline through a band (G, 2) [m], and measure it."""
     start, end = task.anchors[0], task.anchors[-1]
-    knots = np.concatenate(([0.0], np.cumsum(edge_lengths(points))))
+    knots = arc_lengths(points)
     spline = CubicSpline(knots, points, bc_type=((1, unit(start[2])), (1, unit(end[2]))))
     u = np.linspace(0.0, knots[-1], int(np.ceil(knots[-1] / CHECK_SPACING_M)) + 1)
     first, second = spline(u, 1), spline(u, 2)
@@ -206,6 +206,6 @@ def _verified(task: VehicleTask, points: Floats) -> Curve:
     fits = sweep_is_free(task.road, poses, task.vehicle.length, task.vehicle.width)[:, 0] > 0.0
     middle = np.hypot(*spline(0.5 * (u[1:] + u[:-1]), 1).T)
     pieces = np.diff(u) * (speed[:-1] + 4.0 * middle + speed[1:]) / 6.0  # Simpson's rule
-    arc = np.concatenate(([0.0], np.cumsum(pieces)))
+    arc = running_sum(pieces)
     sharpest = poses[np.argmax(curvature), :2]
     return Curve(spline, u, arc, float(curvature.max()), sharpest, poses[~fits])

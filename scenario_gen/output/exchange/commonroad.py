@@ -18,6 +18,7 @@ import numpy as np
 from scenario_gen.base.errors import RefusedError
 from scenario_gen.numerics import Floats
 from scenario_gen.numerics.curve import Curve
+from scenario_gen.numerics.plane import angle_between
 from scenario_gen.output.exchange.cases import (
     Case,
     evenly_sampled,
@@ -321,11 +322,9 @@ def _goal(
     problem: Element, pose: tuple[float, float, float], size: tuple[float, float], last: int
 ) -> None:
     goal = add(problem, "goalState")
-    time = add(goal, "time")
-    add(time, "intervalStart", 1)
-    add(time, "intervalEnd", last)
+    _interval(goal, "time", 1, last)
     x, y, yaw = pose
-    yaw = float((yaw + np.pi) % (2.0 * np.pi) - np.pi)
+    yaw = angle_between(yaw, 0.0)
     rectangle = add(goal, "position/rectangle")
     add(rectangle, "length", size[0])
     add(rectangle, "width", size[1])

@@ -20,7 +20,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from scenario_gen.numerics import Floats, wrap_angle
+from scenario_gen.numerics import Floats, running_sum
 from scenario_gen.numerics.plane import ahead_and_left, angle_between
 from scenario_gen.output.exchange.lanes import LaneMap, SIGN_IDS
 from scenario_gen.output.exchange.opendrive_network import (
@@ -83,7 +83,7 @@ def _road(root: Element, lane_map: LaneMap, network: RoadNetwork, n: int) -> Non
     """Append road `n` with its links, geometry, lanes, crossings and signs."""
     strip, lanes = network.strips[n], lane_map.network.lanes
     pieces = list(_pieces(strip.reference))
-    station = np.concatenate([[0.0], np.cumsum([piece[0] for piece in pieces])])
+    station = running_sum([piece[0] for piece in pieces])
     members = [k for side in strip.lanes.values() for k in side]
     connecting_lanes = [k for k in members if k in network.connecting]
     junction = -1
@@ -335,7 +335,7 @@ def _merged(
                 float(station[first]),
                 x,
                 y,
-                float(wrap_angle(np.asarray(yaw))),
+                angle_between(yaw, 0.0),
                 float(station[last + 1] - station[first]),
                 pieces[first][1],
             )

@@ -16,7 +16,7 @@ import shapely
 
 from scenario_gen.base.errors import InputError
 from scenario_gen.numerics import Floats, runs
-from scenario_gen.numerics.plane import edge_lengths
+from scenario_gen.numerics.plane import arc_lengths, edge_lengths
 from scenario_gen.roads.vector.drafts import (
     Draft,
     MapLanes,
@@ -125,7 +125,7 @@ def cross_sections(left: Floats, right: Floats, place: str) -> tuple[Floats, Flo
         if len(border):
             moves = edge_lengths(border[:, :2]) > 1e-6
             points = border[np.concatenate(([True], moves))]
-        length = np.concatenate(([0.0], np.cumsum(edge_lengths(points[:, :2]))))
+        length = arc_lengths(points[:, :2])
         if length[-1] < _MIN_BORDER_M:
             raise InputError(
                 f"{place}: the {side} border with {len(border)} point(s) has no length; a line is "

@@ -14,7 +14,7 @@ import numpy as np
 
 from scenario_gen.base.errors import InputError
 from scenario_gen.base.xml_reader import Element
-from scenario_gen.numerics import Floats, Ints
+from scenario_gen.numerics import Floats, Ints, running_sum
 from scenario_gen.numerics.plane import place
 
 _MAX_LENGTH_M = 1_000_000.0  # of a road
@@ -168,7 +168,7 @@ def _spiral(shape: Element, length: float, ds: Floats) -> tuple[Floats, Floats, 
     heading = at * (first + 0.5 * rate * at)
     at_ds = np.searchsorted(knots, ds)
     u, v = (
-        np.concatenate(([0.0], np.cumsum((step * weight / 2.0 * part).sum(axis=1))))[at_ds]
+        running_sum((step * weight / 2.0 * part).sum(axis=1))[at_ds]
         for part in (np.cos(heading), np.sin(heading))
     )
     return u, v, ds * (first + 0.5 * rate * ds)
@@ -179,7 +179,7 @@ def _poly3(shape: Element, length: float, ds: Floats) -> tuple[Floats, Floats, F
     a, b, c, d = (shape.number(name) for name in "abcd")
     u = np.linspace(0.0, max(length, 1e-6), max(math.ceil(length / 0.05), 1) + 1)
     v = a + u * (b + u * (c + u * d))
-    arc = np.concatenate(([0.0], np.cumsum(np.hypot(np.diff(u), np.diff(v)))))
+    arc = running_sum(np.hypot(np.diff(u), np.diff(v)))
     at = np.interp(ds, arc, u)
     return at, a + at * (b + at * (c + at * d)), np.arctan(b + at * (2.0 * c + at * 3.0 * d))
 

@@ -18,7 +18,7 @@ import math
 import numpy as np
 
 from scenario_gen.numerics import Bools, Floats
-from scenario_gen.numerics.plane import edge_lengths, meeting_shares, unit
+from scenario_gen.numerics.plane import arc_lengths, meeting_shares, unit
 from scenario_gen.roads.vector.ground import on_lane
 from scenario_gen.roads.vector.signs import YIELDING_KINDS
 from scenario_gen.situation import Conflict
@@ -109,7 +109,7 @@ class RuleCheck:
         heading, speed = motion.heading[n, present], motion.speed[n, present]
         half_length = 0.5 * motion.vehicles[n].length
         front = motion.position[n, present] + half_length * unit(heading)
-        driven = _driven(front)
+        driven = arc_lengths(front)
         for rule in self._stops:
             k = self._crossing_step(rule, front, heading)
             if k is None:
@@ -189,15 +189,10 @@ class RuleCheck:
         before = motion.is_present[n] & (motion.time <= entry + 1e-9)
         if not before.any():
             return set()
-        driven = _driven(motion.position[n])
+        driven = arc_lengths(motion.position[n])
         before &= driven >= driven[before][-1] - _LIMITS.lane_to_conflict_m
         poses = np.column_stack((motion.position[n, before], motion.heading[n, before]))
         return {k for k in lanes if on_lane(self.network.lanes[k], poses)}
-
-
-def _driven(positions: Floats) -> Floats:
-    """Return the distance (T,) [m] driven until each of some positions (T, 2) [m]."""
-    return np.concatenate(([0.0], np.cumsum(edge_lengths(positions))))
 
 
 def _waits_before(motion: Motion, met: Conflict) -> bool:
@@ -207,6 +202,6 @@ def _waits_before(motion: Motion, met: Conflict) -> bool:
     passing: Bools = motion.is_present[n] & (time >= met.entry_first) & (time <= last)
     if not passing.any():
         return False
-    driven = _driven(motion.position[n])
+    driven = arc_lengths(motion.position[n])
     near = driven >= np.interp(met.entry_second, time, driven) - _LIMITS.waiting_distance_m
     return bool((motion.speed[n, passing & near] < _LIMITS.stopped_mps).any())

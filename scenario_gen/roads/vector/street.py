@@ -18,7 +18,7 @@ import numpy as np
 
 from scenario_gen.base.cancelling import stop_if_cancelled
 from scenario_gen.base.errors import RefusedError
-from scenario_gen.numerics import Floats, wrap_angle
+from scenario_gen.numerics import Floats, running_sum, wrap_angle
 from scenario_gen.numerics.curve import Curve
 from scenario_gen.roads.vector.lane_graph import LaneChain, LaneGraph, LEAD_M
 from scenario_gen.roads.vector.lane_path import (
@@ -190,7 +190,7 @@ def _stretches(graph: LaneGraph, span: float, lanes: Sequence[int] | None) -> It
             continue
         begins = np.arange(0.0, curve.length - span + 1e-9, 5.0)
         station = np.arange(0.0, curve.length + 1e-9, 1.0)
-        turned = np.concatenate(([0.0], np.cumsum(np.abs(np.diff(curve.at(station)[:, 2])))))
+        turned = running_sum(np.abs(np.diff(curve.at(station)[:, 2])))
         turned_before = np.interp(begins, station, turned)
         bend = (np.interp(begins + span, station, turned) - turned_before) / span
         k = int(np.argmin(np.round(bend, 6)))

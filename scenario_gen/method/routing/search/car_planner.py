@@ -31,7 +31,7 @@ from scenario_gen.method.routing.search.search import Search
 from scenario_gen.method.routing.search.shortcuts import dense_path, shortened, string_pulled
 from scenario_gen.method.routing.search.sweep import car_scene, poses_in_cells
 from scenario_gen.numerics import Floats, Ints, wrap_angle
-from scenario_gen.numerics.plane import edge_lengths, edge_yaws
+from scenario_gen.numerics.plane import arc_lengths, edge_yaws
 from scenario_gen.roads import (
     footprint_fits,
     FreeSpace,
@@ -241,7 +241,7 @@ def _driven_path(search: Search) -> Floats:
 def poses_on_line(line: Floats, spacing: float) -> Floats:
     """Return poses (M, 3) about `spacing` apart on a polyline (P, 2) [m]."""
     yaw = edge_yaws(line)
-    corners = np.concatenate(([0.0], np.cumsum(edge_lengths(line))))
+    corners = arc_lengths(line)
     s = np.linspace(0.0, corners[-1], max(int(np.ceil(corners[-1] / spacing)) + 1, 2))
     edge = np.clip(np.searchsorted(corners, s, side="right") - 1, 0, len(yaw) - 1)
     x = np.interp(s, corners, line[:, 0])
