@@ -80,7 +80,7 @@ def scenario_markers(scenario: Scenario, stamp_ns: int) -> bytes:
     Each path with its vehicle at the start.
     """
     markers = [_delete_all()]
-    names = tokens(vehicle.id for vehicle in scenario.vehicles)
+    names = tokens(scenario.ids)
     for k, (name, vehicle) in enumerate(zip(names, scenario.vehicles, strict=True)):
         first, last = scenario.present[k].tolist()
         colour = COLOURS_RGB[k % len(COLOURS_RGB)]

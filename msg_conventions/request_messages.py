@@ -18,9 +18,7 @@ SCENARIOS = "scenarios"
 
 def footprint_messages(encounter: Encounter) -> Iterator[tuple[str, bytes]]:
     """Yield topic and CDR bytes of the footprint of each vehicle of a template."""
-    for vehicle, name in zip(
-        encounter.vehicles, tokens(vehicle.id for vehicle in encounter.vehicles), strict=True
-    ):
+    for vehicle, name in zip(encounter.vehicles, tokens(encounter.ids), strict=True):
         yield (
             vehicle_topic(name, "footprint"),
             encode_footprint(vehicle, encounter.start_ns, f"vehicle_{name}"),

@@ -335,7 +335,7 @@ def case_of(case: "GenerationResult") -> dict[str, object]:
     generated = case.generated
     return {
         "title": case.title,
-        "vehicles": [vehicle.id for vehicle in case.encounter.vehicles],
+        "vehicles": case.encounter.ids,
         "requested": generated.requested,
         "scenarios": len(generated.scenarios),
         "candidates": generated.candidates,

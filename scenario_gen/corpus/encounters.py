@@ -192,7 +192,7 @@ def row_of(encounter: Encounter, source: str, config: CorpusConfig) -> dict[str,
     gaps = _space_time_gaps(encounter, config.log.proximity)
     kinds = {pair: situation.kind(*pair) for _, pair in gaps}
     nearest_gap, nearest = gaps[0]
-    ids = [vehicle.id for vehicle in encounter.vehicles]
+    ids = encounter.ids
     measures = criticality(encounter, EvaluationConfig().ttc_horizon)
     latitude, longitude = encounter.origin or (None, None)
     return {

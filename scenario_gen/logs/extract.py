@@ -90,7 +90,7 @@ def _selected(encounter: Encounter, config: LogConfig) -> tuple[Encounter, list[
     Raises:
         InputError: a vehicle is unknown, or fewer than two vehicles are left.
     """
-    ids = [vehicle.id for vehicle in encounter.vehicles]
+    ids = encounter.ids
     requested = [ids.index(name) for name in chosen_vehicles(ids, config, encounter.name)]
     if config.start >= encounter.duration:
         raise InputError(
@@ -122,7 +122,7 @@ def _selected(encounter: Encounter, config: LogConfig) -> tuple[Encounter, list[
 
 def encounter_quality(encounter: Encounter) -> EncounterQuality:
     """Return the quality of an encounter."""
-    ids = tuple(vehicle.id for vehicle in encounter.vehicles)
+    ids = encounter.ids
     last = len(encounter.time) - 1
     partly = tuple(
         (name, float(encounter.time[begin]), float(encounter.time[end]))

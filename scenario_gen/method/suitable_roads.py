@@ -123,7 +123,7 @@ def _refuse_lost_conflicts(result: GenerationResult) -> None:
     for conflict in Situation.of(encounter).conflicts:
         names = [encounter.vehicles[n].id for n in conflict.pair]
         for scenario in map(join_ego, islice(result, CHECKED_SCENARIOS)):
-            ids = [vehicle.id for vehicle in scenario.vehicles]
+            ids = scenario.ids
             if conflict_of(scenario, *map(ids.index, names)) is None:
                 raise RefusedError(
                     f"vehicles {names[0]} and {names[1]} share no area there"

@@ -133,7 +133,7 @@ def _check_arrays(encounter: Encounter) -> None:
         raise InputError(f"{encounter.title} holds a value that is not finite")
     if (np.asarray(encounter.speed) < 0.0).any():
         raise InputError(f"{encounter.title} holds a negative speed")
-    ids = [vehicle.id for vehicle in encounter.vehicles]
+    ids = encounter.ids
     if len(set(ids)) != n:
         raise InputError(f"{encounter.title}: vehicle ids are not unique: {', '.join(ids)}")
 
@@ -175,7 +175,7 @@ def vehicle_index(encounter: Encounter, name: str, parameter: str) -> int:
     Raises:
         InputError: there is no such vehicle; the message names `parameter` and lists the ids.
     """
-    ids = [vehicle.id for vehicle in encounter.vehicles]
+    ids = encounter.ids
     for known in (ids, list(tokens(ids))):
         if name in known:
             return known.index(name)

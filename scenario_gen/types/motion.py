@@ -199,6 +199,11 @@ class Motion:
         return float(self.time[-1] - self.time[0])
 
     @property
+    def ids(self) -> tuple[str, ...]:
+        """The ids of the vehicles."""
+        return tuple(vehicle.id for vehicle in self.vehicles)
+
+    @property
     def all_present(self) -> bool:
         """Whether every vehicle is always present."""
         return always(self.present, len(self.time))
@@ -339,7 +344,7 @@ class Motion:
     def columns(self) -> dict[str, Any]:
         """Return the columns of its table: a row for each vehicle and sample with it present."""
         row, sample = np.nonzero(self.is_present)
-        ids = np.array([vehicle.id for vehicle in self.vehicles], dtype=object)
+        ids = np.array(self.ids, dtype=object)
         return {
             "vehicle": ids[row],
             "time": self.time[sample],

@@ -271,7 +271,7 @@ def decode_with_witness(
         witness, seed=seed, index=index, source=source, may_start_late=True
     )
     is_same_frame = (witness_ns, drive.frame_id) == (stamp_ns, scenario.frame_id)
-    others = {vehicle.id for vehicle in scenario.vehicles}
+    others = set(scenario.ids)
     if not is_same_frame or len(drive.vehicles) != 1 or drive.vehicles[0].id in others:
         raise InputError(
             f"{source}: it is not one other vehicle with the scenario's stamp and frame"

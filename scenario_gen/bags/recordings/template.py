@@ -29,7 +29,7 @@ def missing_topics(messages: Mapping[str, bytes]) -> list[str]:
     """
     needed = ["tracks", "changepoints", "map", "fit"]
     if "tracks" in messages:
-        names = tokens(vehicle.id for vehicle in decode_tracks(messages["tracks"]).vehicles)
+        names = tokens(decode_tracks(messages["tracks"]).ids)
         needed += [vehicle_topic(name, "route") for name in names]
     return [topic for topic in needed if topic not in messages]
 
@@ -86,7 +86,7 @@ def decode_routes(
         InputError: a route is missing or damaged.
     """
     routes = []
-    for name in tokens(vehicle.id for vehicle in encounter.vehicles):
+    for name in tokens(encounter.ids):
         topic = vehicle_topic(name, "route")
         if topic not in messages:
             raise InputError(f"{topic} is missing, but tracks has a vehicle {name!r}")

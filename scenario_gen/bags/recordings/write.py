@@ -57,7 +57,7 @@ def result_messages(
     template["changepoints"] = encode_changepoints(encounter, result.segmentation)
     template["fit"] = encode_fit(encounter, fit, road.frame_id)
     anchors = anchor_stamps(encounter, result.segmentation.changepoints)
-    names = tokens(vehicle.id for vehicle in encounter.vehicles)
+    names = tokens(encounter.ids)
     for name, route in zip(names, result.routes, strict=True):
         template[vehicle_topic(name, "route")] = encode_route(route, anchors, road.frame_id)
     infos["fit/info"] = encode_hashes("fit", template, stamp)

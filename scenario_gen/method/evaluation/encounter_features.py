@@ -126,7 +126,7 @@ def scenario_features(
     scenario: Scenario, template: EncounterFeatures, encounter: Encounter
 ) -> EncounterFeatures:
     """Return the features of the template's pair in a scenario; vehicles may be reordered."""
-    ids = [vehicle.id for vehicle in scenario.vehicles]
+    ids = scenario.ids
     a, b = sorted(ids.index(encounter.vehicles[n].id) for n in template.pair or (0, 1))
     features = features_of(scenario, template.recording, template.template, (a, b))
     return replace(features, scenario=scenario.index)

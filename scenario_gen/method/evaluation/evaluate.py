@@ -158,11 +158,11 @@ def shared_vehicles(
     Raises:
         InputError: a scenario has a vehicle that the encounter has not, or none is left.
     """
-    ids = [vehicle.id for vehicle in encounter.vehicles]
+    ids = encounter.ids
     shared = set(ids)
     for name, scenarios in rows.items():
         for scenario in scenarios:
-            present = {vehicle.id for vehicle in scenario.vehicles}
+            present = set(scenario.ids)
             if len(present) != len(scenario.vehicles) or not present <= set(ids):
                 raise InputError(
                     f"row {name!r}: scenario {scenario.index} has {len(scenario.vehicles)} "

@@ -173,7 +173,7 @@ class VehiclePair:
 
 def chosen(motion: Motion, ids: Sequence[str]) -> Motion:
     """Return the motion of the vehicles with these ids, in their order."""
-    present = [vehicle.id for vehicle in motion.vehicles]
+    present = motion.ids
     rows = [present.index(known) for known in ids]
     return motion if rows == list(range(len(present))) else motion.of_vehicles(rows)
 
@@ -183,7 +183,7 @@ def common_motion(motion: Motion, ids: tuple[str, str], samples: int) -> Motion 
 
     None if that is for less than MIN_COMMON_S.
     """
-    known = [vehicle.id for vehicle in motion.vehicles]
+    known = motion.ids
     i, j = (known.index(name) for name in ids)
     both = motion.present_slice(i, j)
     if both.stop - both.start < 2:

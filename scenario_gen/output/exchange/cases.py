@@ -206,7 +206,7 @@ def _with_ego(
             was left out, or the ego's track is not in the bag.
     """
     slot = entry.ego if entry else ""
-    ids = list(tokens(vehicle.id for vehicle in scenario.vehicles))
+    ids = list(tokens(scenario.ids))
     where = f"{space.where(SCENARIOS)}, scenario {scenario.index}"
     if slot:
         if requested not in ("", slot):
@@ -214,7 +214,7 @@ def _with_ego(
                 f"{where} was generated for ego {slot!r}; omit --ego, or name that vehicle"
             )
         track = scenario.reference_drive
-        if track is None or tokens(vehicle.id for vehicle in track.vehicles) != (slot,):
+        if track is None or tokens(track.ids) != (slot,):
             raise InputError(
                 f"{where} was generated for ego {slot!r}, whose track is not on {space.where(WITNESS)}"
             )

@@ -214,7 +214,7 @@ def _entry(
         "index": exported.index,
         "seed": exported.seed,
         "sha256": exported.sha256,
-        "vehicles": [vehicle.id for vehicle in exported.others.vehicles],
+        "vehicles": exported.others.ids,
         "ego": None if exported.ego is None else exported.ego.vehicles[0].id,
     }
 

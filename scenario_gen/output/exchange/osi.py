@@ -98,7 +98,7 @@ def object_numbers(exported: Exported) -> tuple[tuple[int, ...], tuple[str, ...]
 
     OSI's ids are numbers: if any id is not a number, all vehicles are numbered from 1.
     """
-    ids = [vehicle.id for vehicle in exported.everybody.vehicles]
+    ids = exported.everybody.ids
     if all(
         name.isascii() and name.isdigit() and str(int(name)) == name and int(name) <= MAX_ID
         for name in ids

@@ -39,7 +39,7 @@ MOTION_PERIOD_S = 0.1
 def case_data(case: GenerationResult, samples: int) -> dict[str, Any]:
     """Return the drawings of one case for JSON, with at most `samples` scenarios per set."""
     arms = _arms(case, samples)
-    ids = [vehicle.id for vehicle in case.encounter.vehicles]
+    ids = case.encounter.ids
     longest = max(
         [case.encounter.duration, *(float(s.time[-1]) for group in arms.values() for s in group)]
     )
@@ -99,7 +99,7 @@ def pack(values: Floats) -> dict[str, Any]:
     }
 
 
-def runs(mask: Bools) -> list[int]:
+def run_lengths(mask: Bools) -> list[int]:
     """Return the run lengths of a grid (H, W) in row order; the first run is False (may be 0)."""
     flat = mask.ravel()
     edges = np.flatnonzero(np.diff(flat)) + 1
@@ -120,11 +120,8 @@ def road_data(road: Road) -> dict[str, Any]:
     factor = max(1, -(-max(road.drivable.shape) // MAX_CELLS))
     height, width = (-(-side // factor) for side in road.drivable.shape)
     padded = np.zeros((height * factor, width * factor))
-    others = road.cells_in(
-        (lane for lane in road.lanes.others if lane.open_to(DRIVERS))
-        if road.lanes is not None
-        else (),
-    )
+    lanes = road.lanes.others if road.lanes is not None else ()
+    others = road.cells_in(lane for lane in lanes if lane.open_to(DRIVERS))
     padded[: road.drivable.shape[0], : road.drivable.shape[1]] = road.drivable | others
     coarse = padded.reshape(height, factor, width, factor).mean(axis=(1, 3)) >= 0.5
     return {
@@ -132,34 +129,34 @@ def road_data(road: Road) -> dict[str, Any]:
         "cell": float(road.resolution * factor),
         "origin": [_short(v) for v in road.origin],
         "size": [width, height],
-        "runs": runs(coarse),
+        "runs": run_lengths(coarse),
         "markings": _markings(road),
     }
 
 
 def _markings(road: Road) -> dict[str, list[list[float]]]:
     """Return road markings by kind, each as x, y, x, y, … [m]; a subset on large maps."""
+    if road.lanes is None:
+        return {}
     drawn = {}
-    for kind, lines in (markings(road.lanes) if road.lanes is not None else {}).items():
-        some = lines[:: max(1, -(-len(lines) // MAX_LINES))]
-        kept = [
-            line[np.linspace(0, len(line) - 1, min(len(line), 25)).round().astype(np.int64)]
-            for line in some
-        ]
-        drawn[kind.value] = [np.round(line.ravel(), 2).tolist() for line in kept]
+    for kind, lines in markings(road.lanes).items():
+        shown = lines[:: max(1, -(-len(lines) // MAX_LINES))]
+        drawn[kind.value] = [_few_points(line).ravel().round(2).tolist() for line in shown]
     return drawn
+
+
+def _few_points(line: Floats, most: int = 25) -> Floats:
+    """Return at most some of the points of a line (M, 2), spread evenly."""
+    rows = np.linspace(0, len(line) - 1, min(len(line), most)).round().astype(np.int64)
+    return line[rows]
 
 
 def _turn(encounter: Encounter, fit: Fit | None) -> float:
     """Return the angle [rad] from the recording to the road: the mean over first headings."""
     if fit is None or not fit.fitted:
         return 0.0
-    turned = np.array(
-        [
-            fitted.anchors[0, 2] - heading[0]
-            for fitted, heading in zip(fit.fitted, encounter.heading, strict=True)
-        ]
-    )
+    first = [fitted.anchors[0, 2] for fitted in fit.fitted]
+    turned = np.array(first) - encounter.heading[:, 0]
     return _short(float(np.arctan2(np.sin(turned).sum(), np.cos(turned).sum())))
 
 
@@ -185,11 +182,8 @@ def _presence(source: Encounter | Scenario, ids: Sequence[str]) -> list[list[flo
 
     A vehicle that is left out counts as present throughout.
     """
-    shares = source.time[source.present] / source.time[-1]
-    present = {
-        vehicle.id: [_short(share, 5) for share in interval]
-        for vehicle, interval in zip(source.vehicles, shares, strict=True)
-    }
+    shares = (source.time[source.present] / source.time[-1]).round(5).tolist()
+    present = dict(zip(source.ids, shares, strict=True))
     return [present.get(name, [0.0, 1.0]) for name in ids]
 
 
@@ -198,36 +192,26 @@ def _whole(scenario: Scenario, frames: int, ids: Sequence[str]) -> Floats:
 
     Without a reference drive, it is drawn under the first vehicle.
     """
-    known = {
-        vehicle.id: state
-        for vehicle, state in zip(scenario.vehicles, states(scenario, frames), strict=True)
-    }
-    track = (
-        next(iter(known.values()))
-        if scenario.reference_drive is None
-        else states(scenario.reference_drive, frames)[0]
-    )
-    return np.stack([known.get(name, track) for name in ids])
+    known = dict(zip(scenario.ids, states(scenario, frames), strict=True))
+    missing = next(iter(known.values()))
+    if scenario.reference_drive is not None:
+        missing = states(scenario.reference_drive, frames)[0]
+    return np.stack([known.get(name, missing) for name in ids])
 
 
 def _motion(encounter: Encounter, scenarios: Sequence[Scenario]) -> list[dict[str, Any]]:
     """Return speed and accelerations of each vehicle, in the template and in the scenarios."""
     motions = []
-    for n, vehicle in enumerate(encounter.vehicles):
-        rows = [
-            (scenario, _index(scenario, vehicle.id))
-            for scenario in scenarios
-            if any(other.id == vehicle.id for other in scenario.vehicles)
-        ]
-        samples = [_over_time(scenario, k) for scenario, k in rows]
-        index = [scenario.index for scenario, _ in rows]
-        motions.append({"template": _over_time(encounter, n), "samples": samples, "index": index})
+    for n, name in enumerate(encounter.ids):
+        members = [scenario for scenario in scenarios if name in scenario.ids]
+        motions.append(
+            {
+                "template": _over_time(encounter, n),
+                "samples": [_over_time(member, member.ids.index(name)) for member in members],
+                "index": [member.index for member in members],
+            }
+        )
     return motions
-
-
-def _index(scenario: Scenario, name: str) -> int:
-    """Return the index of a vehicle in a scenario."""
-    return [vehicle.id for vehicle in scenario.vehicles].index(name)
 
 
 def _over_time(source: Encounter | Scenario, n: int) -> dict[str, Any]:
@@ -267,18 +251,13 @@ def _template(encounter: Encounter, segmentation: Segmentation, frames: int) -> 
 def _fit(fit: Fit, routes: Sequence[Route]) -> list[dict[str, Any]]:
     vehicles = []
     for fitted, route in zip(fit.fitted, routes, strict=True):
-        keep = (
-            np.linspace(0, len(route.points) - 1, min(len(route.points), 200))
-            .round()
-            .astype(np.int64)
-        )
         vehicles.append(
             {
-                "route": [[_short(x, 2), _short(y, 2)] for x, y, _ in route.points[keep]],
+                "route": _few_points(route.points[:, :2], 200).round(2).tolist(),
                 "anchors": [
                     [_short(x, 2), _short(y, 2), _short(yaw)] for x, y, yaw in fitted.anchors
                 ],
-                "moved": [_short(value, 2) for value in fitted.moved],
+                "moved": np.round(fitted.moved, 2).tolist(),
             }
         )
     return vehicles
@@ -287,15 +266,16 @@ def _fit(fit: Fit, routes: Sequence[Route]) -> list[dict[str, Any]]:
 def _reactions(case: GenerationResult) -> list[dict[str, Any]]:
     """Return the reactions between vehicles, with their interval as shares of the recording."""
     duration = case.encounter.duration
+    graph = case.generated.graph
     return [
         {
-            "who": e.who,
-            "whom": e.whom,
-            "kind": e.kind,
-            "from": _short(e.since / duration),
-            "to": _short(e.until / duration),
+            "who": edge.who,
+            "whom": edge.whom,
+            "kind": edge.kind,
+            "from": _short(edge.since / duration),
+            "to": _short(edge.until / duration),
         }
-        for e in (case.generated.graph.edges if case.generated.graph is not None else ())
+        for edge in (graph.edges if graph is not None else ())
     ]
 
 

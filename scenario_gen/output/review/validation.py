@@ -149,7 +149,7 @@ class Reference:
             waits = situation.waits_to_keep(segmentation)
         return cls(
             road,
-            tokens(vehicle.id for vehicle in encounter.vehicles),
+            tokens(encounter.ids),
             tuple(conflicts),
             waits,
             required_orders(conflicts, entry.facts.order if entry else "keep"),
@@ -165,7 +165,7 @@ class Reference:
 
         They must meet the `requested` boundary states.
         """
-        ids = tokens(vehicle.id for vehicle in scenario.vehicles)
+        ids = tokens(scenario.ids)
         if self.template is None or not set(ids) <= set(self.template):
             return Checker(self.road, requested, None, None, limits)
         rows = {self.template.index(name): k for k, name in enumerate(ids)}
@@ -282,7 +282,7 @@ class Checkers:
             facts.lost_reactions,
         )
         state_bytes = b"" if states is None else states.start.tobytes() + states.end.tobytes()
-        key = (source, tuple(vehicle.id for vehicle in scenario.vehicles), state_bytes)
+        key = (source, scenario.ids, state_bytes)
         if key not in self._checkers:
             if source not in self._references:
                 self._references[source] = _reference(self._namespace, stamp, entry, is_lost)
@@ -352,14 +352,14 @@ def _alterations(namespace: Namespace, k: int) -> list[tuple[str, str]]:
 
 def kept_reactions(situation: Situation, entry: ScenarioEntry | None) -> tuple[Reaction, ...]:
     """Return the template's reactions that the scenario keeps, according to its entry."""
-    names = tokens(vehicle.id for vehicle in situation.encounter.vehicles)
+    names = tokens(situation.encounter.ids)
     kept = entry.facts.reactions if entry else ()
     return tuple(edge for edge in situation.reactions.edges if edge.named(names) in kept)
 
 
 def kept_gaps(situation: Situation, entry: ScenarioEntry | None) -> LaneGaps:
     """Return the template's gaps in a lane; zero for the lost reactions in the entry."""
-    names = tokens(vehicle.id for vehicle in situation.encounter.vehicles)
+    names = tokens(situation.encounter.ids)
     lost = entry.facts.lost_reactions if entry else ()
     return {
         (who, whom): (speed, 0.0 * gap if (names[who], names[whom]) in lost else gap)

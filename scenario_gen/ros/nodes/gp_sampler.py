@@ -113,7 +113,7 @@ class GpSampler(StageNode):
 
     def _follow(self, tracks: bytes) -> None:
         """Subscribe to the routes of the vehicles in the tracks, and no longer to others."""
-        names = tokens(vehicle.id for vehicle in decode_tracks(tracks).vehicles)
+        names = tokens(decode_tracks(tracks).ids)
         routes = {vehicle_topic(name, "route") for name in names}
         self.inputs.forget(self._routes - routes)
         for topic in sorted(self._routes - routes):

@@ -76,7 +76,7 @@ class LogPlayer(StageNode):
 
     def _stream(self, encounter: Encounter, config: Config, cancelled: Callable[[], bool]) -> None:
         """Publish sample after sample, each after its /clock, until the end or a cancellation."""
-        names = tokens(vehicle.id for vehicle in encounter.vehicles)
+        names = tokens(encounter.ids)
         positions = latitude_longitude(encounter)
         clock = self.create_publisher(Clock, "/clock", 10)
         self._wait_for_subscribers(names, config.wait_matching_subscriptions, cancelled)

@@ -111,9 +111,7 @@ class Planner(StageNode):
         anchors = anchor_stamps(encounter, segmentation.changepoints)
         results = {
             vehicle_topic(name, "route"): encode_route(route, anchors, road.frame_id)
-            for name, route in zip(
-                tokens(vehicle.id for vehicle in encounter.vehicles), routes, strict=True
-            )
+            for name, route in zip(tokens(encounter.ids), routes, strict=True)
         }
         results["fit"] = encode_fit(encounter, fit, road.frame_id)
         results["fit/info"] = encode_hashes("fit", messages | results, encounter.start_ns)

@@ -102,7 +102,7 @@ class Preview(StageNode):
         scenario = shown.scenario
         stamp_ns = self.get_clock().now().nanoseconds
         present, poses, speeds = states_at(scenario, time)
-        names = tokens(vehicle.id for vehicle in scenario.vehicles)
+        names = tokens(scenario.ids)
         children = [f"preview/vehicle_{names[n]}" for n in present]
         self.outputs.publish(self._tf, encode_frames(poses, children, scenario.frame_id, stamp_ns))
 
@@ -154,7 +154,7 @@ def changepoint_markers(anchors: Floats) -> list[Marker]:
 
 def conflicts_of(scenario: Scenario) -> tuple[tuple[tuple[float, float, float], str], ...]:
     """Return the pose of the second vehicle at each conflict, with a text."""
-    names = tokens(vehicle.id for vehicle in scenario.vehicles)
+    names = tokens(scenario.ids)
     conflicts = []
     for conflict in find_conflicts(scenario):
         x, y, yaw = scenario.at(conflict.entry_second).poses[conflict.second].tolist()

@@ -169,7 +169,7 @@ class Traffic(Node):  # type: ignore[misc]
         self._verdict = ""
         self._reply_count = 0
         self._load_at = math.inf
-        self._names = tokens(vehicle.id for vehicle in self._loop.scenario.vehicles)
+        self._names = tokens(self._loop.scenario.ids)
         self._children = tuple(f"vehicle_{name}" for name in self._names)
         for name in self._names:
             topic = vehicle_topic(name, "odom")

@@ -20,7 +20,7 @@ from support.evaluation_worlds import cross_road, report_case
 
 from scenario_gen.bags.recordings.read import read_recording
 from scenario_gen.method.evaluation import coverage_of, feature_matrix
-from scenario_gen.output.report.data import case_data, MATRIX_SIZE_CELLS, pack, runs
+from scenario_gen.output.report.data import case_data, MATRIX_SIZE_CELLS, pack, run_lengths
 from scenario_gen.output.report.page import render, ReportInput, write_report
 from scenario_gen.output.report.summary import summary
 from scenario_gen.output.results import write_results
@@ -87,8 +87,8 @@ def test_packing_loses_less_than_a_sixty_thousandth(values):
 
 
 @given(arrays(np.bool_, st.tuples(st.integers(1, 9), st.integers(1, 9))))
-def test_runs_give_the_mask_back(mask):
-    lengths = runs(mask)
+def test_run_lengths_give_the_mask_back(mask):
+    lengths = run_lengths(mask)
     assert (np.repeat(np.arange(len(lengths)) % 2 == 1, lengths) == mask.ravel()).all()
 
 
