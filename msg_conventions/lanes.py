@@ -10,8 +10,8 @@ before the right one. `text` is a JSON object with these members:
 - `lanes`, each with its `id`, the number of `points` of a border, `successors` and `beside`
   (indices of lanes), `speed_limit` [m/s, null: unknown], `junction`; also `users` if it is not for
   all vehicles, `crossing` true for crossings, `arm` (from 1) and `inward` for lanes of an arm of a
-  built-in road, and `height` [m] of its points if lanes lie above others. Lanes closed to cars come
-  last.
+  built-in road, and `height` [m] of its points if lanes lie above others. Lanes closed to cars
+  come last.
 - `rules`, if the map has traffic rules, each with `id`, `kind`, `lanes`, `over` (indices of lanes)
   and `line` (points of the stop line), and `rules_kept`
 - `origin`: latitude and longitude of the frame's origin, if the map has it

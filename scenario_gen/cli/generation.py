@@ -21,6 +21,7 @@ from scenario_gen.cli.options import (
 from scenario_gen.cli.output import current, emit_json, print_, progress, status
 
 if TYPE_CHECKING:
+    from scenario_gen.pipeline import PipelineConfig
     from scenario_gen.types import GenerationResult, Request
 
 commands = Commands("Generate scenarios")
@@ -124,8 +125,8 @@ class Generate:
         str,
         typer.Option(
             help="What to accept, separated by commas. On the road: lost_conflict, lost_order, "
-            "lost_following, lost_merge, lost_lane_change, lost_overtaking, lost_stand, lost_turn. "
-            "In the log: doubt (read it although the result contradicts its data)."
+            "lost_following, lost_merge, lost_lane_change, lost_overtaking, lost_stand, "
+            "lost_turn. In the log: doubt (read it although the result contradicts its data)."
         ),
     ] = ""
     obstacle: Annotated[
@@ -136,6 +137,29 @@ class Generate:
     ] = None
     assignments: SetOption = None
     parameter_file: ParametersOption = None
+
+
+def _config(options: Generate) -> "PipelineConfig":
+    from scenario_gen.base.parameters import updated
+    from scenario_gen.logs.doubts import ALLOWED
+    from scenario_gen.roads import read_obstacles
+    from scenario_gen.types import join_pieces
+
+    config = configured(options.parameter_file, options.assignments)
+    accepted = [name.strip() for name in options.allow.split(",") if name.strip()]
+    losses = [name for name in accepted if name != ALLOWED]
+    for text in options.obstacle or []:
+        read_obstacles(text, "--obstacle")
+    obstacles = filter(None, [config.road.obstacles, *(options.obstacle or [])])
+    return updated(
+        config,
+        {
+            "fitting.allow": ",".join(losses) or config.fitting.allow,
+            "log.allow": ALLOWED if ALLOWED in accepted else config.log.allow,
+            "evaluation.compare": options.compare or config.evaluation.compare,
+            "road.obstacles": join_pieces(obstacles),
+        },
+    )
 
 
 def _request(options: Generate) -> "Request":
@@ -154,31 +178,12 @@ def _request(options: Generate) -> "Request":
 @takes(Generate)
 def generate(options: Generate) -> None:
     """Generate scenarios from a log; write a bag, a report and figures to one folder."""
-    from scenario_gen.base.parameters import updated
     from scenario_gen.cli.folder import FolderRequest, generate_folder
-    from scenario_gen.logs.doubts import ALLOWED
-    from scenario_gen.roads import read_obstacles
-    from scenario_gen.types import join_pieces
 
-    config = configured(options.parameter_file, options.assignments)
-    accepted = [name.strip() for name in options.allow.split(",") if name.strip()]
-    losses = [name for name in accepted if name != ALLOWED]
-    for text in options.obstacle or []:
-        read_obstacles(text, "--obstacle")
-    obstacles = filter(None, [config.road.obstacles, *(options.obstacle or [])])
-    config = updated(
-        config,
-        {
-            "fitting.allow": ",".join(losses) or config.fitting.allow,
-            "log.allow": ALLOWED if ALLOWED in accepted else config.log.allow,
-            "evaluation.compare": options.compare or config.evaluation.compare,
-            "road.obstacles": join_pieces(obstacles),
-        },
-    )
     logs = [options.log, *([path] for path in options.recording or [])]
     request = FolderRequest(
         jobs=[(files, options.road) for files in logs],
-        config=config,
+        config=_config(options),
         count=options.count,
         seed=options.seed,
         encounters=options.encounter or [],

@@ -14,7 +14,7 @@ _MAX_CLOCK_DIFFERENCE_S = 0.5  # of two vehicles; latencies differ by less
 _MAX_JITTER_S = 0.25  # of the latency; with more, the time of reception tells nothing
 _MIN_MESSAGES_COUNT = 5
 _SAME_RATE_RATIO = 0.1
-_STAMP_FACTORS = (1e-3, 1e-6, 1e-9)
+_STAMP_UNITS_S = (1e-3, 1e-6, 1e-9)
 
 
 @dataclass
@@ -67,7 +67,7 @@ def stamp_factor(clocks: Sequence[TopicClock]) -> float:
     rates = np.array([clock.rate for clock in clocks])
     if not len(rates) or not np.isfinite(rates).all():
         return 1.0
-    for factor in _STAMP_FACTORS:
+    for factor in _STAMP_UNITS_S:
         if (np.abs(rates * factor - 1.0) < _SAME_RATE_RATIO).all():
             return factor
     return 1.0

@@ -70,8 +70,8 @@ def check_frames(label: str, frames: Mapping[str, str], vehicles: Mapping[str, R
     if len(local) >= 2 and len(local) == len(frames):
         raise InputError(
             f"{label}: the odometries of {' and '.join(local)} are in frames that begin where "
-            f"each vehicle started ({names}): each is on the x axis of its frame and faces along it; "
-            "record positions in one frame, such as map, or choose with --set log.topics=…"
+            f"each vehicle started ({names}): each is on the x axis of its frame and faces along "
+            "it; record positions in one frame, such as map, or choose with --set log.topics=…"
         )
     if len(set(frames.values())) > 1:
         return [f"the odometries name several frames ({names}); they are read as one"]

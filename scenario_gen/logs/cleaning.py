@@ -3,7 +3,7 @@
 
 """Cleaning: impossible values are dropped and counted; the rest is sorted by time, in metres."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from enum import Enum
 from itertools import chain
@@ -115,6 +115,15 @@ class Drops:
         )
 
 
+def _chosen_tracks(log: RawLog, config: LogConfig) -> Iterable[Observations]:
+    """Return the tracks of the chosen vehicles, in the order of `chosen_vehicles`."""
+    by_id: dict[str, list[Observations]] = {}
+    for vehicle in log.vehicles:
+        by_id.setdefault(vehicle.id, []).append(vehicle)
+    names = chosen_vehicles(list(by_id), config, log.name)
+    return chain.from_iterable(by_id[name] for name in names)
+
+
 def clean(log: RawLog, config: LogConfig) -> tuple[tuple[Observations, ...], Drops]:
     """Drop impossible values and project every vehicle into a local frame.
 
@@ -128,11 +137,7 @@ def clean(log: RawLog, config: LogConfig) -> tuple[tuple[Observations, ...], Dro
     drops = Drops()
     for cause, row in log.dropped:
         drops.add(cause, np.array([row]))
-    by_id: dict[str, list[Observations]] = {}
-    for vehicle in log.vehicles:
-        by_id.setdefault(vehicle.id, []).append(vehicle)
-    names = chosen_vehicles(list(by_id), config, log.name)
-    tracks = chain.from_iterable(by_id[name] for name in names)
+    tracks = _chosen_tracks(log, config)
     vehicles = [_without_invalid(track, log.geographic, drops) for track in tracks]
 
     first_ns, last_ns = _time_window(vehicles, log, drops, config)

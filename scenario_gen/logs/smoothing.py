@@ -265,6 +265,13 @@ class _Fit(NamedTuple):
     headings: Headings | None
 
 
+def _used_headings(fit: _Fit, is_known: Bools, travel_m: float) -> Bools:
+    """Return which of the recorded headings (F,) determine the result."""
+    if travel_m < _MODEL.straight_m:
+        return is_known
+    return ~is_known if fit.headings is None else fit.headings.weight > 0.0
+
+
 def smooth_piece(piece: Observations, origin_ns: int, config: LogConfig) -> Smooth | None:
     """Fit path and motion to a piece of a track.
 
@@ -321,12 +328,6 @@ def smooth_piece(piece: Observations, origin_ns: int, config: LogConfig) -> Smoo
     is_known = np.isfinite(piece.heading)
     if np.ptp(distance) < _MODEL.min_travel_m and not is_known.any():
         heading = np.full(len(distance), np.nan)
-    if np.ptp(distance) < _MODEL.straight_m:
-        is_used = is_known
-    elif fit.headings is not None:
-        is_used = fit.headings.weight > 0.0
-    else:
-        is_used = ~is_known
     rolling = is_known & (np.gradient(fit.distance, fix_t) > HEADINGS.moving_mps)
     return Smooth(
         first=first,
@@ -339,7 +340,7 @@ def smooth_piece(piece: Observations, origin_ns: int, config: LogConfig) -> Smoo
         moved=np.hypot(*(piece.fix - fit.path.pose(fit.distance)[0]).T),
         noise=fit.noise,
         turned=wrap_angle(piece.heading[rolling] - np.interp(fix_t[rolling], ticks, heading)),
-        headings=is_used[is_known],
+        headings=_used_headings(fit, is_known, float(np.ptp(distance)))[is_known],
         believed=believed[: len(piece.speed)],
     )
 

@@ -59,6 +59,14 @@ def _first_lines(path: Path) -> tuple[str, list[str]]:
     return encoding, start.decode(encoding, errors="replace").splitlines()
 
 
+def _separator(header: str) -> str:
+    """Return what separates the names in a header, as pandas understands it."""
+    separator = max(_SEPARATORS, key=header.count)
+    if separator not in header and len(header.split()) > 1:
+        return _WHITE_SPACE
+    return separator
+
+
 def layout_of(path: Path) -> Layout:
     """Return the layout of a text table.
 
@@ -72,9 +80,7 @@ def layout_of(path: Path) -> Layout:
         raise UnknownFormatError(
             f"{path} is not a table: its first line has {_MAX_HEADER_BYTES} characters or more"
         )
-    separator = max(_SEPARATORS, key=header.count)
-    if separator not in header and len(header.split()) > 1:
-        separator = _WHITE_SPACE
+    separator = _separator(header)
     pattern = separator if separator == _WHITE_SPACE else re.escape(separator)
     first = re.split(pattern, header.strip())
     names = _names_in_comment(lines[above - 1], pattern, first) if above else ()

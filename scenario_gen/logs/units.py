@@ -86,6 +86,18 @@ def _scaled_speeds(factor: float) -> Callable[[Observations], Observations]:
 # Degrees
 
 
+def _doubt_degrees(reading: Reading, latitude: float, others: Sequence[str]) -> None:
+    """Add the doubt that latitudes and longitudes may have other units."""
+    options = " or ".join(reading.option(**_unit_options(reading, other)) for other in others)
+    reading.add_doubt(
+        Quantity.POSITION,
+        latitude,
+        "latitude and longitude may be degrees and minutes (ddmm) or minutes (min), and no speeds "
+        "tell which",
+        f"{reading.option()}, or {options}",
+    )
+
+
 def _find_degrees(reading: Reading) -> None:
     """Convert latitudes and longitudes without a unit that cannot be degrees."""
     fix = np.concatenate([vehicle.fix for vehicle in reading.log.vehicles] or [np.zeros((0, 2))])
@@ -104,16 +116,7 @@ def _find_degrees(reading: Reading) -> None:
     unit = units[0]
     reading.use_unit(unit, "lat", "lon")
     if len(units) > 1:
-        others = " or ".join(
-            reading.option(**_unit_options(reading, other)) for other in units[1:]
-        )
-        reading.add_doubt(
-            Quantity.POSITION,
-            float(latitude),
-            "latitude and longitude may be degrees and minutes (ddmm) or minutes (min), and no "
-            "speeds tell which",
-            f"{reading.option()}, or {others}",
-        )
+        _doubt_degrees(reading, float(latitude), units[1:])
     reading.notes.append(f"latitude and longitude are read in the unit {unit}: {reading.option()}")
     reading.change(_converted_degrees(unit))
 

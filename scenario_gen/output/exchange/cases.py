@@ -216,7 +216,8 @@ def _with_ego(
         track = scenario.reference_drive
         if track is None or tokens(track.ids) != (slot,):
             raise InputError(
-                f"{where} was generated for ego {slot!r}, whose track is not on {space.where(WITNESS)}"
+                f"{where} was generated for ego {slot!r}, whose track is missing on "
+                f"{space.where(WITNESS)}"
             )
         return replace(scenario, reference_drive=None), track, True
     if not requested:
