@@ -402,7 +402,7 @@ class Search:
     def _near(self, drawn: Sequence[_Drawn]) -> Floats:
         """Return the probabilities (S,) of being driven for the predicted nearness to failure."""
         predicted, error = self._predictor()(drawn)
-        tail = special.ndtr(-predicted / (SETTINGS.error_factor * error)).max(axis=1)
+        tail: Floats = special.ndtr(-predicted / (SETTINGS.error_factor * error)).max(axis=1)
         return np.clip(2.0 * tail, 0.0, 1.0)
 
     def _design(self) -> tuple[float, float]:
