@@ -12,10 +12,10 @@
 | heading | heading, degrees | heading, 0.0125 degrees; 28800: unknown | heading_deg |
 | length, width | size, cm | the same | the same |
 
-Headings are clockwise from north. If recordGeneratedAt is empty, odeReceivedAt has the date. The tables of Wyoming and Tampa on data.transportation.gov have
-the same values, in columns such as coreData_position_lat. A file has one message a line, a list,
-or messages one after the other. Each event of New York has its own clock and frame, and is read
-100 s later than the previous one.
+Headings are clockwise from north. If recordGeneratedAt is empty, odeReceivedAt has the date. The
+tables of Wyoming and Tampa on data.transportation.gov have the same values, in columns such as
+coreData_position_lat. A file has one message a line, a list, or messages one after the other. Each
+event of New York has its own clock and frame, and is read 100 s later than the previous one.
 
 Source: the samples and data dictionaries of the ITS JPO's sandbox.
 """
