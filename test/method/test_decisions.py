@@ -12,8 +12,11 @@ from rich.console import Console
 from support.textbook_motions import labelled
 
 import scenario_gen as sg
+from scenario_gen.closed_loop.config import ClosedLoopConfig
+from scenario_gen.closed_loop.results import Drives
+from scenario_gen.closed_loop.trials import run_trials, trials_of
 from scenario_gen.method.decisions import goes_first_probability, offered_lags
-from scenario_gen.method.outcome_sets import drawn_sizes
+from scenario_gen.method.outcome_sets import drawn_sizes, requested_decisions
 from scenario_gen.output.report.summary import summary
 from scenario_gen.output.review.regenerate import regenerate_scenario
 from scenario_gen.output.review.validation import validate_bag
@@ -173,3 +176,30 @@ def test_the_summary_states_the_mix(sets):
     sizes = {result.encounter.decision.outcome: len(result) for result in sets}
     assert f"and goes first in {sizes[Outcome.GOES_FIRST]}" in text
     assert f"vehicle 2 stops in {sizes[Outcome.STOPS]} scenarios" in text
+
+
+def test_the_requested_vehicles_take_part(sets):
+    encounter = recorded()
+    shift = np.array([0.0, -60.0])
+    three = replace(
+        encounter,
+        vehicles=(*encounter.vehicles, replace(encounter.vehicles[0], id="third")),
+        position=np.concatenate([encounter.position, encounter.position[:1] + shift]),
+        heading=np.concatenate([encounter.heading, encounter.heading[:1]]),
+        speed=np.concatenate([encounter.speed, encounter.speed[:1]]),
+        present=np.tile([0, len(encounter.time) - 1], (3, 1)),
+    )
+    whys = [
+        requested_decisions(three, DRAWN.sampling, Request(ego=ego)).why for ego in ("2", "third")
+    ]
+    assert whys == ["", "the requested vehicle third does not take part in it"]
+
+
+def test_drives_are_counted_by_outcome(sets):
+    trials = [trial for result in sets for trial in trials_of(result, "1")]
+    outcomes = run_trials(trials, "scenario_gen.closed_loop.planners:ConstantSpeed")
+    drives = Drives(outcomes, "constant", ClosedLoopConfig(), trials)
+    assert {trial.encounter for trial in trials} == {recorded().name}
+    (note,) = [note for note in drives.notes() if "outcome of the decision" in note]
+    passed = sum(outcome.verdict.passed for outcome in outcomes[: len(sets[0])])
+    assert f"stops: {passed} of {len(sets[0])}" in note and "weighted" in note
