@@ -25,6 +25,7 @@ from scenario_gen.method.evaluation.encounter_features import (
     EncounterFeatures,
     FEATURES,
     features_of,
+    JOINT_FEATURES,
 )
 from scenario_gen.method.evaluation.law import SHIPPED
 from scenario_gen.method.evaluation.population import KINDS
@@ -75,9 +76,7 @@ def main() -> None:
     seen = encounters()
     if not seen:
         raise SystemExit(f"{DATA / WINDOWS}: no recordings; set SCENARIO_GEN_DATA to their folder")
-    by_kind = {
-        kind: np.array([one.features for one in seen if one.kind == kind]) for kind in KINDS
-    }
+    by_kind = {kind: np.array([one.every for one in seen if one.kind == kind]) for kind in KINDS}
     by_kind = {kind: rows for kind, rows in by_kind.items() if len(rows)}
     scatter = {kind: len(rows) * np.cov(rows.T, bias=True) for kind, rows in by_kind.items()}
     pooled = sum(scatter.values()) / len(seen)
@@ -91,7 +90,12 @@ def main() -> None:
         }
         print(kind, len(rows))
     made_by = "benchmarks/_population_law.py"
-    document = {"source": SOURCE, "made by": made_by, "features": FEATURES, "kinds": kinds}
+    document = {
+        "source": SOURCE,
+        "made by": made_by,
+        "features": FEATURES + JOINT_FEATURES,
+        "kinds": kinds,
+    }
     SHIPPED.write_text(json.dumps(document) + "\n")
 
 

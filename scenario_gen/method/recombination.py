@@ -51,7 +51,7 @@ class InteractingPair:
     Attributes:
         situation: of the encounter, with all its vehicles.
         kind: what they do.
-        features: (F,) as in `evaluation.population`.
+        features: (F + J,) as in `EncounterFeatures.every`.
         conflict: between the two.
         reactions: of one of them to the other.
     """
@@ -123,7 +123,7 @@ def pair_of(encounter: Encounter) -> InteractingPair | None:
         return None
     edges = situation.reactions.edges
     reactions = tuple(edge for edge in edges if {edge.who, edge.whom} == set(conflict.pair))
-    return InteractingPair(situation, member.kind, member.features, conflict, reactions)
+    return InteractingPair(situation, member.kind, member.every, conflict, reactions)
 
 
 def recombined(first: Encounter, second: Encounter) -> Encounter:

@@ -127,6 +127,10 @@ class ReactionGraph:
     cut: tuple[Reaction, ...] = ()
     why: str = ""
 
+    def of(self, who: int) -> tuple[Reaction, ...]:
+        """Return the reactions of vehicle `who`."""
+        return tuple(edge for edge in self.edges if edge.who == who)
+
     def sentences(
         self, vehicles: Sequence[Vehicle], kept: Sequence[Reaction] | None = None
     ) -> tuple[str, ...]:

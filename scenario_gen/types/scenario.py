@@ -137,6 +137,7 @@ class Cause(StrEnum):
     CONFLICT_LOST = (
         "conflict_lost"  # the stretch in which all are there leaves out a conflict of the template
     )
+    TOO_SHORT = "too_short"  # less than 5 s, or than half of a vehicle's recorded distance
     NOT_FINITE = "not_finite"
     OUT_OF_RANGE = "out_of_range"  # not in the requested range; it was not checked
     UNUSUAL = "unusual"  # valid, but rarer among encounters of its kind than the template

@@ -6,7 +6,7 @@
 They describe its most critical pair of vehicles; `FEATURES` names them.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -46,9 +46,20 @@ FEATURES = (
     *(f"{name} of the first" for name in VEHICLE_FEATURES),
     *(f"{name} of the second" for name in VEHICLE_FEATURES),
 )
+JOINT_FEATURES = (
+    "answer of the second",
+    "speed of the second at the clearing",
+    "way of the second at the clearing",
+    "correlation of speeds",
+)
+"""How the second vehicle answers the first one; only the law of a population holds them."""
 DISTANCE = FEATURES.index("distance")
 MAX_GAP_S = 10.0  # larger time gaps are alike
 MAX_DISTANCE_M = 30.0  # larger distances are alike
+_BRAKING_MPS2 = 0.4  # from which a first vehicle brakes
+_ENTRY_S = 1.0  # before and after its entry, in which it is answered, too
+_END_S = 5.0  # in which speeds are compared
+_STILL_MPS = 0.2  # of a speed whose variation is noise
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,6 +69,7 @@ class EncounterFeatures:
     Attributes:
         kind: what the pair does; None if it shares no area.
         features: (F,).
+        joint: (J,) JOINT_FEATURES.
         recording: name of the recording; of a generated encounter that of its template.
         template: index of the template among the recorded encounters.
         pair: the vehicles that are described; None if no two share an area.
@@ -73,6 +85,12 @@ class EncounterFeatures:
     pair: Pair | None
     other: int = -1
     scenario: int = -1
+    joint: Floats = field(default_factory=lambda: np.zeros(len(JOINT_FEATURES)))
+
+    @property
+    def every(self) -> Floats:
+        """(F + J,) the features and the joint ones."""
+        return np.concatenate([self.features, self.joint])
 
     @property
     def kind_name(self) -> str:
@@ -119,7 +137,10 @@ def features_of(
         *_vehicle_features(motion, conflict.second, conflict.entry_second),
     ]
     kind = kind_of(motion, conflict.first, conflict.second)
-    return EncounterFeatures(kind, np.array(values), recording, template, chosen)
+    joint = _joint_features(motion, conflict)
+    return EncounterFeatures(
+        kind, np.array(values), recording, template, chosen, joint=np.array(joint)
+    )
 
 
 def scenario_features(
@@ -141,6 +162,32 @@ def _headway(motion: Motion, conflict: Conflict) -> float:
         return MAX_GAP_S
     gap = footprint_distance(motion, conflict.first, conflict.second)[both]
     return float(np.median(gap[moves] / speed[moves]))
+
+
+def _joint_features(motion: Motion, conflict: Conflict) -> list[float]:
+    """Return the JOINT_FEATURES of the two vehicles of a conflict."""
+    both = motion.present_slice(conflict.first, conflict.second)
+    speed = motion.speed[:, both]
+    first, second = speed[conflict.first], speed[conflict.second]
+    time = motion.time[both]
+    acceleration = np.gradient(speed, motion.dt, axis=1) if len(time) > 1 else 0.0 * speed
+    is_answered = acceleration[conflict.first] < -_BRAKING_MPS2
+    is_answered |= np.abs(time - conflict.entry_first) <= _ENTRY_S
+    answer = acceleration[conflict.second][is_answered]
+    clears = conflict.exit_first if np.isfinite(conflict.exit_first) else conflict.entry_first
+    at, enters = np.searchsorted(time, [clears, conflict.entry_second]).tolist()
+    way = np.sign(enters - at) * second[min(at, enters) : max(at, enters)].sum() * motion.dt
+    ending = slice(-round(_END_S / motion.dt), None)
+    deviation = np.stack(
+        [first[ending] - first[ending].mean(), second[ending] - second[ending].mean()]
+    )
+    scale = np.square(deviation).mean(axis=1) + _STILL_MPS * _STILL_MPS
+    return [
+        float(answer.mean()) if len(answer) else 0.0,
+        float(second[min(at, len(second) - 1)]),
+        float(np.clip(way, -MAX_DISTANCE_M, MAX_DISTANCE_M)),
+        float(deviation.prod(axis=0).mean() / np.sqrt(scale.prod())),
+    ]
 
 
 def _vehicle_features(motion: Motion, n: int, entry: float) -> list[float]:

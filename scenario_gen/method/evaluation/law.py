@@ -3,11 +3,11 @@
 
 """The distribution of recorded encounters of one kind, for `sampling.variety=population`.
 
-The law is a Gaussian of an encounter's features (FEATURES of
+The law is a Gaussian of an encounter's features (FEATURES and JOINT_FEATURES of
 `scenario_gen.method.evaluation.encounter_features`): speeds, braking and standstills of both
-vehicles, the approach, and the gaps at the conflict. It is learned from the template and the other
-recorded encounters of its kind, and shrunk towards a shipped law. With n encounters of features
-x_i,
+vehicles, the approach, the gaps at the conflict, and how the second vehicle answers the first one.
+It is learned from the template and the other recorded encounters of its kind, and shrunk towards a
+shipped law. With n encounters of features x_i,
 
     μ = (a μ₀ + Σ x_i) / (a + n),   S = (b S₀ + Σ (x_i − μ)(x_i − μ)ᵀ) / (b + n),
 
@@ -31,6 +31,7 @@ from scenario_gen.method.evaluation.encounter_features import (
     EncounterFeatures,
     FEATURES,
     features_of,
+    JOINT_FEATURES,
     scenario_features,
 )
 from scenario_gen.method.evaluation.measures import MEASURES
@@ -101,7 +102,7 @@ def rarity_in(
         if not any(_is_same(member, other) for other in members):
             members.append(member)
     laws = {
-        kind: Law.of(kind, [member.features for member in members if member.kind == kind])
+        kind: Law.of(kind, [member.every for member in members if member.kind == kind])
         for kind in EncounterKind
     }
 
@@ -109,7 +110,7 @@ def rarity_in(
         member = scenario_features(scenario, template, encounter)
         if member.kind is None:
             return math.inf
-        return laws[member.kind].distance(member.features) / USUAL_SIGMAS
+        return laws[member.kind].distance(member.every) / USUAL_SIGMAS
 
     return rarity
 
@@ -137,7 +138,7 @@ def _shipped_law(kind: EncounterKind) -> tuple[Floats, Floats]:
 def _shipped() -> dict[str, tuple[Floats, Floats]]:
     """Return mean (F,) and covariance (F, F) by kind."""
     document = json.loads(SHIPPED.read_text())
-    assert tuple(document["features"]) == FEATURES
+    assert tuple(document["features"]) == FEATURES + JOINT_FEATURES
     return {
         kind: (np.array(law["mean"]), np.array(law["covariance"]))
         for kind, law in document["kinds"].items()

@@ -33,7 +33,7 @@ from scenario_gen.method.sampling.vehicle_model import VehicleModel
 from scenario_gen.numerics import Bools, Floats
 from scenario_gen.roads import ground_for
 from scenario_gen.situation import Situation, Wait
-from scenario_gen.types import FOLLOW, Note, NoteKind, ReactionGraph, Road
+from scenario_gen.types import FOLLOW, Note, NoteKind, Reaction, ReactionGraph, Road
 
 
 @dataclass(frozen=True)
@@ -104,10 +104,9 @@ def build_model(plan: Plan, config: SamplingConfig, order: str = "keep") -> Buil
     reactions, trimming = kept_reactions(plan.situation, config, order), None
     if config.variety == "wide":
         fixed = (plan.requested.relaxed[..., 0] == 0.0).any(axis=0)
-        reacting = {edge.who for edge in reactions.edges}
         models = [
             replace(
-                model, variation=_variation(n, each, plan, nominal, fixed, n in reacting, config)
+                model, variation=_variation(n, each, plan, nominal, fixed, reactions.of(n), config)
             )
             for n, (model, each) in enumerate(zip(models, routed, strict=True))
         ]
@@ -277,7 +276,7 @@ def _variation(
     plan: Plan,
     nominal: Clock,
     fixed: Bools,
-    reacts: bool,
+    edges: Sequence[Reaction],
     config: SamplingConfig,
 ) -> Variation:
     """Return what preset `wide` varies of vehicle n.
@@ -288,7 +287,7 @@ def _variation(
         plan: the template on its road.
         nominal: the clock without deviation.
         fixed: (2,) whether start and end states are requested of any vehicle.
-        reacts: whether it reacts to another vehicle.
+        edges: its reactions to other vehicles.
         config: the standard deviations.
     """
     config = config.of(routed.vehicle.kind)
@@ -297,8 +296,8 @@ def _variation(
     fastest = fastest + 2.0 * routed.limits.max_acceleration * ACCELERATION_DECAY_S
     ground = ground_for(plan.road, routed.vehicle)
     ahead = road_ahead(routed.path, routed.vehicle, ground, MAX_EXTRAPOLATION_S * fastest)
-    clock = VehicleClock.of(nominal, routed.rests, fixed.tolist(), config)
-    if reacts:
+    clock = VehicleClock.of(nominal, routed.rests, fixed.tolist(), config, edges, plan.limits)
+    if edges:
         clock = replace(clock, bound=_TUNING.reacting_bound * clock.bound)
     relaxed = plan.requested.relaxed[n].copy()
     relaxed[speed <= _TUNING.halting_speed, 1] = 0.0

@@ -14,6 +14,9 @@ POPULATION_LEAST = {
     "pace_sigma": 0.18,
     "wait_sigma": 2.0,
     "end_speed_sigma": 1.2,
+    "gap_sigma": 1.0,
+    "headway_sigma": 0.3,
+    "strength_sigma": 0.4,
     "leave_out": 0.9,
 }
 """Least values with `population`: as wide as encounters differ; the population selects."""
@@ -48,6 +51,23 @@ class SamplingConfig(Parameters):
     )
     end_speed_sigma: float = parameter(
         0.4, "wide: standard deviation of start and end speeds", unit="m/s", low=0.0, high=5.0
+    )
+    gap_sigma: float = parameter(
+        0.0,
+        "wide: standard deviation, from driver to driver, of the gap behind a vehicle to which it "
+        "yields",
+        unit="s",
+        low=0.0,
+        high=5.0,
+    )
+    headway_sigma: float = parameter(
+        0.0, "wide: the same of the logarithm of a follower's time gap", low=0.0, high=1.0
+    )
+    strength_sigma: float = parameter(
+        0.0,
+        "wide: the same of the logarithm of braking and of acceleration",
+        low=0.0,
+        high=1.0,
     )
     leave_out: float = parameter(
         0.0,

@@ -7,8 +7,13 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 import math
 
+import numpy as np
+
 from scenario_gen.method.sampling.importance_sampling import TargetSet
 from scenario_gen.method.sampling.sampler import Block, BLOCK_CANDIDATES, LEVELS, Sampler
+from scenario_gen.method.sampling.time_warp import MIN_RATE_RATIO, SAMPLE_PERIOD_S
+from scenario_gen.method.sampling.trimming import MIN_DURATION_S
+from scenario_gen.numerics import Floats
 from scenario_gen.types import Cause, Note, NoteKind, Reaction, Scenario, Verdict
 
 Check = Callable[[Sequence[Scenario]], list[Verdict]]
@@ -17,6 +22,7 @@ NO_LIMIT_COUNT = 1 << 30  # with one clock for all vehicles, conflicts depend on
 PILOT_CANDIDATES = 2 * BLOCK_CANDIDATES  # by which a level is judged
 MIN_RARITY_SCENARIOS = 20  # valid ones from which a bound is taken
 _LARGE_PILOT_FACTOR = 5  # over a pilot that has too few valid candidates
+_MIN_DISTANCE_SHARE = 0.55  # of a route; half of the recorded distance, which may be longer
 _KEPT_SHARE = 0.4  # of the valid candidates that are kept at least
 
 
@@ -52,12 +58,16 @@ class ValidityFilter:
         lost: reactions of the template, by their vehicles, that cannot be kept on this road, each
             with a message: neither the undisturbed drive nor those candidates keep them. No
             candidate is refused for them.
+        min_distances: (N,) metres that each vehicle drives at least.
+        min_duration: s that a scenario lasts at least.
     """
 
     check: Check
     max_absent: int
     enough: float
     lost: Mapping[tuple[int, ...], str] = field(default_factory=dict)
+    min_distances: Floats = field(default_factory=lambda: np.zeros(0))
+    min_duration: float = 0.0
 
     @classmethod
     def of(cls, sampler: Sampler, check: Check, enough: float) -> "ValidityFilter":
@@ -77,17 +87,33 @@ class ValidityFilter:
                 if verdict.not_applicable <= absent:
                     also_lost = _lost_reactions(verdict)
                     lost = {pair: lost[pair] for pair in lost if pair in also_lost}
-        return cls(check, absent, enough, lost)
+        vehicles, nominal = sampler.model.vehicles, sampler.model.warp.nominal
+        distances = np.array([_MIN_DISTANCE_SHARE * vehicle.path.length for vehicle in vehicles])
+        duration = min(MIN_DURATION_S, MIN_RATE_RATIO * float(nominal.time[-1]))
+        return cls(check, absent, enough, lost, distances, duration)
 
     def __call__(self, scenarios: Sequence[Scenario]) -> list[Cause | None]:
         """Return the first cause for which each scenario is refused, None for a valid one."""
-        return [self._cause(verdict) for verdict in self.check(scenarios)] if scenarios else []
+        verdicts = self.check(scenarios) if scenarios else []
+        return [
+            self._cause(scenario, verdict)
+            for scenario, verdict in zip(scenarios, verdicts, strict=True)
+        ]
 
-    def _cause(self, verdict: Verdict) -> Cause | None:
+    def _cause(self, scenario: Scenario, verdict: Verdict) -> Cause | None:
         for violation in verdict.violations:
             if violation.cause != Cause.REACTION or violation.vehicles not in self.lost:
                 return violation.cause
-        return Cause.CONFLICT_LOST if verdict.not_applicable > self.max_absent else None
+        if verdict.not_applicable > self.max_absent:
+            return Cause.CONFLICT_LOST
+        return Cause.TOO_SHORT if self._is_short(scenario) else None
+
+    def _is_short(self, scenario: Scenario) -> bool:
+        """Whether a scenario is short, or a vehicle hardly drives in it."""
+        if float(scenario.time[-1]) < self.min_duration:
+            return True
+        driven = (scenario.speed * scenario.is_present).sum(axis=1) * SAMPLE_PERIOD_S
+        return len(self.min_distances) > 0 and bool((driven < self.min_distances).any())
 
     def kept(self, edges: Iterable[Reaction]) -> tuple[Reaction, ...]:
         """Return the reactions that candidates keep."""

@@ -4,7 +4,8 @@
 """The layout of the vector z of standard normal numbers from which a candidate is computed.
 
     z = (shared clock, vehicle 0, vehicle 1, …, trimming)
-    vehicle = (lateral, speed, clock (shift, pace, waits), place, end speeds, size)
+    vehicle = (lateral, speed, clock (shift, pace, waits, gaps), place, end speeds, size,
+               strength)
 
 All code reads these numbers through named slices.
 """
@@ -25,10 +26,12 @@ class VehicleNumbers(NamedTuple):
     Attributes:
         lateral: deviations across the route.
         speed: deviations along the route.
-        clock: of the vehicle's clock: shift, pace, and one for each wait.
+        clock: of the vehicle's clock: shift, pace, one for each wait, one for the driver's gap in
+            each reaction.
         place: in the lane.
         end_speeds: at the start and at the end.
         size: of the vehicle.
+        strength: of braking and of acceleration.
     """
 
     lateral: slice
@@ -37,17 +40,21 @@ class VehicleNumbers(NamedTuple):
     place: slice
     end_speeds: slice
     size: slice
+    strength: slice
 
     @classmethod
-    def of(cls, lateral: int, speed: int, clock: int | None) -> "VehicleNumbers":
+    def of(
+        cls, lateral: int, speed: int, clock: int | None, strength: int = 0
+    ) -> "VehicleNumbers":
         """Lay out the numbers of a vehicle.
 
         Args:
             lateral: number of deviations across the route.
             speed: number of deviations along it.
             clock: numbers of its clock; None if only the deviations vary.
+            strength: 2 if braking and acceleration vary from driver to driver, else 0.
         """
-        free = (0, 0, 0, 0) if clock is None else (clock, 1, 2, 1)
+        free = (0, 0, 0, 0, 0) if clock is None else (clock, 1, 2, 1, strength)
         return cls(*consecutive((lateral, speed, *free)))
 
     @property

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 from scenario_gen.method.sampling.config import SamplingConfig
 from scenario_gen.method.sampling.variation import relaxed_states
+from scenario_gen.method.validity import Limits
 from scenario_gen.situation import Situation, Wait
 from scenario_gen.types import (
     BoundaryStates,
@@ -19,7 +20,6 @@ from scenario_gen.types import (
     Route,
     Scenario,
     Segmentation,
-    TypeLimits,
 )
 
 Progress = Callable[[int, int, int], None]
@@ -40,7 +40,7 @@ class Plan:
         routes: one per vehicle, with an anchor at start, changepoints and end.
         requested: start and end states; their speeds are met exactly.
         waits: when a vehicle stands, on the template's clock.
-        limits: of each type's motion, within which speeds are planned.
+        limits: of the checker; speeds are planned within those of motion.
     """
 
     situation: Situation
@@ -49,14 +49,14 @@ class Plan:
     routes: Sequence[Route]
     requested: BoundaryStates
     waits: Sequence[Wait]
-    limits: TypeLimits = TypeLimits()
+    limits: Limits = Limits()
 
     @classmethod
     def of(
         cls,
         planned: GenerationResult,
         config: SamplingConfig,
-        limits: TypeLimits,
+        limits: Limits,
         request: Request,
         waits: tuple[Wait, ...] | None = None,
         situation: Situation | None = None,
@@ -66,7 +66,7 @@ class Plan:
         Args:
             planned: with road, fit and routes.
             config: the sampler's parameters.
-            limits: of motion.
+            limits: of the checker.
             request: what is requested.
             waits: that are kept; the template's if None.
             situation: the template's, if it is known.

@@ -137,9 +137,9 @@ class ReactionTransform:
         context = _Context(models, nominal, scale)
         conditions = []
         for n in graph.order if graph.edges else ():
-            equations = [
-                each for edge in graph.edges if edge.who == n for each in context.equations(edge)
-            ]
+            equations = [each for edge in graph.of(n) for each in context.equations(edge)]
+            for each in equations:
+                each.rows[n][:, models[n].driver_gaps] = 0.0
             effective = [each for each in equations if each.rows[n].any()]
             gather, scatter = _solve(n, effective, numbers)
             part, layout = numbers.vehicles[n], models[n].numbers
@@ -313,4 +313,7 @@ def advance(model: VehicleModel, at: Floats, scale: NoiseScale) -> Floats:
     if model.variation is not None:
         metres = driven @ model.speed.faster
         rows[:, model.numbers.end_speeds] = scale.longitudinal * metres * model.variation.end_speed
+        if model.variation.strength > 0.0:
+            metres = driven @ model.speed.strength.effect
+            rows[:, model.numbers.strength] = metres * model.variation.strength
     return rows

@@ -70,6 +70,12 @@ class Clock:
         return curve(tau), curve(tau, 1), curve(tau, 2), curve(tau, 3)
 
 
+def smooth_step(x: Floats) -> tuple[Floats, Floats]:
+    """Return the quintic step 10 x³ - 15 x⁴ + 6 x⁵ from 0 to 1 on [0, 1], and its derivative."""
+    x = np.clip(x, 0.0, 1.0)
+    return x * x * x * (10.0 + x * (6.0 * x - 15.0)), 30.0 * x * x * (1.0 - x) * (1.0 - x)
+
+
 class TimeWarp:
     """Draws clocks.
 

@@ -17,7 +17,7 @@ from scenario_gen.numerics import Bools, Floats
 from scenario_gen.situation import Situation
 
 AFTER_CONFLICT_S = 1.0  # kept after the second vehicle has entered and the first one has left
-MIN_DURATION_S = 3.0  # kept of a template in any case
+MIN_DURATION_S = 5.0  # kept of a template in any case, as the reader demands of encounters
 _INWARD_FACTOR = np.array([1.0, -1.0])  # later at the start, earlier at the end
 
 

@@ -18,11 +18,18 @@ import numpy as np
 from scipy import special
 
 from scenario_gen.method.sampling.config import SamplingConfig
-from scenario_gen.method.sampling.time_warp import Clock, MAX_RATE_RATIO, MIN_RATE_RATIO
+from scenario_gen.method.sampling.driver_gaps import driver_gaps, DriverGap, Ramp
+from scenario_gen.method.sampling.time_warp import (
+    Clock,
+    MAX_RATE_RATIO,
+    MIN_RATE_RATIO,
+    smooth_step,
+)
 from scenario_gen.method.sampling.trimming import max_trimmed_time
+from scenario_gen.method.validity import Limits
 from scenario_gen.numerics import Bools, Floats
 from scenario_gen.situation import Situation
-from scenario_gen.types import BoundaryStates, CAR, Request, Vehicle
+from scenario_gen.types import BoundaryStates, CAR, Reaction, Request, Vehicle
 
 CAR_SIZES = np.array([
     (3.60, 1.62), (4.05, 1.75), (4.25, 1.79), (4.46, 1.83),
@@ -46,6 +53,7 @@ class _Tuning:
         wait_recovery: longest extra wait per remaining second: half the allowed speed-up over the
             peak slope 1.875 of the smooth step.
         end_speed_slack: m/s by which an end speed may exceed its stated bounds.
+        slower_end: m/s by which a vehicle is slower at its end, at most: nothing explains more.
         min_end_speed_share: of the mean speed, left at an end however slow it is drawn.
     """
 
@@ -58,6 +66,7 @@ class _Tuning:
     wait_shortening: float = 0.3
     wait_recovery: float = 0.5 * (1.0 - MIN_RATE_RATIO) / 1.875
     end_speed_slack: float = 0.5
+    slower_end: float = 1.0
     min_end_speed_share: float = 0.2
 
 
@@ -68,12 +77,6 @@ def truncate(z: Floats, bound: float) -> Floats:
     """Return truncated normal numbers of the same shape and probability, within +-bound."""
     low = special.ndtr(np.array(-bound))
     return np.asarray(special.ndtri(low + (1.0 - 2.0 * low) * special.ndtr(z)))
-
-
-def _smooth_step(x: Floats) -> tuple[Floats, Floats]:
-    """Return the quintic step 10 x³ - 15 x⁴ + 6 x⁵ from 0 to 1 on [0, 1], and its derivative."""
-    x = np.clip(x, 0.0, 1.0)
-    return x * x * x * (10.0 + x * (6.0 * x - 15.0)), 30.0 * x * x * (1.0 - x) * (1.0 - x)
 
 
 def relaxed_states(
@@ -126,6 +129,7 @@ def _max_time_shift(situation: Situation, config: SamplingConfig) -> Floats:
     """Return by how many seconds (2,) start and end of a vehicle may shift on its route."""
     duration = situation.encounter.duration
     spread = 2.0 * (config.arrival_sigma + 0.5 * duration * config.pace_sigma) + config.wait_sigma
+    spread += config.gap_sigma
     trimmed = max_trimmed_time(situation, config.leave_out)
     return np.asarray(config.freedom * spread + config.duration_tolerance * duration + trimmed)
 
@@ -135,13 +139,15 @@ class VehicleClock:
     """How the clock of one vehicle differs from the shared one.
 
     Attributes:
-        basis: (2 + W, G) seconds at template times: of a shift by one second (1, but 0 at
-            requested states), of a pace slower by 1, and of one second more in each wait.
-        rates: (2 + W, G) their derivatives.
+        basis: (2 + W + E, G) seconds at template times: of a shift by one second (1, but 0 at
+            requested states), of a pace slower by 1, of one second more in each wait, and of one
+            second of each driver gap.
+        rates: (2 + W + E, G) their derivatives.
         recovery: (W, G) the part of `rates` by which a wait is made up for, at a requested end.
-        sigma: (2 + W,) standard deviations of shift [s], pace and waits [s].
+        sigma: (2 + W + E,) standard deviations of shift [s], pace and waits [s]; 1 of driver gaps.
         low, high: (W,) bounds of the waits' changes [s].
         bound: standard deviations at which all are truncated.
+        gaps: how its driver differs from the recorded one, in E reactions.
     """
 
     basis: Floats
@@ -151,6 +157,7 @@ class VehicleClock:
     low: Floats
     high: Floats
     bound: float
+    gaps: tuple[DriverGap, ...] = ()
 
     @classmethod
     def of(
@@ -159,6 +166,8 @@ class VehicleClock:
         rests: Sequence[tuple[float, float]],
         fixed: Sequence[bool],
         config: SamplingConfig,
+        edges: Sequence[Reaction] = (),
+        limits: Limits = Limits(),
     ) -> "VehicleClock":
         """Prepare the clock of a vehicle.
 
@@ -167,6 +176,8 @@ class VehicleClock:
             rests: begin and end [s] of its stands, on the template's clock.
             fixed: whether start and end states are requested of any vehicle.
             config: the standard deviations.
+            edges: the reactions of the vehicle.
+            limits: of the certificate.
         """
         grid = nominal.grid
         ramp = min(_TUNING.clock_fade, _TUNING.fade_share * float(grid[-1]))
@@ -174,7 +185,7 @@ class VehicleClock:
         distances = ((grid - grid[0], 1.0), (grid[-1] - grid, -1.0))
         for is_fixed, (since, sign) in zip(fixed, distances, strict=True):
             if is_fixed:
-                value, rate = _smooth_step(since / ramp)
+                value, rate = smooth_step(since / ramp)
                 shift_rate = shift_rate * value + shift * sign * rate / ramp
                 shift = shift * value
         centred = nominal.time - 0.5 * nominal.time[-1]
@@ -182,11 +193,11 @@ class VehicleClock:
 
         waits, wait_rates, recovery = np.zeros((3, len(rests), len(grid)))
         for k, (begin, end) in enumerate(rests):
-            value, rate = _smooth_step((grid - begin) / (end - begin))
+            value, rate = smooth_step((grid - begin) / (end - begin))
             waits[k], wait_rates[k] = value, rate / (end - begin)
             if fixed[1]:
                 left = max(grid[-1] - end, 1e-9)
-                value, rate = _smooth_step((grid[-1] - grid) / left)
+                value, rate = smooth_step((grid[-1] - grid) / left)
                 recovery[k] = -waits[k] * rate / left
                 waits[k] *= value
                 wait_rates[k] = wait_rates[k] * value + recovery[k]
@@ -198,14 +209,16 @@ class VehicleClock:
         spare = np.minimum(_TUNING.wait_shortening * length, length - _TUNING.min_stand)
         shortest = np.minimum(np.maximum(spare, 0.0), np.minimum(recoverable, longest))
         sigmas = [config.arrival_sigma, config.pace_sigma] + [config.wait_sigma] * len(rests)
+        gaps = tuple(driver_gaps(edges, Ramp(grid, shift, shift_rate), rests, config, limits))
         return cls(
-            np.vstack([shift, pace, waits]),
-            np.vstack([shift_rate, pace_rate, wait_rates]),
+            np.vstack([shift, pace, waits, *(gap.basis for gap in gaps)]),
+            np.vstack([shift_rate, pace_rate, wait_rates, *(gap.rate for gap in gaps)]),
             recovery,
-            np.array(sigmas),
+            np.array(sigmas + [1.0] * len(gaps)),
             -shortest,
             longest,
             config.freedom,
+            gaps,
         )
 
     @property
@@ -215,9 +228,12 @@ class VehicleClock:
 
     def effective(self, z: Floats, scale: float) -> Floats:
         """Return numbers (S, count) with the effect of z (S, count) after truncation."""
-        truncated = truncate(z, self.bound)
-        unit = np.maximum(scale * self.sigma[2:], 1e-9)
-        truncated[:, 2:] = np.clip(truncated[:, 2:], self.low / unit, self.high / unit)
+        truncated, gaps = truncate(z, self.bound), len(self.recovery) + 2
+        waits = slice(2, gaps)
+        unit = np.maximum(scale * self.sigma[waits], 1e-9)
+        truncated[:, waits] = np.clip(truncated[:, waits], self.low / unit, self.high / unit)
+        for k, gap in enumerate(self.gaps, gaps):
+            truncated[:, k] = gap.delay(z[:, k])
         return truncated
 
     def sample(self, z: Floats, scale: float, shared: Clock, nominal: Clock) -> Clock:
@@ -230,9 +246,9 @@ class VehicleClock:
             nominal: the clock without deviation.
         """
         offsets = scale * self.sigma * self.effective(z, scale)
-        drift, waits = offsets[:, :2], offsets[:, 2:]
+        drift, waits = offsets[:, :2], offsets[:, 2:]  # with the gaps
         rate = drift @ self.rates[:2]
-        running = shared.rate + waits @ self.recovery
+        running = shared.rate + waits[:, : len(self.recovery)] @ self.recovery
         slowing = running - MIN_RATE_RATIO * nominal.rate
         room = np.where(rate < 0.0, slowing, MAX_RATE_RATIO * nominal.rate - running)
         share = np.maximum(room, 0.0) / np.maximum(np.abs(rate), 1e-9)
@@ -254,6 +270,7 @@ class Variation:
             state is requested.
         place_sigma: standard deviation of the place [m].
         end_speed: (2,) standard deviations of start and end speed [m/s].
+        strength: standard deviation of the logarithm of braking and of acceleration.
         bound: standard deviations at which all are truncated.
         sizes: (C, 2) lengths and widths [m] to choose from; empty to keep the recorded size.
         ahead: (2,) metres of free road straight on before its route and behind it; 0 where a state
@@ -264,6 +281,7 @@ class Variation:
     place: Floats
     place_sigma: float
     end_speed: Floats
+    strength: float
     bound: float
     sizes: Floats
     ahead: Floats
@@ -294,7 +312,7 @@ class Variation:
         place = np.ones(len(arc)) if len(arc) > 1 else np.zeros(1)
         for free, since in zip(relaxed[:, 0] > 0.0, (arc - arc[0], arc[-1] - arc), strict=True):
             if not free:
-                place = place * _smooth_step(since / ramp)[0]
+                place = place * smooth_step(since / ramp)[0]
         low, high = _TUNING.car_length
         resizes = (
             config.sizes == "catalogue"
@@ -309,6 +327,7 @@ class Variation:
             place,
             config.place_sigma,
             np.where(relaxed[:, 1] > 0.0, config.end_speed_sigma, 0.0),
+            config.strength_sigma,
             config.freedom,
             CAR_SIZES[CAR_SIZES[:, 0] <= longest],
             ahead,
@@ -321,7 +340,12 @@ class Variation:
     def end_speed_change(self, z: Floats, mean: Floats) -> Floats:
         """Return by how much (S, 2) [m/s] start and end are faster than `mean` (2,) [m/s]."""
         slowest = -(1.0 - _TUNING.min_end_speed_share) * mean
+        slowest[1] = max(slowest[1], -_TUNING.slower_end)
         return np.maximum(self.end_speed * truncate(z, self.bound), slowest)
+
+    def log_strength(self, z: Floats) -> Floats:
+        """Return the logarithms (S, 2) of the strength of braking and of acceleration."""
+        return np.asarray(self.strength * truncate(z, self.bound))
 
     def resized(self, z: Floats, vehicle: Vehicle) -> list[Vehicle]:
         """Return the vehicle in the size that each number z (S, 1) selects."""

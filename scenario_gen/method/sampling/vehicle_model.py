@@ -62,9 +62,19 @@ class VehicleModel:
     numbers: VehicleNumbers = field(init=False)
 
     def __post_init__(self) -> None:
-        clock = None if self.variation is None else self.variation.clock.count
-        numbers = VehicleNumbers.of(self.lateral_root.shape[1], self.speed.count, clock)
+        clock, strength = None, 0
+        if self.variation is not None:
+            clock = self.variation.clock.count
+            strength = 2 if self.variation.strength > 0.0 else 0
+        numbers = VehicleNumbers.of(self.lateral_root.shape[1], self.speed.count, clock, strength)
         freeze(self, numbers=numbers)
+
+    @property
+    def driver_gaps(self) -> slice:
+        """The numbers of its driver's gaps, which are not explained by those it reacts to."""
+        clock = self.numbers.clock
+        count = 0 if self.variation is None else len(self.variation.clock.gaps)
+        return slice(clock.stop - count, clock.stop)
 
     @property
     def span(self) -> Floats:
@@ -89,6 +99,7 @@ class VehicleModel:
         numbers, variation = self.numbers, self.variation
         deviation = (scale.lateral * z[:, numbers.lateral]) @ self.lateral_root.T
         clock, vehicles, faster = shared, [self.vehicle] * len(z), np.zeros((len(z), 2))
+        log_strength = None
         if variation is not None:
             clock = variation.clock.sample(
                 z[:, numbers.clock], scale.vehicle_clock, shared, nominal
@@ -97,6 +108,8 @@ class VehicleModel:
             deviation = deviation + scale.lateral * place
             change = variation.end_speed_change(z[:, numbers.end_speeds], self.speed.mean[[0, -1]])
             faster = scale.longitudinal * change
+            if variation.strength > 0.0:
+                log_strength = variation.log_strength(z[:, numbers.strength])
             if scale.lateral == 1.0:
                 vehicles = variation.resized(z[:, numbers.size], self.vehicle)
         paths = self.path.displaced(soft_clipped(deviation, self.room))
@@ -111,6 +124,7 @@ class VehicleModel:
             pace[:, clock.nearest(self.speed.time)],
             end_pace,
             faster,
+            log_strength,
         )
         spline = self.speed.spline
         speeds = SpeedSamples(

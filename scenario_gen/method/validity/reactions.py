@@ -92,8 +92,7 @@ def _yielding_fault(
     other = scenario.vehicles[edge.whom].id
     clears, enters = passing(scenario, conflict, merges=edge.merges)
     gap = enters - clears
-    low = min(edge.gap, max((1.0 - limits.gap_share) * edge.gap - limits.anticipation, 0.0))
-    high = (1.0 + limits.gap_share) * max(edge.gap, 0.0) + limits.patience
+    low, high = allowed_gap(edge, limits)
     message = ""
     if not low - _EVENT_ROUNDING_S <= gap <= high:
         message = (
@@ -109,6 +108,12 @@ def _yielding_fault(
                 f"at most {max_lead:.2f} s allowed"
             )
     return message, enters
+
+
+def allowed_gap(edge: Reaction, limits: Limits) -> tuple[float, float]:
+    """Return the least and the greatest gap [s] of a yielder behind the other vehicle."""
+    low = min(edge.gap, max((1.0 - limits.gap_share) * edge.gap - limits.anticipation, 0.0))
+    return low, (1.0 + limits.gap_share) * max(edge.gap, 0.0) + limits.patience
 
 
 def tailgaters(

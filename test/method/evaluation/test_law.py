@@ -8,11 +8,12 @@ import json
 
 import numpy as np
 import pytest
+from support.reaction_scenes import answering, lane_encounter, wander
 from support.textbook_motions import labelled
 
 from scenario_gen import generate, PipelineConfig
 from scenario_gen.cli.folder import FolderRequest, generate_all
-from scenario_gen.method.evaluation.encounter_features import FEATURES, features_of
+from scenario_gen.method.evaluation.encounter_features import FEATURES, features_of, JOINT_FEATURES
 from scenario_gen.method.evaluation.law import Law, measures_in, SHIPPED
 from scenario_gen.method.sampling import (
     checker_of,
@@ -29,6 +30,7 @@ from scenario_gen.types import (
 )
 
 POPULATION = PipelineConfig(sampling=SamplingConfig(variety="population"))
+NAMES = FEATURES + JOINT_FEATURES
 APPROACH = FEATURES.index("approach")
 KIND = "crossing, rolls"
 
@@ -61,7 +63,7 @@ def sets(encounters):
 
 def test_the_shipped_law_is_one_of_these_features_names_its_source_and_has_no_rows():
     document = json.loads(SHIPPED.read_text())
-    assert "public domain" in document["source"] and tuple(document["features"]) == FEATURES
+    assert "public domain" in document["source"] and tuple(document["features"]) == NAMES
     for law in document["kinds"].values():
         assert (
             set(law) == {"encounters", "mean", "covariance"}
@@ -72,14 +74,29 @@ def test_the_shipped_law_is_one_of_these_features_names_its_source_and_has_no_ro
 def test_few_encounters_hardly_move_the_shipped_law_and_many_make_it_theirs():
     shipped = json.loads(SHIPPED.read_text())["kinds"]["following"]["mean"]
     rng = np.random.default_rng(4)
-    centre, spread = np.array(shipped) + 3.0, np.linspace(0.5, 2.0, len(FEATURES))
-    seen = centre + spread * rng.standard_normal((4000, len(FEATURES)))
+    centre, spread = np.array(shipped) + 3.0, np.linspace(0.5, 2.0, len(NAMES))
+    seen = centre + spread * rng.standard_normal((4000, len(NAMES)))
     none, few, many = (Law.of("following", list(seen[:n])) for n in (0, 1, 4000))
     np.testing.assert_allclose(none.mean, shipped)
     assert np.abs(few.mean - shipped).max() < np.abs(few.mean - seen[0]).max()
     np.testing.assert_allclose(many.mean, centre, atol=0.1)
     distances = np.array([many.distance(row) for row in seen])
     assert abs(np.square(distances).mean() - 1.0) < 0.05
+
+
+def test_the_joint_features_know_who_answers_the_other():
+    rng = np.random.default_rng(3)
+    leader, stranger = wander(rng, 200), wander(rng, 200)
+
+    def joint(follower):
+        joint = features_of(lane_encounter(leader, follower), "", 0).joint
+        return dict(zip(JOINT_FEATURES, joint, strict=True))
+
+    answers, ignores = joint(answering(leader, 0.5, 1.0)), joint(stranger)
+    assert answers["correlation of speeds"] > 0.5 > ignores["correlation of speeds"]
+    braking = np.gradient(leader, 0.1)[np.gradient(leader, 0.1) < -0.4].mean()
+    name = "answer of the second"
+    assert answers[name] < 0.4 * braking < ignores[name]
 
 
 def test_what_no_recorded_driver_does_is_rarer_and_others_that_do_it_make_it_usual(encounters):
@@ -137,7 +154,7 @@ def test_scenarios_say_their_rarity_and_the_others_are_counted(sets):
     rarities = np.array([scenario.facts.rarity for scenario in population])
     assert len(population) == 40 and population.refused[Cause.UNUSUAL] > 0
     (note,) = (note for note in population.adaptations if note.kind is NoteKind.UNUSUAL)
-    assert 1.0 < rarities.max() <= round(note.values["rarity"], 3)
+    assert 1.0 < rarities.max() <= note.values["rarity"] + 1e-9
     assert not wide.refused[Cause.UNUSUAL] and wide[0].facts.rarity is None
 
 

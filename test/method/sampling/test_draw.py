@@ -14,6 +14,7 @@ from scenario_gen.base.errors import InputError
 from scenario_gen.base.road_users import Dynamics, TypeLimits
 from scenario_gen.method.sampling import Callbacks, draw_scenarios, regenerate, SamplingConfig
 from scenario_gen.method.sampling.build_model import build_model
+from scenario_gen.method.sampling.filters import ValidityFilter
 from scenario_gen.method.sampling.sampler import LEVEL_CANDIDATES
 from scenario_gen.method.sampling.vehicle_model import NoiseScale
 from scenario_gen.method.validity import Checker
@@ -60,6 +61,20 @@ def test_grid_and_duration(fifty):
         config=SamplingConfig(variety="narrow", fixed_duration=True, bend_acceleration=5.0)
     )
     assert {s.time[-1] for s in fixed.scenarios} == {20.0}
+
+
+def test_scenarios_in_which_a_vehicle_hardly_drives_are_refused(fifty):
+    scenario = fifty.scenarios[0]
+    distances = np.array([30.0, 30.0, 0.0])
+    validity = ValidityFilter(all_valid, 0, 0.1, {}, distances, 5.0)
+    halted = replace(scenario, speed=scenario.speed * [[1.0], [0.1], [1.0]])
+    brief = replace(
+        scenario,
+        time=0.2 * scenario.time,
+        speed=5.0 * scenario.speed,
+        acceleration=25.0 * scenario.acceleration,
+    )
+    assert validity([scenario, halted, brief]) == [None, Cause.TOO_SHORT, Cause.TOO_SHORT]
 
 
 def test_asked_states(fifty):

@@ -23,15 +23,16 @@ EDGE = Reaction(FOLLOW, 1, 0, 1.0, 0.8, 0.5, 1.0, 2.0, 18.0, (1.0, 1.5, 2.0))
 @pytest.fixture(scope="module")
 def model():
     """Vehicle 1 follows vehicle 0; all that preset `wide` varies is free."""
-    plan = scene_plan()
-    states = relaxed_states(plan.requested, plan.situation, SamplingConfig(), Request())
-    built = build_model(replace(plan, requested=states), SamplingConfig()).model
+    plan, config = scene_plan(), SamplingConfig(strength_sigma=0.4)
+    states = relaxed_states(plan.requested, plan.situation, config, Request())
+    built = build_model(replace(plan, requested=states), config).model
     return CandidateModel(built.vehicles, built.warp, ReactionGraph((EDGE,), (0, 1, 2)))
 
 
 def test_the_slices_are_consecutive_and_complete():
     vehicle = VehicleNumbers.of(3, 5, 2)
-    assert [part.stop - part.start for part in vehicle] == [3, 5, 2, 1, 2, 1]
+    assert [part.stop - part.start for part in vehicle] == [3, 5, 2, 1, 2, 1, 0]
+    assert VehicleNumbers.of(3, 5, 2, 2).strength == slice(14, 16)
     assert [part.start for part in vehicle[1:]] == [part.stop for part in vehicle[:-1]]
     assert vehicle.total == 14 and VehicleNumbers.of(3, 5, None).total == 8
     whole = ModelNumbers.of(4, [vehicle, vehicle], 2)
@@ -51,7 +52,8 @@ def test_each_slice_moves_what_it_is_named_after(model, name):
         "speed": np.ptp(samples.speeds.coefficients, axis=0).max() > 1e-6,
         "size": samples.vehicles[0] != samples.vehicles[1],
     }
-    expected = {"lateral": "path", "place": "path", "end_speeds": "speed"}.get(name, name)
+    names = {"lateral": "path", "place": "path", "end_speeds": "speed", "strength": "speed"}
+    expected = names.get(name, name)
     assert moved[expected] and not any(
         value for key, value in moved.items() if key not in (expected, "speed")
     )
@@ -65,7 +67,8 @@ def test_reactions_read_the_slices_that_move_time_and_place(model):
     numbers = vehicle.numbers
     everything = np.arange(numbers.total)
     assert set(time) == set(everything[numbers.clock])
-    assert set(place) <= set(everything[numbers.speed]) | set(everything[numbers.end_speeds])
+    moving = (numbers.speed, numbers.end_speeds, numbers.strength)
+    assert set(place) <= set(np.concatenate([everything[part] for part in moving]))
     assert set(place) & set(everything[numbers.end_speeds])
 
 

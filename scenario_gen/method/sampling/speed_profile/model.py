@@ -22,6 +22,7 @@ from scipy import linalg, ndimage
 from scenario_gen.method.sampling.gp import covariance_root, principal
 from scenario_gen.method.sampling.speed_profile.mean import fixed_coefficients, MeanSpeed
 from scenario_gen.method.sampling.speed_profile.spline import SpeedSpline
+from scenario_gen.method.sampling.speed_profile.strength import Strength
 from scenario_gen.numerics import Bools, Floats, runs
 
 _DAQP_SOFT_CODE = 8  # of a constraint that may be violated at a price
@@ -40,6 +41,8 @@ class _Process:
         length_smoothing: s over which a change of the length is spread.
         jerk_room: a sample's largest jerk over the mean's bound.
         stand_overlap: coefficients of a stand to which a neighbouring deviation is tied.
+        end: s before the end of the recording in which samples brake no harder than it does.
+        gentle: m/s² of braking that are nothing there.
         near_sigmas: standard deviations from a bound within which it is checked.
         tolerance: by which a bound may be exceeded.
     """
@@ -52,6 +55,8 @@ class _Process:
     length_smoothing: float = 1.5
     jerk_room: float = 1.05
     stand_overlap: int = 2
+    end: float = 4.0
+    gentle: float = 0.6
     near_sigmas: float = 6.0
     tolerance: float = 1e-6
 
@@ -68,6 +73,7 @@ class SpeedModel:
         mean: (n,) coefficients [m/s] of the mean speed, which drives the length of the route.
         longer: (n,) effect of each further metre.
         faster: (n, 2) effect of each further m/s at the start, and at the end: no length.
+        strength: effect of a driver who brakes and accelerates more strongly.
         factor: (n, r) square root of the covariance.
         rows: (b, n) of the bounded values: coefficients, accelerations, jerks.
         low, high: (b,) their bounds.
@@ -79,6 +85,7 @@ class SpeedModel:
     mean: Floats
     longer: Floats
     faster: Floats
+    strength: Strength
     factor: Floats
     rows: Floats
     low: Floats
@@ -107,6 +114,7 @@ class SpeedModel:
             length: seconds over which that varies.
         """
         longer, faster = _spread_length(spline)
+        strength = Strength.of(spline, mean.coefficients, longer)
         process = _process(spline, speed_residual(spline, mean, time, speed), sigma, length)
         factor = _conditioned(spline, process)
         free, m = ~fixed_coefficients(spline, (0.0, 0.0))[0], len(spline.stations)
@@ -118,13 +126,15 @@ class SpeedModel:
         order = np.repeat([1.0, 2.0, 3.0], [int(free.sum()), m, m])
         at = np.concatenate([spline.middle[free], spline.stations, spline.stations])
 
+        low = _gentle_end(low, order, at, rows @ mean.coefficients)
         driven = rows @ mean.coefficients  # the mean itself is always within bounds
         room = np.where(order == 3.0, _PROCESS.jerk_room, 1.0)
         low, high = np.minimum(room * low, driven), np.maximum(room * high, driven)
         reach = _PROCESS.near_sigmas * np.sqrt(np.square(rows @ factor).sum(axis=1))
+        reach += np.abs(strength.change @ rows.T).max(axis=1).sum(axis=0)
         near = (driven - low < reach) | (high - driven < reach)
         bounded = (rows[near], low[near], high[near], order[near], at[near])
-        return cls(spline, mean.coefficients, longer, faster, factor, *bounded)
+        return cls(spline, mean.coefficients, longer, faster, strength, factor, *bounded)
 
     @property
     def count(self) -> int:
@@ -137,7 +147,13 @@ class SpeedModel:
         return self.rows @ self.factor
 
     def draw(
-        self, z: Floats, longer: Floats, pace: Floats, ends: Floats, faster: Floats
+        self,
+        z: Floats,
+        longer: Floats,
+        pace: Floats,
+        ends: Floats,
+        faster: Floats,
+        log_strength: Floats | None = None,
     ) -> tuple[Floats, Bools]:
         """Return coefficients (S, n) [m/s], and whether they meet all conditions (S,).
 
@@ -149,13 +165,18 @@ class SpeedModel:
             ends: (S, 2) the same at the ends, where the speed of the vehicle is given rather than
                 that on the template's clock.
             faster: (S, 2) m/s by which the vehicle is faster at the ends.
+            log_strength: (S, 2) logarithms of the strength of braking and of acceleration; None:
+                as in the mean.
         """
-        base = self.mean + longer[:, None] * self.longer
+        base, jerk = self.mean + longer[:, None] * self.longer, np.ones(len(z))
+        if log_strength is not None:
+            base = base + self.strength.changes(log_strength)
+            jerk = np.exp(np.maximum(2.0 * log_strength.max(axis=1), 0.0))
         base = base + ((ends - 1.0) * self.mean[[0, -1]] + faster) @ self.faster.T
         coefficients = base + z @ self.factor.T
         feasible = np.ones(len(z), dtype=np.bool_)
         if len(self.rows):
-            cubed = pace * pace * pace
+            cubed = pace * pace * pace * jerk[:, None]
             scale = np.select([self.order == 1.0, self.order == 2.0], [pace, pace * pace], cubed)
             low, high = self.low * scale, self.high * scale
             values, tolerance = coefficients @ self.rows.T, _PROCESS.tolerance
@@ -173,6 +194,22 @@ class SpeedModel:
         sense = np.where(self.order < 3.0, 0, _DAQP_SOFT_CODE).astype(np.intc)
         x, _, flag, _ = daqp.solve(np.eye(self.count), -z, self.bounded, high, low, sense)
         return np.asarray(x) if flag > 0 else None
+
+
+def _gentle_end(low: Floats, order: Floats, at: Floats, driven: Floats) -> Floats:
+    """Return lower bounds (b,) with which samples brake no harder at the end than the mean.
+
+    What follows the end of a recording is not known, so nothing explains harder braking there.
+
+    Args:
+        low: (b,) lower bounds.
+        order: (b,) 2 for accelerations.
+        at: (b,) seconds of each row.
+        driven: (b,) values of the mean.
+    """
+    at_end = (order == 2.0) & (at > at.max() - _PROCESS.end)
+    gentle = min(float(driven[at_end].min(initial=0.0)), -_PROCESS.gentle)
+    return np.where(at_end, np.maximum(low, gentle), low)
 
 
 def _spread_length(spline: SpeedSpline) -> tuple[Floats, Floats]:

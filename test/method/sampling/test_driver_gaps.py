@@ -1,0 +1,96 @@
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""Drivers differ: other gaps and headways within what the certificate allows."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from support.reaction_scenes import answering, crossing, lane_encounter, wander
+
+from scenario_gen.method.chain import Chain
+from scenario_gen.method.evaluation.measures import figures_of
+from scenario_gen.method.sampling import Plan, regenerate, SamplingConfig
+from scenario_gen.method.sampling.driver_gaps import DriverGap
+from scenario_gen.method.segmentation import segment
+from scenario_gen.method.validity import allowed_gap
+from scenario_gen.pipeline import PipelineConfig
+from scenario_gen.roads import build_road
+from scenario_gen.situation import conflict_of, lane_gaps, passing, Situation, time_gaps
+from scenario_gen.types import Request
+
+LEADER = wander(np.random.default_rng(3), 200)
+LANE = lane_encounter(LEADER, answering(LEADER, 1.2, 0.9))
+CROSSING = crossing(8.0)
+COUNT = 60
+
+
+def chain(encounter, **parameters):
+    config = replace(PipelineConfig(), sampling=SamplingConfig(**parameters))
+    segmentation = segment(encounter, config.segmentation, 1)
+    road = build_road("corridor", encounter, config.road)
+    return Chain(Situation.of(encounter), segmentation, road, config, count=COUNT, seed=1)
+
+
+def gaps_behind(result, edge):
+    """Seconds from the first vehicle's clearing to the second one's entry, in each scenario."""
+    gaps = []
+    for scenario in result:
+        conflict = conflict_of(scenario, edge.who, edge.whom)
+        assert conflict.second == edge.who
+        clears, enters = passing(scenario, conflict, merges=edge.merges)
+        gaps.append(enters - clears)
+    return np.array(gaps)
+
+
+def test_half_of_the_drivers_are_nearer_and_all_are_within_the_bounds():
+    z = np.random.default_rng(0).standard_normal(20_000)
+    nobody = np.zeros(2)
+    free = DriverGap(nobody, nobody, 1.0, 0.0, -4.0, 4.0).delay(z)
+    assert (np.median(free), free.std()) == (
+        pytest.approx(0.0, abs=0.02),
+        pytest.approx(1.0, 0.02),
+    )
+    bounded = DriverGap(nobody, nobody, 1.0, 0.0, -0.5, 2.0).delay(z)
+    assert -0.5 <= bounded.min() < -0.49 and 1.9 < bounded.max() <= 2.0
+    assert np.median(bounded) == pytest.approx(0.0, abs=0.02)
+    follower = DriverGap(nobody, nobody, 0.3, 2.0, -1.0, 1.0).delay(z)
+    assert follower.min() >= 2.0 * (np.exp(-0.3) - 1.0) and follower.max() <= 2.0 * np.expm1(0.3)
+    assert DriverGap(nobody, nobody, 1.0, 0.0, 0.0, 0.0).delay(z) == pytest.approx(0.0)
+
+
+def test_other_drivers_accept_other_gaps_within_the_certificate():
+    (edge,) = Situation.of(CROSSING).reactions.edges
+    recorded = gaps_behind(chain(CROSSING).run(), edge)
+    other = chain(CROSSING, gap_sigma=1.0)
+    gaps = gaps_behind(other.run(), edge)
+    assert gaps.std() > 1.3 * recorded.std()
+    assert np.median(gaps) == pytest.approx(np.median(recorded), abs=0.4)
+    least, most = allowed_gap(edge, other.config.limits)
+    assert least - 0.15 <= gaps.min() and gaps.max() <= most + 0.05
+
+
+def test_other_drivers_keep_other_headways():
+    (edge,) = Situation.of(LANE).reactions.edges
+
+    def headways(**parameters):
+        result = chain(LANE, **parameters).run()
+        return np.array(
+            [np.median(time_gaps(lane_gaps(each), edge.who, edge.whom)) for each in result]
+        )
+
+    recorded, other = headways(), headways(headway_sigma=0.3)
+    assert other.std() > 1.5 * recorded.std()
+    assert np.median(other) == pytest.approx(np.median(recorded), rel=0.1)
+
+
+def test_a_scenario_of_another_driver_is_found_again_by_its_index():
+    drawn = chain(CROSSING, gap_sigma=1.0, strength_sigma=0.4)
+    planned = drawn.plan()
+    scenario = drawn.sample(planned).generated.scenarios[7]
+    config = drawn.config
+    plan = Plan.of(planned, config.sampling, config.limits, Request(), None, drawn.situation)
+    again = regenerate(plan, config.sampling, seed=1, index=scenario.index)
+    assert again.position == pytest.approx(scenario.position, abs=1e-9)
+    assert figures_of(again)[0].pet == pytest.approx(figures_of(scenario)[0].pet)
