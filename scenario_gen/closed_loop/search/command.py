@@ -23,11 +23,12 @@ from scenario_gen.base.parameters import assigned, flatten
 from scenario_gen.base.provenance import parameter_texts, versions
 from scenario_gen.closed_loop.config import ClosedLoopConfig
 from scenario_gen.closed_loop.results import as_junit, drawings, JUNIT
-from scenario_gen.closed_loop.search.estimate import Estimate, Search, SETTINGS
+from scenario_gen.closed_loop.search.estimate import Estimate, Search
 from scenario_gen.closed_loop.search.findings import Finding, findings_of
 from scenario_gen.closed_loop.search.journal import open_journal
 from scenario_gen.closed_loop.search.objective import AT_FAULT, COLLISION, Objective
 from scenario_gen.closed_loop.search.problem import DrivenScenarios
+from scenario_gen.closed_loop.search.settings import SETTINGS
 from scenario_gen.closed_loop.trials import find_planner, named_vehicle, Rate, trial_runner
 from scenario_gen.method.evaluation import measures_in, wilson
 from scenario_gen.method.sampling import checker_of, NaturalScenarios, Plan, SamplingConfig

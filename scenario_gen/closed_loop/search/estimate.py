@@ -26,76 +26,15 @@ import math
 from typing import Any, NamedTuple
 
 import numpy as np
-from scipy import optimize, special
+from scipy import special
 
+from scenario_gen.closed_loop.search.rate import Batch, rate_of, rate_without_hits
 from scenario_gen.closed_loop.search.response import Problem, Response
+from scenario_gen.closed_loop.search.settings import SETTINGS
 from scenario_gen.closed_loop.search.surrogate import Surrogate
 from scenario_gen.method.evaluation import wilson
 from scenario_gen.numerics import Floats
 from scenario_gen.types import Interval
-
-
-@dataclass(frozen=True)
-class SearchSettings:
-    """Constants of a search; they change its cost, but not the validity of its intervals.
-
-    Attributes:
-        confidence: of all intervals.
-        explored_share: share of the drives that explore.
-        min_population: drives of one level of an exploration.
-        max_population: bound of its growth.
-        drives_per_member: a level grows by one drive for this number of drives so far.
-        members_per_seed: the best of this number of drives start the chains of the next level.
-        moves: candidates of one step of a chain, of which one is driven.
-        max_levels: of one exploration.
-        first_explored: drives of the first exploration, after which it is cut; later ones are cut
-            when they have used `explored_share` of all drives.
-        first_step: standard deviation of the noise of the first moves, in that of a candidate.
-        accepted_share: of the moves, to which the step is adapted.
-        batch: natural candidates that are drawn at once.
-        refit_ratio: growth of the number of drives that asks for a new regression.
-        even_share: share of the drives of a batch that are chosen evenly, until a drive fails.
-        min_even_probability: lower bound of the probability that each scenario of a batch is
-            driven.
-        max_even_probability: its upper bound while failures are rare and expected.
-        prior_surprises: unexpected failures that are assumed before the first drive.
-        prior_precision: share of failures among the drives near to failure, assumed likewise.
-        frequent_ratio: if failures are more frequent than `max_even_probability`, this multiple of
-            their rate is driven: they need no choice.
-        extra_even_ratio: weight of the hit that the upper end of an interval allows for, over that
-            of an evenly chosen drive. With 0, 90 % of the intervals of 300 drives hold the rate of
-            a planner that fails in two opposite regions; with 0.4, 95 %.
-        extra_rate_ratio: bound of that weight over the rate: rare failures that are all foreseen
-            keep narrow intervals.
-        error_factor: on the error of the regression; a larger one means more drives and smaller
-            weights.
-    """
-
-    confidence: float = 0.95
-    explored_share: float = 0.2
-    min_population: int = 24
-    max_population: int = 96
-    drives_per_member: int = 25
-    members_per_seed: int = 4
-    moves: int = 24
-    max_levels: int = 12
-    first_explored: int = 110
-    first_step: float = 0.5
-    accepted_share: float = 0.4
-    batch: int = 256
-    refit_ratio: float = 1.1
-    even_share: float = 0.95
-    min_even_probability: float = 0.005
-    max_even_probability: float = 0.1
-    prior_surprises: float = 0.02
-    prior_precision: float = 0.5
-    frequent_ratio: float = 1.5
-    extra_even_ratio: float = 0.4
-    extra_rate_ratio: float = 0.7
-    error_factor: float = 3.0
-
-
-SETTINGS = SearchSettings()
 
 
 @dataclass(frozen=True, eq=False)
@@ -132,20 +71,6 @@ class Estimate:
 
 class _SpentError(Exception):
     """The budget is spent."""
-
-
-class _Batch(NamedTuple):
-    """A batch of natural scenarios, or the share of it that was driven.
-
-    Attributes:
-        scenarios: number of certified scenarios.
-        least: least probability that one is driven.
-        expected: number of drives that was expected before it was drawn.
-    """
-
-    scenarios: float
-    least: float
-    expected: float
 
 
 class _Drawn(NamedTuple):
@@ -186,7 +111,7 @@ class Search:
     # latter that were chosen evenly, because no failure was expected.
     _natural: list[int] = field(default_factory=list)
     _even: list[int] = field(default_factory=list)
-    _batches: list[_Batch] = field(default_factory=list)
+    _batches: list[Batch] = field(default_factory=list)
     _batch_of: dict[int, int] = field(default_factory=dict)
     _batch_count: int = 0
     _nearness: Floats = field(default_factory=lambda: np.zeros(1))  # (S,) of the last batch
@@ -390,7 +315,7 @@ class Search:
         driven = self._drive([drawn[place] for place in chosen])
         share = len(driven) / len(chosen) if len(chosen) else 1.0
         if share > 0.0:
-            self._batches.append(_Batch(share * len(drawn), least, share * float(expected)))
+            self._batches.append(Batch(share * len(drawn), least, share * float(expected)))
         for place, k in zip(chosen, driven, strict=False):
             self._batch_of[k] = len(self._batches) - 1
             self.weights[k] = float(1.0 / probability[place])
@@ -483,59 +408,15 @@ class Search:
     def _rate(self, hits: Sequence[int], *, also_natural: bool) -> Interval:
         """Return the rate of some drives over the batches, with its interval.
 
-        That is the gamma interval of a sum of weights (Fay & Feuer 1997). Its upper end allows for
-        one more hit, which has at least the weight of `extra_even_ratio` evenly chosen drives, or
-        `extra_rate_ratio` of the rate if that is less.
-
         Args:
             hits: drives that have a weight.
             also_natural: the natural drives of the exploration have no hit, either.
         """
         if not hits:
-            return self._rate_without_hits(also_natural=also_natural)
-        expected = sum(batch.expected for batch in self._batches)
-        weights = np.array([self.weights[k] / self._batch(k).scenarios for k in hits])
-        weights *= np.array([self._batch(k).expected for k in hits]) / expected
-        even = sum(batch.scenarios * batch.least for batch in self._batches)
-        half_confidence = 0.5 * SETTINGS.confidence
-        rate = float(weights.sum())
-        variance = float(weights @ weights)
-        largest = max(
-            float(weights.max()),
-            min(SETTINGS.extra_even_ratio / even, SETTINGS.extra_rate_ratio * rate),
-        )
-        low = _gamma_quantile(rate, variance, 0.5 - half_confidence)
-        upper_variance = variance + largest * largest
-        high = _gamma_quantile(rate + largest, upper_variance, 0.5 + half_confidence)
-        return Interval(min(rate, 1.0), min(low, 1.0), min(high, 1.0))
-
-    def _batch(self, k: int) -> _Batch:
-        """Return the batch of a drive."""
-        return self._batches[self._batch_of[k]]
-
-    def _rate_without_hits(self, *, also_natural: bool) -> Interval:
-        """Return the interval of a rate of 0.
-
-        Its upper end is the rate at which no hit has a probability of 2.5 %. In a batch each of n
-        scenarios is driven with a probability of e at least, which is fixed before they are drawn.
-        So that probability is Π (1 - rate · e)^n at most, over the batches.
-        """
-        natural = _Batch(len(self._natural) * also_natural, 1.0, 0.0)
-        count, probability, _ = np.array([*self._batches, natural]).T
-        log_tail = math.log(0.5 - 0.5 * SETTINGS.confidence)
-
-        def excess(rate: float) -> float:
-            return float(count @ np.log1p(-rate * probability) - log_tail)
-
-        largest = 1.0 - 1e-12
-        if excess(largest) > 0.0:
-            return Interval(0.0, 0.0, 1.0)
-        return Interval(0.0, 0.0, float(optimize.brentq(excess, 0.0, largest)))
-
-
-def _gamma_quantile(mean: float, variance: float, share: float) -> float:
-    """Return the quantile at a share of the gamma distribution with a mean and a variance."""
-    return float(special.gammaincinv(mean * mean / variance, share)) * variance / mean
+            natural_count = len(self._natural) if also_natural else 0
+            return rate_without_hits(self._batches, natural_count)
+        weights = np.array([self.weights[k] for k in hits])
+        return rate_of(self._batches, weights, [self._batch_of[k] for k in hits])
 
 
 @dataclass(frozen=True, eq=False)

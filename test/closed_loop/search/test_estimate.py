@@ -10,8 +10,9 @@ import pytest
 from scipy.stats import norm
 from support.lengths import LONG
 
-from scenario_gen.closed_loop.search.estimate import Search, SETTINGS
+from scenario_gen.closed_loop.search.estimate import Search
 from scenario_gen.closed_loop.search.response import Response
+from scenario_gen.closed_loop.search.settings import SETTINGS
 
 DIMENSIONS = 24
 SEEDS = 20 if LONG else 6
