@@ -27,8 +27,8 @@ class DriverModel(NamedTuple):
         min_moving_speed_mps: a certified speed below it counts as standing, and the rate is 1.
         min_gap_reduction_m: a driver brakes for a vehicle ahead only if the gap is smaller than
             the certified one by this.
-        comfortable_jerk_mps3: largest jerk where comfortable braking suffices; it rises to the
-            largest one of all where twice as much is needed.
+        comfortable_jerk_mps3: largest jerk where comfortable braking suffices; it rises to that of
+            an emergency where three times as much is needed.
         foot_time_s: mean delay of braking while the foot moves.
         braking_margin_ratio: of the braking of a driver, to the braking that just suffices.
         clock_tolerance_s: uncertainty of a clock.
@@ -283,7 +283,7 @@ def drive_step(
     free = _free_acceleration(world, parameters.acceleration[i], driver, pose, target)
     jerk = parameters.jerk
     if not world.walks[i]:
-        urgency = min(max(-bound / comfortable - 1.0, 0.0), 1.0)
+        urgency = min(max(-0.5 * (bound / comfortable + 1.0), 0.0), 1.0)
         calm = min(jerk, MODEL.comfortable_jerk_mps3)
         jerk = calm + urgency * (jerk - calm)
     gain = min(max(free, -comfortable), bound, driver.acceleration + jerk * h)

@@ -215,6 +215,57 @@ class Pushes:
         return Command(min(2.0 * (self.speed - seen.ego.speed), 3.0), 0.0)
 
 
+@pytest.mark.parametrize("policy", ["reactive", "committed"])
+@pytest.mark.parametrize("braking", [1.0, 2.0, 4.0])
+def test_nobody_enters_before_an_ego_that_has_priority_and_comes_late(policy, braking):
+    """The ego brakes for 1 s, then keeps its speed, and reaches the crossing 0.4 to 3.6 s late."""
+    for start in (-45.0, -50.0, -60.0):
+        loop = ClosedLoop(crossing(second_start=start), 0, config=ClosedLoopConfig(policy=policy))
+        drive = states(loop, lambda k: Command(-braking * (5 <= k < 15), 0.0), 140)
+        passed = next(state for state in drive if state.ego.x > 4.0)
+        assert not any(loop.hit(state) for state in drive) and passed.vehicles[1, 1] < 0.0
+        assert drive[-1].vehicles[1, 1] > 5.0
+
+
+def test_who_lets_the_ego_pass_goes_before_an_ego_that_would_come_much_later():
+    """The ego goes on at 2 m/s from 20 m before the crossing on, which takes it 8 s more."""
+    loop = ClosedLoop(crossing(second_start=-45.0), 0, config=ClosedLoopConfig(patience=NEVER))
+    drive = states(loop, lambda k: Pose(min(0.8 * k, 8.0 + 0.2 * k) - 30.0, 0.0, 0.0, 2.0), 90)
+    assert not any(loop.hit(state) for state in drive)
+    assert drive[-1].vehicles[1, 1] > 5.0 and drive[-1].ego.x < -3.0
+
+
+def test_who_comes_shortly_behind_the_ego_hurries_with_an_early_one():
+    loop = ClosedLoop(crossing(second_start=-50.0), 0)
+    early = states(loop, lambda k: Command(2.0 * (k < 20), 0.0), 80)
+    assert early[-1].clock[0] > 10.0 and early[-1].clock[1] > 8.2
+    late = states(loop, lambda k: Command(-2.0 * (k < 20), 0.0), 80)
+    assert late[-1].clock[1] <= 8.0 + 1e-9
+
+
+def test_drivers_differ_and_keep_the_headway_that_the_scenario_shows():
+    traits = [ClosedLoop(draw_scenario(seed), 0).traits for seed in range(5)]
+    patience = np.concatenate([each.patience for each in traits])
+    assert len(set(patience)) == len(patience) and np.ptp(patience) > 1.0
+    loop = ClosedLoop(following(10.0, 25.0, 3), 2)
+    gap = -np.diff(loop.world.motion[:, 0, 0])[::-1] * -1.0 - 4.5
+    assert loop.traits.headway[:2] == pytest.approx((gap[::-1] - 2.0) / 10.0, abs=0.1)
+
+
+@pytest.mark.parametrize("braking", [0.5, 1.0, 2.0])
+def test_a_follower_brakes_comfortably_for_an_ego_that_does(braking):
+    """It ends as near behind the slower ego as its own time gap."""
+    loop = ClosedLoop(following(15.0, 30.0), 1)
+    drive = states(
+        loop, lambda k: Command(-braking * (10 <= k < 10 + 50 / (10 * braking)), 0.0), 140
+    )
+    speed = np.array([state.vehicles[0, 3] for state in drive])
+    acceleration = np.diff(speed) / 0.1
+    assert acceleration.min() > -3.1 and np.abs(np.diff(acceleration)).max() / 0.1 < 4.1
+    gap = drive[-1].vehicles[1, 0] - drive[-1].vehicles[0, 0] - 4.25
+    assert gap / speed[-1] == pytest.approx(2.0, abs=0.3)
+
+
 def test_who_stands_at_its_end_has_no_speed():
     time = 0.1 * np.arange(60)
     zero, slow = np.zeros_like(time), np.full_like(time, 0.4)
