@@ -35,7 +35,7 @@ class CheckLimits:
         copy_lengths_ratio: farthest distance of two positions on one vehicle, over its length.
     """
 
-    moved_m: float = 4.0
+    moved_m: float = 5.0
     moved_noise_factor: float = 6.0
     min_stretch_s: float = 1.0
     min_stretch_count: int = 4

@@ -24,9 +24,10 @@ _SAME_RATIO = 0.03  # tolerance of a ratio of speeds
 _EQUAL_RATIO = 0.005  # of frame rates that no data tells apart
 _WRONG_RATIO = 1.2  # a ratio of speeds, or its inverse, that no sensor error explains
 _SPREAD_RATIO = 1.3  # the ratio of most legs is within this factor of the median
-_SAME_SPEED_RATIO = 1.08  # of legs whose speeds fit the positions
-_SWAPPED_SHARE = 0.95  # of the legs fit with swapped columns
-_MIN_GAIN_SHARE = 0.05  # of the legs that fit only so
+_SAME_SPEED_RATIO = 1.1  # of legs whose speeds fit the positions
+_SWAP_STRETCH_RATIO = 0.1  # logarithm of a change of length that shows the order of columns
+_SWAPPED_SHARE = 0.75  # of those legs fit with swapped columns, and do not without
+_GROSS_RATIO = 2.0  # a ratio of speeds that noise does not explain
 _AGREEING_SHARE = 0.6  # of the legs have the median ratio
 _MIN_LEGS_COUNT = 10
 _MAX_SPEED_MPS = 70.0  # of road vehicles
@@ -252,7 +253,11 @@ def _find_speed_ratio(reading: Reading) -> None:
         cause = f"{fact}; they would fit with {named[0].text}"
         remedy = _option_of(reading, named[0])
     # The positions decide, so a wrong unit of speeds alone does no harm.
-    stops = bool(reading.log.columns) and not (named and named[0].quantities == ("speed",))
+    is_gross = _deviation(ratio) > _GROSS_RATIO or any(
+        explanation.quantities != ("speed",) for explanation in named
+    )
+    is_harmless = bool(named) and named[0].quantities == ("speed",)
+    stops = bool(reading.log.columns) and is_gross and not is_harmless
     reading.doubts.append(Doubt("", 0.0, 0.0, Quantity.SPEED, ratio, "", cause, remedy, stops))
 
 
@@ -287,18 +292,25 @@ def _deviation(ratio: float) -> float:
 
 
 def _is_swapped(legs: Legs) -> bool:
-    """Return whether speeds fit the positions of all legs only with swapped columns."""
+    """Return whether speeds fit the positions of all legs only with swapped columns.
+
+    Legs whose length depends on the order are compared with the others, in whatever unit the
+    speeds are.
+    """
     known = np.isfinite(legs.speed)
-    swapped = np.hypot(*legs.swapped[known].T) / legs.seconds[known]
-    by_swapped = legs.speed[known] / np.maximum(swapped, 1e-9)
-    share = _same_share(by_swapped)
-    return share >= _SWAPPED_SHARE and share >= _same_share(_ratios(legs)) + _MIN_GAIN_SHARE
+    swapped_rate = np.hypot(*legs.swapped[known].T) / legs.seconds[known]
+    stretch = np.log(np.maximum(swapped_rate, 1e-9) / legs.rate[known])
+    depends = np.abs(stretch - np.median(stretch)) > _SWAP_STRETCH_RATIO
+    if min(depends.sum(), (~depends).sum()) < _MIN_LEGS_COUNT / 2:
+        return False
 
+    def fitting_share(ratios: Floats) -> float:
+        deviation = np.abs(np.log(ratios[depends] / np.median(ratios[~depends])))
+        return float((deviation < np.log(_SAME_SPEED_RATIO)).mean())
 
-def _same_share(ratios: Floats) -> float:
-    """Return the share of ratios (K,) near their median."""
-    deviation = np.abs(np.log(ratios / np.median(ratios)))
-    return float((deviation < np.log(_SAME_SPEED_RATIO)).mean())
+    plain = fitting_share(legs.speed[known] / legs.rate[known])
+    swapped = fitting_share(legs.speed[known] / np.maximum(swapped_rate, 1e-9))
+    return swapped > _SWAPPED_SHARE and plain < 1.0 - _SWAPPED_SHARE
 
 
 def _explanations(
