@@ -105,7 +105,7 @@ def _inventory_of_folder(archive: Path) -> Inventory[Path]:
     """Return the contents of a folder, or what a file is."""
     if not archive.exists():
         raise InputError(f"{archive} does not exist")
-    if archive.is_file() or is_bag(archive):
+    if archive.is_file() or (is_bag(archive) and not _has_other_logs(archive)):
         return _inventory_of_file(archive)
     messages, rest = _split(_visible_files(archive), is_spmd)
     bags, rest = _split_bags(rest)
@@ -117,6 +117,13 @@ def _inventory_of_folder(archive: Path) -> Inventory[Path]:
         names = ", ".join(LOG_FORMATS.names())
         raise InputError(f"{archive} has no log in a known format ({names})")
     return Inventory(messages, logs, others)
+
+
+def _has_other_logs(folder: Path) -> bool:
+    """Whether a folder with files of bags has tables, too, and no metadata that makes it a bag."""
+    files = _visible_files(folder)
+    is_whole = any(path.name == "metadata.yaml" for path in files)
+    return not is_whole and any(is_table(path) for path in files)
 
 
 def _is_one_log(files: Sequence[Path], folder: Path) -> bool:

@@ -20,19 +20,19 @@ NAMES: dict[str, tuple[str, ...]] = {
         "scene": "case_id scenario_id scene scene_id run run_id run_index episode episode_id",
         "date": "date utc_date day",
         "time": "utc stamp unix gentime clock t time timestamp global_time epoch utc_time "
-        "gps_time time_of_day sim_time frame frame_id frame_number frame_no frame_idx",
+        "gps_time time_of_day sim_time timestep_time ts seconds frame frame_id frame_number frame_no frame_idx",
         "vehicle": "vehicle vehicle_id vehicle_name txdevice track_id id name agent_id object_id "
-        "car car_id veh veh_id trackid actor_id obj_id vehicleid objectid agent track",
+        "car car_id veh veh_id trackid actor_id obj_id agent track vid participant_id",
         "lat": "lat latitude gps_lat gps_latitude",
         "lon": "lon lng longitude long gps_lon gps_longitude",
         "x": "x e east easting pos_x position_x x_utm utm_x utm_e utm_east utm_easting xcenter "
-        "x_center center_x tx p_rs_r_x px",
+        "x_center center_x tx p_rs_r_x px vehicle_x world_x map_x",
         "y": "y n north northing pos_y position_y y_utm utm_y utm_n utm_north utm_northing "
-        "ycenter y_center center_y ty p_rs_r_y py",
+        "ycenter y_center center_y ty p_rs_r_y py vehicle_y world_y map_y",
         "speed": "speed v velocity vel vehicle_speed ground_speed speed_over_ground sog",
         "vx": "vx v_x velocity_x vel_x xvelocity x_velocity speed_x",
         "vy": "vy v_y velocity_y vel_y yvelocity y_velocity speed_y",
-        "heading": "heading yaw theta course bearing psi hdg cog course_over_ground",
+        "heading": "heading yaw theta course bearing psi hdg cog course_over_ground vehicle_angle",
         "length": "length len vehicle_length",
         "width": "width vehicle_width",
         "kind": "type kind class vehicle_type object_type agent_type actor_type obj_type category "
@@ -121,6 +121,7 @@ _CLOCKWISE_NAMES = (
     "bearing",
     "cog",
     "course_over_ground",
+    "vehicle_angle",
 )  # by convention degrees clockwise from north
 
 
@@ -163,12 +164,16 @@ def _preferred_name(quantity: str, by_name: Mapping[str, str]) -> str | None:
     """Return the column whose name is the preferred alias of a quantity, with or without unit."""
     suffixes = ("", *(f"_{unit}" for unit in UNITS[quantity]))
     candidates = [alias + suffix for alias in NAMES[quantity] for suffix in suffixes]
-    underscored = {name.replace(" ", "_"): raw for name, raw in by_name.items() if " " in name}
-    for names in (by_name, underscored):
-        for candidate in candidates:
-            if candidate in names:
-                return names[candidate]
-    return None
+    plain = {_letters(name): raw for name, raw in by_name.items() if len(name) > 2}
+    for candidate in candidates:
+        if candidate in by_name:
+            return by_name[candidate]
+    return next((plain[n] for n in map(_letters, candidates) if n in plain), None)
+
+
+def _letters(name: str) -> str:
+    """Return a name without separators: `Pos X`, `pos.x` and `PosX` are the same."""
+    return re.sub(r"[\W_]", "", name)
 
 
 def _requested(header: Sequence[str], path: Path, option: str) -> dict[str, Column | None]:

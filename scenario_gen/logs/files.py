@@ -7,11 +7,13 @@ from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
+from scenario_gen.bags.storage.files import files_of, METADATA
 from scenario_gen.base.errors import did_you_mean, guarded, InputError, reading
 from scenario_gen.base.stores import renamed, require_local
 from scenario_gen.logs.config import LogConfig
 from scenario_gen.logs.formats import (
     is_bag,
+    is_osi,
     is_table,
     is_trajectory,
     LOG_FORMATS,
@@ -78,6 +80,21 @@ def _check_exists(path: Path) -> None:
             f"{path} does not exist; check the name and the folder"
             f"{did_you_mean(path.name, neighbours)}"
         )
+
+
+def logs_in(paths: Sequence[Path]) -> list[list[Path]]:
+    """Return the logs of paths: a folder with bags and tables has several, other paths are one."""
+    folder = paths[0]
+    with guarded(str(folder), OSError):
+        is_mixed = len(paths) == 1 and folder.is_dir() and not (folder / METADATA).exists()
+        if not is_mixed or not is_bag(folder):
+            return [list(paths)]
+    bags = list(files_of(folder).files)
+    tables = sorted(file for file in folder.iterdir() if is_table(file) and file.stat().st_size)
+    traces = [file for file in bags if is_osi(file)]
+    recordings = [file for file in bags if file not in traces]
+    groups = [recordings, tables, *([file] for file in traces)]
+    return [group for group in groups if group] if tables or traces else [list(paths)]
 
 
 def log_files(path: Path) -> list[Path]:

@@ -21,7 +21,7 @@ from scenario_gen.logs.config import chosen_vehicles, LogConfig
 from scenario_gen.logs.doubts import check_doubts, Doubt
 from scenario_gen.logs.encounters import Piece, pieces_of, plausible
 from scenario_gen.logs.extract import cut_encounter, encounter_quality, recorded_encounters
-from scenario_gen.logs.files import read_raw
+from scenario_gen.logs.files import logs_in, read_raw
 from scenario_gen.logs.geodesy import EARTH_RADIUS_M
 from scenario_gen.logs.groups import find_groups
 from scenario_gen.logs.kinds import counted, typed
@@ -83,9 +83,41 @@ def read_log(
                 path.to_csv(file, index=False)
                 return read_log(file, config)
     paths = [Path(name) for name in ([path] if isinstance(path, (str, Path)) else path)]
+    results = [_read_one(group, config) for group in logs_in(paths)]
+    return results[0] if len(results) == 1 else _joined(results, paths[0].name)
+
+
+def _read_one(paths: list[Path], config: LogConfig) -> LogResult:
+    """Read one log.
+
+    Raises:
+        InputError: as `read_log`.
+    """
     log = read_raw(paths, config)
     with reading(paths[0]):
         return encounters_of(log, config)
+
+
+def _joined(results: Sequence[LogResult], name: str) -> LogResult:
+    """Return the encounters of several logs of a folder."""
+    qualities = [result.quality for result in results]
+    names = ", ".join(quality.name for quality in qualities)
+    quality = Quality(
+        name=name,
+        rows=sum(quality.rows for quality in qualities),
+        dropped=tuple(drop for quality in qualities for drop in quality.dropped),
+        vehicles=tuple(vehicle for quality in qualities for vehicle in quality.vehicles),
+        encounters=tuple(each for quality in qualities for each in quality.encounters),
+        notes=(
+            f"the folder has {len(results)} logs, each with its own clock: {names}",
+            *(f"{quality.name}: {note}" for quality in qualities for note in quality.notes),
+        ),
+    )
+    return LogResult(
+        tuple(encounter for result in results for encounter in result.encounters),
+        quality,
+        tuple(doubt for result in results for doubt in result.doubts),
+    )
 
 
 def encounters_of(log: RawLog, config: LogConfig) -> LogResult:

@@ -56,9 +56,9 @@ _SCALED_POSITIONS = ("x", "y")
 def interpret(log: RawLog, config: LogConfig) -> tuple[RawLog, list[str], list[Doubt]]:
     """Return a log in units that agree with each other, notes on changed ones, and doubts."""
     reading = Reading(log, config)
+    _find_time_unit(reading)
     if log.geographic:
         _find_degrees(reading)
-    _find_time_unit(reading)
     _find_speed_ratio(reading)
     _find_frame_rate(reading)
     interpret_headings(reading)
@@ -179,7 +179,7 @@ def _find_radians(reading: Reading) -> None:
         geographic=True,
     )
     deviation = np.abs(np.log(_ratios(radians)))
-    if np.percentile(deviation, 75.0) < np.log(_RADIAN_TOLERANCE_RATIO):
+    if len(deviation) and np.percentile(deviation, 75.0) < np.log(_RADIAN_TOLERANCE_RATIO):
         reading.use_unit("rad", "lat", "lon")
         reading.notes.append(f"latitude and longitude are in radians: {reading.option()}")
         reading.change(lambda vehicle: replace(vehicle, fix=np.degrees(vehicle.fix)))

@@ -340,6 +340,18 @@ def test_one_topic_in_each_bag_is_named_by_its_bag(tmp_path):
     assert [vehicle.id for vehicle in encounter.vehicles] == ["bag_a", "bag_b"]
 
 
+def test_a_folder_of_bags_and_tables_is_read_whole(tmp_path):
+    bag = write(tmp_path / "bag", odometry(crossing()))
+    folder = tmp_path / "drives"
+    folder.mkdir()
+    (plain,) = read_log(save(crossing(), folder, "day1.csv")).encounters
+    next(bag.glob("*.mcap")).rename(folder / "run.mcap")
+    encounters = read_log(folder).encounters
+    assert {encounter.name for encounter in encounters} == {"run", "day1"}
+    for encounter in encounters:
+        np.testing.assert_allclose(encounter.position, plain.position, atol=0.02)
+
+
 def test_header_clocks_that_differ_stop_and_those_of_the_recorder_agree(tmp_path):
     (plain,) = read_log(save(crossing(), tmp_path)).encounters
     rows = crossing()
