@@ -74,13 +74,13 @@ BEFORE = {
 # code into plain steps has cost 14,000 tokens so far; 435,000 are wanted.
 BUDGET = {
     "tokens": 509_910,
-    "long lines": 1,
-    "complex functions": 3,
+    "long lines": 0,
+    "complex functions": 2,
     "branching functions": 0,
     "nested functions": 0,
     "long functions": 0,
     "crowded functions": 0,
-    "constants": 871,
+    "constants": 882,
     "constants without a unit": 0,
     "banned names": 0,
 }
