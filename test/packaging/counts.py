@@ -80,7 +80,7 @@ BUDGET = {
     "nested functions": 0,
     "long functions": 0,
     "crowded functions": 0,
-    "constants": 882,
+    "constants": 895,
     "constants without a unit": 0,
     "banned names": 0,
 }
