@@ -20,7 +20,8 @@ NAMES: dict[str, tuple[str, ...]] = {
         "scene": "case_id scenario_id scene scene_id run run_id run_index episode episode_id",
         "date": "date utc_date day",
         "time": "utc stamp unix gentime clock t time timestamp global_time epoch utc_time "
-        "gps_time time_of_day sim_time timestep_time ts seconds frame frame_id frame_number frame_no frame_idx",
+        "gps_time time_of_day sim_time timestep_time ts seconds frame frame_id frame_number "
+        "frame_no frame_idx",
         "vehicle": "vehicle vehicle_id vehicle_name txdevice track_id id name agent_id object_id "
         "car car_id veh veh_id trackid actor_id obj_id agent track vid participant_id",
         "lat": "lat latitude gps_lat gps_latitude",

@@ -84,17 +84,23 @@ def _check_exists(path: Path) -> None:
 
 def logs_in(paths: Sequence[Path]) -> list[list[Path]]:
     """Return the logs of paths: a folder with bags and tables has several, other paths are one."""
-    folder = paths[0]
-    with guarded(str(folder), OSError):
-        is_mixed = len(paths) == 1 and folder.is_dir() and not (folder / METADATA).exists()
-        if not is_mixed or not is_bag(folder):
-            return [list(paths)]
-    bags = list(files_of(folder).files)
+    if len(paths) > 1:
+        return [list(paths)]
+    with guarded(str(paths[0]), OSError):
+        return _logs_in_folder(paths[0]) or [list(paths)]
+
+
+def _logs_in_folder(folder: Path) -> list[list[Path]]:
+    """Return the logs of a folder with bags and tables; none of other folders, or of files."""
+    if not folder.is_dir() or (folder / METADATA).exists():
+        return []
+    files = files_of(folder).files
+    traces = [[file] for file in files if is_osi(file)]
     tables = sorted(file for file in folder.iterdir() if is_table(file) and file.stat().st_size)
-    traces = [file for file in bags if is_osi(file)]
-    recordings = [file for file in bags if file not in traces]
-    groups = [recordings, tables, *([file] for file in traces)]
-    return [group for group in groups if group] if tables or traces else [list(paths)]
+    if not files or not (tables or traces):
+        return []
+    recordings = [file for file in files if [file] not in traces]
+    return [group for group in (recordings, tables, *traces) if group]
 
 
 def log_files(path: Path) -> list[Path]:

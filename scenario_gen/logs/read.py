@@ -5,6 +5,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import chain
 import math
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -102,21 +103,20 @@ def _joined(results: Sequence[LogResult], name: str) -> LogResult:
     """Return the encounters of several logs of a folder."""
     qualities = [result.quality for result in results]
     names = ", ".join(quality.name for quality in qualities)
-    quality = Quality(
-        name=name,
-        rows=sum(quality.rows for quality in qualities),
-        dropped=tuple(drop for quality in qualities for drop in quality.dropped),
-        vehicles=tuple(vehicle for quality in qualities for vehicle in quality.vehicles),
-        encounters=tuple(each for quality in qualities for each in quality.encounters),
-        notes=(
-            f"the folder has {len(results)} logs, each with its own clock: {names}",
-            *(f"{quality.name}: {note}" for quality in qualities for note in quality.notes),
-        ),
-    )
+    notes = [f"the folder has {len(results)} logs, each with its own clock: {names}"]
+    for quality in qualities:
+        notes += [f"{quality.name}: {note}" for note in quality.notes]
     return LogResult(
-        tuple(encounter for result in results for encounter in result.encounters),
-        quality,
-        tuple(doubt for result in results for doubt in result.doubts),
+        tuple(chain.from_iterable(result.encounters for result in results)),
+        Quality(
+            name=name,
+            rows=sum(quality.rows for quality in qualities),
+            dropped=tuple(chain.from_iterable(quality.dropped for quality in qualities)),
+            vehicles=tuple(chain.from_iterable(quality.vehicles for quality in qualities)),
+            encounters=tuple(chain.from_iterable(quality.encounters for quality in qualities)),
+            notes=tuple(notes),
+        ),
+        tuple(chain.from_iterable(result.doubts for result in results)),
     )
 
 
