@@ -170,8 +170,6 @@ def place_to_wait(
         k += 1
     clear = k * cell if k < order.shape[0] else np.inf
     wait = (min(clear, limit) - other) / max(rate, 1e-6)
-    if limit >= clear:
-        wait = (clear - other) / max(rate, 1e-6)
     if clock + wait <= limit + MODEL.clock_tolerance_s:
         return limit, 0.0
     return limit, wait if rate > 0.01 else np.inf

@@ -146,6 +146,14 @@ def drifts_sideways(rng):
     )
 
 
+def edges_into_the_next_lane(rng):
+    """The ego touches its neighbour 0.15 m beside its path: too little to have left it."""
+    speed = rng.uniform(7.0, 14.0)
+    other = to_pass(lane(0.0), 60.0, 0.0, speed)
+    own = over(1.85, 1.7, -60.0, 20.0)
+    return to_pass(lane(1.85), 60.0, 0.0, speed), other, to_pass(own, 60.0, 0.0, speed)
+
+
 def head_on_in_the_wrong_lane(rng):
     mine, its = rng.uniform(6.0, 12.0, 2)
     other = to_pass(lane(1.75, reverse=True), 150.0, 6.0, its)
@@ -243,6 +251,7 @@ SITUATIONS = {
     merges_before_its_turn: {"out_of_order"},
     merges_early_into_flank: {"cut_in", "out_of_order"},
     drifts_sideways: {"out_of_path"},
+    edges_into_the_next_lane: {"cut_in"},
     head_on_in_the_wrong_lane: {"head_on"},
     stops_in_the_oncoming_lane: {"head_on"},
     brakes_for_nothing: {"other_ran_into_ego", "standing"},
