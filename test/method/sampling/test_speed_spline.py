@@ -3,8 +3,6 @@
 
 """The speed on the template's clock: basis, mean, and what is drawn about it."""
 
-from dataclasses import replace
-
 from hypothesis import given, settings
 from hypothesis import strategies as st
 import numpy as np
@@ -169,15 +167,10 @@ def drawn(count=4000, sigma=0.8, jerk=3.0):
     bounds = loose(basis, jerk=jerk)
     mean = mean_speed(basis, target(speed), plain(basis), bounds)
     model = SpeedModel.of(basis, MeanSpeed(mean, plain(basis), bounds), TIME, speed, sigma, 4.0)
-    longer = np.linspace(-0.2, 0.2, count)
-    return model, ends, longer, drawn_from(model, longer)
-
-
-def drawn_from(model, longer):
-    count = len(longer)
     z = np.random.default_rng(3).standard_normal((count, model.count))
+    longer = np.linspace(-0.2, 0.2, count)
     pace, same = np.ones((count, len(model.time))), np.ones((count, 2))
-    return model.draw(z, longer, pace, same, 0.0 * same)
+    return model, ends, longer, model.draw(z, longer, pace, same, 0.0 * same)
 
 
 def test_draws_keep_ends_length_stands_and_bounds():
@@ -190,15 +183,6 @@ def test_draws_keep_ends_length_stands_and_bounds():
     assert c @ basis.length - model.mean @ basis.length == pytest.approx(longer, abs=1e-4)
     jerk = np.abs(c @ plain(basis).jerk.T)
     assert jerk.max() < max(1.06 * 3.0, 1.01 * np.abs(plain(basis).jerk @ model.mean).max())
-
-
-def test_samples_brake_no_harder_at_the_end_than_the_recording():
-    model, _, _, (c, _) = drawn(sigma=3.0)
-    late = model.spline.stations > model.spline.breaks[-1] - 4.0
-    acceleration = plain(model.spline).acceleration[late]
-    hardest = min(float((acceleration @ model.mean).min()), -0.6)
-    assert (c @ acceleration.T).min() > hardest - 1e-6
-    assert (c @ plain(model.spline).acceleration[~late].T).min() < hardest
 
 
 def test_a_speed_that_is_given_holds_on_any_clock():
@@ -216,9 +200,7 @@ def test_a_speed_that_is_given_holds_on_any_clock():
 
 
 def test_draws_have_the_stated_covariance_where_no_bound_is_near():
-    model, *_ = drawn(1, jerk=1e3)
-    model = replace(model, low=np.where(model.order == 2.0, -1e3, model.low))
-    c, _ = drawn_from(model, np.zeros(20_000))
+    model, _, _, (c, _) = drawn(20_000, jerk=1e3)
     free = ~fixed_coefficients(model.spline, (0.0, 0.0))[0]
     away = free & (model.mean > 5.0 * np.sqrt(np.square(model.factor).sum(axis=1)))
     found, stated = np.cov(c[:, away].T), (model.factor @ model.factor.T)[np.ix_(away, away)]

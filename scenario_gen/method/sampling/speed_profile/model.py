@@ -41,8 +41,6 @@ class _Process:
         length_smoothing: s over which a change of the length is spread.
         jerk_room: a sample's largest jerk over the mean's bound.
         stand_overlap: coefficients of a stand to which a neighbouring deviation is tied.
-        end: s before the end of the recording in which samples brake no harder than it does.
-        gentle: m/s² of braking that are nothing there.
         near_sigmas: standard deviations from a bound within which it is checked.
         tolerance: by which a bound may be exceeded.
     """
@@ -55,8 +53,6 @@ class _Process:
     length_smoothing: float = 1.5
     jerk_room: float = 1.05
     stand_overlap: int = 2
-    end: float = 4.0
-    gentle: float = 0.6
     near_sigmas: float = 6.0
     tolerance: float = 1e-6
 
@@ -126,12 +122,10 @@ class SpeedModel:
         order = np.repeat([1.0, 2.0, 3.0], [int(free.sum()), m, m])
         at = np.concatenate([spline.middle[free], spline.stations, spline.stations])
 
-        low = _gentle_end(low, order, at, rows @ mean.coefficients)
         driven = rows @ mean.coefficients  # the mean itself is always within bounds
         room = np.where(order == 3.0, _PROCESS.jerk_room, 1.0)
         low, high = np.minimum(room * low, driven), np.maximum(room * high, driven)
         reach = _PROCESS.near_sigmas * np.sqrt(np.square(rows @ factor).sum(axis=1))
-        reach += np.abs(strength.change @ rows.T).max(axis=1).sum(axis=0)
         near = (driven - low < reach) | (high - driven < reach)
         bounded = (rows[near], low[near], high[near], order[near], at[near])
         return cls(spline, mean.coefficients, longer, faster, strength, factor, *bounded)
@@ -194,22 +188,6 @@ class SpeedModel:
         sense = np.where(self.order < 3.0, 0, _DAQP_SOFT_CODE).astype(np.intc)
         x, _, flag, _ = daqp.solve(np.eye(self.count), -z, self.bounded, high, low, sense)
         return np.asarray(x) if flag > 0 else None
-
-
-def _gentle_end(low: Floats, order: Floats, at: Floats, driven: Floats) -> Floats:
-    """Return lower bounds (b,) with which samples brake no harder at the end than the mean.
-
-    What follows the end of a recording is not known, so nothing explains harder braking there.
-
-    Args:
-        low: (b,) lower bounds.
-        order: (b,) 2 for accelerations.
-        at: (b,) seconds of each row.
-        driven: (b,) values of the mean.
-    """
-    at_end = (order == 2.0) & (at > at.max() - _PROCESS.end)
-    gentle = min(float(driven[at_end].min(initial=0.0)), -_PROCESS.gentle)
-    return np.where(at_end, np.maximum(low, gentle), low)
 
 
 def _spread_length(spline: SpeedSpline) -> tuple[Floats, Floats]:
