@@ -14,9 +14,6 @@ POPULATION_LEAST = {
     "pace_sigma": 0.18,
     "wait_sigma": 2.0,
     "end_speed_sigma": 1.2,
-    "gap_sigma": 1.0,
-    "headway_sigma": 0.3,
-    "strength_sigma": 0.4,
     "leave_out": 0.9,
 }
 """Least values with `population`: as wide as encounters differ; the population selects."""
