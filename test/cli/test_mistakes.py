@@ -74,7 +74,7 @@ MISTAKES = [  # words of the command line, and what the message says: what is wr
         ("drive", "made/bag", "--planner", PLANNER.replace("Follower", "Folower")),
         "did you mean IdmFollower?",
     ),
-    (("regenerate", "made/bag", "99"), "no scenario 99; there are: "),
+    (("regenerate", "made/bag", "99"), "no scenario 99; it has: "),
     # what is missing
     (("generate",), "Missing argument 'log' (The recording: "),
     (("generate", "my log ü.csv"), "Missing option '--road' (straight, curve, "),
