@@ -310,7 +310,7 @@ def test_a_road_too_tight_for_a_bus_says_where_and_what_it_needs(tmp_path):
     )
     (encounter,) = read_log(table).encounters
     long = PipelineConfig(
-        planning=PlanningConfig(iterations=500), limits=Limits(bus=Dynamics(max_curvature=0.07))
+        planning=PlanningConfig(iterations=100), limits=Limits(bus=Dynamics(max_curvature=0.07))
     )
     with pytest.raises(RefusedError) as refused:
         generate(encounter, str(write(tmp_path, ".xodr")), long, count=1)
@@ -324,7 +324,9 @@ def test_a_road_too_tight_for_a_bus_says_where_and_what_it_needs(tmp_path):
 
 def test_a_limit_binds_all_stages_and_a_refusal_names_it():
     (encounter,) = read_log(WORLDS["a bus turns"][0]).encounters
-    tight = PipelineConfig(limits=Limits(bus=Dynamics(max_curvature=0.03)))
+    tight = PipelineConfig(
+        planning=PlanningConfig(iterations=100), limits=Limits(bus=Dynamics(max_curvature=0.03))
+    )
     with pytest.raises(RefusedError, match=r"limits\.bus\.max_curvature"):
         generate(encounter, "corridor", tight, count=1)
     slow = PipelineConfig(limits=Limits(bus=Dynamics(max_speed=4.0)))

@@ -144,5 +144,5 @@ def test_all_of_it_is_in_the_bag(suite, client):
         assert [regenerate_scenario(bag, k, request=request).sha256 for k in range(2)] == own
     with pytest.raises(InputError, match="choose one: --namespace '' --request 1"):
         regenerate_scenario(bag, 0)
-    with pytest.raises(InputError, match="does not say which log"):
+    with pytest.raises(InputError, match="does not name its log"):
         regenerate_scenario(bag, 0, request="1", log=LOG)
