@@ -12,7 +12,7 @@ SOURCED := $(if $(AMENT_PREFIX_PATH),$(shell $(PYTHON) -c 'import os, rclpy, sys
 PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check --no-compile --no-deps
 LOCKED := $(PIP) --require-hashes
 # A worker that crashes ends the run, with the name of its test: xdist's loadgroup would wait for ever for the one that replaces it.
-PYTEST := $(BIN)/python -m pytest -n 4 --dist loadgroup --max-worker-restart 0 --timeout 600
+PYTEST := $(BIN)/python -m pytest -n 3 --dist loadgroup --max-worker-restart 0 --timeout 600
 
 .PHONY: demo test soak bench judges audit licences core counts docs install tools clean
 

@@ -26,7 +26,7 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from scipy import stats
+from scipy import special
 
 from scenario_gen.base.errors import RefusedError
 from scenario_gen.method.drives import delayed_drive, Drive, free_drive, recorded_drive
@@ -109,7 +109,7 @@ def goes_first_probability(lag: float, rate: float) -> float:
 def offered_lags(sigma: float) -> list[float]:
     """Return the offered lags [s]: medians of equally likely parts of N(0, σ²)."""
     quantiles = (np.arange(LAG_COUNT) + 0.5) / LAG_COUNT
-    return [float(lag) for lag in np.round(sigma * stats.norm.ppf(quantiles), 2)]
+    return [float(lag) for lag in np.round(sigma * special.ndtri(quantiles), 2)]
 
 
 def decisions_of(encounter: Encounter, sampling: SamplingConfig = SamplingConfig()) -> Decisions:

@@ -154,14 +154,23 @@ def test_a_road_with_no_way_through_is_refused(folder, run, monkeypatch):
 
 
 def test_a_disk_that_is_full_is_one_line_and_loses_nothing(folder):
-    """A file may not become longer than 20 kB, as if the disk were full there."""
+    """A file may not become longer than 20 kB, as if the disk were full there.
+
+    Python writes no bytecode then: it would keep what was cut.
+    """
     before, words = (
         files(folder),
         [sys.executable, "-m", "scenario_gen", *GENERATE, "--seed", "1", "--out", "made"],
     )
     limited = partial(resource.setrlimit, resource.RLIMIT_FSIZE, (20_000, 20_000))
     ended = subprocess.run(
-        words, cwd=folder, text=True, stderr=subprocess.PIPE, preexec_fn=limited, check=False
+        words,
+        cwd=folder,
+        env=os.environ | {"PYTHONDONTWRITEBYTECODE": "1"},
+        text=True,
+        stderr=subprocess.PIPE,
+        preexec_fn=limited,
+        check=False,
     )
     assert ended.returncode == 2
     (line,) = ended.stderr.splitlines()
