@@ -4,6 +4,7 @@
 """Mistakes of users: each gets one line that says what is wrong and what to do, exit code 2, and nothing is lost."""
 
 from functools import partial
+import os
 import resource
 import subprocess
 import sys
