@@ -3,6 +3,8 @@
 
 """The layout of the vector z of standard normal numbers from which a candidate is computed.
 
+Its parts::
+
     z = (shared clock, vehicle 0, vehicle 1, …, trimming)
     vehicle = (lateral, speed, clock (shift, pace, waits, gaps), place, end speeds, size,
                strength)
