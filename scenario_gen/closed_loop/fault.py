@@ -217,12 +217,11 @@ class Contact:
         if conflict is None or conflict.first != ego or conflict.following:
             return False
         instant = self._entry(conflict.second, conflict.entry_second)
-        if instant is None or instant > (self._entry(ego, conflict.entry_first) or math.inf):
+        ego_instant = self._entry(ego, conflict.entry_first)
+        if instant is None or (ego_instant is not None and ego_instant < instant):
             return False
-        world = self.loop.world
-        distances = world.cells[ego, :, 7]
         clocks = np.array([self.drive.clock[ego, instant], conflict.entry_first])
-        station, area = np.interp(clocks, np.arange(len(distances)) * world.cell, distances)
+        station, area = self.loop.driven_distance(ego, clocks)
         speed = float(self.drive.motion.speed[ego, instant])
         return bool(station + speed * RSS_RESPONSE_S + braking_distance(speed) <= area)
 

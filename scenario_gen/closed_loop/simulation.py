@@ -203,6 +203,11 @@ class ClosedLoop:
         self._witness_waits = bool(driven_distance < 1.0)
         self.last_step = int(np.ceil((self.duration * config.overtime + 5.0) / config.step))
 
+    def driven_distance(self, vehicle: int, clocks: Floats) -> Floats:
+        """Return the distances (C,) [m] on a vehicle's certified path at clocks (C,) [s]."""
+        distances = self.world.cells[vehicle, :, 7]
+        return np.interp(clocks, np.arange(len(distances)) * self.world.cell, distances)
+
     def _reaction_times(self) -> Floats:
         """Return (N,) reaction times [s]; 0 for pedestrians and for all vehicles in a replay."""
         config = self.config

@@ -318,10 +318,8 @@ def _clearance(drive: Drive, horizon: float) -> Clearance:
 
 def _progress(loop: ClosedLoop, drive: Drive) -> float:
     """Return the share of the witness' path that the ego has driven."""
-    distance = loop.world.cells[drive.ego, :, 7]
-    clock = np.arange(len(distance)) * loop.world.cell
-    driven = float(np.interp(drive.clock[drive.ego, -1], clock, distance))
-    length = float(distance[-1])
+    clocks = np.array([drive.clock[drive.ego, -1], np.inf])
+    driven, length = loop.driven_distance(drive.ego, clocks).tolist()
     return min(driven / length, 1.0) if length > 0.0 else 1.0
 
 

@@ -3,6 +3,7 @@
 
 """The final check of a reading: each vehicle is compared with its raw data, stretch by stretch."""
 
+from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import combinations
@@ -16,6 +17,7 @@ from scenario_gen.logs.doubts import Doubt, Quantity
 from scenario_gen.logs.encounters import Piece
 from scenario_gen.logs.raw import RawLog
 from scenario_gen.numerics import Bools, Floats, runs
+from scenario_gen.numerics.plane import ahead_and_left
 from scenario_gen.types import Encounter, together
 
 
@@ -94,9 +96,9 @@ def _stretches(
 
 def doubts_of_rows(log: RawLog, drops: Drops, config: LogConfig) -> Iterator[Doubt]:
     """Yield doubts about vehicles that are at several places at one time, by their stamps."""
-    counts: dict[str, int] = {}
+    counts: Counter[str] = Counter()
     for vehicle in log.vehicles:
-        counts[vehicle.id] = counts.get(vehicle.id, 0) + len(vehicle.fix_ns)
+        counts[vehicle.id] += len(vehicle.fix_ns)
     for name, conflict in drops.conflicts.items():
         share = conflict.count / max(counts[name], 1)
         if share < _LIMITS.lost_rows_share or conflict.count < _LIMITS.lost_rows_count:
@@ -144,9 +146,7 @@ def _rigid_distance(encounter: Encounter, a: int, b: int) -> float | None:
     reach = _LIMITS.copy_lengths_ratio * min(vehicle.length for vehicle in vehicles)
     if not len(offset) or np.hypot(*offset.T).max() > reach:
         return None
-    heading = encounter.heading[a, common]
-    along = np.cos(heading) * offset[:, 0] + np.sin(heading) * offset[:, 1]
-    across = np.cos(heading) * offset[:, 1] - np.sin(heading) * offset[:, 0]
+    along, across = ahead_and_left(offset, encounter.heading[a, common])
     driven = float(encounter.speed[a, common].sum() * encounter.dt)
     spread = max(float(np.ptp(np.percentile(axis, [5.0, 95.0]))) for axis in (along, across))
     if driven < _LIMITS.min_travel_m or spread > _LIMITS.rigid_m:

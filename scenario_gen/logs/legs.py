@@ -13,7 +13,7 @@ import numpy as np
 
 from scenario_gen.logs.geodesy import EARTH_RADIUS_M
 from scenario_gen.logs.raw import Observations, Rows
-from scenario_gen.numerics import Bools, Floats, Ints
+from scenario_gen.numerics import Bools, Floats, Ints, running_sum
 
 _LEG_S = 1.0
 _MAX_LEG_STEPS_COUNT = 10
@@ -154,8 +154,8 @@ def _mean_speeds(vehicle: Observations, begin: Ints, end: Ints) -> Floats:
     else:
         order = np.argsort(vehicle.speed_ns, kind="stable")
         speed = np.interp(vehicle.fix_ns, vehicle.speed_ns[order], vehicle.speed[order])
-    total = np.concatenate([[0.0], np.cumsum(np.nan_to_num(speed))])
-    unknown = np.concatenate([[0], np.cumsum(~np.isfinite(speed))])
+    total = running_sum(np.nan_to_num(speed))
+    unknown = running_sum(~np.isfinite(speed))
     # The ends count half, as in the trapezoidal rule.
     inner = total[end] - total[begin + 1]
     mean = (inner + 0.5 * (np.nan_to_num(speed[begin]) + np.nan_to_num(speed[end]))) / (

@@ -103,7 +103,7 @@ class Decisions:
 
 def goes_first_probability(lag: float, rate: float) -> float:
     """Return P(goes first) at an offered lag [s], for a rate β [1/s]."""
-    return 1.0 / (1.0 + math.exp(-rate * lag))
+    return float(special.expit(rate * lag))
 
 
 def offered_lags(sigma: float) -> list[float]:

@@ -14,7 +14,7 @@ import numpy as np
 from scipy import ndimage
 
 from scenario_gen.base.errors import RefusedError
-from scenario_gen.numerics import Floats
+from scenario_gen.numerics import Floats, running_sum
 from scenario_gen.situation import Track
 from scenario_gen.situation.evidence import smoothed_speed
 
@@ -76,7 +76,7 @@ class Drive(NamedTuple):
     def time(self) -> Floats:
         """(S,) when [s] it leaves each station; it begins at 0 s."""
         mean = np.maximum(0.5 * (self.speed[1:] + self.speed[:-1]), 0.01)
-        time = np.concatenate([[0.0], np.cumsum(np.diff(self.station) / mean)])
+        time = running_sum(np.diff(self.station) / mean)
         time[self.line :] += self.stand
         return time
 
@@ -95,7 +95,7 @@ class Drive(NamedTuple):
         for _ in range(2):
             speed = ndimage.uniform_filter1d(speed, 5, mode="nearest")
         steps = 0.5 * (speed[1:] + speed[:-1]) * dt
-        station = self.station[0] + np.concatenate([[0.0], np.cumsum(steps)])
+        station = self.station[0] + running_sum(steps)
         return np.column_stack([self.track.curve.at(station), np.maximum(speed, 0.0)])
 
 

@@ -20,7 +20,7 @@ alternate. A search with a larger budget begins with the drives of a smaller one
   with the share that was driven.
 """
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, field
 import math
 from typing import Any, NamedTuple
@@ -341,7 +341,7 @@ class Search:
         if not self._failure_count(range(len(self.z))):
             ratio = (1.0 - SETTINGS.even_share) / SETTINGS.even_share
             return high, min(1.0, ratio * high / max(float(self._nearness.mean()), 1e-9))
-        near = [k for k in self._batch_of if k not in set(self._even)]
+        near = self._batch_of.keys() - set(self._even)
         surprises = self._failure_count(self._even) + SETTINGS.prior_surprises
         surprise_rate = surprises / (len(self._even) + 1.0)
         precision = (self._failure_count(near) + SETTINGS.prior_precision) / (len(near) + 1.0)
@@ -351,7 +351,7 @@ class Search:
             least = max(least, SETTINGS.frequent_ratio * failure_rate)
         return min(least, 1.0), 1.0
 
-    def _failure_count(self, drives: Sequence[int]) -> int:
+    def _failure_count(self, drives: Collection[int]) -> int:
         """Return the number of failures among some drives."""
         return sum(self.responses[k].failed for k in drives)
 

@@ -18,7 +18,7 @@ from scenario_gen.closed_loop.search.problem import DrivenScenarios
 from scenario_gen.closed_loop.simulation import ClosedLoop
 from scenario_gen.closed_loop.trials import Outcome
 from scenario_gen.closed_loop.verdict import judge
-from scenario_gen.numerics.plane import edge_lengths
+from scenario_gen.numerics.plane import arc_lengths
 from scenario_gen.types import Facts, Failure, Scenario
 
 MAX_FINDINGS_COUNT = 100  # each is driven again and saved
@@ -129,7 +129,7 @@ def _station(outcome: Outcome) -> float:
         verdict.off_road,
         float(drive.motion.time[-1]),
     ]
-    way = np.concatenate([[0.0], np.cumsum(edge_lengths(drive.motion.position[drive.ego]))])
+    way = arc_lengths(drive.motion.position[drive.ego])
     return float(np.interp(np.nanmin(times), drive.motion.time, way))
 
 

@@ -12,7 +12,7 @@ from scipy import special
 
 from scenario_gen.base.errors import InputError
 from scenario_gen.method.evaluation.geometry import footprint_distance
-from scenario_gen.numerics import Floats, Ints
+from scenario_gen.numerics import Floats, Ints, running_sum
 from scenario_gen.types import Motion
 
 JERK_SMOOTHING_S = 0.5
@@ -55,7 +55,7 @@ def values_of(motion: Motion) -> dict[str, Floats]:
         present = motion.present_slice(n)
         speed, heading = motion.speed[n, present], motion.heading[n, present]
         acceleration = np.gradient(speed, motion.dt)
-        sums = np.concatenate([np.zeros(1), np.cumsum(acceleration)])
+        sums = running_sum(acceleration)
         smooth = (sums[width:] - sums[:-width]) / width
         samples["speed"].append(speed)
         samples["acceleration"].append(acceleration)

@@ -11,7 +11,7 @@ from scipy import ndimage
 from scenario_gen.method.sampling.config import SamplingConfig
 from scenario_gen.method.sampling.gp import Features, Observations, principal, Regression
 from scenario_gen.method.sampling.path import BasePath
-from scenario_gen.numerics import Bools, Floats
+from scenario_gen.numerics import Bools, Floats, running_sum
 from scenario_gen.numerics.plane import place, unit
 from scenario_gen.roads import along_lanes
 from scenario_gen.types import Road, Vehicle
@@ -147,7 +147,7 @@ class Steering:
 
 def _cumulative(values: Floats, dt: float) -> Floats:
     """Return the integral (T,) of values (T,) by the trapezoidal rule."""
-    return np.concatenate([[0.0], np.cumsum(0.5 * dt * (values[1:] + values[:-1]))])
+    return running_sum(0.5 * dt * (values[1:] + values[:-1]))
 
 
 def _robust_sigma(values: Floats) -> float:

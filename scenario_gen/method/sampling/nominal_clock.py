@@ -15,7 +15,7 @@ import numpy as np
 from scipy import ndimage
 
 from scenario_gen.method.sampling.time_warp import Clock, SAMPLE_PERIOD_S
-from scenario_gen.numerics import Floats
+from scenario_gen.numerics import Floats, running_sum
 from scenario_gen.types import Encounter
 
 SLOWING_S = 1.5  # before and after a bend, over which the clock is slowed: about 2 m/s² at 10 m/s
@@ -53,5 +53,5 @@ def slowed_clock(grid: Floats, slowdowns: Sequence[Floats], max_duration: float)
 def clock_from_rate(grid: Floats, rate: Floats) -> Clock:
     """Return the clock with these rates (G,) at template times (G,) [s], cubic in between."""
     step = float(grid[1] - grid[0])
-    time = np.concatenate([[0.0], np.cumsum(0.5 * step * (rate[1:] + rate[:-1]))])
+    time = running_sum(0.5 * step * (rate[1:] + rate[:-1]))
     return Clock(grid, time, rate)

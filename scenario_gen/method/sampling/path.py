@@ -22,8 +22,9 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 
 from scenario_gen.method.sampling.time_warp import ClockSamples
-from scenario_gen.numerics import Floats, frozen, Ints
+from scenario_gen.numerics import Floats, frozen, Ints, running_sum
 from scenario_gen.numerics.kernels import F, F1, F2, F3, I1, kernel, named, OUT2, OUT3
+from scenario_gen.numerics.plane import arc_lengths
 from scenario_gen.types import Route
 
 NODE_SPACING_M = 1.0  # a cubic between such nodes is within 0.1 mm of an arc of radius 5 m
@@ -55,7 +56,7 @@ class BasePath:
         points = route.points
         if len(points) == 1:
             return cls(frozen(points), 0.0, frozen(np.zeros(len(route.anchor))))
-        chord = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(points[:, :2], axis=0).T))])
+        chord = arc_lengths(points[:, :2])
         tangents = [np.array([np.cos(yaw), np.sin(yaw)]) for yaw in points[[0, -1], 2]]
         curve = CubicSpline(chord, points[:, :2], bc_type=((1, tangents[0]), (1, tangents[1])))
         fine = np.linspace(chord[:-1], chord[1:], _FINE_STEPS, endpoint=False).T.ravel()
@@ -63,7 +64,7 @@ class BasePath:
         middle = 0.5 * (fine[:-1] + fine[1:])
         speed = np.hypot(*curve(fine, 1).T)
         simpson = (speed[:-1] + 4.0 * np.hypot(*curve(middle, 1).T) + speed[1:]) / 6.0
-        arc = np.concatenate([[0.0], np.cumsum(simpson * np.diff(fine))])
+        arc = running_sum(simpson * np.diff(fine))
 
         count = max(MIN_NODES_COUNT, int(np.ceil(arc[-1] / NODE_SPACING_M)) + 1)
         u = np.linspace(0.0, arc[-1], count)
