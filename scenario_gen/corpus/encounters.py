@@ -22,6 +22,7 @@ from scenario_gen.base.errors import guarded, InputError
 from scenario_gen.base.stores import fetched, Place
 from scenario_gen.corpus.config import CorpusConfig
 from scenario_gen.corpus.grouping import FoundEncounter, label, part_of, read_found
+from scenario_gen.corpus.meetings import MESSAGES_AFTER_US, MESSAGES_BEFORE_US
 from scenario_gen.corpus.messages import UNITS_PER_DEGREE
 from scenario_gen.corpus.tables import write_table
 from scenario_gen.logs import (
@@ -53,7 +54,7 @@ COLUMNS = {  # of a table
     **dict.fromkeys(("seconds", "gap", "distance", "lat", "lon", "ttc", "pet", "speed"), "double"),
     "tracks": "binary",
 }
-SMOOTHING_MARGIN_US = 2_000_000  # messages before and after an encounter
+MEETING_MARGIN_US = 2_000_000  # smooth vehicles meet a little earlier or later than raw ones
 
 
 @dataclass(frozen=True)
@@ -105,8 +106,8 @@ def clean_found(task: CleanTask) -> None:
         listed: list[FoundEncounter] = []
         for path, (_, first, last) in zip(paths, task.row_ranges, strict=False):
             listed += read_found(path, first, last)
-        begin = min(entry.start for entry in listed) - SMOOTHING_MARGIN_US
-        end = max(entry.end for entry in listed) + SMOOTHING_MARGIN_US
+        begin = min(entry.start for entry in listed) - MESSAGES_BEFORE_US
+        end = max(entry.end for entry in listed) + MESSAGES_AFTER_US
         devices = sorted({device for entry in listed for device in entry.devices})
         filters = [("t", ">=", begin), ("t", "<=", end), ("device", "in", devices)]
         tables = [parquet.read_table(path, filters=filters) for path in paths[len(parts) :]]
@@ -115,7 +116,8 @@ def clean_found(task: CleanTask) -> None:
     refused = []
     for entry in listed:
         try:
-            encounters = encounters_of(_raw_log(entry, by_device), task.config.log).encounters
+            log = _raw_log(entry, by_device)
+            encounters = encounters_of(log, task.config.log, _met_ns(entry)).encounters
         except InputError as error:
             refused.append(_refusal(entry.name, error))
             continue
@@ -135,7 +137,7 @@ def _by_device(tables: Sequence[Any]) -> dict[int, Any]:
 def _raw_log(entry: FoundEncounter, by_device: Mapping[int, Any]) -> RawLog:
     """Return the messages of an encounter as a log."""
     vehicles, count = [], 0
-    begin, end = entry.start - SMOOTHING_MARGIN_US, entry.end + SMOOTHING_MARGIN_US
+    begin, end = entry.start - MESSAGES_BEFORE_US, entry.end + MESSAGES_AFTER_US
     for device in entry.devices:
         messages = by_device[device]
         messages = messages[(messages["t"] >= begin) & (messages["t"] <= end)]
@@ -156,6 +158,12 @@ def _raw_log(entry: FoundEncounter, by_device: Mapping[int, Any]) -> RawLog:
         count += len(messages)
     segment = Segment(0, entry.name, "message", 1)
     return RawLog(entry.name, True, tuple(vehicles), count, (segment,))
+
+
+def _met_ns(entry: FoundEncounter) -> tuple[int, int]:
+    """Return the stamps [ns] between which the vehicles of an encounter meet."""
+    begin = 1000 * (entry.start - MEETING_MARGIN_US) + SPMD_EPOCH_NS
+    return begin, 1000 * (entry.end + MEETING_MARGIN_US) + SPMD_EPOCH_NS
 
 
 def read_one_log(task: LogTask) -> None:

@@ -43,6 +43,7 @@ from scenario_gen.corpus.tracks import (
     tracks_of,
 )
 from scenario_gen.logs import GAP_RATE_MPS, OUT_OF_RANGE_S, shortest
+from scenario_gen.logs.manoeuvres import AROUND_CROSSING_S, LONGEST_EXTENSION_S
 from scenario_gen.numerics import Bools, Floats, Ints
 from scenario_gen.numerics.kernels import F, F1, I, I1, kernel, named
 
@@ -55,7 +56,9 @@ CELLS_PER_ROW_COUNT = 1 << 24  # at most, around the globe
 MIN_SPREAD_COUNT = 3  # bins with too large a spread, from which on an id may be shared
 MIN_COMMON_COUNT = 10  # bins in which several vehicles send; fewer are fixes that jump
 SENDERS_RATIO = 1.4  # of the messages of one vehicle in a bin, from which on two are sending
-EXCERPT_MARGIN_US = 3_000_000  # messages that are kept before and after a meeting
+_SMOOTHING_S = 2.0  # messages before and after an encounter, for smoothing its ends
+MESSAGES_BEFORE_US = round(1e6 * (AROUND_CROSSING_S + _SMOOTHING_S))
+MESSAGES_AFTER_US = round(1e6 * (LONGEST_EXTENSION_S + AROUND_CROSSING_S + _SMOOTHING_S))
 MAX_GAP_COUNT = 4  # bins without candidates, between which a meeting is one
 
 Columns = Mapping[str, Any]  # arrays (M,) by column
@@ -85,7 +88,7 @@ def overlap(config: CorpusConfig) -> int:
     """
     log = config.log
     seconds = log.max_duration + log.min_duration + OUT_OF_RANGE_S + log.longest_gap + 1.0
-    return round(seconds / MICROSECOND_S)
+    return round(seconds / MICROSECOND_S) + MESSAGES_AFTER_US
 
 
 def search_hours(task: HourTask) -> None:
@@ -189,11 +192,11 @@ def in_order(rows: Columns) -> Ints:
 
 
 def _excerpt(rows: Columns, meetings_in_hour: Sequence[Mapping[str, Any]]) -> Bools:
-    """(M,) which messages belong to a meeting, from 3 s before to 3 s after it."""
+    """(M,) which messages belong to a meeting, or to manoeuvres that begin in it."""
     wanted = np.zeros(len(rows["t"]), dtype=bool)
     spans = {int(rows["device"][first]): (first, last) for first, last in runs_of(rows["device"])}
     for meeting in meetings_in_hour:
-        window = [meeting["start"] - EXCERPT_MARGIN_US, meeting["end"] + EXCERPT_MARGIN_US + 1]
+        window = [meeting["start"] - MESSAGES_BEFORE_US, meeting["end"] + MESSAGES_AFTER_US + 1]
         for device in (meeting["a"], meeting["b"]):
             first, last = spans[device]
             low, high = np.searchsorted(rows["t"][first:last], window)

@@ -23,6 +23,7 @@ from scenario_gen.logs.config import LogConfig
 from scenario_gen.logs.encounters import Piece
 from scenario_gen.logs.gap import INTERACTS_M, space_time_gap
 from scenario_gen.logs.growing import Group, Growth, Meeting, MIN_MET_SHARE, Span
+from scenario_gen.logs.manoeuvres import complete_spans
 from scenario_gen.logs.raw import natural
 from scenario_gen.numerics import Floats, runs
 
@@ -101,14 +102,6 @@ class _PieceGroups(Growth[Meeting]):
                 member: (max(start, first), min(end, last))
                 for member, (start, end) in group.spans.items()
             }
-        for member, (start, end) in group.spans.items():
-            if (start, end) != (group.start, group.end):
-                group.notes.append(
-                    f"vehicle {self.pieces[member].track.id} is recorded from "
-                    f"{_seconds((group.start, start + 1), config)} to "
-                    f"{_seconds((group.start, end), config)} s of "
-                    f"{_seconds((group.start, group.end), config)} s"
-                )
 
     def _near_span(self, other: int, group: Group[Meeting]) -> Span:
         """Return the longest part of a group's time in which a piece is near a present member."""
@@ -128,25 +121,64 @@ class _PieceGroups(Growth[Meeting]):
 
 
 def find_groups(
-    pieces: Sequence[Piece], config: LogConfig
+    pieces: Sequence[Piece], config: LogConfig, within: Span | None = None
 ) -> tuple[list[Group[Meeting]], list[str]]:
-    """Return the encounters by time, and notes on vehicles left out or present partly."""
+    """Return the encounters by time, and notes on vehicles left out or present partly.
+
+    Args:
+        pieces: all pieces of a log.
+        config: when vehicles meet.
+        within: ticks in which vehicles must meet; None: at any time.
+    """
     small = len({piece.track.id for piece in pieces}) <= config.max_vehicles
-    meetings = _find_meetings(pieces, config, small=small)
+    meetings = _find_meetings(pieces, config, within, small=small)
     groups = []
     notes = []
     for group in _PieceGroups(pieces, config, small=small).groups(meetings):
         parts, part_notes = _split(group, pieces, config)
         groups += parts
         notes += [*group.notes, *part_notes] if parts else []
-    groups.sort(key=lambda group: (group.start, group.end, sorted(group.spans)))
+    groups.sort(key=_by_time)
     shared = sorted(_in_several(groups, pieces), key=natural)
     if shared:
         notes.append(
             "in several encounters at the same time, since each meets half of its vehicles: "
             f"vehicle {', '.join(shared)}"
         )
+    if not config.whole:
+        groups = sorted((_completed(group, pieces, config) for group in groups), key=_by_time)
+    for group in groups:
+        notes += _presence_notes(group, pieces, config)
     return groups, notes
+
+
+def _by_time(group: Group[Meeting]) -> tuple[int, int, list[int]]:
+    """Sort key of encounters."""
+    return group.start, group.end, sorted(group.spans)
+
+
+def _completed(
+    group: Group[Meeting], pieces: Sequence[Piece], config: LogConfig
+) -> Group[Meeting]:
+    """Return a group with the ends of its members' manoeuvres."""
+    members = {member: pieces[member] for member in group.spans}
+    spans = complete_spans(group.spans, members, config.period)
+    start = min(begin for begin, _ in spans.values())
+    return Group(start, max(end for _, end in spans.values()), spans, group.meetings)
+
+
+def _presence_notes(
+    group: Group[Meeting], pieces: Sequence[Piece], config: LogConfig
+) -> Iterator[str]:
+    """Yield a note on each vehicle that arrives late or leaves early."""
+    for member, (start, end) in group.spans.items():
+        if (start, end) != (group.start, group.end):
+            yield (
+                f"vehicle {pieces[member].track.id} is recorded from "
+                f"{_seconds((group.start, start + 1), config)} to "
+                f"{_seconds((group.start, end), config)} s of "
+                f"{_seconds((group.start, group.end), config)} s"
+            )
 
 
 def _in_several(groups: Sequence[Group[Meeting]], pieces: Sequence[Piece]) -> set[str]:
@@ -161,21 +193,28 @@ def _in_several(groups: Sequence[Group[Meeting]], pieces: Sequence[Piece]) -> se
     return shared
 
 
-def _find_meetings(pieces: Sequence[Piece], config: LogConfig, *, small: bool) -> list[Meeting]:
+def _find_meetings(
+    pieces: Sequence[Piece], config: LogConfig, within: Span | None, *, small: bool
+) -> list[Meeting]:
     """Return all meetings of two vehicles, in ticks; in a `small` log each has gap 0."""
     meetings = []
     for i, j in _overlapping(pieces, shortest(config)):
-        for span in _near_spans(pieces[i], pieces[j], config):
+        for span in _near_spans(pieces[i], pieces[j], config, within):
             gap = 0.0 if small else _gap(pieces[i], pieces[j], span, config)
             if gap <= INTERACTS_M:
                 meetings.append(Meeting(gap, span[0], min(i, j), max(i, j), span[1]))
     return meetings
 
 
-def _near_spans(a: Piece, b: Piece, config: LogConfig) -> Iterator[Span]:
+def _near_spans(
+    a: Piece, b: Piece, config: LogConfig, within: Span | None = None
+) -> Iterator[Span]:
     """Yield the spans of at least `shortest` ticks in which two pieces are near each other."""
     begin = max(a.first, b.first)
     is_near = distances(a, b) < config.proximity
+    if within is not None:
+        time = np.arange(begin, begin + len(is_near))
+        is_near &= (time >= within[0]) & (time < within[1])
     for low, high in runs(is_near, ticks(OUT_OF_RANGE_S, config)):
         for first, last in windows(begin + low, begin + high, config):
             if last - first >= shortest(config):

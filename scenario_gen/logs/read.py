@@ -120,8 +120,16 @@ def _joined(results: Sequence[LogResult], name: str) -> LogResult:
     )
 
 
-def encounters_of(log: RawLog, config: LogConfig) -> LogResult:
+def encounters_of(
+    log: RawLog, config: LogConfig, met_ns: tuple[int, int] | None = None
+) -> LogResult:
     """Cut a raw log, from files or streams, into encounters.
+
+    Args:
+        log: the observations.
+        config: how to clean and cut.
+        met_ns: stamps between which vehicles must meet; None: at any time. Their manoeuvres may
+            end later.
 
     Raises:
         NoEncounterError: there is no encounter in it; the message says how near it comes to one.
@@ -142,12 +150,13 @@ def encounters_of(log: RawLog, config: LogConfig) -> LogResult:
     origin_ns = _first_tick_ns(tracks, config)
     pieces, vehicles = _smooth_pieces(log, tracks, origin_ns, config)
     pieces, doubts = plausible(pieces, config)
-    grouping = _find_encounters(log, pieces, doubts, origin_ns, config)
+    within = _ticks_within(met_ns, origin_ns, config)
+    grouping = _find_encounters(log, pieces, doubts, origin_ns, config, within)
     copies = copies_in(grouping.encounters)
     if copies:
         doubts += [str(doubt) for doubt in copies.values()]
         pieces = [piece for piece in pieces if piece.track.id not in copies]
-        grouping = _find_encounters(log, pieces, doubts, origin_ns, config)
+        grouping = _find_encounters(log, pieces, doubts, origin_ns, config, within)
     contradictions = [
         *doubts_of_rows(log, drops, config),
         *doubts_of_pieces(pieces, origin_ns),
@@ -193,15 +202,30 @@ class _Grouping:
     cut_notes: list[str]
 
 
+def _ticks_within(
+    met_ns: tuple[int, int] | None, origin_ns: int, config: LogConfig
+) -> tuple[int, int] | None:
+    """Return stamps as ticks; None stays."""
+    if met_ns is None:
+        return None
+    period_ns = round(config.period * 1e9)
+    return (met_ns[0] - origin_ns) // period_ns, -(-(met_ns[1] - origin_ns) // period_ns)
+
+
 def _find_encounters(
-    log: RawLog, pieces: Sequence[Piece], doubts: Sequence[str], origin_ns: int, config: LogConfig
+    log: RawLog,
+    pieces: Sequence[Piece],
+    doubts: Sequence[str],
+    origin_ns: int,
+    config: LogConfig,
+    within: tuple[int, int] | None,
 ) -> _Grouping:
     """Return the encounters of smooth pieces.
 
     Raises:
         NoEncounterError: there is none.
     """
-    groups, group_notes = find_groups(pieces, config)
+    groups, group_notes = find_groups(pieces, config, within)
     if not groups:
         reasons = (explain_no_encounter(log, pieces, config), *doubts)
         raise NoEncounterError("; ".join(reasons))

@@ -211,3 +211,28 @@ def test_a_column_of_13_is_encounters_of_three_and_who_is_in_two_is_named(tmp_pa
     )
     assert [names for names, _ in found] == [f"{k},{k + 1},{k + 2}" for k in range(1, 13, 2)]
     assert [note for note in quality.notes if note.endswith("vehicle 3, 5, 7, 9, 11")]
+
+
+def test_a_left_turn_is_complete_though_the_oncoming_car_is_far_away(tmp_path):
+    """The turner waits until the other one is 100 m away, and for longer."""
+    time = np.round(np.arange(0.0, 60.05, 0.1), 3)
+    driven = np.interp(time, [0, 5, 12, 18, 60], [0, 50, 50, 74, 494])  # waits from 5 to 12 s
+    bend = np.clip((driven - 50.0) / 10.0, 0.0, np.pi / 2.0)  # radius 10 m
+    straight = np.maximum(driven - 50.0 - 5.0 * np.pi, 0.0)
+    turner = pd.DataFrame(
+        {
+            "t_s": time,
+            "vehicle_id": "turner",
+            "x_m": 2.0 - 10.0 * (1.0 - np.cos(bend)) - straight,
+            "y_m": np.minimum(driven, 50.0) - 60.0 + 10.0 * np.sin(bend),
+        }
+    )
+    oncoming = car("oncoming", 0, 60, -2, 60, 0, -14).drop(columns="speed_mps")
+    ((spans,), result) = presence(tmp_path, turner, oncoming)
+    (encounter,) = result.encounters
+    assert encounter.duration < 30.0
+    row = encounter.ids.index("turner")
+    heading = encounter.heading[row, : spans["turner"][1] + 1]
+    assert np.degrees(heading[-1] - heading[0]) == pytest.approx(90.0, abs=3.0)
+    assert encounter.time[spans["oncoming"][1]] < 17.0
+    assert any("vehicle oncoming is recorded from" in note for note in result.quality.notes)
