@@ -11,8 +11,9 @@ from benchmarks._driving_worlds import as_scenario, PERIOD
 from benchmarks._size import sized
 from benchmarks.row import lower, Row
 from scenario_gen.closed_loop.config import ClosedLoopConfig
+from scenario_gen.closed_loop.drive import Drive
 from scenario_gen.closed_loop.ego import Command
-from scenario_gen.closed_loop.simulation import ClosedLoop, Drive
+from scenario_gen.closed_loop.simulation import ClosedLoop
 from scenario_gen.numerics.arrays import Floats
 from scenario_gen.types.scenario import Scenario
 

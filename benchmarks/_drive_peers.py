@@ -16,7 +16,7 @@ import numpy as np
 from benchmarks._size import sized
 from benchmarks.bridges import judged
 from benchmarks.row import higher, Row
-from scenario_gen.closed_loop.simulation import Drive
+from scenario_gen.closed_loop.drive import Drive
 from scenario_gen.closed_loop.trials import Outcome
 
 STEPS_COUNT = sized(300, quick=5)

@@ -21,6 +21,7 @@ from benchmarks._sampling_cases import cases, Prepared
 from benchmarks._size import sized
 from benchmarks.row import higher, lower, Row
 from scenario_gen.closed_loop.config import ClosedLoopConfig, REACTIVE, REPLAY
+from scenario_gen.closed_loop.drive import Drive
 from scenario_gen.closed_loop.ego import Command, Pose
 from scenario_gen.closed_loop.origin import Trial
 from scenario_gen.closed_loop.planners import (
@@ -30,7 +31,7 @@ from scenario_gen.closed_loop.planners import (
     ReferenceFollower,
 )
 from scenario_gen.closed_loop.reacting import needs_reaction
-from scenario_gen.closed_loop.simulation import ClosedLoop, Drive, Observation, Planner, State
+from scenario_gen.closed_loop.simulation import ClosedLoop, Observation, Planner, State
 from scenario_gen.closed_loop.trials import Outcome, rates, run_trials
 from scenario_gen.closed_loop.verdict import judge
 from scenario_gen.method.evaluation.bootstrap import wilson

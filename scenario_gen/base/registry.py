@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Registries of roads, planners, log and export formats and metrics.
+"""Registries of roads, planners, log and export formats, metrics and criteria.
 
 Built-in ones and those of installed packages.
 """
@@ -10,7 +10,10 @@ from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from functools import cache
 from importlib.metadata import entry_points, EntryPoint
-from typing import cast, Generic, TypeVar
+from pathlib import Path
+import pkgutil
+import sys
+from typing import Any, cast, Generic, TypeVar
 
 from scenario_gen.base.errors import describe, did_you_mean, InputError, ScenarioGenError
 
@@ -31,6 +34,38 @@ def installed(group: str) -> Mapping[str, EntryPoint]:
             raise InputError(f"plugins: {sources} both have {group} {entry.name!r}")
         plugins[entry.name] = entry
     return plugins
+
+
+def load_class(option: str, name: str) -> Any:
+    """Return the class that a user names as MODULE:CLASS, also from the current folder.
+
+    Args:
+        option: the option or parameter, for messages.
+        name: MODULE:CLASS.
+
+    Raises:
+        InputError: there is no such module or class.
+    """
+    module, colon, attribute = name.partition(":")
+    if not (colon and module and attribute):
+        raise InputError(f"{option} {name}: write it as MODULE:CLASS, e.g. my_module:MyClass")
+    if str(Path.cwd()) not in sys.path:
+        sys.path.insert(0, str(Path.cwd()))
+    try:
+        loaded = pkgutil.resolve_name(name)
+    except ImportError as error:
+        raise InputError(
+            f"{option} {name}: {error}; run in the folder of the module, or put it on PYTHONPATH"
+        ) from error
+    except AttributeError as error:
+        classes = [member for member in vars(sys.modules[module]) if member[:1].isupper()]
+        near = did_you_mean(attribute, classes)
+        raise InputError(f"{option} {name}: {error}; name a class of that module{near}") from error
+    except (Exception, SystemExit) as error:  # the module runs
+        raise InputError(f"{option} {name}: {describe(error)}") from error
+    if not callable(loaded):
+        raise InputError(f"{option} {name}: not a class")
+    return loaded
 
 
 def _source(entry: EntryPoint) -> str:

@@ -186,7 +186,7 @@ class Search:
         str,
         typer.Option(
             help="Definition of a failure: at_fault, collision, off_road, goal, or e.g. "
-            "'ttc<1.5', 'pet<1' (s)."
+            "'ttc<1.5', 'pet<1' (s), or a criterion: its name or MODULE:CLASS."
         ),
     ] = "at_fault"
     ego: Annotated[

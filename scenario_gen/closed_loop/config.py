@@ -15,6 +15,59 @@ TEMPLATE, NEVER = "template", "never"
 
 
 @dataclass(frozen=True)
+class ObservationConfig(Parameters):
+    """How the ego observes the other vehicles; by default everywhere, exactly and at once."""
+
+    delay: int = parameter(
+        0, "number of steps after which the ego observes the others", low=0, high=100
+    )
+    position_noise: float = parameter(
+        0.0, "standard deviation of observed x and y", unit="m", low=0.0, high=100.0
+    )
+    speed_noise: float = parameter(
+        0.0, "standard deviation of observed speeds", unit="m/s", low=0.0, high=100.0
+    )
+    seed: int = parameter(0, "seed of the noise", low=0, high=2**32 - 1)
+    range: float = parameter(
+        0.0,
+        "distance of the centres up to which others are observed; 0: any",
+        unit="m",
+        low=0.0,
+        high=1e6,
+    )
+    occlusion: bool = parameter(
+        False, "vehicles, obstacles and the surroundings of the road hide others"
+    )
+    setback: float = parameter(
+        2.5,
+        "distance from the road's edge at which the surroundings hide others: the width of a "
+        "pavement (RASt 06)",
+        unit="m",
+        low=0.0,
+        high=100.0,
+    )
+
+    @property
+    def is_perfect(self) -> bool:
+        """Whether the ego observes everything exactly and at once."""
+        noise = self.position_noise or self.speed_noise
+        return not (self.delay or noise or self.range or self.occlusion)
+
+    def __str__(self) -> str:
+        parts = []
+        if self.delay:
+            parts.append(f"delay {self.delay} steps")
+        if self.position_noise or self.speed_noise:
+            noise = f"{self.position_noise:g} m and {self.speed_noise:g} m/s"
+            parts.append(f"noise {noise} (seed {self.seed})")
+        if self.range:
+            parts.append(f"range {self.range:g} m")
+        if self.occlusion:
+            parts.append(f"occlusion by vehicles and {self.setback:g} m beside the road")
+        return ", ".join(parts) or "perfect"
+
+
+@dataclass(frozen=True)
 class ClosedLoopConfig(Parameters):
     """The other drivers, the ego's limits, the end of a drive, and the verdict's thresholds."""
 
@@ -70,6 +123,7 @@ class ClosedLoopConfig(Parameters):
         low=0.0,
         high=1e6,
     )
+    observation: ObservationConfig = field(default_factory=ObservationConfig)
     limits: TypeLimits = field(default_factory=TypeLimits)
     ego_curvature_rate: float = parameter(
         0.3,
@@ -104,6 +158,11 @@ class ClosedLoopConfig(Parameters):
         low=0.0,
         high=5.0,
     )
+    criteria: str = parameter(
+        "",
+        "further criteria that a drive must meet, separated by commas: names of installed ones or "
+        "MODULE:CLASS, with e.g. <0.5 for another threshold",
+    )
     decision_time: float = parameter(
         1.0,
         "longer decisions of a planner are counted, without a change of the verdict",
@@ -118,3 +177,7 @@ class ClosedLoopConfig(Parameters):
         low=0.1,
         high=1e6,
     )
+
+    def facts(self) -> dict[str, str]:
+        """Return the facts that every file of verdicts states."""
+        return {"policy": self.policy, "observation": str(self.observation)}

@@ -20,7 +20,8 @@ from typing import NamedTuple
 import numpy as np
 import shapely
 
-from scenario_gen.closed_loop.simulation import ClosedLoop, Drive, PAST_GOAL_M
+from scenario_gen.closed_loop.drive import Drive
+from scenario_gen.closed_loop.simulation import ClosedLoop, PAST_GOAL_M
 from scenario_gen.numerics import Bools, Floats, Ints
 from scenario_gen.numerics.boxes import corners
 from scenario_gen.numerics.curve import Curve

@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from scenario_gen.closed_loop.simulation import Drive
+from scenario_gen.closed_loop.drive import Drive
 from scenario_gen.method.validity import first_exits, Ground, Proof
 from scenario_gen.numerics import Bools, Floats
 from scenario_gen.numerics.hermite import control_points

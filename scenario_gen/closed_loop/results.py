@@ -79,8 +79,12 @@ class Drives:
         return trivial_note(passed, len(self.baseline))
 
     def scores(self) -> dict[str, float]:
-        """Return the means of nuPlan's and NAVSIM's scores and of their terms."""
-        terms = [outcome.verdict.document()["terms"] for outcome in self.outcomes]
+        """Return the means of nuPlan's and NAVSIM's scores and terms, and shares of criteria."""
+        terms = []
+        for outcome in self.outcomes:
+            verdict = outcome.verdict
+            met = {f"criterion {each.name}": float(not each.missed) for each in verdict.criteria}
+            terms.append(verdict.document()["terms"] | met)
         return {
             name: math.fsum(values[name] for values in terms) / len(terms)
             for name in (terms[0] if terms else ())
@@ -94,6 +98,8 @@ class Drives:
             self._copies_note(),
             self._baseline_note(),
         ]
+        if not self.config.observation.is_perfect:
+            messages.append(f"observation of the others: {self.config.observation}")
         if self.comparison is not None:
             messages.append(self.comparison.sentence())
         messages.append(self._scores_note())
@@ -180,6 +186,7 @@ class Drives:
         ]
         return {
             "planner": self.planner,
+            **self.config.facts(),
             "parameters": {name: value for name, (_, value) in flatten(self.config).items()},
             "summary": {name: rate.document() for name, rate in rates(self.outcomes).items()},
             "scores": self.scores(),
@@ -219,7 +226,7 @@ class Drives:
             OSError: the disk is full, or the folder is not writable.
         """
         write_text(folder / JSON, self.json())
-        facts = {"policy": self.config.policy}
+        facts = self.config.facts()
         if self.easy:
             facts["hardly tests"] = self.easy
         write_text(folder / JUNIT, as_junit(self.outcomes, self.planner, facts))
@@ -230,7 +237,7 @@ class Drives:
 def as_junit(outcomes: Sequence[Outcome], planner: str, facts: Mapping[str, str] = EMPTY) -> str:
     """Return one test case per scenario, as JUnit's XML, and facts as properties.
 
-    Cases fail with the type collision, off_road, jump or goal.
+    Cases fail with the type collision, off_road, jump, goal, or the name of a criterion.
     """
     failed = [outcome for outcome in outcomes if not outcome.verdict.passed]
     lasted = math.fsum(outcome.verdict.duration for outcome in outcomes)

@@ -25,8 +25,8 @@ import numpy as np
 from scipy.signal import savgol_filter
 import shapely
 
+from scenario_gen.closed_loop.drive import Drive
 from scenario_gen.closed_loop.fault import state_at, VehicleState
-from scenario_gen.closed_loop.simulation import Drive
 from scenario_gen.numerics import Floats
 from scenario_gen.numerics.boxes import corners
 from scenario_gen.numerics.plane import ahead_and_left

@@ -9,7 +9,7 @@ with the same commands are identical.
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Protocol
 
 import numpy as np
@@ -17,9 +17,12 @@ import numpy as np
 from scenario_gen.base.errors import InputError
 from scenario_gen.closed_loop.config import ClosedLoopConfig, FORESIGHT, REPLAY, TEMPLATE
 from scenario_gen.closed_loop.coordination_space import world_of
+from scenario_gen.closed_loop.criteria import find_criteria
+from scenario_gen.closed_loop.drive import Drive
 from scenario_gen.closed_loop.driver import DriverParameters
 from scenario_gen.closed_loop.driver_traits import driver_traits, reaction_time
 from scenario_gen.closed_loop.ego import Command, EgoState, move, Pose
+from scenario_gen.closed_loop.sensor import Sensor
 from scenario_gen.closed_loop.step import advance, ego_hits
 from scenario_gen.numerics import Bools, Floats, wrap_angle
 from scenario_gen.numerics.plane import ahead_and_left, edge_lengths
@@ -50,6 +53,7 @@ class State:
             braking, or more suddenly than the jerk allows, to preserve the order.
         fault: description of an error in the last command, "" if it was correct.
         jumped: whether no vehicle can reach the ego's pose in one step.
+        past: states before this one, newest first, as far back as the delay of the observation.
     """
 
     step: int
@@ -66,6 +70,7 @@ class State:
     forced: int = 0
     fault: str = ""
     jumped: bool = False
+    past: tuple["State", ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,7 +103,7 @@ class Task:
 
 @dataclass(frozen=True, eq=False)
 class Observation:
-    """The planner's input at one instant: the ego, and the M other vehicles in the scene.
+    """The planner's input at one instant: the ego, and the M other vehicles that it observes.
 
     Attributes:
         time: seconds from the drive's start.
@@ -125,38 +130,6 @@ class Planner(Protocol):
         """Return the ego's command for the next step; None brakes."""
 
 
-@dataclass(frozen=True, eq=False)
-class Drive:
-    """One drive from start to end; N vehicles, T instants.
-
-    Attributes:
-        motion: the driven motion of all vehicles, the ego in its witness' row: a scenario like the
-            certified one.
-        ego: index of the ego.
-        present: (N, T) whether each vehicle was in the scene.
-        clock: (N, T) as in `State`.
-        accelerations: (T,) accelerations of the ego [m/s²].
-        forced: number of times that one of the others braked harder or more suddenly than drivers
-            do, to preserve the order.
-        faults: steps of faulty commands, and their descriptions.
-        jumps: the instants before which the ego jumped.
-    """
-
-    motion: Scenario
-    ego: int
-    present: Bools
-    clock: Floats
-    accelerations: Floats
-    forced: int
-    faults: tuple[tuple[int, str], ...]
-    jumps: tuple[int, ...] = ()
-
-    @property
-    def driven(self) -> int:
-        """Number of instants before the first jump."""
-        return min((*self.jumps, len(self.motion.time)))
-
-
 PAST_GOAL_M = 10.0  # more than any vehicle drives in one step
 
 
@@ -179,7 +152,8 @@ class ClosedLoop:
             config: the parameters.
 
         Raises:
-            InputError: the scenario has no such vehicle, or the road is in another frame.
+            InputError: the scenario has no such vehicle, the road is in another frame, or a
+                criterion is not valid.
         """
         if road is not None and road.frame_id != scenario.frame_id:
             raise InputError(
@@ -190,6 +164,11 @@ class ClosedLoop:
         self.ego = self.world.ego
         self.road = road and ground_for(road, scenario.vehicles[self.ego])
         self.config, self.limits = config, config.limits.of(scenario.vehicles[self.ego].type)
+        self.criteria = find_criteria(config.criteria)
+        observation = config.observation
+        self._sensor = (
+            None if observation.is_perfect else Sensor(observation, scenario, self.ego, road)
+        )
         self.reactions = self._reaction_times()
         self.traits = driver_traits(scenario, config)
         self._parameters = self._driver_parameters()
@@ -303,6 +282,8 @@ class ClosedLoop:
         advance(self.world, self._parameters, now, before, seen, passes, after, vehicles)
         clock, rate, acceleration, waited, forced = after.T
         count = state.forced + int(np.count_nonzero(forced))
+        delay = config.observation.delay
+        past = (replace(state, past=()), *state.past)[:delay] if delay else ()
         return State(
             number,
             time,
@@ -318,13 +299,36 @@ class ClosedLoop:
             count,
             note or moved.fault,
             moved.jumped,
+            past,
+        )
+
+    def perceive(self, state: State) -> State:
+        """Return a state with the other vehicles as the ego observes them.
+
+        Those that it does not observe are not present.
+        """
+        if self._sensor is None:
+            return state
+        source = state.past[-1] if state.past else state
+        vehicles, present = self._sensor.measure(source.step, source.vehicles, source.present)
+        vehicles[self.ego] = state.vehicles[self.ego]
+        present[self.ego] = True
+        return replace(
+            source,
+            step=state.step,
+            time=state.time,
+            ego=state.ego,
+            vehicles=vehicles,
+            present=present,
+            past=(),
         )
 
     def observe(self, state: State) -> Observation:
         """Return the planner's input at an instant."""
-        rows = np.flatnonzero(self._others & state.present)
+        observed = self.perceive(state)
+        rows = np.flatnonzero(self._others & observed.present)
         ids = tuple(self._ids[row] for row in rows)
-        return Observation(state.time, state.ego, ids, state.vehicles[rows], self._sizes[rows])
+        return Observation(state.time, state.ego, ids, observed.vehicles[rows], self._sizes[rows])
 
     def drive(self, planner: Planner, ended: Callable[[State], bool] | None = None) -> Drive:
         """Drive with a planner until the drive ends.

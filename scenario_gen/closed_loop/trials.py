@@ -18,8 +18,6 @@ import multiprocessing
 import os
 from pathlib import Path
 import pickle
-import pkgutil
-import sys
 from typing import Any
 
 import numpy as np
@@ -36,10 +34,12 @@ from scenario_gen.bags.storage.bag import naming_bag
 from scenario_gen.bags.storage.config import BagConfig
 from scenario_gen.base.errors import did_you_mean, InputError, ScenarioGenError
 from scenario_gen.base.parameters import parameter, Parameters
+from scenario_gen.base.registry import load_class
 from scenario_gen.base.signals import ctrl_c_blocked, end_with_parent
 from scenario_gen.closed_loop.config import ClosedLoopConfig
+from scenario_gen.closed_loop.drive import Drive
 from scenario_gen.closed_loop.origin import Origin, origins_of, Trial, units_of
-from scenario_gen.closed_loop.simulation import ClosedLoop, Drive, Planner
+from scenario_gen.closed_loop.simulation import ClosedLoop, Planner
 from scenario_gen.closed_loop.timeouts import bounded, Decisions, Timed, TooLongError
 from scenario_gen.closed_loop.verdict import DriveVerdict, judge
 from scenario_gen.method.evaluation import clustered_wilson
@@ -93,6 +93,9 @@ class Bars(Parameters):
     jumps: float = parameter(
         0.0, "largest share of drives in which the ego teleports", low=0.0, high=1.0
     )
+    criteria: float = parameter(
+        0.0, "largest share of drives that miss one of the criteria", low=0.0, high=1.0
+    )
     progress: float = parameter(
         0.9,
         "smallest share of drives with progress: 20 % of the reference drive's path, as in nuPlan",
@@ -107,33 +110,7 @@ def find_planner(name: str) -> MakePlanner:
     Raises:
         InputError: there is no such module or class.
     """
-    module, colon, attribute = name.partition(":")
-    if not (colon and module and attribute):
-        raise InputError(
-            f"--planner {name}: write it as MODULE:CLASS, "
-            "e.g. scenario_gen.closed_loop.planners:IdmFollower"
-        )
-    if str(Path.cwd()) not in sys.path:
-        sys.path.insert(0, str(Path.cwd()))
-    try:
-        planner: Any = pkgutil.resolve_name(name)
-    except ImportError as error:
-        raise InputError(
-            f"--planner {name}: {error}; run in the folder of the module, or put it on PYTHONPATH"
-        ) from error
-    except AttributeError as error:
-        classes = [member for member in vars(sys.modules[module]) if member[:1].isupper()]
-        near = did_you_mean(attribute, classes)
-        raise InputError(
-            f"--planner {name}: {error}; name a class of that module{near}"
-        ) from error
-    except (Exception, SystemExit) as error:  # the module runs
-        raise InputError(f"--planner {name}: {type(error).__name__}: {error}") from error
-    if not callable(planner):
-        raise InputError(
-            f"--planner {name}: not a class; a planner has reset(task) and act(observation)"
-        )
-    return planner  # type: ignore[no-any-return]
+    return load_class("--planner", name)  # type: ignore[no-any-return]
 
 
 def read_trials(
@@ -393,6 +370,7 @@ def _run(task: tuple[Trial, MakePlanner | str, ClosedLoopConfig]) -> Outcome:
         timed = Timed(make(), config.decision_time)
         with bounded(config.drive_time):
             drive = loop.drive(timed)
+        verdict = judge(loop, drive)
     except TooLongError as error:
         raise too_long(trial, config) from error
     except InputError as error:
@@ -406,7 +384,7 @@ def _run(task: tuple[Trial, MakePlanner | str, ClosedLoopConfig]) -> Outcome:
     finally:
         if os.getpid() != process:  # the planner has forked: only the parent has a result
             os._exit(1)
-    return Outcome(trial.name, judge(loop, drive), drive, Origin(trial.encounter), timed.decisions)
+    return Outcome(trial.name, verdict, drive, Origin(trial.encounter), timed.decisions)
 
 
 CONFIDENCE = 0.95
@@ -446,18 +424,26 @@ def rates(outcomes: Sequence[Outcome]) -> dict[str, Rate]:
     random. With a single encounter they hold for that encounter, and copies of one scenario count
     as one.
     """
-    verdicts = [outcome.verdict for outcome in outcomes]
-    flags = {
-        "failures": [not v.passed for v in verdicts],
-        "collisions": [v.collision is not None for v in verdicts],
-        "at_fault": [v.at_fault for v in verdicts],
-        "at_fault_nuplan": [v.terms.no_at_fault_collision == 0.0 for v in verdicts],
-        "off_road": [not math.isnan(v.off_road) for v in verdicts],
-        "jumps": [v.jumps > 0 for v in verdicts],
-        "goals": [not math.isnan(v.goal) for v in verdicts],
-        "progress": [v.terms.making_progress > 0.0 for v in verdicts],
+    each = [_events(outcome.verdict) for outcome in outcomes]
+    names = each[0] if each else ()
+    return {name: _rate(outcomes, [events[name] for events in each]) for name in names}
+
+
+def _events(v: DriveVerdict) -> dict[str, bool]:
+    """Return what happened in a drive, by the names of rates."""
+    events = {
+        "failures": not v.passed,
+        "collisions": v.collision is not None,
+        "at_fault": v.at_fault,
+        "at_fault_nuplan": v.terms.no_at_fault_collision == 0.0,
+        "off_road": not math.isnan(v.off_road),
+        "jumps": v.jumps > 0,
+        "goals": not math.isnan(v.goal),
+        "progress": v.terms.making_progress > 0.0,
     }
-    return {name: _rate(outcomes, each) for name, each in flags.items()}
+    if v.criteria:
+        events["criteria"] = bool(v.missed)
+    return events | {f"criterion {result.name}": result.missed for result in v.criteria}
 
 
 def passed_of(outcomes: Sequence[Outcome]) -> Rate:
@@ -481,6 +467,8 @@ def broken_bars(rates_by_name: dict[str, Rate], bars: Bars) -> list[str]:
     """Return a sentence for each bar that is not met."""
     messages = []
     for name, bar in asdict(bars).items():
+        if name not in rates_by_name:
+            continue  # no criteria are used
         value = rates_by_name[name].share.value
         is_lower = name in LOWER_BARS
         if value < bar if is_lower else value > bar:

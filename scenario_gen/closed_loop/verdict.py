@@ -3,13 +3,15 @@
 
 """The verdict on one drive: its failures, their times and causes, and the closest approaches."""
 
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from itertools import combinations
 import math
 from typing import Any, NamedTuple
 
 import numpy as np
 
+from scenario_gen.closed_loop.criteria import CriterionResult
+from scenario_gen.closed_loop.drive import Drive
 from scenario_gen.closed_loop.fault import (
     Contact,
     CutIn,
@@ -20,7 +22,7 @@ from scenario_gen.closed_loop.fault import (
 )
 from scenario_gen.closed_loop.off_road import RESOLUTION_S, road_use, SUBSTEPS_COUNT
 from scenario_gen.closed_loop.score import not_behind, Terms, terms
-from scenario_gen.closed_loop.simulation import ClosedLoop, Drive
+from scenario_gen.closed_loop.simulation import ClosedLoop
 from scenario_gen.method.evaluation import distance_and_ttc, footprint_distance
 from scenario_gen.method.validity import first_contacts, Proof
 from scenario_gen.numerics import Floats
@@ -102,6 +104,7 @@ class DriveVerdict:
         jumps: number of poses that no vehicle can reach in a step.
         stood: duration for which the ego stood at the end of the drive.
         terms: terms of nuPlan's and NAVSIM's scores.
+        criteria: results of the user's criteria.
     """
 
     index: int
@@ -129,15 +132,25 @@ class DriveVerdict:
     jumps: int
     stood: float
     terms: Terms
+    criteria: tuple[CriterionResult, ...] = ()
+
+    @property
+    def missed(self) -> list[CriterionResult]:
+        """The criteria that the drive misses."""
+        return [result for result in self.criteria if result.missed]
 
     @property
     def passed(self) -> bool:
-        """Whether the ego reached its goal without a jump, a collision or leaving the road."""
+        """Whether the ego reached its goal without a jump, a collision or leaving the road.
+
+        A drive that passes also meets all criteria.
+        """
         return (
             self.collision is None
             and math.isnan(self.off_road)
             and not math.isnan(self.goal)
             and not self.jumps
+            and not self.missed
         )
 
     @property
@@ -147,21 +160,26 @@ class DriveVerdict:
 
     @property
     def failure(self) -> str:
-        """The first that applies: jump, collision, off_road, goal; "" if the ego passed."""
-        if self.passed:
-            return ""
+        """The first that applies; "" if the ego passed.
+
+        One of: jump, collision, off_road, goal, the name of a criterion.
+        """
         if self.jumps:
             return "jump"
         if self.collision is not None:
             return "collision"
-        return "off_road" if not math.isnan(self.off_road) else "goal"
+        if not math.isnan(self.off_road):
+            return "off_road"
+        if math.isnan(self.goal):
+            return "goal"
+        return self.missed[0].name if self.missed else ""
 
     @property
     def fault(self) -> str:
         """The cause of the failure; "" if the ego passed.
 
         One of: jump, the reason of a collision, off_road, standing (at the end, before the goal),
-        goal (missed otherwise).
+        goal (missed otherwise), the name of a criterion.
         """
         if self.collision is not None and not self.jumps:
             return self.collision.reason.value
@@ -172,13 +190,15 @@ class DriveVerdict:
     def severity(self) -> tuple[float, ...]:
         """A key that sorts verdicts, the worst last.
 
-        Collisions by speed, then leaving the road, a missed goal, and the least time to collision.
+        Collisions by speed, then leaving the road, a missed goal, missed criteria, and the least
+        time to collision.
         """
         hit = self.collision.speed if self.collision else -1.0
         return (
             hit,
             float(not math.isnan(self.off_road)),
             float(math.isnan(self.goal)),
+            float(len(self.missed)),
             -self.min_ttc,
             -self.min_gap,
         )
@@ -203,7 +223,8 @@ class DriveVerdict:
             messages.append(
                 f"did not reach its goal, {100.0 * self.progress:.0f} % of the route{stands}"
             )
-        elif not messages:
+        messages += map(str, self.missed)
+        if not messages:
             messages.append(f"reached its goal at {self.goal:.1f} s")
         if self.faults:
             messages.append(f"{self.faults} faulty command(s)")
@@ -218,6 +239,15 @@ class DriveVerdict:
         }
         plain["sentence"] = self.sentence()
         plain["terms"] |= {"nuplan": self.terms.nuplan, "pdms": self.terms.pdms}
+        plain["criteria"] = [
+            {
+                "name": result.name,
+                "value": result.value if math.isfinite(result.value) else None,
+                "threshold": result.threshold,
+                "met": not result.missed,
+            }
+            for result in self.criteria
+        ]
         return {
             key: None if isinstance(value, float) and math.isnan(value) else value
             for key, value in plain.items()
@@ -244,6 +274,9 @@ def judge(loop: ClosedLoop, drive: Drive) -> DriveVerdict:
     Collisions and exits from the road are detected in continuous time, on the motion that
     `Scenario` defines between two instants. A jump is not a motion: the ego meets nobody on its
     way, and after it the ego neither reaches its goal nor leaves the road.
+
+    Raises:
+        InputError: a criterion fails.
     """
     motion, config = drive.motion, loop.config
     contacts = _contacts(drive)
@@ -280,6 +313,7 @@ def judge(loop: ClosedLoop, drive: Drive) -> DriveVerdict:
         jumps=len(drive.jumps),
         stood=_stood(motion.speed[drive.ego], config.step),
         terms=terms(drive, hit, road.margin, progress, clearance.ttc_not_behind),
+        criteria=tuple(measure(replace(drive, road=loop.road)) for measure in loop.criteria),
     )
 
 

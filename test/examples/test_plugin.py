@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The example package adds a road, a log format, a planner, a metric, a type of road users and an export format.
+"""The example package adds a road, a log format, a planner, a metric, a criterion, a type of road users and an export format.
 
 All serve the command and the library.
 """
@@ -78,6 +78,14 @@ def test_the_command_takes_all_by_name(python):
         rows["recording"]["value"] > 1.0
         and rows["with changepoints"]["value"] > 0.5 * rows["recording"]["value"]
     )
+
+    idm = ("--planner", "scenario_gen.closed_loop.planners:IdmFollower", "--no-baseline")
+    bars = (word for bar in ("goals", "progress") for word in ("--set", f"bars.{bar}=0"))
+    python("-m", "scenario_gen", "drive", "out/bag", *idm, *bars, "--set", "criteria=clearance")
+    driven = json.loads((python.folder / "out" / "drives" / "drives.json").read_text())
+    assert driven["drives"][0]["criteria"] == [
+        {"name": "clearance", "value": None, "threshold": 0.5, "met": True}
+    ]
 
     python("-m", "scenario_gen", "export", "out/bag", "--to", "csv", "--out", "tables")
     manifest = json.loads((python.folder / "tables" / "export.json").read_text())

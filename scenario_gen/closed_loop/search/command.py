@@ -22,6 +22,7 @@ from scenario_gen.base.folders import Kind, replaced_folder, sha256_of, write_te
 from scenario_gen.base.parameters import assigned, flatten
 from scenario_gen.base.provenance import parameter_texts, versions
 from scenario_gen.closed_loop.config import ClosedLoopConfig
+from scenario_gen.closed_loop.criteria import find_criteria
 from scenario_gen.closed_loop.results import as_junit, drawings, JUNIT
 from scenario_gen.closed_loop.search.estimate import Estimate, Search
 from scenario_gen.closed_loop.search.findings import Finding, findings_of
@@ -99,8 +100,8 @@ class SearchRequest:
 
     def identity(self) -> dict[str, Any]:
         """Return everything that determines the drives; the budget does not change them."""
-        make = find_planner(self.planner)
-        source = Path(getattr(__import__(make.__module__, fromlist=["_"]), "__file__", None) or "")
+        config = self.drive_config()
+        criteria = find_criteria(config.criteria)
         return {
             "template": self.planned.encounter.name,
             "road": self.planned.road_and_fit()[0].name,
@@ -109,8 +110,9 @@ class SearchRequest:
             "sampling": parameter_texts(self.sampling),
             "limits": parameter_texts(self.limits),
             "planner": self.planner,
-            "planner's file": sha256_of(source) if source.is_file() else "",
-            "drive": parameter_texts(self.drive_config()),
+            "planner's file": _source_hash(find_planner(self.planner)),
+            "criteria's files": [_source_hash(each.measure) for each in criteria],
+            "drive": parameter_texts(config),
             "ego": self.ego_id(),
             "objective": str(self.objective),
             "seed": self.seed,
@@ -124,7 +126,14 @@ class SearchRequest:
         Raises:
             InputError: a name is unknown, or a value is not valid.
         """
-        return reduce(assigned, self.assignments, ClosedLoopConfig(limits=self.limits))
+        config = reduce(assigned, self.assignments, ClosedLoopConfig(limits=self.limits))
+        return self.objective.configured(config)
+
+
+def _source_hash(code: object) -> str:
+    """Return the SHA-256 of the module of a class or instance; "" if it has no file."""
+    source = Path(getattr(__import__(code.__module__, fromlist=["_"]), "__file__", None) or "")
+    return sha256_of(source) if source.is_file() else ""
 
 
 @dataclass(frozen=True, eq=False)
@@ -284,7 +293,7 @@ def _write(
     text = json.dumps(document, indent=1, ensure_ascii=False, allow_nan=False)
     write_text(folder / JSON, text + "\n")
     outcomes = [finding.outcome for finding in result.findings]
-    write_text(folder / JUNIT, as_junit(outcomes, request.planner, _facts(request)))
+    write_text(folder / JUNIT, as_junit(outcomes, request.planner, request.drive_config().facts()))
     write_text(folder / PAGE, _page(result, request))
     if result.findings:
         with BagWriter(folder / BAG) as bag:
@@ -320,10 +329,6 @@ def _failures(
     )
 
 
-def _facts(request: SearchRequest) -> dict[str, str]:
-    return {"policy": request.drive_config().policy}
-
-
 def _rounded(value: float) -> float | None:
     return None if math.isnan(value) else float(f"{value:.6g}")
 
@@ -345,6 +350,7 @@ def _document(
         for kind, findings in result.kinds.items()
     ]
     return {
+        **request.drive_config().facts(),
         "rate": None if request.worst else _interval(estimate.rate),
         "plain": {"failures": plain.count, "drives": plain.of, **_interval(plain.share)},
         "drives": estimate.drives,

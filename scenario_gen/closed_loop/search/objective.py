@@ -3,13 +3,15 @@
 
 """The definition of a failure of a planner, and the distance of a drive to it."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 import math
 import re
 
 import numpy as np
 
 from scenario_gen.base.errors import did_you_mean, InputError
+from scenario_gen.closed_loop.config import ClosedLoopConfig
+from scenario_gen.closed_loop.criteria import CRITERIA, find_criteria
 from scenario_gen.closed_loop.search.response import Response
 from scenario_gen.closed_loop.trials import Outcome
 from scenario_gen.closed_loop.verdict import DriveVerdict
@@ -29,14 +31,18 @@ UNKNOWN_MARGIN_S = 100.0  # of a drive for which the figure does not exist
 
 @dataclass(frozen=True)
 class Objective:
-    """A failure: at_fault, collision, off_road, goal (missed), or ttc or pet below a limit [s]."""
+    """A failure: at_fault, collision, off_road, goal (missed), or ttc or pet below a limit [s].
+
+    With `criterion`, its text, a failure is a drive that misses the criterion called `name`.
+    """
 
     name: str = AT_FAULT
     limit: float = 0.0
+    criterion: str = ""
 
     @classmethod
     def parsed(cls, text: str) -> "Objective":
-        """Return the objective of a text: a name, or e.g. `ttc<1.5`.
+        """Return the objective of a text: a name, or e.g. `ttc<1.5`, or a criterion.
 
         Raises:
             InputError: it is none of these.
@@ -44,14 +50,34 @@ class Objective:
         bound = re.fullmatch(rf"({TTC}|{PET})\s*<\s*(\d+\.?\d*|\.\d+)", text.strip())
         if bound is not None:
             return cls(bound[1], float(bound[2]))
-        if text.strip() not in NAMES:
-            known = f"{', '.join(NAMES)}, or e.g. {TTC}<1.5, {PET}<1 (seconds)"
-            raise InputError(
-                f"objective {text!r} is not known; take {known}{did_you_mean(text, NAMES)}"
-            )
-        return cls(text.strip())
+        if text.strip() in NAMES:
+            return cls(text.strip())
+        name = re.split("[<>]", text)[0].strip()
+        if ":" not in name and name not in CRITERIA:
+            known = f"{', '.join(NAMES)}, or e.g. {TTC}<1.5, {PET}<1 (seconds), or a criterion"
+            near = did_you_mean(text, (*NAMES, *CRITERIA.names()))
+            raise InputError(f"objective {text!r} is not known; take {known}{near}")
+        text = text.replace(",", " ")
+        return cls(find_criteria(text)[0].name, criterion=text)
+
+    def configured(self, config: ClosedLoopConfig) -> ClosedLoopConfig:
+        """Return parameters of drives with the criterion of the objective among the criteria.
+
+        Raises:
+            InputError: they have the criterion with another threshold.
+        """
+        if not self.criterion:
+            return config
+        (wanted,) = find_criteria(self.criterion)
+        listed = {each.name: each.threshold for each in find_criteria(config.criteria)}
+        if listed.get(wanted.name) == wanted.threshold:
+            return config
+        texts = [text for text in (config.criteria, self.criterion) if text]
+        return replace(config, criteria=",".join(texts))
 
     def __str__(self) -> str:
+        if self.criterion:
+            return self.criterion
         return f"{self.name}<{self.limit:g}" if self.limit else self.name
 
     def response(self, outcome: Outcome) -> Response:
@@ -60,18 +86,29 @@ class Objective:
         The parts of an objective of collisions are the time shifts [s] that would meet the others.
         """
         verdict = outcome.verdict
+        events = []
+        if verdict.collision is not None:
+            events.append(COLLISION)
+        if verdict.at_fault:
+            events.append(AT_FAULT)
+        if self.criterion:
+            return self._criterion_response(verdict, events)
         shifts = _time_shifts(outcome)
         margin = self._margin(outcome, min(shifts, default=UNKNOWN_MARGIN_S))
         if math.isnan(margin):
             margin = UNKNOWN_MARGIN_S
         parts = shifts if self.name in (AT_FAULT, COLLISION) else ()
         kind = _kind(outcome, self.name) if margin <= 0.0 else ""
-        events = []
-        if verdict.collision is not None:
-            events.append(COLLISION)
-        if verdict.at_fault:
-            events.append(AT_FAULT)
         return Response(float(margin), parts, kind, tuple(events))
+
+    def _criterion_response(self, verdict: DriveVerdict, events: list[str]) -> Response:
+        """Return the response of a drive by the objective's criterion."""
+        (result,) = (each for each in verdict.criteria if each.name == self.name)
+        limit = UNKNOWN_MARGIN_S
+        margin = float(np.nan_to_num(result.margin, nan=limit, posinf=limit, neginf=-limit))
+        if result.missed:
+            return Response(margin, (), f"{self.name} missed", tuple(events))
+        return Response(max(margin, 1e-9), events=tuple(events))  # equality meets a criterion
 
     def _margin(self, outcome: Outcome, nearest: float) -> float:
         """Return the margin of a drive whose least time shift to a collision is `nearest` [s].

@@ -373,8 +373,9 @@ class Traffic(Node):  # type: ignore[misc]
         """
         if self._loop is None:
             return
+        observed = [self._loop.perceive(state) for state in self._states[-2:]]
         messages = surroundings(
-            self._loop, self._states[-2:], self._names, self._autoware, self._has_subscribers
+            self._loop, observed, self._names, self._autoware, self._has_subscribers
         )
         for topic, data in messages:
             self._publish(topic, data)
