@@ -28,12 +28,20 @@ from scenario_gen.bags.vehicles import (
     TWIST,
 )
 from scenario_gen.base.errors import InputError
-from scenario_gen.logs.bag_clock import clock_doubt, stamp_factor, TopicClock
+from scenario_gen.logs.bag_clock import (
+    check_rates,
+    clock_doubt,
+    LARGE_COUNT,
+    received_window,
+    stamp_factor,
+    TopicClock,
+)
 from scenario_gen.logs.bag_frames import base_frames, check_fixed_frame, check_frames
 from scenario_gen.logs.bag_names import child_vehicle, find_owners, without_duplicates
 from scenario_gen.logs.config import listed, LogConfig
 from scenario_gen.logs.doubts import Doubt
 from scenario_gen.logs.file_names import file_names
+from scenario_gen.logs.growing import Span
 from scenario_gen.logs.raw import check_size, check_vehicles, Observations, RawLog, Rows, Segment
 from scenario_gen.types import Encounter
 
@@ -55,7 +63,8 @@ class Topic:
         label: the log's name in messages to the user.
         bag: name of the bag, if several have the topic at one time; else "".
         stamps: log stamps [ns].
-        data: CDR bytes.
+        data: CDR bytes; empty once a message is decoded.
+        part: the window of time that is read, if not all of it; else "".
     """
 
     name: str
@@ -64,14 +73,15 @@ class Topic:
     bag: str = ""
     stamps: list[int] = field(default_factory=list)
     data: list[bytes] = field(default_factory=list)
+    part: str = ""
 
     def where(self, number: int) -> str:
         """Name the log, the topic and a message."""
-        return f"{self.label}, topic {self.name}, message {number}"
+        return f"{self.label}, topic {self.name}{self.part}, message {number}"
 
     def segment(self, first_row: int) -> Segment:
         """Return the place of its messages, which are rows of the log from `first_row` on."""
-        return Segment(first_row, f"{self.label}, topic {self.name}", "message", 1)
+        return Segment(first_row, f"{self.label}, topic {self.name}{self.part}", "message", 1)
 
 
 def read(paths: Sequence[Path], config: LogConfig) -> RawLog:
@@ -120,19 +130,28 @@ def _read_topics(paths: Sequence[Path], config: LogConfig) -> list[Topic]:
     bags = file_names([path.resolve() for path in paths])
     topics: dict[tuple[str, str], Topic] = {}
     types: dict[str, str] = {}
+    n_messages = 0
     for path in paths:
         with open_bag(path, bounds, "log.size_limit") as bag:
             types |= {topic.name: topic.type for topic in bag.topics()}
+            n_messages += sum(topic.count for topic in bag.topics())
     is_used = _usable(requested, types)
+    window: Span | None = None
+    if (config.start or config.end) and n_messages > LARGE_COUNT:
+        window = received_window(paths, is_used, config)
+    part = f" from {config.start:g} s on" if window else ""
     n_rows = 0
     for path, name in zip(paths, bags, strict=True):
         with open_bag(path, bounds, "log.size_limit") as bag:
-            for message in bag.messages(is_used):
+            for message in bag.messages(is_used, window[0] if window else None):
+                topic = topics.setdefault(
+                    (message.topic, name),
+                    Topic(message.topic, message.type, label, name, part=part),
+                )
+                if window and message.stamp_ns > window[1] and topic.stamps:
+                    break
                 n_rows += 1
                 check_size(str(path), 0, n_rows, config)
-                topic = topics.setdefault(
-                    (message.topic, name), Topic(message.topic, message.type, label, name)
-                )
                 topic.stamps.append(message.stamp_ns)
                 topic.data.append(message.data)
     _check_requested(requested, types, paths[0])
@@ -246,6 +265,8 @@ def _read_streams(topics: Sequence[Topic], name: str, config: LogConfig) -> RawL
     check_vehicles(label, len(vehicles), config)
     _check_positions(topics, owners, vehicles)
     notes += check_frames(label, frames, vehicles)
+    if topics[0].part:
+        check_rates(label, clocks, config)
     vehicles, doubts = _checked_clocks(vehicles, clocks, notes, config)
     unstamped = [clock.topic for clock in clocks if not clock.has_stamps]
     if unstamped:
@@ -344,6 +365,7 @@ def _collect(
             _add_sample(vehicles.setdefault(name, Rows()), sample, stamp_ns, first_row + number)
             if sample.frame:
                 frames.setdefault(name, sample.frame)
+        topic.data[number] = b""  # bounds the memory
     return clock
 
 

@@ -3,13 +3,25 @@
 
 """The clocks of a bag: header stamps of each topic against the time of reception."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from itertools import islice
+from pathlib import Path
 
 import numpy as np
 
+from scenario_gen.bags.storage.bag import open_bag
+from scenario_gen.bags.storage.config import BagConfig
+from scenario_gen.base.errors import InputError
+from scenario_gen.logs.config import LogConfig
 from scenario_gen.logs.doubts import Doubt, Quantity
+from scenario_gen.logs.growing import Span
 
+LARGE_COUNT = 200_000
+"""Messages above which a window is read alone; a smaller log is read whole, and cut afterwards."""
+
+_RECEPTION_SLACK_S = 10.0
+_LATEST_NS = 2**63 - 1
 _MAX_CLOCK_DIFFERENCE_S = 0.5  # of two vehicles; latencies differ by less
 _MAX_JITTER_S = 0.25  # of the latency; with more, the time of reception tells nothing
 _MIN_MESSAGES_COUNT = 5
@@ -96,3 +108,40 @@ def clock_doubt(clocks: Sequence[TopicClock]) -> Doubt | None:
         f"the header clocks differ by {difference:.1f} s (header minus reception: {listed})",
         "--set log.stamps=received uses the recorder's clock",
     )
+
+
+def check_rates(label: str, clocks: Sequence[TopicClock], config: LogConfig) -> None:
+    """Check that a window of the time of reception is one of the headers' time.
+
+    Raises:
+        InputError: the clocks of the headers are slower or faster.
+    """
+    if config.stamps == "header" and any(
+        abs(clock.rate - 1.0) > _SAME_RATE_RATIO for clock in clocks
+    ):
+        raise InputError(
+            f"{label}: the clock of the headers is not as fast as that of the recorder, so a "
+            "window of a large bag cannot be read by the headers: --set log.stamps=received uses "
+            "the recorder's clock"
+        )
+
+
+def received_window(
+    paths: Sequence[Path], is_used: Callable[[str, str], bool], config: LogConfig
+) -> Span:
+    """Return the stamps of reception [ns] between which a large log is read.
+
+    Headers are cut afterwards: their stamps may differ by `_RECEPTION_SLACK_S`.
+
+    Raises:
+        InputError: a bag is damaged.
+    """
+    first_ns = []
+    for path in paths:
+        with open_bag(path, BagConfig(most_bytes=config.size_limit << 20)) as bag:
+            first_ns += [message.stamp_ns for message in islice(bag.messages(is_used), 1)]
+    start_ns = min(first_ns, default=0)
+    begin_ns = start_ns + round(1e9 * (config.start - _RECEPTION_SLACK_S))
+    if not config.end:
+        return begin_ns, _LATEST_NS
+    return begin_ns, start_ns + round(1e9 * (config.end + _RECEPTION_SLACK_S))

@@ -32,6 +32,7 @@ from scenario_gen.logs.table_parts import (
     tracks_of,
     with_hemispheres,
 )
+from scenario_gen.logs.table_window import has_window, read_window
 from scenario_gen.logs.text import Layout, layout_of
 from scenario_gen.numerics import Floats
 
@@ -90,21 +91,25 @@ def read(paths: Sequence[Path], config: LogConfig, *, spmd: bool = False) -> Raw
     segments = []
     notes: list[str] = []
     n_rows = 0
+    n_read = 0
     n_bytes = 0
     for path in paths:
-        n_bytes += path.stat().st_size
-        check_size(str(path), n_bytes, n_rows, config)
+        if spmd or not has_window(path, config):
+            n_bytes += path.stat().st_size
+        check_size(str(path), n_bytes, n_read, config)
         if spmd:
-            frame = _read_spmd(path, n_rows, config)
+            frame = _read_spmd(path, n_read, config)
             header_lines = 0
         else:
-            frame, columns, header_lines, names = _read_named(path, n_rows, config, notes)
+            frame, columns, header_lines, names = _read_named(path, n_read, config, notes)
             separators |= dict.fromkeys(names)
         if "vehicle" not in frame:
             frame["vehicle"] = "0" if len(paths) == 1 else path.stem
+        frame["row"] = n_rows + frame.index
         frames.append(frame)
         segments.append(segment_of(path, n_rows, header_lines))
-        n_rows += len(frame)
+        n_read += len(frame)
+        n_rows = int(frame["row"].iloc[-1]) + 1
     if len({"lat" in frame for frame in frames}) > 1:
         raise InputError(
             f"{paths[0]} and the other files mix latitude/longitude and x/y; read them separately"
@@ -158,7 +163,7 @@ def _read_text_columns(
     path: Path, layout: Layout, rows_before: int, config: LogConfig
 ) -> tuple[pd.DataFrame, dict[str, Column], list[str]]:
     """Return a text table, its columns by quantity, and its header."""
-    options = {
+    options: dict[str, Any] = {
         "encoding": layout.encoding,
         "sep": layout.separator,
         "decimal": layout.decimal,
@@ -171,7 +176,11 @@ def _read_text_columns(
     # Numbers of 64 bits, or in hexadecimal, are not float64.
     texts = ("vehicle", "kind", "scene", "date")
     names = [columns[quantity].name for quantity in texts if quantity in columns]
-    frame = read_text(path, rows_before, config, **options, dtype=dict.fromkeys(names, object))
+    options["dtype"] = dict.fromkeys(names, object)
+    if has_window(path, config):
+        frame = read_window(path, columns, config, options)
+    else:
+        frame = read_text(path, rows_before, config, **options)
     return with_hemispheres(frame, columns), columns, header
 
 

@@ -3,7 +3,7 @@
 
 """Bags, MCAP and SQLite: streams per vehicle, odometry, tracks, and everything that can be wrong with them."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from mcap.writer import Writer as McapWriter
 import numpy as np
@@ -20,6 +20,7 @@ from scenario_gen.bags.storage.definitions import definition, type_store
 from scenario_gen.bags.vehicles import FIX, ODOMETRY, POSE, TRANSFORMS, TWIST
 from scenario_gen.base.errors import InputError
 from scenario_gen.logs import LogConfig, read_log
+import scenario_gen.logs.bag
 from scenario_gen.logs.doubts import DoubtError
 from scenario_gen.types import Encounter, Vehicle
 
@@ -362,6 +363,18 @@ def test_header_clocks_that_differ_stop_and_those_of_the_recorder_agree(tmp_path
         read_log(bag)
     (encounter,) = read_log(bag, LogConfig(stamps="received")).encounters
     np.testing.assert_allclose(encounter.position, plain.position, atol=0.02)
+
+
+def test_the_window_of_a_large_bag_is_that_of_the_whole_one(tmp_path, monkeypatch):
+    bag = write(tmp_path / "drive", streams(crossing(40.0)))
+    config = LogConfig(start=12.0, end=20.0)
+    whole = read_log(bag, config)
+    monkeypatch.setattr(scenario_gen.logs.bag, "LARGE_COUNT", 10)
+    part = read_log(bag, replace(config, row_limit=whole.quality.rows - 1))
+    (expected,), (encounter,) = whole.encounters, part.encounters
+    assert encounter.start_ns == expected.start_ns
+    np.testing.assert_array_equal(encounter.position, expected.position)
+    assert part.quality.rows < whole.quality.rows
 
 
 def test_stamps_in_milliseconds_are_scaled(tmp_path):

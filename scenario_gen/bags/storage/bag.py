@@ -77,16 +77,26 @@ class StoredBag:
         return tuple(topics[name] for name in sorted(topics))
 
     def messages(
-        self, wanted: Callable[[str, str], bool] = lambda _topic, _type: True
+        self,
+        wanted: Callable[[str, str], bool] = lambda _topic, _type: True,
+        begin_ns: int | None = None,
     ) -> Iterator[BagMessage]:
         """Yield the messages of topics with a `wanted` name and type, by their stamps.
+
+        Args:
+            wanted: chooses topics.
+            begin_ns: earlier messages are left out, except the first one of each topic.
 
         Raises:
             InputError: a file is damaged, there are more messages than the bounds allow, or a
                 topic is not CDR of a known type.
         """
         streams = [self._messages_of_file(path, file, wanted) for path, file in self.files]
+        seen: set[str] = set()
         for message in heapq.merge(*streams, key=attrgetter("stamp_ns")):
+            if begin_ns is not None and message.stamp_ns < begin_ns and message.topic in seen:
+                continue
+            seen.add(message.topic)
             self.budget.spend_message(len(message.data))
             yield message
 
