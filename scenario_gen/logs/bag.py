@@ -159,7 +159,8 @@ def _read_topics(paths: Sequence[Path], config: LogConfig) -> list[Topic]:
         raise InputError(
             f"{paths[0]}: no topic to read, it has {_listing(types)}. Needed per vehicle: {FIX} "
             f"with {TWIST}, or {ODOMETRY}; or a topic named tracks of {TRACKED} or {TRACKS}; "
-            "choose others by name with --set log.topics=…"
+            "choose others by name with --set log.topics=…, or convert them first, for example with "
+            "`ros2 run topic_tools transform`"
         )
     return _joined([topics[key] for key in sorted(topics)])
 

@@ -284,13 +284,13 @@ def _complete(columns: dict[str, Column], path: Path, header: Sequence[str]) -> 
     is_geographic = {"lat", "lon"} <= columns.keys()
     if not is_geographic and not {"x", "y"} <= columns.keys():
         missing = [name for name in ("x", "y", "lat", "lon") if name not in columns]
-        raise _missing_column(
-            "position (x and y, or lat and lon)", "x=…,y=…", missing, path, header
-        )
+        options = ["x", "y", *(name for name in ("time", "vehicle") if name not in columns)]
+        raise _missing_column("position (x and y, or lat and lon)", options, missing, path, header)
     if "time" not in columns and "date" in columns:
         columns = {**columns, "time": columns.pop("date")}
     if "time" not in columns:
-        raise _missing_column("time", "time=…", ["time"], path, header)
+        options = [name for name in ("time", "vehicle") if name not in columns]
+        raise _missing_column("time", options, ["time"], path, header)
     ignored = ["x", "y"] if is_geographic else ["lat", "lon"]
     if "speed" in columns or not {"vx", "vy"} <= columns.keys():
         ignored += ["vx", "vy"]
@@ -298,9 +298,14 @@ def _complete(columns: dict[str, Column], path: Path, header: Sequence[str]) -> 
 
 
 def _missing_column(
-    missing: str, remedy: str, quantities: Sequence[str], path: Path, header: Sequence[str]
+    missing: str,
+    options: Sequence[str],
+    quantities: Sequence[str],
+    path: Path,
+    header: Sequence[str],
 ) -> UnknownFormatError:
-    """Return the error on a missing column, with a similar name that may be meant."""
+    """Return the error on a missing column, with all options that the next command needs."""
+    remedy = ",".join(f"{option}=…" for option in options)
     aliases = {alias for quantity in quantities for alias in NAMES[quantity]}
     return UnknownFormatError(
         f"{path} has no column for {missing}; it has {', '.join(header)}. Rename it, or name it "
