@@ -61,6 +61,8 @@ class KindThresholds:
         path_step_m: distance of the points of a path.
         sample_period_s: all samples give the same kinds as these.
         min_speed_mps: below it a heading is not reliable.
+        alone_s: a vehicle that is present for this long without the other one may still turn
+            because of it.
     """
 
     lane_offset_m: float = 2.5
@@ -73,6 +75,7 @@ class KindThresholds:
     path_step_m: float = 4.0
     sample_period_s: float = 0.3
     min_speed_mps: float = 0.5
+    alone_s: float = 15.0
 
 
 THRESHOLDS = KindThresholds()
@@ -138,14 +141,26 @@ def kind_of(motion: Motion, a: int, b: int) -> EncounterKind:
     period = float(motion.time[1] - motion.time[0])
     stride = max(round(THRESHOLDS.sample_period_s / period), 1)
     rows = slice(common.start, common.stop, stride)
-    first, second = (
-        _Drive(motion.position[n, rows], motion.heading[n, rows], motion.speed[n, rows])
-        for n in (a, b)
+    alone = round(THRESHOLDS.alone_s / period)
+    whole = []
+    for n in (a, b):
+        begin, end = motion.present[n].tolist()
+        begin = max(begin, common.start - stride * (alone // stride))
+        whole.append(_drive(motion, n, slice(begin, min(end + 1, common.stop + alone), stride)))
+    return _kind_of_drives(_drive(motion, a, rows), _drive(motion, b, rows), *whole)
+
+
+def _drive(motion: Motion, vehicle: int, rows: slice) -> _Drive:
+    """Return some samples of a vehicle."""
+    return _Drive(
+        motion.position[vehicle, rows], motion.heading[vehicle, rows], motion.speed[vehicle, rows]
     )
-    return _kind_of_drives(first, second)
 
 
-def _kind_of_drives(first: _Drive, second: _Drive) -> EncounterKind:
+def _kind_of_drives(
+    first: _Drive, second: _Drive, whole_first: _Drive, whole_second: _Drive
+) -> EncounterKind:
+    """Return the kind of two drives while together, with the samples before and after it."""
     count = max(len(first.speed) // 4, 1)
     path, other_path = first.path, second.path
 
@@ -156,8 +171,8 @@ def _kind_of_drives(first: _Drive, second: _Drive) -> EncounterKind:
     if same_way(slice(-count, None)):
         return EncounterKind.FOLLOWING if same_way(slice(count)) else EncounterKind.MERGING
 
-    if _paths_cross(first, second):
-        turns = max(abs(first.turn), abs(second.turn)) >= THRESHOLDS.turn_rad
+    if _paths_cross(whole_first, whole_second):
+        turns = max(abs(whole_first.turn), abs(whole_second.turn)) >= THRESHOLDS.turn_rad
         return EncounterKind.LEFT_TURN if turns else EncounterKind.CROSSING
 
     nearest = np.hypot(*(first.position - second.position).T).argmin()

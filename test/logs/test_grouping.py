@@ -12,6 +12,8 @@ from support.log_builders import save
 
 from scenario_gen.base.errors import InputError
 from scenario_gen.logs import LogConfig, read_log
+from scenario_gen.situation import Situation
+from scenario_gen.situation.kind import EncounterKind
 
 
 def car(name, begin, end, x, y, vx=0.0, vy=0.0):
@@ -236,3 +238,4 @@ def test_a_left_turn_is_complete_though_the_oncoming_car_is_far_away(tmp_path):
     assert np.degrees(heading[-1] - heading[0]) == pytest.approx(90.0, abs=3.0)
     assert encounter.time[spans["oncoming"][1]] < 17.0
     assert any("vehicle oncoming is recorded from" in note for note in result.quality.notes)
+    assert Situation.of(encounter).kind(0, 1) == EncounterKind.LEFT_TURN
