@@ -12,7 +12,7 @@ from scenario_gen.base.provenance import what_makes_it_again
 from scenario_gen.method.config import PipelineConfig
 from scenario_gen.method.evaluation import coverage_of, evaluate, measures_in, replay
 from scenario_gen.method.fitting import fit_template
-from scenario_gen.method.outcome_sets import outcome_sets, swapped_order
+from scenario_gen.method.outcome_sets import for_one_set, outcome_sets, swapped_order
 from scenario_gen.method.reference_sets import with_references
 from scenario_gen.method.routing import plan_routes
 from scenario_gen.method.sampling import Callbacks, Plan, Progress, sample_scenarios
@@ -159,14 +159,13 @@ def generate_outcomes(
         50
     """
     encounter, *population = [encounter] if isinstance(encounter, Encounter) else encounter
-    undecided = replace(config, sampling=replace(config.sampling, decisions="recorded"))
 
     def generate_set(template: Encounter, size: int) -> GenerationResult:
         """Generate the scenarios of one outcome."""
         return generate(
             [template, *population],
             road,
-            undecided if template.decision is None else config,
+            replace(config, sampling=for_one_set(config.sampling, template)),
             count=size,
             seed=seed,
             request=request,

@@ -174,15 +174,18 @@ class Drives:
 
     def document(self) -> dict[str, Any]:
         """Return all verdicts and their summary as JSON's types."""
+        known = [trial.scenario.facts.decision for trial in self.trials]
+        decisions = known or [None] * len(self.outcomes)
         drives = [
             {
                 "name": outcome.name,
                 "encounter": outcome.origin.encounter,
                 "scenario": outcome.origin.digest,
                 "copy_of": outcome.origin.copy_of or None,
+                "decision": decision.document() if decision else None,
                 **outcome.verdict.document(),
             }
-            for outcome in self.outcomes
+            for outcome, decision in zip(self.outcomes, decisions, strict=False)
         ]
         return {
             "planner": self.planner,

@@ -5,9 +5,11 @@
 
 A task generates the scenarios of ten templates on one road, and writes three files:
 
-    bags/road=NAME/part-00000/              a bag as from `generate`, a namespace per template
+    bags/road=NAME/part-00000/              a bag as from `generate`, a namespace per set
     scenarios/road=NAME/part-00000.parquet  a row per scenario: its place and its criticality
-    cases/road=NAME/part-00000.parquet      a row per template: counts, and the causes of refusals
+    cases/road=NAME/part-00000.parquet      a row per set: counts, and the causes of refusals
+
+A template has one set, or one for each outcome of its decision (`sampling.decisions=drawn`).
 
 The table of cases is written last, so a part is finished if that table exists. There is no other
 record of progress.
@@ -16,7 +18,8 @@ record of progress.
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import partial
 from hashlib import sha256
 from itertools import groupby
 import json
@@ -38,22 +41,28 @@ from scenario_gen.method.chain import Chain
 from scenario_gen.method.config import PipelineConfig
 from scenario_gen.method.evaluation import criticality
 from scenario_gen.method.fitting import LostEncounterError
+from scenario_gen.method.outcome_sets import for_one_set, outcome_sets
 from scenario_gen.method.segmentation import segment
 from scenario_gen.roads import build_road, road_and_template
 from scenario_gen.situation import Situation
-from scenario_gen.types import GenerationResult, most_exposed
+from scenario_gen.types import Encounter, GenerationResult, most_exposed, Request
 
 MANIFEST = "batch.json"
 TASK_TEMPLATE_COUNT = 10
+NO_CANDIDATE = "no valid candidate"
 LOST_CONFLICT = "lost conflict"  # the cause of a case whose encounter is lost, on any road
 SCENARIO_COLUMNS = {
-    **dict.fromkeys(("template", "kind", "namespace", "sha256", "type"), "string"),
+    **dict.fromkeys(("template", "kind", "namespace", "sha256", "type", "outcome"), "string"),
     "types": "string[]",
     **dict.fromkeys(("vehicles", "part", "index", "seed"), "int64"),
-    **dict.fromkeys(("seconds", "distance", "ttc", "pet", "speed", "braking"), "double"),
+    **dict.fromkeys(
+        ("seconds", "distance", "ttc", "pet", "speed", "braking", "probability"), "double"
+    ),
 }
 CASE_COLUMNS = {
-    **dict.fromkeys(("template", "kind", "namespace", "refused", "cause", "why"), "string"),
+    **dict.fromkeys(
+        ("template", "kind", "namespace", "refused", "cause", "why", "outcome"), "string"
+    ),
     **dict.fromkeys(
         ("vehicles", "seed", "wanted", "published", "candidates", "part", "changepoints"), "int64"
     ),
@@ -115,6 +124,7 @@ class Batch:
         requested: number of scenarios requested.
         failures: cases without any scenario, by cause.
         refused: candidates refused, by cause.
+        outcomes: scenarios by the outcome of the decision, if decisions were drawn.
         failed: messages of the tasks that failed.
     """
 
@@ -123,6 +133,7 @@ class Batch:
     requested: int
     failures: dict[str, int]
     refused: dict[str, int]
+    outcomes: dict[str, int]
     failed: list[str]
 
     def lines(self) -> list[str]:
@@ -131,6 +142,8 @@ class Batch:
             f"{self.scenarios} of {self.requested} scenarios"
             f" from {self.cases} cases (encounter and road)"
         ]
+        for outcome, count in Counter(self.outcomes).most_common():
+            lines.append(f"{count} scenarios with the outcome: {outcome}")
         for cause, count in Counter(self.failures).most_common():
             lines.append(f"{count} cases without any: {cause}")
         for cause, count in Counter(self.refused).most_common():
@@ -177,7 +190,7 @@ def run_batch(
         with suppress(RefusedError):
             build_road(road, first, request.config.road)
     document = {
-        "format": 1,
+        "format": 2,
         "corpus": hashes,
         "roads": list(roads),
         "count": request.count,
@@ -225,11 +238,11 @@ def generate_part(task: PartTask) -> None:
     scenarios: list[dict[str, Any]] = []
     results: dict[str, GenerationResult] = {}
     for k, (row, table) in enumerate(_rows(task.templates)):
-        case, result = _generate_case(row, table, f"/case_{k}", task)
-        cases.append(case)
-        if result is not None and len(result.generated.scenarios):
-            results[f"/case_{k}"] = result
-            scenarios += _scenario_rows(case, result, task)
+        for case, result in _generate_cases(row, table, f"/case_{k}", task):
+            cases.append(case)
+            if result is not None and len(result):
+                results[case["namespace"]] = result
+                scenarios += _scenario_rows(case, result, task)
     if results:
         with arriving(task.file("bags", "")) as part, BagWriter(part) as bag:
             add_results(bag, results)
@@ -247,12 +260,12 @@ def _rows(templates: Sequence[tuple[Place, int]]) -> Iterator[tuple[dict[str, An
             yield row, table
 
 
-def _generate_case(
+def _generate_cases(
     row: Mapping[str, Any], table: Place, namespace: str, task: PartTask
-) -> tuple[dict[str, Any], GenerationResult | None]:
-    """Generate the scenarios of one template; return the case's row and the result.
+) -> list[tuple[dict[str, Any], GenerationResult | None]]:
+    """Generate the sets of one template; return the row and the result of each.
 
-    A refused template has no result, and the reason is in its row.
+    A refused template has one row with the reason, and no result.
     """
     request = task.request
     seed = seed_of(request.seed, row["name"], task.road)
@@ -270,42 +283,54 @@ def _generate_case(
         "why": "",
         "part": task.number,
         "changepoints": 0,
+        "outcome": "",
     }
+    generate = partial(_generate_set, task, seed)
+    sampling = request.config.sampling
     try:
         encounter = encounter_of(row, table)
-        road, encounter = road_and_template(task.road, encounter, request.config.road)
-        segmentation = segment(encounter, request.config.segmentation, seed)
-        result = Chain(
-            Situation.of(encounter),
-            segmentation,
-            road,
-            request.config,
-            count=request.count,
-            seed=seed,
-        ).run()
+        sets = outcome_sets(generate, encounter, sampling, Request(), request.count, seed)
     except (RefusedError, InputError) as error:
-        return case | {"cause": _cause(error), "why": str(error)}, None
-    generated = result.generated
-    facts = {"template": row["name"], "roads": task.road, "seed": str(seed)}
-    facts["count"] = str(request.count)
+        return [(case | {"cause": _cause(error), "why": str(error)}, None)]
+    names = [namespace, *(f"{namespace}_{n}" for n in range(1, len(sets)))]
+    return [
+        (case | {"namespace": name} | _set_columns(result), result)
+        for name, result in zip(names, sets, strict=True)
+    ]
+
+
+def _generate_set(task: PartTask, seed: int, encounter: Encounter, count: int) -> GenerationResult:
+    """Return scenarios from an encounter.
+
+    Raises:
+        InputError, RefusedError: as the stages; an outcome of a decision has no valid scenario.
+    """
+    config = task.request.config
+    config = replace(config, sampling=for_one_set(config.sampling, encounter))
+    road, placed = road_and_template(task.road, encounter, config.road)
+    segmentation = segment(placed, config.segmentation, seed)
+    situation = Situation.of(placed)
+    result = Chain(situation, segmentation, road, config, count=count, seed=seed).run()
+    if encounter.decision is not None and not len(result):
+        raise RefusedError(NO_CANDIDATE)
+    facts = {"template": encounter.recording, "roads": task.road, "seed": str(seed)}
+    facts["count"] = str(count)
+    return replace(result, provenance=facts | versions() | parameter_texts(config))
+
+
+def _set_columns(result: GenerationResult) -> dict[str, Any]:
+    """Return the columns of a case that follow from its result."""
+    generated, decision = result.generated, result.encounter.decision
     refused = {str(cause): number for cause, number in sorted(generated.refused.items()) if number}
-    case |= {
-        "published": len(generated.scenarios),
+    return {
+        "wanted": generated.requested,
+        "published": len(result),
         "candidates": generated.candidates,
         "refused": json.dumps(refused),
-        "changepoints": len(segmentation.changepoints),
-        "cause": "" if len(generated.scenarios) else "no valid candidate",
+        "changepoints": len(result.segmentation.changepoints),
+        "cause": "" if len(result) else NO_CANDIDATE,
+        "outcome": decision.outcome if decision else "",
     }
-    return case, GenerationResult(
-        encounter,
-        segmentation,
-        road,
-        result.fit,
-        result.routes,
-        generated,
-        seed,
-        provenance=facts | versions() | parameter_texts(request.config),
-    )
 
 
 def _cause(error: RefusedError | InputError) -> str:
@@ -329,6 +354,7 @@ def _scenario_rows(
 ) -> list[dict[str, Any]]:
     """Return a row for each scenario of a case."""
     config = task.request.config.evaluation
+    decision = result.encounter.decision
     rows = []
     for scenario in result.generated.scenarios:
         measures = criticality(scenario.resampled(config.period), config.ttc_horizon)
@@ -349,6 +375,8 @@ def _scenario_rows(
             "braking": float(-scenario.acceleration.min()),
             "type": most_exposed(scenario.vehicles),
             "types": [vehicle.type for vehicle in scenario.vehicles],
+            "outcome": case["outcome"],
+            "probability": decision.probability if decision else 1.0,
         }
         rows.append(row)
     return rows
@@ -364,4 +392,11 @@ def summary(out: Place, failed: list[str]) -> Batch:
     scenarios = sum(int(case["published"]) for case in cases)
     requested = sum(int(case["wanted"]) for case in cases)
     failures = Counter(case["cause"] for case in cases if not case["published"])
-    return Batch(len(cases), scenarios, requested, dict(failures), dict(refused), failed)
+    outcomes: Counter[str] = Counter()
+    for case in cases:
+        if case.get("outcome"):
+            outcomes[case["outcome"]] += int(case["published"])
+    pairs = {(case["template"], case["seed"]) for case in cases}
+    return Batch(
+        len(pairs), scenarios, requested, dict(failures), dict(refused), dict(outcomes), failed
+    )

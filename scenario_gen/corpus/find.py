@@ -67,8 +67,9 @@ def find(batch: Place, condition: str = "true") -> Hits:
         batch: written by `run_batch`, finished or not; or a corpus written by `mine`.
         condition: SQL over the columns template, kind, road, vehicles, index, seed, seconds [s],
             distance [m], ttc [s], pet [s], speed [m/s], braking [m/s²], type (of the most exposed
-            road user), types (of all road users) and sha256. Encounters have no index, seed,
-            braking, types and sha256, but gap [m].
+            road user), types (of all road users), outcome (of the decision), its probability and
+            sha256. Encounters have no index, seed, braking, types, outcome, probability and
+            sha256, but gap [m].
 
     Raises:
         InputError: there is no batch, or the condition is invalid.
@@ -84,7 +85,7 @@ def find(batch: Place, condition: str = "true") -> Hits:
     if not tables:
         command = f"scenario-gen batch DIR --roads … --out {batch}"
         raise InputError(f"{batch} holds no scenarios; write them with `{command}`")
-    remedy = f"the columns are {', '.join(COLUMNS)}, types, seed, sha256"
+    remedy = f"the columns are {', '.join(COLUMNS)}, types, seed, sha256, outcome, probability"
     if not generated:
         remedy += "; if the corpus is from an older version, mine it again"
     task = f"{batch}: condition {condition!r}"

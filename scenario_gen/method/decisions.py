@@ -41,10 +41,12 @@ from scenario_gen.method.recombination import (
 from scenario_gen.method.sampling import SamplingConfig
 from scenario_gen.numerics import Floats
 from scenario_gen.situation import conflict_of, EncounterKind, passing
+from scenario_gen.situation.evidence import heading_difference, LIMITS
 from scenario_gen.types import (
     Decided,
     Decision,
     Encounter,
+    FOLLOW,
     Outcome,
     token,
     YIELD,
@@ -65,8 +67,9 @@ class DecisionMargins:
         min_gap_s: from the first vehicle's exit to the second one's entry.
         free_gap_s: a driver who would enter later than this does not slow down.
         approach_s: time before the first entry at which a new encounter begins.
-        max_braking_mps2: of any driver.
-        min_courtesy_ratio: share of its speed that a driver keeps who lets another one go first.
+        max_braking_mps2: of any driver, unless one brakes harder in the recording.
+        min_courtesy_ratio: share of its speed that a driver keeps who lets another one go first,
+            or who merges from beside.
         usual_sigmas: RMS distance from the mean of a kind; four in five recordings are nearer.
         behind_s: after its entry, when a vehicle has its free speed again.
     """
@@ -221,18 +224,8 @@ class DecidedConflict:
         pair = pair_of(encounter)
         if pair is None:
             raise RefusedError("no two vehicles share an area")
+        _refuse_undecided(pair)
         conflict, time, second = pair.conflict, encounter.time, pair.tracks[1]
-        both = encounter.present_slice(*conflict.pair)
-        if (both.stop - both.start) * encounter.dt < MARGINS.min_together_s:
-            raise RefusedError(f"together for less than {MARGINS.min_together_s:g} s")
-        if pair.kind not in DECIDED_KINDS:
-            raise RefusedError("no vehicle crosses another one's path or merges into it")
-        for n, entry in (
-            (conflict.first, conflict.entry_first),
-            (conflict.second, conflict.entry_second),
-        ):
-            if entry <= pair.presence(n)[0]:
-                raise RefusedError("a vehicle is inside the shared area when its recording begins")
         entry, leaves = np.interp(
             [conflict.entry_second, conflict.entry_second + MARGINS.behind_s],
             time,
@@ -260,6 +253,14 @@ class DecidedConflict:
                 return Outcome.ROLLS if edge.since < edge.until else Outcome.GOES_SECOND
         return Outcome.GOES_SECOND
 
+    @property
+    def _merges_from_beside(self) -> bool:
+        """Whether the second vehicle changes lanes: nobody stops for this in moving traffic."""
+        conflict = self.pair.conflict
+        entries = (conflict.first, conflict.entry_first), (conflict.second, conflict.entry_second)
+        turned = heading_difference(self.pair.encounter, *entries)
+        return self.pair.kind is EncounterKind.MERGING and turned < LIMITS.side_by_side_rad
+
     def meeting(self, decision: Decision) -> Meeting:
         """Return the two vehicles with a decision at its lag, and the outcome.
 
@@ -273,7 +274,8 @@ class DecidedConflict:
             meeting = _meeting(self.free, other, decision.lag, MARGINS.min_courtesy_ratio)
             meeting = meeting._replace(outcome=Outcome.GOES_FIRST)
         else:
-            meeting = _meeting(other, self.free, -decision.lag)
+            least = MARGINS.min_courtesy_ratio if self._merges_from_beside else 0.0
+            meeting = _meeting(other, self.free, -decision.lag, least)
         self._refuse_inhuman(meeting.encounter)
         return meeting
 
@@ -292,12 +294,54 @@ class DecidedConflict:
         clears, enters = passing(encounter, pair.conflict, merges=merges)
         if pair.features[DISTANCE] <= 0.0 or enters - clears < MARGINS.min_gap_s:
             raise RefusedError("they would come too close")
-        if -np.diff(encounter.speed).min() > MARGINS.max_braking_mps2 * encounter.dt:
+        allowed = max(MARGINS.max_braking_mps2, _hardest_braking(self.pair.encounter))
+        if _hardest_braking(encounter) > allowed:
             raise RefusedError("a driver would brake too hard")
-        law = Law.of(self.pair.kind, [])
+        law = Law.mixed(DECIDED_KINDS)
         allowed = MAX_RARITY_RATIO * law.distance(self.pair.features)
         if law.distance(pair.features) > max(allowed, MARGINS.usual_sigmas):
             raise RefusedError("it would be more unusual than the recording")
+
+
+def _refuse_undecided(pair: InteractingPair) -> None:
+    """Refuse a pair without a decision about who goes first.
+
+    Raises:
+        RefusedError: the message says why.
+    """
+    encounter, conflict = pair.encounter, pair.conflict
+    both = encounter.present_slice(*conflict.pair)
+    if (both.stop - both.start) * encounter.dt < MARGINS.min_together_s:
+        raise RefusedError(f"together for less than {MARGINS.min_together_s:g} s")
+    if pair.kind not in DECIDED_KINDS:
+        raise RefusedError("no vehicle crosses another one's path or merges into it")
+    if _follows_before(pair):
+        raise RefusedError("the second vehicle follows the first one to the shared area")
+    entries = (conflict.first, conflict.entry_first), (conflict.second, conflict.entry_second)
+    if any(entry <= pair.presence(n)[0] for n, entry in entries):
+        raise RefusedError("a vehicle is inside the shared area when its recording begins")
+    if conflict_of(_narrower(encounter), *conflict.pair) is None:
+        raise RefusedError("the vehicles hardly touch each other's paths")
+
+
+def _follows_before(pair: InteractingPair) -> bool:
+    """Whether the second vehicle follows the first one before either has entered the area."""
+    conflict = pair.conflict
+    return any(
+        (edge.kind, edge.who) == (FOLLOW, conflict.second) and edge.since < conflict.entry_first
+        for edge in pair.reactions
+    )
+
+
+def _hardest_braking(encounter: Encounter) -> float:
+    """Return the hardest braking [m/s²] of any vehicle of an encounter."""
+    return -float(np.diff(encounter.speed).min()) / encounter.dt
+
+
+def _narrower(encounter: Encounter) -> Encounter:
+    """Return an encounter with vehicles of half their widths."""
+    vehicles = tuple(replace(each, width=0.5 * each.width) for each in encounter.vehicles)
+    return replace(encounter, vehicles=vehicles)
 
 
 def _free_entry(free: Drive, entry: float, time: Floats) -> float:
@@ -345,7 +389,8 @@ def _meeting(first: Drive, second: Drive, later: float, least: float = 0.0) -> M
         free = second
         second = delayed_drive(free, entry, enters + clears - arrives)
         if (second.speed < least * free.speed).any():
-            raise RefusedError("the other one would have to slow down too much")
+            who = second.track.vehicle.id
+            raise RefusedError(f"vehicle {who} would have to slow down too much")
         outcome = Outcome.STOPS if second.stand else Outcome.ROLLS
     begin = round((arrives - enters) / dt)
     encounter = _together(first, second, begin)

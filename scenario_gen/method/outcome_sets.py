@@ -5,6 +5,7 @@
 
 from collections import Counter
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -71,6 +72,14 @@ def outcome_sets(
     for note in notes:
         results = [result.noted(note) for result in results]
     return results
+
+
+def for_one_set(sampling: SamplingConfig, encounter: Encounter) -> SamplingConfig:
+    """Return the parameters of one set: of a recorded encounter no decisions are drawn.
+
+    Those of an outcome stay as they are, so that its scenarios can be generated again.
+    """
+    return sampling if encounter.decision else replace(sampling, decisions="recorded")
 
 
 def requested_decisions(

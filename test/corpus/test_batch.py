@@ -23,8 +23,10 @@ from scenario_gen.corpus.encounters import encounter_of, tables_of
 from scenario_gen.corpus.find import coverage_lines, export_hits, find, make_again
 from scenario_gen.corpus.tables import rows_of
 from scenario_gen.corpus.tasks import Workers
+from scenario_gen.method.config import PipelineConfig
 from scenario_gen.method.evaluation import criticality
 from scenario_gen.method.fitting import LostEncounterError
+from scenario_gen.method.sampling import SamplingConfig
 
 pytestmark = pytest.mark.xdist_group("corpus")
 ROADS = ("corridor", "straight")
@@ -290,3 +292,15 @@ def test_like_refusals_are_counted_under_one_cause(
     assert made.failures == failures and not made.failed
     cases = list(rows_of(sorted((tmp_path / "out" / "cases").rglob("*.parquet"))))
     assert {case["why"].split()[1] for case in cases} == set(ROADS)
+
+
+def test_drawn_decisions_have_a_set_for_each_outcome(corpus, tmp_path):
+    drawn = BatchRequest(PipelineConfig(sampling=SamplingConfig(decisions="drawn")), 4, 5)
+    made = run_batch(corpus[0], ["corridor"], tmp_path / "out", drawn, templates=3)
+    cases = list(rows_of(sorted((tmp_path / "out" / "cases").rglob("*.parquet"))))
+    assert made.cases == 3 < len(cases) and made.requested == 12 and not made.failed
+    assert len({case["namespace"] for case in cases}) == len(cases)
+    assert "goes first" in made.outcomes and sum(made.outcomes.values()) <= made.scenarios
+    first, *_ = find(tmp_path / "out", "outcome = 'goes first'").rows
+    assert 0.0 < first["probability"] < 1.0
+    assert make_again(tmp_path / "out", first).sha256 == first["sha256"]

@@ -123,7 +123,11 @@ def test_what_cannot_be_decided_is_refused_by_name():
     conflict = Situation.of(inside).conflicts[0]
     late = inside.between(round(conflict.entry_first / inside.dt) + 2, len(inside.time) - 1)
     brief = replace(inside, present=np.array([[80, len(inside.time) - 1], [0, 95]]))
+    merging = recorded("merges")
+    shift = np.array([[[0.0, 0.0]], [[0.0, -1.5]]])
+    beside = replace(merging, position=merging.position + shift)
     for encounter, why in (
+        (beside, "hardly touch each other's paths"),
         (recorded("follows"), "no vehicle crosses"),
         (recorded("merges", 4), "who is ahead decides this merge"),
         (late, "inside the shared area when its recording begins"),
@@ -203,3 +207,5 @@ def test_drives_are_counted_by_outcome(sets):
     (note,) = [note for note in drives.notes() if "outcome of the decision" in note]
     passed = sum(outcome.verdict.passed for outcome in outcomes[: len(sets[0])])
     assert f"stops: {passed} of {len(sets[0])}" in note and "weighted" in note
+    documents = [drive["decision"] for drive in drives.document()["drives"]]
+    assert documents == [trial.scenario.facts.decision.document() for trial in trials]

@@ -36,6 +36,7 @@ from scenario_gen.method.sampling import checker_of, NaturalScenarios, Plan, Sam
 from scenario_gen.method.validity import Limits
 from scenario_gen.output.report.html import render_page
 from scenario_gen.types import (
+    Decision,
     EgoSlot,
     GenerationResult,
     Interval,
@@ -104,6 +105,7 @@ class SearchRequest:
         criteria = find_criteria(config.criteria)
         return {
             "template": self.planned.encounter.name,
+            "decision": str(self.planned.encounter.decision or ""),
             "road": self.planned.road_and_fit()[0].name,
             "scenarios": str(self.planned.seed),
             "request": parameter_texts(self.request),
@@ -138,12 +140,13 @@ def _source_hash(code: object) -> str:
 
 @dataclass(frozen=True, eq=False)
 class SearchResult:
-    """The result of a search, and the files with it."""
+    """The result of a search, the files with it, and the outcome that all scenarios have."""
 
     estimate: Estimate
     findings: Sequence[Finding]
     worst: bool
     written: Sequence[Path]
+    decision: Decision | None = None
 
     @property
     def kinds(self) -> dict[str, list[Finding]]:
@@ -193,6 +196,12 @@ class SearchResult:
                 f"no failure in {drives} drives; the natural drives bound the rate by"
                 f" {_share(rate.high)} (95 %)"
             ]
+        if self.decision is not None:
+            probability = self.decision.probability
+            messages.append(
+                f"outcome: {self.decision} (probability {_share(probability)}); its failures are"
+                f" {_share(probability * rate.value)} of all scenarios from the encounter"
+            )
         for name, share in self.estimate.events.items():
             event = "collisions by the ego's fault" if name == AT_FAULT else "collisions"
             interval = f"{_share(share.low)} to {_share(share.high)}"
@@ -275,7 +284,11 @@ def search_failures(
             findings = findings_of(search, problem, config)
         names = (JSON, PAGE, JUNIT, *((BAG,) if findings else ()))
         result = SearchResult(
-            estimate, findings, request.worst, (*(out / name for name in names), journal_path)
+            estimate,
+            findings,
+            request.worst,
+            (*(out / name for name in names), journal_path),
+            request.planned.encounter.decision,
         )
         _write(folder, result, request, identity, plan.requested)
     return result
@@ -307,7 +320,7 @@ def _failures(
     encounter = request.planned.encounter
     fit = request.planned.road_and_fit()[1]
     ordered = sorted(result.findings, key=lambda finding: finding.drive)
-    scenarios = tuple(finding.scenario() for finding in ordered)
+    scenarios = tuple(finding.scenario(encounter.decision) for finding in ordered)
     ego = request.request.ego_of(encounter)
     slot = None
     if ego is not None:  # the request left it out
@@ -351,6 +364,7 @@ def _document(
     ]
     return {
         **request.drive_config().facts(),
+        "decision": result.decision.document() if result.decision else None,
         "rate": None if request.worst else _interval(estimate.rate),
         "plain": {"failures": plain.count, "drives": plain.of, **_interval(plain.share)},
         "drives": estimate.drives,

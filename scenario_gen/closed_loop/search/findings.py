@@ -19,7 +19,7 @@ from scenario_gen.closed_loop.simulation import ClosedLoop
 from scenario_gen.closed_loop.trials import Outcome
 from scenario_gen.closed_loop.verdict import judge
 from scenario_gen.numerics.plane import arc_lengths
-from scenario_gen.types import Facts, Failure, Scenario
+from scenario_gen.types import Decision, Facts, Failure, Scenario
 
 MAX_FINDINGS_COUNT = 100  # each is driven again and saved
 MAX_PER_KIND_COUNT = 30
@@ -61,10 +61,10 @@ class Finding:
             "verdict": self.outcome.verdict.document(),
         }
 
-    def scenario(self) -> Scenario:
-        """Return the scenario of all vehicles, with the facts of the failure."""
+    def scenario(self, decision: Decision | None) -> Scenario:
+        """Return the scenario of all vehicles, with the facts of the failure and the decision."""
         failure = Failure(self.kind, self.deviation, self.weight)
-        return replace(self.trial.scenario, facts=Facts(failure=failure))
+        return replace(self.trial.scenario, facts=Facts(failure=failure, decision=decision))
 
 
 def findings_of(

@@ -45,8 +45,9 @@ def sample_scenarios(
     """
     if sampling.decisions == "drawn" and planned.encounter.decision is None:
         raise InputError(
-            "sampling.decisions=drawn gives a set for each outcome: "
-            "use `generate_outcomes`, or `scenario-gen generate` without --for-testing"
+            "sampling.decisions=drawn gives a set for each outcome: use `scenario-gen generate` "
+            "without --for-testing, `scenario-gen batch` or `generate_outcomes`; "
+            "nodes need sampling.decisions=recorded"
         )
     plan = plan or Plan.of(planned, sampling, limits, request)
     generated = draw_scenarios(

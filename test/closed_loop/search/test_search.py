@@ -9,8 +9,10 @@ import math
 from xml.etree import ElementTree
 
 import pytest
+from support.textbook_motions import labelled
 from typer.testing import CliRunner
 
+from scenario_gen.bags.recordings.read import read_recording
 from scenario_gen.bags.recordings.write import write_recording
 from scenario_gen.base.errors import InputError
 from scenario_gen.cli.commands import app
@@ -21,11 +23,13 @@ from scenario_gen.closed_loop.search.objective import Objective
 from scenario_gen.closed_loop.trials import read_trials, run_trials
 from scenario_gen.logs import read_log
 from scenario_gen.logs.synthetic import bundled
+from scenario_gen.method.decisions import decided, decisions_of
 from scenario_gen.method.evaluation import EvaluationConfig
 from scenario_gen.output.results import provenance_of
 from scenario_gen.output.review.regenerate import replanned
 from scenario_gen.output.review.validation import validate_bag
 from scenario_gen.pipeline import generate, PipelineConfig
+from scenario_gen.types import Outcome
 
 LOG, ROAD = bundled("b"), "t_intersection"
 BUDGET = 60
@@ -240,3 +244,26 @@ def test_the_command_searches_a_log_on_a_road_and_says_what_it_found(tmp_path):
     assert isinstance(refused.exception, InputError) and "has no encounter 'none'" in str(
         refused.exception
     )
+
+
+def test_a_search_of_an_outcome_weights_its_failures(tmp_path):
+    encounter = replace(labelled("crossing, stops", 0).encounter, name="crossing")
+    (drawn,) = (
+        decision
+        for decision in decisions_of(encounter).possible
+        if decision.outcome is Outcome.GOES_FIRST
+    )
+    case = generate(decided(encounter, drawn), "corridor", count=1, seed=7)
+    bag = write_recording(tmp_path / "bag", case)
+    found = search_failures(
+        request_of(bag, "Stands", ego=drawn.whom, objective=Objective("goal"), budget=3),
+        tmp_path / "out",
+        workers=1,
+    )
+    assert found.decision == drawn
+    share = f"{100.0 * drawn.probability * found.estimate.rate.value:.3g} % of all scenarios"
+    assert any(share in sentence for sentence in found.sentences())
+    document = json.loads((tmp_path / "out" / "search.json").read_text())
+    assert document["decision"]["probability"] == drawn.probability
+    (failures,) = read_recording(tmp_path / "out" / "bag").namespaces.values()
+    assert {entry.facts.decision for entry in failures.entries} == {drawn}
