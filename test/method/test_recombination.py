@@ -11,7 +11,7 @@ import pytest
 from support.textbook_motions import labelled
 
 from scenario_gen import generate, recombined, RefusedError
-from scenario_gen.method.evaluation.encounter_features import features_of
+from scenario_gen.method.evaluation.encounter_features import DISTANCE, features_of
 from scenario_gen.method.recombination import pair_of, recombinations
 from scenario_gen.situation import conflict_of, lane_gaps, time_gaps
 from scenario_gen.types import FOLLOW, Recorded, YIELD
@@ -29,7 +29,7 @@ def recorded(kind, *seeds):
 
 
 def stands(motion, n):
-    return float((motion.speed[n] < 0.5).sum() * motion.dt)
+    return float((motion.speed[n, motion.present_slice(n)] < 0.5).sum() * motion.dt)
 
 
 @pytest.mark.parametrize("kind", [WAITS, FOLLOWS, MERGES, TURNS])
@@ -60,7 +60,9 @@ def test_who_waits_stands_as_long_and_passes_as_long_behind_as_it_did_for_anothe
         first, second = pair_of(one).conflict.first, pair_of(other).conflict.second
         begin = round((made.start_ns - one.start_ns) / one.dt_ns)
         np.testing.assert_allclose(
-            made.speed[0], one.speed[first, begin : begin + len(made.time)], atol=1e-9
+            made.speed[0, made.present_slice(0)],
+            one.speed[first, begin:][: len(made.time)],
+            atol=1e-9,
         )
         assert stands(made, 1) == pytest.approx(stands(other, second), abs=0.2)
         behind = conflict_of(other, 0, 1).encroachment
@@ -88,6 +90,17 @@ def test_who_follows_keeps_its_own_distance_behind_another_leader():
     assert len(makes) >= 8
     off, off_ones = (np.abs(np.subtract(makes, gaps)).mean() for gaps in (wanted, others))
     assert off < 0.25 and off < 0.6 * off_ones, (off, off_ones)
+
+
+@pytest.mark.parametrize("kind", [FOLLOWS, MERGES, "U-turn"])
+def test_most_pairs_of_a_kind_recombine_and_come_no_closer_than_drivers_do(kind):
+    known = recorded(kind, *range(4))
+    made, refused = recombinations(known, 12)
+    assert len(made) >= 8, refused
+    nearest = min(pair_of(encounter).features[DISTANCE] for encounter in known)
+    for encounter in made:
+        assert pair_of(encounter).features[DISTANCE] >= min(nearest, 1.0)
+        assert encounter.present_slice(0, 1).start == 0, "it begins when both are there"
 
 
 def test_what_is_not_alike_is_refused_and_says_why():
