@@ -121,6 +121,14 @@ class Batch:
     templates: Annotated[
         int, typer.Option(min=0, help="Use only the first N encounters of the corpus. 0: all.")
     ] = 0
+    recombine: Annotated[
+        int,
+        typer.Option(
+            min=0,
+            max=100_000,
+            help="Create up to this many new encounters, as `generate` does, from the corpus.",
+        ),
+    ] = 0
     workers: WorkersOption = 0
     scheduler: SchedulerOption = ""
     assignments: SetOption = None
@@ -140,7 +148,8 @@ def batch(options: Batch) -> None:
     names = [name for text in options.roads for name in text.split(",") if name]
     with workers_of(options.workers, options.scheduler) as who:
         result = run_batch(
-            place(options.corpus), names, out, BatchRequest(config, options.count, options.seed),
+            place(options.corpus), names, out,
+            BatchRequest(config, options.count, options.seed, options.recombine),
             templates=options.templates, workers=who,
         )  # fmt: skip
     conclude(result.lines(), result.failed, out)

@@ -12,7 +12,8 @@ A task generates the scenarios of ten templates on one road, and writes three fi
 A template has one set, or one for each outcome of its decision (`sampling.decisions=drawn`).
 
 The table of cases is written last, so a part is finished if that table exists. There is no other
-record of progress.
+record of progress. `recombined/encounters.parquet` has the templates that were recombined from
+those of the corpus.
 """
 
 from collections import Counter
@@ -28,13 +29,16 @@ import re
 from textwrap import shorten
 from typing import Any
 
+import numpy as np
+
 from scenario_gen.bags.recordings.write import add_results, scenario_bytes
 from scenario_gen.bags.storage.writer import BagWriter
 from scenario_gen.base.errors import InputError, needs, RefusedError
 from scenario_gen.base.folders import sha256_of
 from scenario_gen.base.provenance import parameter_texts, versions
 from scenario_gen.base.stores import each_fetched, Place
-from scenario_gen.corpus.encounters import encounter_of, tables_of
+from scenario_gen.corpus.config import CorpusConfig
+from scenario_gen.corpus.encounters import encounter_of, row_of, tables_of, write_encounters
 from scenario_gen.corpus.tables import rows_at, rows_of, write_table
 from scenario_gen.corpus.tasks import agree, arriving, check_out, held, spread, undone, Workers
 from scenario_gen.method.chain import Chain
@@ -42,13 +46,23 @@ from scenario_gen.method.config import PipelineConfig
 from scenario_gen.method.evaluation import criticality
 from scenario_gen.method.fitting import LostEncounterError
 from scenario_gen.method.outcome_sets import for_one_set, outcome_sets
+from scenario_gen.method.recombination import recombinations
 from scenario_gen.method.segmentation import segment
 from scenario_gen.roads import build_road, road_and_template
 from scenario_gen.situation import Situation
-from scenario_gen.types import Encounter, GenerationResult, most_exposed, Request
+from scenario_gen.types import (
+    Encounter,
+    GenerationResult,
+    most_exposed,
+    Note,
+    NoteKind,
+    Recombined,
+    Request,
+)
 
 MANIFEST = "batch.json"
 TASK_TEMPLATE_COUNT = 10
+MAX_PARENT_COUNT = 1000  # encounters that are recombined: each is in memory
 NO_CANDIDATE = "no valid candidate"
 LOST_CONFLICT = "lost conflict"  # the cause of a case whose encounter is lost, on any road
 SCENARIO_COLUMNS = {
@@ -78,11 +92,27 @@ class BatchRequest:
         count: number of scenarios per template and road.
         seed: seed of the batch; the seed of a case follows from it, the template's name and the
             road.
+        recombine: largest number of further templates, recombined from those of the corpus.
     """
 
     config: PipelineConfig = PipelineConfig()
     count: int = 50
     seed: int = 0
+    recombine: int = 0
+
+
+@dataclass(frozen=True)
+class RecombineTask:
+    """Templates (table, row) to recombine, and the table to write."""
+
+    templates: tuple[tuple[Place, int], ...]
+    target: Place
+    request: BatchRequest
+
+    @property
+    def name(self) -> str:
+        """The task in messages."""
+        return "recombination"
 
 
 @dataclass(frozen=True)
@@ -196,11 +226,19 @@ def run_batch(
         "count": request.count,
         "seed": request.seed,
         "templates": len(rows),
+        "recombine": request.recombine,
         "parameters": parameter_texts(request.config),
     }
     with held(out), spread(workers) as run:
         agree(out, MANIFEST, document, "batch")
-        return summary(out, run(generate_part, undone(parts(rows, roads, out, request))))
+        failed: list[str] = []
+        if request.recombine:
+            table = out / "recombined" / "encounters.parquet"
+            failed = run(recombine, undone([RecombineTask(tuple(rows), table, request)]))
+            if not failed:
+                rows += [(table, k) for k, _ in enumerate(rows_of([table], ["name"]))]
+        failed += run(generate_part, undone(parts(rows, roads, out, request)))
+        return summary(out, failed)
 
 
 def parts(
@@ -226,6 +264,21 @@ def tokens_of(roads: Sequence[str]) -> list[str]:
 def seed_of(seed: int, template: str, road: str) -> int:
     """Return the seed of one template on one road, below 2^32."""
     return int.from_bytes(sha256(f"{seed}\n{template}\n{road}".encode()).digest()[:4], "big")
+
+
+def recombine(task: RecombineTask) -> None:
+    """Recombine templates, if there are very many some of them, and write a table of the result.
+
+    Raises:
+        OSError: the disk is full or fails.
+    """
+    request = task.request
+    order = np.random.default_rng(request.seed).permutation(len(task.templates))
+    chosen = [task.templates[k] for k in sorted(order[:MAX_PARENT_COUNT].tolist())]
+    recorded = [encounter_of(row, table) for row, table in _rows(chosen)]
+    made, _ = recombinations(recorded, request.recombine, request.seed)
+    rows = [row_of(encounter, "recombined", CorpusConfig()) for encounter in made]
+    write_encounters(task.target, rows, {})
 
 
 def generate_part(task: PartTask) -> None:
@@ -313,6 +366,8 @@ def _generate_set(task: PartTask, seed: int, encounter: Encounter, count: int) -
     result = Chain(situation, segmentation, road, config, count=count, seed=seed).run()
     if encounter.decision is not None and not len(result):
         raise RefusedError(NO_CANDIDATE)
+    if isinstance(encounter.source, Recombined):
+        result = result.noted(Note.of(NoteKind.RECOMBINED, **vars(encounter.source)))
     facts = {"template": encounter.recording, "roads": task.road, "seed": str(seed)}
     facts["count"] = str(count)
     return replace(result, provenance=facts | versions() | parameter_texts(config))

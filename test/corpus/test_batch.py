@@ -148,6 +148,20 @@ def test_a_batch_is_gone_on_with_but_not_as_another_one(batch, corpus):
         run_batch(corpus[0], ROADS, out, BatchRequest(count=4, seed=5), templates=TEMPLATES)
 
 
+def test_a_batch_recombines_the_encounters_of_its_corpus(corpus, tmp_path):
+    request = BatchRequest(count=1, seed=5, recombine=2)
+    run_batch(corpus[0], ROADS[:1], tmp_path, request, templates=6)
+    recombined = [encounter_of(row) for row in rows_of([*tmp_path.glob("recombined/*.parquet")])]
+    names = {row["name"] for row in rows_of(tables_of(corpus[0]))}
+    assert len(recombined) == 2
+    assert all({made.source.first, made.source.second} < names for made in recombined)
+    found = {row["template"] for row in find(tmp_path).rows}
+    assert found & {made.name for made in recombined}
+    before = digests(tmp_path)
+    run_batch(corpus[0], ROADS[:1], tmp_path, request, templates=6)
+    assert digests(tmp_path) == before
+
+
 def at_work(run, folder, pattern):
     """Wait until a process has made what matches a pattern; it must not end before, nor take for ever."""
     end = time.monotonic() + PATIENCE
