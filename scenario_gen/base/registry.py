@@ -10,6 +10,7 @@ from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from functools import cache
 from importlib.metadata import entry_points, EntryPoint
+from importlib.util import find_spec
 from pathlib import Path
 import pkgutil
 import sys
@@ -37,7 +38,9 @@ def installed(group: str) -> Mapping[str, EntryPoint]:
 
 
 def load_class(option: str, name: str) -> Any:
-    """Return the class that a user names as MODULE:CLASS, also from the current folder.
+    """Return the class that a user names as MODULE:CLASS.
+
+    The current folder is searched last, and only for a module that is not installed.
 
     Args:
         option: the option or parameter, for messages.
@@ -49,9 +52,9 @@ def load_class(option: str, name: str) -> Any:
     module, colon, attribute = name.partition(":")
     if not (colon and module and attribute):
         raise InputError(f"{option} {name}: write it as MODULE:CLASS, e.g. my_module:MyClass")
-    if str(Path.cwd()) not in sys.path:
-        sys.path.insert(0, str(Path.cwd()))
     try:
+        if find_spec(module.partition(".")[0]) is None and str(Path.cwd()) not in sys.path:
+            sys.path.append(str(Path.cwd()))
         loaded = pkgutil.resolve_name(name)
     except ImportError as error:
         raise InputError(

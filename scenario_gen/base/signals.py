@@ -7,7 +7,7 @@ The handler raises no exception. Python ignores exceptions in some callbacks, fo
 the import of a module, and compiled code may crash on them.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 import multiprocessing
 from multiprocessing import resource_tracker
@@ -61,12 +61,29 @@ def signals_deferred() -> Iterator[None]:
 
 
 @contextmanager
+def environment_set(variables: Mapping[str, str]) -> Iterator[None]:
+    """Set environment variables for processes that are started within the block."""
+    before = {name: os.environ.get(name) for name in variables}
+    os.environ.update(variables)
+    try:
+        yield
+    finally:
+        for name, value in before.items():
+            if value is None:
+                del os.environ[name]
+            else:
+                os.environ[name] = value
+
+
+@contextmanager
 def ctrl_c_blocked() -> Iterator[None]:
     """Start child processes inside with Ctrl-C blocked: the terminal sends it to them, too.
 
     It is blocked before their first statement, because an interrupted import ends in a traceback.
+    Python searches modules in the current folder only after a child has got its parent's path:
+    code that lies beside the data is not run.
     """
-    with signals_deferred():
+    with signals_deferred(), environment_set({"PYTHONSAFEPATH": "1"}):
         resource_tracker.ensure_running()  # its start would unblock Ctrl-C
         mask = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
         try:

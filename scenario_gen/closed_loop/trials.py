@@ -317,7 +317,9 @@ def trial_runner(
         yield lambda trials: map(_run, ((trial, planner, config) for trial in trials))
         return
     context = multiprocessing.get_context("spawn")
-    with ProcessPoolExecutor(workers, mp_context=context, initializer=end_with_parent) as pool:
+    with ctrl_c_blocked():
+        processes = ProcessPoolExecutor(workers, mp_context=context, initializer=end_with_parent)
+    with processes as pool:
 
         def run(trials: Sequence[Trial]) -> Iterator[Outcome]:
             tasks = (

@@ -7,6 +7,7 @@ from collections.abc import Iterable
 import os
 
 from scenario_gen.base.errors import RefusedError
+from scenario_gen.base.signals import ctrl_c_blocked
 from scenario_gen.method.config import PipelineConfig
 from scenario_gen.pipeline import generate
 from scenario_gen.types import Encounter, GenerationResult, Road
@@ -53,8 +54,12 @@ def generate_many(
     workers = min(workers or os.cpu_count() or 1, len(tasks))
     if workers <= 1:
         return list(map(_answer, tasks))
-    with ProcessPoolExecutor(workers, get_context("spawn")) as pool:
-        return list(pool.map(_answer, tasks))
+    with ctrl_c_blocked():
+        pool = ProcessPoolExecutor(workers, get_context("spawn"))
+    with pool:
+        with ctrl_c_blocked():
+            answers = pool.map(_answer, tasks)
+        return list(answers)
 
 
 def _answer(task: tuple[Case, PipelineConfig, int, int]) -> Answer:

@@ -4,18 +4,17 @@
 """Tasks: pure functions that write one file each, distributed over processes.
 
 A task writes to a temporary name, syncs and renames. A file that exists is therefore complete,
-even if a run was killed, and the existing files are the only record of progress. Dask only
-distributes the tasks; it holds no state that a killed run would lose.
+even if a run was killed, and the existing files are the only record of progress. Local processes
+or a Dask cluster only run the tasks; they hold no state that a killed run would lose.
 """
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import CancelledError
-from contextlib import contextmanager, ExitStack, suppress
+from contextlib import contextmanager, ExitStack
 from dataclasses import dataclass
 from functools import partial
 import json
 import logging
-import multiprocessing
 import os
 from pathlib import Path
 import shutil
@@ -27,8 +26,9 @@ from scenario_gen.base.documents import read_json
 from scenario_gen.base.errors import describe, InputError, needs, of_system, ScenarioGenError
 from scenario_gen.base.folders import naming, scratch, sync, sync_tree, write_text
 from scenario_gen.base.folders.scratch import claimed, PREFIX, sweep_tree
-from scenario_gen.base.signals import cleaned_up, ctrl_c_blocked
+from scenario_gen.base.signals import cleaned_up
 from scenario_gen.base.stores import create, fetched, Place, Remote, temp_folder, upload
+from scenario_gen.corpus.local_pool import local_pool, LocalPool
 
 
 class _Task(Protocol):
@@ -43,15 +43,6 @@ Task = TypeVar("Task")
 Target = TypeVar("Target", bound=_Task)
 Progress = Callable[[int, int], None]
 """Called with the number of finished tasks and the number of all tasks."""
-
-# Environment of a worker: one thread, and the allocator's default thresholds. With Dask's own
-# environment, a worker returns every freed array to the system, which costs a fifth of all CPU.
-WORKER_ENVIRONMENT = {
-    "OMP_NUM_THREADS": "1",
-    "MKL_NUM_THREADS": "1",
-    "OPENBLAS_NUM_THREADS": "1",
-    "DASK_LOGGING__DISTRIBUTED": "critical",
-}
 
 
 @contextmanager
@@ -182,9 +173,9 @@ class Workers:
 
 
 class Spread:
-    """Runs a function on many tasks: in this process, in local processes, or on a cluster.
+    """Runs a function on many tasks: in this process, in local processes, or on a Dask cluster.
 
-    A local cluster is started when the first task needs it, and is used until the end.
+    Local processes are started when the first task needs them, and are used until the end.
     """
 
     def __init__(self, workers: Workers, stack: ExitStack) -> None:
@@ -193,6 +184,7 @@ class Spread:
         self._on_progress = workers.on_progress
         self._stack = stack
         self._client: Any = None
+        self._pool: LocalPool | None = None
 
     def __call__(self, function: Callable[[Task], Any], tasks: Sequence[Task]) -> list[str]:
         """Run independent tasks.
@@ -217,17 +209,27 @@ class Spread:
 
     def _outcomes(self, function: Callable[[Task], Any], tasks: Sequence[Task]) -> Iterator[str]:
         """Yield the error message of each task as it finishes, "" for success."""
-        if not tasks or (self._workers == 1 and not self._scheduler):
-            yield from (_guarded(function, task) for task in tasks)
+        if not self._scheduler:
+            yield from self._local(partial(_guarded, function), tasks)
+            return
+        if not tasks:
             return
         needs("corpus", "dask", "distributed")
         try:
             if self._client is None:
-                self._client = self._stack.enter_context(_client(self._workers, self._scheduler))
+                self._client = self._stack.enter_context(_client(self._scheduler))
             yield from self._distributed(function, tasks)
         except (OSError, TimeoutError, CancelledError) as error:
-            lost = f"{self._scheduler or 'Dask'} is lost or does not answer: {describe(error)}"
+            lost = f"{self._scheduler} is lost or does not answer: {describe(error)}"
             raise InputError(f"{lost}; the same command resumes where it stopped") from error
+
+    def _local(self, run: Callable[[Task], str], tasks: Sequence[Task]) -> Iterator[str]:
+        """Return the outcomes of tasks in this process, or in processes of this machine."""
+        if self._workers == 1 or not tasks:
+            return map(run, tasks)
+        if self._pool is None:
+            self._pool = self._stack.enter_context(local_pool(self._workers))
+        return self._pool.outcomes(run, tasks)
 
     def _distributed(
         self, function: Callable[[Task], Any], tasks: Sequence[Task]
@@ -279,48 +281,12 @@ def _guarded(function: Callable[[Any], Any], task: Any) -> str:
 
 
 @contextmanager
-def _client(workers: int, scheduler: str) -> Iterator[Any]:
-    """Give a client of a running scheduler, or of a new cluster of local processes."""
+def _client(scheduler: str) -> Iterator[Any]:
+    """Give a client of a running scheduler."""
     from distributed import Client
 
     # Dead workers and a lost scheduler are reported by the tasks. Each logger has its own level.
     for name in ("distributed", "distributed.client"):
         logging.getLogger(name).setLevel(logging.CRITICAL)
-    with ExitStack() as stack:
-        cluster: Any = scheduler or stack.enter_context(_local_cluster(workers))
-        yield stack.enter_context(Client(cluster))
-
-
-@contextmanager
-def _local_cluster(workers: int) -> Iterator[Any]:
-    """Give a cluster of processes on this machine."""
-    import dask
-    from distributed import LocalCluster
-
-    with ExitStack() as stack:
-        settings = {
-            "temporary-directory": str(stack.enter_context(scratch(temp_folder()))),
-            "distributed.scheduler.worker-saturation": 1.0,  # no queue at a busy worker
-            "distributed.worker.daemon": True,
-            "distributed.worker.profile.enabled": False,
-            "distributed.admin.tick.interval": "500ms",
-            "distributed.nanny.pre-spawn-environ": WORKER_ENVIRONMENT,
-        }
-        sizes = {"n_workers": workers, "threads_per_worker": 1, "memory_limit": 0}
-        stack.enter_context(dask.config.set(settings))
-        with ctrl_c_blocked():
-            cluster = stack.enter_context(
-                LocalCluster(**sizes, processes=True, dashboard_address="127.0.0.1:0")
-            )
-            stack.enter_context(cleaned_up(partial(_end, cluster)))
-        yield cluster
-
-
-def _end(cluster: Any) -> None:
-    """Kill the processes of a cluster at once; they write no more and are not restarted."""
-    cluster.loop.add_callback(cluster.loop.stop)
-    for process in multiprocessing.active_children():
-        process.kill()
-        # Dask waits for the same process, and fails if the exit status is consumed here.
-        with suppress(ChildProcessError):
-            os.waitid(os.P_PID, process.pid or 0, os.WEXITED | os.WNOWAIT)
+    with Client(scheduler) as client:
+        yield client

@@ -21,6 +21,12 @@ MAX_WORKERS_COUNT = max(1, min(4, os.cpu_count() or 1))
 POLL_S = 0.5
 QUEUE = "--queue"
 NAME_BYTES = 256  # a record of the queue: a kernel's name with spaces, read and written at once
+# Without -P, code in the current folder would run; the package may not be installed.
+_PROGRAM = f"""
+import runpy, sys
+sys.path.append({str(Path(__file__).parents[2])!r})
+runpy.run_module("scenario_gen.numerics", run_name="__main__")
+"""
 Progress = Callable[[int, int, float], None]  # compiled kernels, needed kernels, seconds
 
 
@@ -84,7 +90,7 @@ def _missing(kernels: Sequence[Compilable]) -> list[Compilable]:
 def _compile(missing: Sequence[Compilable], show: Callable[[], None]) -> None:
     """Let processes compile kernels from a shared queue, the largest and so slowest first."""
     environment = os.environ | {"NUMBA_CACHE_DIR": str(root())}
-    command = [sys.executable, "-m", "scenario_gen.numerics", QUEUE]
+    command = [sys.executable, "-P", "-c", _PROGRAM, QUEUE]
     queue, writer = os.pipe()
     try:
         # A session of their own keeps the terminal's Ctrl-C from them.

@@ -78,7 +78,7 @@ def examine(environment: Mapping[str, str] | None = None) -> Iterator[Finding]:
         )
     yield Finding(OK, "action", message)
     run = subprocess.run(
-        [sys.executable, "-c", NODE_PROGRAM],
+        [sys.executable, "-P", "-c", NODE_PROGRAM],
         capture_output=True,
         text=True,
         check=False,

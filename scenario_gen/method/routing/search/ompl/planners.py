@@ -19,6 +19,7 @@ import numpy as np
 
 from scenario_gen.base.errors import needs
 from scenario_gen.base.parameters import parameter, Parameters
+from scenario_gen.base.signals import environment_set
 from scenario_gen.method.routing.search.planner import (
     Budget,
     BudgetSpentError,
@@ -89,7 +90,8 @@ class OmplPlanner:
             ),
             daemon=True,
         )
-        child.start()
+        with environment_set({"PYTHONSAFEPATH": "1"}):  # runs no code beside the data
+            child.start()
         sender.close()
         try:
             path, iterations, seconds = self._answer(receiver, child, budget)

@@ -1,0 +1,112 @@
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""Local processes that run tasks; only the task that ends its process fails.
+
+The processes are connected to their parent by pipes, so that no other account of the machine can
+reach them.
+"""
+
+from collections.abc import Callable, Generator, Iterator, Sequence
+from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
+from concurrent.futures.process import BrokenProcessPool
+from contextlib import contextmanager, suppress
+import multiprocessing
+from typing import TypeVar
+
+from scenario_gen.base.signals import (
+    cleaned_up,
+    ctrl_c_blocked,
+    end_with_parent,
+    environment_set,
+)
+
+Task = TypeVar("Task")
+
+# One thread for each worker. The processes are started with these variables.
+WORKER_ENVIRONMENT = dict.fromkeys(
+    ("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS"), "1"
+)
+_SUBMITTED_RATIO = 2  # tasks for each process: one that runs, and one that waits
+
+
+class LocalPool:
+    """Processes on this machine, started when the first task needs them."""
+
+    def __init__(self, count: int) -> None:
+        self._count = count
+        self._executor: ProcessPoolExecutor | None = None
+
+    def outcomes(self, run: Callable[[Task], str], tasks: Sequence[Task]) -> Iterator[str]:
+        """Yield what a function returns for each task as it finishes.
+
+        Args:
+            run: module-level; it may be repeated.
+            tasks: each has a name.
+        """
+        suspects = yield from self._attempt(run, tasks)
+        for task in suspects:
+            failed = yield from self._attempt(run, [task])
+            if failed:
+                name = getattr(task, "name", task)
+                yield f"{name}: its process died: it crashed, or was killed for lack of memory"
+
+    def _attempt(
+        self, run: Callable[[Task], str], tasks: Sequence[Task]
+    ) -> Generator[str, None, list[Task]]:
+        """Yield the outcomes of tasks; return those that ran or waited when a process died."""
+        waiting = iter(tasks)
+        running: dict[Future[str], Task] = {}
+        lost: list[Task] = []
+        while True:
+            while len(running) < _SUBMITTED_RATIO * self._count:
+                task = next(waiting, None)
+                if task is None:
+                    break
+                running[self._submit(run, task)] = task
+            if not running:
+                return lost
+            done, _ = wait(running, return_when=FIRST_COMPLETED)
+            if any(isinstance(future.exception(), BrokenProcessPool) for future in done):
+                done, _ = wait(running)
+                self.end()
+            for future in done:
+                task = running.pop(future)
+                if isinstance(future.exception(), BrokenProcessPool):
+                    lost.append(task)
+                else:
+                    yield future.result()
+
+    def _submit(self, run: Callable[[Task], str], task: Task) -> "Future[str]":
+        """Submit a task, to new processes if one has died."""
+        with ctrl_c_blocked(), environment_set(WORKER_ENVIRONMENT):
+            if self._executor is not None:
+                with suppress(BrokenProcessPool):
+                    return self._executor.submit(run, task)
+            self._executor = ProcessPoolExecutor(
+                self._count, multiprocessing.get_context("spawn"), end_with_parent
+            )
+            return self._executor.submit(run, task)
+
+    def end(self) -> None:
+        """End the processes at once; they write no more."""
+        executor, self._executor = self._executor, None
+        if executor is not None:
+            _kill_children()
+            executor.shutdown(cancel_futures=True)
+
+
+def _kill_children() -> None:
+    for process in multiprocessing.active_children():
+        process.kill()
+
+
+@contextmanager
+def local_pool(count: int) -> Iterator[LocalPool]:
+    """Give local processes, which end with the block, or with a signal."""
+    pool = LocalPool(count)
+    with cleaned_up(_kill_children):
+        try:
+            yield pool
+        finally:
+            pool.end()
