@@ -17,8 +17,9 @@ from scenario_gen.cli.output import emit_json, print_, print_table, progress
 
 if TYPE_CHECKING:
     from scenario_gen.closed_loop.command import RunTrials
-    from scenario_gen.closed_loop.results import Drives
+    from scenario_gen.closed_loop.comparison import Comparison
     from scenario_gen.closed_loop.search.command import SearchResult
+    from scenario_gen.closed_loop.suite import Suite
     from scenario_gen.output.review.regenerate import Replanned
 
 commands = Commands("Test a planner")
@@ -29,12 +30,18 @@ MAX_NAMES_COUNT = 12  # of changed scenarios, on the terminal
 class Drive:
     """The options of `drive`."""
 
-    bag: Annotated[Path, typer.Argument(help="A bag with scenarios from this suite.")]
+    bags: Annotated[
+        list[Path],
+        typer.Argument(
+            help="Bags with scenarios from this suite, folders with such bags (e.g. from `batch`), "
+            "or text files with a path per line. Repeatable."
+        ),
+    ]
     planner: Annotated[
-        str,
+        list[str],
         typer.Option(
             help="MODULE:CLASS of the planner, e.g. mine:MyPlanner. With --ros: the command that "
-            "starts its node."
+            "starts its node. Repeatable: planners side by side."
         ),
     ]
     ego: Annotated[
@@ -52,7 +59,7 @@ class Drive:
             "over DDS in lock-step.",
         ),
     ] = False
-    count: Annotated[int, typer.Option(min=0, help="Number of scenarios to drive. 0: all.")] = 0
+    count: Annotated[int, typer.Option(min=0, help="Number of scenarios of each bag. 0: all.")] = 0
     workers: WorkersOption = 0
     against: Annotated[
         Path | None,
@@ -68,7 +75,7 @@ class Drive:
         ),
     ] = True
     out: Annotated[
-        Path, typer.Option(help="Folder for drives.json, junit.xml and drives.html.")
+        Path, typer.Option(help="Folder for verdicts (drives.json, junit.xml) and pages.")
     ] = Path("out/drives")
     assignments: Annotated[
         list[str] | None,
@@ -83,24 +90,26 @@ class Drive:
 @commands.command()
 @takes(Drive)
 def drive(options: Drive) -> None:
-    """Test a planner in closed loop in the scenarios of a bag. Exit code 1: below a threshold."""
-    from scenario_gen.closed_loop.command import drive_bag, DriveRequest, in_processes
+    """Test planners in closed loop in the scenarios of bags. Exit code 1: below a threshold."""
+    from scenario_gen.closed_loop.command import drive_bags, DriveRequest, in_processes
 
-    warn_of_metadata(options.bag)
-    planner, processes = options.planner, in_processes(options.workers)
+    for bag in options.bags:
+        warn_of_metadata(bag)
+    processes = in_processes(options.workers)
     request = DriveRequest(
-        options.bag,
-        planner,
+        options.bags,
+        options.planner,
         options.ego,
         options.count,
         options.assignments or [],
         options.against,
     )
+    name = options.planner[0] if len(options.planner) == 1 else "drives"
     with progress() as advance:
-        result = drive_bag(
+        result = drive_bags(
             request,
             options.out,
-            progress=lambda done, total: advance(planner, done, total),
+            progress=lambda done, total: advance(name, done, total),
             run=_over_dds() if options.ros else processes,
             baseline=processes if options.baseline else None,
         )
@@ -110,31 +119,47 @@ def drive(options: Drive) -> None:
         raise typer.Exit(1)
 
 
-def _report(drives: "Drives", out: Path) -> None:
-    from scenario_gen.closed_loop.results import JSON, JUNIT, PAGE
+def _report(suite: "Suite", out: Path) -> None:
     from scenario_gen.closed_loop.timeouts import Decisions
     from scenario_gen.closed_loop.trials import rates
 
-    files = [out / name for name in (JSON, JUNIT, PAGE)]
-    table = rates(drives.outcomes)
-    emit_json(rates=table, notes=drives.notes(), bars_not_met=drives.broken, files=files)
-    print_table(("drives", drives.planner), [(name, str(rate)) for name, rate in table.items()])
-    print_(*drives.notes(), sep="\n")
-    if drives.comparison is not None:
-        emit_json(now_fail=drives.comparison.now_fail, now_pass=drives.comparison.now_pass)
-        _print_names("now fail", drives.comparison.now_fail)
-        _print_names("now pass", drives.comparison.now_pass)
-    decisions = Decisions.all_of([outcome.decisions for outcome in drives.outcomes])
+    files = sorted(path for path in out.iterdir() if not path.name.startswith("."))
+    tables = [rates(drives.outcomes) for drives in suite.drives]
+    rows = [(name, *(str(table[name]) for table in tables)) for name in tables[0]]
+    by_planner = dict(zip(suite.planners, tables, strict=True))
+    shown = tables[0] if len(tables) == 1 else by_planner
+    emit_json(rates=shown, notes=suite.notes(), bars_not_met=suite.broken, files=files)
+    names = suite.planners if len(tables) > 1 else [suite.drives[0].planner]
+    print_table(("drives", *names), rows)
+    if not suite.is_single:
+        print_table(
+            ("encounter", "road user", *(f"{name} passes" for name in suite.planners)),
+            [(*row.category, *map(str, row.passed)) for row in suite.table()],
+            names=2,
+        )
+    print_(*suite.notes(), sep="\n")
+    for drives in suite.drives:
+        _print_comparison(drives.comparison)
+    outcomes = [outcome for drives in suite.drives for outcome in drives.outcomes]
+    decisions = Decisions.all_of([outcome.decisions for outcome in outcomes])
     if decisions.count:
         print_(
             f"planner step: {1e3 * decisions.longest:.0f} ms at most; {decisions.slow} of "
             f"{decisions.count} exceed decision_time (not written to files)"
         )
-    outcomes = [drives.outcomes[k] for k in drives.by_severity()]
-    failures = [outcome for outcome in outcomes if not outcome.verdict.passed]
-    for outcome in failures[:5]:
-        print_(f"scenario {outcome.name}: {outcome.verdict.sentence()}")
+    if len(tables) == 1:
+        drives = suite.drives[0]
+        outcomes = [drives.outcomes[k] for k in drives.by_severity()]
+        for outcome in [outcome for outcome in outcomes if not outcome.verdict.passed][:5]:
+            print_(f"scenario {outcome.name}: {outcome.verdict.sentence()}")
     print_(*map(str, files), sep="\n")
+
+
+def _print_comparison(comparison: "Comparison | None") -> None:
+    if comparison is not None:
+        emit_json(now_fail=comparison.now_fail, now_pass=comparison.now_pass)
+        _print_names("now fail", comparison.now_fail)
+        _print_names("now pass", comparison.now_pass)
 
 
 def _print_names(title: str, names: Sequence[str]) -> None:

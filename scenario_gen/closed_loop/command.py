@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The work of `scenario-gen drive`: a bag and a planner's name in, a folder of verdicts out."""
+"""The work of `scenario-gen drive`: bags and planners' names in, a folder of verdicts out."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
@@ -9,18 +9,19 @@ from functools import reduce
 import os
 from pathlib import Path
 
+from scenario_gen.base.errors import InputError
 from scenario_gen.base.folders import replaced_folder
 from scenario_gen.base.parameters import assigned
 from scenario_gen.closed_loop.comparison import compared, read_drives, refuse_others
 from scenario_gen.closed_loop.config import ClosedLoopConfig
 from scenario_gen.closed_loop.origin import origins_of, Trial
 from scenario_gen.closed_loop.results import DRIVEN, Drives
+from scenario_gen.closed_loop.suite import bags_in, read_suite, Suite
 from scenario_gen.closed_loop.trials import (
     Bars,
     broken_bars,
     Outcome,
     rates,
-    read_trials,
     run_trials,
     with_origins,
 )
@@ -51,17 +52,18 @@ class DriveRequest:
     """The arguments of the command.
 
     Attributes:
-        bag: a bag that scenario_gen recorded.
-        planner: MODULE:CLASS; over DDS the command that starts its node.
+        sources: bags that scenario_gen recorded, folders with bags, or lists of them.
+        planners: MODULE:CLASS of each; over DDS the commands that start their nodes.
         ego: id of the vehicle that the planner replaces.
-        count: greatest number of scenarios; 0: all.
+        count: greatest number of scenarios of each bag; 0: all.
         assignments: parameters as name=value; those of a drive without prefix, those of the bars
             as bars.name.
-        against: drives.json of an earlier planner on the same scenarios, or its folder.
+        against: drives.json of an earlier planner on the same scenarios, or its folder; with one
+            planner only.
     """
 
-    bag: Path
-    planner: str
+    sources: Sequence[Path]
+    planners: Sequence[str]
     ego: str = ""
     count: int = 0
     assignments: Sequence[str] = ()
@@ -80,30 +82,35 @@ class DriveRequest:
         return reduce(assigned, named, DriveCommandConfig())
 
 
-def drive_bag(
+def drive_bags(
     request: DriveRequest,
     out: Path,
     *,
     progress: Progress = lambda *_: None,
     run: RunTrials | None = None,
     baseline: RunTrials | None = None,
-) -> Drives:
-    """Drive a planner through the scenarios of a bag and write the results.
+) -> Suite:
+    """Drive planners through the scenarios of bags and write the results.
 
     Args:
-        request: planner and bag.
+        request: planners and bags.
         out: folder of the results.
         progress: called with the numbers of finished and of all drives.
-        run: drives the planner; default: `in_processes()`.
+        run: drives a planner; default: `in_processes()`.
         baseline: drives the non-reactive baseline in at most MAX_BASELINE_COUNT of the scenarios;
             None: no baseline.
 
     Raises:
-        InputError: bag, planner, folder, a parameter or the file to compare with is invalid.
+        InputError: a bag, planner, folder, parameter or the file to compare with is invalid.
     """
-    config, planner = request.config(), request.planner
-    earlier = read_drives(request.against) if request.against is not None else None
-    trials = read_trials(request.bag, request.ego, request.count)
+    config = request.config()
+    earlier = None
+    if request.against is not None:
+        if len(request.planners) > 1:
+            raise InputError("--against compares with one planner; give one --planner")
+        earlier = read_drives(request.against)
+    bags = bags_in(request.sources)
+    trials = read_suite(bags, request.ego, request.count)
     if earlier is not None:  # refuses before the drives
         digests = {
             trial.name: origin.digest
@@ -111,16 +118,27 @@ def drive_bag(
         }
         refuse_others(digests, config.drive, earlier)
     run = run or in_processes()
-    with replaced_folder(out, DRIVEN, [request.bag]) as folder:  # refuses before the drives
-        outcomes = with_origins(run(trials, planner, config.drive, progress), trials)
-        comparison = compared(outcomes, config.drive, earlier) if earlier is not None else None
-        broken = broken_bars(rates(outcomes), config.bars)
-        if comparison is not None and comparison.worse:
-            broken.append(comparison.sentence())
+    total = len(trials) * len(request.planners)
+    with replaced_folder(out, DRIVEN, bags) as folder:  # refuses before the drives
         unreactive = () if baseline is None else _baseline(trials, config.drive, baseline)
-        drives = Drives(outcomes, planner, config.drive, trials, broken, unreactive, comparison)
-        drives.write(folder)
-    return drives
+        results: list[Drives] = []
+        for planner in request.planners:
+            before = len(results) * len(trials)
+
+            def advance(done: int, _: int, before: int = before) -> None:
+                progress(before + done, total)
+
+            outcomes = with_origins(run(trials, planner, config.drive, advance), trials)
+            comparison = compared(outcomes, config.drive, earlier) if earlier is not None else None
+            broken = broken_bars(rates(outcomes), config.bars)
+            if comparison is not None and comparison.worse:
+                broken.append(comparison.sentence())
+            results.append(
+                Drives(outcomes, planner, config.drive, trials, broken, unreactive, comparison)
+            )
+        suite = Suite.of(results, bags)
+        suite.write(folder)
+    return suite
 
 
 def _baseline(trials: Sequence[Trial], config: ClosedLoopConfig, run: RunTrials) -> list[Outcome]:

@@ -102,7 +102,7 @@ class Drives:
             messages.append(f"observation of the others: {self.config.observation}")
         if self.comparison is not None:
             messages.append(self.comparison.sentence())
-        messages.append(self._scores_note())
+        messages += [self._faults_note(), self._scores_note()]
         return [message for message in messages if message]
 
     def _encounters(self) -> list[str]:
@@ -163,6 +163,17 @@ class Drives:
         rate = passed_of(self.baseline)
         return f"{prefix}the non-reactive baseline passes {rate}{by_encounter}"
 
+    def _faults_note(self) -> str:
+        faulty = [outcome for outcome in self.outcomes if outcome.drive.faults]
+        if not faulty:
+            return ""
+        step, fault = faulty[0].drive.faults[0]
+        time = step * self.config.step
+        return (
+            f"{len(faulty)} drives with faulty commands; the first in scenario {faulty[0].name} "
+            f"at {time:.1f} s: {fault}"
+        )
+
     def _scores_note(self) -> str:
         scores = self.scores()
         if not scores:
@@ -222,6 +233,10 @@ class Drives:
             parameters={name: value for name, (_, value) in flatten(self.config).items()},
         )
 
+    def facts(self) -> dict[str, str]:
+        """Return the properties for JUnit."""
+        return self.config.facts() | ({"hardly tests": self.easy} if self.easy else {})
+
     def write(self, folder: Path) -> None:
         """Write JSON, JUnit's XML and, if there are trials, the page to an existing folder.
 
@@ -229,10 +244,7 @@ class Drives:
             OSError: the disk is full, or the folder is not writable.
         """
         write_text(folder / JSON, self.json())
-        facts = self.config.facts()
-        if self.easy:
-            facts["hardly tests"] = self.easy
-        write_text(folder / JUNIT, as_junit(self.outcomes, self.planner, facts))
+        write_text(folder / JUNIT, as_junit(self.outcomes, self.planner, self.facts()))
         if self.trials:
             write_text(folder / PAGE, self.page())
 
@@ -242,6 +254,13 @@ def as_junit(outcomes: Sequence[Outcome], planner: str, facts: Mapping[str, str]
 
     Cases fail with the type collision, off_road, jump, goal, or the name of a criterion.
     """
+    return junit_text(junit_suite(outcomes, planner, facts))
+
+
+def junit_suite(
+    outcomes: Sequence[Outcome], planner: str, facts: Mapping[str, str] = EMPTY
+) -> ElementTree.Element:
+    """Return the element `testsuite` of one planner; arguments as in `as_junit`."""
     failed = [outcome for outcome in outcomes if not outcome.verdict.passed]
     lasted = math.fsum(outcome.verdict.duration for outcome in outcomes)
     suite = ElementTree.Element(
@@ -270,37 +289,48 @@ def as_junit(outcomes: Sequence[Outcome], planner: str, facts: Mapping[str, str]
             )
         message = ElementTree.SubElement(case, "system-out")
         message.text = json.dumps(verdict.document(), ensure_ascii=False)
-    ElementTree.indent(suite)
-    for element in suite.iter():  # XML has no form for control characters
+    return suite
+
+
+def junit_text(root: ElementTree.Element) -> str:
+    """Return the text of a document in JUnit's XML."""
+    ElementTree.indent(root)
+    for element in root.iter():  # XML has no form for control characters
         element.attrib.update({name: printable(value) for name, value in element.attrib.items()})
         element.text = printable(element.text) if element.text else None
     return (
         '<?xml version="1.0" encoding="UTF-8"?>\n'
-        + ElementTree.tostring(suite, encoding="unicode")
+        + ElementTree.tostring(root, encoding="unicode")
         + "\n"
     )
 
 
 def drawings(
-    outcomes: Sequence[Outcome], trials: Sequence[Trial], drawn: Sequence[int]
+    outcomes: Sequence[Outcome],
+    trials: Sequence[Trial],
+    drawn: Sequence[int],
+    max_frames: int = MAX_FRAMES_COUNT,
 ) -> dict[str, Any]:
     """Return the page's replays: the drives with some indices, and their roads."""
     roads = {id(trials[k].road): trials[k].road for k in drawn}
     place = {key: number for number, key in enumerate(roads)}
     return {
         "roads": [road_data(road) if road is not None else None for road in roads.values()],
-        "drives": [_drawing(outcomes[k], trials[k], place[id(trials[k].road)]) for k in drawn],
+        "drives": [
+            _drawing(outcomes[k], trials[k], place[id(trials[k].road)], max_frames) for k in drawn
+        ],
     }
 
 
-def _drawing(outcome: Outcome, trial: Trial, road: int) -> dict[str, Any]:
+def _drawing(outcome: Outcome, trial: Trial, road: int, max_frames: int) -> dict[str, Any]:
     drive, verdict = outcome.drive, outcome.verdict
     motion = drive.motion
-    frames = max(2, min(MAX_FRAMES_COUNT, int(np.ceil(verdict.duration / FRAME_PERIOD_S)) + 1))
+    frames = max(2, min(max_frames, int(np.ceil(verdict.duration / FRAME_PERIOD_S)) + 1))
     spans = [
         motion.time[row][[0, -1]].tolist() if row.any() else [0.0, -1.0] for row in drive.present
     ]
     witness = trial.scenario
+    stride = max(1, len(witness.time) // min(max_frames, 100))
     return {
         "name": outcome.name,
         "sentence": verdict.sentence(),
@@ -315,8 +345,7 @@ def _drawing(outcome: Outcome, trial: Trial, road: int) -> dict[str, Any]:
             "durations": [round(verdict.duration, 3)],
         },
         "witness": [
-            [round(x, 2), round(y, 2)]
-            for x, y in witness.position[drive.ego, :: max(1, len(witness.time) // 100)].tolist()
+            [round(x, 2), round(y, 2)] for x, y in witness.position[drive.ego, ::stride].tolist()
         ],
         "spans": [[round(time, 3) for time in span] for span in spans],
         "hit": round(verdict.collision.time, 3) if verdict.collision else None,

@@ -43,6 +43,7 @@ from scenario_gen.closed_loop.simulation import ClosedLoop, Planner
 from scenario_gen.closed_loop.timeouts import bounded, Decisions, Timed, TooLongError
 from scenario_gen.closed_loop.verdict import DriveVerdict, judge
 from scenario_gen.method.evaluation import clustered_wilson
+from scenario_gen.numerics import Floats
 from scenario_gen.types import (
     GenerationResult,
     Interval,
@@ -448,17 +449,20 @@ def _events(v: DriveVerdict) -> dict[str, bool]:
     return events | {f"criterion {result.name}": result.missed for result in v.criteria}
 
 
-def passed_of(outcomes: Sequence[Outcome]) -> Rate:
-    """Return the rate of drives that passed."""
-    return _rate(outcomes, [outcome.verdict.passed for outcome in outcomes])
+def passed_of(outcomes: Sequence[Outcome], weight: Floats | None = None) -> Rate:
+    """Return the rate of drives that passed; with weights (S,) the share is weighted."""
+    return _rate(outcomes, [outcome.verdict.passed for outcome in outcomes], weight)
 
 
-def _rate(outcomes: Sequence[Outcome], flags: Sequence[bool]) -> Rate:
+def _rate(
+    outcomes: Sequence[Outcome], flags: Sequence[bool], weight: Floats | None = None
+) -> Rate:
     unit, encounters = units_of(
         [outcome.name for outcome in outcomes], [outcome.origin for outcome in outcomes]
     )
     hits = np.array(flags, dtype=np.bool_)
-    return Rate(sum(flags), len(flags), clustered_wilson(hits, unit, CONFIDENCE), encounters)
+    share = clustered_wilson(hits, unit, CONFIDENCE, weight)
+    return Rate(sum(flags), len(flags), share, encounters)
 
 
 LOWER_BARS = ("goals", "progress")

@@ -19,7 +19,7 @@ from typer.testing import CliRunner
 from scenario_gen.bags.recordings.write import write_recording
 from scenario_gen.base.errors import InputError
 from scenario_gen.cli.commands import app
-from scenario_gen.closed_loop.command import drive_bag, DriveRequest, in_processes
+from scenario_gen.closed_loop.command import drive_bags, DriveRequest, in_processes
 from scenario_gen.closed_loop.ego import Pose
 from scenario_gen.closed_loop.results import as_junit
 from scenario_gen.closed_loop.trials import read_trials
@@ -147,8 +147,8 @@ class Nowhere(Still):
 )
 def test_a_planner_that_fails_is_said_and_never_passes(bag, tmp_path, planner, workers, said):
     with pytest.raises(InputError, match=said):
-        drive_bag(
-            DriveRequest(bag, f"{__name__}:{planner}", count=2),
+        drive_bags(
+            DriveRequest([bag], [f"{__name__}:{planner}"], count=2),
             tmp_path / "out",
             run=in_processes(workers),
         )
@@ -161,9 +161,9 @@ def test_a_planner_that_hangs_is_ended_and_what_was_found_is_told(bag, tmp_path)
         InputError, match=r"scenario 1: the planner did not finish in 5 s"
     ) as caught:
         request = DriveRequest(
-            bag, f"{__name__}:Hangs", count=2, assignments=["drive_time=5", "overtime=1"]
+            [bag], [f"{__name__}:Hangs"], count=2, assignments=["drive_time=5", "overtime=1"]
         )
-        drive_bag(request, tmp_path / "out", run=in_processes(1))
+        drive_bags(request, tmp_path / "out", run=in_processes(1))
     assert (
         "of the 1 drives before: failures 1, collisions" in str(caught.value)
         and not (tmp_path / "out").exists()
@@ -177,20 +177,20 @@ def test_compiled_code_that_hangs_is_ended_with_its_process(bag, tmp_path):
         match=r"ended after 0 of 2 drives: .* hung in compiled code for longer than drive_time",
     ):
         request = DriveRequest(
-            bag, f"{__name__}:HangsInCompiledCode", count=2, assignments=["drive_time=0.5"]
+            [bag], [f"{__name__}:HangsInCompiledCode"], count=2, assignments=["drive_time=0.5"]
         )
-        drive_bag(request, tmp_path, run=in_processes(2))
+        drive_bags(request, tmp_path, run=in_processes(2))
 
 
 def test_slow_decisions_are_counted_and_change_nothing_that_is_written(bag, tmp_path):
     known = {}
     for planner in ("Slow", "Still"):
         sets = ["decision_time=0.04", "overtime=1.0"]
-        result = drive_bag(
-            DriveRequest(bag, f"{__name__}:{planner}", count=1, assignments=sets),
+        (result,) = drive_bags(
+            DriveRequest([bag], [f"{__name__}:{planner}"], count=1, assignments=sets),
             tmp_path / planner,
             run=in_processes(1),
-        )
+        ).drives
         known[planner] = json.loads((tmp_path / planner / "drives.json").read_text())
         assert any(
             line.startswith("progress: 0.0 %") for line in result.broken
@@ -203,8 +203,10 @@ def test_slow_decisions_are_counted_and_change_nothing_that_is_written(bag, tmp_
 
 @pytest.mark.parametrize("planner", ["Forks", "Nowhere"])
 def test_a_planner_that_forks_or_leaves_every_road_is_judged_once(bag, tmp_path, planner):
-    drive_bag(
-        DriveRequest(bag, f"{__name__}:{planner}", count=1), tmp_path / "out", run=in_processes(1)
+    drive_bags(
+        DriveRequest([bag], [f"{__name__}:{planner}"], count=1),
+        tmp_path / "out",
+        run=in_processes(1),
     )
     (drive,) = json.loads((tmp_path / "out" / "drives.json").read_text())["drives"]
     assert drive["faults"] > 0 and not drive["passed"]

@@ -316,6 +316,9 @@ def act(heard, left=[int(sys.argv[2])]):
     twist = Twist()
     twist.linear.x = 3.0 + math.sin(heard.pose.pose.position.x)
     command.publish(twist)
+    if sys.argv[4:]:
+        twist.linear.x = 0.0
+        command.publish(twist)
 
 
 node.create_subscription(Odometry, sys.argv[1], act, 10)
@@ -343,6 +346,7 @@ def test_a_planner_that_is_a_node_gets_the_verdicts_that_it_gets_in_process(
     command = f"{sys.executable} {program} vehicle_1/odom"
     for out, more in (
         ("over_dds", ["--ros", "--planner", f"{command} 1000000"]),
+        ("twice", ["--ros", "--planner", f"{command} 1000000 0 twice"]),
         ("in_process", ["--planner", "test_traffic:ByPlace", "--workers", "1"]),
     ):
         told = CliRunner().invoke(app, [*words, "--out", str(tmp_path / out), *more])
@@ -352,6 +356,9 @@ def test_a_planner_that_is_a_node_gets_the_verdicts_that_it_gets_in_process(
         for out in ("over_dds", "in_process")
     )
     assert over_dds["drives"] == in_process["drives"] and len(in_process["drives"]) == 2
+    twice = json.loads((tmp_path / "twice" / "drives.json").read_text())
+    assert all(drive["faults"] > 0 for drive in twice["drives"])
+    assert any("replies to one state" in note for note in twice["notes"])
     monkeypatch.setattr(planner_trials, "SILENCE_TIMEOUT_S", 1.0)
     for planner, more, said in (
         (f"{sys.executable} -c 'print(7)'", (), "ended with code 0; its last output: 7"),

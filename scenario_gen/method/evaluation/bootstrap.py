@@ -102,8 +102,12 @@ def wilson(count: int, total: int, level: float) -> Interval:
     return _wilson(count / total, total, float(special.ndtri(0.5 + 0.5 * level)))
 
 
-def clustered_wilson(hits: Bools, unit: Ints, level: float) -> Interval:
+def clustered_wilson(
+    hits: Bools, unit: Ints, level: float, weight: Floats | None = None
+) -> Interval:
     """Return the share of hits (S,) with Wilson's interval for samples that depend within units.
+
+    With weights (S,) the share is weighted, and a single unit has Kish's number of samples.
 
     The number of samples is divided by the design effect: the variance between the totals of units
     over that of independent samples, at least 1. The quantile is Student's with a degree of
@@ -112,14 +116,16 @@ def clustered_wilson(hits: Bools, unit: Ints, level: float) -> Interval:
     Source: Korn & Graubard 1998; for Wilson's interval, Franco, Little, Louis & Slud 2019.
     """
     count, total = int(np.count_nonzero(hits)), len(hits)
+    if not total:
+        return wilson(0, 0, level)
     _, member = np.unique(unit, return_inverse=True)
-    units = int(member.max(initial=-1)) + 1
-    if units < 2:
-        return wilson(count, total, level)
-    share = count / total
-    if count in (0, total):
-        return _wilson(share, float(units), float(special.ndtri(0.5 + 0.5 * level)))
-    excess = np.bincount(member, weights=hits - share)
+    units = int(member.max()) + 1
+    weight = np.ones(total) if weight is None else weight * total / weight.sum()
+    share = float(weight @ hits) / total
+    if units < 2 or count in (0, total):
+        independent = float(units) if units > 1 else total * total / float(weight @ weight)
+        return _wilson(share, independent, float(special.ndtri(0.5 + 0.5 * level)))
+    excess = np.bincount(member, weights=weight * (hits - share))
     between = float(np.sum(excess * excess)) * units / (units - 1)
     effect = max(between / (total * share * (1.0 - share)), 1.0)
     return _wilson(share, total / effect, float(special.stdtrit(units - 1, 0.5 + 0.5 * level)))

@@ -36,6 +36,8 @@ Progress = Callable[[int, int], None]
 class TrialTraffic(Traffic):
     """Drives trials one after the other; each step waits for the planner's reply."""
 
+    is_local = True
+
     def __init__(
         self, trials: Sequence[Trial], config: ClosedLoopConfig, progress: Progress
     ) -> None:

@@ -16,11 +16,13 @@ Topics, frames and units: msg_conventions/driving.py. Faults of the ego are on /
 the verdict.
 """
 
+from collections.abc import Mapping
 from functools import partial
 import json
 import math
 from pathlib import Path
-from time import monotonic
+from time import monotonic, time_ns
+from typing import Any, ClassVar
 
 from rclpy.callback_groups import ReentrantCallbackGroup
 from rclpy.clock import Clock, ClockType
@@ -70,6 +72,8 @@ POLL_S = 0.05  # real time between two checks whether a wait is over
 class Traffic(Node):  # type: ignore[misc]
     """Drives one scenario after the other."""
 
+    is_local: ClassVar[bool] = False  # whether the planner's messages have the time of this clock
+
     def __init__(self, namespace: str | None = None, config: Config = Config()) -> None:
         self._callback_group = ReentrantCallbackGroup()
         super().__init__("traffic", namespace=namespace)
@@ -81,6 +85,9 @@ class Traffic(Node):  # type: ignore[misc]
         self._states: list[State] = []
         self._received: EgoCommand | None = None
         self._reply_count = 0  # to the last state
+        self._late_reply_count = 0  # to the state before it, which had an answer
+        self._published: State | None = None  # the last state, when it has been published
+        self._published_ns = 0  # time of its first odometry of the ego
         # Times are on the steady clock [s].
         self._last_reply_at = 0.0
         self._waiting: Future | None = None
@@ -167,7 +174,7 @@ class Traffic(Node):  # type: ignore[misc]
         self._states = [self._loop.start()]
         self._received = None
         self._verdict = ""
-        self._reply_count = 0
+        self._reply_count = self._late_reply_count = 0
         self._load_at = math.inf
         self._names = tokens(self._loop.scenario.ids)
         self._children = tuple(f"vehicle_{name}" for name in self._names)
@@ -182,19 +189,23 @@ class Traffic(Node):  # type: ignore[misc]
 
     # --- the ego -------------------------------------------------------------------------------
 
-    def _receive_command(self, topic: str, data: bytes) -> None:
+    def _receive_command(self, topic: str, data: bytes, info: Mapping[str, Any]) -> None:
         """Store a command and report a damaged one, which commands nothing.
 
-        Ignore commands after a drive.
+        Ignore commands after a drive. A local planner's command without a stamp, which it sent
+        before the last state, answers the state before it.
         """
         if self._loop is None or self._load_at < math.inf:
             return
         state = self._states[-1]
-        command = decode_command(
-            topic, data, self._loop, self._children[self._loop.ego], state.step
-        )
+        is_earlier = self.is_local and 0 < info["source_timestamp"] < self._published_ns
+        if is_earlier and state.step == 0:
+            return  # it answers the drive before this one
+        step = state.step - is_earlier
+        command = decode_command(topic, data, self._loop, self._children[self._loop.ego], step)
         self._last_reply_at = monotonic()
         self._reply_count += command.step == state.step
+        self._late_reply_count += is_earlier and step > 0 and not command.stamp_ns
         if fault := command.fault or self._multiple_replies(state):
             self._report_status(Level.WARN, fault, "ego")
         if self._received is not None and command.step < self._received.step:
@@ -222,7 +233,11 @@ class Traffic(Node):  # type: ignore[misc]
 
         The first state is sent repeatedly and may have several.
         """
-        if not self.config.lock_step or self._reply_count < 2 or state.step == 0:
+        if not self.config.lock_step or state.step == 0:
+            return ""
+        if self._late_reply_count:
+            return "several replies to one state; the first one counts, send one"
+        if self._reply_count < 2:
             return ""
         return f"{self._reply_count} replies to one state; the last one before the step counts"
 
@@ -247,7 +262,7 @@ class Traffic(Node):  # type: ignore[misc]
 
     def _advance(self, loop: ClosedLoop) -> None:
         requested, note = self._command(self._states[-1])
-        self._reply_count = 0
+        self._reply_count = self._late_reply_count = 0
         self._states.append(loop.step(self._states[-1], requested, note))
         if fault := self._states[-1].fault:
             self._report_status(Level.WARN, fault, "ego")
@@ -377,8 +392,12 @@ class Traffic(Node):  # type: ignore[misc]
         messages = surroundings(
             self._loop, observed, self._names, self._autoware, self._has_subscribers
         )
+        sent_ns = 0
         for topic, data in messages:
+            sent_ns = time_ns()
             self._publish(topic, data)
+        if self._published is not self._states[-1]:
+            self._published, self._published_ns = self._states[-1], sent_ns
 
     def _has_subscribers(self, topic: str) -> bool:
         """Return whether a topic has subscribers; slowly encoded messages need some."""

@@ -117,4 +117,8 @@ document.addEventListener("keydown", (event) => {
 byId("time")?.addEventListener("input", draw);
 document.querySelectorAll("tr[data-show]").forEach((row) => row.addEventListener("click", () => show(Number(row.dataset.show))));
 window.addEventListener("resize", draw);
-show(0);
+
+/** A link to a scenario, #s12, shows its replay. */
+const linked = () => Number(/^#s(\d+)$/.exec(location.hash)?.[1] ?? 0);
+window.addEventListener("hashchange", () => show(linked()));
+show(linked());

@@ -12,7 +12,7 @@ document.querySelectorAll("table[data-sort]").forEach((table) => {
     button.addEventListener("click", () => {
       const up = head.ariaSort !== "ascending";
       table.querySelectorAll("thead th").forEach((other) => { other.ariaSort = other === head ? (up ? "ascending" : "descending") : null; });
-      const value = (row) => { const text = row.cells[k].textContent.trim(); return [parseFloat(text), text]; };
+      const value = (row) => { const text = row.cells[k].dataset.value ?? row.cells[k].textContent.trim(); return [parseFloat(text), text]; };
       const order = ([a, s], [b, t]) => (Number.isNaN(a) && Number.isNaN(b) ? s.localeCompare(t) : Number.isNaN(a) ? 1 : Number.isNaN(b) ? -1 : a - b);
       const rows = [...body.rows].map((row) => [value(row), row]).sort(([a], [b]) => (up ? order(a, b) : order(b, a)));
       body.append(...rows.map(([, row]) => row));

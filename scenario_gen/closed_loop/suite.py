@@ -1,0 +1,268 @@
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""A suite: planners side by side in the scenarios of many bags, by kind of encounter."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+import json
+import os
+from pathlib import Path
+from typing import Any, NamedTuple
+from xml.etree import ElementTree
+
+import numpy as np
+
+from scenario_gen.bags.storage.files import files_of, METADATA
+from scenario_gen.base.documents import read_text
+from scenario_gen.base.folders import write_text
+from scenario_gen.closed_loop.origin import Trial
+from scenario_gen.closed_loop.results import drawings, Drives, JUNIT, junit_suite, junit_text
+from scenario_gen.closed_loop.trials import passed_of, Rate, read_trials
+from scenario_gen.method.evaluation import footprint_distance
+from scenario_gen.numerics import Floats
+from scenario_gen.output.report.html import render_page
+from scenario_gen.situation import EncounterKind, kind_of
+from scenario_gen.types import mask
+
+JSON, PAGE = "suite.json", "suite.html"
+MAX_LIST_BYTES = 1024 * 1024
+MAX_REPLAYS_COUNT = 1000
+REPLAY_BYTES = 1_300_000  # of the motions of all replays; with many, each has fewer frames
+FRAME_BYTES = 11  # of one vehicle: four 16-bit numbers in base64
+MIN_FRAMES_COUNT = 12
+
+
+class Category(NamedTuple):
+    """The kind of an encounter, and the type of the road user that the ego meets."""
+
+    kind: str
+    road_user: str
+
+
+@dataclass(frozen=True)
+class Row:
+    """The rates of passed scenarios of one category, one for each planner."""
+
+    category: Category
+    passed: tuple[Rate, ...]
+
+
+def bags_in(sources: Sequence[Path]) -> list[Path]:
+    """Return the bags of sources: bags, folders with bags below them, and lists of paths.
+
+    A list is a text file with one path per line, relative to the folder of the list.
+
+    Raises:
+        InputError: a list cannot be read.
+    """
+    bags = (bag for source in sources for bag in list(_bags_of(source)) or [source])
+    return list(dict.fromkeys(bags))
+
+
+def _bags_of(source: Path) -> Iterator[Path]:
+    if not source.exists() or (source / METADATA).exists() or files_of(source).files:
+        yield source
+    elif source.is_dir():
+        yield from sorted(file.parent for file in source.rglob(METADATA))
+    else:
+        name = f"{source} (must be a bag, a folder with bags, or a list of their paths)"
+        paths = map(str.strip, read_text(source, MAX_LIST_BYTES, name).splitlines())
+        yield from bags_in([source.parent / path for path in paths if path and path[0] != "#"])
+
+
+def read_suite(bags: Sequence[Path], ego: str = "", count: int = 0) -> list[Trial]:
+    """Return the scenarios of bags; with several, the names begin with the place of the bag.
+
+    Arguments and errors are as in `read_trials`, `count` is for each bag.
+    """
+    if len(bags) == 1:
+        return read_trials(bags[0], ego, count)
+    root = os.path.commonpath([bag.resolve() for bag in bags])
+    trials = []
+    for bag in bags:
+        place = os.path.relpath(bag.resolve(), root)
+        trials += [
+            replace(trial, name=f"{place} {trial.name.lstrip('/')}")
+            for trial in read_trials(bag, ego, count)
+        ]
+    return trials
+
+
+def category_of(trial: Trial) -> Category:
+    """Return the category of a scenario by the vehicle that comes nearest to the ego in it."""
+    scenario = trial.scenario
+    ids = [vehicle.id for vehicle in scenario.vehicles]
+    ego = ids.index(trial.ego) if isinstance(trial.ego, str) else trial.ego
+    present = mask(scenario.present, len(scenario.time))
+    nearest, least = ego, np.inf
+    for other in range(len(ids)):
+        both = present[ego] & present[other]
+        gap = footprint_distance(scenario, ego, other)[both].min(initial=np.inf)
+        if other != ego and gap < least:
+            nearest, least = other, gap
+    if nearest == ego:
+        return Category(EncounterKind.OTHER.value, "nobody")
+    return Category(kind_of(scenario, ego, nearest).value, scenario.vehicles[nearest].type)
+
+
+def population_weights(trials: Sequence[Trial]) -> Floats:
+    """Return the weights (S,) of scenarios that represent the traffic of their encounters.
+
+    All encounters weigh the same. The outcomes of a decision share the weight of their encounter
+    by probability, and scenarios that share an outcome by their importance weights.
+    """
+    groups: dict[Any, list[int]] = {}
+    for k, trial in enumerate(trials):
+        groups.setdefault((trial.encounter, trial.scenario.facts.decision), []).append(k)
+    weights = np.array([trial.scenario.facts.weight or 1.0 for trial in trials])
+    for (_, decision), members in groups.items():
+        probability = 1.0 if decision is None else decision.probability
+        weights[members] *= probability / weights[members].sum()
+    return np.asarray(weights / weights.mean())
+
+
+@dataclass(frozen=True, eq=False)
+class Suite:
+    """The results of planners in the same S scenarios.
+
+    Attributes:
+        drives: the results of each planner.
+        bags: the bags of the scenarios.
+        categories: (S,) categories of the scenarios.
+        weights: (S,) weights of the scenarios, of mean 1.
+    """
+
+    drives: Sequence[Drives]
+    bags: Sequence[Path]
+    categories: Sequence[Category]
+    weights: Floats
+
+    @classmethod
+    def of(cls, drives: Sequence[Drives], bags: Sequence[Path]) -> "Suite":
+        """Return the suite of results that have the same trials."""
+        trials = drives[0].trials
+        return cls(drives, bags, [*map(category_of, trials)], population_weights(trials))
+
+    @property
+    def is_single(self) -> bool:
+        """Whether it has one bag and one planner, and needs no table."""
+        return len(self.bags) == len(self.drives) == 1
+
+    @property
+    def planners(self) -> list[str]:
+        """Names of the planners: their classes, if these differ."""
+        names = [drives.planner for drives in self.drives]
+        short = [name.rpartition(":")[2] for name in names]
+        return short if len(set(short)) == len(names) else names
+
+    @property
+    def broken(self) -> list[str]:
+        """Sentences on the thresholds that are not met."""
+        if len(self.drives) == 1:
+            return list(self.drives[0].broken)
+        named = zip(self.planners, self.drives, strict=True)
+        return [f"{name}: {', '.join(each.broken)}" for name, each in named if each.broken]
+
+    def notes(self) -> list[str]:
+        """Return sentences that qualify the figures; those for one planner begin with its name."""
+        sentences = [drives.notes() for drives in self.drives]
+        common = [text for text in sentences[0] if all(text in each for each in sentences)]
+        return common + [
+            f"{name}: {text}"
+            for name, each in zip(self.planners, sentences, strict=True)
+            for text in each
+            if text not in common
+        ]
+
+    def table(self) -> list[Row]:
+        """Return the shares of passed scenarios of all, then of each category, worst first."""
+        groups: dict[Category, list[int]] = {}
+        for k, category in enumerate(self.categories):
+            groups.setdefault(category, []).append(k)
+        rows = [self._row(*group) for group in groups.items()]
+        rows.sort(key=lambda row: min(rate.share.value for rate in row.passed))
+        return [self._row(Category("all", ""), range(len(self.categories))), *rows]
+
+    def _row(self, category: Category, members: Sequence[int]) -> Row:
+        weights = self.weights[list(members)]
+        passed = (
+            passed_of([drives.outcomes[k] for k in members], weights) for drives in self.drives
+        )
+        return Row(category, tuple(passed))
+
+    def document(self) -> dict[str, Any]:
+        """Return the table and the scenarios as JSON's types."""
+        scenarios = zip(self.drives[0].outcomes, self.categories, self.weights, strict=True)
+        return {
+            "planners": [drives.planner for drives in self.drives],
+            **self.drives[0].config.facts(),
+            "bags": [str(bag) for bag in self.bags],
+            "table": [
+                {**row.category._asdict(), "passed": [rate.document() for rate in row.passed]}
+                for row in self.table()
+            ],
+            "notes": self.notes(),
+            "thresholds_not_met": self.broken,
+            "scenarios": [
+                {"name": outcome.name, **category._asdict(), "weight": round(float(weight), 6)}
+                for outcome, category, weight in scenarios
+            ],
+        }
+
+    def write(self, folder: Path) -> None:
+        """Write the results of all planners, and the table and its page, to an existing folder.
+
+        Raises:
+            OSError: the disk is full, or the folder is not writable.
+        """
+        if len(self.drives) == 1:
+            self.drives[0].write(folder)
+        else:
+            for number, drives in enumerate(self.drives, start=1):
+                write_text(folder / f"drives-{number}.json", drives.json())
+            root = ElementTree.Element("testsuites")
+            root.extend(junit_suite(d.outcomes, d.planner, d.facts()) for d in self.drives)
+            write_text(folder / JUNIT, junit_text(root))
+        if not self.is_single:
+            text = json.dumps(self.document(), indent=1, ensure_ascii=False, allow_nan=False)
+            write_text(folder / JSON, text + "\n")
+            write_text(folder / PAGE, self.page())
+
+    def page(self) -> str:
+        """Return the page: the table, and all scenarios with the planners side by side."""
+        cells = [
+            (drives.outcomes[k].verdict.severity, k, number)
+            for number, drives in enumerate(self.drives)
+            for k in range(len(drives.outcomes))
+        ]
+        rank = {(k, number): place for place, (_, k, number) in enumerate(sorted(cells))}
+        columns = range(len(self.drives))
+        worst = [
+            max((rank[k, number], number) for number in columns)[1]
+            for k in range(len(self.categories))
+        ]
+        order = sorted(range(len(worst)), key=lambda k: -rank[k, worst[k]])
+        shown = order[:MAX_REPLAYS_COUNT]
+        trials = self.drives[0].trials
+        vehicles = sum(len(trials[k].scenario.vehicles) for k in shown)
+        frames = max(REPLAY_BYTES // (FRAME_BYTES * vehicles), MIN_FRAMES_COUNT)
+        outcomes = [self.drives[worst[k]].outcomes[k] for k in range(len(worst))]
+        data = drawings(outcomes, trials, shown, frames)
+        for drawing, k in zip(data["drives"], shown, strict=True):
+            drawing["sentence"] = f"{self.planners[worst[k]]} {drawing['sentence']}"
+        return render_page(
+            "suite.html.j2",
+            ("scene.js", "drives.js", "tables.js"),
+            data,
+            suite=self,
+            rows=[
+                (
+                    number if number < len(shown) else None,
+                    k,
+                    [(rank[k, each], self.drives[each].outcomes[k].verdict) for each in columns],
+                )
+                for number, k in enumerate(order)
+            ],
+            is_weighted=bool(np.ptp(self.weights) > 1e-9),
+        )
