@@ -18,6 +18,7 @@ from scenario_gen.cli.output import emit_json, print_, print_table, progress
 if TYPE_CHECKING:
     from scenario_gen.closed_loop.command import RunTrials
     from scenario_gen.closed_loop.comparison import Comparison
+    from scenario_gen.closed_loop.results import Drives
     from scenario_gen.closed_loop.search.command import SearchResult
     from scenario_gen.closed_loop.suite import Suite
     from scenario_gen.output.review.regenerate import Replanned
@@ -33,7 +34,7 @@ class Drive:
     bags: Annotated[
         list[Path],
         typer.Argument(
-            help="Bags with scenarios from this suite, folders with such bags (e.g. from `batch`), "
+            help="Bags with scenarios from this suite, folders with such bags (as from `batch`), "
             "or text files with a path per line. Repeatable."
         ),
     ]
@@ -120,16 +121,28 @@ def drive(options: Drive) -> None:
 
 
 def _report(suite: "Suite", out: Path) -> None:
-    from scenario_gen.closed_loop.timeouts import Decisions
+    """Print the tables, notes and files."""
+    files = sorted(path for path in out.iterdir() if not path.name.startswith("."))
+    _print_tables(suite, files)
+    print_(*suite.notes(), sep="\n")
+    for drives in suite.drives:
+        _print_comparison(drives.comparison)
+    _print_durations(suite)
+    if len(suite.drives) == 1:
+        _print_failures(suite.drives[0])
+    print_(*map(str, files), sep="\n")
+
+
+def _print_tables(suite: "Suite", files: Sequence[Path]) -> None:
     from scenario_gen.closed_loop.trials import rates
 
-    files = sorted(path for path in out.iterdir() if not path.name.startswith("."))
     tables = [rates(drives.outcomes) for drives in suite.drives]
-    rows = [(name, *(str(table[name]) for table in tables)) for name in tables[0]]
-    by_planner = dict(zip(suite.planners, tables, strict=True))
-    shown = tables[0] if len(tables) == 1 else by_planner
+    names = suite.planners
+    shown: object = dict(zip(names, tables, strict=True))
+    if len(tables) == 1:
+        shown, names = tables[0], [suite.drives[0].planner]
     emit_json(rates=shown, notes=suite.notes(), bars_not_met=suite.broken, files=files)
-    names = suite.planners if len(tables) > 1 else [suite.drives[0].planner]
+    rows = [(name, *(str(table[name]) for table in tables)) for name in tables[0]]
     print_table(("drives", *names), rows)
     if not suite.is_single:
         print_table(
@@ -137,9 +150,11 @@ def _report(suite: "Suite", out: Path) -> None:
             [(*row.category, *map(str, row.passed)) for row in suite.table()],
             names=2,
         )
-    print_(*suite.notes(), sep="\n")
-    for drives in suite.drives:
-        _print_comparison(drives.comparison)
+
+
+def _print_durations(suite: "Suite") -> None:
+    from scenario_gen.closed_loop.timeouts import Decisions
+
     outcomes = [outcome for drives in suite.drives for outcome in drives.outcomes]
     decisions = Decisions.all_of([outcome.decisions for outcome in outcomes])
     if decisions.count:
@@ -147,12 +162,13 @@ def _report(suite: "Suite", out: Path) -> None:
             f"planner step: {1e3 * decisions.longest:.0f} ms at most; {decisions.slow} of "
             f"{decisions.count} exceed decision_time (not written to files)"
         )
-    if len(tables) == 1:
-        drives = suite.drives[0]
-        outcomes = [drives.outcomes[k] for k in drives.by_severity()]
-        for outcome in [outcome for outcome in outcomes if not outcome.verdict.passed][:5]:
-            print_(f"scenario {outcome.name}: {outcome.verdict.sentence()}")
-    print_(*map(str, files), sep="\n")
+
+
+def _print_failures(drives: "Drives") -> None:
+    outcomes = [drives.outcomes[k] for k in drives.by_severity()]
+    failures = [outcome for outcome in outcomes if not outcome.verdict.passed]
+    for outcome in failures[:5]:
+        print_(f"scenario {outcome.name}: {outcome.verdict.sentence()}")
 
 
 def _print_comparison(comparison: "Comparison | None") -> None:
