@@ -15,7 +15,7 @@ from typing import Protocol
 
 from filelock import FileLock, Timeout
 
-from scenario_gen.numerics.kernel_cache import is_lasting, root
+from scenario_gen.numerics.kernel_cache import root, temporary_because
 
 MAX_WORKERS_COUNT = max(1, min(4, os.cpu_count() or 1))
 POLL_S = 0.5
@@ -46,9 +46,8 @@ _workers: list["subprocess.Popen[bytes]"] = []
 
 def words(done: int, needed: int, seconds: float) -> str:
     """Describe the progress."""
-    how_often = "once for this installation"
-    if not is_lasting():
-        how_often = "at every start: set NUMBA_CACHE_DIR to a folder that can be written to"
+    why = temporary_because()
+    how_often = f"at every start: {why}" if why else "once for this installation"
     return f"kernels: {done} of {needed} compiled, {seconds:.0f} s; {how_often}"
 
 

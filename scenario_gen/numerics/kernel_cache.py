@@ -1,8 +1,13 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The cache of compiled kernels: numba's own, in one folder per version of a source file."""
+"""The cache of compiled kernels: numba's own, in one folder per content of a source file.
 
+Compiled code is run, so a cache that another account could write to is not used.
+"""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
 from functools import cache
 from hashlib import sha256
 import os
@@ -11,7 +16,11 @@ import platform
 import re
 import tempfile
 
+from llvmlite import binding
 import numba
+
+from scenario_gen.base.errors import InputError
+from scenario_gen.base.folders.disk import own_folder
 
 PACKAGE = Path(__file__).parents[1]
 _DECORATED = re.compile(rb"^@kernel\(", re.MULTILINE)
@@ -50,37 +59,101 @@ def _with_imports(source: Path) -> list[Path]:
 
 
 @cache
+def _chosen_root() -> tuple[Path, str]:
+    """Return the folder of all caches, and why it does not last, "" if it does."""
+    user = Path(os.environ.get("XDG_CACHE_HOME") or "~/.cache") / "scenario_gen"
+    fault = "set NUMBA_CACHE_DIR to a folder that can be written to"
+    try:
+        place = Path(numba.config.CACHE_DIR or user.expanduser()).resolve()
+        own_folder(place)
+        tempfile.TemporaryFile(dir=place).close()
+    except InputError as error:
+        fault = f"{error}, or set NUMBA_CACHE_DIR to a folder of your own"
+    except (OSError, RuntimeError):  # RuntimeError: the user has no home
+        pass
+    else:
+        return place, ""
+    return Path(_temporary().name), fault
+
+
 def root() -> Path:
     """Return the folder of all caches.
 
     `NUMBA_CACHE_DIR`, the user's cache, or a temporary folder of this process.
     """
-    user = Path(os.environ.get("XDG_CACHE_HOME") or "~/.cache") / "scenario_gen"
-    try:
-        folder = Path(numba.config.CACHE_DIR or user.expanduser())
-        folder.mkdir(mode=0o700, parents=True, exist_ok=True)
-        tempfile.TemporaryFile(dir=folder).close()
-    except (OSError, RuntimeError):  # RuntimeError: the user has no home
-        return Path(_temporary().name)
-    return folder
+    return _chosen_root()[0]
 
 
 @cache
 def folder(source: Path) -> Path:
     """Return the folder for the compiled kernels of one source file.
 
-    Its name is a hash of the versions of Python and numba, and of path, time and size of the file
-    and of the files with kernels that it imports. So a kernel is compiled again when a file that
-    it calls has changed.
+    Its name is a hash of the processor, the versions of Python and numba, and the content of the
+    file and of the files with kernels that it imports. So a kernel is compiled again when a file
+    that it calls has changed, and is found by a copy of the package elsewhere.
     """
-    stamps = [
-        (str(file), file.stat().st_mtime_ns, file.stat().st_size) for file in _with_imports(source)
-    ]
-    versions = (numba.__version__, platform.python_version())
-    digest = sha256(repr((stamps, versions)).encode()).hexdigest()[:16]
-    place = root() / f"kernels-{digest}"
+    digest = sha256(repr((_processor(), numba.__version__, platform.python_version())).encode())
+    for file in _with_imports(source):
+        digest.update(file.name.encode())
+        digest.update(sha256(file.read_bytes()).digest())
+    place = root() / f"kernels-{digest.hexdigest()[:16]}"
     place.mkdir(mode=0o700, exist_ok=True)
     return place
+
+
+@cache
+def _processor() -> tuple[str, str]:
+    """Return the name and the features of the processor that kernels are compiled for."""
+    return (
+        numba.config.CPU_NAME or binding.get_host_cpu_name(),
+        numba.config.CPU_FEATURES or binding.get_host_cpu_features().flatten(),
+    )
+
+
+class Locator:
+    """The place of a function's cache, for numba.
+
+    Numba's own locators use the path of the source, so that a copy would be compiled again.
+    """
+
+    def __init__(self, source: str) -> None:
+        self._source = Path(source)
+
+    @classmethod
+    def from_function(cls, _function: object, source: str) -> "Locator":
+        """Return the place for a function of a file."""
+        return cls(source)
+
+    def ensure_cache_path(self) -> None:
+        """Do nothing: the folder exists."""
+
+    def get_cache_path(self) -> str:
+        """Return the folder."""
+        return str(folder(self._source))
+
+    def get_source_stamp(self) -> str:
+        """Return the version of the source."""
+        return folder(self._source).name
+
+    def get_disambiguator(self) -> str:
+        """Return what distinguishes files with functions of the same name in one folder."""
+        return self._source.stem
+
+
+@contextmanager
+def used_by_numba(source: Path) -> Iterator[None]:
+    """Let functions that are compiled within the block use the cache of a source file."""
+    settings = {"CACHE_DIR": str(folder(source))}
+    if hasattr(numba.config, "CACHE_LOCATOR_CLASSES"):  # since numba 0.61
+        settings["CACHE_LOCATOR_CLASSES"] = f"{__name__}.{Locator.__name__}"
+    before = {name: getattr(numba.config, name) for name in settings}
+    try:
+        for name, value in settings.items():
+            setattr(numba.config, name, value)
+        yield
+    finally:
+        for name, value in before.items():
+            setattr(numba.config, name, value)
 
 
 @cache
@@ -89,6 +162,6 @@ def _temporary() -> tempfile.TemporaryDirectory[str]:
     return tempfile.TemporaryDirectory(prefix="scenario_gen-kernels-")
 
 
-def is_lasting() -> bool:
-    """Return whether other processes will find the kernels that this one compiles."""
-    return _temporary.cache_info().currsize == 0
+def temporary_because() -> str:
+    """Return why other processes will not find the kernels that this one compiles; "" if not."""
+    return _chosen_root()[1]

@@ -21,7 +21,7 @@ import numpy as np
 
 from scenario_gen.numerics.arrays import sealed
 from scenario_gen.numerics.compiling import make_ready
-from scenario_gen.numerics.kernel_cache import folder, PACKAGE, sources
+from scenario_gen.numerics.kernel_cache import folder, PACKAGE, sources, used_by_numba
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 
@@ -52,13 +52,9 @@ def named(of: type[Any], *fields: Any) -> Any:
 
 
 def _compiler(function: Callable[..., Any], **options: Any) -> Any:
-    """Apply `numba.njit` with the cache in our folder, and restore the user's setting."""
-    user_folder = numba.config.CACHE_DIR
-    numba.config.CACHE_DIR = str(folder(Path(function.__code__.co_filename)))
-    try:
+    """Apply `numba.njit` with the cache in our folder."""
+    with used_by_numba(Path(function.__code__.co_filename)):
         return numba.njit(**OPTIONS, **options)(function)
-    finally:
-        numba.config.CACHE_DIR = user_folder
 
 
 def _reader(declared: Any) -> Callable[[Any], Any]:
@@ -142,11 +138,22 @@ class Kernel:
         """Compile or load it, once, and return numba's function."""
         with _one_at_a_time:
             if not self._is_ready:
-                self.dispatcher.compile(self.declared)
+                try:
+                    self.dispatcher.compile(self.declared)
+                except Exception:
+                    if not self.mark.exists():
+                        raise
+                    self._forget()  # the cache is damaged
+                    self.dispatcher.compile(self.declared)
                 self.dispatcher.disable_compile()
                 self.mark.touch()
                 self._is_ready = True
         return self.dispatcher
+
+    def _forget(self) -> None:
+        """Remove what the cache has of this file."""
+        for file in self.mark.parent.iterdir():
+            file.unlink(missing_ok=True)
 
     def __call__(self, *values: Any) -> Any:
         """Call the compiled function."""

@@ -7,6 +7,9 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 import os
 from pathlib import Path
+import stat
+
+from scenario_gen.base.errors import InputError
 
 
 @contextmanager
@@ -23,6 +26,26 @@ def write_text(path: Path, text: str) -> None:
     """Write a text file; an OSError names it."""
     with naming(path), path.open("w", encoding="utf-8") as stream:
         stream.write(text)
+
+
+def own_folder(path: Path) -> None:
+    """Create a folder for this account alone, or check that an existing one is.
+
+    Raises:
+        InputError: it is a link, belongs to another account, or others may write to it.
+        OSError: it cannot be created.
+    """
+    path.mkdir(0o700, parents=True, exist_ok=True)
+    status = path.lstat()
+    writable = stat.S_IWOTH
+    if status.st_gid != status.st_uid:  # as of a user's private group
+        writable |= stat.S_IWGRP
+    if not stat.S_ISDIR(status.st_mode):
+        raise InputError(f"{path} is a link; remove it")
+    if status.st_uid != os.geteuid():
+        raise InputError(f"{path} belongs to another account; remove it")
+    if status.st_mode & writable:
+        raise InputError(f"other accounts may write to {path}; run `chmod go-w {path}`")
 
 
 def sync(path: Path) -> None:
