@@ -62,6 +62,8 @@ class ReactionThresholds:
         departure_lag_s, departure_sigma_s: departures of humans behind a clearing.
         yield_sigma_s: variation of one driver's lag.
         slowing_mps: smaller drops of speed are no slowing.
+        overtaking_mps: a vehicle that is always faster than the one ahead by this, and does not
+            slow down, overtakes it.
         wait_distance_m: a wait farther from the shared area has another reason.
         entry_window_s: before an entry, in which a merging vehicle is beside the lane.
         queue_delay_s: in addition to the greatest lag, until a driver starts behind its leader.
@@ -98,6 +100,7 @@ class ReactionThresholds:
     departure_sigma_s: float = 1.4
     yield_sigma_s: float = 0.6
     slowing_mps: float = 1.0
+    overtaking_mps: float = 2.0
     wait_distance_m: float = 25.0
     entry_window_s: float = 3.0
     queue_delay_s: float = 1.0

@@ -69,13 +69,16 @@ def _follower(
     if len(rows) * dt < LIMITS.min_following_s or stands:
         return None
 
+    closing = speed[rows] - leader_speed[rows]
+    slows = float(speed[rows].max() - speed[rows[-1]]) >= LIMITS.slowing_mps
+    overtakes = float(closing.min()) > LIMITS.overtaking_mps and not slows
     seconds = np.sort(gaps[rows] / np.maximum(speed[rows], LIMITS.slow_follower_mps))
     time_gap = float(seconds[round(LIMITS.closest_for_s / dt)])
     lag, likeness = _best_lag(np.gradient(speed, dt), np.gradient(leader_speed, dt), behind, dt)
     closeness = closeness_confidence(time_gap, LIMITS.lane_time_s)
     need = need_confidence(recording, who, whom)
     confidence = combined_confidence(closeness, need, 0.0 if closeness else likeness)
-    if confidence < LIMITS.min_confidence:
+    if confidence < LIMITS.min_confidence or overtakes:
         return Evidence(who, whom, time_gap)
 
     reaction = Reaction(

@@ -59,7 +59,7 @@ def find_reactions(
             latest.get(key, reaction), reaction, key=lambda each: (each.clears, each.confidence)
         )
     graph = without_circles([*leading.values(), *latest.values()], len(tracks))
-    return graph if graph.edges else replace(graph, why=_why_none(encounter, evidence))
+    return graph if graph.edges else replace(graph, why=_why_none(recording, evidence))
 
 
 def _explained_pairs(
@@ -77,8 +77,9 @@ def _explained_pairs(
     return explained
 
 
-def _why_none(encounter: Encounter, evidence: Sequence[Evidence]) -> str:
+def _why_none(recording: Recording, evidence: Sequence[Evidence]) -> str:
     """Say why there is no reaction."""
+    encounter = recording.encounter
     nearest = min(evidence, key=lambda pair: pair.time_gap, default=None)
     if nearest is None or nearest.time_gap == math.inf:
         standing = [
@@ -87,6 +88,8 @@ def _why_none(encounter: Encounter, evidence: Sequence[Evidence]) -> str:
             if np.all(speed < vehicle.kind.waits_below)
         ]
         why = "none drives behind another one in its lane, or crosses its path"
+        if recording.conflicts:
+            why = "vehicles share an area, but nothing shows that one reacts to another one"
         return f"{why}; {' and '.join(standing)} stands throughout" if standing else why
     who, whom = (encounter.vehicles[n].label for n in (nearest.who, nearest.whom))
     seconds = math.floor(10.0 * nearest.time_gap) / 10.0

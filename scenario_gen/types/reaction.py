@@ -86,7 +86,10 @@ class Reaction:
                 else ""
             )
             when = f"{self.gap:.1f} s behind" if self.gap >= 0.05 else "right behind"
-            text = f"{who} {verb} passes {when} it" if verb else f"{who} passes {when} {whom}"
+            text = f"{who} {verb} passes {when} it"
+            if not verb:
+                when = f"{self.gap:.1f} s after" if self.gap >= 0.05 else "just as"
+                text = f"{who} drives on {when} {whom} has cleared its way"
             if self.gap == math.inf:
                 text = f"{who} {'stops' if self.stands else 'slows'} for {whom}"
         return f"{text} (doubtful)" if self.doubtful else text

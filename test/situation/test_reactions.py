@@ -3,6 +3,7 @@
 
 """Who reacts to whom: planted reactions are found with their lag, independent drives have none, circles are cut."""
 
+from dataclasses import replace
 import itertools
 
 import numpy as np
@@ -105,6 +106,14 @@ def test_why_none_is_seen_is_said():
     assert (
         "none drives behind another" in Situation.of(labelled("beside", 1).encounter).reactions.why
     )
+
+
+def test_who_overtakes_does_not_follow():
+    lane = lane_encounter(np.full(150, 7.0), np.full(150, 14.0), 40.0)
+    steps = 1.0 / (1.0 + np.exp((np.abs(lane.time - 7.0) - 3.5) * 3.0))
+    aside = np.stack([np.zeros((150, 2)), np.column_stack([np.zeros(150), 3.5 * steps])])
+    reactions = Situation.of(replace(lane, position=lane.position + aside)).reactions
+    assert reactions.edges == () and "share an area" not in reactions.why
 
 
 def edge(who, whom, confidence):

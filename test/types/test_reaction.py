@@ -30,7 +30,7 @@ def test_who_slows_passes_or_stops_is_said_to():
     assert early.words(VEHICLES) == "vehicle b slows for vehicle a and passes right behind it"
     assert (
         replace(early, since=9.0, gap=1.2).words(VEHICLES)
-        == "vehicle b passes 1.2 s behind vehicle a"
+        == "vehicle b drives on 1.2 s after vehicle a has cleared its way"
     )
     assert replace(early, gap=math.inf).words(VEHICLES) == "vehicle b slows for vehicle a"
     assert (

@@ -197,10 +197,11 @@ class SearchResult:
                 f" {_share(rate.high)} (95 %)"
             ]
         if self.decision is not None:
-            probability = self.decision.probability
+            weight = self.decision.probability
+            low, high = _share(weight * rate.low), _share(weight * rate.high)
             messages.append(
-                f"outcome: {self.decision} (probability {_share(probability)}); its failures are"
-                f" {_share(probability * rate.value)} of all scenarios from the encounter"
+                f"outcome: {self.decision} (probability {_share(weight)}); of all scenarios from"
+                f" the encounter {low} to {high} fail in this way"
             )
         for name, share in self.estimate.events.items():
             event = "collisions by the ego's fault" if name == AT_FAULT else "collisions"

@@ -117,7 +117,8 @@ def standardised(x: Floats, error: Floats) -> tuple[Floats, Floats, Ints]:
     scaled = (filled[:, channels] - centre[channels]) / unit[channels]
     complete = scaled[~np.isnan(scaled).any(axis=1)]
     if len(complete) > 2 * len(channels):
-        kept = independent(complete / np.maximum(complete.std(axis=0), 1e-300))
+        deviation = complete.std(axis=0)
+        kept = independent(complete / np.where(deviation > 0.0, deviation, np.inf))
         channels, scaled = channels[kept], scaled[:, kept]
     return np.ascontiguousarray(scaled), np.square(error[channels] / unit[channels]), channels
 

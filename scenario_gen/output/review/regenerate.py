@@ -172,11 +172,13 @@ def replanned(
     """
     with naming_bag(bag):
         entries = _entries(bag, config)
-        names = sorted({where.name for where, _, _ in entries})
+        decisions = {where.name: entry.facts.decision for where, entry, _ in entries}
+        names = sorted(decisions)
         if namespace is None and len(names) > 1:
+            known = [f"{name} ({decisions[name]})" if decisions[name] else name for name in names]
             raise InputError(
                 f"{bag}: {len(names)} namespaces hold scenarios; choose one: --namespace "
-                f"{' or '.join(names)}"
+                f"{' or '.join(known)}"
             )
         matching = [entry for where, entry, _ in entries if namespace in (None, where.name)]
         if not matching:

@@ -261,7 +261,7 @@ def test_a_search_of_an_outcome_weights_its_failures(tmp_path):
         workers=1,
     )
     assert found.decision == drawn
-    share = f"{100.0 * drawn.probability * found.estimate.rate.value:.3g} % of all scenarios"
+    share = f"to {100.0 * drawn.probability * found.estimate.rate.high:.3g} % fail in this way"
     assert any(share in sentence for sentence in found.sentences())
     document = json.loads((tmp_path / "out" / "search.json").read_text())
     assert document["decision"]["probability"] == drawn.probability
