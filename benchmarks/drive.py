@@ -30,7 +30,7 @@ from scenario_gen.closed_loop.planners import (
     NonReactive,
     ReferenceFollower,
 )
-from scenario_gen.closed_loop.reacting import needs_reaction
+from scenario_gen.closed_loop.reacting import Selection
 from scenario_gen.closed_loop.simulation import ClosedLoop, Observation, Planner, State
 from scenario_gen.closed_loop.trials import Outcome, rates, run_trials
 from scenario_gen.closed_loop.verdict import judge
@@ -128,11 +128,12 @@ def planners(trials: list[Trial]) -> tuple[list[Row], list[Outcome]]:
 
 
 def for_testing(trials: Sequence[Trial]) -> list[Row]:
-    """Drive the trials that need a reaction, as `generate --for-testing` selects them."""
+    """Drive the trials that test, as `generate --for-testing` selects them."""
     loops = [
         ClosedLoop(trial.scenario, trial.ego, trial.road, ClosedLoopConfig()) for trial in trials
     ]
-    kept = [loop for loop in loops if needs_reaction(loop)]
+    selection = Selection.of(max(loop.task().speed for loop in loops))
+    kept = [loop for loop in loops if selection.keeps(loop)]
     rows = []
     for row, group in ((higher, BLIND), (lower, SIGHTED)):
         for name, (planner, target) in group.items():

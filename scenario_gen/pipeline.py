@@ -111,10 +111,21 @@ def generate(
         measures=measures_in(config.sampling.variety, encounter, population),
     )
     _refuse_empty(result)
+    return completed(result, config, request, population)
 
+
+def completed(
+    result: GenerationResult,
+    config: PipelineConfig,
+    request: Request,
+    population: Sequence[Encounter] = (),
+) -> GenerationResult:
+    """Return a set of scenarios with its replay, references, evaluation, coverage, provenance."""
+    encounter, (road, fit) = result.encounter, result.road_and_fit()
     if isinstance(encounter.source, Recombined):
         result = result.noted(Note.of(NoteKind.RECOMBINED, **vars(encounter.source)))
     if config.evaluation.compare:
+        situation = Situation.of(encounter)
         result = with_references(result, situation, config, request, population)
     result = replace(result, replay=replay(encounter, fit, road.frame_id))
     return replace(

@@ -4,7 +4,7 @@
 """A folder of results from logs: scenarios, bag, report and figures."""
 
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, replace
 from functools import partial
@@ -18,6 +18,7 @@ from scenario_gen.base.provenance import RECORDING
 from scenario_gen.logs import LogResult, NoEncounterError, read_log
 from scenario_gen.method.nearest import answer_refusal
 from scenario_gen.method.recombination import recombinations
+from scenario_gen.method.sampling import TargetError
 from scenario_gen.output.results import BAG, GENERATED, provenance_of, write_results
 from scenario_gen.pipeline import generate_outcomes, PipelineConfig
 from scenario_gen.types import (
@@ -30,7 +31,7 @@ from scenario_gen.types import (
 )
 
 if TYPE_CHECKING:
-    from scenario_gen.closed_loop.reacting import Testing
+    from scenario_gen.closed_loop.reacting import TestSets
 
 Advance = Callable[[str, int, int], None]
 """Called with the progress of a case: its name, scenarios so far, scenarios requested."""
@@ -54,6 +55,7 @@ class FolderRequest:
         request: a vehicle to leave out, start and end states, targets.
         also_read: further inputs, which the folder must not contain: maps, a parameter file.
         for_testing: whether to search for scenarios in which the ego has to react.
+        budget: computing time [s] of that search, per encounter and road.
         recombine: largest number of encounters to recombine from the recorded ones.
     """
 
@@ -66,6 +68,7 @@ class FolderRequest:
     request: Request = Request()
     also_read: Sequence[Path] = ()
     for_testing: bool = False
+    budget: float = 60.0
     recombine: int = 0
 
     @property
@@ -140,12 +143,12 @@ def generate_folder(
             (template, road) for template in templates for road in sources[template.name].roads
         ]
         with progress() as advance:
-            cases, refusals = generate_all(pairs, requested, advance)
+            cases, refusals = generate_all(pairs, requested, advance, notify)
         if not cases:
             raise RefusedError("nothing could be generated:\n" + "\n".join(refusals))
         cases = [_with_recording(case, sources) for case in cases]
-        untested = _untested(cases, requested)
-        for line in (*map_faults(cases), *untested):
+        blind_rates = _blind_rates(cases, requested)
+        for line in (*map_faults(cases), *blind_rates):
             notify(line)
         if record is not None:
             record(folder / BAG, cases)
@@ -154,7 +157,7 @@ def generate_folder(
             folder,
             cases,
             title=requested.title or ", ".join(path.stem for path in requested.logs),
-            quality=[*quality, *refusals, *untested],
+            quality=[*quality, *refusals, *blind_rates],
             provenance=requested.provenance(),
         )
     return cases, refusals
@@ -165,15 +168,15 @@ def _with_recording(case: GenerationResult, sources: dict[str, Source]) -> Gener
     return replace(case, provenance={**case.provenance, **recording})
 
 
-def _untested(cases: Sequence[GenerationResult], requested: FolderRequest) -> list[str]:
-    """Return sentences on scenarios with an ego slot in which the ego need not react."""
+def _blind_rates(cases: Sequence[GenerationResult], requested: FolderRequest) -> list[str]:
+    """Return a sentence on each set with an ego slot: how the best blind planner does in it."""
     if not requested.request.ego:
         return []
     from scenario_gen.closed_loop.config import ClosedLoopConfig
-    from scenario_gen.closed_loop.reacting import baseline_passes
+    from scenario_gen.closed_loop.reacting import blind_sentence
 
     config = ClosedLoopConfig(limits=requested.config.limits)
-    return [sentence for case in cases if (sentence := baseline_passes(case, config))]
+    return [sentence for case in cases if (sentence := blind_sentence(case, config))]
 
 
 def sources_of(readings: Sequence[tuple[LogResult, Sequence[str]]]) -> dict[str, Source]:
@@ -269,6 +272,7 @@ def generate_all(
     pairs: Sequence[tuple[Encounter, str]],
     requested: FolderRequest,
     advance: Advance = lambda *_: None,
+    notify: Notify = lambda _: None,
 ) -> tuple[list[GenerationResult], list[str]]:
     """Generate scenarios for encounters on their roads.
 
@@ -281,19 +285,72 @@ def generate_all(
     for encounter, road in pairs:
         name = f"{encounter.name} on {Path(road).stem}"
         advance(name, 0, requested.count)
+        report = partial(advance, name)
         try:
-            sets = _generate_sets(encounter, road, requested, recorded, partial(advance, name))
+            if requested.for_testing:
+                tests = _generate_tests(encounter, road, requested, report, notify)
+                sets, shortages = tests.results, [tests.shortage] if tests.shortage else []
+            else:
+                sets = _generate_sets(encounter, road, requested, recorded, report)
+                shortages = list(_shortages(sets))
         except RefusedError as error:
             refusals.append(f"{encounter.name} on {road}: {error}")
             continue
         cases += sets
-        refusals += [
-            f"{case.encounter.name} on {road}: only {len(case)} of {case.generated.requested} "
-            f"scenarios: {_shortage(case, requested)}"
-            for case in sets
-            if len(case) < case.generated.requested
-        ]
+        refusals += [f"{encounter.name} on {road}: {shortage}" for shortage in shortages]
     return cases, refusals
+
+
+def _generate_tests(
+    encounter: Encounter,
+    road: str,
+    requested: FolderRequest,
+    advance: Callable[[int, int], None],
+    notify: Notify,
+) -> "TestSets":
+    """Generate scenarios that test, with the first vehicle of --ego auto that gives some.
+
+    Raises:
+        RefusedError: nothing could be generated.
+    """
+    from scenario_gen.closed_loop.reacting import Testing
+
+    egos = _egos(encounter, requested.request)
+    for k, ego in enumerate(egos):
+        testing = Testing(
+            encounter,
+            road,
+            requested.config,
+            replace(requested.request, ego=ego),
+            requested.seed,
+            requested.budget / (len(egos) - k),
+            notify,
+        )
+        try:
+            return testing.run(requested.count, lambda done, total, _: advance(done, total))
+        except RefusedError:
+            if k + 1 == len(egos):
+                raise
+    raise AssertionError("there is a vehicle in any case")
+
+
+def _egos(encounter: Encounter, request: Request) -> list[str]:
+    """Return the vehicles that may be the ego, for --ego auto those that have to react.
+
+    Raises:
+        TargetError: nobody has to react.
+    """
+    if request.ego != EGO_AUTO:
+        return [request.ego]
+    from scenario_gen.closed_loop.reacting import reacting_vehicles
+
+    egos = reacting_vehicles(encounter)
+    if not egos:
+        raise TargetError(
+            "--ego auto: no vehicle has to react in this encounter; name one with --ego, or use "
+            "an encounter in which a vehicle yields or follows"
+        )
+    return egos
 
 
 def _generate_sets(
@@ -309,22 +366,8 @@ def _generate_sets(
         RefusedError: nothing could be generated; the message names the nearest possible request.
     """
     config, count, seed = requested.config, requested.count, requested.seed
-    one_outcome = updated(config, {"sampling.decisions": "recorded"})
-
-    def report(done: int, total: int, _candidates: int) -> None:
-        advance(done, total)
-
-    def testing(request: Request, config: PipelineConfig) -> "Testing":
-        from scenario_gen.closed_loop.reacting import Testing
-
-        return Testing(encounter, road, config, request, seed)
-
-    request = requested.request
+    request = replace(requested.request, ego=_egos(encounter, requested.request)[0])
     try:
-        if request.ego == EGO_AUTO:
-            request = replace(request, ego=testing(request, one_outcome).who_reacts_most())
-        if requested.for_testing:
-            return [testing(request, config).run(count, report)]
         return generate_outcomes(
             [encounter, *recorded],
             road,
@@ -332,20 +375,21 @@ def _generate_sets(
             count=count,
             seed=seed,
             request=request,
-            progress=report,
+            progress=lambda done, total, _: advance(done, total),
         )
     except RefusedError as error:
-        named = replace(request, ego="") if request.ego == EGO_AUTO else request
-        raise answer_refusal(error, encounter, road, one_outcome, named, count, seed) from error
+        one_outcome = updated(config, {"sampling.decisions": "recorded"})
+        raise answer_refusal(error, encounter, road, one_outcome, request, count, seed) from error
 
 
-def _shortage(case: GenerationResult, requested: FolderRequest) -> str:
-    """Return why a case has fewer scenarios than requested."""
-    if requested.for_testing:
-        return str(case.generated.adaptations[-1])
-    counts = case.generated.refused.most_common()
-    causes = ", ".join(f"{count} × {cause}" for cause, count in counts)
-    return causes or "no candidate was drawn"
+def _shortages(sets: Sequence[GenerationResult]) -> Iterator[str]:
+    """Yield why sets have fewer scenarios than requested."""
+    for case in sets:
+        wanted = case.generated.requested
+        if len(case) < wanted:
+            counts = case.generated.refused.most_common()
+            causes = ", ".join(f"{count} × {cause}" for cause, count in counts)
+            yield f"only {len(case)} of {wanted} scenarios: {causes or 'no candidate was drawn'}"
 
 
 def chosen(encounters: Sequence[Encounter], names: Sequence[str]) -> list[Encounter]:

@@ -94,7 +94,7 @@ class Generate:
     target: Annotated[
         list[str] | None,
         typer.Option(
-            help="Range of pet, ttc, gap, arrival_gap, closing_speed or baseline_margin, "
+            help="Range of pet, ttc, gap, arrival_gap, closing_speed or blind_margin, "
             r"e.g. 'pet=0.5..1.5', 'ttc\[1,2]=1..2'. Repeatable."
         ),
     ] = None
@@ -102,10 +102,19 @@ class Generate:
         bool,
         typer.Option(
             "--for-testing",
-            help="Search for scenarios in which the --ego has to react: a baseline that ignores "
-            "the others collides, and a simple reactive planner passes.",
+            help="Search for scenarios in which the --ego has to react: planners that ignore the "
+            "others fail in 90 % of the set, and a simple reactive planner passes.",
         ),
     ] = False
+    budget: Annotated[
+        float,
+        typer.Option(
+            min=1.0,
+            max=1e6,
+            help="Computing time (s) of the search of --for-testing, per encounter and road; what "
+            "was found until then is kept.",
+        ),
+    ] = 60.0
     compare: Annotated[
         bool,
         typer.Option(
@@ -190,6 +199,7 @@ def generate(options: Generate) -> None:
         request=_request(options),
         also_read=[options.parameter_file] if options.parameter_file else [],
         for_testing=options.for_testing,
+        budget=options.budget,
         recombine=options.recombine,
     )
     conclude(*generate_folder(options.out, request, progress=progress, notify=print_), options.out)

@@ -12,10 +12,12 @@ from pathlib import Path
 from scenario_gen.base.errors import InputError
 from scenario_gen.base.folders import replaced_folder
 from scenario_gen.base.parameters import assigned
+from scenario_gen.closed_loop.blind import blind_rate, BlindRate
 from scenario_gen.closed_loop.comparison import compared, read_drives, refuse_others
 from scenario_gen.closed_loop.config import ClosedLoopConfig
 from scenario_gen.closed_loop.origin import origins_of, Trial
 from scenario_gen.closed_loop.results import DRIVEN, Drives
+from scenario_gen.closed_loop.simulation import ClosedLoop
 from scenario_gen.closed_loop.suite import bags_in, read_suite, Suite
 from scenario_gen.closed_loop.trials import (
     Bars,
@@ -120,7 +122,7 @@ def drive_bags(
     run = run or in_processes()
     total = len(trials) * len(request.planners)
     with replaced_folder(out, DRIVEN, bags) as folder:  # refuses before the drives
-        unreactive = () if baseline is None else _baseline(trials, config.drive, baseline)
+        unreactive, blind = _baseline(trials, config.drive, baseline)
         results: list[Drives] = []
         for planner in request.planners:
             before = len(results) * len(trials)
@@ -134,14 +136,25 @@ def drive_bags(
             if comparison is not None and comparison.worse:
                 broken.append(comparison.sentence())
             results.append(
-                Drives(outcomes, planner, config.drive, trials, broken, unreactive, comparison)
+                Drives(
+                    outcomes, planner, config.drive, trials, broken, unreactive, blind, comparison
+                )
             )
         suite = Suite.of(results, bags)
         suite.write(folder)
     return suite
 
 
-def _baseline(trials: Sequence[Trial], config: ClosedLoopConfig, run: RunTrials) -> list[Outcome]:
-    """Return drives of the non-reactive baseline, in every k-th scenario if there are many."""
+def _baseline(
+    trials: Sequence[Trial], config: ClosedLoopConfig, run: RunTrials | None
+) -> tuple[list[Outcome], BlindRate | None]:
+    """Return drives of the non-reactive baseline, and how the best blind planner does.
+
+    They drive every k-th scenario if there are many. Without a function that drives there is none.
+    """
+    if run is None:
+        return [], None
     chosen = trials[:: max(1, -(-len(trials) // MAX_BASELINE_COUNT))]
-    return with_origins(run(chosen, BASELINE, config, lambda *_: None), chosen)
+    outcomes = with_origins(run(chosen, BASELINE, config, lambda *_: None), chosen)
+    loops = [ClosedLoop(trial.scenario, trial.ego, trial.road, config) for trial in chosen]
+    return outcomes, blind_rate(loops)

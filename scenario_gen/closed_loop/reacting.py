@@ -1,23 +1,46 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Scenarios that test a planner: a non-reactive one collides, a simple reactive one passes."""
+"""Sets that test a planner: every blind planner fails in most scenarios, and who looks passes.
 
-from collections.abc import Iterator
-from contextlib import suppress
-from dataclasses import dataclass, replace
-from itertools import islice
+Scenarios come in stages. A stage has one outcome of the encounter's decision in which the ego has
+to react, and begins so late that speeds hardly matter any more: the blind planners of the family
+then meet the other vehicle together. A scenario is kept if every blind planner still fails in 90 %
+of the set, and if the reference drive and `IdmFollower` pass, the latter without braking hard.
+"""
+
+from collections import Counter
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass, field, replace
+from enum import StrEnum
+import math
+from time import process_time
+
+import numpy as np
 
 from scenario_gen.base.errors import InputError, RefusedError
 from scenario_gen.base.parameters import updated
+from scenario_gen.closed_loop.blind import (
+    blind_family,
+    blind_passes,
+    blind_rate,
+    BlindPlanner,
+    BlindRate,
+)
 from scenario_gen.closed_loop.config import ClosedLoopConfig
-from scenario_gen.closed_loop.planners import IdmFollower, NonReactive, ReferenceFollower
+from scenario_gen.closed_loop.planners import IdmFollower, ReferenceFollower
 from scenario_gen.closed_loop.simulation import ClosedLoop
 from scenario_gen.closed_loop.verdict import judge
-from scenario_gen.method.sampling import Progress, TargetError
+from scenario_gen.method.chain import Chain
+from scenario_gen.method.decisions import decided
+from scenario_gen.method.evaluation import replay
+from scenario_gen.method.outcome_sets import requested_decisions
+from scenario_gen.method.sampling import Callbacks, Progress, TargetError
 from scenario_gen.method.segmentation import segment
-from scenario_gen.method.suitable_roads import suitable_roads
-from scenario_gen.pipeline import generate, PipelineConfig
+from scenario_gen.method.suitable_roads import AUTO, suitable_roads
+from scenario_gen.numerics import Ints
+from scenario_gen.pipeline import completed, PipelineConfig
+from scenario_gen.roads import road_and_template
 from scenario_gen.situation import Situation
 from scenario_gen.types import (
     Encounter,
@@ -29,10 +52,18 @@ from scenario_gen.types import (
     Request,
     Road,
     Scenario,
+    token,
+    YIELD,
 )
 
-PROBE_COUNT = 12  # scenarios per vehicle to find out whether it has to react
-TRIVIAL = "these scenarios hardly test a planner"
+MAX_BLIND_SHARE = 0.1  # of a set that tests, which a blind planner may pass
+CUT_STEP_S = 0.25  # between two begins that are tried
+MIN_REMAINING_S = 4.0  # of a template from its begin on
+PLATEAU_SHARE = 0.15  # of the family, by which a begin may be worse than the best one
+TRIED_PER_KEPT = 100  # scenarios of a stage, before it is given up
+MAX_MARGIN_S = 0.1  # of scenarios that sampling aims at
+ATTEMPTS = 200  # candidates per scenario, at most
+PROBED_COUNT = 4  # blind planners that are driven first
 MORE_VARIATION = {
     "arrival_sigma": 3.0,
     "wait_sigma": 2.0,
@@ -40,15 +71,110 @@ MORE_VARIATION = {
     "end_speed_sigma": 2.0,
     "longitudinal_sigma": 6.0,
 }
-"""Least sampling parameters if those of the user yield too few scenarios that test."""
+"""Least sampling parameters of a stage that gives no scenario without them."""
+BLIND_COUNT = 50  # scenarios of a set in which blind planners drive
+MAX_TURNS = 8  # in which stages are drawn from again
 
 
-def needs_reaction(loop: ClosedLoop) -> bool:
-    """Whether the baseline collides, while the reference drive and an IDM follower pass."""
-    if judge(loop, loop.drive(NonReactive())).collision is None:
-        return False
-    references = (ReferenceFollower(loop), IdmFollower(speed=loop.task().speed))
-    return all(judge(loop, loop.drive(reference)).passed for reference in references)
+class Unfit(StrEnum):
+    """Why a valid scenario is not kept for testing."""
+
+    BLIND = "passed by blind planners"
+    REFERENCE = "failed by the reference drive"
+    HARSH = "failed, or passed with hard braking, by IdmFollower"
+
+
+@dataclass
+class Selection:
+    """The scenarios that are kept so far, by what blind planners do in them.
+
+    Attributes:
+        family: the blind planners.
+        passed: (M,) number of kept scenarios that each of them passes.
+        seen: (M,) number of scenarios that each was seen to pass.
+        kept: number of kept scenarios.
+        unfit: number of other scenarios, by cause.
+    """
+
+    family: Sequence[BlindPlanner]
+    passed: Ints
+    seen: Ints
+    kept: int = 0
+    unfit: Counter[Unfit] = field(default_factory=Counter)
+
+    @classmethod
+    def of(cls, top_speed: float) -> "Selection":
+        """Return an empty selection for reference drives with a highest speed [m/s]."""
+        family = blind_family(top_speed)
+        return cls(family, *np.zeros((2, len(family)), dtype=np.int64))
+
+    def keeps(self, loop: ClosedLoop) -> bool:
+        """Keep a scenario if the set tests with it; return whether it is kept."""
+        cause = self._cause(loop)
+        if cause is not None:
+            self.unfit[cause] += 1
+        return cause is None
+
+    def _cause(self, loop: ClosedLoop) -> Unfit | None:
+        allowed = math.floor(MAX_BLIND_SHARE * (self.kept + 1)) - self.passed
+        passes = np.zeros(len(self.family), dtype=np.int64)
+        order = np.argsort(-self.seen, kind="stable")
+        for rows in (order[:PROBED_COUNT], order[PROBED_COUNT:]):
+            passes[rows] = blind_passes(loop, [self.family[row] for row in rows])
+            self.seen[rows] += passes[rows]
+            if (passes > allowed)[rows].any():
+                return Unfit.BLIND
+        if not judge(loop, loop.drive(ReferenceFollower(loop))).passed:
+            return Unfit.REFERENCE
+        verdict = judge(loop, loop.drive(IdmFollower(speed=loop.task().speed)))
+        if not verdict.passed or verdict.hardest_braking > loop.config.hard_braking:
+            return Unfit.HARSH
+        self.passed += passes
+        self.kept += 1
+        return None
+
+    def rate(self) -> BlindRate:
+        """Return how the best blind planner does in the set."""
+        return BlindRate.of(self.family, self.passed, self.kept)
+
+
+@dataclass(frozen=True, eq=False)
+class Stage:
+    """Scenarios from one template, planned on its road.
+
+    Attributes:
+        chain: the template and the parameters.
+        planned: the template on its road.
+        label: the outcome and the begin, in words.
+        top_speed: highest speed of the ego in the template [m/s].
+        extended: whether it has MORE_VARIATION.
+    """
+
+    chain: Chain
+    planned: GenerationResult
+    label: str
+    top_speed: float
+    extended: bool = False
+
+    def with_more_variation(self) -> "Stage":
+        """Return the stage with MORE_VARIATION at least."""
+        config = self.chain.config
+        config = replace(config, sampling=config.sampling.at_least(MORE_VARIATION))
+        label = f"{self.label}, with more variation"
+        return replace(self, chain=replace(self.chain, config=config), label=label, extended=True)
+
+
+@dataclass(frozen=True)
+class TestSets:
+    """Sets that test.
+
+    Attributes:
+        results: one set for each stage that gave scenarios.
+        shortage: why there are less than requested, "" otherwise.
+    """
+
+    results: list[GenerationResult]
+    shortage: str = ""
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,7 +182,8 @@ class Testing:
     """A request for scenarios in which the ego has to react; arguments as in `pipeline.generate`.
 
     Attributes:
-        extended: whether the sampling was extended to MORE_VARIATION.
+        budget: computing time [s] after which no further candidate is drawn.
+        notify: called with a line on each stage.
     """
 
     encounter: Encounter
@@ -64,17 +191,16 @@ class Testing:
     config: PipelineConfig
     request: Request
     seed: int
-    extended: bool = False
+    budget: float = math.inf
+    notify: Callable[[str], None] = lambda _: None
 
-    def run(self, count: int, progress: Progress = lambda *_: None) -> GenerationResult:
-        """Return `count` scenarios, or as many as possible.
-
-        They are drawn with more variation if the parameters yield too few.
+    def run(self, count: int, progress: Progress = lambda *_: None) -> TestSets:
+        """Return sets with `count` scenarios in all, or as many as the budget allows.
 
         Raises:
             InputError: no vehicle is named as ego.
-            TargetError: there is no scenario; the message names vehicles and roads that have some.
-            RefusedError: as `pipeline.generate`.
+            TargetError: there is no scenario; the message has the stages and their causes.
+            RefusedError: the encounter does not fit the road.
         """
         if not self.request.ego:
             ids = ", ".join(vehicle.id for vehicle in self.encounter.vehicles)
@@ -82,153 +208,255 @@ class Testing:
                 "--for-testing: name the vehicle that the planner replaces with --ego, or use "
                 f"--ego auto; there are {ids}"
             )
-        best: GenerationResult | None = None
-        for attempt in self.attempts():
-            with suppress(TargetError):
-                case = attempt._generate_noted(count, progress)
-                if best is None or len(case.generated) > len(best.generated):
-                    best = case
-            if best is not None and len(best.generated) == count:
-                return best
-        kept = 0 if best is None else len(best.generated)
+        end = process_time() + self.budget
+        drawing = _Drawing(self, count, end, progress)
+        waiting = drawing.draw(self._stages(drawing))
+        for turn in range(1, MAX_TURNS):
+            waiting = drawing.draw(waiting, len(waiting), turn)
+        shortage = self._shortage(drawing) if drawing.kept < count else ""
+        if not drawing.results:
+            raise TargetError(shortage)
+        note = Note.of(NoteKind.TESTS, rate=str(drawing.selection.rate()))
+        return TestSets([result.noted(note) for result in drawing.results], shortage)
+
+    def _shortage(self, drawing: "_Drawing") -> str:
+        """Return why there are fewer scenarios than requested."""
+        others = [ego for ego in reacting_vehicles(self.encounter) if ego != self.request.ego]
+        advice = [f"vehicle {others[0]} may react more: --ego {others[0]}"] if others else []
+        if process_time() > drawing.end:
+            advice.append(f"search for more than {self.budget:g} s: --budget")
         note = Note.of(
             NoteKind.EGO_TESTS,
             ego=self.request.ego,
-            kept=kept,
-            requested=count,
-            advice=self._advice(),
+            kept=drawing.kept,
+            requested=drawing.count,
+            stages="; ".join(drawing.lines) or "it has to react in no outcome",
+            advice=" or ".join(advice) or "use an encounter in which a vehicle yields",
         )
-        if best is None:
-            raise TargetError(str(note))
-        return _with_note(best, note)
+        return str(note)
 
-    def _generate_noted(self, count: int, progress: Progress) -> GenerationResult:
-        """Return scenarios with a note if the sampling has the values of MORE_VARIATION."""
-        case = self.generate(count, progress)
-        if not self.extended:
-            return case
-        sampling = self.config.sampling
-        parameters = ", ".join(
-            f"sampling.{name}={getattr(sampling, name):g}" for name in MORE_VARIATION
-        )
-        return _with_note(case, Note.of(NoteKind.MORE_FREEDOM, parameters=parameters))
-
-    def _advice(self) -> str:
-        """Return other vehicles that have to react as the ego, or else other roads, in words."""
-        others = ", ".join(
-            f"{vehicle} in {count} of {PROBE_COUNT}"
-            for vehicle, count in self.who_reacts().items()
-            if vehicle != self.request.ego
-        )
-        return f"has to react as ego: {others}" if others else self.other_roads()
-
-    def generate(self, count: int, progress: Progress = lambda *_: None) -> GenerationResult:
-        """Return `count` scenarios, or as many as the parameters yield.
-
-        The ego's motion varies like that of the others. Sampling is directed to motions with which
-        an ego that ignores all others collides.
+    def _stages(self, drawing: "_Drawing") -> Iterator[Stage]:
+        """Yield the stages; refused ones are reported.
 
         Raises:
-            InputError, RefusedError: as `pipeline.generate`; a TargetError if there is none.
+            RefusedError: the encounter does not fit the road.
         """
-        ego = self.request.ego
-        targets = join_pieces(filter(None, [f"baseline_margin[{ego}]=..0", self.request.target]))
+        name = self.road
+        if name == AUTO:
+            segmentation = segment(self.encounter, self.config.segmentation, self.seed)
+            names = suitable_roads(Situation.of(self.encounter), segmentation, self.config)
+            name = next(names, AUTO)
+        for outcome in self._templates(self.encounter):
+            try:
+                road, template = road_and_template(name, outcome, self.config.road)
+                yield from self._stages_from(road, template, drawing)
+            except RefusedError as error:
+                drawing.report(f"{_outcome(outcome)}: {error}")
 
-        def accepts(road: Road, whole: Scenario) -> bool:
-            config = ClosedLoopConfig(limits=self.config.limits)
-            return needs_reaction(ClosedLoop(whole, ego, road, config))
+    def _templates(self, encounter: Encounter) -> Iterator[Encounter]:
+        """Yield the outcomes of an encounter in which the ego goes second; the recorded first."""
+        ego = token(self.request.ego)
+        decisions = requested_decisions(encounter, self.config.sampling, self.request)
+        recorded, others = decisions.possible[:1], decisions.possible[1:]
+        if self.request.ego in reacting_vehicles(encounter):
+            yield decided(encounter, recorded[0]) if recorded else encounter
+        for decision in others:
+            if decision.second == ego:
+                yield decided(encounter, decision)
 
-        return generate(
-            self.encounter,
-            self.road,
-            updated(self.config, {"sampling.ego": "free"}),
-            count=count,
-            seed=self.seed,
-            request=replace(self.request, target=targets),
-            progress=progress,
-            accepts=accepts,
-        )
+    def _stages_from(
+        self, road: Road, template: Encounter, drawing: "_Drawing"
+    ) -> Iterator[Stage]:
+        """Yield the stages from the begins of a template at which most blind planners fail.
 
-    def attempts(self) -> Iterator["Testing"]:
-        """Yield the request, then one with MORE_VARIATION if that is different."""
-        yield self
-        sampling = self.config.sampling.at_least(MORE_VARIATION)
-        if sampling != self.config.sampling:
-            config = replace(self.config, sampling=sampling)
-            yield replace(self, config=config, extended=True)
-
-    def who_reacts(self) -> dict[str, int]:
-        """Return in how many of PROBE_COUNT scenarios each vehicle has to react if it is the ego.
-
-        The vehicle with the most scenarios is the first.
+        A recorded encounter has one begin, since its scenarios would count as of several else.
         """
-        results: dict[str, tuple[int, float]] = {}
-        for vehicle in self.encounter.vehicles:
-            request = replace(self.request, ego=vehicle.id)
-            with suppress(TargetError):
-                drawn = replace(self, request=request).generate(PROBE_COUNT).generated
-                share = drawn.reached.share if drawn.reached is not None else 0.0
-                results[vehicle.id] = (len(drawn), share)
-        order = sorted(results, key=lambda ego: results[ego], reverse=True)
-        return {ego: results[ego][0] for ego in order}
+        whole = self._stage(road, template, 0)
+        _, fit = whole.planned.road_and_fit()
+        scenario = replay(template, fit, road.frame_id)
+        loop = ClosedLoop(scenario, self.request.ego, road, self.drive_config)
+        family = blind_family(whole.top_speed)
+        latest = max(loop.begin + CUT_STEP_S, template.duration - MIN_REMAINING_S)
+        begins = np.arange(loop.begin, latest, CUT_STEP_S)
+        passed = np.array([blind_passes(loop, family, begin).mean() for begin in begins])
+        good = begins[passed <= passed.min() + PLATEAU_SHARE]
+        for begin in dict.fromkeys(good[[len(good) // 2, -1, 0]].tolist()):
+            first = round(begin / template.dt)
+            yield self._stage(road, template, first) if first else whole
+            if template.decision is None and drawing.results:
+                return
 
-    def who_reacts_most(self) -> str:
-        """Return the vehicle that has to react in most scenarios if it is the ego.
+    def _stage(self, road: Road, template: Encounter, first: int) -> Stage:
+        """Return the stage of a template from a sample on.
 
         Raises:
-            TargetError: no vehicle has to react; the message names other roads.
-            RefusedError: as `pipeline.generate`.
+            RefusedError: it does not fit the road.
         """
-        for attempt in self.attempts():
-            for ego in attempt.who_reacts():
-                return ego
-        raise TargetError(
-            f"--ego auto: no vehicle has to react in any scenario; {self.other_roads()}"
+        rows = np.flatnonzero(template.present[:, 1] > first + 1).tolist()
+        encounter = template
+        if first:
+            encounter = template.select(rows, first)
+            if template.decision is not None:
+                name = f"{template.name}, from {first * template.dt:.1f} s on"
+                encounter = replace(encounter, name=name)
+        aim = f"blind_margin[{self.request.ego}]=..{MAX_MARGIN_S}"
+        targets = join_pieces(filter(None, [aim, self.request.target]))
+        chain = Chain(
+            Situation.of(encounter),
+            segment(encounter, self.config.segmentation, self.seed),
+            road,
+            updated(
+                self.config,
+                {
+                    "sampling.ego": "free",
+                    "sampling.decisions": "recorded",
+                    "sampling.attempts": ATTEMPTS,
+                },
+            ),
+            replace(self.request, target=targets),
         )
+        ego = self.request.ego_of(encounter)
+        label = f"{_outcome(template)}, from {first * template.dt:.1f} s on"
+        return Stage(chain, chain.plan(), label, float(encounter.speed[ego].max()))
 
-    def other_roads(self) -> str:
-        """Return other roads on which a vehicle has to react, in words."""
-        segmentation = segment(self.encounter, self.config.segmentation, self.seed)
-        names = (
-            name
-            for name in suitable_roads(Situation.of(self.encounter), segmentation, self.config)
-            if name != self.road
+    @property
+    def drive_config(self) -> ClosedLoopConfig:
+        """The parameters of the drives."""
+        return ClosedLoopConfig(limits=self.config.limits)
+
+
+@dataclass
+class _Drawing:
+    """The sets so far.
+
+    Attributes:
+        testing: the request.
+        count: scenarios wanted.
+        end: computing time [s] at which it ends.
+        progress: of the caller.
+        selection: the kept scenarios; it is made for the first stage.
+        results: one set per stage.
+        lines: on each stage.
+    """
+
+    testing: Testing
+    count: int
+    end: float
+    progress: Progress
+    selection: Selection = field(default_factory=lambda: Selection.of(0.0))
+    results: list[GenerationResult] = field(default_factory=list)
+    lines: list[str] = field(default_factory=list)
+
+    @property
+    def kept(self) -> int:
+        """Number of scenarios so far."""
+        return self.selection.kept
+
+    def report(self, line: str) -> None:
+        """Report a line on a stage."""
+        self.lines.append(line)
+        self.testing.notify(line)
+
+    def draw(self, stages: Iterable[Stage], count: int = 0, turn: int = 0) -> list[Stage]:
+        """Draw from stages, an equal part from each; return those to draw from again.
+
+        Those are the productive ones, or else all with more variation.
+
+        Args:
+            stages: in order.
+            count: of the stages; 0 if it is not known: each has half of what is missing.
+            turn: number of the turn.
+        """
+        productive, others = [], []
+        for k, stage in enumerate(stages):
+            if not self.kept:
+                self.selection = Selection.of(stage.top_speed)
+            left = count - k if count else 2
+            wanted = -(-(self.count - self.kept) // left)
+            seconds = (self.end - process_time()) / left
+            if not wanted or seconds <= 0.0:
+                break
+            if self._draw_stage(stage, turn, wanted, seconds):
+                productive.append(stage)
+            elif not stage.extended:
+                others.append(stage.with_more_variation())
+        if self.kept == self.count or process_time() > self.end:
+            return []
+        return productive or others
+
+    def _draw_stage(self, stage: Stage, turn: int, wanted: int, seconds: float) -> bool:
+        """Draw from a stage for some seconds; return whether it gave a scenario."""
+        testing, selection, begin = self.testing, self.selection, process_time()
+        kept, unfit = selection.kept, Counter(selection.unfit)
+        chain = replace(stage.chain, count=wanted, seed=testing.seed + turn)
+
+        def accepts(scenario: Scenario) -> bool:
+            loop = ClosedLoop(scenario, testing.request.ego, chain.road, testing.drive_config)
+            return selection.keeps(loop)
+
+        def cancelled() -> bool:
+            tried = selection.unfit.total() - unfit.total()
+            hopeless = tried >= TRIED_PER_KEPT * (selection.kept - kept + 1)
+            return hopeless or process_time() > begin + seconds
+
+        def progress(_done: int, _total: int, candidates: int) -> None:
+            self.progress(selection.kept, self.count, candidates)
+
+        planned = replace(stage.planned, seed=chain.seed)
+        causes: Counter[str] = Counter()
+        try:
+            drawn = chain.sample(planned, Callbacks(progress, cancelled, accepts))
+            causes.update(
+                {cause.value: number for cause, number in drawn.generated.refused.items()}
+            )
+            if len(drawn):
+                self.results.append(_completed(drawn, chain))
+        except RefusedError as error:
+            causes[str(error)] += 1
+        causes.update(selection.unfit - unfit)
+        words = ", ".join(f"{number} {cause}" for cause, number in causes.most_common())
+        self.report(
+            f"{stage.label}: {selection.kept - kept} of {wanted} scenarios in "
+            f"{process_time() - begin:.0f} s ({words or 'nobody was refused'})"
         )
-        options: list[str] = []
-        for name in islice(names, 2):
-            with suppress(RefusedError):
-                egos = replace(self, road=name).who_reacts()
-                options += [f"--road {name} --ego {ego}" for ego in islice(egos, 1)]
-        if not options:
-            return "use an encounter in which a vehicle yields or follows more closely"
-        return f"possible: {' or '.join(options)}"
+        return selection.kept > kept
 
 
-def _with_note(case: GenerationResult, note: Note) -> GenerationResult:
-    """Return a result with one more note on its sampling."""
-    return replace(
-        case, generated=replace(case.generated, adaptations=(*case.generated.adaptations, note))
+def _completed(drawn: GenerationResult, chain: Chain) -> GenerationResult:
+    """Return a set with its evaluation; it has as many scenarios as were requested of it."""
+    notes = [note for note in drawn.generated.adaptations if note.kind is not NoteKind.CANCELLED]
+    generated = replace(drawn.generated, requested=len(drawn), adaptations=tuple(notes))
+    return completed(replace(drawn, generated=generated), chain.config, chain.request)
+
+
+def _outcome(template: Encounter) -> str:
+    """Return the outcome of a template's decision, in words."""
+    return "as recorded" if template.decision is None else str(template.decision)
+
+
+def reacting_vehicles(encounter: Encounter) -> list[str]:
+    """Return the ids of the vehicles that react, or go second at a conflict, in an encounter.
+
+    Who yields is first, then who follows.
+    """
+    situation = Situation.of(encounter)
+    edges = sorted(
+        situation.reactions.edges, key=lambda edge: (edge.kind != YIELD, not edge.stands)
     )
+    rows = [*(edge.who for edge in edges), *(each.second for each in situation.conflicts)]
+    vehicles = [encounter.vehicles[row] for row in dict.fromkeys(rows)]
+    return [vehicle.id for vehicle in vehicles if not vehicle.kind.walks]
 
 
-def trivial_note(passed: int, driven: int) -> str:
-    """Return a sentence if the baseline passes more than 90 % of a set, else ""."""
-    if passed <= 0.9 * driven:
-        return ""
-    return f"{TRIVIAL}: the non-reactive baseline passes {passed} of {driven}"
+def blind_sentence(case: GenerationResult, config: ClosedLoopConfig = ClosedLoopConfig()) -> str:
+    """Return in words how the best blind planner does in a set; "" without an ego slot.
 
-
-def baseline_passes(case: GenerationResult, config: ClosedLoopConfig = ClosedLoopConfig()) -> str:
-    """Return in words how many scenarios the non-reactive baseline passes.
-
-    It drives the first 50 scenarios at most. "" if the scenarios have no ego slot.
+    It drives in the first BLIND_COUNT scenarios at most.
     """
     drawn = case.generated
     if drawn.ego is None or not drawn.scenarios:
         return ""
     ego = drawn.ego.vehicle.id
-    scenarios = drawn.scenarios[:50]
-    loops = [ClosedLoop(join_ego(scenario), ego, case.road, config) for scenario in scenarios]
-    passed = sum(judge(loop, loop.drive(NonReactive())).passed for loop in loops)
-    rate = f"the non-reactive baseline, in place of {ego}, passes {passed} of {len(loops)}"
-    return f"{case.title}: {trivial_note(passed, len(loops)) or rate}"
+    scenarios = map(join_ego, drawn.scenarios[:BLIND_COUNT])
+    rate = blind_rate([ClosedLoop(scenario, ego, case.road, config) for scenario in scenarios])
+    return f"{case.title}, ego {ego}: {rate}"

@@ -20,10 +20,10 @@ import numpy as np
 from scenario_gen.base.errors import printable
 from scenario_gen.base.folders import Kind, write_text
 from scenario_gen.base.parameters import flatten
+from scenario_gen.closed_loop.blind import BlindRate
 from scenario_gen.closed_loop.comparison import Comparison
 from scenario_gen.closed_loop.config import ClosedLoopConfig
 from scenario_gen.closed_loop.origin import Trial
-from scenario_gen.closed_loop.reacting import TRIVIAL, trivial_note
 from scenario_gen.closed_loop.trials import Outcome, passed_of, rates
 from scenario_gen.output.report.data import (
     FRAME_PERIOD_S,
@@ -54,6 +54,7 @@ class Drives:
         broken: sentences on the thresholds that are not met, and on the comparison if the planner
             is worse.
         baseline: outcomes of the non-reactive baseline.
+        blind: how the best blind planner does in the same scenarios.
         comparison: the comparison with an earlier planner.
     """
 
@@ -63,6 +64,7 @@ class Drives:
     trials: Sequence[Trial] = ()
     broken: Sequence[str] = ()
     baseline: Sequence[Outcome] = ()
+    blind: BlindRate | None = None
     comparison: Comparison | None = None
 
     def by_severity(self) -> list[int]:
@@ -71,12 +73,6 @@ class Drives:
         return sorted(
             order, key=lambda k: (*(-value for value in self.outcomes[k].verdict.severity), k)
         )
-
-    @property
-    def easy(self) -> str:
-        """A sentence if the non-reactive baseline passes most scenarios, else ""."""
-        passed = sum(outcome.verdict.passed for outcome in self.baseline)
-        return trivial_note(passed, len(self.baseline))
 
     def scores(self) -> dict[str, float]:
         """Return the means of nuPlan's and NAVSIM's scores and terms, and shares of criteria."""
@@ -97,6 +93,7 @@ class Drives:
             self._outcomes_note(),
             self._copies_note(),
             self._baseline_note(),
+            "" if self.blind is None else str(self.blind),
         ]
         if not self.config.observation.is_perfect:
             messages.append(f"observation of the others: {self.config.observation}")
@@ -159,9 +156,8 @@ class Drives:
             if name and passed
         ]
         by_encounter = f": {', '.join(counts)}" if 1 < len(counts) <= 12 else ""
-        prefix = f"{TRIVIAL}: " if self.easy else ""
         rate = passed_of(self.baseline)
-        return f"{prefix}the non-reactive baseline passes {rate}{by_encounter}"
+        return f"the non-reactive baseline passes {rate}{by_encounter}"
 
     def _faults_note(self) -> str:
         faulty = [outcome for outcome in self.outcomes if outcome.drive.faults]
@@ -205,6 +201,7 @@ class Drives:
             "summary": {name: rate.document() for name, rate in rates(self.outcomes).items()},
             "scores": self.scores(),
             "baseline_pass": passed_of(self.baseline).document() if self.baseline else None,
+            "best_blind": None if self.blind is None else self.blind.document(),
             "against": None if self.comparison is None else self.comparison.document(),
             "notes": self.notes(),
             "drives": drives,
@@ -235,7 +232,8 @@ class Drives:
 
     def facts(self) -> dict[str, str]:
         """Return the properties for JUnit."""
-        return self.config.facts() | ({"hardly tests": self.easy} if self.easy else {})
+        blind = {} if self.blind is None else {"best blind planner": str(self.blind)}
+        return self.config.facts() | blind
 
     def write(self, folder: Path) -> None:
         """Write JSON, JUnit's XML and, if there are trials, the page to an existing folder.

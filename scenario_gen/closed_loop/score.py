@@ -41,12 +41,10 @@ class Thresholds:
     """The thresholds of the metric configurations in nuplan-devkit 1.2.
 
     Attributes:
-        outside_m: `max_violation_threshold` of drivable_area_compliance.
         ttc_s: `least_min_ttc` of time_to_collision_within_bound; PDMS has 1 s.
         progress: `min_progress_threshold` of ego_is_making_progress.
     """
 
-    outside_m: float = 0.3
     ttc_s: float = 0.95
     progress: float = 0.2
 
@@ -78,7 +76,8 @@ class Terms:
         no_at_fault_collision: 0 if, by nuPlan's definition, the ego hit a stationary vehicle, or
             hit a vehicle with its front, or was off the road when it was hit at its side; 1 if it
             stood or was hit from behind. `Collision.reason` has another definition.
-        drivable_area: 0 if the footprint was more than 0.3 m outside; 1 if no road is known.
+        drivable_area: 0 if the ego left the road, as in `DriveVerdict.off_road` (nuPlan: by more
+            than 0.3 m); 1 if no road is known.
         making_progress: 0 below 20 % of the witness' path.
         ttc: 0 if the time to collision with a vehicle that is not behind was less than 0.95 s.
         progress: share of the witness' path.
@@ -107,22 +106,22 @@ class Terms:
 
 
 def terms(
-    drive: Drive, hit: tuple[int, float] | None, margin: float, progress: float, ttc: float
+    drive: Drive, hit: tuple[int, float] | None, off_road: bool, progress: float, ttc: float
 ) -> Terms:
     """Return the terms of a drive.
 
     Args:
         drive: the drive.
         hit: index of the first vehicle that the ego touched, and the time [s]; None without one.
-        margin: least signed distance to the road's edge [m], NaN if no road is known.
+        off_road: whether the ego left the road.
         progress: share of the witness' path.
         ttc: least time to collision with a vehicle that is not behind [s].
     """
-    at_fault = hit is not None and _at_fault(drive, *hit, off_road=margin < 0.0)
+    at_fault = hit is not None and _at_fault(drive, *hit, off_road=off_road)
     thresholds = Thresholds()
     return Terms(
         no_at_fault_collision=float(not at_fault),
-        drivable_area=float(not margin < -thresholds.outside_m),
+        drivable_area=float(not off_road),
         making_progress=float(progress >= thresholds.progress),
         ttc=float(ttc >= thresholds.ttc_s),
         progress=progress,

@@ -171,8 +171,8 @@ class ClosedLoop:
         )
         self.reactions = self._reaction_times()
         self.traits = driver_traits(scenario, config)
-        self._parameters = self._driver_parameters()
-        self._slowest = int(self._parameters.delay.max())
+        self.parameters = self._driver_parameters()
+        self._slowest = int(self.parameters.delay.max())
         self._sizes = 2.0 * self.world.half
         self._ids = tuple(vehicle.id for vehicle in scenario.vehicles)
         self._others = np.arange(len(self._ids)) != self.ego
@@ -180,7 +180,12 @@ class ClosedLoop:
         self.duration = end - self.begin
         driven_distance = self.world.cells[self.ego, -1, 7]
         self._witness_waits = bool(driven_distance < 1.0)
-        self.last_step = int(np.ceil((self.duration * config.overtime + 5.0) / config.step))
+        self.last_step = self.steps_from(self.begin)
+
+    def steps_from(self, begin: float) -> int:
+        """Return the largest number of steps of a drive from a certified time [s] on."""
+        remaining = self.begin + self.duration - begin
+        return int(np.ceil((remaining * self.config.overtime + 5.0) / self.config.step))
 
     def driven_distance(self, vehicle: int, clocks: Floats) -> Floats:
         """Return the distances (C,) [m] on a vehicle's certified path at clocks (C,) [s]."""
@@ -279,7 +284,7 @@ class ClosedLoop:
         after, vehicles = np.empty((n, 5)), np.empty((n, 5))
         passes = state.passes.copy()
         now = self.begin + time
-        advance(self.world, self._parameters, now, before, seen, passes, after, vehicles)
+        advance(self.world, self.parameters, now, before, seen, passes, after, vehicles)
         clock, rate, acceleration, waited, forced = after.T
         count = state.forced + int(np.count_nonzero(forced))
         delay = config.observation.delay

@@ -28,7 +28,7 @@ from scenario_gen.method.validity import first_contacts, Proof
 from scenario_gen.numerics import Floats
 from scenario_gen.numerics.hermite import control_points
 from scenario_gen.numerics.plane import unit
-from scenario_gen.situation import find_conflicts
+from scenario_gen.situation import conflict_of, encroachment
 from scenario_gen.types import Scenario
 
 __all__ = ["Collision", "DriveVerdict", "Reason", "Runner", "judge"]
@@ -84,9 +84,10 @@ class DriveVerdict:
             NaN if never, or if no road is known.
         goal: time at the goal; NaN if the ego never reached it.
         delay: delay at the goal with respect to the witness.
-        min_ttc: least time to collision, at most the horizon.
-        min_gap: least distance of two footprints [m].
-        min_pet: least post-encroachment time at crossings, negative if both were inside.
+        min_ttc: least time to collision, at most the horizon; 0 at a contact.
+        min_gap: least distance of two footprints [m]; 0 at a contact.
+        min_pet: least post-encroachment time at crossings and merges, negative if both were
+            inside; 0 at a contact.
         hardest_braking: largest deceleration [m/s²].
         hard_braking: duration of hard braking.
         jerk: largest change of acceleration over 0.5 s [m/s³].
@@ -283,7 +284,7 @@ def judge(loop: ClosedLoop, drive: Drive) -> DriveVerdict:
     hit = _first_of_ego(drive, contacts)
     goal = _goal_time(loop, drive)
     progress = _progress(loop, drive) if math.isnan(goal) else 1.0
-    clearance = _clearance(drive, config.horizon)
+    clearance = _clearance(drive, config.horizon, hit)
     braking = np.maximum(-drive.accelerations, 0.0)
     hard_braking_count = int(np.count_nonzero(braking[1:] >= config.hard_braking))
     road = road_use(drive, loop.road, config.off_road_depth)
@@ -298,7 +299,7 @@ def judge(loop: ClosedLoop, drive: Drive) -> DriveVerdict:
         delay=goal - loop.duration,
         min_ttc=clearance.ttc,
         min_gap=clearance.gap,
-        min_pet=_pet(drive),
+        min_pet=0.0 if hit is not None else _pet(drive),
         hardest_braking=float(braking.max()),
         hard_braking=round(hard_braking_count * config.step, 9),
         jerk=_jerk(drive.accelerations, config.step),
@@ -312,7 +313,7 @@ def judge(loop: ClosedLoop, drive: Drive) -> DriveVerdict:
         off_road_area=road.area,
         jumps=len(drive.jumps),
         stood=_stood(motion.speed[drive.ego], config.step),
-        terms=terms(drive, hit, road.margin, progress, clearance.ttc_not_behind),
+        terms=terms(drive, hit, not math.isnan(road.time), progress, clearance.ttc_not_behind),
         criteria=tuple(measure(replace(drive, road=loop.road)) for measure in loop.criteria),
     )
 
@@ -335,7 +336,7 @@ def _first_of_ego(
     return other, time
 
 
-def _clearance(drive: Drive, horizon: float) -> Clearance:
+def _clearance(drive: Drive, horizon: float, hit: tuple[int, float] | None) -> Clearance:
     gap, ttc, ttc_not_behind = math.nan, horizon, math.inf
     for i in range(len(drive.motion.vehicles)):
         if i == drive.ego:
@@ -343,6 +344,9 @@ def _clearance(drive: Drive, horizon: float) -> Clearance:
         distance, to_contact = distance_and_ttc(drive.motion, drive.ego, i)
         distance = np.where(drive.present[i], distance, np.inf)
         to_contact = np.where(drive.present[i], to_contact, np.inf)
+        if hit is not None and hit[0] == i:  # between two instants, or after the last one
+            k = int(np.searchsorted(drive.motion.time[:-1], hit[1]))
+            distance[k] = to_contact[k] = 0.0
         gap = float(np.fmin(gap, distance.min()))
         ttc = min(ttc, float(to_contact.min()))
         to_contact = np.where(not_behind(drive, i), to_contact, np.inf)
@@ -440,7 +444,7 @@ def _goal_time(loop: ClosedLoop, drive: Drive) -> float:
 
 
 def _pet(drive: Drive) -> float:
-    """Return the ego's least post-encroachment time [s] at crossings; NaN without a crossing.
+    """Return the ego's least post-encroachment time [s]; NaN if nobody crosses or merges.
 
     Source: Allen, Shin & Cooper 1978.
     """
@@ -450,9 +454,11 @@ def _pet(drive: Drive) -> float:
         span = np.flatnonzero(drive.present[i])
         if i == ego or len(span) < 2:
             continue
-        conflicts = find_conflicts(motion.select([ego, i], int(span[0]), int(span[-1])))
-        times += [conflict.encroachment for conflict in conflicts if not conflict.following]
-    return min(times, default=math.nan)
+        pair = motion.select([ego, i], int(span[0]), int(span[-1]))
+        conflict = conflict_of(pair, 0, 1)
+        if conflict is not None:
+            times.append(encroachment(pair, conflict))
+    return float(np.fmin.reduce(times, initial=math.nan))
 
 
 def _jerk(acceleration: Floats, step: float) -> float:

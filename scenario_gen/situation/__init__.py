@@ -16,6 +16,7 @@ from scenario_gen.situation.conflicts import (
 from scenario_gen.situation.frenet import FrenetTracks, main_line, MainLine, to_frenet
 from scenario_gen.situation.gaps import (
     departure,
+    encroachment,
     lag_behind,
     lane_gaps,
     LaneGaps,
@@ -51,7 +52,7 @@ __all__ = [
     "WAIT_SPEED_MPS", "Conflict", "EncounterKind", "Equation", "FrenetTracks", "LaneGaps",
     "MainLine", "PairConflicts", "Situation", "Track", "Wait", "clean_tracks",
     "closest_crossing", "conflict_of", "conflicts_by_pair", "departure", "describe_turn",
-    "driver_rows", "drivers_of", "find_conflicts", "find_waits", "is_same_turn", "kind_of",
+    "driver_rows", "drivers_of", "encroachment", "find_conflicts", "find_waits", "is_same_turn", "kind_of",
     "lag_behind", "lane_gaps", "main_line", "manoeuvre_of", "mirrored", "pair_crossings",
     "passing", "path_crossing", "refuse_reversing", "refuse_too_large", "required_orders",
     "separate", "sharpness_of", "smallest_gaps", "solve_placement", "time_gaps", "to_frenet",

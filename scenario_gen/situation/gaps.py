@@ -5,6 +5,7 @@
 
 from collections.abc import Mapping
 from itertools import permutations
+import math
 
 import numpy as np
 from scipy.spatial import distance
@@ -84,6 +85,19 @@ def passing(motion: Motion, conflict: Conflict, *, merges: bool) -> tuple[float,
     if gap[after] > MERGE_CLEARANCE_M > gap[k]:
         share = (MERGE_CLEARANCE_M - gap[k]) / (gap[after] - gap[k])
     return float(motion.time[k] + share * (motion.time[after] - motion.time[k])), enters
+
+
+def encroachment(motion: Motion, conflict: Conflict) -> float:
+    """Return the post-encroachment time [s]: from the first one's exit to the second one's entry.
+
+    Negative if both were inside the shared area. In a merge that is the place where the second
+    one enters. NaN if the first one is on the shared path from the start: the second one follows.
+    """
+    first_time = motion.time[motion.present[conflict.first, 0]]
+    if conflict.following and conflict.entry_first <= first_time:
+        return math.nan
+    clears, enters = passing(motion, conflict, merges=conflict.following)
+    return enters - clears
 
 
 def is_behind(motion: Motion, follower: int, leader: int) -> Bools:

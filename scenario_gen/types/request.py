@@ -36,7 +36,7 @@ class Request(Parameters):
     goals: str = parameter("", f"end states, likewise `{_FORM}`", unit="m, rad, m/s")
     target: str = parameter(
         "",
-        "ranges to aim at, of pet, ttc, gap, arrival_gap, closing_speed, baseline_margin: "
+        "ranges to aim at, of pet, ttc, gap, arrival_gap, closing_speed, blind_margin: "
         "`pet=0.5..1.5; ttc[1,2]=1..2`",
     )
     order: str = parameter(

@@ -18,7 +18,7 @@ UNITS = {
     "gap": "m",
     "arrival_gap": "s",
     "closing_speed": "m/s",
-    "baseline_margin": "s",
+    "blind_margin": "s",
 }
 """Figures that a target can be set on, with units; see `method.evaluation.measures`."""
 Pair = tuple[int, ...]  # of vehicle indices; one: with whom it is the most critical

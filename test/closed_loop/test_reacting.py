@@ -1,17 +1,20 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Sets for testing: planners that look at nobody fail in them, others than those by which they were chosen, too."""
+"""Sets for testing: planners that ignore the others fail, also those that did not choose the set."""
+
+from functools import partial
+from time import process_time
 
 import numpy as np
 import pytest
 from support.driving_scenes import crossing
-from support.recordlike import drive, Phase, Writing
 from test_verdict import straight
 from typer.testing import CliRunner
 
 from benchmarks._driving_worlds import as_scenario
 from scenario_gen.cli.commands import app
+from scenario_gen.closed_loop.blind import blind_passes, blind_rate, BlindPlanner
 from scenario_gen.closed_loop.config import ClosedLoopConfig
 from scenario_gen.closed_loop.ego import Command
 from scenario_gen.closed_loop.origin import Trial
@@ -31,6 +34,17 @@ from scenario_gen.output.review.regenerate import regenerate_scenario
 from scenario_gen.output.review.validation import validate_bag
 
 
+class Steady(RouteFollower):
+    """Drives at a constant speed and ignores all others."""
+
+    def __init__(self, speed):
+        self.speed = speed
+
+    def act(self, observation):
+        ego = observation.ego
+        return Command(self.speed - ego.speed, self.steer(ego)[0])
+
+
 class FullThrottle(RouteFollower):
     """Speeds up as much as it can."""
 
@@ -38,75 +52,81 @@ class FullThrottle(RouteFollower):
         return Command(4.0, self.steer(observation.ego)[0])
 
 
-def generated(out, log, road, *words):
-    quick = ("--set", "evaluation.resamples=10")
-    command = ["generate", str(log), "--road", road, "--count", "3", "--for-testing", *quick]
-    return CliRunner().invoke(app, [*command, *words, "--out", str(out)])
+def generated(out, *words):
+    quick = ("--set", "evaluation.resamples=10", "--for-testing", "--out", str(out))
+    return CliRunner().invoke(app, ["generate", *words, *quick])
 
 
 @pytest.fixture(scope="module")
 def bag(tmp_path_factory):
-    """Of a follower so far behind that few natural scenarios need its reaction: sampling is directed to them."""
+    """Return the bag of a set from a recorded crossing in which vehicle 2 rolls on."""
     folder = tmp_path_factory.mktemp("testing")
-    phases = Phase(3.0, -0.8), Phase(9.0, 0.3)
-    drives = [
-        drive(name, (x, 0.0, 0.0), 10.0, Phase(wait), *phases)
-        for name, x, wait in (("1", 35.0, 3.0), ("2", 5.7, 4.2))
-    ]
-    Writing(5, 0.0, 14.0).doppler(drives).to_csv(folder / "log.csv", index=False)
-    done = generated(folder / "out", folder / "log.csv", "straight", "--ego", "auto")
-    assert done.exit_code == 0 and "3 of 3 scenarios" in done.output, done.output
-    said = "on straight: the non-reactive baseline, in place of 2, passes 0 of 3"
-    assert (
-        said in " ".join(done.output.split())
-        and said in (folder / "out" / "report.html").read_text()
-    )
+    words = ("examples/my_log.csv", "--road", "four_way", "--ego", "auto", "--count", "10")
+    done = generated(folder / "out", *words, "--seed", "7")
+    output = " ".join(done.output.split())
+    assert done.exit_code == 0, output
+    assert "vehicle 2 stops, from 4.0 s on: 5 of 5 scenarios" in output, output
+    sentence = "ego 2: the best of 27 blind planners"
+    assert sentence in output and sentence in (folder / "out" / "report.html").read_text()
     return folder / "out" / "bag"
 
 
-def test_scenarios_that_test_are_rare_and_say_how_rare(bag):
-    scenarios = [trial.scenario for trial in read_trials(bag)]
-    assert all(0.0 < scenario.facts.weight < 0.5 for scenario in scenarios)
-    assert (
-        len({float(scenario.speed[1, 0]) for scenario in scenarios}) == 3
-    )  # the ego's motion varies, too
-
-
-def test_who_looks_at_nobody_fails_and_who_looks_passes(bag):
+def test_blind_planners_fail_and_planners_that_look_pass(bag):
     trials = read_trials(bag)
-    assert len(trials) == 3
-    drivers = {"baseline": NonReactive, "fast": FullThrottle, "looks": IdmFollower}
-    failed = {
-        name: sum(not one.verdict.passed for one in run_trials(trials, make))
-        for name, make in drivers.items()
-    }
-    assert failed["baseline"] == 3 and failed["fast"] >= 2 and failed["looks"] == 0
+    assert len(trials) == 10
+    blind = [NonReactive, FullThrottle, *(partial(Steady, v) for v in (3.5, 5.5, 8.5, 12.5))]
+    for make in blind:
+        assert sum(outcome.verdict.passed for outcome in run_trials(trials, make)) <= 1
+    assert all(outcome.verdict.passed for outcome in run_trials(trials, IdmFollower))
     loops = [ClosedLoop(trial.scenario, trial.ego, trial.road) for trial in trials]
     assert all(judge(loop, loop.drive(ReferenceFollower(loop))).passed for loop in loops)
 
 
-def test_such_a_set_is_checked_and_made_again_as_any(bag):
-    (found,) = validate_bag(bag)
-    assert (found.scenarios, found.invalid) == (3, 0)
-    regenerate_scenario(
-        bag, read_trials(bag)[-1].scenario.index
-    )  # raises if it comes out differently
+def test_compiled_drives_of_blind_planners_agree_with_driven_ones(bag):
+    trials = read_trials(bag)[::3]
+    for speed in (3.0, 6.0, 14.0):
+        outcomes = run_trials(trials, partial(Steady, speed))
+        loops = [ClosedLoop(trial.scenario, trial.ego, trial.road) for trial in trials]
+        passes = [bool(blind_passes(loop, [BlindPlanner(speed)])[0]) for loop in loops]
+        assert passes == [outcome.verdict.passed for outcome in outcomes]
 
 
-def test_where_the_ego_does_not_have_to_react_who_has_to_is_said(tmp_path):
-    done = generated(
-        tmp_path / "none", bundled("b"), "t_intersection", "--ego", "1", "--count", "1"
+def test_such_a_set_is_valid_and_is_regenerated(bag):
+    sets = validate_bag(bag)
+    assert sum(each.scenarios for each in sets) == 10 and not any(each.invalid for each in sets)
+    last = read_trials(bag)[-1]
+    namespace = last.name.partition(" ")[0]
+    regenerate_scenario(bag, last.scenario.index, namespace=namespace)
+
+
+def test_a_refusal_names_the_stages_and_their_causes(tmp_path):
+    words = (
+        str(bundled("b")),
+        "--road",
+        "t_intersection",
+        "--ego",
+        "1",
+        "--count",
+        "1",
+        "--budget",
+        "3",
     )
-    said = " ".join(str(done.exception or done.output).split())
-    assert (
-        done.exit_code != 0
-        and "for testing ego 1: 0 of 1 scenarios found in which it has to react" in said
-    )
-    assert "has to react as ego: 2 in 12 of 12" in said
+    done = generated(tmp_path / "none", *words)
+    output = " ".join(str(done.exception or done.output).split())
+    assert done.exit_code != 0 and "for testing ego 1: 0 of 1 scenarios found" in output
+    assert "--ego 2" in output
+
+
+def test_a_search_ends_with_its_budget(tmp_path):
+    words = ("examples/my_log.csv", "--road", "four_way", "--ego", "2", "--count", "500")
+    begin = process_time()
+    done = generated(tmp_path / "some", *words, "--budget", "5")
+    assert done.exit_code != 0 and "of 500 scenarios" in str(done.exception)
+    assert process_time() - begin < 20.0
 
 
 def test_without_an_ego_it_is_refused(tmp_path):
-    done = generated(tmp_path / "none", bundled("b"), "t_intersection")
+    done = generated(tmp_path / "none", str(bundled("b")), "--road", "t_intersection")
     assert done.exit_code != 0 and "name the vehicle that the planner replaces" in str(
         done.exception
     )
@@ -133,16 +153,13 @@ def test_who_is_committed_does_not_rescue_an_ego_that_looks_at_nobody():
     )  # it brakes, too late
 
 
-def test_a_set_that_hardly_tests_says_so(tmp_path):
+def test_the_best_blind_planner_is_in_all_results(tmp_path):
     trials = [Trial(str(k), crossing(), 0, None) for k in range(3)]
+    rate = blind_rate([ClosedLoop(trial.scenario, trial.ego) for trial in trials])
     outcomes = run_trials(trials, NonReactive)
-    drives = Drives(outcomes, "p:C", ClosedLoopConfig(), baseline=outcomes)
+    drives = Drives(outcomes, "p:C", ClosedLoopConfig(), baseline=outcomes, blind=rate)
     drives.write(tmp_path)
-    said = "the non-reactive baseline passes 3 of 3"
-    assert said in drives.easy and said in (tmp_path / "junit.xml").read_text()
-    assert (
-        [drives.easy in note for note in drives.notes()].count(True)
-        == 1
-        == "".join(drives.notes()).count("baseline passes")
-    )
+    assert rate.passed == 3 and str(rate).startswith("these scenarios hardly test a planner")
+    assert str(rate) in drives.notes() and str(rate) in (tmp_path / "junit.xml").read_text()
+    assert drives.document()["best_blind"]["passed"] == 3
     assert 'name="policy" value="reactive"' in (tmp_path / "junit.xml").read_text()

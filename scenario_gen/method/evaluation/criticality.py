@@ -10,7 +10,7 @@ import math
 import numpy as np
 
 from scenario_gen.method.evaluation.geometry import distance_and_ttc
-from scenario_gen.situation import find_conflicts
+from scenario_gen.situation import encroachment, find_conflicts
 from scenario_gen.types import Motion
 
 
@@ -23,9 +23,8 @@ class Criticality:
     Attributes:
         min_distance: least distance between two footprints [m]; NaN with one vehicle.
         min_ttc: least time to collision [s], at most the horizon; likewise.
-        pet: least post-encroachment time [s] over crossing conflicts: from the first vehicle's
-            exit of the shared area to the second's entry; negative if both were inside; NaN
-            without such a conflict.
+        pet: least post-encroachment time [s] of two vehicles that cross or merge; NaN without
+            such a pair, see `encroachment`.
         order: (pair, which of them went first) of every conflict, by vehicle index.
     """
 
@@ -55,10 +54,10 @@ def criticality(motion: Motion, horizon: float) -> Criticality:
             distances.append(float(distance[both].min()))
             times.append(float(ttc[both].min()))
     conflicts = find_conflicts(motion)
-    encroachments = [conflict.encroachment for conflict in conflicts if not conflict.following]
+    encroachments = [encroachment(motion, conflict) for conflict in conflicts]
     return Criticality(
         min_distance=min(distances, default=math.nan),
         min_ttc=min(times) if distances else math.nan,
-        pet=min(encroachments, default=math.nan),
+        pet=float(np.fmin.reduce(encroachments, initial=math.nan)),
         order=tuple((conflict.pair, conflict.first) for conflict in conflicts),
     )

@@ -7,7 +7,7 @@ They are taken on the published samples (0.1 s). Of a pair a, b:
 
 - `pet`: post-encroachment time [s] (Allen, Shin & Cooper 1978): from the first one's exit of the
   area that both footprints sweep to the second one's entry; negative if both were inside at once.
-  Of crossing and merging pairs only, see `scenario_gen.situation.conflicts`.
+  Of crossing and merging pairs only, see `scenario_gen.situation.encroachment`.
 - `arrival_gap` [s]: from the first one's entry into that area to the second one's. Of a named pair
   [a,b] it has a sign: negative if b is first. Of crossing and merging pairs only.
 - `ttc` [s]: least time to collision while both keep their velocities (Hayward 1972), of the
@@ -16,7 +16,7 @@ They are taken on the published samples (0.1 s). Of a pair a, b:
 - `closing_speed` [m/s]: rate at which the distance of the two centres shrinks when the first one
   enters the shared area; of a pair that neither crosses nor merges the greatest rate while both
   are there.
-- `baseline_margin` [s]: time by which vehicle a, as the non-reactive baseline, would have to be
+- `blind_margin` [s]: mean time by which vehicle a, at four constant speeds, would have to be
   shifted to meet b; 0 if it would. See `scenario_gen.method.evaluation.non_reactive`.
 
 Over all pairs the most critical value counts: the least, of `closing_speed` the greatest.
@@ -30,9 +30,9 @@ import math
 import numpy as np
 
 from scenario_gen.method.evaluation.geometry import footprint_distance, time_to_collision
-from scenario_gen.method.evaluation.non_reactive import baseline_margin
+from scenario_gen.method.evaluation.non_reactive import blind_margin
 from scenario_gen.numerics.plane import unit
-from scenario_gen.situation import Conflict, conflict_of
+from scenario_gen.situation import Conflict, conflict_of, encroachment
 from scenario_gen.types import Measures, Motion, Pair
 
 FIGURE_PERIOD_S = 0.1  # of the published samples
@@ -62,7 +62,7 @@ def measure(scenario: Motion, name: str, pair: Pair | None = None) -> float:
     """
     motion = scenario.resampled(FIGURE_PERIOD_S)
     ordered = permutations(range(len(motion.vehicles)), 2)
-    chosen, directed = pair or (), name == "baseline_margin"
+    chosen, directed = pair or (), name == "blind_margin"
     pairs = [
         (a, b)
         for a, b in ordered
@@ -83,10 +83,9 @@ def figures_of(scenario: Motion) -> tuple[PairFigures, ...]:
         if both.stop - both.start < 2:
             continue
         conflict = _crossing(motion, a, b)
-        pet, arrival, first = math.nan, math.nan, None
+        pet, arrival, first = _figure(motion, "pet", a, b), math.nan, None
         if conflict is not None:
-            first = conflict.first
-            pet, arrival = conflict.encroachment, conflict.arrival_gap
+            first, arrival = conflict.first, conflict.arrival_gap
         ttc, gap = _figure(motion, "ttc", a, b), _figure(motion, "gap", a, b)
         figures.append(
             PairFigures(
@@ -120,19 +119,20 @@ def _figure(motion: Motion, name: str, a: int, b: int) -> float:
     both = motion.present_slice(a, b)
     if both.stop - both.start < 2:
         return math.nan
-    if name == "baseline_margin":
-        return baseline_margin(motion, a, b)
+    if name == "blind_margin":
+        return blind_margin(motion, a, b)
     if name == "ttc":
         return float(time_to_collision(motion, a, b)[both].min())
     if name == "gap":
         return float(footprint_distance(motion, a, b)[both].min())
+    if name == "pet":
+        met = conflict_of(motion, a, b)
+        return math.nan if met is None else encroachment(motion, met)
     conflict = _crossing(motion, a, b)
     if name == "closing_speed":
         return _closing_speed(motion, a, b, conflict)
     if conflict is None:
         return math.nan
-    if name == "pet":
-        return conflict.encroachment
     return conflict.arrival_gap if conflict.first == a else -conflict.arrival_gap
 
 

@@ -3,8 +3,8 @@
 
 """The non-reactive baseline: it follows its path, slows in bends, and ignores others.
 
-Planners are compared with it; the figure `baseline_margin` is the time by which it would miss the
-others.
+Planners are compared with it; the figure `blind_margin` is the time by which vehicles at constant
+speeds would miss the others.
 """
 
 import numpy as np
@@ -20,7 +20,7 @@ MAX_BRAKING_MPS2 = 2.5
 MAX_LATERAL_MPS2 = 2.5  # in bends
 STANDSTILL_MPS = 0.5  # a vehicle with a lower last speed stops at its end
 _PREVIEW_M = np.arange(0.0, 21.0, 4.0)  # distances ahead at which it looks for bends
-_STATION_STEP_M = 0.5  # its desired speed is constant on each step
+BLIND_SPEEDS_MPS = (3.0, 4.5, 7.0, 14.0)  # of `blind_margin`
 
 
 def wanted_speeds(route: Curve, station: Floats, top: float, *, stops: bool) -> Floats:
@@ -43,36 +43,28 @@ def free_acceleration(speed: float, wanted: float, most: float = MAX_ACCELERATIO
     return max(most * (1.0 - over * over), -MAX_BRAKING_MPS2)
 
 
-def baseline_margin(motion: Motion, a: int, b: int) -> float:
-    """Return the least time shift [s] with which vehicle a, as the baseline, meets b.
+def blind_margin(motion: Motion, a: int, b: int) -> float:
+    """Return the mean time shift [s] with which vehicle a, at constant speeds, meets b.
 
-    0: it would meet b. At most MAX_SHIFT_S.
+    The speeds are BLIND_SPEEDS_MPS, reached with 2.5 m/s². 0: it would meet b at each of them. At
+    most MAX_SHIFT_S.
     """
     present = motion.present_slice(a)
-    position, speed = motion.position[a, present], motion.speed[a, present]
+    position, speed = motion.position[a, present], float(motion.speed[a, present.start])
     position = position[np.concatenate([[True], edge_lengths(position) > 1e-3])]
     if len(position) < 3:
         return MAX_SHIFT_S
     route = Curve.through(position)
-    stops = bool(speed[-1] < STANDSTILL_MPS)
-    wanted = wanted_speeds(
-        route,
-        np.arange(0.0, route.length + _STATION_STEP_M, _STATION_STEP_M),
-        float(speed.max()),
-        stops=stops,
-    ).tolist()
-    stations, now, dt = [0.0], float(speed[0]), motion.dt
-    while stations[-1] < route.length and len(stations) < motion.speed.shape[1]:
-        after = max(
-            now + free_acceleration(now, wanted[int(stations[-1] / _STATION_STEP_M)]) * dt, 0.0
-        )
-        stations.append(stations[-1] + 0.5 * (now + after) * dt)
-        now = after
-    poses = np.column_stack(
-        [motion.time[present.start] + dt * np.arange(len(stations)), route.at(np.array(stations))]
-    )
-    return poses_time_shift(
-        poses,
-        timed_poses(motion, motion.is_present[b], b),
-        (motion.vehicles[a], motion.vehicles[b]),
-    )
+    time = motion.dt * np.arange(motion.speed.shape[1])
+    other = timed_poses(motion, motion.is_present[b], b)
+    vehicles = (motion.vehicles[a], motion.vehicles[b])
+    shifts = []
+    for blind_speed in BLIND_SPEEDS_MPS:
+        change = np.minimum(time, abs(blind_speed - speed) / MAX_ACCELERATION_MPS2)
+        gained = np.sign(blind_speed - speed) * MAX_ACCELERATION_MPS2 * change
+        stations = speed * time + gained * (time - 0.5 * change)
+        stations = stations[stations < route.length]
+        times = motion.time[present.start] + time[: len(stations)]
+        poses = np.column_stack([times, route.at(stations)])
+        shifts.append(poses_time_shift(poses, other, vehicles))
+    return float(np.mean(shifts))
