@@ -101,7 +101,7 @@ def move(
             f"a planner's `act` returns Command, Pose or None; it returned {type(asked).__name__}"
         )
     try:
-        finite = asked is not None and np.isfinite(np.array(asked, dtype=np.float64)).all()
+        finite = asked is not None and all(math.isfinite(float(value)) for value in asked)
     except (TypeError, ValueError, OverflowError) as error:
         raise InputError(
             f"a planner's `act` returned a {type(asked).__name__} without numbers: {error}"
@@ -155,7 +155,7 @@ def _driven(ego: EgoState, asked: Command, config: ClosedLoopConfig, limits: Dyn
         end_speed = 0.0
         distance = 0.5 * speed * speed / -acceleration
     half_turn = 0.5 * curvature * distance
-    chord = distance * float(np.sinc(half_turn / np.pi))
+    chord = distance * math.sin(half_turn) / half_turn if half_turn else distance
     return EgoState(
         x=ego.x + chord * math.cos(ego.yaw + half_turn),
         y=ego.y + chord * math.sin(ego.yaw + half_turn),

@@ -37,8 +37,8 @@ from scenario_gen.numerics.plane import ahead_and_left, angle_between, unit
 from scenario_gen.types import MAX_PLANNED_CURVATURE_PER_M
 
 MAX_OTHERS_COUNT = 8
-ROUTE_STATIONS = np.array((5.0, 10.0, 15.0, 20.0, 30.0, 40.0))
-"""Distances [m] along the route to the observed points."""
+ROUTE_STATIONS = np.array((0.0, 5.0, 10.0, 15.0, 20.0, 30.0, 40.0))
+"""Distances [m] along the route to the observed points; the offset is measured at the first."""
 RANGE_M = 100.0  # vehicles farther away are not observed
 MAX_SPEED_MPS = 100.0
 ID = "scenario_gen/Drive-v0"
@@ -196,33 +196,29 @@ class DriveEnv(gymnasium.Env[Array, Array]):  # type: ignore[misc]
         route = self._follower.route
         if route is None:
             values = np.array((ego.speed, ego.curvature, 0.0, 0.0, 0.0))
-            return values, np.zeros(2 * len(ROUTE_STATIONS))
-        x, y, yaw = route.at(np.array([self._station]))[0].tolist()
+            return values, np.zeros(2 * len(ROUTE_STATIONS) - 2)
+        poses = route.at(self._station + ROUTE_STATIONS)
+        x, y, yaw = poses[0].tolist()
         _, offset = ahead_and_left(np.array(ego[:2]) - (x, y), yaw)
         angle = angle_between(ego.yaw, yaw)
         remaining = route.length - self._station
         values = np.array((ego.speed, ego.curvature, offset, angle, remaining))
-        points = route.at(self._station + ROUTE_STATIONS)[:, :2]
-        return values, _local(points, ego).ravel()
+        return values, _local(poses[1:, :2], ego).ravel()
 
     def _other_values(self, state: State) -> Floats:
         """Return (7 O,) the values of the nearest others."""
         observation = self._loop.observe(state)
         position = _local(observation.others[:, :2], state.ego)
         distance = np.hypot(position[:, 0], position[:, 1])
-        values = np.column_stack(
-            (
-                np.ones(len(distance)),
-                position,
-                unit(observation.others[:, 2] - state.ego.yaw),
-                observation.others[:, 3],
-                observation.sizes[:, 0],
-            )
-        )
         order = np.argsort(distance, kind="stable")[:MAX_OTHERS_COUNT]
-        nearest = values[order[distance[order] <= RANGE_M]]
-        padded = np.zeros((MAX_OTHERS_COUNT, values.shape[1]))
-        padded[: len(nearest)] = nearest
+        nearest = order[distance[order] <= RANGE_M]
+        padded = np.zeros((MAX_OTHERS_COUNT, 7))
+        rows, others = padded[: len(nearest)], observation.others[nearest]
+        rows[:, 0] = 1.0
+        rows[:, 1:3] = position[nearest]
+        rows[:, 3:5] = unit(others[:, 2] - state.ego.yaw)
+        rows[:, 5] = others[:, 3]
+        rows[:, 6] = observation.sizes[nearest, 0]
         return padded.ravel()
 
 
@@ -233,7 +229,7 @@ def _local(positions: Floats, ego: EgoState) -> Floats:
 
 def observation_space() -> Box:
     """Return the space of the observations, with finite bounds."""
-    route = np.full(2 * len(ROUTE_STATIONS), RANGE_M)
+    route = np.full(2 * len(ROUTE_STATIONS) - 2, RANGE_M)
     ego_high = (MAX_SPEED_MPS, MAX_PLANNED_CURVATURE_PER_M, RANGE_M, np.pi, 1000.0)
     ego_low = (0.0, -MAX_PLANNED_CURVATURE_PER_M, -RANGE_M, -np.pi, -RANGE_M)
     other_high = np.array((1.0, RANGE_M, RANGE_M, 1.0, 1.0, MAX_SPEED_MPS, 50.0))

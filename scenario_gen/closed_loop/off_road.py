@@ -8,6 +8,7 @@ if it reports an exit, the depth is measured, at poses so close together that no
 footprint moves more than POSE_SPACING_M from one to the next.
 """
 
+from functools import lru_cache
 import math
 from typing import NamedTuple
 
@@ -15,9 +16,9 @@ import numpy as np
 
 from scenario_gen.closed_loop.drive import Drive
 from scenario_gen.method.validity import first_exits, Ground, Proof
-from scenario_gen.numerics import Bools, Floats
+from scenario_gen.numerics import Bools, Floats, frozen
 from scenario_gen.numerics.hermite import control_points
-from scenario_gen.numerics.kernels import B2, F, F2, kernel, OUT1, OUT2
+from scenario_gen.numerics.kernels import B2, F, F2, kernel, OUT2
 from scenario_gen.numerics.plane import edge_lengths
 from scenario_gen.roads import footprint_fits, to_cells
 from scenario_gen.types import Motion, Road
@@ -25,7 +26,6 @@ from scenario_gen.types.road import MAX_DEPTH_M
 
 POSE_SPACING_M = 0.05
 POINT_SPACING_M = 0.1  # greatest distance between sampled points of the footprint
-CORNER_CELLS = 0.7072  # from the centre of a cell to its corner, rounded up
 SUBSTEPS_COUNT = 200  # per step, to locate the beginning of an event
 RESOLUTION_S = 1e-6  # an event that cannot be excluded over such an interval counts
 
@@ -70,7 +70,11 @@ def _excursion(road: Road, motion: Motion, limit: float) -> RoadUse:
     half = motion.vehicles[0].half
     deepest, largest_area, begin = 0.0, 0.0, math.nan
     for k in range(len(motion.time) - 1):
-        depth, area = _depths_and_areas(road, _poses_in(motion, k, _pose_count(motion, k)), half)
+        poses = _poses_in(motion, k, _pose_count(motion, k))
+        outside = ~footprint_fits(road, poses, 2.0 * half[0], 2.0 * half[1])
+        if not outside.any():
+            continue
+        depth, area = _depths_and_areas(road, poses[outside], half)
         if math.isnan(begin) and depth.max() > 0.0 and depth.max() >= limit:
             fine, _ = _depths_and_areas(road, _poses_in(motion, k, SUBSTEPS_COUNT), half)
             reached = (fine >= limit) & (fine > 0.0)
@@ -108,10 +112,11 @@ def _pose_count(motion: Motion, k: int) -> int:
     return min(max(math.ceil(distance / POSE_SPACING_M), 1), SUBSTEPS_COUNT)
 
 
+@lru_cache(maxsize=64)
 def _footprint_points(half: tuple[float, float]) -> Floats:
     """Return points (A, B, 2) [m] of a footprint in its frame."""
     along, across = (np.linspace(-h, h, math.ceil(2.0 * h / POINT_SPACING_M) + 1) for h in half)
-    return np.stack(np.meshgrid(along, across, indexing="ij"), axis=-1)
+    return frozen(np.stack(np.meshgrid(along, across, indexing="ij"), axis=-1))
 
 
 def _cell_poses(road: Road, poses: Floats) -> Floats:
@@ -138,12 +143,10 @@ def _least_room(road: Road, poses: Floats, half: tuple[float, float]) -> float:
     """Return the least distance [m] from a footprint at poses (P, 3) to the road's edge."""
     grid = _footprint_points(half)  # the nearest point is on the outline
     outline = np.concatenate([grid[0], grid[-1], grid[1:-1, 0], grid[1:-1, -1]]) / road.resolution
-    out = np.empty(len(poses))
     limit = MAX_DEPTH_M / road.resolution
-    least_depths(
-        road.drivable, road.clearance_cells, _cell_poses(road, poses), outline, limit, out
-    )
-    return float(out.min() * road.resolution)
+    grid = _cell_poses(road, poses)
+    depth = least_depth(road.drivable, road.clearance_cells, grid, outline, limit)
+    return float(depth * road.resolution)
 
 
 @kernel(B2, F2, F2, F2, F, F, OUT2)
@@ -170,39 +173,42 @@ def greatest_depths(
     """
     for p in range(poses.shape[0]):
         deepest, count = 0.0, 0
+        c, s = np.cos(poses[p, 2]), np.sin(poses[p, 2])
         for m in range(points.shape[0]):
-            u, v = _point_at(poses[p], points[m])
+            u, v = _point_at(poses[p], c, s, points[m])
             low, high = _depth_bounds(solid, distance, u, v, rim, limit)
             deepest = max(deepest, low)
             count += high > 0.0
         for m in range(points.shape[0]):
-            u, v = _point_at(poses[p], points[m])
+            u, v = _point_at(poses[p], c, s, points[m])
             if _depth_bounds(solid, distance, u, v, rim, limit)[1] > deepest:
                 deepest = max(deepest, _exact_depth(solid, distance, u, v, limit))
         out[p, 0], out[p, 1] = deepest, count
 
 
-@kernel(B2, F2, F2, F2, F, OUT1)
-def least_depths(
-    solid: Bools, distance: Floats, poses: Floats, points: Floats, limit: float, out: Floats
-) -> None:
-    """Write the depth (P,) [cells] of the least deep point; arguments as in `greatest_depths`."""
+@kernel(B2, F2, F2, F2, F)
+def least_depth(
+    solid: Bools, distance: Floats, poses: Floats, points: Floats, limit: float
+) -> float:
+    """Return the depth [cells] of the least deep point at all poses; see `greatest_depths`."""
+    least = limit
     for p in range(poses.shape[0]):
-        least = limit
+        c, s = np.cos(poses[p, 2]), np.sin(poses[p, 2])
         for m in range(points.shape[0]):
-            u, v = _point_at(poses[p], points[m])
+            u, v = _point_at(poses[p], c, s, points[m])
             least = min(least, _depth_bounds(solid, distance, u, v, 0.0, limit)[1])
+    for p in range(poses.shape[0]):
+        c, s = np.cos(poses[p, 2]), np.sin(poses[p, 2])
         for m in range(points.shape[0]):
-            u, v = _point_at(poses[p], points[m])
+            u, v = _point_at(poses[p], c, s, points[m])
             if _depth_bounds(solid, distance, u, v, 0.0, limit)[0] < least:
                 least = min(least, _exact_depth(solid, distance, u, v, limit))
-        out[p] = least
+    return least
 
 
 @kernel(inline=True)
-def _point_at(pose: Floats, point: Floats) -> tuple[float, float]:
-    """Return x and y [cells] of a point of a footprint at a pose."""
-    c, s = np.cos(pose[2]), np.sin(pose[2])
+def _point_at(pose: Floats, c: float, s: float, point: Floats) -> tuple[float, float]:
+    """Return x and y [cells] of a point of a footprint at a pose, by its cosine and sine."""
     return pose[0] + c * point[0] - s * point[1], pose[1] + s * point[0] + c * point[1]
 
 
@@ -220,36 +226,40 @@ def _depth_bounds(
     i, j = int(np.floor(v)), int(np.floor(u))
     if i < 0 or j < 0 or i >= height or j >= width or not solid[i, j]:
         return 0.0, 0.0
-    low = min(max(distance[i, j] - CORNER_CELLS, 0.0), limit)
-    return low, min(distance[i, j] + CORNER_CELLS, limit)
+    offset = np.hypot(u - j - 0.5, v - i - 0.5) + 1e-9  # from the centre of the cell
+    low = min(max(distance[i, j] - offset, 0.0), limit)
+    return low, min(distance[i, j] + offset, limit)
 
 
 @kernel(inline=True)
 def _exact_depth(solid: Bools, distance: Floats, u: float, v: float, limit: float) -> float:
     """Return the distance [cells] from a point in a solid cell to the nearest other square."""
     i, j = int(np.floor(v)), int(np.floor(u))
-    best = min(float(distance[i, j]) + CORNER_CELLS, limit)
-    ring = max(int((distance[i, j] - CORNER_CELLS) / 1.4143), 1)
-    while ring - 1 < best:
-        best = min(best, _distance_to_ring(solid, u, v, ring))
-        ring += 1
+    best = _depth_bounds(solid, distance, u, v, 0.0, limit)[1]
+    reach = int(best) + 1
+    for a in range(i - reach, i + reach + 1):
+        dv = max(a - v, v - a - 1.0, 0.0)
+        if dv < best:
+            # Squares nearer to the centre of the point's cell than `distance` are solid.
+            before = max(abs(a - i) - 0.5, 0.0)
+            solid_reach = np.sqrt(max(distance[i, j] ** 2 - before * before, 0.0))
+            first = int(solid_reach + 0.5 - 1e-6)
+            last = int(np.sqrt(best * best - dv * dv)) + 1
+            best = min(best, _distance_in_row(solid, u, a, first, last, dv))
     return best
 
 
 @kernel(inline=True)
-def _distance_to_ring(solid: Bools, u: float, v: float, ring: int) -> float:
-    """Return the distance to the nearest square that is not solid, among those of one ring.
+def _distance_in_row(solid: Bools, u: float, row: int, first: int, last: int, dv: float) -> float:
+    """Return the distance to the nearest square that is not solid, among some of one row.
 
-    The ring has the cells that are `ring` rows or columns away from the point's cell.
+    Their columns are `first` to `last` away from that of the point; the row is `dv` away.
     """
     height, width = solid.shape
-    i, j = int(np.floor(v)), int(np.floor(u))
     best = np.inf
-    for a in range(i - ring, i + ring + 1):
-        stride = 1 if abs(a - i) == ring else 2 * ring
-        for b in range(j - ring, j + ring + 1, stride):
-            if 0 <= a < height and 0 <= b < width and solid[a, b]:
-                continue
-            du, dv = max(b - u, u - b - 1.0, 0.0), max(a - v, v - a - 1.0, 0.0)
-            best = min(best, np.sqrt(du * du + dv * dv))
+    for k in range(first, last + 1):
+        for b in (int(np.floor(u)) - k, int(np.floor(u)) + k):
+            if row < 0 or b < 0 or row >= height or b >= width or not solid[row, b]:
+                du = max(b - u, u - b - 1.0, 0.0)
+                best = min(best, np.sqrt(du * du + dv * dv))
     return best

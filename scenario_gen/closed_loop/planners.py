@@ -20,6 +20,9 @@ from scenario_gen.method.evaluation import (
 from scenario_gen.numerics.curve import Curve
 from scenario_gen.numerics.plane import ahead_and_left, place
 
+NEAR_STATIONS = np.linspace(-2.0, 8.0, 41)
+"""Distances [m] along the route from the last nearest place to candidates for the next one."""
+
 
 class RouteFollower:
     """Steers along the route towards a point ahead of the ego (pure pursuit, Coulter 1992)."""
@@ -34,7 +37,7 @@ class RouteFollower:
         """Return the curvature to drive [1/m], and the ego's station on the route [m]."""
         if self.route is None:
             return 0.0, 0.0
-        around = np.linspace(self._near - 2.0, self._near + 8.0, 41)
+        around = self._near + NEAR_STATIONS
         poses = self.route.at(around)
         self._near = float(around[np.argmin(np.hypot(poses[:, 0] - ego.x, poses[:, 1] - ego.y))])
         ahead = min(max(0.8 * ego.speed, 3.0), 15.0)

@@ -10,6 +10,7 @@ with the same commands are identical.
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+import math
 from typing import Protocol
 
 import numpy as np
@@ -277,7 +278,9 @@ class ClosedLoop:
         ego, n = moved.state, len(self._ids)
         number = state.step + 1
         time = number * config.step
-        before = np.column_stack([state.clock, state.rate, state.acceleration, state.waited])
+        before = np.empty((n, 4))
+        before[:, 0], before[:, 1] = state.clock, state.rate
+        before[:, 2], before[:, 3] = state.acceleration, state.waited
         seen = np.empty((min(len(state.seen), self._slowest) + 1, 9))
         seen[0, :6] = ego
         seen[1:] = state.seen[: len(seen) - 1]
@@ -360,6 +363,9 @@ class ClosedLoop:
 
     def at_goal(self, state: State) -> bool:
         """Whether the ego is at its goal at this instant."""
+        goal, ego = self.world.motion[self.ego, -1], state.ego
+        if math.hypot(ego.x - goal[0], ego.y - goal[1]) > PAST_GOAL_M + self.config.goal_width:
+            return False
         return bool(self.reached(np.array([state.time]), state.vehicles[self.ego, None])[0])
 
     def reached(self, time: Floats, poses: Floats) -> Bools:
