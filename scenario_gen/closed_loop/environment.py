@@ -192,7 +192,7 @@ class DriveEnv(gymnasium.Env[Array, Array]):  # type: ignore[misc]
     def _route_values(self, state: State) -> tuple[Floats, Floats]:
         """Return (5,) the values of the ego, and (2 R,) the points of the route."""
         ego = state.ego
-        _, self._station = self._follower.steer(ego)
+        self._station = self._follower.locate(ego)
         route = self._follower.route
         if route is None:
             values = np.array((ego.speed, ego.curvature, 0.0, 0.0, 0.0))

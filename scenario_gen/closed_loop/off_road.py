@@ -70,13 +70,11 @@ def _excursion(road: Road, motion: Motion, limit: float) -> RoadUse:
     half = motion.vehicles[0].half
     deepest, largest_area, begin = 0.0, 0.0, math.nan
     for k in range(len(motion.time) - 1):
-        poses = _poses_in(motion, k, _pose_count(motion, k))
-        outside = ~footprint_fits(road, poses, 2.0 * half[0], 2.0 * half[1])
-        if not outside.any():
-            continue
-        depth, area = _depths_and_areas(road, poses[outside], half)
+        depth, area = _depths_and_areas(road, _poses_in(motion, k, _pose_count(motion, k)), half)
         if math.isnan(begin) and depth.max() > 0.0 and depth.max() >= limit:
-            fine, _ = _depths_and_areas(road, _poses_in(motion, k, SUBSTEPS_COUNT), half)
+            reached_at = int(np.argmax((depth >= limit) & (depth > 0.0))) / (len(depth) - 1)
+            last = math.ceil(reached_at * SUBSTEPS_COUNT) + 1
+            fine, _ = _depths_and_areas(road, _poses_in(motion, k, SUBSTEPS_COUNT)[:last], half)
             reached = (fine >= limit) & (fine > 0.0)
             share = int(np.argmax(reached)) / SUBSTEPS_COUNT if reached.any() else 1.0
             begin = float(motion.time[k] + share * (motion.time[k + 1] - motion.time[k]))
@@ -131,11 +129,13 @@ def _depths_and_areas(
     points = _footprint_points(half).reshape(-1, 2) / road.resolution
     closed = road.closed_cells
     rim = (closed.shape[0] - road.drivable.shape[0]) // 2
-    grid = _cell_poses(road, poses)
+    outside = ~footprint_fits(road, poses, 2.0 * half[0], 2.0 * half[1])
+    grid = _cell_poses(road, poses[outside])
     grid[:, :2] += rim
-    out = np.empty((len(poses), 2))
+    found, out = np.empty((len(grid), 2)), np.zeros((len(poses), 2))
     limit = MAX_DEPTH_M / road.resolution
-    greatest_depths(closed, road.depth_cells, grid, points, float(rim), limit, out)
+    greatest_depths(closed, road.depth_cells, grid, points, float(rim), limit, found)
+    out[outside] = found
     return out[:, 0] * road.resolution, out[:, 1] * (4.0 * half[0] * half[1] / len(points))
 
 
@@ -226,7 +226,8 @@ def _depth_bounds(
     i, j = int(np.floor(v)), int(np.floor(u))
     if i < 0 or j < 0 or i >= height or j >= width or not solid[i, j]:
         return 0.0, 0.0
-    offset = np.hypot(u - j - 0.5, v - i - 0.5) + 1e-9  # from the centre of the cell
+    du, dv = u - j - 0.5, v - i - 0.5  # from the centre of the cell
+    offset = np.sqrt(du * du + dv * dv) + 1e-9
     low = min(max(distance[i, j] - offset, 0.0), limit)
     return low, min(distance[i, j] + offset, limit)
 

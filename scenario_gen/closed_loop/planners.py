@@ -33,13 +33,20 @@ class RouteFollower:
         self.route = Curve.through(task.route[:, :2]) if len(task.route) > 2 else None
         self._near = 0.0
 
+    def locate(self, ego: EgoState) -> float:
+        """Return the ego's station on the route [m]."""
+        if self.route is None:
+            return 0.0
+        around = self._near + NEAR_STATIONS
+        offset = self.route.at(around)[:, :2] - ego[:2]
+        self._near = float(around[np.argmin(np.hypot(offset[:, 0], offset[:, 1]))])
+        return self._near
+
     def steer(self, ego: EgoState) -> tuple[float, float]:
         """Return the curvature to drive [1/m], and the ego's station on the route [m]."""
+        self.locate(ego)
         if self.route is None:
             return 0.0, 0.0
-        around = self._near + NEAR_STATIONS
-        poses = self.route.at(around)
-        self._near = float(around[np.argmin(np.hypot(poses[:, 0] - ego.x, poses[:, 1] - ego.y))])
         ahead = min(max(0.8 * ego.speed, 3.0), 15.0)
         along, left = ahead_and_left(self.route.at(self._near + ahead)[:2] - ego[:2], ego.yaw)
         return float(2.0 * left / np.maximum(along * along + left * left, 1e-6)), self._near

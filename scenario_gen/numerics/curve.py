@@ -56,8 +56,9 @@ class Curve:
         for k in range(3):
             pose[..., k] = np.interp(s, self.station, self.points[:, k])
         beyond = np.minimum(s, 0.0) + np.maximum(s - self.length, 0.0)
-        pose[..., 0] += beyond * np.cos(pose[..., 2])
-        pose[..., 1] += beyond * np.sin(pose[..., 2])
+        if beyond.any():
+            pose[..., 0] += beyond * np.cos(pose[..., 2])
+            pose[..., 1] += beyond * np.sin(pose[..., 2])
         return pose
 
     def at_offset(self, station: Floats, offset: Floats | float) -> Floats:
