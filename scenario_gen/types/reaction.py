@@ -78,21 +78,20 @@ class Reaction:
                 f"and answers its speed after {self.lag:.1f} s"
             )
         else:
-            verb = (
-                f"waits for {whom}, then"
-                if self.stands
-                else f"slows for {whom} and"
-                if self.since < self.until
-                else ""
-            )
-            when = f"{self.gap:.1f} s behind" if self.gap >= 0.05 else "right behind"
-            text = f"{who} {verb} passes {when} it"
-            if not verb:
-                when = f"{self.gap:.1f} s after" if self.gap >= 0.05 else "just as"
-                text = f"{who} drives on {when} {whom} has cleared its way"
-            if self.gap == math.inf:
-                text = f"{who} {'stops' if self.stands else 'slows'} for {whom}"
+            text = self._yielding_words(who, whom)
         return f"{text} (doubtful)" if self.doubtful else text
+
+    def _yielding_words(self, who: str, whom: str) -> str:
+        """Return in words how vehicle `who` yields to vehicle `whom`."""
+        if self.gap == math.inf:
+            return f"{who} {'stops' if self.stands else 'slows'} for {whom}"
+        is_later = self.gap >= 0.05
+        if not self.stands and self.since >= self.until:
+            when = f"{self.gap:.1f} s after" if is_later else "just as"
+            return f"{who} drives on {when} {whom} has cleared its way"
+        when = f"{self.gap:.1f} s behind" if is_later else "right behind"
+        verb = f"waits for {whom}, then" if self.stands else f"slows for {whom} and"
+        return f"{who} {verb} passes {when} it"
 
     @property
     def doubtful(self) -> bool:
