@@ -8,6 +8,7 @@ within a centimetre.
 """
 
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
 
@@ -23,10 +24,11 @@ from scenario_gen.bags.recordings.write import add_message, distance_apart, same
 from scenario_gen.bags.storage.bag import BagMessage, naming_bag
 from scenario_gen.bags.storage.config import BagConfig
 from scenario_gen.bags.storage.writer import atomic_bag
-from scenario_gen.base.errors import InputError, ScenarioGenError
+from scenario_gen.base.errors import InputError, RefusedError, ScenarioGenError
 from scenario_gen.base.folders import Kind, sha256_of
 from scenario_gen.base.provenance import read_log_hashes, read_parameters, versions
 from scenario_gen.logs import LogConfig, read_log
+from scenario_gen.method.decisions import decided
 from scenario_gen.method.evaluation import MEASURES
 from scenario_gen.method.fitting import fit_template, FittingConfig
 from scenario_gen.method.routing import plan_routes, PlanningConfig
@@ -366,6 +368,9 @@ def _from_log(
     for encounter in read_log(log, config).encounters:
         if encounter.start_ns != recorded.start_ns:
             continue
+        if recorded.decision is not None:
+            with suppress(RefusedError):  # of another encounter from the log
+                encounter = decided(encounter, recorded.decision)
         for candidate in (encounter, mirrored(encounter)):
             if same_tracks(candidate, recorded):
                 values = summary.values
