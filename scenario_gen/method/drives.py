@@ -40,11 +40,11 @@ class DrivingMargins:
     """
 
     braking_mps2: float = 2.0
-    departure_mps2: float = 1.3
+    departure_mps2: float = 1.7
     acceleration_mps2: float = 2.0
     max_lateral_mps2: float = 3.0
     min_rolling_mps: float = 1.5
-    stop_distance_m: float = 2.5
+    stop_distance_m: float = 6.0
     gap_s: float = 1.5
     departure_lag_s: float = 0.8
     min_stand_s: float = 1.5
