@@ -126,7 +126,7 @@ def decisions_of(encounter: Encounter, sampling: SamplingConfig = SamplingConfig
         >>> from scenario_gen import decisions_of, read_log
         >>> (encounter,) = read_log("my_log.csv").encounters
         >>> [str(decision.outcome) for decision in decisions_of(encounter).possible]
-        ['rolls', 'goes first', 'stops']
+        ['rolls', 'stops', 'goes first']
     """
     try:
         conflict = DecidedConflict.of(encounter)
@@ -163,7 +163,7 @@ def decided(encounter: Encounter, decision: Decision) -> Encounter:
     Example:
         >>> from scenario_gen import decided, decisions_of, read_log
         >>> (encounter,) = read_log("my_log.csv").encounters
-        >>> decided(encounter, decisions_of(encounter).possible[1]).decision.outcome
+        >>> decided(encounter, decisions_of(encounter).possible[-1]).decision.outcome
         <Outcome.GOES_FIRST: 'goes first'>
     """
     conflict = DecidedConflict.of(encounter)
