@@ -49,6 +49,7 @@ from scenario_gen.types import (
     join_pieces,
     Note,
     NoteKind,
+    Outcome,
     Request,
     Road,
     Scenario,
@@ -60,7 +61,7 @@ MAX_BLIND_SHARE = 0.1  # of a set that tests, which a blind planner may pass
 CUT_STEP_S = 0.25  # between two begins that are tried
 MIN_REMAINING_S = 4.0  # of a template from its begin on
 PLATEAU_SHARE = 0.15  # of the family, by which a begin may be worse than the best one
-TRIED_PER_KEPT = 100  # scenarios of a stage, before it is given up
+TRIED_PER_KEPT = 60  # scenarios of a stage, before it is given up
 MAX_MARGIN_S = 0.1  # of scenarios that sampling aims at
 ATTEMPTS = 200  # candidates per scenario, at most
 PROBED_COUNT = 4  # blind planners that are driven first
@@ -254,15 +255,17 @@ class Testing:
                 drawing.report(f"{_outcome(outcome)}: {error}")
 
     def _templates(self, encounter: Encounter) -> Iterator[Encounter]:
-        """Yield the outcomes of an encounter in which the ego goes second; the recorded first."""
+        """Yield the outcomes of an encounter in which the ego goes second.
+
+        Those in which it stops are first: blind planners that start together meet the others.
+        """
         ego = token(self.request.ego)
         decisions = requested_decisions(encounter, self.config.sampling, self.request)
-        recorded, others = decisions.possible[:1], decisions.possible[1:]
-        if self.request.ego in reacting_vehicles(encounter):
-            yield decided(encounter, recorded[0]) if recorded else encounter
-        for decision in others:
-            if decision.second == ego:
-                yield decided(encounter, decision)
+        second = [decision for decision in decisions.possible if decision.second == ego]
+        for decision in sorted(second, key=lambda each: each.outcome is not Outcome.STOPS):
+            yield decided(encounter, decision)
+        if not second and self.request.ego in reacting_vehicles(encounter):
+            yield encounter
 
     def _stages_from(
         self, road: Road, template: Encounter, drawing: "_Drawing"
@@ -280,7 +283,7 @@ class Testing:
         begins = np.arange(loop.begin, latest, CUT_STEP_S)
         passed = np.array([blind_passes(loop, family, begin).mean() for begin in begins])
         good = begins[passed <= passed.min() + PLATEAU_SHARE]
-        for begin in dict.fromkeys(good[[len(good) // 2, -1, 0]].tolist()):
+        for begin in dict.fromkeys(good[[-1, len(good) // 2, 0]].tolist()):
             first = round(begin / template.dt)
             yield self._stage(road, template, first) if first else whole
             if template.decision is None and drawing.results:
