@@ -328,7 +328,7 @@ def _drawing(outcome: Outcome, trial: Trial, road: int, max_frames: int) -> dict
         motion.time[row][[0, -1]].tolist() if row.any() else [0.0, -1.0] for row in drive.present
     ]
     witness = trial.scenario
-    stride = max(1, len(witness.time) // min(max_frames, 100))
+    stride = -(-len(witness.time) // min(max_frames, 100))
     return {
         "name": outcome.name,
         "sentence": verdict.sentence(),

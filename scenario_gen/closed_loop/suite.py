@@ -28,7 +28,7 @@ from scenario_gen.types import mask
 JSON, PAGE = "suite.json", "suite.html"
 MAX_LIST_BYTES = 1024 * 1024
 MAX_REPLAYS_COUNT = 1000
-REPLAY_BYTES = 1_300_000  # of the motions of all replays; with many, each has fewer frames
+REPLAY_BYTES = 900_000  # of the motions of all replays; with many, each has fewer frames
 FRAME_BYTES = 11  # of one vehicle: four 16-bit numbers in base64
 MIN_FRAMES_COUNT = 12
 
