@@ -1,90 +1,130 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""What coverage is compared with: members that no generator made, at the precision of the generated ones.
+"""What coverage is compared with, and at which precision.
 
-Of every null the deviations of its members from their template, in features, are multiplied by one number such that it is as
-precise as what is generated from MIDDLE templates.
+Sets are compared at one precision, PRECISION: of each set those members are kept that are nearest
+to their template, as many as give this precision. The nulls have no generator: records shifted in
+time and paced, and pairs mixed from different members of a set.
 """
 
 from collections.abc import Iterator, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
-from scenario_gen.method.evaluation.encounter_features import EncounterFeatures, FEATURES
+from scenario_gen.method.evaluation.encounter_features import (
+    EncounterFeatures,
+    FEATURES,
+    JOINT_FEATURES,
+)
 from scenario_gen.method.evaluation.population import KINDS, Members
 from scenario_gen.numerics import Bools, Floats
 from scenario_gen.situation import EncounterKind
-from scenario_gen.types import Interval
+from scenario_gen.types import Encounter, Interval, Scenario
 
+RADIUS_SHARE = 0.8  # of the recorded encounters have another session's one within the radius
+PRECISION = 0.75  # at which members are compared; that of the recorded encounters is 0.8
 JOINT = (
     "gap",
     "arrival gap",
     "distance",
     "time to collision",
     "closing speed",
+    *JOINT_FEATURES,
 )  # how one answers the other
-MOST_TIMES, STEPS = 4.0, 9  # the largest such number, and halvings by which it is found
+SHIFT_S, PACE_RATIO = 1.0, 0.06
+HALVINGS = 6  # by which the kept share is found
 DRAWS = 60  # of templates, while it is looked for
 
 
-def at_precision(null: Members, precision: float, count: int) -> tuple[Interval, Interval]:
-    """Return coverage and precision of a null whose deviations are as large as gives this precision with `count` templates."""
-    low, high = 0.0, MOST_TIMES
-    for _ in range(STEPS):
-        times = 0.5 * (low + high)
-        precise = scaled(null, times).shares(count, draws=DRAWS)[2].value >= precision
-        low, high = (times, high) if precise else (low, times)
-    _, coverage, reached, _ = scaled(null, low).shares(count)
-    return coverage, reached
+@dataclass(frozen=True)
+class Shares:
+    """Coverage and precision with templates of one kind each, weighted means over kinds.
+
+    Attributes:
+        alone: coverage by the templates.
+        coverage: coverage by templates and members.
+        precision: of the members.
+        kept: share of the members that were kept.
+    """
+
+    alone: Interval
+    coverage: Interval
+    precision: Interval
+    kept: float = 1.0
 
 
-def scaled(null: Members, times: float) -> Members:
-    """Return members whose deviations from their templates are `times` as large; those of another kind stay."""
-
-    def moved(member: EncounterFeatures) -> EncounterFeatures:
-        own = null.recorded[member.template]
-        if member.kind != own.kind:
-            return member
-        return replace(member, features=own.features + times * (member.features - own.features))
-
-    return replace(null, made=[moved(member) for member in null.made])
+def kinds_with(found: Members, count: int) -> list[Members]:
+    """Return members by kind, of kinds with twice as many encounters as templates, in sessions."""
+    kinds = [found.of_kind(kind) for kind in KINDS]
+    return [one for one in kinds if len(one.recorded) >= 2 * count and one.recordings > 1]
 
 
-def jitters(found: Members, rng: np.random.Generator) -> Iterator[tuple[str, Members]]:
-    """Yield nulls that add noise to the templates: of the spread of each feature, of one spread for all, of all correlations."""
-    noise: dict[str, dict[EncounterKind | None, Floats]] = {
-        "per feature": {},
-        "isotropic": {},
-        "covariance": {},
-    }
-    for kind in {own.kind for own in found.recorded}:
-        own = np.array([member.features for member in found.recorded if member.kind == kind])
-        off = deviations(found, kind)
-        spread = np.maximum(own.std(axis=0), 1e-9)
-        noise["per feature"][kind] = np.diag(np.sqrt(np.square(off).mean(axis=0)))
-        noise["isotropic"][kind] = np.diag(spread * np.sqrt(np.square(off / spread).mean()))
-        values, vectors = np.linalg.eigh(off.T @ off / len(off))
-        noise["covariance"][kind] = vectors * np.sqrt(np.maximum(values, 0.0))
-    for name, roots in noise.items():
-        made = []
-        for member in found.made:
-            own_member = found.recorded[member.template]
-            moved = own_member.features + roots[own_member.kind] @ rng.standard_normal(
-                len(FEATURES)
-            )
-            made.append(replace(member, kind=own_member.kind, features=moved))
-        yield name, replace(found, made=made)
-
-
-def deviations(found: Members, kind: EncounterKind | None) -> Floats:
-    """Return by how much members of a kind differ from their templates (S, F); a row of zeros where there are none."""
-    pairs = [(member, found.recorded[member.template]) for member in found.made]
-    off = [
-        member.features - own.features for member, own in pairs if member.kind == own.kind == kind
+def shares_by_kind(kinds: Sequence[Members], count: int, draws: int = 200) -> Shares:
+    """Return the shares with `count` templates of each kind."""
+    weights = [len(one.recorded) for one in kinds]
+    values = [
+        [(share.value, share.low, share.high) for share in one.shares(count, draws=draws)[:3]]
+        for one in kinds
     ]
-    return np.array(off).reshape(-1, len(FEATURES)) if off else np.zeros((1, len(FEATURES)))
+    means = np.average(values, axis=0, weights=weights)
+    alone, coverage, precision = (Interval(*row.tolist()) for row in means)
+    return Shares(alone, coverage, precision)
+
+
+def at_precision(kinds: Sequence[Members], count: int) -> Shares:
+    """Return the shares of the members that are nearest to their templates, at PRECISION."""
+    low, high = 0.0, 1.0
+    if shares_by_kind(kinds, count, DRAWS).precision.value < PRECISION:
+        for _ in range(HALVINGS):
+            middle = 0.5 * (low + high)
+            kept = [nearest(one, middle) for one in kinds]
+            precise = shares_by_kind(kept, count, DRAWS).precision.value >= PRECISION
+            low, high = (middle, high) if precise else (low, middle)
+    else:
+        low = 1.0
+    shares = shares_by_kind([nearest(one, low) for one in kinds], count)
+    return replace(shares, kept=low)
+
+
+def nearest(found: Members, share: float) -> Members:
+    """Return members without those farthest from their template; a share of each set is kept."""
+    near = found.near
+    size = len(found.recorded)
+    off = near.scaled[size:] - near.scaled[[one.template for one in found.made]]
+    distance = np.sqrt(np.square(off).mean(axis=1))
+    distance[[one.kind != found.recorded[one.template].kind for one in found.made]] = np.inf
+    kept: list[int] = []
+    templates = np.array([one.template for one in found.made], dtype=np.int64)
+    for template in np.unique(templates):
+        rows = np.flatnonzero(templates == template)
+        kept += rows[np.argsort(distance[rows], kind="stable")][
+            : round(share * len(rows))
+        ].tolist()
+    return replace(found, made=[found.made[k] for k in sorted(kept)])
+
+
+def coverage_alone(kinds: Sequence[Members]) -> Floats:
+    """(C,) coverage by 1, 2, … recorded encounters of a kind without members, mean over kinds."""
+    means = []
+    for count in range(1, max(len(one.recorded) for one in kinds)):
+        shares, weights = [], []
+        for one in kinds:
+            templates = min(count, len(one.recorded) - 1)
+            share = replace(one, made=[]).shares(templates, draws=DRAWS)[0].value
+            if np.isfinite(share):
+                shares.append(share)
+                weights.append(len(one.recorded))
+        means.append(np.average(shares, weights=weights) if shares else np.nan)
+    return np.array(means)
+
+
+def stands_for(alone: Floats, coverage: float) -> float:
+    """Return how many recorded encounters cover as much; inf: more than there are."""
+    enough = np.flatnonzero(alone >= coverage)
+    return float(enough[0] + 1) if len(enough) else float("inf")
 
 
 def joint_gain(found: Members, mixed: Members, count: int) -> dict[EncounterKind, float]:
@@ -96,7 +136,9 @@ def joint_gain(found: Members, mixed: Members, count: int) -> dict[EncounterKind
             continue
         most = max(min(count, len(of_kind[0].recorded) // 2), 1)
         precision = [
-            Members(_joint(sets.recorded), _joint(sets.made)).shares(most)[2].value
+            replace(sets, recorded=_joint(sets.recorded), made=_joint(sets.made))
+            .shares(most)[2]
+            .value
             for sets in of_kind
         ]
         gains[kind] = precision[0] - precision[1]
@@ -105,31 +147,62 @@ def joint_gain(found: Members, mixed: Members, count: int) -> dict[EncounterKind
 
 def _joint(members: Sequence[EncounterFeatures]) -> list[EncounterFeatures]:
     """Return members with JOINT features alone."""
-    columns = [FEATURES.index(name) for name in JOINT]
-    return [replace(member, features=member.features[columns]) for member in members]
+    names = FEATURES + JOINT_FEATURES
+    columns = [names.index(name) for name in JOINT]
+    return [replace(member, features=member.every[columns]) for member in members]
 
 
 def speed_spread(found: Members) -> float:
     """Return the median over kinds and speeds: standard deviation within a set, of that of the recorded."""
     speeds: Bools = np.array(["speed" in name and "closing" not in name for name in FEATURES])
     shares: list[float] = []
-    for kind in {own.kind for own in found.recorded}:
-        recorded = np.array([own.features for own in found.recorded if own.kind == kind])[
-            :, speeds
-        ].std(axis=0)
-        sets = [
-            np.array(rows)[:, speeds].std(axis=0)
-            for n, own in enumerate(found.recorded)
-            if own.kind == kind
-            and len(
-                rows := [
-                    member.features
-                    for member in found.made
-                    if member.template == n and member.kind == kind
-                ]
-            )
-            > 1
-        ]
+    for kind in {one.kind for one in found.recorded}:
+        recorded = _speeds(found.recorded, kind, speeds).std(axis=0)
+        sets = []
+        for n, one in enumerate(found.recorded):
+            members = [member for member in found.made if member.template == n]
+            rows = _speeds(members, kind, speeds)
+            if one.kind == kind and len(rows) > 1:
+                sets.append(rows.std(axis=0))
         if sets and recorded.min() > 0.0:
             shares += (np.mean(sets, axis=0) / recorded).tolist()
     return float(np.median(shares)) if shares else 0.0
+
+
+def _speeds(
+    members: Sequence[EncounterFeatures], kind: EncounterKind | None, columns: Bools
+) -> Floats:
+    """(M, C) some features of the members of a kind."""
+    rows = [member.features[columns] for member in members if member.kind == kind]
+    return np.array(rows).reshape(len(rows), int(columns.sum()))
+
+
+def shifted(encounter: Encounter, rng: np.random.Generator) -> Scenario:
+    """Return each vehicle's record, moved in time and paced."""
+    time, rows = encounter.time, []
+    for n in range(len(encounter.vehicles)):
+        pace = 1.0 + PACE_RATIO * rng.standard_normal()
+        at = np.clip(time * pace + SHIFT_S * rng.standard_normal(), 0.0, time[-1])
+        track = np.column_stack(
+            [encounter.position[n], encounter.heading[n], encounter.speed[n] * pace]
+        )
+        rows.append(np.array([np.interp(at, time, column) for column in track.T]))
+    x, y, heading, speed = np.stack(rows, axis=1)
+    position = np.stack((x, y), axis=-1)
+    return Scenario(
+        encounter.vehicles, time, position, heading, speed, np.gradient(speed, time, axis=1)
+    )
+
+
+def mixed(members: Sequence[Scenario], rng: np.random.Generator) -> Iterator[Scenario]:
+    """Yield scenarios whose vehicles come from different members, as long as the shorter one."""
+    for _ in members:
+        chosen = rng.permutation(len(members))
+        drawn = [members[chosen[n % len(members)]] for n in range(len(members[0].vehicles))]
+        count = min(len(one.time) for one in drawn)
+        rows: dict[str, Any] = {
+            name: np.stack([getattr(one, name)[n, :count] for n, one in enumerate(drawn)])
+            for name in ("position", "heading", "speed", "acceleration", "present")
+        }
+        rows["present"] = np.minimum(rows["present"], count - 1)
+        yield replace(members[0], time=drawn[0].time[:count], reference_drive=None, **rows)

@@ -1,70 +1,83 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Nulls of the coverage benchmark, about drawn features of which the right answer is known."""
+"""Coverage at one precision, about drawn features of which the right answer is known."""
+
+from dataclasses import replace
+import json
 
 import numpy as np
 import pytest
 
 from benchmarks._coverage_nulls import (
     at_precision,
-    deviations,
-    jitters,
+    coverage_alone,
     joint_gain,
-    scaled,
+    kinds_with,
+    nearest,
+    PRECISION,
+    RADIUS_SHARE,
+    shares_by_kind,
     speed_spread,
+    stands_for,
 )
+from benchmarks.coverage import PAIRS
 from scenario_gen.method.evaluation.encounter_features import EncounterFeatures, FEATURES
 from scenario_gen.method.evaluation.population import Members
 
 WIDTH = len(FEATURES)
 
 
-@pytest.fixture(scope="module")
-def found():
-    """Forty recorded encounters of eight recordings, and ten members of each that differ by 0.3 standard deviations."""
+def members(spread):
+    """Return forty encounters of eight sessions, and ten members of each with a spread."""
     rng = np.random.default_rng(7)
     recorded = [
         EncounterFeatures("crossing", rng.standard_normal(WIDTH), f"{n // 5}", n, (0, 1))
         for n in range(40)
     ]
     made = [
-        EncounterFeatures(
-            "crossing",
-            own.features + 0.3 * rng.standard_normal(WIDTH),
-            own.recording,
-            own.template,
-            (0, 1),
-        )
-        for own in recorded
+        replace(member, features=member.features + spread * rng.standard_normal(WIDTH))
+        for member in recorded
         for _ in range(10)
     ]
-    return Members(recorded, made)
+    return Members(recorded, made, radius_share=RADIUS_SHARE)
 
 
-def test_deviations_are_scaled_about_each_template(found):
-    np.testing.assert_allclose(
-        deviations(scaled(found, 0.5), "crossing"), 0.5 * deviations(found, "crossing")
-    )
+def test_the_radius_makes_the_precision_of_the_recorded():
+    found = members(0.3)
+    shares = found.shares(10)
+    assert shares[3].value == pytest.approx(RADIUS_SHARE, abs=0.1)
 
 
-def test_a_null_becomes_as_precise_as_is_asked(found):
-    wild = scaled(found, 5.0)
-    wanted = found.shares(10)[2].value
-    assert wild.shares(10)[2].value < wanted - 0.2
-    assert at_precision(wild, wanted, 10)[1].value == pytest.approx(wanted, abs=0.1)
+def test_of_wild_members_those_nearest_to_their_template_are_kept_at_the_precision():
+    (wild,) = kinds_with(members(0.3), 10)
+    assert shares_by_kind([wild], 10).precision.value < PRECISION
+    kept = at_precision([wild], 10)
+    assert 0.0 < kept.kept < 1.0 and kept.precision.value >= PRECISION - 0.05
+    (tame,) = kinds_with(members(0.05), 10)
+    assert at_precision([tame], 10).kept == 1.0
+    assert len(nearest(tame, 0.5).made) == 200
 
 
-def test_jitters_have_the_spread_of_the_generated(found):
-    own = deviations(found, "crossing")
-    for name, null in jitters(found, np.random.default_rng(3)):
-        assert deviations(null, "crossing").std() == pytest.approx(own.std(), rel=0.1), name
+def test_more_recordings_cover_more():
+    alone = coverage_alone(kinds_with(members(0.3), 10))
+    assert len(alone) == 39 and alone[19] > alone[1]
+    assert stands_for(alone, alone[10]) <= 11 and stands_for(alone, 1.1) == np.inf
 
 
-def test_speeds_spread_by_the_share_that_was_drawn(found):
-    assert speed_spread(found) == pytest.approx(0.3, abs=0.05)
+def test_speeds_spread_by_the_share_that_was_drawn():
+    assert speed_spread(members(0.3)) == pytest.approx(0.3, abs=0.05)
 
 
-def test_what_is_not_mixed_is_more_precise_than_what_is(found):
+def test_what_is_not_mixed_is_more_precise_than_what_is():
+    found = members(0.3)
     assert joint_gain(found, found, 10) == {"crossing": 0.0}
-    assert joint_gain(found, scaled(found, 5.0), 10)["crossing"] > 0.2
+    assert joint_gain(found, members(3.0), 10)["crossing"] > 0.2
+
+
+def test_windows_of_a_session_are_one_recording():
+    files = {}
+    for row in json.loads(PAIRS.read_text()):
+        for file in row["files"]:
+            files.setdefault(file, set()).add(row["name"])
+    assert all(len(sessions) == 1 for sessions in files.values())

@@ -115,16 +115,21 @@ def population_of(
 
 @dataclass(frozen=True, eq=False)
 class Members:
-    """Recorded encounters with a shared area, their names, and the generated ones."""
+    """Recorded encounters with a shared area, their names, and the generated ones.
+
+    r is the quantile `radius_share` of the distances from recorded encounters to the nearest one
+    in other recordings, which makes it the precision of the recorded encounters.
+    """
 
     recorded: Sequence[EncounterFeatures]
     made: Sequence[EncounterFeatures]
     names: Sequence[str] = ()
+    radius_share: float = 0.5
 
     @cached_property
     def near(self) -> "_Near":
         """How near they are to each other."""
-        return _Near.of(self.recorded, self.made)
+        return _Near.of(self.recorded, self.made, self.radius_share)
 
     @property
     def recordings(self) -> int:
@@ -149,7 +154,8 @@ class Members:
             ]
 
         names = [self.names[n] for n in chosen if n < len(self.names)]
-        return Members(renumbered(self.recorded), renumbered(self.made), names)
+        recorded, made = renumbered(self.recorded), renumbered(self.made)
+        return replace(self, recorded=recorded, made=made, names=names)
 
     def shares(
         self, count: int, *, draws: int = 200, seed: int = 0
@@ -270,7 +276,10 @@ class _Near:
 
     @classmethod
     def of(
-        cls, recorded: Sequence[EncounterFeatures], made: Sequence[EncounterFeatures]
+        cls,
+        recorded: Sequence[EncounterFeatures],
+        made: Sequence[EncounterFeatures],
+        radius_share: float,
     ) -> "_Near":
         """Scale features by kind, and measure all distances."""
         every = [*recorded, *made]
@@ -293,7 +302,7 @@ class _Near:
             known = nearest[np.isfinite(nearest)]
             if len(known):
                 distances[np.ix_(rows, columns)] = between / max(
-                    float(np.median(known)), MIN_RADIUS_RATIO
+                    float(np.quantile(known, radius_share)), MIN_RADIUS_RATIO
                 )
         template = [
             (member.template, member.template if member.other < 0 else member.other)
