@@ -27,6 +27,7 @@ def parameter(
     high: float | None = None,
     choices: tuple[str, ...] = (),
     group: str = "",
+    fixed: bool = False,
 ) -> Any:
     """Declare one parameter of a frozen configuration dataclass; bounds are inclusive.
 
@@ -38,6 +39,7 @@ def parameter(
         high: upper bound, or None.
         choices: the allowed texts; none: any.
         group: entry points whose names are also allowed (see `base.registry`).
+        fixed: a node reads it only when it starts; it is read-only afterwards.
     """
     meta = {
         "meaning": meaning,
@@ -46,6 +48,7 @@ def parameter(
         "high": high,
         "choices": choices,
         "group": group,
+        "fixed": fixed,
     }
     return field(default=default, metadata=meta)
 

@@ -18,6 +18,7 @@ MAX_STAMP_S = 9e9
 """Latest stamp since 1970 in 64 bits of nanoseconds."""
 
 _UNIX_TIME_S = (3e8, 4e9)  # from 1979 to 2096
+MAX_DATE_LENGTH_COUNT = 64  # characters; pandas takes minutes for a date of 100,000 digits
 _MAX_NUMBER_LENGTH_COUNT = 300  # characters; pandas fails on a number beyond float64
 _USUAL_PERIOD_S = (0.005, 2.0)
 _DAY_S = 86_400.0
@@ -119,6 +120,7 @@ def _days(dates: "pd.Series[Any]") -> "pd.Series[float]":
 
 def _dates(texts: "pd.Series[Any]") -> "pd.Series[Any]":
     """Return dates with the day first if dots separate it, or if a month would be above 12."""
+    texts = texts.where(texts.astype(str).str.len() <= MAX_DATE_LENGTH_COUNT)
     dates = pd.to_datetime(texts, errors="coerce", utc=True, format="ISO8601")
     if dates.notna().any():
         return dates

@@ -284,3 +284,16 @@ def test_what_is_no_file(tmp_path):
             read_log(path)
     with pytest.raises(InputError, match="does not exist"):
         read_log(Path("a\0b"))
+
+
+@pytest.mark.parametrize("column", ["vehicle_id", "t_s"])
+def test_numbers_and_dates_of_any_length_end_in_one_line_or_a_name(tmp_path, column):
+    rows = crossing().astype({column: object})
+    digits = "2" * 5000
+    rows.loc[rows["vehicle_id"] == "a", column] = digits
+    path = save(rows, tmp_path)
+    if column == "t_s":
+        with pytest.raises(InputError):
+            read_log(path)
+    else:
+        assert digits in read_log(path).encounters[0].ids

@@ -113,6 +113,9 @@ def test_every_node_loads_what_was_dumped_of_it(domain, client, tmp_path):
             assert {key: (type(value), value) for key, value in after.items()} == {
                 key: (type(value), value) for key, value in before.items()
             }
+            if name == "player":
+                file.write_text(yaml.dump({node: {"ros__parameters": {"bag": "/other"}}}))
+                assert "read-only" in loaded(client, node, file)["bag"]
             if name == "gp_sampler":
                 assert (
                     before["ego"] == "21202"

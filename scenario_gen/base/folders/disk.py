@@ -4,7 +4,7 @@
 """Writes whose errors name the file, and flushes that survive a crash of the machine."""
 
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 import os
 from pathlib import Path
 import stat
@@ -35,7 +35,10 @@ def own_folder(path: Path) -> None:
         InputError: it is a link, belongs to another account, or others may write to it.
         OSError: it cannot be created.
     """
-    path.mkdir(0o700, parents=True, exist_ok=True)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    with suppress(FileExistsError):
+        path.mkdir(0o700)
+        return  # also on a disk that has no owners and modes
     status = path.lstat()
     writable = stat.S_IWOTH
     if status.st_gid != status.st_uid:  # as of a user's private group

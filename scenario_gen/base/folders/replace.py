@@ -28,6 +28,15 @@ Kind = NewType("Kind", str)
 """A kind of result, as in the markers."""
 
 
+def check_replaceable(target: Path, kind: Kind) -> None:
+    """Check that `replaced_folder` may replace a folder.
+
+    Raises:
+        InputError: as `replaced_folder`.
+    """
+    _check(target, _checked_place(target, ()), kind)
+
+
 @contextmanager
 def replaced_folder(target: Path, kind: Kind, inputs: Iterable[Path] = ()) -> Iterator[Path]:
     """Yield an empty folder for a result, and move it to `target` at the end, flushed to the disk.
@@ -47,12 +56,7 @@ def replaced_folder(target: Path, kind: Kind, inputs: Iterable[Path] = ()) -> It
         InputError: `target` may not be replaced, another process is writing to it, it cannot be
             written, or the disk is full.
     """
-    try:
-        place = _place(target, inputs)
-    except (OSError, RuntimeError, ValueError) as error:  # too long, a loop of links, a null byte
-        raise InputError(
-            f"{target} cannot be written: {describe(error)}; name another folder"
-        ) from error
+    place = _checked_place(target, inputs)
     scratch = place.with_name(f"{PREFIX}{place.name}")
     try:
         with claimed(scratch, target) as parent:
@@ -72,6 +76,20 @@ def replaced_folder(target: Path, kind: Kind, inputs: Iterable[Path] = ()) -> It
         if os.path.lexists(scratch / OLD):
             advice = f"; the earlier result is in {scratch / OLD}, the next command puts it back"
         raise of_system(error, target, advice) from error
+
+
+def _checked_place(target: Path, inputs: Iterable[Path]) -> Path:
+    """Return the target's absolute path.
+
+    Raises:
+        InputError: as `_place`, or the path cannot be used.
+    """
+    try:
+        return _place(target, inputs)
+    except (OSError, RuntimeError, ValueError) as error:  # too long, a loop of links, a null byte
+        raise InputError(
+            f"{target} cannot be written: {describe(error)}; name another folder"
+        ) from error
 
 
 def _place(target: Path, inputs: Iterable[Path]) -> Path:

@@ -24,7 +24,7 @@ import tempfile
 from filelock import FileLock, Timeout
 
 from scenario_gen.base.errors import InputError
-from scenario_gen.base.folders.disk import write_text
+from scenario_gen.base.folders.disk import own_folder, write_text
 from scenario_gen.base.signals import cleaned_up, signals_deferred
 
 PREFIX = ".scenario_gen-"
@@ -47,7 +47,8 @@ def claimed(folder: Path, purpose: Path, timeout_s: float = 1.0) -> Iterator[Pat
         An empty folder in it that only this user may enter.
 
     Raises:
-        InputError: another process has locked it, or it contains other files.
+        InputError: another process has locked it, it contains other files, or it is of another
+            account.
         OSError: the disk is full, or there is no right to write.
     """
     lock = FileLock(folder / LOCK, thread_local=False)
@@ -84,7 +85,7 @@ def _prepare(lock: FileLock, folder: Path, purpose: Path, timeout_s: float) -> N
 
 def _acquire(lock: FileLock, folder: Path, purpose: Path, timeout_s: float) -> None:
     while not lock.is_locked:
-        folder.mkdir(0o700, parents=True, exist_ok=True)
+        own_folder(folder)
         names = {path.name for path in folder.iterdir()}
         if names and not {LOCK} <= names <= {LOCK, NEW, OLD}:
             raise InputError(
@@ -99,6 +100,7 @@ def _acquire(lock: FileLock, folder: Path, purpose: Path, timeout_s: float) -> N
                 raise InputError(
                     f"{purpose} is being written by {owner}; wait for it, or name another folder"
                 ) from error
+    own_folder(folder)  # nobody has put a folder or a link of his own into its place
     write_text(folder / LOCK, f"process {os.getpid()} on {socket.gethostname()}")
 
 

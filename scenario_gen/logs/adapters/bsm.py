@@ -34,7 +34,7 @@ import pandas as pd
 from scenario_gen.base.errors import guarded, InputError
 from scenario_gen.logs.config import LogConfig
 from scenario_gen.logs.raw import check_size, RawLog, Segment
-from scenario_gen.logs.stamps import MAX_STAMP_S
+from scenario_gen.logs.stamps import MAX_DATE_LENGTH_COUNT, MAX_STAMP_S
 from scenario_gen.logs.tables import from_frame
 
 _MINUTE_MS = 60_000
@@ -171,7 +171,8 @@ def _row(core: Any, seconds: float, state: Row) -> Row:
 
 def _seconds(generated: str, second_mark: Any) -> float:
     """Return the stamp [s since 1970] by a record's date and the milliseconds of the minute."""
-    date = pd.to_datetime(re.sub(r"\s*\[.*", "", generated), utc=True, errors="coerce")
+    text = re.sub(r"\s*\[.*", "", generated[:MAX_DATE_LENGTH_COUNT])
+    date = pd.to_datetime(text, utc=True, errors="coerce")
     if pd.isna(date):
         return math.nan
     milliseconds = int(date.value) // 1_000_000

@@ -99,8 +99,13 @@ def object_numbers(exported: Exported) -> tuple[tuple[int, ...], tuple[str, ...]
     OSI's ids are numbers: if any id is not a number, all vehicles are numbered from 1.
     """
     ids = exported.everybody.ids
+    digits = len(str(MAX_ID))
     if all(
-        name.isascii() and name.isdigit() and str(int(name)) == name and int(name) <= MAX_ID
+        name.isascii()
+        and name.isdigit()
+        and len(name) <= digits
+        and str(int(name)) == name
+        and int(name) <= MAX_ID
         for name in ids
     ):
         return tuple(int(name) for name in ids), ()

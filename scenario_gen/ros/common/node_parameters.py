@@ -62,7 +62,9 @@ class SamplerParameters(Parameters):
         low=0.0,
     )
     pair_map: bool = parameter(
-        True, "use only a map with the recording's stamp; false: the newest map of any map server"
+        True,
+        "use only a map with the recording's stamp; false: the newest map of any map server",
+        fixed=True,
     )
 
 
@@ -71,12 +73,13 @@ class RecorderParameters(Parameters):
     """The recorder's parameters."""
 
     bag: str = parameter(
-        "", "folder of the bag; empty: wait for ~/start, and name the bag by the time"
+        "", "folder of the bag; empty: wait for ~/start, and name the bag by the time", fixed=True
     )
     topics: str = parameter(
         "",
         "regular expression of the full names of the topics; empty: those in the node's "
         "namespace, /clock and /tf",
+        fixed=True,
     )
     compress: bool = parameter(True, "compress chunks with zstd")
     split_bytes: int = parameter(
@@ -94,15 +97,20 @@ class TrafficParameters(Parameters):
     bag: str = parameter(
         "",
         "bag with scenarios; empty: they arrive live on `scenarios`, `scenarios/info` and `map`",
+        fixed=True,
     )
     ego: str = parameter(
         "",
         "id of the vehicle that the ego replaces; empty: the scenario's ego slot, or its first "
         "vehicle",
     )
-    index: int = parameter(0, "index of the first scenario in the bag, from 0", low=0)
-    rate: float = parameter(1.0, "speed as a multiple of real time", low=0.01, high=1000.0)
-    lock_step: bool = parameter(False, "step with each call of ~/step instead of a clock")
+    index: int = parameter(0, "index of the first scenario in the bag, from 0", low=0, fixed=True)
+    rate: float = parameter(
+        1.0, "speed as a multiple of real time", low=0.01, high=1000.0, fixed=True
+    )
+    lock_step: bool = parameter(
+        False, "step with each call of ~/step instead of a clock", fixed=True
+    )
     wait_for_ego: bool = parameter(
         True, "begin a drive with the ego's first command; false: the ego brakes until one arrives"
     )
@@ -117,8 +125,11 @@ class TrafficParameters(Parameters):
         False,
         "publish predicted objects and the ego's state for Autoware's planners; needs "
         "autoware_perception_msgs",
+        fixed=True,
     )
     results: str = parameter(
-        "", "folder for drives.json and junit.xml, rewritten after each drive; empty: none"
+        "",
+        "folder for drives.json and junit.xml, replaced after each drive; empty: none",
+        fixed=True,
     )
     drive: ClosedLoopConfig = field(default_factory=ClosedLoopConfig)

@@ -121,6 +121,12 @@ class ConfigParameters:
             [new for new, old in zip(stored, overrides, strict=True) if new is not old]
         )
         self.config = with_values(config, [node.get_parameter(name) for name in self._declared])
+        for name, entry in self._declared.items():
+            if entry.metadata["fixed"]:
+                fixed = descriptor(entry)
+                fixed.type = node.describe_parameter(name).type
+                fixed.read_only = True
+                node.set_descriptor(name, fixed)
         node.add_pre_set_parameters_callback(self._prepare)
         node.add_on_set_parameters_callback(self._check)
         node.add_post_set_parameters_callback(self._apply)
@@ -140,7 +146,8 @@ class ConfigParameters:
             for parameter in parameters
             if not self._is_unchanged_read_only(parameter)
         ]
-        return changes or [self._node.get_parameter(next(iter(self._declared)))]
+        free = (name for name, entry in self._declared.items() if not entry.metadata["fixed"])
+        return changes or [self._node.get_parameter(next(free))]
 
     def _stored(self, parameter: Parameter) -> Parameter:
         """Return the parameter in its stored form, the same object if it has that form."""

@@ -46,6 +46,7 @@ class Config(Parameters):
         3000,
         "scenarios stored for incomplete requests; the oldest requests are dropped",
         low=1,
+        fixed=True,
     )
     wait: int = parameter(
         100, "closed requests that wait for missing scenarios; older ones are dropped", low=1

@@ -57,24 +57,29 @@ TICK_S = 0.01  # between two clock messages
 class Config(Parameters):
     """The player's parameters."""
 
-    bag: str = parameter("", "bag to play: its folder or one of its files")
-    topics: str = parameter(".*", "regular expression of the full names of the topics to play")
+    bag: str = parameter("", "bag to play: its folder or one of its files", fixed=True)
+    topics: str = parameter(
+        ".*", "regular expression of the full names of the topics to play", fixed=True
+    )
     rate: float = parameter(
         1.0, "how many times as fast as it was recorded", low=0.01, high=1000.0
     )
-    start_offset: float = parameter(0.0, "time in the bag at which to begin", unit="s", low=0.0)
+    start_offset: float = parameter(
+        0.0, "time in the bag at which to begin", unit="s", low=0.0, fixed=True
+    )
     loop: bool = parameter(False, "begin again at the end")
     stay: bool = parameter(
         False, "keep running at the end, so that late subscribers get latched topics"
     )
-    paused: bool = parameter(False, "wait for ~/resume before the first message")
-    clock: bool = parameter(False, "publish /clock")
+    paused: bool = parameter(False, "wait for ~/resume before the first message", fixed=True)
+    clock: bool = parameter(False, "publish /clock", fixed=True)
     patience: float = parameter(
         60.0,
         "time without acknowledgement after which a subscriber is no longer waited for; 0: wait "
         "for ever",
         unit="s",
         low=0.0,
+        fixed=True,
     )
 
 
@@ -151,7 +156,7 @@ class Player(Node):  # type: ignore[misc]
         try:
             while not self._ended.is_set():
                 self._play_once(config)
-                if not config.loop:
+                if not self.parameters.config.loop:
                     break
             if self._ended.is_set():
                 return
@@ -162,7 +167,7 @@ class Player(Node):  # type: ignore[misc]
             self.exit_code = error.exit_code
             values = {"error": type(error).__name__}
             self.diagnostics.status(Level.ERROR, str(error), "playing", values)
-        if not config.stay and not self._ended.is_set():
+        if not self.parameters.config.stay and not self._ended.is_set():
             self._end_when_acknowledged()
 
     def _wait_for_acknowledgement(self, publisher: Any, deadline: float) -> None:
@@ -243,9 +248,10 @@ class Player(Node):  # type: ignore[misc]
             self._elapsed = elapsed
             self._running.wait(TICK_S)
             started = monotonic()
+            rate = self.parameters.config.rate
             if self._running.is_set():
-                self._ended.wait(min(TICK_S, (due - elapsed) / config.rate))
-                elapsed += (monotonic() - started) * config.rate
+                self._ended.wait(min(TICK_S, (due - elapsed) / rate))
+                elapsed += (monotonic() - started) * rate
             self._publish_clock(first_ns + round((min(elapsed, due) - config.start_offset) * 1e9))
         self._running.wait()
         return max(elapsed, due) if elapsed < due + 1.0 else due

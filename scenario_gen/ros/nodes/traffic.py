@@ -34,10 +34,11 @@ from msg_conventions.autoware import EGO, OBJECTS
 from msg_conventions.diagnostics import Level
 from msg_conventions.topics import vehicle_topic
 from scenario_gen.bags.recordings.scenario_decoder import TOPICS
-from scenario_gen.base.errors import InputError, of_system, ScenarioGenError
+from scenario_gen.base.errors import InputError, ScenarioGenError
+from scenario_gen.base.folders import check_replaceable, replaced_folder
 from scenario_gen.closed_loop.ego import Command, Pose
 from scenario_gen.closed_loop.origin import Trial
-from scenario_gen.closed_loop.results import Drives
+from scenario_gen.closed_loop.results import DRIVEN, Drives
 from scenario_gen.closed_loop.simulation import ClosedLoop, State
 from scenario_gen.closed_loop.trials import Outcome, read_trials
 from scenario_gen.closed_loop.verdict import judge
@@ -129,7 +130,7 @@ class Traffic(Node):  # type: ignore[misc]
         """
         config = self.config
         if config.results:
-            _create_results(Path(config.results))  # an error must precede the first drive
+            check_replaceable(Path(config.results), DRIVEN)  # an error must precede the drives
         if config.autoware:
             self._autoware = (OBJECTS, EGO)
             self._out |= {topic: create_publisher(self, topic) for topic in self._autoware}
@@ -281,10 +282,9 @@ class Traffic(Node):  # type: ignore[misc]
         self._publish("verdicts", encode_verdict(self.get_name(), outcome, stamp_ns))
         self.get_logger().info(f"scenario {outcome.name}: {self._verdict}")
         if self.config.results:
-            folder = Path(self.config.results)
-            _create_results(folder)
             planner = f"{self.get_name()} over ROS 2"
-            Drives(self.outcomes, planner, self.config.drive).write(folder)
+            with replaced_folder(Path(self.config.results), DRIVEN) as folder:
+                Drives(self.outcomes, planner, self.config.drive).write(folder)
         self._follow_on()
 
     def _follow_on(self) -> None:
@@ -433,17 +433,3 @@ class Traffic(Node):  # type: ignore[misc]
         if self._paused:
             return "paused"
         return "waiting for the ego" if self._waits_for_ego else "driving"
-
-
-def _create_results(folder: Path) -> None:
-    """Create the folder of results.
-
-    Raises:
-        InputError: it cannot be created.
-    """
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise of_system(
-            error, f"parameter results is {folder}", "; name another folder"
-        ) from error
