@@ -7,7 +7,7 @@ With the same machine and versions, the bytes are mostly identical; on another C
 within a centimetre.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
@@ -344,6 +344,19 @@ def _find(
     return _Published(where, entry, summary, where.messages_of(info, entry, summary))
 
 
+def _templates(encounters: Sequence[Encounter], recorded: Encounter) -> Iterator[Encounter]:
+    """Yield what may be the recorded template: encounters of a log, decided and mirrored."""
+    for encounter in encounters:
+        if encounter.start_ns != recorded.start_ns:
+            continue
+        template = encounter
+        if recorded.decision is not None:
+            with suppress(RefusedError):  # of another encounter from the log
+                template = decided(encounter, recorded.decision)
+        yield template
+        yield mirrored(template)
+
+
 def _from_log(
     log: Path, recorded: Encounter, summary: RequestSummary, seed: int, origin: str
 ) -> tuple[Encounter, Segmentation]:
@@ -365,17 +378,11 @@ def _from_log(
             fault = f"has sha256 {sha256}: it is another file, or was changed"
         raise InputError(f"{log} {fault}; the bag is from {listed}")
     config = read_parameters(LogConfig(), summary.values, "log.", origin)
-    for encounter in read_log(log, config).encounters:
-        if encounter.start_ns != recorded.start_ns:
-            continue
-        if recorded.decision is not None:
-            with suppress(RefusedError):  # of another encounter from the log
-                encounter = decided(encounter, recorded.decision)
-        for candidate in (encounter, mirrored(encounter)):
-            if same_tracks(candidate, recorded):
-                values = summary.values
-                parameters = read_parameters(SegmentationConfig(), values, "segmentation.", origin)
-                return candidate, segment(candidate, parameters, seed)
+    for candidate in _templates(read_log(log, config).encounters, recorded):
+        if same_tracks(candidate, recorded):
+            values = summary.values
+            parameters = read_parameters(SegmentationConfig(), values, "segmentation.", origin)
+            return candidate, segment(candidate, parameters, seed)
     raise InputError(
         f"{log}: none of its encounters is on the bag's tracks, although the file is the same"
     )
