@@ -15,6 +15,7 @@ from dataclasses import dataclass, field, replace
 from enum import StrEnum
 import math
 from time import process_time
+from typing import TypeVar
 
 import numpy as np
 
@@ -41,12 +42,13 @@ from scenario_gen.method.suitable_roads import AUTO, suitable_roads
 from scenario_gen.numerics import Ints
 from scenario_gen.pipeline import completed, PipelineConfig
 from scenario_gen.roads import road_and_template
-from scenario_gen.situation import Situation
+from scenario_gen.situation import encroachment, Situation
 from scenario_gen.types import (
     Encounter,
     GenerationResult,
     join_ego,
     join_pieces,
+    Motion,
     Note,
     NoteKind,
     Outcome,
@@ -57,13 +59,17 @@ from scenario_gen.types import (
     YIELD,
 )
 
+AnyMotion = TypeVar("AnyMotion", bound=Motion)
+
 MAX_BLIND_SHARE = 0.1  # of a set that tests, which a blind planner may pass
 CUT_STEP_S = 0.25  # between two begins that are tried
 MIN_REMAINING_S = 4.0  # of a template from its begin on
-PLATEAU_SHARE = 0.15  # of the family, by which a begin may be worse than the best one
-TRIED_PER_KEPT = 60  # scenarios of a stage, before it is given up
+BEGINS_COUNT = 3  # begins of a template
+DELAYS_S = (0.0, 0.3, 0.6, 0.9, 1.2)  # by which the others may be later than in a template
+MIN_GAP_S = 1.0  # in which the ego of a template enters behind the others
+TRIED_PER_KEPT_COUNT = 60  # scenarios of a stage, before it is given up
 MAX_MARGIN_S = 0.1  # of scenarios that sampling aims at
-ATTEMPTS = 200  # candidates per scenario, at most
+ATTEMPTS_COUNT = 200  # candidates per scenario, at most
 PROBED_COUNT = 4  # blind planners that are driven first
 MORE_VARIATION = {
     "arrival_sigma": 3.0,
@@ -277,17 +283,36 @@ class Testing:
         whole = self._stage(road, template, 0)
         _, fit = whole.planned.road_and_fit()
         scenario = replay(template, fit, road.frame_id)
-        loop = ClosedLoop(scenario, self.request.ego, road, self.drive_config)
         family = blind_family(whole.top_speed)
-        latest = max(loop.begin + CUT_STEP_S, template.duration - MIN_REMAINING_S)
-        begins = np.arange(loop.begin, latest, CUT_STEP_S)
-        passed = np.array([blind_passes(loop, family, begin).mean() for begin in begins])
-        good = begins[passed <= passed.min() + PLATEAU_SHARE]
-        for begin in dict.fromkeys(good[[-1, len(good) // 2, 0]].tolist()):
-            first = round(begin / template.dt)
-            yield self._stage(road, template, first) if first else whole
+        options: list[tuple[float, float, int]] = []
+        for delay in DELAYS_S:
+            count = round(delay / template.dt)
+            if count and not self._has_room(with_delay(template, self.request.ego, count)):
+                break
+            delayed = with_delay(scenario, self.request.ego, round(delay / scenario.dt))
+            loop = ClosedLoop(delayed, self.request.ego, road, self.drive_config)
+            first = max(loop.begin, delay)
+            latest = max(first + CUT_STEP_S, template.duration - MIN_REMAINING_S)
+            options += [
+                (float(blind_passes(loop, family, begin).mean()), -begin, count)
+                for begin in np.arange(first, latest, CUT_STEP_S).tolist()
+            ]
+        for _, begin, count in sorted(options)[:BEGINS_COUNT]:
+            encounter = with_delay(template, self.request.ego, count)
+            first_row = round(-begin / template.dt)
+            yield self._stage(road, encounter, first_row)
             if template.decision is None and drawing.results:
                 return
+
+    def _has_room(self, template: Encounter) -> bool:
+        """Whether the ego, where it goes second, enters at least MIN_GAP_S after the other one."""
+        ego = self.request.ego_of(template)
+        gaps = [
+            encroachment(template, conflict)
+            for conflict in Situation.of(template).conflicts
+            if conflict.second == ego
+        ]
+        return bool(gaps) and not min(gaps) < MIN_GAP_S
 
     def _stage(self, road: Road, template: Encounter, first: int) -> Stage:
         """Return the stage of a template from a sample on.
@@ -313,7 +338,7 @@ class Testing:
                 {
                     "sampling.ego": "free",
                     "sampling.decisions": "recorded",
-                    "sampling.attempts": ATTEMPTS,
+                    "sampling.attempts": ATTEMPTS_COUNT,
                 },
             ),
             replace(self.request, target=targets),
@@ -399,7 +424,7 @@ class _Drawing:
 
         def cancelled() -> bool:
             tried = selection.unfit.total() - unfit.total()
-            hopeless = tried >= TRIED_PER_KEPT * (selection.kept - kept + 1)
+            hopeless = tried >= TRIED_PER_KEPT_COUNT * (selection.kept - kept + 1)
             return hopeless or process_time() > begin + seconds
 
         def progress(_done: int, _total: int, candidates: int) -> None:
@@ -430,6 +455,17 @@ def _completed(drawn: GenerationResult, chain: Chain) -> GenerationResult:
     notes = [note for note in drawn.generated.adaptations if note.kind is not NoteKind.CANCELLED]
     generated = replace(drawn.generated, requested=len(drawn), adaptations=tuple(notes))
     return completed(replace(drawn, generated=generated), chain.config, chain.request)
+
+
+def with_delay(motion: AnyMotion, ego: str, count: int) -> AnyMotion:
+    """Return a motion in which all but one vehicle are some samples later; the first are void."""
+    rows = np.array([vehicle.id != ego for vehicle in motion.vehicles])
+    arrays = {name: getattr(motion, name).copy() for name in motion.array_names}
+    present = motion.present.copy()
+    for values in arrays.values():
+        values[rows, count:] = values[rows, : values.shape[1] - count]
+    present[rows] = np.minimum(present[rows] + [0, count], len(motion.time) - 1)
+    return replace(motion, present=present, **arrays)
 
 
 def _outcome(template: Encounter) -> str:
