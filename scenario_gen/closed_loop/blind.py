@@ -60,7 +60,7 @@ class BlindPlanner(NamedTuple):
 def blind_family(top_speed: float) -> tuple[BlindPlanner, ...]:
     """Return the family for reference drives with a highest speed [m/s]; the baseline is first."""
     top = max(math.ceil(top_speed), TOP_SPEED_MPS)
-    speeds = np.round(np.linspace(MIN_SPEED_MPS, top, SPEEDS_COUNT), 1).tolist()
+    speeds = np.round(np.geomspace(MIN_SPEED_MPS, top, SPEEDS_COUNT), 1).tolist()
     constant = [BlindPlanner(speed, gain) for gain in GAINS_PER_S for speed in speeds]
     return BlindPlanner(math.nan), *constant
 
