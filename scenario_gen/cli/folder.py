@@ -172,8 +172,8 @@ def _blind_rates(cases: Sequence[GenerationResult], requested: FolderRequest) ->
     """Return a sentence on each set with an ego slot: how the best blind planner does in it."""
     if not requested.request.ego:
         return []
+    from scenario_gen.closed_loop.blind import blind_sentence
     from scenario_gen.closed_loop.config import ClosedLoopConfig
-    from scenario_gen.closed_loop.reacting import blind_sentence
 
     config = ClosedLoopConfig(limits=requested.config.limits)
     return [sentence for case in cases if (sentence := blind_sentence(case, config))]

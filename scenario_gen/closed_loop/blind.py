@@ -16,6 +16,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from scenario_gen.closed_loop.config import ClosedLoopConfig
 from scenario_gen.closed_loop.coordination_space import WORLD, World
 from scenario_gen.closed_loop.driver import CLOCK, DRIVER_PARAMETERS, DriverParameters, RATE
 from scenario_gen.closed_loop.simulation import ClosedLoop
@@ -30,6 +31,7 @@ from scenario_gen.numerics import Bools, Floats, Ints
 from scenario_gen.numerics.curve import Curve
 from scenario_gen.numerics.kernels import F, F2, I, kernel, named, OUTB1
 from scenario_gen.numerics.plane import edge_lengths
+from scenario_gen.types import GenerationResult, join_ego
 
 MIN_SPEED_MPS = 3.0  # a slower planner stands in the way, or misses the goal
 TOP_SPEED_MPS = 15.0  # of the family where no reference drive is faster
@@ -37,6 +39,7 @@ SPEEDS_COUNT = 13  # constant speeds of the family
 GAINS_PER_S = (1.0, 10.0)  # soft as `ConstantSpeed`, and as fast as the body can
 STATION_STEP_M = 0.5  # between two points of a course
 TRIVIAL_SHARE = 0.9  # a set of which a blind planner passes more hardly tests
+BLIND_COUNT = 50  # scenarios of a set in which blind planners drive
 GOAL_MARGIN_M = 0.2  # before the end of the route, as in `ClosedLoop.reached`
 
 
@@ -237,3 +240,17 @@ def drive_blindly(
             if station >= course.length:
                 out[m] = True
                 break
+
+
+def blind_sentence(case: GenerationResult, config: ClosedLoopConfig = ClosedLoopConfig()) -> str:
+    """Return in words how the best blind planner does in a set; "" without an ego slot.
+
+    It drives in the first BLIND_COUNT scenarios at most.
+    """
+    drawn = case.generated
+    if drawn.ego is None or not drawn.scenarios:
+        return ""
+    ego = drawn.ego.vehicle.id
+    scenarios = map(join_ego, drawn.scenarios[:BLIND_COUNT])
+    rate = blind_rate([ClosedLoop(scenario, ego, case.road, config) for scenario in scenarios])
+    return f"{case.title}, ego {ego}: {rate}"

@@ -24,7 +24,6 @@ from scenario_gen.base.parameters import updated
 from scenario_gen.closed_loop.blind import (
     blind_family,
     blind_passes,
-    blind_rate,
     BlindPlanner,
     BlindRate,
 )
@@ -46,7 +45,6 @@ from scenario_gen.situation import encroachment, Situation
 from scenario_gen.types import (
     Encounter,
     GenerationResult,
-    join_ego,
     join_pieces,
     Motion,
     Note,
@@ -79,7 +77,6 @@ MORE_VARIATION = {
     "longitudinal_sigma": 6.0,
 }
 """Least sampling parameters of a stage that gives no scenario without them."""
-BLIND_COUNT = 50  # scenarios of a set in which blind planners drive
 MAX_TURNS = 8  # in which stages are drawn from again
 
 
@@ -485,17 +482,3 @@ def reacting_vehicles(encounter: Encounter) -> list[str]:
     rows = [*(edge.who for edge in edges), *(each.second for each in situation.conflicts)]
     vehicles = [encounter.vehicles[row] for row in dict.fromkeys(rows)]
     return [vehicle.id for vehicle in vehicles if not vehicle.kind.walks]
-
-
-def blind_sentence(case: GenerationResult, config: ClosedLoopConfig = ClosedLoopConfig()) -> str:
-    """Return in words how the best blind planner does in a set; "" without an ego slot.
-
-    It drives in the first BLIND_COUNT scenarios at most.
-    """
-    drawn = case.generated
-    if drawn.ego is None or not drawn.scenarios:
-        return ""
-    ego = drawn.ego.vehicle.id
-    scenarios = map(join_ego, drawn.scenarios[:BLIND_COUNT])
-    rate = blind_rate([ClosedLoop(scenario, ego, case.road, config) for scenario in scenarios])
-    return f"{case.title}, ego {ego}: {rate}"
