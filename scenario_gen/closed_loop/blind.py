@@ -6,7 +6,7 @@
 A set of scenarios tests a planner only if every blind planner fails in most of them. The family
 has constant speeds, which are reached softly or at once, and the non-reactive baseline. Its
 members stay exactly on the route, so one compiled loop drives all of them; the others react to
-them as to any ego. A drive ends at the first instant with a contact, at the goal, or when the time is over.
+them as to any ego. A drive ends at the first contact, at the goal, or when its time is over.
 """
 
 from collections.abc import Sequence

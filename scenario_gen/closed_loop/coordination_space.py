@@ -170,16 +170,16 @@ def _add_reactions(scenario: Scenario, ego: int, order: Floats) -> Floats:
     kinds = dict.fromkeys(((who, ego) for who in range(n) if who != ego), "")
     kinds |= _known_reactions(scenario)
     for (who, whom), kind in kinds.items():
-        conflict = conflict_of(scenario, who, whom)
         if kind == FOLLOW:
             reacts[who, whom] = np.inf
             continue
+        conflict = conflict_of(scenario, who, whom)
         if conflict is None or conflict.second != who:
             continue
         cleared, enters = passing(scenario, conflict, merges=conflict.following)
-        if kind or enters - cleared < MAX_REACTION_GAP_S:
-            reacts[who, whom] = np.inf if conflict.following else enters
-        if whom != ego != who:
+        until = np.inf if conflict.following else enters
+        reacts[who, whom] = until if kind or enters - cleared < MAX_REACTION_GAP_S else 0.0
+        if ego not in (who, whom):
             _add_wait(order[who, whom], cleared, enters)
     return reacts
 

@@ -132,10 +132,11 @@ def _depths_and_areas(
     outside = ~footprint_fits(road, poses, 2.0 * half[0], 2.0 * half[1])
     grid = _cell_poses(road, poses[outside])
     grid[:, :2] += rim
-    found, out = np.empty((len(grid), 2)), np.zeros((len(poses), 2))
+    outcome = np.empty((len(grid), 2))
+    out = np.zeros((len(poses), 2))
     limit = MAX_DEPTH_M / road.resolution
-    greatest_depths(closed, road.depth_cells, grid, points, float(rim), limit, found)
-    out[outside] = found
+    greatest_depths(closed, road.depth_cells, grid, points, float(rim), limit, outcome)
+    out[outside] = outcome
     return out[:, 0] * road.resolution, out[:, 1] * (4.0 * half[0] * half[1] / len(points))
 
 

@@ -77,7 +77,7 @@ MORE_VARIATION = {
     "longitudinal_sigma": 6.0,
 }
 """Least sampling parameters of a stage that gives no scenario without them."""
-MAX_TURNS = 8  # in which stages are drawn from again
+MAX_TURNS_COUNT = 8  # in which stages are drawn from again
 
 
 class Unfit(StrEnum):
@@ -215,7 +215,7 @@ class Testing:
         end = process_time() + self.budget
         drawing = _Drawing(self, count, end, progress)
         waiting = drawing.draw(self._stages(drawing))
-        for turn in range(1, MAX_TURNS):
+        for turn in range(1, MAX_TURNS_COUNT):
             waiting = drawing.draw(waiting, len(waiting), turn)
         shortage = self._shortage(drawing) if drawing.kept < count else ""
         if not drawing.results:

@@ -11,6 +11,7 @@ from collections.abc import Callable, Generator, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager, suppress
+from itertools import islice
 import multiprocessing
 from typing import TypeVar
 
@@ -59,23 +60,17 @@ class LocalPool:
         running: dict[Future[str], Task] = {}
         lost: list[Task] = []
         while True:
-            while len(running) < _SUBMITTED_RATIO * self._count:
-                task = next(waiting, None)
-                if task is None:
-                    break
+            for task in islice(waiting, _SUBMITTED_RATIO * self._count - len(running)):
                 running[self._submit(run, task)] = task
             if not running:
                 return lost
             done, _ = wait(running, return_when=FIRST_COMPLETED)
-            if any(isinstance(future.exception(), BrokenProcessPool) for future in done):
+            if any(map(_has_died, done)):
                 done, _ = wait(running)
                 self.end()
-            for future in done:
-                task = running.pop(future)
-                if isinstance(future.exception(), BrokenProcessPool):
-                    lost.append(task)
-                else:
-                    yield future.result()
+            lost += [running[future] for future in done if _has_died(future)]
+            yield from (future.result() for future in done if not _has_died(future))
+            running = {future: task for future, task in running.items() if future not in done}
 
     def _submit(self, run: Callable[[Task], str], task: Task) -> "Future[str]":
         """Submit a task, to new processes if one has died."""
@@ -94,6 +89,11 @@ class LocalPool:
         if executor is not None:
             _kill_children()
             executor.shutdown(cancel_futures=True)
+
+
+def _has_died(future: "Future[str]") -> bool:
+    """Return whether the process of a finished task has died."""
+    return isinstance(future.exception(), BrokenProcessPool)
 
 
 def _kill_children() -> None:

@@ -14,6 +14,7 @@ import numpy as np
 from scenario_gen.bags.storage.bag import open_bag
 from scenario_gen.bags.storage.config import BagConfig
 from scenario_gen.bags.storage.definitions import TRACKED
+from scenario_gen.bags.storage.mcap import BagTopic
 from scenario_gen.bags.vehicles import (
     decode_samples,
     decode_tracked,
@@ -128,39 +129,35 @@ def _read_topics(paths: Sequence[Path], config: LogConfig) -> list[Topic]:
     label = str(paths[0]) if len(paths) == 1 else f"{paths[0]} and {len(paths) - 1} more"
     bounds = BagConfig(most_bytes=config.size_limit << 20)
     bags = file_names([path.resolve() for path in paths])
-    topics: dict[tuple[str, str], Topic] = {}
-    types: dict[str, str] = {}
-    n_messages = 0
+    offered: list[BagTopic] = []
     for path in paths:
         with open_bag(path, bounds, "log.size_limit") as bag:
-            types |= {topic.name: topic.type for topic in bag.topics()}
-            n_messages += sum(topic.count for topic in bag.topics())
+            offered += bag.topics()
+    types = {topic.name: topic.type for topic in offered}
     is_used = _usable(requested, types)
     window: Span | None = None
-    if (config.start or config.end) and n_messages > LARGE_COUNT:
+    if (config.start or config.end) and sum(topic.count for topic in offered) > LARGE_COUNT:
         window = received_window(paths, is_used, config)
-    part = f" from {config.start:g} s on" if window else ""
+    topics: dict[tuple[str, str], Topic] = {}
     n_rows = 0
     for path, name in zip(paths, bags, strict=True):
         with open_bag(path, bounds, "log.size_limit") as bag:
-            for message in bag.messages(is_used, window[0] if window else None):
-                topic = topics.setdefault(
-                    (message.topic, name),
-                    Topic(message.topic, message.type, label, name, part=part),
-                )
-                if window and message.stamp_ns > window[1] and topic.stamps:
-                    break
+            for message in bag.messages(is_used, window):
                 n_rows += 1
                 check_size(str(path), 0, n_rows, config)
+                key = message.topic, name
+                topic = topics.setdefault(key, Topic(message.topic, message.type, label, name))
                 topic.stamps.append(message.stamp_ns)
                 topic.data.append(message.data)
+    if window:
+        for topic in topics.values():
+            topic.part = f" from {config.start:g} s on"
     _check_requested(requested, types, paths[0])
     if not topics:
         raise InputError(
             f"{paths[0]}: no topic to read, it has {_listing(types)}. Needed per vehicle: {FIX} "
             f"with {TWIST}, or {ODOMETRY}; or a topic named tracks of {TRACKED} or {TRACKS}; "
-            "choose others by name with --set log.topics=…, or convert them first, for example with "
-            "`ros2 run topic_tools transform`"
+            "choose with --set log.topics=…, or convert others with topic_tools"
         )
     return _joined([topics[key] for key in sorted(topics)])
 

@@ -284,13 +284,11 @@ def _complete(columns: dict[str, Column], path: Path, header: Sequence[str]) -> 
     is_geographic = {"lat", "lon"} <= columns.keys()
     if not is_geographic and not {"x", "y"} <= columns.keys():
         missing = [name for name in ("x", "y", "lat", "lon") if name not in columns]
-        options = ["x", "y", *(name for name in ("time", "vehicle") if name not in columns)]
-        raise _missing_column("position (x and y, or lat and lon)", options, missing, path, header)
+        raise _missing_column("position (x and y, or lat and lon)", missing, columns, path, header)
     if "time" not in columns and "date" in columns:
         columns = {**columns, "time": columns.pop("date")}
     if "time" not in columns:
-        options = [name for name in ("time", "vehicle") if name not in columns]
-        raise _missing_column("time", options, ["time"], path, header)
+        raise _missing_column("time", ["time"], columns, path, header)
     ignored = ["x", "y"] if is_geographic else ["lat", "lon"]
     if "speed" in columns or not {"vx", "vy"} <= columns.keys():
         ignored += ["vx", "vy"]
@@ -299,13 +297,14 @@ def _complete(columns: dict[str, Column], path: Path, header: Sequence[str]) -> 
 
 def _missing_column(
     missing: str,
-    options: Sequence[str],
     quantities: Sequence[str],
+    columns: Collection[str],
     path: Path,
     header: Sequence[str],
 ) -> UnknownFormatError:
     """Return the error on a missing column, with all options that the next command needs."""
-    remedy = ",".join(f"{option}=…" for option in options)
+    needed = ["time", "vehicle"] if "time" in quantities else ["x", "y", "time", "vehicle"]
+    remedy = ",".join(f"{name}=…" for name in needed if name in "xy" or name not in columns)
     aliases = {alias for quantity in quantities for alias in NAMES[quantity]}
     return UnknownFormatError(
         f"{path} has no column for {missing}; it has {', '.join(header)}. Rename it, or name it "

@@ -16,15 +16,18 @@ import platform
 import re
 import tempfile
 
-from llvmlite import binding
 import numba
 
 from scenario_gen.base.errors import InputError
 from scenario_gen.base.folders.disk import own_folder
 
+OPTIONS = {"nogil": True, "error_model": "numpy", "no_cfunc_wrapper": True}
+"""How numba compiles every kernel."""
+
 PACKAGE = Path(__file__).parents[1]
 _DECORATED = re.compile(rb"^@kernel\(", re.MULTILINE)
 _IMPORT = re.compile(rb"^from (scenario_gen[\w.]*) import ([^(\n]+|\([^)]*\))", re.MULTILINE)
+_PROCESSOR_FACTS = ("vendor_id", "cpu family", "model", "flags", "Features")
 _NAME = re.compile(rb"\w+")
 
 
@@ -92,7 +95,8 @@ def folder(source: Path) -> Path:
     file and of the files with kernels that it imports. So a kernel is compiled again when a file
     that it calls has changed, and is found by a copy of the package elsewhere.
     """
-    digest = sha256(repr((_processor(), numba.__version__, platform.python_version())).encode())
+    versions = (numba.__version__, platform.python_version())
+    digest = sha256(repr((OPTIONS, _processor(), versions)).encode())
     for file in _with_imports(source):
         digest.update(file.name.encode())
         digest.update(sha256(file.read_bytes()).digest())
@@ -102,12 +106,16 @@ def folder(source: Path) -> Path:
 
 
 @cache
-def _processor() -> tuple[str, str]:
+def _processor() -> tuple[str, ...]:
     """Return the name and the features of the processor that kernels are compiled for."""
-    return (
-        numba.config.CPU_NAME or binding.get_host_cpu_name(),
-        numba.config.CPU_FEATURES or binding.get_host_cpu_features().flatten(),
-    )
+    requested = (str(numba.config.CPU_NAME), str(numba.config.CPU_FEATURES))
+    try:
+        lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
+    except OSError:
+        return (platform.machine(), platform.processor(), *requested)
+    facts = dict(line.split(":", 1) for line in reversed(lines) if ":" in line)
+    facts = {name.strip(): value.strip() for name, value in facts.items()}
+    return (*(facts.get(name, "") for name in _PROCESSOR_FACTS), *requested)
 
 
 class Locator:

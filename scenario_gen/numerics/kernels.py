@@ -21,7 +21,7 @@ import numpy as np
 
 from scenario_gen.numerics.arrays import sealed
 from scenario_gen.numerics.compiling import make_ready
-from scenario_gen.numerics.kernel_cache import folder, PACKAGE, sources, used_by_numba
+from scenario_gen.numerics.kernel_cache import folder, OPTIONS, PACKAGE, sources, used_by_numba
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 
@@ -41,7 +41,6 @@ OUT1, OUT2, OUT3, OUT4 = (_array(F, n, readonly=False) for n in (1, 2, 3, 4))
 OUTI1, OUTI2 = (_array(I, n, readonly=False) for n in (1, 2))
 OUTB1, OUTB2 = (_array(B, n, readonly=False) for n in (1, 2))
 
-OPTIONS = {"nogil": True, "error_model": "numpy", "no_cfunc_wrapper": True}
 _one_at_a_time = RLock()  # threads that need the same kernel
 _kernels: list["Kernel"] = []
 
@@ -138,22 +137,22 @@ class Kernel:
         """Compile or load it, once, and return numba's function."""
         with _one_at_a_time:
             if not self._is_ready:
-                try:
-                    self.dispatcher.compile(self.declared)
-                except Exception:
-                    if not self.mark.exists():
-                        raise
-                    self._forget()  # the cache is damaged
-                    self.dispatcher.compile(self.declared)
+                self._compile_or_load()
                 self.dispatcher.disable_compile()
                 self.mark.touch()
                 self._is_ready = True
         return self.dispatcher
 
-    def _forget(self) -> None:
-        """Remove what the cache has of this file."""
-        for file in self.mark.parent.iterdir():
-            file.unlink(missing_ok=True)
+    def _compile_or_load(self) -> None:
+        """Load the kernel, or compile it if the cache has none, or a damaged one."""
+        try:
+            self.dispatcher.compile(self.declared)
+        except Exception:
+            if not self.mark.exists():
+                raise
+            for file in self.mark.parent.iterdir():
+                file.unlink(missing_ok=True)
+            self.dispatcher.compile(self.declared)
 
     def __call__(self, *values: Any) -> Any:
         """Call the compiled function."""

@@ -73,14 +73,14 @@ BEFORE = {
 # A change that needs more tokens deletes something, or says why in the commit. Splitting dense
 # code into plain steps has cost 14,000 tokens so far; 435,000 are wanted.
 BUDGET = {
-    "tokens": 535_700,
+    "tokens": 551_300,
     "long lines": 0,
-    "complex functions": 2,
+    "complex functions": 1,
     "branching functions": 0,
     "nested functions": 0,
     "long functions": 0,
     "crowded functions": 0,
-    "constants": 896,
+    "constants": 945,
     "constants without a unit": 0,
     "banned names": 0,
 }

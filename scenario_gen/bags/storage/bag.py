@@ -79,13 +79,14 @@ class StoredBag:
     def messages(
         self,
         wanted: Callable[[str, str], bool] = lambda _topic, _type: True,
-        begin_ns: int | None = None,
+        within_ns: tuple[int, int] | None = None,
     ) -> Iterator[BagMessage]:
         """Yield the messages of topics with a `wanted` name and type, by their stamps.
 
         Args:
             wanted: chooses topics.
-            begin_ns: earlier messages are left out, except the first one of each topic.
+            within_ns: first and last stamp; other messages are left out, except the first one of
+                each topic.
 
         Raises:
             InputError: a file is damaged, there are more messages than the bounds allow, or a
@@ -94,7 +95,8 @@ class StoredBag:
         streams = [self._messages_of_file(path, file, wanted) for path, file in self.files]
         seen: set[str] = set()
         for message in heapq.merge(*streams, key=attrgetter("stamp_ns")):
-            if begin_ns is not None and message.stamp_ns < begin_ns and message.topic in seen:
+            is_outside = within_ns and not within_ns[0] <= message.stamp_ns <= within_ns[1]
+            if is_outside and message.topic in seen:
                 continue
             seen.add(message.topic)
             self.budget.spend_message(len(message.data))

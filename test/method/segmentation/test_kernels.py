@@ -14,7 +14,7 @@ from scenario_gen.method.segmentation.hdp_hmm.config import SamplerConfig
 from scenario_gen.method.segmentation.hdp_hmm.problem import new_top, Place, Prior, Problem
 from scenario_gen.method.segmentation.hdp_hmm.random import TAIL
 from scenario_gen.method.segmentation.posterior import matched_labels
-from scenario_gen.numerics.kernels import OPTIONS
+from scenario_gen.numerics.kernel_cache import OPTIONS
 
 
 def from_python(helper):
