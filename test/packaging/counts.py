@@ -73,7 +73,7 @@ BEFORE = {
 # A change that needs more tokens deletes something, or says why in the commit. Splitting dense
 # code into plain steps has cost 14,000 tokens so far; 435,000 are wanted.
 BUDGET = {
-    "tokens": 551_300,
+    "tokens": 551_400,
     "long lines": 0,
     "complex functions": 1,
     "branching functions": 0,

@@ -346,7 +346,7 @@ def test_a_planner_that_is_a_node_gets_the_verdicts_that_it_gets_in_process(
     command = f"{sys.executable} {program} vehicle_1/odom"
     for out, more in (
         ("over_dds", ["--ros", "--planner", f"{command} 1000000"]),
-        ("twice", ["--ros", "--planner", f"{command} 1000000 0 twice"]),
+        ("twice", ["--ros", "--planner", f"{command} 1000000 0 twice", "--count", "1"]),
         ("in_process", ["--planner", "test_traffic:ByPlace", "--workers", "1"]),
     ):
         told = CliRunner().invoke(app, [*words, "--out", str(tmp_path / out), *more])
