@@ -8,6 +8,7 @@ the import of a module, and compiled code may crash on them.
 """
 
 from collections.abc import Callable, Iterator, Mapping
+import concurrent.futures
 from contextlib import contextmanager, suppress
 import multiprocessing
 from multiprocessing import resource_tracker
@@ -90,6 +91,13 @@ def ctrl_c_blocked() -> Iterator[None]:
             yield
         finally:
             signal.pthread_sigmask(signal.SIG_SETMASK, mask)
+
+
+def worker_pool(count: int) -> "concurrent.futures.ProcessPoolExecutor":
+    """Return a pool of processes that end with this one; submit tasks within `ctrl_c_blocked`."""
+    context = multiprocessing.get_context("spawn")
+    with ctrl_c_blocked():
+        return concurrent.futures.ProcessPoolExecutor(count, context, end_with_parent)
 
 
 def end_with_parent() -> None:

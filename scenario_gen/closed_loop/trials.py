@@ -7,14 +7,12 @@ The results do not depend on the number of workers.
 """
 
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass, replace
 from functools import lru_cache
 from itertools import chain, islice
 import math
-import multiprocessing
 import os
 from pathlib import Path
 import pickle
@@ -35,7 +33,7 @@ from scenario_gen.bags.storage.config import BagConfig
 from scenario_gen.base.errors import did_you_mean, InputError, ScenarioGenError
 from scenario_gen.base.parameters import parameter, Parameters
 from scenario_gen.base.registry import load_class
-from scenario_gen.base.signals import ctrl_c_blocked, end_with_parent
+from scenario_gen.base.signals import ctrl_c_blocked, worker_pool
 from scenario_gen.closed_loop.config import ClosedLoopConfig
 from scenario_gen.closed_loop.drive import Drive
 from scenario_gen.closed_loop.origin import Origin, origins_of, Trial, units_of
@@ -317,10 +315,7 @@ def trial_runner(
     if workers <= 1:
         yield lambda trials: map(_run, ((trial, planner, config) for trial in trials))
         return
-    context = multiprocessing.get_context("spawn")
-    with ctrl_c_blocked():
-        processes = ProcessPoolExecutor(workers, mp_context=context, initializer=end_with_parent)
-    with processes as pool:
+    with worker_pool(workers) as pool:
 
         def run(trials: Sequence[Trial]) -> Iterator[Outcome]:
             tasks = (

@@ -18,8 +18,8 @@ from typing import TypeVar
 from scenario_gen.base.signals import (
     cleaned_up,
     ctrl_c_blocked,
-    end_with_parent,
     environment_set,
+    worker_pool,
 )
 
 Task = TypeVar("Task")
@@ -78,9 +78,7 @@ class LocalPool:
             if self._executor is not None:
                 with suppress(BrokenProcessPool):
                     return self._executor.submit(run, task)
-            self._executor = ProcessPoolExecutor(
-                self._count, multiprocessing.get_context("spawn"), end_with_parent
-            )
+            self._executor = worker_pool(self._count)
             return self._executor.submit(run, task)
 
     def end(self) -> None:

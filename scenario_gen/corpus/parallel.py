@@ -7,7 +7,7 @@ from collections.abc import Iterable
 import os
 
 from scenario_gen.base.errors import RefusedError
-from scenario_gen.base.signals import ctrl_c_blocked
+from scenario_gen.base.signals import ctrl_c_blocked, worker_pool
 from scenario_gen.method.config import PipelineConfig
 from scenario_gen.pipeline import generate
 from scenario_gen.types import Encounter, GenerationResult, Road
@@ -47,16 +47,11 @@ def generate_many(
         >>> answers = generate_many([(encounter, "straight"), (encounter, "curve")], count=20)
         >>> results = [answer for answer in answers if not isinstance(answer, RefusedError)]
     """
-    from concurrent.futures import ProcessPoolExecutor
-    from multiprocessing import get_context
-
     tasks = [(case, config, count, seed) for case in cases]
     workers = min(workers or os.cpu_count() or 1, len(tasks))
     if workers <= 1:
         return list(map(_answer, tasks))
-    with ctrl_c_blocked():
-        pool = ProcessPoolExecutor(workers, get_context("spawn"))
-    with pool:
+    with worker_pool(workers) as pool:
         with ctrl_c_blocked():
             answers = pool.map(_answer, tasks)
         return list(answers)

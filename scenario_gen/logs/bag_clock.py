@@ -138,7 +138,9 @@ def received_window(
     """
     first_ns = []
     for path in paths:
-        with open_bag(path, BagConfig(most_bytes=config.size_limit << 20)) as bag:
+        with open_bag(
+            path, BagConfig(most_bytes=config.size_limit << 20), "log.size_limit"
+        ) as bag:
             first_ns += [message.stamp_ns for message in islice(bag.messages(is_used), 1)]
     start_ns = min(first_ns, default=0)
     begin_ns = start_ns + round(1e9 * (config.start - _RECEPTION_SLACK_S))

@@ -168,12 +168,13 @@ class RawLog:
         return f"{renamed(segment.label)}, {segment.unit} {segment.number + row - segment.first}"
 
 
-_MAX_NUMBER_LENGTH_COUNT = 300  # digits; Python refuses to read numbers of 4,300
+MAX_NUMBER_LENGTH_COUNT = 300
+"""Characters: float64 has no longer number, and Python refuses to read 4,300 digits."""
 
 
 def natural(name: str) -> tuple[int, int, str]:
     """Sort key of names in which whole numbers sort by value, before the rest."""
-    is_number = name.isascii() and name.isdigit() and len(name) < _MAX_NUMBER_LENGTH_COUNT
+    is_number = name.isascii() and name.isdigit() and len(name) < MAX_NUMBER_LENGTH_COUNT
     return (0, int(name), name) if is_number else (1, 0, name)
 
 

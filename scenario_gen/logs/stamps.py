@@ -12,6 +12,7 @@ from scenario_gen.base.documents import shown
 from scenario_gen.base.errors import InputError
 from scenario_gen.logs.column import Column
 from scenario_gen.logs.columns import UNITS
+from scenario_gen.logs.raw import MAX_NUMBER_LENGTH_COUNT
 from scenario_gen.numerics import Bools
 
 MAX_STAMP_S = 9e9
@@ -19,7 +20,6 @@ MAX_STAMP_S = 9e9
 
 _UNIX_TIME_S = (3e8, 4e9)  # from 1979 to 2096
 MAX_DATE_LENGTH_COUNT = 64  # characters; pandas takes minutes for a date of 100,000 digits
-_MAX_NUMBER_LENGTH_COUNT = 300  # characters; pandas fails on a number beyond float64
 _USUAL_PERIOD_S = (0.005, 2.0)
 _DAY_S = 86_400.0
 _CLOCK_TIME = r"\s*\d{1,2}:\d{2}:\d{2}(?:[.,]\d+)?\s*"
@@ -31,7 +31,7 @@ Stamps = tuple["pd.Series[int]", "pd.Series[bool]"]
 def reals(values: "pd.Series[Any]") -> "pd.Series[float]":
     """Return numbers, or texts that are numbers, as float64; NaN for others."""
     if not pd.api.types.is_numeric_dtype(values):
-        values = values.where(values.astype(str).str.len() < _MAX_NUMBER_LENGTH_COUNT)
+        values = values.where(values.astype(str).str.len() < MAX_NUMBER_LENGTH_COUNT)
     return pd.to_numeric(values, errors="coerce").astype(float)
 
 

@@ -18,6 +18,7 @@ from scenario_gen.logs.column import Column
 from scenario_gen.logs.config import LogConfig
 from scenario_gen.logs.raw import check_size
 from scenario_gen.logs.stamps import read_stamps, time_of_day
+from scenario_gen.logs.text import READ_OPTIONS
 from scenario_gen.numerics import Bools, Ints
 
 LARGE_BYTES = 64 << 20
@@ -69,14 +70,7 @@ def _blocks(path: Path, options: Mapping[str, Any]) -> Iterator[pd.DataFrame]:
     """
     with (
         guarded(f"{path} cannot be read as a table"),
-        pd.read_csv(
-            path,
-            skipinitialspace=True,
-            skip_blank_lines=False,
-            compression=None,
-            chunksize=_BLOCK_ROWS,
-            **options,
-        ) as reader,
+        pd.read_csv(path, chunksize=_BLOCK_ROWS, **READ_OPTIONS, **options) as reader,
     ):
         yield from reader
 
@@ -134,13 +128,9 @@ def _check_continuous(block: pd.DataFrame, path: Path, columns: Mapping[str, Col
     values = block[column.name]
     if "date" not in columns and time_of_day(values, column) is not None:
         raise InputError(f"{where}: times of the day have no date; {remedy}")
-    if not column.unit and _are_counts(values):
+    may_count_frames = pd.api.types.is_integer_dtype(values) and values.abs().max() < 1e9
+    if not column.unit and may_count_frames:
         raise InputError(
             f"{where} has whole numbers without a unit; name it, for example "
             f"--set log.columns=time={column.name}:s or {column.name}:25fps"
         )
-
-
-def _are_counts(values: "pd.Series[Any]") -> bool:
-    """Return whether stamps are small whole numbers, which may count frames."""
-    return bool(pd.api.types.is_integer_dtype(values) and values.abs().max() < 1e9)

@@ -33,7 +33,7 @@ from scenario_gen.logs.table_parts import (
     with_hemispheres,
 )
 from scenario_gen.logs.table_window import has_window, read_window
-from scenario_gen.logs.text import Layout, layout_of
+from scenario_gen.logs.text import Layout, layout_of, READ_OPTIONS
 from scenario_gen.numerics import Floats
 
 SPMD_EPOCH_NS = 1_072_915_200 * 10**9
@@ -278,9 +278,7 @@ def read_text(path: Path, rows_before: int, config: LogConfig, **options: Any) -
     options = {"encoding": "utf-8-sig", "nrows": config.row_limit - rows_before + 1, **options}
     with guarded(f"{path} cannot be read as a table"):
         try:
-            frame = pd.read_csv(
-                path, skipinitialspace=True, skip_blank_lines=False, compression=None, **options
-            )
+            frame = pd.read_csv(path, **READ_OPTIONS, **options)
         except UnicodeDecodeError as error:
             raise InputError(
                 f"{path} is not UTF-8 text (byte {error.start}); save it as UTF-8"

@@ -19,6 +19,10 @@ _NUMBER = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?")
 _NUMBER_WITH_COMMA = re.compile(r"[-+]?\d*,\d+")
 
 
+READ_OPTIONS = {"skipinitialspace": True, "skip_blank_lines": False, "compression": None}
+"""How pandas reads every text table: a row for each line, and no archive by its suffix."""
+
+
 @dataclass(frozen=True)
 class Layout:
     """How a table is written.

@@ -99,10 +99,16 @@ def folder(source: Path) -> Path:
     digest = sha256(repr((OPTIONS, _processor(), versions)).encode())
     for file in _with_imports(source):
         digest.update(file.name.encode())
-        digest.update(sha256(file.read_bytes()).digest())
+        digest.update(_content(file))
     place = root() / f"kernels-{digest.hexdigest()[:16]}"
     place.mkdir(mode=0o700, exist_ok=True)
     return place
+
+
+@cache
+def _content(file: Path) -> bytes:
+    """Return the hash of a file, which several others may import."""
+    return sha256(file.read_bytes()).digest()
 
 
 @cache

@@ -48,6 +48,19 @@ class BagMessage:
     stamp_ns: int
 
 
+def _within(
+    messages: Iterator[BagMessage], within_ns: tuple[int, int], unseen: set[str]
+) -> Iterator[BagMessage]:
+    """Yield the messages in a window, and the first ones of the `unseen` topics."""
+    first_ns, last_ns = within_ns
+    for message in messages:
+        if message.stamp_ns > last_ns and not unseen:
+            return
+        if message.topic in unseen or first_ns <= message.stamp_ns <= last_ns:
+            unseen.discard(message.topic)
+            yield message
+
+
 @dataclass(frozen=True)
 class StoredBag:
     """An open bag.
@@ -93,12 +106,11 @@ class StoredBag:
                 topic is not CDR of a known type.
         """
         streams = [self._messages_of_file(path, file, wanted) for path, file in self.files]
-        seen: set[str] = set()
-        for message in heapq.merge(*streams, key=attrgetter("stamp_ns")):
-            is_outside = within_ns and not within_ns[0] <= message.stamp_ns <= within_ns[1]
-            if is_outside and message.topic in seen:
-                continue
-            seen.add(message.topic)
+        merged: Iterator[BagMessage] = heapq.merge(*streams, key=attrgetter("stamp_ns"))
+        if within_ns:
+            offered = (topic for topic in self.topics() if wanted(topic.name, topic.type))
+            merged = _within(merged, within_ns, {topic.name for topic in offered if topic.count})
+        for message in merged:
             self.budget.spend_message(len(message.data))
             yield message
 
