@@ -20,10 +20,10 @@ from scenario_gen.logs.read import LogResult as LogResult
 from scenario_gen.logs.synthetic import bundled as bundled
 from scenario_gen.method.config import PipelineConfig as PipelineConfig
 from scenario_gen.method.decisions import decided as decided, decisions_of as decisions_of
-from scenario_gen.method.evaluation import (
+from scenario_gen.method.evaluation.config import EvaluationConfig as EvaluationConfig
+from scenario_gen.method.evaluation.evaluate import (
     evaluate as evaluate,
     evaluate_scenarios as evaluate_scenarios,
-    EvaluationConfig as EvaluationConfig,
 )
 from scenario_gen.method.fitting import (
     fit_template as fit_template,
