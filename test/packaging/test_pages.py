@@ -56,7 +56,7 @@ def test_python_of_the_readme_runs(place, capsys):
 def test_the_table_of_columns_is_the_code_s():
     rows = re.findall(
         r"^\| (\w+) \| (`.*?) \| (.*?) \|$",
-        (ROOT / "docs" / "columns.md").read_text(),
+        (ROOT / "docs" / "files.md").read_text(),
         re.MULTILINE,
     )
     shown = {
