@@ -13,9 +13,9 @@ from scenario_gen.numerics import Floats, Ints
 from scenario_gen.types.markings import markings
 
 PICTURE = Path(__file__).with_name("picture.svg")
-CASE, ROAD, COUNT, SEED = "left_turn", "four_way", 30, 7
-LABELS = ("vehicle 1 goes straight on", "vehicle 2 turns left and waits")
-TURNS = 1  # index of the one that waits
+CASE, ROAD, COUNT, SEED = "ngsim_left_turn", "four_way", 30, 7
+LABELS = ("vehicle 2839 waits and turns left", "vehicle 21019 goes straight on")
+TURNS = 0  # index of the one that waits
 PANELS = 4  # the recording and three scenarios; the speeds are of all
 WIDTH, PANEL, GAP, TOP, PLOT_TOP, PLOT_HEIGHT = 900, 216, 12, 24, 280, 120  # pixels
 LEFT = 36

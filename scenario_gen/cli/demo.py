@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The demo: three encounters with reactions.
+"""The demo: three recorded encounters with reactions.
 
 This process and, on request, the ROS nodes generate scenarios; both must agree byte for byte.
 """
@@ -20,9 +20,13 @@ from scenario_gen.output.results import namespaces
 from scenario_gen.pipeline import PipelineConfig
 from scenario_gen.types import GenerationResult
 
-ROADS = {"left_turn": "four_way", "follower": "curve", "all_way_stop": "four_way"}
+ROADS = {
+    "ngsim_left_turn": "four_way",
+    "ngsim_two_left_turns": "t_intersection",
+    "v2x_following": "curve",
+}
 """The bundled encounters and their roads."""
-TITLE = "Demo: new scenarios from three synthetic encounters"
+TITLE = "Demo: new scenarios from three recorded encounters"
 
 
 def run_demo(

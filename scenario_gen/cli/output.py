@@ -18,6 +18,10 @@ from scenario_gen.base.errors import InputError, printable
 from scenario_gen.base.stores import renamed
 
 
+UNBOUNDED_COLUMNS = 10_000
+"""Width of a terminal in which no line breaks."""
+
+
 @dataclass
 class Output:
     """How the running command prints, and the fields of its JSON object so far."""
@@ -70,12 +74,25 @@ def _json_scalar(value: Any) -> bool | int | float | str | None:
 
 
 def print_(*values: Any, sep: str = " ", wrap: bool = False) -> None:
-    """Print texts literally, and rich objects; `wrap` breaks lines at the terminal width."""
+    """Print texts literally, and rich objects; `wrap` breaks lines at the terminal width.
+
+    Where another program reads, no line is broken or ends in spaces, and Markdown stays as it is.
+    """
     from scenario_gen.base.terminal import Terminal
 
-    if not current.quiet:
-        texts = [renamed(value) if isinstance(value, str) else value for value in values]
-        Terminal(stderr=current.as_json).print(*texts, sep=sep, soft_wrap=not wrap)
+    if current.quiet:
+        return
+    texts = [renamed(value) if isinstance(value, str) else value for value in values]
+    terminal = Terminal(stderr=current.as_json)
+    if terminal.is_terminal:
+        terminal.print(*texts, sep=sep, soft_wrap=not wrap)
+        return
+    plain = [getattr(text, "markup", text) for text in texts]
+    terminal.width = UNBOUNDED_COLUMNS
+    with terminal.capture() as captured:
+        terminal.print(*plain, sep=sep)
+    for line in captured.get().splitlines():
+        print(line.rstrip(), file=terminal.file)
 
 
 def print_table(columns: Sequence[str], rows: Sequence[Sequence[str]], names: int = 1) -> None:
@@ -101,7 +118,7 @@ def print_table(columns: Sequence[str], rows: Sequence[Sequence[str]], names: in
     table = Table(*columns, box=None, pad_edge=False)
     for row in rows:
         table.add_row(*row)
-    unbounded = terminal.options.update(width=10_000)  # measures a table without wrapping it
+    unbounded = terminal.options.update(width=UNBOUNDED_COLUMNS)  # measures a table without wrapping it
     if terminal.measure(table, options=unbounded).maximum <= terminal.width:
         print_(table)
         return

@@ -1,23 +1,30 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The bundled synthetic logs: the paper's three cases (V-A, Fig. 3) and the demo's encounters."""
+"""The bundled logs: three recorded ones, and invented ones: the paper's cases (V-A, Fig. 3) and three more.
+
+`resources/recorded/README.md` names the sources and licences of the recorded logs.
+"""
 
 from pathlib import Path
 
+RECORDED = ("ngsim_left_turn", "ngsim_two_left_turns", "v2x_following")
 CASES = ("a", "b", "c")
-DEMO = ("left_turn", "follower", "all_way_stop")  # drawn by docs/demo_encounters.py
+DRAWN = ("left_turn", "follower", "all_way_stop")  # drawn by docs/demo_encounters.py
 RESOURCES = Path(__file__).resolve().parents[1] / "resources"
 
 
 def bundled(case: str) -> Path:
-    """Return the path of a bundled log: the bag of one of `CASES`, or the table of one of `DEMO`.
+    """Return the path of a bundled log: a table of `RECORDED` or `DRAWN`, or a bag of `CASES`.
 
     Raises:
-        ValueError: there is no such case.
+        ValueError: there is no such log.
     """
-    if case not in CASES + DEMO:
-        raise ValueError(f"there is no case {case!r}; choose one of {', '.join(CASES + DEMO)}")
-    if case in DEMO:
+    if case in RECORDED:
+        return RESOURCES / "recorded" / f"{case}.csv"
+    if case in DRAWN:
         return RESOURCES / "demo" / f"{case}.csv"
-    return RESOURCES / f"synthetic_{case}"
+    if case in CASES:
+        return RESOURCES / f"synthetic_{case}"
+    names = ", ".join(RECORDED + CASES + DRAWN)
+    raise ValueError(f"there is no bundled log {case!r}; choose one of {names}")
