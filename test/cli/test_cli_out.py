@@ -119,7 +119,7 @@ def test_names_are_shown_letter_by_letter(run, tmp_path):
     )
     told = [run(*words)[1] for words in more]
     escaped = r"\[red\]a\\x1b\[31m\*b\*\\u202e"  # in Markdown, which a pipe receives
-        assert f"{escaped} on straight" in told[0]
+    assert f"{escaped} on straight" in told[0]
     assert all("\x1b" not in text and "\u202e" not in text for text in (said, *told))
 
 
