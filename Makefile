@@ -63,9 +63,9 @@ judges: $(TEST) .venv-judges-commonroad/.ready .venv-judges-asam/.ready .venv-ju
 core: $(TEST)
 	$(BIN)/python test/packaging/core_install.py
 
-# The counts in docs/architecture.md. A test holds their budget.
+# The counts in CONTRIBUTING.md. A test holds their budget.
 counts: $(TEST)
-	$(BIN)/python test/packaging/counts.py --write docs/architecture.md
+	$(BIN)/python test/packaging/counts.py --write CONTRIBUTING.md
 
 # The site, in out/docs: built from the sources, which are not imported.
 docs: .venv-docs/.ready

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Measure the sources and their budget; `make counts` writes the tables into docs/architecture.md.
+"""Measure the sources and their budget; `make counts` writes the tables into CONTRIBUTING.md.
 
     python counts.py [--write PAGE] [--list NAME] [PATH ...]
 
