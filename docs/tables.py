@@ -1,0 +1,102 @@
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""Write the tables of the reference, docs/tables/*.csv, from the code: `python docs/tables.py`."""
+
+from collections.abc import Iterator
+import csv
+import io
+from pathlib import Path
+import re
+from typing import Any
+
+import typer
+
+from scenario_gen.base.parameters import flatten
+from scenario_gen.cli.commands import app
+from scenario_gen.closed_loop.config import ClosedLoopConfig
+from scenario_gen.closed_loop.trials import Bars
+from scenario_gen.corpus.config import CorpusConfig
+from scenario_gen.logs.columns import NAMES, UNITS
+from scenario_gen.output.exchange import ExportConfig
+
+FOLDER = Path(__file__).with_name("tables")
+# Parameters of single commands, without those of config/default.yaml.
+SINGLE = {
+    "drive": [ClosedLoopConfig(), Bars()],
+    "mine": [CorpusConfig()],
+    "export": [ExportConfig()],
+}
+SHARED = ("limits.", "log.", "bag.")
+Row = tuple[str, ...]
+
+
+def code(text: str) -> str:
+    """Return text as reStructuredText's literal."""
+    return f"``{text}``" if text else ""
+
+
+def columns() -> Iterator[Row]:
+    """Yield the recognised columns of a table, with their units."""
+    yield "quantity", "names, the preferred first", "units, the default first"
+    for quantity, names in NAMES.items():
+        yield quantity, ", ".join(map(code, names)), ", ".join(map(code, UNITS[quantity]))
+
+
+def parameters() -> Iterator[Row]:
+    """Yield the parameters of single commands."""
+    yield "command", "parameter", "default", "meaning"
+    for command, configs in SINGLE.items():
+        for config in configs:
+            prefix = "bars." if isinstance(config, Bars) else ""
+            for name, (entry, default) in flatten(config, prefix).items():
+                if not name.startswith(SHARED):
+                    unit = f" {entry.metadata['unit']}" if entry.metadata["unit"] else ""
+                    value = f"{code(str(default))}{unit}"
+                    yield command, code(name), value, literal(entry.metadata["meaning"])
+
+
+def commands() -> Iterator[Row]:
+    """Yield all commands with their arguments and options."""
+    yield "command", "argument or option", "default", "meaning"
+    group: Any = typer.main.get_command(app)
+    yield from options(group)
+    for name, command in group.commands.items():
+        yield code(name), "", "", literal(command.get_short_help_str(limit=1000))
+        yield from options(command)
+
+
+def options(command: Any) -> Iterator[Row]:
+    """Yield a row per argument and option of a command."""
+    for entry in command.params:
+        if entry.name == "help" or getattr(entry, "hidden", False):
+            continue
+        names = entry.opts if entry.opts[0].startswith("-") else [str(entry.name).upper()]
+        default = "" if entry.default in (None, "") or entry.default is False else entry.default
+        meaning = getattr(entry, "help", "") or ""
+        yield "", ", ".join(map(code, names)), code(str(default)), literal(meaning)
+
+
+def literal(text: str) -> str:
+    """Return a help text with Markdown's code as reStructuredText's, without rich's escapes."""
+    text = text.replace("\\[", "[")
+    return re.sub(r"(?<!`)`([^`]+)`(?!`)", r"``\1``", " ".join(text.split())).replace("*", r"\*")
+
+
+def tables() -> dict[str, str]:
+    """Return the text of each table by its file's name."""
+    made: dict[str, Any] = {"columns": columns, "parameters": parameters, "commands": commands}
+    return {f"{name}.csv": written(list(table())) for name, table in made.items()}
+
+
+def written(lines: list[Row]) -> str:
+    """Return rows as CSV."""
+    text = io.StringIO()
+    csv.writer(text, lineterminator="\n").writerows(lines)
+    return text.getvalue()
+
+
+if __name__ == "__main__":
+    FOLDER.mkdir(exist_ok=True)
+    for name, text in tables().items():
+        (FOLDER / name).write_text(text, encoding="utf-8")
