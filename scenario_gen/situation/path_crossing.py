@@ -5,6 +5,7 @@
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 
@@ -36,6 +37,7 @@ class PathCrossing:
     driven: bool
 
 
+@lru_cache(maxsize=256)
 def path_crossing(a: Track, b: Track) -> PathCrossing | None:
     """Return the crossing that both vehicles come closest to reaching; None if there is none.
 

@@ -21,7 +21,8 @@ def over_all_edges(curve, xy):
     along = edge / size[:, None]
     rel = xy[:, None, :] - line[None, :-1, :]
     t = np.clip(rel[..., 0] * along[:, 0] + rel[..., 1] * along[:, 1], 0.0, size)
-    gap = np.hypot(rel[..., 0] - t * along[:, 0], rel[..., 1] - t * along[:, 1])
+    across, over = rel[..., 0] - t * along[:, 0], rel[..., 1] - t * along[:, 1]
+    gap = np.sqrt(across * across + over * over)
     best, rows = np.argmin(gap, axis=1), np.arange(len(xy))
     side = along[best, 0] * rel[rows, best, 1] - along[best, 1] * rel[rows, best, 0]
     return at[best] + t[rows, best], np.sign(side) * gap[rows, best]

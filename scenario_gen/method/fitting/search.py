@@ -211,8 +211,8 @@ class _GridSearch:
             clearance = np.where(inside, self.road.clearance[row, column], 0.0)
             return np.asarray(self._penalty(clearance).mean(axis=1))
 
-        start = np.array([*coarse.centre, coarse.yaw])
+        start = np.array([[*coarse.centre, coarse.yaw]])
         steps = np.array([1.0, 1.0, np.radians(3.0)])
-        state, cost = pattern_search(costs, start, steps, 0.05)
-        x, y, yaw = state.tolist()
-        return _Similarity(cost, coarse.scale, yaw, (x, y))
+        states, (cost,) = pattern_search(costs, start, steps, 0.05)
+        x, y, yaw = states[0].tolist()
+        return _Similarity(float(cost), coarse.scale, yaw, (x, y))

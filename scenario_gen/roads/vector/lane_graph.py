@@ -4,19 +4,18 @@
 """The lanes of a map prepared for placing recordings: lane paths, nearby lanes, distances."""
 
 from collections.abc import Collection, Iterator, Sequence
-from dataclasses import dataclass
 from functools import cached_property, lru_cache
 import math
 
 import numpy as np
 
-from scenario_gen.base.errors import RefusedError
-from scenario_gen.numerics import Counts, Floats, Ints, wrap_angle
+from scenario_gen.numerics import Floats, wrap_angle
 from scenario_gen.numerics.curve import crossings, Curve
 from scenario_gen.numerics.plane import edge_lengths
+from scenario_gen.roads.vector.lane_field import LaneField
 from scenario_gen.roads.vector.network import crossing_lanes
 from scenario_gen.situation import Track
-from scenario_gen.types import CARS, Lane, LaneNetwork
+from scenario_gen.types import CARS, LaneNetwork
 
 LEAD_M = 25.0
 """Of lanes before and after the driven part of a lane path."""
@@ -28,14 +27,6 @@ _MAX_START_TURN_RAD = math.radians(60.0)
 _POINT_SPACING_M = 0.5  # of a lane path
 _SMOOTHING_POINTS = 3  # to each side of a point that is averaged: polylines have corners
 _MIN_CROSSING_ANGLE_RAD = math.radians(15.0)
-
-_MAX_FIELD_CELLS = 30_000_000  # of a map; a larger one gets larger cells
-_MAX_SECTIONS_COUNT = 300_000  # a metre of lane each, of a map that is searched as a whole
-_CHUNK_ROWS = 20_000  # sections that are rasterised at once
-_MAX_FIELD_DISTANCE_M = 4.0  # beyond which a pose counts as off the road
-_DIRECTION_COUNT = 16
-_MAX_LANE_TURN_RAD = math.radians(35.0)  # between a pose and its lane
-_NUDGE_CELLS = 1e-6  # puts a pose on the edge of two cells into the same one on every CPU
 
 
 class LaneGraph:
@@ -62,7 +53,7 @@ class LaneGraph:
         self._closed: dict[frozenset[str], frozenset[int]] = {}
 
     @cached_property
-    def field(self) -> "LaneField":
+    def field(self) -> LaneField:
         """The distance of every pose on the map from the nearest lane of its direction."""
         return LaneField.of(self.network)
 
@@ -174,87 +165,3 @@ def _smooth_curve(points: Floats) -> Curve:
     room = np.minimum(index, index[::-1])[:, None]
     offset = np.arange(-_SMOOTHING_POINTS, _SMOOTHING_POINTS + 1)
     return Curve.through(even[index[:, None] + np.clip(offset, -room, room)].mean(axis=1))
-
-
-def lane_sections(lanes: Sequence[Lane], every: int = 1) -> tuple[Floats, Floats]:
-    """Return the middles (P, 2) [m] and directions (P,) [rad] of every n-th section of lanes."""
-    middles = np.concatenate([lane.middle[::every] for lane in lanes])
-    return middles, np.concatenate([lane.yaw[::every] for lane in lanes])
-
-
-@dataclass(frozen=True, eq=False)
-class LaneField:
-    """The distance of every cell of a map from the nearest lane of each direction.
-
-    Attributes:
-        low: (2,) [m] the lower-left corner of the grid.
-        size: (2,) its columns and rows.
-        cell: [m] size of its cells.
-        rows: (size,) the row of `distance` of each cell, by flat index.
-        distance: (C + 1, 16) [m], at most `_MAX_FIELD_DISTANCE_M`; the last row is off the road.
-    """
-
-    low: Floats
-    size: Ints
-    cell: float
-    rows: Counts
-    distance: Floats
-
-    @classmethod
-    def of(cls, network: LaneNetwork) -> "LaneField":
-        """Return the field of a network.
-
-        Raises:
-            RefusedError: the map is too large.
-        """
-        points, yaws = lane_sections(network.lanes)
-        if len(points) > _MAX_SECTIONS_COUNT:
-            raise RefusedError(
-                f"map {network.name} has {len(points)} sections of lanes; at most "
-                f"{_MAX_SECTIONS_COUNT} are searched for a place: choose a part with "
-                "#box=x0,y0,x1,y1"
-            )
-        low = points.min(axis=0) - _MAX_FIELD_DISTANCE_M
-        high = points.max(axis=0) + _MAX_FIELD_DISTANCE_M
-        cell = max(1.0, math.sqrt(float(np.prod(high - low)) / _MAX_FIELD_CELLS))
-        size = np.ceil((high - low) / cell).astype(np.int64) + 1
-        chunks = [slice(k, k + _CHUNK_ROWS) for k in range(0, len(points), _CHUNK_ROWS)]
-
-        near_lanes = np.zeros(int(size[0] * size[1]), dtype=np.bool_)
-        for chunk in chunks:
-            near_lanes[_cells_around(points[chunk], low, cell, size)[1]] = True
-        known = np.flatnonzero(near_lanes)
-        rows = np.full(len(near_lanes), len(known), dtype=np.int32)
-        rows[known] = np.arange(len(known))
-
-        table = np.full((len(known) + 1, _DIRECTION_COUNT), _MAX_FIELD_DISTANCE_M)
-        for chunk in chunks:
-            distance, flat = _cells_around(points[chunk], low, cell, size)
-            row = rows[flat]
-            for k in range(_DIRECTION_COUNT):
-                turn = np.abs(wrap_angle(yaws[chunk] - 2.0 * np.pi * k / _DIRECTION_COUNT))
-                alike = turn <= _MAX_LANE_TURN_RAD
-                np.minimum.at(table[:, k], row[alike].ravel(), distance[alike].ravel())
-        return cls(low, size, cell, rows, table)
-
-    def squared(self, points: Floats, yaws: Floats) -> Floats:
-        """Return the squared distances [m²] of poses (..., 2), (...) from the nearest lanes."""
-        cell = np.floor((points - self.low) / self.cell + _NUDGE_CELLS).astype(np.int64)
-        inside = ((cell >= 0) & (cell < self.size)).all(axis=-1)
-        flat = np.where(inside, cell[..., 1] * self.size[0] + cell[..., 0], 0)
-        row = np.where(inside, self.rows[flat], len(self.distance) - 1)
-        sector = np.round(yaws / (2.0 * np.pi / _DIRECTION_COUNT) + _NUDGE_CELLS)
-        column: Ints = sector.astype(np.int64) % _DIRECTION_COUNT
-        return np.asarray(np.square(self.distance[row, column]))
-
-
-def _cells_around(points: Floats, low: Floats, cell: float, size: Ints) -> tuple[Floats, Ints]:
-    """Return the distances [m] and flat indices (P, O) of the cells around points (P, 2) [m]."""
-    reach = math.ceil(_MAX_FIELD_DISTANCE_M / cell)
-    steps = np.arange(-reach, reach + 1)
-    offsets = np.stack(np.meshgrid(steps, steps), axis=-1).reshape(-1, 2)
-    at = np.floor((points - low) / cell).astype(np.int64)
-    cells = np.clip(at[:, None] + offsets, 0, size - 1)
-    centres = low + (cells + 0.5) * cell
-    distance = np.hypot(centres[..., 0] - points[:, None, 0], centres[..., 1] - points[:, None, 1])
-    return distance, cells[..., 1] * size[0] + cells[..., 0]

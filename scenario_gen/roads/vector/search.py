@@ -19,7 +19,8 @@ from scenario_gen.base.cancelling import stop_if_cancelled
 from scenario_gen.numerics import Floats, wrap_angle
 from scenario_gen.numerics.pattern_search import pattern_search
 from scenario_gen.numerics.plane import place
-from scenario_gen.roads.vector.lane_graph import lane_sections, LaneField, LaneGraph
+from scenario_gen.roads.vector.lane_field import lane_sections, LaneField
+from scenario_gen.roads.vector.lane_graph import LaneGraph
 from scenario_gen.situation import pair_crossings, Track
 
 _KEPT_CANDIDATES = 60
@@ -82,24 +83,24 @@ class _RecordedPoses:
         step = max(_CHUNK_POSES // len(self.poses), 1)
         parts = []
         for first in range(0, len(frames), step):
-            chunk = frames[first : first + step]
-            points = place(chunk[:, None], *self.poses[:, :2].T)
-            squared = field.squared(points, self.poses[:, 2] + chunk[:, 2, None])
+            squared = field.squared(frames[first : first + step], self.poses)
             parts.append((squared * self.weight).sum(axis=1))
         return np.concatenate([np.zeros(0), *parts])
 
-    def refined(self, field: LaneField, placement: RigidPlacement) -> RigidPlacement:
-        """Return the best placement near one, by moves and turns about the recording's centre."""
+    def refined(self, field: LaneField, rows: Floats) -> Floats:
+        """Return the best rows near some, by moves and turns about the recording's centre.
+
+        Rows (M, 4) are cost [m²], x, y [m], yaw [rad].
+        """
         centre = self.centre
         local = _RecordedPoses(self.poses - np.array([*centre, 0.0]), self.weight)
-        state, cost = pattern_search(
+        states, costs = pattern_search(
             lambda frames: local.costs(field, frames),
-            np.array([*placement.apply(centre), placement.yaw]),
+            np.column_stack((place(rows[:, 1:], *centre), rows[:, 3])),
             np.array([2.0, 2.0, math.radians(4.0)]),
             0.2,
         )
-        (frame,) = _frames_onto(centre, state[None, :2], state[2:])
-        return RigidPlacement(cost, *frame.tolist())
+        return np.column_stack((costs, _frames_onto(centre, states[:, :2], states[:, 2])))
 
 
 def rigid_placements(
@@ -115,16 +116,15 @@ def rigid_placements(
     field, recorded = graph.field, _RecordedPoses.of(tracks)
     chosen = graph.network.lanes if lanes is None else [graph.network.lanes[k] for k in lanes]
     points, yaws = lane_sections(chosen, every=2)
-    candidates: list[RigidPlacement] = []
+    candidates = []
     for anchor in _anchors(tracks):
         frames = _frames_onto(anchor[:2], points, yaws - anchor[2])
         cost = recorded.costs(field, frames)
         stop_if_cancelled()
         best = np.argsort(np.round(cost, 9), kind="stable")[: 4 * _KEPT_CANDIDATES]
-        rows = np.column_stack((cost, frames))[best].tolist()
-        candidates += [RigidPlacement(*row) for row in rows]
-    coarse = _distinct(candidates, recorded.centre)
-    return _distinct([recorded.refined(field, each) for each in coarse], recorded.centre)
+        candidates.append(np.column_stack((cost, frames))[best])
+    coarse = _distinct(np.concatenate(candidates), recorded.centre)
+    return _placements(_distinct(recorded.refined(field, coarse), recorded.centre))
 
 
 def crossing_placements(graph: LaneGraph, tracks: tuple[Track, ...]) -> list[RigidPlacement]:
@@ -146,8 +146,8 @@ def crossing_placements(graph: LaneGraph, tracks: tuple[Track, ...]) -> list[Rig
     if not len(moved):
         return []
     recorded = _RecordedPoses.of(tracks)
-    rows = np.column_stack((recorded.costs(graph.field, moved), moved)).tolist()
-    return _distinct([RigidPlacement(*row) for row in rows], recorded.centre)
+    rows = np.column_stack((recorded.costs(graph.field, moved), moved))
+    return _placements(_distinct(rows, recorded.centre))
 
 
 def placement_at(graph: LaneGraph, tracks: tuple[Track, ...], frame: Floats) -> RigidPlacement:
@@ -174,27 +174,22 @@ def _anchors(tracks: tuple[Track, ...]) -> list[Floats]:
     return anchors
 
 
-def _rank(placement: RigidPlacement) -> tuple[float, ...]:
-    """Order placements by cost; rounding makes it the same on every CPU."""
-    return (
-        round(placement.cost, 6),
-        round(placement.yaw, 6),
-        round(placement.x, 3),
-        round(placement.y, 3),
-    )
+def _placements(rows: Floats) -> list[RigidPlacement]:
+    """Return the placements of rows (M, 4) cost [m²], x, y [m], yaw [rad]."""
+    return [RigidPlacement(*row) for row in rows.tolist()]
 
 
-def _distinct(placements: list[RigidPlacement], centre: Floats) -> list[RigidPlacement]:
-    """Return the best of those that are nearly the same, the best first."""
-    kept: list[RigidPlacement] = []
-    poses = np.empty((0, 3))
-    for placement in sorted(placements, key=_rank):
-        pose = np.array([*placement.apply(centre), placement.yaw])
-        offset = np.abs(poses - pose)[:, :2]
-        turn = np.abs(wrap_angle(poses[:, 2] - pose[2]))
-        if not ((offset < _MIN_DISTANCE_M).all(axis=1) & (turn < _MIN_TURN_RAD)).any():
-            kept.append(placement)
-            poses = np.vstack((poses, pose))
-            if len(kept) == _KEPT_CANDIDATES:
-                break
-    return kept
+def _distinct(rows: Floats, centre: Floats) -> Floats:
+    """Return the best of those rows (M, 4) that are nearly the same, the best first."""
+    cost, x, y, yaw = rows.T
+    # Rounding makes the order the same on every CPU.
+    order = np.lexsort((np.round(y, 3), np.round(x, 3), np.round(yaw, 6), np.round(cost, 6)))
+    places = place(rows[:, 1:], *centre)
+    kept: list[int] = []
+    while len(order) and len(kept) < _KEPT_CANDIDATES:
+        best = order[0]
+        kept.append(best)
+        offset = np.abs(places[order] - places[best]).max(axis=1)
+        turn = np.abs(wrap_angle(yaw[order] - yaw[best]))
+        order = order[(offset >= _MIN_DISTANCE_M) | (turn >= _MIN_TURN_RAD)]
+    return rows[kept]

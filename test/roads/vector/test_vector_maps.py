@@ -380,7 +380,7 @@ def test_lanes_that_cross_are_one_junction_however_long_they_are(tmp_path):
 
 
 def test_a_whole_map_that_is_too_long_to_be_searched_is_refused(tmp_path, monkeypatch):
-    monkeypatch.setattr("scenario_gen.roads.vector.lane_graph._MAX_SECTIONS_COUNT", 100)
+    monkeypatch.setattr("scenario_gen.roads.vector.lane_field._MAX_SECTIONS_COUNT", 100)
     (encounter,) = read_log([bundled("b")]).encounters
     with pytest.raises(RefusedError, match=r"choose a part with #box=x0,y0,x1,y1"):
         build_road(str(write(tmp_path, ".osm")), encounter)
