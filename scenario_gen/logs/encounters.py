@@ -15,6 +15,7 @@ from scenario_gen.logs.noise import speed_of_fixes
 from scenario_gen.logs.quality import VehicleQuality
 from scenario_gen.logs.raw import Observations
 from scenario_gen.logs.smoothing import (
+    interpolated_piece,
     Smooth,
     smooth_piece,
     standing,
@@ -52,6 +53,7 @@ class PieceLimits:
 
 
 _LIMITS = PieceLimits()
+_COURSE_FIX_COUNT = 64  # fixes that are searched first for a course
 
 
 @dataclass(frozen=True, eq=False)
@@ -100,18 +102,21 @@ class _Cuts:
 
 
 def pieces_of(
-    track: Observations, origin_ns: int, config: LogConfig
+    track: Observations, origin_ns: int, config: LogConfig, *, smooth: bool = True
 ) -> tuple[list[Piece], VehicleQuality]:
     """Cut a track at gaps, relocations and reversals, and smooth each piece.
 
     Gaps of up to two and a half periods of the source are bridged, so that a source of 1 Hz is not
-    cut at every fix.
+    cut at every fix. With `smooth` false, the pieces are as recorded.
     """
     cuts = _find_cuts(track, config)
     parts = _split(track, cuts.any)
     smoothed: list[tuple[Observations, Smooth | None]] = []
     lost_s = 0.0
     for part in parts:
+        if not smooth:
+            smoothed.append((part, interpolated_piece(part, origin_ns, config)))
+            continue
         try:
             smoothed += _steerable(part, origin_ns, config)
         except UnreconciledError:
@@ -119,9 +124,9 @@ def pieces_of(
             lost_s += float(part.fix_ns[-1] - part.fix_ns[0]) * 1e-9
     ahead = points_ahead(config) * track.length
     pieces = [
-        Piece(part, _moved_ahead(smooth, ahead) if ahead else smooth)
-        for part, smooth in smoothed
-        if smooth is not None
+        Piece(part, _moved_ahead(motion, ahead) if ahead else motion)
+        for part, motion in smoothed
+        if motion is not None
     ]
     extra_reversals = len(smoothed) - len(parts)
     return pieces, _vehicle_quality(track, pieces, cuts, extra_reversals, lost_s, config)
@@ -188,6 +193,7 @@ def _vehicle_quality(
         turned=float(np.median(turned)) if len(turned) else np.nan,
         headings=float(used_headings.mean()) if len(used_headings) else np.nan,
         lost=lost_s,
+        smoothed=not pieces or any(len(smooth.moved) for smooth in smooths),
     )
 
 
@@ -202,6 +208,8 @@ def _with_plausible_types(pieces: Sequence[Piece]) -> tuple[list[Piece], list[st
     """Return the pieces; a vehicle that is too fast for its type becomes `other`, with a note."""
     top_speed: dict[tuple[str, str], float] = {}
     for piece in pieces:
+        if not len(piece.smooth.moved):
+            continue
         key = piece.track.id, piece.track.kind
         top_speed[key] = max(top_speed.get(key, 0.0), float(piece.smooth.speed.max()))
     too_fast: set[str] = set()
@@ -331,10 +339,16 @@ def _reversals(track: Observations, config: LogConfig) -> Bools:
 
 def _course(fix: Floats) -> Floats | None:
     """Return the unit vector (2,) from the first fix (F, 2) [m] to a distant one, or None."""
-    offset = fix - fix[0]
-    distance = np.hypot(offset[:, 0], offset[:, 1])
-    far = np.flatnonzero(distance > _LIMITS.course_length_m)
-    return offset[far[0]] / distance[far[0]] if len(far) else None
+    n_fixes = _COURSE_FIX_COUNT
+    while True:
+        offset = fix[:n_fixes] - fix[0]
+        distance = np.hypot(offset[:, 0], offset[:, 1])
+        far = np.flatnonzero(distance > _LIMITS.course_length_m)
+        if len(far):
+            return np.asarray(offset[far[0]] / distance[far[0]])
+        if n_fixes >= len(fix):
+            return None
+        n_fixes *= 4
 
 
 def _split(track: Observations, cuts: Bools) -> list[Observations]:

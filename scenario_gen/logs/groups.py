@@ -25,7 +25,7 @@ from scenario_gen.logs.gap import INTERACTS_M, space_time_gap
 from scenario_gen.logs.growing import Group, Growth, Meeting, MIN_MET_SHARE, Span
 from scenario_gen.logs.manoeuvres import complete_spans
 from scenario_gen.logs.raw import natural
-from scenario_gen.numerics import Floats, runs
+from scenario_gen.numerics import Floats, Ints, runs
 
 OUT_OF_RANGE_S = 1.0
 """Time for which a pair may be out of range within one meeting."""
@@ -34,6 +34,7 @@ _MIN_PRESENCE_SHARE = 0.6  # with `whole`, a vehicle joins if it is present for 
 _EDGE_S = 1.0  # by which a group is shortened so that its vehicles start and end together
 _REST_S = 2.0  # part of a long standstill that belongs to the encounter before or after it
 _STANDING_MPS = 0.1
+_NOISE_M = 50.0  # by which the distance of two vehicles may be wrong before smoothing
 
 
 class _PieceGroups(Growth[Meeting]):
@@ -198,11 +199,12 @@ def _find_meetings(
 ) -> list[Meeting]:
     """Return all meetings of two vehicles, in ticks; in a `small` log each has gap 0."""
     meetings = []
-    for i, j in _overlapping(pieces, shortest(config)):
-        for span in _near_spans(pieces[i], pieces[j], config, within):
-            gap = 0.0 if small else _gap(pieces[i], pieces[j], span, config)
-            if gap <= INTERACTS_M:
-                meetings.append(Meeting(gap, span[0], min(i, j), max(i, j), span[1]))
+    for i, others, bounds in simultaneous(pieces, shortest(config)):
+        for j in others[bounds < config.proximity].tolist():
+            for span in _near_spans(pieces[i], pieces[j], config, within):
+                gap = 0.0 if small else _gap(pieces[i], pieces[j], span, config)
+                if gap <= INTERACTS_M:
+                    meetings.append(Meeting(gap, span[0], min(i, j), max(i, j), span[1]))
     return meetings
 
 
@@ -221,15 +223,41 @@ def _near_spans(
                 yield first, last
 
 
-def _overlapping(pieces: Sequence[Piece], least: int) -> Iterator[tuple[int, int]]:
-    """Yield the pairs of pieces of different vehicles that share at least `least` ticks."""
-    order = sorted(range(len(pieces)), key=lambda i: pieces[i].first)
-    for k, i in enumerate(order):
-        for j in order[k + 1 :]:
-            if pieces[j].first > pieces[i].last - least:
-                break
-            if pieces[i].track.id != pieces[j].track.id:
-                yield i, j
+def vehicles_near(pieces: Sequence[Piece], config: LogConfig) -> set[str]:
+    """Return the vehicles of raw pieces that come near another one, with a margin."""
+    reach = config.proximity + _NOISE_M
+    near: set[str] = set()
+    for i, others, bounds in simultaneous(pieces, 1):
+        for j in others[bounds < reach].tolist():
+            names = {pieces[i].track.id, pieces[j].track.id}
+            if not names <= near and distances(pieces[i], pieces[j]).min() < reach:
+                near |= names
+    return near
+
+
+def simultaneous(pieces: Sequence[Piece], least: int) -> Iterator[tuple[int, Ints, Floats]]:
+    """Yield each piece with the later ones of other vehicles at its site, by first tick.
+
+    Args:
+        pieces: all pieces of a log.
+        least: ticks that two pieces share at least.
+
+    Yields:
+        The number of a piece, numbers (K,) of the others, and lower bounds (K,) of the distances
+        to them [m], by the rectangles around their positions.
+    """
+    first = np.array([piece.first for piece in pieces])
+    low = np.array([piece.smooth.position.min(axis=0) for piece in pieces])
+    high = np.array([piece.smooth.position.max(axis=0) for piece in pieces])
+    _, vehicle = np.unique([piece.track.id for piece in pieces], return_inverse=True)
+    _, site = np.unique([str(piece.track.origin) for piece in pieces], return_inverse=True)
+    order = np.argsort(first, kind="stable")
+    for k, i in enumerate(order.tolist()):
+        others = order[k + 1 :]
+        others = others[: np.searchsorted(first[others], pieces[i].last - least, side="right")]
+        others = others[(vehicle[others] != vehicle[i]) & (site[others] == site[i])]
+        space = np.maximum(low[others] - high[i], low[i] - high[others])
+        yield i, others, np.hypot(*np.maximum(space, 0.0).T)
 
 
 def _gap(a: Piece, b: Piece, span: Span, config: LogConfig) -> float:

@@ -3,8 +3,7 @@
 
 """Why a log has no encounter, and which parameter would change that."""
 
-from collections.abc import Sequence
-from itertools import combinations
+from collections.abc import Callable, Sequence
 import math
 from typing import NamedTuple
 
@@ -15,10 +14,10 @@ from scenario_gen.base.errors import InputError
 from scenario_gen.logs.cleaning import Cause, Drops
 from scenario_gen.logs.config import LogConfig
 from scenario_gen.logs.encounters import Piece
-from scenario_gen.logs.groups import distances, driven, ticks
+from scenario_gen.logs.groups import distances, driven, simultaneous, ticks
 from scenario_gen.logs.kinds import counted
 from scenario_gen.logs.raw import RawLog
-from scenario_gen.numerics import Floats, runs
+from scenario_gen.numerics import runs
 
 _MANY_DROPS_SHARE = 0.3  # of the rows, for one cause: their unit is likely wrong
 _UNIT_CHECKS = {
@@ -70,20 +69,19 @@ def explain_no_encounter(log: RawLog, pieces: Sequence[Piece], config: LogConfig
         f"{log.segments[0].label}: no two vehicles are within {config.proximity:g} m for "
         f"{config.min_duration:g} s while one drives {config.travel:g} m"
     )
-    pairs = [
-        (a, b)
-        for a, b in combinations(pieces, 2)
-        if a.track.id != b.track.id and np.isfinite(distances(a, b)).any()
+    near = [
+        _approach(pieces[i], pieces[j], config)
+        for i, others, bounds in simultaneous(pieces, 1)
+        for j in others[bounds < config.proximity].tolist()
     ]
-    if not pairs:
-        return f"{rule}: no two vehicles are recorded at the same time and place"
-    approaches = [_approach(a, b, config) for a, b in pairs]
-    best = max(approaches, key=lambda pair: (pair.seconds, pair.driven_m, -pair.nearest_m))
-    if best.seconds <= 0.0:
-        best = min(approaches, key=lambda pair: pair.nearest_m)
+    best = max(near, key=lambda pair: (pair.seconds, pair.driven_m, -pair.nearest_m), default=None)
+    if best is None or best.seconds <= 0.0:
+        nearest_m, i, j = _least(pieces, lambda a, b: float(distances(a, b).min()))
+        if not math.isfinite(nearest_m):
+            return f"{rule}: no two vehicles are recorded at the same time and place"
         return (
-            f"{rule}. Vehicles {best.first} and {best.second} come closest, to "
-            f"{best.nearest_m:.0f} m; {_proximity_advice(pairs, config)}"
+            f"{rule}. Vehicles {pieces[i].track.id} and {pieces[j].track.id} come closest, to "
+            f"{nearest_m:.0f} m; {_proximity_advice(pieces, config)}"
         )
     fact = (
         f"{rule}. Vehicles {best.first} and {best.second} are within {config.proximity:g} m for "
@@ -114,18 +112,37 @@ def _approach(a: Piece, b: Piece, config: LogConfig) -> _Approach:
     return _Approach(seconds, farther, float(distance.min()), a.track.id, b.track.id)
 
 
-def _proximity_advice(pairs: Sequence[tuple[Piece, Piece]], config: LogConfig) -> str:
+def _least(
+    pieces: Sequence[Piece], measure: Callable[[Piece, Piece], float]
+) -> tuple[float, int, int]:
+    """Return the least measure of two simultaneous pieces, and their numbers; infinite if none.
+
+    The measure [m] is at least the least distance of the two pieces.
+    """
+    best = math.inf, 0, 0
+    for i, others, bounds in simultaneous(pieces, 1):
+        for k in np.argsort(bounds).tolist():
+            if bounds[k] >= best[0]:
+                break
+            j = int(others[k])
+            best = min(best, (measure(pieces[i], pieces[j]), min(i, j), max(i, j)))
+    return best
+
+
+def _proximity_advice(pieces: Sequence[Piece], config: LogConfig) -> str:
     """Return the proximity that would accept two vehicles."""
     n_ticks = ticks(config.min_duration, config)
-    enough = [d for d in (distances(a, b) for a, b in pairs) if len(d) > n_ticks]
-    if not enough:
+
+    def needed_m(a: Piece, b: Piece) -> float:
+        """Return the least bound within which two pieces stay for `n_ticks`."""
+        distance = distances(a, b)
+        if len(distance) <= n_ticks:
+            return math.inf
+        windows = sliding_window_view(np.pad(distance, 1, "edge"), n_ticks + 2)
+        return float(windows.max(axis=1).min())
+
+    reach = _least(pieces, needed_m)[0]
+    if not math.isfinite(reach):
         return "no two vehicles are recorded together for that long"
-    reach = min(_largest_distance_needed(distance, n_ticks + 2) for distance in enough)
     proximity = math.ceil(reach / 10.0 + 1e-9) * 10
     return f"--set log.proximity={proximity} accepts two"
-
-
-def _largest_distance_needed(distance: Floats, width: int) -> float:
-    """Return the smallest bound within which distances (T,) [m] stay for `width` - 2 ticks."""
-    windows = sliding_window_view(np.pad(distance, 1, "edge"), width)
-    return float(windows.max(axis=1).min())

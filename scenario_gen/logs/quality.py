@@ -49,6 +49,7 @@ class VehicleQuality:
         turned: median difference of recorded and smooth headings while it moves [rad], or NaN.
         headings: share of the recorded headings that were used; others contradict the path.
         lost: seconds of pieces left out, since no motion of a car fits them.
+        smoothed: whether its motion was smoothed; not if it comes near no other vehicle.
     """
 
     id: str
@@ -69,6 +70,7 @@ class VehicleQuality:
     turned: float = math.nan
     headings: float = math.nan
     lost: float = 0.0
+    smoothed: bool = True
 
 
 @dataclass(frozen=True)
@@ -155,15 +157,17 @@ def _vehicle_line(vehicle: VehicleQuality) -> str:
         gaps += f", cut at {vehicle.cut} (up to {vehicle.longest_cut:.1f} s)"
     if vehicle.reversals:
         gaps += f", cut at {vehicle.reversals} reversals"
+    recorded = f"  vehicle {vehicle.id}: {vehicle.fixes} fixes, {vehicle.seconds:.1f} s; {gaps}; "
+    if not vehicle.smoothed:
+        return f"{recorded}not smoothed, since it comes near no other vehicle"
     headings = ""
     if math.isfinite(vehicle.headings):
         headings = f"; {100.0 * vehicle.headings:.0f} % of its headings used"
     if headings and math.isfinite(vehicle.turned):
         headings += f", changed by {math.degrees(vehicle.turned):.1f}° (median)"
     return (
-        f"  vehicle {vehicle.id}: {vehicle.fixes} fixes, {vehicle.seconds:.1f} s; {gaps}; "
-        f"speed against position {vehicle.speed_before:.2f} → {vehicle.speed_after:.2f} m/s RMS, "
-        f"speeds changed by {vehicle.changed:.2f} m/s, positions by {vehicle.moved:.2f} m RMS "
+        f"{recorded}speed against position {vehicle.speed_before:.2f} → "
+        f"{vehicle.speed_after:.2f} m/s RMS, speeds changed by {vehicle.changed:.2f} m/s, positions by {vehicle.moved:.2f} m RMS "
         f"(at most {vehicle.moved_most:.1f} m; noise of the fixes {vehicle.noise:.2f} m){headings}"
     )
 

@@ -24,7 +24,7 @@ from scenario_gen.logs.encounters import Piece, pieces_of, plausible
 from scenario_gen.logs.extract import cut_encounter, encounter_quality, recorded_encounters
 from scenario_gen.logs.files import logs_in, read_raw
 from scenario_gen.logs.geodesy import EARTH_RADIUS_M
-from scenario_gen.logs.groups import find_groups
+from scenario_gen.logs.groups import find_groups, vehicles_near
 from scenario_gen.logs.kinds import counted, typed
 from scenario_gen.logs.no_encounter import (
     explain_few_vehicles,
@@ -250,15 +250,22 @@ def _first_tick_ns(tracks: Sequence[Observations], config: LogConfig) -> int:
 def _smooth_pieces(
     log: RawLog, tracks: Sequence[Observations], origin_ns: int, config: LogConfig
 ) -> tuple[list[Piece], list[VehicleQuality]]:
-    """Return the smooth pieces of all vehicles, and how well each vehicle was recorded.
+    """Return the pieces of all vehicles, and how well each vehicle was recorded.
+
+    Vehicles that come near no other one are not smoothed: they are in no encounter.
 
     Raises:
         InputError: no motion of a car fits any vehicle.
     """
     pieces: list[Piece] = []
     vehicles = []
-    for track in tracks:
-        track_pieces, quality = pieces_of(track, origin_ns, config)
+    raw = [pieces_of(track, origin_ns, config, smooth=False) for track in tracks]
+    near = vehicles_near(
+        list(chain.from_iterable(track_pieces for track_pieces, _ in raw)), config
+    )
+    for track, unsmoothed in zip(tracks, raw, strict=True):
+        is_near = track.id in near
+        track_pieces, quality = pieces_of(track, origin_ns, config) if is_near else unsmoothed
         pieces += track_pieces
         vehicles.append(quality)
     if not pieces and any(vehicle.lost for vehicle in vehicles):

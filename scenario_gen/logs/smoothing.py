@@ -12,7 +12,7 @@ and the heading is the direction of the path, constant while standing.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
 import clarabel  # type: ignore[import-untyped,unused-ignore]
@@ -226,7 +226,8 @@ class Smooth:
         before: (S,) measured speed minus the speed of the raw fixes [m/s].
         after: (T,) smooth speed minus the speed of the smooth positions [m/s].
         changed: (S,) measured speed minus the smooth speed [m/s].
-        moved: (F,) distance between the raw fixes and the smooth positions [m].
+        moved: (F,) distance between the raw fixes and the smooth positions [m]; empty if the
+            piece is not smoothed.
         noise: standard deviation of the fixes [m], estimated or given.
         turned: (H,) recorded minus smooth headings [rad] while the vehicle moves.
         headings: (H',) whether each recorded heading was used.
@@ -272,6 +273,48 @@ def _used_headings(fit: _Fit, is_known: Bools, travel_m: float) -> Bools:
     return ~is_known if fit.headings is None else fit.headings.weight > 0.0
 
 
+def interpolated_piece(piece: Observations, origin_ns: int, config: LogConfig) -> Smooth | None:
+    """Return a piece on the clock as it was recorded; arguments as in `smooth_piece`."""
+    dt = config.period
+    fix_t = _seconds(piece.fix_ns, origin_ns)
+    first = int(np.ceil(fix_t[0] / dt - 1e-6))
+    last = int(np.floor(fix_t[-1] / dt + 1e-6))
+    if last - first < 2:
+        return None
+    ticks = dt * np.arange(last - first + 1, dtype=np.float64)
+    fix_t = fix_t - first * dt
+    fix_speed = speed_of_fixes(fix_t, piece.fix)
+    speed_t = _seconds(piece.speed_ns, origin_ns) - first * dt
+    speed = piece.speed
+    if not len(speed):
+        speed_t = fix_t
+        speed = fix_speed
+    difference = speed - np.interp(speed_t, fix_t, fix_speed)
+    noise = config.position_noise or estimated_noise(piece.fix)
+    agrees = _agreeing(speed_t, difference, max(DOUBTED_MPS, 5.0 * noise))
+    believed = agrees[: len(piece.speed)]
+    if agrees.sum() <= len(agrees) / 2.0:
+        believed = np.zeros_like(believed)
+    return Smooth(
+        first=first,
+        position=np.column_stack([np.interp(ticks, fix_t, axis) for axis in piece.fix.T]),
+        heading=np.full(len(ticks), np.nan),
+        speed=np.interp(ticks, speed_t, speed),
+        before=difference,
+        after=np.zeros(0),
+        changed=np.zeros(0),
+        moved=np.zeros(0),
+        noise=noise,
+        turned=np.zeros(0),
+        headings=np.zeros(0, dtype=bool),
+        believed=believed,
+    )
+
+
+def _seconds(stamps: Ints, origin_ns: int) -> Floats:
+    return (stamps - origin_ns).astype(np.float64) * 1e-9
+
+
 def smooth_piece(piece: Observations, origin_ns: int, config: LogConfig) -> Smooth | None:
     """Fit path and motion to a piece of a track.
 
@@ -286,62 +329,44 @@ def smooth_piece(piece: Observations, origin_ns: int, config: LogConfig) -> Smoo
     Raises:
         UnreconciledError: no motion of a car fits.
     """
-    dt = config.period
-    fix_t = (piece.fix_ns - origin_ns).astype(np.float64) * 1e-9
-    speed_t = (piece.speed_ns - origin_ns).astype(np.float64) * 1e-9
-    first = int(np.ceil(fix_t[0] / dt - 1e-6))
-    last = int(np.floor(fix_t[-1] / dt + 1e-6))
-    if last - first < 2:
+    raw = interpolated_piece(piece, origin_ns, config)
+    if raw is None:
         return None
-    fix_t = fix_t - first * dt
-    speed_t = speed_t - first * dt
-    fix_speed = speed_of_fixes(fix_t, piece.fix)
-    speed = piece.speed
-    if not len(speed):
-        speed_t = fix_t
-        speed = fix_speed
-    ticks = dt * np.arange(last - first + 1, dtype=np.float64)
-    stands = standing(ticks, fix_t, piece.fix, speed_t, speed)
+    dt = config.period
+    ticks = dt * np.arange(len(raw.speed), dtype=np.float64)
+    fix_t = _seconds(piece.fix_ns, origin_ns) - raw.first * dt
+    speed_t = _seconds(piece.speed_ns, origin_ns) - raw.first * dt
+    stands = standing(ticks, fix_t, piece.fix, ticks, raw.speed)
     motion = Motion(_without_ends(stands, round(_MODEL.settling_s / dt)), config)
-    difference = speed - np.interp(speed_t, fix_t, fix_speed)
-    noise = config.position_noise or estimated_noise(piece.fix)
     deviation = config.speed_noise
     if not deviation:
-        deviation = float(np.clip(white_equivalent(difference), *_MODEL.speed_noise_mps))
-    max_difference = max(DOUBTED_MPS, 5.0 * noise)
-    agrees = _agreeing(speed_t, difference, max_difference)
-    is_trusted = len(piece.speed) > 0 and agrees.sum() > len(agrees) / 2.0
-    believed = agrees if is_trusted else np.zeros(len(speed), dtype=bool)
-    n_believed = int(believed.sum())
+        deviation = float(np.clip(white_equivalent(raw.before), *_MODEL.speed_noise_mps))
     measured = []
-    if n_believed:
-        deviations = np.full(n_believed, deviation)
-        measured = [(speed_t[believed], speed[believed], deviations, True)]
-    tick_speed = np.interp(ticks, speed_t, speed)
-    tick_fix_speed = np.interp(ticks, fix_t, fix_speed)
-    guess = _first_distances(ticks, stands, tick_speed, tick_fix_speed, fix_t)
+    if raw.believed.any():
+        deviations = np.full(int(raw.believed.sum()), deviation)
+        measured = [(speed_t[raw.believed], piece.speed[raw.believed], deviations, True)]
+    tick_fix_speed = np.interp(ticks, fix_t, speed_of_fixes(fix_t, piece.fix))
+    guess = _first_distances(ticks, stands, raw.speed, tick_fix_speed, fix_t)
     is_moving = np.interp(fix_t, ticks, stands) < 0.5
 
-    fit = _fit_in_turn(piece, fix_t, motion, measured, guess, is_moving, noise, config)
+    fit = _fit_in_turn(piece, fix_t, motion, measured, guess, is_moving, raw.noise, config)
     distance, smooth_speed = motion.at_ticks(fit.coefficients)
     position, heading = fit.path.pose(distance)
     is_known = np.isfinite(piece.heading)
     if np.ptp(distance) < _MODEL.min_travel_m and not is_known.any():
         heading = np.full(len(distance), np.nan)
     rolling = is_known & (np.gradient(fit.distance, fix_t) > HEADINGS.moving_mps)
-    return Smooth(
-        first=first,
+    return replace(
+        raw,
         position=position,
         heading=heading,
         speed=smooth_speed,
-        before=difference,
         after=smooth_speed - speed_of_fixes(ticks, position),
-        changed=piece.speed - np.interp(speed_t, ticks, smooth_speed)[: len(piece.speed)],
+        changed=piece.speed - np.interp(speed_t, ticks, smooth_speed),
         moved=np.hypot(*(piece.fix - fit.path.pose(fit.distance)[0]).T),
         noise=fit.noise,
         turned=wrap_angle(piece.heading[rolling] - np.interp(fix_t[rolling], ticks, heading)),
         headings=_used_headings(fit, is_known, float(np.ptp(distance)))[is_known],
-        believed=believed[: len(piece.speed)],
     )
 
 
@@ -485,7 +510,8 @@ def standing(ticks: Floats, fix_t: Floats, fix: Floats, speed_t: Floats, speed: 
         still = slow_begin + np.flatnonzero(slow <= still_mps)  # not rolling before and after
         begin = int(still[0])
         end = int(still[-1]) + 1
-        inside = fix[(fix_t >= ticks[begin]) & (fix_t <= ticks[end - 1])]
+        first = np.searchsorted(fix_t, ticks[begin])
+        inside = fix[first : np.searchsorted(fix_t, ticks[end - 1], side="right")]
         if (end - begin) * dt >= 1.0 and len(inside):
             n_ends = max(len(inside) // 5, 1)
             shift = np.median(inside[-n_ends:], axis=0) - np.median(inside[:n_ends], axis=0)

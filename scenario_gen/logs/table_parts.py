@@ -72,7 +72,9 @@ def named_by_file(frames: list[pd.DataFrame], paths: Sequence[Path]) -> list[str
     are_scenes = any(frame["vehicle"].nunique() > 1 for frame in frames)
     for frame, file in zip(frames, file_names(paths), strict=True):
         if are_scenes:
-            frame["scene"] = f"{file}/" + frame["scene"] if "scene" in frame else file
+            frame["scene"] = (
+                f"{file}/" + frame["scene"].astype(object) if "scene" in frame else file
+            )
         else:
             frame["vehicle"] = file
     if are_scenes:
@@ -127,7 +129,7 @@ def apart_by_scene(frame: pd.DataFrame) -> tuple[pd.DataFrame, list[str]]:
         seconds = -(-(end + gap - first) // second) if shifts else 0
         shifts[name] = seconds * second
         end = last + shifts[name]
-    shifted = frame["time"] + frame["scene"].map(shifts)
+    shifted = frame["time"] + frame["scene"].map(shifts).astype(np.int64)
     note = f"{len(spans)} scenes that overlap in time are read one after the other"
     return frame.assign(time=shifted), [note]
 

@@ -357,13 +357,13 @@ def vehicle_name(value: Any) -> str:
 
 
 def vehicle_names(values: "pd.Series[Any]") -> "pd.Series[Any]":
-    """Return vehicles' names; if all are whole numbers, 017 and 17.0 are 17, too."""
-    names = values.map(vehicle_name).astype(object)
-    unique = pd.Series(names.unique(), dtype=object)
-    is_whole = unique.str.fullmatch(r"\d{1,300}(\.0*)?") | (unique == "")
-    if not is_whole.all():
-        return names
-    return names.map({name: name and str(int(name.partition(".")[0])) for name in unique})
+    """Return vehicles' names as categories; if all are whole numbers, 017 and 17.0 are 17, too."""
+    codes, different = pd.factorize(values)  # the code -1, of missing names, is that of the last
+    unique = pd.Series([*map(vehicle_name, different), ""], dtype=object)
+    if (unique.str.fullmatch(r"\d{1,300}(\.0*)?") | (unique == "")).all():
+        unique = unique.map(lambda name: name and str(int(name.partition(".")[0])))
+    code_of_unique, names = pd.factorize(unique)
+    return pd.Series(pd.Categorical.from_codes(code_of_unique[codes], names), index=values.index)
 
 
 def _check_metres(frame: pd.DataFrame, columns: dict[str, Column], path: Path) -> None:
@@ -400,11 +400,10 @@ def from_frame(
     check_vehicles(str(paths[0]), frame["vehicle"].nunique(), config)
     if "row" not in frame:
         frame = frame.assign(row=np.arange(len(frame)))
-    cause = np.where(frame["time_ok"], "no vehicle", "stamp is not a number")
     is_usable = frame["time_ok"] & (frame["vehicle"] != "")
-    unusable = zip(cause[~is_usable], frame["row"][~is_usable], strict=True)
+    unusable = frame[~is_usable]
     position = ("lat", "lon") if "lat" in frame else ("x", "y")
-    usable, notes = apart_by_scene(frame[is_usable])
+    usable, notes = apart_by_scene(frame if unusable.empty else frame[is_usable])
     keys = ["scene", "vehicle"] if "scene" in usable else ["vehicle"]
     vehicles = tuple(
         _observations(str(names[-1]), track, position)
@@ -418,7 +417,10 @@ def from_frame(
         rows=len(frame),
         segments=segments,
         notes=tuple(notes),
-        dropped=tuple((str(why), int(row)) for why, row in unusable),
+        dropped=tuple(
+            ("no vehicle" if is_ok else "stamp is not a number", int(row))
+            for is_ok, row in zip(unusable["time_ok"], unusable["row"], strict=True)
+        ),
     )
 
 

@@ -239,3 +239,15 @@ def test_a_left_turn_is_complete_though_the_oncoming_car_is_far_away(tmp_path):
     assert encounter.time[spans["oncoming"][1]] < 17.0
     assert any("vehicle oncoming is recorded from" in note for note in result.quality.notes)
     assert Situation.of(encounter).kind(0, 1) == EncounterKind.LEFT_TURN
+
+
+def test_only_vehicles_that_come_near_another_one_are_smoothed(tmp_path, monkeypatch):
+    near = car("1", 0, 10, 0, 0, 8), car("2", 0, 10, 0, 4, 8)
+    found, quality = groups(tmp_path, *near, car("3", 0, 10, 0, 5000, 8))
+    assert found == [("1,2", 10.0)]
+    assert [vehicle.smoothed for vehicle in quality.vehicles] == [True, True, False]
+    assert quality.notes == ("vehicle 3 is in no encounter; it was recorded for 10.0 s",)
+
+    monkeypatch.delattr("scenario_gen.logs.encounters.smooth_piece")
+    with pytest.raises(InputError, match=r"2 and 3 come closest, to 4996 m; .*proximity=5000"):
+        groups(tmp_path, near[1], car("3", 0, 10, 0, 5000, 8))
