@@ -265,23 +265,29 @@ def test_the_player_ends_when_all_is_played_and_heard(start, client):
     ]
     topics = sorted({f"/{m.topic.lstrip('/')}" for m in played})
     process = start("player", bag=bag, paused=True, rate=1000.0, clock=True)
-    client.hear(*topics)
+    client.hear("/clock", *topics)
+    client.wait("/clock", 2)  # while it is paused
     for topic in topics:
         client.until(
             lambda name=topic: client.node.count_publishers(name) == 1, f"a publisher of {topic}"
         )
     client.until(lambda: client.node.count_publishers("/clock") == 1, "one publisher of /clock")
+    assert len(set(client.heard["/clock"])) == 1
+    assert client.call(Trigger, "/player/play_next", Trigger.Request()).success
+    client.until(lambda: any(client.heard[topic] for topic in topics), "the first message")
     assert client.call(Trigger, "/player/resume", Trigger.Request()).success
     output, _ = process.communicate(timeout=180.0)
     assert process.returncode == 0 and "played" in output and "Traceback" not in output, output
     assert {topic: len(client.heard[topic]) for topic in topics} == Counter(
         f"/{m.topic.lstrip('/')}" for m in played
     )
+    assert "without any subscriber: " in output and "speed" in output
 
 
 def test_the_player_stays_if_it_is_told_to(start, client):
     bag = RESOURCES / "synthetic_c"
-    process = start("player", bag=bag, rate=1000.0, stay=True)
+    client.hear("/vehicle_1/fix")
+    process = start("player", bag=bag, rate=1000.0, stay=True, topics="/vehicle_1/fix")
     client.until(lambda: "played" in process.output(), "its end")
     client.until(
         lambda: ("player", "/") in client.node.get_node_names_and_namespaces(),
@@ -291,12 +297,13 @@ def test_the_player_stays_if_it_is_told_to(start, client):
     ended(process)
 
 
-def test_a_player_whose_bag_breaks_off_says_so_by_its_exit_code(start, tmp_path):
+def test_a_player_whose_bag_breaks_off_says_so_by_its_exit_code(start, client, tmp_path):
     source = next((RESOURCES / "synthetic_c").glob("*.mcap"))
     bag = tmp_path / "broken.mcap"
     data = bytearray(source.read_bytes())
     data[len(data) // 2 : len(data) // 2 + 64] = bytes(64)
     bag.write_bytes(data)
-    process = start("player", bag=bag, rate=1000.0)
+    client.hear("/vehicle_1/fix")
+    process = start("player", bag=bag, rate=1000.0, topics="/vehicle_1/fix")
     output, _ = process.communicate(timeout=180.0)
     assert process.returncode == 2 and "Traceback" not in output, output

@@ -15,12 +15,12 @@ import threading
 from time import monotonic
 import traceback
 
-from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
 
 from msg_conventions.diagnostics import encode_diagnostics, Level, of_template, Status
 from scenario_gen.base.errors import MAX_REFUSAL_CHARACTERS, presentable, ScenarioGenError
 from scenario_gen.base.worker import stop_if_abandoned
+from scenario_gen.ros.common.timers import create_steady_timer
 from scenario_gen.ros.common.topics import (
     create_publisher,
     other_publishers,
@@ -73,7 +73,7 @@ class NodeDiagnostics:
         self._ticks = 0
         self._twins: dict[str, list[str]] = {}  # topic -> other nodes that publish it
         self._publisher = create_publisher(node, "/diagnostics")
-        node.create_timer(TICK_S, self._tick, clock=Clock(clock_type=ClockType.STEADY_TIME))
+        create_steady_timer(node, TICK_S, self._tick)
 
     def enable(self, enabled: bool) -> None:
         """Accept reports about the node's work, or drop them and all that were accepted."""

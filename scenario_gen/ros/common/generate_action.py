@@ -16,12 +16,12 @@ from typing import Any
 from diagnostic_msgs.msg import KeyValue
 from rclpy.action import ActionServer, CancelResponse
 from rclpy.action.server import ServerGoalHandle
-from rclpy.clock import Clock, ClockType
 from rclpy.qos import QoSProfile
 
 from msg_conventions.scenario_info import REFUSED
 from scenario_gen.ros.common.requests import Code, OpenRequest, OpenRequests, Outcome
 from scenario_gen.ros.common.services import REQUESTS
+from scenario_gen.ros.common.timers import create_steady_timer
 
 NAME = "~/generate_scenarios"
 
@@ -55,8 +55,7 @@ class Goals:
             feedback_pub_qos_profile=QoSProfile(depth=100),
             result_timeout=900,
         )
-        steady = Clock(clock_type=ClockType.STEADY_TIME)
-        self._timer = node.create_timer(0.1, self._send_feedback, clock=steady)
+        self._timer = create_steady_timer(node, 0.1, self._send_feedback)
 
     def destroy(self) -> None:
         """Withdraw the action."""

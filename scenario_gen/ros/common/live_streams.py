@@ -9,13 +9,12 @@ import re
 from time import monotonic
 from typing import Any
 
-from rclpy.clock import Clock, ClockType
-
 from msg_conventions.streams import decode_fix, decode_speed
 from msg_conventions.topics import FIX_TYPE, TWIST_TYPE, vehicle_topic
 from scenario_gen.base.errors import InputError
 from scenario_gen.base.parameters import parameter, Parameters
 from scenario_gen.logs import LogConfig, RawLog, Streams
+from scenario_gen.ros.common.timers import create_steady_timer
 from scenario_gen.ros.common.topics import adapted_quality
 from scenario_gen.situation import MAX_VEHICLES
 from scenario_gen.types import Sample, token
@@ -65,8 +64,7 @@ class LiveStreams:
         self._last_message = monotonic()
         self._topics: dict[str, tuple[str, str]] = {}  # full name -> vehicle, kind
         self._refused: set[str] = set()  # topics with an error on /diagnostics
-        steady = Clock(clock_type=ClockType.STEADY_TIME)
-        self._timer = node.create_timer(0.2, self._check, clock=steady)
+        self._timer = create_steady_timer(node, 0.2, self._check)
 
     def _check(self) -> None:
         """Forget ended streams, subscribe to new ones, and end the log after silence."""

@@ -26,7 +26,6 @@ import traceback
 from typing import Any
 
 import rclpy
-from rclpy.clock import Clock, ClockType
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.signals import SignalHandlerOptions
 from rclpy.utilities import remove_ros_args
@@ -37,6 +36,7 @@ from scenario_gen.base.signals import SIGNALS
 from scenario_gen.numerics.compiling import end_workers, make_ready, Progress, words
 from scenario_gen.numerics.kernels import registered
 from scenario_gen.ros.common.ros_parameters import help_of, USAGE
+from scenario_gen.ros.common.timers import create_steady_timer
 
 REPORT_PERIOD_S = 5.0  # between two reports of how many kernels are compiled
 NODE_END_S = 5.0  # in which a node reacts to a signal, and again leaves its ROS domain
@@ -105,9 +105,8 @@ class NodeProcess:
             for make in makers:
                 self._nodes.append(make(namespace))
                 self._executor.add_node(self._nodes[-1])
-        steady = Clock(clock_type=ClockType.STEADY_TIME)
         # The longest wait of the executor, which signals do not end.
-        self._nodes[0].create_timer(0.2, lambda: None, clock=steady)
+        create_steady_timer(self._nodes[0], 0.2, lambda: None)
 
     def spin(self) -> int:
         """Start the nodes once their kernels are compiled, and spin them; return the exit code."""

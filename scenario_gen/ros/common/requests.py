@@ -18,7 +18,6 @@ from time import monotonic
 from typing import Any
 
 from rcl_interfaces.srv import SetParametersAtomically
-from rclpy.clock import Clock, ClockType
 from rclpy.parameter import Parameter
 from rclpy.task import Future
 from std_srvs.srv import Trigger
@@ -41,6 +40,7 @@ from scenario_gen.method.validity import Limits
 from scenario_gen.ros.common.node_parameters import SamplerParameters
 from scenario_gen.ros.common.ros_parameters import values_of_call
 from scenario_gen.ros.common.services import offer_trigger, REQUESTS
+from scenario_gen.ros.common.timers import create_steady_timer
 from scenario_gen.situation import Situation
 from scenario_gen.types import (
     BoundaryStates,
@@ -138,8 +138,7 @@ class OpenRequests:
         self._numbers = count(1)
         self._lock = threading.Lock()
         self._waiters: list[tuple[Future, Callable[[], bool]]] = []
-        steady = Clock(clock_type=ClockType.STEADY_TIME)
-        self._timer = node.create_timer(POLL_S, self.check_waiting, clock=steady)
+        self._timer = create_steady_timer(node, POLL_S, self.check_waiting)
         for kind, name, answer in (
             (SetParametersAtomically, "~/generate", self._generate),
             (Trigger, "~/wait_until_ready", self._wait_until_ready),

@@ -272,7 +272,8 @@ class Pace:
         self._publisher = publisher
         self._patience = patience
         self._report = report
-        self._max_pending = max(1, publisher.qos_profile.depth * 9 // 10)
+        # Fast DDS asks for acknowledgements at once only when the history is full.
+        self._max_pending = max(1, publisher.qos_profile.depth)
         self._pending = 0  # messages since the last acknowledgement, or the last vain wait
         self._next_wait_s = patience
         self._ignoring = False  # whether a subscriber is not waited for
@@ -280,11 +281,11 @@ class Pace:
 
     def wait(self, stop: Callable[[], bool]) -> None:
         """Wait until one more message overwrites no pending one, or `stop` returns True."""
-        if 8 * self._pending >= self._max_pending and self._is_acknowledged():
+        if 8 * self._pending >= self._max_pending and self.is_acknowledged():
             self._restart()
         deadline = monotonic() + self._next_wait_s
         while self._pending >= self._max_pending and not stop():
-            if self._is_acknowledged():
+            if self.is_acknowledged():
                 self._restart()
             elif self._patience and monotonic() >= deadline:
                 self._stop_waiting()
@@ -317,7 +318,8 @@ class Pace:
         if unacknowledged is not None:
             self._report(unacknowledged)
 
-    def _is_acknowledged(self) -> bool:
+    def is_acknowledged(self) -> bool:
+        """Return whether the subscribers have all messages."""
         with suppress(InvalidHandle):  # it was destroyed meanwhile
             return bool(self._publisher.wait_for_all_acked(Duration()))
         return True

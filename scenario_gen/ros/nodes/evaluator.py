@@ -23,6 +23,7 @@ from scenario_gen.base.errors import InputError
 from scenario_gen.base.parameters import parameter, Parameters
 from scenario_gen.method.evaluation import evaluate_scenarios, EvaluationConfig
 from scenario_gen.ros.common.stage_node import StageNode
+from scenario_gen.ros.common.timers import create_steady_timer
 from scenario_gen.types import Evaluation, Row, WITH
 
 Entries = Sequence[tuple[bytes, ScenarioEntry]]
@@ -66,7 +67,7 @@ class Evaluator(StageNode):
         self._newest: dict[str, bytes] = {}
         self._requests = RequestTracker()
         self._last_message = math.inf  # time of the last message [s]
-        self.create_timer(1.0, self._report_missing)
+        create_steady_timer(self, 1.0, self._report_missing)
 
     def started(self) -> None:
         """Subscribe to scenarios with a quality for which paced publishers wait."""

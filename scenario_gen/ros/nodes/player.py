@@ -1,29 +1,31 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""player: a bag's messages as they were recorded, raw; `~/pause` and `~/resume`.
+"""player: a bag's messages as they were recorded, raw.
 
-It plays any rosbag2 bag, MCAP or SQLite.
+It plays any rosbag2 bag, MCAP or SQLite, and has the services of rosbag2's player
+(common/player_services.py).
 
 Each topic has the quality of service of its recording, or the one that the parameters
-`qos_overrides./topic.publisher.reliability` and its siblings set. With an offset, the earlier
-messages of latched topics are published first. With `clock`, /clock has the bag's time for nodes
-with `use_sim_time`, in place of the bag's own /clock. The player ends when all is played and
-acknowledged, unless it is to `loop`, or to `stay` for late subscribers of latched topics.
+`qos_overrides./topic.publisher.reliability` and its siblings set; the history of a volatile topic
+is longer. Playing begins once the topics have subscribers, or after seconds without. With an
+offset, the earlier messages of latched topics are published first. With `clock`, /clock has the
+bag's time for nodes with `use_sim_time`, also while the player is paused, in place of the bag's
+own /clock. The player ends when all is played and acknowledged, unless it is to `loop`, or to
+`stay` for late subscribers of latched topics.
 """
 
 from collections import deque
 from collections.abc import Iterator
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 import re
 import threading
-from time import monotonic
+from time import monotonic, sleep
 from typing import Any
 
-from rclpy.duration import Duration
 from rclpy.exceptions import InvalidHandle
 from rclpy.node import Node
 from rclpy.qos_overriding_options import QoSOverridingOptions
@@ -36,9 +38,11 @@ from scenario_gen.bags.storage.config import BagConfig
 from scenario_gen.bags.storage.mcap import BagTopic
 from scenario_gen.base.errors import InputError, ScenarioGenError
 from scenario_gen.base.parameters import parameter, Parameters
+from scenario_gen.ros.common.bag_time import BagTime
 from scenario_gen.ros.common.diagnostics import NodeDiagnostics
+from scenario_gen.ros.common.player_services import offer_player_services
 from scenario_gen.ros.common.ros_parameters import ConfigParameters
-from scenario_gen.ros.common.services import offer_trigger
+from scenario_gen.ros.common.timers import create_steady_timer
 from scenario_gen.ros.common.topics import (
     acknowledgement_warning,
     message_class,
@@ -47,10 +51,16 @@ from scenario_gen.ros.common.topics import (
     publish,
     qos,
 )
+from scenario_gen.types import Quality
 
 UNBOUNDED = BagConfig(most_bytes=2**62)  # messages are published and dropped: any size will do
 END_PATIENCE_S = 5.0  # for subscribers to receive the last messages
 TICK_S = 0.01  # between two clock messages
+MATCH_S = 1.0  # for the topics to get subscribers once one of them has one
+FIRST_MATCH_S = 5.0  # for that first one
+MIN_ROUND_S = 1.0  # time of the bag between two rounds, for bags with a single stamp
+# Fast DDS asks for acknowledgements when a history is full, and else every 3 s.
+MIN_HISTORY_COUNT = 100
 
 
 @dataclass(frozen=True)
@@ -65,7 +75,7 @@ class Config(Parameters):
         1.0, "how many times as fast as it was recorded", low=0.01, high=1000.0
     )
     start_offset: float = parameter(
-        0.0, "time in the bag at which to begin", unit="s", low=0.0, fixed=True
+        0.0, "time in the bag at which a round begins, or to which ~/seek jumps", unit="s", low=0.0
     )
     loop: bool = parameter(False, "begin again at the end")
     stay: bool = parameter(
@@ -91,6 +101,11 @@ class Offered:
     publisher: Any
     pace: Pace
 
+    @property
+    def is_heard(self) -> bool:
+        """Whether it has a subscriber."""
+        return bool(self.publisher.get_subscription_count())
+
 
 class Player(Node):  # type: ignore[misc]
     """Plays one bag."""
@@ -99,18 +114,20 @@ class Player(Node):  # type: ignore[misc]
         super().__init__("player", namespace=namespace)
         self.parameters = ConfigParameters(self, Config())
         self.diagnostics = NodeDiagnostics(self, self._report_progress)
-        self._elapsed: float | None = None  # seconds of the bag that have been played, while it is
         self.done = False
         self.exit_code = 0
-        self._running = threading.Event()
-        self._ended = threading.Event()
+        self._time = BagTime(lambda: self.parameters.config.rate)
+        self._begin_ns: int | None = None  # stamp of the bag's first message
         self._thread: threading.Thread | None = None
         self._offered: dict[str, Offered] = {}
+        self._count = 0  # messages that were played
+        self._unheard: set[str] = set()  # names in the bag of topics without a subscriber so far
         self._clock_publisher = None
+        self._clock_lock = threading.Lock()
         if self.parameters.config.clock:
             self._clock_publisher = self.create_publisher(Clock, "/clock", 10)
-        offer_trigger(self, "~/pause", partial(self._set_running, running=False))
-        offer_trigger(self, "~/resume", partial(self._set_running, running=True))
+            create_steady_timer(self, TICK_S, self._publish_clock)
+        offer_player_services(self, self._time, self._seek)
 
     def autostart(self) -> None:
         """Offer the bag's topics and begin.
@@ -130,8 +147,7 @@ class Player(Node):  # type: ignore[misc]
                 f"{config.bag}: none of its topics can be played; see the messages above and the "
                 "parameter topics"
             )
-        if not config.paused:
-            self._running.set()
+        self._unheard = set(self._offered)
         self._thread = threading.Thread(target=self._play, args=(config,), daemon=True)
         self._thread.start()
 
@@ -141,7 +157,7 @@ class Player(Node):  # type: ignore[misc]
             publisher = self.create_publisher(
                 message_class(topic.type),
                 name,
-                qos(topic.quality),
+                qos(_played_quality(topic.quality)),
                 qos_overriding_options=QoSOverridingOptions(OVERRIDABLE),
             )
         except InputError as error:
@@ -152,61 +168,82 @@ class Player(Node):  # type: ignore[misc]
         self._offered[topic.name] = Offered(topic, publisher, pace)
 
     def _play(self, config: Config) -> None:
-        self._elapsed = config.start_offset
+        if not config.paused:
+            self._wait_for_subscribers()
+            self._time.pause(False)
+        started = monotonic()
         try:
-            while not self._ended.is_set():
-                self._play_once(config)
-                if not self.parameters.config.loop:
+            while not self._time.ended:
+                self._play_round(Path(config.bag))
+                if not (self._time.round_over or self.parameters.config.loop):
                     break
-            if self._ended.is_set():
+            if self._time.ended:
                 return
-            self._elapsed = None
-            self.diagnostics.status(Level.OK, f"{config.bag}: played", "playing", {})
+            self._report_end(config.bag, monotonic() - started)
         except ScenarioGenError as error:
-            self._elapsed = None
             self.exit_code = error.exit_code
             values = {"error": type(error).__name__}
             self.diagnostics.status(Level.ERROR, str(error), "playing", values)
-        if not self.parameters.config.stay and not self._ended.is_set():
+        self._begin_ns = None
+        if not self.parameters.config.stay and not self._time.ended:
             self._end_when_acknowledged()
 
-    def _wait_for_acknowledgement(self, publisher: Any, deadline: float) -> None:
-        """Wait until the subscribers have all messages, the deadline [s] or the node's end."""
-        while not publisher.wait_for_all_acked(Duration()):
-            if monotonic() >= deadline or self._ended.wait(TICK_S):
+    def _wait_for_subscribers(self) -> None:
+        """Wait until each topic has a subscriber; volatile messages before that would be lost."""
+        started = monotonic()
+        while not self._time.ended:
+            heard = [offered.is_heard for offered in self._offered.values()]
+            patience = MATCH_S if any(heard) else FIRST_MATCH_S
+            if all(heard) or monotonic() - started > patience:
                 return
+            sleep(TICK_S)
+
+    def _report_end(self, bag: str, seconds: float) -> None:
+        """Report how much was played in real time, and which topics nobody subscribed to."""
+        unheard = sorted(self._unheard)
+        message = f"{bag}: played, {self._count} messages in {seconds:.1f} s"
+        if unheard:
+            message += f"; without any subscriber: {', '.join(unheard)}"
+        level = Level.WARN if len(unheard) == len(self._offered) else Level.OK
+        self.diagnostics.status(level, message, "playing", {})
+
+    def _wait_for_acknowledgement(self, pace: Pace, deadline: float) -> None:
+        """Wait until the subscribers have all messages, the deadline [s] or the node's end."""
+        while not (pace.is_acknowledged() or self._time.ended or monotonic() >= deadline):
+            sleep(TICK_S)
 
     def _end_when_acknowledged(self) -> None:
         """Let `run_nodes` end the node once the subscribers have all messages."""
-        for offered in self._offered.values():
-            offered.pace.end()
         deadline = monotonic() + END_PATIENCE_S
         with suppress(InvalidHandle):  # the node is ending already
             for offered in self._offered.values():
-                self._wait_for_acknowledgement(offered.publisher, deadline)
+                offered.pace.end()
+                self._wait_for_acknowledgement(offered.pace, deadline)
         self.executor.create_task(self._finish)  # waking the executor alone has no effect
 
     def _finish(self) -> None:
         self.diagnostics.publish()  # the result
         self.done = True
 
-    def _play_once(self, config: Config) -> None:
-        first_ns: int | None = None
-        elapsed = config.start_offset  # seconds of the bag that have been played
-        for message in self._from_offset(config):
-            if first_ns is None:
-                first_ns = message.stamp_ns
-            due = (message.stamp_ns - first_ns) * 1e-9 + config.start_offset
-            elapsed = self._wait_until(due, elapsed, config, first_ns)
-            if self._ended.is_set():
+    def _play_round(self, bag: Path) -> None:
+        """Play the bag from the offset, or from where a seek leads, to its end or a seek."""
+        start = self._time.begin(self.parameters.config.start_offset)
+        for message, elapsed in self._from_offset(bag, start):
+            if not self._time.wait(elapsed):
                 return
+            self._publish_clock()
             self._publish(message.topic, message.data)
+        if self.parameters.config.loop:
+            self._time.wait(start + MIN_ROUND_S)
 
     def _publish(self, topic: str, data: bytes) -> None:
         """Publish once no pending message is overwritten; this may slow the replay down."""
         offered = self._offered[topic]
-        offered.pace.wait(self._ended.is_set)
+        if topic in self._unheard and offered.is_heard:
+            self._unheard.discard(topic)
+        offered.pace.wait(lambda: self._time.ended)
         publish(self, offered.publisher, data)
+        self._count += 1
 
     def _report_pace(self, topic: str, count: int) -> None:
         self.diagnostics.status(
@@ -216,19 +253,18 @@ class Player(Node):  # type: ignore[misc]
             {"count": str(count)},
         )
 
-    def _from_offset(self, config: Config) -> Iterator[BagMessage]:
-        """Yield the messages after the offset.
+    def _from_offset(self, bag: Path, start: float) -> Iterator[tuple[BagMessage, float]]:
+        """Yield the messages from `start` [s] on, each with its time in the bag.
 
         Publish the last ones of latched topics before it first.
         """
         latched: dict[str, deque[bytes]] = {}
         begin_ns: int | None = None
-        for message in read_messages(
-            Path(config.bag), lambda topic: topic in self._offered, UNBOUNDED
-        ):
+        for message in read_messages(bag, lambda topic: topic in self._offered, UNBOUNDED):
             if begin_ns is None:
-                begin_ns = message.stamp_ns
-            if message.stamp_ns - begin_ns < config.start_offset * 1e9:
+                self._begin_ns = begin_ns = message.stamp_ns
+            elapsed = (message.stamp_ns - begin_ns) * 1e-9
+            if elapsed < start:
                 quality = self._offered[message.topic].topic.quality
                 if quality.transient_local:
                     kept = latched.setdefault(message.topic, deque(maxlen=quality.depth))
@@ -237,52 +273,48 @@ class Player(Node):  # type: ignore[misc]
             for topic in list(latched):
                 for data in latched.pop(topic):
                     self._publish(topic, data)
-            yield message
-
-    def _wait_until(self, due: float, elapsed: float, config: Config, first_ns: int) -> float:
-        """Let the bag's time run from `elapsed` to `due` [s], at `rate` and unless paused.
-
-        Return the time reached.
-        """
-        while elapsed < due and not self._ended.is_set():
-            self._elapsed = elapsed
-            self._running.wait(TICK_S)
-            started = monotonic()
-            rate = self.parameters.config.rate
-            if self._running.is_set():
-                self._ended.wait(min(TICK_S, (due - elapsed) / rate))
-                elapsed += (monotonic() - started) * rate
-            self._publish_clock(first_ns + round((min(elapsed, due) - config.start_offset) * 1e9))
-        self._running.wait()
-        return max(elapsed, due) if elapsed < due + 1.0 else due
+            yield message, elapsed
 
     def _report_progress(self) -> None:
         """Report the time in the bag, each second."""
-        elapsed = self._elapsed
-        if elapsed is None:
+        if self._begin_ns is None:
             return
-        paused = "" if self._running.is_set() else ", paused"
+        elapsed = self._time.shown()
+        paused = ", paused" if self._time.paused else ""
         message = f"{self.parameters.config.bag}: {elapsed:.1f} s played{paused}"
         values = {"seconds": f"{elapsed:.1f}"}
         self.diagnostics.status(Level.OK, message, "playing", values, log=False)
 
-    def _publish_clock(self, stamp_ns: int) -> None:
-        if self._clock_publisher is not None:
+    def _publish_clock(self) -> None:
+        """Publish the bag's time; the lock keeps it from running backwards."""
+        if self._clock_publisher is None or self._begin_ns is None:
+            return
+        with self._clock_lock:
+            stamp_ns = self._begin_ns + round(self._time.shown() * 1e9)
             publish(self, self._clock_publisher, encode_clock(stamp_ns))
 
-    def _set_running(self, *, running: bool) -> str:
-        if running == self._running.is_set():
-            raise InputError("it is so already")
-        if running:
-            self._running.set()
-            return "playing"
-        self._running.clear()
-        return "paused"
+    def _seek(self, stamp_ns: int | None = None) -> str:
+        """Play on from a stamp, or by default from the parameter `start_offset`."""
+        if self._begin_ns is None:
+            raise InputError("nothing is being played")
+        target: float = self.parameters.config.start_offset
+        if stamp_ns is not None:
+            target = (stamp_ns - self._begin_ns) * 1e-9
+        if target < 0.0:
+            raise InputError("the bag begins later")
+        self._time.seek(target)
+        return f"plays on from {target:.3f} s"
 
     def destroy_node(self) -> None:
         """End playing, then the node."""
-        self._ended.set()
-        self._running.set()
+        self._time.end()
         if self._thread is not None:
             self._thread.join(END_PATIENCE_S)  # its last reports need the node
         super().destroy_node()
+
+
+def _played_quality(quality: Quality) -> Quality:
+    """Return the quality of a topic's publisher: the recorded one, volatile ones with room."""
+    if quality.transient_local:
+        return quality
+    return replace(quality, depth=max(quality.depth, MIN_HISTORY_COUNT), keep_all=False)

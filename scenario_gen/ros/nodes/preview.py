@@ -12,7 +12,6 @@ from dataclasses import dataclass
 from time import monotonic
 
 import numpy as np
-from rclpy.clock import Clock, ClockType
 
 from msg_conventions.fits import decode_fit
 from msg_conventions.frames import encode_frames
@@ -23,6 +22,7 @@ from scenario_gen.bags.recordings.scenario_decoder import ScenarioDecoder, TOPIC
 from scenario_gen.base.parameters import parameter, Parameters
 from scenario_gen.numerics import Floats
 from scenario_gen.ros.common.stage_node import StageNode
+from scenario_gen.ros.common.timers import create_steady_timer
 from scenario_gen.ros.common.topics import create_frames_publisher
 from scenario_gen.situation import find_conflicts
 from scenario_gen.types import Scenario, tokens
@@ -69,9 +69,7 @@ class Preview(StageNode):
         self._newest: tuple[Scenario, ScenarioEntry] | None = None
         self._shown: Shown | None = None
         self._anchors = np.zeros((0, 0, 3))
-        self.create_timer(
-            1.0 / self.config.frame_rate, self._tick, clock=Clock(clock_type=ClockType.STEADY_TIME)
-        )
+        create_steady_timer(self, 1.0 / self.config.frame_rate, self._tick)
 
     def stopped(self) -> None:
         """Forget what was shown."""

@@ -32,6 +32,7 @@ from scenario_gen.ros.common.diagnostics import NodeDiagnostics
 from scenario_gen.ros.common.node_parameters import RecorderParameters
 from scenario_gen.ros.common.ros_parameters import ConfigParameters
 from scenario_gen.ros.common.services import offer_trigger
+from scenario_gen.ros.common.timers import create_steady_timer
 from scenario_gen.ros.common.topics import adapted_quality, message_class, qos
 
 DRAIN_S = 30.0  # at most, at the end, for messages that have arrived
@@ -86,8 +87,8 @@ class Recorder(Node):  # type: ignore[misc]
         self._refused: set[str] = set()
         offer_trigger(self, "~/start", self._start_now)
         offer_trigger(self, "~/stop", self._stop_now)
-        self.create_timer(0.1, self._subscribe_to_new)
-        self.create_timer(4.0, self._flush)  # writes incomplete chunks
+        create_steady_timer(self, 0.1, self._subscribe_to_new)
+        create_steady_timer(self, 4.0, self._flush)  # writes incomplete chunks
         self._losses = MessageLoss(self.count_publishers)
         self._warned: dict[str, TopicLoss] = {}
         self.diagnostics = NodeDiagnostics(self, self._report_counts)

@@ -25,7 +25,6 @@ from time import monotonic, time_ns
 from typing import Any, ClassVar
 
 from rclpy.callback_groups import ReentrantCallbackGroup
-from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
 from rclpy.task import Future
 from std_srvs.srv import Trigger
@@ -56,6 +55,7 @@ from scenario_gen.ros.common.driving import (
 from scenario_gen.ros.common.node_parameters import TrafficParameters as Config
 from scenario_gen.ros.common.ros_parameters import ConfigParameters
 from scenario_gen.ros.common.services import offer_trigger
+from scenario_gen.ros.common.timers import create_steady_timer
 from scenario_gen.ros.common.topics import (
     create_frames_publisher,
     create_publisher,
@@ -94,7 +94,7 @@ class Traffic(Node):  # type: ignore[misc]
         self._waiting: Future | None = None
         self._wait_deadline = 0.0
         self._load_at = math.inf  # when the next scenario begins
-        self.create_timer(POLL_S, self._end_waiting, clock=Clock(clock_type=ClockType.STEADY_TIME))
+        create_steady_timer(self, POLL_S, self._end_waiting)
         self._paused = False
         self._sources: list[str] = []
         self.outcomes: list[Outcome] = []  # of finished drives
@@ -147,7 +147,7 @@ class Traffic(Node):  # type: ignore[misc]
                 create_subscription(self, topic, partial(self._receive_scenario, topic))
         if not config.lock_step:
             period = config.drive.step / config.rate
-            self.create_timer(period, self._tick, clock=Clock(clock_type=ClockType.STEADY_TIME))
+            create_steady_timer(self, period, self._tick)
 
     # --- scenarios -----------------------------------------------------------------------------
 
