@@ -12,6 +12,7 @@ from typing import Any
 
 import typer
 
+from msg_conventions.topics import TOPICS
 from scenario_gen.base.parameters import flatten
 from scenario_gen.cli.commands import app
 from scenario_gen.closed_loop.config import ClosedLoopConfig
@@ -66,6 +67,14 @@ def commands() -> Iterator[Row]:
         yield from options(command)
 
 
+def topics() -> Iterator[Row]:
+    """Yield all topics with their types and qualities of service."""
+    yield "topic", "type", "durability", "depth"
+    for topic, (kind, quality) in sorted(TOPICS.items()):
+        durability = "latched" if quality.transient_local else "volatile"
+        yield code(topic), kind.replace("/msg/", "/"), durability, str(quality.depth)
+
+
 def options(command: Any) -> Iterator[Row]:
     """Yield a row per argument and option of a command."""
     for entry in command.params:
@@ -85,7 +94,12 @@ def literal(text: str) -> str:
 
 def tables() -> dict[str, str]:
     """Return the text of each table by its file's name."""
-    made: dict[str, Any] = {"columns": columns, "parameters": parameters, "commands": commands}
+    made: dict[str, Any] = {
+        "columns": columns,
+        "commands": commands,
+        "parameters": parameters,
+        "topics": topics,
+    }
     return {f"{name}.csv": written(list(table())) for name, table in made.items()}
 
 
