@@ -17,6 +17,7 @@ from scenario_gen.method.reference_sets import with_references
 from scenario_gen.method.routing import plan_routes
 from scenario_gen.method.sampling import Callbacks, Plan, Progress, sample_scenarios
 from scenario_gen.method.segmentation import segment
+from scenario_gen.method.shortening import fit_what_matters
 from scenario_gen.method.suitable_roads import AUTO, on_first_suitable_road
 from scenario_gen.roads import road_and_template
 from scenario_gen.situation import Situation
@@ -79,7 +80,7 @@ def generate(
         on_road = partial(
             generate,
             [encounter, *population],
-            config=config,
+            config=replace(config, fitting=replace(config.fitting, shorten=False)),
             count=count,
             seed=seed,
             request=request,
@@ -90,6 +91,38 @@ def generate(
     swapped = swapped_order(encounter, config.sampling) if request.order == "swap" else None
     if swapped is not None:
         encounter, request = swapped, replace(request, order="keep")
+    generate_set = partial(
+        _generate_set,
+        road=road,
+        config=config,
+        seed=seed,
+        request=request,
+        callbacks=lambda road: Callbacks(progress, accepts=partial(accepts, road)),
+        population=population,
+    )
+    if config.fitting.shorten and not request.moves:
+        result = fit_what_matters(generate_set, encounter, count)
+    else:
+        result = generate_set(encounter, count)
+    return completed(result, config, request, population)
+
+
+def _generate_set(
+    encounter: Encounter,
+    count: int,
+    *,
+    road: Road | str,
+    config: PipelineConfig,
+    seed: int,
+    request: Request,
+    callbacks: Callable[[Road], Callbacks],
+    population: Sequence[Encounter],
+) -> GenerationResult:
+    """Return scenarios of a template; all stages but the evaluation.
+
+    Raises:
+        RefusedError: as `generate`.
+    """
     road, encounter = road_and_template(road, encounter, config.road)
 
     situation = Situation.of(encounter)
@@ -107,11 +140,11 @@ def generate(
         request,
         count=count,
         plan=plan,
-        callbacks=Callbacks(progress, accepts=partial(accepts, road)),
+        callbacks=callbacks(road),
         measures=measures_in(config.sampling.variety, encounter, population),
     )
     _refuse_empty(result)
-    return completed(result, config, request, population)
+    return result
 
 
 def completed(

@@ -44,6 +44,7 @@ STAGES = (
     "decisions",
     "outcome_sets",
     "config",
+    "shortening",
     "chain",
     "reference_sets",
     "suitable_roads",

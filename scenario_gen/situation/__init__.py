@@ -23,6 +23,7 @@ from scenario_gen.situation.gaps import (
     passing,
     time_gaps,
 )
+from scenario_gen.situation.interaction_window import interaction_windows, keeps_interaction
 from scenario_gen.situation.kind import EncounterKind, kind_of
 from scenario_gen.situation.manoeuvre import (
     describe_turn,
@@ -48,13 +49,14 @@ from scenario_gen.situation.traffic_side import mirrored, traffic_side
 from scenario_gen.situation.waits import find_waits, STANDSTILL_SPEED_MPS, Wait, WAIT_SPEED_MPS
 
 __all__ = [
-    "MAX_SAMPLES", "MAX_TURN_CHANGE_RAD", "MAX_VEHICLES", "STANDSTILL_SPEED_MPS",
-    "WAIT_SPEED_MPS", "Conflict", "EncounterKind", "Equation", "FrenetTracks", "LaneGaps",
-    "MainLine", "PairConflicts", "Situation", "Track", "Wait", "clean_tracks",
+    "MAX_SAMPLES", "MAX_TURN_CHANGE_RAD", "MAX_VEHICLES",
+    "STANDSTILL_SPEED_MPS", "WAIT_SPEED_MPS", "Conflict", "EncounterKind",
+    "Equation", "FrenetTracks", "LaneGaps", "MainLine", "PairConflicts", "Situation", "Track",
+    "Wait", "clean_tracks",
     "closest_crossing", "conflict_of", "conflicts_by_pair", "departure", "describe_turn",
-    "driver_rows", "drivers_of", "encroachment", "find_conflicts", "find_waits", "is_same_turn",
-    "kind_of", "lag_behind", "lane_gaps", "main_line", "manoeuvre_of", "mirrored",
-    "pair_crossings",
+    "driver_rows", "drivers_of", "encroachment", "find_conflicts", "find_waits",
+    "interaction_windows", "is_same_turn", "keeps_interaction", "kind_of", "lag_behind",
+    "lane_gaps", "main_line", "manoeuvre_of", "mirrored", "pair_crossings",
     "passing", "path_crossing", "refuse_reversing", "refuse_too_large", "required_orders",
     "separate", "sharpness_of", "smallest_gaps", "solve_placement", "time_gaps", "to_frenet",
     "track_conflicts", "traffic_side", "turn_of", "turns_to_keep",

@@ -45,6 +45,7 @@ class Conflict:
         entry_first: when [s] the first one enters the shared area.
         exit_first: when [s] the first one has left it.
         entry_second: when [s] the second one enters.
+        exit_second: when [s] the second one has left it.
     """
 
     first: int
@@ -53,6 +54,7 @@ class Conflict:
     entry_first: float
     exit_first: float
     entry_second: float
+    exit_second: float
 
     @property
     def pair(self) -> tuple[int, int]:
@@ -169,8 +171,8 @@ def _pair_conflict(a: int, b: int, sweep_a: _Sweep, sweep_b: _Sweep) -> Conflict
         return None
     entry_a, exit_a, entry_b, exit_b = times
     if a_first:
-        return Conflict(a, b, bool(following), entry_a, exit_a, entry_b)
-    return Conflict(b, a, bool(following), entry_b, exit_b, entry_a)
+        return Conflict(a, b, bool(following), entry_a, exit_a, entry_b, exit_b)
+    return Conflict(b, a, bool(following), entry_b, exit_b, entry_a, exit_a)
 
 
 @kernel(inline=True)

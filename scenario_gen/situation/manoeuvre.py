@@ -10,7 +10,7 @@ import numpy as np
 from scenario_gen.numerics.plane import angle_between
 from scenario_gen.situation.tracks import Track
 
-MAX_TURN_CHANGE_RAD: Final = np.radians(25.0)  # between turns that are the same manoeuvre
+MAX_TURN_CHANGE_RAD: Final = np.radians(40.0)  # between turns that are the same manoeuvre
 SURELY_SAME_TURN_RAD: Final = np.radians(15.0)  # even if their names differ
 MIN_NAMED_TURN_RAD = np.radians(30.0)
 MIN_NAMED_U_TURN_RAD = np.radians(150.0)
@@ -35,7 +35,7 @@ def manoeuvre_of(turn: float) -> str:
 
 
 def is_same_turn(recorded: float, turn: float) -> bool:
-    """Whether a turn [rad] is that of the recording: at most 25° different, with the same name."""
+    """Whether a turn [rad] is that of the recording: at most 40° different, with the same name."""
     change = abs(angle_between(turn, recorded))
     if change <= SURELY_SAME_TURN_RAD:
         return True

@@ -59,6 +59,7 @@ class NoteKind(Enum):
     SMOOTHED = "vehicle {vehicle}: record smoothed by up to {distance:.2f} m into a drivable path"
 
     # Sampling.
+    SHORTENED = "shortened to fit the road: {parts} ({reason})"
     AUTO_ROAD = "road auto: {road}, the first built-in road on which the encounter is unchanged"
     RECOMBINED = "recombined from {first} and {second}: this encounter was not recorded"
     OUTCOMES = "outcomes of the decision: {mix}"

@@ -24,6 +24,11 @@ class FittingConfig(Parameters):
         "losses that a fit may have, separated by commas: "
         + ", ".join(f"lost_{kind} ({meaning})" for kind, meaning in LOSABLE.items()),
     )
+    shorten: bool = parameter(
+        True,
+        "shorten a recording at its begin and end if it does not fit as a whole, as long as "
+        "conflicts, orders, reactions, waits and turns remain",
+    )
     scale_low: float = parameter(0.8, "smallest accepted scale s of eq 9", low=0.01, high=1.0)
     scale_high: float = parameter(1.25, "largest accepted scale s of eq 9", low=1.0, high=1000.0)
     max_move: float = parameter(

@@ -39,7 +39,13 @@ NOT_COMPARED = (
 )
 VARIED = ("pet", "gap", "speed")
 """Figures whose range is printed: PET, or the smallest gap if no vehicles cross, and the speed."""
-DECISION_NOTES = (NoteKind.OUTCOMES, NoteKind.OUTCOME_REFUSED, NoteKind.NOTHING_DECIDED)
+LABELS = {
+    NoteKind.SHORTENED: "length",
+    NoteKind.OUTCOMES: "decision",
+    NoteKind.OUTCOME_REFUSED: "decision",
+    NoteKind.NOTHING_DECIDED: "decision",
+}
+"""Labels of the notes that are printed."""
 WARNING_STYLE = "yellow"
 
 
@@ -74,8 +80,8 @@ def _case(case: GenerationResult, verbose: bool) -> list[RenderableType]:
         table.add_row("", "reaction", printable(sentence))
     table.add_row("", "valid", _validity(case.generated))
     for note in case.generated.adaptations:
-        if note.kind in DECISION_NOTES:
-            table.add_row("", "decision", printable(str(note)))
+        if label := LABELS.get(note.kind):
+            table.add_row("", label, printable(str(note)))
     if variety := _variety(case):
         table.add_row("", "variety", variety)
     for message in not_kept:

@@ -34,6 +34,7 @@ from scenario_gen.method.fitting import fit_template, FittingConfig
 from scenario_gen.method.routing import plan_routes, PlanningConfig
 from scenario_gen.method.sampling import checker_of, Plan, regenerate, SamplingConfig
 from scenario_gen.method.segmentation import segment, SegmentationConfig
+from scenario_gen.method.shortening import cut
 from scenario_gen.method.validity import Limits
 from scenario_gen.situation import mirrored, Situation
 from scenario_gen.types import Encounter, GenerationResult, Request, Scenario, Segmentation
@@ -345,16 +346,18 @@ def _find(
 
 
 def _templates(encounters: Sequence[Encounter], recorded: Encounter) -> Iterator[Encounter]:
-    """Yield what may be the recorded template: encounters of a log, decided and mirrored."""
+    """Yield what may be the recorded template: encounters, decided, shortened and mirrored."""
     for encounter in encounters:
-        if encounter.start_ns != recorded.start_ns:
-            continue
         template = encounter
-        if recorded.decision is not None:
-            with suppress(RefusedError):  # of another encounter from the log
+        with suppress(RefusedError, InputError):  # of another encounter from the log
+            if recorded.decision is not None:
                 template = decided(encounter, recorded.decision)
-        yield template
-        yield mirrored(template)
+            if template.ids == recorded.ids:
+                offset = (recorded.start_ns - template.start_ns) * 1e-9
+                template = cut(template, recorded.time[recorded.present] + offset)
+        if template.start_ns == recorded.start_ns:
+            yield template
+            yield mirrored(template)
 
 
 def _from_log(

@@ -54,7 +54,6 @@ class MatchLimits:
     samples: int = 24  # of a path that are compared with a chain
     chains: int = 96  # tried for a vehicle: recorded maps have at most 15
     changing_chains: int = 4  # the best, between which lane changes are tried
-    turn_error_rad: float = math.radians(40.0)  # of a chain: more is another manoeuvre
     noticeable_turn_error_rad: float = math.radians(12.0)  # from which another start is tried
     crossing_angle_rad: float = math.radians(15.0)  # less is a merge
     same_lane_m: float = 2.0  # sideways

@@ -36,6 +36,7 @@ from scenario_gen.roads.vector.search import RigidPlacement
 from scenario_gen.situation import (
     describe_turn,
     Equation,
+    MAX_TURN_CHANGE_RAD,
     pair_crossings,
     PairConflicts,
     solve_placement,
@@ -431,7 +432,7 @@ def _misfits(path: LanePath, track: Track) -> Iterator[str]:
     if short > 0.0:
         yield f"the lanes of vehicle {vehicle.id} are {short:.1f} m too short"
     recorded = turn_of(track)
-    if abs(path.turn - recorded) > LIMITS.turn_error_rad:
+    if abs(path.turn - recorded) > MAX_TURN_CHANGE_RAD:
         yield (
             f"vehicle {vehicle.id} {describe_turn(recorded)} in the recording, "
             f"{describe_turn(path.turn)} on these lanes"

@@ -70,7 +70,7 @@ def test_a_wait_or_a_conflict_of_nobody_is_refused(index):
     with pytest.raises(InputError, match=f"name vehicle {index}"):
         causes(passing(), waits=[Wait(index, 2.0, 8.0)])
     with pytest.raises(InputError, match=f"name vehicle {index}"):
-        causes(passing(), conflicts=[Conflict(0, index, False, 1.0, 2.0, 3.0)])
+        causes(passing(), conflicts=[Conflict(0, index, False, 1.0, 2.0, 3.0, 4.0)])
 
 
 @pytest.mark.parametrize(

@@ -186,7 +186,7 @@ def test_passing_order_is_that_of_the_template():
     scenario = scenario_of(CROSSING, TIME)
     kept = find_conflicts(scenario)
     assert causes(scenario, conflicts=kept) == []
-    reverse = (Conflict(kept[0].second, kept[0].first, False, 0.0, 1.0, 2.0),)
+    reverse = (Conflict(kept[0].second, kept[0].first, False, 0.0, 1.0, 2.0, 3.0),)
     assert causes(scenario, conflicts=reverse) == [Cause.PASSING_ORDER]
 
 
@@ -194,7 +194,7 @@ def test_a_conflict_that_the_scenario_does_not_have_is_counted_not_refused():
     lanes = scenario_of(
         [straight(-90, 0, 0, 9, TIME), straight(90, 4, np.pi, 9, TIME), CROSSING[1]], TIME
     )
-    conflicts = tuple(Conflict(a, b, False, 0.0, 1.0, 2.0) for a, b in ((1, 0), (2, 0)))
+    conflicts = tuple(Conflict(a, b, False, 0.0, 1.0, 2.0, 3.0) for a, b in ((1, 0), (2, 0)))
     (verdict,) = Checker(ROAD, None, conflicts, None).check([lanes])
     assert (verdict.valid, verdict.conflicts, verdict.not_applicable) == (True, 1, 1)
 

@@ -1,0 +1,154 @@
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""A recording that is too long for a road is shortened to its interaction, as little as possible.
+
+Each vehicle's track may lose its begin and its end, as long as all conflicts, orders, reactions,
+waits and turns remain (`interaction_windows`). Three ways are tried, the one with the smallest
+loss first: the same time for all vehicles; then other ends; then other begins, too. What the road
+has room for is then given back, in quarters.
+"""
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from scenario_gen.base.errors import RefusedError
+from scenario_gen.method.sampling import TargetError
+from scenario_gen.numerics import Floats
+from scenario_gen.situation import (
+    describe_turn,
+    interaction_windows,
+    keeps_interaction,
+    Situation,
+    turn_of,
+)
+from scenario_gen.types import Encounter, GenerationResult, Note, NoteKind
+
+GenerateSet = Callable[[Encounter, int], GenerationResult]
+MIN_LOSS_S = 0.5  # a recording that can lose less is not shortened
+
+
+def fit_what_matters(generate: GenerateSet, encounter: Encounter, count: int) -> GenerationResult:
+    """Return the scenarios of a recording, or of a shortened one if the whole does not fit.
+
+    Args:
+        generate: returns so many scenarios from a template.
+        encounter: the recording.
+        count: scenarios.
+
+    Raises:
+        RefusedError: as `generate` for the whole recording; the message has the lanes that its
+            shortest form needs.
+        InputError, TargetError: as `generate`.
+    """
+    try:
+        return generate(encounter, count)
+    except TargetError:
+        raise
+    except RefusedError as error:
+        refusal = error
+    search = _Search(generate, Situation.of(encounter))
+    shortest = search.shortest_loss()
+    if shortest is None:
+        raise search.with_remedy(refusal) from refusal
+    note = Note.of(NoteKind.SHORTENED, parts=in_words(encounter, shortest), reason=refusal)
+    return generate(shortest, count).noted(note)
+
+
+def cut(encounter: Encounter, windows: Floats) -> Encounter:
+    """Return an encounter with each vehicle in its window (N, 2) [s]; the clock starts at 0 s."""
+    samples = windows / encounter.dt
+    kept = np.column_stack((np.floor(samples[:, 0] + 1e-6), np.ceil(samples[:, 1] - 1e-6)))
+    kept = np.clip(kept.astype(np.int64), encounter.present[:, :1], encounter.present[:, 1:])
+    first, last = int(kept[:, 0].min()), int(kept[:, 1].max())
+    part = encounter.select(range(len(kept)), first, last)
+    return replace(part, present=kept - first)
+
+
+def in_words(encounter: Encounter, part: Encounter) -> str:
+    """Return which part of the recording is used, for each vehicle if they differ."""
+    offset = (part.start_ns - encounter.start_ns) * 1e-9
+    spans = [f"{a + offset:.1f} to {b + offset:.1f} s" for a, b in part.time[part.present]]
+    if len(set(spans)) == 1:
+        return f"{spans[0]} of {encounter.duration:.1f} s"
+    each = [f"vehicle {name}: {span}" for name, span in zip(part.ids, spans, strict=True)]
+    return f"{', '.join(each)} of {encounter.duration:.1f} s"
+
+
+@dataclass(eq=False)
+class _Search:
+    """The search for the shortest loss with which a recording fits."""
+
+    generate: GenerateSet
+    situation: Situation
+    refusals: list[tuple[Encounter, RefusedError]] = field(default_factory=list)
+
+    def shortest_loss(self) -> Encounter | None:
+        """Return the recording with the smallest loss found; None if it does not fit shortened."""
+        encounter = self.situation.encounter
+        whole = encounter.time[encounter.present]
+        for tightest in self._ways():
+            loss = np.abs(tightest - whole)
+            if loss.max() >= MIN_LOSS_S and (best := self._fitting(tightest)):
+                return self._restored(whole, best, tightest - whole)
+        return None
+
+    def _ways(self) -> Iterator[Floats]:
+        """Yield the tightest windows (N, 2) [s] of each way of shortening."""
+        each = interaction_windows(self.situation)
+        common = np.tile((each[:, 0].min(), each[:, 1].max()), (len(each), 1))
+        ways = common, np.column_stack((common[:, 0], each[:, 1])), each
+        for k, way in enumerate(ways):
+            if not any(np.array_equal(way, earlier) for earlier in ways[:k]):
+                yield way
+
+    def _restored(self, whole: Floats, best: Encounter, change: Floats) -> Encounter:
+        """Return the fitting part with the smallest share of a change (N, 2) [s] of the windows.
+
+        First the begins are restored as far as possible, then the ends: to all, half or a quarter.
+        """
+        shares = np.ones(2)
+        for end in (0, 1):
+            lowest, highest = 0.0, 1.0
+            for step in range(3):
+                share = 0.0 if step == 0 else (lowest + highest) / 2.0
+                tried = np.where(np.arange(2) == end, share, shares)
+                part = self._fitting(whole + tried * change)
+                if part is None:
+                    lowest = share
+                    continue
+                best, shares, highest = part, tried, share
+                if step == 0:
+                    break
+        return best
+
+    def with_remedy(self, refusal: RefusedError) -> RefusedError:
+        """Return a refusal with the lanes that the shortest form of the recording needs."""
+        if not self.refusals:
+            return refusal
+        part, error = self.refusals[-1]
+        needed = [
+            f"vehicle {track.vehicle.id} {describe_turn(turn_of(track))} within "
+            f"{track.travelled:.0f} m"
+            for track in Situation.of(part).drivers
+            if not track.still
+        ]
+        used = in_words(self.situation.encounter, part)
+        return type(refusal)(
+            f"{refusal}. Shortened to its interaction ({used}), it needs a road on which "
+            f"{' and '.join(needed)}: {error}"
+        )
+
+    def _fitting(self, windows: Floats) -> Encounter | None:
+        """Return the recording cut to windows (N, 2) [s] if it keeps its interaction and fits."""
+        part = cut(self.situation.encounter, windows)
+        if not keeps_interaction(self.situation, Situation.of(part)):
+            return None
+        try:
+            self.generate(part, 1)
+        except RefusedError as error:
+            self.refusals.append((part, error))
+            return None
+        return part

@@ -1,0 +1,84 @@
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""When each vehicle is needed for the interaction, so that the rest of a recording can be cut."""
+
+from collections import Counter
+from collections.abc import Iterator
+
+import numpy as np
+
+from scenario_gen.numerics import Floats
+from scenario_gen.situation.manoeuvre import is_same_turn, manoeuvre_of, turn_of
+from scenario_gen.situation.situation import Situation
+from scenario_gen.situation.tracks import Track
+from scenario_gen.types import YIELD
+
+LEAD_S = 2.0  # kept before the first event of a vehicle
+FOLLOW_UP_S = 1.0  # kept after its last one
+MIN_FOLLOWING_S = 4.0  # of a vehicle that follows another one after a merge
+TURN_ENDS_SHARE = 0.05  # of a turn that may be missing at each end
+
+
+def interaction_windows(situation: Situation) -> Floats:
+    """Return (N, 2) from when to when [s] each vehicle is needed.
+
+    It is needed from 2 s before to 1 s after all its conflicts, reactions and waits, and while it
+    turns. A vehicle without an event is needed all the time.
+    """
+    encounter = situation.encounter
+    present = encounter.time[encounter.present]
+    windows = np.tile([np.inf, -np.inf], (len(present), 1))
+    for vehicle, begin, end in _events(situation):
+        windows[vehicle, 0] = min(windows[vehicle, 0], begin - LEAD_S)
+        windows[vehicle, 1] = max(windows[vehicle, 1], end + FOLLOW_UP_S)
+    for vehicle, track in enumerate(situation.tracks):
+        if windows[vehicle, 0] < np.inf and manoeuvre_of(turn_of(track)) != "straight":
+            begin, end = encounter.time[_turning(track)]
+            windows[vehicle] = min(windows[vehicle, 0], begin), max(windows[vehicle, 1], end)
+    needed = np.isfinite(windows[:, :1])
+    return np.where(needed, np.clip(windows, present[:, :1], present[:, 1:]), present)
+
+
+def _events(situation: Situation) -> Iterator[tuple[int, float, float]]:
+    """Yield the vehicle, begin and end [s] of each event."""
+    for conflict in situation.conflicts:
+        first, second, entry = conflict.first, conflict.second, conflict.entry_first
+        if not conflict.following:
+            yield first, entry, conflict.exit_first
+            yield second, entry, conflict.exit_second
+        elif entry > situation.tracks[first].present[0] * situation.encounter.dt:
+            yield first, conflict.entry_second, conflict.entry_second  # it merges
+            yield second, conflict.entry_second, conflict.entry_second
+    for edge in situation.reactions.edges:
+        if edge.kind == YIELD:
+            yield edge.who, edge.since, edge.until
+        elif edge.since > situation.encounter.dt:  # after a merge
+            shown = min(edge.since + MIN_FOLLOWING_S, edge.until)
+            yield edge.who, edge.since, shown
+            yield edge.whom, edge.since, shown
+    for wait in situation.waits:
+        yield wait.vehicle, wait.start, wait.end
+
+
+def _turning(track: Track) -> list[int]:
+    """Return the first and the last sample between which a track does 90 % of its turn."""
+    yaw = track.poses[:, 2]
+    share = (yaw - yaw[0]) / (yaw[-1] - yaw[0])
+    begun = np.flatnonzero(share > TURN_ENDS_SHARE)[0]
+    unfinished = np.flatnonzero(share < 1.0 - TURN_ENDS_SHARE)[-1]
+    return [int(begun), int(max(unfinished, begun))]
+
+
+def keeps_interaction(recorded: Situation, cut: Situation) -> bool:
+    """Return whether a cut recording has the same conflicts, reactions, waits and turns."""
+    turns = zip(recorded.tracks, cut.tracks, strict=True)
+    return (
+        {(each.first, each.second) for each in recorded.conflicts}
+        == {(each.first, each.second) for each in cut.conflicts}
+        and Counter(wait.vehicle for wait in recorded.waits)
+        == Counter(wait.vehicle for wait in cut.waits)
+        and {(edge.kind, edge.who, edge.whom) for edge in recorded.reactions.edges}
+        == {(edge.kind, edge.who, edge.whom) for edge in cut.reactions.edges}
+        and all(is_same_turn(turn_of(whole), turn_of(part)) for whole, part in turns)
+    )

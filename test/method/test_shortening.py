@@ -1,0 +1,69 @@
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""A recording that is too long for a road is shortened to its interaction."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from scenario_gen import read_log
+from scenario_gen.base.errors import RefusedError
+from scenario_gen.method.shortening import cut, fit_what_matters
+from scenario_gen.situation import interaction_windows, keeps_interaction, Situation
+from scenario_gen.types import Encounter, GenerationResult, NoteKind, Segmentation
+
+LOG = Path(__file__).resolve().parents[2] / "examples" / "my_log.csv"
+
+
+@pytest.fixture(scope="module")
+def crossing() -> Encounter:
+    """One vehicle lets another one pass at a crossing."""
+    return read_log(LOG).encounters[0]
+
+
+def result_of(encounter: Encounter) -> GenerationResult:
+    """Return a result without stages."""
+    labels = np.zeros(len(encounter.time), dtype=np.int64)
+    segmentation = Segmentation(labels, labels[:0], labels.astype(float), ("",))
+    return GenerationResult(encounter, segmentation, None, None, ())
+
+
+def test_the_smallest_loss_that_fits_is_used_and_noted(crossing: Encounter) -> None:
+    calls = []
+
+    def short_road(template: Encounter, count: int) -> GenerationResult:
+        calls.append(count)
+        longest = max(track.travelled for track in Situation.of(template).tracks)
+        if longest > limit:
+            raise RefusedError("too long")
+        return result_of(template)
+
+    situation = Situation.of(crossing)
+    longest = max(track.travelled for track in situation.tracks)
+    limit = 0.95 * longest
+    result = fit_what_matters(short_road, crossing, 7)
+    assert (calls[0], calls[-1]) == (7, 7) and len(calls) <= 11
+    assert result.encounter.duration > 0.7 * crossing.duration
+    assert keeps_interaction(situation, Situation.of(result.encounter))
+    (note,) = result.generated.adaptations
+    assert note.kind is NoteKind.SHORTENED and f"of {crossing.duration:.1f} s" in str(note)
+
+    limit = 1.0
+    with pytest.raises(RefusedError, match=r"too long. Shortened to its interaction .* within"):
+        fit_what_matters(short_road, crossing, 7)
+
+
+def test_each_vehicle_keeps_its_events(crossing: Encounter) -> None:
+    situation = Situation.of(crossing)
+    windows = interaction_windows(situation)
+    for conflict in situation.conflicts:
+        assert windows[conflict.first, 0] <= max(conflict.entry_first - 2.0, 0.0)
+        assert windows[conflict.second, 1] >= min(conflict.exit_second, crossing.duration)
+    part = cut(crossing, windows)
+    assert part.start_ns - crossing.start_ns == pytest.approx(1e9 * windows[:, 0].min(), abs=1e8)
+    assert keeps_interaction(situation, Situation.of(part))
+    lost = windows.copy()
+    lost[:, 1] = situation.conflicts[0].entry_first - 1.0
+    assert not keeps_interaction(situation, Situation.of(cut(crossing, lost)))
