@@ -54,7 +54,8 @@ def load_class(option: str, name: str) -> Any:
         raise InputError(f"{option} {name}: write it as MODULE:CLASS, e.g. my_module:MyClass")
     try:
         if find_spec(module.partition(".")[0]) is None and str(Path.cwd()) not in sys.path:
-            sys.path.append(str(Path.cwd()))
+            # This package comes first, lest a folder of its name hides it from other processes.
+            sys.path += [str(Path(__file__).parents[2]), str(Path.cwd())]
         loaded = pkgutil.resolve_name(name)
     except ImportError as error:
         raise InputError(

@@ -140,8 +140,8 @@ def _print_validation(validation: "Validation") -> None:
     from scenario_gen.bags.recordings.read import NO_ENTRY
 
     valid = validation.scenarios - validation.invalid
-    name = validation.namespace or "/"
-    print_(f"{name}: {valid} of {validation.scenarios} scenarios are valid")
+    name = f"{validation.namespace}: " if validation.namespace else ""
+    print_(f"{name}{valid} of {validation.scenarios} scenarios are valid")
     if validation.causes:
         rows = [
             (cause, str(entry.count), str(entry.scenario), entry.message)

@@ -17,7 +17,6 @@ import webbrowser
 from scenario_gen.base.errors import InputError, printable
 from scenario_gen.base.stores import renamed
 
-
 UNBOUNDED_COLUMNS = 10_000
 """Width of a terminal in which no line breaks."""
 
@@ -118,7 +117,9 @@ def print_table(columns: Sequence[str], rows: Sequence[Sequence[str]], names: in
     table = Table(*columns, box=None, pad_edge=False)
     for row in rows:
         table.add_row(*row)
-    unbounded = terminal.options.update(width=UNBOUNDED_COLUMNS)  # measures a table without wrapping it
+    unbounded = terminal.options.update(
+        width=UNBOUNDED_COLUMNS
+    )  # measures a table without wrapping it
     if terminal.measure(table, options=unbounded).maximum <= terminal.width:
         print_(table)
         return

@@ -3,12 +3,15 @@
 
 """A registry: built-in things first, those of installed packages when they are wanted, and faults of a package by its name."""
 
+from importlib.machinery import PathFinder
+from pathlib import Path
 import sys
 
 import pytest
 
+import scenario_gen
 from scenario_gen.base.errors import InputError
-from scenario_gen.base.registry import installed, Registry
+from scenario_gen.base.registry import installed, load_class, Registry
 
 GROUP = "scenario_gen.test"
 NUMBERS = {"one": int, "two": float}
@@ -123,3 +126,17 @@ def test_two_distributions_with_one_name_are_both_named(install):
         InputError, match=r"left 1\.2 and right 1\.2 both have scenario_gen\.test 'same'"
     ):
         Registry(GROUP, NUMBERS).names()
+
+
+def test_a_folder_with_this_package_s_name_does_not_hide_it_from_other_processes(
+    tmp_path, monkeypatch
+):
+    (tmp_path / "scenario_gen").mkdir()
+    (tmp_path / "module_in_the_folder.py").write_text("class Planner: ...\n")
+    monkeypatch.chdir(tmp_path)
+    installed = Path(scenario_gen.__file__).parents[1]
+    elsewhere = [path for path in sys.path if Path(path or ".").resolve() != installed]
+    monkeypatch.setattr(sys, "path", elsewhere)
+    load_class("--planner", "module_in_the_folder:Planner")
+    spec = PathFinder.find_spec("scenario_gen", sys.path)
+    assert spec is not None and spec.origin == scenario_gen.__file__

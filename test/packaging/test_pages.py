@@ -1,12 +1,13 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The code that pages show runs: README, tutorial, and the how-to on data; the table of columns is the code's."""
+"""The code that pages show runs and prints what they show; the table of columns is the code's."""
 
 import csv
 import doctest
 import re
 import runpy
+import shlex
 import sys
 
 import pytest
@@ -24,34 +25,64 @@ def blocks(page):
     )
 
 
+def shown_after(page, command):
+    """Return the output that a page shows for a command: the next block of text before another command."""
+    rest = (ROOT / page).read_text().partition(f"\n{command}\n")[2]
+    text, found = rest.partition("```text\n")[::2]
+    return found.partition("```")[0] if "```sh" not in text else ""
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    """A folder as a fresh clone has it, in which the code of pages runs."""
+    folder = tmp_path_factory.mktemp("clone")
+    (folder / "scenario_gen").mkdir()
+    for name in ("examples", "scenario_gen/resources"):
+        (folder / name).symlink_to(ROOT / name)
+    return folder
+
+
 @pytest.fixture
-def place(tmp_path, monkeypatch):
-    """A folder with the examples, in which a page's code runs, and modules that it writes are found."""
-    (tmp_path / "examples").symlink_to(ROOT / "examples")
-    monkeypatch.chdir(tmp_path)
-    monkeypatch.syspath_prepend(tmp_path)
-    return tmp_path
+def place(folder, monkeypatch):
+    """The folder as the current one, where modules that a page writes are found."""
+    monkeypatch.chdir(folder)
+    monkeypatch.syspath_prepend(folder)
+    return folder
+
+
+LONG = ("tutorial_planner", "howto_planner", "howto_failures", "howto_archives")
 
 
 @pytest.mark.parametrize(
-    "page", [pytest.param("docs/tutorial.md", marks=pytest.mark.long), "docs/howto_data.md"]
+    "page",
+    [
+        pytest.param(page, marks=pytest.mark.long if page.stem in LONG else ())
+        for page in sorted((ROOT / "docs").glob("*to*.md"))
+        if page.stem.startswith(("tutorial", "howto")) and not page.stem.endswith("_ros")
+    ],
+    ids=lambda page: page.stem,
 )
-def test_commands_of_a_page_run(page, place, monkeypatch):
+def test_commands_of_a_page_run_and_print_what_it_shows(page, place, monkeypatch, capsys):
     for language, text in blocks(page):
         if language == "python":
             (place / text.partition("\n")[0].removeprefix("# ")).write_text(text)
             continue
         for line in text.splitlines():
-            if line.startswith("scenario-gen "):
-                monkeypatch.setattr(sys, "argv", line.split())
+            program, *words = shlex.split(line)
+            monkeypatch.setattr(sys, "argv", words if program == "python" else [program, *words])
+            if program == "python":
+                runpy.run_path(words[0], run_name="__main__")
+            elif program == "scenario-gen":
                 with pytest.raises(SystemExit) as end:
                     main()
                 assert int(end.value.code or 0) == int(FAILS in line), line
+                assert shown_after(page, line) in capsys.readouterr().out
 
 
 def test_python_of_the_readme_runs(place, capsys):
     exec("\n".join(text for language, text in blocks("README.md") if language == "python"), {})
-    assert capsys.readouterr().out
+    shown = (ROOT / "README.md").read_text().partition("```text\n")[2].partition("```")[0]
+    assert capsys.readouterr().out == shown
 
 
 def test_the_tables_of_the_reference_are_the_code_s():
@@ -62,7 +93,6 @@ def test_the_tables_of_the_reference_are_the_code_s():
         assert names[0] == names[1], "run: python docs/tables.py"
 
 
-@pytest.mark.long
 @pytest.mark.usefixtures("place")
 def test_the_tasks_of_the_library_run_and_are_short():
     pytest.importorskip("matplotlib").use("Agg")
