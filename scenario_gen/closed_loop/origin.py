@@ -23,6 +23,7 @@ class Origin:
 
     Attributes:
         encounter: name of the recorded encounter; "" if it is not known.
+        request: the request that a live scenario belongs to.
         digest: SHA-256 of its motion and of the ego's index; "" if not computed.
         copy_of: name of an earlier scenario from the same encounter with the same motion; ""
             without one.
@@ -50,6 +51,7 @@ class Trial:
     ego: int | str
     road: Road | None
     encounter: str = ""
+    request: str = ""
 
 
 def origins_of(trials: Sequence[Trial]) -> list[Origin]:

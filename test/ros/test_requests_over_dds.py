@@ -90,6 +90,11 @@ def test_the_same_bytes_as_in_process_with_an_ego(suite, client):
     assert all(
         values["ego"] == "1" and values["ego_start"] == str(state.tolist()) for values in accounts
     )
+    client.announce("/ego/goal")  # as traffic does
+    client.until(
+        lambda: client.node.count_publishers("/ego/goal") == 1,
+        "that the sampler leaves it the goal",
+    )
 
 
 def test_the_same_bytes_as_in_process_with_states(suite, client):

@@ -24,6 +24,7 @@ from msg_conventions.layouts import VELOCITY_STAMPED
 from msg_conventions.odometry import decode_odometry, encode_odometry
 from msg_conventions.paths import encode_path
 from msg_conventions.roads import decode_map
+from msg_conventions.scenario_info import encode_info, request_summary
 from scenario_gen.bags.recordings.write import result_messages, write_recording
 from scenario_gen.closed_loop.config import ClosedLoopConfig
 from scenario_gen.closed_loop.simulation import ClosedLoop
@@ -250,36 +251,47 @@ def test_two_egos_and_a_late_one_are_said(traffic, client):
 
 
 def test_live_scenarios_are_driven_on_the_road_that_they_name(start, client):
-    """What gp_sampler publishes: a map, witnesses, scenarios, entries, of which another may come before what it belongs to."""
+    """What gp_sampler publishes, in any order; neither requests from before the start nor cancelled ones."""
     from std_srvs.srv import Trigger
 
     run = hand_made_run()
     slot = EgoSlot(run.encounter.vehicles[1], np.zeros(4), np.ones(4))
     parted = tuple(with_witness(one, 1) for one in run.generated.scenarios)
     live = replace(run, generated=replace(run.generated, scenarios=parted, ego=slot))
-    messages = [(topic, data) for topic, data, _ in result_messages(live)]
-    start("traffic", lock_step=True)
     topics = ("map", "scenarios/info", "scenarios", "ego/witness")
+
+    def publish(request):
+        for wanted in topics:  # entries before scenarios, witnesses last
+            for topic, data, _ in result_messages(live, request):
+                if topic == wanted:
+                    client.say(topic, data)
+
+    publish("old")
+    start("traffic", lock_step=True)
     for topic in topics:
-        client.announce(topic)
         client.until(lambda topic=topic: client.node.count_subscribers(topic) >= 1, topic)
-    client.hear("ego/goal", "traffic/local_map", "verdicts")
-    for wanted in topics:  # entries before scenarios, witnesses last
-        for topic, data in messages:
-            if topic == wanted:
-                client.say(topic, data)
+    client.hear("ego/goal", "traffic/local_map", "verdicts", "/diagnostics")
+    publish("trial")
+    publish("stopped")
+    cancelled = request_summary(live.generated, "stopped", "/gp_sampler", 1, cancelled=True)
+    client.say("scenarios/info", encode_info(cancelled, 0))
     _, _, child, goal = decode_state(client.wait("ego/goal")[0])
     witness = parted[0].reference_drive
     assert child == f"vehicle_{token(slot.vehicle.id)}"
     assert goal[:2] == pytest.approx(witness.position[0, -1])
     client.announce("ego/cmd_vel")
+    client.announce("ego/goal")  # a sampler's
     client.until(lambda: client.node.count_subscribers("ego/cmd_vel") >= 1, "ego/cmd_vel")
     said = {"over": False}
     while not said["over"]:
         client.say("ego/cmd_vel", encode_twist(3.0, 0.0))
         said = step(client)
     client.wait("traffic/local_map")
-    assert client.call(Trigger, "/traffic/next", Trigger.Request()).success
+    driven = [decode_diagnostics(client.wait("verdicts")[0])[1][0].subject]
+    while (answer := client.call(Trigger, "/traffic/next", Trigger.Request())).success:
+        driven.append(answer.message)
+    assert driven == [f"scenario trial {scenario.index}" for scenario in parted]
+    assert not [status.message for status in client.statuses() if "twins" in status.name]
 
 
 class ByPlace:

@@ -3,10 +3,11 @@
 
 """Decodes scenarios from live messages in any order: scenarios, entries, witnesses."""
 
+from collections.abc import Callable
 from typing import TypeVar
 
 from msg_conventions.ego import WITNESS
-from msg_conventions.scenario_info import decode_info, INFO, ScenarioEntry
+from msg_conventions.scenario_info import decode_info, INFO, Info, ScenarioEntry
 from msg_conventions.scenarios import digest
 from scenario_gen.bags.recordings.request_tracker import Match, RequestTracker
 from scenario_gen.bags.recordings.scenarios import decode_with_witness, SCENARIOS
@@ -28,8 +29,10 @@ class ScenarioDecoder:
         unmatched: number of messages on `scenarios` that did not complete a scenario yet.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, accepts: Callable[[Info], bool] = lambda _: True) -> None:
+        """Ignore the messages on `scenarios/info` for which `accepts` returns False."""
         self.unmatched = 0
+        self._accepts = accepts
         self._tracker = RequestTracker(_MAX_STORED_COUNT)
         self._entries: dict[str, ScenarioEntry] = {}  # by SHA-256; the tracker omits their texts
         self._witnesses: dict[str, bytes] = {}  # by SHA-256
@@ -53,7 +56,7 @@ class ScenarioDecoder:
         if topic == SCENARIOS:
             self.unmatched += 1
             return self._decode_matches([self._tracker.add_scenario(digest(data), data)])
-        infos = decode_info(data)
+        infos = [info for info in decode_info(data) if self._accepts(info)]
         for info in infos:
             if isinstance(info, ScenarioEntry):
                 _store(self._entries, info.sha256, info)

@@ -7,8 +7,9 @@ Commands to the ego, live trials, states of a drive.
 """
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 import json
+from time import time_ns
 
 import numpy as np
 
@@ -28,6 +29,7 @@ from msg_conventions.odometry import decode_odometry, encode_odometry
 from msg_conventions.paths import encode_path
 from msg_conventions.pictures import vehicle_markers
 from msg_conventions.roads import decode_map
+from msg_conventions.scenario_info import Info, ScenarioEntry
 from msg_conventions.topics import vehicle_topic
 from scenario_gen.bags.recordings.scenario_decoder import ScenarioDecoder
 from scenario_gen.base.errors import InputError, ScenarioGenError
@@ -160,21 +162,32 @@ def _decode_motion(topic: str, data: bytes, loop: ClosedLoop, step: int) -> EgoC
 class ArrivingTrials:
     """Makes trials from live scenarios, each on the road that its entry names."""
 
-    def __init__(self) -> None:
+    def __init__(self, request: str, cancelled: Callable[[str], None]) -> None:
+        """Begin now.
+
+        Args:
+            request: whose scenarios are driven; "": all that are sent from now on.
+            cancelled: called with a request that was ended early; later trials leave it out.
+        """
+        self._request = request
+        self._started_ns = time_ns()
+        self._cancelled = cancelled
+        self._left_out: set[str] = set()  # cancelled requests
         self._roads: dict[str, Road] = {}  # by the hashes of their maps
-        self._scenarios = ScenarioDecoder()
+        self._scenarios = ScenarioDecoder(self._accepts)
 
     @property
     def unmatched(self) -> int:
         """The number of messages that wait for their entry."""
         return self._scenarios.unmatched
 
-    def receive(self, topic: str, data: bytes, ego: str) -> Iterator[Trial]:
+    def receive(self, topic: str, data: bytes, sent_ns: int, ego: str) -> Iterator[Trial]:
         """Receive a map, or a message of a scenario; yield the trials that it completes.
 
         Args:
             topic: of the message.
             data: its CDR bytes.
+            sent_ns: when it was sent; latched messages may be old. 0 if it is not known.
             ego: id of the vehicle that the ego replaces.
 
         Raises:
@@ -183,10 +196,26 @@ class ArrivingTrials:
         if topic == "map":
             self._roads[hash_of("map", data)] = decode_map(data)[1]
             return
+        if not self._request and 0 < sent_ns < self._started_ns:
+            return
         for entry, _, scenario in self._scenarios.add(topic, data):
+            if entry.request in self._left_out:
+                continue
             name = f"{entry.request} {entry.index}"
             road = self._roads.get(entry.map_hash or "")
-            yield trial_of(name, scenario, entry, road, ego, f"scenario {name}")
+            trial = trial_of(name, scenario, entry, road, ego, f"scenario {name}")
+            yield replace(trial, request=entry.request)
+
+    def _accepts(self, info: Info) -> bool:
+        """Return whether an entry or a summary concerns the scenarios to be driven."""
+        if self._request not in ("", info.request):
+            return False
+        if isinstance(info, ScenarioEntry):
+            self._left_out.discard(info.request)  # a restarted sampler counts from 1 again
+        elif info.cancelled:
+            self._left_out.add(info.request)
+            self._cancelled(info.request)
+        return True
 
 
 def task_messages(loop: ClosedLoop, child: str) -> Iterator[tuple[str, bytes]]:

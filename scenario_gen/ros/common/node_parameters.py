@@ -104,6 +104,11 @@ class TrafficParameters(Parameters):
         "id of the vehicle that the ego replaces; empty: the scenario's ego slot, or its first "
         "vehicle",
     )
+    request: str = parameter(
+        "",
+        "request whose live scenarios are driven; empty: all that are sent after the start",
+        fixed=True,
+    )
     index: int = parameter(0, "index of the first scenario in the bag, from 0", low=0, fixed=True)
     rate: float = parameter(
         1.0, "speed as a multiple of real time", low=0.01, high=1000.0, fixed=True

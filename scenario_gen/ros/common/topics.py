@@ -44,6 +44,7 @@ SHARED_SUFFIXES = (
     "/tf_static",
     "/clock",
     "/footprint",
+    "/ego/goal",
     "/transition_event",
 )
 """Ends of the names of topics that many nodes publish."""
@@ -251,8 +252,13 @@ class Outputs:
 
     def destroy(self) -> None:
         """Destroy all publishers with their latched messages."""
+        for topic in list(self._publishers):
+            self.withdraw(topic)
+
+    def withdraw(self, topic: str) -> None:
+        """Destroy the publisher of a topic, if there is one, with its latched messages."""
         with self._lock:
-            for topic in list(self._publishers):
+            if topic in self._publishers:
                 self._node.destroy_publisher(self._publishers.pop(topic))
 
 

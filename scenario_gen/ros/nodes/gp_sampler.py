@@ -11,7 +11,7 @@ service `~/generate`. Their parameters are the node's own, valid for that reques
 request, `~/cancel` all.
 """
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from functools import partial
 import os
 import threading
@@ -30,9 +30,10 @@ from scenario_gen.ros.common.requests import (
     OpenRequests,
 )
 from scenario_gen.ros.common.stage_node import Inputs, StageNode
-from scenario_gen.ros.common.topics import acknowledgement_warning
+from scenario_gen.ros.common.topics import acknowledgement_warning, other_publishers
 from scenario_gen.types import tokens
 
+GOAL = "ego/goal"
 ENDS = ("road/entries", "road/exits")  # only requests with start or end states need them
 
 
@@ -78,6 +79,16 @@ class GpSampler(StageNode):
         """Report the progress of the running request."""
         super().update_diagnostics()
         self._requests.report()
+        if self._has_traffic():
+            self.outputs.withdraw(GOAL)
+
+    def _has_traffic(self) -> bool:
+        """Return whether another node, `traffic`, publishes the ego's goal."""
+        return bool(other_publishers(self, self.resolve_topic_name(GOAL)))
+
+    def _send(self, topic: str, data: bytes, stop: Callable[[], bool]) -> None:
+        if topic != GOAL or not self._has_traffic():
+            self.outputs.send_paced(topic, data, stop)
 
     def received(self, topic: str, data: bytes) -> None:
         """Generate when all inputs have arrived."""
@@ -158,7 +169,7 @@ class GpSampler(StageNode):
                 return None
             self._requests.begin(request)
             report = partial(self._report_pace, request.name)
-            send = partial(self.outputs.send_paced, stop=stop)
+            send = partial(self._send, stop=stop)
             with self.outputs.paced(self.OUTPUTS[:2], config.patience, report):
                 node = self.get_fully_qualified_name()
                 result, summary = answer_request(

@@ -5,8 +5,9 @@
 
 It runs in real time or in lock-step.
 
-Scenarios come from a bag, or live from `scenarios`, `scenarios/info`, `ego/witness` and `map`. The
-ego replaces one vehicle. `ego/cmd_vel`, `ego/cmd_vel_stamped`, `ego/trajectory`, `ego/path` or
+Scenarios come from a bag, or live from `scenarios`, `scenarios/info`, `ego/witness` and `map`: those
+of one `request`, or all that are sent after the start, without cancelled requests. The ego replaces
+one vehicle. `ego/cmd_vel`, `ego/cmd_vel_stamped`, `ego/trajectory`, `ego/path` or
 `ego/odom` steer it: the drive begins with the first command, and the latest command counts.
 Services are `~/next`, `~/reset`, `~/pause`, `~/resume` and, in lock-step, `~/step`. Each step
 waits for a command that arrived after the previous step, so a client that answers each step with
@@ -98,7 +99,7 @@ class Traffic(Node):  # type: ignore[misc]
         self._paused = False
         self._sources: list[str] = []
         self.outcomes: list[Outcome] = []  # of finished drives
-        self._arriving = ArrivingTrials()
+        self._arriving = ArrivingTrials(self.config.request, self._leave_out)
         self._verdict = ""
         self._out = {topic: create_publisher(self, topic) for topic in OUTPUTS}
         self._out["/tf"] = create_frames_publisher(self)
@@ -151,17 +152,34 @@ class Traffic(Node):  # type: ignore[misc]
 
     # --- scenarios -----------------------------------------------------------------------------
 
-    def _receive_scenario(self, topic: str, data: bytes) -> None:
+    def _receive_scenario(self, topic: str, data: bytes, info: Mapping[str, Any]) -> None:
         """Receive a map or a message of a live scenario.
 
         Scenarios are driven in the order of their completion.
         """
         try:
-            self._trials += self._arriving.receive(topic, data, self.config.ego)
+            sent_ns = info["source_timestamp"]
+            trials = list(self._arriving.receive(topic, data, sent_ns, self.config.ego))
+            self._trials += trials
             if self._loop is None and len(self._trials) > self._index:
                 self._load(self._index)
+            elif self._verdict and self._load_at == math.inf and self.config.follow_on:
+                self._follow_on()
         except ScenarioGenError as error:
             self._report_status(Level.ERROR, str(error), topic)
+
+    def _leave_out(self, request: str) -> None:
+        """Leave out the scenarios of a cancelled request that were not driven to their end."""
+        n_begun = self._index + (self._loop is not None)
+        n_over = self._index + bool(self._verdict)
+        if n_over < n_begun and self._trials[self._index].request == request:
+            self._loop = None
+            n_begun = n_over
+        waiting = [trial for trial in self._trials[n_begun:] if trial.request != request]
+        self._trials[n_begun:] = waiting
+        if len(self._trials) <= self._index + 1:
+            self._load_at = math.inf
+        self.get_logger().info(f"request {request} was cancelled; its scenarios are left out")
 
     def _load(self, number: int) -> None:
         """Begin a scenario.
