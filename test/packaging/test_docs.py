@@ -63,12 +63,7 @@ def test_every_function_that_contributing_names_is_in_its_file():
     ]
 
 
-def test_every_public_name_is_on_the_page_of_the_library_and_every_page_on_the_site():
-    page = (ROOT / "docs" / "library.md").read_text()
-    shown = dict(re.findall(r"\{py:(?:class|func)\}`(\w+) <([\w.]+)>`", page))
-    assert shown == {
-        name: f"{getattr(scenario_gen, name).__module__}.{name}" for name in scenario_gen.__all__
-    }
+def test_every_page_is_on_the_site():
     site = (ROOT / "docs" / "index.md").read_text().split()
     pages = {path.stem for path in (ROOT / "docs").glob("*.md")}
     assert pages - {"index"} <= set(site) and not pages & {"search", "genindex"}, (
