@@ -3,12 +3,23 @@
 
 """The whole method on one screen: from an encounter and a road to valid, evaluated scenarios."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
+from pathlib import Path
+from typing import Any
 
 from scenario_gen.base.errors import RefusedError
 from scenario_gen.base.provenance import what_makes_it_again
+from scenario_gen.method.arguments import (
+    config_of,
+    encounters_of,
+    progress_of,
+    request_of,
+    seed_of,
+    Templates,
+    whole_number,
+)
 from scenario_gen.method.config import PipelineConfig
 from scenario_gen.method.evaluation import coverage_of, evaluate, measures_in, replay
 from scenario_gen.method.fitting import fit_template
@@ -37,34 +48,37 @@ __all__ = ["PipelineConfig", "generate", "generate_outcomes"]
 
 
 def generate(
-    encounter: Encounter | Sequence[Encounter],
-    road: Road | str,
-    config: PipelineConfig = PipelineConfig(),
+    encounter: Templates,
+    road: Road | Path | str,
+    config: PipelineConfig | Mapping[str, Any] = PipelineConfig(),
     *,
     count: int = 50,
-    seed: int = 0,
-    request: Request = Request(),
-    progress: Progress = lambda *_: None,
+    seed: int | None = 0,
+    request: Request | Mapping[str, Any] | str = Request(),
+    progress: Progress | bool = False,
     accepts: Callable[[Road, Scenario], bool] = lambda *_: True,
 ) -> GenerationResult:
     """Segment, fit, plan, sample (every candidate is checked) and evaluate.
 
     Args:
-        encounter: the template. Further encounters in a list show how encounters differ:
+        encounter: the template: an encounter, or a log with one encounter (a path, a DataFrame, or
+            what `read_log` returns). Further encounters in a list show how encounters differ:
             `sampling.variety=population` keeps scenarios that are usual among them.
         road: the target: a road, a name or path for `build_road`, or "auto": the first built-in
             road that is suitable. A template is mirrored on a map with the other side of traffic.
-        config: the parameters of every stage; `evaluation.compare` adds sets to compare with.
+        config: the parameters of every stage, or a mapping like a parameter file;
+            `evaluation.compare` adds sets to compare with.
         count: valid scenarios wanted.
-        seed: of all randomness.
+        seed: of all randomness; None draws one, which the result has.
         request: a vehicle to leave out for a planner under test, start and end states, a target,
-            an order.
-        progress: takes scenarios so far, scenarios wanted, candidates so far.
+            an order; a text is the target.
+        progress: True prints it; a function takes scenarios so far, scenarios wanted, candidates
+            so far.
         accepts: takes the road and a valid scenario of all vehicles; a scenario that it refuses is
             left out of the set.
 
     Raises:
-        InputError: a vehicle of the request does not exist.
+        InputError: an argument cannot be used, or a vehicle of the request does not exist.
         RefusedError: the encounter is too large, it does not fit the road, there is no route, the
             request is impossible, or no candidate is valid; the message has the reason.
 
@@ -75,7 +89,9 @@ def generate(
         >>> len(result)
         5
     """
-    encounter, *population = [encounter] if isinstance(encounter, Encounter) else encounter
+    config, request, progress = config_of(config), request_of(request), progress_of(progress)
+    count, seed = whole_number("count", count, 1), seed_of(seed)
+    encounter, *population = encounters_of(encounter, config)
     if road == AUTO:
         on_road = partial(
             generate,
@@ -111,7 +127,7 @@ def _generate_set(
     encounter: Encounter,
     count: int,
     *,
-    road: Road | str,
+    road: Road | Path | str,
     config: PipelineConfig,
     seed: int,
     request: Request,
@@ -170,14 +186,14 @@ def completed(
 
 
 def generate_outcomes(
-    encounter: Encounter | Sequence[Encounter],
-    road: Road | str,
-    config: PipelineConfig = PipelineConfig(),
+    encounter: Templates,
+    road: Road | Path | str,
+    config: PipelineConfig | Mapping[str, Any] = PipelineConfig(),
     *,
     count: int = 50,
-    seed: int = 0,
-    request: Request = Request(),
-    progress: Progress = lambda *_: None,
+    seed: int | None = 0,
+    request: Request | Mapping[str, Any] | str = Request(),
+    progress: Progress | bool = False,
 ) -> list[GenerationResult]:
     """Generate one set for each outcome of the encounter's decision, the recorded one first.
 
@@ -202,7 +218,8 @@ def generate_outcomes(
         >>> sum(map(len, sg.generate_outcomes(encounter, "four_way", config)))
         50
     """
-    encounter, *population = [encounter] if isinstance(encounter, Encounter) else encounter
+    config, request, seed = config_of(config), request_of(request), seed_of(seed)
+    encounter, *population = encounters_of(encounter, config)
 
     def generate_set(template: Encounter, size: int) -> GenerationResult:
         """Generate the scenarios of one outcome."""

@@ -44,6 +44,7 @@ STAGES = (
     "decisions",
     "outcome_sets",
     "config",
+    "arguments",
     "shortening",
     "chain",
     "reference_sets",

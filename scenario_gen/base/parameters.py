@@ -247,15 +247,15 @@ def read_parameter_file(path: Path) -> dict[str, Any]:
         nested = body.get("ros__parameters") if isinstance(body, dict) else None
     if not isinstance(nested, dict):
         raise InputError(f"{path}: not a parameter file of the form '/**: ros__parameters: ...'")
-    return dict(_dotted(nested))
+    return dict(dotted(nested))
 
 
-def _dotted(nested: dict[Any, Any], prefix: str = "") -> list[tuple[str, Any]]:
+def dotted(nested: Mapping[Any, Any], prefix: str = "") -> list[tuple[str, Any]]:
     """Flatten nested mappings to (dotted name, value) pairs."""
     pairs: list[tuple[str, Any]] = []
     for name, value in nested.items():
         if isinstance(value, dict):
-            pairs += _dotted(value, f"{prefix}{name}.")
+            pairs += dotted(value, f"{prefix}{name}.")
         else:
             pairs.append((f"{prefix}{name}", value))
     return pairs

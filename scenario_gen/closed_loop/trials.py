@@ -175,13 +175,18 @@ def trial_of(
     return Trial(name, join_ego(scenario), _ego_of(scenario, slot, ego, place), road)
 
 
-def trials_of(result: GenerationResult, ego: str = "") -> list[Trial]:
+def trials_of(result: GenerationResult, ego: str | int = "") -> list[Trial]:
     """Return the scenarios of a result as trials; `ego` as in `read_trials`.
 
     Raises:
-        InputError: a scenario has no vehicle `ego`, or it was made for another ego.
+        InputError: it is no result, a scenario has no vehicle `ego`, or it was made for another
+            ego.
     """
-    trials = []
+    if not isinstance(result, GenerationResult):
+        raise InputError(
+            f"trials_of: a result of generate or load is needed, not {type(result).__name__}"
+        )
+    ego, trials = str(ego), []
     for scenario in result:
         index = str(scenario.index)
         trial = trial_of(index, scenario, None, result.road, ego, f"scenario {index}")

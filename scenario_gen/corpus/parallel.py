@@ -3,10 +3,10 @@
 
 """Scenarios from several encounters on several roads; for archives see `scenario-gen batch`."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 import os
 
-from scenario_gen.base.errors import RefusedError
+from scenario_gen.base.errors import InputError, RefusedError
 from scenario_gen.base.signals import ctrl_c_blocked, worker_pool
 from scenario_gen.method.config import PipelineConfig
 from scenario_gen.pipeline import generate
@@ -41,12 +41,19 @@ def generate_many(
         For each case, in order, its result or the error that refused it.
 
     Raises:
-        InputError: a road or a parameter is invalid.
+        InputError: a case is no pair, or a road or a parameter is invalid.
 
     Example:
         >>> answers = generate_many([(encounter, "straight"), (encounter, "curve")], count=20)
         >>> results = [answer for answer in answers if not isinstance(answer, RefusedError)]
     """
+    cases = list(cases)
+    for case in cases:
+        if not isinstance(case, Sequence) or len(case) != 2:
+            raise InputError(
+                "generate_many: pairs (encounter, road) are needed, e.g. "
+                f'[(encounter, "four_way")], not {type(case).__name__}'
+            )
     tasks = [(case, config, count, seed) for case in cases]
     workers = min(workers or os.cpu_count() or 1, len(tasks))
     if workers <= 1:

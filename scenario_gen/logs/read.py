@@ -3,17 +3,19 @@
 
 """From a log to encounters: read, clean, smooth, group, cut (paper II-A)."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from html import escape
 from itertools import chain
 import math
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import Any, TYPE_CHECKING
 
 import numpy as np
 
 from scenario_gen.base.errors import InputError, reading
 from scenario_gen.base.folders.scratch import scratch
+from scenario_gen.base.parameters import updated
 from scenario_gen.base.stores import naming_objects, temp_folder
 from scenario_gen.logs.checks import copies_in, doubts_of_pieces, doubts_of_rows
 from scenario_gen.logs.cleaning import clean, Drops
@@ -53,16 +55,22 @@ class LogResult:
     quality: Quality
     doubts: tuple[Doubt, ...] = ()
 
+    def _repr_html_(self) -> str:
+        """Return the encounters as a list for a notebook."""
+        items = "".join(f"<li>{escape(repr(encounter))}</li>" for encounter in self.encounters)
+        return f"<b>LogResult({len(self.encounters)} encounters)</b><ol>{items}</ol>"
+
 
 def read_log(
-    path: "Path | str | Sequence[Path | str] | DataFrame", config: LogConfig = LogConfig()
+    path: "Path | str | Sequence[Path | str] | DataFrame",
+    config: LogConfig | Mapping[str, Any] = LogConfig(),
 ) -> LogResult:
     """Read a log and cut it into encounters.
 
     Args:
         path: a file, a bag or a folder of files; or several files that share one clock; or a
             DataFrame with the columns of a table.
-        config: how to read, clean and cut.
+        config: how to read, clean and cut, or a mapping with parameters of `log`.
 
     Returns:
         At least one encounter, on a common clock in a local east-north frame, and the quality.
@@ -77,6 +85,12 @@ def read_log(
         >>> len(encounter.vehicles)
         2
     """
+    if not isinstance(config, LogConfig):
+        config = updated(LogConfig(), dict(config))
+    if not isinstance(path, (str, Path, Sequence)) and not hasattr(path, "to_csv"):
+        raise InputError(
+            f"read_log: a path, several paths or a DataFrame is needed, not {type(path).__name__}"
+        )
     if hasattr(path, "to_csv"):
         with scratch(temp_folder()) as folder:
             file = folder / _DATAFRAME_FILE

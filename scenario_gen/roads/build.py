@@ -36,7 +36,7 @@ from scenario_gen.types import Encounter, LaneNetwork, Note, NoteKind, Road
 
 
 def build_road(
-    name_or_path: str | Shape,
+    name_or_path: str | Path | Shape,
     encounter: Encounter | None = None,
     config: RoadConfig = RoadConfig(),
 ) -> Road:
@@ -62,8 +62,8 @@ def build_road(
         Road('straight', 120.2 x 11 m)
     """
     obstacles = read_obstacles(config.obstacles)
-    if isinstance(name_or_path, str):
-        road = _road_without_obstacles(name_or_path, encounter, config)
+    if isinstance(name_or_path, (str, Path)):
+        road = _road_without_obstacles(str(name_or_path), encounter, config)
     else:
         road = road_of_shape(name_or_path, config)
     other_lanes = road.lanes.others if road.lanes is not None else ()
@@ -71,7 +71,7 @@ def build_road(
 
 
 def road_and_template(
-    name_or_path: Road | str, encounter: Encounter, config: RoadConfig = RoadConfig()
+    name_or_path: Road | Path | str, encounter: Encounter, config: RoadConfig = RoadConfig()
 ) -> tuple[Road, Encounter]:
     """Return a road, and the recording as it is driven there.
 
@@ -92,6 +92,7 @@ def road_and_template(
     refuse_reversing(encounter)
     if isinstance(name_or_path, Road):
         return name_or_path, encounter
+    name_or_path = str(name_or_path) if isinstance(name_or_path, Path) else name_or_path
     refusal: RefusedError | None = None
     try:
         road = build_road(name_or_path, encounter, config)

@@ -10,6 +10,8 @@ import math
 from pathlib import Path
 from typing import Any, TYPE_CHECKING
 
+import numpy as np
+
 from scenario_gen.base.errors import InputError
 from scenario_gen.types.coverage import Coverage
 from scenario_gen.types.encounter import Encounter
@@ -81,6 +83,20 @@ class GenerationResult:
         sizes = f"{len(self)} of {self.generated.candidates} candidates"
         return f"GenerationResult({sizes}, {road}, {vehicles}, seed {self.seed})"
 
+    def __eq__(self, other: object) -> bool:
+        """Return whether both have the same scenarios, from the same encounter with one seed."""
+        if not isinstance(other, GenerationResult):
+            return NotImplemented
+        same = (self.seed, self.encounter.name, len(self)) == (
+            other.seed,
+            other.encounter.name,
+            len(other),
+        )
+        return same and all(map(np.array_equal, self, other))
+
+    def __hash__(self) -> int:
+        return hash((self.seed, self.encounter.name, len(self)))
+
     def __len__(self) -> int:
         return len(self.generated)
 
@@ -142,6 +158,16 @@ class GenerationResult:
         import scenario_gen
 
         return scenario_gen.plot(self, ax)
+
+    def report(self, folder: Path | str) -> Path:
+        """Write page, bag and figures to a folder, as `scenario_gen.report` does.
+
+        Raises:
+            InputError: the folder has other contents.
+        """
+        import scenario_gen
+
+        return scenario_gen.report(folder, self)
 
     def save(self, folder: Path | str) -> Path:
         """Write the result to a new bag; return its folder. `scenario_gen.load` reads it.

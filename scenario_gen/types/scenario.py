@@ -57,6 +57,11 @@ class Scenario(Motion):
         """Its name in messages."""
         return f"scenario {self.index}"
 
+    def __array__(self, dtype: Any = None, copy: bool | None = None) -> Floats:
+        """Return x [m], y [m], heading [rad] and speed [m/s] of the vehicles (V, T, 4)."""
+        x, y = np.moveaxis(self.position, -1, 0)
+        return np.stack([x, y, self.heading, self.speed], axis=-1).astype(dtype or float)
+
     @property
     def array_names(self) -> tuple[str, ...]:
         """The names of the arrays (N, T, ...)."""
