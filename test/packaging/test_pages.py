@@ -85,6 +85,13 @@ def test_python_of_the_readme_runs(place, capsys):
     assert capsys.readouterr().out == shown
 
 
+def test_python_of_the_page_on_interaction_prints_what_it_shows(place, capsys):
+    page = (ROOT / "docs" / "interaction.md").read_text()
+    ((_, text),) = blocks("docs/interaction.md")
+    exec(text, {})
+    assert f"\n    {capsys.readouterr().out}" in page
+
+
 def test_the_tables_of_the_reference_are_the_code_s():
     """Only names are compared, so a better help text needs no new table at once."""
     for name, text in runpy.run_path(ROOT / "docs" / "tables.py")["tables"]().items():
