@@ -64,7 +64,7 @@ class LiveStreams:
         self._last_message = monotonic()
         self._topics: dict[str, tuple[str, str]] = {}  # full name -> vehicle, kind
         self._refused: set[str] = set()  # topics with an error on /diagnostics
-        self._timer = create_steady_timer(node, 0.2, self._check)
+        self._timer = create_steady_timer(node, 0.25, self._check)
 
     def _check(self) -> None:
         """Forget ended streams, subscribe to new ones, and end the log after silence."""

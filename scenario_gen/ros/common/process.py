@@ -106,7 +106,7 @@ class NodeProcess:
                 self._nodes.append(make(namespace))
                 self._executor.add_node(self._nodes[-1])
         # The longest wait of the executor, which signals do not end.
-        create_steady_timer(self._nodes[0], 0.2, lambda: None)
+        create_steady_timer(self._nodes[0], 0.25, lambda: None)
 
     def spin(self) -> int:
         """Start the nodes once their kernels are compiled, and spin them; return the exit code."""
@@ -125,12 +125,20 @@ class NodeProcess:
         for node in self._nodes:
             if not self._stopping:
                 node.autostart()
+        self._align_timers()
         while not self._stopping and not all(getattr(node, "done", False) for node in self._nodes):
             try:
                 self._executor.spin_once()
             except RuntimeError as error:  # rclpy: an impossible lifecycle transition
                 self._nodes[0].get_logger().warning(f"a request is dropped: {error}")
         return max(getattr(node, "exit_code", 0) for node in self._nodes)
+
+    def _align_timers(self) -> None:
+        """Let all timers begin now: each wake-up of the executor costs more than a callback."""
+        for node in self._nodes:
+            for timer in node.timers:
+                if not timer.is_canceled():
+                    timer.reset()
 
     def _load_kernels(self, stages: Iterable[str]) -> None:
         """Load or compile kernels until a signal, and report the progress on standard error."""

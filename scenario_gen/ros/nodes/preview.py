@@ -27,6 +27,8 @@ from scenario_gen.ros.common.topics import create_frames_publisher
 from scenario_gen.situation import find_conflicts
 from scenario_gen.types import Scenario, tokens
 
+IDLE_PERIOD_S = 1.0  # between two looks whether there is something to show, to somebody
+
 
 @dataclass(frozen=True)
 class Config(Parameters):
@@ -69,7 +71,7 @@ class Preview(StageNode):
         self._newest: tuple[Scenario, ScenarioEntry] | None = None
         self._shown: Shown | None = None
         self._anchors = np.zeros((0, 0, 3))
-        create_steady_timer(self, 1.0 / self.config.frame_rate, self._tick)
+        self._timer = create_steady_timer(self, IDLE_PERIOD_S, self._tick)
 
     def stopped(self) -> None:
         """Forget what was shown."""
@@ -84,8 +86,19 @@ class Preview(StageNode):
         for entry, _, scenario in self._arriving.add(topic, data):
             self._newest = scenario, entry
 
+    def _pace_ticks(self) -> None:
+        """Tick at the frame rate while a scenario is watched."""
+        period = IDLE_PERIOD_S
+        if self._newest and (self.count_subscribers("preview") or self.count_subscribers("/tf")):
+            period = 1.0 / self.config.frame_rate
+        period_ns = round(period * 1e9)
+        if period_ns != self._timer.timer_period_ns:
+            self._timer.timer_period_ns = period_ns
+            self._timer.reset()
+
     def _tick(self) -> None:
         """Publish where everybody is."""
+        self._pace_ticks()
         now, shown = monotonic(), self._shown
         if shown is None or now - shown.since > float(shown.scenario.time[-1]) + self.config.pause:
             if self._newest is None:

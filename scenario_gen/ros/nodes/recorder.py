@@ -87,7 +87,7 @@ class Recorder(Node):  # type: ignore[misc]
         self._refused: set[str] = set()
         offer_trigger(self, "~/start", self._start_now)
         offer_trigger(self, "~/stop", self._stop_now)
-        create_steady_timer(self, 0.1, self._subscribe_to_new)
+        create_steady_timer(self, 0.125, self._subscribe_to_new)
         create_steady_timer(self, 4.0, self._flush)  # writes incomplete chunks
         self._losses = MessageLoss(self.count_publishers)
         self._warned: dict[str, TopicLoss] = {}

@@ -5,9 +5,9 @@
 
 It runs in real time or in lock-step.
 
-Scenarios come from a bag, or live from `scenarios`, `scenarios/info`, `ego/witness` and `map`: those
-of one `request`, or all that are sent after the start, without cancelled requests. The ego replaces
-one vehicle. `ego/cmd_vel`, `ego/cmd_vel_stamped`, `ego/trajectory`, `ego/path` or
+Scenarios come from a bag, or live from `scenarios`, `scenarios/info`, `ego/witness` and `map`:
+those of one `request`, or all that are sent after the start, without cancelled requests. The ego
+replaces one vehicle. `ego/cmd_vel`, `ego/cmd_vel_stamped`, `ego/trajectory`, `ego/path` or
 `ego/odom` steer it: the drive begins with the first command, and the latest command counts.
 Services are `~/next`, `~/reset`, `~/pause`, `~/resume` and, in lock-step, `~/step`. Each step
 waits for a command that arrived after the previous step, so a client that answers each step with
