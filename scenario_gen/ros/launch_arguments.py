@@ -21,6 +21,7 @@ import yaml
 from scenario_gen.base.documents import parse_yaml, shown
 from scenario_gen.base.errors import did_you_mean, InputError
 from scenario_gen.base.parameters import check_value, flatten, parameter, Parameters
+from scenario_gen.base.registry import installed
 from scenario_gen.ros.common import node_parameters
 from scenario_gen.ros.node_names import SUITE
 
@@ -30,6 +31,8 @@ NAMESPACE = re.compile(r"/|/?[A-Za-z_]\w*(/[A-Za-z_]\w*)*", re.ASCII)
 # Matches every node. Of two matching keys rcl applies the one that it meets last for the first
 # time, so this key differs from the usual `/**`.
 EVERY_NODE = "/**/**"
+_NUMBER = r"[-+]?(\d+\.?\d*|\.\d+)(e[-+]?\d+)?"
+STATES = re.compile(rf"([^;]+:\s*{_NUMBER}(\s+{_NUMBER}){{2,3}}\s*(;|$)\s*)+", re.IGNORECASE)
 
 
 @dataclass(frozen=True)
@@ -157,6 +160,7 @@ def parse_arguments(arguments: Arguments, texts: Mapping[str, str]) -> Launch:
     )
     is_suite = "log" in arguments
     _check_options(launch)
+    _check_texts(launch.parameters)
     _check_paths(launch, is_suite=is_suite)
     if is_suite and not (values.get("log") or launch.options.params):
         raise InputError(
@@ -192,6 +196,24 @@ def _check_options(launch: Launch) -> None:
             raise InputError(
                 f"without:={name}: choose of {', '.join(SUITE)}{did_you_mean(name, SUITE)}"
             )
+
+
+def _check_texts(parameters: Mapping[str, Any]) -> None:
+    """Raise InputError if states, a regular expression or a road's name is invalid."""
+    for name in ("starts", "goals"):
+        text = parameters.get(name, "")
+        if text and not STATES.fullmatch(text):
+            raise InputError(
+                f"{name}:={shown(text)}: write `id: x y yaw [speed]`, vehicles separated by `;`"
+            )
+    node_parameters.RecorderParameters(topics=parameters.get("topics", ""))
+    road = parameters.get("road_name", "")
+    roads = (*node_parameters.ROAD_NAMES, *installed("scenario_gen.roads"))
+    if road and road not in roads and not Path(road).exists():
+        raise InputError(
+            f"road:={shown(road)}: no map with this name; choose a file, or of {', '.join(roads)}"
+            f"{did_you_mean(road, roads)}"
+        )
 
 
 def _check_paths(launch: Launch, *, is_suite: bool) -> None:

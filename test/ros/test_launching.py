@@ -18,6 +18,8 @@ import yaml
 
 from scenario_gen.base.errors import InputError
 from scenario_gen.base.parameters import flatten
+from scenario_gen.roads.build import ROADS
+from scenario_gen.ros.common.node_parameters import ROAD_NAMES
 from scenario_gen.ros.common.ros_parameters import config_of
 from scenario_gen.ros.common.start import node_class
 from scenario_gen.ros.launch_arguments import (
@@ -118,6 +120,8 @@ def test_arguments_are_parameters_of_nodes_and_count_only_where_they_are_given()
         "ros__parameters"
     ]
     assert set(defaults) <= known
+    assert set(ROADS.built_in) == set(ROAD_NAMES)
+    assert launched(log=LOG, starts="2: 53 4.57 0 9.5; a b:1 -2e1 .5", road="corridor")
 
 
 @pytest.mark.parametrize(
@@ -142,6 +146,10 @@ def test_arguments_are_parameters_of_nodes_and_count_only_where_they_are_given()
             "results:=.*; name another folder",
         ),
         ({"params": str(ROOT / "pyproject.toml")}, "no ros__parameters"),
+        ({"starts": "1 2 3"}, "starts:=1 2 3: write `id: x y yaw"),
+        ({"goals": "1: 2 3 0; 2: 4"}, "goals:=.*: write `id: x y yaw"),
+        ({"topics": "(tracks"}, "topics is no regular expression"),
+        ({"road": "forway"}, "road:=forway: no map .*did you mean four_way"),
         ({"file": "drive.launch.py", "policy": "brave"}, "policy:=brave: .*reactive"),
     ],
     ids=str,
@@ -211,7 +219,7 @@ import json, sys
 before = set(sys.modules)
 from pathlib import Path
 from scenario_gen.ros.launch_arguments import DRIVE_ARGUMENTS, parse_arguments, SUITE_ARGUMENTS
-given = {"log": sys.argv[1], "bag": sys.argv[2], "starts": "'1: 31.8 68.45 0.0 10.7'"}
+given = {"log": sys.argv[1], "bag": sys.argv[2], "starts": "'1: 31.8 68.45 0.0 10.7'", "goals": "1: 2 3 0", "road": "straight"}
 for arguments, given in ((DRIVE_ARGUMENTS, {}), (SUITE_ARGUMENTS, given)):
     for name, (_, entry) in arguments.items():
         text = entry.metadata["choices"][0] if entry.metadata["choices"] else "/tmp" if name == "results" else "1"

@@ -146,12 +146,13 @@ class NodeDiagnostics:
             return
         kind = type(error).__name__
         message = str(error)
-        if not isinstance(error, ScenarioGenError):
+        is_bug = not isinstance(error, ScenarioGenError)
+        if is_bug:
             self._node.get_logger().error("".join(traceback.format_exception(error)))
             message = f"{kind}: {error}"
         subject, _, job = name.partition(" ")
         values = {"error": kind, "job": job} if job else {"error": kind}
-        self.status(Level.ERROR, message, subject, values)
+        self.status(Level.ERROR, message, subject, values, log=not is_bug)
 
     def resolve(self, name: str) -> None:
         """Mark a finding as over: valid input has arrived, or a job of that name has succeeded."""

@@ -7,9 +7,21 @@
 """
 
 from dataclasses import dataclass, field
+import re
 
+from scenario_gen.base.errors import InputError
 from scenario_gen.base.parameters import parameter, Parameters
 from scenario_gen.closed_loop.config import ClosedLoopConfig
+
+ROAD_NAMES = (
+    "straight",
+    "curve",
+    "t_intersection",
+    "four_way",
+    "merge",
+    "roundabout",
+    "corridor",
+)
 
 
 @dataclass(frozen=True)
@@ -36,9 +48,7 @@ class RoadServerParameters(Parameters):
 
     road_name: str = parameter(
         "t_intersection",
-        "straight, curve, t_intersection, four_way, merge, roundabout, corridor, a map_server "
-        "YAML file, or a vector map "
-        "(.osm, .xodr, .xml)",
+        f"{', '.join(ROAD_NAMES)}, a map_server YAML file, or a vector map (.osm, .xodr, .xml)",
     )
     wait_for_tracks: bool = parameter(False, "publish no road before tracks arrive")
 
@@ -88,6 +98,13 @@ class RecorderParameters(Parameters):
     split_seconds: float = parameter(
         0.0, "time after which a new file begins; 0: never", unit="s", low=0.0
     )
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        try:
+            re.compile(self.topics)
+        except re.error as error:
+            raise InputError(f"parameter topics is no regular expression: {error}") from None
 
 
 @dataclass(frozen=True)

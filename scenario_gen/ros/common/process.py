@@ -27,6 +27,7 @@ from typing import Any
 
 import rclpy
 from rclpy.executors import SingleThreadedExecutor
+from rclpy.logging import get_logger
 from rclpy.signals import SignalHandlerOptions
 from rclpy.utilities import remove_ros_args
 
@@ -130,7 +131,7 @@ class NodeProcess:
             try:
                 self._executor.spin_once()
             except RuntimeError as error:  # rclpy: an impossible lifecycle transition
-                self._nodes[0].get_logger().warning(f"a request is dropped: {error}")
+                get_logger("lifecycle").warning(f"a request is dropped: {error}")
         return max(getattr(node, "exit_code", 0) for node in self._nodes)
 
     def _align_timers(self) -> None:

@@ -13,7 +13,6 @@ disk the recording ends with an error on /diagnostics, and the written part stay
 
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass
 from pathlib import Path
 import re
 from time import monotonic
@@ -29,7 +28,7 @@ from scenario_gen.bags.storage.metadata import qos_yaml
 from scenario_gen.bags.storage.writer import BagWriter, Split
 from scenario_gen.base.errors import InputError, of_system
 from scenario_gen.ros.common.diagnostics import NodeDiagnostics
-from scenario_gen.ros.common.node_parameters import RecorderParameters
+from scenario_gen.ros.common.node_parameters import RecorderParameters as Config
 from scenario_gen.ros.common.ros_parameters import ConfigParameters
 from scenario_gen.ros.common.services import offer_trigger
 from scenario_gen.ros.common.timers import create_steady_timer
@@ -49,18 +48,6 @@ def default_topics(namespace: str) -> str:
     """Return the expression of the suites' topics in a namespace and the domain's topics."""
     prefix = re.escape(namespace.rstrip("/"))
     return rf"{prefix}(/.*)?/({SUITE_TOPICS}|{DOMAIN_TOPICS})|/({DOMAIN_TOPICS})"
-
-
-@dataclass(frozen=True)
-class Config(RecorderParameters):
-    """The recorder's parameters."""
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        try:
-            re.compile(self.topics)
-        except re.error as error:
-            raise InputError(f"parameter topics is no regular expression: {error}") from None
 
 
 @contextmanager
