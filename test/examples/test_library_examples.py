@@ -11,9 +11,6 @@ import sys
 import numpy as np
 import pytest
 
-from benchmarks._driving_worlds import draw_scenario
-from scenario_gen.closed_loop.origin import Trial
-
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 
 
@@ -57,8 +54,8 @@ def test_the_notebook_was_executed_and_runs(name, pictures, capsys):
     )
 
 
-def test_the_notebook_of_drive_env_was_executed_without_errors():
-    """Its training takes minutes, and stable-baselines3 is not in the locks: so it is not run here."""
+def test_the_notebook_of_drive_env_was_executed_and_its_first_cells_run(monkeypatch):
+    """Learning takes a minute, so it is not repeated; one drive with the policy is."""
     cells = [
         cell
         for cell in json.loads((EXAMPLES / "drive_env.ipynb").read_text())["cells"]
@@ -68,12 +65,10 @@ def test_the_notebook_of_drive_env_was_executed_without_errors():
     assert not [
         output for cell in cells for output in cell["outputs"] if output["output_type"] == "error"
     ]
+    monkeypatch.chdir(EXAMPLES.parent)
     namespace = {}
-    for cell in cells:
-        code = "".join(cell["source"])
-        if "class Speed" in code:
-            exec(compile(code.partition("\nprint(")[0], "drive_env.ipynb", "exec"), namespace)
-    env = namespace["make"]([Trial("1", draw_scenario(1), 0, None)])
-    env.reset(seed=1)
-    seen, reward, *_ = env.step(np.zeros(1, dtype=np.float32))
-    assert env.observation_space.contains(seen) and reward >= -20.0
+    for cell in cells[:2]:
+        code = "".join(cell["source"]).replace("count=8", "count=2").replace("count=20", "count=1")
+        exec(compile(code, "drive_env.ipynb", "exec"), namespace)
+    total, passed = namespace["drive"](namespace["env"], np.zeros(5), 0)
+    assert np.isfinite(total) and passed in (True, False)
