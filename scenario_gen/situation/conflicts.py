@@ -83,23 +83,27 @@ class _Sweep(NamedTuple):
     size: Floats
 
 
-def find_conflicts(motion: Motion) -> tuple[Conflict, ...]:
+def find_conflicts(
+    motion: Motion, pairs: Iterable[tuple[int, int]] | None = None
+) -> tuple[Conflict, ...]:
     """Return one conflict per pair of vehicles whose swept footprints intersect, ordered by pair.
 
-    Between samples position and heading are linear. If two vehicles enter at the same instant
-    (both are inside from the start), the order along the shared path counts, else the index.
+    By default, `pairs` are all pairs. Between samples position and heading are linear. If two
+    vehicles enter at the same instant (both are inside from the start), the order along the shared
+    path counts, else the index.
     """
-    sweeps = [_sweep_of(motion, n) for n in range(len(motion.vehicles))]
-    conflicts = [
-        _pair_conflict(a, b, sweeps[a], sweeps[b]) for a, b in combinations(range(len(sweeps)), 2)
-    ]
+    if pairs is None:
+        pairs = combinations(range(len(motion.vehicles)), 2)
+    chosen = sorted({(min(pair), max(pair)) for pair in pairs})
+    vehicles = {n for pair in chosen for n in pair}
+    sweeps = {n: _sweep_of(motion, n) for n in vehicles}
+    conflicts = [_pair_conflict(a, b, sweeps[a], sweeps[b]) for a, b in chosen]
     return tuple(conflict for conflict in conflicts if conflict is not None)
 
 
 def conflict_of(motion: Motion, a: int, b: int) -> Conflict | None:
     """Return the conflict between two vehicles of a motion; None if they have none."""
-    low, high = min(a, b), max(a, b)
-    return _pair_conflict(low, high, _sweep_of(motion, low), _sweep_of(motion, high))
+    return next(iter(find_conflicts(motion, [(a, b)])), None)
 
 
 def conflicts_by_pair(conflicts: Iterable[Conflict]) -> PairConflicts:

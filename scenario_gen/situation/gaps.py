@@ -8,11 +8,10 @@ from itertools import permutations
 import math
 
 import numpy as np
-from scipy.spatial import distance
 
 from scenario_gen.numerics import Bools, Floats, wrap_angle
 from scenario_gen.numerics.boxes import footprint_gaps
-from scenario_gen.numerics.plane import ahead_and_left
+from scenario_gen.numerics.kernels import F2, F3, I, kernel, OUTB1
 from scenario_gen.situation.conflicts import Conflict
 from scenario_gen.types import Motion, together
 
@@ -106,39 +105,63 @@ def is_behind(motion: Motion, follower: int, leader: int) -> Bools:
     It is straight behind the other one, drives where that one was before, or the other one is
     where it will be.
     """
-    position, heading = motion.position[follower], motion.heading[follower]
-    leader_position, leader_heading = motion.position[leader], motion.heading[leader]
-    between = leader_position - position
-    along, across = ahead_and_left(between, heading)
-    alike = np.abs(wrap_angle(leader_heading - heading)) < MAX_HEADING_DIFFERENCE_RAD
-    behind = (along > 0.0) & (np.abs(across) < HALF_LANE_M) & alike
-
-    step = max(round(PATH_SAMPLE_PERIOD_S / float(motion.time[1] - motion.time[0])), 1)
-    leads_by, is_on = _steps_ahead(leader_position, leader_heading, position, heading, step)
-    behind |= is_on & (-leads_by > step)
-    leads_by, is_on = _steps_ahead(position, heading, leader_position, leader_heading, step)
-    behind |= is_on & (leads_by > step)
-
-    both = np.zeros(len(position), dtype=np.bool_)
-    both[together(motion.present, follower, leader)] = True
-    is_near = np.sqrt(np.square(between).sum(axis=1)) < MAX_FOLLOWING_M
-    return np.asarray(behind & both & is_near)
+    behind = np.zeros(len(motion.time), dtype=np.bool_)
+    step = max(round(PATH_SAMPLE_PERIOD_S / motion.dt), 1)
+    both = together(motion.present, follower, leader)
+    rows = both.start, both.stop, step
+    _fill_behind(motion.position, motion.heading, follower, leader, *rows, behind)
+    return behind
 
 
-def _steps_ahead(
-    path: Floats, path_heading: Floats, position: Floats, heading: Floats, step: int
-) -> tuple[Floats, Bools]:
-    """(T,) how many samples later the nearest point of a path is driven, and (T,) if it is near.
+@kernel(F3, F2, I, I, I, I, I, OUTB1)
+def _fill_behind(
+    position: Floats,
+    heading: Floats,
+    follower: int,
+    leader: int,
+    first: int,
+    last: int,
+    step: int,
+    out: Bools,
+) -> None:
+    """Fill `out` (T,) from sample first to last - 1, as `is_behind`."""
+    path, yaw = position[follower], heading[follower]
+    leader_path, leader_yaw = position[leader], heading[leader]
+    for t in range(first, last):
+        dx, dy = leader_path[t, 0] - path[t, 0], leader_path[t, 1] - path[t, 1]
+        if np.sqrt(dx * dx + dy * dy) >= MAX_FOLLOWING_M:
+            continue
+        cos, sin = np.cos(yaw[t]), np.sin(yaw[t])
+        is_straight = dx * cos + dy * sin > 0.0 and abs(dy * cos - dx * sin) < HALF_LANE_M
+        out[t] = (
+            (is_straight and _is_alike(leader_yaw[t], yaw[t]))
+            or t - _sample_near(leader_path, leader_yaw, path[t], yaw[t], step, t) > step
+            or _sample_near(path, yaw, leader_path[t], leader_yaw[t], step, t) - t > step
+        )
 
-    The path (T, 2) is compared at every `step`-th sample.
+
+@kernel(inline=True)
+def _is_alike(heading: float, other: float) -> bool:
+    """Return whether two headings [rad] differ little."""
+    return abs((heading - other + np.pi) % (2.0 * np.pi) - np.pi) < MAX_HEADING_DIFFERENCE_RAD
+
+
+@kernel(inline=True)
+def _sample_near(
+    path: Floats, heading: Floats, place: Floats, yaw: float, step: int, default: int
+) -> int:
+    """Return the sample of a path (T, 2) that is nearest to a pose, if it is near.
+
+    The path is compared at every `step`-th sample.
     """
-    rows = np.arange(0, len(path), step)
-    squares = distance.cdist(position, path[rows], "sqeuclidean")
-    nearest = np.argmin(squares, axis=1)
-    samples = np.arange(len(position))
-    turned = np.abs(wrap_angle(path_heading[rows[nearest]] - heading))
-    is_near = np.sqrt(squares[samples, nearest]) < HALF_LANE_M
-    return rows[nearest] - samples, is_near & (turned < MAX_HEADING_DIFFERENCE_RAD)
+    least, nearest = np.inf, 0
+    for k in range(0, len(path), step):
+        dx, dy = path[k, 0] - place[0], path[k, 1] - place[1]
+        square = dx * dx + dy * dy
+        if square < least:
+            least, nearest = square, k
+    is_near = np.sqrt(least) < HALF_LANE_M and _is_alike(heading[nearest], yaw)
+    return nearest if is_near else default
 
 
 def bumper_gaps(motion: Motion, follower: int, leader: int) -> Floats:

@@ -109,6 +109,11 @@ class Lane:
         """(2M, 2) metres: the left border forth and the right border back."""
         return frozen(np.concatenate((self.left, self.right[::-1])))
 
+    @cached_property
+    def box(self) -> Floats:
+        """(2, 2) metres: the lowest and the highest x, y."""
+        return frozen((self.outline.min(axis=0), self.outline.max(axis=0)))
+
 
 class RuleKind(StrEnum):
     """What traffic has to do."""

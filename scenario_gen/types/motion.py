@@ -262,9 +262,8 @@ class Motion:
 
         A vehicle has two samples at least, be its presence ever so short.
         """
-        if self.time.shape == time.shape and np.allclose(
-            time, self.time, rtol=0.0, atol=TIME_TOLERANCE_S
-        ):
+        is_same = self.time.shape == time.shape
+        if is_same and np.abs(time - self.time).max() <= TIME_TOLERANCE_S:
             return self
         ends = self.time[self.present]
         first = np.searchsorted(time, ends[:, 0] - TIME_TOLERANCE_S)

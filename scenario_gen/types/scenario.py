@@ -5,6 +5,7 @@
 
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from copy import copy
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
 from typing import Any, TYPE_CHECKING
@@ -71,6 +72,12 @@ class Scenario(Motion):
         """Return the arrays at times (M,) [s], by field."""
         acceleration = [np.interp(time, self.time, row) for row in self.acceleration]
         return {**super()._arrays_at(time), "acceleration": np.array(acceleration)}
+
+    def with_facts(self, facts: Facts) -> "Scenario":
+        """Return the scenario with other facts; its arrays are not checked again."""
+        other = copy(self)
+        freeze(other, facts=facts)
+        return other
 
     def to_dataframe(self) -> "DataFrame":
         """Return a table with a row for each vehicle and each sample at which it is present.

@@ -9,7 +9,7 @@ import math
 
 import numpy as np
 
-from scenario_gen.method.evaluation.geometry import distance_and_ttc
+from scenario_gen.method.evaluation.geometry import least_distance_and_ttc
 from scenario_gen.situation import encroachment, find_conflicts
 from scenario_gen.types import Motion
 
@@ -50,9 +50,9 @@ def criticality(motion: Motion, horizon: float) -> Criticality:
     for a, b in combinations(range(len(motion.vehicles)), 2):
         both = motion.present_slice(a, b)
         if both.stop > both.start:
-            distance, ttc = distance_and_ttc(motion, a, b)
-            distances.append(float(distance[both].min()))
-            times.append(float(ttc[both].min()))
+            distance, ttc = least_distance_and_ttc(motion, a, b)
+            distances.append(distance)
+            times.append(ttc)
     conflicts = find_conflicts(motion)
     encroachments = [encroachment(motion, conflict) for conflict in conflicts]
     return Criticality(

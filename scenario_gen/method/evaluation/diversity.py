@@ -17,9 +17,10 @@ def displacements(position: Floats, counted: Bools | None = None) -> Floats:
     """
     samples = position.shape[0]
     table = np.zeros((samples, samples))
+    x, y = np.ascontiguousarray(np.moveaxis(position, -1, 0))
     for s in range(samples - 1):
-        step = position[s + 1 :] - position[s]
-        table[s, s + 1 :] = _mean(np.hypot(step[..., 0], step[..., 1]), counted)
+        squared = np.square(x[s + 1 :] - x[s]) + np.square(y[s + 1 :] - y[s])
+        table[s, s + 1 :] = _mean(np.sqrt(squared), counted)
     return table + table.T
 
 

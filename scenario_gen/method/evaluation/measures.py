@@ -29,13 +29,20 @@ import math
 
 import numpy as np
 
-from scenario_gen.method.evaluation.geometry import footprint_distance, time_to_collision
+from scenario_gen.method.evaluation.geometry import least_distance_and_ttc
 from scenario_gen.method.evaluation.non_reactive import blind_margin
 from scenario_gen.numerics.plane import unit
-from scenario_gen.situation import Conflict, conflict_of, encroachment
+from scenario_gen.situation import (
+    Conflict,
+    conflicts_by_pair,
+    encroachment,
+    find_conflicts,
+    PairConflicts,
+)
 from scenario_gen.types import Measures, Motion, Pair
 
 FIGURE_PERIOD_S = 0.1  # of the published samples
+_CONFLICT_FIGURES = ("pet", "arrival_gap", "closing_speed")
 
 
 @dataclass(frozen=True)
@@ -68,7 +75,9 @@ def measure(scenario: Motion, name: str, pair: Pair | None = None) -> float:
         for a, b in ordered
         if (a, b)[: len(chosen)] == chosen and (chosen or a < b or directed)
     ]
-    values = [value for a, b in pairs if not math.isnan(value := _figure(motion, name, a, b))]
+    sought = pairs if name in _CONFLICT_FIGURES else []
+    met = conflicts_by_pair(find_conflicts(motion, sought))
+    values = [value for a, b in pairs if not math.isnan(value := _figure(motion, name, a, b, met))]
     if len(chosen) < 2 and name == "arrival_gap":
         values = [abs(value) for value in values]
     return (max if name == "closing_speed" else min)(values, default=math.nan)
@@ -77,19 +86,23 @@ def measure(scenario: Motion, name: str, pair: Pair | None = None) -> float:
 def figures_of(scenario: Motion) -> tuple[PairFigures, ...]:
     """Return all figures of each pair that is present together; `arrival_gap` unsigned."""
     motion = scenario.resampled(FIGURE_PERIOD_S)
+    met = conflicts_by_pair(find_conflicts(motion))
     figures = []
     for a, b in combinations(range(len(motion.vehicles)), 2):
         both = motion.present_slice(a, b)
         if both.stop - both.start < 2:
             continue
-        conflict = _crossing(motion, a, b)
-        pet, arrival, first = _figure(motion, "pet", a, b), math.nan, None
-        if conflict is not None:
-            first, arrival = conflict.first, conflict.arrival_gap
-        ttc, gap = _figure(motion, "ttc", a, b), _figure(motion, "gap", a, b)
+        crossing = _crossing(met.get((a, b)))
+        gap, ttc = least_distance_and_ttc(motion, a, b)
         figures.append(
             PairFigures(
-                (a, b), first, pet, arrival, ttc, gap, _closing_speed(motion, a, b, conflict)
+                (a, b),
+                None if crossing is None else crossing.first,
+                _figure(motion, "pet", a, b, met),
+                math.nan if crossing is None else crossing.arrival_gap,
+                ttc,
+                gap,
+                _closing_speed(motion, a, b, crossing),
             )
         )
     return tuple(figures)
@@ -109,26 +122,25 @@ MEASURES = Measures(measure)
 """What sampling towards a target, and a choice, measure with."""
 
 
-def _crossing(motion: Motion, a: int, b: int) -> Conflict | None:
-    """The conflict of two vehicles whose paths cross or merge, else None."""
-    conflict = conflict_of(motion, a, b)
+def _crossing(conflict: Conflict | None) -> Conflict | None:
+    """Return a conflict of two vehicles whose paths cross or merge, else None."""
     return None if conflict is None or conflict.following else conflict
 
 
-def _figure(motion: Motion, name: str, a: int, b: int) -> float:
+def _figure(motion: Motion, name: str, a: int, b: int, met: PairConflicts) -> float:
     both = motion.present_slice(a, b)
     if both.stop - both.start < 2:
         return math.nan
     if name == "blind_margin":
         return blind_margin(motion, a, b)
     if name == "ttc":
-        return float(time_to_collision(motion, a, b)[both].min())
+        return least_distance_and_ttc(motion, a, b)[1]
     if name == "gap":
-        return float(footprint_distance(motion, a, b)[both].min())
+        return least_distance_and_ttc(motion, a, b)[0]
+    conflict = met.get((min(a, b), max(a, b)))
     if name == "pet":
-        met = conflict_of(motion, a, b)
-        return math.nan if met is None else encroachment(motion, met)
-    conflict = _crossing(motion, a, b)
+        return math.nan if conflict is None else encroachment(motion, conflict)
+    conflict = _crossing(conflict)
     if name == "closing_speed":
         return _closing_speed(motion, a, b, conflict)
     if conflict is None:

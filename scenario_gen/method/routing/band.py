@@ -160,38 +160,38 @@ def _add_obstacles(problem: _Problem, band: Band, push: Floats, points: Floats) 
     """
     tangent = points[2:] - points[:-2]
     norm = np.maximum(np.hypot(*tangent.T), 1e-9)
-    lack = np.zeros(len(norm))
-    for k, offset in enumerate(band.disc):
-        lever = offset / norm
-        centre = points[1:-1] + lever[:, None] * tangent
-        room, gradient = _clearance_at(band.field, centre / band.resolution)
-        slope = np.hypot(*gradient.T)
-        required = band.required[1:-1, k]
-        is_short = room < required
-        wanted = np.where(is_short, required, band.wish[1:-1])
-        weight = np.where(is_short, push[1:-1], WISH_WEIGHT)
-        weight *= (room < wanted) & (slope > 1e-9)
-        move = (wanted - room) / np.maximum(slope, 1e-9)
-        target = centre + move[:, None] * gradient
-        problem.add(0, np.stack((-lever, np.ones(len(lever)), lever)), weight, target)
-        share = (required - room) / np.maximum(required, 1e-9)
-        lack = np.maximum(lack, np.where(is_short & (slope > 1e-9), share, 0.0))
-    return lack
+    lever = band.disc[:, None] / norm  # (D, M - 2)
+    centre = points[1:-1] + lever[..., None] * tangent
+    room, gradient = _clearance_at(band.field, centre / band.resolution)
+    slope = np.hypot(gradient[..., 0], gradient[..., 1])
+    required = band.required[1:-1].T
+    is_short = room < required
+    wanted = np.where(is_short, required, band.wish[1:-1])
+    weight = np.where(is_short, push[1:-1], WISH_WEIGHT)
+    weight *= (room < wanted) & (slope > 1e-9)
+    move = (wanted - room) / np.maximum(slope, 1e-9)
+    target = centre + move[..., None] * gradient
+    for k in np.flatnonzero(weight.any(axis=1)):
+        stencil = np.stack((-lever[k], np.ones(len(norm)), lever[k]))
+        problem.add(0, stencil, weight[k], target[k])
+    share = (required - room) / np.maximum(required, 1e-9)
+    lack = np.where(is_short & (slope > 1e-9), share, 0.0)
+    return np.asarray(lack.max(axis=0))
 
 
 def _clearance_at(field: Floats, cells: Floats) -> tuple[Floats, Floats]:
-    """Return clearance (M,) and gradient (M, 2) at points (M, 2) [cells], bilinear."""
+    """Return clearance (...) and gradient (..., 2) at points (..., 2) [cells], bilinear."""
     highest = np.array(field.shape[::-1]) - 2
     corner = np.clip(np.floor(cells - 0.5), 0, highest).astype(np.int64)
-    u, v = np.clip(cells - 0.5 - corner, 0.0, 1.0).T
-    column, row = corner.T
+    u, v = np.moveaxis(np.clip(cells - 0.5 - corner, 0.0, 1.0), -1, 0)
+    column, row = np.moveaxis(corner, -1, 0)
     a, b = field[row, column], field[row, column + 1]
     c, d = field[row + 1, column], field[row + 1, column + 1]
     low = a + u * (b - a)
     high = c + u * (d - c)
     across = (b - a) + v * ((d - c) - (b - a))
     along = (c - a) + u * ((d - b) - (c - a))
-    return low + v * (high - low), np.column_stack((across, along))
+    return low + v * (high - low), np.stack((across, along), axis=-1)
 
 
 def _curvature(points: Floats, mirror: Floats, spacing: float) -> Floats:

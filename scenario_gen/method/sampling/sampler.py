@@ -137,7 +137,7 @@ class Sampler:
         facts = self.label(whole)
         if self.proposal is not None:
             facts = replace(facts, weight=self.weight(whole.index))
-        named = replace(whole, facts=facts)
+        named = whole.with_facts(facts)
         return named if self.ego is None else with_witness(named, self.ego)
 
     def weight(self, index: int) -> float:

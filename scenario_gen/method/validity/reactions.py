@@ -121,7 +121,11 @@ def tailgaters(
 ) -> Iterator[Violation]:
     """Yield the vehicles that, at the samples, follow closer than they do in the template."""
     none = (np.zeros(0), np.zeros(0))
-    for pair, (speed, gap) in gaps.items():
+    for pair, (speeds, bumper_gaps) in gaps.items():
+        close = bumper_gaps < np.maximum(_ample_gap(speeds), limits.least_headway * speeds)
+        if not close.any():
+            continue
+        speed, gap = speeds[close], bumper_gaps[close]
         floor = least_gaps(speed, *recorded.get(pair, none), limits)
         k = int(np.argmax(floor - gap))
         if floor[k] - gap[k] > _FOLLOWING.tolerance:
@@ -147,10 +151,14 @@ def least_gaps(speed: Floats, recorded: Floats, gap: Floats, limits: Limits) -> 
     smallest = np.min(np.where(similar, gap, np.inf), axis=1, initial=np.inf)
     time_gap = np.where(similar & (recorded > moving), gap / np.maximum(recorded, moving), np.inf)
 
-    ample = _FOLLOWING.ample_gap + _FOLLOWING.ample_time_gap * speed
-    kept = np.minimum(limits.floor_share * smallest, ample)
+    kept = np.minimum(limits.floor_share * smallest, _ample_gap(speed))
     kept = np.where(np.isfinite(smallest), kept, -np.inf)
 
     keeps_headway = np.min(time_gap, axis=1, initial=np.inf) >= limits.least_headway
     headway = limits.least_headway * speed
     return np.where((speed > moving) & keeps_headway, np.maximum(kept, headway), kept)
+
+
+def _ample_gap(speed: Floats) -> Floats:
+    """Return the gaps (k,) [m] that are ample at speeds (k,) [m/s]."""
+    return _FOLLOWING.ample_gap + _FOLLOWING.ample_time_gap * speed

@@ -6,10 +6,10 @@
 from dataclasses import replace
 
 import numpy as np
+from scipy.spatial.distance import cdist
 
 from scenario_gen.base.errors import RefusedError
-from scenario_gen.numerics import Bools, Floats
-from scenario_gen.numerics.plane import angle_between
+from scenario_gen.numerics import Bools, Floats, wrap_angle
 from scenario_gen.roads.clearance import footprint_fits
 from scenario_gen.types import Lane, Road, Vehicle
 from scenario_gen.types.road import DIRECTION_COUNT
@@ -100,17 +100,15 @@ def on_lane(lane: Lane, poses: Floats, every: int = 1) -> bool:
 
 
 def _in_bounding_box(lane: Lane, poses: Floats) -> Bools:
-    low, high = lane.outline.min(axis=0), lane.outline.max(axis=0)
+    low, high = lane.box
     return np.asarray(((poses[:, :2] >= low) & (poses[:, :2] <= high)).all(axis=1))
 
 
 def _lies_along(lane: Lane, poses: Floats) -> Bools:
     """Return whether poses (M, 3) in a lane's bounding box lie in the lane, in its direction."""
-    along = np.zeros(len(poses), dtype=np.bool_)
     half_width = np.hypot(*(lane.left - lane.right).T)[:-1] / 2.0
-    for row, (x, y, heading) in enumerate(poses.tolist()):
-        distance = np.hypot(lane.middle[:, 0] - x, lane.middle[:, 1] - y)
-        k = int(np.argmin(distance))
-        turn = abs(angle_between(lane.yaw[k], heading))
-        along[row] = distance[k] <= half_width[k] and turn < _MAX_TURN_FROM_LANE_RAD
-    return along
+    distance = cdist(poses[:, :2], lane.middle)
+    nearest = distance.argmin(axis=1)
+    turn = np.abs(wrap_angle(lane.yaw[nearest] - poses[:, 2]))
+    inside = distance.min(axis=1) <= half_width[nearest]
+    return np.asarray(inside & (turn < _MAX_TURN_FROM_LANE_RAD))

@@ -150,13 +150,13 @@ class RuleCheck:
         """Yield the right of way that the first vehicle at a conflict violates."""
         if not self._rights:
             return
-        first, second = (met.first, met.entry_first), (met.second, met.entry_second)
-        rule = self._rule_between(motion, first, second)
-        if rule is None:
-            return
         gap = met.arrival_gap if met.following else met.encroachment
         waits = _waits_before(motion, met)
-        if waits or gap < _LIMITS.hindered_gap_s:
+        if not waits and gap >= _LIMITS.hindered_gap_s:
+            return
+        first, second = (met.first, met.entry_first), (met.second, met.entry_second)
+        rule = self._rule_between(motion, first, second)
+        if rule is not None:
             hindered = "which waits for it" if waits else f"which follows after {gap:.1f} s"
             ids = [motion.vehicles[n].id for n in (met.first, met.second)]
             message = (
