@@ -3,6 +3,14 @@
 
 """The situation: everything that is derived from a recorded encounter, without a road."""
 
+from scenario_gen.situation.abreast import (
+    abreast_in_lane,
+    MAX_SIDE_OFFSET_M,
+    MIN_SIDE_BY_SIDE_S,
+    path_offsets,
+    SAME_DIRECTION_RAD,
+    side_offsets,
+)
 from scenario_gen.situation.conflicts import (
     closest_crossing,
     Conflict,
@@ -49,15 +57,15 @@ from scenario_gen.situation.traffic_side import mirrored, traffic_side
 from scenario_gen.situation.waits import find_waits, STANDSTILL_SPEED_MPS, Wait, WAIT_SPEED_MPS
 
 __all__ = [
-    "MAX_SAMPLES", "MAX_TURN_CHANGE_RAD", "MAX_VEHICLES",
-    "STANDSTILL_SPEED_MPS", "WAIT_SPEED_MPS", "Conflict", "EncounterKind",
-    "Equation", "FrenetTracks", "LaneGaps", "MainLine", "PairConflicts", "Situation", "Track",
-    "Wait", "clean_tracks",
+    "MAX_SAMPLES", "MAX_SIDE_OFFSET_M", "MAX_TURN_CHANGE_RAD", "MAX_VEHICLES",
+    "MIN_SIDE_BY_SIDE_S", "SAME_DIRECTION_RAD", "STANDSTILL_SPEED_MPS", "WAIT_SPEED_MPS",
+    "Conflict", "EncounterKind", "Equation", "FrenetTracks", "LaneGaps", "MainLine",
+    "PairConflicts", "Situation", "Track", "Wait", "abreast_in_lane", "clean_tracks",
     "closest_crossing", "conflict_of", "conflicts_by_pair", "departure", "describe_turn",
     "driver_rows", "drivers_of", "encroachment", "find_conflicts", "find_waits",
     "interaction_windows", "is_same_turn", "keeps_interaction", "kind_of", "lag_behind",
-    "lane_gaps", "main_line", "manoeuvre_of", "mirrored", "pair_crossings",
-    "passing", "path_crossing", "refuse_reversing", "refuse_too_large", "required_orders",
-    "separate", "sharpness_of", "smallest_gaps", "solve_placement", "time_gaps", "to_frenet",
-    "track_conflicts", "traffic_side", "turn_of", "turns_to_keep",
+    "lane_gaps", "main_line", "manoeuvre_of", "mirrored", "pair_crossings", "passing",
+    "path_crossing", "path_offsets", "refuse_reversing", "refuse_too_large", "required_orders",
+    "separate", "sharpness_of", "side_offsets", "smallest_gaps", "solve_placement",
+    "time_gaps", "to_frenet", "track_conflicts", "traffic_side", "turn_of", "turns_to_keep",
 ]  # fmt: skip

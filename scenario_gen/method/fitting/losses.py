@@ -6,16 +6,21 @@
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from itertools import combinations, permutations
-import math
 
 import numpy as np
 
 from scenario_gen.base.errors import InputError, RefusedError
-from scenario_gen.numerics import Bools, Floats, Ints, wrap_angle
+from scenario_gen.numerics import Bools, wrap_angle
 from scenario_gen.numerics.plane import ahead_and_left
 from scenario_gen.situation import (
+    abreast_in_lane,
     describe_turn,
     is_same_turn,
+    MAX_SIDE_OFFSET_M,
+    MIN_SIDE_BY_SIDE_S,
+    path_offsets,
+    SAME_DIRECTION_RAD,
+    side_offsets,
     Track,
     track_conflicts,
     turn_of,
@@ -30,6 +35,7 @@ LOSABLE = {
     "merge": "a vehicle does not enter another one's lane",
     "lane_change": "a vehicle does not leave another one's lane, or two lanes become one",
     "overtaking": "a vehicle does not pass another one",
+    "clearance": "two vehicles side by side in one lane are nearer to each other",
     "stand": "a vehicle does not pass a stationary one on the same side",
     "turn": "a vehicle turns otherwise",
 }
@@ -45,12 +51,10 @@ Tracks = tuple[Track, ...]
 class _Limits:
     """The bounds of lanes, passings and vehicles side by side."""
 
-    min_side_by_side_s: float = 1.0  # shorter encounters are not compared
     min_kept_share: float = 0.5  # of the time side by side
     min_side_offset_m: float = 1.0  # between centres of vehicles side by side,
-    max_side_offset_m: float = 6.0
+    max_clearance_change_m: float = 0.3  # of vehicles side by side in one lane
     lane_width_difference_m: float = 1.5  # between recorded lanes and those of the road
-    same_direction_rad: float = math.radians(30.0)
     in_lane_m: float = 1.4  # offset up to which a vehicle is in another one's lane,
     in_lane_on_road_m: float = 2.0
     next_lane_m: float = 2.3  # and from which it is in another lane
@@ -127,6 +131,7 @@ def find_losses(tracks: Tracks, placed: Tracks) -> tuple[Loss, ...]:
         *_lost_passings(tracks, placed),
         *_lost_lanes(tracks, placed),
         *_lost_conflicts(tracks, placed),
+        *_lost_clearances(tracks, placed),
         *_lost_neighbours(tracks, placed),
     ]
     by_vehicles: dict[frozenset[str], Loss] = {}
@@ -202,14 +207,19 @@ def _in_two_lanes(track: Track, other: Track) -> bool:
 
 
 def _lost_lanes(tracks: Tracks, placed: Tracks) -> Iterator[Loss]:
-    """Yield the vehicles that share a lane at the start or the end, and do so no more."""
+    """Yield the vehicles that share a lane at the start or the end, and do so no more.
+
+    Those side by side in one lane have another rule, `_lost_clearances`.
+    """
     drivers = [n for n, track in enumerate(tracks) if not track.vehicle.kind.walks]
+    beside = {each.pair for each in abreast_in_lane(tracks)}
     for i, j in permutations(drivers, 2):
         before = [_offset_at_end(tracks[i], tracks[j], end) for end in (0, 1)]
         after = [_offset_at_end(placed[i], placed[j], end) for end in (0, 1)]
         shares_lane = any(abs(offset) < _LIMITS.in_lane_m for offset in before)
-        max_offset = np.inf if shares_lane else _LIMITS.max_side_offset_m
-        if any(map(_changes_lane, before, after, (max_offset, max_offset))):
+        max_offset = np.inf if shares_lane else MAX_SIDE_OFFSET_M
+        changes = any(map(_changes_lane, before, after, (max_offset, max_offset)))
+        if changes and beside.isdisjoint(((i, j), (j, i))):
             yield _lane_loss(tracks[i].vehicle.id, tracks[j].vehicle.id, before)
 
 
@@ -254,7 +264,7 @@ def _offset_at_end(track: Track, other: Track, end: int) -> float:
     if track.still or other.still:
         return np.nan
     if beyond <= 0.0:
-        leads_there = turn < _LIMITS.same_direction_rad
+        leads_there = turn < SAME_DIRECTION_RAD
     else:
         leads_there = beyond < _LIMITS.max_extrapolation_m and turn * beyond < _LIMITS.max_drift_m
     return float(offset[0]) if leads_there else np.nan
@@ -262,8 +272,8 @@ def _offset_at_end(track: Track, other: Track, end: int) -> float:
 
 def _lost_passings(tracks: Tracks, placed: Tracks) -> Iterator[Loss]:
     for i, j in permutations(range(len(tracks)), 2):
-        side = _passing_side(tracks[i], tracks[j], _LIMITS.max_side_offset_m)
-        max_offset = _LIMITS.max_side_offset_m + _LIMITS.lane_width_difference_m
+        side = _passing_side(tracks[i], tracks[j], MAX_SIDE_OFFSET_M)
+        max_offset = MAX_SIDE_OFFSET_M + _LIMITS.lane_width_difference_m
         if side and _passing_side(placed[i], placed[j], max_offset) != side:
             a, b = tracks[i].vehicle.id, tracks[j].vehicle.id
             word = "left" if side > 0 else "right"
@@ -285,7 +295,7 @@ def _passing_side(track: Track, other: Track, max_offset: float) -> int:
         return 0
     poses, others = track.poses[both], other.poses[both]
     ahead, left = ahead_and_left((others - poses)[:, :2], poses[:, 2])
-    alike = np.abs(wrap_angle(others[:, 2] - poses[:, 2])) < _LIMITS.same_direction_rad
+    alike = np.abs(wrap_angle(others[:, 2] - poses[:, 2])) < SAME_DIRECTION_RAD
     near = (np.abs(left) < max_offset) & (other.still | alike)
     before = np.flatnonzero(near & (ahead > _LIMITS.passing_distance_m))
     after = np.flatnonzero(near & (ahead < -_LIMITS.passing_distance_m))
@@ -297,15 +307,13 @@ def _passing_side(track: Track, other: Track, max_offset: float) -> int:
 
 def _lost_neighbours(tracks: Tracks, placed: Tracks) -> Iterator[Loss]:
     for i, j in combinations(range(len(tracks)), 2):
-        reach = (tracks[i].vehicle.length + tracks[j].vehicle.length) / 2.0
-        both = tracks[i].is_present & tracks[j].is_present
-        recorded = _side(tracks[i].poses, tracks[j].poses, reach, _LIMITS.max_side_offset_m)
-        max_offset = _LIMITS.max_side_offset_m + _LIMITS.lane_width_difference_m
-        on_road = _side(placed[i].poses, placed[j].poses, reach, max_offset)
+        recorded = side_offsets(tracks[i], tracks[j])
+        max_offset = MAX_SIDE_OFFSET_M + _LIMITS.lane_width_difference_m
+        on_road = np.sign(np.nan_to_num(side_offsets(placed[i], placed[j], max_offset)))
         for side, word in ((1, "left"), (-1, "right")):
-            side_by_side: Bools = both & (recorded == side)
+            side_by_side: Bools = np.sign(recorded) == side
             seconds = float(side_by_side.sum()) * tracks[0].dt
-            if seconds < _LIMITS.min_side_by_side_s:
+            if seconds < MIN_SIDE_BY_SIDE_S:
                 continue
             kept = float((on_road[side_by_side] == side).mean())
             if kept < _LIMITS.min_kept_share:
@@ -317,13 +325,18 @@ def _lost_neighbours(tracks: Tracks, placed: Tracks) -> Iterator[Loss]:
                 yield Loss("beside", (a, b), message)
 
 
-def _side(path: Floats, other: Floats, reach: float, max_offset: float) -> Ints:
-    """Return (T,) on which side of poses (T, 3) others (T, 3) are side by side, in one direction.
-
-    It is 1 for left and -1 for right, 0 where they are not side by side.
-    """
-    ahead, left = ahead_and_left((other - path)[:, :2], path[:, 2])
-    alike = np.abs(wrap_angle(other[:, 2] - path[:, 2])) < _LIMITS.same_direction_rad
-    offset = np.abs(left)
-    near = (np.abs(ahead) < reach) & (offset > _LIMITS.min_side_offset_m) & (offset < max_offset)
-    return np.where(alike & near, np.sign(left), 0.0).astype(np.int64)
+def _lost_clearances(tracks: Tracks, placed: Tracks) -> Iterator[Loss]:
+    """Yield the pairs that share a lane side by side, and are nearer or farther on the road."""
+    for abreast in abreast_in_lane(tracks):
+        first, second = (placed[n] for n in abreast.pair)
+        offsets = path_offsets(first, second)[abreast.samples]
+        if not np.isfinite(offsets).any():
+            continue
+        change = abs(float(np.nanmedian(offsets))) - abs(abreast.offset)
+        if abs(change) > _LIMITS.max_clearance_change_m:
+            a, b = first.vehicle.id, second.vehicle.id
+            message = (
+                f"vehicle {b} drives {abreast.clearance:.1f} m beside vehicle {a} in the "
+                f"recording, {abreast.clearance + change:.1f} m on this road"
+            )
+            yield Loss("clearance" if change < 0.0 else "beside", (a, b), message)

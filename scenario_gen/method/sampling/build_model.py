@@ -32,7 +32,7 @@ from scenario_gen.method.sampling.variation import Variation, VehicleClock
 from scenario_gen.method.sampling.vehicle_model import VehicleModel
 from scenario_gen.numerics import Bools, Floats
 from scenario_gen.roads import ground_for
-from scenario_gen.situation import Situation, Wait
+from scenario_gen.situation import abreast_in_lane, Situation, Wait
 from scenario_gen.types import FOLLOW, Note, NoteKind, Reaction, ReactionGraph, Road
 
 
@@ -49,6 +49,7 @@ class _Tuning:
             other vehicle's deviation adds to its own.
         halting_speed: m/s; a vehicle that is slower at an end of the template halts there.
         noted_slowing, noted_shift, noted_jerk: share, m and m/s³ from which changes are noted.
+        room_beside: lateral room [m] of a vehicle that shares its lane side by side.
     """
 
     stretches: int = 9
@@ -59,6 +60,7 @@ class _Tuning:
     noted_slowing: float = 0.02
     noted_shift: float = 0.3
     noted_jerk: float = 0.2
+    room_beside: float = 0.1
 
 
 _TUNING = _Tuning()
@@ -91,9 +93,10 @@ def build_model(plan: Plan, config: SamplingConfig, order: str = "keep") -> Buil
     stretch = _feasible_stretch(routed, clock.clock, config)
     if stretch.means is None:
         return BuiltModel(None, refusal=stretch.refusal)
+    abreast = {n for each in abreast_in_lane(plan.situation.tracks) for n in each.pair}
     vehicles = [
-        _vehicle_model(each, plan.road, mean, config)
-        for each, mean in zip(routed, stretch.means, strict=True)
+        _vehicle_model(each, plan.road, mean, config, beside=n in abreast)
+        for n, (each, mean) in enumerate(zip(routed, stretch.means, strict=True))
     ]
     nominal = stretch.clock
     warp = TimeWarp(nominal, config, least_shares(nominal.grid, waits))
@@ -242,9 +245,9 @@ class _NotedVehicle(NamedTuple):
 
 
 def _vehicle_model(
-    routed: RoutedVehicle, road: Road, mean: MeanSpeed, config: SamplingConfig
+    routed: RoutedVehicle, road: Road, mean: MeanSpeed, config: SamplingConfig, *, beside: bool
 ) -> _NotedVehicle:
-    """Return the model of a vehicle, without variation."""
+    """Return the model of a vehicle, without variation; `beside`: it shares its lane."""
     label, path, notes = routed.vehicle.id, routed.path, []
     shift = routed.largest_shift(mean.coefficients)
     if shift > _TUNING.noted_shift:
@@ -253,7 +256,10 @@ def _vehicle_model(
     if jerk > smooth + _TUNING.noted_jerk:
         notes.append(Note.of(NoteKind.JERKY, vehicle=label, jerk=jerk, smooth=smooth))
     ground = ground_for(road, routed.vehicle)
-    room = lateral_room(path, routed.vehicle, ground, MAX_ROOM_SIGMAS * config.lateral_sigma)
+    most = MAX_ROOM_SIGMAS * config.lateral_sigma
+    room = lateral_room(
+        path, routed.vehicle, ground, min(most, _TUNING.room_beside) if beside else most
+    )
     narrow = room < ROOM_SIGMAS * config.lateral_sigma
     if narrow.any() and config.lateral_sigma > 0.0 and path.length > 0.0:
         percent = 100.0 * float(narrow.mean())

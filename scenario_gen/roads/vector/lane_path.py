@@ -113,6 +113,14 @@ class LateralAcceleration(NamedTuple):
     forced: float
 
 
+def lane_change_length(width: float) -> float:
+    """Return the length [m] of a change by a width [m] with the curvature of a lane change.
+
+    The largest second derivative of the blend x³(10 - 15x + 6x²) is 5.7735.
+    """
+    return math.sqrt(max(abs(width), 0.1) * 5.7735 / LIMITS.lane_change_curvature_per_m)
+
+
 def off_reserved_cost(
     graph: LaneGraph, paths: Sequence[LanePath], tracks: Sequence[Track]
 ) -> float:

@@ -24,6 +24,7 @@ from scenario_gen.roads.vector.lane_graph import LaneChain, LaneGraph, LEAD_M
 from scenario_gen.roads.vector.lane_path import (
     bend_cost,
     COSTS,
+    lane_change_length,
     LanePath,
     lateral_acceleration,
     LIMITS,
@@ -32,6 +33,7 @@ from scenario_gen.roads.vector.lane_path import (
     STEP_M,
     WEIGHTS,
 )
+from scenario_gen.roads.vector.lateral import with_lateral_positions
 from scenario_gen.roads.vector.search import RigidPlacement
 from scenario_gen.situation import (
     describe_turn,
@@ -119,6 +121,7 @@ def match(
             yield Match((), math.inf, reason)
             return
         paths.append(path)
+    paths = with_lateral_positions(graph, paths, tuple(tracks))
     yield _judged(
         graph, _moved_starts(graph.network, paths, tracks, met, scale, []), tracks, placement
     )
@@ -258,12 +261,11 @@ def _may_change(network: LaneNetwork, chain: LaneChain, other: LaneChain) -> boo
 def lane_change_curve(first: Curve, second: Curve, at: Floats) -> Curve | None:
     """Return a smooth change from one curve to another around a place (2,) [m].
 
-    The blend is x³(10 - 15x + 6x²), whose largest second derivative is 5.7735.
+    The blend is x³(10 - 15x + 6x²).
     """
     station = float(first.project(at[None])[0][0])
     _, offset = second.project(first.at(np.array([station]))[:, :2])
-    width = abs(float(offset[0]))
-    reach = math.sqrt(max(width, 0.1) * 5.7735 / LIMITS.lane_change_curvature_per_m)
+    reach = lane_change_length(float(offset[0]))
     s = np.arange(0.0, first.length + 1e-9, STEP_M)
     points = first.at(s)[:, :2]
     station_on_second, _ = second.project(points)
