@@ -1,79 +1,141 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Draw docs/gallery/*.png and write docs/gallery.md: `python docs/gallery.py` (bundled logs, built-in roads, seed 7)."""
+"""Draw docs/gallery/*.svg and write docs/gallery.md: `python docs/gallery.py` (one scenario each, seed 7)."""
 
+from dataclasses import dataclass
 from pathlib import Path
 
 import matplotlib
 from matplotlib import pyplot
+import numpy as np
+from picture import heading, path, road_shapes, STYLE
 
-from scenario_gen import (
-    bundled,
-    Encounter,
-    generate,
-    GenerationResult,
-    InputError,
-    read_log,
-    RefusedError,
-)
+from scenario_gen import generate, read_log, Road, Scenario
+from scenario_gen.numerics import Floats
 
 PAGE = Path(__file__).with_name("gallery.md")
 PICTURES = PAGE.with_suffix("")
-TUTORIAL = PAGE.parents[1] / "examples" / "my_log.csv"
-ROADS = ("four_way", "t_intersection", "corridor", "straight", "curve")
-CASES, COUNT, SEED = ("a", "b", "c"), 10, 7
+ROOT = PAGE.parents[1]
+RECORDED = "scenario_gen/resources/recorded"
+DRAWN = "scenario_gen/resources/demo"
+SEED = 7
+WIDTH, HEIGHT = 600, 360  # pixels
+STEP_S = 0.2
+PAUSE_S = 1.0  # at the end of the film
+MARGIN_M = 12.0
+MAX_VIEW_M = 110.0
+COLOURS = ("#0b6e99", "#d9622b", "#4c8f2f")
 HEAD = """# Gallery
 
-What can be generated? Each picture shows scenarios of a bundled synthetic log on a built-in road. A dot is where a vehicle
-starts, a colour is a vehicle. `python docs/gallery.py` draws this page.
+What can be generated? Each film shows one scenario. Vehicles are numbered in the order of the recording. `python docs/gallery.py` draws this page.
 """
 
 
+@dataclass(frozen=True)
+class Scene:
+    """A film: title, log, road, and whether the log is recorded or invented."""
+
+    name: str
+    title: str
+    log: str
+    road: str
+
+
+SCENES = (
+    Scene(
+        "left_turn",
+        "A left turn waits for an oncoming car",
+        f"{RECORDED}/ngsim_left_turn.csv",
+        "four_way",
+    ),
+    Scene(
+        "two_left_turns",
+        "Two left turns, one behind the other",
+        f"{RECORDED}/ngsim_two_left_turns.csv",
+        "t_intersection",
+    ),
+    Scene("following", "Following in a curve", f"{RECORDED}/v2x_following.csv", "curve"),
+    Scene(
+        "map",
+        "The left turn on an OpenDRIVE map",
+        f"{RECORDED}/ngsim_left_turn.csv",
+        "examples/town.xodr",
+    ),
+    Scene("crossing", "Slowing down for a crossing car", "examples/my_log.csv", "four_way"),
+    Scene(
+        "all_way_stop",
+        "Three cars at an all-way stop",
+        f"{DRAWN}/all_way_stop.csv",
+        "four_way",
+    ),
+)
+
+
 def main() -> None:
-    """Draw each case on each road that it fits, and the tutorial's scenarios."""
-    matplotlib.use("Agg")
-    PICTURES.mkdir(exist_ok=True)
+    """Draw each scene, and the paths of the tutorial's scenarios."""
     parts = [HEAD]
-    for case in CASES:
-        log = bundled(case)
-        (encounter,) = read_log(log).encounters
-        drawn = {
-            road: result
-            for road in ROADS
-            if (result := drawn_on(encounter, road, COUNT, f"{case}_{road}"))
-        }
-        words = "; ".join(sentences(next(iter(drawn.values()))))
-        pictures = "".join(f"![{road}]({PICTURES.name}/{case}_{road}.png)\n" for road in drawn)
-        roads = " ".join(f"--road {road}" for road in drawn)
-        command = f"scenario-gen generate scenario_gen/resources/{log.name} {roads} --count {COUNT} --seed {SEED}"
-        text = f"{words[:1].upper()}{words[1:]}."
+    for scene in SCENES:
+        (encounter,) = read_log(ROOT / scene.log).encounters
+        road = scene.road if "/" not in scene.road else str(ROOT / scene.road)
+        result = generate(encounter, road, count=1, seed=SEED)
+        (PICTURES / f"{scene.name}.svg").write_text(film(result[0], result.road), encoding="utf-8")
+        source = "Recorded" if scene.log.startswith(RECORDED) else "Invented"
+        words = "; ".join(result.reacting["sentences"]) or "no reactions detected"
+        command = f"scenario-gen generate {scene.log} --road {scene.road} --count 1 --seed {SEED} --out out/{scene.name}"
         parts.append(
-            f"## Case {case}: {', '.join(drawn)}\n\n{pictures}\n{text}\n\n```sh\n{command}\n```\n"
+            f"## {scene.title}\n\n![{scene.title}](gallery/{scene.name}.svg)\n\n{source}: {words}.\n\n```sh\n{command}\n```\n"
         )
     PAGE.write_text("\n".join(parts), encoding="utf-8")
-    drawn_on(read_log(TUTORIAL).encounters[0], "four_way", 20, "tutorial")
+    draw_tutorial()
 
 
-def drawn_on(encounter: Encounter, name: str, count: int, picture: str) -> GenerationResult | None:
-    """Draw scenarios of an encounter on a road; return them, or nothing if the road does not take it."""
-    try:
-        result = generate(encounter, name, count=count, seed=SEED)
-    except (InputError, RefusedError) as error:
-        print(f"{encounter.name}, {name}: {error}")
-        return None
-    figure, axes = pyplot.subplots(figsize=(4.4, 4.4), layout="constrained")
-    result.plot(axes)
-    figure.savefig(PICTURES / f"{picture}.png", dpi=70)
-    pyplot.close(figure)
-    return result
+def film(scenario: Scenario, road: Road) -> str:
+    """Return an animated SVG of a scenario on its road, with numbered vehicles."""
+    shown = scenario.position.reshape(-1, 2)
+    low, high = shown.min(axis=0) - MARGIN_M, shown.max(axis=0) + MARGIN_M
+    apart = np.linalg.norm(scenario.position[0] - scenario.position[1], axis=-1)
+    meeting = scenario.position[:2, np.argmin(apart)].mean(axis=0)
+    view = np.minimum(high - low, (MAX_VIEW_M, MAX_VIEW_M * HEIGHT / WIDTH))
+    centre = np.where(high - low > view, meeting, (low + high) / 2.0)
+    pixels = min(WIDTH / view[0], HEIGHT / view[1])
 
+    def place(points: Floats) -> Floats:
+        return (points - centre) * (pixels, -pixels) + (WIDTH / 2.0, HEIGHT / 2.0)
 
-def sentences(result: GenerationResult) -> list[str]:
-    """Return who reacts to whom, in words."""
-    return [str(sentence) for sentence in result.reacting["sentences"]] or [
-        "No reactions detected"
+    clock = np.arange(0.0, scenario.time[-1] + PAUSE_S, STEP_S)
+    rows = np.minimum(np.searchsorted(scenario.time, clock), len(scenario.time) - 1)
+    seconds = f'dur="{clock[-1]:.1f}s" repeatCount="indefinite"'
+    lines = [
+        f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {WIDTH} {HEIGHT}" width="{WIDTH}" height="{HEIGHT}">',
+        f"<style>{STYLE} .number {{ font-weight: bold; fill: #fff; text-anchor: middle }}</style>",
+        f'<rect class="back" width="{WIDTH}" height="{HEIGHT}"/>',
+        *road_shapes(road, place),
     ]
+    for n, vehicle in enumerate(scenario.vehicles):
+        colour = COLOURS[n % len(COLOURS)]
+        xy = place(scenario.position[n][rows])
+        turned = -np.degrees(heading(scenario, n)[rows])
+        length, width = vehicle.length * pixels, vehicle.width * pixels
+        box = f'<rect fill="{colour}" x="{-length / 2:.1f}" y="{-width / 2:.1f}" width="{length:.1f}" height="{width:.1f}" rx="2"/>'
+        moves = f'<animateTransform attributeName="transform" type="translate" values="{path(xy, ";")}" {seconds}/>'
+        angles = ";".join(f"{angle:.0f}" for angle in turned)
+        turns = f'<animateTransform attributeName="transform" type="rotate" values="{angles}" {seconds}/>'
+        lines += [
+            f'<path d="M{path(place(scenario.position[n][::3]))}" fill="none" stroke="{colour}" opacity=".4"/>',
+            f'<g>{moves}<g>{turns}{box}</g><text class="number" y="4">{n + 1}</text></g>',
+        ]
+    return "\n".join([*lines, "</svg>"]) + "\n"
+
+
+def draw_tutorial() -> None:
+    """Draw the paths of the scenarios of the first tutorial."""
+    matplotlib.use("Agg")
+    (encounter,) = read_log(ROOT / RECORDED / "ngsim_left_turn.csv").encounters
+    figure, axes = pyplot.subplots(figsize=(4.4, 4.4), layout="constrained")
+    generate(encounter, "four_way", count=20, seed=SEED).plot(axes)
+    figure.savefig(PICTURES / "tutorial.png", dpi=70)
+    pyplot.close(figure)
 
 
 if __name__ == "__main__":

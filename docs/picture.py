@@ -3,7 +3,7 @@
 
 """Draw docs/picture.svg, the animated picture of the README: `python docs/picture.py` (the first case of the demo, seed 7)."""
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -89,14 +89,8 @@ def panel(motion: Encounter | Scenario, road: Road | None, clock: Floats) -> Ite
     def place(points: Floats) -> Floats:
         return (points - centre) * (pixels, -pixels) + PANEL / 2.0
 
-    if road is not None and road.lanes is not None:
-        for lane in road.lanes.lanes:
-            yield f'<path class="road" d="M{path(place(np.concatenate([lane.left, lane.right[::-1]])))}Z"/>'
-        for kind, painted in markings(road.lanes).items():
-            css = {"lane": " dashed", "centre": " dashed", "stop": " thick"}.get(kind.value, "")
-            yield from (
-                f'<path class="marking{css}" d="M{path(place(line))}"/>' for line in painted
-            )
+    if road is not None:
+        yield from road_shapes(road, place)
     seconds = f'dur="{clock[-1]:.1f}s" repeatCount="indefinite"'
     for n, vehicle in enumerate(motion.vehicles):
         at = np.minimum(np.searchsorted(motion.time, clock), len(motion.time) - 1)
@@ -107,6 +101,18 @@ def panel(motion: Encounter | Scenario, road: Road | None, clock: Floats) -> Ite
         box = f'<rect class="f{n}" x="{-length / 2:.1f}" y="{-width / 2:.1f}" width="{length:.1f}" height="{width:.1f}" rx="2"/>'
         yield f'<path class="path s{n}" d="M{path(place(motion.position[n][::3]))}"/>'
         yield f"<g>{moves}<g>{turns}{box}</g>{waits(motion, at, seconds) if n == TURNS else ''}</g>"
+
+
+def road_shapes(road: Road, place: Callable[[Floats], Floats]) -> Iterator[str]:
+    """Yield the lanes of a road and their markings; `place` turns metres into pixels."""
+    if road.lanes is None:
+        return
+    for lane in road.lanes.lanes:
+        outline = place(np.concatenate([lane.left, lane.right[::-1]]))
+        yield f'<path class="road" d="M{path(outline)}Z"/>'
+    for kind, painted in markings(road.lanes).items():
+        css = {"lane": " dashed", "centre": " dashed", "stop": " thick"}.get(kind.value, "")
+        yield from (f'<path class="marking{css}" d="M{path(place(line))}"/>' for line in painted)
 
 
 def animated(kind: str, values: str, seconds: str) -> str:
