@@ -24,5 +24,6 @@ setup(
         files("config"),
         files("launch", "*.launch.py"),
         files("examples"),
+        files("examples/cpp"),
     ],
 )
