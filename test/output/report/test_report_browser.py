@@ -70,6 +70,16 @@ def test_it_loads_without_errors_or_requests(tab, report):
         assert len(pixels.getcolors(1_000_000)) > 10, role
 
 
+def test_a_link_opens_one_scenario_and_the_address_names_the_shown_one(tab, report):
+    tab.page.goto(f"{report.as_uri()}#case=2&scenario=2")
+    assert tab.part("sample", 1).input_value() == "2"
+    assert tab.page.locator('[data-case="0"]').is_hidden()
+    tab.part("next", 1).click()
+    assert tab.page.url.endswith("#case=2&scenario=3")
+    tab.page.goto(f"{report.as_uri()}#case=9&scenario=nothing")
+    assert tab.page.locator('[data-case="0"]').is_visible() and tab.troubles == []
+
+
 def test_the_table_of_figures_fits_a_desktop(tab):
     table = tab.page.locator('[data-case="0"] .metrics')
     assert table.evaluate("t => t.scrollWidth <= t.parentElement.clientWidth")

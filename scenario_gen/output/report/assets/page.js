@@ -48,7 +48,7 @@ class Player {
     this.find("arm").value = this.arm;
     this.listSamples();
     this.find("arm").addEventListener("change", (event) => { this.arm = event.target.value; this.listSamples(); this.draw(); });
-    this.find("sample").addEventListener("change", () => this.draw());
+    this.find("sample").addEventListener("change", () => { this.draw(); this.link(); });
     this.find("play").addEventListener("click", () => this.toggle());
     this.find("scrub").addEventListener("input", (event) => { this.pause(); this.time = (event.target.value / 1000) * this.duration; this.draw(); });
     this.find("ghosts").addEventListener("change", () => this.draw());
@@ -117,6 +117,12 @@ class Player {
     const list = this.find("sample");
     list.selectedIndex = (list.selectedIndex + by + this.set.samples) % this.set.samples;
     this.draw();
+    this.link();
+  }
+
+  /** Put the shown scenario into the address of the page, which can be shared. */
+  link() {
+    history.replaceState(null, "", `#case=${shown + 1}&scenario=${this.set.index[this.sample]}`);
   }
 
   /** Show the generated sample of that index, from its start. */
@@ -128,6 +134,7 @@ class Player {
     this.find("sample").selectedIndex = this.set.index.indexOf(index);
     this.time = 0;
     this.draw();
+    this.link();
     this.find("stage").scrollIntoView({ behavior: "smooth", block: "center" });
   }
 
@@ -375,7 +382,17 @@ document.addEventListener("keydown", (event) => {
   if (event.key === "ArrowRight") player.step(1);
   if (event.key === "ArrowLeft") player.step(-1);
 });
+/** Show the case and the scenario that the address names, or the first case. */
+function follow() {
+  const asked = new URLSearchParams(location.hash.slice(1));
+  const index = Number(asked.get("case") ?? 1) - 1;
+  show(CASES[index] ? index : 0);
+  const { player } = opened.get(shown);
+  const scenario = Number(asked.get("scenario") ?? NaN);
+  if (player && player.sets.with && player.sets.with.index.includes(scenario)) player.showSample(scenario);
+}
+window.addEventListener("hashchange", follow);
 matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => { if (shown >= 0) opened.get(shown).draw(); });
-show(0);
+follow();
 document.querySelectorAll("[data-primitive]").forEach((chip) => { chip.style.background = primitiveColour(Number(chip.dataset.primitive)); });
 document.querySelectorAll("[data-vehicle]").forEach((chip) => { chip.style.background = vehicleColour(Number(chip.dataset.vehicle)); });
