@@ -168,9 +168,36 @@ def hide_edit_link(_app: Any, page: str, _template: str, context: Any, _doctree:
         context["page_source_suffix"] = ""
 
 
+def parameter_lines(match: re.Match[str]) -> str:
+    """Return a signature's parameters as blocks: they are no list of definitions."""
+    lines = re.sub("<(/?)dd>", lambda tag: "</span>" if tag[1] else BLOCK, match[1])
+    return f"{BLOCK}{lines}</span>"
+
+
+BLOCK = '<span style="display: block; margin-left: 1em">'
+REPAIRS = (
+    (r' role="heading">', ' role="heading" aria-level="2">'),
+    (r"<pre>", '<pre tabindex="0">'),
+    (r'<div class="table-wrapper', '<div tabindex="0" class="table-wrapper'),
+    (r'<aside class="sidebar-drawer', '<aside aria-label="Site" class="sidebar-drawer'),
+    (r'<aside class="toc-drawer', '<aside aria-label="Page" class="toc-drawer'),
+    (r"<dl>\n((?:<dd>.*?</dd>\n?)+)</dl>", parameter_lines),
+)
+
+
+def repair(app: Any, _error: Any) -> None:
+    """Repair what keeps the theme's pages from people who use a keyboard or a screen reader."""
+    for path in Path(app.outdir).rglob("*.html"):
+        text = path.read_text(encoding="utf-8")
+        for pattern, replacement in REPAIRS:
+            text = re.sub(pattern, replacement, text)
+        path.write_text(text, encoding="utf-8")
+
+
 def setup(app: Any) -> None:
     """Connect the functions above; docstrings are escaped before napoleon reads them."""
     app.connect("autodoc-process-docstring", escaped, priority=100)
     app.connect("autoapi-skip-member", skip)
     app.connect("missing-reference", resolve)
     app.connect("html-page-context", hide_edit_link)
+    app.connect("build-finished", repair)
