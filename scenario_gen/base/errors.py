@@ -20,10 +20,14 @@ FULL_DISK_ADVICE = "; make room there, or name a place on another disk"
 class ScenarioGenError(Exception):
     """Base of the errors that this project raises.
 
-    The command line prints them without a traceback and exits with 2.
+    Its arguments are lines; unprintable characters in them are escaped. The command line prints
+    them without a traceback and exits with 2.
     """
 
     exit_code = 2
+
+    def __str__(self) -> str:
+        return "\n".join(printable(str(line)) for line in self.args)
 
 
 class InputError(ScenarioGenError):
@@ -69,7 +73,7 @@ def needs(extra: str, *modules: str) -> None:
 
 
 def presentable(text: str, max_length: int = MAX_INPUT_CHARACTERS) -> str:
-    """Return a message of at most `max_length` printable characters and line breaks.
+    """Return a message of at most `max_length` printable characters.
 
     The parts of a long message (reasons and remedies, joined by semicolons) share the length; a
     longer part loses its middle.
@@ -128,10 +132,13 @@ def of_system(error: OSError, name: object = None, advice: str = "") -> InputErr
 
 
 def printable(text: str) -> str:
-    """Return the text with control characters and bidi marks escaped as in Python source."""
-    return "".join(
-        c if c.isprintable() or c == "\n" else c.encode("unicode_escape").decode() for c in text
-    )
+    """Return the text with line breaks, control characters and bidi marks escaped as in Python."""
+    return "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in text)
+
+
+def printable_lines(text: str) -> str:
+    """Return a text whose line breaks are its own, with the rest escaped as in `printable`."""
+    return "\n".join(map(printable, text.split("\n")))
 
 
 def shown_error(error: Exception) -> str:

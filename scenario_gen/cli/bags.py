@@ -12,7 +12,7 @@ from typing import Annotated, TYPE_CHECKING
 
 import typer
 
-from scenario_gen.base.errors import did_you_mean, InputError, printable
+from scenario_gen.base.errors import did_you_mean, InputError, printable_lines
 from scenario_gen.cli.options import (
     assigned_all,
     Commands,
@@ -75,7 +75,7 @@ def evaluate(
         if folder is not None:
             write_evaluation(folder, cases, bag, config.bag)
     emit_json(cases=[json.loads(case.evaluation.to_json()) for case in cases], folder=out)
-    print_(Markdown(printable(as_table(cases))), wrap=True)
+    print_(Markdown(printable_lines(as_table(cases))), wrap=True)
 
 
 @commands.command()
@@ -233,7 +233,7 @@ def export_scenarios(
             bag, folder, to, *configs, namespace=namespace, indices=index or (), progress=counted
         )
     emit_json(scenarios=result.scenarios, folder=folder, notes=result.notes)
-    print_("\n".join((*result.notes, f"{result.scenarios} scenarios: {folder}")))
+    print_(*result.notes, f"{result.scenarios} scenarios: {folder}", sep="\n")
 
 
 @commands.command("reindex")
@@ -270,5 +270,6 @@ def compare_sets(
     differences = compare(read_evaluations(first), read_evaluations(second))
     emit_json(differences=differences)
     print_(
-        Markdown(printable(comparison_table(differences, (first.name, second.name)))), wrap=True
+        Markdown(printable_lines(comparison_table(differences, (first.name, second.name)))),
+        wrap=True,
     )

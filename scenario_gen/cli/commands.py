@@ -88,7 +88,7 @@ def parameters() -> None:
         allowed = " | ".join(meta["choices"]) or ("…".join(bounds) if any(bounds) else "")
         allowed = f"({allowed})" if allowed else ""
         text = f" = {default!r} {meta['unit']} {allowed}\n    {meta['meaning']}"
-        output.print_(Text(name, style="bold"), text, sep="", wrap=True)
+        output.print_(Text(name, style="bold"), Text(text), sep="", wrap=True)
     output.emit_json(parameters=table)
 
 

@@ -145,7 +145,7 @@ def generate_folder(
         with progress() as advance:
             cases, refusals = generate_all(pairs, requested, advance, notify)
         if not cases:
-            raise RefusedError("nothing could be generated:\n" + "\n".join(refusals))
+            raise RefusedError("nothing could be generated:", *refusals)
         cases = [_with_recording(case, sources) for case in cases]
         blind_rates = _blind_rates(cases, requested)
         for line in (*map_faults(cases), *blind_rates):

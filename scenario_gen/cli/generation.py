@@ -257,7 +257,7 @@ def roads(
     out.parent.mkdir(parents=True, exist_ok=True)
     write_text(out, picture)
     emit_json(picture=out, notes=notes)
-    print_("\n".join([*notes, f"picture: {out}"]))
+    print_(*notes, f"picture: {out}", sep="\n")
 
 
 @commands.command()
@@ -339,10 +339,10 @@ def conclude(cases: "list[GenerationResult]", refusals: list[str], out: Path) ->
         refusals=refusals,
     )
     print_(summary(cases, verbose=current.verbose), wrap=True)
-    print_(f"report: {out / REPORT}\nbag:    {out / BAG}")
+    print_(f"report: {out / REPORT}", f"bag:    {out / BAG}", sep="\n")
     print_("next:   open the report, or test a planner on the bag (`scenario-gen drive --help`)")
     if refusals:
-        raise RefusedError("part of the request could not be generated:\n" + "\n".join(refusals))
+        raise RefusedError("part of the request could not be generated:", *refusals)
 
 
 def case_of(case: "GenerationResult") -> dict[str, object]:

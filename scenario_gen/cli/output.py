@@ -14,7 +14,7 @@ import sys
 from typing import Any
 import webbrowser
 
-from scenario_gen.base.errors import InputError, printable
+from scenario_gen.base.errors import InputError, printable, printable_lines
 from scenario_gen.base.stores import renamed
 
 UNBOUNDED_COLUMNS = 10_000
@@ -55,7 +55,10 @@ def json_value(value: Any) -> Any:
     if is_dataclass(value) and not isinstance(value, type):
         return {entry.name: json_value(getattr(value, entry.name)) for entry in fields(value)}
     if isinstance(value, Mapping):
-        return {str(getattr(key, "value", key)): json_value(item) for key, item in value.items()}
+        return {
+            printable(str(getattr(key, "value", key))): json_value(item)
+            for key, item in value.items()
+        }
     if isinstance(value, (list, tuple, set, frozenset)):
         return [json_value(item) for item in value]
     if hasattr(value, "tolist"):  # NumPy arrays and scalars
@@ -69,7 +72,7 @@ def _json_scalar(value: Any) -> bool | int | float | str | None:
         return value if math.isfinite(value) else None
     if value is None or isinstance(value, (bool, int)):
         return value
-    return printable(renamed(str(value)))
+    return printable_lines(renamed(str(value)))
 
 
 def print_(*values: Any, sep: str = " ", wrap: bool = False) -> None:
@@ -77,6 +80,8 @@ def print_(*values: Any, sep: str = " ", wrap: bool = False) -> None:
 
     Where another program reads, no line is broken or ends in spaces, and Markdown stays as it is.
     """
+    from rich.text import Text
+
     from scenario_gen.base.terminal import Terminal
 
     if current.quiet:
@@ -86,7 +91,7 @@ def print_(*values: Any, sep: str = " ", wrap: bool = False) -> None:
     if terminal.is_terminal:
         terminal.print(*texts, sep=sep, soft_wrap=not wrap)
         return
-    plain = [getattr(text, "markup", text) for text in texts]
+    plain = [Text(text.markup) if hasattr(text, "markup") else text for text in texts]
     terminal.width = UNBOUNDED_COLUMNS
     with terminal.capture() as captured:
         terminal.print(*plain, sep=sep)

@@ -17,7 +17,7 @@ from xml.etree import ElementTree
 
 import numpy as np
 
-from scenario_gen.base.errors import printable
+from scenario_gen.base.errors import printable, printable_lines
 from scenario_gen.base.folders import Kind, write_text
 from scenario_gen.base.parameters import flatten
 from scenario_gen.closed_loop.blind import BlindRate
@@ -295,7 +295,7 @@ def junit_text(root: ElementTree.Element) -> str:
     ElementTree.indent(root)
     for element in root.iter():  # XML has no form for control characters
         element.attrib.update({name: printable(value) for name, value in element.attrib.items()})
-        element.text = printable(element.text) if element.text else None
+        element.text = printable_lines(element.text) if element.text else None
     return (
         '<?xml version="1.0" encoding="UTF-8"?>\n'
         + ElementTree.tostring(root, encoding="unicode")

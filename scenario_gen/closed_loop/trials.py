@@ -293,7 +293,7 @@ def summary_on_error(outcomes: Sequence[Outcome]) -> Iterator[None]:
         if not outcomes:
             raise
         summary = ", ".join(f"{name} {rate.count}" for name, rate in rates(outcomes).items())
-        raise InputError(f"{error}\nof the {len(outcomes)} drives before: {summary}") from error
+        raise InputError(f"{error}; of the {len(outcomes)} drives before: {summary}") from error
 
 
 def too_long(trial: Trial, config: ClosedLoopConfig) -> InputError:

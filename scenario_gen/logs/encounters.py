@@ -21,7 +21,7 @@ from scenario_gen.logs.smoothing import (
     standing,
     UnreconciledError,
 )
-from scenario_gen.numerics import Bools, Floats, runs
+from scenario_gen.numerics import Bools, Floats, running_sum, runs
 from scenario_gen.numerics.plane import edge_lengths, unit
 from scenario_gen.types import CAR, OTHER, VEHICLE_TYPES
 
@@ -34,6 +34,7 @@ class PieceLimits:
         min_reversal_rad: change of course in a stop above which the vehicle has reversed, or
             turned on the spot.
         max_tick_count: ticks of a piece; smoothing needs 3 kB for each.
+        max_length_m: of a piece; smoothing needs 1.5 kB for each metre.
         max_car_curvature_per_m: no car turns more sharply, including noise.
         curvature_factor: the same for other types, over the sharpest turn of the type.
         min_backward_rad: recorded headings farther off the path are of a vehicle in reverse.
@@ -44,6 +45,7 @@ class PieceLimits:
 
     min_reversal_rad: float = float(np.radians(120.0))
     max_tick_count: int = 100_000
+    max_length_m: float = 100_000.0
     max_car_curvature_per_m: float = 0.4
     curvature_factor: float = 1.6
     min_backward_rad: float = float(np.radians(150.0))
@@ -53,6 +55,7 @@ class PieceLimits:
 
 
 _LIMITS = PieceLimits()
+_MAX_CUT_DEPTH_COUNT = 6  # halvings of a part whose path turns too sharply
 _COURSE_FIX_COUNT = 64  # fixes that are searched first for a course
 
 
@@ -143,12 +146,13 @@ def _find_cuts(track: Observations, config: LogConfig) -> _Cuts:
     section = (track.fix_ns - track.fix_ns[0]) // round(
         _LIMITS.max_tick_count * config.period * 1e9
     )
+    part = np.floor(running_sum(distance) / _LIMITS.max_length_m)
     usual = float(np.median(seconds))
     return _Cuts(
         seconds=seconds,
         gaps=gaps,
         reversals=reversals,
-        any=gaps | reversals | (np.diff(section) > 0),
+        any=gaps | reversals | (np.diff(section) > 0) | (np.diff(part) > 0.0),
         bridged=(seconds > 1.5 * max(usual, config.period)) & ~gaps,
     )
 
@@ -262,15 +266,17 @@ def _moved_ahead(smooth: Smooth, distance: float) -> Smooth:
 
 
 def _steerable(
-    part: Observations, origin_ns: int, config: LogConfig
+    part: Observations, origin_ns: int, config: LogConfig, depth: int = 0
 ) -> list[tuple[Observations, Smooth | None]]:
     """Smooth a part of a track, cut wherever its path turns more sharply than a car can.
 
     A car cannot turn on the spot: it reversed in a stop that was too short for the fixes.
 
     Raises:
-        UnreconciledError: no motion fits the part.
+        UnreconciledError: no motion fits the part, also after many cuts (`depth`).
     """
+    if depth > _MAX_CUT_DEPTH_COUNT:
+        raise UnreconciledError("the path turns more sharply than a car can, again and again")
     smooth = smooth_piece(part, origin_ns, config)
     kind = VEHICLE_TYPES[part.kind or CAR]
     if smooth is None or kind.walks:
@@ -288,7 +294,7 @@ def _steerable(
     cuts[np.clip(fix, 1, len(cuts)) - 1] = True
     pieces = []
     for half in _split(part, cuts):
-        pieces += _steerable(half, origin_ns, config)
+        pieces += _steerable(half, origin_ns, config, depth + 1)
     return pieces
 
 

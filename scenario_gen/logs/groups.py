@@ -19,6 +19,7 @@ from itertools import pairwise
 
 import numpy as np
 
+from scenario_gen.base.errors import InputError
 from scenario_gen.logs.config import LogConfig
 from scenario_gen.logs.encounters import Piece
 from scenario_gen.logs.gap import INTERACTS_M, space_time_gap
@@ -34,6 +35,7 @@ _MIN_PRESENCE_SHARE = 0.6  # with `whole`, a vehicle joins if it is present for 
 _EDGE_S = 1.0  # by which a group is shortened so that its vehicles start and end together
 _REST_S = 2.0  # part of a long standstill that belongs to the encounter before or after it
 _STANDING_MPS = 0.1
+_MAX_MEETING_COUNT = 200_000  # grouping takes minutes for more
 _NOISE_M = 50.0  # by which the distance of two vehicles may be wrong before smoothing
 
 
@@ -197,7 +199,11 @@ def _in_several(groups: Sequence[Group[Meeting]], pieces: Sequence[Piece]) -> se
 def _find_meetings(
     pieces: Sequence[Piece], config: LogConfig, within: Span | None, *, small: bool
 ) -> list[Meeting]:
-    """Return all meetings of two vehicles, in ticks; in a `small` log each has gap 0."""
+    """Return all meetings of two vehicles, in ticks; in a `small` log each has gap 0.
+
+    Raises:
+        InputError: there are too many.
+    """
     meetings = []
     for i, others, bounds in simultaneous(pieces, shortest(config)):
         for j in others[bounds < config.proximity].tolist():
@@ -205,6 +211,11 @@ def _find_meetings(
                 gap = 0.0 if small else _gap(pieces[i], pieces[j], span, config)
                 if gap <= INTERACTS_M:
                     meetings.append(Meeting(gap, span[0], min(i, j), max(i, j), span[1]))
+        if len(meetings) > _MAX_MEETING_COUNT:
+            raise InputError(
+                f"more than {_MAX_MEETING_COUNT} meetings of two vehicles: read a part of the log "
+                "(log.start, log.end, log.vehicles), or lower --set log.proximity=…"
+            )
     return meetings
 
 

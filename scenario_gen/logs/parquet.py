@@ -110,7 +110,7 @@ def _read_batches(
             if batch is None:
                 break
             n_rows += batch.num_rows
-            n_bytes += batch.nbytes
+            n_bytes += sum(map(_decoded_bytes, batch.columns))
         check_size(str(path), n_bytes, rows_before + n_rows, config)
         batches.append(batch)
     if not n_rows:
@@ -127,6 +127,14 @@ def _declared_bytes(metadata: Any, names: Sequence[str]) -> int:
             if column.path_in_schema.split(".")[0] in names:
                 total += max(column.total_uncompressed_size, 0)
     return total
+
+
+def _decoded_bytes(values: pa.Array) -> int:
+    """Return the size of values; texts in a dictionary count as often as they occur."""
+    if not pa.types.is_dictionary(values.type) or not _is_text(values.type.value_type):
+        return int(values.nbytes)
+    lengths = compute.binary_length(values.dictionary).take(values.indices)
+    return compute.sum(lengths.cast(pa.int64())).as_py() or 0
 
 
 def _value_type(kind: pa.DataType) -> pa.DataType:

@@ -7,13 +7,14 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from html import escape
 from itertools import chain
+import logging
 import math
 from pathlib import Path
 from typing import Any, TYPE_CHECKING
 
 import numpy as np
 
-from scenario_gen.base.errors import InputError, reading
+from scenario_gen.base.errors import InputError, printable, reading
 from scenario_gen.base.folders.scratch import scratch
 from scenario_gen.base.parameters import updated
 from scenario_gen.base.stores import naming_objects, temp_folder
@@ -44,6 +45,8 @@ if TYPE_CHECKING:
 
 _DATAFRAME_FILE = "dataframe.csv"
 _FAR_FROM_ORIGIN_M = 200_000.0  # there, distances are 0.02 % too long
+_MANY_TICK_COUNT = 30_000  # the user is told that smoothing takes long
+_TICK_S = 8e-5  # of one tick
 _MANY_DROPS_SHARE = 0.02  # of the rows; the user is told at once
 
 
@@ -274,9 +277,16 @@ def _smooth_pieces(
     pieces: list[Piece] = []
     vehicles = []
     raw = [pieces_of(track, origin_ns, config, smooth=False) for track in tracks]
-    near = vehicles_near(
-        list(chain.from_iterable(track_pieces for track_pieces, _ in raw)), config
-    )
+    raw_pieces = list(chain.from_iterable(track_pieces for track_pieces, _ in raw))
+    near = vehicles_near(raw_pieces, config)
+    n_ticks = sum(piece.last - piece.first for piece in raw_pieces if piece.track.id in near)
+    if n_ticks > _MANY_TICK_COUNT:
+        logging.getLogger("scenario_gen").warning(
+            "%s: %d vehicles come near others and are smoothed; this takes %.0f s or more",
+            printable(log.name),
+            len(near),
+            n_ticks * _TICK_S,
+        )
     for track, unsmoothed in zip(tracks, raw, strict=True):
         is_near = track.id in near
         track_pieces, quality = pieces_of(track, origin_ns, config) if is_near else unsmoothed

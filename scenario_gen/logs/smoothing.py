@@ -57,6 +57,7 @@ class SmoothingModel:
         settling_s: at either end of a stand, free for the motion: a car stops without a step.
         min_travel_m: a vehicle that moves less has no direction of travel.
         straight_m: a shorter path has no shape.
+        max_path_m: a longer one, by its speeds, contradicts the fixes, which are cut before.
         round_count: fits of path and motion in turn.
         speed_noise_mps: bounds of the estimated noise of speeds.
         min_doubted_s: a stretch of speeds that contradict the fixes for longer is not used.
@@ -68,6 +69,7 @@ class SmoothingModel:
     settling_s: float = 0.3
     min_travel_m: float = 0.5
     straight_m: float = 3.0
+    max_path_m: float = 200_000.0
     round_count: int = 3
     speed_noise_mps: tuple[float, float] = (0.3, 3.0)
     min_doubted_s: float = 0.5
@@ -475,11 +477,19 @@ def _fit_path(
         noise: standard deviation of the fixes [m].
         speed: (F,) at the fixes [m/s].
         headings: recorded headings, or None.
+
+    Raises:
+        UnreconciledError: no path fits.
     """
     low = float(distance.min())
     high = float(distance.max())
+    if high - low > _MODEL.max_path_m:
+        raise UnreconciledError("speeds and positions contradict each other; check their units")
     if high - low >= _MODEL.straight_m:
-        return fit_path(distance, piece.fix, weight, noise, speed, headings)
+        try:
+            return fit_path(distance, piece.fix, weight, noise, speed, headings)
+        except np.linalg.LinAlgError as error:
+            raise UnreconciledError(f"no smooth path leads through the fixes: {error}") from error
     known = piece.heading[np.isfinite(piece.heading)]
     if len(known):
         heading = float(np.arctan2(np.median(np.sin(known)), np.median(np.cos(known))))

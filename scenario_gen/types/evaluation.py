@@ -254,7 +254,7 @@ class Evaluation:
 
 def as_markdown(name: str) -> str:
     """Return a name so that Markdown shows it letter by letter."""
-    return re.sub(r"([\\`*\[\]<>|]|^[_#]|_$)", r"\\\1", printable(name).replace("\n", " "))
+    return re.sub(r"([\\`*\[\]<>|]|^[_#]|_$)", r"\\\1", printable(name))
 
 
 def formatted(

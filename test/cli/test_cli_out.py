@@ -91,7 +91,7 @@ def test_an_out_that_cannot_be(run, tmp_path, out):
     assert sorted(path.name for path in tmp_path.iterdir()) == ["file", "link"]
 
 
-NAME = "[red]a\x1b[31m*b*\u202e[/]"
+NAME = "[red]a\x1b[31m\n*b*\u202e[/]"
 
 
 def test_names_are_shown_letter_by_letter(run, tmp_path):
@@ -103,7 +103,7 @@ def test_names_are_shown_letter_by_letter(run, tmp_path):
     ]
     log = tmp_path / f"{NAME.replace('[/]', '')}.csv"
     log.write_text("\n".join(rows) + "\n")
-    literal = r"[red]a\x1b[31m*b*\u202e"
+    literal = r"[red]a\x1b[31m\n*b*\u202e"
     out = f"[out]{NAME.replace('/', '')}"
     code, said = run("generate", log, "--road", "straight", "--count", 2, "--out", out)
     assert (
@@ -118,7 +118,7 @@ def test_names_are_shown_letter_by_letter(run, tmp_path):
         ("generate", NAME, "--road", "straight"),
     )
     told = [run(*words)[1] for words in more]
-    escaped = r"\[red\]a\\x1b\[31m\*b\*\\u202e"  # in Markdown, which a pipe receives
+    escaped = r"\[red\]a\\x1b\[31m\\n\*b\*\\u202e"  # in Markdown, which a pipe receives
     assert f"{escaped} on straight" in told[0]
     assert all("\x1b" not in text and "\u202e" not in text for text in (said, *told))
 

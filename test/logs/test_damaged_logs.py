@@ -297,3 +297,11 @@ def test_numbers_and_dates_of_any_length_end_in_one_line_or_a_name(tmp_path, col
             read_log(path)
     else:
         assert digits in read_log(path).encounters[0].ids
+
+
+def test_a_small_file_of_long_texts_is_bounded(tmp_path):
+    text = "A" * 1_000_000
+    table = {"t": [0.1 * k for k in range(400)], "id": ["a", "b"] * 200, "type": [text] * 400}
+    pd.DataFrame({**table, "x": 0.0, "y": 0.0}).to_parquet(tmp_path / "log.parquet")
+    with pytest.raises(InputError, match=r"381.* MiB after decompression"):
+        read_log(tmp_path / "log.parquet")

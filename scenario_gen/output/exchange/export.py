@@ -117,7 +117,7 @@ def export_bag(
             exporting.add_case(case)
         notes, entries = exporting.notes, exporting.entries
         if not entries:
-            raise RefusedError("nothing could be exported:\n" + "\n".join(notes))
+            raise RefusedError("nothing could be exported:", *notes)
         for name, data in to.closing(exporting.contents).items():
             (folder / name).write_bytes(data)
         digests = {
