@@ -6,6 +6,7 @@
 import os
 import sys
 
+from scenario_gen import __version__
 from scenario_gen.base.errors import MissingExtraError, needs
 from scenario_gen.base.signals import handle_signals
 
@@ -15,6 +16,9 @@ def main() -> None:
     # Before numpy is loaded: the matrices are small, and BLAS threads would only wait.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     handle_signals()
+    if sys.argv[1:] == ["--version"]:  # without any extra, too
+        print(f"scenario-gen {__version__}")
+        return
     try:
         needs("cli", "rich", "typer")
         from scenario_gen.base.folders.scratch import sweep_beside

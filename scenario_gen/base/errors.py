@@ -68,7 +68,8 @@ def needs(extra: str, *modules: str) -> None:
     missing = [name for name in modules if find_spec(name) is None]
     if missing:
         raise MissingExtraError(
-            f"{', '.join(missing)} not installed; `pip install 'scenario_gen[{extra}]'` brings it"
+            f"{', '.join(missing)} not installed; install it with the extra: "
+            f"`pip install '.[{extra}]'` in a checkout, or `pip install 'scenario_gen[{extra}]'`"
         )
 
 

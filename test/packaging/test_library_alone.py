@@ -76,7 +76,9 @@ def test_the_command_names_the_extra_that_it_lacks():
     )
     assert (ran.returncode, ran.stdout) == (1, "")
     assert (
-        ran.stderr == "error: typer not installed; `pip install 'scenario_gen[cli]'` brings it\n"
+        ran.stderr
+        == "error: typer not installed; install it with the extra: `pip install '.[cli]'` "
+        "in a checkout, or `pip install 'scenario_gen[cli]'`\n"
     )
 
 
