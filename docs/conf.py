@@ -177,6 +177,7 @@ def parameter_lines(match: re.Match[str]) -> str:
 BLOCK = '<span style="display: block; margin-left: 1em">'
 REPAIRS = (
     (r' role="heading">', ' role="heading" aria-level="2">'),
+    (r'^<div id="search-results">', '<h1>Search</h1><div id="search-results">'),
     (r"<pre>", '<pre tabindex="0">'),
     (r'<div class="table-wrapper', '<div tabindex="0" class="table-wrapper'),
     (r'<aside class="sidebar-drawer', '<aside aria-label="Site" class="sidebar-drawer'),
@@ -190,7 +191,7 @@ def repair(app: Any, _error: Any) -> None:
     for path in Path(app.outdir).rglob("*.html"):
         text = path.read_text(encoding="utf-8")
         for pattern, replacement in REPAIRS:
-            text = re.sub(pattern, replacement, text)
+            text = re.sub(pattern, replacement, text, flags=re.MULTILINE)
         path.write_text(text, encoding="utf-8")
 
 
