@@ -30,6 +30,7 @@ from scenario_gen.method.evaluation import (
 from scenario_gen.numerics import Bools, Floats, Ints
 from scenario_gen.numerics.curve import Curve
 from scenario_gen.numerics.kernels import F, F2, I, kernel, named, OUTB1
+from scenario_gen.numerics.loops import copy_rows, copy_to
 from scenario_gen.numerics.plane import edge_lengths
 from scenario_gen.types import GenerationResult, join_ego
 
@@ -206,7 +207,9 @@ def drive_blindly(
 ) -> None:
     """Write whether each member (M, 2) of a family passes (M,)."""
     n = len(world.motion)
-    oldest = parameters.delay.max() + 1
+    oldest = 1
+    for i in range(n):
+        oldest = max(oldest, parameters.delay[i] + 1)
     before = np.empty((n, 4))
     after = np.empty((n, 5))
     vehicles = np.empty((n, 5))
@@ -228,13 +231,13 @@ def drive_blindly(
             station += 0.5 * (speed + end_speed) * world.step
             known = min(step + 1, oldest)
             for row in range(known - 1, 0, -1):
-                seen[row] = seen[row - 1]
+                copy_to(seen[row], seen[row - 1])
             _fill_ego(course, station, end_speed, (end_speed - speed) / world.step, seen[0])
             speed = end_speed
             now = course.begin + step * world.step
             advance(world, parameters, now, before, seen[:known], passes, after, vehicles)
-            before[:] = after[:, :4]
-            poses[:] = vehicles[:, :4]
+            copy_rows(before, after)
+            copy_rows(poses, vehicles)
             if ego_hits(poses, world.half, vehicles[:, 4] > 0.0, world.ego):
                 break
             if station >= course.length:

@@ -21,6 +21,7 @@ from scenario_gen.closed_loop.driver import (
 from scenario_gen.numerics import Floats
 from scenario_gen.numerics.boxes import boxes_meet, fill_box
 from scenario_gen.numerics.kernels import kernel
+from scenario_gen.numerics.loops import copy_to
 
 
 @kernel(inline=True)
@@ -82,7 +83,7 @@ def predict_ego(world: World, seen: Floats, ago: int, out: Floats) -> None:
     way = 0.0
     pose = np.empty(5)
     if ago == 0:
-        out[0, :4] = seen[:4]
+        copy_to(out[0, :4], seen)
         out[0, 4] = clock
     for m in range(1 - ago, out.shape[0]):
         moved, speed = _brake(speed, braking, h)
@@ -101,7 +102,7 @@ def predict_ego(world: World, seen: Floats, ago: int, out: Floats) -> None:
             pose[1] = seen[1] + way * sin
             pose[2] = seen[2]
         if m >= 0:
-            out[m, :3] = pose[:3]
+            copy_to(out[m, :3], pose)
             out[m, 3] = seen[EGO_RATE] * pose[3] if keeps_rate else speed
             out[m, 4] = clock
 

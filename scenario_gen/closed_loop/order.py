@@ -106,7 +106,9 @@ def may_pass(world: World, moving: Bools, clocks: Floats, passes: Bools, i: int,
     begin = clocks.copy()
     running = moving.copy()
     while True:
-        end = np.minimum(begin + world.cell, world.time[-1])
+        end = begin.copy()
+        for k in range(len(end)):
+            end[k] = min(end[k] + world.cell, world.time[-1])
         enforce_order(world, running, begin, trial, end)
         progress = 0.0
         waiting = 0

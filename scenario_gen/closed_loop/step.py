@@ -23,6 +23,7 @@ from scenario_gen.closed_loop.traffic_model import react
 from scenario_gen.numerics import Bools, Floats
 from scenario_gen.numerics.boxes import boxes_meet, fill_box
 from scenario_gen.numerics.kernels import B1, F, F2, I, kernel, OUT2, OUTB2
+from scenario_gen.numerics.loops import copy_to
 
 
 class WitnessMatching(NamedTuple):
@@ -140,7 +141,7 @@ def fill_vehicles(time: Floats, motion: Floats, drivers: Floats, out: Floats) ->
     pose = np.empty(5)
     for i in range(out.shape[0]):
         pose_at(time, motion[i], drivers[i, CLOCK], pose)
-        out[i, :3] = pose[:3]
+        copy_to(out[i, :3], pose)
         out[i, 3] = pose[3] * drivers[i, RATE]
 
 
@@ -221,7 +222,7 @@ def advance(
     after[ego, WAITED] = 0.0
     after[ego, HELD] = 0.0
     fill_vehicles(time, world.motion, after, vehicles)
-    vehicles[ego, :4] = body[:4]
+    copy_to(vehicles[ego, :4], body)
     for i in range(len(world.motion)):
         if i != ego and not world.leaves[i] and after[i, CLOCK] >= time[-1]:
             vehicles[i, 3] = 0.0  # it stands where its motion ended

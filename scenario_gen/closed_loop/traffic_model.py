@@ -46,6 +46,7 @@ from scenario_gen.closed_loop.order import enforce_order, may_pass, passing_limi
 from scenario_gen.numerics import Bools, Floats
 from scenario_gen.numerics.boxes import boxes_meet, fill_box
 from scenario_gen.numerics.kernels import kernel
+from scenario_gen.numerics.loops import copy_to
 
 MIN_ROOM_M = 0.05  # a driver that is nearer to the end of its permitted way drives up to it
 
@@ -97,7 +98,7 @@ def react(
     for i in range(drivers.shape[0]):
         driver = DriverState(i, drivers[i, CLOCK], drivers[i, RATE], drivers[i, ACCELERATION])
         after[i] = 0.0
-        after[i, :WAITED] = driver[1:]
+        _write_driver(driver, after[i])
         if i == world.ego or not now.moving[i]:
             continue
         if not now.present[i]:
@@ -112,10 +113,18 @@ def react(
             bound = min(bound, _bound_by_others(world, parameters, now, driver, after))
         ego_clock = ego[0, 4] - world.step if seen[age, ON_PATH] > 0.0 else -np.inf
         target = _hurry_until(world, now, i, ego_clock)
-        pose[:] = now.pose[i]
+        copy_to(pose, now.pose[i])
         driver = drive_step(world, parameters, driver, pose, bound, target)
-        after[i, :WAITED] = driver[1:]
+        _write_driver(driver, after[i])
     _enforce(world, now, after)
+
+
+@kernel(inline=True)
+def _write_driver(driver: DriverState, out: Floats) -> None:
+    """Write clock, rate and acceleration of a driver to its row (5,)."""
+    out[CLOCK] = driver.clock
+    out[RATE] = driver.rate
+    out[ACCELERATION] = driver.acceleration
 
 
 @kernel(inline=True)

@@ -12,6 +12,7 @@ import numpy as np
 
 from scenario_gen.numerics.arrays import Floats, Ints
 from scenario_gen.numerics.kernels import F1, F2, F3, I2, kernel, OUT3, OUT4
+from scenario_gen.numerics.loops import copy_to
 
 
 @kernel(inline=True)
@@ -61,12 +62,12 @@ def control_points(
             from_start = third * speed[i, k]
             to_end = third * speed[i, k + 1]
             start, end = position[i, k], position[i, k + 1]
-            out[i, k, 0] = start
+            copy_to(out[i, k, 0], start)
             out[i, k, 1, 0] = start[0] + from_start * np.cos(heading[i, k])
             out[i, k, 1, 1] = start[1] + from_start * np.sin(heading[i, k])
             out[i, k, 2, 0] = end[0] - to_end * np.cos(heading[i, k + 1])
             out[i, k, 2, 1] = end[1] - to_end * np.sin(heading[i, k + 1])
-            out[i, k, 3] = end
+            copy_to(out[i, k, 3], end)
 
 
 @kernel(F1, F3, F2, F2, I2, F1, OUT3)

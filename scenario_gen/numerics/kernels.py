@@ -170,6 +170,11 @@ def _typeof_kernel(kernel: Kernel, context: Any) -> Any:
     return typeof_impl(kernel.compile(), context)
 
 
+def _without_literals(compile_types: Callable[[Any], Any]) -> Callable[[Any], Any]:
+    """Let a helper that is called with `1` or `True` be compiled once, for any number or truth."""
+    return lambda argument_types: compile_types(tuple(map(types.unliteral, argument_types)))
+
+
 def kernel(
     *declared: Any, inline: bool = False, forced: bool = False
 ) -> Callable[[Function], Function]:
@@ -185,9 +190,9 @@ def kernel(
 
     def decorate(function: Function) -> Function:
         if inline:
-            return cast(
-                "Function", _compiler(function, no_cpython_wrapper=True, forceinline=forced)
-            )
+            helper = _compiler(function, no_cpython_wrapper=True, forceinline=forced)
+            helper.compile = _without_literals(helper.compile)
+            return cast("Function", helper)
         _kernels.append(Kernel(function, declared))
         return cast("Function", _kernels[-1])
 

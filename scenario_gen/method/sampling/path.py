@@ -24,6 +24,7 @@ from scipy.interpolate import CubicSpline
 from scenario_gen.method.sampling.time_warp import ClockSamples
 from scenario_gen.numerics import Floats, frozen, Ints, running_sum
 from scenario_gen.numerics.kernels import F, F1, F2, F3, I1, kernel, named, OUT2, OUT3
+from scenario_gen.numerics.loops import copy_to
 from scenario_gen.numerics.plane import arc_lengths
 from scenario_gen.types import Route
 
@@ -302,7 +303,7 @@ def fill_states(
                 out[s, k, 0], out[s, k, 1] = c[0, 0], c[0, 1]
                 out[s, k, 2] = np.arctan2(c[0, 3], c[0, 2])
             elif driven == before:
-                out[s, k, :3] = out[s, k - 1, :3]
+                copy_to(out[s, k, :3], out[s, k - 1])
             else:
                 j = _cell_of(arc, driven, j)
                 x = _fraction(c, j, h, driven - arc[j], arc[j + 1] - arc[j])

@@ -89,12 +89,7 @@ def _rewire(tree: Tree, new: int, count: int, scene: Scene) -> None:
 def _extend(
     tree: Tree, target: Pose, nearest: int, greedy: bool, scene: Scene, rules: Rules, bound: float
 ) -> tuple[int, int]:
-    """Algorithm 2: one step of a tree towards a pose; return its outcome and the new node.
-
-    `nearest` is the node nearest to the pose if it is known, else -1.
-    """
-    if nearest < 0:
-        nearest = nearest_node(tree, target, scene.body)  # line 1
+    """Algorithm 2: one step from the nearest node to a pose; return its outcome and new node."""
     start, pose, status = pose_of(tree, nearest), target, REACHED_CODE
     edge = steer(start, target, scene.body)
     if length_of(edge) < SAME_POSE_CELLS:
@@ -132,10 +127,11 @@ def _connect(
     With one step at most it is Algorithm 2. Without a new node, the node is -1.
     """
     status, last, steps = ADVANCED_CODE, -1, 0
+    nearest = nearest_node(tree, target, scene.body)  # line 1 of Algorithm 2
     while status == ADVANCED_CODE and steps < max_steps and has_room(tree):
-        # the node added last is the nearest one
-        status, new = _extend(tree, target, last, greedy, scene, rules, bound)
+        status, new = _extend(tree, target, nearest, greedy, scene, rules, bound)
         last = new if new >= 0 else last
+        nearest = last  # it is the nearest one now
         steps += 1
     return status, last
 

@@ -18,6 +18,7 @@ from scenario_gen.method.routing.search.steering import costs_per_length, steeri
 from scenario_gen.method.routing.search.sweep import Scene
 from scenario_gen.numerics import Floats, wrap_angle
 from scenario_gen.numerics.kernels import F, F2, I, kernel, OUT2
+from scenario_gen.numerics.loops import copy_to
 from scenario_gen.numerics.plane import edge_lengths
 from scenario_gen.roads import segment_free
 
@@ -70,7 +71,7 @@ def _cut(clearance: Floats, path: Floats, v: int, n: int, radius: float) -> int:
     if free < MIN_CUT_SHARE or n == path.shape[0]:
         return n
     for k in range(n, v + 1, -1):
-        path[k] = path[k - 1]
+        copy_to(path[k], path[k - 1])
     path[v, 0], path[v, 1] = vx + free * ax, vy + free * ay
     path[v + 1, 0], path[v + 1, 1] = vx + free * bx, vy + free * by
     return n + 1
@@ -89,7 +90,7 @@ def _remove_vertices(clearance: Floats, path: Floats, n: int, radius: float) -> 
             else:
                 stride //= 2
         i = farthest
-        path[kept] = path[i]  # and vertex i is still there: kept <= i
+        copy_to(path[kept], path[i])  # and vertex i is still there: kept <= i
         kept += 1
     return kept
 

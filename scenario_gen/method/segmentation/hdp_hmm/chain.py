@@ -50,6 +50,7 @@ from scenario_gen.method.segmentation.hdp_hmm.transitions import (
 )
 from scenario_gen.numerics import Floats, Ints
 from scenario_gen.numerics.kernels import I, kernel
+from scenario_gen.numerics.loops import column_sums, copy_to
 
 TRACE = ("log_joint", "occupied", "gamma", "alpha_kappa", "rho")
 MIN_MESSAGE_RATIO = 1e-30  # a smaller sum of a message is rescaled
@@ -107,7 +108,7 @@ def replace_gaps(
         t = data.gaps[gap]
         out = block[:, t - start]
         observed_log_likelihood(
-            data.vt[:, t],
+            data.v[t],
             data.hidden[gap],
             emitted.coef,
             emitted.shape,
@@ -243,13 +244,17 @@ def write_trace(
     data: Data, hyper: Hyper, stats: Statistics, base: float, top: Floats, row: Floats
 ) -> None:
     """Fill row (5,), see TRACE; `base` is the log marginal likelihood of no samples."""
-    used = stats.n.sum(axis=0) > 0
-    row[0] = log_transitions(stats.n, top[1], top[2], top[3:])
-    row[0] += (stats.marginal[used] - base).sum()
+    counts = column_sums(stats.n)
+    used, gain = 0, 0.0
+    for k in range(len(counts)):
+        if counts[k] > 0:
+            used += 1
+            gain += stats.marginal[k] - base
+    row[0] = log_transitions(stats.n, top[1], top[2], top[3:]) + gain
     if hyper.dof > 0.0:
         row[0] += log_masses(data.mass, hyper.weight * len(hyper.blur), hyper.dof)
-    row[1] = used.sum()
-    row[2:] = top[:3]
+    row[1] = used
+    copy_to(row[2:], top)
 
 
 @kernel(inline=True)
@@ -306,10 +311,10 @@ def run_chain(data: Data, grid: Grid, hyper: Hyper, start: Start, out: Out, seed
         count_transitions(labels, data.ends, stats.n)
         for _ in range(hyper.moves if sweep >= 0 else 0):
             split_or_merge(state, data, joint, top, labels, stats)
-        before[:] = labels
+        copy_to(before, labels)
         sample_transitions(state, stats.n, hyper.levels, top, top[3:], pi)  # steps 3 to 5
         draw_emissions(state, stats, joint, emitted)
         if sweep >= 0:
             write_trace(data, hyper, stats, base, top, out.trace[sweep])
         if sweep >= burn:
-            out.samples[sweep - burn] = labels
+            copy_to(out.samples[sweep - burn], labels)

@@ -16,6 +16,7 @@ from scenario_gen.method.segmentation.hdp_hmm.model import JOINT, Joint
 from scenario_gen.method.segmentation.hdp_hmm.transitions import count_transitions
 from scenario_gen.numerics import Floats, Ints
 from scenario_gen.numerics.kernels import F, F1, F2, I1, kernel, OUTI1
+from scenario_gen.numerics.loops import add_to
 
 
 @kernel(inline=True)
@@ -163,8 +164,9 @@ def merge_states(
         if i < 0:
             break
         single[j], single[i] = pairs[i, j], 0.0
-        outer[j] += outer[i]
-        sums[j] += sums[i]
+        for row in range(m):
+            add_to(outer[j, row], outer[i, row])
+        add_to(sums[j], sums[i])
         counts[j] += counts[i]
         counts[i] = 0
         for t in range(len(labels)):

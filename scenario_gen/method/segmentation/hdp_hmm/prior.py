@@ -18,6 +18,7 @@ from scenario_gen.method.segmentation.hdp_hmm.model import Grid, Hyper, Joint, S
 from scenario_gen.method.segmentation.hdp_hmm.random import pick, State, uniform
 from scenario_gen.numerics import Floats, Ints
 from scenario_gen.numerics.kernels import kernel
+from scenario_gen.numerics.loops import copy_rows
 
 
 @kernel(inline=True)
@@ -52,7 +53,7 @@ def set_prior(
             for q in range(p):
                 value += g0[p + i, q] * mean[j, q]
             g0[p + i, p + j] = value
-    factor[:] = g0
+    copy_rows(factor, g0)
     cholesky(factor)
     joint = Joint(g0, d + extra, hyper.weight, hyper.blur)
     return log_marginal(factor, 0.0, joint), joint

@@ -12,6 +12,7 @@ from scenario_gen.method.segmentation.hdp_hmm.emission import add_sample
 from scenario_gen.method.segmentation.hdp_hmm.observed import log_radial, without_hidden
 from scenario_gen.numerics import Bools, Floats, Ints
 from scenario_gen.numerics.kernels import B2, F, F1, F2, F3, I1, kernel, named, OUT1, OUT2
+from scenario_gen.numerics.loops import copy_to
 
 MIN_LOG_RATIO = -600.0  # of a density to the best state's
 
@@ -96,7 +97,7 @@ def filter_forward(
     likelihood, ahead = np.empty(states), np.empty(states)
     total = 0.0
     sequence = 0
-    ahead[:] = initial
+    copy_to(ahead, initial)
     for t in range(samples):
         total += relative_likelihood(log_density[t], likelihood)
         for k in range(states):
@@ -104,7 +105,7 @@ def filter_forward(
         total += np.log(scaled(out[t]))
         if t + 1 == ends[sequence]:
             sequence += 1
-            ahead[:] = initial
+            copy_to(ahead, initial)
         else:
             predict(out[t], transition, ahead)
     return total
@@ -267,7 +268,7 @@ def expected_statistics(
             mass = (dof + seen) / (
                 dof + weight * without_hidden(v[t], unused[t], coef, factor, shift)[0]
             )
-        row[:] = v[t]
+        copy_to(row, v[t])
         if hidden[t].any():
             without_hidden(v[t], hidden[t], coef, factor, shift)
             fill_hidden(hidden[t], factor, shift, share[t], inverse, row[p:], outer[p:, p:])

@@ -28,6 +28,7 @@ from scenario_gen.method.segmentation.hdp_hmm.random import log_beta_draw, State
 from scenario_gen.method.segmentation.hdp_hmm.transitions import count_transitions, log_transitions
 from scenario_gen.numerics import Floats, Ints
 from scenario_gen.numerics.kernels import kernel
+from scenario_gen.numerics.loops import add_to, column_sums, copy_rows, copy_to
 
 REFINEMENTS_COUNT = 2  # rounds of fitting and labelling
 ANCHOR_SAMPLES = 5  # on either side of an anchor, which share its label at first
@@ -92,12 +93,17 @@ def group_of(labels: Ints, ends: Ints, i: int, j: int, stats: Statistics) -> Gro
         if t + 1 == ends[sequence]:
             sequence += 1
             before = -2
-    return Group(
-        index[:count],
-        opens[:count],
-        stats.outer[i] + stats.outer[j],
-        stats.sums[i] + stats.sums[j],
-    )
+    outer, sums = stats.outer[i].copy(), stats.sums[i].copy()
+    add_state(stats, j, outer, sums)
+    return Group(index[:count], opens[:count], outer, sums)
+
+
+@kernel(inline=True)
+def add_state(stats: Statistics, k: int, outer: Floats, sums: Floats) -> None:
+    """Add the statistics of state k to outer (M, M) and sums (2,)."""
+    for row in range(len(outer)):
+        add_to(outer[row], stats.outer[k, row])
+    add_to(sums, stats.sums[k])
 
 
 @kernel(inline=True)
@@ -267,6 +273,25 @@ def log_sides(
 
 
 @kernel(inline=True)
+def is_used(n: Ints, k: int) -> bool:
+    """Return whether any row of n (L + 1, L) enters state k."""
+    for j in range(n.shape[0]):
+        if n[j, k] > 0:
+            return True
+    return False
+
+
+@kernel(inline=True)
+def count_used(counts: Ints) -> int:
+    """Return the number of occupied states by counts (L,)."""
+    used = 0
+    for k in range(len(counts)):
+        if counts[k] > 0:
+            used += 1
+    return used
+
+
+@kernel(inline=True)
 def predecessors(n: Ints, k: int) -> int:
     """Return the number of rows of n (L + 1, L), except row k, that enter state k; at least 1.
 
@@ -319,7 +344,7 @@ def log_pair(members: int, left: int, right: int, used: int, empty: int) -> floa
 @kernel(inline=True)
 def draw_split(state: State, counts: Ints) -> tuple[int, int, int, int]:
     """Draw a state, an empty state (-1: impossible), and the numbers of two anchors."""
-    used = (counts > 0).sum()
+    used = count_used(counts)
     i = chosen_state(counts, int(uniform(state) * used), True)
     if used == len(counts) or counts[i] < 2:
         return i, -1, 0, 0
@@ -332,7 +357,7 @@ def draw_split(state: State, counts: Ints) -> tuple[int, int, int, int]:
 @kernel(inline=True)
 def draw_merge(state: State, counts: Ints) -> tuple[int, int, int, int]:
     """Draw two occupied states (the second is -1 if impossible), and an anchor in each."""
-    used = (counts > 0).sum()
+    used = count_used(counts)
     i = chosen_state(counts, int(uniform(state) * used), True)
     if used < 2:
         return i, -1, 0, 0
@@ -356,8 +381,8 @@ def propose_split(
 ) -> Proposal:
     """Divide state i into i and j, which was empty: see `draw_split`."""
     i, j, first, second = drawn
-    counts, m = stats.n.sum(axis=0), len(joint.g0)
-    used, members = (counts > 0).sum(), counts[i]
+    counts, m = column_sums(stats.n), len(joint.g0)
+    used, members = count_used(counts), counts[i]
     group = group_of(labels, data.ends, i, j, stats)
     side, n = np.zeros(members, np.int64), np.empty_like(stats.n)
     gain = -log_sides(state, data, joint, stay, group, (first, second), side, False)
@@ -375,13 +400,14 @@ def propose_split(
 def propose_merge(joint: Joint, stats: Statistics, drawn: tuple[int, int, int, int]) -> Proposal:
     """Make state j part of state i: see `draw_merge`."""
     i, j = drawn[0], drawn[1]
-    counts, m = stats.n.sum(axis=0), len(joint.g0)
-    used, members = (counts > 0).sum() - 1, counts[i] + counts[j]
+    counts, m = column_sums(stats.n), len(joint.g0)
+    used, members = count_used(counts) - 1, counts[i] + counts[j]
     n, outer, sums = stats.n.copy(), np.zeros((2, m, m)), np.zeros((2, 2))
-    outer[0], sums[0] = stats.outer[i] + stats.outer[j], stats.sums[i] + stats.sums[j]
-    n[i] += n[j]
+    for k in (i, j):
+        add_state(stats, k, outer[0], sums[0])
+    add_to(n[i], n[j])
     n[j] = 0
-    n[:, i] += n[:, j]
+    add_to(n[:, i], n[:, j])
     n[:, j] = 0
     gain = -log_pair(members, counts[i], counts[j], used, len(counts) - used)
     none = np.empty(0, np.int64)
@@ -444,7 +470,7 @@ def split_or_merge(
     """
     threshold = np.log(uniform(state))
     splits = uniform(state) < 0.5
-    counts = stats.n.sum(axis=0)
+    counts = column_sums(stats.n)
     stay = min(max(top[2], MIN_STAY_PROBABILITY), MAX_STAY_PROBABILITY)
     drawn = draw_split(state, counts) if splits else draw_merge(state, counts)
     if drawn[1] < 0:
@@ -470,11 +496,14 @@ def split_or_merge(
     if not gain >= threshold:
         return False
     relabel(labels, move.group, move.side, i, j)
-    stats.n[:], beta[:] = move.n, after
+    copy_rows(stats.n, move.n)
+    copy_to(beta, after)
     for s in range(2):
         k = move.pair[s]
-        stats.outer[k], stats.sums[k] = move.outer[s], move.sums[s]
-        stats.factors[k], stats.marginal[k] = factors[s], marginal[s]
+        copy_rows(stats.outer[k], move.outer[s])
+        copy_to(stats.sums[k], move.sums[s])
+        copy_rows(stats.factors[k], factors[s])
+        stats.marginal[k] = marginal[s]
     return True
 
 
@@ -488,8 +517,8 @@ def draw_shares(
     """
     i, j = move.pair[0], move.pair[1]
     both = beta[i] + beta[j]
-    old = predecessors(n, j) if n[:, j].any() else 0
-    new = predecessors(move.n, j) if move.n[:, j].any() else 0
+    old = predecessors(n, j) if is_used(n, j) else 0
+    new = predecessors(move.n, j) if is_used(move.n, j) else 0
     share_i, share_j = log_beta_draw(state, a + predecessors(move.n, i), a + new)
     gain: float = log_share(a, predecessors(move.n, i), new, share_i, share_j)
     gain -= log_share(a, predecessors(n, i), old, np.log(beta[i] / both), np.log(beta[j] / both))
