@@ -70,7 +70,7 @@ class Traffic(NamedTuple):
     passes: Bools
 
 
-@kernel(inline=True)
+@kernel(inline=True, merged=True)
 def react(
     world: World,
     parameters: DriverParameters,

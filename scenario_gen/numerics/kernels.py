@@ -110,10 +110,13 @@ def _field_reader(declared: Any) -> Callable[[Any], Any]:
 class Kernel:
     """A function that numba compiles for its declared types, for Python and other kernels."""
 
-    def __init__(self, function: Callable[..., Any], declared: Sequence[Any]) -> None:
+    def __init__(
+        self, function: Callable[..., Any], declared: Sequence[Any], *, on_demand: bool
+    ) -> None:
         """Declare the kernel; its first call compiles or loads it."""
         update_wrapper(self, function)
         self.declared = tuple(declared)
+        self.group = str(Path(function.__code__.co_filename).parent) if on_demand else ""
         self.dispatcher = _compiler(function, cache=True)
         self._readers = [_reader(kind) for kind in declared]
         self._is_ready = False
@@ -158,7 +161,7 @@ class Kernel:
         """Call the compiled function."""
         if not self._is_ready:
             if not self.mark.exists():
-                make_ready(registered())
+                make_ready([other for other in _kernels if other.group in ("", self.group)])
             self.compile()
         arguments = [read(value) for read, value in zip(self._readers, values, strict=True)]
         return self.dispatcher(*arguments)
@@ -176,7 +179,11 @@ def _without_literals(compile_types: Callable[[Any], Any]) -> Callable[[Any], An
 
 
 def kernel(
-    *declared: Any, inline: bool = False, forced: bool = False
+    *declared: Any,
+    inline: bool = False,
+    forced: bool = False,
+    merged: bool = False,
+    on_demand: bool = False,
 ) -> Callable[[Function], Function]:
     """Compile a function with numba: cached, without the GIL, IEEE arithmetic (no fastmath).
 
@@ -186,22 +193,29 @@ def kernel(
             them.
         forced: the caller includes the helper whatever its size; a call would count the references
             of its array arguments.
+        merged: the helper is copied into its only caller and compiled as a part of it, so that its
+            code, and that of all helpers that it calls, is not optimised once more.
+        on_demand: it is compiled when it, or another one on demand in its folder, is called for
+            the first time, and not with all others.
     """
 
     def decorate(function: Function) -> Function:
         if inline:
-            helper = _compiler(function, no_cpython_wrapper=True, forceinline=forced)
+            copied = "always" if merged else "never"
+            helper = _compiler(
+                function, no_cpython_wrapper=True, forceinline=forced, inline=copied
+            )
             helper.compile = _without_literals(helper.compile)
             return cast("Function", helper)
-        _kernels.append(Kernel(function, declared))
+        _kernels.append(Kernel(function, declared, on_demand=on_demand))
         return cast("Function", _kernels[-1])
 
     return decorate
 
 
-def registered() -> list[Kernel]:
-    """Return the kernels of all modules that have been imported."""
-    return list(_kernels)
+def registered(*, on_demand: bool = True) -> list[Kernel]:
+    """Return the kernels of all modules that have been imported, with those on demand or not."""
+    return [each for each in _kernels if on_demand or not each.group]
 
 
 def import_all(packages: Sequence[str] = ()) -> None:

@@ -3,8 +3,8 @@
 
 """Copies and sums for kernels, by plain loops.
 
-Numba compiles an assignment of an array to a slice, `a[:] = b`, with the text of its error message,
-which takes a second and more for each kernel. Numbers may be assigned to slices.
+Numba compiles an assignment of an array to a slice, `a[:] = b`, with the text of its error
+message, which takes a second and more for each kernel. Numbers may be assigned to slices.
 """
 
 from typing import Any
@@ -40,7 +40,7 @@ def add_to(out: npt.NDArray[Any], values: npt.NDArray[Any]) -> None:
 @kernel(inline=True)
 def column_sums(counts: Ints) -> Ints:
     """Return the sums (m,) of the columns of counts (n, m)."""
-    sums = counts[0].copy()
+    sums: Ints = counts[0].copy()
     for i in range(1, len(counts)):
         add_to(sums, counts[i])
     return sums

@@ -187,7 +187,7 @@ def _near_squares_free(
     return True
 
 
-@kernel(F2, F, F, F, F, F)
+@kernel(F2, F, F, F, F, F, on_demand=True)
 def free_length(
     clearance: Floats, ax: float, ay: float, bx: float, by: float, radius: float
 ) -> float:
@@ -227,7 +227,7 @@ def free_length(
             return np.inf
 
 
-@kernel(F2, F, F, F, F, F)
+@kernel(F2, F, F, F, F, F, on_demand=True)
 def segment_free(
     clearance: Floats, ax: float, ay: float, bx: float, by: float, radius: float
 ) -> bool:
@@ -235,7 +235,7 @@ def segment_free(
     return free_length(clearance, ax, ay, bx, by, radius) == np.inf
 
 
-@kernel(F2, F2, F2, F, OUTB1)
+@kernel(F2, F2, F2, F, OUTB1, on_demand=True)
 def check_segments(
     clearance: Floats, start: Floats, end: Floats, radius: float, free: Bools
 ) -> None:

@@ -85,7 +85,7 @@ def _feature_rows(
                 row[j] = 1.0 if value > 1.0 else value
 
 
-@kernel(F2, F2, F, I)
+@kernel(F2, F2, F, I, on_demand=True)
 def _wavefront(a: Floats, b: Floats, turn: float, band: int) -> float:
     """Exact DTW by anti-diagonals, whose cells are independent; three diagonals are kept.
 

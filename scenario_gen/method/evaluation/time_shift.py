@@ -75,7 +75,7 @@ def _overlaps(b: Floats, half: Floats, boxes: Floats) -> bool:
     return boxes_meet(boxes[0], boxes[1])
 
 
-@kernel(F2, F2, F2, OUT1)
+@kernel(F2, F2, F2, OUT1, on_demand=True)
 def _lower_to_shift(a: Floats, b: Floats, half: Floats, out: Floats) -> None:
     """Lower `out` (1,) to the least difference of times [s] at which footprints overlap.
 

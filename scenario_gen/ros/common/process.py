@@ -235,4 +235,4 @@ def kernels_ready(stages: Iterable[str], progress: Progress = lambda *_: None) -
         for module in pkgutil.iter_modules(getattr(package, "__path__", ())):
             stop_if_cancelled()
             importlib.import_module(f"scenario_gen.{stage}.{module.name}")
-    return make_ready(registered(), progress) if stages else 0
+    return make_ready(registered(on_demand=False), progress) if stages else 0

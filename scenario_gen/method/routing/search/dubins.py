@@ -181,7 +181,7 @@ def pose_along(pose: Pose, curve: Curve, distance: float, radius: float) -> Pose
     return pose
 
 
-@kernel(POSE, POSE, F)
+@kernel(POSE, POSE, F, on_demand=True)
 def shortest_curve(start: Pose, end: Pose, radius: float) -> tuple[Curve, Pose]:
     """Return the curve of `shortest`, and the pose at its end."""
     curve = shortest(start, end, radius)

@@ -172,7 +172,7 @@ def _extend_and_connect(
     return (new, reached) if status == REACHED_CODE else (-1, -1)
 
 
-@kernel(I, SCENE, RULES, TREE, TREE, OUTI2, STATES)
+@kernel(I, SCENE, RULES, TREE, TREE, OUTI2, STATES, on_demand=True)
 def grow(
     iterations: int,
     scene: Scene,

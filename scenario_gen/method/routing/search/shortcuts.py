@@ -103,7 +103,7 @@ def _length(path: Floats, n: int) -> float:
     return total
 
 
-@kernel(F2, I, F, I, OUT2)
+@kernel(F2, I, F, I, OUT2, on_demand=True)
 def pull_string(clearance: Floats, n: int, radius: float, passes: int, path: Floats) -> int:
     """Shorten the first `n` vertices of `path` (m, 2) [cells] in place; m - n have room for cuts.
 

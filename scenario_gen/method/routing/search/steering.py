@@ -73,13 +73,13 @@ def is_free(pose: Pose, scene: Scene) -> bool:
     return segment_free(scene.clearance, pose.x, pose.y, pose.x, pose.y, scene.body.half_length)
 
 
-@kernel(POSE, POSE, SCENE)
+@kernel(POSE, POSE, SCENE, on_demand=True)
 def steering_cost(start: Pose, end: Pose, scene: Scene) -> float:
     """Return the cost of the shortest edge between two poses, of which the first is free."""
     return edge_cost(start, end, steer(start, end, scene.body), scene)
 
 
-@kernel(F2, SCENE, OUT1)
+@kernel(F2, SCENE, OUT1, on_demand=True)
 def costs_per_length(poses: Floats, scene: Scene, costs: Floats) -> None:
     """Write the cost per length (P,) at each of P free poses (P, 3)."""
     for k in range(poses.shape[0]):

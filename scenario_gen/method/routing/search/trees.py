@@ -158,7 +158,7 @@ def _put_in_bucket(tree: Tree, m: int) -> None:
     tree.bucket[i, j] = m
 
 
-@kernel(TREE)
+@kernel(TREE, on_demand=True)
 def fill_buckets(tree: Tree) -> None:
     """Put all nodes into empty buckets."""
     for m in range(tree.size[0]):

@@ -120,7 +120,7 @@ def replace_gaps(
     return gap
 
 
-@kernel(inline=True)
+@kernel(inline=True, merged=True)
 def backward_messages(data: Data, emitted: States, hyper: Hyper, pi: Floats, w: Floats) -> None:
     """Fill w (T, L) with likelihood times backward message (step 1), each row up to a factor.
 
@@ -204,7 +204,7 @@ def update_outer(
                 outer[a] = 0.0
 
 
-@kernel(inline=True)
+@kernel(inline=True, merged=True)
 def draw_samples(
     state: State, data: Data, emitted: States, hyper: Hyper, pi: Floats, w: Floats, labels: Ints
 ) -> None:

@@ -17,7 +17,7 @@ from scenario_gen.numerics.loops import copy_to
 MIN_LOG_RATIO = -600.0  # of a density to the best state's
 
 
-@kernel(F2, B2, F3, F, F, OUT2)
+@kernel(F2, B2, F3, F, F, OUT2, on_demand=True)
 def log_densities(
     v: Floats, hidden: Bools, coef: Floats, weight: float, dof: float, out: Floats
 ) -> None:
@@ -131,7 +131,7 @@ def pass_back(transition: Floats, likelihood: Floats, before: Floats, message: F
     return 1.0 - stays / whole
 
 
-@kernel(F2, F2, F1, I1, OUT2, OUT1)
+@kernel(F2, F2, F1, I1, OUT2, OUT1, on_demand=True)
 def smooth(
     log_density: Floats,
     transition: Floats,
@@ -238,7 +238,7 @@ class Rows(NamedTuple):
     dof: float
 
 
-@kernel(named(Rows, F2, B2, B2, F, F), F1, F2, OUT2, OUT1)
+@kernel(named(Rows, F2, B2, B2, F, F), F1, F2, OUT2, OUT1, on_demand=True)
 def expected_statistics(
     rows: Rows, share: Floats, coef: Floats, outer: Floats, sums: Floats
 ) -> None:

@@ -273,15 +273,6 @@ def log_sides(
 
 
 @kernel(inline=True)
-def is_used(n: Ints, k: int) -> bool:
-    """Return whether any row of n (L + 1, L) enters state k."""
-    for j in range(n.shape[0]):
-        if n[j, k] > 0:
-            return True
-    return False
-
-
-@kernel(inline=True)
 def count_used(counts: Ints) -> int:
     """Return the number of occupied states by counts (L,)."""
     used = 0
@@ -293,15 +284,15 @@ def count_used(counts: Ints) -> int:
 
 @kernel(inline=True)
 def predecessors(n: Ints, k: int) -> int:
-    """Return the number of rows of n (L + 1, L), except row k, that enter state k; at least 1.
+    """Return the number of rows of n (L + 1, L), except row k, that enter state k.
 
-    It is a lower bound of the number of tables of state k.
+    It is at least 1 if any row enters it: a lower bound of the number of tables of state k.
     """
     count = 0
     for j in range(n.shape[0]):
         if j != k and n[j, k] > 0:
             count += 1
-    return max(count, 1)
+    return 1 if count == 0 and n[k, k] > 0 else count
 
 
 @kernel(inline=True)
@@ -369,7 +360,7 @@ def draw_merge(state: State, counts: Ints) -> tuple[int, int, int, int]:
     return i, j, first, int(uniform(state) * counts[j])
 
 
-@kernel(inline=True)
+@kernel(inline=True, merged=True)
 def propose_split(
     state: State,
     data: Data,
@@ -416,7 +407,7 @@ def propose_merge(joint: Joint, stats: Statistics, drawn: tuple[int, int, int, i
     )
 
 
-@kernel(inline=True)
+@kernel(inline=True, merged=True)
 def log_undone(
     state: State,
     data: Data,
@@ -454,7 +445,7 @@ def relabel(labels: Ints, group: Group, side: Ints, i: int, j: int) -> None:
             labels[group.members[r]] = j
 
 
-@kernel(inline=True)
+@kernel(inline=True, merged=True)
 def split_or_merge(
     state: State, data: Data, joint: Joint, top: Floats, labels: Ints, stats: Statistics
 ) -> bool:
@@ -517,8 +508,7 @@ def draw_shares(
     """
     i, j = move.pair[0], move.pair[1]
     both = beta[i] + beta[j]
-    old = predecessors(n, j) if is_used(n, j) else 0
-    new = predecessors(move.n, j) if is_used(move.n, j) else 0
+    old, new = predecessors(n, j), predecessors(move.n, j)
     share_i, share_j = log_beta_draw(state, a + predecessors(move.n, i), a + new)
     gain: float = log_share(a, predecessors(move.n, i), new, share_i, share_j)
     gain -= log_share(a, predecessors(n, i), old, np.log(beta[i] / both), np.log(beta[j] / both))
