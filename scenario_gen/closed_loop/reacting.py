@@ -43,6 +43,7 @@ from scenario_gen.pipeline import completed, PipelineConfig
 from scenario_gen.roads import road_and_template
 from scenario_gen.situation import encroachment, Situation
 from scenario_gen.types import (
+    causes_in_words,
     Encounter,
     GenerationResult,
     join_pieces,
@@ -290,10 +291,11 @@ class Testing:
             loop = ClosedLoop(delayed, self.request.ego, road, self.drive_config)
             first = max(loop.begin, delay)
             latest = max(first + CUT_STEP_S, template.duration - MIN_REMAINING_S)
-            options += [
-                (float(blind_passes(loop, family, begin).mean()), -begin, count)
-                for begin in np.arange(first, latest, CUT_STEP_S).tolist()
-            ]
+            for begin in np.arange(first, latest, CUT_STEP_S).tolist():
+                if options and process_time() > drawing.end:
+                    break
+                share = float(blind_passes(loop, family, begin).mean())
+                options.append((share, -begin, count))
         for _, begin, count in sorted(options)[:BEGINS_COUNT]:
             encounter = with_delay(template, self.request.ego, count)
             first_row = round(-begin / template.dt)
@@ -322,7 +324,7 @@ class Testing:
         if first:
             encounter = template.select(rows, first)
             if template.decision is not None:
-                name = f"{template.name}, from {first * template.dt:.1f} s on"
+                name = f"{template.name}, from {first * template.dt:.1f} s"
                 encounter = replace(encounter, name=name)
         aim = f"blind_margin[{self.request.ego}]=..{MAX_MARGIN_S}"
         targets = join_pieces(filter(None, [aim, self.request.target]))
@@ -341,7 +343,7 @@ class Testing:
             replace(self.request, target=targets),
         )
         ego = self.request.ego_of(encounter)
-        label = f"{_outcome(template)}, from {first * template.dt:.1f} s on"
+        label = f"{_outcome(template)}, from {first * template.dt:.1f} s"
         return Stage(chain, chain.plan(), label, float(encounter.speed[ego].max()))
 
     @property
@@ -431,9 +433,7 @@ class _Drawing:
         causes: Counter[str] = Counter()
         try:
             drawn = chain.sample(planned, Callbacks(progress, cancelled, accepts))
-            causes.update(
-                {cause.value: number for cause, number in drawn.generated.refused.items()}
-            )
+            causes.update(dict(causes_in_words(drawn.generated.refused)))
             if len(drawn):
                 self.results.append(_completed(drawn, chain))
         except RefusedError as error:

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The bundled logs: three recorded ones, and invented ones: the paper's cases (V-A, Fig. 3) and three more.
+"""The bundled logs: recorded ones and invented ones, the paper's cases (V-A, Fig. 3) among them.
 
 `resources/recorded/README.md` names the sources and licences of the recorded logs.
 """

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Arguments of `generate`: what has one meaning is accepted, anything else is refused in one line."""
+"""Arguments of `generate`: values with one meaning are accepted, others are refused."""
 
 from collections.abc import Callable, Mapping, Sequence
 import operator
@@ -44,8 +44,8 @@ def encounters_of(source: Templates, config: PipelineConfig) -> list[Encounter]:
         count = len(source.encounters)
         if count != 1:
             raise InputError(
-                f"the log has {count} encounters: give one of them, e.g. log.encounters[0], or call "
-                "generate_many for all"
+                f"the log has {count} encounters: give one of them, e.g. log.encounters[0], or "
+                "call generate_many for all"
             )
         return list(source.encounters)
     is_list = isinstance(source, Sequence) and len(source) > 0
