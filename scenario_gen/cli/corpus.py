@@ -22,7 +22,7 @@ from scenario_gen.cli.options import (
     takes,
     WorkersOption,
 )
-from scenario_gen.cli.output import emit_json, print_, print_table, progress
+from scenario_gen.cli.output import current, emit_json, print_, print_table, progress
 
 if TYPE_CHECKING:
     from scenario_gen.corpus.tasks import Workers
@@ -197,10 +197,11 @@ def find(
     if report is not None and bag is None:
         raise InputError("--report needs --bag, the bag that the page describes; give both")
     source = place(batch)
-    matches = finding.find(source, condition)
+    shows_some = not (current.as_json or again or bag)
+    matches = finding.find(source, condition, limit if shows_some else 0)
     lines = finding.coverage_lines(matches, source)
     emit_json(scenarios=matches.rows, coverage=lines)
-    _print_matches(matches.rows, limit)
+    _print_matches(matches.rows[: limit or None], matches.count)
     print_(*lines, sep="\n")
     if again:
         for row in matches.rows:
@@ -216,17 +217,16 @@ def find(
             print_(f"report: {report}")
 
 
-def _print_matches(rows: Sequence[Mapping[str, object]], limit: int) -> None:
-    """Print a table of the first matching scenarios, and a summary; limit 0 prints all."""
+def _print_matches(listed: Sequence[Mapping[str, object]], count: int) -> None:
+    """Print a table of the first of `count` matching scenarios, and a summary."""
     from scenario_gen.corpus.find import COLUMNS, UNITS
 
-    listed = rows[: limit or None]
     titles = [f"{name} [{UNITS[name]}]" if name in UNITS else name for name in COLUMNS]
     print_table(titles, [[shown(row[name]) for name in COLUMNS] for row in listed], names=3)
-    summary = f"{len(rows)} scenarios" if rows else "no scenario matches"
-    if len(listed) < len(rows):
+    summary = f"{count} scenarios" if count else "no scenario matches"
+    if len(listed) < count:
         summary += f"; the first {len(listed)} are listed, --limit 0 lists all"
-    if rows:
+    if count:
         summary += "; ttc is capped at evaluation.ttc_horizon (10 s)"
     print_(summary)
 

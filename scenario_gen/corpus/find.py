@@ -3,13 +3,15 @@
 
 """`find`: scenarios from a batch, or encounters from a corpus, that meet a condition in SQL.
 
-The scenarios are exported to a bag or a page, or generated again.
+The scenarios are copied to a bag or shown on a page, or generated again.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from itertools import product
 from pathlib import Path
+from threading import Timer
 from typing import Any
 
 from scenario_gen.bags.recordings.write import add_message
@@ -17,7 +19,11 @@ from scenario_gen.bags.storage.writer import atomic_bag
 from scenario_gen.base.errors import InputError, ScenarioGenError
 from scenario_gen.base.stores import fetched, Place, relative_name, workplace
 from scenario_gen.corpus.messages import database, quoted
-from scenario_gen.output.review.regenerate import regenerate_scenario, Regenerated
+from scenario_gen.output.review.regenerate import (
+    recorded_scenarios,
+    regenerate_scenario,
+    Regenerated,
+)
 
 COLUMNS = (
     "template", "kind", "road", "vehicles", "index", "type", "seconds", "distance", "ttc", "pet",
@@ -36,6 +42,7 @@ RECORDED = (
     "name AS template, kind, 'recorded' AS road, count AS vehicles, NULL AS index,"
     " NULL AS type, seconds, distance, ttc, pet, speed, NULL AS braking, gap"
 )
+MAX_SECONDS_S = 60.0  # of one search
 PET_BOUNDS_S = (0.0, 1.0, 2.0, 4.0)  # bounds of the PET classes in the coverage table
 PET_CLASSES = (*(f"< {bound:g} s" for bound in PET_BOUNDS_S), "more", "none")
 PET_CLASS_SQL = (
@@ -50,15 +57,19 @@ class Hits:
     """The result of a search.
 
     Attributes:
-        rows: the scenarios or encounters that meet the condition.
+        rows: the first scenarios or encounters that meet the condition.
+        count: number of all that meet it.
         coverage: (kind, road, PET class, number of scenarios) for the whole batch.
     """
 
     rows: list[dict[str, Any]]
+    count: int
     coverage: list[tuple[str, str, str, int]]
 
 
-def find(batch: Place, condition: str = "true") -> Hits:
+def find(
+    batch: Place, condition: str = "true", limit: int = 0, seconds: float = MAX_SECONDS_S
+) -> Hits:
     """Return the scenarios of a batch, or the encounters of a corpus, that meet a condition.
 
     The most critical ones come first.
@@ -70,9 +81,11 @@ def find(batch: Place, condition: str = "true") -> Hits:
             road user), types (of all road users), outcome (of the decision), its probability and
             sha256. Encounters have no index, seed, braking, types, outcome, probability and
             sha256, but gap [m].
+        limit: number of rows to return; 0: all.
+        seconds: longest search.
 
     Raises:
-        InputError: there is no batch, or the condition is invalid.
+        InputError: there is no batch, or the condition is invalid or takes too long.
     """
     finished = {
         relative_name(table, batch / "cases") for table in (batch / "cases").rglob("*.parquet")
@@ -89,25 +102,53 @@ def find(batch: Place, condition: str = "true") -> Hits:
     if not generated:
         remedy += "; if the corpus is from an older version, mine it again"
     task = f"{batch}: condition {condition!r}"
-    with fetched(tables) as paths, database(workplace(batch), 500, task, remedy) as base:
+    with (
+        fetched(tables) as paths,
+        database(workplace(batch), 400, task, remedy) as base,
+        _time_limit(base, seconds, task),
+    ):
         base.execute(
-            f"CREATE TABLE scenarios AS SELECT {'*' if generated else RECORDED}"
+            f"CREATE VIEW scenarios AS SELECT {'*' if generated else RECORDED}"
             f" FROM read_parquet([{quoted([str(path) for path in paths])}],"
             " hive_partitioning=true, hive_types_autocast=false)"
         )
+        base.execute(f"SET allowed_paths = [{quoted([str(path) for path in paths])}]")
+        base.execute("SET max_temp_directory_size = '4GiB'")
         base.execute("SET enable_external_access = false")  # a condition must not read files
+        base.execute("SET lock_configuration = true")
         # `filter` accepts one expression, not a second statement.
-        matches = (
-            base.table("scenarios")
-            .filter(condition)
-            .order("pet NULLS LAST, ttc, template, road, index")
-        )
-        rows = [dict(zip(matches.columns, row, strict=True)) for row in matches.fetchall()]
+        matches = base.view("scenarios").filter(condition)
+        ((count,),) = matches.aggregate("count(*)").fetchall()
+        ordered = matches.order("pet NULLS LAST, ttc, template, road, index")
+        ordered = ordered.limit(limit or count)
+        rows = [dict(zip(ordered.columns, row, strict=True)) for row in ordered.fetchall()]
         coverage = base.execute(
             f"SELECT kind, road, {PET_CLASS_SQL} AS pet, count(*)"
             " FROM scenarios GROUP BY ALL ORDER BY ALL"
         ).fetchall()
-    return Hits(rows, coverage)
+    return Hits(rows, count, coverage)
+
+
+@contextmanager
+def _time_limit(base: Any, seconds: float, task: str) -> Iterator[None]:
+    """Interrupt a database that takes too long.
+
+    Raises:
+        InputError: it does.
+    """
+    from duckdb import InterruptException
+
+    timer = Timer(seconds, base.interrupt)
+    timer.daemon = True
+    timer.start()
+    try:
+        yield
+    except InterruptException as error:
+        raise InputError(
+            f"{task} takes more than {seconds:g} s and is stopped; simplify the condition"
+        ) from error
+    finally:
+        timer.cancel()
 
 
 def coverage_lines(hits: Hits, batch: Place) -> list[str]:
@@ -128,7 +169,16 @@ def coverage_lines(hits: Hits, batch: Place) -> list[str]:
 
 
 def bag_of(batch: Place, row: Mapping[str, Any]) -> Place:
-    """Return the bag with a row's scenario."""
+    """Return the bag with a row's scenario.
+
+    Raises:
+        InputError: the row is a recorded encounter.
+    """
+    if row["index"] is None:
+        raise InputError(
+            f"{batch} holds recordings; to get a bag, generate scenarios with"
+            f" `scenario-gen batch {batch} --roads …`"
+        )
     return batch / "bags" / f"road={row['road']}" / f"part-{row['part']:05}"
 
 
@@ -139,23 +189,27 @@ def make_again(batch: Place, row: Mapping[str, Any]) -> Regenerated:
         InputError: the row is a recorded encounter.
         ScenarioGenError: the SHA-256 differs from the one in the table.
     """
-    if row["index"] is None:
-        raise InputError(
-            f"{batch} holds recordings; to get a bag, generate scenarios with"
-            f" `scenario-gen batch {batch} --roads …`"
-        )
     bag = bag_of(batch, row)
     with fetched([bag]) as (path,):
         result = regenerate_scenario(path, row["index"], namespace=row["namespace"])
-    if result.sha256 != row["sha256"]:
-        raise ScenarioGenError(
-            f"{bag}: scenario {row['index']} of {row['namespace']} differs from that in the table"
-        )
+    _check_same(bag, row, result.sha256)
     return result
 
 
+def _check_same(bag: Place, row: Mapping[str, Any], sha256: str) -> None:
+    """Check that a row's scenario is that of its bag.
+
+    Raises:
+        ScenarioGenError: the SHA-256 differs from the one in the table.
+    """
+    if sha256 != row["sha256"]:
+        raise ScenarioGenError(
+            f"{bag}: scenario {row['index']} of {row['namespace']} differs from that in the table"
+        )
+
+
 def export_hits(batch: Place, rows: Sequence[Mapping[str, Any]], folder: Path) -> Path:
-    """Generate the scenarios of rows again and write them to a bag; return its folder.
+    """Copy the scenarios of rows to a bag; return its folder.
 
     Each scenario has a namespace with its template and road.
 
@@ -164,9 +218,18 @@ def export_hits(batch: Place, rows: Sequence[Mapping[str, Any]], folder: Path) -
     """
     if not rows:
         raise InputError("no scenario matches; nothing exported; use a wider condition")
+    by_bag: dict[Place, list[int]] = {}
+    for k, row in enumerate(rows):
+        by_bag.setdefault(bag_of(batch, row), []).append(k)
     with atomic_bag(folder) as bag:
-        for k, row in enumerate(rows):
-            for message in make_again(batch, row).messages:
-                topic = message.topic.removeprefix(row["namespace"])
-                add_message(bag, f"/hit_{k + 1}{topic}", message.data, message.stamp_ns)
+        for source, hits in by_bag.items():
+            wanted = [(rows[k]["namespace"], rows[k]["index"]) for k in hits]
+            with fetched([source]) as (path,):
+                for k, (messages, sha256) in zip(
+                    hits, recorded_scenarios(path, wanted), strict=True
+                ):
+                    _check_same(source, rows[k], sha256)
+                    for message in messages:
+                        topic = message.topic.removeprefix(rows[k]["namespace"])
+                        add_message(bag, f"/hit_{k + 1}{topic}", message.data, message.stamp_ns)
     return folder

@@ -116,6 +116,15 @@ def test_scenarios_are_found_by_what_they_are_and_made_again_alone(
         with pytest.raises(InputError, match="condition"):
             find(out, hostile)
     assert not list(tmp_path.glob("a.*"))
+    for endless in (
+        "(SELECT count(*) FROM range(1000000000000)) > 0",
+        "1 IN (WITH RECURSIVE r(n) AS (SELECT 1 UNION ALL SELECT n + 1 FROM r) SELECT n FROM r"
+        " WHERE n < 0)",
+    ):
+        with pytest.raises(InputError, match=r"takes more than 0\.5 s and is stopped"):
+            find(out, endless, seconds=0.5)
+    limited = find(out, limit=2)
+    assert limited.rows == find(out).rows[:2] and limited.count == made.scenarios
 
 
 def test_recorded_encounters_are_found_by_their_figures(corpus):

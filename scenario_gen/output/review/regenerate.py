@@ -7,7 +7,7 @@ With the same machine and versions, the bytes are mostly identical; on another C
 within a centimetre.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
@@ -100,8 +100,23 @@ def regenerate_scenario(
             the differing versions.
     """
     with naming_bag(bag):
-        published = _find(bag, index, namespace, request, config)
+        published = _find(bag, _entries(bag, config), index, namespace, request)
         return _regenerate(published, f"{bag}: request {published.entry.request}", log)
+
+
+def recorded_scenarios(
+    bag: Path, wanted: Iterable[tuple[str, int]], config: BagConfig = BagConfig()
+) -> Iterator[tuple[tuple[BagMessage, ...], str]]:
+    """Yield the messages of scenarios in a bag, and their SHA-256, by namespace and index.
+
+    Raises:
+        InputError: one is missing or ambiguous.
+    """
+    with naming_bag(bag):
+        entries = _entries(bag, config)
+        for namespace, index in wanted:
+            published = _find(bag, entries, index, namespace, None)
+            yield published.messages, published.entry.sha256
 
 
 def _regenerate(published: "_Published", origin: str, log: Path | None) -> Regenerated:
@@ -189,7 +204,7 @@ def replanned(
                 f"{bag}: no namespace {namespace!r}; there is {', '.join(map(repr, names))}"
             )
         first = matching[0]
-        published = _find(bag, first.index, namespace, first.request, config)
+        published = _find(bag, entries, first.index, namespace, first.request)
         source = _replan(published, f"{bag}: request {published.entry.request}", None)
         facts, planned = published.entry.status.values, source.planned
         road, placed = planned.road_and_fit()
@@ -280,7 +295,10 @@ class _Published:
         return replace(template, encounter=encounter)
 
 
-def _entries(bag: Path, config: BagConfig) -> list[tuple[Namespace, ScenarioEntry, BagMessage]]:
+_Entry = tuple[Namespace, ScenarioEntry, BagMessage]
+
+
+def _entries(bag: Path, config: BagConfig) -> list[_Entry]:
     """Return every scenario's entry with its namespace and message.
 
     Raises:
@@ -304,16 +322,16 @@ def _entries(bag: Path, config: BagConfig) -> list[tuple[Namespace, ScenarioEntr
 
 
 def _find(
-    bag: Path, index: int, namespace: str | None, request: str | None, config: BagConfig
+    bag: Path, entries: Iterable[_Entry], index: int, namespace: str | None, request: str | None
 ) -> _Published:
-    """Find the only scenario with this index.
+    """Find the only scenario with this index among the entries of a bag.
 
     Raises:
         InputError: there is none, there are several, or its request was not closed.
     """
     candidates = [
         (where, entry, message)
-        for where, entry, message in _entries(bag, config)
+        for where, entry, message in entries
         if namespace in (None, where.name) and request in (None, entry.request)
     ]
     same = [candidate for candidate in candidates if candidate[1].index == index]
