@@ -91,7 +91,10 @@ def print_(*values: Any, sep: str = " ", wrap: bool = False) -> None:
     if terminal.is_terminal:
         terminal.print(*texts, sep=sep, soft_wrap=not wrap)
         return
-    plain = [Text(text.markup) if hasattr(text, "markup") else text for text in texts]
+    markdown = [hasattr(text, "markup") and not isinstance(text, Text) for text in texts]
+    plain = [
+        Text(text.markup) if marked else text for text, marked in zip(texts, markdown, strict=True)
+    ]
     terminal.width = UNBOUNDED_COLUMNS
     with terminal.capture() as captured:
         terminal.print(*plain, sep=sep)

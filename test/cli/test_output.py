@@ -11,6 +11,7 @@ import sys
 
 import pytest
 from rich.console import Console
+from rich.text import Text
 import typer
 from typer.testing import CliRunner
 
@@ -177,3 +178,8 @@ def test_no_word_of_a_help_is_cut_at_80_columns(name, monkeypatch):
     )
     helps = " ".join(option.help or "" for option in options).replace("\\[", "[")
     assert "Usage" in shown and not [word for word in helps.split() if word not in shown]
+
+
+def test_a_pipe_receives_no_markup(capsys):
+    output.print_(Text("log.period", style="bold"), " = 0.1", sep="")
+    assert capsys.readouterr().out == "log.period = 0.1\n"
