@@ -3,6 +3,10 @@
 
 """ROS parameters as the tools of ROS give them: numbers for texts, whole numbers for real ones, what they dumped."""
 
+import ast
+from pathlib import Path
+import sys
+
 from hypothesis import given, strategies
 import pytest
 from rclpy.parameter import Parameter, parameter_dict_from_yaml_file, parameter_value_to_python
@@ -12,7 +16,9 @@ import yaml
 
 from scenario_gen.base.errors import InputError
 from scenario_gen.base.parameters import flatten
-from scenario_gen.ros.common.ros_parameters import converted, with_values
+from scenario_gen.ros.common.ros_parameters import config_of, converted, with_values
+from scenario_gen.ros.common.start import node_class
+from scenario_gen.ros.node_names import ALL
 from scenario_gen.ros.nodes.gp_sampler import Config
 
 DECLARED = {name: entry for name, (entry, _) in flatten(Config()).items()}
@@ -45,6 +51,31 @@ def test_a_real_number_is_taken_as_any_tool_writes_it(number):
 def test_what_can_only_be_a_mistake_is_refused(name, value):
     with pytest.raises(InputError, match=name.rpartition(".")[2]):
         with_values(Config(), [Parameter(name, value=value)])
+
+
+def config_names(function: ast.AST) -> set[str]:
+    """The parameters that a function reads as `config.NAME` or `self.config.NAME`."""
+    return {
+        node.attr
+        for node in ast.walk(function)
+        if isinstance(node, ast.Attribute)
+        and getattr(node.value, "attr", getattr(node.value, "id", "")) == "config"
+    }
+
+
+@pytest.mark.parametrize("name", ALL)
+def test_a_parameter_that_is_read_only_at_the_start_cannot_be_changed_later(name):
+    """`param set` must not say "successful" and change nothing."""
+    node = node_class(name)
+    tree = ast.parse(Path(sys.modules[node.__module__].__file__).read_text())
+    kinds = (ast.FunctionDef, ast.Lambda)
+    early, later = set(), set()
+    for function in (entry for entry in ast.walk(tree) if isinstance(entry, kinds)):
+        at_start = getattr(function, "name", "lambda") in ("__init__", "autostart")
+        (early if at_start else later).update(config_names(function))
+    declared = {key: entry for key, (entry, _) in flatten(config_of(node)).items()}
+    changeable = {key for key, entry in declared.items() if not entry.metadata["fixed"]}
+    assert not (early - later) & changeable
 
 
 def dumped(client: Client, node: str) -> dict[str, object]:

@@ -354,12 +354,12 @@ def test_a_planner_that_is_a_node_gets_the_verdicts_that_it_gets_in_process(
         for bar in ("collisions", "at_fault", "off_road")
         for word in ("--set", f"bars.{bar}=1.0")
     ]
-    words += ["--set", "bars.progress=0.0"]
+    words += ["--set", "bars.progress=0.0", "--workers", "1"]
     command = f"{sys.executable} {program} vehicle_1/odom"
     for out, more in (
         ("over_dds", ["--ros", "--planner", f"{command} 1000000"]),
         ("twice", ["--ros", "--planner", f"{command} 1000000 0 twice", "--count", "1"]),
-        ("in_process", ["--planner", "test_traffic:ByPlace", "--workers", "1"]),
+        ("in_process", ["--planner", "test_traffic:ByPlace"]),
     ):
         told = CliRunner().invoke(app, [*words, "--out", str(tmp_path / out), *more])
         assert told.exit_code == 0, told.output
