@@ -14,9 +14,10 @@ from dataclasses import dataclass
 import json
 from pathlib import Path
 import re
+import shutil
 from typing import Any
 
-from scenario_gen.base.errors import guarded, needs
+from scenario_gen.base.errors import guarded, InputError, needs
 from scenario_gen.base.folders import scratch, write_text
 from scenario_gen.base.stores import download, Part, Place, Remote, size_of, workplace
 from scenario_gen.corpus.tasks import arriving
@@ -130,10 +131,31 @@ def database(folder: Path, memory: int, task: str, remedy: str = MEMORY_REMEDY) 
 def parse_range(task: RangeTask) -> None:
     """Write the rows of a range, and an account of the rejected rows by file.
 
-    The account is a JSON file with the name of the table.
+    The account is a JSON file with the name of the table. If the parser refuses the bytes, as it
+    does lone carriage returns, the range is parsed again as plain lines.
 
     Raises:
         InputError: the database fails (no memory, a full disk).
+    """
+    try:
+        _parse_range(task, plain=False)
+    except InputError as error:
+        if not isinstance(error.__cause__, _parser_error()):
+            raise
+        _parse_range(task, plain=True)
+
+
+def _parser_error() -> type[Exception]:
+    from duckdb import InvalidInputException
+
+    return InvalidInputException
+
+
+def _parse_range(task: RangeTask, *, plain: bool) -> None:
+    """Write the rows and the account of a range; with `plain`, of a copy as plain lines.
+
+    Raises:
+        InputError: as `parse_range`.
     """
     folder = workplace(task.target.parent.parent)
     folder.mkdir(parents=True, exist_ok=True)
@@ -147,6 +169,8 @@ def parse_range(task: RangeTask) -> None:
         for k, ((path, begin, end), text) in enumerate(zip(task.pieces, texts, strict=True)):
             is_whole = begin == 0 and end == size_of(path)
             lines = text if is_whole else _extract(text, begin, end, temporary / f"{k}.csv")
+            if plain:
+                lines = _plain(lines, temporary / f"{k}.plain.csv")
             names[str(lines)] = str(path)
         table = temporary / "parsed.parquet"
         account = _parse(base, names, table)
@@ -185,6 +209,16 @@ def _extract(path: Path, begin: int, end: int, target: Path) -> Path:
             source.seek(source.tell() - 1)
             if source.read(1) != b"\n":
                 copy.write(source.readline())
+    return target
+
+
+def _plain(path: Path, target: Path) -> Path:
+    """Copy a text with one kind of line end and ASCII only; other bytes become question marks."""
+    with (
+        path.open(encoding="latin-1") as source,
+        target.open("w", encoding="ascii", errors="replace", newline="\n") as copy,
+    ):
+        shutil.copyfileobj(source, copy, 1 << 24)
     return target
 
 

@@ -114,6 +114,30 @@ def test_ranges_and_whole_files_give_the_same_rows(archive, tmp_path):
     assert (seen[0][0] == seen[1][0]).all() and seen[0][1] == seen[1][1]
 
 
+def test_a_faulty_byte_costs_its_row(tmp_path):
+    """A lone carriage return, mixed line ends and noise: the database's parser refuses them all."""
+    lines = [
+        f"1,1,{k % 3},{2 * 10**14 + k * 100_000},0,1,65535,42.1,-83.2,200,9,90,0,0,0,0,1,0,0".encode()
+        for k in range(400)
+    ]
+    text = b"\n".join(lines) + b"\n"
+    half = len(text) // 2 + 9  # within a row
+    noise = np.random.default_rng(1).bytes(4096)
+    faults = {
+        "stray": (text[:half] + b"\r" + text[half:], 399),
+        "mixed": (b"".join(line + b"\r\n"[k % 2 :] for k, line in enumerate(lines)), 400),
+        "noise": (text[:half] + noise + text[half:], 399),
+    }
+    for name, (data, n_rows) in faults.items():
+        file = tmp_path / f"{name}.csv"
+        file.write_bytes(data)
+        (task,) = ranges([file], tmp_path / name / "messages", 1 << 20, 400)
+        task.target.parent.mkdir(parents=True)
+        parse_range(task)
+        account = json.loads(task.target.with_suffix(".json").read_text())
+        assert sum(account["hours"].values()) == n_rows, name
+
+
 def test_what_is_missing_is_made_again_and_the_same(archive, corpus, tmp_path):
     """As after a kill: of each stage a file is gone, and a torn one lies there."""
     out, _ = corpus
