@@ -83,14 +83,16 @@ licences: $(TEST)
 install: $(READY)
 	$(BIN)/python -m scenario_gen.numerics
 
-# The core first: with it the kernels of the stages are compiled, once for this user, while pip installs the rest.
+# The core, and beside it the wheels of ROS, which share no package with it. With the core the kernels that every case calls are compiled,
+# once for this user, while pip installs the rest.
 STAGES := numerics situation roads method
 $(RUN): requirements/core.lock requirements/run.lock requirements/ros.lock pyproject.toml
 	@$(PYTHON) -c 'import sys; v = sys.version_info[:2]; sys.exit(not (3, 11) <= v <= (3, 13) and f"Python {v[0]}.{v[1]} found; 3.11, 3.12 or 3.13 is needed: make PYTHON=python3.12")'
 	$(PYTHON) -m venv $(if $(SOURCED),--system-site-packages) .venv
-	$(LOCKED) -r requirements/core.lock
+	$(if $(SOURCED),true,$(LOCKED) -r requirements/ros.lock) & ros=$$!; \
+	$(LOCKED) -r requirements/core.lock || { wait $$ros; exit 1; }; \
 	$(BIN)/python -m scenario_gen.numerics $(STAGES) & kernels=$$!; \
-	$(LOCKED) -r requirements/run.lock $(if $(SOURCED),,-r requirements/ros.lock) && $(PIP) --no-build-isolation --editable .; \
+	wait $$ros && $(LOCKED) -r requirements/run.lock && $(PIP) --no-build-isolation --editable .; \
 	installed=$$?; wait $$kernels && exit $$installed
 	@touch $(RUN)
 

@@ -77,7 +77,9 @@ def log_evidence(
 @kernel(inline=True)
 def draw_option(state: State, logs: Floats) -> int:
     """Draw an index with these log probabilities (n,), up to a constant; they are overwritten."""
-    top = logs.max()
+    top = logs[0]
+    for option in range(1, len(logs)):
+        top = max(top, logs[option])
     total = 0.0
     for option in range(len(logs)):
         logs[option] = np.exp(logs[option] - top)

@@ -25,7 +25,13 @@ from scenario_gen.method.segmentation.hdp_hmm.emission import (
 )
 from scenario_gen.method.segmentation.hdp_hmm.model import Data, Joint, States, Statistics
 from scenario_gen.method.segmentation.hdp_hmm.random import log_beta_draw, State, uniform
-from scenario_gen.method.segmentation.hdp_hmm.transitions import count_transitions, log_transitions
+from scenario_gen.method.segmentation.hdp_hmm.transitions import (
+    chosen_state,
+    count_transitions,
+    count_used,
+    log_transitions,
+    predecessors,
+)
 from scenario_gen.numerics import Floats, Ints
 from scenario_gen.numerics.kernels import kernel
 from scenario_gen.numerics.loops import add_to, column_sums, copy_rows, copy_to
@@ -273,29 +279,6 @@ def log_sides(
 
 
 @kernel(inline=True)
-def count_used(counts: Ints) -> int:
-    """Return the number of occupied states by counts (L,)."""
-    used = 0
-    for k in range(len(counts)):
-        if counts[k] > 0:
-            used += 1
-    return used
-
-
-@kernel(inline=True)
-def predecessors(n: Ints, k: int) -> int:
-    """Return the number of rows of n (L + 1, L), except row k, that enter state k.
-
-    It is at least 1 if any row enters it: a lower bound of the number of tables of state k.
-    """
-    count = 0
-    for j in range(n.shape[0]):
-        if j != k and n[j, k] > 0:
-            count += 1
-    return 1 if count == 0 and n[k, k] > 0 else count
-
-
-@kernel(inline=True)
 def log_share(a: float, first: int, second: int, log_first: float, log_second: float) -> float:
     """Return the log ratio of the Dirichlet prior of two β to the density of their drawn shares.
 
@@ -305,17 +288,6 @@ def log_share(a: float, first: int, second: int, log_first: float, log_second: f
         math.lgamma(a + first) + math.lgamma(a + second) - math.lgamma(2.0 * a + first + second)
     )
     return value - first * log_first - second * log_second
-
-
-@kernel(inline=True)
-def chosen_state(counts: Ints, number: int, occupied: bool) -> int:
-    """Return state number `number` of the occupied states by counts (L,), or of the empty ones."""
-    for k in range(len(counts)):
-        if (counts[k] > 0) == occupied:
-            if number == 0:
-                return k
-            number -= 1
-    return -1
 
 
 @kernel(inline=True)

@@ -45,6 +45,40 @@ def count_transitions(labels: Ints, ends: Ints, n: Ints) -> None:
 
 
 @kernel(inline=True)
+def predecessors(n: Ints, k: int) -> int:
+    """Return the number of rows of n (L + 1, L), except row k, that enter state k.
+
+    It is at least 1 if any row enters it: a lower bound of the number of tables of state k.
+    """
+    count = 0
+    for j in range(n.shape[0]):
+        if j != k and n[j, k] > 0:
+            count += 1
+    return 1 if count == 0 and n[k, k] > 0 else count
+
+
+@kernel(inline=True)
+def chosen_state(counts: Ints, number: int, occupied: bool) -> int:
+    """Return state number `number` of the occupied states by counts (L,), or of the empty ones."""
+    for k in range(len(counts)):
+        if (counts[k] > 0) == occupied:
+            if number == 0:
+                return k
+            number -= 1
+    return -1
+
+
+@kernel(inline=True)
+def count_used(counts: Ints) -> int:
+    """Return the number of occupied states by counts (L,)."""
+    used = 0
+    for k in range(len(counts)):
+        if counts[k] > 0:
+            used += 1
+    return used
+
+
+@kernel(inline=True)
 def sample_tables(state: State, n: Ints, top: Floats, beta: Floats, tables: Floats) -> None:
     """Draw the tables m_jk of every dish k in every restaurant j, less the overridden ones.
 
