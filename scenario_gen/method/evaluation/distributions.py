@@ -19,6 +19,7 @@ JERK_SMOOTHING_S = 0.5
 """Acceleration is averaged over this time before it is differentiated to jerk."""
 
 MAX_BIN_COUNT = 20_000_000  # over all samples
+MAX_SPAN_BIN_COUNT = 20_000  # of one quantity: gaps of 20 km; each bin has all resamples
 ROUNDING_SHARE = 1e-6
 """A value that is this share of a bin below an edge counts as above it, against rounding."""
 
@@ -155,7 +156,8 @@ def compare(
         return np.asarray(np.floor(values / quantity.bin_width + ROUNDING_SHARE), dtype=np.int64)
 
     span = (everything.max() - everything.min()) / quantity.bin_width
-    if not span * (len(samples) + 1) < MAX_BIN_COUNT:
+    most = min(MAX_SPAN_BIN_COUNT, MAX_BIN_COUNT / (len(samples) + 1))
+    if not span < most:
         raise InputError(
             f"{quantity.label} from {everything.min():g} to {everything.max():g} "
             f"{quantity.unit}: no vehicles move so; check the units"

@@ -170,7 +170,7 @@ def test_figures_that_would_fill_the_memory_are_refused(tmp_path):
     def far_apart(data):
         message = trajectory.decode(data, "/scenarios")
         return trajectory.encode(
-            replace(message, position=message.position * np.array([[[1e6]], [[1.0]]]))
+            replace(message, position=message.position * np.array([[[1e5]], [[1.0]]]))
         )
 
     with pytest.raises(InputError, match=r"broken: gap from .* no vehicles move so"):
