@@ -20,7 +20,18 @@ from figures import Figure, ROOT
 from rich.console import Console
 from rich.table import Table
 
-PARTS = ("cpu", "fuzz", "kills", "long", "newest", "properties", "recorded", "ros", "tests")
+PARTS = (
+    "cpu",
+    "fuzz",
+    "kills",
+    "long",
+    "newest",
+    "properties",
+    "recorded",
+    "ros",
+    "tests",
+    "workspace",
+)
 OUT = Path("out/soak")
 
 
