@@ -131,13 +131,14 @@ class Generate:
         ),
     ] = "keep"
     allow: Annotated[
-        str,
+        list[str] | None,
         typer.Option(
             help="What to accept, separated by commas. On the road: lost_conflict, lost_order, "
-            "lost_following, lost_merge, lost_lane_change, lost_overtaking, "
-            "lost_clearance, lost_stand, lost_turn. In the log: doubt (read it although the result contradicts its data)."
+            "lost_following, lost_merge, lost_lane_change, lost_overtaking, lost_clearance, "
+            "lost_stand, lost_turn. In the log: doubt (read it although the result contradicts "
+            "its data). Repeatable."
         ),
-    ] = ""
+    ] = None
     obstacle: Annotated[
         list[str] | None,
         typer.Option(
@@ -155,8 +156,8 @@ def _config(options: Generate) -> "PipelineConfig":
     from scenario_gen.types import join_pieces
 
     config = configured(options.parameter_file, options.assignments)
-    accepted = [name.strip() for name in options.allow.split(",") if name.strip()]
-    losses = [name for name in accepted if name != ALLOWED]
+    accepted = [name.strip() for name in ",".join(options.allow or []).split(",")]
+    losses = [name for name in accepted if name and name != ALLOWED]
     for text in options.obstacle or []:
         read_obstacles(text, "--obstacle")
     obstacles = filter(None, [config.road.obstacles, *(options.obstacle or [])])

@@ -79,9 +79,6 @@ def with_obstacles(
     Raises:
         InputError: an obstacle overlaps no drivable cell, or all cells are blocked.
     """
-    if not obstacles:
-        return road
-    blocked = np.zeros(road.drivable.shape, dtype=np.bool_)
     for obstacle in obstacles:
         overlapped = _overlapped_cells(road, obstacle)
         if not (overlapped & (road.drivable | others)).any():
@@ -91,11 +88,29 @@ def with_obstacles(
                 f"obstacle `{obstacle}` is not on drivable ground of road {road.name!r}, which "
                 f"lies between ({low[0]:.1f}, {low[1]:.1f}) and ({high[0]:.1f}, {high[1]:.1f}) m"
             )
-        blocked |= overlapped
+    return with_obstacles_on(road, obstacles, others)
+
+
+def with_obstacles_on(
+    road: Road, obstacles: tuple[Obstacle, ...], others: Bools | bool = False
+) -> Road:
+    """Return the road without the cells that obstacles overlap, of which some may be elsewhere.
+
+    Raises:
+        InputError: all cells are blocked.
+    """
+    blocked = np.zeros(road.drivable.shape, dtype=np.bool_)
+    for obstacle in obstacles:
+        blocked |= _overlapped_cells(road, obstacle)
+    obstructed = (road.drivable | others) & blocked
+    if not obstructed.any():
+        return road
     drivable = road.drivable & ~blocked
     if not drivable.any():
         raise InputError(f"the obstacles leave no drivable cell of road {road.name!r}")
-    return replace(road, drivable=drivable, obstructed=(road.drivable | others) & blocked)
+    if road.obstructed is not None:
+        obstructed |= road.obstructed
+    return replace(road, drivable=drivable, obstructed=obstructed)
 
 
 def _overlapped_cells(road: Road, obstacle: Obstacle) -> Bools:

@@ -181,6 +181,7 @@ class LaneNetwork:
         drawn_for: how it was drawn for a template; None: for none, or without a place for it.
         origin: latitude and longitude [degrees] about which the frame is `geodesy`'s; (): the map
             says metres.
+        obstacles: centre x, y [m], yaw [rad], length and width [m] of each static obstacle.
         of_all: the lanes of all users, those of cars first, in the order of `lanes`; their
             `successors` and `neighbours` count in here. (): no lane is closed to cars.
     """
@@ -194,6 +195,7 @@ class LaneNetwork:
     drawn_for: DrawnFor | None = None
     origin: tuple[float, ...] = ()
     of_all: tuple[Lane, ...] = ()
+    obstacles: tuple[tuple[float, ...], ...] = ()
 
     def __post_init__(self) -> None:
         if len(self.origin) not in (0, 2):

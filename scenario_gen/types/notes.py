@@ -36,6 +36,9 @@ class NoteKind(Enum):
     OTHER_LANES = "{count} lanes are closed to cars: {users}"
     UNUSED_LANES = "{count} lanes left out: no supported road user may use them"
     UNREAD_SIGNS = "{count} signs left out: not stop, give way, priority or speed limit"
+    MAP_OBSTACLES = (
+        "{count} static obstacles of the map: where they are on lanes, vehicles drive around them"
+    )
     TRAFFIC_RULES = "traffic rules: {rules}"
     LIGHTS_OFF = "traffic lights have no state: the signs apply"
     MAP_PART = "part {part} of the map"

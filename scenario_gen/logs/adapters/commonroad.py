@@ -76,6 +76,10 @@ def read(paths: Sequence[Path], config: LogConfig) -> RawLog:
     notes = ["read as CommonRoad"]
     if without_trajectory:
         notes.append(f"left out, without a trajectory: {counted(without_trajectory)}")
+    if static := len(root.findall("staticObstacle")):
+        notes.append(
+            f"{static} static obstacles belong to the road: give this file as the map, too"
+        )
     segment = Segment(0, str(path), "state", 1)
     return RawLog(path.stem, False, tuple(vehicles), row, (segment,), tuple(notes))
 

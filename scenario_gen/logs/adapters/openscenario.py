@@ -18,7 +18,7 @@ Without a time reference the vehicle's first speed counts, or else the times of 
 Source: ASAM OpenSCENARIO XML 1.2.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from itertools import product
 import math
 from pathlib import Path
@@ -50,15 +50,32 @@ _FOLLOW_ACTION = "PrivateAction/RoutingAction/FollowTrajectoryAction"
 _SPEED_TARGET = (
     "PrivateAction/LongitudinalAction/SpeedAction/SpeedActionTarget/AbsoluteTargetSpeed"
 )
-_TIME_CONDITION = "StartTrigger/ConditionGroup/Condition/ByValueCondition/SimulationTimeCondition"
+_CONDITION = "StartTrigger/ConditionGroup/Condition"
+_TIME_CONDITION = "ByValueCondition/SimulationTimeCondition"
+_ENTITY_CONDITION = "ByEntityCondition/EntityCondition"
+_DISTANCE_STEP_S = 0.01  # at which the distance of a trigger is looked at
 
 
 class _Follower(NamedTuple):
-    """A vehicle that follows a trajectory from a time [s] on."""
+    """A vehicle that follows a trajectory from the conditions of its act and its event on."""
 
     vehicle: str
     action: Element
-    start_s: float
+    conditions: tuple[Element, ...] = ()
+
+    @property
+    def waits_for(self) -> str:
+        """The road user whose distance starts it; "" if only a time does."""
+        distances = [_distance_condition(condition) for condition in self.conditions]
+        names = [each.attribute("entityRef") for each in distances if each is not None]
+        return names[0] if names else ""
+
+
+class _Timed(NamedTuple):
+    """When [s] (K,) a vehicle passes its vertices (K, 4): time, x, y, heading."""
+
+    seconds: Floats
+    vertices: Floats
 
 
 def read(paths: Sequence[Path], config: LogConfig) -> RawLog:
@@ -80,12 +97,14 @@ def read(paths: Sequence[Path], config: LogConfig) -> RawLog:
 
     observations: dict[str, Observations] = {}
     n_rows = 0
-    for follower in _followers(root):
+    timed: dict[str, _Timed] = {}
+    for follower in sorted(_followers(root), key=lambda each: bool(each.waits_for)):
         name = follower.vehicle
         if name not in vehicles or name in observations:
             continue
         try:
-            observed = _observations(follower, vehicles[name], speeds.get(name, 0.0), n_rows)
+            timed[name] = _timed(follower, speeds.get(name, 0.0), timed)
+            observed = _observations(name, timed[name], vehicles[name], n_rows)
         except InputError as error:
             notes.append(f"{name} left out: {error}")
             del vehicles[name]
@@ -103,8 +122,9 @@ def read(paths: Sequence[Path], config: LogConfig) -> RawLog:
         for name in vehicles
         if name not in observations
     ]
-    if not observations:
-        raise InputError(f"{path}: no vehicle has a trajectory; {'; '.join(notes[1:])}")
+    if len(observations) < min(len(vehicles) + len(notes) - 1, 2):
+        only = ", ".join(observations) or "no vehicle"
+        raise InputError(f"{path}: {only} has a trajectory; {'; '.join(notes[1:])}")
     segment = Segment(0, str(path), "vertex", 1)
     return RawLog(path.stem, False, tuple(observations.values()), n_rows, (segment,), tuple(notes))
 
@@ -160,46 +180,94 @@ def _followers(root: Element) -> Iterator[_Follower]:
     """Yield the vehicles that follow trajectories."""
     for private in root.findall(_PRIVATE_ACTIONS):
         for action in private.findall(_FOLLOW_ACTION):
-            yield _Follower(private.attribute("entityRef"), action, 0.0)
-    for group in root.findall("Storyboard/Story/Act/ManeuverGroup"):
-        actors = [actor.attribute("entityRef") for actor in group.findall("Actors/EntityRef")]
-        for event in group.findall("Maneuver/Event"):
-            conditions = event.findall(_TIME_CONDITION)
-            start_s = conditions[0].number("value") if conditions else 0.0
-            actions = event.findall(f"Action/{_FOLLOW_ACTION}")
-            yield from (_Follower(*pair, start_s) for pair in product(actors, actions))
+            yield _Follower(private.attribute("entityRef"), action)
+    for act in root.findall("Storyboard/Story/Act"):
+        for group in act.findall("ManeuverGroup"):
+            actors = [actor.attribute("entityRef") for actor in group.findall("Actors/EntityRef")]
+            for event in group.findall("Maneuver/Event"):
+                conditions = (*act.findall(_CONDITION), *event.findall(_CONDITION))
+                actions = event.findall(f"Action/{_FOLLOW_ACTION}")
+                yield from (_Follower(*pair, conditions) for pair in product(actors, actions))
 
 
-def _observations(
-    follower: _Follower, vehicle: Element, first_speed: float, first_row: int
-) -> Observations:
-    """Return the motion of a vehicle that follows a trajectory.
+def _distance_condition(condition: Element) -> Element | None:
+    """Return the distance to another road user that starts an event, if this is its condition."""
+    distance = condition.find(f"{_ENTITY_CONDITION}/RelativeDistanceCondition")
+    if distance is None or not str(distance.get("rule")).startswith("less"):
+        return None
+    kind = distance.get("relativeDistanceType")
+    is_direct = kind in ("euclidianDistance", "cartesianDistance")
+    return distance if is_direct and distance.get("freespace") != "true" else None
+
+
+def _timed(follower: _Follower, first_speed: float, others: Mapping[str, _Timed]) -> _Timed:
+    """Return when a vehicle passes its vertices.
 
     Args:
-        follower: the vehicle's name, and the action.
-        vehicle: has the bounding box.
+        follower: the vehicle and its trajectory.
         first_speed: [m/s]; 0 if unknown.
-        first_row: of its vertices.
+        others: the vehicles whose times are known.
 
     Raises:
-        InputError: an element is missing, or the vertices have no times.
+        InputError: an element is missing, the vertices have no times, or the start is unknown.
     """
     action = follower.action
     trajectory = action.find("TrajectoryRef/Trajectory")
     if trajectory is None:  # OpenSCENARIO 1.0
         trajectory = action.child("Trajectory")
-    vertices = np.array(
-        [_vertex(vertex) for vertex in trajectory.child("Shape/Polyline").findall("Vertex")]
-    )
+    polyline = trajectory.child("Shape/Polyline").findall("Vertex")
+    vertices = np.array([_vertex(vertex) for vertex in polyline])
     if len(vertices) < 2:
         raise InputError(
             f"{action.place}: its polyline has {len(vertices)} vertices; at least 2 are needed"
         )
+    starts = [_start_s(each, vertices[0, 1:3], others) for each in follower.conditions]
+    start_s = max(starts, default=0.0)
+    return _Timed(_times(action, start_s, vertices, first_speed), vertices)
+
+
+def _start_s(condition: Element, place: Floats, others: Mapping[str, _Timed]) -> float:
+    """Return when [s] the condition of a vehicle that stands at a place (2,) [m] is met.
+
+    Raises:
+        InputError: it is neither a time nor the distance of a vehicle with a trajectory.
+    """
+    delay_s = condition.number("delay", 0.0)
+    time = condition.find(_TIME_CONDITION)
+    if time is not None:
+        return time.number("value") + delay_s
+    distance = _distance_condition(condition)
+    if distance is not None and distance.attribute("entityRef") in others:
+        other = others[distance.attribute("entityRef")]
+        seconds = np.arange(other.seconds[0], other.seconds[-1], _DISTANCE_STEP_S)
+        x, y = (np.interp(seconds, other.seconds, other.vertices[:, k]) for k in (1, 2))
+        near = np.hypot(x - place[0], y - place[1]) < distance.number("value")
+        if near.any():
+            return float(seconds[np.argmax(near)]) + delay_s
+        raise InputError(f"{distance.place}: the distance is never reached")
+    kinds = [each.tag for group in condition for each in group]
+    entity = condition.find(_ENTITY_CONDITION)
+    kinds = kinds if entity is None else [each.tag for each in entity]
+    raise InputError(
+        f"{condition.place}: its trigger is {', '.join(kinds) or 'empty'}; a time, or the "
+        "distance of a road user with a trajectory, is needed"
+    )
+
+
+def _observations(name: str, timed: _Timed, vehicle: Element, first_row: int) -> Observations:
+    """Return the motion of a vehicle that follows a trajectory.
+
+    Args:
+        name: of the vehicle.
+        timed: when it passes its vertices.
+        vehicle: has the bounding box.
+        first_row: of its vertices.
+    """
+    seconds, vertices = timed
     xy = vertices[:, 1:3]
     step = np.gradient(xy, axis=0)
     course = np.arctan2(step[:, 1], step[:, 0])
     heading = np.where(np.isnan(vertices[:, 3]), course, vertices[:, 3])
-    seconds = _times(follower, vertices[:, 0], xy, first_speed)
 
     box = vehicle.child("BoundingBox")
     center = box.child("Center")
@@ -209,7 +277,7 @@ def _observations(
     speeds = _recorded_speeds(vehicle, len(vertices))
     known_speeds = np.zeros(len(vertices)) if speeds is None else speeds
     return Observations.of_rows(
-        follower.vehicle,
+        name,
         np.round(seconds * 1e9).astype(np.int64),
         np.column_stack((position, heading, known_speeds)),
         np.arange(first_row, first_row + len(vertices)),
@@ -226,23 +294,22 @@ def _vertex(vertex: Element) -> tuple[float, float, float, float]:
     return time, world.number("x"), world.number("y"), world.number("h", math.nan)
 
 
-def _times(follower: _Follower, time: Floats, xy: Floats, first_speed: float) -> Floats:
-    """Return the times [s] of vertices (K,), by the time reference or the first speed.
+def _times(action: Element, start_s: float, vertices: Floats, first_speed: float) -> Floats:
+    """Return the times [s] of vertices (K, 4), by the time reference or the first speed.
 
     Raises:
         InputError: they are unknown.
     """
-    timing = follower.action.find("TimeReference/Timing")
+    timing, time = action.find("TimeReference/Timing"), vertices[:, 0]
     if timing is not None:
         is_relative = timing.attribute("domainAbsoluteRelative") == "relative"
-        origin = timing.number("offset") + (follower.start_s if is_relative else 0.0)
+        origin = timing.number("offset") + (start_s if is_relative else 0.0)
         time = time * timing.number("scale") + origin
     elif first_speed > 0.0:
-        distance = arc_lengths(xy)
-        time = follower.start_s + distance / first_speed
+        time = start_s + arc_lengths(vertices[:, 1:3]) / first_speed
     if not np.isfinite(time).all():
         raise InputError(
-            f"{follower.action.place}: its vertices have no times, and the vehicle no first speed"
+            f"{action.place}: its vertices have no times, and the vehicle no first speed"
         )
     return time
 

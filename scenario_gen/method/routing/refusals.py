@@ -34,8 +34,14 @@ def too_tight(task: VehicleTask) -> str:
         fits = footprint_fits(task.road, middle, vehicle.length, vehicle.width)
         curvature = np.where(fits, 0.0, curvature)
         reason = "there its footprint reaches beyond the road"
-        if curvature.max() < STRAIGHT_PER_M:
+        if fits.all():
             return ""
+        if curvature.max() < STRAIGHT_PER_M:
+            x, y = middle[~fits][np.count_nonzero(~fits) // 2, :2]
+            return (
+                f"the road is too narrow for a {vehicle.type} of {vehicle.length:g} m by "
+                f"{vehicle.width:g} m at ({x:.1f}, {y:.1f}) m; choose another place (#box=…)"
+            )
     k = int(np.argmax(curvature))
     return (
         f"the road is too tight for a {vehicle.type} of {vehicle.length:g} m by "

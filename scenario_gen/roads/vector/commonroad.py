@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""CommonRoad maps: XML of versions 2018b and 2020a, without obstacles and planning problems.
+"""CommonRoad maps: XML of versions 2018b and 2020a, without what moves and planning problems.
 
 Source: CommonRoad's documentation of the XML format, 2018b and 2020a.
 """
@@ -174,6 +174,21 @@ class _Map:
         limits = [self.speed_limits[sign] for sign in signs if sign in self.speed_limits]
         return min(limits, default=math.nan)
 
+    def obstacles(self) -> Iterator[tuple[float, ...]]:
+        """Yield the static obstacles, as in `LaneNetwork`."""
+        roles = ((each, each.find("role")) for each in self.root.findall("obstacle"))
+        static = [each for each, role in roles if role is not None and role.content == "static"]
+        for obstacle in (*self.root.findall("staticObstacle"), *static):
+            with self.faults.leaving_out("static obstacle", obstacle.get("id", "?")):
+                state = obstacle.child("initialState")
+                point = state.child("position/point")
+                circle = obstacle.find("shape/circle/radius")
+                size = [2.0 * circle.value()] * 2 if circle is not None else []
+                sides = ("shape/rectangle/length", "shape/rectangle/width")
+                size = size or [obstacle.child(side).value() for side in sides]
+                yaw = state.child("orientation/exact").value()
+                yield point.child("x").value(), point.child("y").value(), yaw, *size
+
     @cached_property
     def rule_kinds(self) -> dict[tuple[str, str], RuleKind]:
         """The meanings of signs and lights, by the tag of references to them and their ids."""
@@ -229,6 +244,7 @@ def lanes_of(root: Element) -> MapLanes:
         unsupported=len(commonroad.lanelets) - len(commonroad.users),
         faults=commonroad.faults,
         rules=list(commonroad.rules()),
+        obstacles=tuple(commonroad.obstacles()),
         other_signs=sum(not any(map(_is_known_sign, _sign_names(sign))) for sign in signs),
     )
 

@@ -144,6 +144,7 @@ class MapLanes:
         rules: signs, lights and rights of way.
         other_signs: how many signs and lights have another meaning and are not read.
         origin: as in `LaneNetwork`.
+        obstacles: as in `LaneNetwork`.
     """
 
     drafts: Sequence[Draft]
@@ -153,6 +154,7 @@ class MapLanes:
     rules: Sequence[DraftRule]
     other_signs: int
     origin: tuple[float, ...] = ()
+    obstacles: tuple[tuple[float, ...], ...] = ()
 
 
 def by_id(elements: Iterable[Element], faults: Faults) -> dict[str, Element]:

@@ -63,7 +63,8 @@ def network_of(name: str, map_lanes: MapLanes) -> LaneNetwork:
             crossing=draft.crossing,
         )
         lanes.append(lane)
-    network = LaneNetwork(name, (), origin=map_lanes.origin).with_lanes(lanes)
+    network = LaneNetwork(name, (), origin=map_lanes.origin, obstacles=map_lanes.obstacles)
+    network = network.with_lanes(lanes)
     network = replace(network, notes=tuple(_notes(network, map_lanes)))
     if not any(lane.junction for lane in network.lanes):
         network = with_junctions(network)
@@ -108,6 +109,8 @@ def _notes(network: LaneNetwork, map_lanes: MapLanes) -> Iterator[Note]:
         yield Note.of(NoteKind.UNUSED_LANES, count=map_lanes.unsupported)
     if map_lanes.other_signs:
         yield Note.of(NoteKind.UNREAD_SIGNS, count=map_lanes.other_signs)
+    if network.obstacles:
+        yield Note.of(NoteKind.MAP_OBSTACLES, count=len(network.obstacles))
     yield from map_lanes.faults.notes()
 
 

@@ -71,7 +71,7 @@ def lanes_of(root: Element) -> MapLanes:
     lanes = [lane for road in roads.values() for lane in road.lanes]
     return MapLanes(
         drafts,
-        (*_coordinate_notes(root.child("header")), *links.notes()),
+        (*_coordinate_notes(root), *links.notes()),
         unsupported=sum(lane.is_car_lane and not lane.users for lane in lanes),
         faults=faults,
         rules=[*signal_rules(roads, faults), *priorities(root, roads)],
@@ -104,8 +104,12 @@ def _roads(root: Element, faults: Faults) -> dict[str, OpenDriveRoad]:
     return roads
 
 
-def _coordinate_notes(header: Element) -> Iterator[Note]:
+def _coordinate_notes(root: Element) -> Iterator[Note]:
     """Yield notes on the coordinates of a map, and on ignored parts of its header."""
+    header = root.find("header")
+    if header is None:
+        yield Note.of(NoteKind.COORDINATES, format="OpenDRIVE without <header>")
+        return
     version = ".".join(header.get(name, "?") for name in ("revMajor", "revMinor"))
     yield Note.of(NoteKind.COORDINATES, format=f"OpenDRIVE {version}")
     reference = header.find("geoReference")

@@ -19,6 +19,7 @@ from scenario_gen.numerics.plane import place
 
 _MAX_LENGTH_M = 1_000_000.0  # of a road
 _MAX_CURVATURE_PER_M = 10.0
+_ARTEFACT_LENGTH_M = 0.1  # of a piece with a larger curvature
 _SAME_STATION_M = 1e-4  # between the begins of a record and a section that are the same
 _QUADRATURE_STEP_M = 1.0  # of a spiral
 
@@ -99,6 +100,7 @@ def reference_line(road: Element) -> ReferenceLine:
     pieces = sorted(geometries, key=lambda piece: piece.number("s"))
     if not pieces:
         raise InputError(f"{road.place}: its <planView> has no <geometry>")
+    pieces = [piece for piece in pieces if not _is_artefact(piece)] or pieces
     for piece in pieces:
         shape = _shape_of(piece)
         length = piece.number("length")
@@ -120,6 +122,16 @@ def reference_line(road: Element) -> ReferenceLine:
             "read"
         )
     return ReferenceLine(np.array([piece.number("s") for piece in pieces]), tuple(pieces), length)
+
+
+def _is_artefact(piece: Element) -> bool:
+    """Return whether a piece is a remainder of a few centimetres with a wild curvature.
+
+    The piece before it is continued instead.
+    """
+    shape = _shape_of(piece)
+    curvatures = [abs(shape.number(name, 0.0)) for name in ("curvature", "curvStart", "curvEnd")]
+    return piece.number("length") < _ARTEFACT_LENGTH_M and max(curvatures) > _MAX_CURVATURE_PER_M
 
 
 def _shape_of(piece: Element) -> Element:

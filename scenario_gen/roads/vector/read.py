@@ -16,6 +16,7 @@ from scenario_gen.base.stores import require_local
 from scenario_gen.base.xml_reader import Element, read_xml, to_number
 from scenario_gen.numerics import Floats, frozen
 from scenario_gen.roads.config import RoadConfig
+from scenario_gen.roads.obstacles import Obstacle, with_obstacles_on
 from scenario_gen.roads.vector import commonroad, lanelet2, opendrive
 from scenario_gen.roads.vector.drafts import MapLanes
 from scenario_gen.roads.vector.network import extent, network_of, part_of
@@ -156,6 +157,17 @@ def vector_road(name: str, tracks: tuple[Track, ...] | None, config: RoadConfig)
     if part and kind not in PART_KINDS:
         kinds = ", ".join(f"#{each}=…" for each in PART_KINDS)
         raise InputError(f"map {path.name}: part {shown(part, 40)!r}; choose one of {kinds}")
+    road = _road_of_lanes(path, part, tracks, config)
+    assert road.lanes is not None
+    obstacles = tuple(Obstacle(*values) for values in road.lanes.obstacles)
+    return with_obstacles_on(road, obstacles, road.cells_in(road.lanes.others))
+
+
+def _road_of_lanes(
+    path: Path, part: str, tracks: tuple[Track, ...] | None, config: RoadConfig
+) -> Road:
+    """Return the road of `vector_road`, without the obstacles of the map."""
+    kind = part.partition("=")[0]
     network = read_network(path)
     if config.traffic_rules == "ignored":
         network = replace(network, rules_kept=False)

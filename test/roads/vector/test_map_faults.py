@@ -1,0 +1,36 @@
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""Maps with a fault that does not matter, and with static obstacles."""
+
+from support.map_builders import commonroad, opendrive, write
+
+from scenario_gen.roads import build_road
+from scenario_gen.types import NoteKind
+
+OBSTACLE = """<staticObstacle id="77"><type>parkedVehicle</type><shape><rectangle>
+<length>4.5</length><width>1.8</width></rectangle></shape><initialState><position><point>
+<x>-30</x><y>-3.0</y></point></position><orientation><exact>0</exact></orientation>
+<time><exact>0</exact></time></initialState></staticObstacle>"""
+ARTEFACT = """<geometry s="51.99" x="-8.01" y="0" hdg="0" length="0.01">
+<spiral curvStart="0" curvEnd="100"/></geometry></planView>"""
+
+
+def test_static_obstacles_of_commonroad_block_cells(tmp_path) -> None:
+    whole = build_road(str(write(tmp_path, ".xml")))
+    road = build_road(str(write(tmp_path, ".xml", commonroad(extra=OBSTACLE))))
+    assert road.obstructed is not None
+    assert road.obstructed.sum() * road.resolution**2 > 0.9 * 4.5 * 1.4
+    assert (whole.drivable == road.drivable | road.obstructed).all()
+    assert NoteKind.MAP_OBSTACLES in {note.kind for note in road.lanes.notes}
+
+
+def test_a_spiral_of_a_centimetre_and_a_missing_header_do_not_matter(tmp_path) -> None:
+    text = opendrive()
+    begin, end = text.index("<header"), text.index("<road")
+    wild = text.replace("</planView>", ARTEFACT, 1)
+    whole = build_road(str(write(tmp_path, ".xodr")))
+    for faulty in (text[:begin] + text[end:], wild):
+        road = build_road(str(write(tmp_path, ".xodr", faulty)))
+        assert len(road.lanes.lanes) == len(whole.lanes.lanes)
+        assert NoteKind.FAULTY not in {note.kind for note in road.lanes.notes}
