@@ -63,7 +63,7 @@ def lane_map_of(
 def derived_lanes(
     scenarios: Sequence[Scenario], road: Road | None, lane_width: float, run_out: float
 ) -> LaneMap:
-    """Return one lane along each driven path, extended straight at both ends.
+    """Return one lane along each driven path, extended straight at both ends; none for walkers.
 
     Args:
         scenarios: scenarios from one template on one road; the lanes contain all footprints.
@@ -73,8 +73,10 @@ def derived_lanes(
     """
     paths: dict[str, Curve] = {}
     for scenario in scenarios:
+        drive = any(not vehicle.kind.walks for vehicle in scenario.vehicles)
         for n, vehicle in enumerate(scenario.vehicles):
-            paths.setdefault(vehicle.id, driven_path(scenario, n))
+            if not (drive and vehicle.kind.walks):  # who walks needs no lane
+                paths.setdefault(vehicle.id, driven_path(scenario, n))
     derived = [
         _lane(
             f"along vehicle {name}",
@@ -114,7 +116,7 @@ def _paths_off_lanes(network: LaneNetwork, scenarios: Sequence[Scenario]) -> dic
     missing: dict[str, Curve] = {}
     for scenario in scenarios:
         for n, vehicle in enumerate(scenario.vehicles):
-            if vehicle.id in missing:
+            if vehicle.id in missing or vehicle.kind.walks:
                 continue
             path = driven_path(scenario, n)
             is_inside = covers(area, polygons(footprints(scenario, n))).all()

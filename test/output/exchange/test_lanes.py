@@ -108,6 +108,11 @@ def test_who_leaves_the_true_lanes_gets_a_lane_and_that_is_said(side):
     for n in range(2):
         assert all(area.covers(Polygon(corners)) for corners in footprints(scenario, n))
 
+    walker = replace(scenario.vehicles[1], type="pedestrian")
+    walked = replace(scenario, vehicles=(scenario.vehicles[0], walker))
+    assert lane_map_of(road, [walked], 3.5, 5.0).added == 0
+    assert derived_lanes([walked], road, 3.5, 5.0).derived == 1
+
 
 def test_a_vector_maps_own_lanes_are_written():
     config = RoadConfig()
