@@ -12,11 +12,12 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import combinations
 from typing import NamedTuple
+from weakref import WeakKeyDictionary
 
 import numpy as np
 
 from scenario_gen.base.errors import RefusedError
-from scenario_gen.numerics import Floats, Ints
+from scenario_gen.numerics import Bools, Floats, Ints
 from scenario_gen.numerics.boxes import Box, box_gap
 from scenario_gen.numerics.kernels import F1, F2, kernel, OUT1
 from scenario_gen.situation.tracks import Track
@@ -72,6 +73,8 @@ class Conflict:
         return self.entry_second - self.entry_first
 
 
+# A scenario is checked, measured and evaluated: its conflicts are known as long as it exists.
+_conflicts_of: WeakKeyDictionary[Motion, tuple[Conflict, ...]] = WeakKeyDictionary()
 PairConflicts = Mapping[tuple[int, int], Conflict]  # by vehicles, the lower index first
 
 
@@ -92,8 +95,15 @@ def find_conflicts(
     vehicles enter at the same instant (both are inside from the start), the order along the shared
     path counts, else the index.
     """
-    if pairs is None:
-        pairs = combinations(range(len(motion.vehicles)), 2)
+    if pairs is not None:
+        return _conflicts(motion, pairs)
+    if motion not in _conflicts_of:
+        _conflicts_of[motion] = _conflicts(motion, combinations(range(len(motion.vehicles)), 2))
+    return _conflicts_of[motion]
+
+
+def _conflicts(motion: Motion, pairs: Iterable[tuple[int, int]]) -> tuple[Conflict, ...]:
+    """Return the conflicts of some pairs."""
     chosen = sorted({(min(pair), max(pair)) for pair in pairs})
     vehicles = {n for pair in chosen for n in pair}
     sweeps = {n: _sweep_of(motion, n) for n in vehicles}
@@ -295,18 +305,39 @@ def _crossing_time(
 
 
 @kernel(inline=True)
+def _near_blocks(circles: Floats, others: Floats, reach: float) -> Bools:
+    """Return (B,) which blocks of poses come within `reach` [m] of any block of others."""
+    near = np.zeros(circles.shape[0], dtype=np.bool_)
+    for a in range(circles.shape[0]):
+        for b in range(others.shape[0]):
+            dx, dy = circles[a, 0] - others[b, 0], circles[a, 1] - others[b, 1]
+            r = circles[a, 2] + others[b, 2] + reach
+            near[a] |= dx * dx + dy * dy < r * r
+    return near
+
+
+@kernel(inline=True)
 def _occupancy(
-    vehicle: Floats, half: HalfSize, poses: Floats, circles: Floats, other: HalfSize
+    vehicle: Floats,
+    half: HalfSize,
+    near: Bools,
+    poses: Floats,
+    circles: Floats,
+    other: HalfSize,
 ) -> tuple[float, float]:
     """(first entry, last exit) [s] of a vehicle into a sweep; entry inf if they never meet."""
     count = vehicle.shape[0]
     first = 0
-    while first < count and not _meets_sweep(vehicle[first], half, poses, circles, other):
+    while first < count and not (
+        near[first // BLOCK_POSES] and _meets_sweep(vehicle[first], half, poses, circles, other)
+    ):
         first += 1
     if first == count:
         return np.inf, -np.inf
     last = count - 1
-    while not _meets_sweep(vehicle[last], half, poses, circles, other):
+    while not (
+        near[last // BLOCK_POSES] and _meets_sweep(vehicle[last], half, poses, circles, other)
+    ):
         last -= 1
     entry, leave = vehicle[first, 0], vehicle[last, 0]
     if first > 0:
@@ -339,7 +370,7 @@ def _nearest_pose(pose: Floats, poses: Floats, circles: Floats, guess: int, reac
 
 @kernel(inline=True)
 def _shared_path(
-    a: Floats, b: Floats, circles_b: Floats, half_a: HalfSize, half_b: HalfSize
+    a: Floats, near_a: Bools, b: Floats, circles_b: Floats, half_a: HalfSize, half_b: HalfSize
 ) -> tuple[float, float]:
     """(metres of a's path shared with b, the part on which a came first minus the other part)."""
     shared, lead, last = 0.0, 0.0, 0
@@ -348,7 +379,9 @@ def _shared_path(
         step = np.hypot(a[i, 1] - a[i - 1, 1], a[i, 2] - a[i - 1, 2])
         if step == 0.0:
             continue
-        near = _nearest_pose(a[i], b, circles_b, last, reach)
+        near = -1
+        if near_a[i // BLOCK_POSES]:
+            near = _nearest_pose(a[i], b, circles_b, last, reach)
         last = max(near, 0)
         if near < 0 or a[i, 3] * b[near, 3] + a[i, 4] * b[near, 4] < np.cos(SAME_WAY_RAD):
             continue
@@ -379,11 +412,14 @@ def _conflict(
     out[0] = 0.0
     half_a = (0.5 * size_a[0], 0.5 * size_a[1])
     half_b = (0.5 * size_b[0], 0.5 * size_b[1])
-    entry_a, exit_a = _occupancy(a, half_a, b, circles_b, half_b)
-    entry_b, exit_b = _occupancy(b, half_b, a, circles_a, half_a)
+    reach = np.hypot(half_a[0], half_a[1]) + np.hypot(half_b[0], half_b[1]) + CONTACT_DEPTH_M
+    near_a = _near_blocks(circles_a, circles_b, reach)
+    near_b = _near_blocks(circles_b, circles_a, reach)
+    entry_a, exit_a = _occupancy(a, half_a, near_a, b, circles_b, half_b)
+    entry_b, exit_b = _occupancy(b, half_b, near_b, a, circles_a, half_a)
     if not (np.isfinite(entry_a) and np.isfinite(entry_b)):
         return
-    shared, lead = _shared_path(a, b, circles_b, half_a, half_b)
+    shared, lead = _shared_path(a, near_a, b, circles_b, half_a, half_b)
     following = shared >= FOLLOWING_LENGTHS * max(size_a[0], size_b[0])
     a_first = entry_a <= entry_b
     if (following or entry_a == entry_b) and lead != 0.0:

@@ -9,6 +9,7 @@ bends. The gaps between them are therefore preserved when the line is straighten
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -110,6 +111,7 @@ def main_line(frenet: FrenetTracks, tracks: tuple[Track, ...]) -> MainLine:
     return MainLine(shape, frozen(low + scale * grid), frozen(shape.station))
 
 
+@lru_cache(maxsize=4)  # the road and the placing ask for the same ones
 def to_frenet(tracks: tuple[Track, ...]) -> FrenetTracks:
     """Return tracks in path coordinates.
 

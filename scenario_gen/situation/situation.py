@@ -4,7 +4,7 @@
 """The situation: everything that is derived from a recorded encounter, computed once."""
 
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 
 import numpy as np
 
@@ -42,7 +42,7 @@ class Situation:
     @classmethod
     def of(cls, encounter: "Encounter | Situation") -> "Situation":
         """Return the situation of an encounter; a situation is returned unchanged."""
-        return encounter if isinstance(encounter, Situation) else cls(encounter)
+        return encounter if isinstance(encounter, Situation) else _situation_of(encounter)
 
     @cached_property
     def tracks(self) -> tuple[Track, ...]:
@@ -113,3 +113,9 @@ class Situation:
     def traffic_side(self) -> str:
         """Either "right" or "left"; "" where no oncoming vehicles pass each other."""
         return traffic_side(self.encounter)
+
+
+@lru_cache(maxsize=4)  # the stages, and roads that are drawn, ask for the same one
+def _situation_of(encounter: Encounter) -> Situation:
+    """Return the situation of an encounter."""
+    return Situation(encounter)

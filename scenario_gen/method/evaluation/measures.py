@@ -75,7 +75,7 @@ def measure(scenario: Motion, name: str, pair: Pair | None = None) -> float:
         for a, b in ordered
         if (a, b)[: len(chosen)] == chosen and (chosen or a < b or directed)
     ]
-    sought = pairs if name in _CONFLICT_FIGURES else []
+    sought = (pairs if chosen else None) if name in _CONFLICT_FIGURES else []
     met = conflicts_by_pair(find_conflicts(motion, sought))
     values = [value for a, b in pairs if not math.isnan(value := _figure(motion, name, a, b, met))]
     if len(chosen) < 2 and name == "arrival_gap":

@@ -84,14 +84,16 @@ def pair_similarity(
             would show its noise.
         unit: (S,) the number, from 0, of the unit of each sample; None: each sample is a unit.
     """
-    a, b = (np.ascontiguousarray(series) for series in generated)
+    samples, _, steps = generated[0].shape
+    unit = np.arange(samples) if unit is None else unit
+    order = np.argsort(unit, kind="stable")
+    begins = np.flatnonzero(np.diff(unit[order], prepend=-1))
+    a, b = (np.ascontiguousarray(series[order]) for series in generated)
     left, right = (np.ascontiguousarray(series)[None] for series in template)
     extents, template_extents = (
         feature_extents(a, b, distance),
         feature_extents(left, right, distance),
     )
-    samples, _, steps = a.shape
-    unit = np.arange(samples) if unit is None else unit
     units = int(unit.max()) + 1 if samples else 0
     gram, cross, total = np.zeros((units, units)), np.zeros(units), np.zeros(units)
     count = np.bincount(unit, minlength=units).astype(np.float64)
@@ -103,13 +105,10 @@ def pair_similarity(
         difference = feature_rows(a, b, extents, rows, distance)
         difference -= target
         if units < samples:
-            pooled = np.zeros((units, difference.shape[1]))
-            for n, row in zip(unit, difference, strict=True):
-                pooled[n] += row
-            difference = pooled
+            difference = np.add.reduceat(difference, begins, axis=0)
         gram += difference @ difference.T
         cross += difference @ target
-        total += difference.sum(axis=1)
+        total += difference @ np.ones(len(target))
         first += float(target.sum())
         second += float(np.square(target).sum())
     return PairSimilarity(gram, cross, total, (steps * steps, first, second), count)
