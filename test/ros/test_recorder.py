@@ -286,9 +286,11 @@ def test_the_player_ends_when_all_is_played_and_heard(start, client):
 
 def test_the_player_stays_if_it_is_told_to(start, client):
     bag = RESOURCES / "synthetic_c"
-    client.hear("/vehicle_1/fix")
-    process = start("player", bag=bag, rate=1000.0, stay=True, topics="/vehicle_1/fix")
+    client.hear("/vehicle_1/fix", "/clock")
+    topics = "/vehicle_1/fix"
+    process = start("player", bag=bag, rate=1000.0, stay=True, topics=topics, clock=True)
     client.until(lambda: "played" in process.output(), "its end")
+    client.wait("/clock", len(client.heard["/clock"]) + 2)
     client.until(
         lambda: ("player", "/") in client.node.get_node_names_and_namespaces(),
         "the player in the graph",

@@ -17,7 +17,6 @@ own /clock. The player ends when all is played and acknowledged, unless it is to
 
 from collections import deque
 from collections.abc import Iterator
-from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
@@ -26,7 +25,6 @@ import threading
 from time import monotonic, sleep
 from typing import Any
 
-from rclpy.exceptions import InvalidHandle
 from rclpy.node import Node
 from rclpy.qos_overriding_options import QoSOverridingOptions
 from rosgraph_msgs.msg import Clock
@@ -118,6 +116,7 @@ class Player(Node):  # type: ignore[misc]
         self.exit_code = 0
         self._time = BagTime(lambda: self.parameters.config.rate)
         self._begin_ns: int | None = None  # stamp of the bag's first message
+        self._is_over = False
         self._thread: threading.Thread | None = None
         self._offered: dict[str, Offered] = {}
         self._count = 0  # messages that were played
@@ -184,7 +183,7 @@ class Player(Node):  # type: ignore[misc]
             self.exit_code = error.exit_code
             values = {"error": type(error).__name__}
             self.diagnostics.status(Level.ERROR, str(error), "playing", values)
-        self._begin_ns = None
+        self._is_over = True
         if not self.parameters.config.stay and not self._time.ended:
             self._end_when_acknowledged()
 
@@ -215,10 +214,9 @@ class Player(Node):  # type: ignore[misc]
     def _end_when_acknowledged(self) -> None:
         """Let `run_nodes` end the node once the subscribers have all messages."""
         deadline = monotonic() + END_PATIENCE_S
-        with suppress(InvalidHandle):  # the node is ending already
-            for offered in self._offered.values():
-                offered.pace.end()
-                self._wait_for_acknowledgement(offered.pace, deadline)
+        for offered in self._offered.values():
+            offered.pace.end()
+            self._wait_for_acknowledgement(offered.pace, deadline)
         self.executor.create_task(self._finish)  # waking the executor alone has no effect
 
     def _finish(self) -> None:
@@ -277,7 +275,7 @@ class Player(Node):  # type: ignore[misc]
 
     def _report_progress(self) -> None:
         """Report the time in the bag, each second."""
-        if self._begin_ns is None:
+        if self._begin_ns is None or self._is_over:
             return
         elapsed = self._time.shown()
         paused = ", paused" if self._time.paused else ""
@@ -295,7 +293,7 @@ class Player(Node):  # type: ignore[misc]
 
     def _seek(self, stamp_ns: int | None = None) -> str:
         """Play on from a stamp, or by default from the parameter `start_offset`."""
-        if self._begin_ns is None:
+        if self._begin_ns is None or self._is_over:
             raise InputError("nothing is being played")
         target: float = self.parameters.config.start_offset
         if stamp_ns is not None:
