@@ -86,7 +86,7 @@ def print_(*values: Any, sep: str = " ", wrap: bool = False) -> None:
 
     if current.quiet:
         return
-    texts = [renamed(value) if isinstance(value, str) else value for value in values]
+    texts: list[Any] = [renamed(value) if isinstance(value, str) else value for value in values]
     terminal = Terminal(stderr=current.as_json)
     if terminal.is_terminal:
         terminal.print(*texts, sep=sep, soft_wrap=not wrap)

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import faulthandler
 import multiprocessing
 import signal
+import subprocess
 import sys
 import threading
 from time import perf_counter
@@ -104,3 +105,21 @@ def bounded(seconds: float) -> Iterator[None]:
         signal.signal(signal.SIGALRM, before)
         if alone:
             faulthandler.cancel_dump_traceback_later()
+
+
+@contextmanager
+def end_named() -> Iterator[None]:
+    """Print a line if this process ends within the block: by a crash, `os._exit` or a kill.
+
+    A shell waits for a line, which the end of the block writes, or for the end of the pipe.
+    """
+    message = (
+        "error: the planner ended the process: it crashed, called os._exit, or was killed for "
+        "lack of memory"
+    )
+    command = ["/bin/sh", "-c", 'read -r line || echo "$0" >&2', message]
+    with subprocess.Popen(command, stdin=subprocess.PIPE) as shell:
+        try:
+            yield
+        finally:
+            shell.communicate(b"done\n")

@@ -38,7 +38,7 @@ from scenario_gen.closed_loop.config import ClosedLoopConfig
 from scenario_gen.closed_loop.drive import Drive
 from scenario_gen.closed_loop.origin import Origin, origins_of, Trial, units_of
 from scenario_gen.closed_loop.simulation import ClosedLoop, Planner
-from scenario_gen.closed_loop.timeouts import bounded, Decisions, Timed, TooLongError
+from scenario_gen.closed_loop.timeouts import bounded, Decisions, end_named, Timed, TooLongError
 from scenario_gen.closed_loop.verdict import DriveVerdict, judge
 from scenario_gen.method.evaluation import clustered_wilson
 from scenario_gen.numerics import Floats
@@ -318,7 +318,8 @@ def trial_runner(
     if isinstance(planner, str):
         find_planner(planner)  # reports errors before any process starts
     if workers <= 1:
-        yield lambda trials: map(_run, ((trial, planner, config) for trial in trials))
+        with end_named():
+            yield lambda trials: map(_run, ((trial, planner, config) for trial in trials))
         return
     with worker_pool(workers) as pool:
 

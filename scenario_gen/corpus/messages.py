@@ -137,18 +137,15 @@ def parse_range(task: RangeTask) -> None:
     Raises:
         InputError: the database fails (no memory, a full disk).
     """
+    needs("corpus", "duckdb", "pyarrow")
+    from duckdb import InvalidInputException
+
     try:
         _parse_range(task, plain=False)
     except InputError as error:
-        if not isinstance(error.__cause__, _parser_error()):
+        if not isinstance(error.__cause__, InvalidInputException):
             raise
         _parse_range(task, plain=True)
-
-
-def _parser_error() -> type[Exception]:
-    from duckdb import InvalidInputException
-
-    return InvalidInputException
 
 
 def _parse_range(task: RangeTask, *, plain: bool) -> None:

@@ -255,3 +255,15 @@ def test_processes_of_a_killed_drive_end_with_it_whatever_they_are_at(bag, tmp_p
     while any(os.path.lexists(worker) for worker in workers) and time.monotonic() < patience:
         time.sleep(0.01)
     assert workers and not any(os.path.lexists(worker) for worker in workers)
+
+
+def test_a_planner_that_ends_the_process_of_the_command_is_named():
+    code = (
+        "import os\nfrom scenario_gen.closed_loop.timeouts import end_named\n"
+        "with end_named(): pass\n"
+        "with end_named(): os._exit(0)"
+    )
+    ended = subprocess.run(
+        [sys.executable, "-c", code], check=False, capture_output=True, text=True, timeout=60
+    )
+    assert ended.stderr.count("the planner ended the process") == 1

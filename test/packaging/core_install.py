@@ -8,6 +8,7 @@ And the wheel with the locked packages of the extra `segmentation`, and nothing 
 
 from collections.abc import Sequence
 import json
+import os
 from pathlib import Path
 import re
 import subprocess
@@ -49,17 +50,12 @@ def main() -> None:
     """Build, install, run, and say what was seen."""
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        run(
-            sys.executable,
-            *PIP,
-            "wheel",
-            "--no-deps",
-            "--no-build-isolation",
-            "--wheel-dir",
-            folder,
-            ROOT,
-        )
-        (wheel,) = folder.glob("*.whl")
+        os.environ["SOURCE_DATE_EPOCH"] = "1700000000"
+        build = [sys.executable, *PIP, "wheel", "--no-deps", "--no-build-isolation", ROOT]
+        for place in ("first", "again"):
+            run(*build, "--wheel-dir", folder / place)
+        wheel, again = sorted(folder.glob("*/*.whl"), reverse=True)
+        assert wheel.read_bytes() == again.read_bytes(), "the wheel is not reproducible"
         core = extras()["core"]
         alone = environment(
             folder / "segmentation", wheel, [one for one in core if one.name in SEGMENTATION]

@@ -149,6 +149,7 @@ def test_arguments_are_parameters_of_nodes_and_count_only_where_they_are_given()
         ({"starts": "1 2 3"}, "starts:=1 2 3: write `id: x y yaw"),
         ({"goals": "1: 2 3 0; 2: 4"}, "goals:=.*: write `id: x y yaw"),
         ({"topics": "(tracks"}, "topics is no regular expression"),
+        ({"topics": "(a+)+b"}, "topics repeats a repetition"),
         ({"road": "forway"}, "road:=forway: no map .*did you mean four_way"),
         ({"file": "drive.launch.py", "policy": "brave"}, "policy:=brave: .*reactive"),
     ],

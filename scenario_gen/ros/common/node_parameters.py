@@ -105,6 +105,11 @@ class RecorderParameters(Parameters):
             re.compile(self.topics)
         except re.error as error:
             raise InputError(f"parameter topics is no regular expression: {error}") from None
+        if re.search(r"\([^()]*[*+}][^()]*\)[*+{]", self.topics):
+            raise InputError(
+                "parameter topics repeats a repetition, as in (a+)+: matching may take hours; "
+                "write it with one repetition"
+            )
 
 
 @dataclass(frozen=True)
