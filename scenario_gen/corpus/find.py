@@ -15,6 +15,7 @@ from threading import Timer
 from typing import Any
 
 from scenario_gen.bags.recordings.write import add_message
+from scenario_gen.bags.storage.bag import BagMessage
 from scenario_gen.bags.storage.writer import atomic_bag
 from scenario_gen.base.errors import InputError, ScenarioGenError
 from scenario_gen.base.stores import fetched, Place, relative_name, workplace
@@ -218,18 +219,24 @@ def export_hits(batch: Place, rows: Sequence[Mapping[str, Any]], folder: Path) -
     """
     if not rows:
         raise InputError("no scenario matches; nothing exported; use a wider condition")
+    with atomic_bag(folder) as bag:
+        for k, messages in _copies(batch, rows):
+            for message in messages:
+                topic = message.topic.removeprefix(rows[k]["namespace"])
+                add_message(bag, f"/hit_{k + 1}{topic}", message.data, message.stamp_ns)
+    return folder
+
+
+def _copies(
+    batch: Place, rows: Sequence[Mapping[str, Any]]
+) -> Iterator[tuple[int, Sequence[BagMessage]]]:
+    """Yield the numbers of rows and the messages of their scenarios; each bag is read once."""
     by_bag: dict[Place, list[int]] = {}
     for k, row in enumerate(rows):
         by_bag.setdefault(bag_of(batch, row), []).append(k)
-    with atomic_bag(folder) as bag:
-        for source, hits in by_bag.items():
-            wanted = [(rows[k]["namespace"], rows[k]["index"]) for k in hits]
-            with fetched([source]) as (path,):
-                for k, (messages, sha256) in zip(
-                    hits, recorded_scenarios(path, wanted), strict=True
-                ):
-                    _check_same(source, rows[k], sha256)
-                    for message in messages:
-                        topic = message.topic.removeprefix(rows[k]["namespace"])
-                        add_message(bag, f"/hit_{k + 1}{topic}", message.data, message.stamp_ns)
-    return folder
+    for source, hits in by_bag.items():
+        wanted = [(rows[k]["namespace"], rows[k]["index"]) for k in hits]
+        with fetched([source]) as (path,):
+            for k, (messages, sha256) in zip(hits, recorded_scenarios(path, wanted), strict=True):
+                _check_same(source, rows[k], sha256)
+                yield k, messages

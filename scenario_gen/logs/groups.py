@@ -205,12 +205,11 @@ def _find_meetings(
         InputError: there are too many.
     """
     meetings = []
-    for i, others, bounds in simultaneous(pieces, shortest(config)):
-        for j in others[bounds < config.proximity].tolist():
-            for span in _near_spans(pieces[i], pieces[j], config, within):
-                gap = 0.0 if small else _gap(pieces[i], pieces[j], span, config)
-                if gap <= INTERACTS_M:
-                    meetings.append(Meeting(gap, span[0], min(i, j), max(i, j), span[1]))
+    for i, j in near_pairs(pieces, shortest(config), config.proximity):
+        for span in _near_spans(pieces[i], pieces[j], config, within):
+            gap = 0.0 if small else _gap(pieces[i], pieces[j], span, config)
+            if gap <= INTERACTS_M:
+                meetings.append(Meeting(gap, span[0], min(i, j), max(i, j), span[1]))
         if len(meetings) > _MAX_MEETING_COUNT:
             raise InputError(
                 f"more than {_MAX_MEETING_COUNT} meetings of two vehicles: read a part of the log "
@@ -238,12 +237,18 @@ def vehicles_near(pieces: Sequence[Piece], config: LogConfig) -> set[str]:
     """Return the vehicles of raw pieces that come near another one, with a margin."""
     reach = config.proximity + _NOISE_M
     near: set[str] = set()
-    for i, others, bounds in simultaneous(pieces, 1):
-        for j in others[bounds < reach].tolist():
-            names = {pieces[i].track.id, pieces[j].track.id}
-            if not names <= near and distances(pieces[i], pieces[j]).min() < reach:
-                near |= names
+    for i, j in near_pairs(pieces, 1, reach):
+        names = {pieces[i].track.id, pieces[j].track.id}
+        if not names <= near and distances(pieces[i], pieces[j]).min() < reach:
+            near |= names
     return near
+
+
+def near_pairs(pieces: Sequence[Piece], least: int, reach: float) -> Iterator[tuple[int, int]]:
+    """Yield simultaneous pieces whose rectangles are within `reach` [m], as `simultaneous`."""
+    for i, others, bounds in simultaneous(pieces, least):
+        for j in others[bounds < reach].tolist():
+            yield i, j
 
 
 def simultaneous(pieces: Sequence[Piece], least: int) -> Iterator[tuple[int, Ints, Floats]]:

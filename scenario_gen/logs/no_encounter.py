@@ -14,7 +14,7 @@ from scenario_gen.base.errors import InputError
 from scenario_gen.logs.cleaning import Cause, Drops
 from scenario_gen.logs.config import LogConfig
 from scenario_gen.logs.encounters import Piece
-from scenario_gen.logs.groups import distances, driven, simultaneous, ticks
+from scenario_gen.logs.groups import distances, driven, near_pairs, simultaneous, ticks
 from scenario_gen.logs.kinds import counted
 from scenario_gen.logs.raw import RawLog
 from scenario_gen.numerics import runs
@@ -70,9 +70,7 @@ def explain_no_encounter(log: RawLog, pieces: Sequence[Piece], config: LogConfig
         f"{config.min_duration:g} s while one drives {config.travel:g} m"
     )
     near = [
-        _approach(pieces[i], pieces[j], config)
-        for i, others, bounds in simultaneous(pieces, 1)
-        for j in others[bounds < config.proximity].tolist()
+        _approach(pieces[i], pieces[j], config) for i, j in near_pairs(pieces, 1, config.proximity)
     ]
     best = max(near, key=lambda pair: (pair.seconds, pair.driven_m, -pair.nearest_m), default=None)
     if best is None or best.seconds <= 0.0:

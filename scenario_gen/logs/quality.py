@@ -167,8 +167,9 @@ def _vehicle_line(vehicle: VehicleQuality) -> str:
         headings += f", changed by {math.degrees(vehicle.turned):.1f}° (median)"
     return (
         f"{recorded}speed against position {vehicle.speed_before:.2f} → "
-        f"{vehicle.speed_after:.2f} m/s RMS, speeds changed by {vehicle.changed:.2f} m/s, positions by {vehicle.moved:.2f} m RMS "
-        f"(at most {vehicle.moved_most:.1f} m; noise of the fixes {vehicle.noise:.2f} m){headings}"
+        f"{vehicle.speed_after:.2f} m/s RMS, speeds changed by {vehicle.changed:.2f} m/s, "
+        f"positions by {vehicle.moved:.2f} m RMS (at most "
+        f"{vehicle.moved_most:.1f} m; noise of the fixes {vehicle.noise:.2f} m){headings}"
     )
 
 
