@@ -87,5 +87,5 @@ def path_offsets(track: Track, other: Track) -> Floats:
     station, offset = track.curve.project(other.poses[:, :2])
     turned = wrap_angle(other.poses[:, 2] - track.curve.at(station)[:, 2])
     on_path = (station > 0.0) & (station < track.travelled)
-    beside = on_path & other.is_present & (np.abs(turned) < SAME_DIRECTION_RAD)
-    return np.where(beside, offset, np.nan)
+    alongside = on_path & other.is_present & (np.abs(turned) < SAME_DIRECTION_RAD)
+    return np.where(alongside, offset, np.nan)

@@ -212,14 +212,14 @@ def _lost_lanes(tracks: Tracks, placed: Tracks) -> Iterator[Loss]:
     Those side by side in one lane have another rule, `_lost_clearances`.
     """
     drivers = [n for n, track in enumerate(tracks) if not track.vehicle.kind.walks]
-    beside = {each.pair for each in abreast_in_lane(tracks)}
+    abreast = {each.pair for each in abreast_in_lane(tracks)}
     for i, j in permutations(drivers, 2):
         before = [_offset_at_end(tracks[i], tracks[j], end) for end in (0, 1)]
         after = [_offset_at_end(placed[i], placed[j], end) for end in (0, 1)]
         shares_lane = any(abs(offset) < _LIMITS.in_lane_m for offset in before)
         max_offset = np.inf if shares_lane else MAX_SIDE_OFFSET_M
         changes = any(map(_changes_lane, before, after, (max_offset, max_offset)))
-        if changes and beside.isdisjoint(((i, j), (j, i))):
+        if changes and abreast.isdisjoint(((i, j), (j, i))):
             yield _lane_loss(tracks[i].vehicle.id, tracks[j].vehicle.id, before)
 
 

@@ -95,7 +95,7 @@ def build_model(plan: Plan, config: SamplingConfig, order: str = "keep") -> Buil
         return BuiltModel(None, refusal=stretch.refusal)
     abreast = {n for each in abreast_in_lane(plan.situation.tracks) for n in each.pair}
     vehicles = [
-        _vehicle_model(each, plan.road, mean, config, beside=n in abreast)
+        _vehicle_model(each, plan.road, mean, config, shares_lane=n in abreast)
         for n, (each, mean) in enumerate(zip(routed, stretch.means, strict=True))
     ]
     nominal = stretch.clock
@@ -245,9 +245,14 @@ class _NotedVehicle(NamedTuple):
 
 
 def _vehicle_model(
-    routed: RoutedVehicle, road: Road, mean: MeanSpeed, config: SamplingConfig, *, beside: bool
+    routed: RoutedVehicle,
+    road: Road,
+    mean: MeanSpeed,
+    config: SamplingConfig,
+    *,
+    shares_lane: bool,
 ) -> _NotedVehicle:
-    """Return the model of a vehicle, without variation; `beside`: it shares its lane."""
+    """Return the model of a vehicle, without variation; `shares_lane`: with another one."""
     label, path, notes = routed.vehicle.id, routed.path, []
     shift = routed.largest_shift(mean.coefficients)
     if shift > _TUNING.noted_shift:
@@ -258,7 +263,7 @@ def _vehicle_model(
     ground = ground_for(road, routed.vehicle)
     most = MAX_ROOM_SIGMAS * config.lateral_sigma
     room = lateral_room(
-        path, routed.vehicle, ground, min(most, _TUNING.room_beside) if beside else most
+        path, routed.vehicle, ground, min(most, _TUNING.room_beside) if shares_lane else most
     )
     narrow = room < ROOM_SIGMAS * config.lateral_sigma
     if narrow.any() and config.lateral_sigma > 0.0 and path.length > 0.0:
