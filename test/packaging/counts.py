@@ -71,16 +71,18 @@ BEFORE = {
     "banned names": 1_014,
 }
 # A change that needs more tokens deletes something, or says why in the commit. Splitting dense
-# code into plain steps has cost 14,000 tokens so far; 435,000 are wanted.
+# code into plain steps has cost 14,000 tokens so far; 435,000 are wanted. Fitting the interaction
+# instead of the whole recording, users beside each other in a lane, obstacles from maps, playback at
+# its rate, and arguments that are checked have cost 12,500.
 BUDGET = {
-    "tokens": 551_400,
+    "tokens": 563_900,
     "long lines": 0,
     "complex functions": 1,
     "branching functions": 0,
     "nested functions": 0,
     "long functions": 0,
     "crowded functions": 0,
-    "constants": 945,
+    "constants": 980,
     "constants without a unit": 0,
     "banned names": 0,
 }

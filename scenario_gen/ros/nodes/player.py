@@ -57,7 +57,7 @@ TICK_S = 0.01  # between two clock messages
 MATCH_S = 1.0  # for the topics to get subscribers once one of them has one
 FIRST_MATCH_S = 5.0  # for that first one
 MIN_ROUND_S = 1.0  # time of the bag between two rounds, for bags with a single stamp
-# Fast DDS asks for acknowledgements every 3 s, or when a history is full: more than 3 s of messages.
+# Fast DDS asks for acknowledgements every 3 s, or when a history is full: more than that.
 MIN_HISTORY_COUNT = 1000
 
 

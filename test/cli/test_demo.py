@@ -1,0 +1,20 @@
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""The demo compares what the nodes recorded with its own scenarios."""
+
+import pytest
+
+from scenario_gen import bundled, generate, read_log, report
+from scenario_gen.base.errors import ScenarioGenError
+from scenario_gen.cli.demo import compare_with_nodes
+
+
+def test_scenarios_in_which_a_vehicle_leaves_early_are_compared_whole(tmp_path):
+    encounter = read_log(bundled("ngsim_two_left_turns")).encounters[0]
+    made = generate(encounter, "t_intersection", count=2, seed=7)
+    other = generate(encounter, "t_intersection", count=2, seed=8)
+    report(tmp_path / "out", made)
+    compare_with_nodes([made], tmp_path / "out" / "bag")
+    with pytest.raises(ScenarioGenError, match="the nodes generated other scenarios"):
+        compare_with_nodes([other], tmp_path / "out" / "bag")
