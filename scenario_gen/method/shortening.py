@@ -21,6 +21,7 @@ from scenario_gen.situation import (
     describe_turn,
     interaction_windows,
     keeps_interaction,
+    refuse_too_large,
     Situation,
     turn_of,
 )
@@ -43,6 +44,7 @@ def fit_what_matters(generate: GenerateSet, encounter: Encounter, count: int) ->
             shortest form needs.
         InputError, TargetError: as `generate`.
     """
+    refuse_too_large(encounter)
     try:
         return generate(encounter, count)
     except TargetError:
