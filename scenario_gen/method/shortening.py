@@ -21,6 +21,7 @@ from scenario_gen.situation import (
     describe_turn,
     interaction_windows,
     keeps_interaction,
+    MIN_LOSS_S,
     refuse_too_large,
     Situation,
     turn_of,
@@ -28,7 +29,6 @@ from scenario_gen.situation import (
 from scenario_gen.types import Encounter, GenerationResult, Note, NoteKind
 
 GenerateSet = Callable[[Encounter, int], GenerationResult]
-MIN_LOSS_S = 0.5  # a recording that can lose less is not shortened
 
 
 def fit_what_matters(generate: GenerateSet, encounter: Encounter, count: int) -> GenerationResult:

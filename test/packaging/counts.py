@@ -75,7 +75,7 @@ BEFORE = {
 # instead of the whole recording, users beside each other in a lane, obstacles from maps, playback at
 # its rate, and arguments that are checked have cost 12,500.
 BUDGET = {
-    "tokens": 563_900,
+    "tokens": 564_000,
     "long lines": 0,
     "complex functions": 1,
     "branching functions": 0,

@@ -42,7 +42,7 @@ from scenario_gen.method.validity import Limits
 from scenario_gen.numerics import Floats
 from scenario_gen.ros.common.services import REQUESTS
 from scenario_gen.ros.common.stage_node import Inputs, StageNode
-from scenario_gen.situation import Situation
+from scenario_gen.situation import naming_interaction, Situation
 from scenario_gen.types import Road, tokens
 
 ROAD_TOPICS = ("map", "road/entries", "road/exits")
@@ -105,8 +105,9 @@ class Planner(StageNode):
             messages.get(LANES),
         )
         situation, limits = Situation.of(encounter), config.limits
-        fit = fit_template(situation, segmentation, road, config.fitting, limits=limits)
-        routes = plan_routes(road, fit, config.planning, config.seed, limits)
+        with naming_interaction(encounter if config.fitting.shorten else None):
+            fit = fit_template(situation, segmentation, road, config.fitting, limits=limits)
+            routes = plan_routes(road, fit, config.planning, config.seed, limits)
         stop_if_cancelled()
         anchors = anchor_stamps(encounter, segmentation.changepoints)
         results = {

@@ -33,6 +33,7 @@ from scenario_gen.roads import build_road, RoadConfig
 from scenario_gen.ros.common.node_parameters import RoadServerParameters
 from scenario_gen.ros.common.services import REQUESTS
 from scenario_gen.ros.common.stage_node import StageNode
+from scenario_gen.situation import naming_interaction
 from scenario_gen.types import NoteKind
 
 
@@ -98,7 +99,9 @@ class RoadServer(StageNode):
     def _publish(self, name: str) -> None:
         """Build a road, sized to the tracks if there are any, and publish it."""
         tracks = self._tracks
-        road = build_road(name, decode_tracks(tracks) if tracks else None, self.config.road)
+        encounter = decode_tracks(tracks) if tracks else None
+        with naming_interaction(encounter):
+            road = build_road(name, encounter, self.config.road)
         stamp_ns = stamp_of(tracks, "tracks") if tracks else 0
         messages = {
             "road/entries": encode_poses(road.entries, road.frame_id, stamp_ns),
