@@ -9,6 +9,7 @@ controller of nav2 does. With `lock_step` it also calls `traffic/step`. Replace 
 """
 
 import math
+import signal
 import sys
 
 from diagnostic_msgs.msg import DiagnosticArray
@@ -140,11 +141,12 @@ class EgoConsumer(Node):
 
 def main() -> None:
     """Run until Ctrl-C."""
+    signal.signal(signal.SIGINT, signal.SIG_DFL)  # rclpy handles it: nothing breaks off a message
     rclpy.init(args=sys.argv)
     node = EgoConsumer()
     try:
         rclpy.spin(node)
-    except (KeyboardInterrupt, ExternalShutdownException):
+    except ExternalShutdownException:
         pass
     finally:
         node.destroy_node()
