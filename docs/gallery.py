@@ -9,7 +9,7 @@ from pathlib import Path
 import matplotlib
 from matplotlib import pyplot
 import numpy as np
-from picture import heading, path, road_shapes, STYLE
+from picture import Film, moving_vehicle, path, road_shapes, STYLE
 
 from scenario_gen import generate, read_log, Road, Scenario
 from scenario_gen.numerics import Floats
@@ -92,8 +92,8 @@ def main() -> None:
 
 def film(scenario: Scenario, road: Road) -> str:
     """Return an animated SVG of a scenario on its road, with numbered vehicles."""
-    shown = scenario.position.reshape(-1, 2)
-    low, high = shown.min(axis=0) - MARGIN_M, shown.max(axis=0) + MARGIN_M
+    places = scenario.position.reshape(-1, 2)
+    low, high = places.min(axis=0) - MARGIN_M, places.max(axis=0) + MARGIN_M
     apart = np.linalg.norm(scenario.position[0] - scenario.position[1], axis=-1)
     meeting = scenario.position[:2, np.argmin(apart)].mean(axis=0)
     view = np.minimum(high - low, (MAX_VIEW_M, MAX_VIEW_M * HEIGHT / WIDTH))
@@ -112,18 +112,13 @@ def film(scenario: Scenario, road: Road) -> str:
         f'<rect class="back" width="{WIDTH}" height="{HEIGHT}"/>',
         *road_shapes(road, place),
     ]
-    for n, vehicle in enumerate(scenario.vehicles):
+    shown = Film(place, pixels, rows, seconds)
+    for n in range(len(scenario.vehicles)):
         colour = COLOURS[n % len(COLOURS)]
-        xy = place(scenario.position[n][rows])
-        turned = -np.degrees(heading(scenario, n)[rows])
-        length, width = vehicle.length * pixels, vehicle.width * pixels
-        box = f'<rect fill="{colour}" x="{-length / 2:.1f}" y="{-width / 2:.1f}" width="{length:.1f}" height="{width:.1f}" rx="2"/>'
-        moves = f'<animateTransform attributeName="transform" type="translate" values="{path(xy, ";")}" {seconds}/>'
-        angles = ";".join(f"{angle:.0f}" for angle in turned)
-        turns = f'<animateTransform attributeName="transform" type="rotate" values="{angles}" {seconds}/>'
+        number = f'<text class="number" y="4">{n + 1}</text>'
         lines += [
             f'<path d="M{path(place(scenario.position[n][::3]))}" fill="none" stroke="{colour}" opacity=".4"/>',
-            f'<g>{moves}<g>{turns}{box}</g><text class="number" y="4">{n + 1}</text></g>',
+            moving_vehicle(scenario, n, shown, f'fill="{colour}"', number),
         ]
     return "\n".join([*lines, "</svg>"]) + "\n"
 

@@ -5,6 +5,7 @@
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
@@ -92,15 +93,37 @@ def panel(motion: Encounter | Scenario, road: Road | None, clock: Floats) -> Ite
     if road is not None:
         yield from road_shapes(road, place)
     seconds = f'dur="{clock[-1]:.1f}s" repeatCount="indefinite"'
-    for n, vehicle in enumerate(motion.vehicles):
-        at = np.minimum(np.searchsorted(motion.time, clock), len(motion.time) - 1)
-        xy, turned = place(motion.position[n][at]), -np.degrees(heading(motion, n)[at])
-        length, width = vehicle.length * pixels, vehicle.width * pixels
-        moves = animated("translate", path(xy, ";"), seconds)
-        turns = animated("rotate", ";".join(f"{angle:.0f}" for angle in turned), seconds)
-        box = f'<rect class="f{n}" x="{-length / 2:.1f}" y="{-width / 2:.1f}" width="{length:.1f}" height="{width:.1f}" rx="2"/>'
+    at = np.minimum(np.searchsorted(motion.time, clock), len(motion.time) - 1)
+    film = Film(place, pixels, at, seconds)
+    for n in range(len(motion.vehicles)):
+        label = waits(motion, at, seconds) if n == TURNS else ""
         yield f'<path class="path s{n}" d="M{path(place(motion.position[n][::3]))}"/>'
-        yield f"<g>{moves}<g>{turns}{box}</g>{waits(motion, at, seconds) if n == TURNS else ''}</g>"
+        yield moving_vehicle(motion, n, film, f'class="f{n}"', label)
+
+
+class Film(NamedTuple):
+    """How metres become pixels, the shown samples, and the attributes of an animation."""
+
+    place: Callable[[Floats], Floats]
+    pixels: float
+    rows: Ints
+    seconds: str
+
+
+def moving_vehicle(
+    motion: Encounter | Scenario, n: int, film: Film, paint: str, label: str
+) -> str:
+    """Return the moving footprint of a vehicle, with attributes `paint`, and a label on it."""
+    vehicle = motion.vehicles[n]
+    xy, turned = (
+        film.place(motion.position[n][film.rows]),
+        -np.degrees(heading(motion, n)[film.rows]),
+    )
+    length, width = vehicle.length * film.pixels, vehicle.width * film.pixels
+    moves = animated("translate", path(xy, ";"), film.seconds)
+    turns = animated("rotate", ";".join(f"{angle:.0f}" for angle in turned), film.seconds)
+    box = f'<rect {paint} x="{-length / 2:.1f}" y="{-width / 2:.1f}" width="{length:.1f}" height="{width:.1f}" rx="2"/>'
+    return f"<g>{moves}<g>{turns}{box}</g>{label}</g>"
 
 
 def road_shapes(road: Road, place: Callable[[Floats], Floats]) -> Iterator[str]:

@@ -80,8 +80,6 @@ def print_(*values: Any, sep: str = " ", wrap: bool = False) -> None:
 
     Where another program reads, no line is broken or ends in spaces, and Markdown stays as it is.
     """
-    from rich.text import Text
-
     from scenario_gen.base.terminal import Terminal
 
     if current.quiet:
@@ -91,15 +89,19 @@ def print_(*values: Any, sep: str = " ", wrap: bool = False) -> None:
     if terminal.is_terminal:
         terminal.print(*texts, sep=sep, soft_wrap=not wrap)
         return
-    markdown = [hasattr(text, "markup") and not isinstance(text, Text) for text in texts]
-    plain = [
-        Text(text.markup) if marked else text for text, marked in zip(texts, markdown, strict=True)
-    ]
     terminal.width = UNBOUNDED_COLUMNS
     with terminal.capture() as captured:
-        terminal.print(*plain, sep=sep)
+        terminal.print(*map(_plain, texts), sep=sep)
     for line in captured.get().splitlines():
         print(line.rstrip(), file=terminal.file)
+
+
+def _plain(value: Any) -> Any:
+    """Return the text of Markdown, and anything else as it is."""
+    from rich.text import Text
+
+    is_markdown = hasattr(value, "markup") and not isinstance(value, Text)
+    return Text(value.markup) if is_markdown else value
 
 
 def print_table(columns: Sequence[str], rows: Sequence[Sequence[str]], names: int = 1) -> None:

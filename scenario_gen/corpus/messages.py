@@ -137,12 +137,11 @@ def parse_range(task: RangeTask) -> None:
     Raises:
         InputError: the database fails (no memory, a full disk).
     """
-    needs("corpus", "duckdb", "pyarrow")
-    from duckdb import InvalidInputException
-
     try:
         _parse_range(task, plain=False)
     except InputError as error:
+        from duckdb import InvalidInputException
+
         if not isinstance(error.__cause__, InvalidInputException):
             raise
         _parse_range(task, plain=True)

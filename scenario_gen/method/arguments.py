@@ -22,7 +22,6 @@ if TYPE_CHECKING:
 
 Templates: TypeAlias = "Encounter | Sequence[Encounter] | LogResult | Path | str | DataFrame"
 """An encounter and further ones, or a log with one encounter."""
-MAX_DRAWN_SEED = 2**31
 
 
 def encounters_of(source: Templates, config: PipelineConfig) -> list[Encounter]:
@@ -111,7 +110,7 @@ def seed_of(seed: int | None) -> int:
     Raises:
         InputError: it is no whole number, or negative.
     """
-    return secrets.randbelow(MAX_DRAWN_SEED) if seed is None else whole_number("seed", seed, 0)
+    return secrets.randbits(31) if seed is None else whole_number("seed", seed, 0)
 
 
 def progress_of(progress: Progress | bool | None) -> Progress:

@@ -382,6 +382,7 @@ document.addEventListener("keydown", (event) => {
   if (event.key === "ArrowRight") player.step(1);
   if (event.key === "ArrowLeft") player.step(-1);
 });
+
 /** Show the case and the scenario that the address names, or the first case. */
 function follow() {
   const asked = new URLSearchParams(location.hash.slice(1));
