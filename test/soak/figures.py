@@ -16,7 +16,7 @@ ROOT = Path(__file__).resolve().parents[2]
 
 @dataclass(frozen=True)
 class Figure:
-    """One promise of docs/reliability.md with the figure seen in this run."""
+    """One promise of docs/project.md with the figure seen in this run."""
 
     promise: str
     asked: str

@@ -55,7 +55,7 @@ class Checker:
     Proven at every instant of the motion that `Scenario` defines, not at samples only:
     footprints do not overlap, and each lies inside drivable cells. A scenario is refused if
     that is not proven at `limits.time_resolution`. The other guarantees are listed in
-    docs/validity.md. Any of road,
+    docs/method.md. Any of road,
     requested, conflicts and waits may be None: those checks are left out, and `not_applicable`
     names them. One checker serves many scenarios of one request.
 
