@@ -473,7 +473,11 @@ class _RoadDrawing:
 def _straight_length(route: Curve) -> float:
     """Return how far [m] a route goes before it bends; infinite if it does not."""
     bent = np.abs(route.points[:, 2] - route.points[0, 2]) > _BENT_RAD
-    return float(route.station[max(int(np.argmax(bent)) - 1, 0)]) if bent.any() else np.inf
+    first = int(np.argmax(bent))
+    if not bent.any():
+        return np.inf
+    # A long edge is straight up to the bend at its end.
+    return float(max(route.station[max(first - 1, 0)], route.station[first] - _ARM_STEP_M))
 
 
 def middle_stations(line: Curve) -> tuple[float, float]:

@@ -8,6 +8,8 @@ import pytest
 
 from msg_conventions.lanes import decode_lanes, encode_lanes
 from scenario_gen.base.errors import InputError, RefusedError
+from scenario_gen.logs import read_log
+from scenario_gen.logs.synthetic import bundled
 from scenario_gen.roads import Arm, build_road, BUILT_IN, draw_plan, ground_for, Plan, RoadConfig
 from scenario_gen.types import Vehicle
 
@@ -123,3 +125,11 @@ def test_roads_that_have_no_cycle_lanes_refuse_them():
         RoadConfig(cycle_lane=0.5)
     with pytest.raises(InputError, match=r"road\.paper: .* no crossings and no cycle lanes"):
         RoadConfig(paper=True, crossing="zebra")
+
+
+def test_a_junction_ends_near_its_corners_where_its_arms_are_almost_in_line():
+    (encounter,) = read_log(bundled("all_way_stop")).encounters
+    network = build_road("four_way", encounter).lanes
+    for lane in network.lanes:
+        length = np.hypot(*np.diff(lane.centre, axis=0).T).sum()
+        assert length < 25.0 if lane.junction else length > 50.0

@@ -21,6 +21,7 @@ from typing import NamedTuple
 import numpy as np
 
 from scenario_gen.numerics import Floats, running_sum
+from scenario_gen.numerics.curve import Curve
 from scenario_gen.numerics.plane import ahead_and_left, angle_between
 from scenario_gen.output.exchange.lanes import LaneMap, SIGN_IDS
 from scenario_gen.output.exchange.opendrive_network import (
@@ -235,17 +236,18 @@ def _signals(
     if not governed:
         return
     group = add(road, "signals")
+    curve = Curve(strip.reference)
     for n, lanes in governed.items():
         rule, first = network.rules[n], lanes[0]
         position = strip.reference[-1 if first.along else 0, :2]
         if len(rule.line):
             position = rule.line.mean(axis=0)
-        nearest = int(np.argmin(np.hypot(*(strip.reference[:, :2] - position).T)))
+        (along,) = curve.project(position[None])[0]
         signal = add(
             group,
             "signal",
             id=f"{n + 1}.{first.road}",
-            s=float(station[nearest]),
+            s=float(np.interp(along, curve.station, station)),
             t=0.0,
             type=SIGN_IDS[rule.kind],
             subtype="-1",

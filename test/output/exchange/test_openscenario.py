@@ -327,4 +327,4 @@ def test_how_a_maps_lanes_are_joined_and_signed_comes_back(tmp_path):
     (stop,) = again.rules
     assert (stop.kind, stop.lanes) == (RuleKind.STOP, (0,)) and np.abs(
         stop.line[:, 0] - 48.0
-    ).max() < 3.0
+    ).max() < 0.1
