@@ -4,12 +4,13 @@
 """The motion along a path: distance and speed over time, from positions and measured speeds."""
 
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any
 
 import clarabel  # type: ignore[import-untyped,unused-ignore]
 import numpy as np
-from scipy import sparse
+from scipy import linalg, sparse
 
 from scenario_gen.base.errors import InputError
 from scenario_gen.logs.config import LogConfig
@@ -148,8 +149,29 @@ class Motion:
             tick, weights = self._weights(seconds, speed=are_speeds)
             start, rows = self._merged(tick, np.column_stack(weights))
             observe(quadratic, linear, start, rows, 1, 1.0 / np.square(deviation), values)
+        best = self._optimum(quadratic[:, : self.size], linear[: self.size])
+        # Within the solver's tolerance, the motion may run backwards.
+        increasing = np.maximum.accumulate(best)
+        return np.asarray(increasing[self.variable])
+
+    def _optimum(self, quadratic: Floats, linear: Floats) -> Floats:
+        """Return the variables of least cost within the limits.
+
+        The optimum without limits is 20 times as fast; mostly no limit is reached there.
+
+        Args:
+            quadratic: lower bands (4, V) of the cost's matrix.
+            linear: (V,) right side.
+
+        Raises:
+            UnreconciledError: the solver finds no solution.
+        """
+        with suppress(np.linalg.LinAlgError):
+            free = np.asarray(linalg.solveh_banded(quadratic, linear, lower=True))
+            if (self.constraints @ free <= self.bounds).all():
+                return free
         shape = (self.size, self.size)
-        lower = sparse.dia_array((quadratic[:, : self.size], -np.arange(4)), shape)
+        lower = sparse.dia_array((quadratic, -np.arange(4)), shape)
         upper = lower.T.tocsc()
         settings = clarabel.DefaultSettings()
         settings.verbose = False
@@ -158,21 +180,15 @@ class Motion:
         for equilibrate in (True, False):  # scaling worsens the matrix if fixes are seconds apart
             settings.equilibrate_enable = equilibrate
             solver = clarabel.DefaultSolver(
-                upper, -linear[: self.size], self.constraints, self.bounds, cones, settings
+                upper, -linear, self.constraints, self.bounds, cones, settings
             )
             solution = solver.solve()
             if solution.status in (
                 clarabel.SolverStatus.Solved,
                 clarabel.SolverStatus.AlmostSolved,
             ):
-                break
-        else:
-            raise UnreconciledError(
-                "speeds and positions contradict each other; check their units"
-            )
-        # Within the solver's tolerance, the motion may run backwards.
-        increasing = np.maximum.accumulate(np.asarray(solution.x))
-        return np.asarray(increasing[self.variable])
+                return np.asarray(solution.x)
+        raise UnreconciledError("speeds and positions contradict each other; check their units")
 
     def place(self, coefficients: Floats, seconds: Floats) -> Floats:
         """Return the distances (F,) [m] at any times (F,) [s] for coefficients (T+1,)."""
