@@ -1,12 +1,13 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The calls that docs/interfaces.md shows: read as `ros2 service call` reads them, sent to real nodes, answered as it says."""
+"""The calls of examples/service_calls.sh: read as `ros2 service call` reads them, sent to real nodes, answered as it says."""
 
 import array
 from collections.abc import Iterator
 from dataclasses import dataclass
 import importlib
+from itertools import pairwise
 import os
 from pathlib import Path
 import re
@@ -19,7 +20,8 @@ from support.suite_processes import Processes, RESOURCES
 import yaml
 
 pytestmark = pytest.mark.dds
-TEXT = (Path(__file__).resolve().parents[2] / "docs" / "interfaces.md").read_text(encoding="utf-8")
+ROOT = Path(__file__).resolve().parents[2]
+CALLS = (ROOT / "examples" / "service_calls.sh").read_text(encoding="utf-8")
 LOG = RESOURCES / "synthetic_c"
 NODES = {
     "log_player": ["-p", f"log_path:={LOG}"],
@@ -34,7 +36,7 @@ NODES = {
 
 @dataclass(frozen=True)
 class Call:
-    """A line of the page, and the answer that stands below it."""
+    """A call, and the answer below it."""
 
     name: str
     type: str
@@ -54,15 +56,13 @@ class Call:
 
 
 def calls() -> Iterator[Call]:
-    for block in re.findall(r"^```sh\n(.*?)^```", TEXT, re.DOTALL | re.MULTILINE):
-        lines = block.splitlines()
-        for line, below in zip(lines, [*lines[1:], ""], strict=True):
-            if line.startswith("ros2 service call"):
-                _, _, _, name, kind, *more = shlex.split(line)
-                assert below.startswith("# {"), f"no answer below {line}"
-                yield Call(
-                    name, kind, yaml.safe_load(more[0]) if more else {}, yaml.safe_load(below[2:])
-                )
+    for line, below in pairwise(CALLS.splitlines()):
+        if line.startswith("ros2 service call"):
+            _, _, _, name, kind, *more = shlex.split(line)
+            assert below.startswith("# {"), f"no answer below {line}"
+            yield Call(
+                name, kind, yaml.safe_load(more[0]) if more else {}, yaml.safe_load(below[2:])
+            )
 
 
 def fill(message: Any, values: dict[str, Any]) -> None:
@@ -115,7 +115,8 @@ def differences(answer: Any, wanted: Any, where: str = "") -> list[str]:
 
 
 def test_every_service_of_the_list_is_called():
-    services = TEXT.partition("## Services\n\n")[2].partition("\n\n")[0]
+    page = (ROOT / "docs" / "interfaces.md").read_text(encoding="utf-8")
+    services = page.partition("## Services\n\n")[2].partition("\n\n")[0]
     listed = {
         name
         for row in re.findall(r"^- (`.*?) \(", services, re.MULTILINE)
@@ -139,13 +140,13 @@ def suite(tmp_path_factory, domain):
     assert made.end() == dict.fromkeys(NODES, 0)
 
 
-def test_the_calls_are_answered_as_the_page_says(suite, client):
+def test_the_calls_are_answered_as_the_example_says(suite, client):
     from diagnostic_msgs.msg import DiagnosticArray
     from rclpy.serialization import deserialize_message
 
     client.hear("/scenarios/info", "/diagnostics")
     client.wait("/scenarios/info", 4)  # the nodes' own request
-    echo = re.search(r"topic echo /diagnostics --filter \"(.*)\"", TEXT)[1]
+    echo = re.search(r"topic echo /diagnostics --filter \"(.*)\"", CALLS)[1]
 
     def large_is_at_work() -> bool:
         messages = [
