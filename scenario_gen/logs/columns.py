@@ -38,6 +38,8 @@ NAMES: dict[str, tuple[str, ...]] = {
         "width": "width vehicle_width",
         "kind": "type kind class vehicle_type object_type agent_type actor_type obj_type category "
         "classification vehicle_class object_class road_user road_user_type",
+        "signal": "signal signal_state traffic_light traffic_light_state light_state",
+        "signal_id": "signal_id traffic_light_id light_id signal_group",
     }.items()
 }
 """Column names of each quantity, the preferred first.
@@ -82,6 +84,8 @@ UNITS: dict[str, dict[str, float]] = {
     "scene": {},
     "vehicle": {},
     "kind": {},
+    "signal": {},
+    "signal_id": {},
     "lat": _DEGREES,
     "lon": _DEGREES,
     "x": _LENGTHS_M,

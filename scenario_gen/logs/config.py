@@ -46,6 +46,11 @@ class LogConfig(Parameters):
         "",
         "types of road users to keep, e.g. car,van,truck,bus; other: unknown type; empty: all",
     )
+    signals: str = parameter(
+        "recorded",
+        "states of traffic lights in a log: read, or ignored",
+        choices=("recorded", "ignored"),
+    )
     start: float = parameter(
         0.0, "start of the time window, counted from the log's first stamp", unit="s", low=0.0
     )

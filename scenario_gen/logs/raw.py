@@ -15,6 +15,7 @@ from scenario_gen.base.stores import renamed
 from scenario_gen.logs.column import Column
 from scenario_gen.logs.config import LogConfig
 from scenario_gen.logs.doubts import Doubt
+from scenario_gen.logs.signals import RawSignal
 from scenario_gen.numerics import Floats, Ints
 from scenario_gen.types import Encounter
 
@@ -142,6 +143,7 @@ class RawLog:
         separators: further columns that tell apart rows of one vehicle with the same stamp.
         columns: of a table, by quantity; they tell whether a unit is named or assumed.
         doubts: of the reader.
+        signals: traffic lights whose states were recorded, on the clock of the vehicles.
         encounters: those of a recorded `tracks` topic, used unchanged; then without vehicles.
     """
 
@@ -157,6 +159,7 @@ class RawLog:
     separators: tuple[str, ...] = ()
     columns: Mapping[str, Column] = field(default_factory=dict)
     doubts: tuple[Doubt, ...] = ()
+    signals: tuple[RawSignal, ...] = ()
 
     def segment(self, row: int) -> Segment:
         """Return where a row comes from."""

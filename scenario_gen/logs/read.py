@@ -37,6 +37,7 @@ from scenario_gen.logs.no_encounter import (
 )
 from scenario_gen.logs.quality import Quality, VehicleQuality
 from scenario_gen.logs.raw import natural, Observations, RawLog
+from scenario_gen.logs.signals import moved_signals, with_lights
 from scenario_gen.logs.units import interpret
 from scenario_gen.types import Encounter
 
@@ -158,7 +159,9 @@ def encounters_of(
     log, unit_notes, unit_doubts = interpret(log, config)
     check_doubts(log.segments[0].label, [*log.doubts, *unit_doubts], config.allow)
     log = typed(log, config)
+    recorded_ns = log.vehicles[0].fix_ns[:1]
     log, clock_notes = retimed(log, config)
+    signals = moved_signals(log.signals, log.vehicles[0].fix_ns[:1] - recorded_ns)
     tracks, drops = clean(log, config)
     if len({track.id for track in tracks}) < 2:
         raise NoEncounterError(explain_few_vehicles(log, [track.id for track in tracks], drops))
@@ -206,7 +209,8 @@ def encounters_of(
             *dict.fromkeys(notes_by_vehicle),
         ),
     )
-    return LogResult(grouping.encounters, quality, all_doubts)
+    encounters = tuple(with_lights(encounter, signals) for encounter in grouping.encounters)
+    return LogResult(encounters, quality, all_doubts)
 
 
 @dataclass(frozen=True)

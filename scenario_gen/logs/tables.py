@@ -24,6 +24,7 @@ from scenario_gen.logs.columns import (
 )
 from scenario_gen.logs.config import LogConfig
 from scenario_gen.logs.raw import check_size, check_vehicles, Observations, RawLog, Segment
+from scenario_gen.logs.signals import RawSignal, signals_of_table
 from scenario_gen.logs.sizes import MAX_LENGTH_M
 from scenario_gen.logs.stamps import read_stamps, reals
 from scenario_gen.logs.table_parts import (
@@ -174,7 +175,7 @@ def _read_text_columns(
     header = [str(name) for name in read_text(path, rows_before, config, **options, nrows=0)]
     columns = find_columns(header, path, config.columns)
     # Numbers of 64 bits, or in hexadecimal, are not float64.
-    texts = ("vehicle", "kind", "scene", "date")
+    texts = ("vehicle", "kind", "scene", "date", "signal", "signal_id")
     names = [columns[quantity].name for quantity in texts if quantity in columns]
     options["dtype"] = dict.fromkeys(names, object)
     if has_window(path, config):
@@ -309,8 +310,8 @@ def to_numbers(frame: pd.DataFrame, columns: dict[str, Column], path: Path) -> p
             numbers[quantity] = vehicle_names(values)
         elif quantity == "date":
             continue
-        elif quantity == "kind":
-            numbers["kind"] = _kind_names(values, column)
+        elif quantity in ("kind", "signal", "signal_id"):
+            numbers[quantity] = _words(values, column)
         elif pd.api.types.is_bool_dtype(values):
             raise InputError(
                 f"{path}, column {column.name!r} ({quantity}): true or false is not a {quantity}; "
@@ -328,8 +329,8 @@ def to_numbers(frame: pd.DataFrame, columns: dict[str, Column], path: Path) -> p
     return numbers
 
 
-def _kind_names(values: "pd.Series[Any]", column: Column) -> "pd.Series[Any]":
-    """Return what a table calls the types of its road users."""
+def _words(values: "pd.Series[Any]", column: Column) -> "pd.Series[Any]":
+    """Return what a table calls the types of its road users, or its lights and their states."""
     words = values.astype(str).where(values.notna(), "")
     if not column.types:
         return words
@@ -410,6 +411,10 @@ def from_frame(
         for names, group in usable.groupby(keys, sort=False)
         for track in tracks_of(group)
     )
+    signals: list[RawSignal] = []
+    if "signal" in usable and config.signals == "recorded":
+        signals, signal_notes = signals_of_table(usable, segments[0].label)
+        notes = [*notes, *signal_notes]
     return RawLog(
         name=paths[0].stem if len(paths) == 1 else paths[0].parent.name,
         geographic="lat" in frame,
@@ -417,6 +422,7 @@ def from_frame(
         rows=len(frame),
         segments=segments,
         notes=tuple(notes),
+        signals=tuple(signals),
         dropped=tuple(
             ("no vehicle" if is_ok else "stamp is not a number", int(row))
             for is_ok, row in zip(unusable["time_ok"], unusable["row"], strict=True)

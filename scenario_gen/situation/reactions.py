@@ -21,6 +21,7 @@ import numpy as np
 from scenario_gen.situation.conflicts import Conflict
 from scenario_gen.situation.evidence import Evidence, heading_difference, LIMITS, Recording
 from scenario_gen.situation.following import following_evidence, nearest_leaders
+from scenario_gen.situation.signal_stops import find_signal_stops, SignalExplanations
 from scenario_gen.situation.tracks import Track
 from scenario_gen.situation.waits import Wait
 from scenario_gen.situation.yielding import giving_way, waits_for_leader, yielding_evidence
@@ -50,15 +51,20 @@ def find_reactions(
     explained = _explained_pairs(recording, following, yielding)
     yields = [giving_way(recording, *pair) for pair in recording.pairs if pair not in explained]
     yields += [pair.reaction for pair in yielding if pair is not None]
+    stops = find_signal_stops(encounter, waits) if encounter.lights else ()
+    by_light = SignalExplanations(encounter, stops)
     latest: dict[tuple[int, float], Reaction] = {}
     for reaction in yields:
-        if reaction is None or waits_for_leader(reaction, leading.get(reaction.who), waits):
+        if reaction is None or by_light.explain(reaction):
+            continue
+        if waits_for_leader(reaction, leading.get(reaction.who), waits):
             continue
         key = reaction.who, reaction.until  # the last vehicle to clear ends a wait
         latest[key] = max(
             latest.get(key, reaction), reaction, key=lambda each: (each.clears, each.confidence)
         )
     graph = without_circles([*leading.values(), *latest.values()], len(tracks))
+    graph = replace(graph, stops=stops)
     return graph if graph.edges else replace(graph, why=_why_none(recording, evidence))
 
 

@@ -44,10 +44,13 @@ def traffic_side(encounter: Encounter) -> str:
 
 def mirrored(encounter: Encounter) -> Encounter:
     """Return the encounter with left and right exchanged; it has no place on the globe."""
+    flip = np.array([1.0, -1.0])
+    lights = (replace(light, line=light.line[::-1] * flip) for light in encounter.lights)
     return replace(
         encounter,
         name=f"{encounter.name} mirrored",
-        position=encounter.position * np.array([1.0, -1.0]),
+        position=encounter.position * flip,
         heading=-encounter.heading,
         origin=None,
+        lights=tuple(lights),
     )

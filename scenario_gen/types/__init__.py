@@ -107,6 +107,13 @@ from scenario_gen.types.target import (
     Target,
     UNITS,
 )
+from scenario_gen.types.traffic_light import (
+    fronts,
+    SignalSchedule,
+    SignalState,
+    SignalStop,
+    TrafficLight,
+)
 from scenario_gen.types.vehicle import (
     height,
     most_exposed,
@@ -190,10 +197,14 @@ __all__ = [
     "Scenario",
     "ScenarioSet",
     "Segmentation",
+    "SignalSchedule",
+    "SignalState",
+    "SignalStop",
     "Spread",
     "State",
     "States",
     "Target",
+    "TrafficLight",
     "TrafficRule",
     "TypeLimits",
     "Vehicle",
@@ -207,6 +218,7 @@ __all__ = [
     "causes_in_words",
     "cut",
     "formatted",
+    "fronts",
     "height",
     "join_ego",
     "join_pieces",

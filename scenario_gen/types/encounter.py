@@ -14,6 +14,7 @@ from scenario_gen.base.errors import did_you_mean, InputError
 from scenario_gen.numerics import Floats, freeze
 from scenario_gen.types.decision import Decision
 from scenario_gen.types.motion import Motion
+from scenario_gen.types.traffic_light import TrafficLight
 
 MAX_UNEVEN_S = 1e-6  # a time may differ by this from a whole multiple of the period
 
@@ -64,6 +65,7 @@ class Encounter(Motion):
         origin: (latitude, longitude) in degrees of the frame's origin, or None if the log is in
             metres.
         source: whether its vehicles were recorded together.
+        lights: traffic lights whose states were recorded, in the encounter's frame.
 
     Raises:
         InputError: shapes disagree, a value is not finite, a speed is negative, ids repeat, the
@@ -74,6 +76,7 @@ class Encounter(Motion):
     start_ns: int = 0
     origin: tuple[float, float] | None = None
     source: Recorded | Recombined | Decided = Recorded()
+    lights: tuple[TrafficLight, ...] = ()
 
     def __post_init__(self) -> None:
         _check_arrays(self)
@@ -114,7 +117,9 @@ class Encounter(Motion):
     def select(self, rows: Sequence[int], first: int = 0, last: int | None = None) -> Self:
         """Return some vehicles between two samples, as `Motion.select` does."""
         start_ns = self.start_ns + first * self.dt_ns
-        return replace(super().select(rows, first, last), start_ns=start_ns)
+        by = -float(self.time[first])
+        lights = tuple(light.retimed(lambda times: times + by) for light in self.lights)
+        return replace(super().select(rows, first, last), start_ns=start_ns, lights=lights)
 
 
 def _check_arrays(encounter: Encounter) -> None:

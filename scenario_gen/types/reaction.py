@@ -9,6 +9,7 @@ import math
 from typing import Any
 
 from scenario_gen.types.facts import FOLLOW, NamedReaction
+from scenario_gen.types.traffic_light import SignalStop
 from scenario_gen.types.vehicle import Vehicle
 
 DOUBTFUL_CONFIDENCE = 0.5  # confidence below which an edge is called doubtful
@@ -122,12 +123,14 @@ class ReactionGraph:
         cut: reactions that were left out because they close a circle, each the least sure one of
             it.
         why: why there is none, "" if there is one.
+        stops: stops for traffic lights.
     """
 
     edges: tuple[Reaction, ...]
     order: tuple[int, ...]
     cut: tuple[Reaction, ...] = ()
     why: str = ""
+    stops: tuple[SignalStop, ...] = ()
 
     def of(self, who: int) -> tuple[Reaction, ...]:
         """Return the reactions of vehicle `who`."""
@@ -146,6 +149,7 @@ class ReactionGraph:
             f"{edge.words(vehicles)}: left out, as it closes a cycle of reactions"
             for edge in self.cut
         ]
+        sentences += [stop.words(vehicles[stop.who].label) for stop in self.stops]
         return tuple(sentences) or (f"no reactions detected{self.why and ': '}{self.why}",)
 
     def document(

@@ -13,6 +13,8 @@
 | heading | orientation/exact | rad, counter-clockwise from +x |
 | speed | velocity/exact | m/s |
 
+| traffic light | trafficLight: cycle/cycleElement: duration, color; cycle/timeOffset | steps |
+
 An interval (intervalStart, intervalEnd) counts as its middle.
 
 Source: CommonRoad's documentation of the XML format, 2018b and 2020a.
@@ -38,6 +40,9 @@ from scenario_gen.logs.raw import (
     RawLog,
     Segment,
 )
+from scenario_gen.logs.signals import naming, RawSignal, state_of
+from scenario_gen.numerics import Floats
+from scenario_gen.types import SignalSchedule, SignalState
 
 
 def read(paths: Sequence[Path], config: LogConfig) -> RawLog:
@@ -81,7 +86,85 @@ def read(paths: Sequence[Path], config: LogConfig) -> RawLog:
             f"{static} static obstacles belong to the road: give this file as the map, too"
         )
     segment = Segment(0, str(path), "state", 1)
-    return RawLog(path.stem, False, tuple(vehicles), row, (segment,), tuple(notes))
+    signals: list[RawSignal] = []
+    if config.signals == "recorded":
+        signals, without_lane = _signals(root, step_s)
+        if without_lane:
+            notes.append(f"traffic lights without a lane are left out: {', '.join(without_lane)}")
+    return RawLog(
+        path.stem,
+        False,
+        tuple(vehicles),
+        row,
+        (segment,),
+        tuple(notes),
+        signals=tuple(signals),
+    )
+
+
+def _signals(root: Element, step_s: float) -> tuple[list[RawSignal], list[str]]:
+    """Return the lights whose states are known, one for each of their lanelets' stop lines.
+
+    Returns:
+        The lights, and the ids of those to which no lanelet refers.
+    """
+    signals, without_lane = [], []
+    lanelets: dict[str, list[Element]] = {}
+    for lanelet in root.findall("lanelet"):
+        refs = [*lanelet.findall("trafficLightRef"), *lanelet.findall("stopLine/trafficLightRef")]
+        for ref in dict.fromkeys(link.attribute("ref") for link in refs):
+            lanelets.setdefault(ref, []).append(lanelet)
+    for light in root.findall("trafficLight"):
+        name = light.attribute("id")
+        schedule = cycle_of(light, step_s)
+        if schedule is None:
+            continue
+        if name not in lanelets:
+            without_lane.append(name)
+        for lanelet in lanelets.get(name, ()):
+            line = stop_line(lanelet)
+            signals.append(
+                RawSignal(name, schedule, light.place, line, (lanelet.attribute("id"),))
+            )
+    return signals, without_lane
+
+
+def cycle_of(light: Element, step_s: float) -> SignalSchedule | None:
+    """Return the cycle of a light, None if it has no state or is never active.
+
+    Raises:
+        InputError: a duration or a colour is damaged.
+    """
+    elements = light.findall("cycle/cycleElement")
+    durations = [step_s * element.child("duration").value() for element in elements]
+    states = [
+        state_of(element.child("color").content, element.child("color").place)
+        for element in elements
+    ]
+    active = light.find("active")
+    is_off = active is not None and active.content == "false"
+    if is_off or all(state is SignalState.OFF for state in states):
+        return None
+    offset = light.find("cycle/timeOffset")
+    start_s = 0.0 if offset is None else step_s * offset.value()
+    with naming(f"{light.place}: traffic light {light.get('id', '?')}"):
+        return SignalSchedule.cycle(durations, states, start_s)
+
+
+def stop_line(lanelet: Element) -> Floats:
+    """Return the stop line (2, 2) [m] of a lanelet from left to right; by default its end."""
+    bounds = [lanelet.child(f"{side}Bound").findall("point") for side in ("left", "right")]
+    ends = np.array([_point(points[-1]) for points in bounds if points])
+    points = np.array([_point(point) for point in lanelet.findall("stopLine/point")])
+    if len(points) < 2:
+        return ends
+    line = points[[0, -1]]
+    is_reversed = float(((line[1] - line[0]) * (ends[1] - ends[0])).sum()) < 0.0
+    return line[::-1] if is_reversed else line
+
+
+def _point(point: Element) -> tuple[float, float]:
+    return point.child("x").value(), point.child("y").value()
 
 
 def _observations(
