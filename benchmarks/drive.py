@@ -30,7 +30,7 @@ from scenario_gen.closed_loop.planners import (
     NonReactive,
     ReferenceFollower,
 )
-from scenario_gen.closed_loop.reacting import Selection
+from scenario_gen.closed_loop.set_selection import Selection
 from scenario_gen.closed_loop.simulation import ClosedLoop, Observation, Planner, State
 from scenario_gen.closed_loop.trials import Outcome, rates, run_trials
 from scenario_gen.closed_loop.verdict import judge

@@ -9,7 +9,6 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from scenario_gen.base.errors import RefusedError
 from scenario_gen.base.provenance import what_makes_it_again
 from scenario_gen.method.arguments import (
     config_of,
@@ -20,20 +19,16 @@ from scenario_gen.method.arguments import (
     Templates,
     whole_number,
 )
+from scenario_gen.method.chain import generate_set
 from scenario_gen.method.config import PipelineConfig
-from scenario_gen.method.evaluation import coverage_of, evaluate, measures_in, replay
-from scenario_gen.method.fitting import fit_template
+from scenario_gen.method.evaluation import coverage_of, evaluate, replay
 from scenario_gen.method.outcome_sets import for_one_set, outcome_sets, swapped_order
 from scenario_gen.method.reference_sets import with_references
-from scenario_gen.method.routing import plan_routes
-from scenario_gen.method.sampling import Callbacks, Plan, Progress, sample_scenarios
-from scenario_gen.method.segmentation import segment
+from scenario_gen.method.sampling import Callbacks, Progress
 from scenario_gen.method.shortening import fit_what_matters
 from scenario_gen.method.suitable_roads import AUTO, on_first_suitable_road
-from scenario_gen.roads import road_and_template
 from scenario_gen.situation import Situation
 from scenario_gen.types import (
-    causes_in_words,
     Encounter,
     GenerationResult,
     Note,
@@ -92,75 +87,29 @@ def generate(
     config, request, progress = config_of(config), request_of(request), progress_of(progress)
     count, seed = whole_number("count", count, 1), seed_of(seed)
     encounter, *population = encounters_of(encounter, config)
-    if road == AUTO:
-        on_road = partial(
-            generate,
-            [encounter, *population],
-            config=replace(config, fitting=replace(config.fitting, shorten=False)),
-            count=count,
-            seed=seed,
-            request=request,
-            progress=progress,
-            accepts=accepts,
-        )
-        return on_first_suitable_road(on_road, encounter, config, seed)
     swapped = swapped_order(encounter, config.sampling) if request.order == "swap" else None
     if swapped is not None:
         encounter, request = swapped, replace(request, order="keep")
-    generate_set = partial(
-        _generate_set,
-        road=road,
-        config=config,
-        seed=seed,
-        request=request,
-        callbacks=lambda road: Callbacks(progress, accepts=partial(accepts, road)),
-        population=population,
-    )
-    if config.fitting.shorten and not request.moves:
-        result = fit_what_matters(generate_set, encounter, count)
-    else:
-        result = generate_set(encounter, count)
+
+    def generate_template(template: Encounter, size: int) -> GenerationResult:
+        """Generate scenarios from the encounter, or from a part of it."""
+        on_road = partial(
+            generate_set,
+            template,
+            size,
+            config=config,
+            seed=seed,
+            request=request,
+            callbacks=lambda road: Callbacks(progress, accepts=partial(accepts, road)),
+            population=population,
+        )
+        if road == AUTO:
+            return on_first_suitable_road(on_road, template, config, seed)
+        return on_road(road)
+
+    shorten = config.fitting.shorten and not request.moves
+    result = fit_what_matters(generate_template, encounter, count, shorten=shorten)
     return completed(result, config, request, population)
-
-
-def _generate_set(
-    encounter: Encounter,
-    count: int,
-    *,
-    road: Road | Path | str,
-    config: PipelineConfig,
-    seed: int,
-    request: Request,
-    callbacks: Callable[[Road], Callbacks],
-    population: Sequence[Encounter],
-) -> GenerationResult:
-    """Return scenarios of a template; all stages but the evaluation.
-
-    Raises:
-        RefusedError: as `generate`.
-    """
-    road, encounter = road_and_template(road, encounter, config.road)
-
-    situation = Situation.of(encounter)
-    segmentation = segment(encounter, config.segmentation, seed)
-    fit = fit_template(
-        situation, segmentation, road, config.fitting, request=request, limits=config.limits
-    )
-    routes = plan_routes(road, fit, config.planning, seed, config.limits)
-    planned = GenerationResult(encounter, segmentation, road, fit, routes, seed=seed)
-    plan = Plan.of(planned, config.sampling, config.limits, request, situation=situation)
-    result = sample_scenarios(
-        planned,
-        config.sampling,
-        config.limits,
-        request,
-        count=count,
-        plan=plan,
-        callbacks=callbacks(road),
-        measures=measures_in(config.sampling.variety, encounter, population),
-    )
-    _refuse_empty(result)
-    return result
 
 
 def completed(
@@ -234,17 +183,3 @@ def generate_outcomes(
         )
 
     return outcome_sets(generate_set, encounter, config.sampling, request, count, seed)
-
-
-def _refuse_empty(result: GenerationResult) -> None:
-    """Refuse a result without scenarios.
-
-    Raises:
-        RefusedError: the causes of all refusals, and the notes.
-    """
-    generated = result.generated
-    if not generated.scenarios:
-        refused = causes_in_words(generated.refused)
-        causes = ", ".join(f"{count} × {cause}" for cause, count in refused)
-        reasons = "; ".join((causes or "none was drawn", *map(str, generated.adaptations)))
-        raise RefusedError(f"none of {generated.candidates} candidates is valid: {reasons}")

@@ -10,9 +10,8 @@ of the set, and if the reference drive and `IdmFollower` pass, the latter withou
 """
 
 from collections import Counter
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field, replace
-from enum import StrEnum
 import math
 from time import process_time
 from typing import TypeVar
@@ -21,24 +20,18 @@ import numpy as np
 
 from scenario_gen.base.errors import InputError, RefusedError
 from scenario_gen.base.parameters import updated
-from scenario_gen.closed_loop.blind import (
-    blind_family,
-    blind_passes,
-    BlindPlanner,
-    BlindRate,
-)
+from scenario_gen.closed_loop.blind import blind_family, blind_passes
 from scenario_gen.closed_loop.config import ClosedLoopConfig
-from scenario_gen.closed_loop.planners import IdmFollower, ReferenceFollower
+from scenario_gen.closed_loop.set_selection import Selection
 from scenario_gen.closed_loop.simulation import ClosedLoop
-from scenario_gen.closed_loop.verdict import judge
 from scenario_gen.method.chain import Chain
 from scenario_gen.method.decisions import decided
 from scenario_gen.method.evaluation import replay
 from scenario_gen.method.outcome_sets import requested_decisions
 from scenario_gen.method.sampling import Callbacks, Progress, TargetError
 from scenario_gen.method.segmentation import segment
+from scenario_gen.method.shortening import fitting_part
 from scenario_gen.method.suitable_roads import AUTO, suitable_roads
-from scenario_gen.numerics import Ints
 from scenario_gen.pipeline import completed, PipelineConfig
 from scenario_gen.roads import road_and_template
 from scenario_gen.situation import encroachment, Situation
@@ -55,12 +48,12 @@ from scenario_gen.types import (
     Road,
     Scenario,
     token,
+    vehicle_index,
     YIELD,
 )
 
 AnyMotion = TypeVar("AnyMotion", bound=Motion)
 
-MAX_BLIND_SHARE = 0.1  # of a set that tests, which a blind planner may pass
 CUT_STEP_S = 0.25  # between two begins that are tried
 MIN_REMAINING_S = 4.0  # of a template from its begin on
 BEGINS_COUNT = 3  # begins of a template
@@ -69,7 +62,6 @@ MIN_GAP_S = 1.0  # in which the ego of a template enters behind the others
 TRIED_PER_KEPT_COUNT = 60  # scenarios of a stage, before it is given up
 MAX_MARGIN_S = 0.1  # of scenarios that sampling aims at
 ATTEMPTS_COUNT = 200  # candidates per scenario, at most
-PROBED_COUNT = 4  # blind planners that are driven first
 MORE_VARIATION = {
     "arrival_sigma": 3.0,
     "wait_sigma": 2.0,
@@ -79,68 +71,6 @@ MORE_VARIATION = {
 }
 """Least sampling parameters of a stage that gives no scenario without them."""
 MAX_TURNS_COUNT = 8  # in which stages are drawn from again
-
-
-class Unfit(StrEnum):
-    """Why a valid scenario is not kept for testing."""
-
-    BLIND = "passed by blind planners"
-    REFERENCE = "failed by the reference drive"
-    HARSH = "failed, or passed with hard braking, by IdmFollower"
-
-
-@dataclass
-class Selection:
-    """The scenarios that are kept so far, by what blind planners do in them.
-
-    Attributes:
-        family: the blind planners.
-        passed: (M,) number of kept scenarios that each of them passes.
-        seen: (M,) number of scenarios that each was seen to pass.
-        kept: number of kept scenarios.
-        unfit: number of other scenarios, by cause.
-    """
-
-    family: Sequence[BlindPlanner]
-    passed: Ints
-    seen: Ints
-    kept: int = 0
-    unfit: Counter[Unfit] = field(default_factory=Counter)
-
-    @classmethod
-    def of(cls, top_speed: float) -> "Selection":
-        """Return an empty selection for reference drives with a highest speed [m/s]."""
-        family = blind_family(top_speed)
-        return cls(family, *np.zeros((2, len(family)), dtype=np.int64))
-
-    def keeps(self, loop: ClosedLoop) -> bool:
-        """Keep a scenario if the set tests with it; return whether it is kept."""
-        cause = self._cause(loop)
-        if cause is not None:
-            self.unfit[cause] += 1
-        return cause is None
-
-    def _cause(self, loop: ClosedLoop) -> Unfit | None:
-        allowed = math.floor(MAX_BLIND_SHARE * (self.kept + 1)) - self.passed
-        passes = np.zeros(len(self.family), dtype=np.int64)
-        order = np.argsort(-self.seen, kind="stable")
-        for rows in (order[:PROBED_COUNT], order[PROBED_COUNT:]):
-            passes[rows] = blind_passes(loop, [self.family[row] for row in rows])
-            self.seen[rows] += passes[rows]
-            if (passes > allowed)[rows].any():
-                return Unfit.BLIND
-        if not judge(loop, loop.drive(ReferenceFollower(loop))).passed:
-            return Unfit.REFERENCE
-        verdict = judge(loop, loop.drive(IdmFollower(speed=loop.task().speed)))
-        if not verdict.passed or verdict.hardest_braking > loop.config.hard_braking:
-            return Unfit.HARSH
-        self.passed += passes
-        self.kept += 1
-        return None
-
-    def rate(self) -> BlindRate:
-        """Return how the best blind planner does in the set."""
-        return BlindRate.of(self.family, self.passed, self.kept)
 
 
 @dataclass(frozen=True, eq=False)
@@ -153,6 +83,7 @@ class Stage:
         label: the outcome and the begin, in words.
         top_speed: highest speed of the ego in the template [m/s].
         extended: whether it has MORE_VARIATION.
+        notes: on its template.
     """
 
     chain: Chain
@@ -160,6 +91,7 @@ class Stage:
     label: str
     top_speed: float
     extended: bool = False
+    notes: tuple[Note, ...] = ()
 
     def with_more_variation(self) -> "Stage":
         """Return the stage with MORE_VARIATION at least."""
@@ -213,6 +145,7 @@ class Testing:
                 "--for-testing: name the vehicle that the planner replaces with --ego, or use "
                 f"--ego auto; there are {ids}"
             )
+        self._refuse_over()
         end = process_time() + self.budget
         drawing = _Drawing(self, count, end, progress)
         waiting = drawing.draw(self._stages(drawing))
@@ -223,6 +156,31 @@ class Testing:
             raise TargetError(shortage)
         note = Note.of(NoteKind.TESTS, rate=str(drawing.selection.rate()))
         return TestSets([result.noted(note) for result in drawing.results], shortage)
+
+    def _refuse_over(self) -> None:
+        """Refuse an encounter in which all others leave before the ego can be where they meet.
+
+        Raises:
+            TargetError: it names the first of them.
+        """
+        situation = Situation.of(self.encounter)
+        ego = vehicle_index(self.encounter, self.request.ego, "ego")
+        met = [conflict for conflict in situation.conflicts if ego in conflict.pair]
+        track = situation.tracks[ego]
+        for conflict in met:
+            spare = conflict.exit_first + DELAYS_S[-1]
+            reach = spare * (track.speed[0] + 2.0 * spare)  # at 4 m/s² from the begin on
+            driven = np.interp(conflict.entry_second, self.encounter.time, track.progress)
+            if conflict.first == ego or conflict.following or reach > driven:
+                return
+        if met:
+            first, name = met[0], self.encounter.ids[met[0].first]
+            raise TargetError(
+                f"for testing ego {self.request.ego}: nothing is left to react to, since vehicle "
+                f"{name} leaves their shared area {first.exit_first:.1f} s after the recording "
+                f"begins, and the ego enters it {first.encroachment:.1f} s later: use a recording "
+                "that begins earlier, or another ego"
+            )
 
     def _shortage(self, drawing: "_Drawing") -> str:
         """Return why there are fewer scenarios than requested."""
@@ -253,8 +211,7 @@ class Testing:
             name = next(names, AUTO)
         for outcome in self._templates(self.encounter):
             try:
-                road, template = road_and_template(name, outcome, self.config.road)
-                yield from self._stages_from(road, template, drawing)
+                yield from self._stages_from(self._whole_stage(name, outcome), drawing)
             except RefusedError as error:
                 drawing.report(f"{_outcome(outcome)}: {error}")
 
@@ -271,15 +228,31 @@ class Testing:
         if not second and self.request.ego in reacting_vehicles(encounter):
             yield encounter
 
-    def _stages_from(
-        self, road: Road, template: Encounter, drawing: "_Drawing"
-    ) -> Iterator[Stage]:
+    def _whole_stage(self, road: Road | str, template: Encounter) -> Stage:
+        """Return the stage of a whole template, which is shortened if it does not fit.
+
+        Raises:
+            RefusedError: it does not fit the road.
+        """
+
+        def stage_of(part: Encounter) -> Stage:
+            return self._stage(*road_and_template(road, part, self.config.road), 0)
+
+        try:
+            return stage_of(template)
+        except RefusedError as error:
+            if not self.config.fitting.shorten or self.request.moves:
+                raise
+            part, note = fitting_part(stage_of, template, error)
+        return replace(stage_of(part), notes=(note,))
+
+    def _stages_from(self, whole: Stage, drawing: "_Drawing") -> Iterator[Stage]:
         """Yield the stages from the begins of a template at which most blind planners fail.
 
         A recorded encounter has one begin, since its scenarios would count as of several else.
         """
-        whole = self._stage(road, template, 0)
-        _, fit = whole.planned.road_and_fit()
+        template = whole.planned.encounter
+        road, fit = whole.planned.road_and_fit()
         scenario = replay(template, fit, road.frame_id)
         family = blind_family(whole.top_speed)
         options: list[tuple[float, float, int]] = []
@@ -299,7 +272,7 @@ class Testing:
         for _, begin, count in sorted(options)[:BEGINS_COUNT]:
             encounter = with_delay(template, self.request.ego, count)
             first_row = round(-begin / template.dt)
-            yield self._stage(road, encounter, first_row)
+            yield replace(self._stage(road, encounter, first_row), notes=whole.notes)
             if template.decision is None and drawing.results:
                 return
 
@@ -435,7 +408,7 @@ class _Drawing:
             drawn = chain.sample(planned, Callbacks(progress, cancelled, accepts))
             causes.update(dict(causes_in_words(drawn.generated.refused)))
             if len(drawn):
-                self.results.append(_completed(drawn, chain))
+                self.results.append(_completed(drawn, stage))
         except RefusedError as error:
             causes[str(error)] += 1
         causes.update(selection.unfit - unfit)
@@ -447,11 +420,12 @@ class _Drawing:
         return selection.kept > kept
 
 
-def _completed(drawn: GenerationResult, chain: Chain) -> GenerationResult:
+def _completed(drawn: GenerationResult, stage: Stage) -> GenerationResult:
     """Return a set with its evaluation; it has as many scenarios as were requested of it."""
     notes = [note for note in drawn.generated.adaptations if note.kind is not NoteKind.CANCELLED]
-    generated = replace(drawn.generated, requested=len(drawn), adaptations=tuple(notes))
-    return completed(replace(drawn, generated=generated), chain.config, chain.request)
+    generated = replace(drawn.generated, requested=len(drawn), adaptations=(*stage.notes, *notes))
+    result = replace(drawn, generated=generated)
+    return completed(result, stage.chain.config, stage.chain.request)
 
 
 def with_delay(motion: AnyMotion, ego: str, count: int) -> AnyMotion:

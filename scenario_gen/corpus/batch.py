@@ -41,15 +41,14 @@ from scenario_gen.corpus.config import CorpusConfig
 from scenario_gen.corpus.encounters import encounter_of, row_of, tables_of, write_encounters
 from scenario_gen.corpus.tables import rows_at, rows_of, write_table
 from scenario_gen.corpus.tasks import agree, arriving, check_out, held, spread, undone, Workers
-from scenario_gen.method.chain import Chain
+from scenario_gen.method.chain import EmptySetError, generate_set
 from scenario_gen.method.config import PipelineConfig
 from scenario_gen.method.evaluation import criticality
 from scenario_gen.method.fitting import LostEncounterError
 from scenario_gen.method.outcome_sets import for_one_set, outcome_sets
 from scenario_gen.method.recombination import recombinations
-from scenario_gen.method.segmentation import segment
-from scenario_gen.roads import build_road, road_and_template
-from scenario_gen.situation import Situation
+from scenario_gen.method.shortening import fit_what_matters
+from scenario_gen.roads import build_road
 from scenario_gen.types import (
     Encounter,
     GenerationResult,
@@ -75,7 +74,8 @@ SCENARIO_COLUMNS = {
 }
 CASE_COLUMNS = {
     **dict.fromkeys(
-        ("template", "kind", "namespace", "refused", "cause", "why", "outcome"), "string"
+        ("template", "kind", "namespace", "refused", "cause", "why", "outcome", "shortened"),
+        "string",
     ),
     **dict.fromkeys(
         ("vehicles", "seed", "wanted", "published", "candidates", "part", "changepoints"), "int64"
@@ -155,6 +155,7 @@ class Batch:
         failures: cases without any scenario, by cause.
         refused: candidates refused, by cause.
         outcomes: scenarios by the outcome of the decision, if decisions were drawn.
+        shortened: sets from a shortened recording.
         failed: messages of the tasks that failed.
     """
 
@@ -164,6 +165,7 @@ class Batch:
     failures: dict[str, int]
     refused: dict[str, int]
     outcomes: dict[str, int]
+    shortened: int
     failed: list[str]
 
     def lines(self) -> list[str]:
@@ -174,6 +176,11 @@ class Batch:
         ]
         for outcome, count in Counter(self.outcomes).most_common():
             lines.append(f"{count} scenarios with the outcome: {outcome}")
+        if self.shortened:
+            lines.append(
+                f"{self.shortened} sets from a recording shortened to fit the road "
+                "(column shortened of cases/)"
+            )
         for cause, count in Counter(self.failures).most_common():
             lines.append(f"{count} cases without any: {cause}")
         for cause, count in Counter(self.refused).most_common():
@@ -337,12 +344,19 @@ def _generate_cases(
         "part": task.number,
         "changepoints": 0,
         "outcome": "",
+        "shortened": "",
     }
-    generate = partial(_generate_set, task, seed)
+    generate = partial(
+        fit_what_matters,
+        partial(_generate_set, task, seed),
+        shorten=request.config.fitting.shorten,
+    )
     sampling = request.config.sampling
     try:
         encounter = encounter_of(row, table)
         sets = outcome_sets(generate, encounter, sampling, Request(), request.count, seed)
+    except EmptySetError as error:
+        return [(case | _set_columns(error.result), None)]
     except (RefusedError, InputError) as error:
         return [(case | {"cause": _cause(error), "why": str(error)}, None)]
     names = [namespace, *(f"{namespace}_{n}" for n in range(1, len(sets)))]
@@ -356,16 +370,11 @@ def _generate_set(task: PartTask, seed: int, encounter: Encounter, count: int) -
     """Return scenarios from an encounter.
 
     Raises:
-        InputError, RefusedError: as the stages; an outcome of a decision has no valid scenario.
+        InputError, RefusedError: as `generate_set`.
     """
     config = task.request.config
     config = replace(config, sampling=for_one_set(config.sampling, encounter))
-    road, placed = road_and_template(task.road, encounter, config.road)
-    segmentation = segment(placed, config.segmentation, seed)
-    situation = Situation.of(placed)
-    result = Chain(situation, segmentation, road, config, count=count, seed=seed).run()
-    if encounter.decision is not None and not len(result):
-        raise RefusedError(NO_CANDIDATE)
+    result = generate_set(encounter, count, task.road, config=config, seed=seed)
     if isinstance(encounter.source, Recombined):
         result = result.noted(Note.of(NoteKind.RECOMBINED, **vars(encounter.source)))
     facts = {"template": encounter.recording, "roads": task.road, "seed": str(seed)}
@@ -376,6 +385,7 @@ def _generate_set(task: PartTask, seed: int, encounter: Encounter, count: int) -
 def _set_columns(result: GenerationResult) -> dict[str, Any]:
     """Return the columns of a case that follow from its result."""
     generated, decision = result.generated, result.encounter.decision
+    shortened = [note for note in generated.adaptations if note.kind is NoteKind.SHORTENED]
     refused = {str(cause): number for cause, number in sorted(generated.refused.items()) if number}
     return {
         "wanted": generated.requested,
@@ -385,6 +395,7 @@ def _set_columns(result: GenerationResult) -> dict[str, Any]:
         "changepoints": len(result.segmentation.changepoints),
         "cause": "" if len(result) else NO_CANDIDATE,
         "outcome": decision.outcome if decision else "",
+        "shortened": str(shortened[0].values["parts"]) if shortened else "",
     }
 
 
@@ -399,7 +410,7 @@ def _cause(error: RefusedError | InputError) -> str:
         return "input"
     words = [
         "…" if any(c.isdigit() for c in word) else word
-        for word in re.split(r"[:;(]", str(error))[0].split()
+        for word in re.split(r"[:;(]|\. ", str(error))[0].split()
     ]
     return shorten(" ".join(words), 80, placeholder=" …")
 
@@ -453,5 +464,12 @@ def summary(out: Place, failed: list[str]) -> Batch:
             outcomes[case["outcome"]] += int(case["published"])
     pairs = {(case["template"], case["seed"]) for case in cases}
     return Batch(
-        len(pairs), scenarios, requested, dict(failures), dict(refused), dict(outcomes), failed
+        len(pairs),
+        scenarios,
+        requested,
+        dict(failures),
+        dict(refused),
+        dict(outcomes),
+        sum(bool(case.get("shortened")) for case in cases),
+        failed,
     )

@@ -1,18 +1,29 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Fit, plan and sample: the stages between segmentation and evaluation, to repeat with changes."""
+"""All stages but the evaluation; those after the segmentation can be repeated with changes."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 
+from scenario_gen.base.errors import RefusedError
 from scenario_gen.method.config import PipelineConfig
 from scenario_gen.method.evaluation import measures_in
 from scenario_gen.method.fitting import fit_template
 from scenario_gen.method.routing import plan_routes
 from scenario_gen.method.sampling import Callbacks, Plan, sample_scenarios
+from scenario_gen.method.segmentation import segment
+from scenario_gen.roads import road_and_template
 from scenario_gen.situation import Situation, Wait
-from scenario_gen.types import Encounter, GenerationResult, Request, Road, Segmentation
+from scenario_gen.types import (
+    causes_in_words,
+    Encounter,
+    GenerationResult,
+    Request,
+    Road,
+    Segmentation,
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,3 +103,51 @@ class Chain:
             InputError, RefusedError: as the stages.
         """
         return self.sample(self.plan(), callbacks)
+
+
+class EmptySetError(RefusedError):
+    """No candidate is valid; `result` has the account of the candidates."""
+
+    def __init__(self, message: str, result: GenerationResult) -> None:
+        super().__init__(message)
+        self.result = result
+
+
+def generate_set(
+    encounter: Encounter,
+    count: int,
+    road: Road | Path | str,
+    *,
+    config: PipelineConfig,
+    seed: int,
+    request: Request = Request(),
+    callbacks: Callable[[Road], Callbacks] = lambda _: Callbacks(),
+    population: Sequence[Encounter] = (),
+) -> GenerationResult:
+    """Return scenarios from a template on a road.
+
+    Raises:
+        InputError, RefusedError: as the stages.
+        EmptySetError: there is none; the message has the causes of all refusals, and the notes.
+    """
+    road, encounter = road_and_template(road, encounter, config.road)
+    segmentation = segment(encounter, config.segmentation, seed)
+    chain = Chain(
+        Situation.of(encounter),
+        segmentation,
+        road,
+        config,
+        request,
+        count,
+        seed,
+        population=population,
+    )
+    result = chain.run(callbacks(road))
+    if not len(result):
+        generated = result.generated
+        refused = causes_in_words(generated.refused)
+        causes = ", ".join(f"{number} × {cause}" for cause, number in refused)
+        reasons = "; ".join((causes or "none was drawn", *map(str, generated.adaptations)))
+        message = f"none of {generated.candidates} candidates is valid: {reasons}"
+        raise EmptySetError(message, result)
+    return result

@@ -31,13 +31,16 @@ from scenario_gen.types import Encounter, GenerationResult, Note, NoteKind
 GenerateSet = Callable[[Encounter, int], GenerationResult]
 
 
-def fit_what_matters(generate: GenerateSet, encounter: Encounter, count: int) -> GenerationResult:
+def fit_what_matters(
+    generate: GenerateSet, encounter: Encounter, count: int, *, shorten: bool = True
+) -> GenerationResult:
     """Return the scenarios of a recording, or of a shortened one if the whole does not fit.
 
     Args:
         generate: returns so many scenarios from a template.
         encounter: the recording.
         count: scenarios.
+        shorten: whether the recording may be shortened.
 
     Raises:
         RefusedError: as `generate` for the whole recording; the message has the lanes that its
@@ -47,16 +50,32 @@ def fit_what_matters(generate: GenerateSet, encounter: Encounter, count: int) ->
     refuse_too_large(encounter)
     try:
         return generate(encounter, count)
-    except TargetError:
-        raise
     except RefusedError as error:
-        refusal = error
-    search = _Search(generate, Situation.of(encounter))
-    shortest = search.shortest_loss()
-    if shortest is None:
-        raise search.with_remedy(refusal) from refusal
-    note = Note.of(NoteKind.SHORTENED, parts=in_words(encounter, shortest), reason=refusal)
-    return generate(shortest, count).noted(note)
+        if not shorten or isinstance(error, TargetError):
+            raise
+        part, note = fitting_part(lambda part: generate(part, 1), encounter, error)
+    return generate(part, count).noted(note)
+
+
+def fitting_part(
+    attempt: Callable[[Encounter], object], encounter: Encounter, refusal: RefusedError
+) -> tuple[Encounter, Note]:
+    """Return the part of a recording that fits with the smallest loss, and a note on it.
+
+    Args:
+        attempt: raises a RefusedError if a recording does not fit.
+        encounter: the recording.
+        refusal: why the whole does not fit.
+
+    Raises:
+        RefusedError: the refusal, with the lanes that the shortest form needs: it does not fit.
+    """
+    search = _Search(attempt, Situation.of(encounter))
+    part = search.shortest_loss()
+    if part is None:
+        search.add_remedy(refusal)
+        raise refusal
+    return part, Note.of(NoteKind.SHORTENED, parts=in_words(encounter, part), reason=refusal)
 
 
 def cut(encounter: Encounter, windows: Floats) -> Encounter:
@@ -83,7 +102,7 @@ def in_words(encounter: Encounter, part: Encounter) -> str:
 class _Search:
     """The search for the shortest loss with which a recording fits."""
 
-    generate: GenerateSet
+    attempt: Callable[[Encounter], object]
     situation: Situation
     refusals: list[tuple[Encounter, RefusedError]] = field(default_factory=list)
 
@@ -126,10 +145,10 @@ class _Search:
                     break
         return best
 
-    def with_remedy(self, refusal: RefusedError) -> RefusedError:
-        """Return a refusal with the lanes that the shortest form of the recording needs."""
+    def add_remedy(self, refusal: RefusedError) -> None:
+        """Add to a refusal the lanes that the shortest form of the recording needs."""
         if not self.refusals:
-            return refusal
+            return
         part, error = self.refusals[-1]
         needed = [
             f"vehicle {track.vehicle.id} {describe_turn(turn_of(track))} within "
@@ -138,9 +157,9 @@ class _Search:
             if not track.still
         ]
         used = in_words(self.situation.encounter, part)
-        return type(refusal)(
+        refusal.args = (
             f"{refusal}. Shortened to its interaction ({used}), it needs a road on which "
-            f"{' and '.join(needed)}: {error}"
+            f"{' and '.join(needed)}: {error}",
         )
 
     def _fitting(self, windows: Floats) -> Encounter | None:
@@ -149,7 +168,7 @@ class _Search:
         if not keeps_interaction(self.situation, Situation.of(part)):
             return None
         try:
-            self.generate(part, 1)
+            self.attempt(part)
         except RefusedError as error:
             self.refusals.append((part, error))
             return None

@@ -13,7 +13,9 @@ from scenario_gen.method.config import PipelineConfig
 from scenario_gen.method.fitting import fit_template
 from scenario_gen.method.sampling import TargetError
 from scenario_gen.method.segmentation import segment
+from scenario_gen.method.shortening import cut
 from scenario_gen.roads import (
+    CORRIDOR,
     drives_about_ring,
     NoPlaceError,
     road_and_template,
@@ -22,6 +24,7 @@ from scenario_gen.roads import (
 )
 from scenario_gen.situation import (
     conflict_of,
+    interaction_windows,
     refuse_reversing,
     refuse_too_large,
     Situation,
@@ -101,15 +104,24 @@ def on_first_suitable_road(
 def with_suitable_roads(
     error: RefusedError, encounter: Encounter, road: Road | str, config: PipelineConfig, seed: int
 ) -> RefusedError:
-    """Return a refusal with the names of suitable roads if the road is the reason."""
+    """Return a refusal with the names of suitable roads if the road is the reason.
+
+    If the whole recording fits none but the corridor, the names for its interaction are added.
+    """
     with suppress(RefusedError):
         refuse_too_large(encounter)
         situation = Situation.of(encounter)
         segmentation = segment(encounter, config.segmentation, seed)
         no_place = isinstance(error, NoPlaceError)
         if no_place or not fits_road(road, situation, segmentation, config):
-            names = ", ".join(suitable_roads(situation, segmentation, config))
-            return RefusedError(f"{error}. It fits these roads: {names}" if names else str(error))
+            names = list(suitable_roads(situation, segmentation, config))
+            advice = f". It fits these roads: {', '.join(names)}" if names else ""
+            if config.fitting.shorten and not set(names) - {CORRIDOR}:
+                part = cut(encounter, interaction_windows(situation))
+                segmentation = segment(part, config.segmentation, seed)
+                more = ", ".join(suitable_roads(Situation.of(part), segmentation, config))
+                advice += f". Shortened to its interaction, it fits: {more}" if more else ""
+            return RefusedError(f"{error}{advice}")
     return error
 
 

@@ -12,7 +12,10 @@ from test_verdict import straight
 from typer.testing import CliRunner
 
 from benchmarks._driving_worlds import as_scenario
+from scenario_gen.base.errors import RefusedError
+from scenario_gen.base.parameters import updated
 from scenario_gen.cli.commands import app
+from scenario_gen.closed_loop import reacting
 from scenario_gen.closed_loop.blind import blind_passes, blind_rate, BlindPlanner
 from scenario_gen.closed_loop.config import ClosedLoopConfig
 from scenario_gen.closed_loop.ego import Command
@@ -28,9 +31,13 @@ from scenario_gen.closed_loop.results import Drives
 from scenario_gen.closed_loop.simulation import ClosedLoop
 from scenario_gen.closed_loop.trials import read_trials, run_trials
 from scenario_gen.closed_loop.verdict import judge
+from scenario_gen.logs import read_log
 from scenario_gen.logs.synthetic import bundled
+from scenario_gen.method.sampling import TargetError
 from scenario_gen.output.review.regenerate import regenerate_scenario
 from scenario_gen.output.review.validation import validate_bag
+from scenario_gen.pipeline import PipelineConfig
+from scenario_gen.types import Request
 
 
 class Steady(RouteFollower):
@@ -114,6 +121,41 @@ def test_a_refusal_names_the_stages_and_their_causes(tmp_path):
     output = " ".join(str(done.exception or done.output).split())
     assert done.exit_code != 0 and "for testing ego 1: 0 of 1 scenarios found" in output
     assert "--ego 2" in output
+
+
+def test_a_recording_whose_meeting_is_over_is_refused_at_once(tmp_path):
+    words = (
+        str(bundled("ngsim_left_turn")),
+        "--road",
+        "four_way",
+        "--ego",
+        "auto",
+        "--count",
+        "1",
+    )
+    done = generated(tmp_path / "none", *words)
+    output = " ".join(str(done.exception or done.output).split())
+    assert done.exit_code != 0
+    assert "vehicle 21019 leaves their shared area 0.2 s after the recording begins" in output
+
+
+def test_a_recording_that_does_not_fit_is_shortened_if_that_is_allowed(monkeypatch):
+    whole = read_log("examples/my_log.csv").encounters[0]
+
+    def refuse(road, template, config):
+        raise RefusedError("the road is too short")
+
+    def no_part(attempt, template, refusal):
+        with pytest.raises(RefusedError, match="too short"):
+            attempt(template)
+        raise RefusedError(f"{refusal} for all parts")
+
+    monkeypatch.setattr(reacting, "road_and_template", refuse)
+    monkeypatch.setattr(reacting, "fitting_part", no_part)
+    for allowed, why in ((True, "too short for all parts"), (False, "too short;")):
+        config = updated(PipelineConfig(), {"fitting.shorten": allowed})
+        with pytest.raises(TargetError, match=why):
+            reacting.Testing(whole, "four_way", config, Request(ego="2"), 7).run(1)
 
 
 def test_a_search_ends_with_its_budget(tmp_path):

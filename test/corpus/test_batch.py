@@ -23,6 +23,7 @@ from scenario_gen.corpus.encounters import encounter_of, tables_of
 from scenario_gen.corpus.find import coverage_lines, export_hits, find, make_again
 from scenario_gen.corpus.tables import rows_of
 from scenario_gen.corpus.tasks import Workers
+from scenario_gen.method.chain import generate_set
 from scenario_gen.method.config import PipelineConfig
 from scenario_gen.method.evaluation import criticality
 from scenario_gen.method.fitting import LostEncounterError
@@ -305,16 +306,36 @@ def test_a_road_that_is_none_is_an_error_at_once(corpus, tmp_path):
 def test_like_refusals_are_counted_under_one_cause(
     corpus, tmp_path, monkeypatch, kind, why, failures
 ):
-    def refuse(attempt):
-        raise kind(f"road {attempt.road.name} {why}")
+    def refuse(_encounter, _count, road, **_):
+        raise kind(f"road {road} {why}")
 
-    monkeypatch.setattr(batches.Chain, "run", refuse)
+    monkeypatch.setattr(batches, "generate_set", refuse)
     made = run_batch(
         corpus[0], ROADS, tmp_path / "out", BatchRequest(count=1), templates=2, workers=Workers(1)
     )
     assert made.failures == failures and not made.failed
     cases = list(rows_of(sorted((tmp_path / "out" / "cases").rglob("*.parquet"))))
     assert {case["why"].split()[1] for case in cases} == set(ROADS)
+
+
+def test_a_recording_that_is_too_long_for_a_road_is_shortened_and_made_again(
+    corpus, tmp_path, monkeypatch
+):
+    row = next(rows_of(tables_of(corpus[0])))
+    limit = 0.95 * encounter_of(row).duration
+
+    def short_road(encounter, *arguments, **others):
+        if encounter.duration > limit:
+            raise RefusedError("the road is too short")
+        return generate_set(encounter, *arguments, **others)
+
+    monkeypatch.setattr(batches, "generate_set", short_road)
+    out, workers = tmp_path / "out", Workers(1)
+    made = run_batch(corpus[0], ["corridor"], out, REQUEST, templates=1, workers=workers)
+    (case,) = rows_of(sorted((out / "cases").rglob("*.parquet")))
+    assert made.shortened == 1 and case["published"] == REQUEST.count
+    assert "shortened" in " ".join(made.lines()) and " of " in case["shortened"]
+    assert make_again(out, find(out).rows[0]).sha256 == find(out).rows[0]["sha256"]
 
 
 def test_drawn_decisions_have_a_set_for_each_outcome(corpus, tmp_path):
