@@ -23,6 +23,7 @@ _PACKED_SUFFIXES = (".gz", ".zip")
 _MCAP_MAGIC = b"\x89MCAP0\r\n\x01"
 _MCAP_PROFILE = slice(17, 25)  # after the magic, the header's opcode and its length
 _ROS2_PROFILE = b"\x04\0\0\0ros2"
+_J2735_MARKS = (b'"coredata"', b'"signalgroup"')
 _OSI_MARKS = (b"net.asam.osi", b"osi3.", b"ground_truth")
 
 Predicate = Callable[[Path], bool]
@@ -83,12 +84,19 @@ def is_spmd(path: Path) -> bool:
     return len(fields) == 19 and all(map(_is_number_or_empty, fields))
 
 
+def is_sumo(path: Path) -> bool:
+    """Return whether a file has SUMO's floating-car data, or the net or lights that go with it."""
+    marks = (b"<fcd-export", b"<tlsStates", b"<net ")
+    return path.suffix.lower() == ".xml" and any(mark in _head(path) for mark in marks)
+
+
 def is_bsm(path: Path) -> bool:
-    """Return whether a file has basic safety messages, in JSON or in a table made from it."""
+    """Return whether a file has messages of J2735, in JSON or in a table made from it."""
     if path.suffix.lower() == ".csv":
         return b"coredata_position_lat" in _head(path).lower()
     is_json = path.suffix.lower() in (".json", ".jsonl", ".ndjson", ".txt")
-    return is_json and b'"coredata"' in _head(path).lower()
+    head = _head(path).lower()
+    return is_json and any(mark in head for mark in _J2735_MARKS)
 
 
 def is_nmea(path: Path) -> bool:
@@ -218,9 +226,7 @@ LOG_FORMATS = Registry[LogFormat](
             _lazy_reader("adapters.openscenario"),
         ),
         "bsm": LogFormat(is_bsm, _lazy_reader("adapters.bsm")),
-        "fcd": LogFormat(
-            lambda path: _starts_with(path, b"<fcd-export", ".xml"), _lazy_reader("adapters.fcd")
-        ),
+        "fcd": LogFormat(is_sumo, _lazy_reader("adapters.fcd")),
         "nocturne": LogFormat(
             lambda path: _starts_with(path, b'"objects"', ".json"),
             _lazy_reader("adapters.nocturne"),

@@ -3,7 +3,7 @@
 
 """Traffic lights of a log: recorded states, and the lights of encounters that are cut from it."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from itertools import combinations
@@ -14,6 +14,7 @@ import numpy as np
 
 from scenario_gen.base.documents import shown
 from scenario_gen.base.errors import InputError
+from scenario_gen.logs.geodesy import local_frame
 from scenario_gen.numerics import Floats, Ints, wrap_angle
 from scenario_gen.numerics.plane import unit, unit_left
 from scenario_gen.types import (
@@ -62,6 +63,7 @@ class RawSignal:
             where the front of vehicles is that last saw the light.
         lanes: ids of its lanes.
         seen: until when [s] each vehicle saw it, of those that went on without it.
+        geographic: `line` is in latitude and longitude [degrees].
     """
 
     id: str
@@ -70,6 +72,7 @@ class RawSignal:
     line: Floats = field(default_factory=lambda: np.zeros((0, 2)))
     lanes: tuple[str, ...] = ()
     seen: Mapping[str, float] = field(default_factory=dict)
+    geographic: bool = False
 
 
 def signals_of_table(frame: "DataFrame", place: str) -> tuple[list[RawSignal], list[str]]:
@@ -181,6 +184,19 @@ def sampled_schedule(
     return SignalSchedule.of_samples(known_at, known, times[-1] + usual)
 
 
+def most_permissive(states: Iterable[SignalState]) -> SignalState:
+    """Return the state that permits most, of lights for several directions from one lane."""
+    order = (SignalState.UNKNOWN, SignalState.GREEN, SignalState.OFF, SignalState.YELLOW)
+    order += (SignalState.RED_YELLOW, SignalState.RED)
+    return min(states, key=order.index)
+
+
+def line_across(end: Floats, yaw: float, width: float) -> Floats:
+    """Return the stop line (2, 2) [m] of a lane that ends at a point (2,) [m], left end first."""
+    sideways = 0.5 * width * unit_left(yaw)
+    return np.stack((end + sideways, end - sideways))
+
+
 def with_lights(encounter: Encounter, signals: Sequence[RawSignal]) -> Encounter:
     """Return an encounter with the lights of its log.
 
@@ -194,6 +210,10 @@ def with_lights(encounter: Encounter, signals: Sequence[RawSignal]) -> Encounter
         subject = f"{signal.place}: traffic light {signal.id}"
         schedule = signal.schedule.moved(-start_s)
         line = signal.line
+        if signal.geographic:
+            if encounter.origin is None:
+                continue
+            line = local_frame(line[:, 0], line[:, 1], encounter.origin)
         if not len(line):
             if not any(vehicle in encounter.ids for vehicle in signal.seen):
                 continue

@@ -11,7 +11,8 @@
 | heading | angle | degrees clockwise from north |
 | speed | speed | m/s |
 
-The format has no sizes: a car has those of the parameters `length` and `width`.
+The format has no sizes: a car has those of the parameters `length` and `width`. The net and the
+recorded states of its traffic lights may be given with it (sumo_lights).
 
 Source: SUMO's user documentation, FCDOutput.
 """
@@ -27,9 +28,11 @@ import pandas as pd
 
 from scenario_gen.base.errors import InputError
 from scenario_gen.base.xml_reader import Element, read_xml
+from scenario_gen.logs.adapters.sumo_lights import read_lights
 from scenario_gen.logs.config import LogConfig
 from scenario_gen.logs.kinds import type_called, usual_size
-from scenario_gen.logs.raw import check_size, only_file, RawLog, Segment
+from scenario_gen.logs.raw import check_size, RawLog, Segment
+from scenario_gen.logs.signals import RawSignal
 from scenario_gen.logs.stamps import MAX_STAMP_S
 from scenario_gen.logs.tables import from_frame
 
@@ -43,9 +46,10 @@ def read(paths: Sequence[Path], config: LogConfig) -> RawLog:
     Raises:
         InputError: the file is damaged or too large, or an attribute is missing; names the line.
     """
-    path = only_file(paths, config)
+    roots = _roots(paths, config)
+    path = paths[list(roots).index("fcd-export")]
     rows: list[dict[str, Any]] = []
-    for step in read_xml(path, str(path)).findall("timestep"):
+    for step in roots["fcd-export"].findall("timestep"):
         time = step.number("time")
         rows += [{"time": time, **_state(element)} for element in step]
         check_size(str(path), 0, len(rows), config)
@@ -55,7 +59,8 @@ def read(paths: Sequence[Path], config: LogConfig) -> RawLog:
     seconds = frame["time"].clip(-MAX_STAMP_S, MAX_STAMP_S)
     frame["time"] = (seconds * 1e9).round().astype(np.int64)
     frame["time_ok"] = True
-    if _is_in_degrees(frame):
+    is_in_degrees = _is_in_degrees(frame)
+    if is_in_degrees:
         frame = frame.rename(columns={"x": "lon", "y": "lat"})
     else:
         sizes = frame["kind"].map(lambda kind: usual_size(type_called(kind) or "", config))
@@ -63,9 +68,37 @@ def read(paths: Sequence[Path], config: LogConfig) -> RawLog:
         heading = frame["heading"].fillna(0.0)
         frame["x"] -= half_length * np.cos(heading)
         frame["y"] -= half_length * np.sin(heading)
-    log = from_frame(frame, paths, (Segment(0, str(path), "vehicle", 1),), config)
-    note = "read as SUMO's floating-car data: x, y are those of the front bumper"
-    return replace(log, notes=(note, *log.notes))
+    log = from_frame(frame, [path], (Segment(0, str(path), "vehicle", 1),), config)
+    notes = ["read as SUMO's floating-car data: x, y are those of the front bumper"]
+    signals: Sequence[RawSignal] = ()
+    if config.signals == "recorded" and is_in_degrees and len(roots) > 1:
+        notes.append("traffic lights are left out: the vehicles are in degrees, the net in metres")
+    elif config.signals == "recorded":
+        signals = read_lights(roots.get("net"), roots.get("tlsStates"), notes)
+    return replace(log, notes=(*notes, *log.notes), signals=tuple(signals))
+
+
+def _roots(paths: Sequence[Path], config: LogConfig) -> dict[str, Element]:
+    """Return the roots of files of one simulation by their tags, in the order of the files.
+
+    Raises:
+        InputError: a file is damaged, two are of one kind, or none has vehicles.
+    """
+    roots: dict[str, Element] = {}
+    for path in paths:
+        check_size(str(path), path.stat().st_size, 0, config)
+        root = read_xml(path, str(path))
+        if root.tag in roots:
+            raise InputError(
+                f"{path} and {roots[root.tag].file}: each has its own clock; read one at a time"
+            )
+        roots[root.tag] = root
+    if "fcd-export" not in roots:
+        raise InputError(
+            f"{paths[0]} has no vehicles; give the floating-car data (--fcd-output) of its "
+            "simulation, too"
+        )
+    return roots
 
 
 def _state(element: Element) -> dict[str, Any]:

@@ -14,7 +14,14 @@
 | heading | heading, counter-clockwise from +x | degrees (Nocturne) or rad (GPUDrive) |
 | speed | velocity: x, y | m/s |
 
-The unit of the headings is determined from the velocities.
+| quantity | key of an entry of `tl_states`, which is named after its lane | unit |
+|---|---|---|
+| state | state: stop, caution, go, with arrow_ or flashing_ before it | |
+| time | time_index, times 0.1 s | |
+| place | x, y: where the lane's traffic stops | m |
+
+The unit of the headings is determined from the velocities. The direction of a stop line is that of
+the lane in `roads` at its place.
 
 Source: the documentation of Nocturne's and of GPUDrive's scenes.
 """
@@ -27,7 +34,7 @@ from typing import Any
 
 import numpy as np
 
-from scenario_gen.base.errors import InputError
+from scenario_gen.base.errors import guarded, InputError
 from scenario_gen.logs.config import LogConfig
 from scenario_gen.logs.raw import (
     check_size,
@@ -37,8 +44,12 @@ from scenario_gen.logs.raw import (
     RawLog,
     Segment,
 )
+from scenario_gen.logs.signals import line_across, RawSignal, sampled_schedule, state_of
 from scenario_gen.numerics import Floats
+from scenario_gen.types import SignalState
 
+_LANE_WIDTH_M = 3.5  # of stop lines: the format has no widths
+_MAX_LANE_DISTANCE_M = 5.0  # from a stop line to its lane
 _MOVING_MPS = 2.0  # a faster vehicle has the direction of its velocity
 _MAX_SPEED_MPS = 1000.0  # higher values mark absence
 
@@ -51,7 +62,8 @@ def read(paths: Sequence[Path], config: LogConfig) -> RawLog:
             object.
     """
     path = only_file(paths, config)
-    objects = _objects(path)
+    scene = _scene(path)
+    objects = _objects(path, scene)
     check_vehicles(str(path), len(objects), config)
     names = [str(item.get("id", k)) for k, item in enumerate(objects)]
     if len(set(names)) < len(names):
@@ -70,21 +82,99 @@ def read(paths: Sequence[Path], config: LogConfig) -> RawLog:
         vehicles.append(_observations(name, item, state, first_row, are_degrees))
         first_row += len(state)
     unit = "degrees" if are_degrees else "rad"
-    notes = (f"read as a scene of Nocturne or GPUDrive, headings in {unit}",)
+    notes = [f"read as a scene of Nocturne or GPUDrive, headings in {unit}"]
+    signals = _signals(path, scene, notes) if config.signals == "recorded" else []
     segment = Segment(0, str(path), "state", 1)
-    return RawLog(path.stem, False, tuple(vehicles), n_rows, (segment,), notes)
+    return RawLog(
+        path.stem,
+        False,
+        tuple(vehicles),
+        n_rows,
+        (segment,),
+        tuple(notes),
+        signals=tuple(signals),
+    )
 
 
-def _objects(path: Path) -> list[dict[str, Any]]:
+def _scene(path: Path) -> Any:
+    """Return the document of a scene.
+
+    Raises:
+        InputError: the file is not JSON.
+    """
+    try:
+        return json.loads(path.read_bytes())
+    except (ValueError, RecursionError) as error:
+        raise InputError(f"{path} is not JSON: {str(error)[:200]}; copy it again") from None
+
+
+def _signals(path: Path, scene: Mapping[str, Any], notes: list[str]) -> list[RawSignal]:
+    """Return the lights of a scene; a note on those without a lane is appended.
+
+    Raises:
+        InputError: an entry is damaged, or a state is not known.
+    """
+    entries = scene.get("tl_states") or {}
+    if not isinstance(entries, Mapping):
+        raise InputError(f"{path}: `tl_states` is not an object with an entry for each lane")
+    signals = []
+    without_lane = []
+    edges = _lane_edges(path, scene) if entries else np.zeros((0, 4))
+    for name, entry in entries.items():
+        place = f"{path}: traffic light {name}"
+        with guarded(place, LookupError, TypeError, ValueError, OverflowError):
+            points = np.column_stack([entry["x"], entry["y"]]).astype(float)
+            steps = [int(step) for step in entry["time_index"]]
+            words = [str(word).removeprefix("arrow_") for word in entry["state"]]
+        if not len(steps) == len(points) == len(words) > 0:
+            raise InputError(f"{place}: state, x, y and time_index differ in length, or are empty")
+        times = [0.1 * step for step in steps]
+        states = [
+            SignalState.OFF if word.startswith("flashing") else state_of(word, place)
+            for word in words
+        ]
+        yaw = _lane_yaw(points[0], edges)
+        if math.isnan(yaw):
+            without_lane.append(str(name))
+            continue
+        line = line_across(points[0], yaw, _LANE_WIDTH_M)
+        schedule = sampled_schedule(times, states, place)
+        signals.append(RawSignal(str(name), schedule, str(path), line, (str(name),)))
+    if without_lane:
+        notes.append(f"traffic lights without a lane are left out: {', '.join(without_lane)}")
+    return signals
+
+
+def _lane_yaw(point: Floats, edges: Floats) -> float:
+    """Return the direction [rad] of the lane at a point (2,); NaN if there is none near it."""
+    start = edges[:, :2]
+    edge = edges[:, 2:]
+    length = np.maximum(np.hypot(*edge.T), 1e-6)
+    share = np.clip(((point - start) * edge).sum(axis=1) / length**2, 0.0, 1.0)
+    distance = np.hypot(*(start + share[:, None] * edge - point).T)
+    if not len(edges) or distance.min() > _MAX_LANE_DISTANCE_M:
+        return math.nan
+    nearest = edge[np.argmin(distance)]
+    return float(np.arctan2(nearest[1], nearest[0]))
+
+
+def _lane_edges(path: Path, scene: Mapping[str, Any]) -> Floats:
+    """Return the first point and the vector of each edge of the lanes (K, 4) [m]."""
+    edges = [np.zeros((0, 4))]
+    for road in scene.get("roads", ()):
+        if isinstance(road, Mapping) and road.get("type") == "lane":
+            with guarded(f"{path}: a lane", LookupError, TypeError, ValueError, OverflowError):
+                points = _vectors(road["geometry"])
+            edges.append(np.column_stack([points[:-1], np.diff(points, axis=0)]))
+    return np.concatenate(edges)
+
+
+def _objects(path: Path, scene: Any) -> list[dict[str, Any]]:
     """Return the objects of a scene.
 
     Raises:
-        InputError: the file is not JSON, or has no objects.
+        InputError: it has no objects.
     """
-    try:
-        scene = json.loads(path.read_bytes())
-    except (ValueError, RecursionError) as error:
-        raise InputError(f"{path} is not JSON: {str(error)[:200]}; copy it again") from None
     objects = scene.get("objects") if isinstance(scene, dict) else None
     if not isinstance(objects, list) or not all(isinstance(item, dict) for item in objects):
         raise InputError(f"{path}: `objects` is not a list of objects")

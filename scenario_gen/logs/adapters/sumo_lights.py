@@ -1,0 +1,143 @@
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""Traffic lights of SUMO: the links of a net, and their states over time.
+
+| quantity | element: attribute | unit |
+|---|---|---|
+| stop line | lane: shape, width; its end | m |
+| light | connection: tl, linkIndex, from, fromLane | |
+| cycle, of static programs | tlLogic: offset; phase: duration, state | s |
+| recorded states | tlsState: time, id, state (SaveTLSStates) | s |
+
+The states of `tlsState` come before those of the cycle. A state has a letter for each link. Links
+from one lane share a stop line: the most permissive state counts.
+
+Source: SUMO's user documentation, Traffic Lights, Networks, Output/Traffic Lights.
+"""
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from scenario_gen.base.errors import InputError
+from scenario_gen.base.xml_reader import Element
+from scenario_gen.logs.signals import (
+    line_across,
+    most_permissive,
+    naming,
+    RawSignal,
+    sampled_schedule,
+    state_of,
+)
+from scenario_gen.numerics import Floats
+from scenario_gen.types import SignalSchedule, SignalState
+
+
+def read_lights(
+    net: Element | None, states: Element | None, notes: list[str]
+) -> Sequence[RawSignal]:
+    """Return the lights of the lanes of a net; notes on others are appended.
+
+    Args:
+        net: the root of the net; without it no stop line is known.
+        states: the root of the recorded states.
+        notes: of the log.
+
+    Raises:
+        InputError: an attribute is missing, or a state is not known; names the line.
+    """
+    if net is None:
+        if states is not None:
+            notes.append(
+                "the states of traffic lights are left out: give the net (.net.xml), too, which "
+                "has their stop lines"
+            )
+        return ()
+    lanes = {lane.attribute("id"): lane for lane in net.findall("edge/lane")}
+    recorded = _recorded(states)
+    cycles = {logic.attribute("id"): logic for logic in net.findall("tlLogic")}
+    links: dict[tuple[str, str], list[int]] = {}
+    for link in net.findall("connection[@tl]"):
+        lane = f"{link.attribute('from')}_{link.attribute('fromLane')}"
+        links.setdefault((link.attribute("tl"), lane), []).append(int(link.number("linkIndex")))
+
+    signals = []
+    unknown = set()
+    for (name, lane), indices in sorted(links.items()):
+        schedule = None
+        if name in recorded:
+            schedule = _schedule_of(recorded[name], indices)
+        elif name in cycles and cycles[name].get("type", "static") == "static":
+            schedule = _cycle_of(cycles[name], indices)
+        if schedule is None or lane not in lanes:
+            unknown.add(name)
+            continue
+        place = net.file if name not in recorded or states is None else states.file
+        signals.append(RawSignal(f"{name}/{lane}", schedule, place, _line(lanes[lane]), (lane,)))
+    if unknown:
+        notes.append(
+            f"traffic lights whose states are not known are left out: {', '.join(sorted(unknown))}"
+            '; record them with <timedEvent type="SaveTLSStates">'
+        )
+    return signals
+
+
+def _recorded(states: Element | None) -> Mapping[str, list[Element]]:
+    """Return the recorded states by light."""
+    recorded: dict[str, list[Element]] = {}
+    for state in () if states is None else states.findall("tlsState"):
+        recorded.setdefault(state.attribute("id"), []).append(state)
+    return recorded
+
+
+def _schedule_of(samples: Sequence[Element], indices: Sequence[int]) -> SignalSchedule:
+    times = [sample.number("time") for sample in samples]
+    place = f"{samples[0].file}: traffic light {samples[0].attribute('id')}"
+    return sampled_schedule(times, [_state(sample, indices) for sample in samples], place)
+
+
+def _cycle_of(logic: Element, indices: Sequence[int]) -> SignalSchedule:
+    phases = logic.findall("phase")
+    durations = [phase.number("duration") for phase in phases]
+    states = [_state(phase, indices) for phase in phases]
+    with naming(f"{logic.place}: traffic light {logic.attribute('id')}"):
+        return SignalSchedule.cycle(durations, states, logic.number("offset", 0.0))
+
+
+def _state(element: Element, indices: Sequence[int]) -> SignalState:
+    """Return the most permissive state of some links.
+
+    Raises:
+        InputError: the state has no letter for a link, or an unknown one.
+    """
+    letters = element.attribute("state")
+    if not 0 <= min(indices) <= max(indices) < len(letters):
+        raise InputError(
+            f"{element.place}: its state has {len(letters)} letters, and the net has links "
+            f"with indices {min(indices)} to {max(indices)}; give the net of this simulation"
+        )
+    # `s` is red with a green arrow: who turns right may go after a stop.
+    states = {
+        SignalState.OFF if letters[k] == "s" else state_of(letters[k], element.place)
+        for k in indices
+    }
+    return most_permissive(states)
+
+
+def _line(lane: Element) -> Floats:
+    """Return the stop line (2, 2) [m] at the end of a lane.
+
+    Raises:
+        InputError: its shape is damaged.
+    """
+    words = lane.attribute("shape").split()
+    try:
+        points = np.array([word.split(",")[:2] for word in words[-2:]], dtype=float)
+    except ValueError:
+        points = np.zeros((0, 2))
+    if points.shape != (2, 2) or not np.isfinite(points).all():
+        raise InputError(f"{lane.place}: its shape is not a list of points x,y")
+    step = points[1] - points[0]
+    width = lane.number("width", 3.2)  # SUMO's default
+    return line_across(points[1], float(np.arctan2(step[1], step[0])), width)

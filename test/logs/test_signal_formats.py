@@ -1,0 +1,244 @@
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""States of traffic lights in the files of other programs."""
+
+import json
+
+import numpy as np
+import pandas as pd
+import pytest
+from support.signalised import signalised
+
+from scenario_gen import read_log
+from scenario_gen.base.errors import InputError
+
+GREEN = 13.0
+NET = """<net version="1.16">
+<edge id="west"><lane id="west_0" index="0" shape="-90,-1.75 -8,-1.75" width="3.5"/></edge>
+<edge id="south"><lane id="south_0" index="0" shape="1.75,-90 1.75,-8" width="3.5"/></edge>
+<tlLogic id="J" type="static" programID="0" offset="-2"><phase duration="10" state="Gr"/>
+<phase duration="3" state="yr"/><phase duration="2" state="rr"/><phase duration="20" state="rG"/>
+</tlLogic>
+<connection from="west" to="east" fromLane="0" toLane="0" tl="J" linkIndex="0"/>
+<connection from="south" to="north" fromLane="0" toLane="0" tl="J" linkIndex="1"/></net>"""
+
+
+def letters(time):
+    """The state of both links at a time of the drawn recording."""
+    west = "G" if time < GREEN - 5.0 else "y" if time < GREEN - 2.0 else "r"
+    return west + ("r" if time < GREEN else "G")
+
+
+def sumo(folder):
+    """Write the recording as SUMO's floating-car data; return the file."""
+    steps = []
+    for time, rows in signalised(GREEN).groupby("time"):
+        cars = "".join(
+            f'<vehicle id="{row.vehicle}" x="{row.x + 2.4 * np.cos(row.heading)}" '
+            f'y="{row.y + 2.4 * np.sin(row.heading)}" angle="{90 - np.degrees(row.heading)}" '
+            f'speed="{row.speed}" type="car"/>'
+            for row in rows.itertuples()
+        )
+        steps.append(f'<timestep time="{time}">{cars}</timestep>')
+    (folder / "fcd.xml").write_text(f"<fcd-export>{''.join(steps)}</fcd-export>")
+    (folder / "net.xml").write_text(NET)
+    states = "".join(
+        f'<tlsState time="{t:.1f}" id="J" programID="0" phase="0" state="{letters(t)}"/>'
+        for t in np.arange(0.0, 30.0, 0.1)
+    )
+    (folder / "tls.xml").write_text(f"<tlsStates>{states}</tlsStates>")
+    return folder / "fcd.xml"
+
+
+def scene(folder):
+    """Write the recording as a scene of Nocturne; return the file."""
+    table = signalised(GREEN)
+    steps = range(round(table.time.max() * 10) + 1)
+    objects = []
+    for name, rows in table.groupby("vehicle"):
+        states = {round(row.time * 10): row for row in rows.itertuples()}
+        known = [states.get(k) for k in steps]
+        objects.append(
+            {
+                "id": int(name),
+                "type": "vehicle",
+                "length": 4.8,
+                "width": 1.9,
+                "valid": [row is not None for row in known],
+                "position": [
+                    {"x": row.x, "y": row.y} if row else {"x": 0, "y": 0} for row in known
+                ],
+                "heading": [row.heading if row else 0.0 for row in known],
+                "velocity": [
+                    {"x": row.speed * np.cos(row.heading), "y": row.speed * np.sin(row.heading)}
+                    if row
+                    else {"x": 0, "y": 0}
+                    for row in known
+                ],
+            }
+        )
+    words = {"G": "go", "y": "arrow_caution", "r": "stop"}
+    lights = {
+        lane: {
+            "state": [words[letters(k / 10)[link]] for k in steps],
+            "x": [x] * len(steps),
+            "y": [y] * len(steps),
+            "time_index": list(steps),
+        }
+        for link, (lane, x, y) in enumerate([("61", -8.0, -1.75), ("62", 1.75, -8.0)])
+    }
+    lights["63"] = lights["62"] | {"x": [900.0] * len(steps)}
+    roads = [
+        {"type": "lane", "geometry": [{"x": x, "y": y} for x, y in points]}
+        for points in ([(-90, -1.75), (90, -1.75)], [(1.75, -90), (1.75, 90)])
+    ]
+    file = folder / "scene.json"
+    file.write_text(json.dumps({"objects": objects, "tl_states": lights, "roads": roads}))
+    return file
+
+
+def messages(folder, is_ode):
+    """Write the recording as basic safety messages, SPaT and MAP; return the files."""
+    degree = 111_319.4907932736
+    stamp = pd.Timestamp("2024-05-01T12:00:00Z")
+
+    def of(seconds, **data):
+        made = (stamp + pd.Timedelta(seconds=seconds)).isoformat()
+        return {"metadata": {"recordGeneratedAt": made}, "payload": {"data": data}}
+
+    table = signalised(GREEN)
+    cars = [
+        of(
+            row.time,
+            coreData={
+                "id": row.vehicle,
+                "secMark": round(row.time * 1000) % 60_000,
+                "position": {"latitude": row.y / 110_574.2755, "longitude": row.x / degree},
+                "speed": row.speed,
+                "heading": 90.0 - np.degrees(row.heading),
+                "size": {"length": 480, "width": 190},
+            },
+        )
+        for row in table.itertuples()
+    ]
+    ode = {
+        "G": "PROTECTED_MOVEMENT_ALLOWED",
+        "y": "PROTECTED_CLEARANCE",
+        "r": "STOP_AND_REMAIN",
+    }
+    spats = []
+    for time in np.arange(0.0, 30.0, 0.1):
+        words = {2 + 2 * k: ode[letter] for k, letter in enumerate(letters(time))}
+        head = {"id": {"region": None, "id": 7}, "timeStamp": round(time * 1000)}
+        if is_ode:
+            groups = [
+                {"signalGroup": k, "state_time_speed": {"movementEventList": [{"eventState": w}]}}
+                for k, w in words.items()
+            ]
+            junction = head | {"states": {"movementList": groups}}
+            spats.append(
+                of(time, intersectionStateList={"intersectionStatelist": [junction]}, name=None)
+            )
+        else:
+            groups = [
+                {
+                    "signalGroup": k,
+                    "state-time-speed": [{"eventState": w.lower().replace("_", "-")}],
+                }
+                for k, w in words.items()
+            ]
+            spats.append(of(time, value={"SPAT": {"intersections": [head | {"states": groups}]}}))
+    lanes = [
+        {
+            "laneID": lane,
+            "nodeList": {
+                "nodes": {"NodeXY": [{"delta": {"nodeXY1": None, "nodeXY4": n}} for n in xy]}
+            },
+            "connectsTo": {"connectsTo": [{"connectingLane": {"lane": 9}, "signalGroup": group}]},
+        }
+        for lane, group, xy in (
+            (1, 2, [{"x": -800, "y": -175}, {"x": -6000, "y": 0}]),
+            (2, 4, [{"x": 175, "y": -800}, {"x": 0, "y": -6000}]),
+        )
+    ]
+    junction = {
+        "id": {"id": 7},
+        "refPoint": {"latitude": 0.0, "longitude": 0.0},
+        "laneWidth": 350,
+        "laneSet": {"GenericLane": lanes},
+    }
+    files = []
+    for name, records in (
+        ("bsm", cars),
+        ("spat", spats),
+        ("map", [of(0.0, intersections={"intersectionGeometry": [junction]})]),
+    ):
+        files.append(folder / f"{name}.json")
+        files[-1].write_text("\n".join(map(json.dumps, records)))
+    return files
+
+
+def check(encounter, names):
+    """Check the states at 100 instants, and the stop lines."""
+    lights = {light.id: light for light in encounter.lights}
+    assert set(lights) == set(names)
+    start = encounter.start_ns * 1e-9 % 86_400.0
+    start -= 43_200.0 if start > 40_000.0 else 0.0  # messages begin at noon
+    words = {"G": "green", "y": "yellow", "r": "red"}
+    for time in np.linspace(start, start + encounter.duration, 100) + 0.003:
+        states = [words[letter] for letter in letters(time)]
+        assert [lights[name].schedule.at(time - start) for name in names] == states
+    crosses = [lights[name].crossing(encounter, n) for n, name in enumerate(names)]
+    fronts = [encounter.of_vehicles([n]).at(np.array([t])) for n, t in enumerate(crosses)]
+    place = [at.position[0, 0] + 2.4 * np.array([1 - k, k]) for k, at in enumerate(fronts)]
+    middle = [lights[name].line.mean(axis=0) for name in names]
+    np.testing.assert_allclose(place, middle, atol=0.1)
+    widths = [np.hypot(*np.diff(lights[name].line, axis=0)[0]) for name in names]
+    np.testing.assert_allclose(widths, 3.5, rtol=1e-4)
+    assert [lights[name].yaw for name in names] == pytest.approx([0.0, np.pi / 2.0], abs=1e-4)
+
+
+@pytest.mark.parametrize("recorded", [True, False])
+def test_sumo(tmp_path, recorded):
+    vehicles = sumo(tmp_path)
+    assert read_log(vehicles).encounters[0].lights == ()
+    files = [vehicles, tmp_path / "net.xml", *[tmp_path / "tls.xml"] * recorded]
+    (encounter,) = read_log(files).encounters
+    check(encounter, ["J/west_0", "J/south_0"])
+
+
+def test_sumo_without_states_or_net(tmp_path):
+    vehicles = sumo(tmp_path)
+    result = read_log([vehicles, tmp_path / "tls.xml"])
+    assert "give the net (.net.xml), too" in "; ".join(result.quality.notes)
+    net = tmp_path / "net.xml"
+    net.write_text(NET.replace('"static"', '"actuated"'))
+    result = read_log([vehicles, net])
+    assert result.encounters[0].lights == ()
+    assert "whose states are not known are left out: J" in "; ".join(result.quality.notes)
+    net.write_text(NET.replace('state="Gr"', 'state="Gx"'))
+    with pytest.raises(InputError, match=r"net\.xml, line 4, <phase>: signal state 'x'"):
+        read_log([vehicles, net])
+    with pytest.raises(InputError, match="has no vehicles; give the floating-car data"):
+        read_log(tmp_path / "tls.xml")
+
+
+def test_nocturne(tmp_path):
+    result = read_log(scene(tmp_path))
+    check(result.encounters[0], ["61", "62"])
+    assert "traffic lights without a lane are left out: 63" in result.quality.notes
+
+
+@pytest.mark.parametrize("is_ode", [True, False])
+def test_spat_and_map(tmp_path, is_ode):
+    files = messages(tmp_path, is_ode)
+    check(read_log(files).encounters[0], ["7/1", "7/2"])
+    result = read_log(files[:2])
+    assert result.encounters[0].lights == ()
+    assert "traffic lights of junctions 7 are left out" in "; ".join(result.quality.notes)
+    with pytest.raises(InputError, match="has no basic safety messages"):
+        read_log(files[1:])
+    files[1].write_text('{"payload": {"data": {"intersectionStateList": [{"signalGroup": 1}]}}}')
+    with pytest.raises(InputError, match=r"spat\.json, record 1 is not a known SPaT or MAP"):
+        read_log(files)
