@@ -186,8 +186,14 @@ def sampled_schedule(
 
 def most_permissive(states: Iterable[SignalState]) -> SignalState:
     """Return the state that permits most, of lights for several directions from one lane."""
-    order = (SignalState.UNKNOWN, SignalState.GREEN, SignalState.OFF, SignalState.YELLOW)
-    order += (SignalState.RED_YELLOW, SignalState.RED)
+    order = [
+        SignalState.UNKNOWN,
+        SignalState.GREEN,
+        SignalState.OFF,
+        SignalState.YELLOW,
+        SignalState.RED_YELLOW,
+        SignalState.RED,
+    ]
     return min(states, key=order.index)
 
 

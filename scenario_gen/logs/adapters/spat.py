@@ -150,7 +150,7 @@ def _lanes(junction: Mapping[str, Any]) -> Iterator[tuple[str, _Lane]]:
         groups = {
             int(link["signalGroup"]) for link in links if link.get("signalGroup") is not None
         }
-        nodes = [
+        nodes: list[dict[str, float]] = [
             next((place for place in node["delta"].values() if place is not None), {})
             for node in _entries(lane["nodeList"]["nodes"])[:2]
         ]
