@@ -44,7 +44,7 @@ __all__ = ["PipelineConfig", "generate", "generate_outcomes"]
 
 def generate(
     encounter: Templates,
-    road: Road | Path | str,
+    road: Road | Path | str = "",
     config: PipelineConfig | Mapping[str, Any] = PipelineConfig(),
     *,
     count: int = 50,

@@ -41,6 +41,10 @@ class InputError(ScenarioGenError):
         super().__init__(presentable(message))
 
 
+class OutOfRangeError(InputError, IndexError):
+    """No element has this number."""
+
+
 class UnforeseenError(InputError):
     """A reader failed on a file in an unforeseen way: a bug in the reader."""
 

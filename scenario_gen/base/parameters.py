@@ -8,7 +8,7 @@ from contextlib import suppress
 from dataclasses import dataclass, Field, field, fields, is_dataclass, replace
 import math
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, Self, TypeVar
 
 from scenario_gen.base.documents import MAX_INTEGER_BITS, parse_yaml, read_yaml, shown
 from scenario_gen.base.errors import did_you_mean, InputError
@@ -60,6 +60,16 @@ class Parameters:
     Raises:
         InputError: a value has the wrong type or is out of range.
     """
+
+    def __new__(cls, *_: Any, **values: Any) -> Self:
+        """Refuse a name that is no parameter.
+
+        Raises:
+            InputError: there is one.
+        """
+        for name in values.keys() - cls.__dataclass_fields__.keys():
+            raise InputError(_unknown(cls(), name))
+        return super().__new__(cls)
 
     @property
     def of_plugins(self) -> "Mapping[str, Parameters]":

@@ -5,7 +5,6 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from html import escape
 from itertools import chain
 import logging
 import math
@@ -40,6 +39,7 @@ from scenario_gen.logs.raw import natural, Observations, RawLog
 from scenario_gen.logs.signals import moved_signals, with_lights
 from scenario_gen.logs.units import interpret
 from scenario_gen.types import Encounter
+from scenario_gen.types.html import html_list, html_table
 
 if TYPE_CHECKING:
     from pandas import DataFrame
@@ -60,14 +60,24 @@ class LogResult:
     doubts: tuple[Doubt, ...] = ()
 
     def _repr_html_(self) -> str:
-        """Return the encounters as a list for a notebook."""
-        items = "".join(f"<li>{escape(repr(encounter))}</li>" for encounter in self.encounters)
-        return f"<b>LogResult({len(self.encounters)} encounters)</b><ol>{items}</ol>"
+        """Return encounters, quality and doubts for a notebook."""
+        rows = [
+            (
+                f"encounters[{k}]",
+                encounter.name,
+                ", ".join(encounter.ids),
+                f"{encounter.duration:.1f} s",
+            )
+            for k, encounter in enumerate(self.encounters)
+        ]
+        notes = [*self.quality.lines(), *map(str, self.doubts)]
+        return html_table(f"LogResult({len(rows)} encounters)", rows) + html_list(notes)
 
 
 def read_log(
     path: "Path | str | Sequence[Path | str] | DataFrame",
     config: LogConfig | Mapping[str, Any] = LogConfig(),
+    **parameters: Any,
 ) -> LogResult:
     """Read a log and cut it into encounters.
 
@@ -75,6 +85,7 @@ def read_log(
         path: a file, a bag or a folder of files; or several files that share one clock; or a
             DataFrame with the columns of a table.
         config: how to read, clean and cut, or a mapping with parameters of `log`.
+        **parameters: single parameters of `log`, e.g. `vehicles="1,2"`.
 
     Returns:
         At least one encounter, on a common clock in a local east-north frame, and the quality.
@@ -91,6 +102,7 @@ def read_log(
     """
     if not isinstance(config, LogConfig):
         config = updated(LogConfig(), dict(config))
+    config = updated(config, parameters)
     if not isinstance(path, (str, Path, Sequence)) and not hasattr(path, "to_csv"):
         raise InputError(
             f"read_log: a path, several paths or a DataFrame is needed, not {type(path).__name__}"

@@ -4,11 +4,14 @@
 """Plots of results, scenarios and encounters with matplotlib (extra `plot`)."""
 
 from collections.abc import Sequence
+from io import BytesIO
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
+from PIL import Image, ImageDraw
 
-from scenario_gen.base.errors import needs
+from scenario_gen.base.errors import InputError, needs
 from scenario_gen.numerics import Floats
 from scenario_gen.types import DRIVERS, GenerationResult, Motion, Road
 from scenario_gen.types.markings import Marking, markings
@@ -16,11 +19,12 @@ from scenario_gen.types.markings import Marking, markings
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
+_FRAME_PERIOD_S = 0.1  # of animations
 _MAX_SCENARIOS_COUNT = 200  # more would hide each other
 
 
 def plot(
-    shown: GenerationResult | Motion,
+    shown: GenerationResult | Motion | Road,
     ax: "Axes | None" = None,
     *,
     road: Road | None = None,
@@ -28,7 +32,8 @@ def plot(
     """Draw the paths of all vehicles, one colour per vehicle, with a dot at the start.
 
     Args:
-        shown: a result (its first 200 scenarios, on its road), a scenario, or an encounter.
+        shown: a result (its first 200 scenarios, on its road), a scenario, an encounter, or a
+            road alone.
         ax: the axes to draw on; None: new axes.
         road: the road to draw below a scenario or an encounter.
 
@@ -39,9 +44,11 @@ def plot(
     import matplotlib.pyplot as plt
 
     axes = plt.subplots()[1] if ax is None else ax
-    title = shown.title
-    if isinstance(shown, Motion):
-        motions: Sequence[Motion] = [shown]
+    motions: Sequence[Motion] = ()
+    if isinstance(shown, Road):
+        title, road = shown.name, shown
+    elif isinstance(shown, Motion):
+        title, motions = shown.title, [shown]
     else:
         motions = shown.generated.scenarios[:_MAX_SCENARIOS_COUNT]
         road = road or shown.road
@@ -60,6 +67,45 @@ def plot(
         for line in axes.legend().get_lines():
             line.set_alpha(1.0)
     return axes
+
+
+def animate(shown: Motion, file: Path | str, *, road: Road | None = None) -> Path:
+    """Write an animated GIF: paths, and footprints that move along them in real time.
+
+    Args:
+        shown: a scenario or an encounter.
+        file: the file to write, with the suffix .gif.
+        road: the road to draw below it.
+
+    Raises:
+        InputError: the file has another suffix.
+        MissingExtraError: matplotlib is not installed.
+    """
+    path = Path(file)
+    if path.suffix.lower() != ".gif":
+        raise InputError(f"{path}: an animation is a .gif file")
+    needs("plot", "matplotlib")
+    from matplotlib.colors import to_hex
+    from matplotlib.figure import Figure
+
+    figure, ground = Figure(), BytesIO()
+    axes = plot(shown, figure.add_subplot(), road=road)
+    figure.savefig(ground, dpi=figure.dpi)
+    film = shown.resampled(_FRAME_PERIOD_S)
+    picture = Image.open(ground).convert("RGB").quantize()
+    frames = []
+    for k in range(len(film.time)):
+        frame = picture.copy()
+        canvas = ImageDraw.Draw(frame)
+        for n, box in enumerate(film.footprints(k)):
+            x, y = axes.transData.transform(box).T
+            if film.is_present[n, k]:
+                corners = np.stack([x, frame.height - y], axis=-1)
+                canvas.polygon([*map(tuple, corners.tolist())], fill=to_hex(f"C{n}"))
+        frames.append(frame)
+    period_ms = round(1000 * _FRAME_PERIOD_S)
+    frames[0].save(path, append_images=frames[1:], save_all=True, duration=period_ms, loop=0)
+    return path
 
 
 def _draw_paths(axes: "Axes", motions: Sequence[Motion]) -> list[Floats]:

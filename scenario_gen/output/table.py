@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from scenario_gen.base.errors import describe, InputError
 from scenario_gen.method.evaluation import MEASURES
-from scenario_gen.types import Evaluation, GenerationResult, join_ego, Note, NoteKind
+from scenario_gen.types import GenerationResult, join_ego, Note, NoteKind
 
 if TYPE_CHECKING:
     from pandas import DataFrame
@@ -64,12 +64,4 @@ def filter_scenarios(result: GenerationResult, condition: str) -> GenerationResu
     generated = replace(
         result.generated, scenarios=scenarios, adaptations=(*result.generated.adaptations, note)
     )
-    return replace(
-        result,
-        generated=generated,
-        evaluation=Evaluation.empty(),
-        references={},
-        refusals={},
-        coverage=None,
-        valid=None,
-    )
+    return result.with_scenarios(generated)

@@ -13,6 +13,7 @@ import numpy as np
 from scenario_gen.base.errors import did_you_mean, InputError
 from scenario_gen.numerics import Floats, freeze
 from scenario_gen.types.decision import Decision
+from scenario_gen.types.html import html_table
 from scenario_gen.types.motion import Motion
 from scenario_gen.types.traffic_light import TrafficLight
 
@@ -93,6 +94,23 @@ class Encounter(Motion):
 
     def __repr__(self) -> str:
         return f"Encounter({self.name!r}, {len(self.vehicles)} vehicles, {self.duration:.1f} s)"
+
+    def _repr_html_(self) -> str:
+        """Return a table of the vehicles for a notebook."""
+        rows = [("vehicle", "type", "size", "present", "mean speed")]
+        for k, (vehicle, present) in enumerate(zip(self.vehicles, self.present, strict=True)):
+            first, last = self.time[present]
+            speed = self.speed[k, self.present_slice(k)].mean()
+            rows.append(
+                (
+                    vehicle.id,
+                    vehicle.type,
+                    f"{vehicle.length:g} x {vehicle.width:g} m",
+                    f"{first:.1f} to {last:.1f} s",
+                    f"{speed:.1f} m/s",
+                )
+            )
+        return html_table(repr(self), rows)
 
     @property
     def title(self) -> str:

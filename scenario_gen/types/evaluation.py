@@ -13,6 +13,7 @@ from typing import Any, Literal
 
 from scenario_gen.base.documents import COUNT, NUMBER
 from scenario_gen.base.errors import printable
+from scenario_gen.types.html import html_list, html_table
 from scenario_gen.types.notes import Note, NoteKind
 from scenario_gen.types.scenario import Cause, ScenarioSet, Verdict
 
@@ -222,8 +223,28 @@ class Evaluation:
         fields["rows"] = tuple(_row(row) for row in document["rows"])
         return cls(**fields)
 
+    def _table(self) -> list[tuple[str, ...]]:
+        """Return the header, then the cells of each metric: label, better, a figure per row."""
+        header = ("metric", "better", *(f"{row.name} ({row.samples})" for row in self.rows))
+        lines = [header]
+        for metric in self.metrics:
+            figures = [
+                formatted(row.values.get(metric.id), metric.unit, cap=metric.cap)
+                for row in self.rows
+            ]
+            unit = f" [{metric.unit}]" if metric.unit else ""
+            lines.append((metric.label + unit, metric.better, *figures))
+        return lines
+
+    def _repr_html_(self) -> str:
+        """Return the table with its notes for a notebook."""
+        notes = [f"{row.name}: {note}" for row in self.rows for note in row.notes]
+        title = f"Evaluation of {self.encounter} on {self.road or 'no road'}"
+        return html_table(title, self._table()) + html_list(notes)
+
     def to_markdown(self) -> str:
         """Return a table: metrics down, rows across, each figure with its interval."""
+        header, *table = (f"| {' | '.join(cells)} |" for cells in self._table())
         lines = [
             f"# {as_markdown(self.encounter)} on {as_markdown(self.road)}",
             "",
@@ -232,22 +253,15 @@ class Evaluation:
             f"{self.level:.0%} bootstrap intervals in brackets "
             f"({self.resamples} resamples, seed {self.seed}).",
             "",
-            "| metric | better | "
-            + " | ".join(f"{row.name} ({row.samples})" for row in self.rows)
-            + " |",
+            header,
             "|---|---|" + "---|" * len(self.rows),
         ]
         group = ""
-        for metric in self.metrics:
+        for metric, line in zip(self.metrics, table, strict=True):
             if metric.group != group:
                 group = metric.group
                 lines.append(f"| **{group}** | |" + " |" * len(self.rows))
-            unit = f" [{metric.unit}]" if metric.unit else ""
-            cells = [
-                formatted(row.values.get(metric.id), metric.unit, cap=metric.cap)
-                for row in self.rows
-            ]
-            lines.append(f"| {metric.label}{unit} | {metric.better} | " + " | ".join(cells) + " |")
+            lines.append(line)
         notes = [f"- {row.name}: {note}" for row in self.rows for note in row.notes]
         return "\n".join([*lines, "", *notes]).rstrip() + "\n"
 

@@ -17,6 +17,7 @@ from scenario_gen.types.coverage import Coverage
 from scenario_gen.types.encounter import Encounter
 from scenario_gen.types.evaluation import Evaluation, NARROW, REPLAY, UNIFORM, WITH, WITHOUT
 from scenario_gen.types.fit import Fit
+from scenario_gen.types.html import html_list
 from scenario_gen.types.notes import Note, NoteKind
 from scenario_gen.types.road import Road
 from scenario_gen.types.route import Route
@@ -106,6 +107,48 @@ class GenerationResult:
     def __getitem__(self, k: int) -> Scenario:
         return self.generated[k]
 
+    def __add__(self, other: "GenerationResult") -> "GenerationResult":
+        """Return the scenarios of both, all in memory; figures of whole sets are left out.
+
+        The scenarios are numbered again from 0, so `regenerate` cannot make them.
+
+        Raises:
+            InputError: encounter or road differ.
+        """
+        if not isinstance(other, GenerationResult):
+            return NotImplemented
+        is_same = np.array_equal(self.encounter.position, other.encounter.position)
+        if self.title != other.title or not is_same:
+            raise InputError(
+                f"{self.title} and {other.title} cannot be added: encounter and road must be the "
+                "same. report(folder, first, second) shows several results on one page"
+            )
+        first, second = self.generated, other.generated
+        scenarios = [
+            replace(scenario, index=k, seed=self.seed)
+            for k, scenario in enumerate((*first, *second))
+        ]
+        generated = replace(
+            first,
+            requested=first.requested + second.requested,
+            scenarios=scenarios,
+            candidates=first.candidates + second.candidates,
+            refused=first.refused + second.refused,
+        )
+        return replace(self.with_scenarios(generated), provenance={})
+
+    def with_scenarios(self, generated: ScenarioSet) -> "GenerationResult":
+        """Return the result with another set, without the figures of the whole set."""
+        return replace(
+            self,
+            generated=generated,
+            evaluation=Evaluation.empty(),
+            references={},
+            refusals={},
+            coverage=None,
+            valid=None,
+        )
+
     def noted(self, note: Note) -> "GenerationResult":
         """Return the result with a note in front of the others."""
         return replace(
@@ -130,8 +173,7 @@ class GenerationResult:
             f"refused candidates: {refused}",
             *map(str, self.generated.adaptations),
         ]
-        items = "".join(f"<li>{escape(line)}</li>" for line in lines)
-        return f"<b>{escape(repr(self))}</b><ul>{items}</ul>"
+        return f"<b>{escape(repr(self))}</b>{html_list(lines)}"
 
     def measures(self) -> "DataFrame":
         """Return how critical each scenario is, as `scenario_gen.measures` does."""
@@ -158,6 +200,25 @@ class GenerationResult:
         import scenario_gen
 
         return scenario_gen.plot(self, ax)
+
+    def animate(self, file: Path | str, k: int = 0) -> Path:
+        """Write an animated GIF of scenario k on its road, as `scenario_gen.animate` does.
+
+        Raises:
+            MissingExtraError: matplotlib is not installed.
+        """
+        return self[k].animate(file, self.road)
+
+    def export(self, folder: Path | str, target: str) -> Path:
+        """Write files for other software, as `scenario_gen.export` does.
+
+        Raises:
+            InputError: there is no such target, or the folder is something else.
+            RefusedError: no scenario can be written in that format.
+        """
+        import scenario_gen
+
+        return scenario_gen.export(self, folder, target)
 
     def report(self, folder: Path | str) -> Path:
         """Write page, bag and figures to a folder, as `scenario_gen.report` does.

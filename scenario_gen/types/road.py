@@ -7,6 +7,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 import math
+from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
@@ -27,6 +28,9 @@ from scenario_gen.numerics import (
 )
 from scenario_gen.numerics.polygons import fill_slits, polygon_cells
 from scenario_gen.types.lanes import Lane, LaneNetwork
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 MIN_CELL_M = 0.001
 MAX_CELL_M = 10.0  # larger cells do not resolve a vehicle
@@ -94,6 +98,16 @@ class Road:
                 f"road {self.name!r} has origin {self.origin}; "
                 f"at most {MAX_ORIGIN_M:g} m from the frame's origin are read"
             )
+
+    def plot(self, ax: "Axes | None" = None) -> "Axes":
+        """Draw the road, as `scenario_gen.plot` does.
+
+        Raises:
+            MissingExtraError: matplotlib is not installed.
+        """
+        import scenario_gen
+
+        return scenario_gen.plot(self, ax)
 
     @property
     def map_lanes(self) -> LaneNetwork | None:

@@ -12,6 +12,7 @@ from typing import Any, TYPE_CHECKING
 
 import numpy as np
 
+from scenario_gen.base.errors import OutOfRangeError
 from scenario_gen.numerics import canonical_poses, Floats, freeze, frozen, Ints
 from scenario_gen.types.facts import Facts
 from scenario_gen.types.motion import held, Motion
@@ -235,7 +236,17 @@ class ScenarioSet:
         return iter(self.scenarios)
 
     def __getitem__(self, k: int) -> Scenario:
-        return self.scenarios[k]
+        """Return a scenario by its place in the set.
+
+        Raises:
+            OutOfRangeError: there is none.
+        """
+        try:
+            return self.scenarios[k]
+        except (IndexError, TypeError) as error:
+            raise OutOfRangeError(
+                f"no scenario [{k!r}]: a number from 0 to {len(self) - 1} is needed"
+            ) from error
 
     @property
     def acceptance(self) -> float:

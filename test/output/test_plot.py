@@ -4,10 +4,11 @@
 """Results, scenarios and encounters drawn with matplotlib."""
 
 import numpy as np
+from PIL import Image
 import pytest
 from support.bag_examples import hand_made_run
 
-from scenario_gen import MissingExtraError, plot
+from scenario_gen import InputError, MissingExtraError, plot
 
 matplotlib = pytest.importorskip("matplotlib")
 matplotlib.use("Agg")
@@ -42,3 +43,21 @@ def test_without_matplotlib_the_extra_is_named(monkeypatch):
     monkeypatch.setattr("scenario_gen.base.errors.find_spec", lambda name: None)
     with pytest.raises(MissingExtraError, match=r"scenario_gen\[plot\]"):
         hand_made_run().plot()
+
+
+def test_a_road_is_drawn_alone():
+    axes = hand_made_run().road.plot()
+    assert axes.get_title() == "straight" and axes.get_images() and not lines(axes)
+
+
+def test_a_scenario_becomes_an_animation_in_real_time(tmp_path):
+    made = hand_made_run()
+    with Image.open(made.animate(tmp_path / "film.gif", 3)) as film:
+        assert film.n_frames * film.info["duration"] / 1000 == pytest.approx(
+            made[3].duration, abs=0.2
+        )
+        first = np.array(film.convert("RGB"))
+        film.seek(film.n_frames - 1)
+        assert (first != np.array(film.convert("RGB"))).any()
+    with pytest.raises(InputError, match=r"\.gif"):
+        made[3].animate(tmp_path / "film.mov")

@@ -9,8 +9,9 @@ import numpy as np
 import pytest
 from support.bag_examples import hand_made_run
 
-from scenario_gen.types import NARROW, REPLAY, UNIFORM, WITH, WITHOUT
-from scenario_gen.types.evaluation import Evaluation, Interval, Row
+from scenario_gen import InputError, load
+from scenario_gen.types import NARROW, REPLAY, UNIFORM, Vehicle, WITH, WITHOUT
+from scenario_gen.types.evaluation import Evaluation, Interval, Metric, Row
 from scenario_gen.types.generation import GenerationResult
 from scenario_gen.types.scenario import dataframe, ScenarioSet
 
@@ -127,3 +128,38 @@ def test_results_are_counted_indexed_and_made_a_table():
     assert list(dataframe([]).columns) == list(table.columns)
     for thing in (result, result.generated, first, result.encounter, result.road):
         assert len(repr(thing)) < 120 and repr(thing).startswith(type(thing).__name__)
+
+
+def test_the_sum_of_two_results_is_saved_and_read_as_one(tmp_path):
+    made = hand_made_run()
+    both = made + replace(made, seed=5)
+    assert len(both) == 2 * len(made)
+    assert len({scenario.index for scenario in both}) == len(both)
+    assert len(load(both.save(tmp_path / "bag"))) == len(both)
+    with pytest.raises(InputError, match="cannot be added"):
+        made + replace(made, road=replace(made.road, name="other"))
+    with pytest.raises(TypeError):
+        made + 1
+
+
+@pytest.mark.parametrize("k", [10, "a", None])
+def test_a_number_that_no_scenario_has_is_refused_in_a_line(k):
+    with pytest.raises(IndexError, match="a number from 0 to 4 is needed") as refused:
+        hand_made_run()[k]
+    assert isinstance(refused.value, InputError)
+
+
+def test_values_are_tables_in_a_notebook():
+    made = hand_made_run()
+    encounter = replace(made.encounter, vehicles=(Vehicle("<b>"), made.encounter.vehicles[1]))
+    assert "<td>&lt;b&gt;</td>" in encounter._repr_html_()
+    evaluation = result(**FIVE).evaluation
+    shown = replace(evaluation, metrics=(Metric("e_speed", "E speed", "m", "lower", "", ""),))
+    assert "<td>E speed [m]</td><td>lower</td><td>0.2</td>" in shown._repr_html_()
+
+
+def test_a_result_is_exported_for_other_software(tmp_path):
+    folder = hand_made_run().export(tmp_path / "files", "openscenario")
+    assert len(list(folder.glob("*.xosc"))) == 5
+    with pytest.raises(InputError, match="choose one of commonroad"):
+        hand_made_run().export(tmp_path / "other", "oops")

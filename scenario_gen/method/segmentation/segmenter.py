@@ -99,8 +99,13 @@ def segment(
         seed: same seed, same answer.
 
     Raises:
-        InputError: fewer than 4 samples.
+        InputError: fewer than 4 samples, or it is no encounter.
     """
+    if not isinstance(encounter, Motion):
+        raise InputError(
+            "segment: an encounter is needed, e.g. read_log(path).encounters[0], not "
+            f"{type(encounter).__name__}"
+        )
     if config.preset == "paper":
         posterior = segment_series(paper_features(encounter), config.sampler, seed)
         points = cut(posterior, config, encounter.dt)
