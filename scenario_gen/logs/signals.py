@@ -39,6 +39,7 @@ class _Limits:
         crossing_rad: least and greatest angle between traffic that needs alternate greens.
         straight_rad: turning traffic may meet other traffic at green.
         common_green_s: shorter common greens are rounding.
+        far_m: lights farther from all vehicles do not belong to an encounter.
     """
 
     half_lane_m: float = 1.75
@@ -46,6 +47,7 @@ class _Limits:
     crossing_rad: tuple[float, float] = (math.radians(60.0), math.radians(120.0))
     straight_rad: float = math.radians(30.0)
     common_green_s: float = 0.5
+    far_m: float = 100.0
 
 
 _LIMITS = _Limits()
@@ -215,16 +217,11 @@ def with_lights(encounter: Encounter, signals: Sequence[RawSignal]) -> Encounter
     for signal in signals:
         subject = f"{signal.place}: traffic light {signal.id}"
         schedule = signal.schedule.moved(-start_s)
-        line = signal.line
-        if signal.geographic:
-            if encounter.origin is None:
-                continue
-            line = local_frame(line[:, 0], line[:, 1], encounter.origin)
-        if not len(line):
-            if not any(vehicle in encounter.ids for vehicle in signal.seen):
-                continue
-            line = _line_of(encounter, signal, start_s)
-        elif not schedule.repeats and schedule.end < encounter.duration - encounter.dt:
+        line = _line_in(encounter, signal, start_s)
+        if line is None:
+            continue
+        is_short = not schedule.repeats and schedule.end < encounter.duration - encounter.dt
+        if is_short and not signal.seen:
             raise InputError(
                 f"{subject} ends at {schedule.end:g} s, before {encounter.title} at "
                 f"{encounter.duration:g} s; cut the log (log.end), or set log.signals=ignored"
@@ -239,6 +236,21 @@ def with_lights(encounter: Encounter, signals: Sequence[RawSignal]) -> Encounter
                 "traffic crosses; set log.signals=ignored"
             )
     return replace(encounter, lights=tuple(lights))
+
+
+def _line_in(encounter: Encounter, signal: RawSignal, start_s: float) -> Floats | None:
+    """Return the stop line (2, 2) [m] of a light; None if it is far from the encounter."""
+    line = signal.line
+    if not len(line):
+        is_seen = any(vehicle in encounter.ids for vehicle in signal.seen)
+        return _line_of(encounter, signal, start_s) if is_seen else None
+    if signal.geographic:
+        if encounter.origin is None:
+            return None
+        line = local_frame(line[:, 0], line[:, 1], encounter.origin)
+    low = encounter.position.min(axis=(0, 1)) - _LIMITS.far_m
+    high = encounter.position.max(axis=(0, 1)) + _LIMITS.far_m
+    return line if bool(((line > low) & (line < high)).all()) else None
 
 
 def _line_of(encounter: Encounter, signal: RawSignal, start_s: float) -> Floats:

@@ -117,32 +117,35 @@ def _signals(path: Path, scene: Mapping[str, Any], notes: list[str]) -> list[Raw
     entries = scene.get("tl_states") or {}
     if not isinstance(entries, Mapping):
         raise InputError(f"{path}: `tl_states` is not an object with an entry for each lane")
-    signals = []
-    without_lane = []
     edges = _lane_edges(path, scene) if entries else np.zeros((0, 4))
-    for name, entry in entries.items():
-        place = f"{path}: traffic light {name}"
-        with guarded(place, LookupError, TypeError, ValueError, OverflowError):
-            points = np.column_stack([entry["x"], entry["y"]]).astype(float)
-            steps = [int(step) for step in entry["time_index"]]
-            words = [str(word).removeprefix("arrow_") for word in entry["state"]]
-        if not len(steps) == len(points) == len(words) > 0:
-            raise InputError(f"{place}: state, x, y and time_index differ in length, or are empty")
-        times = [0.1 * step for step in steps]
-        states = [
-            SignalState.OFF if word.startswith("flashing") else state_of(word, place)
-            for word in words
-        ]
-        yaw = _lane_yaw(points[0], edges)
-        if math.isnan(yaw):
-            without_lane.append(str(name))
-            continue
-        line = line_across(points[0], yaw, _LANE_WIDTH_M)
-        schedule = sampled_schedule(times, states, place)
-        signals.append(RawSignal(str(name), schedule, str(path), line, (str(name),)))
+    signals = {name: _signal(path, name, entry, edges) for name, entry in entries.items()}
+    without_lane = [name for name, signal in signals.items() if signal is None]
     if without_lane:
         notes.append(f"traffic lights without a lane are left out: {', '.join(without_lane)}")
-    return signals
+    return [signal for signal in signals.values() if signal is not None]
+
+
+def _signal(path: Path, name: str, entry: Any, edges: Floats) -> RawSignal | None:
+    """Return the light of a lane; None if no edge of a lane (K, 4) is near its place.
+
+    Raises:
+        InputError: the entry is damaged, or a state is not known.
+    """
+    place = f"{path}: traffic light {name}"
+    with guarded(place, LookupError, TypeError, ValueError, OverflowError):
+        points = np.column_stack([entry["x"], entry["y"]]).astype(float)
+        times = [0.1 * int(step) for step in entry["time_index"]]
+        words = [str(word).removeprefix("arrow_") for word in entry["state"]]
+    if not len(times) == len(points) == len(words) > 0:
+        raise InputError(f"{place}: state, x, y and time_index differ in length, or are empty")
+    yaw = _lane_yaw(points[0], edges)
+    if math.isnan(yaw):
+        return None
+    states = [
+        SignalState.OFF if word.startswith("flashing") else state_of(word, place) for word in words
+    ]
+    line = line_across(points[0], yaw, _LANE_WIDTH_M)
+    return RawSignal(name, sampled_schedule(times, states, place), str(path), line, (name,))
 
 
 def _lane_yaw(point: Floats, edges: Floats) -> float:

@@ -5,9 +5,9 @@
 
 | quantity | key | unit |
 |---|---|---|
-| time | SPaT: metadata, as of basic safety messages; timeStamp | ms of the minute |
+| time | SPaT: metadata as in other messages; timeStamp | ms of the minute |
 | state | SPaT: states: signalGroup, eventState | |
-| stop line | MAP: refPoint; laneSet: nodeList, from the stop line upstream; laneWidth | degrees; cm |
+| stop line | MAP: refPoint; laneSet: nodeList, beginning at the line; laneWidth | degrees, cm |
 | light | MAP: laneSet: connectsTo: signalGroup | |
 
 A stop line is across the first edge of its lane. Lanes whose signal groups differ show the most
@@ -82,14 +82,17 @@ class SignalMessages:
         with guarded(problem, AttributeError, LookupError, TypeError, ValueError, OverflowError):
             junctions = _junctions(record)
             for junction in junctions:
-                name = str(junction["id"]["id"])
-                if "laneSet" in junction:
-                    self.lanes.setdefault(name, {}).update(_lanes(junction))
-                else:
-                    time = clock(junction.get("timeStamp"))
-                    if math.isfinite(time):
-                        self.samples.setdefault(name, {})[time] = dict(self._states(junction))
+                self._add(junction, clock)
         return bool(junctions)
+
+    def _add(self, junction: Mapping[str, Any], clock: Callable[[Any], float]) -> None:
+        name = str(junction["id"]["id"])
+        if "laneSet" in junction:
+            self.lanes.setdefault(name, {}).update(_lanes(junction))
+            return
+        time = clock(junction.get("timeStamp"))
+        if math.isfinite(time):
+            self.samples.setdefault(name, {})[time] = dict(self._states(junction))
 
     def _states(self, junction: Mapping[str, Any]) -> Iterator[tuple[int, SignalState]]:
         for movement in _entries(junction["states"]):

@@ -16,7 +16,8 @@ from one lane share a stop line: the most permissive state counts.
 Source: SUMO's user documentation, Traffic Lights, Networks, Output/Traffic Lights.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 
 import numpy as np
 
@@ -55,32 +56,45 @@ def read_lights(
             )
         return ()
     lanes = {lane.attribute("id"): lane for lane in net.findall("edge/lane")}
-    recorded = _recorded(states)
-    cycles = {logic.attribute("id"): logic for logic in net.findall("tlLogic")}
+    schedule_of = _schedules(net, states)
     links: dict[tuple[str, str], list[int]] = {}
     for link in net.findall("connection[@tl]"):
         lane = f"{link.attribute('from')}_{link.attribute('fromLane')}"
         links.setdefault((link.attribute("tl"), lane), []).append(int(link.number("linkIndex")))
 
     signals = []
-    unknown = set()
     for (name, lane), indices in sorted(links.items()):
-        schedule = None
-        if name in recorded:
-            schedule = _schedule_of(recorded[name], indices)
-        elif name in cycles and cycles[name].get("type", "static") == "static":
-            schedule = _cycle_of(cycles[name], indices)
-        if schedule is None or lane not in lanes:
-            unknown.add(name)
-            continue
-        place = net.file if name not in recorded or states is None else states.file
-        signals.append(RawSignal(f"{name}/{lane}", schedule, place, _line(lanes[lane]), (lane,)))
+        if name in schedule_of and lane in lanes:
+            signals.append(
+                RawSignal(
+                    f"{name}/{lane}",
+                    schedule_of[name](indices),
+                    net.file,
+                    _line(lanes[lane]),
+                    (lane,),
+                )
+            )
+    unknown = sorted({name for name, _ in links} - set(schedule_of))
     if unknown:
         notes.append(
-            f"traffic lights whose states are not known are left out: {', '.join(sorted(unknown))}"
+            f"traffic lights whose states are not known are left out: {', '.join(unknown)}"
             '; record them with <timedEvent type="SaveTLSStates">'
         )
     return signals
+
+
+def _schedules(
+    net: Element, states: Element | None
+) -> dict[str, Callable[[Sequence[int]], SignalSchedule]]:
+    """Return by light the function that gives the schedule of some of its links."""
+    schedules: dict[str, Callable[[Sequence[int]], SignalSchedule]] = {
+        logic.attribute("id"): partial(_cycle_of, logic)
+        for logic in net.findall("tlLogic")
+        if logic.get("type", "static") == "static"
+    }
+    for name, samples in _recorded(states).items():
+        schedules[name] = partial(_schedule_of, samples)
+    return schedules
 
 
 def _recorded(states: Element | None) -> Mapping[str, list[Element]]:
