@@ -8,7 +8,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import Annotated, TYPE_CHECKING
+from typing import Annotated, Literal, TYPE_CHECKING
 
 import typer
 
@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     from scenario_gen.corpus.tasks import Workers
 
 commands = Commands("Archives of recordings")
+Bags = Literal["none", "hits", "all"]
 
 SchedulerOption = Annotated[
     str,
@@ -111,7 +112,7 @@ class Batch:
     out: Annotated[
         Path,
         typer.Option(
-            help="Folder for tables and bags, or s3://…. An unfinished batch is continued."
+            help="Folder for tables and bags, or s3://…. An existing batch continues and grows."
         ),
     ]
     count: Annotated[
@@ -129,6 +130,13 @@ class Batch:
             help="Create up to this many new encounters, as `generate` does, from the corpus.",
         ),
     ] = 0
+    bags: Annotated[
+        Bags,
+        typer.Option(help="Scenarios to write to bags, too. `find --bag` generates others again."),
+    ] = "none"
+    hits: Annotated[
+        str, typer.Option(help="Condition as for `find`: the scenarios that go to bags.")
+    ] = ""
     workers: WorkersOption = 0
     scheduler: SchedulerOption = ""
     assignments: SetOption = None
@@ -138,21 +146,37 @@ class Batch:
 @takes(Batch)
 def batch(options: Batch) -> None:
     """Generate scenarios from all encounters of a corpus on several roads."""
-    from scenario_gen.corpus.batch import BatchRequest, run_batch
+    from scenario_gen.corpus.batch import run_batch
+    from scenario_gen.corpus.parts import BatchRequest
     from scenario_gen.method.config import PipelineConfig
 
-    config, out = (
-        assigned_all(PipelineConfig(), options.assignments),
-        place(options.out, to_write=True),
-    )
+    config = assigned_all(PipelineConfig(), options.assignments)
+    out = place(options.out, to_write=True)
     names = [name for text in options.roads for name in text.split(",") if name]
+    bags = "hits" if options.hits else options.bags
+    request = BatchRequest(
+        config, options.count, options.seed, options.recombine, bags, options.hits
+    )
     with workers_of(options.workers, options.scheduler) as who:
         result = run_batch(
-            place(options.corpus), names, out,
-            BatchRequest(config, options.count, options.seed, options.recombine),
-            templates=options.templates, workers=who,
-        )  # fmt: skip
+            place(options.corpus), names, out, request, templates=options.templates, workers=who
+        )
     conclude(result.lines(), result.failed, out)
+
+
+@commands.command("compact", urls=("batch",))
+def compact_batch(
+    batch: Annotated[Path, typer.Argument(help="A batch, or s3://….")],
+    workers: WorkersOption = 0,
+    scheduler: SchedulerOption = "",
+) -> None:
+    """Merge the many small tables of a batch into few with large row groups."""
+    from scenario_gen.corpus.compact import compact
+
+    out = place(batch, to_write=True)
+    with workers_of(workers, scheduler) as who:
+        before, after, failed = compact(out, who)
+    conclude([f"{before} tables merged to {after}"], failed, out)
 
 
 def shown(value: object) -> str:
@@ -186,7 +210,7 @@ def find(
         bool,
         typer.Option(
             "--again",
-            help="Generate each matching scenario again and check that it is byte-identical.",
+            help="Generate each matching scenario again, also if it is in a bag, and compare it.",
         ),
     ] = False,
 ) -> None:
@@ -203,12 +227,11 @@ def find(
     emit_json(scenarios=matches.rows, coverage=lines)
     _print_matches(matches.rows[: limit or None], matches.count)
     print_(*lines, sep="\n")
-    if again:
-        for row in matches.rows:
-            finding.make_again(source, row)
-        print_(f"{len(matches.rows)} scenarios generated again: all byte-identical")
+    if again or bag is not None:
+        identical = finding.export_hits(source, matches.rows, bag, again=again)
+        if again:
+            print_(f"{identical} of {len(matches.rows)} scenarios are byte-identical again")
     if bag is not None:
-        finding.export_hits(source, matches.rows, bag)
         emit_json(bag=bag)
         print_(f"bag: {bag}")
         if report is not None:
@@ -219,7 +242,8 @@ def find(
 
 def _print_matches(listed: Sequence[Mapping[str, object]], count: int) -> None:
     """Print a table of the first of `count` matching scenarios, and a summary."""
-    from scenario_gen.corpus.find import COLUMNS, UNITS
+    from scenario_gen.corpus.find import COLUMNS
+    from scenario_gen.corpus.tables import UNITS
 
     titles = [f"{name} [{UNITS[name]}]" if name in UNITS else name for name in COLUMNS]
     print_table(titles, [[shown(row[name]) for name in COLUMNS] for row in listed], names=3)

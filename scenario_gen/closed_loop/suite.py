@@ -15,6 +15,7 @@ import numpy as np
 
 from scenario_gen.bags.storage.files import files_of, METADATA
 from scenario_gen.base.documents import read_text
+from scenario_gen.base.errors import InputError
 from scenario_gen.base.folders import write_text
 from scenario_gen.closed_loop.origin import Trial
 from scenario_gen.closed_loop.results import drawings, Drives, JUNIT, junit_suite, junit_text
@@ -64,7 +65,11 @@ def _bags_of(source: Path) -> Iterator[Path]:
     if not source.exists() or (source / METADATA).exists() or files_of(source).files:
         yield source
     elif source.is_dir():
-        yield from sorted(file.parent for file in source.rglob(METADATA))
+        bags = sorted(file.parent for file in source.rglob(METADATA))
+        if not bags and (source / "batch.json").exists():
+            remedy = f"`scenario-gen find {source} --bag BAG` writes one"
+            raise InputError(f"{source} is a batch without bags; {remedy}")
+        yield from bags
     else:
         name = f"{source} (must be a bag, a folder with bags, or a list of their paths)"
         paths = map(str.strip, read_text(source, MAX_LIST_BYTES, name).splitlines())

@@ -3,47 +3,42 @@
 
 """`find`: scenarios from a batch, or encounters from a corpus, that meet a condition in SQL.
 
-The scenarios are copied to a bag or shown on a page, or generated again.
+The scenarios are copied from the batch's bags, or generated again.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import nullcontext
 from dataclasses import dataclass
+from functools import cache, partial
 from itertools import product
 from pathlib import Path
-from threading import Timer
 from typing import Any
 
-from scenario_gen.bags.recordings.write import add_message
+import numpy as np
+
+from scenario_gen.bags.recordings.write import add_message, add_results
 from scenario_gen.bags.storage.bag import BagMessage
-from scenario_gen.bags.storage.writer import atomic_bag
+from scenario_gen.bags.storage.writer import atomic_bag, BagWriter
 from scenario_gen.base.errors import InputError, ScenarioGenError
-from scenario_gen.base.stores import fetched, Place, relative_name, workplace
-from scenario_gen.corpus.messages import database, quoted
-from scenario_gen.output.review.regenerate import (
-    recorded_scenarios,
-    regenerate_scenario,
-    Regenerated,
-)
+from scenario_gen.base.folders import scratch
+from scenario_gen.base.stores import fetched, Place, temp_folder, workplace
+from scenario_gen.corpus.batch import tasks_of
+from scenario_gen.corpus.conditions import matching, MAX_SECONDS_S, NAMES
+from scenario_gen.corpus.parts import part_result, PartTask
+from scenario_gen.corpus.store import finished_tables, parts_of
+from scenario_gen.output.review.regenerate import recorded_scenarios
 
 COLUMNS = (
     "template", "kind", "road", "vehicles", "index", "type", "seconds", "distance", "ttc", "pet",
     "speed", "braking",
 )  # fmt: skip
-UNITS = {
-    "seconds": "s",
-    "distance": "m",
-    "ttc": "s",
-    "pet": "s",
-    "speed": "m/s",
-    "braking": "m/s²",
-}
 # The columns of an encounter with the names of a scenario's columns.
 RECORDED = (
     "name AS template, kind, 'recorded' AS road, count AS vehicles, NULL AS index,"
     " NULL AS type, seconds, distance, ttc, pet, speed, NULL AS braking, gap"
 )
-MAX_SECONDS_S = 60.0  # of one search
+FIGURES = ("seconds", "distance", "ttc", "pet", "speed", "braking")
+TOLERANCE_RATIO = 0.01  # of figures on another processor, whose last digits may differ
 PET_BOUNDS_S = (0.0, 1.0, 2.0, 4.0)  # bounds of the PET classes in the coverage table
 PET_CLASSES = (*(f"< {bound:g} s" for bound in PET_BOUNDS_S), "more", "none")
 PET_CLASS_SQL = (
@@ -51,6 +46,9 @@ PET_CLASS_SQL = (
     + " ".join(f"WHEN pet < {bound:g} THEN '< {bound:g} s'" for bound in PET_BOUNDS_S)
     + " ELSE 'more' END"
 )
+
+Copy = tuple[tuple[BagMessage, ...], str]
+"""The messages of a scenario, and its SHA-256."""
 
 
 @dataclass(frozen=True)
@@ -77,48 +75,37 @@ def find(
 
     Args:
         batch: written by `run_batch`, finished or not; or a corpus written by `mine`.
-        condition: SQL over the columns template, kind, road, vehicles, index, seed, seconds [s],
-            distance [m], ttc [s], pet [s], speed [m/s], braking [m/s²], type (of the most exposed
-            road user), types (of all road users), outcome (of the decision), its probability and
-            sha256. Encounters have no index, seed, braking, types, outcome, probability and
-            sha256, but gap [m].
+        condition: SQL over the columns template, recording, kind, road, vehicles, index, seed,
+            seconds [s], distance [m], ttc [s], pet [s], speed [m/s], braking [m/s²], type (of the
+            most exposed road user), types (of all road users), outcome (of the decision), its
+            probability and sha256. Encounters have no index, seed, braking, types, outcome,
+            probability and sha256, but gap [m].
         limit: number of rows to return; 0: all.
         seconds: longest search.
 
     Raises:
         InputError: there is no batch, or the condition is invalid or takes too long.
     """
-    finished = {
-        relative_name(table, batch / "cases") for table in (batch / "cases").rglob("*.parquet")
-    }
-    scenarios: list[Place] = sorted((batch / "scenarios").rglob("*.parquet"), key=str)
-    generated = [
-        table for table in scenarios if relative_name(table, batch / "scenarios") in finished
-    ]
+    generated = finished_tables(batch, "scenarios")
     tables: list[Place] = generated or sorted((batch / "encounters").glob("*.parquet"), key=str)
     if not tables:
         command = f"scenario-gen batch DIR --roads … --out {batch}"
         raise InputError(f"{batch} holds no scenarios; write them with `{command}`")
-    remedy = f"the columns are {', '.join(COLUMNS)}, types, seed, sha256, outcome, probability"
+    remedy = f"the columns are {NAMES}"
     if not generated:
         remedy += "; if the corpus is from an older version, mine it again"
-    task = f"{batch}: condition {condition!r}"
     with (
         fetched(tables) as paths,
-        database(workplace(batch), 400, task, remedy) as base,
-        _time_limit(base, seconds, task),
+        matching(
+            paths,
+            condition,
+            workplace(batch),
+            columns="*" if generated else RECORDED,
+            source=batch,
+            remedy=remedy,
+            seconds=seconds,
+        ) as (base, matches),
     ):
-        base.execute(
-            f"CREATE VIEW scenarios AS SELECT {'*' if generated else RECORDED}"
-            f" FROM read_parquet([{quoted([str(path) for path in paths])}],"
-            " hive_partitioning=true, hive_types_autocast=false)"
-        )
-        base.execute(f"SET allowed_paths = [{quoted([str(path) for path in paths])}]")
-        base.execute("SET max_temp_directory_size = '4GiB'")
-        base.execute("SET enable_external_access = false")  # a condition must not read files
-        base.execute("SET lock_configuration = true")
-        # `filter` accepts one expression, not a second statement.
-        matches = base.view("scenarios").filter(condition)
         ((count,),) = matches.aggregate("count(*)").fetchall()
         ordered = matches.order("pet NULLS LAST, ttc, template, road, index")
         ordered = ordered.limit(limit or count)
@@ -130,33 +117,10 @@ def find(
     return Hits(rows, count, coverage)
 
 
-@contextmanager
-def _time_limit(base: Any, seconds: float, task: str) -> Iterator[None]:
-    """Interrupt a database that takes too long.
-
-    Raises:
-        InputError: it does.
-    """
-    from duckdb import InterruptException
-
-    timer = Timer(seconds, base.interrupt)
-    timer.daemon = True
-    timer.start()
-    try:
-        yield
-    except InterruptException as error:
-        raise InputError(
-            f"{task} takes more than {seconds:g} s and is stopped; simplify the condition"
-        ) from error
-    finally:
-        timer.cancel()
-
-
 def coverage_lines(hits: Hits, batch: Place) -> list[str]:
     """Return the coverage in words: for each kind and road, the scenarios by PET class."""
     kinds = sorted({kind for kind, *_ in hits.coverage})
-    tables = (batch / "cases").rglob("*.parquet")
-    roads = sorted({table.parent.name.partition("=")[2] for table in tables}) or ["recorded"]
+    roads = sorted(road.partition("=")[2] for road in parts_of(batch / "cases")) or ["recorded"]
     cells = {(kind, road, pet): count for kind, road, pet, count in hits.coverage}
     size = len(kinds) * len(roads) * len(PET_CLASSES)
     lines = [f"coverage: {len(cells)} of {size} cells of kind × road × PET hold a scenario"]
@@ -169,74 +133,105 @@ def coverage_lines(hits: Hits, batch: Place) -> list[str]:
     return lines
 
 
-def bag_of(batch: Place, row: Mapping[str, Any]) -> Place:
-    """Return the bag with a row's scenario.
-
-    Raises:
-        InputError: the row is a recorded encounter.
-    """
-    if row["index"] is None:
-        raise InputError(
-            f"{batch} holds recordings; to get a bag, generate scenarios with"
-            f" `scenario-gen batch {batch} --roads …`"
-        )
-    return batch / "bags" / f"road={row['road']}" / f"part-{row['part']:05}"
-
-
-def make_again(batch: Place, row: Mapping[str, Any]) -> Regenerated:
-    """Generate one scenario again from its template, road, parameters and seed.
-
-    Raises:
-        InputError: the row is a recorded encounter.
-        ScenarioGenError: the SHA-256 differs from the one in the table.
-    """
-    bag = bag_of(batch, row)
-    with fetched([bag]) as (path,):
-        result = regenerate_scenario(path, row["index"], namespace=row["namespace"])
-    _check_same(bag, row, result.sha256)
-    return result
-
-
-def _check_same(bag: Place, row: Mapping[str, Any], sha256: str) -> None:
-    """Check that a row's scenario is that of its bag.
-
-    Raises:
-        ScenarioGenError: the SHA-256 differs from the one in the table.
-    """
-    if sha256 != row["sha256"]:
-        raise ScenarioGenError(
-            f"{bag}: scenario {row['index']} of {row['namespace']} differs from that in the table"
-        )
-
-
-def export_hits(batch: Place, rows: Sequence[Mapping[str, Any]], folder: Path) -> Path:
-    """Copy the scenarios of rows to a bag; return its folder.
+def export_hits(
+    batch: Place, rows: Sequence[Mapping[str, Any]], folder: Path | None, *, again: bool = False
+) -> int:
+    """Write the scenarios of rows to a bag; return how many have the bytes of the batch.
 
     Each scenario has a namespace with its template and road.
 
+    Args:
+        batch: written by `run_batch`.
+        rows: from `find`.
+        folder: of the bag; None: only compare.
+        again: also generate scenarios again that the batch has in bags.
+
     Raises:
         InputError: there are no rows, a bag is missing or damaged, or `folder` is not a bag.
+        ScenarioGenError: a scenario differs from the one in the table.
     """
     if not rows:
         raise InputError("no scenario matches; nothing exported; use a wider condition")
-    with atomic_bag(folder) as bag:
-        for k, messages in _copies(batch, rows):
-            for message in messages:
-                topic = message.topic.removeprefix(rows[k]["namespace"])
-                add_message(bag, f"/hit_{k + 1}{topic}", message.data, message.stamp_ns)
-    return folder
+    identical = 0
+    with nullcontext() if folder is None else atomic_bag(folder) as bag:
+        for k, messages, sha256 in _messages(batch, rows, again):
+            identical += sha256 == rows[k]["sha256"]
+            if bag is not None:
+                _copy(bag, f"/hit_{k + 1}", rows[k]["namespace"], messages)
+    return identical
 
 
-def _copies(
-    batch: Place, rows: Sequence[Mapping[str, Any]]
-) -> Iterator[tuple[int, Sequence[BagMessage]]]:
-    """Yield the numbers of rows and the messages of their scenarios; each bag is read once."""
-    by_bag: dict[Place, list[int]] = {}
+def _copy(bag: BagWriter, name: str, namespace: str, messages: Sequence[BagMessage]) -> None:
+    """Write messages of a namespace under another name."""
+    for message in messages:
+        topic = message.topic.removeprefix(namespace)
+        add_message(bag, f"{name}{topic}", message.data, message.stamp_ns)
+
+
+def _messages(
+    batch: Place, rows: Sequence[Mapping[str, Any]], again: bool
+) -> Iterator[tuple[int, tuple[BagMessage, ...], str]]:
+    """Yield number, messages and SHA-256 of each row's scenario.
+
+    Each bag is read once, and each set is generated once.
+    """
+    by_part: dict[tuple[str, int], list[int]] = {}
     for k, row in enumerate(rows):
-        by_bag.setdefault(bag_of(batch, row), []).append(k)
-    for source, hits in by_bag.items():
-        wanted = [(rows[k]["namespace"], rows[k]["index"]) for k in hits]
-        with fetched([source]) as (path,):
-            for k, (messages, sha256) in zip(hits, recorded_scenarios(path, wanted), strict=True):
-                _check_same(source, rows[k], sha256)
-                yield k, messages
+        if row["index"] is None:
+            raise InputError(
+                f"{batch} holds recordings; to get a bag, generate scenarios with"
+                f" `scenario-gen batch {batch} --roads …`"
+            )
+        by_part.setdefault((row["road"], row["part"]), []).append(k)
+    tasks = cache(partial(_numbered_tasks, batch))
+    for (road, part), numbers in by_part.items():
+        hits = [rows[k] for k in numbers]
+        bag = batch / "bags" / f"road={road}" / f"part-{part:05}"
+        scenarios = [] if again else _copied(bag, hits)
+        scenarios = scenarios or _made_again(tasks()[road, part], hits)
+        for k, (messages, sha256) in zip(numbers, scenarios, strict=True):
+            yield k, messages, sha256
+
+
+def _numbered_tasks(batch: Place) -> dict[tuple[str, int], PartTask]:
+    return {(task.token, task.number): task for task in tasks_of(batch)}
+
+
+def _copied(bag: Place, rows: Sequence[Mapping[str, Any]]) -> list[Copy]:
+    """Return the scenarios of rows from a bag; none if it lacks one of them."""
+    try:
+        with fetched([bag]) as (path,):
+            copies = _scenarios_in(path, rows)
+    except InputError:
+        return []
+    same = [sha256 for _, sha256 in copies] == [row["sha256"] for row in rows]
+    return copies if same else []
+
+
+def _scenarios_in(bag: Path, rows: Sequence[Mapping[str, Any]]) -> list[Copy]:
+    return list(recorded_scenarios(bag, [(row["namespace"], row["index"]) for row in rows]))
+
+
+def _made_again(task: PartTask, rows: Sequence[Mapping[str, Any]]) -> list[Copy]:
+    """Return the scenarios of rows, generated again.
+
+    Raises:
+        ScenarioGenError: a scenario is missing, or its figures differ from the ones in the table.
+    """
+    part = part_result(task, {row["template"] for row in rows})
+    made = {(row["namespace"], row["index"]): row for row, _ in part.scenarios}
+    for row in rows:
+        scenario = made.get((row["namespace"], row["index"]), {})
+        figures, expected = ([each.get(n) or np.nan for n in FIGURES] for each in (scenario, row))
+        if not np.allclose(figures, expected, atol=TOLERANCE_RATIO, equal_nan=True):
+            raise _differs(task.name, row)
+    with scratch(temp_folder()) as folder:
+        with BagWriter(folder / "bag") as bag:
+            add_results(bag, part.results)
+        return _scenarios_in(folder / "bag", rows)
+
+
+def _differs(source: object, row: Mapping[str, Any]) -> ScenarioGenError:
+    return ScenarioGenError(
+        f"{source}: scenario {row['index']} of {row['namespace']} differs from that in the table"
+    )

@@ -5,6 +5,7 @@
 
 from collections.abc import Iterator, Mapping, Sequence
 import json
+from pathlib import Path
 from typing import Any
 
 from scenario_gen.base.errors import guarded, InputError, needs
@@ -13,6 +14,32 @@ from scenario_gen.corpus.tasks import arriving
 
 # A row group is decoded as a whole, and the tracks of an encounter are long.
 GROUP_ROWS = 100
+UNITS = {
+    "seconds": "s",
+    "distance": "m",
+    "ttc": "s",
+    "pet": "s",
+    "speed": "m/s",
+    "braking": "m/s²",
+}
+SAMPLES = "trajectory.list.element."  # the fields of samples, of which x, y, … are smooth
+SMOOTH = tuple(SAMPLES + name for name in ("x", "y", "heading", "speed"))
+
+
+def table_writer(path: Path, schema: Any) -> Any:
+    """Return a writer of a Parquet file; smooth columns are stored byte by byte."""
+    from pyarrow import parquet
+
+    smooth = [name for name in SMOOTH if "trajectory" in schema.names]
+    plain = [name for name in (*schema.names, f"{SAMPLES}t") if name != "trajectory"]
+    return parquet.ParquetWriter(
+        path,
+        schema,
+        compression="zstd",
+        compression_level=9,
+        use_dictionary=plain,
+        use_byte_stream_split=smooth,
+    )
 
 
 def write_table(
@@ -36,7 +63,11 @@ def write_table(
         return pa.type_for_alias(name)
 
     metadata = {name: json.dumps(value) for name, value in facts.items()}
-    schema = pa.schema([(name, data_type(text)) for name, text in columns.items()], metadata)
+    fields = []
+    for name, text in columns.items():
+        unit = {"unit": UNITS[name]} if name in UNITS else None
+        fields.append(pa.field(name, data_type(text), metadata=unit))
+    schema = pa.schema(fields, metadata)
     clean = [
         {name: None if row[name] != row[name] else row[name] for name in columns} for row in rows
     ]

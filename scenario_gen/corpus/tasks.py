@@ -22,10 +22,12 @@ import traceback
 from typing import Any, Protocol, TypeVar
 from uuid import uuid4
 
+from scenario_gen import __version__
 from scenario_gen.base.documents import read_json
 from scenario_gen.base.errors import describe, InputError, needs, of_system, ScenarioGenError
 from scenario_gen.base.folders import naming, scratch, sync, sync_tree, write_text
 from scenario_gen.base.folders.scratch import claimed, PREFIX, sweep_tree
+from scenario_gen.base.provenance import versions
 from scenario_gen.base.signals import cleaned_up
 from scenario_gen.base.stores import create, fetched, Place, Remote, temp_folder, upload
 from scenario_gen.corpus.local_pool import local_pool, LocalPool
@@ -43,6 +45,7 @@ Task = TypeVar("Task")
 Target = TypeVar("Target", bound=_Task)
 Progress = Callable[[int, int], None]
 """Called with the number of finished tasks and the number of all tasks."""
+MANIFEST = {"type": "object", "properties": {"versions": {"type": "object"}}}
 
 
 @contextmanager
@@ -108,8 +111,10 @@ def held(out: Place) -> Iterator[None]:
         sweep_tree(out)
 
 
-def agree(out: Place, name: str, document: Mapping[str, Any], kind: str) -> None:
-    """Write the manifest of results, or check that an existing one is the same.
+def agree(out: Place, name: str, document: Mapping[str, Any], kind: str) -> dict[str, Any]:
+    """Write the manifest of results, or check that an existing one is the same; return it.
+
+    The manifest also has the versions of the release and its libraries.
 
     Args:
         out: folder of the results.
@@ -118,9 +123,10 @@ def agree(out: Place, name: str, document: Mapping[str, Any], kind: str) -> None
         kind: the kind of results, for messages.
 
     Raises:
-        InputError: the folder has other content.
+        InputError: the folder has other content, or is of another release.
     """
     manifest = out / name
+    document = {**document, "versions": versions()}
     text = json.dumps(document, indent=1) + "\n"
     if not manifest.exists():
         if _has_entries(out):
@@ -128,17 +134,24 @@ def agree(out: Place, name: str, document: Mapping[str, Any], kind: str) -> None
         if isinstance(manifest, Path):
             with arriving(manifest) as part:
                 write_text(part, text)
-            return
+            return document
         if create(manifest, text.encode()):
-            return
+            return document
     with fetched([manifest]) as (path,):
-        existing = read_json(path, {"type": "object"})
-    changed = [key for key in document if existing.get(key) != document[key]]
+        existing: dict[str, Any] = read_json(path, MANIFEST)
+    release = existing.get("versions", {}).get("scenario_gen", "")
+    if existing.get("format") != document.get("format") or release not in ("", __version__):
+        raise InputError(
+            f"{out} is a {kind} of release {release or 'before ' + __version__}, this is"
+            f" {__version__}: it can be read, but not continued; name another folder"
+        )
+    changed = [key for key in document if existing.get(key) != document[key] and key != "versions"]
     if changed:
         raise InputError(
             f"{out} is a {kind} with other {', '.join(changed)};"
             " name another folder, or remove this one"
         )
+    return existing
 
 
 def _has_entries(folder: Place) -> bool:

@@ -3,24 +3,34 @@
 
 """Batches: the same bytes by whomever, found again by what they are, made again alone; a killed run loses and doubles nothing."""
 
+from dataclasses import replace
 from functools import partial
+from importlib.util import find_spec
 import json
 import os
+import re
 import signal
 import subprocess
 import sys
 import time
 
+import numpy as np
+import pandas as pd
+from pyarrow import parquet
 import pytest
+from support.source_files import ROOT
 
-from scenario_gen.bags.recordings.read import read_recording
+from scenario_gen.bags.recordings.read import load, read_recording
+from scenario_gen.bags.recordings.write import scenario_bytes
 from scenario_gen.base.errors import InputError, RefusedError, ScenarioGenError
 from scenario_gen.base.folders import sha256_of
 from scenario_gen.cli.commands import main
-from scenario_gen.corpus import batch as batches
-from scenario_gen.corpus.batch import BatchRequest, LOST_CONFLICT, run_batch
+from scenario_gen.corpus import parts
+from scenario_gen.corpus.batch import run_batch
+from scenario_gen.corpus.compact import compact
 from scenario_gen.corpus.encounters import encounter_of, tables_of
-from scenario_gen.corpus.find import coverage_lines, export_hits, find, make_again
+from scenario_gen.corpus.find import coverage_lines, export_hits, find
+from scenario_gen.corpus.parts import BatchRequest, LOST_CONFLICT
 from scenario_gen.corpus.tables import rows_of
 from scenario_gen.corpus.tasks import Workers
 from scenario_gen.method.chain import generate_set
@@ -31,7 +41,7 @@ from scenario_gen.method.sampling import SamplingConfig
 
 pytestmark = pytest.mark.xdist_group("corpus")
 ROADS = ("corridor", "straight")
-REQUEST, TEMPLATES = BatchRequest(count=3, seed=5), 3
+REQUEST, TEMPLATES = BatchRequest(count=3, seed=5, bags="hits", hits="index % 2 = 0"), 3
 PATIENCE = 300.0  # seconds in which a process is at work
 interruptible = partial(
     signal.signal, signal.SIGINT, signal.SIG_DFL
@@ -72,8 +82,7 @@ def test_scenarios_are_found_by_what_they_are_and_made_again_alone(
     condition = "road = 'corridor' and speed > 1"
     found = find(out, condition)
     assert found.rows[0]["road"] == "corridor"
-    for row in found.rows[:2]:
-        assert make_again(out, row).sha256 == row["sha256"]
+    assert export_hits(out, found.rows[:2], None, again=True) == 2
     words = [
         "scenario-gen",
         "--json",
@@ -100,8 +109,12 @@ def test_scenarios_are_found_by_what_they_are_and_made_again_alone(
         sum(count for *_, count in found.coverage) == made.scenarios
         and "coverage" in coverage_lines(found, out)[0]
     )
-    with pytest.raises(ScenarioGenError, match="differs from that in the table"):
-        make_again(out, found.rows[0] | {"sha256": "0"})
+    changed = found.rows[0] | {"sha256": "0", "speed": 0.0}
+    for again in (False, True):
+        with pytest.raises(ScenarioGenError, match="differs from that in the table"):
+            export_hits(out, [changed], None, again=again)
+    (row,) = find(out, "index = 1", limit=1).rows
+    assert export_hits(out, [row], None) == 1, "made again, since it is in no bag"
     with pytest.raises(InputError, match="the columns are"):
         find(out, "colour = 'red'")
     with pytest.raises(InputError, match="no scenario matches; nothing exported"):
@@ -142,7 +155,7 @@ def test_recorded_encounters_are_found_by_their_figures(corpus):
     with pytest.raises(
         InputError, match="holds recordings; to get a bag, generate scenarios with"
     ):
-        make_again(corpus[0], found.rows[0])
+        export_hits(corpus[0], found.rows[:1], None)
 
 
 def test_a_batch_is_gone_on_with_but_not_as_another_one(batch, corpus):
@@ -154,14 +167,67 @@ def test_a_batch_is_gone_on_with_but_not_as_another_one(batch, corpus):
     assert not find(out, "road = 'straight'").rows
     run_batch(corpus[0], ROADS, out, REQUEST, templates=TEMPLATES)
     assert digests(out) == before
-    with pytest.raises(InputError, match="other count"):
-        run_batch(corpus[0], ROADS, out, BatchRequest(count=4, seed=5), templates=TEMPLATES)
+    for other, said in (({"count": 2}, "other count"), ({"seed": 6}, "other seed")):
+        with pytest.raises(InputError, match=said):
+            run_batch(corpus[0], ROADS, out, replace(REQUEST, **other), templates=TEMPLATES)
+
+
+def test_a_batch_grows_by_what_it_lacks_also_when_it_was_merged(corpus, tmp_path):
+    """By templates, roads and scenarios; what is there is neither written again nor changed."""
+    out = tmp_path / "out"
+
+    def grown(roads, count, templates):
+        before = {path: path.stat().st_mtime_ns for path in out.rglob("*.parquet")}
+        made = run_batch(corpus[0], roads, out, BatchRequest(count=count), templates=templates)
+        now = {path: path.stat().st_mtime_ns for path in out.rglob("*.parquet")}
+        assert before.items() <= now.items() and made.requested == made.cases * count
+        return len(now) - len(before), made.cases
+
+    assert grown(ROADS[:1], 1, 1)[1] == 1
+    assert grown(ROADS[:1], 1, 2)[1] == 2
+    before = find(out).rows
+    tables = len(list(out.rglob("*.parquet")))
+    assert compact(out)[2] == [] and len(list(out.rglob("*.parquet"))) < tables
+    assert find(out).rows == before
+    assert grown(ROADS[:1], 1, 2)[0] == 0
+    assert grown(ROADS, 1, 2)[1] == 4
+    assert grown(ROADS, 2, 2)[1] == 4
+    after = find(out).rows
+    assert all(row in after for row in before) and len({row["sha256"] for row in after}) == len(
+        after
+    )
+
+
+def test_trajectories_are_those_of_the_scenarios(batch, tmp_path):
+    """As pandas reads them, with units, within 2 mm of the bag; the page's code reads them."""
+    out, made = batch
+    page = (ROOT / "docs" / "corpus.md").read_text().replace("out/batch", str(out))
+    for code in re.findall(r"^```python\n(.*?)^```", page, re.MULTILINE | re.DOTALL):
+        library = re.search(r"import (\w+)", code)[1]
+        if find_spec(library) is not None:  # polars is not among the libraries of the tests
+            exec(code, {})
+    table = pd.read_parquet(out / "trajectories")
+    assert table["sha256"].nunique() == made.scenarios and {"kind", "road"} <= set(table)
+    rows = find(out, "road = 'corridor'").rows
+    export_hits(out, rows, tmp_path / "hits")
+    for name in read_recording(tmp_path / "hits").results:
+        result = load(tmp_path / "hits", namespace=name)
+        (scenario,) = result
+        hit = table[table["sha256"] == scenario_bytes(scenario, result.encounter)[1]]
+        for vehicle, samples in zip(hit["vehicle"], hit["trajectory"], strict=True):
+            x = scenario.position[scenario.ids.index(vehicle), :, 0]
+            assert np.abs(x - [sample["x"] for sample in samples]).max() < 0.002
+    schema = parquet.read_schema(next((out / "trajectories").rglob("*.parquet")))
+    sample = schema.field("trajectory").type.value_type
+    assert [(field.name, field.metadata[b"unit"]) for field in sample] == [
+        ("t", b"s"), ("x", b"m"), ("y", b"m"), ("heading", b"rad"), ("speed", b"m/s"),
+    ]  # fmt: skip
 
 
 def test_a_batch_recombines_the_encounters_of_its_corpus(corpus, tmp_path):
     request = BatchRequest(count=1, seed=5, recombine=2)
     run_batch(corpus[0], ROADS[:1], tmp_path, request, templates=6)
-    recombined = [encounter_of(row) for row in rows_of([*tmp_path.glob("recombined/*.parquet")])]
+    recombined = [encounter_of(row) for row in rows_of([*tmp_path.glob("templates/*1.parquet")])]
     names = {row["name"] for row in rows_of(tables_of(corpus[0]))}
     assert len(recombined) == 2
     assert all({made.source.first, made.source.second} < names for made in recombined)
@@ -203,7 +269,7 @@ def test_a_killed_run_with_two_processes_ends_with_the_same_bytes(batch, corpus,
     with subprocess.Popen(
         words, start_new_session=True, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
     ) as run:
-        at_work(run, out, "*.mcap")
+        at_work(run, out, "part-*.parquet")
         os.killpg(run.pid, signal.SIGKILL)
     made = run_batch(corpus[0], ROADS, out, REQUEST, templates=TEMPLATES, workers=Workers(2))
     assert digests(out) == digests(batch[0]) and made.lines() == batch[1].lines()
@@ -309,7 +375,7 @@ def test_like_refusals_are_counted_under_one_cause(
     def refuse(_encounter, _count, road, **_):
         raise kind(f"road {road} {why}")
 
-    monkeypatch.setattr(batches, "generate_set", refuse)
+    monkeypatch.setattr(parts, "generate_set", refuse)
     made = run_batch(
         corpus[0], ROADS, tmp_path / "out", BatchRequest(count=1), templates=2, workers=Workers(1)
     )
@@ -329,13 +395,13 @@ def test_a_recording_that_is_too_long_for_a_road_is_shortened_and_made_again(
             raise RefusedError("the road is too short")
         return generate_set(encounter, *arguments, **others)
 
-    monkeypatch.setattr(batches, "generate_set", short_road)
+    monkeypatch.setattr(parts, "generate_set", short_road)
     out, workers = tmp_path / "out", Workers(1)
     made = run_batch(corpus[0], ["corridor"], out, REQUEST, templates=1, workers=workers)
     (case,) = rows_of(sorted((out / "cases").rglob("*.parquet")))
     assert made.shortened == 1 and case["published"] == REQUEST.count
     assert "shortened" in " ".join(made.lines()) and " of " in case["shortened"]
-    assert make_again(out, find(out).rows[0]).sha256 == find(out).rows[0]["sha256"]
+    assert export_hits(out, find(out).rows[:1], None, again=True) == 1
 
 
 def test_drawn_decisions_have_a_set_for_each_outcome(corpus, tmp_path):
@@ -347,4 +413,4 @@ def test_drawn_decisions_have_a_set_for_each_outcome(corpus, tmp_path):
     assert "goes first" in made.outcomes and sum(made.outcomes.values()) <= made.scenarios
     first, *_ = find(tmp_path / "out", "outcome = 'goes first'").rows
     assert 0.0 < first["probability"] < 1.0
-    assert make_again(tmp_path / "out", first).sha256 == first["sha256"]
+    assert export_hits(tmp_path / "out", [first], None) == 1

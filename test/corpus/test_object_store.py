@@ -25,10 +25,12 @@ from scenario_gen.bags.recordings.read import read_recording
 from scenario_gen.base.errors import InputError
 from scenario_gen.base.stores import place, relative_name, upload
 from scenario_gen.cli.commands import app
-from scenario_gen.corpus.batch import BatchRequest, run_batch
-from scenario_gen.corpus.find import coverage_lines, export_hits, find, make_again
+from scenario_gen.corpus.batch import run_batch
+from scenario_gen.corpus.compact import compact
+from scenario_gen.corpus.find import coverage_lines, export_hits, find
 from scenario_gen.corpus.library import build
 from scenario_gen.corpus.mine import mine
+from scenario_gen.corpus.parts import BatchRequest
 
 pytestmark = pytest.mark.xdist_group("corpus")  # one archive for all
 
@@ -95,7 +97,7 @@ def test_a_batch_and_what_it_finds_are_the_same_in_a_store(bucket, corpus, tmp_p
     stored, local, request = (
         place(f"{bucket}/corpus"),
         tmp_path / "batch",
-        BatchRequest(count=2, seed=5),
+        BatchRequest(count=2, seed=5, bags="hits", hits="index = 0"),
     )
     upload(corpus[0] / "encounters", stored / "encounters")
     out = place(f"{bucket}/batch")
@@ -105,14 +107,18 @@ def test_a_batch_and_what_it_finds_are_the_same_in_a_store(bucket, corpus, tmp_p
     assert find(out).rows == find(local).rows and coverage_lines(find(out), out) == coverage_lines(
         find(local), local
     )
-    row = find(out).rows[0]
-    assert make_again(out, row).sha256 == row["sha256"]
-    namespaces = read_recording(export_hits(out, [row], tmp_path / "hits")).namespaces
-    assert [one.hashes for one in namespaces.values()] == [(row["sha256"],)]
-    with pytest.raises(InputError, match="batch with other count"):
-        run_batch(stored, ["corridor"], out, BatchRequest(count=3, seed=5), templates=2)
+    rows = find(out).rows
+    assert export_hits(out, rows, tmp_path / "hits") == len(rows)
+    namespaces = read_recording(tmp_path / "hits").namespaces
+    assert [one.hashes for one in namespaces.values()] == [(row["sha256"],) for row in rows]
+    with pytest.raises(InputError, match="batch with other seed"):
+        run_batch(stored, ["corridor"], out, BatchRequest(count=2), templates=2)
+    run_batch(stored, ["corridor"], out, request, templates=3)
+    before = find(out).rows
+    assert compact(out)[2] == [] and find(out).rows == before
+    assert not list((out / "cases").rglob("part-*"))
     remove(
-        out / "cases" / "road=corridor" / "part-00000.parquet"
+        out / "cases" / "road=corridor" / "parts-00000-00001.parquet"
     )  # as if killed before its last object
     with pytest.raises(InputError, match="holds no scenarios"):
         find(out)

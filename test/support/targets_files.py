@@ -10,7 +10,6 @@ import re
 
 import pandas as pd
 
-from scenario_gen.corpus.batch import CASE_COLUMNS, SCENARIO_COLUMNS
 from scenario_gen.corpus.config import CorpusConfig
 from scenario_gen.corpus.encounters import (
     account_of,
@@ -21,6 +20,7 @@ from scenario_gen.corpus.encounters import (
 )
 from scenario_gen.corpus.find import coverage_lines, find
 from scenario_gen.corpus.messages import parse_range, ranges
+from scenario_gen.corpus.parts import CASE_COLUMNS, SCENARIO_COLUMNS
 from scenario_gen.corpus.tables import rows_of
 from scenario_gen.logs import read_log
 from scenario_gen.logs.synthetic import bundled
