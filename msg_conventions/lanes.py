@@ -13,7 +13,8 @@ before the right one. `text` is a JSON object with these members:
   built-in road, and `height` [m] of its points if lanes lie above others. Lanes closed to cars
   come last.
 - `rules`, if the map has traffic rules, each with `id`, `kind`, `lanes`, `over` (indices of lanes)
-  and `line` (points of the stop line), and `rules_kept`
+  and `line` (points of the stop line), and `rules_kept`; also `schedule` of lights with states:
+  `starts` [s] and `states` of its phases, `end` [s], and whether it `repeats`
 - `origin`: latitude and longitude of the frame's origin, if the map has it
 - `drawn` true for lanes of a built-in road, and `drawn_for` for those drawn for a template: the
   `frame` of the template (x, y [m], yaw [rad] on the road), and the ids of the `lanes` by which
@@ -43,6 +44,7 @@ from scenario_gen.types import (
     note_kinds,
     recorded_notes,
     RuleKind,
+    SignalSchedule,
     TrafficRule,
 )
 
@@ -87,6 +89,7 @@ def _document(network: LaneNetwork) -> dict[str, Any]:
                 "over": rule.over,
                 "line": rule.line.tolist(),
             }
+            | ({} if rule.schedule is None else {"schedule": rule.schedule.document()})
             for rule in network.rules
         ]
         document["rules_kept"] = network.rules_kept
@@ -174,7 +177,9 @@ def _drawn_for(document: dict[str, Any]) -> DrawnFor:
 def _rule(document: dict[str, Any]) -> TrafficRule:
     lanes, over = _indices(document["lanes"]), _indices(document["over"])
     line = np.array([(float(x), float(y)) for x, y in document["line"]]).reshape(-1, 2)
-    return TrafficRule(str(document["id"]), RuleKind(document["kind"]), lanes, over, line)
+    schedule = SignalSchedule.of_document(document["schedule"]) if "schedule" in document else None
+    kind = RuleKind(document["kind"])
+    return TrafficRule(str(document["id"]), kind, lanes, over, line, schedule)
 
 
 def _lanes(documents: list[dict[str, Any]], points: Floats, source: str) -> Iterator[Lane]:

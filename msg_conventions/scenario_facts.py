@@ -19,6 +19,7 @@ from scenario_gen.types import (
     ORDERS,
     PassingOrder,
     split_pieces,
+    TrafficLight,
     YIELD,
 )
 
@@ -45,11 +46,21 @@ def fact_values(facts: Facts) -> dict[str, str]:
         values["reactions_lost"] = join_pieces(pairs)
     if facts.decision is not None:
         values["decision"] = json.dumps(facts.decision.document())
-    if facts.failure is not None:
-        values["search.kind"] = facts.failure.kind
-        values["search.deviation"] = f"{facts.failure.deviation:.4g}"
-        if facts.failure.weight is not None:
-            values["search.weight"] = repr(facts.failure.weight)
+    if facts.lights:
+        values["lights"] = json.dumps([light.document() for light in facts.lights])
+    return values | _failure_values(facts.failure)
+
+
+def _failure_values(failure: Failure | None) -> dict[str, str]:
+    """Return the key-values of a failure; none if there is none."""
+    if failure is None:
+        return {}
+    values = {
+        "search.kind": failure.kind,
+        "search.deviation": f"{failure.deviation:.4g}",
+    }
+    if failure.weight is not None:
+        values["search.weight"] = repr(failure.weight)
     return values
 
 
@@ -89,7 +100,13 @@ def decode_facts(values: Mapping[str, str], origin: str) -> Facts:
         lost_reactions=_pairs(values.get("reactions_lost", "")),
         failure=failure,
         decision=decode_decision(values["decision"], origin) if "decision" in values else None,
+        lights=_lights(values.get("lights", "[]"), origin),
     )
+
+
+def _lights(text: str, origin: str) -> tuple[TrafficLight, ...]:
+    with guarded(f"{origin}: lights"):
+        return tuple(map(TrafficLight.of_document, json.loads(text)))
 
 
 def decode_decision(text: str, origin: str) -> Decision:

@@ -43,6 +43,7 @@ def encode_samples(encounter: Encounter, at: Ints) -> bytes:
             at * encounter.dt_ns,
             *states,
             present=present,
+            lights=encounter.lights,
         )
     )
 
@@ -93,6 +94,7 @@ def decode_tracks(data: bytes, name: str = "tracks") -> Encounter:
         name=name,
         start_ns=message.stamp_ns,
         present=present,
+        lights=message.lights,
     )
 
 

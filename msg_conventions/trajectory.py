@@ -6,7 +6,8 @@
 - `header.frame_id`: the frame of the positions.
 - `header.stamp`: the template's first sample, repeated in messages derived from the template.
 - `joint_names[i]`: `<id>:<length>x<width>` in metres, then `:<type>` unless the vehicle is a car
-  shorter than 7 m or a truck from 7 m on. A bare `<id>` is a default car.
+  shorter than 7 m or a truck from 7 m on. A bare `<id>` is a default car. The last one of `tracks`
+  is `signals=<JSON>`, far below the ground, if states of traffic lights were recorded.
 - `points[k].time_from_start`: time since `header.stamp`.
 - `points[k].transforms[i]`: pose of the footprint's centre with z = 0 and the yaw as a quaternion.
   z is `ABSENT_Z_M`, far below the ground, where the vehicle is absent; x, y and yaw are then those
@@ -19,6 +20,7 @@ All other components are zero; no value is NaN. In `scenarios` no vehicle is abs
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+import json
 import re
 from typing import Any
 
@@ -28,9 +30,9 @@ from msg_conventions import layouts
 from msg_conventions.cdr import CdrReader, HEADER
 from msg_conventions.cdr import encode as encode_fields
 from msg_conventions.yaw import check_quaternions, quaternion, yaw
-from scenario_gen.base.errors import InputError
+from scenario_gen.base.errors import guarded, InputError
 from scenario_gen.numerics import Bools, Floats, Ints, NS_PER_S
-from scenario_gen.types import tokens, usual_type, Vehicle
+from scenario_gen.types import tokens, TrafficLight, usual_type, Vehicle
 
 TYPE = "trajectory_msgs/msg/MultiDOFJointTrajectory"
 MAX_COORDINATE_M = 1e8  # more than any geodetic grid has
@@ -41,6 +43,7 @@ MAX_DURATION_NS = 7200 * NS_PER_S  # of an encounter or a scenario
 MIN_SIZE_M = 0.01  # of a footprint
 MAX_SIZE_M = 1000.0
 ABSENT_Z_M = -1000.0  # z of an absent vehicle
+_SIGNALS = "signals="
 SEQUENCES = {"transforms": 7, "velocities": 6, "accelerations": 6}
 """The sequences of a point, and how many numbers an entry has."""
 
@@ -59,6 +62,7 @@ class Trajectory:
         speed: (N, T) [m/s].
         acceleration: (N, T) [m/s²].
         present: (N, T) whether each vehicle is present; None: all are.
+        lights: traffic lights whose states are known.
     """
 
     stamp_ns: int
@@ -70,6 +74,7 @@ class Trajectory:
     speed: Floats
     acceleration: Floats
     present: Bools | None = None
+    lights: tuple[TrafficLight, ...] = ()
 
 
 def joint_names(vehicles: Sequence[Vehicle]) -> tuple[str, ...]:
@@ -124,6 +129,10 @@ def encode(trajectory: Trajectory) -> bytes:
         InputError: a value is not finite, an id cannot be a ROS name, or a time does not fit.
     """
     n, count = trajectory.speed.shape
+    names = joint_names(trajectory.vehicles)
+    if trajectory.lights:
+        document = [light.document() for light in trajectory.lights]
+        names = (*names, f"{_SIGNALS}{json.dumps(document)}")
     values = (trajectory.position, trajectory.heading, trajectory.speed, trajectory.acceleration)
     if not all(np.isfinite(value).all() for value in values):
         raise InputError("a trajectory with a value that is not finite cannot be sent")
@@ -131,18 +140,20 @@ def encode(trajectory: Trajectory) -> bytes:
         layouts.TRAJECTORY,
         stamp=trajectory.stamp_ns,
         frame_id=trajectory.frame_id,
-        names=joint_names(trajectory.vehicles),
+        names=names,
         count=count,
     )
-    points = np.zeros(count, dtype=_point_type(n))
+    points = np.zeros(count, dtype=_point_type(len(names)))
     for name in SEQUENCES:
-        points["n_" + name] = n
-    points["transforms"][..., :2] = trajectory.position.swapaxes(0, 1)
+        points["n_" + name] = len(names)
+    pose = points["transforms"]
+    pose[:, n:, 2], pose[:, n:, 6] = ABSENT_Z_M, 1.0
+    pose[:, :n, :2] = trajectory.position.swapaxes(0, 1)
     if trajectory.present is not None:
-        points["transforms"][..., 2] = np.where(trajectory.present, 0.0, ABSENT_Z_M).T
-    points["transforms"][..., 3:] = quaternion(trajectory.heading).swapaxes(0, 1)
-    points["velocities"][..., 0] = trajectory.speed.T
-    points["accelerations"][..., 0] = trajectory.acceleration.T
+        pose[:, :n, 2] = np.where(trajectory.present, 0.0, ABSENT_Z_M).T
+    pose[:, :n, 3:] = quaternion(trajectory.heading).swapaxes(0, 1)
+    points["velocities"][:, :n, 0] = trajectory.speed.T
+    points["accelerations"][:, :n, 0] = trajectory.acceleration.T
     points["sec"], points["nanosec"] = np.divmod(trajectory.time_ns, NS_PER_S)
     body = points.tobytes()
     # At an odd multiple of 4 the first point needs no padding after its first length.
@@ -169,13 +180,18 @@ def decode_first(data: bytes, source: str) -> tuple[Trajectory, int]:
     """
     reader = CdrReader(data, source)
     head = reader.fields(layouts.TRAJECTORY, framed=True)
-    vehicles = tuple(map(vehicle_of, head.names))
-    n = len(vehicles)
-    if not n:
+    n, names = len(head.names), head.names
+    lights: tuple[TrafficLight, ...] = ()
+    if n and names[-1].startswith(_SIGNALS):
+        lights = _decode_lights(names[-1].removeprefix(_SIGNALS), source)
+        names = names[:-1]
+    vehicles = tuple(map(vehicle_of, names))
+    if not vehicles:
         raise InputError(f"{source}: joint_names is empty; at least one vehicle is needed")
     points = _read_table(reader, n, head.count) or _read_points(reader, source, n, head.count)
     _check_points(points, source)
-    time_ns, pose, velocity, acceleration = points
+    time_ns, *states = points
+    pose, velocity, acceleration = (values[:, : len(vehicles)] for values in states)
     present = pose[..., 2].T > 0.5 * ABSENT_Z_M
     trajectory = Trajectory(
         stamp_ns=head.stamp,
@@ -187,8 +203,14 @@ def decode_first(data: bytes, source: str) -> tuple[Trajectory, int]:
         speed=velocity[..., 0].T,
         acceleration=acceleration[..., 0].T,
         present=None if present.all() else present,
+        lights=lights,
     )
     return trajectory, len(HEADER) + reader.place
+
+
+def _decode_lights(text: str, source: str) -> tuple[TrafficLight, ...]:
+    with guarded(f"{source}: traffic lights"):
+        return tuple(map(TrafficLight.of_document, json.loads(text)))
 
 
 Points = tuple[Ints, Floats, Floats, Floats]

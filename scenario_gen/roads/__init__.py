@@ -28,6 +28,7 @@ from scenario_gen.roads.config import RoadConfig
 from scenario_gen.roads.connectivity import FreeSpace
 from scenario_gen.roads.drawn import draw_plan
 from scenario_gen.roads.junctions import drives_about_ring
+from scenario_gen.roads.lights import lights_of
 from scenario_gen.roads.obstacles import read_obstacles
 from scenario_gen.roads.pavement import drivable_width
 from scenario_gen.roads.plan import Arm, Connection, Driven, Plan, ways_through
@@ -84,6 +85,7 @@ __all__ = [
     "lane_along",
     "lane_graph",
     "layout_for",
+    "lights_of",
     "nearest_pose_with_room",
     "own_side",
     "placements",

@@ -214,11 +214,14 @@ def draw_main_road(name: str, encounter: Encounter | None, config: RoadConfig) -
     situation = Situation.of(encounter)
     tracks = situation.drivers
     config = fitting_width(tracks, config)
+    is_junction = name in ("t_intersection", "four_way")
+    if is_junction and config.priority == "signals" and encounter.lights:
+        return draw_junction(name, situation, config)
     try:
         frenet = to_frenet(tracks)
     except RefusedError:  # turns or crossings need a junction
         has_u_turn = any(track.makes_u_turn for track in tracks)
-        if name in ("t_intersection", "four_way") and not has_u_turn:
+        if is_junction and not has_u_turn:
             return draw_junction(name, situation, config)
     else:
         main = main_line(frenet, tracks)

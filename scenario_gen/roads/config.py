@@ -36,8 +36,14 @@ class RoadConfig(Parameters):
     priority: str = parameter(
         "auto",
         "signs of a drawn junction; auto: arms whose recorded vehicles yielded give way, as do "
-        "those into a roundabout; all_way_stop: all stop",
-        choices=("none", "auto", "all_way_stop"),
+        "those into a roundabout; all_way_stop: all stop; signals: traffic lights",
+        choices=("none", "auto", "all_way_stop", "signals"),
+    )
+    signals: str = parameter(
+        "recorded",
+        "states of the lights with `priority` signals: recorded ones, which move with the "
+        "encounter, or a fixed program of two phases whose offset suits the encounter",
+        choices=("recorded", "fixed"),
     )
     crossing: str = parameter(
         "none",

@@ -21,6 +21,7 @@ from scenario_gen.numerics import Floats
 from scenario_gen.numerics.curve import Curve
 from scenario_gen.numerics.plane import angle_between, unit
 from scenario_gen.roads.config import RoadConfig
+from scenario_gen.roads.lights import arm_lights
 from scenario_gen.roads.pavement import drivable_width, inside, paved, ring, strip, swept
 from scenario_gen.roads.plan import Connection, lane_id, Plan
 from scenario_gen.roads.vector.raster import road_of, VERGE_M
@@ -135,6 +136,7 @@ class _RoadDrawing:
         """Yield the signs at the mouths of arms: to stop, or to give way to other traffic."""
         if not self._plan.has_junction or self._config.priority == "none":
             return
+        signals = self._config.priority == "signals" and not self._plan.ring
         all_stop = (
             self._config.priority == "all_way_stop"
             and not self._plan.ring
@@ -145,12 +147,15 @@ class _RoadDrawing:
             if not lanes:
                 continue
             name = f"arm {arm + 1}"
-            if all_stop:
-                yield TrafficRule(name, RuleKind.STOP, lanes, (), self._stop_line(arm, lanes))
+            line = self._stop_line(arm, lanes)
+            if signals:
+                recorded = [self._plan.lights.get((arm, n)) for n in range(len(lanes))]
+                axis = self._lines[arm]
+                yield from arm_lights(name, lanes, recorded, line, axis, self._config)
+            elif all_stop:
+                yield TrafficRule(name, RuleKind.STOP, lanes, (), line)
             elif arm in self._plan.yielding:
-                line = self._stop_line(arm, lanes)
-                over = self._lanes_before(arm)
-                yield TrafficRule(name, RuleKind.GIVE_WAY, lanes, over, line)
+                yield TrafficRule(name, RuleKind.GIVE_WAY, lanes, self._lanes_before(arm), line)
 
     def _lanes_inward(self, arm: int) -> tuple[int, ...]:
         count = self._plan.arms[arm].inward

@@ -26,6 +26,7 @@ from scenario_gen.roads.junction_arms import (
     lanes_of_arm,
     SURE_LENGTH_M,
 )
+from scenario_gen.roads.lights import recorded_lights
 from scenario_gen.roads.pavement import END_ROOM_M, JUNCTION_SLACK_M, MIN_ARM_M
 from scenario_gen.roads.plan import aligned, Arm, Connection, Driven, Plan
 from scenario_gen.roads.shaped import fitting_width
@@ -85,7 +86,8 @@ def draw_junction(name: str, situation: Situation, config: RoadConfig) -> Road:
                 driven.append(Driven(connection, route, track.vehicle.length, width))
     drawn_for = aligned(tracks, lane_of, np.array([*centre, 0.0]), np.array([0.0, 0.0, turn]))
     yielding = _yielding_arms(situation, lane_of, config)
-    plan = Plan(arms, driven=driven, yielding=yielding, drawn_for=drawn_for)
+    lights = recorded_lights(situation, lane_of, drawn_for)
+    plan = Plan(arms, driven=driven, yielding=yielding, drawn_for=drawn_for, lights=lights)
     return draw_plan(plan, name, config)
 
 

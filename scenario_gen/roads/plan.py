@@ -4,7 +4,7 @@
 """The plan of a drawn road: its arms, and the routes that it is drawn for."""
 
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import numpy as np
@@ -15,7 +15,7 @@ from scenario_gen.numerics.plane import place, unit, unit_left
 from scenario_gen.roads.config import RoadConfig
 from scenario_gen.roads.ways import reverse
 from scenario_gen.situation import Track
-from scenario_gen.types import DrawnFor, Note, Road
+from scenario_gen.types import DrawnFor, Note, Road, TrafficLight
 
 
 class Connection(NamedTuple):
@@ -93,6 +93,7 @@ class Plan:
         ring: radius [m] of a roundabout's lane about the origin; 0: there is none.
         yielding: the arms that give way if priorities are shown.
         drawn_for: where the recording lies that the road is drawn for.
+        lights: recorded lights about the plan's origin, by arm and lane.
         notes: on decisions.
     """
 
@@ -102,6 +103,7 @@ class Plan:
     ring: float = 0.0
     yielding: Collection[int] = ()
     drawn_for: DrawnFor | None = None
+    lights: Mapping[tuple[int, int], TrafficLight] = field(default_factory=dict)
     notes: tuple[Note, ...] = ()
 
     @property

@@ -51,6 +51,11 @@ from scenario_gen.situation.manoeuvre import (
 from scenario_gen.situation.path_crossing import pair_crossings, path_crossing
 from scenario_gen.situation.placement_lsq import Equation, solve_placement
 from scenario_gen.situation.separation import separate, smallest_gaps
+from scenario_gen.situation.signal_stops import (
+    faced_light,
+    red_runners,
+    runs_red,
+)
 from scenario_gen.situation.situation import Situation
 from scenario_gen.situation.size import (
     MAX_SAMPLES,
@@ -92,6 +97,7 @@ __all__ = [
     "driver_rows",
     "drivers_of",
     "encroachment",
+    "faced_light",
     "find_conflicts",
     "find_waits",
     "interaction_advice",
@@ -109,9 +115,11 @@ __all__ = [
     "passing",
     "path_crossing",
     "path_offsets",
+    "red_runners",
     "refuse_reversing",
     "refuse_too_large",
     "required_orders",
+    "runs_red",
     "separate",
     "sharpness_of",
     "side_offsets",

@@ -64,7 +64,7 @@ def find_reactions(
             latest.get(key, reaction), reaction, key=lambda each: (each.clears, each.confidence)
         )
     graph = without_circles([*leading.values(), *latest.values()], len(tracks))
-    graph = replace(graph, stops=stops)
+    graph = replace(graph, stops=stops, crossings=by_light.crossings)
     return graph if graph.edges else replace(graph, why=_why_none(recording, evidence))
 
 

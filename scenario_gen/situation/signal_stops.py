@@ -9,7 +9,7 @@ import math
 
 import numpy as np
 
-from scenario_gen.numerics import Floats, Ints
+from scenario_gen.numerics import Ints
 from scenario_gen.numerics.plane import angle_between
 from scenario_gen.situation.waits import STANDSTILL_SPEED_MPS, Wait
 from scenario_gen.types import (
@@ -129,27 +129,25 @@ def _stop(encounter: Encounter, light: TrafficLight, wait: Wait) -> SignalStop |
         return None
     queue = _queue_before(encounter, n, light, k)
     is_last = wait.end >= float(encounter.time[encounter.present[n, 1]]) - 1e-9
-    green, phase = _green(light, wait.start, wait.end + _LIMITS.anticipation_s)
+    green = _green(light, wait.start, wait.end + _LIMITS.anticipation_s)
     latest = green + _LIMITS.start_up_s + _LIMITS.queue_s * queue
     if not is_last and not wait.end <= latest:
         return None
     rows = (encounter.time >= wait.start) & (encounter.time <= wait.end)
     standing = encounter.time[rows & (encounter.speed[n] <= STANDSTILL_SPEED_MPS)]
     departs = float(standing[-1]) if len(standing) else wait.end
-    return SignalStop(n, light.id, wait.start, departs, green, phase, queue)
+    return SignalStop(n, light.id, wait.start, departs, green, queue)
 
 
-def _green(light: TrafficLight, first: float, last: float) -> tuple[float, int]:
-    """Return when [s] a light turned green for the last time in an interval, and the phase.
-
-    inf and -1: it did not.
-    """
+def _green(light: TrafficLight, first: float, last: float) -> float:
+    """Return when [s] a light turned green for the last time in an interval; inf: never."""
     phases = light.schedule.between(first - 1.0, last + 1.0)
-    for phase in range(len(phases.states) - 1, -1, -1):
-        is_green = phases.states[phase] is SignalState.GREEN
-        if is_green and first < phases.starts[phase] <= last:
-            return phases.starts[phase], phase
-    return math.inf, -1
+    greens = [
+        start
+        for start, state in zip(phases.starts, phases.states, strict=True)
+        if state is SignalState.GREEN and first < start <= last
+    ]
+    return max(greens, default=math.inf)
 
 
 def _queue_before(encounter: Encounter, n: int, light: TrafficLight, k: int) -> int:
@@ -179,12 +177,14 @@ def _slowdown(
         return None
     since, until = float(time[top]), float(time[low])
     before = float(light.before(fronts(encounter, n)[rows[low]]))
-    green, phase = _green(light, since, until + _LIMITS.anticipation_s)
+    green = _green(light, since, until + _LIMITS.anticipation_s)
     at_red = light.schedule.stops_within(since, until)
-    answers = until <= green + _LIMITS.start_up_s if phase >= 0 else light.schedule.at(until).stops
+    answers = until <= green + _LIMITS.start_up_s
+    if math.isinf(green):
+        answers = light.schedule.at(until).stops
     if not at_red or not answers or not -_LIMITS.overrun_m < before < _LIMITS.approach_m:
         return None
-    return SignalStop(n, light.id, since, until, green, phase, stands=False)
+    return SignalStop(n, light.id, since, until, green, stands=False)
 
 
 class SignalExplanations:
@@ -198,6 +198,15 @@ class SignalExplanations:
             for n in range(len(encounter.vehicles))
             if (faced := faced_light(encounter, n, encounter.lights)) is not None
         }
+
+    @property
+    def crossings(self) -> tuple[tuple[int, float, float], ...]:
+        """Vehicles that cross a line, when [s], and how long [s] before or after red."""
+        return tuple(
+            (n, time, light.schedule.slack(time))
+            for n, (light, time) in self._faced.items()
+            if math.isfinite(time)
+        )
 
     def explain(self, reaction: Reaction) -> bool:
         """Return whether a light explains what looks like a reaction to another vehicle.
@@ -221,16 +230,3 @@ class SignalExplanations:
         angle = abs(angle_between(faced[0].yaw, other[0].yaw))
         drives_on = reaction.since >= reaction.until
         return low < angle < high and (drives_on or reaction.until <= faced[1] + 0.5)
-
-
-def slacks_at_lines(encounter: Encounter) -> Floats:
-    """Return when each vehicle crosses its light, and how far that is from red (N, 2) [s].
-
-    NaN for vehicles that cross no line.
-    """
-    slacks = np.full((len(encounter.vehicles), 2), np.nan)
-    for n in range(len(encounter.vehicles)):
-        faced = faced_light(encounter, n, encounter.lights)
-        if faced is not None and math.isfinite(faced[1]):
-            slacks[n] = faced[1], faced[0].schedule.slack(faced[1])
-    return slacks

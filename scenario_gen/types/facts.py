@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from enum import StrEnum
 
 from scenario_gen.types.decision import Decision
+from scenario_gen.types.traffic_light import TrafficLight
 
 FOLLOW, YIELD = "follow", "yield"
 
@@ -77,6 +78,7 @@ class Facts:
         lost_reactions: pairs (who, whom) to whose reaction the scenario is not held.
         failure: of a planner under test, in scenarios that a search found.
         decision: the outcome that the scenario has, if decisions were drawn.
+        lights: traffic lights whose states are known, in the scenario's frame and on its clock.
     """
 
     closest_approach_m: float | None = None
@@ -90,3 +92,4 @@ class Facts:
     lost_reactions: tuple[tuple[str, str], ...] = ()
     failure: Failure | None = None
     decision: Decision | None = None
+    lights: tuple[TrafficLight, ...] = ()

@@ -16,6 +16,7 @@ from scenario_gen.base.road_users import CAR, LANE_USERS
 from scenario_gen.numerics import Floats, freeze, frozen
 from scenario_gen.numerics.plane import edge_yaws
 from scenario_gen.types.notes import Note
+from scenario_gen.types.traffic_light import SignalSchedule
 
 LEVEL_SPACING_M = 2.5  # height difference of two lanes of which one crosses above the other
 DRIVERS = LANE_USERS - {"pedestrian"}
@@ -121,7 +122,7 @@ class RuleKind(StrEnum):
     STOP = "stop"  # stop at the line, then give way
     GIVE_WAY = "give_way"
     PRIORITY = "priority"  # go first
-    TRAFFIC_LIGHT = "traffic_light"  # its state is not known
+    TRAFFIC_LIGHT = "traffic_light"
 
 
 @dataclass(frozen=True, eq=False)
@@ -134,6 +135,8 @@ class TrafficRule:
         lanes: indices of the lanes whose traffic it concerns.
         over: indices of the lanes whose traffic goes first.
         line: (K, 2) metres, K >= 2, the stop line; (0, 2): there is none.
+        schedule: what a light shows, on the clock of the template that the road is drawn for, or
+            as a cycle; None: its states are not known.
     """
 
     id: str
@@ -141,6 +144,7 @@ class TrafficRule:
     lanes: tuple[int, ...]
     over: tuple[int, ...] = ()
     line: Floats = field(default_factory=lambda: np.zeros((0, 2)))
+    schedule: SignalSchedule | None = None
 
     def __post_init__(self) -> None:
         freeze(self, line=frozen(np.reshape(self.line, (-1, 2))))

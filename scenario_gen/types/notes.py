@@ -41,6 +41,7 @@ class NoteKind(Enum):
     )
     TRAFFIC_RULES = "traffic rules: {rules}"
     LIGHTS_OFF = "traffic lights have no state: the signs apply"
+    LIGHTS = "traffic lights: {lights}"
     MAP_PART = "part {part} of the map"
     MAP_AROUND = "{distance:g} m around {part}"
     BEST_PLACE = "best place for the recording: {place}: {part} (cost {cost:.1f} m²)"

@@ -124,6 +124,8 @@ class ReactionGraph:
             it.
         why: why there is none, "" if there is one.
         stops: stops for traffic lights.
+        crossings: of vehicles over the stop lines of lights: index, when [s], and how long [s]
+            before or after red.
     """
 
     edges: tuple[Reaction, ...]
@@ -131,6 +133,7 @@ class ReactionGraph:
     cut: tuple[Reaction, ...] = ()
     why: str = ""
     stops: tuple[SignalStop, ...] = ()
+    crossings: tuple[tuple[int, float, float], ...] = ()
 
     def of(self, who: int) -> tuple[Reaction, ...]:
         """Return the reactions of vehicle `who`."""

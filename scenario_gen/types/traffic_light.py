@@ -275,7 +275,6 @@ class SignalStop:
         light: id of the light.
         since, until: seconds, the stand; or from the greatest speed to the least one.
         green: seconds, when the light lets it go; inf: not within the recording.
-        phase: index of that phase in the schedule, -1 if there is none.
         queue: number of vehicles that stand between it and the line.
         stands: whether it stands.
     """
@@ -285,7 +284,6 @@ class SignalStop:
     since: float
     until: float
     green: float
-    phase: int
     queue: int = 0
     stands: bool = True
 

@@ -21,6 +21,7 @@ from scenario_gen.method.sampling.deviations import (
 )
 from scenario_gen.method.sampling.extrapolation import ACCELERATION_DECAY_S, MAX_EXTRAPOLATION_S
 from scenario_gen.method.sampling.nominal_clock import clock_from_rate, slowed_clock, template_grid
+from scenario_gen.method.sampling.place_lights import with_lights
 from scenario_gen.method.sampling.plan import Plan
 from scenario_gen.method.sampling.routed_vehicle import route_vehicle, RoutedVehicle
 from scenario_gen.method.sampling.speed_profile.knots import least_shares, standing_part
@@ -114,7 +115,8 @@ def build_model(plan: Plan, config: SamplingConfig, order: str = "keep") -> Buil
             for n, (model, each) in enumerate(zip(models, routed, strict=True))
         ]
         trimming = trimming_of(plan.situation, config.leave_out, fixed)
-    return BuiltModel(CandidateModel(tuple(models), warp, reactions, trimming), tuple(notes))
+    model = CandidateModel(tuple(models), warp, reactions, trimming)
+    return BuiltModel(with_lights(model, plan), tuple(notes))
 
 
 def kept_reactions(
@@ -126,7 +128,9 @@ def kept_reactions(
     """
     graph = situation.reactions
     edges = [edge for edge in graph.edges if order == "keep" or edge.kind == FOLLOW]
-    return replace(graph, edges=tuple(edges) if config.reactions == "keep" else ())
+    if config.reactions != "keep":
+        return replace(graph, edges=(), stops=(), crossings=())
+    return replace(graph, edges=tuple(edges))
 
 
 def _route_vehicles(plan: Plan, config: SamplingConfig) -> tuple[list[RoutedVehicle], list[Wait]]:

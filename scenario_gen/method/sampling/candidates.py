@@ -9,13 +9,14 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from scenario_gen.method.sampling.extrapolation import extrapolate, extrapolation_time
+from scenario_gen.method.sampling.lights import PlacedLights
 from scenario_gen.method.sampling.numbers import ModelNumbers
 from scenario_gen.method.sampling.reaction_transform import ReactionTransform
-from scenario_gen.method.sampling.time_warp import SAMPLE_PERIOD_S, TimeWarp
+from scenario_gen.method.sampling.time_warp import Clock, SAMPLE_PERIOD_S, TimeWarp
 from scenario_gen.method.sampling.trimming import Trimming
 from scenario_gen.method.sampling.vehicle_model import NoiseScale, VehicleModel, VehicleSamples
 from scenario_gen.numerics import Bools, Floats, freeze, Ints, wrap_angle
-from scenario_gen.types import ReactionGraph, Scenario
+from scenario_gen.types import Facts, ReactionGraph, Scenario
 
 _MIN_DISTANCE_M = 0.05  # of two poses that imply a curvature
 _ROUNDING_STEPS = 1e-6
@@ -34,6 +35,7 @@ class CandidateModel:
         warp: the clock that all share.
         reactions: how their numbers depend on each other.
         trimming: how begin and end are trimmed; None if they are not.
+        lights: of the road; None: their states are not known.
         numbers: the layout of the standard normal numbers.
     """
 
@@ -41,6 +43,7 @@ class CandidateModel:
     warp: TimeWarp
     reactions: ReactionGraph = ReactionGraph((), ())
     trimming: Trimming | None = None
+    lights: PlacedLights | None = None
     numbers: ModelNumbers = field(init=False)
     _transforms: dict[NoiseScale, ReactionTransform] = field(init=False)
 
@@ -63,7 +66,7 @@ class CandidateModel:
             scale: factors on the standard deviations.
         """
         z = eps
-        if self.reactions.edges:
+        if self.reactions.edges or self.reactions.stops or self.reactions.crossings:
             z = self._transform(scale).apply(eps)
         shared = self.warp.sample(z[:, self.numbers.clock], scale.time)
         samples = [
@@ -79,7 +82,8 @@ class CandidateModel:
         presence = Presence.of(span, extension)
         feasible = np.logical_and.reduce([each.feasible for each in samples])
         feasible &= presence.is_usable()
-        return Batch(self.vehicles, tuple(samples), extension, presence, feasible)
+        parts = self.vehicles, tuple(samples), extension, presence, feasible
+        return Batch(*parts, shared, self.lights)
 
     def _transform(self, scale: NoiseScale) -> ReactionTransform:
         """Return the transform at a scale; there are few scales, so each is computed once."""
@@ -210,6 +214,8 @@ class Batch:
         extension: how they go on beyond their routes.
         presence: when they are present.
         feasible: (S,) False where a speed does not meet its conditions.
+        clock: the clocks that all vehicles share.
+        lights: of the road, on the template's clock.
     """
 
     models: tuple[VehicleModel, ...]
@@ -217,6 +223,8 @@ class Batch:
     extension: Extension
     presence: Presence
     feasible: Bools
+    clock: Clock
+    lights: PlacedLights | None = None
 
     def states(self, time: Floats, count: Ints | None = None) -> Floats:
         """Return states (N, S, T, 5) at ascending times (T,) [s] since the scenarios' begin.
@@ -243,7 +251,11 @@ class Batch:
         time = np.round(np.arange(max(int(count.max()), 2)) * SAMPLE_PERIOD_S, 9)
         states = self.states(time, np.maximum(count, 0))
         scenarios: list[Scenario | None] = [None] * len(count)
+        facts = Facts()
         for s in np.flatnonzero(self.feasible).tolist():
+            if self.lights is not None:
+                lights = self.lights.on_clock(self.clock, s, float(self.presence.begin[s]))
+                facts = Facts(lights=lights)
             x, y, yaw, speed, acceleration = np.moveaxis(states[:, s, : count[s]], -1, 0)
             scenarios[s] = Scenario(
                 tuple(samples.vehicles[s] for samples in self.samples),
@@ -255,6 +267,7 @@ class Batch:
                 seed,
                 index[s],
                 frame_id,
+                facts=facts,
                 present=self.presence.present[s],
             )
         return scenarios

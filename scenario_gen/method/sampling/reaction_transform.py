@@ -56,6 +56,8 @@ class _Residuals:
         quick_sigma: m, standard deviation of its quick part.
         rough_share: of a residual that is independent in each equation.
         entry, entry_share: s and share of the gap, standard deviation of a yielder's entry.
+        slack_share: of the time until red, by which a vehicle crosses a stop line earlier or
+            later.
         event: s, standard deviation of a clearing or departure, besides the residual.
         standstill_gap: m of a follower's gap that do not depend on its speed.
         min_crossing_speed, min_following_speed: m/s that convert metres to seconds.
@@ -71,6 +73,7 @@ class _Residuals:
     entry: float = 0.3
     entry_share: float = 0.2
     event: float = 0.05
+    slack_share: float = 0.5
     standstill_gap: float = 2.0
     min_crossing_speed: float = 1.0
     min_following_speed: float = 0.5
@@ -136,8 +139,9 @@ class ReactionTransform:
         """
         context = _Context(models, nominal, scale)
         conditions = []
-        for n in graph.order if graph.edges else ():
+        for n in graph.order:
             equations = [each for edge in graph.of(n) for each in context.equations(edge)]
+            equations += context.at_light(n, graph)
             for each in equations:
                 each.rows[n][:, models[n].driver_gaps] = 0.0
             effective = [each for each in equations if each.rows[n].any()]
@@ -205,6 +209,21 @@ class _Context:
             yield _Equations(rows, _variance(edge.residual))
         else:
             yield from self._yielding(edge)
+
+    def at_light(self, n: int, graph: ReactionGraph) -> Iterator[_Equations]:
+        """Yield that a vehicle departs as late as its light turns green, and crosses in time.
+
+        Lights are as late as the clock that all vehicles share. A vehicle in a queue departs as
+        its leader does.
+        """
+        for stop in graph.stops:
+            if stop.who == n and stop.stands and not stop.queue:
+                leaves = self._lateness(n, np.array([stop.until]))
+                yield _Equations({n: leaves}, _variance(_RESIDUALS.entry))
+        for who, time, slack in graph.crossings:
+            if who == n:
+                sigma = min(max(_RESIDUALS.slack_share * slack, _RESIDUALS.entry), 3.0)
+                yield _Equations({n: self._arrival(n, time)}, _variance(sigma))
 
     def _lateness(self, n: int, at: Floats) -> Floats:
         """Return the lateness of vehicle n, see `lateness`."""

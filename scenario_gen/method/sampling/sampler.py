@@ -134,7 +134,7 @@ class Sampler:
 
     def published(self, whole: Scenario) -> Scenario:
         """Return a candidate of all vehicles as it is published, with its facts."""
-        facts = self.label(whole)
+        facts = replace(self.label(whole), lights=whole.facts.lights)
         if self.proposal is not None:
             facts = replace(facts, weight=self.weight(whole.index))
         named = whole.with_facts(facts)

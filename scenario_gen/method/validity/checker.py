@@ -3,7 +3,7 @@
 
 """The checker: proves a scenario valid at every instant, or reports each fault."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -12,6 +12,7 @@ from scenario_gen.base.errors import InputError
 from scenario_gen.method.validity.collision import contact_violations
 from scenario_gen.method.validity.containment import exit_violations, Ground
 from scenario_gen.method.validity.dynamics import is_motion, LARGEST_VALUE_RATIO, motion_violations
+from scenario_gen.method.validity.lights import light_violations
 from scenario_gen.method.validity.limits import Limits
 from scenario_gen.method.validity.reactions import broken_reactions, tailgaters
 from scenario_gen.method.validity.template_checks import (
@@ -29,6 +30,7 @@ from scenario_gen.situation import (
     find_conflicts,
     lane_gaps,
     LaneGaps,
+    red_runners,
     required_orders,
     Situation,
     Wait,
@@ -40,6 +42,7 @@ from scenario_gen.types import (
     Reaction,
     Road,
     Scenario,
+    SignalStop,
     Vehicle,
     Verdict,
     Violation,
@@ -73,6 +76,8 @@ class Checker:
             it then must be at the scenario's; None if that is not known.
         lane_gaps: the gaps of the template's followers, as `lane_gaps` returns them; None if they
             are not known.
+        stops: the template's stops for lights.
+        at_red: vehicles that cross a line at red in the template, and so may do it.
 
     Examples:
         >>> import scenario_gen as sg
@@ -90,6 +95,8 @@ class Checker:
     reactions: Sequence[Reaction] = ()
     ends: Bools | None = None
     lane_gaps: LaneGaps | None = None
+    stops: Sequence[SignalStop] = ()
+    at_red: Collection[int] = ()
 
     def __post_init__(self) -> None:
         recorded = tuple(conflict.first for conflict in self.conflicts or ())
@@ -139,6 +146,8 @@ class Checker:
             reactions,
             at_ends(encounter.present, len(encounter.time)),
             situation.lane_gaps,
+            situation.reactions.stops,
+            red_runners(encounter),
         )
 
     @property
@@ -182,6 +191,7 @@ class Checker:
             *self._footprint_faults(scenario),
             *self._wrong_ways(scenario),
             *self._broken_rules(scenario, met),
+            *light_violations(scenario, self.at_red, self.stops),
             *wait_violations(scenario, self.waits or (), self.requested, self._limits),
             *order_violations(recorded, self._first, conflicts),
             *broken_reactions(scenario, conflicts, self.reactions, self._limits, gaps),

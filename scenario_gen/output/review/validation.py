@@ -35,6 +35,7 @@ from scenario_gen.numerics import Bools
 from scenario_gen.situation import (
     Conflict,
     LaneGaps,
+    red_runners,
     required_orders,
     Situation,
     Wait,
@@ -49,6 +50,7 @@ from scenario_gen.types import (
     Road,
     Scenario,
     Segmentation,
+    SignalStop,
     tokens,
 )
 
@@ -120,6 +122,8 @@ class Reference:
         reactions: reactions of the template that the scenarios must keep.
         ends: (N, 2) whether each vehicle is present at the first and at the last instant.
         lane_gaps: the template's smallest gaps to leaders.
+        stops: the template's stops for lights.
+        at_red: vehicles that run red in the template.
     """
 
     road: Road | None
@@ -130,6 +134,8 @@ class Reference:
     reactions: tuple[Reaction, ...] = ()
     ends: Bools | None = None
     lane_gaps: LaneGaps = field(default_factory=dict)
+    stops: tuple[SignalStop, ...] = ()
+    at_red: frozenset[int] = frozenset()
 
     @classmethod
     def of(
@@ -156,6 +162,8 @@ class Reference:
             kept_reactions(situation, entry),
             at_ends(encounter.present, len(encounter.time)),
             kept_gaps(situation, entry),
+            situation.reactions.stops,
+            red_runners(encounter),
         )
 
     def checker(
@@ -182,9 +190,10 @@ class Reference:
             for (who, whom), gap in self.lane_gaps.items()
             if {who, whom} <= rows.keys()
         }
-        return Checker(
-            self.road, requested, conflicts, waits, limits, first, reactions, ends, gaps
-        )
+        template = conflicts, waits, limits, first, reactions, ends, gaps
+        stops = [replace(s, who=rows[s.who]) for s in self.stops if s.who in rows]
+        at_red = [rows[n] for n in self.at_red if n in rows]
+        return Checker(self.road, requested, *template, stops, at_red)
 
     def _conflicts_of(self, rows: Mapping[int, int]) -> tuple[list[Conflict], list[int | None]]:
         """Return the conflicts between vehicles in `rows`, and who must pass each one first.

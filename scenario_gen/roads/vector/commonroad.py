@@ -16,6 +16,7 @@ import numpy as np
 from scenario_gen.base.documents import shown
 from scenario_gen.base.errors import InputError
 from scenario_gen.base.xml_reader import Element
+from scenario_gen.logs.adapters.commonroad import cycle_of
 from scenario_gen.numerics import Floats
 from scenario_gen.roads.vector.drafts import (
     by_id,
@@ -26,7 +27,15 @@ from scenario_gen.roads.vector.drafts import (
     speed_of,
 )
 from scenario_gen.roads.vector.signs import DraftRule, kind_of_sign
-from scenario_gen.types import CARS, DRIVERS, LANE_USERS, Note, NoteKind, RuleKind
+from scenario_gen.types import (
+    CARS,
+    DRIVERS,
+    LANE_USERS,
+    Note,
+    NoteKind,
+    RuleKind,
+    SignalSchedule,
+)
 
 _USERS_BY_TYPE = {
     "sidewalk": frozenset(("pedestrian",)),
@@ -201,6 +210,16 @@ class _Map:
             kinds["trafficLightRef", light.get("id", "?")] = RuleKind.TRAFFIC_LIGHT
         return kinds
 
+    @cached_property
+    def schedules(self) -> dict[str, SignalSchedule | None]:
+        """The cycles of lights by their ids; None: a light has no states."""
+        schedules: dict[str, SignalSchedule | None] = {}
+        for light in self.root.findall("trafficLight/cycle/.."):
+            with self.faults.leaving_out("traffic light", light.get("id", "?")):
+                name, step_s = light.attribute("id"), self.root.number("timeStepSize", 0.1)
+                schedules[name] = cycle_of(light, step_s)
+        return schedules
+
     def rules(self) -> Iterator[DraftRule]:
         """Yield a rule for each sign and light to which a lanelet for cars refers."""
         for name in (name for name, users in self.users.items() if users & CARS):
@@ -218,7 +237,8 @@ class _Map:
         ]
         for ref in dict.fromkeys(refs):
             if ref in self.rule_kinds:
-                yield DraftRule(ref[1], self.rule_kinds[ref], (name,), line=line)
+                kind, schedule = self.rule_kinds[ref], self.schedules.get(ref[1])
+                yield DraftRule(ref[1], kind, (name,), line=line, schedule=schedule)
 
     def notes(self) -> Iterator[Note]:
         """Yield the notes on the file."""

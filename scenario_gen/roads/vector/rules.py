@@ -8,7 +8,7 @@
 - A vehicle violates the right of way of another one if it comes from a lane that gives way to the
   other's lane, goes first where their paths meet, and hinders the other one, which follows closely
   or waits.
-- Traffic lights have no state. Signs apply as if lights were off.
+- Signs apply as if lights were off; stop lines of lights are checked by the certificate.
 """
 
 from collections.abc import Iterator, Sequence

@@ -15,7 +15,14 @@ import re
 import numpy as np
 
 from scenario_gen.numerics import Floats
-from scenario_gen.types import LaneNetwork, Note, NoteKind, RuleKind, TrafficRule
+from scenario_gen.types import (
+    LaneNetwork,
+    Note,
+    NoteKind,
+    RuleKind,
+    SignalSchedule,
+    TrafficRule,
+)
 
 YIELDING_KINDS = (RuleKind.STOP, RuleKind.GIVE_WAY)
 _SIGNS_BY_COUNTRY = {
@@ -49,6 +56,7 @@ class DraftRule:
         lanes: whose traffic it applies to, including lanes that are closed to cars.
         over: whose traffic goes first.
         line: (K, 2) [m] the stop line.
+        schedule: what a light shows, if that is known.
     """
 
     id: str
@@ -56,6 +64,7 @@ class DraftRule:
     lanes: tuple[str, ...]
     over: tuple[str, ...] = ()
     line: Floats = field(default_factory=lambda: np.zeros((0, 2)))
+    schedule: SignalSchedule | None = None
 
 
 def kind_of_sign(name: str, subtype: str = "", country: str = "") -> RuleKind | None:
@@ -115,7 +124,7 @@ def with_rules(network: LaneNetwork, drafts: Sequence[DraftRule]) -> LaneNetwork
     counts = {kind: len({rule.id for rule in rules if rule.kind == kind}) for kind in RuleKind}
     listed = [f"{count} {kind.replace('_', ' ')}" for kind, count in counts.items() if count]
     notes = [*network.notes, Note.of(NoteKind.TRAFFIC_RULES, rules=", ".join(listed))]
-    if counts[RuleKind.TRAFFIC_LIGHT]:
+    if any(rule.kind is RuleKind.TRAFFIC_LIGHT and rule.schedule is None for rule in rules):
         notes.append(Note.of(NoteKind.LIGHTS_OFF))
     return replace(network, rules=tuple(rules), notes=tuple(notes))
 
@@ -131,7 +140,7 @@ def _rules_of(
             line = np.stack((network.lanes[k].left[-1], network.lanes[k].right[-1]))
             yield TrafficRule(draft.id, draft.kind, (k,), over, line)
     elif lanes:
-        yield TrafficRule(draft.id, draft.kind, lanes, over, draft.line)
+        yield TrafficRule(draft.id, draft.kind, lanes, over, draft.line, draft.schedule)
 
 
 def _with_going_first(network: LaneNetwork, rules: Sequence[TrafficRule]) -> list[TrafficRule]:

@@ -1,0 +1,102 @@
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""Which light of a road shows what: recorded states by the vehicles that face it, or its cycle."""
+
+from dataclasses import replace
+import math
+
+import numpy as np
+
+from scenario_gen.base.errors import RefusedError
+from scenario_gen.method.sampling.candidates import CandidateModel
+from scenario_gen.method.sampling.lights import PlacedLights
+from scenario_gen.method.sampling.plan import Plan
+from scenario_gen.method.sampling.time_warp import Clock
+from scenario_gen.method.sampling.vehicle_model import NoiseScale
+from scenario_gen.roads import lights_of
+from scenario_gen.situation import faced_light
+from scenario_gen.types import Encounter, Scenario, SignalSchedule, SignalState, TrafficLight
+
+
+def with_lights(model: CandidateModel, plan: Plan) -> CandidateModel:
+    """Return the model with the lights of the road, if their states are known.
+
+    Raises:
+        RefusedError: the cycle of a road has no offset at which nobody runs red.
+    """
+    network, encounter = plan.road.lanes, plan.encounter
+    if network is None or not network.rules_kept:
+        return model
+    lights = lights_of(network)
+    has_cycle = any(light.schedule.repeats for light in lights)
+    if not lights or not (has_cycle or encounter.lights):
+        return model
+    batch = model.draw(np.zeros((1, model.size)), NoiseScale())
+    (nominal,) = batch.scenarios(0, [0], plan.road.frame_id)
+    if nominal is None:
+        return model
+    if encounter.lights and not (network.drawn and has_cycle):
+        return replace(model, lights=PlacedLights(_recorded(lights, nominal, encounter)))
+    begin = float(batch.presence.begin[0])
+    return replace(model, lights=_with_offset(lights, nominal, model.warp.nominal, begin))
+
+
+def _recorded(
+    lights: tuple[TrafficLight, ...], nominal: Scenario, encounter: Encounter
+) -> tuple[TrafficLight, ...]:
+    """Return the lights with the recorded states of the lights that the vehicles face.
+
+    A light that nobody faces has the states of a recorded light with the same stop line.
+    """
+    shown: dict[int, SignalSchedule] = {}
+    for n in range(len(encounter.vehicles)):
+        faced = faced_light(nominal, n, lights)
+        recorded = faced_light(encounter, n, encounter.lights)
+        if faced is not None and recorded is not None:
+            shown.setdefault(lights.index(faced[0]), recorded[0].schedule)
+    for k, light in enumerate(lights):
+        for other in encounter.lights:
+            if np.abs(other.line - light.line).max() < 1.0:  # m
+                shown.setdefault(k, other.schedule)
+    unknown = SignalSchedule((0.0,), (SignalState.UNKNOWN,), encounter.duration)
+    schedules = [shown.get(k, unknown) for k in range(len(lights))]
+    return tuple(
+        replace(light, schedule=schedule.between(0.0, encounter.duration))
+        for light, schedule in zip(lights, schedules, strict=True)
+    )
+
+
+def _with_offset(
+    lights: tuple[TrafficLight, ...], nominal: Scenario, clock: Clock, begin: float
+) -> PlacedLights:
+    """Return lights with cycles, later by the offset at which crossings are farthest from red.
+
+    Raises:
+        RefusedError: at each offset a vehicle runs red.
+    """
+    cycles = [light for light in lights if light.schedule.repeats]
+    crossings = [
+        (faced[0], faced[1])
+        for n in range(len(nominal.vehicles))
+        if (faced := faced_light(nominal, n, cycles)) is not None and math.isfinite(faced[1])
+    ]
+    if not crossings:
+        return PlacedLights(tuple(cycles))
+    period = max(light.schedule.end - light.schedule.starts[0] for light in cycles)
+    offsets = np.arange(0.0, period, 0.25)  # s
+    slacks = [
+        min(light.schedule.slack(time - offset) for light, time in crossings)
+        for offset in offsets.tolist()
+    ]
+    best = int(np.argmax(slacks))
+    if slacks[best] <= 0.0:
+        raise RefusedError(
+            "traffic lights: at each offset of their cycle a vehicle would cross its line at red;"
+            " set road.signals=recorded, or road.traffic_rules=ignored"
+        )
+    first = min(time for _, time in crossings) + begin
+    anchor = float(np.interp(first, clock.time, clock.grid))
+    by = float(offsets[best]) + begin - (first - anchor)
+    moved = tuple(light.retimed(lambda at: at + by) for light in cycles)
+    return PlacedLights(moved, anchor)

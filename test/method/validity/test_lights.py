@@ -1,0 +1,81 @@
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""Scenarios on roads with traffic lights: nobody runs red, and states survive a bag."""
+
+from dataclasses import replace
+import math
+
+import numpy as np
+import pytest
+from support.signalised import signalised
+
+from scenario_gen import generate, load, read_log
+from scenario_gen.method.validity import Checker
+from scenario_gen.output.review.validation import validate_bag
+from scenario_gen.types import Facts, SignalSchedule
+
+
+@pytest.fixture(scope="module")
+def result():
+    (encounter,) = read_log(signalised(queue=2)).encounters
+    return generate(encounter, "four_way", {"road.priority": "signals"}, count=20)
+
+
+def test_states_move_with_the_encounter(result):
+    assert len(result) == 20 and result.generated.candidates < 40
+    greens = set()
+    for scenario in result:
+        light = next(light for light in scenario.facts.lights if light.id == "B")
+        green = light.schedule.starts[1]
+        greens.add(round(green, 3))
+        crosses = [light.crossing(scenario, n) for n in range(3)]
+        assert math.isnan(crosses[0]) and green < crosses[1] < crosses[2]
+        assert crosses[1] - green < 6.0  # about 3.4 s in the recording
+    assert len(greens) > 10
+
+
+def test_a_vehicle_that_runs_red_is_refused(result):
+    scenario = result[0]
+    early = tuple(
+        replace(light, schedule=SignalSchedule.cycle((1.0, 999.0), ("green", "red")))
+        for light in scenario.facts.lights
+    )
+    verdict = Checker(result.road, None, None, None).check(
+        [scenario, scenario.with_facts(Facts(lights=early))]
+    )
+    assert verdict[0].valid
+    messages = [violation.message for violation in verdict[1].violations]
+    assert messages == [
+        "vehicle 1: crosses the stop line of light A at red",
+        "vehicle 2: crosses the stop line of light B at red",
+        "vehicle 3: crosses the stop line of light B at red",
+    ]
+
+
+def test_a_bag_has_the_states(result, tmp_path):
+    result.save(tmp_path / "bag")
+    (validation,) = validate_bag(tmp_path / "bag")
+    assert (validation.scenarios, validation.invalid) == (20, 0)
+    again = load(tmp_path / "bag")
+    for scenario, other in zip(result, again, strict=True):
+        for light, read in zip(scenario.facts.lights, other.facts.lights, strict=True):
+            assert (light.id, light.schedule) == (read.id, read.schedule)
+            assert np.array_equal(light.line, read.line)
+    assert [light.id for light in again.encounter.lights] == ["A", "B"]
+
+
+def test_fixed_program_has_an_offset_that_suits_the_encounter():
+    (encounter,) = read_log(signalised(lights=False)).encounters
+    config = {"road.priority": "signals", "road.signals": "fixed"}
+    result = generate(encounter, "four_way", config, count=5)
+    for scenario in result:
+        shown = {
+            str(light.schedule.at(light.crossing(scenario, n)))
+            for light in scenario.facts.lights
+            for n in range(2)
+            if not math.isnan(light.crossing(scenario, n))
+        }
+        assert shown <= {"green", "yellow"} and shown
+    plain = generate(encounter, "four_way", {"road.priority": "signals"}, count=1)
+    assert plain[0].facts.lights == ()  # nothing is invented
