@@ -179,6 +179,68 @@ def messages(folder, is_ode):
     return files
 
 
+def trace(folder):
+    """Write the recording as a trace of OSI with two lanes, and bulbs for each; return the file."""
+    osi = pytest.importorskip("betterosi")
+    bulb = osi.TrafficLight.Classification
+    vector = osi.Vector3d
+    ends = {1: [(-90, -1.75), (-8, -1.75)], 2: [(1.75, -8), (1.75, -90)], 3: []}
+    lanes = [
+        osi.Lane(
+            id=osi.Identifier(value=number),
+            classification=osi.Lane.Classification(
+                centerline=[vector(x=x, y=y, z=0.0) for x, y in points],
+                centerline_is_driving_direction=number == 1,
+            ),
+        )
+        for number, points in ends.items()
+    ]
+    colours = {"G": bulb.Color.GREEN, "y": bulb.Color.YELLOW, "r": bulb.Color.RED}
+    path = folder / "trace.mcap"
+    with osi.Writer(path) as writer:
+        for time, rows in signalised(GREEN).groupby("time"):
+            shown = dict(zip((1, 2, 3), letters(time) + "r", strict=True))
+            lights = [
+                osi.TrafficLight(
+                    classification=bulb(
+                        color=colour,
+                        mode=bulb.Mode.CONSTANT if shown[lane] == letter else bulb.Mode.OFF,
+                        assigned_lane_id=[osi.Identifier(value=lane)],
+                    )
+                )
+                for lane in shown
+                for letter, colour in colours.items()
+            ]
+            cars = [
+                osi.MovingObject(
+                    id=osi.Identifier(value=int(row.vehicle)),
+                    type=osi.MovingObject.Type.VEHICLE,
+                    base=osi.BaseMoving(
+                        dimension=osi.Dimension3d(length=4.8, width=1.9, height=1.5),
+                        position=vector(x=row.x, y=row.y, z=0.75),
+                        orientation=osi.Orientation3d(roll=0.0, pitch=0.0, yaw=row.heading),
+                        velocity=vector(
+                            x=row.speed * np.cos(row.heading),
+                            y=row.speed * np.sin(row.heading),
+                            z=0.0,
+                        ),
+                    ),
+                )
+                for row in rows.itertuples()
+            ]
+            nanos = round(time * 1e9)
+            stamp = osi.Timestamp(seconds=nanos // 10**9, nanos=nanos % 10**9)
+            message = osi.GroundTruth(
+                timestamp=stamp,
+                moving_object=cars,
+                traffic_light=lights,
+                lane=lanes,  # in the first message only
+            )
+            writer.add(message, topic="ground_truth", log_time=nanos)
+            lanes = []
+    return path
+
+
 def check(encounter, names):
     """Check the states at 100 instants, and the stop lines."""
     lights = {light.id: light for light in encounter.lights}
@@ -242,3 +304,9 @@ def test_spat_and_map(tmp_path, is_ode):
     files[1].write_text('{"payload": {"data": {"intersectionStateList": [{"signalGroup": 1}]}}}')
     with pytest.raises(InputError, match=r"spat\.json, record 1 is not a known SPaT or MAP"):
         read_log(files)
+
+
+def test_osi(tmp_path):
+    result = read_log(trace(tmp_path))
+    check(result.encounters[0], ["lane 1", "lane 2"])
+    assert "their lanes have no centre line in the trace: 3" in "; ".join(result.quality.notes)

@@ -35,6 +35,7 @@ from scenario_gen.base.documents import shown
 from scenario_gen.base.errors import guarded, InputError
 from scenario_gen.logs.adapters import tracks
 from scenario_gen.logs.adapters.data_sets import DataSet
+from scenario_gen.logs.adapters.osi_lights import LightTrace
 from scenario_gen.logs.config import listed, LogConfig
 from scenario_gen.logs.raw import check_size, RawLog
 from scenario_gen.numerics import NS_PER_S
@@ -65,20 +66,28 @@ def read(paths: Sequence[Path], config: LogConfig) -> RawLog:
             has no id or position; names the message.
     """
     trailers: dict[str, str] = {}
-    log = tracks.read(paths, config, name="omega_prime", load=partial(_table, trailers))
-    notes = (
+    lights = LightTrace()
+    log = tracks.read(paths, config, name="omega_prime", load=partial(_table, trailers, lights))
+    notes = [
         f"trailer {trailer} belongs to {owner}: read as a separate road user"
         for trailer, owner in trailers.items()
-    )
-    return replace(log, notes=(*log.notes, *notes))
+    ]
+    are_read = config.signals == "recorded"
+    signals = tuple(lights.signals(str(paths[0]), notes)) if are_read else ()
+    return replace(log, notes=(*log.notes, *notes), signals=signals)
 
 
 def _table(
-    trailers: dict[str, str], path: Path, _: DataSet, rows_before: int, config: LogConfig
+    trailers: dict[str, str],
+    lights: LightTrace,
+    path: Path,
+    _: DataSet,
+    rows_before: int,
+    config: LogConfig,
 ) -> pd.DataFrame:
     """Return the moving objects as omega-prime's table; without velocities if none has any.
 
-    The owners of `trailers` are added, by their ids.
+    The owners of `trailers` are added, by their ids, and the traffic lights to `lights`.
     """
     rows: list[Row] = []
     first_offset: Any = None
@@ -92,6 +101,8 @@ def _table(
                 "frame can be read"
             )
         rows += _rows(message, place)
+        stamp = message.timestamp
+        lights.add(message, stamp.seconds * NS_PER_S + stamp.nanos)
         for moving in message.moving_object:
             kind = moving.vehicle_classification
             if kind is not None and kind.trailer_id:
