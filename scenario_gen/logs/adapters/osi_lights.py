@@ -9,8 +9,8 @@
 | state | classification.color of the bulbs whose mode is constant or counting | |
 | stop line | lane.classification.centerline; its end in the direction of traffic | m |
 
-A flashing bulb, or none that is lit, is a light that is off. Lights for people, bicycles, buses and
-trams are left out. A lane with a green arrow beside red is green.
+A flashing bulb, or none that is lit, is a light that is off. Lights for people, bicycles, buses
+and trams are left out. A lane with a green arrow beside red is green.
 
 Source: OSI 3.8, osi_trafficlight.proto and osi_lane.proto.
 """
