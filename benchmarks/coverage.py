@@ -117,7 +117,7 @@ def run() -> list[Row]:
 
 def _members(sets: Sequence[Set]) -> Members:
     """Return the members of sets, with the radius of the benchmark."""
-    found = members_of([(one.session, one) for one in sets])  # type: ignore[misc]
+    found = members_of([(one.session, one) for one in sets])
     return replace(found, radius_share=RADIUS_SHARE)
 
 

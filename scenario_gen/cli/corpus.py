@@ -288,7 +288,8 @@ def library(
 @commands.command()
 def coverage(
     bags: Annotated[
-        list[Path], typer.Argument(help="Bags from `generate`, of at least two recordings.")
+        list[Path],
+        typer.Argument(help="Bags, batches or corpora, with at least two recordings in all."),
     ],
     templates: Annotated[
         list[int] | None,
@@ -312,9 +313,8 @@ def coverage(
         out.exists() and not out.read_bytes()[:15].lower().startswith(b"<!doctype html>")
     ):
         raise InputError(f"--out {out}: name a new .html file, or a page to replace")
-    results = results_of(bags)
-    population = population_of(results, templates or (5, 10, 20), draws=draws, seed=seed)
-    write_coverage(out, results, population)
+    population = population_of(results_of(bags), templates or (5, 10, 20), draws=draws, seed=seed)
+    write_coverage(out, results_of(bags), population)  # memory has one result at a time
     emit_json(population=population, page=out)
     print_(population.lead)
     print_table(*population.table())

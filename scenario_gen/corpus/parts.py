@@ -159,10 +159,11 @@ def part_tasks(
 
 
 def recording_of(row: Mapping[str, Any]) -> str:
-    """Return the recording of an encounter: its log, or the hour of an archive's messages."""
+    """Return the recording of an encounter: its log, or ten minutes of an archive's messages."""
     if row["source"] != MESSAGES:
         return str(row["source"])
-    return f"messages {datetime.fromtimestamp(row['start_ns'] // 10**9, UTC):%Y-%m-%dT%H}"
+    start = datetime.fromtimestamp(row["start_ns"] // 10**9, UTC)
+    return f"messages {start:%Y-%m-%dT%H:}{start.minute // 10}0"
 
 
 def seed_of(seed: int, template: str, road: str, step: int = 0) -> int:

@@ -16,10 +16,11 @@ to its nearest in other recordings.
 """
 
 from collections import Counter
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 import math
+from typing import Any, Protocol
 
 import numpy as np
 from scipy.spatial import distance
@@ -41,10 +42,10 @@ from scenario_gen.numerics import Bools, Floats, Ints
 from scenario_gen.situation import EncounterKind
 from scenario_gen.types import (
     Encounter,
-    GenerationResult,
     Interval,
     join_ego,
     Recombined,
+    Scenario,
 )
 
 KINDS = tuple(EncounterKind)
@@ -61,8 +62,19 @@ def _over_draws(values: Iterable[float]) -> Interval:
     return Interval(middle, low, high)
 
 
+class GeneratedSet(Protocol):
+    """Scenarios from one encounter, e.g. a `GenerationResult`."""
+
+    @property
+    def encounter(self) -> Encounter:
+        """The template."""
+
+    def __iter__(self) -> Iterator[Scenario]:
+        """Return the scenarios."""
+
+
 def population_of(
-    results: Iterable[tuple[str, GenerationResult]],
+    results: Iterable[tuple[str, GeneratedSet]],
     counts: Sequence[int] = (5, 10, 20),
     *,
     draws: int = 200,
@@ -71,7 +83,8 @@ def population_of(
     """Measure what recordings and the sets generated from them cover.
 
     Args:
-        results: the name of the recording and what was generated from one of its encounters.
+        results: the name of the recording and what was generated from one of its encounters. An
+            encounter that occurs repeatedly, as on several roads, counts once.
         counts: templates to draw; those that the recordings do not hold are left out.
         draws: of templates, recording by recording in a random order.
         seed: of the draws.
@@ -193,7 +206,7 @@ class Members:
         return tuple(points)
 
 
-def members_of(results: Iterable[tuple[str, GenerationResult]]) -> Members:
+def members_of(results: Iterable[tuple[str, GeneratedSet]]) -> Members:
     """Return the members of recordings and generated sets; arguments as in `population_of`.
 
     An encounter with vehicles of two others, or with another outcome of a decision, is not a
@@ -204,30 +217,48 @@ def members_of(results: Iterable[tuple[str, GenerationResult]]) -> Members:
     made: list[EncounterFeatures] = []
     names: list[str] = []
     derived: list[tuple[tuple[str, str], list[EncounterFeatures]]] = []
+    known: dict[tuple[Any, ...], EncounterFeatures] = {}
     for recording, result in results:
-        template = features_of(result.encounter, recording, len(recorded))
+        encounter = result.encounter
+        parents = _parents(encounter)
+        arrays = (encounter.time, encounter.position, encounter.speed)
+        motion = (parents, *(values.tobytes() for values in arrays))
+        is_new = motion not in known
+        if is_new:
+            known[motion] = features_of(encounter, recording, len(recorded))
+        template = known[motion]
         if template.kind is None:
             continue
         generated = [
-            scenario_features(join_ego(scenario), template, result.encounter)
-            for scenario in result
+            scenario_features(join_ego(scenario), template, encounter) for scenario in result
         ]
-        parents = _parents(result.encounter)
         if parents is not None:
             derived.append((parents, generated))
-        else:
+            continue
+        made += generated
+        if is_new:
             recorded.append(template)
-            names.append(result.encounter.name)
-            made += generated
-    index = {name: k for k, name in enumerate(names)} | {"": -1}
+            names.append(encounter.name)
+    by_name = dict(zip(names, recorded, strict=True))
     for (first, second), generated in derived:
-        if first in index and second in index:
-            parent, other = recorded[index[first]], index[second]
-            made += [
-                replace(member, recording=parent.recording, template=parent.template, other=other)
-                for member in generated
-            ]
+        made += _derived(first, second, generated, by_name)
     return Members(recorded, made, names)
+
+
+def _derived(
+    first: str,
+    second: str,
+    generated: Sequence[EncounterFeatures],
+    recorded: Mapping[str, EncounterFeatures],
+) -> list[EncounterFeatures]:
+    """Return what was generated from two recorded encounters by name, if both are known."""
+    if first not in recorded or (second and second not in recorded):
+        return []
+    parent, other = recorded[first], recorded[second].template if second else -1
+    return [
+        replace(member, recording=parent.recording, template=parent.template, other=other)
+        for member in generated
+    ]
 
 
 def _parents(encounter: Encounter) -> tuple[str, str] | None:

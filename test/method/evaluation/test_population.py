@@ -74,6 +74,14 @@ def test_kinds_are_those_of_the_drawn_motions():
         assert found.count(name) >= 4, (kind, found)
 
 
+def test_an_encounter_on_two_roads_counts_once_under_any_name_of_its_recording(encounters):
+    known = results(encounters, lambda _, own: (own,))
+    again = [(f"copy of {name}", made) for name, made in known]
+    once, twice = members_of(known), members_of([*known, *again])
+    assert len(twice.recorded) == len(once.recorded) and len(twice.made) == 2 * len(once.made)
+    assert twice.recordings == once.recordings
+
+
 def test_copies_of_the_templates_cover_no_more_than_these_and_are_as_precise(encounters):
     (point,) = population_of(results(encounters, lambda _, own: (own, own)), (8,), draws=60).curve
     assert (
