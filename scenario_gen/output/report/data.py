@@ -32,18 +32,21 @@ MAX_FRAMES_COUNT = 240
 MAX_CELLS = 900
 MATRIX_SIZE_CELLS = 72
 MAX_LINES = 400
-MOTION_PERIOD_S = 0.1
-"""Period of speeds and accelerations: shorter than that of the animation, for fewer samples."""
+MAX_STATES_COUNT = 500_000
+"""States of all drawn scenarios of a set, for pages of a few megabytes."""
+MAX_COMPARED_COUNT = 50
+"""Scenarios of a reference, and those that a matrix shows."""
 
 
 def case_data(case: GenerationResult, samples: int) -> dict[str, Any]:
-    """Return the drawings of one case for JSON, with at most `samples` scenarios per set."""
-    arms = _arms(case, samples)
+    """Return the drawings of one case for JSON, with at most `samples` scenarios."""
     ids = case.encounter.ids
+    arms = _arms(case, samples)
     longest = max(
         [case.encounter.duration, *(float(s.time[-1]) for group in arms.values() for s in group)]
     )
     frames = min(MAX_FRAMES_COUNT, int(np.ceil(longest / FRAME_PERIOD_S)) + 1)
+    frames = max(2, min(frames, MAX_STATES_COUNT // (len(arms["with"] or ids) * len(ids))))
     return {
         "row": case.row_name,
         "vehicles": [
@@ -57,7 +60,6 @@ def case_data(case: GenerationResult, samples: int) -> dict[str, Any]:
         "reactions": _reactions(case),
         "arms": {name: _trajectories(group, frames, ids) for name, group in arms.items() if group},
         "turn": _turn(case.encounter, case.fit),
-        "motion": _motion(case.encounter, case.generated.scenarios[:12]),
         "coverage": None if case.coverage is None else case.coverage.document(),
         "features": _features(case.encounter, arms, case.evaluation.vehicles),
     }
@@ -71,7 +73,7 @@ def _arms(case: GenerationResult, samples: int) -> dict[str, tuple[Scenario, ...
         "uniform": case.references.get(UNIFORM),
     }
     arms = {
-        name: tuple(result.scenarios[:samples])
+        name: tuple(result.scenarios[: samples if name == "with" else MAX_COMPARED_COUNT])
         for name, result in sets.items()
         if result is not None
     }
@@ -174,6 +176,7 @@ def _trajectories(
         "there": [_presence(scenario, ids) for scenario in scenarios],
         "durations": [_short(scenario.time[-1]) for scenario in scenarios],
         "index": [scenario.index for scenario in scenarios],
+        "outcome": ["; ".join(map(str, each.facts.passing_order)) for each in scenarios],
     }
 
 
@@ -199,39 +202,6 @@ def _whole(scenario: Scenario, frames: int, ids: Sequence[str]) -> Floats:
     return np.stack([known.get(name, missing) for name in ids])
 
 
-def _motion(encounter: Encounter, scenarios: Sequence[Scenario]) -> list[dict[str, Any]]:
-    """Return speed and accelerations of each vehicle, in the template and in the scenarios."""
-    motions = []
-    for n, name in enumerate(encounter.ids):
-        members = [scenario for scenario in scenarios if name in scenario.ids]
-        motions.append(
-            {
-                "template": _over_time(encounter, n),
-                "samples": [_over_time(member, member.ids.index(name)) for member in members],
-                "index": [member.index for member in members],
-            }
-        )
-    return motions
-
-
-def _over_time(source: Encounter | Scenario, n: int) -> dict[str, Any]:
-    """Return the motion of one vehicle while it is present.
-
-    Columns: speed [m/s], acceleration, and lateral acceleration (speed times yaw rate) [m/s²].
-    """
-    first, last = source.time[source.present[n]].tolist()
-    frames = min(400, max(3, round((last - first) / MOTION_PERIOD_S) + 1))
-    time = np.linspace(first, last, frames)
-    states = source.at(time)
-    speed = states.speed[n]
-    rates = np.gradient(np.stack([speed, states.heading[n]]), time, axis=1)
-    return {
-        "from": _short(first),
-        "to": _short(last),
-        "values": pack(np.column_stack([speed, rates[0], speed * rates[1]])),
-    }
-
-
 def _template(encounter: Encounter, segmentation: Segmentation, frames: int) -> dict[str, Any]:
     bounds = [0, *segmentation.changepoints.tolist(), len(encounter.time) - 1]
     step = max(1, -(-len(encounter.time) // 600))
@@ -239,6 +209,7 @@ def _template(encounter: Encounter, segmentation: Segmentation, frames: int) -> 
     padded = np.append(probability, np.zeros(-len(probability) % step)).reshape(-1, step)
     return {
         "states": pack(states(encounter, frames)[None]),
+        "there": [_presence(encounter, encounter.ids)],
         "durations": [_short(encounter.duration)],
         "bounds": [_short(encounter.time[i]) for i in bounds],
         "labels": [int(segmentation.labels[i]) for i in bounds[:-1]],
@@ -301,7 +272,9 @@ def _matrices(
     group: Sequence[Encounter | Scenario], names: tuple[str, str]
 ) -> tuple[str, str] | None:
     """Return the mean matrices of positions and speeds of a pair; None without common motion."""
-    common = [common_motion(source, names, MATRIX_SIZE_CELLS) for source in group]
+    common = [
+        common_motion(source, names, MATRIX_SIZE_CELLS) for source in group[:MAX_COMPARED_COUNT]
+    ]
     motions = [motion for motion in common if motion is not None]
     if not motions:
         return None

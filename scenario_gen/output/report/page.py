@@ -30,8 +30,8 @@ from scenario_gen.types import (
 MIN_COMPARED_ERROR_RATIO = 0.03
 """Least E of a reference for a case to count in the comparison."""
 UNCOMPARED = "not requested; `scenario-gen generate --compare` draws sets to compare with"
-MAX_SAMPLES = 50
-"""Scenarios of each set that a page draws; the figures use all."""
+MAX_SAMPLES = 1000
+"""Scenarios of a set that a page draws; the figures use all."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,7 +63,7 @@ def render(report: ReportInput) -> str:
     views = [_view(index, case) for index, case in enumerate(report.cases)]
     return render_page(
         "report.html.j2",
-        ("scene.js", "plots.js", "charts.js", "page.js", "tables.js"),
+        ("scene.js", "plots.js", "charts.js", "list.js", "page.js", "tables.js"),
         [case_data(case, MAX_SAMPLES) for case in report.cases],
         report=report,
         views=views,

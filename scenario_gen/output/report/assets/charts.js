@@ -44,6 +44,7 @@ function drawTemplate(place, data, template) {
   chart(place, {
     label: "recorded speeds, and below them the probability of a changepoint",
     x: { title: "time [s]", range: [0, bounds[bounds.length - 1]] },
+    zoom: true,
     panels: [
       { title: "speed [m/s]", share: 0.75, zero: true, lines, bands, marks },
       { title: "p", share: 0.25, range: [0, 1.05], lines: [likely], marks },
@@ -57,7 +58,7 @@ function drawSpeedsNow(place, data, set, sample, template, cursor) {
     { x: clock(template, 0), y: speeds(template, 0, n), colour: vehicleColour(n), width: 1.2, dash: "5 4", name: `${vehicle.id}, recorded` },
     { x: clock(set, sample), y: speeds(set, sample, n), colour: vehicleColour(n), width: 2.2, name: vehicle.id },
   ]);
-  chart(place, { label: "speeds of the shown scenario; dashed: recorded", x: { title: "time [s]" }, cursor, panels: [{ title: "speed [m/s]", share: 1, zero: true, lines }] });
+  chart(place, { label: "speeds of the shown scenario; dashed: recorded", x: { title: "time [s]" }, cursor, zoom: true, panels: [{ title: "speed [m/s]", share: 1, zero: true, lines }] });
 }
 
 /** Figure 4, lower half: the speeds of all scenarios, those of the recording dashed. */
@@ -66,34 +67,36 @@ function drawSpeeds(place, data, set, template, top) {
   data.vehicles.forEach((vehicle, n) => {
     const x = [];
     const y = [];
-    for (let s = 0; s < (isEgo(data, n) ? 1 : set.samples); s += 1) {
+    for (const s of isEgo(data, n) ? [0] : set.shown) {
       x.push(...clock(set, s), null);
       y.push(...speeds(set, s, n), null);
     }
-    lines.push({ x, y, colour: vehicleColour(n), width: isEgo(data, n) ? 2 : 1, dash: isEgo(data, n) ? "7 5" : "", opacity: Math.max(0.3, 1 - set.samples / 30), name: vehicle.id });
+    lines.push({ x, y, colour: vehicleColour(n), width: isEgo(data, n) ? 2 : 1, dash: isEgo(data, n) ? "7 5" : "", opacity: Math.max(0.3, 1 - set.shown.length / 30), name: vehicle.id });
   });
   data.vehicles.forEach((vehicle, n) => lines.push({ x: clock(template, 0), y: speeds(template, 0, n), width: 1.5, dash: "6 4", name: `${vehicle.id}, recorded` }));
-  chart(place, { label: "speeds of all scenarios; dashed: recorded", x: { title: "time [s]" }, panels: [{ title: "speed [m/s]", share: 1, range: [0, top], lines }] });
+  chart(place, { label: "speeds of all scenarios; dashed: recorded", x: { title: "time [s]" }, zoom: true, panels: [{ title: "speed [m/s]", share: 1, range: [0, top], lines }] });
 }
 
-/** One vehicle's speed, acceleration and lateral acceleration: the recording bold, scenarios (all, or the one chosen) thin. */
-function drawMotion(place, motion, colour, chosen) {
+/** One vehicle's speed, acceleration and lateral acceleration: the recording bold, scenarios (the drawn ones, or the one chosen) thin. */
+function drawMotion(place, data, set, template, n, chosen) {
   const lines = [[], [], []];
-  const add = (packed, line) => {
-    const { shape: [frames, channels], low, step, data } = packed.values;
-    const whole = new Uint16Array(bytesOf(data).buffer);
-    const x = Array.from({ length: frames }, (_, f) => +(packed.from + ((packed.to - packed.from) * f) / (frames - 1)).toFixed(2));
-    for (let c = 0; c < channels; c += 1) {
-      lines[c].push({ ...line, x, y: Array.from({ length: frames }, (_, f) => +(low[c] + step[c] * whole[f * channels + c]).toFixed(3)) });
-    }
+  const add = (clip, sample, line) => {
+    const x = clock(clip, sample);
+    const speed = speeds(clip, sample, n);
+    const yaw = x.map((_, f) => clip.values[clip.offset(sample, n, f) + 2]);
+    const slope = (values) => x.map((_, f) => {
+      const [a, b] = [Math.max(f - 1, 0), Math.min(f + 1, x.length - 1)];
+      return values[a] === null || values[b] === null ? null : +((values[b] - values[a]) / (x[b] - x[a])).toFixed(3);
+    });
+    const turning = slope(yaw);
+    [speed, slope(speed), speed.map((v, f) => (v === null ? null : +(v * turning[f]).toFixed(3)))].forEach((y, c) => lines[c].push({ ...line, x, y }));
   };
-  motion.samples.forEach((sample, s) => {
-    if (chosen < 0 || chosen === s) add(sample, { colour, width: chosen < 0 ? 1 : 2 });
-  });
-  add(motion.template, { width: 2.5, name: "recorded" });
+  const drawn = set && !isEgo(data, n) ? set.shown.filter((s) => chosen < 0 || s === chosen) : [];
+  drawn.forEach((s) => add(set, s, { colour: vehicleColour(n), width: chosen < 0 ? 1 : 2, opacity: drawn.length > 12 ? 0.4 : 1, name: `scenario ${set.index[s]}` }));
+  add(template, 0, { width: 2.5, name: "recorded" });
   const titles = ["speed [m/s]", "acceleration [m/s²]", "lateral [m/s²]"];
   const panels = titles.map((title, c) => ({ title, share: 1 / 3, zero: c === 0, lines: lines[c] }));
-  chart(place, { label: "speed and accelerations over time; black: recorded", x: { title: "time [s]" }, panels });
+  chart(place, { label: "speed and accelerations over time; black: recorded", x: { title: "time [s]" }, zoom: true, panels });
 }
 
 /** Figure 5: the mean feature matrices. */
@@ -184,14 +187,14 @@ function drawSamples(view, data, picture, set, arm) {
   data.vehicles.forEach((_, n) => {
     context.strokeStyle = vehicleColour(n);
     context.lineWidth = 1.2;
-    context.globalAlpha = Math.max(0.18, Math.min(1, 8 / set.samples));
+    context.globalAlpha = Math.max(0.18, Math.min(1, 8 / Math.max(set.shown.length, 1)));
     if (isEgo(data, n)) {
       context.globalAlpha = 1;
       context.lineWidth = 2;
       context.setLineDash([7, 5]);
       set.path(context, view, 0, n);
       context.setLineDash([]);
-    } else for (let s = 0; s < set.samples; s += 1) set.path(context, view, s, n);
+    } else set.shown.forEach((s) => set.path(context, view, s, n));
   });
   data.fit.forEach((vehicle, n) => {
     const last = vehicle.anchors.length - 1;

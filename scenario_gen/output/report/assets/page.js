@@ -41,16 +41,19 @@ class Player {
     this.recordView = new View(this.find("record"), record.grow([Infinity, Infinity, -Infinity, -Infinity]), 8);
     this.recordWhole = this.recordView.box;
     this.find("follow").checked = Math.max(box[2] - box[0], box[3] - box[1]) > 160; // from farther away a car is a dot
-    this.time = 0;
     this.playing = false;
     this.arm = sets.with ? "with" : Object.keys(sets)[0];
     Object.keys(ARM_NAMES).filter((arm) => sets[arm]).forEach((arm) => this.find("arm").append(option(arm, arm === "with" ? data.row : ARM_NAMES[arm])));
     this.find("arm").value = this.arm;
+    this.time = 0;
     this.listSamples();
+    this.toMeeting();
     this.find("arm").addEventListener("change", (event) => { this.arm = event.target.value; this.listSamples(); this.draw(); });
     this.find("sample").addEventListener("change", () => { this.draw(); this.link(); });
+    this.find("video").hidden = !window.MediaRecorder;
+    this.find("video").addEventListener("click", () => this.film());
     this.find("play").addEventListener("click", () => this.toggle());
-    this.find("scrub").addEventListener("input", (event) => { this.pause(); this.time = (event.target.value / 1000) * this.duration; this.draw(); });
+    this.find("scrub").addEventListener("input", (event) => { this.pause(); this.fresh = false; this.time = (event.target.value / 1000) * this.duration; this.draw(); });
     this.find("ghosts").addEventListener("change", () => this.draw());
     this.find("follow").addEventListener("change", () => this.draw());
     this.find("previous").addEventListener("click", () => this.step(-1));
@@ -75,6 +78,27 @@ class Player {
     list.replaceChildren(...this.set.index.map((index) => option(index, this.title(index))));
     list.selectedIndex = Math.min(before, this.set.samples - 1);
     this.time = Math.min(this.time, this.duration);
+  }
+
+  /** Show the instant at which two vehicles are nearest; playing starts at 0 all the same. */
+  toMeeting() {
+    this.time = this.set.meeting(this.sample) * this.duration;
+    this.fresh = true;
+  }
+
+  /** Play once, and give the pictures as a video. */
+  film() {
+    const name = `scenario_${this.set.index[this.sample]}.webm`;
+    const recorder = new MediaRecorder(this.find("stage").captureStream(30));
+    const parts = [];
+    recorder.addEventListener("dataavailable", (event) => parts.push(event.data));
+    recorder.addEventListener("stop", () => download(name, new Blob(parts, { type: "video/webm" })));
+    this.pause();
+    this.time = 0;
+    this.recorder = recorder;
+    recorder.start();
+    this.find("said").textContent = "recording: the video is there when the film ends";
+    this.play();
   }
 
   title(index) {
@@ -115,7 +139,8 @@ class Player {
 
   step(by) {
     const list = this.find("sample");
-    list.selectedIndex = (list.selectedIndex + by + this.set.samples) % this.set.samples;
+    const shown = this.set.shown.length ? this.set.shown : this.set.index.map((_, k) => k);
+    list.selectedIndex = shown[(Math.max(shown.indexOf(list.selectedIndex), 0) + by + shown.length) % shown.length];
     this.draw();
     this.link();
   }
@@ -125,14 +150,14 @@ class Player {
     history.replaceState(null, "", `#case=${shown + 1}&scenario=${this.set.index[this.sample]}`);
   }
 
-  /** Show the generated sample of that index, from its start. */
+  /** Show the generated sample of that index, where its vehicles meet. */
   showSample(index) {
     this.pause();
     this.arm = "with";
     this.find("arm").value = this.arm;
     this.listSamples();
     this.find("sample").selectedIndex = this.set.index.indexOf(index);
-    this.time = 0;
+    this.toMeeting();
     this.draw();
     this.link();
     this.find("stage").scrollIntoView({ behavior: "smooth", block: "center" });
@@ -141,7 +166,8 @@ class Player {
   toggle() { if (this.playing) this.pause(); else this.play(); }
 
   play() {
-    if (this.time >= this.duration - 1e-6) this.time = 0;
+    if (this.fresh || this.time >= this.duration - 1e-6) this.time = 0;
+    this.fresh = false;
     this.playing = true;
     this.last = null;
     this.find("play").textContent = "❚❚";
@@ -153,6 +179,11 @@ class Player {
     this.playing = false;
     this.find("play").textContent = "▶";
     this.find("play").setAttribute("aria-label", "play");
+    if (this.recorder) {
+      this.recorder.stop();
+      this.recorder = null;
+      this.find("said").textContent = "";
+    }
   }
 
   tick(now) {
@@ -229,7 +260,7 @@ class Player {
       context.lineWidth = 2.5;
       set.path(context, view, sample, n, Math.max(0, share - 3 / this.duration), share);
       if (ghosts) {
-        for (let s = 0; s < set.samples; s += 1) {
+        for (const s of set.shown) {
           if (s !== sample && !isEgo(data, n) && set.there(s, n, this.time / set.durations[s])) view.footprint(set.state(s, n, this.time / set.durations[s]), vehicle, vehicleColour(n), 0.08, false);
         }
       }
@@ -253,6 +284,7 @@ class Player {
     this.drawSpeeds();
     this.find("clock").textContent = `${this.time.toFixed(1)} / ${this.duration.toFixed(1)} s`;
     this.sayPrimitive(share);
+    if (this.onDraw) this.onDraw(this.arm === "with" ? set.index[sample] : null);
   }
 
   /** The record at the same moment of its clock, on strips as wide as lanes, for what it was driven on is not known. */
@@ -281,8 +313,9 @@ class Player {
   drawSpeeds() {
     const place = this.find("speeds-now");
     const shown = `${this.arm} ${this.sample}`;
-    if (this.charted !== shown) drawSpeedsNow(place, this.data, this.set, this.sample, this.record, (time) => { this.pause(); this.time = Math.min(time, this.duration); this.draw(); });
+    if (this.charted !== shown) drawSpeedsNow(place, this.data, this.set, this.sample, this.record, (time) => { this.pause(); this.fresh = false; this.time = Math.min(time, this.duration); this.draw(); });
     this.charted = shown;
+    place.cursorAt = this.time;
     place.moveCursor(this.time);
   }
 
@@ -315,22 +348,31 @@ function open(section, data) {
   if (find("routes")) maps.push([new View(find("routes"), box, 8), (view) => drawRoutes(view, data, picture)]);
   let top = 1;
   [template, ...Object.values(sets)].forEach((set) => { for (let i = 3; i < set.values.length; i += 4) top = Math.max(top, set.values[i]); });
+  const drawAll = (arm) => drawSpeeds(find(`speeds-${arm}`), data, sets[arm], template, 1.08 * top);
   ["with", "without"].filter((arm) => sets[arm]).forEach((arm) => {
     maps.push([new View(find(`samples-${arm}`), box, 8), (view) => drawSamples(view, data, picture, sets[arm], arm)]);
-    drawSpeeds(find(`speeds-${arm}`), data, sets[arm], template, 1.08 * top);
+    drawAll(arm);
   });
   drawTemplate(find("template-speed"), data, template);
   const who = find("motion-vehicle");
   const which = find("motion-sample");
-  const motion = () => drawMotion(find("motion"), data.motion[who.selectedIndex], vehicleColour(who.selectedIndex), which.selectedIndex - 1);
+  const motion = () => drawMotion(find("motion"), data, sets.with, template, who.selectedIndex, Number(which.value));
   const listed = () => {
-    which.replaceChildren(option("", "all drawn scenarios"), ...data.motion[who.selectedIndex].index.map((index) => option(index, `scenario ${index}`)));
+    which.replaceChildren(option(-1, "all drawn scenarios"), ...(sets.with ? sets.with.shown.map((k) => option(k, `scenario ${sets.with.index[k]}`)) : []));
     motion();
   };
   who.append(...data.vehicles.map((vehicle, n) => option(n, vehicle.id)));
-  who.addEventListener("change", listed);
-  which.addEventListener("change", motion);
+  [who, which].forEach((list) => list.addEventListener("change", motion));
   listed();
+  const drawMaps = () => { maps.forEach(([view, draw]) => draw(view)); if (player) player.draw(); };
+  if (sets.with && find("list")) {
+    let ready = false;
+    const changed = () => { if (ready) { drawAll("with"); listed(); drawMaps(); } };
+    const list = new ScenarioList(section, data, sets.with, changed, (index) => player.showSample(index));
+    ready = true;
+    changed();
+    player.onDraw = (index) => list.mark(index);
+  }
   section.querySelectorAll('[data-role="legend"]').forEach((list) => list.append(...data.vehicles.map((vehicle, n) => chipLine(vehicle, n))));
   const pairs = find("pair");
   data.features.forEach((feature, i) => pairs.append(option(i, feature.pair.map((n) => data.vehicles[n].id).join(" and "))));
@@ -348,7 +390,7 @@ function open(section, data) {
   section.querySelectorAll("[data-pick]").forEach((button) => button.addEventListener("click", () => player.showSample(Number(button.dataset.pick))));
   pairs.addEventListener("change", features);
   features();
-  return { player, draw: () => { maps.forEach(([view, draw]) => draw(view)); if (player) player.draw(); } };
+  return { player, draw: drawMaps };
 }
 
 const opened = new Map();

@@ -31,6 +31,8 @@ class Trajectories {
     this.durations = packed.durations;
     this.presence = packed.there; // of each sample and vehicle, from which to which share of the duration; without: throughout
     this.index = packed.index || [0];
+    this.outcome = packed.outcome || [""];
+    this.shown = this.index.map((_, k) => k); // the samples that are drawn together
   }
 
   offset(sample, vehicle, frame) {
@@ -52,6 +54,22 @@ class Trajectories {
     const a = this.offset(sample, vehicle, frame);
     const mix = (c) => this.values[a + c] * (1 - part) + this.values[a + 4 + c] * part;
     return { x: mix(0), y: mix(1), yaw: mix(2), speed: mix(3) };
+  }
+
+  /** The share of a sample's duration at which two of its vehicles are nearest. */
+  meeting(sample) {
+    let [best, share] = [Infinity, 0];
+    for (let f = 0; f < this.frames; f += 1) {
+      const at = f / (this.frames - 1);
+      for (let a = 0; a < this.vehicles; a += 1) {
+        for (let b = 0; b < a; b += 1) {
+          const [i, j] = [this.offset(sample, a, f), this.offset(sample, b, f)];
+          const distance = Math.hypot(this.values[i] - this.values[j], this.values[i + 1] - this.values[j + 1]);
+          if (distance < best && this.there(sample, a, at) && this.there(sample, b, at)) [best, share] = [distance, at];
+        }
+      }
+    }
+    return share;
   }
 
   /** Grow a box [x0, y0, x1, y1] to hold every position. */
