@@ -108,5 +108,6 @@ def refuse_too_many_cells(name: str, width: int, height: int, config: RoadConfig
     if width * height > config.max_cells:
         raise RefusedError(
             f"road {name} would have {width} x {height} cells, more than road.max_cells "
-            f"({config.max_cells}); cut the encounter, or set road.resolution or road.max_cells"
+            f"({config.max_cells}); name a part of a map (#box=x0,y0,x1,y1), "
+            "cut the encounter, or set road.resolution or road.max_cells"
         )

@@ -95,7 +95,7 @@ def _roads(root: Element, faults: Faults) -> dict[str, OpenDriveRoad]:
             if length > max_length:
                 km = max_length / 1000.0
                 raise TooLargeError(f"{element.place}: more than {km:g} km of roads; cut the map")
-            road = road_of_sections(element, name, line)
+            road = road_of_sections(element, name, line, faults)
             lane_count += sum(1 for _ in road.lanes)
             refuse_too_many_lanes(lane_count, root.file)
             point_count += sum(len(lane.s) for lane in road.lanes)

@@ -18,7 +18,7 @@ from scenario_gen.base.errors import InputError
 from scenario_gen.base.xml_reader import Element
 from scenario_gen.numerics import Floats
 from scenario_gen.numerics.plane import unit_left
-from scenario_gen.roads.vector.drafts import refuse_too_long, refuse_too_many_lanes
+from scenario_gen.roads.vector.drafts import Faults, refuse_too_long, refuse_too_many_lanes
 from scenario_gen.roads.vector.plan_view import Cubics, cubics, ReferenceLine
 from scenario_gen.types import CARS, DRIVERS, LANE_USERS
 
@@ -189,8 +189,10 @@ class OpenDriveRoad:
         return None
 
 
-def road_of_sections(element: Element, name: str, line: ReferenceLine) -> OpenDriveRoad:
-    """Return a road with its sections.
+def road_of_sections(
+    element: Element, name: str, line: ReferenceLine, faults: Faults
+) -> OpenDriveRoad:
+    """Return a road with its sections; lanes whose place is not certain become faults.
 
     Raises:
         InputError: it is broken; names file and line.
@@ -221,7 +223,7 @@ def road_of_sections(element: Element, name: str, line: ReferenceLine) -> OpenDr
             s = _stations(line, begins[k], end)
             stations = _Stations(s, end, line.at(s, end), centre.at(s, end))
             for sign in signs:
-                lanes_of_side = _lanes_of_side(road, k, section, sign, stations)
+                lanes_of_side = _lanes_of_side(road, k, section, sign, stations, faults)
                 road.sections[k].lanes.update(lanes_of_side)
     return road
 
@@ -244,7 +246,12 @@ def _signs(section: Element) -> tuple[int, ...]:
 
 
 def _lanes_of_side(
-    road: OpenDriveRoad, number: int, section: Element, sign: int, stations: _Stations
+    road: OpenDriveRoad,
+    number: int,
+    section: Element,
+    sign: int,
+    stations: _Stations,
+    faults: Faults,
 ) -> Iterator[tuple[int, SectionLane]]:
     """Yield the lanes on one side of the road's section with a number, by id."""
     side = section.find(_SIDES[sign])
@@ -259,9 +266,9 @@ def _lanes_of_side(
     for count, lane in enumerate(elements, start=1):
         name = _lane_id(lane, sign)
         if name != sign * count:
-            raise InputError(
-                f"{lane.place}: a second lane {name}, or one nearer to the centre is missing"
-            )
+            reason = f"{lane.place}: a second lane {name}, or one nearer to the centre is missing"
+            faults.add("lane", f"{road.id}.{number}.{name} and those beyond it", reason)
+            return
         if widths := lane.findall("width"):
             offset = offset + sign * np.maximum(stations.values(widths), 0.0)
         elif borders := lane.findall("border"):

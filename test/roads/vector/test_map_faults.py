@@ -34,3 +34,13 @@ def test_a_spiral_of_a_centimetre_and_a_missing_header_do_not_matter(tmp_path) -
         road = build_road(str(write(tmp_path, ".xodr", faulty)))
         assert len(road.lanes.lanes) == len(whole.lanes.lanes)
         assert NoteKind.FAULTY not in {note.kind for note in road.lanes.notes}
+
+
+def test_a_lane_beyond_a_missing_one_costs_only_itself(tmp_path) -> None:
+    beyond = '<lane id="-3" type="driving"><width sOffset="0" a="3" b="0" c="0" d="0"/></lane>'
+    text = opendrive().replace("</right>", f"{beyond}</right>", 1)
+    whole = build_road(str(write(tmp_path, ".xodr")))
+    road = build_road(str(write(tmp_path, ".xodr", text)))
+    assert len(road.lanes.lanes) == len(whole.lanes.lanes)
+    (note,) = [note for note in road.lanes.notes if note.kind is NoteKind.FAULTY]
+    assert "0.0.-3 and those beyond it" in str(note)
