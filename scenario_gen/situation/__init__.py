@@ -32,11 +32,9 @@ from scenario_gen.situation.gaps import (
     time_gaps,
 )
 from scenario_gen.situation.interaction_window import (
-    interaction_advice,
     interaction_windows,
     keeps_interaction,
     MIN_LOSS_S,
-    naming_interaction,
 )
 from scenario_gen.situation.kind import EncounterKind, kind_of
 from scenario_gen.situation.manoeuvre import (
@@ -100,7 +98,6 @@ __all__ = [
     "faced_light",
     "find_conflicts",
     "find_waits",
-    "interaction_advice",
     "interaction_windows",
     "is_same_turn",
     "keeps_interaction",
@@ -110,7 +107,6 @@ __all__ = [
     "main_line",
     "manoeuvre_of",
     "mirrored",
-    "naming_interaction",
     "pair_crossings",
     "passing",
     "path_crossing",

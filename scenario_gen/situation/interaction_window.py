@@ -5,49 +5,20 @@
 
 from collections import Counter
 from collections.abc import Iterator
-from contextlib import contextmanager
 
 import numpy as np
 
-from scenario_gen.base.errors import RefusedError
 from scenario_gen.numerics import Floats
 from scenario_gen.situation.manoeuvre import is_same_turn, manoeuvre_of, turn_of
 from scenario_gen.situation.situation import Situation
 from scenario_gen.situation.tracks import Track
-from scenario_gen.types import Encounter, YIELD
+from scenario_gen.types import YIELD
 
 LEAD_S = 2.0  # kept before the first event of a vehicle
 FOLLOW_UP_S = 1.0  # kept after its last one
 MIN_FOLLOWING_S = 4.0  # of a vehicle that follows another one after a merge
 MIN_LOSS_S = 0.5  # a recording that can lose less is not shortened
 TURN_ENDS_SHARE = 0.05  # of a turn that may be missing at each end
-
-
-@contextmanager
-def naming_interaction(encounter: Encounter | None) -> Iterator[None]:
-    """Add to a refusal how the recording can be cut to its interaction.
-
-    Raises:
-        RefusedError: as the body.
-    """
-    try:
-        yield
-    except RefusedError as error:
-        advice = "" if encounter is None else interaction_advice(Situation.of(encounter))
-        raise type(error)(f"{error}{advice}") from error
-
-
-def interaction_advice(situation: Situation) -> str:
-    """Return how to cut the recording to its interaction; "" where little would be cut."""
-    duration = situation.encounter.duration
-    windows = interaction_windows(situation)
-    begin, end = windows[:, 0].min(), windows[:, 1].max()
-    if duration - (end - begin) < MIN_LOSS_S:
-        return ""
-    return (
-        f". The interaction lasts from {begin:.1f} to {end:.1f} s of {duration:.1f} s: it "
-        "may fit if the log is cut to that with log.start and log.end"
-    )
 
 
 def interaction_windows(situation: Situation) -> Floats:

@@ -12,7 +12,6 @@ from scenario_gen import read_log
 from scenario_gen.base.errors import RefusedError
 from scenario_gen.method.shortening import cut, fit_what_matters
 from scenario_gen.situation import (
-    interaction_advice,
     interaction_windows,
     keeps_interaction,
     Situation,
@@ -58,16 +57,6 @@ def test_the_smallest_loss_that_fits_is_used_and_noted(crossing: Encounter) -> N
     limit = 1.0
     with pytest.raises(RefusedError, match=r"too long. Shortened to its interaction .* within"):
         fit_what_matters(short_road, crossing, 7)
-
-
-def test_the_part_of_the_interaction_is_named_if_it_is_shorter(crossing: Encounter) -> None:
-    situation = Situation.of(crossing)
-    windows = interaction_windows(situation)
-    begin, end = windows[:, 0].min(), windows[:, 1].max()
-    advice = interaction_advice(situation)
-    assert f"from {begin:.1f} to {end:.1f} s of {crossing.duration:.1f} s" in advice
-    part = cut(crossing, np.tile((begin, end), (2, 1)))
-    assert interaction_advice(Situation.of(part)) == ""
 
 
 def test_each_vehicle_keeps_its_events(crossing: Encounter) -> None:

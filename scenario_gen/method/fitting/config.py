@@ -27,7 +27,7 @@ class FittingConfig(Parameters):
     shorten: bool = parameter(
         True,
         "shorten a recording at its begin and end if it does not fit as a whole, as long as "
-        "conflicts, orders, reactions, waits and turns remain; nodes only name the part",
+        "conflicts, orders, reactions, waits and turns remain",
     )
     scale_low: float = parameter(0.8, "smallest accepted scale s of eq 9", low=0.01, high=1.0)
     scale_high: float = parameter(1.25, "largest accepted scale s of eq 9", low=1.0, high=1000.0)

@@ -51,6 +51,7 @@ class RoadServerParameters(Parameters):
         f"{', '.join(ROAD_NAMES)}, a map_server YAML file, or a vector map (.osm, .xodr, .xml)",
     )
     wait_for_tracks: bool = parameter(False, "publish no road before tracks arrive")
+    shorten: bool = parameter(True, "request a part of a recording that does not fit as a whole")
 
 
 @dataclass(frozen=True)

@@ -3,6 +3,8 @@
 
 """log_player: a log in, one of its encounters out as latched `tracks`; `~/play` reads it again.
 
+The part that a stage requests on `tracks/part` replaces them.
+
 With `stream`, the encounter is published as `vehicle_<id>/fix` and `vehicle_<id>/speed` of each
 vehicle, and `/clock`, instead.
 """
@@ -23,6 +25,8 @@ from scenario_gen.base.cancelling import stop_if_cancelled
 from scenario_gen.base.errors import InputError
 from scenario_gen.logs import latitude_longitude, LogConfig, read_log
 from scenario_gen.ros.common.node_parameters import LogPlayerParameters
+from scenario_gen.ros.common.recording_part import send_part
+from scenario_gen.ros.common.recording_part import TOPIC as PART
 from scenario_gen.ros.common.services import offer_trigger
 from scenario_gen.ros.common.stage_node import StageNode
 from scenario_gen.types import Encounter, tokens
@@ -40,16 +44,22 @@ class Config(LogPlayerParameters):
 class LogPlayer(StageNode):
     """Publishes one encounter of a log."""
 
+    INPUTS = (PART,)
     OUTPUTS = ("tracks",)
 
     def __init__(self, namespace: str | None = None) -> None:
         super().__init__("log_player", Config(), namespace)
         offer_trigger(self, "~/play", self._play_again)
+        self._sent: Encounter | None = None
 
     def started(self) -> None:
         """Read the log, if the parameters name one."""
         if self.config.log_path:
             self.work("play", self._play)
+
+    def received(self, topic: str, data: bytes) -> None:
+        """Send the requested part of the tracks."""
+        send_part(self, self._sent, data)
 
     def _play(self, cancelled: Callable[[], bool]) -> None:
         config = self.config
@@ -62,6 +72,7 @@ class LogPlayer(StageNode):
         encounter = result.encounters[config.encounter]
         stop_if_cancelled()
         if not config.stream:
+            self._sent = encounter
             self.outputs.send("tracks", encode_tracks(encounter))
         n, samples = encounter.speed.shape
         message = (

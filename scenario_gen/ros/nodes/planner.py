@@ -8,7 +8,7 @@
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 import math
 from typing import Any
 
@@ -30,20 +30,23 @@ from msg_conventions.tracks import decode_tracks
 from scenario_gen.base.cancelling import stop_if_cancelled
 from scenario_gen.base.errors import InputError, RefusedError, ScenarioGenError
 from scenario_gen.base.parameters import parameter, Parameters
-from scenario_gen.method.fitting import fit_template, FittingConfig
+from scenario_gen.method.chain import Chain
+from scenario_gen.method.config import PipelineConfig
+from scenario_gen.method.fitting import FittingConfig
 from scenario_gen.method.routing import (
     make_planner,
-    plan_routes,
     plan_with_retry,
     PlanningConfig,
     Query,
 )
 from scenario_gen.method.validity import Limits
 from scenario_gen.numerics import Floats
+from scenario_gen.ros.common.recording_part import request_part
+from scenario_gen.ros.common.recording_part import TOPIC as PART
 from scenario_gen.ros.common.services import REQUESTS
 from scenario_gen.ros.common.stage_node import Inputs, StageNode
-from scenario_gen.situation import naming_interaction, Situation
-from scenario_gen.types import Road, tokens
+from scenario_gen.situation import Situation
+from scenario_gen.types import Encounter, GenerationResult, Road, Segmentation, tokens
 
 ROAD_TOPICS = ("map", "road/entries", "road/exits")
 
@@ -69,7 +72,7 @@ class Planner(StageNode):
 
     INPUTS = (*ROAD_TOPICS, LANES, "road/info", "tracks", "changepoints")
     STAGES = ("situation", "roads", "method.fitting", "method.routing")
-    OUTPUTS = ("fit", "fit/info")
+    OUTPUTS = ("fit", "fit/info", PART)
 
     def __init__(self, namespace: str | None = None) -> None:
         super().__init__("planner", Config(), namespace)
@@ -104,10 +107,29 @@ class Planner(StageNode):
             messages.get("road/exits"),
             messages.get(LANES),
         )
-        situation, limits = Situation.of(encounter), config.limits
-        with naming_interaction(encounter if config.fitting.shorten else None):
-            fit = fit_template(situation, segmentation, road, config.fitting, limits=limits)
-            routes = plan_routes(road, fit, config.planning, config.seed, limits)
+        pipeline = PipelineConfig(
+            fitting=config.fitting, planning=config.planning, limits=config.limits
+        )
+
+        def plan(part: Encounter) -> GenerationResult:
+            stop_if_cancelled()
+            chain = Chain(
+                Situation.of(part),
+                _part_of(segmentation, encounter, part),
+                road,
+                pipeline,
+                seed=config.seed,
+            )
+            return chain.plan()
+
+        try:
+            planned = plan(encounter)
+        except RefusedError as error:
+            if not config.fitting.shorten:
+                raise
+            request_part(self, plan, encounter, error)
+            return
+        (_, fit), routes = planned.road_and_fit(), planned.routes
         stop_if_cancelled()
         anchors = anchor_stamps(encounter, segmentation.changepoints)
         results = {
@@ -159,6 +181,19 @@ class Planner(StageNode):
         elif plan := await self.result_of(name, job, lambda _: b""):
             response.plan = deserialize_message(plan, Path)
         return response
+
+
+def _part_of(segmentation: Segmentation, whole: Encounter, part: Encounter) -> Segmentation:
+    """Return the segmentation of a part of an encounter."""
+    first = (part.start_ns - whole.start_ns) // whole.dt_ns
+    count = len(part.time)
+    changepoints = segmentation.changepoints - first
+    return replace(
+        segmentation,
+        labels=segmentation.labels[first : first + count],
+        changepoints=changepoints[(changepoints > 0) & (changepoints < count)],
+        changepoint_probability=segmentation.changepoint_probability[first : first + count],
+    )
 
 
 def query_of(request: Any, frame_id: str, radius: float) -> Query:

@@ -10,6 +10,7 @@ Built-in roads are sized to the template: the node publishes the road for each e
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 from typing import Any
 from urllib.parse import unquote, urlparse
@@ -28,13 +29,14 @@ from msg_conventions.pictures import road_markers
 from msg_conventions.roads import encode_map, encode_poses
 from msg_conventions.tracks import decode_tracks
 from scenario_gen.base.cancelling import stop_if_cancelled
-from scenario_gen.base.errors import InputError, ScenarioGenError
+from scenario_gen.base.errors import InputError, RefusedError, ScenarioGenError
 from scenario_gen.roads import build_road, RoadConfig
 from scenario_gen.ros.common.node_parameters import RoadServerParameters
+from scenario_gen.ros.common.recording_part import request_part
+from scenario_gen.ros.common.recording_part import TOPIC as PART
 from scenario_gen.ros.common.services import REQUESTS
 from scenario_gen.ros.common.stage_node import StageNode
-from scenario_gen.situation import naming_interaction
-from scenario_gen.types import NoteKind
+from scenario_gen.types import Encounter, NoteKind
 
 
 @dataclass(frozen=True)
@@ -74,7 +76,7 @@ class RoadServer(StageNode):
 
     INPUTS = ("tracks",)
     STAGES = ("roads",)
-    OUTPUTS = ("map", "road/entries", "road/exits", LANES, "road/info", "road/markings")
+    OUTPUTS = ("map", "road/entries", "road/exits", LANES, "road/info", "road/markings", PART)
 
     def __init__(self, namespace: str | None = None) -> None:
         super().__init__("road_server", Config(), namespace)
@@ -100,8 +102,13 @@ class RoadServer(StageNode):
         """Build a road, sized to the tracks if there are any, and publish it."""
         tracks = self._tracks
         encounter = decode_tracks(tracks) if tracks else None
-        with naming_interaction(encounter):
+        try:
             road = build_road(name, encounter, self.config.road)
+        except RefusedError as error:
+            if encounter is None or not self.config.shorten:
+                raise
+            request_part(self, partial(self._attempt, name), encounter, error)
+            return
         stamp_ns = stamp_of(tracks, "tracks") if tracks else 0
         messages = {
             "road/entries": encode_poses(road.entries, road.frame_id, stamp_ns),
@@ -134,6 +141,15 @@ class RoadServer(StageNode):
             (Level.WARN, "; ".join([message, *faults])) if faults else (Level.OK, message)
         )
         self.status(level, message, "road", stamp_ns, **template_hashes(messages | template))
+
+    def _attempt(self, name: str, part: Encounter) -> None:
+        """Build the road for a part of the encounter.
+
+        Raises:
+            RefusedError: it does not fit.
+        """
+        stop_if_cancelled()
+        build_road(name, part, self.config.road)
 
     def _get_map(self, _request: Any, response: Any) -> Any:
         if self._grid is not None:

@@ -7,7 +7,8 @@
 
 While `vehicle_<id>/fix` and `vehicle_<id>/speed` arrive, confirmed changepoints are published on
 `changepoints/live`. At the end of the streams, or on `~/segment`, the buffered messages are read
-like a log and published as `tracks`, for this node and all others.
+like a log and published as `tracks`, for this node and all others; the part that a stage requests
+on `tracks/part` replaces them.
 """
 
 from collections.abc import Callable
@@ -32,9 +33,11 @@ from scenario_gen.method.segmentation import (
     SegmentationConfig,
 )
 from scenario_gen.ros.common.live_streams import LiveConfig, LiveStreams
+from scenario_gen.ros.common.recording_part import send_part
+from scenario_gen.ros.common.recording_part import TOPIC as PART
 from scenario_gen.ros.common.services import offer_trigger
 from scenario_gen.ros.common.stage_node import StageNode
-from scenario_gen.types import Sample
+from scenario_gen.types import Encounter, Sample
 
 
 @dataclass(frozen=True)
@@ -54,7 +57,7 @@ class Config(Parameters):
 class Segmenter(StageNode):
     """Segments every received encounter into driving primitives."""
 
-    INPUTS = ("tracks",)
+    INPUTS = ("tracks", PART)
     STAGES = ("method.segmentation",)
     OUTPUTS = ("changepoints", "posterior", "changepoints/live")
 
@@ -63,6 +66,7 @@ class Segmenter(StageNode):
         self._tracks: bytes | None = None
         self._live: LiveStreams | None = None
         self._encounter_count = 0
+        self._sent: Encounter | None = None
         offer_trigger(self, "~/segment", self._segment_again)
 
     def started(self) -> None:
@@ -83,6 +87,8 @@ class Segmenter(StageNode):
         if topic == "tracks":
             self._tracks = data
             self.work("segment", lambda _: self._segment(data))
+        elif topic == PART:
+            send_part(self, self._sent, data)
         elif self._live is not None:
             self._live.received(topic, data)
 
@@ -116,6 +122,7 @@ class Segmenter(StageNode):
                 f"{len(result.encounters)} encounter(s)"
             )
             self.status(Level.OK, message, "encounter", encounter.start_ns, **notes)
+            self._sent = encounter
             self.outputs.send("tracks", encode_tracks(encounter))
 
         self.work(f"encounter {self._encounter_count}", job)
