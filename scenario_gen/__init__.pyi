@@ -14,6 +14,8 @@ from scenario_gen.closed_loop.trials import (
     run_trials as run_trials,
     trials_of as trials_of,
 )
+from scenario_gen.corpus.config import CorpusConfig as CorpusConfig
+from scenario_gen.corpus.frames import batch as batch, find as find, mine as mine
 from scenario_gen.corpus.parallel import generate_many as generate_many
 from scenario_gen.logs import LogConfig as LogConfig, read_log as read_log
 from scenario_gen.logs.read import LogResult as LogResult

@@ -7,7 +7,7 @@ The scenarios are copied from the batch's bags, or generated again.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import nullcontext
+from contextlib import contextmanager, nullcontext
 from dataclasses import dataclass
 from functools import cache, partial
 from itertools import product
@@ -34,8 +34,8 @@ COLUMNS = (
 )  # fmt: skip
 # The columns of an encounter with the names of a scenario's columns.
 RECORDED = (
-    "name AS template, kind, 'recorded' AS road, count AS vehicles, NULL AS index,"
-    " NULL AS type, seconds, distance, ttc, pet, speed, NULL AS braking, gap"
+    "name AS template, source AS recording, kind, 'recorded' AS road, count AS vehicles,"
+    " NULL AS index, NULL AS type, seconds, distance, ttc, pet, speed, NULL AS braking, gap"
 )
 FIGURES = ("seconds", "distance", "ttc", "pet", "speed", "braking")
 TOLERANCE_RATIO = 0.01  # of figures on another processor, whose last digits may differ
@@ -86,6 +86,25 @@ def find(
     Raises:
         InputError: there is no batch, or the condition is invalid or takes too long.
     """
+    with search(batch, condition, seconds) as (base, matches):
+        ((count,),) = matches.aggregate("count(*)").fetchall()
+        ordered = matches.limit(limit or count)
+        rows = [dict(zip(ordered.columns, row, strict=True)) for row in ordered.fetchall()]
+        coverage = base.execute(
+            f"SELECT kind, road, {PET_CLASS_SQL} AS pet, count(*)"
+            " FROM scenarios GROUP BY ALL ORDER BY ALL"
+        ).fetchall()
+    return Hits(rows, count, coverage)
+
+
+@contextmanager
+def search(
+    batch: Place, condition: str, seconds: float = MAX_SECONDS_S
+) -> Iterator[tuple[Any, Any]]:
+    """Give DuckDB's view of all scenarios or encounters, and those that meet a condition.
+
+    Arguments and errors as for `find`.
+    """
     generated = finished_tables(batch, "scenarios")
     tables: list[Place] = generated or sorted((batch / "encounters").glob("*.parquet"), key=str)
     if not tables:
@@ -94,27 +113,20 @@ def find(
     remedy = f"the columns are {NAMES}"
     if not generated:
         remedy += "; if the corpus is from an older version, mine it again"
+    columns = "*" if generated else RECORDED
     with (
         fetched(tables) as paths,
         matching(
             paths,
             condition,
             workplace(batch),
-            columns="*" if generated else RECORDED,
+            columns=columns,
             source=batch,
             remedy=remedy,
             seconds=seconds,
         ) as (base, matches),
     ):
-        ((count,),) = matches.aggregate("count(*)").fetchall()
-        ordered = matches.order("pet NULLS LAST, ttc, template, road, index")
-        ordered = ordered.limit(limit or count)
-        rows = [dict(zip(ordered.columns, row, strict=True)) for row in ordered.fetchall()]
-        coverage = base.execute(
-            f"SELECT kind, road, {PET_CLASS_SQL} AS pet, count(*)"
-            " FROM scenarios GROUP BY ALL ORDER BY ALL"
-        ).fetchall()
-    return Hits(rows, count, coverage)
+        yield base, matches.order("pet NULLS LAST, ttc, template, road, index")
 
 
 def coverage_lines(hits: Hits, batch: Place) -> list[str]:
