@@ -24,7 +24,8 @@ from scenario_gen.method.routing.search.steering import steering_cost
 from scenario_gen.method.routing.search.sweep import car_scene
 from scenario_gen.numerics.arrays import Floats
 from scenario_gen.roads.clearance import footprint_fits, to_cells
-from scenario_gen.roads.obstacles import Obstacle, with_obstacles
+from scenario_gen.roads.obstacles import with_obstacles
+from scenario_gen.types import Obstacle
 from scenario_gen.types.road import Road
 
 LENGTH, WIDTH, WALL = 80.0, 8.0, 1.0  # [m]

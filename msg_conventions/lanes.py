@@ -4,7 +4,7 @@
 """LaneNetwork ⇄ `road/lanes` (visualization_msgs/Marker): a road's lanes beside its grid.
 
 A LINE_LIST has all borders as pairs of neighbouring points: lane after lane, the left border
-before the right one. `text` is a JSON object with these members:
+before the right one; then the outlines of obstacles. `text` is a JSON object with these members:
 
 - `name`, `notes`, `note_kinds`
 - `lanes`, each with its `id`, the number of `points` of a border, `successors` and `beside`
@@ -19,6 +19,7 @@ before the right one. `text` is a JSON object with these members:
 - `drawn` true for lanes of a built-in road, and `drawn_for` for those drawn for a template: the
   `frame` of the template (x, y [m], yaw [rad] on the road), and the ids of the `lanes` by which
   each vehicle arrives and leaves
+- `obstacles`, if there are some: x, y [m], yaw [rad], length and width [m] of each
 
 Action 2 (delete) means that the road has no lanes. Stamp and frame: the map's. QoS: reliable,
 transient_local, depth 1.
@@ -42,6 +43,7 @@ from scenario_gen.types import (
     Lane,
     LaneNetwork,
     note_kinds,
+    Obstacle,
     recorded_notes,
     RuleKind,
     SignalSchedule,
@@ -60,6 +62,8 @@ def encode_lanes(network: LaneNetwork | None, frame_id: str, stamp_ns: int) -> b
         for lane in lanes
         for border in (lane.left, lane.right)
     ]
+    obstacles = () if network is None else network.obstacles
+    pairs += [obstacle.outline[[0, 1, 1, 2, 2, 3, 3, 0]] for obstacle in obstacles]
     points = np.concatenate(pairs) if pairs else np.zeros((0, 2))
     text = "" if network is None else json.dumps(_document(network), ensure_ascii=False)
     marker = Marker(
@@ -95,6 +99,8 @@ def _document(network: LaneNetwork) -> dict[str, Any]:
         document["rules_kept"] = network.rules_kept
     if network.drawn:
         document["drawn"] = True
+    if network.obstacles:
+        document["obstacles"] = network.obstacles
     if network.origin:
         document["origin"] = network.origin
     if network.drawn_for is not None:
@@ -147,7 +153,11 @@ def decode_lanes(data: bytes, source: str = TOPIC) -> tuple[str, LaneNetwork | N
         )
     try:
         document = json.loads(marker.text)
-        lanes = tuple(_lanes(document["lanes"], points, source))
+        obstacles = tuple(Obstacle(*map(float, each)) for each in document.get("obstacles", ()))
+        if not np.isfinite(obstacles).all():
+            raise ValueError("an obstacle is not finite")
+        borders = points[: len(points) - 8 * len(obstacles)]
+        lanes = tuple(_lanes(document["lanes"], borders, source))
         notes = recorded_notes(map(str, document["notes"]), str(document.get("note_kinds", "")))
         rules = tuple(map(_rule, document.get("rules", ())))
         network = LaneNetwork(
@@ -159,6 +169,7 @@ def decode_lanes(data: bytes, source: str = TOPIC) -> tuple[str, LaneNetwork | N
             drawn=document.get("drawn", False) is True,
             drawn_for=_drawn_for(document["drawn_for"]) if "drawn_for" in document else None,
             origin=tuple(map(float, document.get("origin", ()))),
+            obstacles=obstacles,
         )
         return frame_id, network.with_lanes(lanes)
     except (KeyError, TypeError, ValueError, OverflowError, RecursionError) as error:

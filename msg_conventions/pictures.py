@@ -36,6 +36,7 @@ PAINT = {
     Marking.GIVE_WAY: (0.4, 0.6, 0.4),
     Marking.ARROW: (0.12,),
     Marking.ZEBRA: (0.5,),
+    Marking.OBSTACLE: (0.12,),
 }
 """The width of a marking, and the lengths of its dashes and gaps [m]."""
 

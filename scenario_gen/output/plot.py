@@ -123,7 +123,7 @@ def _draw_paths(axes: "Axes", motions: Sequence[Motion]) -> list[Floats]:
 
 
 def _draw_road(axes: "Axes", road: Road) -> None:
-    """Draw the drivable cells of a road in grey, lanes closed to cars, and crossings."""
+    """Draw drivable cells in grey, lanes closed to cars, crossings and obstacles."""
     height, width = (cells * road.resolution for cells in road.drivable.shape)
     x, y = road.origin
     axes.imshow(
@@ -141,5 +141,8 @@ def _draw_road(axes: "Axes", road: Road) -> None:
         if not lane.crossing:
             colour = "#d9a9a2" if lane.open_to(DRIVERS) else "#e9e5d6"
             axes.fill(*lane.outline.T, color=colour, zorder=-0.5, linewidth=0)
-    for bar in markings(road.lanes).get(Marking.ZEBRA, ()):
+    marked = markings(road.lanes)
+    for bar in marked.get(Marking.ZEBRA, ()):
         axes.plot(*bar.T, color="white", linewidth=1.5, zorder=0.6)
+    for outline in marked.get(Marking.OBSTACLE, ()):
+        axes.fill(*outline.T, color="0.4", zorder=0.6, linewidth=0)

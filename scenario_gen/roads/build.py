@@ -19,7 +19,7 @@ from scenario_gen.roads.builtin import draw_corridor, draw_layout, draw_paper, l
 from scenario_gen.roads.config import refuse_too_many_cells, RoadConfig
 from scenario_gen.roads.junctions import draw_junction, draw_roundabout
 from scenario_gen.roads.nav2 import read_map
-from scenario_gen.roads.obstacles import read_obstacles, with_obstacles
+from scenario_gen.roads.obstacles import parked_cars, read_obstacles, with_obstacles
 from scenario_gen.roads.outline import road_of_shape, Shape
 from scenario_gen.roads.shaped import bends, draw_along, draw_merge, fitting_width, STRAIGHT_LINE
 from scenario_gen.roads.vector.read import FORMATS, is_vector_map, read_network, split, vector_road
@@ -54,7 +54,8 @@ def build_road(
     Raises:
         InputError: there is no such road, a map cannot be used, or an obstacle is not on it.
         RefusedError: the road cannot be drawn for the recording; for `corridor`, because the
-            recorded vehicles overlap too far to be separated.
+            recorded vehicles overlap too far to be separated; an obstacle is not on the part of
+            a vector map.
 
     Examples:
         >>> from scenario_gen import build_road
@@ -64,10 +65,21 @@ def build_road(
     obstacles = read_obstacles(config.obstacles)
     if isinstance(name_or_path, (str, Path)):
         road = _road_without_obstacles(str(name_or_path), encounter, config)
+        network = _vector_network(str(name_or_path)) or road.lanes
     else:
         road = road_of_shape(name_or_path, config)
+        network = road.lanes
     other_lanes = road.lanes.others if road.lanes is not None else ()
-    return with_obstacles(road, obstacles, road.cells_in(other_lanes))
+    others = road.cells_in(other_lanes)
+    road = with_obstacles(road, obstacles, others)
+    cars = parked_cars(network, config.parked)
+    parked = with_obstacles(road, cars, others, elsewhere=True)
+    if cars and parked.obstacles == road.obstacles:
+        raise RefusedError(
+            f"no car of road.parked stands on road {road.name!r}; choose other lanes, or another "
+            "part of the map"
+        )
+    return parked
 
 
 def road_and_template(

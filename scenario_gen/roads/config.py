@@ -3,11 +3,11 @@
 
 """The parameters of roads."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from scenario_gen.base.errors import InputError, RefusedError
 from scenario_gen.base.parameters import parameter, Parameters
-from scenario_gen.roads.obstacles import read_obstacles
+from scenario_gen.roads.obstacles import ParkedConfig, read_obstacles
 
 
 @dataclass(frozen=True)
@@ -83,6 +83,7 @@ class RoadConfig(Parameters):
         "obstacles, rectangles `x y yaw length width` in the road's frame, separated by `;`",
         unit="m, rad",
     )
+    parked: ParkedConfig = field(default_factory=ParkedConfig)
     image_outside_folder: bool = parameter(
         False, "also read a map's image outside the folder of its YAML file"
     )

@@ -8,17 +8,20 @@ from dataclasses import dataclass, field, replace
 from enum import StrEnum
 from functools import cached_property
 import math
+from typing import NamedTuple
 
 import numpy as np
 
 from scenario_gen.base.errors import InputError
 from scenario_gen.base.road_users import CAR, LANE_USERS
 from scenario_gen.numerics import Floats, freeze, frozen
-from scenario_gen.numerics.plane import edge_yaws
+from scenario_gen.numerics.plane import edge_yaws, place
 from scenario_gen.types.notes import Note
 from scenario_gen.types.traffic_light import SignalSchedule
 
 LEVEL_SPACING_M = 2.5  # height difference of two lanes of which one crosses above the other
+OBSTACLE_HEIGHT_M = 1.5
+"""Of obstacles in other formats."""
 DRIVERS = LANE_USERS - {"pedestrian"}
 CARS = frozenset((CAR,))
 
@@ -116,6 +119,39 @@ class Lane:
         return frozen((self.outline.min(axis=0), self.outline.max(axis=0)))
 
 
+class Obstacle(NamedTuple):
+    """A rectangle that does not move, such as a parked car.
+
+    Attributes:
+        x: [m] of its centre.
+        y: [m] of its centre.
+        yaw: [rad] direction of its length.
+        length: [m].
+        width: [m].
+    """
+
+    x: float
+    y: float
+    yaw: float
+    length: float
+    width: float
+
+    def __str__(self) -> str:
+        return " ".join(f"{value:g}" for value in self)
+
+    @property
+    def is_car(self) -> bool:
+        """Whether it has the size of a car."""
+        return 3.0 <= self.length <= 6.0 and 1.4 <= self.width <= 2.2
+
+    @property
+    def outline(self) -> Floats:
+        """(4, 2) [m]: its corners, counter-clockwise from the front left."""
+        ahead = np.array([1.0, -1.0, -1.0, 1.0]) * self.length / 2.0
+        left = np.array([1.0, 1.0, -1.0, -1.0]) * self.width / 2.0
+        return place(np.array(self[:3]), ahead, left)
+
+
 class RuleKind(StrEnum):
     """What traffic has to do."""
 
@@ -185,7 +221,7 @@ class LaneNetwork:
         drawn_for: how it was drawn for a template; None: for none, or without a place for it.
         origin: latitude and longitude [degrees] about which the frame is `geodesy`'s; (): the map
             says metres.
-        obstacles: centre x, y [m], yaw [rad], length and width [m] of each static obstacle.
+        obstacles: what stands on the road, or of a whole map, anywhere.
         of_all: the lanes of all users, those of cars first, in the order of `lanes`; their
             `successors` and `neighbours` count in here. (): no lane is closed to cars.
     """
@@ -199,7 +235,7 @@ class LaneNetwork:
     drawn_for: DrawnFor | None = None
     origin: tuple[float, ...] = ()
     of_all: tuple[Lane, ...] = ()
-    obstacles: tuple[tuple[float, ...], ...] = ()
+    obstacles: tuple[Obstacle, ...] = ()
 
     def __post_init__(self) -> None:
         if len(self.origin) not in (0, 2):

@@ -45,6 +45,7 @@ class Marking(StrEnum):
     GIVE_WAY = "give_way"  # dashed
     ARROW = "arrow"  # a closed shape
     ZEBRA = "zebra"  # a bar of a crossing; missing without crossings
+    OBSTACLE = "obstacle"  # its outline, a closed shape; missing without obstacles
 
 
 _MARKING_OF_RULE = {
@@ -69,8 +70,10 @@ def markings(network: LaneNetwork) -> Mapping[Marking, tuple[Floats, ...]]:
         *_rule_lines(network),
         *((Marking.ARROW, arrow) for arrow in arrows),
         *((Marking.ZEBRA, bar) for bar in _zebras(crossings)),
+        *((Marking.OBSTACLE, each.outline[[0, 1, 2, 3, 0]]) for each in network.obstacles),
     ]
-    kinds = [kind for kind in Marking if crossings or kind != Marking.ZEBRA]
+    missing = {Marking.ZEBRA, Marking.OBSTACLE}.difference(kind for kind, _ in lines)
+    kinds = [kind for kind in Marking if kind not in missing]
     return {kind: tuple(line for each, line in lines if each == kind) for kind in kinds}
 
 

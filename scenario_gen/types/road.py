@@ -27,7 +27,7 @@ from scenario_gen.numerics import (
     wrap_angle,
 )
 from scenario_gen.numerics.polygons import fill_slits, polygon_cells
-from scenario_gen.types.lanes import Lane, LaneNetwork
+from scenario_gen.types.lanes import Lane, LaneNetwork, Obstacle
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -39,6 +39,7 @@ MAX_ORIGIN_M = 1e8  # per axis; every geodetic grid stays within it
 DIRECTION_COUNT = 16
 """The directions that `Road.lane_directions` tells apart."""
 _AGAINST_RAD = np.pi / 2.0 + np.pi / DIRECTION_COUNT  # half a direction's width stays open
+PASSING_M = 30.0  # from an obstacle, within which the oncoming lane may be used
 _CHUNK_CELLS = 4096
 MAX_DEPTH_M = 10.0  # a depth off the road is measured up to this
 
@@ -114,6 +115,11 @@ class Road:
         """The lanes of a vector map, on which templates are placed and vehicles stay."""
         return None if self.lanes is None or self.lanes.drawn else self.lanes
 
+    @property
+    def obstacles(self) -> tuple[Obstacle, ...]:
+        """What stands on a road with lanes; a road without lanes has only `obstructed` cells."""
+        return () if self.lanes is None else self.lanes.obstacles
+
     def __repr__(self) -> str:
         height, width = (self.resolution * cells for cells in self.drivable.shape)
         return f"Road({self.name!r}, {width:g} x {height:g} m)"
@@ -186,13 +192,16 @@ class Road:
     def lane_directions(self) -> npt.NDArray[np.uint16]:
         """(H, W): bit k of a cell is set if traffic may drive there in direction k of 16.
 
-        All bits are set where no lane of a map lies. A cell may lie in several lanes, as in a
-        junction; each lane allows the directions that differ from its own by at most 90°.
+        All bits are set where no lane of a map lies, and near obstacles, which are passed in the
+        oncoming lane. A cell may lie in several lanes, as in a junction; each lane allows the
+        directions that differ from its own by at most 90°.
         """
         directions = np.zeros(self.drivable.shape, dtype=np.uint16)
         for lane in self.map_lanes.lanes if self.map_lanes is not None else ():
             rows, columns = self._cells_of_lane(lane)
             directions[rows, columns] |= self._directions_in(lane, rows, columns)
+        for obstacle in self.obstacles:
+            directions[self.cells_near(obstacle.x, obstacle.y, PASSING_M)] = 0
         directions[directions == 0] = np.iinfo(np.uint16).max
         return sealed(directions)
 
@@ -228,6 +237,13 @@ class Road:
         for lane in lanes:
             cells[self._cells_of_lane(lane)] = True
         return cells
+
+    def cells_near(self, x: float, y: float, distance: float) -> Bools:
+        """Return (H, W): which cells have their centre within a distance [m] of a point [m]."""
+        height, width = self.drivable.shape
+        dx = self.origin[0] + (np.arange(width) + 0.5) * self.resolution - x
+        dy = self.origin[1] + (np.arange(height) + 0.5) * self.resolution - y
+        return np.asarray(np.hypot(dx, dy[:, None]) < distance)
 
     def cells(self, points: Floats) -> tuple[Ints, Ints, Bools]:
         """Return rows, columns (...) of cells nearest to points (..., 2) [m]; whether inside."""

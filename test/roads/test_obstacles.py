@@ -8,12 +8,16 @@ from hypothesis import strategies as st
 import numpy as np
 import pytest
 from shapely import affinity
-from shapely.geometry import box
+from shapely.geometry import box, LineString, Point, Polygon
+from support import map_builders
 
+from msg_conventions.lanes import encode_lanes
 from msg_conventions.roads import decode_map, encode_map
 from scenario_gen.base.errors import InputError
+from scenario_gen.base.parameters import updated
 from scenario_gen.roads import build_road, RoadConfig
-from scenario_gen.roads.obstacles import Obstacle, read_obstacles, with_obstacles
+from scenario_gen.roads.obstacles import read_obstacles, with_obstacles
+from scenario_gen.types import Obstacle
 
 
 def test_text():
@@ -79,6 +83,10 @@ def test_a_map_carries_them():
     np.testing.assert_array_equal(again.drivable, road.drivable)
     np.testing.assert_array_equal(again.cleared.drivable, plain.drivable)
     assert decode_map(encode_map(plain, 0))[1].obstructed is None
+    lanes = encode_lanes(road.lanes, "map", 0)
+    _, again = decode_map(encode_map(road, 0), lanes=lanes)
+    assert again.obstacles == (Obstacle(20, 3, 0.1, 4, 2),)
+    assert [lane.id for lane in again.lanes.lanes] == [lane.id for lane in road.lanes.lanes]
 
 
 def test_one_that_stands_nowhere_is_refused():
@@ -88,3 +96,29 @@ def test_one_that_stands_nowhere_is_refused():
         build_road("straight", config=RoadConfig(obstacles="900 0 0 4 2"))
     with pytest.raises(InputError, match="leave no drivable cell"):
         build_road("straight", config=RoadConfig(obstacles="0 0 0 900 900"))
+
+
+@pytest.mark.parametrize("kind", ["straight", "map"])
+def test_rows_of_cars_are_parked_along_the_edges_of_lanes(tmp_path, kind):
+    values = {"parked.count": 3, "parked.begin": 4.0, "parked.gap": 0.5, "parked.width": 1.6}
+    name = "straight" if kind == "straight" else map_builders.write(tmp_path, ".xml")
+    plain = build_road(name)
+    lane = max(plain.lanes.lanes, key=lambda lane: len(lane.centre))
+    for side in ("right", "left"):
+        config = updated(
+            RoadConfig(), values | {"parked.lanes": f" {lane.id},", "parked.side": side}
+        )
+        road = build_road(name, config=config)
+        cars = np.array(road.obstacles)
+        edge = LineString(getattr(lane, side))
+        assert len(cars) == 3
+        assert [edge.project(Point(car[:2])) for car in cars] == pytest.approx(
+            [6.25, 11.25, 16.25]
+        )
+        assert [edge.distance(Point(car[:2])) for car in cars] == pytest.approx(
+            [0.8] * 3, abs=0.01
+        )
+        assert Polygon(lane.outline).buffer(0.01).covers(Polygon(road.obstacles[0].outline))
+        np.testing.assert_array_equal(road.cleared.drivable, plain.drivable)
+    with pytest.raises(InputError, match=r"road\.parked\.lanes: .* no lane 'nowhere'; it has"):
+        build_road(name, config=updated(RoadConfig(), {"parked.lanes": "nowhere"}))

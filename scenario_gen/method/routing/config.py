@@ -81,6 +81,12 @@ class PlanningConfig(Parameters):
         "right", "the side of the road to keep to", choices=("right", "left")
     )
 
+    oncoming: str = parameter(
+        "around_obstacles",
+        "use of the oncoming lane: where an obstacle blocks the lanes of a direction, or never",
+        choices=("around_obstacles", "never"),
+    )
+
     rrt_star_connect: RrtStarConnectConfig = field(default_factory=RrtStarConnectConfig)
     pose: PoseSearchConfig = field(default_factory=PoseSearchConfig)
     ompl: OmplConfig = field(default_factory=OmplConfig)

@@ -88,14 +88,19 @@ def make_planner(config: PlanningConfig) -> Planner:
 def _route_on_lanes(task: VehicleTask) -> Route:
     """Return the route on the vehicle's lanes if they are known, else on the whole road.
 
-    The whole road is also used if an obstacle blocks these lanes.
+    The whole road is also used if an obstacle blocks these lanes, unless `oncoming` forbids it.
     """
-    ground = own_side(task.road, task.fitted.path, task.vehicle)
-    if ground is not task.road:
+    road, forbidden = task.road, task.config.oncoming == "never"
+    lanes = road.lanes if forbidden else road.map_lanes
+    ground = own_side(road, task.fitted.path, task.vehicle, lanes)
+    if ground is not road:
         try:
             return _route(replace(task, road=ground))
-        except RefusedError:
-            pass
+        except RefusedError as error:
+            if forbidden:
+                raise RefusedError(
+                    f"{error}; planning.oncoming=around_obstacles also uses the oncoming lane"
+                ) from error
     try:
         return _route(task)
     except RefusedError as error:

@@ -28,12 +28,13 @@ from scenario_gen.output.exchange.cases import (
 from scenario_gen.output.exchange.config import ExportConfig
 from scenario_gen.output.exchange.lanes import LaneMap, SIGN_IDS
 from scenario_gen.output.exchange.xml import add, comment, date_of, Element, number, serialized
-from scenario_gen.types import DRIVERS, Lane, LaneNetwork, Scenario
+from scenario_gen.types import DRIVERS, Lane, LaneNetwork, Obstacle, Scenario, Vehicle
 
 FIRST_OBSTACLE_ID = 100_000  # the ids of lanelets start from 1
 FIRST_PROBLEM_ID = 200_000
 FIRST_INTERSECTION_ID = 300_000
 FIRST_SIGN_ID = 400_000
+FIRST_STATIC_ID = 500_000
 MAX_SPEED = "274"
 MAX_GOAL_HEADING_ERROR_RAD = 0.3
 AUTHOR = "scenario_gen"
@@ -77,6 +78,8 @@ def write_commonroad(
     for sign in signs:
         _sign(root, sign)
     _intersection(root, lane_map)
+    for n, obstacle in enumerate(lane_map.network.obstacles):
+        _static_obstacle(root, obstacle, n)
     for n, vehicle in enumerate(scenario.vehicles):
         comment(root, f"vehicle {vehicle.id}")
         _obstacle(root, scenario, n)
@@ -291,13 +294,27 @@ def _state(parent: Element, tag: str, scenario: Scenario, n: int, k: int) -> Ele
     return state
 
 
+def _static_obstacle(root: Element, standing: Obstacle, n: int) -> None:
+    obstacle = add(root, "staticObstacle", id=FIRST_STATIC_ID + n)
+    add(obstacle, "type", "parkedVehicle" if standing.is_car else "unknown")
+    _rectangle(obstacle, standing)
+    state = add(obstacle, "initialState")
+    _point(add(state, "position"), standing.x, standing.y)
+    add(state, "orientation/exact", standing.yaw)
+    add(state, "time/exact", 0)
+
+
+def _rectangle(obstacle: Element, sized: Vehicle | Obstacle) -> None:
+    rectangle = add(obstacle, "shape/rectangle")
+    add(rectangle, "length", sized.length)
+    add(rectangle, "width", sized.width)
+
+
 def _obstacle(root: Element, scenario: Scenario, n: int) -> None:
     vehicle = scenario.vehicles[n]
     obstacle = add(root, "dynamicObstacle", id=FIRST_OBSTACLE_ID + n + 1)
     add(obstacle, "type", vehicle.kind.commonroad)
-    rectangle = add(obstacle, "shape/rectangle")
-    add(rectangle, "length", vehicle.length)
-    add(rectangle, "width", vehicle.width)
+    _rectangle(obstacle, vehicle)
     first, last = scenario.present[n].tolist()
     _state(obstacle, "initialState", scenario, n, first)
     trajectory = add(obstacle, "trajectory")

@@ -96,7 +96,9 @@ def derived_lanes(
         else "the road itself is a grid without lanes"
     )
     origin = f"derived: one lane along each path that the scenarios drive; {why}"
-    return LaneMap(LaneNetwork("derived", tuple(derived)), len(derived), origin)
+    obstacles = road.obstacles if road is not None else ()
+    network = LaneNetwork("derived", tuple(derived), obstacles=obstacles)
+    return LaneMap(network, len(derived), origin)
 
 
 def area_of(network: LaneNetwork) -> BaseGeometry:

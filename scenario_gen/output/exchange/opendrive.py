@@ -31,7 +31,7 @@ from scenario_gen.output.exchange.opendrive_network import (
     Strip,
 )
 from scenario_gen.output.exchange.xml import add, comment, date_of, Element, serialized
-from scenario_gen.types import CARS, DRIVERS, LaneNetwork
+from scenario_gen.types import CARS, DRIVERS, LaneNetwork, OBSTACLE_HEIGHT_M
 
 STRAIGHT_TOLERANCE_RAD = 1e-7  # heading change of a straight piece
 LINEAR_TOLERANCE_M = 1e-5  # deviation of a width or an offset from its linear piece
@@ -114,10 +114,8 @@ def _road(root: Element, lane_map: LaneMap, network: RoadNetwork, n: int) -> Non
     for geometry in _merged(strip.reference, pieces, station):
         _geometry(view, geometry)
     _lane_section(road, network, strip, station)
-    crossings = network.crossings[n]
-    if crossings:
-        objects = add(road, "objects")
-        _crosswalks(objects, lane_map.network, strip.reference, station, crossings)
+    if objects := [*_crosswalks(network, n, station), *_obstacles(network, n, station)]:
+        add(road, "objects").extend(objects)
     _signals(road, lane_map.network, strip, station, network.places)
 
 
@@ -183,39 +181,47 @@ def _lane_type(users: frozenset[str]) -> str:
     return "driving"
 
 
-def _crosswalks(
-    objects: Element,
-    network: LaneNetwork,
-    reference: Floats,
-    station: Floats,
-    crossings: Sequence[int],
-) -> None:
-    """Append the crossings of a road as objects, with an outline in the object's frame."""
-    for k in crossings:
-        lane = network.lanes[k]
-        n = int(np.argmin(np.hypot(*(reference[:, :2] - lane.outline.mean(axis=0)).T)))
-        ahead, left = ahead_and_left(lane.outline - reference[n, :2], float(reference[n, 2]))
+def _crosswalks(network: RoadNetwork, n: int, station: Floats) -> Iterator[Element]:
+    """Yield the crossings of a road as objects, with an outline in the object's frame."""
+    reference = network.strips[n].reference
+    for k in network.crossings[n]:
+        lane = network.network.lanes[k]
+        nearest = int(np.argmin(np.hypot(*(reference[:, :2] - lane.outline.mean(axis=0)).T)))
+        pose = reference[nearest]
+        ahead, left = ahead_and_left(lane.outline - pose[:2], float(pose[2]))
         t = float(left.mean())
-        walk = add(
-            objects,
-            "object",
-            id=k,
-            type="crosswalk",
-            name=lane.id,
-            s=float(station[n]),
-            t=t,
-            zOffset=0.0,
-            orientation="none",
-            hdg=0.0,
-            pitch=0.0,
-            roll=0.0,
-            length=float(np.ptp(ahead)),
-            width=float(np.ptp(left)),
-            height=0.0,
-        )
+        size = {"length": float(np.ptp(ahead)), "width": float(np.ptp(left)), "height": 0.0}
+        walk = _object(k, "crosswalk", lane.id, s=float(station[nearest]), t=t, hdg=0.0, **size)
         outline = add(walk, "outlines/outline", id=0, closed="true")
         for u, v in zip(ahead.tolist(), (left - t).tolist(), strict=True):
             add(outline, "cornerLocal", u=u, v=v, z=0.0, height=0.0)
+        yield walk
+
+
+def _obstacles(network: RoadNetwork, n: int, station: Floats) -> Iterator[Element]:
+    """Yield the obstacles that are nearest to a road as objects."""
+    curve = Curve(network.strips[n].reference)
+    for number in network.obstacles[n]:
+        obstacle = network.network.obstacles[number]
+        along, left = curve.project(np.array([obstacle[:2]]))
+        yield _object(
+            len(network.network.lanes) + number,
+            "obstacle",
+            "parked car" if obstacle.is_car else "obstacle",
+            s=float(np.interp(along[0], curve.station, station)),
+            t=float(left[0]),
+            hdg=angle_between(obstacle.yaw, float(curve.at(along)[0, 2])),
+            length=obstacle.length,
+            width=obstacle.width,
+            height=OBSTACLE_HEIGHT_M,
+        )
+
+
+def _object(number: int, kind: str, name: str, **attributes: float) -> Element:
+    """Return an object that stands on the ground."""
+    about = {"type": kind, "name": name, "orientation": "none"}
+    upright = {"zOffset": 0.0, "pitch": 0.0, "roll": 0.0}
+    return add(Element("objects"), "object", id=number, **about, **upright, **attributes)
 
 
 def _signals(

@@ -4,7 +4,7 @@
 """The roads and junctions of OpenDRIVE that a lane map becomes."""
 
 from collections import defaultdict
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
@@ -150,10 +150,12 @@ class RoadNetwork:
     """The roads of a lane map and the links between their lanes.
 
     Attributes:
+        network: the lanes.
         strips: the roads.
         places: the place of each lane.
         users: the users of each lane.
         crossings: the crossings of each road, as indices of lanes.
+        obstacles: indices of the obstacles of each road.
         connecting: the lanes that are connecting roads, with their junctions.
         numbers: the id of each named junction.
         road_links: attributes of the link at a road's "start" or "end".
@@ -164,6 +166,7 @@ class RoadNetwork:
     def __init__(self, lane_map: LaneMap) -> None:
         network = _with_crossings_alone(lane_map.network)
         strips = lane_map.strips
+        self.network = lane_map.network
         self.strips = [Strip.of(lane_map, *strip) for strip in strips]
         self.places = {
             k: Place(n, side, m, k in strips[n][0])
@@ -172,7 +175,10 @@ class RoadNetwork:
             for m, k in enumerate(lanes)
         }
         self.users = [lane.users for lane in network.lanes]
-        self.crossings = self._crossings_by_road(network)
+        crossings = {k: lane.outline for k, lane in enumerate(network.lanes) if lane.crossing}
+        self.crossings = self._by_road(crossings)
+        obstacles = {k: obstacle.outline for k, obstacle in enumerate(network.obstacles)}
+        self.obstacles = self._by_road(obstacles)
         self.connecting = connecting(network)
         self.road_links: dict[tuple[int, str], dict[str, str | float]] = {}
         self.lane_links: dict[tuple[int, bool], int] = {}
@@ -181,19 +187,17 @@ class RoadNetwork:
         self.numbers = {name: FIRST_JUNCTION_ID + n for n, name in enumerate(junctions)}
         self._link_lanes(network)
 
-    def _crossings_by_road(self, network: LaneNetwork) -> dict[int, list[int]]:
-        """Return the crossings nearest to each road."""
-        crossings: dict[int, list[int]] = defaultdict(list)
-        for k, lane in enumerate(network.lanes):
-            if not lane.crossing:
-                continue
-            centre = lane.outline.mean(axis=0)
+    def _by_road(self, outlines: Mapping[int, Floats]) -> dict[int, list[int]]:
+        """Return which outlines (M, 2) are nearest to each road."""
+        nearest: dict[int, list[int]] = defaultdict(list)
+        for k, outline in outlines.items():
+            centre = outline.mean(axis=0)
             distances = [
                 float(np.hypot(*(strip.reference[:, :2] - centre).T).min())
                 for strip in self.strips
             ]
-            crossings[int(np.argmin(distances))].append(k)
-        return crossings
+            nearest[int(np.argmin(distances))].append(k)
+        return nearest
 
     def _link_lanes(self, network: LaneNetwork) -> None:
         """Link each lane to its successors: by a connecting road, directly, or in a junction."""

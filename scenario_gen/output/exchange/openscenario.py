@@ -18,6 +18,8 @@ from scenario_gen.output.exchange.config import ExportConfig
 from scenario_gen.output.exchange.xml import add, date_of, Element, number, serialized
 from scenario_gen.types import (
     height,
+    Obstacle,
+    OBSTACLE_HEIGHT_M,
     rear_axle,
     Scenario,
     shifted,
@@ -69,6 +71,8 @@ def write_openscenario(
             _placed(actions, entity_name(vehicle), exported.others, n)
     if exported.ego is not None:
         _ego(actions, exported.ego)
+    for n, obstacle in enumerate(case.lane_map.network.obstacles, 1):
+        _standing(entities, actions, f"obstacle_{n}", obstacle)
     act = add(add(storyboard, "Story", name="story"), "Act", name="act")
     for n in range(len(exported.others.vehicles)):
         _follow(act, exported.others, n, export.following)
@@ -102,9 +106,7 @@ def _entity(entities: Element, name: str, vehicle: Vehicle, speeds: str) -> None
     else:
         element = add(entity, "Vehicle", name=vehicle.type, vehicleCategory=kind)
     add(element, "ParameterDeclarations")
-    box = add(element, "BoundingBox")
-    add(box, "Center", x=rear_axle(vehicle), y=0.0, z=height(vehicle) / 2.0)
-    add(box, "Dimensions", length=vehicle.length, width=vehicle.width, height=height(vehicle))
+    _box(element, rear_axle(vehicle), vehicle, height(vehicle))
     if not vehicle.kind.walks:
         add(element, "Performance", **LIMITS)
         axles = add(element, "Axles")
@@ -123,6 +125,25 @@ def _entity(entities: Element, name: str, vehicle: Vehicle, speeds: str) -> None
     properties = add(element, "Properties")
     if speeds:
         add(properties, "Property", name=OPENSCENARIO_SPEEDS, value=speeds)
+
+
+def _standing(entities: Element, actions: Element, name: str, obstacle: Obstacle) -> None:
+    """Append an obstacle and its place."""
+    entity = add(entities, "ScenarioObject", name=name)
+    misc = add(entity, "MiscObject", name=name, mass=1000.0, miscObjectCategory="obstacle")
+    add(misc, "ParameterDeclarations")
+    _box(misc, 0.0, obstacle, OBSTACLE_HEIGHT_M)
+    add(misc, "Properties")
+    private = add(actions, "Private", entityRef=name)
+    position = "PrivateAction/TeleportAction/Position/WorldPosition"
+    add(private, position, x=obstacle.x, y=obstacle.y, h=obstacle.yaw)
+
+
+def _box(parent: Element, ahead: float, sized: Vehicle | Obstacle, height_m: float) -> None:
+    """Append a bounding box whose centre is so far ahead of the reference point [m]."""
+    box = add(parent, "BoundingBox")
+    add(box, "Center", x=ahead, y=0.0, z=height_m / 2.0)
+    add(box, "Dimensions", length=sized.length, width=sized.width, height=height_m)
 
 
 def _pose(parent: Element, scenario: Scenario, n: int, k: int) -> None:

@@ -10,9 +10,10 @@ height above the ground, in the frame of the scenarios. Accelerations are vector
 lateral part. Times start at 0. A vehicle is in the messages while it is present.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cache
+from itertools import count
 import math
 from pathlib import Path
 from typing import Any
@@ -24,7 +25,14 @@ from scenario_gen.base.xml_reader import read_xml
 from scenario_gen.numerics import Floats, NS_PER_S, wrap_angle
 from scenario_gen.output.exchange.cases import Case, Exported, scenario_source
 from scenario_gen.output.exchange.xml import date_of
-from scenario_gen.types import height, rear_axle, Scenario, Vehicle, WHEELBASE_SHARE
+from scenario_gen.types import (
+    height,
+    OBSTACLE_HEIGHT_M,
+    rear_axle,
+    Scenario,
+    Vehicle,
+    WHEELBASE_SHARE,
+)
 
 OBJECTS, MAP = "ground_truth", "ground_truth_map"  # omega-prime's topics
 WHEEL_RADIUS_M = 0.325  # as in OpenSCENARIO files
@@ -74,6 +82,7 @@ def write_osi(path: Path, case: Case, exported: Exported, road: Path) -> tuple[s
     moving = _Moving(motion, numbers, _yaw_rates(motion))
     host = numbers[-1] if exported.ego is not None else numbers[0]
     text, frame = _text(road), _frame(road)
+    standing = list(_standing(case, numbers))
     metadata = {
         "creation_time": f"{date_of(case.start_ns)}Z",
         "description": f"{case.road_name}, {scenario_source(case, exported)}",
@@ -86,7 +95,7 @@ def write_osi(path: Path, case: Case, exported: Exported, road: Path) -> tuple[s
         trace.add(drawn, topic=MAP, log_time=0)
         for k, stamp in enumerate(np.round(motion.time * NS_PER_S).astype(np.int64).tolist()):
             trace.add(
-                _ground_truth(moving, k, stamp, host, road.name, frame),
+                _ground_truth(moving, standing, k, stamp, host, road.name, frame),
                 topic=OBJECTS,
                 log_time=stamp,
             )
@@ -125,7 +134,13 @@ def _yaw_rates(motion: Scenario) -> Floats:
 
 
 def _ground_truth(
-    moving: _Moving, k: int, stamp: int, host: int, road_file: str, frame: Frame
+    moving: _Moving,
+    standing: list[Any],
+    k: int,
+    stamp: int,
+    host: int,
+    road_file: str,
+    frame: Frame,
 ) -> Any:
     """Return the message of instant `k`; it names the host while that is present."""
     import betterosi as osi
@@ -144,6 +159,7 @@ def _ground_truth(
         timestamp=osi.Timestamp(seconds=stamp // NS_PER_S, nanos=stamp % NS_PER_S),
         host_vehicle_id=osi.Identifier(value=host) if has_host else None,
         moving_object=objects,
+        stationary_object=standing,
         map_reference=road_file,
         proj_string=frame.projection or None,
         proj_frame_offset=offset,
@@ -190,6 +206,26 @@ def _objects(moving: _Moving, k: int) -> Iterator[Any]:
                 type=classes.Type[vehicle.kind.osi], role=classes.Role.CIVIL
             ),
             vehicle_attributes=_attributes(vehicle),
+        )
+
+
+def _standing(case: Case, numbers: Sequence[int]) -> Iterator[Any]:
+    """Yield the obstacles of the road, with numbers that no vehicle has."""
+    import betterosi as osi
+
+    classes = osi.StationaryObject.Classification
+    free = (number for number in count(1) if number not in numbers)
+    for obstacle, number in zip(case.lane_map.network.obstacles, free, strict=False):
+        yield osi.StationaryObject(
+            id=osi.Identifier(value=number),
+            base=osi.BaseStationary(
+                dimension=osi.Dimension3d(
+                    length=obstacle.length, width=obstacle.width, height=OBSTACLE_HEIGHT_M
+                ),
+                position=osi.Vector3d(x=obstacle.x, y=obstacle.y, z=OBSTACLE_HEIGHT_M / 2.0),
+                orientation=osi.Orientation3d(roll=0.0, pitch=0.0, yaw=_wrapped(obstacle.yaw)),
+            ),
+            classification=classes(type=classes.Type.OTHER),
         )
 
 

@@ -23,7 +23,14 @@ from scenario_gen.numerics.plane import edge_lengths, unit
 from scenario_gen.output.exchange.cases import Case, evenly_sampled, Exported
 from scenario_gen.output.exchange.config import ExportConfig
 from scenario_gen.output.exchange.lanes import LaneMap
-from scenario_gen.types import DRIVERS, height, Scenario, Vehicle
+from scenario_gen.types import (
+    DRIVERS,
+    height,
+    Obstacle,
+    OBSTACLE_HEIGHT_M,
+    Scenario,
+    Vehicle,
+)
 
 VERSION = "MetaDrive v0.4.3"  # of the description, not of the simulator
 DATASET = "scenario_gen"
@@ -48,6 +55,8 @@ def description(case: Case, exported: Exported, export: ExportConfig) -> dict[st
     """
     motion = evenly_sampled(exported.everybody, export.step)
     tracks = {vehicle.id: _track(motion, n, vehicle) for n, vehicle in enumerate(motion.vehicles)}
+    for k, obstacle in enumerate(case.lane_map.network.obstacles, 1):
+        tracks[f"obstacle_{k}"] = _standing(obstacle, f"obstacle_{k}", len(motion.time))
     summaries = {name: _summary(name, track) for name, track in tracks.items()}
     ego = exported.ego.vehicles[0] if exported.ego is not None else motion.vehicles[0]
     name = f"case_{case.number}_{exported.index}"
@@ -99,8 +108,31 @@ def _track(motion: Scenario, n: int, vehicle: Vehicle) -> dict[str, Any]:
         "height": masked(np.full(steps, height(vehicle))),
         "valid": present.copy(),
     }
-    kind = vehicle.kind.scenarionet
-    metadata = {"type": kind, "object_id": vehicle.id, "track_length": steps, "dataset": DATASET}
+    return _as_track(vehicle.kind.scenarionet, vehicle.id, state)
+
+
+def _standing(obstacle: Obstacle, name: str, steps: int) -> dict[str, Any]:
+    """Return the states of an obstacle."""
+    values = {
+        "position": (obstacle.x, obstacle.y, 0.0),
+        "heading": obstacle.yaw,
+        "velocity": (0.0, 0.0),
+        "length": obstacle.length,
+        "width": obstacle.width,
+        "height": OBSTACLE_HEIGHT_M,
+    }
+    state = {key: np.array([value] * steps, dtype=np.float32) for key, value in values.items()}
+    state["valid"] = np.ones(steps, dtype=np.bool_)
+    return _as_track("VEHICLE" if obstacle.is_car else "TRAFFIC_BARRIER", name, state)
+
+
+def _as_track(kind: str, name: str, state: dict[str, Any]) -> dict[str, Any]:
+    metadata = {
+        "type": kind,
+        "object_id": name,
+        "track_length": len(state["valid"]),
+        "dataset": DATASET,
+    }
     return {"type": kind, "state": state, "metadata": metadata}
 
 

@@ -33,6 +33,7 @@ from scenario_gen.types import (
     LANE_USERS,
     Note,
     NoteKind,
+    Obstacle,
     RuleKind,
     SignalSchedule,
 )
@@ -183,8 +184,8 @@ class _Map:
         limits = [self.speed_limits[sign] for sign in signs if sign in self.speed_limits]
         return min(limits, default=math.nan)
 
-    def obstacles(self) -> Iterator[tuple[float, ...]]:
-        """Yield the static obstacles, as in `LaneNetwork`."""
+    def obstacles(self) -> Iterator[Obstacle]:
+        """Yield the static obstacles."""
         roles = ((each, each.find("role")) for each in self.root.findall("obstacle"))
         static = [each for each, role in roles if role is not None and role.content == "static"]
         for obstacle in (*self.root.findall("staticObstacle"), *static):
@@ -196,7 +197,7 @@ class _Map:
                 sides = ("shape/rectangle/length", "shape/rectangle/width")
                 size = size or [obstacle.child(side).value() for side in sides]
                 yaw = state.child("orientation/exact").value()
-                yield point.child("x").value(), point.child("y").value(), yaw, *size
+                yield Obstacle(point.child("x").value(), point.child("y").value(), yaw, *size)
 
     @cached_property
     def rule_kinds(self) -> dict[tuple[str, str], RuleKind]:

@@ -13,7 +13,7 @@ from scenario_gen.base.errors import InputError
 from scenario_gen.base.xml_reader import Element
 from scenario_gen.numerics import Floats
 from scenario_gen.roads.vector.signs import DraftRule
-from scenario_gen.types import Note, NoteKind
+from scenario_gen.types import Note, NoteKind, Obstacle
 
 SECTION_LENGTH_M = 1.0
 """The largest distance between two cross-sections of a lane."""
@@ -154,7 +154,7 @@ class MapLanes:
     rules: Sequence[DraftRule]
     other_signs: int
     origin: tuple[float, ...] = ()
-    obstacles: tuple[tuple[float, ...], ...] = ()
+    obstacles: tuple[Obstacle, ...] = ()
 
 
 def by_id(elements: Iterable[Element], faults: Faults) -> dict[str, Element]:

@@ -11,7 +11,7 @@ from scipy.spatial.distance import cdist
 from scenario_gen.base.errors import RefusedError
 from scenario_gen.numerics import Bools, Floats, wrap_angle
 from scenario_gen.roads.clearance import footprint_fits
-from scenario_gen.types import Lane, Road, Vehicle
+from scenario_gen.types import Lane, LaneNetwork, Road, Vehicle
 from scenario_gen.types.road import DIRECTION_COUNT
 
 _MAX_TURN_FROM_LANE_RAD = np.radians(60.0)
@@ -50,20 +50,21 @@ def ground_for(road: Road, vehicle: Vehicle) -> Road:
     return road.grounds[user]
 
 
-def own_side(road: Road, path: Floats, vehicle: Vehicle) -> Road:
+def own_side(road: Road, path: Floats, vehicle: Vehicle, network: LaneNetwork | None) -> Road:
     """Return the side of a road that a vehicle uses.
 
     These are the lanes along which its path lies, those of the same direction next to them, and a
     kerb.
 
     Args:
-        road: with or without lanes.
+        road: the road.
         path: (M, 3) x, y [m], yaw [rad].
         vehicle: if its footprint has no room at the path's ends, it gets the whole road.
+        network: its lanes; None: the whole road.
     """
-    if road.map_lanes is None or not len(path):
+    if network is None or not len(path):
         return road
-    lanes = road.map_lanes.lanes
+    lanes = network.lanes
     driven = {k for k, lane in enumerate(lanes) if on_lane(lane, path, every=2)}
     driven |= {neighbour for k in driven for neighbour in lanes[k].neighbours}
     cells = road.cells_in(lanes[k] for k in sorted(driven))

@@ -16,7 +16,7 @@ from scenario_gen.base.stores import require_local
 from scenario_gen.base.xml_reader import Element, read_xml, to_number
 from scenario_gen.numerics import Floats, frozen
 from scenario_gen.roads.config import RoadConfig
-from scenario_gen.roads.obstacles import Obstacle, with_obstacles_on
+from scenario_gen.roads.obstacles import with_obstacles
 from scenario_gen.roads.vector import commonroad, lanelet2, opendrive
 from scenario_gen.roads.vector.drafts import MapLanes
 from scenario_gen.roads.vector.network import extent, network_of, part_of
@@ -159,8 +159,8 @@ def vector_road(name: str, tracks: tuple[Track, ...] | None, config: RoadConfig)
         raise InputError(f"map {path.name}: part {shown(part, 40)!r}; choose one of {kinds}")
     road = _road_of_lanes(path, part, tracks, config)
     assert road.lanes is not None
-    obstacles = tuple(Obstacle(*values) for values in road.lanes.obstacles)
-    return with_obstacles_on(road, obstacles, road.cells_in(road.lanes.others))
+    others = road.cells_in(road.lanes.others)
+    return with_obstacles(road, road.lanes.obstacles, others, elsewhere=True)
 
 
 def _road_of_lanes(

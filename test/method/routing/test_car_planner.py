@@ -28,6 +28,7 @@ from scenario_gen.method.routing.search.planner import (
 )
 from scenario_gen.method.routing.search.sweep import sweep_is_free
 from scenario_gen.numerics import wrap_angle
+from scenario_gen.roads import build_road, RoadConfig
 from scenario_gen.roads.obstacles import read_obstacles, with_obstacles
 from scenario_gen.types import Vehicle
 from scenario_gen.types.fit import Fit, FittedVehicle
@@ -196,6 +197,19 @@ def test_routes_pass_obstacles_on_their_own_side():
         )
         offset = route.points[:, 1] - 6.5
         assert sign * offset[np.argmax(np.abs(offset))] > 1.0
+
+
+def test_the_oncoming_lane_is_used_only_if_it_may_be():
+    road = build_road("straight", config=RoadConfig(arm_length=60.0))
+    lane = next(lane for lane in road.lanes.lanes if lane.inward)
+    x, y = lane.centre[len(lane.centre) // 2]
+    blocked = with_obstacles(road, read_obstacles(f"{x} {y} 0 4.5 2.6"))
+    poses = np.column_stack((lane.centre, lane.yaw[[0, *range(len(lane.yaw))]]))
+    poses = poses[5:-5]
+    ends = poses[[0, -1]]
+    assert route_on(blocked, *ends, path=poses).farthest > 2.0
+    with pytest.raises(RefusedError, match=r"planning\.oncoming=around_obstacles"):
+        route_on(blocked, *ends, path=poses, config=PlanningConfig(oncoming="never"))
 
 
 def test_a_slalom_is_driven():

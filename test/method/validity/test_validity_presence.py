@@ -19,7 +19,7 @@ from scenario_gen.base.road_users import Dynamics
 from scenario_gen.method.validity import Checker, collision
 from scenario_gen.situation import Wait
 from scenario_gen.types import Vehicle
-from scenario_gen.types.lanes import Lane, LaneNetwork
+from scenario_gen.types.lanes import Lane, LaneNetwork, Obstacle
 from scenario_gen.types.scenario import BoundaryStates, Cause, Scenario
 
 TIME = np.arange(101) * 0.1
@@ -220,3 +220,5 @@ def test_who_drives_against_its_lane_does_so_while_it_is_there():
     found, verdict = causes(scenario, road=road)
     assert found == [Cause.WRONG_WAY]
     assert verdict.violations[0].time == 2.0 and "41 samples" in verdict.violations[0].message
+    passed = replace(road, obstacles=(Obstacle(0.0, 4.0, 0.0, 4.5, 1.8),))
+    assert causes(scenario, road=passed)[0] == []

@@ -5,7 +5,7 @@ const VEHICLE_COLOURS = ["#2563eb", "#e2590c", "#0d9488", "#9333ea", "#c2185b", 
 const PRIMITIVE_COLOURS = ["#4e79a7", "#f28e2b", "#59a14f", "#e15759", "#b07aa1", "#edc948", "#76b7b2", "#ff9da7", "#9c755f", "#79706e"];
 /** What is painted on a road: width, dash and gap in metres; 0 is filled. */
 const PAINT = {
-  edge: [0.15], lane: [0.12, 3, 4.5], centre: [0.15, 3, 1.5], stop: [0.5], give_way: [0.4, 0.6, 0.4], arrow: [0], zebra: [0.5],
+  edge: [0.15], lane: [0.12, 3, 4.5], centre: [0.15, 3, 1.5], stop: [0.5], give_way: [0.4, 0.6, 0.4], arrow: [0], zebra: [0.5], obstacle: [0],
 };
 const vehicleColour = (n) => VEHICLE_COLOURS[n % VEHICLE_COLOURS.length];
 const isEgo = (data, n) => data.left_out.includes(n);
