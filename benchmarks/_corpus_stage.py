@@ -19,7 +19,7 @@ from scenario_gen.corpus.grouping import group_partition
 from scenario_gen.corpus.inventory import inventory
 from scenario_gen.corpus.meetings import search_hours
 from scenario_gen.corpus.messages import parse_range, ranges
-from scenario_gen.corpus.schedule import clean_tasks, group_tasks, hour_tasks
+from scenario_gen.corpus.schedule import accounts_of, clean_tasks, group_tasks, hour_tasks
 
 STAGES = ("parse", "search", "group", "clean")
 
@@ -32,7 +32,8 @@ def work(name: str, archive: Path, out: Path) -> Iterator[Callable[[], object]]:
     if name == "parse":
         yield from (partial(parse_range, task) for task in ranged)
     elif name == "search":
-        yield from (partial(search_hours, task) for task in hour_tasks(ranged, out, config))
+        tasks = hour_tasks(accounts_of(ranged, out), out, config)
+        yield from (partial(search_hours, task) for task in tasks)
     elif name == "group":
         yield from (partial(group_partition, task) for task in group_tasks(out, config))
     else:

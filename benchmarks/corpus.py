@@ -26,7 +26,7 @@ from benchmarks.row import higher, lower, Row
 from scenario_gen.base.folders import sha256_of
 from scenario_gen.corpus.mine import mine
 from scenario_gen.corpus.tables import rows_of
-from scenario_gen.logs.tables import SPMD_COLUMNS
+from scenario_gen.logs.text import SPMD_COLUMNS
 
 ROWS_COUNT = sized(10_000_000, quick=40_000)
 ARCHIVES = {

@@ -11,7 +11,7 @@ manifest, which is created only if there is none yet; a second writer has to agr
 other objects follow from the manifest, so that two writers write the same bytes.
 """
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from dataclasses import dataclass, field
@@ -45,10 +45,12 @@ class Remote:
     Attributes:
         url: without a trailing slash.
         size: bytes of the object; -1 if it is unknown.
+        version: of its content, as the store names it; "" if it is unknown.
     """
 
     url: str
     size: int = field(default=-1, compare=False)
+    version: str = field(default="", compare=False)
 
     def __str__(self) -> str:
         return self.url
@@ -137,7 +139,13 @@ class Remote:
             return self
         if info.get("size") is None:
             raise InputError(f"{self}: the server does not report its size; download it first")
-        return Remote(self.url, int(info["size"]))
+        return self._described(info)
+
+    def _described(self, info: Mapping[str, Any]) -> "Remote":
+        """Return the object with the size and the version that the store reports."""
+        size = info.get("size")
+        versions = [info[name] for name in ("ETag", "etag", "LastModified") if info.get(name)]
+        return Remote(self.url, -1 if size is None else int(size), str((*versions, "")[0]))
 
     def rglob(self, pattern: str) -> Iterator["Remote"]:
         """Yield the objects at any depth whose names match, sorted; none if there is no folder."""
@@ -150,8 +158,7 @@ class Remote:
             is_folder = info.get("type") == "directory" or path.endswith("/")
             if is_folder or not relative or not fnmatch(PurePosixPath(path).name, pattern):
                 continue
-            size = info.get("size")
-            yield Remote(f"{self}/{relative}", -1 if size is None else int(size)).with_size()
+            yield Remote(f"{self}/{relative}")._described(info).with_size()
 
     def glob(self, pattern: str) -> Iterator["Remote"]:
         """Yield the objects directly in this folder whose names match, sorted."""
@@ -230,6 +237,30 @@ def workplace(folder: Place) -> Path:
 def size_of(path: Place) -> int:
     """Return the size of a file or an object in bytes."""
     return path.with_size().size if isinstance(path, Remote) else path.stat().st_size
+
+
+def identity_of(path: Place) -> tuple[str, int, str]:
+    """Return what tells whether a file or an object has changed: name, size, time or version."""
+    if isinstance(path, Remote):
+        remote = path.with_size()
+        return remote.url, remote.size, remote.version
+    status = path.stat()
+    return str(path.resolve()), status.st_size, str(status.st_mtime_ns)
+
+
+def remove(places: Sequence[Place]) -> None:
+    """Remove files, or objects of one store.
+
+    Raises:
+        InputError: the store refuses it or keeps failing.
+    """
+    for path in places:
+        if isinstance(path, Path):
+            path.unlink(missing_ok=True)
+    objects = [entry for entry in places if isinstance(entry, Remote)]
+    if objects:
+        paths = [entry.file_system()[1] for entry in objects]
+        objects[0].call(lambda system, _: system.rm(paths))
 
 
 def download(parts: Iterable[Part]) -> None:

@@ -73,13 +73,17 @@ def mine(
     ],
     out: Annotated[
         Path,
-        typer.Option(help="Folder for the corpus, or s3://…; an unfinished one is continued."),
+        typer.Option(help="Folder for the corpus, or s3://…; only what has changed is done again."),
     ],
     workers: WorkersOption = 0,
     scheduler: SchedulerOption = "",
     allow: Annotated[
         str, typer.Option(help="doubt: read logs although the result contradicts their data.")
     ] = "",
+    strict: Annotated[
+        bool,
+        typer.Option("--strict", help="Stop at a file that cannot be read, or a failed task."),
+    ] = False,
     assignments: Annotated[
         list[str] | None,
         typer.Option(
@@ -96,7 +100,8 @@ def mine(
     config = assigned_all(CorpusConfig(), [*allowed, *(assignments or [])])
     corpus = place(out, to_write=True)
     with workers_of(workers, scheduler) as who:
-        result = mined([place(path) for path in archive], corpus, config, workers=who)
+        places = [place(path) for path in archive]
+        result = mined(places, corpus, config, workers=who, strict=strict)
     files = {"page": corpus / PAGE, "details": corpus / DETAILS}
     conclude(result.lines(), result.failed, corpus, **files)
 

@@ -18,12 +18,12 @@ import numpy as np
 
 from scenario_gen.bags.recordings.tracks import tracks_bytes, tracks_of
 from scenario_gen.base.documents import parse_json, shown
-from scenario_gen.base.errors import guarded, InputError
+from scenario_gen.base.errors import guarded, InputError, UnforeseenError
 from scenario_gen.base.stores import fetched, Place
 from scenario_gen.corpus.config import CorpusConfig
-from scenario_gen.corpus.grouping import FoundEncounter, label, part_of, read_found
+from scenario_gen.corpus.grouping import FoundEncounter, label, read_found
 from scenario_gen.corpus.meetings import MESSAGES_AFTER_US, MESSAGES_BEFORE_US
-from scenario_gen.corpus.messages import UNITS_PER_DEGREE
+from scenario_gen.corpus.messages import digest_of, UNITS_PER_DEGREE
 from scenario_gen.corpus.tables import write_table
 from scenario_gen.logs import (
     encounters_of,
@@ -54,6 +54,7 @@ COLUMNS = {  # of a table
     **dict.fromkeys(("seconds", "gap", "distance", "lat", "lon", "ttc", "pet", "speed"), "double"),
     "tracks": "binary",
 }
+UNREAD_LOGS = ("not in a known format", "cannot be read")  # causes
 MEETING_MARGIN_US = 2_000_000  # smooth vehicles meet a little earlier or later than raw ones
 
 
@@ -61,29 +62,33 @@ MEETING_MARGIN_US = 2_000_000  # smooth vehicles meet a little earlier or later 
 class CleanTask:
     """Encounters to clean.
 
-    A corpus has thousands of these tasks, and each passes through the scheduler: it has numbers
+    A corpus has thousands of these tasks, and each passes through the scheduler: it has keys
     instead of tables and paths.
 
     Attributes:
         name: of the task.
         corpus: of the encounters.
-        number: of the table to write.
-        row_ranges: (partition, first row, row after the last) of the encounters.
-        hours: of their messages.
+        part: name of the partition.
+        first: first row of the encounters there.
+        last: row after the last one.
+        hours: keys of the hours with their messages.
         config: the parameters.
     """
 
     name: str
     corpus: Place
-    number: int
-    row_ranges: tuple[tuple[int, int, int], ...]
-    hours: tuple[int, ...]
+    part: str
+    first: int
+    last: int
+    hours: tuple[str, ...]
     config: CorpusConfig
 
     @property
     def target(self) -> Place:
         """The table to write."""
-        return self.corpus / "encounters" / f"found-{self.number:06}.parquet"
+        begin = self.part.split("-")[1]
+        digest = digest_of(self.part, self.first, self.last, self.hours)
+        return self.corpus / "encounters" / f"found-{begin}-{self.first:06}-{digest}.parquet"
 
 
 @dataclass(frozen=True)
@@ -100,17 +105,14 @@ def clean_found(task: CleanTask) -> None:
     """Write a row for each encounter that survives cleaning, and why others do not."""
     from pyarrow import parquet
 
-    parts = [part_of(task.corpus, number) for number, _, _ in task.row_ranges]
-    hours = [task.corpus / "hours" / f"hour-{hour}.rows.parquet" for hour in task.hours]
-    with fetched([*parts, *hours]) as paths:
-        listed: list[FoundEncounter] = []
-        for path, (_, first, last) in zip(paths, task.row_ranges, strict=False):
-            listed += read_found(path, first, last)
+    hours = [task.corpus / "hours" / f"rows-{key}.parquet" for key in task.hours]
+    with fetched([task.corpus / "found" / f"{task.part}.parquet", *hours]) as (part, *paths):
+        listed = read_found(part, task.first, task.last)
         begin = min(entry.start for entry in listed) - MESSAGES_BEFORE_US
         end = max(entry.end for entry in listed) + MESSAGES_AFTER_US
         devices = sorted({device for entry in listed for device in entry.devices})
         filters = [("t", ">=", begin), ("t", "<=", end), ("device", "in", devices)]
-        tables = [parquet.read_table(path, filters=filters) for path in paths[len(parts) :]]
+        tables = [parquet.read_table(path, filters=filters) for path in paths]
         by_device = _by_device([table.to_pandas() for table in tables])
     rows: list[dict[str, Any]] = []
     refused = []
@@ -119,7 +121,7 @@ def clean_found(task: CleanTask) -> None:
             log = _raw_log(entry, by_device)
             encounters = encounters_of(log, task.config.log, _met_ns(entry)).encounters
         except InputError as error:
-            refused.append(_refusal(entry.name, error))
+            refused.append(_refusal(entry.name, error, "not usable"))
             continue
         rows += [row_of(encounter, "messages", task.config) for encounter in encounters]
     write_encounters(task.target, rows, {"refused": refused, "quality": []})
@@ -170,28 +172,31 @@ def read_one_log(task: LogTask) -> None:
     """Write the encounters of a log; it has the bounds of every log (`LogConfig`).
 
     Raises:
-        InputError: the log cannot be used; the message names file and row.
+        InputError: the files cannot be fetched, or a reader has a bug.
     """
-    try:
-        with fetched(task.paths) as paths:
+    with fetched(task.paths) as paths:
+        try:
             result = read_log(paths, task.config.log)
-    except (NoEncounterError, UnknownFormatError, DoubtError) as error:  # the log is finished
-        account = {"refused": [_refusal(task.name, error)], "quality": []}
-        write_encounters(task.target, [], account)
-        return
+        except InputError as error:
+            if isinstance(error, UnforeseenError) or isinstance(error.__cause__, PermissionError):
+                raise
+            # The log is finished until its files change.
+            account = {"refused": [_refusal(task.name, error, UNREAD_LOGS[1])], "quality": []}
+            write_encounters(task.target, [], account)
+            return
     source = ", ".join(path.name for path in task.paths)
     rows = [row_of(encounter, source, task.config) for encounter in result.encounters]
     write_encounters(task.target, rows, {"refused": [], "quality": list(result.quality.lines())})
 
 
-def _refusal(name: str, error: InputError) -> dict[str, str]:
+def _refusal(name: str, error: InputError, otherwise: str) -> dict[str, str]:
     """Return the name of what is left out, the group of the cause, and the reason."""
     causes: dict[type[InputError], str] = {
         NoEncounterError: "no encounter",
-        UnknownFormatError: "not in a known format",
+        UnknownFormatError: UNREAD_LOGS[0],
         DoubtError: "in doubt",
     }
-    return {"name": name, "cause": causes.get(type(error), "not usable"), "why": str(error)}
+    return {"name": name, "cause": causes.get(type(error), otherwise), "why": str(error)}
 
 
 def row_of(encounter: Encounter, source: str, config: CorpusConfig) -> dict[str, Any]:

@@ -16,6 +16,7 @@ import numpy as np
 
 from scenario_gen.base.stores import fetched, Place
 from scenario_gen.corpus.config import CorpusConfig
+from scenario_gen.corpus.messages import DAY_US, digest_of
 from scenario_gen.corpus.tables import write_table
 from scenario_gen.logs import Growth, LogConfig
 from scenario_gen.logs import Meeting as LogMeeting
@@ -70,13 +71,12 @@ class FoundEncounter:
 class GroupTask:
     """A partition: the meetings from `begin` to before `end` [µs since 2004].
 
-    The meetings are in the tables of `hours`.
+    The meetings are in the tables of the hours with the keys `hours`.
     """
 
     name: str
     corpus: Place
-    number: int
-    hours: tuple[int, ...]
+    hours: tuple[str, ...]
     begin: int
     end: int
     config: CorpusConfig
@@ -84,18 +84,14 @@ class GroupTask:
     @property
     def target(self) -> Place:
         """The table of encounters to write."""
-        return part_of(self.corpus, self.number)
-
-
-def part_of(corpus: Place, number: int) -> Place:
-    """Return the table of a partition's encounters."""
-    return corpus / "found" / f"part-{number:06}.parquet"
+        digest = digest_of(self.hours, self.begin, self.end)
+        return self.corpus / "found" / f"part-{self.begin:016}-{digest}.parquet"
 
 
 def partitions(start: Ints, end: Ints, least: int = 0) -> list[tuple[int, int]]:
     """Return spans of time (begin, end) [µs since 2004] such that each meeting is in one span.
 
-    The end is excluded.
+    The end is excluded. Spans begin anew each day, so that further days leave them unchanged.
 
     Args:
         start: (M,) of the meetings, in any order.
@@ -108,8 +104,10 @@ def partitions(start: Ints, end: Ints, least: int = 0) -> list[tuple[int, int]]:
     start, until = start[order], np.maximum.accumulate(end[order])
     cuts = np.flatnonzero(start[1:] >= until[:-1]) + 1
     first = [0]
-    while (k := int(np.searchsorted(cuts, first[-1] + (least or PARTITION_ROWS)))) < len(cuts):
-        first.append(int(cuts[k]))
+    for cut in cuts.tolist():
+        is_new_day = start[cut] // DAY_US > start[first[-1]] // DAY_US
+        if is_new_day or cut - first[-1] >= (least or PARTITION_ROWS):
+            first.append(cut)
     begins = start[first].tolist()
     return list(zip(begins, [*begins[1:], int(until[-1]) + 1], strict=True))
 

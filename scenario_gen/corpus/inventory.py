@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The contents of archives: files of messages (SPMD), other logs, and files in no known format."""
+"""The contents of archives: tables of messages, other logs, and files in no known format."""
 
 from collections.abc import Callable, Iterable, Sequence
 import os
@@ -19,9 +19,11 @@ from scenario_gen.base.stores import (
     Remote,
     temp_folder,
 )
-from scenario_gen.logs import is_bag, is_log, is_spmd, is_table, LOG_FORMATS
+from scenario_gen.corpus.sources import is_parquet, message_table, MessageTable
+from scenario_gen.logs import is_bag, is_log, is_table, LOG_FORMATS
 
 HEAD_BYTES = 16_384  # of an object, by which its format is recognised
+END_BYTES = 1 << 18  # of a Parquet table, with its columns
 
 AnyPlace = TypeVar("AnyPlace", bound=Place)
 
@@ -30,18 +32,18 @@ class Inventory(NamedTuple, Generic[AnyPlace]):
     """What archives contain.
 
     Attributes:
-        messages: the SPMD files.
+        messages: the tables of messages, and how each is read.
         logs: the other logs, each with its files.
         others: the files that are neither.
     """
 
-    messages: list[AnyPlace]
+    messages: list[tuple[AnyPlace, MessageTable]]
     logs: list[list[AnyPlace]]
     others: list[AnyPlace]
 
 
-def inventory(archives: Sequence[Place]) -> Inventory[Place]:
-    """Return the contents of archives.
+def inventory(archives: Sequence[Place], option: str = "") -> Inventory[Place]:
+    """Return the contents of archives; `option` is the parameter `columns` of logs.
 
     Raises:
         InputError: a path does not exist, or contains no log.
@@ -50,9 +52,9 @@ def inventory(archives: Sequence[Place]) -> Inventory[Place]:
     for archive in archives:
         contents: Inventory[Place]
         if isinstance(archive, Remote):
-            contents = _inventory_of_store(archive)
+            contents = _inventory_of_store(archive, option)
         else:
-            files = _inventory_of_folder(archive)
+            files = _inventory_of_folder(archive, option)
             contents = Inventory(
                 [*files.messages], [[*log] for log in files.logs], [*files.others]
             )
@@ -62,8 +64,8 @@ def inventory(archives: Sequence[Place]) -> Inventory[Place]:
     return total
 
 
-def _inventory_of_store(archive: Remote) -> Inventory[Place]:
-    """Return the contents of a store, from copies of the beginnings of its objects."""
+def _inventory_of_store(archive: Remote, option: str) -> Inventory[Place]:
+    """Return the contents of a store, from copies of the beginnings or ends of its objects."""
     single = archive.with_size()
     objects = [single] if single.size >= 0 else list(archive.rglob("*"))
     if not objects:
@@ -74,20 +76,23 @@ def _inventory_of_store(archive: Remote) -> Inventory[Place]:
             root if item is single else root / relative_name(item, archive): item
             for item in objects
         }
-        parts = [
-            Part(item, 0, min(item.size, HEAD_BYTES), path)
-            for path, item in zip(places, objects, strict=True)
-        ]
-        download(parts)
+        download(_sample(item, path) for path, item in zip(places, objects, strict=True))
         for path in list(places):
             places |= _folder_places(path, root, archive)
         with naming_objects({str(root): archive.url}):
-            files = _inventory_of_folder(root)
+            files = _inventory_of_folder(root, option)
         return Inventory(
-            [places[path] for path in files.messages],
+            [(places[path], table) for path, table in files.messages],
             [[places[path] for path in log] for log in files.logs],
             [places[path] for path in files.others],
         )
+
+
+def _sample(item: Remote, copy: Path) -> Part:
+    """Return the bytes of an object that show its format: at the end of Parquet."""
+    if is_parquet(copy):
+        return Part(item, max(item.size - END_BYTES, 0), item.size, copy)
+    return Part(item, 0, min(item.size, HEAD_BYTES), copy)
 
 
 def _folder_places(path: Path, root: Path, archive: Remote) -> dict[Path, Place]:
@@ -101,22 +106,41 @@ def _folder_places(path: Path, root: Path, archive: Remote) -> dict[Path, Place]
     return places
 
 
-def _inventory_of_folder(archive: Path) -> Inventory[Path]:
+def _inventory_of_folder(archive: Path, option: str) -> Inventory[Path]:
     """Return the contents of a folder, or what a file is."""
     if not archive.exists():
         raise InputError(f"{archive} does not exist")
-    if archive.is_file() or (is_bag(archive) and not _has_other_logs(archive)):
-        return _inventory_of_file(archive)
-    messages, rest = _split(_visible_files(archive), is_spmd)
-    bags, rest = _split_bags(rest)
-    files, others = _split(rest, is_log)
+    if archive.is_dir() and is_bag(archive) and not _has_other_logs(archive):
+        return Inventory([], [[archive]], [])
+    paths = [archive] if archive.is_file() else _visible_files(archive)
+    tables = {path: message_table(path, option) for path in paths}
+    messages = [(path, table) for path, table in tables.items() if table]
+    bags, rest = _split_bags([path for path in paths if not tables[path]])
+    files, others = _split(rest, _may_be_log)
     logs = [[path] for path in (*files, *bags)]
-    if not messages and not bags and _is_one_log(files, archive):
+    if len(files) + len(others) == len(paths) and _is_one_log(files, archive):
         logs = [files]
-    if not messages and not logs:
+    _check_logs([*messages, *logs], archive)
+    return Inventory(messages, logs, others)
+
+
+def _check_logs(logs: Sequence[object], archive: Path) -> None:
+    """Check that there is a log.
+
+    Raises:
+        InputError: there is none.
+    """
+    if not logs:
         names = ", ".join(LOG_FORMATS.names())
         raise InputError(f"{archive} has no log in a known format ({names})")
-    return Inventory(messages, logs, others)
+
+
+def _may_be_log(path: Path) -> bool:
+    """Return whether a file is a log, or cannot be read: its reader names the reason."""
+    try:
+        return is_log(path)
+    except OSError:
+        return True
 
 
 def _has_other_logs(folder: Path) -> bool:
@@ -129,13 +153,6 @@ def _has_other_logs(folder: Path) -> bool:
 def _is_one_log(files: Sequence[Path], folder: Path) -> bool:
     """Whether the files of a folder are the tables of one log."""
     return bool(files) and all(path.parent == folder and is_table(path) for path in files)
-
-
-def _inventory_of_file(path: Path) -> Inventory[Path]:
-    """Return the inventory of one file or bag."""
-    if is_spmd(path):
-        return Inventory([path], [], [])
-    return Inventory([], [[path]], [])
 
 
 def _split_bags(paths: Iterable[Path]) -> tuple[list[Path], list[Path]]:

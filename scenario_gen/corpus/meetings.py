@@ -70,13 +70,13 @@ class HourTask:
 
     Attributes:
         name: of the task.
-        hours: (hour since 2004, the files with this hour or a neighbour).
+        hours: (hour since 2004, its key, the files with this hour or a neighbour).
         folder: where `meetings` are written.
         config: the parameters.
     """
 
     name: str
-    hours: tuple[tuple[int, tuple[Place, ...]], ...]
+    hours: tuple[tuple[int, str, tuple[Place, ...]], ...]
     folder: Place
     config: CorpusConfig
 
@@ -97,28 +97,28 @@ def search_hours(task: HourTask) -> None:
     Raises:
         InputError: the database fails.
     """
-    targets = {hour: task.folder / f"hour-{hour}.parquet" for hour, _ in task.hours}
-    remaining = [(hour, files) for hour, files in task.hours if not targets[hour].exists()]
+    corpus = task.folder.parent
+    remaining = [
+        entry for entry in task.hours if not (task.folder / f"hour-{entry[1]}.parquet").exists()
+    ]
     if not remaining:
         return
-    corpus = task.folder.parent
-    tables = sorted({path for _, files in remaining for path in files}, key=str)
+    tables = sorted({path for _, _, files in remaining for path in files}, key=str)
     with (
         fetched(tables) as paths,
         database(workplace(corpus), task.config.memory, f"{task.name} of {corpus}") as base,
     ):
         local = dict(zip(tables, paths, strict=True))
-        for hour, files in remaining:
+        for hour, key, files in remaining:
             with base.cursor() as cursor:  # its tables end with it
-                _search(cursor, hour, [local[path] for path in files], targets[hour], task.config)
+                _search(cursor, hour, [local[path] for path in files], key, task)
 
 
-def _search(
-    base: Any, hour: int, files: Sequence[Path], target: Place, config: CorpusConfig
-) -> None:
+def _search(base: Any, hour: int, files: Sequence[Path], key: str, task: HourTask) -> None:
     import pyarrow as pa
     from pyarrow import parquet
 
+    config = task.config
     edge = overlap(config)
     begin, end = hour * HOUR_US - edge, (hour + 1) * HOUR_US + edge
     names = quoted([str(path) for path in files])
@@ -141,9 +141,9 @@ def _search(
     excerpt = {name: values[wanted] for name, values in rows.items()}
     for name in ("lat", "lon"):  # exactly the recorded numbers
         excerpt[name] = np.rint(excerpt[name] * UNITS_PER_DEGREE).astype(np.int32)
-    with arriving(target.with_suffix(".rows.parquet")) as part:
+    with arriving(task.folder / f"rows-{key}.parquet") as part:
         write_messages(pa.table(excerpt).to_reader(GROUP_ROWS), part)
-    with arriving(target) as part:
+    with arriving(task.folder / f"hour-{key}.parquet") as part:
         described = table.replace_schema_metadata({"shared": json.dumps(shared)})
         parquet.write_table(described, part, compression="zstd")
 

@@ -1,27 +1,37 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Basic safety messages in text -> Parquet, sorted by hour, vehicle and time.
+"""Tables of messages -> Parquet, sorted by hour, vehicle and time.
 
-An account counts the rejected rows by cause. A task parses one byte range, so a file may have any
-size. DuckDB parses the text, and counts the rows that it cannot parse.
+An account counts the rejected rows by cause. A task parses one byte range of a text, so a file may
+have any size. DuckDB parses the rows, and counts those that it cannot parse.
 """
 
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
-from dataclasses import dataclass
+from contextlib import contextmanager, suppress
+from dataclasses import asdict, dataclass
+import gzip
+from hashlib import sha256
 import json
 from pathlib import Path
 import re
-import shutil
-from typing import Any
+from typing import Any, IO, NamedTuple
+import zlib
 
-from scenario_gen.base.errors import guarded, InputError, needs
+from scenario_gen.base.errors import describe, guarded, InputError, needs
 from scenario_gen.base.folders import scratch, write_text
-from scenario_gen.base.stores import download, Part, Place, Remote, size_of, workplace
+from scenario_gen.base.stores import (
+    download,
+    identity_of,
+    Part,
+    Place,
+    Remote,
+    size_of,
+    workplace,
+)
+from scenario_gen.corpus.sources import MAX_LINE_BYTES, MessageTable
 from scenario_gen.corpus.tasks import arriving
-from scenario_gen.logs.tables import SPMD_COLUMNS
 
 HOUR_US = 3_600_000_000
 DAY_US = 24 * HOUR_US
@@ -32,11 +42,6 @@ MEMORY_REMEDY = (
 )
 FILE_DAY = re.compile(r"_(4\d{4})(?:_|\.)")
 EPOCH_DAY_INDEX = 37_987  # 2004-01-01 in the day numbers of file names
-TYPES = {
-    **dict.fromkeys(("TxDevice", "Gentime", "DSecond"), "BIGINT"),
-    **dict.fromkeys(("Latitude", "Longitude"), "DOUBLE"),
-    **dict.fromkeys(("Speed", "Heading"), "FLOAT"),
-}
 # Causes in the order of messages.sql; a row counts under the first cause that holds.
 CAUSES = (
     "left out: no vehicle",
@@ -48,6 +53,7 @@ CAUSES = (
     "left out: its clocks disagree (Gentime, DSecond)",
 )
 CLOCK_CAUSE_CODE = len(CAUSES)
+NO_ROW = "left out: fields are missing, or are no numbers"
 SQL = Path(__file__).with_suffix(".sql").read_text(encoding="utf-8")
 GROUP_ROWS = 122_880  # row group of a table
 # Tables store differences between rows, which are small for one vehicle in order of time.
@@ -59,8 +65,7 @@ PARQUET_OPTIONS: dict[str, Any] = {
 }
 # Latitude and longitude are integers in units of 1e-7 degrees (1 cm), as in SAE J2735.
 UNITS_PER_DEGREE = 1e7
-MAX_LINE_BYTES = 65_536  # a longer line is not a row
-MAX_TASK_FILES = 65_536  # file numbers in a table have two bytes
+GROUPED_RATIO = 64  # files that are smaller than a range by this ratio are parsed together
 
 
 @dataclass(frozen=True)
@@ -70,36 +75,48 @@ class RangeTask:
     Attributes:
         name: the task in messages.
         pieces: (file, first byte, byte after the last one).
+        table: how the database reads them.
         target: the Parquet file to write.
         memory: limit of the database in MiB.
     """
 
     name: str
     pieces: tuple[tuple[Place, int, int], ...]
+    table: MessageTable
     target: Place
     memory: int
 
 
-def ranges(files: Sequence[Place], folder: Place, size: int, memory: int) -> list[RangeTask]:
-    """Divide files into tasks with about `size` bytes and at most `MAX_TASK_FILES` pieces.
+def digest_of(*parts: object) -> str:
+    """Return a short hash of what a result depends on."""
+    return sha256(json.dumps(parts).encode()).hexdigest()[:12]
 
-    Long files are divided, short ones are combined.
+
+def ranges(
+    messages: Sequence[tuple[Place, MessageTable]], folder: Place, size: int, memory: int
+) -> list[RangeTask]:
+    """Divide files into tasks of at most about `size` bytes.
+
+    Small files are combined with their neighbours, at places that depend on their names alone. A
+    task is named after the identity of its files, so that a changed file costs its own task.
     """
-    tasks: list[list[tuple[Place, int, int]]] = []
-    room = 0
-    for path in files:
+    tasks: list[tuple[MessageTable, list[tuple[Place, int, int]]]] = []
+    is_open = False
+    for path, table in messages:
         length = size_of(path)
-        for begin in range(0, length, size):
-            end = min(begin + size, length)
-            if not tasks or room <= 0 or len(tasks[-1]) == MAX_TASK_FILES:
-                tasks.append([])
-                room = size
-            tasks[-1].append((path, begin, end))
-            room -= end - begin
-    return [
-        RangeTask(f"range {k}", tuple(pieces), folder / f"range-{k:06}.parquet", memory)
-        for k, pieces in enumerate(tasks)
-    ]
+        is_small = table.header >= 0 and length * GROUPED_RATIO < size
+        step = size if table.header >= 0 else max(length, 1)
+        for begin in range(max(table.header, 0), length, step):
+            if not (is_small and is_open and tasks[-1][0] == table):
+                tasks.append((table, []))
+            tasks[-1][1].append((path, begin, min(begin + step, length)))
+        is_open = is_small and zlib.crc32(str(path).encode()) % GROUPED_RATIO > 0
+    named = []
+    for table, pieces in tasks:
+        parts = [(*identity_of(path), begin, end) for path, begin, end in pieces]
+        target = folder / f"range-{digest_of(asdict(table), parts)}.parquet"
+        named.append(RangeTask(pieces[0][0].name, tuple(pieces), table, target, memory))
+    return named
 
 
 @contextmanager
@@ -121,6 +138,7 @@ def database(folder: Path, memory: int, task: str, remedy: str = MEMORY_REMEDY) 
     folder.mkdir(parents=True, exist_ok=True)
     with scratch(folder) as spill, duckdb.connect() as connection:
         connection.execute("SET threads = 1")
+        connection.execute("SET TimeZone = 'UTC'")
         connection.execute(f"SET memory_limit = '{memory}MiB'")
         connection.execute("SET temp_directory = ?", [str(spill)])
         connection.execute("SET enable_progress_bar = false")
@@ -131,45 +149,27 @@ def database(folder: Path, memory: int, task: str, remedy: str = MEMORY_REMEDY) 
 def parse_range(task: RangeTask) -> None:
     """Write the rows of a range, and an account of the rejected rows by file.
 
-    The account is a JSON file with the name of the table. If the parser refuses the bytes, as it
-    does lone carriage returns, the range is parsed again as plain lines.
+    The account is a JSON file with the name of the table. If the database refuses a file, the
+    rows that can be decoded are parsed, and the account names the file.
 
     Raises:
         InputError: the database fails (no memory, a full disk).
     """
-    try:
-        _parse_range(task, plain=False)
-    except InputError as error:
-        from duckdb import InvalidInputException
+    import duckdb
 
-        if not isinstance(error.__cause__, InvalidInputException):
-            raise
-        _parse_range(task, plain=True)
-
-
-def _parse_range(task: RangeTask, *, plain: bool) -> None:
-    """Write the rows and the account of a range; with `plain`, of a copy as plain lines.
-
-    Raises:
-        InputError: as `parse_range`.
-    """
     folder = workplace(task.target.parent.parent)
     folder.mkdir(parents=True, exist_ok=True)
-    files = ", ".join(str(path) for path, _, _ in task.pieces)
-    with (
-        scratch(folder) as temporary,
-        database(folder, task.memory, f"{task.name}: {files}") as base,
-    ):
-        names = {}
+    with scratch(folder) as temporary:
         texts = _fetched_text(task, temporary)
-        for k, ((path, begin, end), text) in enumerate(zip(task.pieces, texts, strict=True)):
-            is_whole = begin == 0 and end == size_of(path)
-            lines = text if is_whole else _extract(text, begin, end, temporary / f"{k}.csv")
-            if plain:
-                lines = _plain(lines, temporary / f"{k}.plain.csv")
-            names[str(lines)] = str(path)
-        table = temporary / "parsed.parquet"
-        account = _parse(base, names, table)
+        try:
+            account, table = _parse(task, texts, temporary)
+        except InputError as error:
+            if task.table.header >= 0 or isinstance(error.__cause__, duckdb.OutOfMemoryException):
+                raise
+            texts = [_decodable(path, task.table, temporary) for path in texts]
+            account, table = _parse(task, texts, temporary)
+            reason = describe(error.__cause__ or error)
+            account["damaged"] = {str(path): f"{path}: {reason}" for path, _, _ in task.pieces}
         with arriving(task.target.with_suffix(".json")) as part:
             write_text(part, json.dumps(account, indent=1) + "\n")
         with arriving(task.target) as part:
@@ -208,105 +208,150 @@ def _extract(path: Path, begin: int, end: int, target: Path) -> Path:
     return target
 
 
-def _plain(path: Path, target: Path) -> Path:
-    """Copy a text with one kind of line end and ASCII only; other bytes become question marks."""
+def _decodable(path: Path, table: MessageTable, folder: Path) -> Path:
+    """Copy what can be decoded of a damaged file: a .gz up to the damage, Parquet's row groups."""
+    target = folder / f"{path.name}.decoded"
+    if table.is_text:
+        with path.open("rb") as source, gzip.open(target, "wb", compresslevel=1) as copy:
+            copy.writelines(_unpacked_blocks(source))
+        return target
+    from pyarrow import ArrowException, parquet
+
     with (
-        path.open(encoding="latin-1") as source,
-        target.open("w", encoding="ascii", errors="replace", newline="\n") as copy,
+        parquet.ParquetFile(path) as file,
+        parquet.ParquetWriter(target, file.schema_arrow) as writer,
     ):
-        shutil.copyfileobj(source, copy, 1 << 24)
+        for k in range(file.num_row_groups):
+            with suppress(ArrowException, OSError):
+                writer.write_table(file.read_row_group(k))
     return target
 
 
-def _parse(base: Any, names: Mapping[str, str], target: Path) -> dict[str, Any]:
-    """Parse files into one table with messages.sql; return the account.
+def _unpacked_blocks(source: IO[bytes]) -> Iterator[bytes]:
+    """Yield the content of a .gz, which may have several parts, up to its damage."""
+    unpacker = zlib.decompressobj(wbits=31)
+    with suppress(zlib.error):
+        while block := unpacker.unused_data or source.read(1 << 16):
+            if unpacker.eof:
+                unpacker = zlib.decompressobj(wbits=31)
+            yield unpacker.decompress(block)
 
-    Args:
-        base: the database.
-        names: {path to parse: name of the input}.
-        target: the table.
+
+def _parse(task: RangeTask, files: Sequence[Path], folder: Path) -> tuple[dict[str, Any], Path]:
+    """Parse the pieces in files into one table with messages.sql.
+
+    Returns:
+        The account, and the table in `folder`.
+
+    Raises:
+        InputError: the database fails.
     """
-    columns = {name: TYPES.get(name, "VARCHAR") for name in SPMD_COLUMNS}
-    variables = {
-        "files": list(names),
-        "columns": columns,
-        "line": MAX_LINE_BYTES,
-        "parsed": str(target),
-    }
-    for name, value in variables.items():
-        base.execute(f"SET VARIABLE {name} = ?", [value])
-    base.execute("CREATE TYPE read AS ENUM (SELECT unnest(getvariable('files')))")
-    write_messages(base.sql(SQL).to_arrow_reader(GROUP_ROWS), target)
-    base.execute("CREATE VIEW parsed AS FROM read_parquet(getvariable('parsed'))")
-    inputs = list(names.values())
-    unchecked = _accept_clocks(base, target)
-    account = _row_counts(base, names)
-    hours = base.execute(
-        f"SELECT t // {HOUR_US}, count(*) FROM parsed WHERE cause = 0 GROUP BY ALL ORDER BY ALL"
-    ).fetchall()
-    notes = [
+    inputs = [str(path) for path, _, _ in task.pieces]
+    names = {}
+    for k, (path, (source, begin, end)) in enumerate(zip(files, task.pieces, strict=True)):
+        is_whole = begin == 0 and end == size_of(source)
+        lines = path if is_whole else _extract(path, begin, end, folder / f"{k}.csv")
+        names[str(lines)] = inputs[k]
+    target = folder / "parsed.parquet"
+    with database(folder, task.memory, f"{task.name}: {', '.join(inputs)}") as base:
+        base.execute("SET VARIABLE files = ?", [list(names)])
+        base.execute("SET VARIABLE parsed = ?", [str(target)])
+        base.execute("CREATE TYPE read AS ENUM (SELECT unnest(getvariable('files')))")
+        base.execute(f"CREATE VIEW source AS SELECT {task.table.columns} FROM {task.table.reader}")
+        write_messages(base.sql(SQL).to_arrow_reader(GROUP_ROWS), target)
+        counts = _counts(base)
+        unchecked = _files_with_another_clock(counts)
+        if unchecked:
+            _accept_clocks(base, target, unchecked)
+            counts = _counts(base)
+        account = _account(counts, inputs)
+        if task.table.is_text:
+            _count_rejected(base, names, account["files"])
+    account["notes"] = [
         f"{inputs[file]}: DSecond disagrees with Gentime in most rows, and is ignored"
         for file in unchecked
     ]
-    files = {
-        name: {cause: count for cause, count in sorted(counts.items()) if count}
-        for name, counts in sorted(account.items())
+    return account, target
+
+
+class _Count(NamedTuple):
+    """Rows of a file with a cause in an hour; those that run backwards, and a sum of hashes."""
+
+    file: int
+    cause: int
+    hour: int
+    rows: int
+    backwards: int
+    content: int
+
+
+def _counts(base: Any) -> list[_Count]:
+    """Return the numbers of parsed rows; the hour of rows that are left out is 0."""
+    rows = base.execute(f"""
+        SELECT file, cause, CASE WHEN cause = 0 THEN t // {HOUR_US} ELSE 0 END AS hour, count(*),
+               count(*) FILTER (back), sum(hash(device, t, lat, lon, speed, heading) >> 24)
+        FROM read_parquet(getvariable('parsed')) GROUP BY file, cause, hour""").fetchall()
+    return [_Count(*row) for row in rows]
+
+
+def _account(counts: Sequence[_Count], inputs: Sequence[str]) -> dict[str, Any]:
+    """Return the rows of each input by cause, and the rows and hashes of each hour."""
+    files = {name: Counter[str]() for name in inputs}
+    hours: Counter[int] = Counter()
+    contents: Counter[int] = Counter()
+    for count in counts:
+        causes = files[inputs[count.file]]
+        causes["rows"] += count.rows
+        if count.cause:
+            causes[CAUSES[count.cause - 1]] += count.rows
+            continue
+        causes["kept: stamps that run backwards"] += count.backwards
+        hours[count.hour] += count.rows
+        contents[count.hour] += count.content
+        match = FILE_DAY.search(Path(inputs[count.file]).name)
+        if match and abs(count.hour // 24 - (int(match[1]) - EPOCH_DAY_INDEX)) > 1:
+            causes["kept: stamps of another day"] += count.rows
+    return {
+        "files": {name: dict(sorted((+causes).items())) for name, causes in sorted(files.items())},
+        "hours": {str(hour): hours[hour] for hour in sorted(hours)},
+        "contents": {str(hour): f"{contents[hour]:x}" for hour in sorted(contents)},
     }
-    return {"files": files, "hours": {str(hour): rows for hour, rows in hours}, "notes": notes}
 
 
-def _row_counts(base: Any, names: Mapping[str, str]) -> dict[str, Counter[str]]:
-    """Return the number of rows of each input, and of its rows with a cause."""
-    inputs = list(names.values())
-    account: dict[str, Counter[str]] = {name: Counter() for name in inputs}
-    causes = base.execute(
-        "SELECT file, cause, count(*), count(*) FILTER (back AND cause = 0)"
-        " FROM parsed GROUP BY ALL"
-    )
-    for file, cause, count, backwards in causes.fetchall():
-        counts = account[inputs[file]]
-        counts["rows"] += count
-        counts["kept: stamps that run backwards"] += backwards
-        if cause:
-            counts[CAUSES[cause - 1]] += count
-    rejected = base.execute(  # a line with several errors counts once
+def _count_rejected(base: Any, names: Mapping[str, str], files: dict[str, dict[str, int]]) -> None:
+    """Add the rows that the database rejected; one with several errors counts once."""
+    rejected = base.execute(
         "SELECT file_path, count(DISTINCT line)"
         " FROM reject_errors JOIN reject_scans USING (scan_id, file_id) GROUP BY ALL"
     )
     for path, count in rejected.fetchall():
-        counts = account[names[path]]
-        counts["rows"] += count
-        counts["left out: no row of 19 fields with numbers"] += count
-    days = base.execute(
-        f"SELECT file, t // {DAY_US}, count(*) FROM parsed WHERE cause = 0 GROUP BY ALL"
-    )
-    for file, day, count in days.fetchall():
-        match = FILE_DAY.search(Path(inputs[file]).name)
-        if match and abs(day - (int(match[1]) - EPOCH_DAY_INDEX)) > 1:
-            account[inputs[file]]["kept: stamps of another day"] += count
-    return account
+        causes = files[names[path]]
+        causes["rows"] = causes.get("rows", 0) + count
+        causes[NO_ROW] = count
 
 
-def _accept_clocks(base: Any, target: Path) -> list[int]:
-    """Accept the rows with disagreeing clocks in files where most rows have them.
+def _files_with_another_clock(counts: Sequence[_Count]) -> list[int]:
+    """Return the files in which the clocks of most rows disagree."""
+    all_rows: Counter[int] = Counter()
+    disagreeing: Counter[int] = Counter()
+    for count in counts:
+        all_rows[count.file] += count.rows * (count.cause in (0, CLOCK_CAUSE_CODE))
+        disagreeing[count.file] += count.rows * (count.cause == CLOCK_CAUSE_CODE)
+    return [
+        file
+        for file, rows in sorted(all_rows.items())
+        if disagreeing[file] > MAX_DISAGREEING_SHARE * rows
+    ]
 
-    Returns:
-        The numbers of these files.
-    """
-    disagreeing = f"count(*) FILTER (cause = {CLOCK_CAUSE_CODE})"
-    query = (
-        f"SELECT file FROM parsed WHERE cause IN (0, {CLOCK_CAUSE_CODE}) GROUP BY file"
-        f" HAVING {disagreeing} > {MAX_DISAGREEING_SHARE} * count(*) ORDER BY file"
-    )
-    files = [file for (file,) in base.execute(query).fetchall()]
-    if files:
-        is_accepted = f"cause = {CLOCK_CAUSE_CODE} AND file IN ({', '.join(map(str, files))})"
-        cause = f"(CASE WHEN {is_accepted} THEN 0 ELSE cause END)::UTINYINT AS cause"
-        rows = base.sql(f"SELECT * REPLACE ({cause}) FROM parsed")
-        rewritten = target.with_name("again.parquet")
-        write_messages(rows.to_arrow_reader(GROUP_ROWS), rewritten)
-        rewritten.replace(target)
-    return files
+
+def _accept_clocks(base: Any, target: Path, files: Sequence[int]) -> None:
+    """Accept the rows with disagreeing clocks in some files."""
+    is_accepted = f"cause = {CLOCK_CAUSE_CODE} AND file IN ({', '.join(map(str, files))})"
+    cause = f"(CASE WHEN {is_accepted} THEN 0 ELSE cause END)::UTINYINT AS cause"
+    rows = base.sql(f"SELECT * REPLACE ({cause}) FROM read_parquet(getvariable('parsed'))")
+    rewritten = target.with_name("again.parquet")
+    write_messages(rows.to_arrow_reader(GROUP_ROWS), rewritten)
+    rewritten.replace(target)
 
 
 def write_messages(batches: Any, target: Path) -> None:

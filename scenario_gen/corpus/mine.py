@@ -8,22 +8,24 @@
     found/part-*.parquet        groups of meetings (`grouping.py`)
     encounters/*.parquet        cleaned encounters (`encounters.py`); other logs start here
 
-An existing file is finished, so a killed run continues where it stopped.
+An existing file is finished, so a killed run continues where it stopped. Its name depends on its
+inputs, so a changed file costs what depends on it. An unreadable file is named and left out.
 """
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from itertools import chain
 import json
 from pathlib import Path
+import re
 from typing import Any
 
 from scenario_gen.base.documents import read_json
-from scenario_gen.base.errors import needs
+from scenario_gen.base.errors import needs, RefusedError
 from scenario_gen.base.folders import write_text
 from scenario_gen.base.parameters import flatten
-from scenario_gen.base.stores import each_fetched, Place, Remote, size_of
+from scenario_gen.base.stores import each_fetched, identity_of, Place
 from scenario_gen.corpus.config import CorpusConfig
 from scenario_gen.corpus.encounters import (
     account_of,
@@ -32,22 +34,25 @@ from scenario_gen.corpus.encounters import (
     LogTask,
     read_one_log,
     tables_of,
+    UNREAD_LOGS,
 )
 from scenario_gen.corpus.grouping import group_partition
 from scenario_gen.corpus.inventory import inventory
 from scenario_gen.corpus.meetings import search_hours
-from scenario_gen.corpus.messages import parse_range, ranges
+from scenario_gen.corpus.messages import digest_of, parse_range, ranges, RangeTask
 from scenario_gen.corpus.page import sketch, write_page
 from scenario_gen.corpus.schedule import (
     ACCOUNT,
+    accounts_of,
     clean_tasks,
+    current,
     group_tasks,
     hour_tasks,
     least_rows,
     searched_hours,
 )
 from scenario_gen.corpus.tables import rows_at, rows_of
-from scenario_gen.corpus.tasks import agree, arriving, check_out, held, spread, undone, Workers
+from scenario_gen.corpus.tasks import agree, arriving, check_out, held, spread, Task, Workers
 from scenario_gen.situation import Situation
 
 ARCHIVE, PAGE, DETAILS = "archive.json", "encounters.html", "mine.json"
@@ -58,6 +63,8 @@ LEGEND = (
 DRAWN_COUNT = 20  # encounters of a kind on the page
 NAMED_COUNT = 20  # failures and files that are named; the corpus contains all
 NAMED_FILES_COUNT = 5  # files that a note names
+DAMAGED = "damaged"
+UNREAD = (DAMAGED, *UNREAD_LOGS)
 UNLISTED = ("memory", "task_rows")  # parameters that do not change results
 
 
@@ -68,6 +75,7 @@ class MiningSummary:
     Attributes:
         encounters: number of encounters in the corpus.
         kinds: number of encounters of each kind.
+        read: number of tables and logs that were read, and of all.
         account: number of rows left out, by cause.
         files: the same by file, without files that have none.
         refused: encounters and logs that are left out: name, cause (a group) and reason.
@@ -77,6 +85,7 @@ class MiningSummary:
 
     encounters: int
     kinds: dict[str, int]
+    read: tuple[int, int]
     account: dict[str, int]
     files: dict[str, dict[str, int]]
     refused: list[dict[str, str]]
@@ -102,7 +111,14 @@ class MiningSummary:
 
     def _first_line(self) -> str:
         kinds = ", ".join(f"{count} {kind}" for kind, count in sorted(self.kinds.items()))
-        return f"{self.encounters} encounters: {kinds or 'none'}"
+        return f"{self.encounters} encounters: {kinds or 'none'}; {self._share_read()}"
+
+    def _share_read(self) -> str:
+        files = f"read: {self.read[0]} of {self.read[1]} files"
+        if not self.account:
+            return files
+        left_out = sum(n for cause, n in self.account.items() if cause.startswith("left out"))
+        return f"{files}, {1.0 - left_out / self.account['rows']:.2%} of the rows"
 
     def details(self) -> list[str]:
         """Return the summary with all causes and notes, for the page."""
@@ -127,40 +143,54 @@ def mine(
     config: CorpusConfig = CorpusConfig(),
     *,
     workers: Workers = Workers(),
+    strict: bool = False,
 ) -> MiningSummary:
     """Find the encounters in an archive.
 
     Args:
-        archives: files, bags or folders. All SPMD files in a folder, at any depth, are one archive
-            on one clock; tables and bags are one log each. A folder with nothing but tables is one
-            log, as for `read_log`.
-        out: the corpus; an unfinished one from the same archive and parameters is continued.
+        archives: files, bags or folders. All tables of messages in a folder, at any depth, are one
+            archive on one clock; other tables and bags are one log each. A folder with nothing but
+            such tables is one log, as for `read_log`.
+        out: the corpus. An existing one with the same parameters is continued; only files that are
+            new or have changed are read.
         config: the parameters.
         workers: run the tasks.
+        strict: stop where a file cannot be read, or a task fails, instead of leaving it out.
 
     Raises:
-        InputError: there is no log, or `out` has another archive or other parameters.
+        InputError: there is no log, or `out` has other parameters.
+        RefusedError: with `strict`, something is left out.
     """
     needs("corpus", "duckdb", "pyarrow")
-    messages, logs, others = inventory(archives)
+    messages, logs, others = inventory(archives, config.log.columns)
     check_out(out, archives)
     with held(out), spread(workers) as run:
-        _agree_on_archive(out, [*messages, *chain.from_iterable(logs)], config)
-        encounters = out / "encounters"
-        log_tasks = [
-            LogTask(paths[0].stem, tuple(paths), encounters / f"log-{k:05}.parquet", config)
-            for k, paths in enumerate(logs)
-        ]
-        failed = run(read_one_log, undone(log_tasks))
-        if messages:
-            ranged = ranges(messages, out / "messages", config.range_size << 20, config.memory)
-            lost = run(parse_range, undone(ranged))
-            # an hour is searched once, so all of its ranges must be there
-            lost = lost or run(search_hours, hour_tasks(ranged, out, config))
-            lost = lost or run(group_partition, group_tasks(out, config))
-            failed += lost or run(clean_found, clean_tasks(out, config))
+        agree(out, ARCHIVE, {"format": 4, "parameters": _parameters(config)}, "corpus")
+        log_tasks = [_log_task(paths, out / "encounters", config) for paths in logs]
+        ranged = ranges(messages, out / "messages", config.range_size << 20, config.memory)
+        stale = _stale_files(ranged, out)
+        done: Counter[str] = Counter()
+        failed: list[str] = []
+
+        def work(name: str, function: Callable[[Task], None], tasks: Sequence[Task]) -> None:
+            done[name] += len(tasks)
+            failed.extend(run(function, tasks))
+            if strict and failed:
+                raise RefusedError(f"{failed[0]}; without --strict it is left out")
+
+        work("logs", read_one_log, current(log_tasks, out / "encounters", "log-*"))
+        work("ranges", parse_range, current(ranged, out / "messages"))
+        accounts = accounts_of(ranged, out)
+        work("parts of hours", search_hours, hour_tasks(accounts, out, config))
+        work("partitions", group_partition, group_tasks(out, config))
+        work("tables of encounters", clean_found, clean_tasks(out, config))
         contents = _contents(out)
-        result = _summary(out, config, contents, failed, others)
+        notes = _notes(others, stale, done, accounts.values(), least_rows(config))
+        notes += _shared_ids(out)
+        n_files = len(messages) + len(logs)
+        result = _summary(contents, accounts.values(), failed, notes, n_files)
+        if strict and result.read[0] < n_files:
+            raise RefusedError(f"{result.refused[0]['why']}; without --strict it is left out")
         with arriving(out / PAGE) as part:
             _write_gallery(part, contents, result)
         with arriving(out / DETAILS) as part:
@@ -219,72 +249,107 @@ def _write_gallery(path: Path, contents: _Contents, result: MiningSummary) -> No
     write_page(path, "Encounters mined", f"{first}. {LEGEND}", cards, rest)
 
 
-def _agree_on_archive(out: Place, files: Sequence[Place], config: CorpusConfig) -> None:
-    """Write down the archive and the parameters of a corpus, or compare them with those written.
-
-    Raises:
-        InputError: they are others.
-    """
+def _parameters(config: CorpusConfig) -> dict[str, Any]:
+    """Return the parameters on which results depend."""
     parameters = {name: value for name, (_, value) in flatten(config).items()}
-    document = {
-        "format": 3,
-        "files": [_name_and_size(path) for path in files],
-        "parameters": {n: value for n, value in parameters.items() if n not in UNLISTED},
-    }
-    agree(out, ARCHIVE, document, "corpus")
+    return {name: value for name, value in parameters.items() if name not in UNLISTED}
 
 
-def _name_and_size(path: Place) -> list[str | int]:
-    if isinstance(path, Remote):
-        return [path.url, max(size_of(path), 0)]
-    return [str(path.resolve()), 0 if path.is_dir() else size_of(path)]
+def _log_task(paths: list[Place], folder: Place, config: CorpusConfig) -> LogTask:
+    """Return the task of a log; its table is named after the identity of its files."""
+    files: list[Place] = []
+    for path in paths:
+        is_folder = path.is_dir() if isinstance(path, Path) else path.size < 0
+        files += sorted(path.rglob("*"), key=str) if is_folder else [path]
+    name = re.sub(r"\W+", "_", paths[0].stem)[:40]
+    target = folder / f"log-{name}-{digest_of([identity_of(file) for file in files])}.parquet"
+    return LogTask(paths[0].stem, tuple(paths), target, config)
+
+
+def _stale_files(ranged: Sequence[RangeTask], out: Place) -> list[str]:
+    """Return the files of an earlier run that have changed or are gone."""
+    wanted = {task.target.stem for task in ranged}
+    accounts = (out / "messages").glob("range-*.json")
+    stale = [path for path in accounts if path.stem not in wanted]
+    names = (read_json(local, ACCOUNT)["files"] for _, local in each_fetched(stale))
+    return sorted(set(chain.from_iterable(names)))
 
 
 def _summary(
-    out: Place,
-    config: CorpusConfig,
     contents: _Contents,
+    accounts: Collection[Mapping[str, Any]],
     failed: list[str],
-    others: Sequence[Place],
+    notes: list[str],
+    n_files: int,
 ) -> MiningSummary:
-    """Return the summary of a corpus; `others` are files of the archive in no known format."""
-    least = least_rows(config)
+    """Return the summary of a corpus.
+
+    Args:
+        contents: the encounters.
+        accounts: of the ranges.
+        failed: a sentence for each failed task.
+        notes: on the archive.
+        n_files: number of tables of messages, and of logs.
+    """
     files: dict[str, Counter[str]] = {}
-    notes: list[str] = []
-    strays = 0
-    paths: list[Place] = sorted((out / "messages").glob("*.json"), key=str)
-    for _, local in each_fetched(paths):
-        account = read_json(local, ACCOUNT)
-        notes += account["notes"]
-        strays += sum(int(count) for count in account["hours"].values() if count < least)
+    damaged: dict[str, str] = {}
+    for account in accounts:
+        notes = [*notes, *account["notes"]]
+        damaged |= account.get("damaged", {})
         for file, causes in account["files"].items():
             files.setdefault(file, Counter()).update(causes)
     total = sum(files.values(), Counter[str]())
     faults = {file: dict(+causes) for file, causes in files.items()}
     for causes_of_file in faults.values():
         causes_of_file.pop("rows", None)
-    refused = chain.from_iterable(account.get("refused", ()) for account in contents.accounts)
+    refused = [
+        *({"name": name, "cause": DAMAGED, "why": why} for name, why in sorted(damaged.items())),
+        *chain.from_iterable(account.get("refused", ()) for account in contents.accounts),
+    ]
+    n_unread = len(failed) + sum(row.get("cause") in UNREAD for row in refused)
     quality = chain.from_iterable(account.get("quality", ()) for account in contents.accounts)
     return MiningSummary(
         encounters=contents.kinds.total(),
         kinds=dict(contents.kinds),
+        read=(n_files - n_unread, n_files),
         account=dict(+total),
         files={file: causes for file, causes in faults.items() if causes},
-        refused=list(refused),
+        refused=refused,
         failed=failed,
-        notes=[*notes, *_notes(others, strays, least), *_shared_ids(out), *quality],
+        notes=[*notes, *quality],
     )
 
 
-def _notes(others: Sequence[Place], strays: int, least: int) -> list[str]:
-    """Return notes on files and rows that were not read."""
+def _notes(
+    others: Sequence[Place],
+    stale: Sequence[str],
+    done: Mapping[str, int],
+    accounts: Collection[Mapping[str, Any]],
+    least: int,
+) -> list[str]:
+    """Return notes on files and rows that were not read, and on what was done again.
+
+    Args:
+        others: files of the archive in no known format.
+        stale: files that have changed since the last run.
+        done: number of tasks of each stage in this run.
+        accounts: of the ranges.
+        least: number of rows in an hour, below which they are not searched.
+    """
     notes = []
-    if others:
-        names = ", ".join(path.name for path in others[:NAMED_FILES_COUNT])
-        more = " …" if len(others) > NAMED_FILES_COUNT else ""
+    if stale:
+        tasks = ", ".join(f"{count} {name}" for name, count in done.items())
         notes.append(
-            f"{len(others)} files are in no known format (unpack compressed ones): {names}{more}"
+            f"{_named(stale)} changed or are gone since the last run; done again, with what"
+            f" depends on them: {tasks}"
         )
+    if others:
+        notes.append(
+            f"{_named([path.name for path in others])} are in no known format (unpack"
+            " compressed ones)"
+        )
+    hours = chain.from_iterable(account["hours"].values() for account in accounts)
+    strays = sum(count for count in hours if count < least)
     if strays:
         notes.append(
             f"{strays} rows lie in an hour of which their range of text has fewer than {least}"
@@ -293,12 +358,18 @@ def _notes(others: Sequence[Place], strays: int, least: int) -> list[str]:
     return notes
 
 
+def _named(files: Sequence[str]) -> str:
+    """Return the number of files, and the first names."""
+    names = ", ".join(files[:NAMED_FILES_COUNT])
+    return f"{len(files)} files ({names}{' …' if len(files) > NAMED_FILES_COUNT else ''})"
+
+
 def _shared_ids(out: Place) -> list[str]:
     """Return a note if several vehicles share an id."""
     from pyarrow import parquet
 
     shared: set[str] = set()
-    tables = [out / "hours" / f"hour-{hour}.parquet" for hour in searched_hours(out)]
+    tables = [out / "hours" / f"hour-{key}.parquet" for key in searched_hours(out).values()]
     for _, local in each_fetched(tables):
         metadata = parquet.read_schema(local).metadata or {}
         shared.update(json.loads(metadata.get(b"shared", b"{}")))

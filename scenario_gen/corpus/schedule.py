@@ -1,39 +1,50 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The tasks of the later stages of mining, from the results of the earlier ones."""
+"""The tasks of the later stages of mining, from the results of the earlier ones.
 
-from bisect import bisect_left, bisect_right
+The name of a result has a hash of what it depends on. A result that no task would write is
+removed: its files have changed.
+"""
+
 from collections import Counter
-from collections.abc import Sequence
-from itertools import accumulate
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from scenario_gen.base.documents import COUNT, read_json
-from scenario_gen.base.stores import each_fetched, Place
+from scenario_gen.base.stores import each_fetched, Place, remove
 from scenario_gen.corpus.config import CorpusConfig
 from scenario_gen.corpus.encounters import CleanTask
 from scenario_gen.corpus.grouping import GroupTask, partitions
 from scenario_gen.corpus.meetings import HourTask, overlap
-from scenario_gen.corpus.messages import HOUR_US, RangeTask
-from scenario_gen.corpus.tasks import undone
+from scenario_gen.corpus.messages import digest_of, HOUR_US, RangeTask
+from scenario_gen.corpus.tasks import Target
 from scenario_gen.numerics import Ints
 
-ACCOUNT = {  # of a range of text: rows left out by file, and rows by hour
+
+def _by_hour(values: dict[str, Any]) -> dict[str, Any]:
+    return {
+        "type": "object",
+        "propertyNames": {"pattern": "^[0-9]{1,18}$"},
+        "additionalProperties": values,
+    }
+
+
+_TEXTS = {"type": "object", "additionalProperties": {"type": "string"}}
+ACCOUNT = {  # of a range: rows by cause of each file, rows and hashes of hours, damaged files
     "type": "object",
-    "required": ["files", "hours", "notes"],
+    "required": ["files", "hours", "contents", "notes"],
     "properties": {
         "files": {
             "type": "object",
             "additionalProperties": {"type": "object", "additionalProperties": COUNT},
         },
-        "hours": {
-            "type": "object",
-            "propertyNames": {"pattern": "^-?[0-9]{1,18}$"},
-            "additionalProperties": COUNT,
-        },
+        "hours": _by_hour(COUNT),
+        "contents": _by_hour({"type": "string", "pattern": "^[0-9a-f]+$"}),
         "notes": {"type": "array", "items": {"type": "string"}},
+        "damaged": _TEXTS,
     },
 }
 
@@ -45,37 +56,84 @@ def least_rows(config: CorpusConfig) -> int:
     return 2 * (int(seconds / max(log.longest_gap, log.period)) + 1)
 
 
-def hour_tasks(ranged: Sequence[RangeTask], out: Place, config: CorpusConfig) -> list[HourTask]:
-    """Return tasks of about `task_rows` rows for the hours that are not searched yet."""
-    rows: Counter[int] = Counter()
-    files: dict[int, list[Place]] = {}
-    seen: set[int] = set()
-    least = least_rows(config)
-    accounts = {task.target.with_suffix(".json"): task.target for task in ranged}
-    for account, local in each_fetched(list(accounts)):
-        for name, count in read_json(local, ACCOUNT)["hours"].items():
-            seen.add(int(name))
-            if count >= least:  # fewer rows are wrong stamps, which would add hours to search
-                rows[int(name)] += count
-                files.setdefault(int(name), []).append(accounts[account])
+def current(tasks: Sequence[Target], folder: Place, pattern: str = "[!.]*") -> list[Target]:
+    """Return the tasks that are not done; remove other results of their stage.
 
-    done = {path.name for path in (out / "hours").glob("hour-*.parquet")}
-    wanted = seen & {hour for last in files for hour in (last - 1, last)}
+    Args:
+        tasks: of the stage.
+        folder: of its results.
+        pattern: of their names.
+    """
+    wanted = {task.target.stem for task in tasks}
+    existing: list[Place] = list(folder.glob(pattern))
+    remove([path for path in existing if path.stem not in wanted])
+    names = {path.name for path in existing}
+    return [task for task in tasks if task.target.name not in names]
+
+
+def accounts_of(ranged: Sequence[RangeTask], out: Place) -> dict[Place, dict[str, Any]]:
+    """Return the tables of ranges that are parsed, with their accounts."""
+    existing = {path.name for path in (out / "messages").glob("range-*.json")}
+    tables = {task.target.with_suffix(".json"): task.target for task in ranged}
+    present = [account for account in tables if account.name in existing]
+    return {tables[path]: read_json(local, ACCOUNT) for path, local in each_fetched(present)}
+
+
+class _Hour(NamedTuple):
+    """An hour to search: its number of rows, and the tables with rows in it or near it."""
+
+    hour: int
+    rows: int
+    tables: tuple[Place, ...]
+
+
+def _hours(accounts: Mapping[Place, dict[str, Any]], config: CorpusConfig) -> dict[str, _Hour]:
+    """Return the hours to search by key, which has a hash of their messages."""
+    rows: Counter[int] = Counter()
+    tables: dict[int, list[Place]] = {}
+    least = least_rows(config)
+    for table, account in accounts.items():
+        for name, count in account["hours"].items():
+            rows[int(name)] += count
+            if count >= least:  # fewer rows are wrong stamps, which would add hours to search
+                tables.setdefault(int(name), []).append(table)
     sides = -(-overlap(config) // HOUR_US)
-    batches: list[list[tuple[int, tuple[Place, ...]]]] = []
+    hours = {}
+    # A meeting may begin with the last row of an hour.
+    for hour in sorted(rows.keys() & {later - k for later in tables for k in (0, 1)}):
+        near = range(hour - sides, hour + sides + 1)
+        read = {table for k in near for table in tables.get(k, ())}
+        digest = digest_of([_content(k, map(accounts.__getitem__, read)) for k in near])
+        hours[f"{hour}-{digest}"] = _Hour(hour, rows[hour], tuple(sorted(read, key=str)))
+    return hours
+
+
+def _content(hour: int, accounts: Iterable[dict[str, Any]]) -> int:
+    """Return the sum of the hashes of an hour's messages, whichever ranges have them."""
+    return sum(int(account["contents"].get(str(hour), "0"), 16) for account in accounts)
+
+
+def hour_tasks(
+    accounts: Mapping[Place, dict[str, Any]], out: Place, config: CorpusConfig
+) -> list[HourTask]:
+    """Return tasks of about `task_rows` rows for the hours that are not searched yet."""
+    hours = _hours(accounts, config)
+    folder = out / "hours"
+    existing = {path.stem: path for path in folder.glob("[!.]*")}
+    names = {f"{kind}-{key}" for kind in ("hour", "rows") for key in hours}
+    remove([path for name, path in existing.items() if name not in names])
+    batches: list[list[tuple[int, str, tuple[Place, ...]]]] = []
     room = 0
-    for hour in sorted(wanted):  # a meeting may begin with the last row of an hour
-        if f"hour-{hour}.parquet" in done:
+    for key, (hour, rows, tables) in hours.items():
+        if f"hour-{key}" in existing:
             continue
-        if not batches or rows[hour] > room:
+        if not batches or rows > room:
             batches.append([])
             room = config.task_rows
-        near: set[Place] = set()
-        near.update(*(files.get(k, ()) for k in range(hour - sides, hour + sides + 1)))
-        batches[-1].append((hour, tuple(sorted(near, key=str))))
-        room -= rows[hour]
+        batches[-1].append((hour, key, tables))
+        room -= rows
     return [
-        HourTask(f"hours {batch[0][0]} to {batch[-1][0]}", tuple(batch), out / "hours", config)
+        HourTask(f"hours {batch[0][0]} to {batch[-1][0]}", tuple(batch), folder, config)
         for batch in batches
     ]
 
@@ -83,13 +141,13 @@ def hour_tasks(ranged: Sequence[RangeTask], out: Place, config: CorpusConfig) ->
 def group_tasks(out: Place, config: CorpusConfig) -> list[GroupTask]:
     """Return tasks for the partitions of all meetings that are not grouped yet."""
     hours = searched_hours(out)
-    tables = [out / "hours" / f"hour-{hour}.parquet" for hour in hours]
+    tables = [out / "hours" / f"hour-{key}.parquet" for key in hours.values()]
     start, end = (np.concatenate(parts) for parts in _columns(tables, "start", "end"))
     tasks = []
-    for k, (begin, last) in enumerate(partitions(start, end)):
+    for begin, last in partitions(start, end):
         near = _between(hours, begin // HOUR_US, (last - 1) // HOUR_US)
-        tasks.append(GroupTask(f"partition {k}", out, k, near, begin, last, config))
-    return undone(tasks)
+        tasks.append(GroupTask(f"partition from {begin}", out, near, begin, last, config))
+    return current(tasks, out / "found")
 
 
 def clean_tasks(out: Place, config: CorpusConfig) -> list[CleanTask]:
@@ -97,40 +155,26 @@ def clean_tasks(out: Place, config: CorpusConfig) -> list[CleanTask]:
     hours = searched_hours(out)
     tables: list[Place] = sorted((out / "found").glob("part-*.parquet"), key=str)
     columns = _columns(tables, "earliest", "end")
-    offsets = [0, *accumulate(len(part) for part in columns[0][1:])]
-    earliest, end = (np.concatenate(parts) for parts in columns)
     tasks = []
-    for first in range(0, offsets[-1], config.task_encounters):
-        last = min(first + config.task_encounters, offsets[-1])
-        parts = range(bisect_right(offsets, first) - 1, bisect_left(offsets, last))
-        rows = [
-            (part, max(first - offsets[part], 0), min(last, offsets[part + 1]) - offsets[part])
-            for part in parts
-        ]
-        first_hour = int(min(earliest[first:last])) // HOUR_US - 1
-        last_hour = int(max(end[first:last])) // HOUR_US
-        tasks.append(
-            CleanTask(
-                f"encounters from {first}",
-                out,
-                first // config.task_encounters,
-                tuple(span for span in rows if span[1] < span[2]),
-                _between(hours, first_hour, last_hour),
-                config,
-            )
-        )
-    return undone(tasks)
+    for table, earliest, end in zip(tables, columns[0][1:], columns[1][1:], strict=True):
+        for first in range(0, len(end), config.task_encounters):
+            rows = slice(first, min(first + config.task_encounters, len(end)))
+            first_hour = int(min(earliest[rows])) // HOUR_US - 1
+            near = _between(hours, first_hour, int(max(end[rows])) // HOUR_US)
+            name = f"{table.stem}, encounters from {first}"
+            tasks.append(CleanTask(name, out, table.stem, first, rows.stop, near, config))
+    return current(tasks, out / "encounters", "found-*")
 
 
-def searched_hours(out: Place) -> list[int]:
-    """Return the hours that are searched, in order."""
-    tables = (out / "hours").glob("hour-*[0-9].parquet")
-    return sorted(int(path.stem.removeprefix("hour-")) for path in tables)
+def searched_hours(out: Place) -> dict[int, str]:
+    """Return the keys of the hours that are searched, in order."""
+    keys = [path.stem.partition("-")[2] for path in (out / "hours").glob("hour-*.parquet")]
+    return dict(sorted((int(key.partition("-")[0]), key) for key in keys))
 
 
-def _between(hours: list[int], first: int, last: int) -> tuple[int, ...]:
-    """Return the hours from the first to the last."""
-    return tuple(hours[bisect_left(hours, first) : bisect_right(hours, last)])
+def _between(hours: Mapping[int, str], first: int, last: int) -> tuple[str, ...]:
+    """Return the keys of the hours from the first to the last."""
+    return tuple(hours[hour] for hour in range(first, last + 1) if hour in hours)
 
 
 def _columns(tables: Sequence[Place], *names: str) -> list[list[Ints]]:

@@ -45,6 +45,11 @@ class Column:
         """Whether a time is a number of frames by its name, at an unknown rate."""
         return not self.unit and normalized(self.name) in _FRAME_NAMES
 
+    @property
+    def is_gentime(self) -> bool:
+        """Whether a time is that of SPMD: microseconds since 2004."""
+        return normalized(self.name) == "gentime"
+
     def option(self, unit: str = "", *, flipped: bool = False) -> str:
         """Return the column as in the parameter `columns`, in a unit or in its own one."""
         if not unit and not normalized(self.name).endswith(f"_{self.unit}"):

@@ -148,7 +148,7 @@ def find_columns(header: Sequence[str], path: Path, option: str) -> dict[str, Co
         if column is not None:
             columns[quantity] = column
     time = columns.get("time")
-    if time and time.name.strip().lower() == "gentime" and "heading" in columns:  # SPMD
+    if time and time.is_gentime and "heading" in columns:
         name = columns["heading"].name
         columns["heading"] = Column(name, math.pi / 180.0, clockwise=True)
     return _complete(columns, path, list(by_name.values()))

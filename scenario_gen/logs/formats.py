@@ -4,12 +4,14 @@
 """The formats of logs: how a file is recognised, and which reader it needs."""
 
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import partial
 from importlib import import_module
 from pathlib import Path
 import re
 from typing import Any
+import zlib
 
 from scenario_gen.bags.storage.files import files_of
 from scenario_gen.base.errors import InputError, needs
@@ -76,12 +78,16 @@ def is_osi(path: Path) -> bool:
 
 
 def is_spmd(path: Path) -> bool:
-    """Return whether a file's first line has the 19 numbers of SPMD's messages."""
-    if path.suffix.lower() not in (".csv", ".txt") or not path.is_file():
+    """Return whether half of a file's first lines have the 19 numbers of SPMD's messages.
+
+    Its first line has no names, even if it is damaged.
+    """
+    if without_packing(path).suffix.lower() not in (".csv", ".txt"):
         return False
-    with path.open(encoding="utf-8-sig", errors="replace") as file:
-        fields = file.readline(HEAD_BYTES).split(",")
-    return len(fields) == 19 and all(map(_is_number_or_empty, fields))
+    lines = head_of(path).decode("utf-8-sig", errors="replace").splitlines()[:10]
+    rows = [[field.strip(' "') for field in line.split(",")] for line in lines]
+    n_messages = sum(len(row) == 19 and all(map(_is_number_or_empty, row)) for row in rows)
+    return 0 < len(rows) <= 2 * n_messages and any(map(_is_number, rows[0]))
 
 
 def is_sumo(path: Path) -> bool:
@@ -170,19 +176,32 @@ def _is_of_data_set(path: Path, name: str) -> bool:
 
 
 def _is_number_or_empty(text: str) -> bool:
+    return not text or _is_number(text)
+
+
+def _is_number(text: str) -> bool:
     try:
-        float(text.strip() or "nan")
+        float(text)
     except ValueError:
         return False
     return True
 
 
-def _head(path: Path) -> bytes:
+def head_of(path: Path, size: int = HEAD_BYTES) -> bytes:
+    """Return the first bytes of a file, unpacked if it is a .gz; none of a folder."""
+    head = _head(path, size)
+    if path.suffix.lower() == ".gz":
+        with suppress(zlib.error):
+            return zlib.decompressobj(wbits=31).decompress(head, size)
+    return head
+
+
+def _head(path: Path, size: int = HEAD_BYTES) -> bytes:
     """Return the first bytes of a file; none of a folder."""
     if not path.is_file():
         return b""
     with path.open("rb") as file:
-        return file.read(HEAD_BYTES)
+        return file.read(size)
 
 
 def _lazy_reader(module: str, extra: tuple[str, ...] = (), **options: Any) -> Reader:
@@ -238,7 +257,7 @@ LOG_FORMATS = Registry[LogFormat](
         "nmea": LogFormat(is_nmea, _lazy_reader("adapters.trajectories", kind="nmea")),
         "tum": LogFormat(is_tum, _lazy_reader("adapters.trajectories", kind="tum")),
         "kitti": LogFormat(is_kitti, _refuse_kitti),
-        "spmd": LogFormat(is_spmd, _lazy_reader("tables", spmd=True)),
+        "spmd": LogFormat(is_spmd, _lazy_reader("tables")),
         "argoverse2": _data_set("argoverse2"),
         "interaction": _data_set("interaction"),
         "ind": _data_set("ind"),

@@ -40,48 +40,17 @@ from scenario_gen.numerics import Floats
 SPMD_EPOCH_NS = 1_072_915_200 * 10**9
 """2004-01-01 UTC in Unix time, from which Gentime of SPMD counts microseconds."""
 
-SPMD_COLUMNS = [
-    "RxDevice",
-    "FileId",
-    "TxDevice",
-    "Gentime",
-    "TxRandom",
-    "MsgCount",
-    "DSecond",
-    "Latitude",
-    "Longitude",
-    "Elevation",
-    "Speed",
-    "Heading",
-    "Ax",
-    "Ay",
-    "Az",
-    "Yawrate",
-    "PathCount",
-    "RadiusOfCurve",
-    "Confidence",
-]
-
-_SPMD_QUANTITIES = {
-    "vehicle": Column("TxDevice"),
-    "lat": Column("Latitude", unit="deg"),
-    "lon": Column("Longitude", unit="deg"),
-    "speed": Column("Speed", unit="mps"),
-    "heading": Column("Heading", math.pi / 180.0, clockwise=True),
-}
-_MAX_SPMD_STAMP_US = 8e15
 _PARQUET_SUFFIXES = (".parquet", ".pq")
 _FEW_ROW_COUNT = 10  # each of them may belong to another vehicle
 _STANDING_M = 0.05  # no vehicle of an encounter drives less
 
 
-def read(paths: Sequence[Path], config: LogConfig, *, spmd: bool = False) -> RawLog:
+def read(paths: Sequence[Path], config: LogConfig) -> RawLog:
     """Read tables that share a clock as one log: CSV (also with tabs or semicolons) or Parquet.
 
     Args:
         paths: one or more files.
         config: names columns, and bounds sizes.
-        spmd: they are SPMD files without a header.
 
     Raises:
         InputError: a file is damaged or too large, or a column is missing or unsuitable.
@@ -95,15 +64,11 @@ def read(paths: Sequence[Path], config: LogConfig, *, spmd: bool = False) -> Raw
     n_read = 0
     n_bytes = 0
     for path in paths:
-        if spmd or not has_window(path, config):
+        if not has_window(path, config):
             n_bytes += path.stat().st_size
         check_size(str(path), n_bytes, n_read, config)
-        if spmd:
-            frame = _read_spmd(path, n_read, config)
-            header_lines = 0
-        else:
-            frame, columns, header_lines, names = _read_named(path, n_read, config, notes)
-            separators |= dict.fromkeys(names)
+        frame, columns, header_lines, names = _read_named(path, n_read, config, notes)
+        separators |= dict.fromkeys(names)
         if "vehicle" not in frame:
             frame["vehicle"] = "0" if len(paths) == 1 else path.stem
         frame["row"] = n_rows + frame.index
@@ -115,7 +80,9 @@ def read(paths: Sequence[Path], config: LogConfig, *, spmd: bool = False) -> Raw
         raise InputError(
             f"{paths[0]} and the other files mix latitude/longitude and x/y; read them separately"
         )
-    if not spmd:
+    if columns["time"].is_gentime:  # units and ids are those of SPMD
+        columns = {}
+    else:
         notes += named_by_file(frames, paths)
     log = from_frame(pd.concat(frames, ignore_index=True), paths, tuple(segments), config)
     return replace(
@@ -152,8 +119,11 @@ def _read_named(
         notes += layout.notes
         frame, columns, header = _read_text_columns(path, layout, rows_before, config)
     _ignore_unknown_numbers(frame, columns, notes)
-    notes += column_notes(columns, config.columns, header)
+    if layout.above >= 0:
+        notes += column_notes(columns, config.columns, header)
     numbers = to_numbers(frame, columns, path)
+    if columns["time"].is_gentime:
+        numbers["time"] += SPMD_EPOCH_NS
     if "vehicle=none" not in config.columns.replace(" ", ""):
         _check_vehicle_column(frame, columns, numbers, path)
     _check_metres(numbers, columns, path)
@@ -457,25 +427,3 @@ def _typical_size(values: Floats) -> float:
     if len(possible):
         return float(np.median(possible))
     return float(np.median(values)) if len(values) else math.nan
-
-
-def _read_spmd(path: Path, rows_before: int, config: LogConfig) -> pd.DataFrame:
-    """Read one SPMD file in our units.
-
-    Raises:
-        InputError: the file is empty, or its first line does not have 19 fields.
-    """
-    raw = read_text(path, rows_before, config, sep=",", header=None, dtype=str)
-    if raw.shape[1] != len(SPMD_COLUMNS):
-        raise InputError(
-            f"{path} has {raw.shape[1]} columns on line 1; basic safety messages have "
-            f"{len(SPMD_COLUMNS)}: {', '.join(SPMD_COLUMNS)}"
-        )
-    raw.columns = pd.Index(SPMD_COLUMNS)
-    raw["TxDevice"] = reals(raw["TxDevice"])
-    frame = to_numbers(raw, _SPMD_QUANTITIES, path)
-    stamps_us = reals(raw["Gentime"])  # exact in float64 until the year 2289
-    frame["time_ok"] = stamps_us.notna() & (stamps_us.abs() < _MAX_SPMD_STAMP_US)
-    valid_us = stamps_us.where(frame["time_ok"], 0.0).round().astype(np.int64)
-    frame["time"] = valid_us * 1000 + SPMD_EPOCH_NS
-    return frame

@@ -8,9 +8,11 @@ from dataclasses import dataclass
 from pathlib import Path
 import re
 
+from scenario_gen.logs.formats import head_of, is_spmd
 from scenario_gen.logs.raw import UnknownFormatError
 
 _MAX_HEADER_BYTES = 65_536
+_SAMPLE_BYTES = 4096  # without a NUL if it is text
 _SAMPLE_LINE_COUNT = 20  # lines below the header that may show a decimal comma
 _SEPARATORS = ",;\t|"
 _WHITE_SPACE = r"\s+"
@@ -18,6 +20,29 @@ _COMMENTS = ("#", "//", "%", "sep=")
 _NUMBER = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?")
 _NUMBER_WITH_COMMA = re.compile(r"[-+]?\d*,\d+")
 
+
+SPMD_COLUMNS = [
+    "RxDevice",
+    "FileId",
+    "TxDevice",
+    "Gentime",
+    "TxRandom",
+    "MsgCount",
+    "DSecond",
+    "Latitude",
+    "Longitude",
+    "Elevation",
+    "Speed",
+    "Heading",
+    "Ax",
+    "Ay",
+    "Az",
+    "Yawrate",
+    "PathCount",
+    "RadiusOfCurve",
+    "Confidence",
+]
+"""Columns of basic safety messages in the Safety Pilot Model Deployment, which has no header."""
 
 READ_OPTIONS = {"skipinitialspace": True, "skip_blank_lines": False, "compression": None}
 """How pandas reads every text table: a row for each line, and no archive by its suffix."""
@@ -31,7 +56,7 @@ class Layout:
         encoding: of its text.
         separator: between fields.
         decimal: sign before decimals.
-        above: number of lines above the header.
+        above: number of lines above the header; -1: the format has names, the file no header.
         names: of the columns, if a comment has them; the comment is then the header.
         notes: on what is unusual.
     """
@@ -45,17 +70,16 @@ class Layout:
 
 
 def _first_lines(path: Path) -> tuple[str, list[str]]:
-    """Return the encoding and the first lines of a file.
+    """Return the encoding and the first lines of a file, unpacked if it is a .gz.
 
     Raises:
         UnknownFormatError: it is not text.
     """
-    with path.open("rb") as file:
-        start = file.read(4 * _MAX_HEADER_BYTES)
+    start = head_of(path, 4 * _MAX_HEADER_BYTES)
     encoding = "utf-8-sig"
     if start.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
         encoding = "utf-16"
-    elif b"\0" in start:
+    elif b"\0" in start[:_SAMPLE_BYTES]:
         raise UnknownFormatError(
             f"{path} is not a text file (or UTF-16 without a byte order mark); save the table as "
             "UTF-8 text"
@@ -77,6 +101,8 @@ def layout_of(path: Path) -> Layout:
     Raises:
         UnknownFormatError: it is not text, its first line is too long, or has no column names.
     """
+    if is_spmd(path):
+        return Layout(above=-1, names=tuple(SPMD_COLUMNS))
     encoding, lines = _first_lines(path)
     above = next((k for k, line in enumerate(lines) if not _is_comment(line)), 0)
     header, *rows = lines[above : above + _SAMPLE_LINE_COUNT + 1] or [""]

@@ -28,6 +28,7 @@ def test_each_file_of_an_archive_is_one_thing(tmp_path):
         (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
         (tmp_path / name).write_text(text)
     messages, logs, others = inventory([tmp_path])
+    messages = [path for path, _ in messages]
     names = [
         [path.relative_to(tmp_path).as_posix() for path in own]
         for own in (messages, *logs, others)

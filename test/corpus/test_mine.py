@@ -13,13 +13,14 @@ import pytest
 from support.archives import read_planted
 from support.killed import killed_in
 
-from scenario_gen.base.errors import InputError
+from scenario_gen.base.errors import InputError, RefusedError
 from scenario_gen.base.folders import sha256_of
 from scenario_gen.corpus import grouping
 from scenario_gen.corpus.config import CorpusConfig
 from scenario_gen.corpus.encounters import encounter_of, tables_of
 from scenario_gen.corpus.grouping import group, label, Meeting, partitions
-from scenario_gen.corpus.messages import parse_range, ranges
+from scenario_gen.corpus.inventory import inventory
+from scenario_gen.corpus.messages import NO_ROW, parse_range, ranges
 from scenario_gen.corpus.mine import mine
 from scenario_gen.corpus.schedule import clean_tasks
 from scenario_gen.corpus.tables import rows_of
@@ -50,7 +51,7 @@ def test_every_row_that_is_left_out_is_counted_by_file(archive, corpus):
     mined = corpus[1]
     truth = json.loads((archive / "synthetic.json").read_text())
     assert mined.account["rows"] == truth["rows"]
-    assert mined.account["left out: no row of 19 fields with numbers"] == truth["damaged"]
+    assert mined.account[NO_ROW] == truth["damaged"]
     wrong = sum(
         mined.account[cause] for cause in mined.account if "clocks" in cause or "2004" in cause
     )
@@ -85,7 +86,7 @@ def test_who_reacts_to_whom_stands_in_table_and_page(corpus):
 def test_ranges_and_whole_files_give_the_same_rows(archive, tmp_path):
     from pyarrow import parquet
 
-    files = sorted(archive.glob("*.csv"))
+    files = inventory([archive]).messages
     seen = []
     for name, size in (("whole", 1 << 30), ("cut", 700_001)):
         for task in ranges(files, tmp_path / name / "messages", size, 200):
@@ -114,36 +115,12 @@ def test_ranges_and_whole_files_give_the_same_rows(archive, tmp_path):
     assert (seen[0][0] == seen[1][0]).all() and seen[0][1] == seen[1][1]
 
 
-def test_a_faulty_byte_costs_its_row(tmp_path):
-    """A lone carriage return, mixed line ends and noise: the database's parser refuses them all."""
-    lines = [
-        f"1,1,{k % 3},{2 * 10**14 + k * 100_000},0,1,65535,42.1,-83.2,200,9,90,0,0,0,0,1,0,0".encode()
-        for k in range(400)
-    ]
-    text = b"\n".join(lines) + b"\n"
-    half = len(text) // 2 + 9  # within a row
-    noise = np.random.default_rng(1).bytes(4096)
-    faults = {
-        "stray": (text[:half] + b"\r" + text[half:], 399),
-        "mixed": (b"".join(line + b"\r\n"[k % 2 :] for k, line in enumerate(lines)), 400),
-        "noise": (text[:half] + noise + text[half:], 399),
-    }
-    for name, (data, n_rows) in faults.items():
-        file = tmp_path / f"{name}.csv"
-        file.write_bytes(data)
-        (task,) = ranges([file], tmp_path / name / "messages", 1 << 20, 400)
-        task.target.parent.mkdir(parents=True)
-        parse_range(task)
-        account = json.loads(task.target.with_suffix(".json").read_text())
-        assert sum(account["hours"].values()) == n_rows, name
-
-
 def test_what_is_missing_is_made_again_and_the_same(archive, corpus, tmp_path):
     """As after a kill: of each stage a file is gone, and a torn one lies there."""
     out, _ = corpus
     before = {path.relative_to(out): sha256_of(path) for path in out.rglob("*.parquet")}
     for stage in ("messages", "hours", "found", "encounters"):
-        sorted((out / stage).glob("*[0-9].parquet"))[0].unlink()
+        sorted((out / stage).glob("*.parquet"))[0].unlink()
         killed_in(out / stage)
     killed_in(out)
     mine([archive], out)
@@ -174,17 +151,18 @@ def test_a_file_that_cannot_be_read_is_said_and_does_not_end_the_others(archive,
     mined = mine([tmp_path / "in"], tmp_path / "out")
     assert (
         mined.encounters == 0
-        and len(mined.failed) == 2
-        and "one.csv" in mined.failed[0]
-        and "unpacked" in mined.failed[1]
+        and not mined.failed
+        and mined.read == (1, 4)
+        and {"one", "wide", "packed.csv"} == {one["name"] for one in mined.refused}
+        and "not a table" in str(mined.refused)
+        and "unpacked" in str(mined.refused)
     )
-    assert [one["name"] for one in mined.refused] == ["wide"] and "not a table" in mined.refused[
-        0
-    ]["why"]
+    with pytest.raises(RefusedError, match="without --strict it is left out"):
+        mine([tmp_path / "in"], tmp_path / "out", strict=True)
     assert not list((tmp_path / "out").glob("found/*"))
     assert mined.account == {
         "rows": 4,
-        "left out: no row of 19 fields with numbers": 2,
+        NO_ROW: 2,
         "left out: no vehicle": 1,
     }
 
@@ -281,7 +259,4 @@ def test_small_partitions_give_the_same_corpus_by_small_tasks(
     for table in (tmp_path / "out" / "encounters").glob("*.parquet"):
         table.unlink()
     tasks = clean_tasks(tmp_path / "out", config)
-    assert (
-        max(len(task.row_ranges) for task in tasks) > 1
-        and max(len(pickle.dumps(replace(t, config=None))) for t in tasks) <= 500
-    )
+    assert max(len(pickle.dumps(replace(t, config=None))) for t in tasks) <= 500

@@ -9,7 +9,8 @@ from support.log_builders import crossing, geographic
 
 from scenario_gen.base.errors import InputError
 from scenario_gen.logs import LogConfig, read_log
-from scenario_gen.logs.tables import SPMD_COLUMNS, SPMD_EPOCH_NS
+from scenario_gen.logs.tables import SPMD_EPOCH_NS
+from scenario_gen.logs.text import SPMD_COLUMNS
 
 FIRST = 270_000_000_000_000  # Gentime: microseconds since 2004-01-01, in July 2012
 
@@ -92,5 +93,5 @@ def test_lines_that_break_off(tmp_path):
 def test_the_format_can_be_asked_for(tmp_path):
     path = tmp_path / "log.csv"
     path.write_text("1,2,3\n4,5,6\n")
-    with pytest.raises(InputError, match="3 columns on line 1; basic safety messages have 19"):
+    with pytest.raises(InputError, match="line 1 has numbers instead of column names"):
         read_log(path, LogConfig(format="spmd"))

@@ -21,6 +21,7 @@ from scenario_gen.corpus.encounters import (
 from scenario_gen.corpus.find import coverage_lines, find
 from scenario_gen.corpus.messages import parse_range, ranges
 from scenario_gen.corpus.parts import CASE_COLUMNS, SCENARIO_COLUMNS
+from scenario_gen.corpus.sources import message_table
 from scenario_gen.corpus.tables import rows_of
 from scenario_gen.logs import read_log
 from scenario_gen.logs.synthetic import bundled
@@ -141,7 +142,8 @@ def archive(folder: Path) -> None:
 
 def parse_archive(folder: Path) -> None:
     """Parse an archive with the database."""
-    for task in ranges(sorted(folder.glob("*.csv")), folder.parent / "messages", 1 << 20, 400):
+    files = [(path, table) for path in folder.glob("*.csv") if (table := message_table(path))]
+    for task in ranges(files, folder.parent / "messages", 1 << 20, 400):
         parse_range(task)
 
 

@@ -27,7 +27,7 @@ from scenario_gen.base.errors import ScenarioGenError
 from scenario_gen.logs import encounters_of, LogConfig, read_log, Streams
 from scenario_gen.logs.bag import log_of, READABLE_TYPES, Topic
 from scenario_gen.logs.synthetic import bundled
-from scenario_gen.logs.tables import SPMD_COLUMNS
+from scenario_gen.logs.text import SPMD_COLUMNS
 from scenario_gen.types.encounter import Encounter
 from scenario_gen.types.scenario import Scenario
 from support.harness import Target
