@@ -73,7 +73,9 @@ def mine(
     ],
     out: Annotated[
         Path,
-        typer.Option(help="Folder for the corpus, or s3://…; only what has changed is done again."),
+        typer.Option(
+            help="Folder for the corpus, or s3://…; only what has changed is done again."
+        ),
     ],
     workers: WorkersOption = 0,
     scheduler: SchedulerOption = "",
