@@ -30,6 +30,66 @@ SINGLE = {
 }
 SHARED = ("limits.", "log.", "bag.")
 Row = tuple[str, ...]
+CONTENTS = {
+    "/diagnostics": ("all", "findings and states"),
+    "/localization/kinematic_state": ("traffic", "the ego, for Autoware"),
+    "/perception/object_recognition/objects": ("traffic", "the others, for Autoware"),
+    "changepoints": (
+        "segmenter",
+        "a point per changepoint, at samples of the tracks; frame local_enu",
+    ),
+    "changepoints/live": ("segmenter", "a message per changepoint of the streams"),
+    "clock": ("log_player, player, traffic", "time of what is played"),
+    "diagnostics": ("bags", "/diagnostics of a run in process"),
+    "ego/cmd_vel": ("you", "linear.x [m/s], angular.z [rad/s]"),
+    "ego/cmd_vel_stamped": ("you", "the same; the stamp names the state that it answers"),
+    "ego/goal": ("gp_sampler, traffic", "footprint's centre; speed in twist.twist.linear.x"),
+    "ego/odom": ("you", "the ego of another simulator"),
+    "ego/path": ("you", "stamped poses to track"),
+    "ego/route": ("traffic", "path to the goal"),
+    "ego/start": ("gp_sampler", "footprint's centre; speed in twist.twist.linear.x"),
+    "ego/trajectory": ("you", "stamped poses to track"),
+    "ego/witness": ("gp_sampler", "the reference drive, before each scenario"),
+    "fit": ("planner", "start, changepoints and end on the road, at stamps of the routes"),
+    "fit/info": ("planner", "names its inputs"),
+    "map": (
+        "road_server",
+        "0 free, 100 occupied, −1 unknown; cells below 65 are drivable; not rotated",
+    ),
+    "markers": ("gp_sampler", "scenarios, to look at"),
+    "posterior": (
+        "segmenter",
+        "vehicles × samples: x, y, z, vehicle, primitive, t [s], p of a changepoint; frame local_enu",
+    ),
+    "preview": ("preview", "the newest scenario in motion"),
+    "report": ("evaluator", "figures"),
+    "road/entries": ("road_server", "poses at lane centres, into the road"),
+    "road/exits": ("road_server", "poses at lane centres, out of the road"),
+    "road/info": ("road_server", "names its inputs"),
+    "road/lanes": (
+        "road_server",
+        "borders as a line list; text: JSON of lanes, users, rules (msg_conventions/lanes.py)",
+    ),
+    "road/markings": ("road_server", "paint and signs"),
+    "scenarios": ("gp_sampler", "one or several messages per scenario"),
+    "scenarios/info": ("gp_sampler", "entries and summaries, below"),
+    "tf": ("preview, traffic", "frames of the vehicles"),
+    "tracks": ("log_player, segmenter", "the recording, evenly spaced from 0; frame local_enu"),
+    "tracks/part": (
+        "planner, road_server",
+        "the part of a recording that fits the road; the sender of tracks sends it instead",
+    ),
+    "traffic/local_map": ("traffic", "the map with the others as obstacles"),
+    "traffic/markers": ("traffic", "the drive, to look at"),
+    "vehicle_*/fix": ("log_player", "the log as a stream"),
+    "vehicle_*/footprint": ("gp_sampler", "frame vehicle_<id>"),
+    "vehicle_*/odom": ("traffic", "every vehicle at every step"),
+    "vehicle_*/path": ("", "reserved for the path of a vehicle"),
+    "vehicle_*/route": ("planner", "a pose's stamp is its time; equal poses are a standstill"),
+    "vehicle_*/speed": ("log_player", "the log as a stream"),
+    "verdicts": ("traffic", "a verdict per drive"),
+}
+"""Publisher and content of each topic."""
 
 
 def code(text: str) -> str:
@@ -68,11 +128,13 @@ def commands() -> Iterator[Row]:
 
 
 def topics() -> Iterator[Row]:
-    """Yield all topics with their types and qualities of service."""
-    yield "topic", "type", "durability", "depth"
+    """Yield all topics with their types, publishers, contents and qualities of service."""
+    yield "topic", "type", "from", "content", "durability", "depth"
     for topic, (kind, quality) in sorted(TOPICS.items()):
         durability = "latched" if quality.transient_local else "volatile"
-        yield code(topic), kind.replace("/msg/", "/"), durability, str(quality.depth)
+        publisher, content = CONTENTS[topic]
+        name, depth = kind.replace("/msg/", "/"), str(quality.depth)
+        yield code(topic), name, publisher, content, durability, depth
 
 
 def options(command: Any) -> Iterator[Row]:
