@@ -19,6 +19,7 @@ from typing import NamedTuple
 import numpy as np
 
 from scenario_gen.base.errors import InputError
+from scenario_gen.closed_loop.lights import red_phases
 from scenario_gen.numerics import Bools, Floats, frozen
 from scenario_gen.numerics.boxes import boxes_meet, fill_box
 from scenario_gen.numerics.hermite import cubic, interval_at
@@ -66,6 +67,7 @@ class World(NamedTuple):
         walks: (N,) whether each is a pedestrian.
         kerbs: (N, K) clock [s] at which a pedestrian, in each cell, next steps onto a lane that a
             vehicle uses: the start of the cell on a lane; infinity if never, and for vehicles.
+        reds: (N, R, 3) as `red_phases` returns them.
     """
 
     step: float
@@ -83,9 +85,10 @@ class World(NamedTuple):
     free: Floats
     walks: Bools
     kerbs: Floats
+    reds: Floats
 
 
-WORLD = named(World, F, F1, F3, F2, F2, B1, F3, F, F3, I, F3, F2, F2, B1, F2)
+WORLD = named(World, F, F1, F3, F2, F2, B1, F3, F, F3, I, F3, F2, F2, B1, F2, F3)
 
 
 def _ego_index(scenario: Scenario, ego: int | str) -> int:
@@ -160,6 +163,7 @@ def world_of(scenario: Scenario, ego: int | str, step: float = 0.1) -> World:
         free=frozen(free),
         walks=walks,
         kerbs=frozen(kerbs),
+        reds=frozen(red_phases(scenario)),
     )
 
 

@@ -19,6 +19,7 @@ from scenario_gen.method.evaluation import (
 )
 from scenario_gen.numerics.curve import Curve
 from scenario_gen.numerics.plane import ahead_and_left, place
+from scenario_gen.types import SignalState
 
 NEAR_STATIONS = np.linspace(-2.0, 8.0, 41)
 """Distances [m] along the route from the last nearest place to candidates for the next one."""
@@ -71,7 +72,7 @@ class ConstantSpeed(RouteFollower):
 
 @dataclass
 class IdmFollower(RouteFollower):
-    """Follows its route at a safe distance from the vehicles on it (IDM).
+    """Follows its route at a safe distance from the vehicles on it (IDM), and stops at red.
 
     It also reacts to vehicles that will be on the route if they drive straight on. `speed` [m/s]
     is its speed on a free and straight road.
@@ -97,6 +98,9 @@ class IdmFollower(RouteFollower):
                 wanted_speeds(self.route, np.array([station]), self.speed, stops=stops)[0]
             )
         gap, ahead = self._nearest(observation, station)
+        line = self._stop_line(observation, station)
+        if line < gap:
+            gap, ahead = line, 0.0
         closing = (
             ego.speed
             * (ego.speed - ahead)
@@ -108,6 +112,28 @@ class IdmFollower(RouteFollower):
             - self.acceleration * share * share
         )
         return Command(max(acceleration, -self.task.limits.max_deceleration), curvature)
+
+    def _stop_line(self, seen: Observation, station: float) -> float:
+        """Return the gap [m] to the next stop line at red, or at yellow if it can stop; else inf.
+
+        A line counts if it crosses the route in the direction of its traffic.
+        """
+        nearest = math.inf
+        if self.route is None:
+            return nearest
+        for light in seen.lights:
+            is_yellow = light.state is SignalState.YELLOW
+            if not (light.state.stops or is_yellow):
+                continue
+            places, offset = self.route.project(light.line.mean(axis=0)[None])
+            half_width = 0.5 * float(np.hypot(*(light.line[1] - light.line[0])))
+            turn = float(self.route.at(places)[0, 2]) - light.yaw
+            gap = float(places[0]) - station - self.task.vehicle.half[0]
+            stopping_way = seen.ego.speed**2 / (2.0 * MAX_BRAKING_MPS2)
+            crosses = abs(float(offset[0])) < half_width and math.cos(turn) > 0.5
+            if crosses and gap > (stopping_way if is_yellow else -0.5):
+                nearest = min(nearest, gap)
+        return nearest
 
     def _nearest(self, seen: Observation, station: float) -> tuple[float, float]:
         """Return the gap [m] to the next vehicle on the route, and its speed along it [m/s].
@@ -143,7 +169,7 @@ class IdmFollower(RouteFollower):
 
 @dataclass
 class NonReactive(IdmFollower):
-    """The non-reactive baseline: ignores all others.
+    """The non-reactive baseline: ignores all others, and lights.
 
     It drives as an `IdmFollower` with the highest speed of the reference drive.
     """
@@ -156,7 +182,7 @@ class NonReactive(IdmFollower):
     def act(self, observation: Observation) -> Command:
         """Return the command of the follower on an empty road."""
         others, sizes = observation.others[:0], observation.sizes[:0]
-        return super().act(replace(observation, ids=(), others=others, sizes=sizes))
+        return super().act(replace(observation, ids=(), others=others, sizes=sizes, lights=()))
 
 
 class ReferenceFollower:

@@ -27,6 +27,7 @@ from scenario_gen.closed_loop.origin import Trial
 from scenario_gen.closed_loop.trials import Outcome, passed_of, rates
 from scenario_gen.output.report.data import (
     FRAME_PERIOD_S,
+    lights_of_all,
     MAX_FRAMES_COUNT,
     pack,
     road_data,
@@ -341,7 +342,8 @@ def _drawing(outcome: Outcome, trial: Trial, road: int, max_frames: int) -> dict
         "motion": {
             "states": pack(states(motion, frames)[None]),
             "durations": [round(verdict.duration, 3)],
-        },
+        }
+        | lights_of_all([motion]),
         "witness": [
             [round(x, 2), round(y, 2)] for x, y in witness.position[drive.ego, ::stride].tolist()
         ],

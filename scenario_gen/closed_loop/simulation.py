@@ -23,12 +23,13 @@ from scenario_gen.closed_loop.drive import Drive
 from scenario_gen.closed_loop.driver import DriverParameters
 from scenario_gen.closed_loop.driver_traits import driver_traits, reaction_time
 from scenario_gen.closed_loop.ego import Command, EgoState, move, Pose
+from scenario_gen.closed_loop.lights import observed, ObservedLight
 from scenario_gen.closed_loop.sensor import Sensor
 from scenario_gen.closed_loop.step import advance, ego_hits
 from scenario_gen.numerics import Bools, Floats, wrap_angle
 from scenario_gen.numerics.plane import ahead_and_left, edge_lengths
 from scenario_gen.roads import ground_for
-from scenario_gen.types import Dynamics, Road, Scenario, Vehicle
+from scenario_gen.types import Dynamics, Facts, Road, Scenario, Vehicle
 
 
 @dataclass(frozen=True, eq=False)
@@ -112,6 +113,7 @@ class Observation:
         ids: ids of the others.
         others: (M, 4) x, y [m], yaw [rad], speed [m/s]; (x, y) is the footprint's centre.
         sizes: (M, 2) length and width [m].
+        lights: traffic lights whose states are known.
     """
 
     time: float
@@ -119,6 +121,7 @@ class Observation:
     ids: tuple[str, ...]
     others: Floats
     sizes: Floats
+    lights: tuple[ObservedLight, ...] = ()
 
 
 class Planner(Protocol):
@@ -179,6 +182,10 @@ class ClosedLoop:
         self._others = np.arange(len(self._ids)) != self.ego
         self.begin, end = self.world.spans[self.ego].tolist()
         self.duration = end - self.begin
+        begin = self.begin
+        self.lights = tuple(
+            light.retimed(lambda times: times - begin) for light in scenario.facts.lights
+        )
         driven_distance = self.world.cells[self.ego, -1, 7]
         self._witness_waits = bool(driven_distance < 1.0)
         self.last_step = self.steps_from(self.begin)
@@ -333,10 +340,12 @@ class ClosedLoop:
 
     def observe(self, state: State) -> Observation:
         """Return the planner's input at an instant."""
-        observed = self.perceive(state)
-        rows = np.flatnonzero(self._others & observed.present)
+        perceived = self.perceive(state)
+        rows = np.flatnonzero(self._others & perceived.present)
         ids = tuple(self._ids[row] for row in rows)
-        return Observation(state.time, state.ego, ids, observed.vehicles[rows], self._sizes[rows])
+        others, sizes = perceived.vehicles[rows], self._sizes[rows]
+        lights = observed(self.lights, state.time)
+        return Observation(state.time, state.ego, ids, others, sizes, lights)
 
     def drive(self, planner: Planner, ended: Callable[[State], bool] | None = None) -> Drive:
         """Drive with a planner until the drive ends.
@@ -400,6 +409,7 @@ class ClosedLoop:
             scenario.seed,
             scenario.index,
             scenario.frame_id,
+            facts=Facts(lights=self.lights),
         )
         return Drive(
             motion,

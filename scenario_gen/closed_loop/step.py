@@ -212,7 +212,7 @@ def advance(
     matched = seen[0, EGO_CLOCK:]
     locate_ego(now, time, world.motion[ego], body, before[ego, CLOCK], matched)
     if parameters.reacts:
-        react(world, parameters, seen, before, passes, after)
+        react(world, parameters, seen, before, passes, now, after)
     else:
         after[:] = 0.0
         after[:, CLOCK] = min(now, time[-1])

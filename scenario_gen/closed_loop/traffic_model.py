@@ -77,6 +77,7 @@ def react(
     seen: Floats,
     drivers: Floats,
     passes: Bools,
+    time: float,
     after: Floats,
 ) -> None:
     """Write the reaction of all drivers in a step; the caller writes the row of the ego.
@@ -87,6 +88,7 @@ def react(
         seen: (K, 9) the ego as in `State.seen`, at the end of this step and before.
         drivers: (N, 4) as in `Traffic`.
         passes: (N, N) as in `Traffic`; pairs whose order is drawn again are added.
+        time: at the end of the step [s].
         after: (N, 5) clock [s], rate, acceleration that the driver wanted [m/s²], time waited
             [s], and 1 where the order held the driver back.
     """
@@ -111,12 +113,13 @@ def react(
         bound = _bound_by_ego(world, parameters, now, driver, seen[age], ego, after)
         if drivers.shape[0] > 2:
             bound = min(bound, _bound_by_others(world, parameters, now, driver, after))
+        bound = min(bound, _bound_by_lights(world, parameters, now, driver, time))
         ego_clock = ego[0, 4] - world.step if seen[age, ON_PATH] > 0.0 else -np.inf
         target = _hurry_until(world, now, i, ego_clock)
         copy_to(pose, now.pose[i])
         driver = drive_step(world, parameters, driver, pose, bound, target)
         _write_driver(driver, after[i])
-    _enforce(world, now, after)
+    _enforce(world, now, time, after)
 
 
 @kernel(inline=True)
@@ -314,10 +317,35 @@ def _hurry_until(world: World, now: Traffic, i: int, ego_clock: float) -> float:
 
 
 @kernel(inline=True)
-def _enforce(world: World, now: Traffic, after: Floats) -> None:
-    """Advance the clocks as far as the order permits."""
+def _bound_by_lights(
+    world: World, parameters: DriverParameters, now: Traffic, driver: DriverState, time: float
+) -> float:
+    """Return the largest acceleration [m/s²] of a late driver before a light at a time [s].
+
+    It waits at the line if the light is red, or will be when it arrives at its certified speed.
+    """
+    bound = np.inf
+    i = driver.vehicle
+    for r in range(world.reds.shape[1]):
+        line, begin, end = world.reds[i, r]
+        arrival = time + line - driver.clock
+        is_late = driver.clock < min(line, time - 1.5 * world.step)
+        if is_late and time < end and begin <= arrival and min(time, begin) < end:
+            wait = end - time if arrival < end or begin <= time else 0.0
+            bound = min(bound, _bound_by_limit(world, parameters, now, driver, line, wait))
+    return bound
+
+
+@kernel(inline=True)
+def _enforce(world: World, now: Traffic, time: float, after: Floats) -> None:
+    """Advance the clocks as far as the order and red lights permit at the end of a step [s]."""
     begin = now.drivers[:, CLOCK].copy()
     end = after[:, CLOCK].copy()
+    for i in range(end.shape[0]):
+        for r in range(world.reds.shape[1]):
+            line, red, green = world.reds[i, r]
+            if i != world.ego and begin[i] <= line and red <= time + world.step and time < green:
+                end[i] = min(end[i], line)
     enforce_order(world, now.moving, begin, now.passes, end)
     for i in range(after.shape[0]):
         if end[i] < after[i, CLOCK]:

@@ -28,7 +28,7 @@ from scenario_gen.method.validity import first_contacts, Proof
 from scenario_gen.numerics import Floats
 from scenario_gen.numerics.hermite import control_points
 from scenario_gen.numerics.plane import unit
-from scenario_gen.situation import conflict_of, encroachment
+from scenario_gen.situation import conflict_of, encroachment, runs_red
 from scenario_gen.types import Scenario
 
 __all__ = ["Collision", "DriveVerdict", "Reason", "Runner", "judge"]
@@ -106,6 +106,7 @@ class DriveVerdict:
         stood: duration for which the ego stood at the end of the drive.
         terms: terms of nuPlan's and NAVSIM's scores.
         criteria: results of the user's criteria.
+        ran_red: first time at which the ego crossed a stop line at red; NaN if never.
     """
 
     index: int
@@ -134,6 +135,7 @@ class DriveVerdict:
     stood: float
     terms: Terms
     criteria: tuple[CriterionResult, ...] = ()
+    ran_red: float = math.nan
 
     @property
     def missed(self) -> list[CriterionResult]:
@@ -144,11 +146,12 @@ class DriveVerdict:
     def passed(self) -> bool:
         """Whether the ego reached its goal without a jump, a collision or leaving the road.
 
-        A drive that passes also meets all criteria.
+        A drive that passes also runs no red light and meets all criteria.
         """
         return (
             self.collision is None
             and math.isnan(self.off_road)
+            and math.isnan(self.ran_red)
             and not math.isnan(self.goal)
             and not self.jumps
             and not self.missed
@@ -163,7 +166,7 @@ class DriveVerdict:
     def failure(self) -> str:
         """The first that applies; "" if the ego passed.
 
-        One of: jump, collision, off_road, goal, the name of a criterion.
+        One of: jump, collision, off_road, ran_red, goal, the name of a criterion.
         """
         if self.jumps:
             return "jump"
@@ -171,6 +174,8 @@ class DriveVerdict:
             return "collision"
         if not math.isnan(self.off_road):
             return "off_road"
+        if not math.isnan(self.ran_red):
+            return "ran_red"
         if math.isnan(self.goal):
             return "goal"
         return self.missed[0].name if self.missed else ""
@@ -179,8 +184,8 @@ class DriveVerdict:
     def fault(self) -> str:
         """The cause of the failure; "" if the ego passed.
 
-        One of: jump, the reason of a collision, off_road, standing (at the end, before the goal),
-        goal (missed otherwise), the name of a criterion.
+        One of: jump, the reason of a collision, off_road, ran_red, standing (at the end, before the
+        goal), goal (missed otherwise), the name of a criterion.
         """
         if self.collision is not None and not self.jumps:
             return self.collision.reason.value
@@ -191,13 +196,14 @@ class DriveVerdict:
     def severity(self) -> tuple[float, ...]:
         """A key that sorts verdicts, the worst last.
 
-        Collisions by speed, then leaving the road, a missed goal, missed criteria, and the least
-        time to collision.
+        Collisions by speed, then leaving the road, a red light, a missed goal, missed criteria, and
+        the least time to collision.
         """
         hit = self.collision.speed if self.collision else -1.0
         return (
             hit,
             float(not math.isnan(self.off_road)),
+            float(not math.isnan(self.ran_red)),
             float(math.isnan(self.goal)),
             float(len(self.missed)),
             -self.min_ttc,
@@ -217,6 +223,8 @@ class DriveVerdict:
         if not math.isnan(self.off_road):
             depth = f"by {-self.road_margin:.2f} m, {self.off_road_area:.1f} m² of its footprint"
             messages.append(f"left the road at {self.off_road:.2f} s ({depth})")
+        if not math.isnan(self.ran_red):
+            messages.append(f"ran a red light at {self.ran_red:.2f} s")
         if self.jumps:
             messages.append(f"{self.jumps} teleport(s): poses that cannot be reached in a step")
         if math.isnan(self.goal):
@@ -315,7 +323,20 @@ def judge(loop: ClosedLoop, drive: Drive) -> DriveVerdict:
         stood=_stood(motion.speed[drive.ego], config.step),
         terms=terms(drive, hit, not math.isnan(road.time), progress, clearance.ttc_not_behind),
         criteria=tuple(measure(replace(drive, road=loop.road)) for measure in loop.criteria),
+        ran_red=_ran_red(drive),
     )
+
+
+def _ran_red(drive: Drive) -> float:
+    """Return the first time [s] at which the ego crosses a stop line at red; NaN if it never does.
+
+    A jump crosses nothing.
+    """
+    motion, lights = drive.motion.of_vehicles([drive.ego]), drive.motion.facts.lights
+    if lights and drive.driven < len(motion.time):
+        motion = motion.between(0, max(drive.driven - 1, 1))
+    times = [runs_red(motion, 0, light, 0.0) for light in lights]
+    return min((time for time in times if not math.isnan(time)), default=math.nan)
 
 
 def _contacts(drive: Drive) -> dict[tuple[int, int], float]:

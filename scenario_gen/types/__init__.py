@@ -100,6 +100,7 @@ from scenario_gen.types.scenario import (
     with_witness,
 )
 from scenario_gen.types.segmentation import LiveChangepoints, Sample, Segmentation
+from scenario_gen.types.signal_schedule import SignalSchedule, SignalState
 from scenario_gen.types.target import (
     join_pieces,
     Pair,
@@ -111,8 +112,6 @@ from scenario_gen.types.target import (
 )
 from scenario_gen.types.traffic_light import (
     fronts,
-    SignalSchedule,
-    SignalState,
     SignalStop,
     TrafficLight,
 )

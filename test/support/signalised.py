@@ -51,12 +51,13 @@ def signalised(green=13.0, lag=1.4, queue=1, lights=True):
     return pd.DataFrame(rows, columns=COLUMNS)
 
 
-def crossing_map(cycles, stamps=""):
+def crossing_map(cycles, stamps="", queue=1):
     """Return a CommonRoad file with two crossing lanes, their lights, and two vehicles.
 
     Args:
         cycles: states of the two lights, each with its steps of 0.1 s, as in `"green:120 red:80"`.
         stamps: further elements of each light.
+        queue: as in `signalised`.
     """
     lanes, lights, cars = [], [], []
     for k, (ahead, left) in enumerate([((1, 0), (0, 1)), ((0, 1), (-1, 0))]):
@@ -78,7 +79,7 @@ def crossing_map(cycles, stamps=""):
         lights.append(
             f'<trafficLight id="{11 + k}"><cycle>{"".join(texts)}{stamps}</cycle></trafficLight>'
         )
-    table = signalised(lights=False)
+    table = signalised(lights=False, queue=queue)
     for vehicle, rows in table.groupby("vehicle"):
         states = [
             f"<position><point><x>{x}</x><y>{y}</y></point></position><orientation><exact>{yaw}"

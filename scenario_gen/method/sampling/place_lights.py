@@ -62,9 +62,19 @@ def _recorded(
     unknown = SignalSchedule((0.0,), (SignalState.UNKNOWN,), encounter.duration)
     schedules = [shown.get(k, unknown) for k in range(len(lights))]
     return tuple(
-        replace(light, schedule=schedule.between(0.0, encounter.duration))
+        replace(light, schedule=_known_from_start(schedule, encounter))
         for light, schedule in zip(lights, schedules, strict=True)
     )
+
+
+def _known_from_start(schedule: SignalSchedule, encounter: Encounter) -> SignalSchedule:
+    """Return a schedule without a cycle.
+
+    The state at the template's start also holds before: scenarios may begin earlier.
+    """
+    phases = schedule.between(0.0, encounter.duration)
+    first, *others = phases.starts
+    return replace(phases, starts=(min(first, -60.0 * (first <= encounter.dt)), *others))
 
 
 def _with_offset(

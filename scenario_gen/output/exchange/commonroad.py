@@ -27,8 +27,18 @@ from scenario_gen.output.exchange.cases import (
 )
 from scenario_gen.output.exchange.config import ExportConfig
 from scenario_gen.output.exchange.lanes import LaneMap, SIGN_IDS
+from scenario_gen.output.exchange.lights import light_of, runs_of_states
 from scenario_gen.output.exchange.xml import add, comment, date_of, Element, number, serialized
-from scenario_gen.types import DRIVERS, Lane, LaneNetwork, Obstacle, Scenario, Vehicle
+from scenario_gen.types import (
+    DRIVERS,
+    Lane,
+    LaneNetwork,
+    Obstacle,
+    Scenario,
+    SignalState,
+    TrafficLight,
+    Vehicle,
+)
 
 FIRST_OBSTACLE_ID = 100_000  # the ids of lanelets start from 1
 FIRST_PROBLEM_ID = 200_000
@@ -38,6 +48,12 @@ FIRST_STATIC_ID = 500_000
 MAX_SPEED = "274"
 MAX_GOAL_HEADING_ERROR_RAD = 0.3
 AUTHOR = "scenario_gen"
+_COLOURS = {
+    SignalState.GREEN: "green",
+    SignalState.YELLOW: "yellow",
+    SignalState.RED: "red",
+    SignalState.RED_YELLOW: "redYellow",
+}
 _EXCLUSIVE_TYPES = {  # types of lanelets with one type of users
     "bicycleLane": frozenset(("bicycle",)),
     "busLane": frozenset(("bus",)),
@@ -72,11 +88,11 @@ def write_commonroad(
     step = float(np.round(scenario.time[1] - scenario.time[0], 9))
     root = _header(case, exported, step)
     lane_map = case.lane_map
-    signs = _signs(lane_map.network)
+    signs = _signs(lane_map.network, scenario)
     for k in range(len(lane_map.network.lanes)):
         _lanelet(root, lane_map, k, [sign for sign in signs if k in sign.lanes])
     for sign in signs:
-        _sign(root, sign)
+        _sign(root, sign, scenario)
     _intersection(root, lane_map)
     for n, obstacle in enumerate(lane_map.network.obstacles):
         _static_obstacle(root, obstacle, n)
@@ -161,7 +177,7 @@ def _point(parent: Element, x: float, y: float, tag: str = "point") -> None:
 class _Sign:
     """A sign or a light with its lanes; `line` (K, 2) [m] is its stop line.
 
-    `number` is the traffic sign's number, "" for a light.
+    `number` is the traffic sign's number, "" for a light, whose states are `light`'s, if known.
     """
 
     id: int
@@ -169,6 +185,7 @@ class _Sign:
     number: str
     value: str = ""
     line: Floats = field(default_factory=lambda: np.zeros((0, 2)))
+    light: TrafficLight | None = None
 
     @property
     def tag(self) -> str:
@@ -176,18 +193,25 @@ class _Sign:
         return "trafficSignRef" if self.number else "trafficLightRef"
 
 
-def _signs(network: LaneNetwork) -> list[_Sign]:
+def _signs(network: LaneNetwork, scenario: Scenario) -> list[_Sign]:
     """Return the signs of a road, one sign per speed limit, and its lights."""
     limits: dict[float, set[int]] = {}
     for k, lane in enumerate(network.lanes):
         if lane.speed_limit > 0.0:
             limits.setdefault(lane.speed_limit, set()).add(k)
+    lights = scenario.facts.lights
     signs = [
-        (frozenset(rule.lanes), SIGN_IDS.get(rule.kind, ""), "", rule.line)
+        (
+            frozenset(rule.lanes),
+            SIGN_IDS.get(rule.kind, ""),
+            "",
+            rule.line,
+            light_of(rule, network, lights),
+        )
         for rule in network.rules
     ]
     signs += [
-        (frozenset(lanes), MAX_SPEED, number(limit), np.zeros((0, 2)))
+        (frozenset(lanes), MAX_SPEED, number(limit), np.zeros((0, 2)), None)
         for limit, lanes in limits.items()
     ]
     return sorted(
@@ -196,17 +220,22 @@ def _signs(network: LaneNetwork) -> list[_Sign]:
     )
 
 
-def _sign(root: Element, sign: _Sign) -> None:
-    """Append a sign, or an inactive light, as its states are unknown."""
+def _sign(root: Element, sign: _Sign, scenario: Scenario) -> None:
+    """Append a sign, or a light with its states at the steps; unknown ones are inactive."""
     if sign.number:
         element = add(add(root, "trafficSign", id=sign.id), "trafficSignElement")
         add(element, "trafficSignID", sign.number)
         if sign.value:
             add(element, "additionalValue", sign.value)
         return
-    state = add(add(root, "trafficLight", id=sign.id), "cycle/cycleElement")
-    add(state, "duration", 1)
-    add(state, "color", "inactive")
+    cycle = add(add(root, "trafficLight", id=sign.id), "cycle")
+    phases = [(SignalState.OFF, 1)]
+    if sign.light is not None:
+        phases = runs_of_states(sign.light.schedule, scenario)
+    for state, steps in phases:
+        element = add(cycle, "cycleElement")
+        add(element, "duration", steps)
+        add(element, "color", _COLOURS.get(state, "inactive"))
 
 
 def _lanelet(root: Element, lane_map: LaneMap, k: int, signs: Sequence[_Sign]) -> None:

@@ -23,17 +23,26 @@ from scenario_gen.numerics.plane import edge_lengths, unit
 from scenario_gen.output.exchange.cases import Case, evenly_sampled, Exported
 from scenario_gen.output.exchange.config import ExportConfig
 from scenario_gen.output.exchange.lanes import LaneMap
+from scenario_gen.output.exchange.lights import light_of, states_at
 from scenario_gen.types import (
     DRIVERS,
     height,
     Obstacle,
     OBSTACLE_HEIGHT_M,
     Scenario,
+    SignalState,
     Vehicle,
 )
 
 VERSION = "MetaDrive v0.4.3"  # of the description, not of the simulator
 DATASET = "scenario_gen"
+_UNKNOWN = "TRAFFIC_LIGHT_UNKNOWN"
+_STATES = {
+    SignalState.GREEN: "TRAFFIC_LIGHT_GREEN",
+    SignalState.YELLOW: "TRAFFIC_LIGHT_YELLOW",
+    SignalState.RED: "TRAFFIC_LIGHT_RED",
+    SignalState.RED_YELLOW: "TRAFFIC_LIGHT_RED",
+}
 SUMMARY_FILE = "dataset_summary.pkl"
 MAPPING_FILE = "dataset_mapping.pkl"
 
@@ -60,7 +69,7 @@ def description(case: Case, exported: Exported, export: ExportConfig) -> dict[st
     summaries = {name: _summary(name, track) for name, track in tracks.items()}
     ego = exported.ego.vehicles[0] if exported.ego is not None else motion.vehicles[0]
     name = f"case_{case.number}_{exported.index}"
-    metadata = {
+    metadata: dict[str, Any] = {
         "id": name,
         "scenario_id": name,
         "dataset": DATASET,
@@ -78,15 +87,49 @@ def description(case: Case, exported: Exported, export: ExportConfig) -> dict[st
         "number_summary": _counts(summaries),
     }
     lanes = range(len(case.lane_map.network.lanes))
+    lights = _lights(case.lane_map, motion)
+    if lights:
+        metadata["number_summary"] |= {
+            "num_traffic_lights": len(lights),
+            "num_traffic_light_types": sorted(
+                {state for light in lights.values() for state in light["state"]["object_state"]}
+            ),
+            "num_traffic_lights_each_step": dict.fromkeys(range(len(motion.time)), len(lights)),
+        }
     return {
         "id": name,
         "version": VERSION,
         "length": len(motion.time),
         "metadata": metadata,
         "tracks": tracks,
-        "dynamic_map_states": {},
+        "dynamic_map_states": lights,
         "map_features": {str(k + 1): _map_feature(case.lane_map, k) for k in lanes},
     }
+
+
+def _lights(lane_map: LaneMap, motion: Scenario) -> dict[str, dict[str, Any]]:
+    """Return the states of the lights at each step, by the id of their lane in the file."""
+    network, lights = lane_map.network, {}
+    for rule in network.rules:
+        light = light_of(rule, network, motion.facts.lights)
+        for k in rule.lanes if light is not None else ():
+            assert light is not None
+            states = states_at(light.schedule, motion.time)
+            lane = str(k + 1)
+            lights[lane] = {
+                "type": "TRAFFIC_LIGHT",
+                "state": {"object_state": [_STATES.get(state, _UNKNOWN) for state in states]},
+                "lane": lane,
+                "stop_point": np.array([*network.lanes[k].centre[-1], 0.0], dtype=np.float32),
+                "metadata": {
+                    "type": "TRAFFIC_LIGHT",
+                    "object_id": light.id,
+                    "lane_id": lane,
+                    "track_length": len(motion.time),
+                    "dataset": DATASET,
+                },
+            }
+    return lights
 
 
 def _track(motion: Scenario, n: int, vehicle: Vehicle) -> dict[str, Any]:

@@ -177,7 +177,13 @@ def _trajectories(
         "durations": [_short(scenario.time[-1]) for scenario in scenarios],
         "index": [scenario.index for scenario in scenarios],
         "outcome": ["; ".join(map(str, each.facts.passing_order)) for each in scenarios],
-    }
+    } | lights_of_all(scenarios)
+
+
+def lights_of_all(scenarios: Sequence[Scenario]) -> dict[str, Any]:
+    """Return the traffic lights of each scenario; nothing if no states are known."""
+    lights = [[light.document() for light in each.facts.lights] for each in scenarios]
+    return {"lights": lights} if any(lights) else {}
 
 
 def _presence(source: Encounter | Scenario, ids: Sequence[str]) -> list[list[float]]:

@@ -49,6 +49,7 @@ function draw() {
   const time = share * duration;
   const context = view.begin();
   view.road(all.roads[drive.road], pictures[drive.road]);
+  view.lights(motion.lights[0], time);
   context.globalAlpha = 0.9;
   context.lineWidth = 1;
   context.strokeStyle = themed("ink");

@@ -248,6 +248,7 @@ class Player {
     this.drawRecord(share);
     const context = view.begin();
     view.road(data.road, this.picture);
+    view.lights(set.lights[sample], this.time);
     const ghosts = this.find("ghosts").checked;
     data.vehicles.forEach((vehicle, n) => {
       context.globalAlpha = 0.35;

@@ -7,6 +7,7 @@ const PRIMITIVE_COLOURS = ["#4e79a7", "#f28e2b", "#59a14f", "#e15759", "#b07aa1"
 const PAINT = {
   edge: [0.15], lane: [0.12, 3, 4.5], centre: [0.15, 3, 1.5], stop: [0.5], give_way: [0.4, 0.6, 0.4], arrow: [0], zebra: [0.5], obstacle: [0],
 };
+const LIGHT_COLOURS = { green: "#16a34a", yellow: "#eab308", red: "#dc2626", red_yellow: "#f97316" };
 const vehicleColour = (n) => VEHICLE_COLOURS[n % VEHICLE_COLOURS.length];
 const isEgo = (data, n) => data.left_out.includes(n);
 const primitiveColour = (label) => PRIMITIVE_COLOURS[label % PRIMITIVE_COLOURS.length];
@@ -33,6 +34,7 @@ class Trajectories {
     this.index = packed.index || [0];
     this.outcome = packed.outcome || [""];
     this.shown = this.index.map((_, k) => k); // the samples that are drawn together
+    this.lights = packed.lights || []; // of each sample
   }
 
   offset(sample, vehicle, frame) {
@@ -172,6 +174,17 @@ class View {
     this.context.globalAlpha = 1;
     this.context.strokeStyle = this.context.fillStyle = themed("lane");
     Object.entries(road.markings).forEach(([kind, lines]) => this.lines(lines, ...PAINT[kind]));
+  }
+
+  /** Draw the stop lines of traffic lights in the colours that they show at a time. */
+  lights(lights, time) {
+    (lights || []).forEach(({ line, starts, states, end, repeats }) => {
+      const [first, period] = [starts[0], end - starts[0]];
+      const at = repeats ? first + ((((time - first) % period) + period) % period) : time;
+      const state = at < end ? states[starts.filter((start) => start <= at).length - 1] : undefined;
+      this.context.strokeStyle = LIGHT_COLOURS[state] || themed("soft");
+      this.lines([line.flat()], 0.7);
+    });
   }
 
   /** Draw lines, each x, y, x, y … in metres, so many metres wide, with dashes and gaps of so many metres; or fill them. */
