@@ -4,7 +4,9 @@
 """The situation: everything that is derived from a recorded encounter, without a road."""
 
 from scenario_gen.situation.abreast import (
+    Abreast,
     abreast_in_lane,
+    MAX_CLEARANCE_CHANGE_M,
     MAX_SIDE_OFFSET_M,
     MIN_SIDE_BY_SIDE_S,
     path_offsets,
@@ -66,6 +68,7 @@ from scenario_gen.situation.traffic_side import mirrored, traffic_side
 from scenario_gen.situation.waits import find_waits, STANDSTILL_SPEED_MPS, Wait, WAIT_SPEED_MPS
 
 __all__ = [
+    "MAX_CLEARANCE_CHANGE_M",
     "MAX_SAMPLES",
     "MAX_SIDE_OFFSET_M",
     "MAX_TURN_CHANGE_RAD",
@@ -75,6 +78,7 @@ __all__ = [
     "SAME_DIRECTION_RAD",
     "STANDSTILL_SPEED_MPS",
     "WAIT_SPEED_MPS",
+    "Abreast",
     "Conflict",
     "EncounterKind",
     "Equation",

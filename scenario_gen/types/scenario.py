@@ -147,6 +147,7 @@ class Cause(StrEnum):
     REACTION = (
         "reaction"  # who reacts in the template goes too early, too late, or at another distance
     )
+    SIDE_CLEARANCE = "side_clearance"  # who shares a lane side by side is nearer or farther
     CONFLICT_LOST = (
         "conflict_lost"  # the stretch in which all are there leaves out a conflict of the template
     )

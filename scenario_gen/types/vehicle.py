@@ -56,6 +56,11 @@ class Vehicle:
         return f"{'vehicle' if self.type in (CAR, OTHER) else self.type} {self.id}"
 
     @property
+    def is_narrow(self) -> bool:
+        """Whether it is as narrow as a two-wheeler, which shares lanes."""
+        return self.width <= 1.2
+
+    @property
     def half(self) -> tuple[float, float]:
         """Half its length and half its width [m]."""
         return 0.5 * self.length, 0.5 * self.width

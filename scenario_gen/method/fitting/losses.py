@@ -16,6 +16,7 @@ from scenario_gen.situation import (
     abreast_in_lane,
     describe_turn,
     is_same_turn,
+    MAX_CLEARANCE_CHANGE_M,
     MAX_SIDE_OFFSET_M,
     MIN_SIDE_BY_SIDE_S,
     path_offsets,
@@ -53,7 +54,6 @@ class _Limits:
 
     min_kept_share: float = 0.5  # of the time side by side
     min_side_offset_m: float = 1.0  # between centres of vehicles side by side,
-    max_clearance_change_m: float = 0.3  # of vehicles side by side in one lane
     lane_width_difference_m: float = 1.5  # between recorded lanes and those of the road
     in_lane_m: float = 1.4  # offset up to which a vehicle is in another one's lane,
     in_lane_on_road_m: float = 2.0
@@ -333,7 +333,7 @@ def _lost_clearances(tracks: Tracks, placed: Tracks) -> Iterator[Loss]:
         if not np.isfinite(offsets).any():
             continue
         change = abs(float(np.nanmedian(offsets))) - abs(abreast.offset)
-        if abs(change) > _LIMITS.max_clearance_change_m:
+        if abs(change) > MAX_CLEARANCE_CHANGE_M:
             a, b = first.vehicle.id, second.vehicle.id
             message = (
                 f"vehicle {b} drives {abreast.clearance:.1f} m beside vehicle {a} in the "

@@ -140,6 +140,10 @@ def _band(task: VehicleTask, weights: Floats, guess: Guess, points: Floats, disc
     cover = float(np.hypot(0.5 * vehicle.width, 0.5 * vehicle.length / DISCS_COUNT))
     spacing = path_length(points) / (len(points) - 1)
     anchor, pull = _anchors_of(points, task.anchors[weights > 0.0, :2], weights[weights > 0.0])
+    wish = cover + task.config.margin
+    if vehicle.is_narrow and len(task.fitted.path):  # a bicycle rides near the edge on purpose
+        on_path = float(np.median(_clearance_along(task, task.fitted.path[:, :2], disc)))
+        wish = min(wish, max(on_path, cover))
     return Band(
         field=road.clearance,
         resolution=road.resolution,
@@ -150,7 +154,7 @@ def _band(task: VehicleTask, weights: Floats, guess: Guess, points: Floats, disc
         yaws=task.anchors[[0, -1], 2],
         disc=disc,
         required=np.minimum(_clearance_along(task, guess.points, disc), cover),
-        wish=_wanted_clearance(task, disc, cover + task.config.margin, spacing, len(points)),
+        wish=_wanted_clearance(task, disc, wish, spacing, len(points)),
         spacing=spacing,
         max_curvature=task.max_curvature,
     )

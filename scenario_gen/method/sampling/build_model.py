@@ -33,7 +33,7 @@ from scenario_gen.method.sampling.variation import Variation, VehicleClock
 from scenario_gen.method.sampling.vehicle_model import VehicleModel
 from scenario_gen.numerics import Bools, Floats
 from scenario_gen.roads import ground_for
-from scenario_gen.situation import abreast_in_lane, Situation, Wait
+from scenario_gen.situation import Situation, Wait
 from scenario_gen.types import FOLLOW, Note, NoteKind, Reaction, ReactionGraph, Road
 
 
@@ -94,7 +94,7 @@ def build_model(plan: Plan, config: SamplingConfig, order: str = "keep") -> Buil
     stretch = _feasible_stretch(routed, clock.clock, config)
     if stretch.means is None:
         return BuiltModel(None, refusal=stretch.refusal)
-    abreast = {n for each in abreast_in_lane(plan.situation.tracks) for n in each.pair}
+    abreast = {n for each in plan.abreast for n in each.pair}
     vehicles = [
         _vehicle_model(each, plan.road, mean, config, shares_lane=n in abreast)
         for n, (each, mean) in enumerate(zip(routed, stretch.means, strict=True))

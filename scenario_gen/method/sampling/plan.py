@@ -9,11 +9,18 @@ from dataclasses import dataclass
 from scenario_gen.method.sampling.config import SamplingConfig
 from scenario_gen.method.sampling.variation import relaxed_states
 from scenario_gen.method.validity import Limits
-from scenario_gen.situation import Situation, Wait
+from scenario_gen.situation import (
+    Abreast,
+    abreast_in_lane,
+    MAX_CLEARANCE_CHANGE_M,
+    Situation,
+    Wait,
+)
 from scenario_gen.types import (
     BoundaryStates,
     EgoSlot,
     Encounter,
+    Fit,
     GenerationResult,
     Request,
     Road,
@@ -41,6 +48,7 @@ class Plan:
         requested: start and end states; their speeds are met exactly.
         waits: when a vehicle stands, on the template's clock.
         limits: of the checker; speeds are planned within those of motion.
+        abreast: who shares a lane side by side, at the offset that scenarios keep.
     """
 
     situation: Situation
@@ -50,6 +58,7 @@ class Plan:
     requested: BoundaryStates
     waits: Sequence[Wait]
     limits: Limits = Limits()
+    abreast: Sequence[Abreast] = ()
 
     @classmethod
     def of(
@@ -79,12 +88,30 @@ class Plan:
         states = relaxed_states(fit.requested, situation, config, request)
         if waits is None:
             waits = situation.waits_to_keep(planned.segmentation)
-        return cls(situation, planned.segmentation, road, planned.routes, states, waits, limits)
+        abreast = [_placed_abreast(each, fit) for each in abreast_in_lane(situation.tracks)]
+        return cls(
+            situation, planned.segmentation, road, planned.routes, states, waits, limits, abreast
+        )
 
     @property
     def encounter(self) -> Encounter:
         """The template."""
         return self.situation.encounter
+
+
+def _placed_abreast(abreast: Abreast, fit: Fit) -> Abreast:
+    """Return a pair side by side, at its offset on the road where the recorded one is lost.
+
+    Such a loss is reported by the fit, with both clearances.
+    """
+    first, second = (fit.fitted[n].path for n in abreast.pair)
+    offset = abreast.offset_on(first, second)
+    change = abs(offset) - abs(abreast.offset)
+    pair = {fit.vehicles[n].id for n in abreast.pair}
+    is_lost = any(pair == set(loss.vehicles) for loss in fit.losses)
+    if not (is_lost and abs(change) > MAX_CLEARANCE_CHANGE_M):  # true for NaN
+        return abreast
+    return abreast._replace(offset=offset, clearance=abreast.clearance + change)
 
 
 @dataclass(frozen=True)

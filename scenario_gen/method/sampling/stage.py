@@ -76,6 +76,7 @@ def checker_of(plan: Plan, sampling: SamplingConfig, limits: Limits, request: Re
         RefusedError: an order is to be swapped, and there is none.
     """
     edges = kept_reactions(plan.situation, sampling, request.order).edges
-    return Checker.of_template(
+    checker = Checker.of_template(
         plan.situation, plan.road, plan.requested, plan.waits, limits, request.order, edges
     )
+    return replace(checker, abreast=plan.abreast)

@@ -16,6 +16,7 @@ from scenario_gen.method.validity.lights import light_violations
 from scenario_gen.method.validity.limits import Limits
 from scenario_gen.method.validity.reactions import broken_reactions, tailgaters
 from scenario_gen.method.validity.template_checks import (
+    clearance_violations,
     order_violations,
     presence_violations,
     state_violations,
@@ -25,6 +26,7 @@ from scenario_gen.numerics import Bools, Floats
 from scenario_gen.numerics.hermite import control_points
 from scenario_gen.roads import drives_against, ground_for, RuleCheck
 from scenario_gen.situation import (
+    Abreast,
     Conflict,
     conflicts_by_pair,
     find_conflicts,
@@ -78,6 +80,7 @@ class Checker:
             are not known.
         stops: the template's stops for lights.
         at_red: vehicles that cross a line at red in the template, and so may do it.
+        abreast: who shares a lane side by side, at the offset that is kept.
 
     Examples:
         >>> import scenario_gen as sg
@@ -97,6 +100,7 @@ class Checker:
     lane_gaps: LaneGaps | None = None
     stops: Sequence[SignalStop] = ()
     at_red: Collection[int] = ()
+    abreast: Sequence[Abreast] = ()
 
     def __post_init__(self) -> None:
         recorded = tuple(conflict.first for conflict in self.conflicts or ())
@@ -195,6 +199,7 @@ class Checker:
             *wait_violations(scenario, self.waits or (), self.requested, self._limits),
             *order_violations(recorded, self._first, conflicts),
             *broken_reactions(scenario, conflicts, self.reactions, self._limits, gaps),
+            *clearance_violations(scenario, self.abreast),
             *self._tailgaters(scenario, gaps),
         )
         return Verdict(violations, present, len(recorded) - present)

@@ -10,7 +10,7 @@ import numpy as np
 from scenario_gen.method.validity.limits import Limits
 from scenario_gen.numerics import Bools, runs
 from scenario_gen.numerics.plane import edge_lengths
-from scenario_gen.situation import Conflict, Wait
+from scenario_gen.situation import Abreast, Conflict, MAX_CLEARANCE_CHANGE_M, Wait
 from scenario_gen.types import at_ends, BoundaryStates, Cause, Scenario, Violation
 
 _ROUNDING_M = 1e-9  # and m/s, s
@@ -105,6 +105,24 @@ def order_violations(
             )
             pair = (conflict.first, conflict.second)
             yield Violation(Cause.PASSING_ORDER, conflict.entry_first, pair, message)
+
+
+def clearance_violations(scenario: Scenario, abreast: Sequence[Abreast]) -> Iterator[Violation]:
+    """Yield the pairs side by side in one lane that are nearer, farther or on the other side.
+
+    A pair is not compared where it hardly shares a lane.
+    """
+    for each in abreast:
+        a, b = each.pair
+        first, second = (scenario.poses[n][scenario.is_present[n]] for n in each.pair)
+        change = (each.offset_on(first, second) - each.offset) * np.sign(each.offset)
+        if abs(change) > MAX_CLEARANCE_CHANGE_M:  # NaN passes
+            message = (
+                f"vehicle {b}: drives {each.clearance + change:.2f} m beside vehicle {a}; "
+                f"{each.clearance:.2f} ± {MAX_CLEARANCE_CHANGE_M:g} m is allowed"
+            )
+            time = float(scenario.time[scenario.present[b, 0]])
+            yield Violation(Cause.SIDE_CLEARANCE, time, each.pair, message)
 
 
 def wait_violations(

@@ -8,10 +8,11 @@ from functools import cached_property, lru_cache
 import math
 
 import numpy as np
+from scipy.spatial import KDTree
 
-from scenario_gen.numerics import Floats, wrap_angle
+from scenario_gen.numerics import Bools, Floats, wrap_angle
 from scenario_gen.numerics.curve import crossings, Curve
-from scenario_gen.numerics.plane import edge_lengths
+from scenario_gen.numerics.plane import ahead_and_left, edge_lengths
 from scenario_gen.roads.vector.lane_field import LaneField
 from scenario_gen.roads.vector.network import crossing_lanes
 from scenario_gen.situation import Track
@@ -38,6 +39,7 @@ class LaneGraph:
         points: (P, 2) [m] on the centre lines of all lanes.
         yaws: (P,) [rad] directions of the lanes at these points.
         height: (P,) [m], NaN where it is not known.
+        half_width: (P,) [m] of the lanes at these points.
         lane_of: (P,) the lane that each point is on.
     """
 
@@ -48,6 +50,8 @@ class LaneGraph:
         self.points = np.concatenate([lane.centre[:-1] for lane in lanes])
         self.yaws = np.concatenate([lane.yaw for lane in lanes])
         self.height = np.concatenate([lane.height[:-1] for lane in lanes])
+        borders = np.concatenate([(lane.left - lane.right)[:-1] for lane in lanes])
+        self.half_width = np.hypot(*borders.T) / 2.0
         self.lane_of = np.repeat(np.arange(len(lanes)), [len(lane.yaw) for lane in lanes])
         self._curves: dict[LaneChain, Curve] = {}
         self._closed: dict[frozenset[str], frozenset[int]] = {}
@@ -72,6 +76,17 @@ class LaneGraph:
                 points += [first[None, :2], first[None, :2]]
                 yaws += [np.array([[first[2], second[2]]]), np.array([[second[2], first[2]]])]
         return np.concatenate(points), np.concatenate(yaws)
+
+    @cached_property
+    def _nearest(self) -> KDTree:
+        """The points for queries of the nearest one."""
+        return KDTree(self.points)
+
+    def covers(self, places: Floats) -> Bools:
+        """Return whether each place (M, 2) [m] lies in the lane with the nearest centre line."""
+        k = self._nearest.query(places)[1]
+        _, left = ahead_and_left(places - self.points[k], self.yaws[k])
+        return np.asarray(np.abs(left) <= self.half_width[k])
 
     def curve(self, chain: LaneChain) -> Curve:
         """Return the smoothed centre line of a chain of lanes."""

@@ -32,6 +32,8 @@ class MatchCosts:
     comfortable_lateral_mps2: float = 3.0
     max_lateral_excess_mps2: float = 10.0  # that costs
     lane_change_gain_m2: float = 1.5  # that justifies a lane change
+    narrow_m2_per_m: float = 30.0  # of side distance for which a lane is too narrow,
+    max_missing_m: float = 0.5  # up to this
 
 
 @dataclass(frozen=True)

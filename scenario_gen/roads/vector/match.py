@@ -121,9 +121,14 @@ def match(
             yield Match((), math.inf, reason)
             return
         paths.append(path)
-    paths = with_lateral_positions(graph, paths, tuple(tracks))
+    paths, missing = with_lateral_positions(graph, paths, tuple(tracks))
+    narrow_cost = COSTS.narrow_m2_per_m * min(missing, COSTS.max_missing_m)
     yield _judged(
-        graph, _moved_starts(graph.network, paths, tracks, met, scale, []), tracks, placement
+        graph,
+        _moved_starts(graph.network, paths, tracks, met, scale, []),
+        tracks,
+        placement,
+        narrow_cost,
     )
     turning = [
         Equation(((i, 1.0),), start, WEIGHTS.turn)
@@ -136,6 +141,7 @@ def match(
             _moved_starts(graph.network, paths, tracks, met, scale, turning),
             tracks,
             placement,
+            narrow_cost,
         )
 
 
@@ -399,10 +405,10 @@ def _judged(
     paths: Sequence[LanePath],
     tracks: Sequence[Track],
     placement: RigidPlacement,
+    cost: float,
 ) -> Match:
-    """Return the match of lane paths, with its cost and the reason against it."""
+    """Return the match of lane paths, with a further cost, and the reason against it."""
     driven = list(zip(paths, tracks, strict=True))
-    cost = 0.0
     for path, track in driven:
         cost += _resemblance_cost(path, _placed_poses(track, placement)) / len(tracks)
     for a, b, crossing in pair_crossings(tracks):

@@ -13,10 +13,15 @@ from support.textbook_motions import driven, line, ramps
 from scenario_gen import generate
 from scenario_gen.method.fitting import fit_template
 from scenario_gen.method.fitting.losses import LostEncounterError
+from scenario_gen.method.sampling import SamplingConfig
+from scenario_gen.method.sampling.plan import Plan
+from scenario_gen.method.sampling.stage import checker_of
 from scenario_gen.method.segmentation import segment
+from scenario_gen.method.validity import Limits
+from scenario_gen.numerics.plane import unit_left
 from scenario_gen.roads import build_road
 from scenario_gen.situation import abreast_in_lane, clean_tracks, path_offsets
-from scenario_gen.types import Encounter, Vehicle
+from scenario_gen.types import Cause, Encounter, Request, Vehicle
 
 
 def right_hook(gap: float = 2.55) -> Encounter:
@@ -63,8 +68,28 @@ def test_a_car_beside_a_bicycle_keeps_its_distance(tmp_path) -> None:
         assert side_distance(made) == pytest.approx(2.55, abs=0.3)
 
 
+def test_scenarios_that_lose_the_distance_are_refused(tmp_path) -> None:
+    encounter = right_hook()
+    result = generate(encounter, "four_way", count=2, seed=1)
+    assert not [loss for loss in result.fit.losses if loss.kind != "arm"]
+    plan = Plan.of(result, SamplingConfig(), Limits(), Request())
+    check = checker_of(plan, SamplingConfig(), Limits(), Request()).check
+    scenario = result[0]
+    assert check([scenario])[0].valid
+    left = unit_left(scenario.heading[1])
+    for shift in (0.6, -0.6):
+        position = scenario.position.copy()
+        position[1] += shift * left
+        causes = [
+            each.cause for each in check([replace(scenario, position=position)])[0].violations
+        ]
+        assert Cause.SIDE_CLEARANCE in causes
+
+
 def test_a_lane_too_narrow_for_the_distance_is_refused(tmp_path) -> None:
     encounter = right_hook(2.95)
+    car, bicycle = encounter.vehicles
+    encounter = replace(encounter, vehicles=(replace(car, width=2.5), bicycle))
     road = build_road(str(write(tmp_path, ".xodr")), encounter)
-    with pytest.raises(LostEncounterError, match=r"drives 1.7 m beside vehicle a in the record"):
+    with pytest.raises(LostEncounterError, match=r"drives 1.4 m beside vehicle a in the record"):
         fit_template(encounter, segment(encounter), road)
