@@ -17,11 +17,12 @@ import numpy as np
 from scenario_gen.closed_loop.drive import Drive
 from scenario_gen.method.validity import first_exits, Ground, Proof
 from scenario_gen.numerics import Bools, Floats, frozen
+from scenario_gen.numerics.boxes import footprint_gaps
 from scenario_gen.numerics.hermite import control_points
 from scenario_gen.numerics.kernels import B2, F, F2, kernel, OUT2
 from scenario_gen.numerics.plane import edge_lengths
 from scenario_gen.roads import footprint_fits, to_cells
-from scenario_gen.types import Motion, Road
+from scenario_gen.types import Motion, Obstacle, Road
 from scenario_gen.types.road import MAX_DEPTH_M
 
 POSE_SPACING_M = 0.05
@@ -85,10 +86,41 @@ def _excursion(road: Road, motion: Motion, limit: float) -> RoadUse:
     return RoadUse(-deepest, largest_area, begin)
 
 
+def first_obstacle(drive: Drive, road: Road | None) -> tuple[float, Obstacle] | None:
+    """Return when a drive first touches an obstacle [s], and which; None if it touches none.
+
+    The drive is measured up to its first jump, at poses as close together as in `road_use`.
+    """
+    if road is None or not road.obstacles or drive.driven < 2:
+        return None
+    motion = drive.motion.select([drive.ego], 0, drive.driven - 1)
+    for k in range(len(motion.time) - 1):
+        poses = _poses_in(motion, k, _pose_count(motion, k))
+        touches = _touches(road, poses, motion.vehicles[0].half)
+        if touches.any():
+            instant, obstacle = np.argwhere(touches)[0].tolist()
+            share = instant / (len(poses) - 1)
+            time = motion.time[k] + share * (motion.time[k + 1] - motion.time[k])
+            return float(time), road.obstacles[obstacle]
+    return None
+
+
+def _touches(road: Road, poses: Floats, half: tuple[float, float]) -> Bools:
+    """Return (P, K) whether a footprint at poses (P, 3) overlaps each obstacle of a road."""
+    touches = np.zeros((len(poses), len(road.obstacles)), dtype=np.bool_)
+    for k, obstacle in enumerate(road.obstacles):
+        place = np.tile(obstacle[:3], (len(poses), 1))
+        size = (obstacle.length / 2.0, obstacle.width / 2.0)
+        touches[:, k] = footprint_gaps(half, poses, size, place)[0] < 0.0
+    return touches
+
+
 def is_off_road(road: Road, pose: Floats, half: tuple[float, float], limit: float) -> bool:
-    """Whether a footprint at a pose (3,) is off the road, as in `road_use`."""
+    """Whether a footprint at a pose (3,) is off the road, as in `road_use`, or in an obstacle."""
     if footprint_fits(road, pose, 2.0 * half[0], 2.0 * half[1])[0]:
         return False
+    if _touches(road, pose[None], half).any():
+        return True
     depth, _ = _depths_and_areas(road, pose[None], half)
     return bool(depth[0] >= limit)
 

@@ -20,7 +20,12 @@ from scenario_gen.closed_loop.fault import (
     Runner,
     STANDSTILL_MPS,
 )
-from scenario_gen.closed_loop.off_road import RESOLUTION_S, road_use, SUBSTEPS_COUNT
+from scenario_gen.closed_loop.off_road import (
+    first_obstacle,
+    RESOLUTION_S,
+    road_use,
+    SUBSTEPS_COUNT,
+)
 from scenario_gen.closed_loop.score import not_behind, Terms, terms
 from scenario_gen.closed_loop.simulation import ClosedLoop
 from scenario_gen.method.evaluation import distance_and_ttc, footprint_distance
@@ -34,6 +39,7 @@ from scenario_gen.types import Scenario
 __all__ = ["Collision", "DriveVerdict", "Reason", "Runner", "judge"]
 
 JERK_WINDOW_S = 0.5
+CELL_S = 0.5  # an obstacle is touched so much later than the cells that it closes, at most
 MIN_STANDSTILL_S = 5.0  # an ego that stood so long at the end missed its goal for that reason
 
 
@@ -80,8 +86,9 @@ class DriveVerdict:
         ego: id of the vehicle that the ego replaced.
         duration: duration of the drive.
         collision: first contact with another vehicle; None without a contact.
-        off_road: first time at which the footprint was `off_road_depth` outside the drivable area;
-            NaN if never, or if no road is known.
+        off_road: first time at which the footprint was `off_road_depth` outside the drivable area
+            or touched an obstacle; NaN if never, or if no road is known.
+        obstacle: the obstacle that it touched then, "" if none.
         goal: time at the goal; NaN if the ego never reached it.
         delay: delay at the goal with respect to the witness.
         min_ttc: least time to collision, at most the horizon; 0 at a contact.
@@ -115,6 +122,7 @@ class DriveVerdict:
     duration: float
     collision: Collision | None
     off_road: float
+    obstacle: str
     goal: float
     delay: float
     min_ttc: float
@@ -184,11 +192,13 @@ class DriveVerdict:
     def fault(self) -> str:
         """The cause of the failure; "" if the ego passed.
 
-        One of: jump, the reason of a collision, off_road, ran_red, standing (at the end, before the
-        goal), goal (missed otherwise), the name of a criterion.
+        One of: jump, the reason of a collision, off_road, obstacle, ran_red, standing (at the end,
+        before the goal), goal (missed otherwise), the name of a criterion.
         """
         if self.collision is not None and not self.jumps:
             return self.collision.reason.value
+        if self.failure == "off_road" and self.obstacle:
+            return "obstacle"
         stands = self.failure == "goal" and self.stood >= MIN_STANDSTILL_S
         return "standing" if stands else self.failure
 
@@ -222,7 +232,8 @@ class DriveVerdict:
             messages.append(f"{words} at {hit.time:.2f} s and {hit.speed:.1f} m/s ({hit.why})")
         if not math.isnan(self.off_road):
             depth = f"by {-self.road_margin:.2f} m, {self.off_road_area:.1f} m² of its footprint"
-            messages.append(f"left the road at {self.off_road:.2f} s ({depth})")
+            event = f"ran into obstacle `{self.obstacle}`" if self.obstacle else "left the road"
+            messages.append(f"{event} at {self.off_road:.2f} s ({depth})")
         if not math.isnan(self.ran_red):
             messages.append(f"ran a red light at {self.ran_red:.2f} s")
         if self.jumps:
@@ -296,13 +307,18 @@ def judge(loop: ClosedLoop, drive: Drive) -> DriveVerdict:
     braking = np.maximum(-drive.accelerations, 0.0)
     hard_braking_count = int(np.count_nonzero(braking[1:] >= config.hard_braking))
     road = road_use(drive, loop.road, config.off_road_depth)
+    off_road, obstacle = road.time, ""
+    touched = first_obstacle(drive, loop.road)
+    if touched is not None and not touched[0] > off_road + CELL_S:
+        off_road, obstacle = float(np.fmin(off_road, touched[0])), str(touched[1])
     return DriveVerdict(
         index=motion.index,
         seed=motion.seed,
         ego=motion.vehicles[drive.ego].id,
         duration=float(motion.time[-1]),
         collision=None if hit is None else _collision(loop, drive, hit),
-        off_road=road.time,
+        off_road=off_road,
+        obstacle=obstacle,
         goal=goal,
         delay=goal - loop.duration,
         min_ttc=clearance.ttc,
@@ -321,7 +337,7 @@ def judge(loop: ClosedLoop, drive: Drive) -> DriveVerdict:
         off_road_area=road.area,
         jumps=len(drive.jumps),
         stood=_stood(motion.speed[drive.ego], config.step),
-        terms=terms(drive, hit, not math.isnan(road.time), progress, clearance.ttc_not_behind),
+        terms=terms(drive, hit, not math.isnan(off_road), progress, clearance.ttc_not_behind),
         criteria=tuple(measure(replace(drive, road=loop.road)) for measure in loop.criteria),
         ran_red=_ran_red(drive),
     )

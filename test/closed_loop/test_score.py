@@ -3,11 +3,14 @@
 
 """The terms of nuPlan's and NAVSIM's scores, and the reasons of contacts, in drives made by hand."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from test_verdict import go_on, straight, verdict_of
 
 from scenario_gen.closed_loop.ego import Command, Pose
+from scenario_gen.roads import build_road, RoadConfig
 from scenario_gen.types.road import Road
 
 
@@ -102,3 +105,17 @@ def test_off_the_road_counts_from_a_depth(aside, counted):
     assert np.isfinite(verdict.off_road)
     verdict, _ = verdict_of(motions, go_on, road=road)
     assert verdict.road_margin == pytest.approx(1.1)
+
+
+def test_an_obstacle_in_the_way_is_named():
+    config = RoadConfig(arm_length=100.0)
+    x, y = build_road("straight", config=config).lanes.lanes[0].centre[30].tolist()
+    name = f"{x:g} {y + 1.85:g} 0 4 2"
+    road = build_road("straight", config=replace(config, obstacles=name))
+    others = straight(60.0, y, 0.0, 10.0)
+    verdict, _ = verdict_of([straight(5.0, y, 0.0, 10.0), others], go_on, road=road)
+    assert verdict.off_road == pytest.approx(0.1 * (x - 2.0 - 2.0 - 5.0), abs=0.01)
+    assert (verdict.failure, verdict.fault, verdict.obstacle) == ("off_road", "obstacle", name)
+    assert f"ran into obstacle `{name}` at" in verdict.sentence()
+    passed, _ = verdict_of([straight(5.0, y - 0.3, 0.0, 10.0), others], go_on, road=road)
+    assert passed.obstacle == "" and passed.passed
