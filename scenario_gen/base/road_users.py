@@ -13,7 +13,7 @@ Sources:
   5.3 m of UN Regulation 107 and Regulation (EU) 1230/2012, so that the middle of the footprint
   turns with 8 m; a car's turning circle between kerbs is 10.5 m.
 - Walking: Weidmann 1993 (1.34 m/s, to 2 m/s); running ends at 5 m/s. Bicycles: 45 km/h (L1e-B) is
-  the fastest that is one.
+  the fastest that is one. E-scooters: those of German law (eKFV) reach 20 km/h, others 25 km/h.
 """
 
 from collections.abc import Mapping
@@ -184,12 +184,27 @@ _BUILT_IN = {
         dynamics=Dynamics(14.0, 3.0, 6.0, 4.5, 0.7),
         words=(
             *("bicyclist", "cyclist", "cycle", "bike"),
-            *("biker", "biketype", "standup", "micromobility"),
+            *("biker", "biketype", "pedelec"),
         ),
         autoware=6,
         commonroad="bicycle",
         openscenario="bicycle",
         osi="BICYCLE",
+        scenarionet="CYCLIST",
+    ),
+    "e_scooter": VehicleType(
+        length=1.2,
+        width=0.6,
+        height=1.8,
+        dynamics=Dynamics(8.0, 3.0, 5.0, 4.0, 1.0),
+        words=(
+            *("escooter", "electric scooter", "kick scooter", "standup scooter"),
+            *("standup", "micromobility"),
+        ),
+        autoware=6,
+        commonroad="bicycle",
+        openscenario="bicycle",
+        osi="STANDUP_SCOOTER",
         scenarionet="CYCLIST",
     ),
     "pedestrian": VehicleType(
@@ -199,7 +214,7 @@ _BUILT_IN = {
         dynamics=Dynamics(5.0, 4.0, 5.0, 4.0, 0.0),
         words=(
             *("ped", "pedtype", "person", "people", "human", "walker"),
-            *("adult", "child", "wheelchair", "stroller", "skater"),
+            *("adult", "child", "wheelchair", "mobility scooter", "stroller", "skater"),
         ),
         autoware=7,
         commonroad="pedestrian",
@@ -230,6 +245,7 @@ class TypeLimits(Parameters):
     bus: Dynamics = _BUILT_IN["bus"].dynamics
     motorcycle: Dynamics = _BUILT_IN["motorcycle"].dynamics
     bicycle: Dynamics = _BUILT_IN["bicycle"].dynamics
+    e_scooter: Dynamics = _BUILT_IN["e_scooter"].dynamics
     pedestrian: Dynamics = _BUILT_IN["pedestrian"].dynamics
     other: Dynamics = _BUILT_IN[OTHER].dynamics
     plugins: tuple[tuple[str, Dynamics], ...] = ()

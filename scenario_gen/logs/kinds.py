@@ -26,6 +26,7 @@ _NOT_ROAD_USERS = frozenset(
         "riderless",
         "unknown",
         "tram",
+        "streetcar",
         "train",
         "watercraft",
         "aircraft",
@@ -41,9 +42,9 @@ def type_called(word: str) -> str | None:
     if plain in _UNSPECIFIC:
         return ""
     known = {_plain(name): kind for name, kind in words().items()}
-    parts = plain.split()
-    singular = [part.removesuffix("s") for part in parts]
-    matches = [part for part in (plain, *parts, *singular) if part in known]
+    singular = " ".join(part.removesuffix("s") for part in plain.split())
+    text = f" {plain} {singular} "
+    matches = [name for name in known if f" {name} " in text]
     return known[max(matches, key=len)] if matches else None
 
 

@@ -130,15 +130,15 @@ from scenario_gen import read_log
 from scenario_gen.logs import bundled
 
 table = read_log(bundled("a")).encounters[0].to_dataframe()
-table["type"] = table["vehicle"].map(dict(zip(table["vehicle"].unique(), ("Standup-Scooter", "car"))))
+table["type"] = table["vehicle"].map(dict(zip(table["vehicle"].unique(), ("Cargo-Bike", "car"))))
 table["speed"], table["x"], table["y"] = 0.5 * table["speed"], 0.5 * table["x"], 0.5 * table["y"]
-scooter = read_log(table).encounters[0].vehicles[0]
-print(scooter.type, scooter.length, scooter.kind.dynamics.max_speed)
+bike = read_log(table).encounters[0].vehicles[0]
+print(bike.type, bike.length, bike.kind.dynamics.max_speed)
 """
 
 
 def test_a_type_of_the_package_is_read(python):
-    assert python("-c", TYPES).strip() == "e_scooter 1.2 7.0"
+    assert python("-c", TYPES).strip() == "cargo_bike 2.6 7.0"
 
 
 LIMITS = """
@@ -146,11 +146,11 @@ from scenario_gen.base.parameters import assigned, flatten
 from scenario_gen.method.config import PipelineConfig
 
 config = PipelineConfig()
-for assignment in ("limits.e_scooter.max_speed=6", "limits.e_scooter.max_curvature=0.5"):
+for assignment in ("limits.cargo_bike.max_speed=6", "limits.cargo_bike.max_curvature=0.5"):
     config = assigned(config, assignment)
-scooter = config.limits.of("e_scooter")
-print(scooter.max_speed, scooter.max_curvature, PipelineConfig().limits.of("e_scooter").max_speed)
-print(flatten(config)["limits.e_scooter.max_speed"][1])
+bike = config.limits.of("cargo_bike")
+print(bike.max_speed, bike.max_curvature, PipelineConfig().limits.of("cargo_bike").max_speed)
+print(flatten(config)["limits.cargo_bike.max_speed"][1])
 """
 
 

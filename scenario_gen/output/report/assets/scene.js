@@ -231,13 +231,13 @@ class View {
     context.fillStyle = colour;
     context.beginPath();
     if (vehicle.type === "pedestrian") context.arc(0, 0, length / 2, 0, 2 * Math.PI);
-    else if (vehicle.type === "bicycle" || vehicle.type === "motorcycle") {
+    else if (["bicycle", "e_scooter", "motorcycle"].includes(vehicle.type)) {
       context.ellipse(0, 0, length / 2, width / 5, 0, 0, 2 * Math.PI); // the frame, and across it who rides
       context.rect(-length * 0.08, -width / 2, length * 0.16, width);
     } else if (context.roundRect) context.roundRect(-length / 2, -width / 2, length, width, Math.min(width, length) * 0.22);
     else context.rect(-length / 2, -width / 2, length, width);
     context.fill();
-    if (front && !["pedestrian", "bicycle", "motorcycle"].includes(vehicle.type)) {
+    if (front && !["pedestrian", "bicycle", "e_scooter", "motorcycle"].includes(vehicle.type)) {
       context.fillStyle = "rgba(255,255,255,0.8)";
       context.fillRect(length * 0.16, -width * 0.36, length * 0.14, width * 0.72);
       context.lineWidth = 1;
