@@ -13,6 +13,8 @@ from typing import Any, TYPE_CHECKING
 import numpy as np
 
 from scenario_gen.base.errors import InputError
+from scenario_gen.base.folders import scratch
+from scenario_gen.base.stores import temp_folder
 from scenario_gen.types.coverage import Coverage
 from scenario_gen.types.encounter import Encounter
 from scenario_gen.types.evaluation import Evaluation, NARROW, REPLAY, UNIFORM, WITH, WITHOUT
@@ -207,10 +209,17 @@ class GenerationResult:
         Raises:
             MissingExtraError: matplotlib is not installed.
         """
-        return self[k].animate(file, self.road)
+        import scenario_gen
+
+        return scenario_gen.animate(self[k], file, road=self.road)
 
     def export(self, folder: Path | str, target: str) -> Path:
-        """Write files for other software, as `scenario_gen.export` does.
+        """Write files for other software to a folder, as `scenario-gen export` does.
+
+        Args:
+            folder: an earlier export in it is replaced.
+            target: "commonroad", "openscenario", "osi", "autoware", "scenarionet" or a plugin's
+                name.
 
         Raises:
             InputError: there is no such target, or the folder is something else.
@@ -218,7 +227,9 @@ class GenerationResult:
         """
         import scenario_gen
 
-        return scenario_gen.export(self, folder, target)
+        with scratch(temp_folder()) as place:
+            scenario_gen.export_bag(self.save(place / "bag"), Path(folder), target)
+        return Path(folder)
 
     def report(self, folder: Path | str) -> Path:
         """Write page, bag and figures to a folder, as `scenario_gen.report` does.

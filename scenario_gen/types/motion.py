@@ -6,7 +6,6 @@
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from pathlib import Path
 from typing import Any, NamedTuple, Self, TYPE_CHECKING
 
 import numpy as np
@@ -100,8 +99,6 @@ def cut(present: Ints, first: int, last: int) -> Ints:
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from pandas import DataFrame
-
-    from scenario_gen.types.road import Road
 
 TIME_TOLERANCE_S = 1e-9  # times are whole nanoseconds
 
@@ -375,13 +372,3 @@ class Motion:
         import scenario_gen
 
         return scenario_gen.plot(self, ax)
-
-    def animate(self, file: Path | str, road: "Road | None" = None) -> Path:
-        """Write an animated GIF of the motion, as `scenario_gen.animate` does.
-
-        Raises:
-            MissingExtraError: matplotlib is not installed.
-        """
-        import scenario_gen
-
-        return scenario_gen.animate(self, file, road=road)

@@ -60,4 +60,4 @@ def test_a_scenario_becomes_an_animation_in_real_time(tmp_path):
         film.seek(film.n_frames - 1)
         assert (first != np.array(film.convert("RGB"))).any()
     with pytest.raises(InputError, match=r"\.gif"):
-        made[3].animate(tmp_path / "film.mov")
+        made.animate(tmp_path / "film.mov")

@@ -13,19 +13,16 @@ import numpy as np
 from shapely import contains_xy, prepare
 
 from scenario_gen.bags.recordings.autoware import add_autoware
-from scenario_gen.bags.recordings.write import write_recording
 from scenario_gen.bags.storage.config import BagConfig
 from scenario_gen.bags.storage.writer import BagWriter
 from scenario_gen.base.errors import InputError, RefusedError
 from scenario_gen.base.folders import (
     Kind,
     replaced_folder,
-    scratch,
     sha256_of,
     write_text,
 )
 from scenario_gen.base.registry import Registry
-from scenario_gen.base.stores import temp_folder
 from scenario_gen.numerics import Floats
 from scenario_gen.output.exchange.cases import Case, Exported, read_cases
 from scenario_gen.output.exchange.commonroad import benchmark_id, write_commonroad
@@ -37,7 +34,7 @@ from scenario_gen.output.exchange.osi import write_osi
 from scenario_gen.output.exchange.projection import projection_of
 from scenario_gen.output.exchange.scenarionet import dataset_files, description, file_name, pickled
 from scenario_gen.roads import read_network
-from scenario_gen.types import GenerationResult, Scenario
+from scenario_gen.types import Scenario
 
 EXPORTED = Kind("exported")
 MANIFEST = "export.json"
@@ -136,32 +133,6 @@ def export_bag(
         document = {"format": target, "notes": notes, "scenarios": entries, "sha256": digests}
         write_text(folder / MANIFEST, json.dumps(document, indent=2) + "\n")
     return Export(len(entries), tuple(notes))
-
-
-def export(
-    result: GenerationResult,
-    folder: Path | str,
-    target: str,
-    config: ExportConfig = ExportConfig(),
-) -> Path:
-    """Write the scenarios of a result to a folder in another format, like `scenario-gen export`.
-
-    Args:
-        result: from `generate` or `load`.
-        folder: an earlier export in it is replaced.
-        target: "commonroad", "openscenario", "osi", "autoware", "scenarionet" or a plugin's name.
-        config: ego, map and frame.
-
-    Returns:
-        The folder.
-
-    Raises:
-        InputError: there is no such target, or the folder is something else.
-        RefusedError: no scenario can be written in that format.
-    """
-    with scratch(temp_folder()) as place:
-        export_bag(write_recording(place / "bag", result), Path(folder), target, config)
-    return Path(folder)
 
 
 @dataclass(eq=False)

@@ -234,7 +234,6 @@ def _fit(fit: Fit, routes: Sequence[Route]) -> list[dict[str, Any]]:
                 "anchors": [
                     [_short(x, 2), _short(y, 2), _short(yaw)] for x, y, yaw in fitted.anchors
                 ],
-                "moved": np.round(fitted.moved, 2).tolist(),
             }
         )
     return vehicles

@@ -93,7 +93,6 @@ def _view(index: int, case: GenerationResult) -> dict[str, Any]:
     return {
         "index": index,
         "case": case,
-        "title": case.title,
         "without": case.references.get(WITHOUT),
         "refused": [case.refusals.get(name, "") for name in (WITHOUT, UNIFORM)],
         "arms": [
@@ -102,7 +101,6 @@ def _view(index: int, case: GenerationResult) -> dict[str, Any]:
             if result is not None
         ],
         "rows": [*evaluation.rows[1:], evaluation.rows[0]],
-        "metrics": evaluation.metrics,
         "ego": case.generated.ego.vehicle.id if case.generated.ego else "",
         "k": changepoints,
         "remark": case.segmentation.remark(duration),
@@ -111,12 +109,9 @@ def _view(index: int, case: GenerationResult) -> dict[str, Any]:
         "best": {key: case.best(key) for key in ERRORS},
         "verdict": _in_words(case),
         "reactions": case.reacting,
-        "not_kept": case.lost_reactions,
         "nearer": case.similarity()["said"],
         "segments": _segments(case),
         "vehicles": _vehicles(case),
-        "remarks": case.route_remarks,
-        "lost": case.losses,
         "planned": routes_in_words(case.routes),
     }
 
