@@ -6,8 +6,10 @@
 - `header.frame_id`: the frame of the positions.
 - `header.stamp`: the template's first sample, repeated in messages derived from the template.
 - `joint_names[i]`: `<id>:<length>x<width>` in metres, then `:<type>` unless the vehicle is a car
-  shorter than 7 m or a truck from 7 m on. A bare `<id>` is a default car. The last one of `tracks`
-  is `signals=<JSON>`, far below the ground, if states of traffic lights were recorded.
+  shorter than 7 m or a truck from 7 m on. A bare `<id>` is a default car. After the type (or "")
+  a vehicle with a trailer has `:<id>:<length>x<width>x<hitch>x<reach>`, see `Trailer`. The last
+  joint of `tracks` is `signals=<JSON>`, far below the ground, if states of traffic lights were
+  recorded.
 - `points[k].time_from_start`: time since `header.stamp`.
 - `points[k].transforms[i]`: pose of the footprint's centre with z = 0 and the yaw as a quaternion.
   z is `ABSENT_Z_M`, far below the ground, where the vehicle is absent; x, y and yaw are then those
@@ -19,6 +21,7 @@ All other components are zero; no value is NaN. In `scenarios` no vehicle is abs
 """
 
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 import json
 import re
@@ -32,7 +35,7 @@ from msg_conventions.cdr import encode as encode_fields
 from msg_conventions.yaw import check_quaternions, quaternion, yaw
 from scenario_gen.base.errors import guarded, InputError
 from scenario_gen.numerics import Bools, Floats, Ints, NS_PER_S
-from scenario_gen.types import tokens, TrafficLight, usual_type, Vehicle
+from scenario_gen.types import token, tokens, TrafficLight, Trailer, usual_type, Vehicle
 
 TYPE = "trajectory_msgs/msg/MultiDOFJointTrajectory"
 MAX_COORDINATE_M = 1e8  # more than any geodetic grid has
@@ -86,6 +89,10 @@ def joint_names(vehicles: Sequence[Vehicle]) -> tuple[str, ...]:
     ids = tokens(vehicle.id for vehicle in vehicles)
     for name, vehicle in zip(ids, vehicles, strict=True):
         kind = "" if vehicle.type == usual_type(vehicle.length) else f":{vehicle.type}"
+        trailer = vehicle.trailer
+        if trailer is not None:
+            sizes = (trailer.length, trailer.width, trailer.hitch, trailer.reach)
+            kind = f"{kind or ':'}:{token(trailer.id)}:{'x'.join(map(repr, sizes))}"
         names.append(f"{name}:{vehicle.length!r}x{vehicle.width!r}{kind}")
     return tuple(names)
 
@@ -96,22 +103,31 @@ def vehicle_of(joint_name: str) -> Vehicle:
     Raises:
         InputError: the footprint is not two possible lengths, or the type is unknown.
     """
-    name, colon, rest = joint_name.partition(":")
-    size, _, kind = rest.partition(":")
-    if not colon:
+    name, *rest = joint_name.split(":")
+    if not rest:
         return Vehicle(name)
-    match = re.fullmatch(r"([0-9.eE+-]+)x([0-9.eE+-]+)", size)
-    try:
-        length, width = (float(value) for value in match.groups()) if match else (0.0, 0.0)
-    except ValueError:
-        length = width = 0.0
-    if not all(MIN_SIZE_M <= side <= MAX_SIZE_M for side in (length, width)):
-        raise InputError(
-            f"joint name {joint_name!r}: expected <id>:<length>x<width> (and :<type>), "
-            f"{MIN_SIZE_M:g} to "
-            f"{MAX_SIZE_M:g} m each, e.g. car:4.8x1.9"
-        )
-    return Vehicle(name, length, width, kind)
+    size, kind, trailer, trailer_sizes = (*rest, "", "", "")[:4]
+    length, width = _sizes(size, 2, joint_name)
+    towed = Trailer(trailer, *_sizes(trailer_sizes, 4, joint_name)) if trailer else None
+    return Vehicle(name, length, width, kind, towed)
+
+
+def _sizes(text: str, count: int, joint_name: str) -> list[float]:
+    """Return the `count` lengths [m] of a part of a joint name.
+
+    Raises:
+        InputError: it has others.
+    """
+    parts = text.split("x")
+    if len(parts) == count and all(re.fullmatch(r"[0-9.eE+-]+", part) for part in parts):
+        with suppress(ValueError):
+            sizes = list(map(float, parts))
+            if all(MIN_SIZE_M <= size <= MAX_SIZE_M for size in sizes):
+                return sizes
+    raise InputError(
+        f"joint name {joint_name!r}: expected <id>:<length>x<width> (and :<type>), "
+        f"{MIN_SIZE_M:g} to {MAX_SIZE_M:g} m each, e.g. car:4.8x1.9"
+    )
 
 
 def _point_type(n: int) -> np.dtype[np.void]:

@@ -75,6 +75,7 @@ from scenario_gen.types.scenario import (
     Violation as Violation,
 )
 from scenario_gen.types.segmentation import Segmentation as Segmentation
+from scenario_gen.types.vehicle import Trailer as Trailer
 from scenario_gen.types.vehicle import Vehicle as Vehicle
 
 __version__: str

@@ -23,7 +23,7 @@ import math
 from scenario_gen.base.parameters import parameter, Parameters
 from scenario_gen.base.registry import Registry
 
-CAR, TRUCK, OTHER = "car", "truck", "other"
+CAR, TRUCK, TRAILER, OTHER = "car", "truck", "trailer", "other"
 MIN_TRUCK_LENGTH_M = 7.0  # of a vehicle of unknown type
 LANE_USERS = frozenset(
     (CAR, "van", TRUCK, "bus", "motorcycle", "bicycle", "pedestrian")
@@ -116,7 +116,9 @@ class VehicleType:
     @property
     def lane_user(self) -> frozenset[str]:
         """The one of `LANE_USERS` as which it may use lanes, by its category in OpenSCENARIO."""
-        user = {"motorbike": "motorcycle"}.get(self.openscenario, self.openscenario)
+        user = {"motorbike": "motorcycle", TRAILER: TRUCK}.get(
+            self.openscenario, self.openscenario
+        )
         return frozenset((user if user in LANE_USERS else CAR,))
 
 
@@ -148,11 +150,22 @@ _BUILT_IN = {
         width=2.4,
         height=3.2,
         dynamics=Dynamics(36.0, 3.0, 7.5, 4.5, 0.16),
-        words=("lorry", "semitractor", "semitrailer", "trailer", "heavy", "hgv"),
+        words=("lorry", "semitractor", "heavy", "hgv"),
         autoware=2,
         commonroad="truck",
         openscenario="truck",
         osi="HEAVY_TRUCK",
+    ),
+    TRAILER: VehicleType(
+        length=8.0,
+        width=2.4,
+        height=3.2,
+        dynamics=Dynamics(36.0, 3.0, 7.5, 4.5, 0.16),
+        words=("semitrailer",),
+        autoware=4,
+        commonroad="truck",
+        openscenario=TRAILER,
+        osi="TRAILER",
     ),
     "bus": VehicleType(
         length=12.0,
@@ -242,6 +255,7 @@ class TypeLimits(Parameters):
     car: Dynamics = _BUILT_IN[CAR].dynamics
     van: Dynamics = _BUILT_IN["van"].dynamics
     truck: Dynamics = _BUILT_IN[TRUCK].dynamics
+    trailer: Dynamics = _BUILT_IN[TRAILER].dynamics
     bus: Dynamics = _BUILT_IN["bus"].dynamics
     motorcycle: Dynamics = _BUILT_IN["motorcycle"].dynamics
     bicycle: Dynamics = _BUILT_IN["bicycle"].dynamics

@@ -40,6 +40,7 @@ NAMES: dict[str, tuple[str, ...]] = {
         "classification vehicle_class object_class road_user road_user_type",
         "signal": "signal signal_state traffic_light traffic_light_state light_state",
         "signal_id": "signal_id traffic_light_id light_id signal_group",
+        "trailer": "trailer trailer_id trailer_length",
     }.items()
 }
 """Column names of each quantity, the preferred first.
@@ -86,6 +87,7 @@ UNITS: dict[str, dict[str, float]] = {
     "kind": {},
     "signal": {},
     "signal_id": {},
+    "trailer": {},
     "lat": _DEGREES,
     "lon": _DEGREES,
     "x": _LENGTHS_M,

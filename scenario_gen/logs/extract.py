@@ -54,7 +54,7 @@ def cut_encounter(
     tracks = [piece.track for piece in members]
     dt_ns = round(config.period * 1e9)
     encounter = Encounter.sampled(
-        tuple(Vehicle(t.id, t.length, t.width, t.kind) for t in tracks),
+        tuple(Vehicle(t.id, t.length, t.width, t.kind, t.trailer) for t in tracks),
         config.period,
         np.array(position),
         np.array(heading),

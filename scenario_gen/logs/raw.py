@@ -17,7 +17,7 @@ from scenario_gen.logs.config import LogConfig
 from scenario_gen.logs.doubts import Doubt
 from scenario_gen.logs.signals import RawSignal
 from scenario_gen.numerics import Floats, Ints
-from scenario_gen.types import Encounter
+from scenario_gen.types import Encounter, Trailer
 
 
 class UnknownFormatError(InputError):
@@ -40,6 +40,8 @@ class Observations:
         length: metres, NaN if it is not recorded.
         width: metres, NaN if it is not recorded.
         kind: the log's word for its type of road user, or ""; `kinds.typed` turns it into a type.
+        trailer_name: the id or the length [m] of its trailer in the log, or "".
+        trailer: its trailer, as far as it is known.
         origin: latitude and longitude [degrees] of the frame of a projected `fix`.
     """
 
@@ -54,6 +56,8 @@ class Observations:
     length: float = np.nan
     width: float = np.nan
     kind: str = ""
+    trailer_name: str = ""
+    trailer: Trailer | None = None
     origin: tuple[float, float] | None = None
 
     @classmethod

@@ -37,6 +37,7 @@ from scenario_gen.logs.no_encounter import (
 from scenario_gen.logs.quality import Quality, VehicleQuality
 from scenario_gen.logs.raw import natural, Observations, RawLog
 from scenario_gen.logs.signals import moved_signals, with_lights
+from scenario_gen.logs.trailers import coupled
 from scenario_gen.logs.units import interpret
 from scenario_gen.types import Encounter
 from scenario_gen.types.html import html_list, html_table
@@ -185,14 +186,12 @@ def encounters_of(
     within = _ticks_within(met_ns, origin_ns, config)
     grouping = _find_encounters(log, pieces, doubts, origin_ns, config, within)
     copies = copies_in(grouping.encounters)
-    if copies:
-        doubts += [str(doubt) for doubt in copies.values()]
+    pieces, trailer_notes = coupled(pieces, grouping.encounters)
+    if copies or trailer_notes:
+        doubts += [*trailer_notes, *map(str, copies.values())]
         pieces = [piece for piece in pieces if piece.track.id not in copies]
         grouping = _find_encounters(log, pieces, doubts, origin_ns, config, within)
-    contradictions = [
-        *doubts_of_rows(log, drops, config),
-        *doubts_of_pieces(pieces, origin_ns),
-    ]
+    contradictions = [*doubts_of_rows(log, drops, config), *doubts_of_pieces(pieces, origin_ns)]
     check_doubts(log.segments[0].label, contradictions, config.allow)
     all_doubts = (*log.doubts, *unit_doubts, *contradictions, *copies.values())
     excluded = (f"left out: {counted(log.excluded)}",) if log.excluded else ()
@@ -270,8 +269,8 @@ def _find_encounters(
         encounter, notes = cut_encounter(name, group, pieces, origin_ns, config)
         encounters.append(encounter)
         cut_notes += notes
-    members = {pieces[member].track.id for group in groups for member in group.spans}
-    return _Grouping(tuple(encounters), members, group_notes, cut_notes)
+    members = chain.from_iterable(encounter.with_trailers().ids for encounter in encounters)
+    return _Grouping(tuple(encounters), set(members), group_notes, cut_notes)
 
 
 def _first_tick_ns(tracks: Sequence[Observations], config: LogConfig) -> int:

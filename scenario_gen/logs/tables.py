@@ -42,6 +42,7 @@ SPMD_EPOCH_NS = 1_072_915_200 * 10**9
 
 _PARQUET_SUFFIXES = (".parquet", ".pq")
 _FEW_ROW_COUNT = 10  # each of them may belong to another vehicle
+_NO_TRAILER = frozenset(("", "0", "False", "false", "no", "none"))
 _STANDING_M = 0.05  # no vehicle of an encounter drives less
 
 
@@ -145,7 +146,7 @@ def _read_text_columns(
     header = [str(name) for name in read_text(path, rows_before, config, **options, nrows=0)]
     columns = find_columns(header, path, config.columns)
     # Numbers of 64 bits, or in hexadecimal, are not float64.
-    texts = ("vehicle", "kind", "scene", "date", "signal", "signal_id")
+    texts = ("vehicle", "kind", "trailer", "scene", "date", "signal", "signal_id")
     names = [columns[quantity].name for quantity in texts if quantity in columns]
     options["dtype"] = dict.fromkeys(names, object)
     if has_window(path, config):
@@ -276,7 +277,7 @@ def to_numbers(frame: pd.DataFrame, columns: dict[str, Column], path: Path) -> p
         values = frame[column.name]
         if isinstance(values, pd.DataFrame):
             raise InputError(f"{path} has several columns {column.name!r}; rename all but one")
-        if quantity in ("vehicle", "scene"):
+        if quantity in ("vehicle", "scene", "trailer"):
             numbers[quantity] = vehicle_names(values)
         elif quantity == "date":
             continue
@@ -409,7 +410,7 @@ def _observations(name: str, group: pd.DataFrame, position: tuple[str, str]) -> 
         values: Floats = group[quantity].to_numpy(float)
         return values
 
-    return Observations.of_rows(
+    observed = Observations.of_rows(
         name,
         group["time"].to_numpy(np.int64),
         np.column_stack([column(quantity) for quantity in (*position, "heading", "speed")]),
@@ -418,6 +419,8 @@ def _observations(name: str, group: pd.DataFrame, position: tuple[str, str]) -> 
         kind=str(group["kind"].mode().iloc[0]) if "kind" in group else "",
         measured="speed" in group,
     )
+    trailers = set(group["trailer"]) - _NO_TRAILER if "trailer" in group else set()
+    return replace(observed, trailer_name=str(min(trailers, default="")))
 
 
 def _typical_size(values: Floats) -> float:

@@ -112,7 +112,7 @@ def _draw_paths(axes: "Axes", motions: Sequence[Motion]) -> list[Floats]:
     """Draw the paths of all vehicles; return them, (P, 2) [m]."""
     opacity = max(0.1, 1.0 / np.sqrt(max(len(motions), 1)))
     paths = []
-    for k, motion in enumerate(motions):
+    for k, motion in enumerate(each.with_trailers() for each in motions):
         for n, vehicle in enumerate(motion.vehicles):
             path = motion.position[n, motion.is_present[n]]
             label = f"vehicle {vehicle.id}" if k == 0 else "_"

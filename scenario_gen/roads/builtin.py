@@ -29,7 +29,7 @@ from scenario_gen.roads.plan import aligned, Arm, Connection, Driven, Plan
 from scenario_gen.roads.vector.raster import VERGE_M
 from scenario_gen.roads.ways import draw_u_turn
 from scenario_gen.situation import pair_crossings, Situation, to_frenet, Track
-from scenario_gen.types import DrawnFor, Encounter, LaneNetwork, Road
+from scenario_gen.types import DrawnFor, Encounter, LaneNetwork, Road, Trailer, trailer_poses
 
 _DEFAULT_ARM_M = 60.0  # without a recording
 _U_TURN_WIDTH_M = 12.0  # between the lanes of a U-turn
@@ -192,7 +192,7 @@ def junction_centre(tracks: tuple[Track, ...]) -> Floats:
 def _layout_of_junction(tracks: tuple[Track, ...], config: RoadConfig) -> Layout:
     centre = junction_centre(tracks)
     poses = np.concatenate([track.poses[[0, -1]] for track in tracks])
-    half = np.repeat([track.vehicle.length / 2.0 for track in tracks], 2)
+    half = np.repeat([track.vehicle.rear for track in tracks], 2)
     distance = np.hypot(poses[:, 0] - centre[0], poses[:, 1] - centre[1])
     needed = distance + half + END_ROOM_M + JUNCTION_SLACK_M
     sine = np.abs(np.sin(wrap_angle(poses[:, 2] - poses[np.argmax(needed), 2])))
@@ -244,19 +244,27 @@ def draw_corridor(name: str, encounter: Encounter | None, config: RoadConfig) ->
     surface: list[BaseGeometry] = []
     paths: dict[str, Curve] = {}
     widths: dict[str, float] = {}
+    trailers: dict[str, Trailer] = {}
     for track in Situation.of(encounter).separation.tracks:
         vehicle = track.vehicle
         reach = config.corridor_margin if track.still else config.corridor_run_out
         path = track.curve.cut(-reach, track.travelled + reach, _FOOTPRINT_STEP_M)
-        widths[vehicle.id] = vehicle.width + 2.0 * config.corridor_margin
-        surface.append(swept(path, vehicle.length, widths[vehicle.id]))
+        width = vehicle.width + 2.0 * config.corridor_margin
+        widths[vehicle.id] = width
+        surface.append(swept(path, vehicle.length, width, vehicle.trailer))
         if not track.still:
             paths[vehicle.id] = path
+        if vehicle.trailer is not None:
+            trailers[vehicle.id] = vehicle.trailer
     lanes = []
     for lane_name, sharing in sharing_lanes(paths).items():
         path = paths[lane_name]
-        half = max(widths[vehicle] for vehicle in sharing) / 2.0
         line = path.cut(0.0, path.length, 1.0)
+        half = np.full(len(line.points), max(widths[vehicle] for vehicle in sharing) / 2.0)
+        for towing in trailers.keys() & set(sharing):
+            towed = trailer_poses(line.points, trailers[towing])
+            station, offset = line.project(towed[:, :2])
+            half += np.interp(line.station, station, np.abs(offset))
         lanes.append(lane_along(f"along vehicle {lane_name}", line, half))
     network = LaneNetwork(name, tuple(lanes), drawn=True)
     road = draw_lanes(network, paved(surface, 0.0), config)

@@ -296,7 +296,7 @@ class _RoadDrawing:
             if not self._plan.ring or from_arm == to_arm:  # the ring has all other routes
                 half = route.length / 2.0
                 inner = route.curve.cut(half, route.curve.length - half)
-                yield swept(inner, route.length, route.width)
+                yield swept(inner, route.length, route.width, route.trailer)
 
     def _dividing_line(self, k: int) -> Curve:
         """Return the dividing line of an arm from its end to the middle of the junction.

@@ -71,7 +71,7 @@ class ArmDirection:
 
     def reach(self, tracks: tuple[Track, ...]) -> float:
         """Return how far [m] from the centre the footprints on it reach."""
-        distances = [end.distance + tracks[end.vehicle].vehicle.length / 2.0 for end in self.ends]
+        distances = [end.distance + tracks[end.vehicle].vehicle.rear for end in self.ends]
         return max(distances, default=0.0)
 
 

@@ -82,8 +82,10 @@ def draw_junction(name: str, situation: Situation, config: RoadConfig) -> Road:
             goal = arms[connection.to_arm].lane(connection.to_lane, config, inward=False)
             route = draw_route(start, goal, sharpness=sharpness_of(track))
             if route is not None:
-                width = track.vehicle.width + 2.0 * _SWEPT_MARGIN_M
-                driven.append(Driven(connection, route, track.vehicle.length, width))
+                vehicle = track.vehicle
+                width = vehicle.width + 2.0 * _SWEPT_MARGIN_M
+                size = vehicle.length, width, vehicle.trailer
+                driven.append(Driven(connection, route, *size))
     drawn_for = aligned(tracks, lane_of, np.array([*centre, 0.0]), np.array([0.0, 0.0, turn]))
     yielding = _yielding_arms(situation, lane_of, config)
     lights = recorded_lights(situation, lane_of, drawn_for)

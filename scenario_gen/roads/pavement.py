@@ -14,6 +14,7 @@ from shapely.geometry.base import BaseGeometry
 from scenario_gen.numerics import Bools, Floats, running_sum
 from scenario_gen.numerics.boxes import corners
 from scenario_gen.numerics.curve import Curve
+from scenario_gen.types import Trailer, trailer_poses
 
 Inside: TypeAlias = Callable[[Floats], Bools]
 """Returns whether points (..., 2) [m] are drivable."""
@@ -41,10 +42,13 @@ def strip(line: Curve, right: float, left: float) -> Polygon:
     return shapely.make_valid(Polygon(np.concatenate((edges[0], edges[1][::-1]))))
 
 
-def swept(line: Curve, length: float, width: float) -> BaseGeometry:
+def swept(
+    line: Curve, length: float, width: float, trailer: Trailer | None = None
+) -> BaseGeometry:
     """Return the area that a footprint with length and width [m] covers along a line.
 
-    It is the union of the hulls of two footprints each, which are at most 10 m and 0.05 rad apart.
+    A trailer is as wide. The area is the union of the hulls of two footprints each, which are at
+    most 10 m and 0.05 rad apart.
     """
     dense = line.cut(0.0, line.length, _STATION_STEP_M)
     turned = running_sum(np.abs(np.diff(dense.points[:, 2])))
@@ -52,7 +56,11 @@ def swept(line: Curve, length: float, width: float) -> BaseGeometry:
     _, first = np.unique(interval, return_index=True)
     boxes = corners(dense.points[[*first, -1]], length, width)
     pairs = np.concatenate((boxes[:-1], boxes[1:]), axis=1)
-    return shapely.union_all(shapely.convex_hull(shapely.multipoints(pairs)))
+    area = shapely.union_all(shapely.convex_hull(shapely.multipoints(pairs)))
+    if trailer is None:
+        return area
+    towed = Curve(trailer_poses(dense.points, trailer))
+    return area.union(swept(towed, trailer.length, width))
 
 
 def ring(radius: float, half_width: float) -> BaseGeometry:

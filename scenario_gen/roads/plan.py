@@ -15,7 +15,7 @@ from scenario_gen.numerics.plane import place, unit, unit_left
 from scenario_gen.roads.config import RoadConfig
 from scenario_gen.roads.ways import reverse
 from scenario_gen.situation import Track
-from scenario_gen.types import DrawnFor, Note, Road, TrafficLight
+from scenario_gen.types import DrawnFor, Note, Road, TrafficLight, Trailer
 
 
 class Connection(NamedTuple):
@@ -73,12 +73,14 @@ class Driven:
         curve: from the end of one lane to that of the other.
         length: [m] of the vehicle that drives it.
         width: [m] that the vehicle needs.
+        trailer: that it tows.
     """
 
     connection: Connection
     curve: Curve
     length: float
     width: float
+    trailer: Trailer | None = None
 
 
 @dataclass(frozen=True, eq=False)

@@ -65,7 +65,7 @@ class FrenetTracks:
 
     def span(self, tracks: tuple[Track, ...]) -> tuple[float, float]:
         """Return the lowest and highest station [m] of all footprints."""
-        half = np.array([[track.vehicle.length / 2.0] for track in tracks])
+        half = np.array([[track.vehicle.rear] for track in tracks])
         return float((self.station - half).min()), float((self.station + half).max())
 
     def spread(self) -> "FrenetTracks":

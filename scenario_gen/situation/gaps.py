@@ -167,8 +167,8 @@ def _sample_near(
 def bumper_gaps(motion: Motion, follower: int, leader: int) -> Floats:
     """(T,) metres from the front bumper of a vehicle to the rear bumper of another one ahead."""
     between = motion.position[leader] - motion.position[follower]
-    lengths = motion.vehicles[follower].length + motion.vehicles[leader].length
-    return np.asarray(np.sqrt(np.square(between).sum(axis=1)) - 0.5 * lengths)
+    lengths = motion.vehicles[follower].half[0] + motion.vehicles[leader].rear
+    return np.asarray(np.sqrt(np.square(between).sum(axis=1)) - lengths)
 
 
 def lane_gaps(motion: Motion) -> LaneGaps:

@@ -11,10 +11,11 @@ from typing import Any, NamedTuple, Self, TYPE_CHECKING
 import numpy as np
 
 from scenario_gen.base.errors import InputError
+from scenario_gen.base.road_users import TRAILER
 from scenario_gen.numerics import Bools, canonical_heading, Floats, freeze, frozen, Ints, sealed
 from scenario_gen.numerics.boxes import corners
 from scenario_gen.numerics.hermite import fill_states
-from scenario_gen.types.vehicle import Vehicle
+from scenario_gen.types.vehicle import trailer_poses, Vehicle
 
 ALWAYS: Ints = sealed(
     np.zeros((0, 2), dtype=np.int64)
@@ -327,6 +328,33 @@ class Motion:
         """The names of the arrays (N, T, ...)."""
         return ("position", "heading", "speed")
 
+    def with_trailers(self) -> Self:
+        """Return the motion in which every trailer is a vehicle, too, after all others.
+
+        A trailer begins straight behind the vehicle that tows it.
+        """
+        towing = [
+            n
+            for n, vehicle in enumerate(self.vehicles)
+            if vehicle.trailer is not None and vehicle.trailer.id not in self.ids
+        ]
+        if not towing:
+            return self
+        trailers, towed = zip(*(_trailer_motion(self, n) for n in towing), strict=True)
+        arrays = {}
+        for name in self.array_names:
+            rows = getattr(self, name)
+            added = [values.get(name, rows[n]) for n, values in zip(towing, towed, strict=True)]
+            arrays[name] = np.concatenate([rows, added])
+        present = np.concatenate([self.present, self.present[towing]])
+        return replace(self, vehicles=self.vehicles + trailers, present=present, **arrays)
+
+    @property
+    def owners(self) -> tuple[int, ...]:
+        """The index of each vehicle itself, or for a trailer, of the vehicle that tows it."""
+        towing = {v.trailer.id: n for n, v in enumerate(self.vehicles) if v.trailer}
+        return tuple(towing.get(name, n) for n, name in enumerate(self.ids))
+
     def footprints(self, k: int) -> Floats:
         """Return the corners (N, 4, 2) [m] of all vehicles at sample k.
 
@@ -372,3 +400,18 @@ class Motion:
         import scenario_gen
 
         return scenario_gen.plot(self, ax)
+
+
+def _trailer_motion(motion: Motion, n: int) -> tuple[Vehicle, dict[str, Floats]]:
+    """Return the trailer of vehicle n, and its arrays (T, ...) by field."""
+    trailer = motion.vehicles[n].trailer
+    assert trailer is not None
+    poses = trailer_poses(motion.poses[n], trailer)
+    bend = motion.heading[n] - poses[:, 2]
+    sideways = trailer.hitch * np.gradient(motion.heading[n], motion.time) * np.sin(bend)
+    towed = {
+        "position": poses[:, :2],
+        "heading": poses[:, 2],
+        "speed": np.maximum(motion.speed[n] * np.cos(bend) + sideways, 0.0),
+    }
+    return Vehicle(trailer.id, trailer.length, trailer.width, TRAILER), towed

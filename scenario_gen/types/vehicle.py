@@ -5,13 +5,38 @@
 
 from collections.abc import Iterable
 from dataclasses import dataclass
+import math
 
 import numpy as np
 
 from scenario_gen.base.errors import InputError
-from scenario_gen.base.road_users import CAR, OTHER, usual_type, VEHICLE_TYPES, VehicleType
+from scenario_gen.base.road_users import (
+    CAR,
+    OTHER,
+    usual_type,
+    VEHICLE_TYPES,
+    VehicleType,
+)
 from scenario_gen.numerics import Floats
-from scenario_gen.numerics.plane import unit
+from scenario_gen.numerics.plane import edge_lengths, edge_yaws, unit
+
+
+@dataclass(frozen=True)
+class Trailer:
+    """A trailer, whose axle lies below its centre.
+
+    Attributes:
+        id: unique among the vehicles, too.
+        length, width: of its footprint [m].
+        hitch: from the centre of the vehicle that tows it back to the hitch [m].
+        reach: from the hitch back to its own centre [m].
+    """
+
+    id: str
+    length: float
+    width: float
+    hitch: float
+    reach: float
 
 
 @dataclass(frozen=True)
@@ -22,6 +47,7 @@ class Vehicle:
         id: unique within an encounter or a scenario.
         length, width: of the footprint [m].
         type: a name in `VEHICLE_TYPES`; the default follows from the length: a car or a truck.
+        trailer: what it tows; None: nothing. See `Motion.with_trailers`.
 
     Raises:
         InputError: the type is not known.
@@ -35,6 +61,7 @@ class Vehicle:
     length: float = 4.8
     width: float = 1.9
     type: str = ""
+    trailer: Trailer | None = None
 
     def __post_init__(self) -> None:
         if not self.type:
@@ -65,6 +92,13 @@ class Vehicle:
         """Half its length and half its width [m]."""
         return 0.5 * self.length, 0.5 * self.width
 
+    @property
+    def rear(self) -> float:
+        """From its centre back to its rear bumper, or to that of its trailer [m]."""
+        if self.trailer is None:
+            return 0.5 * self.length
+        return self.trailer.hitch + self.trailer.reach + 0.5 * self.trailer.length
+
 
 def most_exposed(vehicles: Iterable[Vehicle]) -> str:
     """Return the type of the most exposed road user: the type with the smallest usual width."""
@@ -92,3 +126,20 @@ def rear_axle(vehicle: Vehicle) -> float:
 def shifted(position: Floats, heading: Floats, ahead: float) -> Floats:
     """Return positions (..., 2) [m] shifted by `ahead` [m] along headings (...) [rad]."""
     return np.asarray(position + ahead * unit(heading))
+
+
+def trailer_poses(poses: Floats, trailer: Trailer) -> Floats:
+    """Return the poses (T, 3) x, y [m], yaw [rad] of a trailer behind those of its vehicle.
+
+    It begins straight behind, and follows the hitch without side slip: on a straight way s [m]
+    of the hitch, the tangent of half the angle from the trailer to the way falls with
+    exp(-s / reach) (tractrix).
+    """
+    hitch = shifted(poses[:, :2], poses[:, 2], -trailer.hitch)
+    remaining = np.exp(-edge_lengths(hitch) / trailer.reach)
+    yaw = [float(poses[0, 2])]
+    for way, share in zip(edge_yaws(hitch).tolist(), remaining.tolist(), strict=True):
+        angle = math.remainder(way - yaw[-1], 2.0 * math.pi)
+        yaw.append(yaw[-1] + angle - 2.0 * math.atan(math.tan(0.5 * angle) * share))
+    heading = np.array(yaw)
+    return np.column_stack([shifted(hitch, heading, -trailer.reach), heading])

@@ -24,15 +24,13 @@ from support.recording_files import (
 )
 
 from scenario_gen.base.errors import InputError
-from scenario_gen.logs import LogConfig, read_log, read_raw
+from scenario_gen.logs import LogConfig, read_log
 
 
 def test_whose_trailer_it_is_is_said(tmp_path):
-    found = read_raw([osi(tmp_path)[0]], LogConfig())
-    assert (
-        "trailer 7 belongs to 8: read as a separate road user" in found.notes
-        and len(found.vehicles) == 3
-    )
+    result = read_log(osi(tmp_path)[0])
+    assert any("has the trailer 7; left out" in note for note in result.quality.notes)
+    assert len(result.encounters[0].vehicles) == 3
 
 
 MADE = {

@@ -19,6 +19,7 @@ Source: ASAM OpenSCENARIO XML 1.2.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 from itertools import product
 import math
 from pathlib import Path
@@ -40,7 +41,7 @@ from scenario_gen.logs.raw import (
 )
 from scenario_gen.numerics import Floats
 from scenario_gen.numerics.plane import arc_lengths, place
-from scenario_gen.types import VEHICLE_TYPES
+from scenario_gen.types import Trailer, VEHICLE_TYPES
 
 OPENSCENARIO_SPEEDS = "speed_mps"
 """Name of a vehicle's property with its speed at each vertex, which the format cannot express."""
@@ -142,15 +143,6 @@ def _vehicles(root: Element, notes: list[str]) -> dict[str, Element]:
             )
             continue
         vehicles[name] = vehicle
-        notes += [
-            f"trailer {trailer.attribute('name')} left out: it is part of {name}"
-            for trailer in vehicle.findall("Trailer/Trailer")
-        ]
-        notes += [
-            f"trailer {trailer.attribute('entityRef')} belongs to {name}: read as a separate "
-            "road user"
-            for trailer in vehicle.findall("Trailer/TrailerRef")
-        ]
     return vehicles
 
 
@@ -276,7 +268,7 @@ def _observations(name: str, timed: _Timed, vehicle: Element, first_row: int) ->
     position = place(poses, center.number("x"), center.number("y"))
     speeds = _recorded_speeds(vehicle, len(vertices))
     known_speeds = np.zeros(len(vertices)) if speeds is None else speeds
-    return Observations.of_rows(
+    observed = Observations.of_rows(
         name,
         np.round(seconds * 1e9).astype(np.int64),
         np.column_stack((position, heading, known_speeds)),
@@ -285,6 +277,32 @@ def _observations(name: str, timed: _Timed, vehicle: Element, first_row: int) ->
         kind=_category(vehicle),
         measured=speeds is not None,
     )
+    reference = vehicle.find("Trailer/TrailerRef")
+    named = reference.attribute("entityRef") if reference is not None else ""
+    towed = vehicle.find("Trailer/Trailer/Vehicle")
+    trailer = None if towed is None else _trailer(f"{name}_trailer", vehicle, towed)
+    return replace(observed, trailer_name=named, trailer=trailer)
+
+
+def _trailer(name: str, vehicle: Element, towed: Element) -> Trailer | None:
+    """Return the trailer that is part of a vehicle; None if it has no bounding box."""
+    if towed.find("BoundingBox") is None:
+        return None
+    hitch, reach = (
+        _coupling(element, part, end)
+        for element, part, end in ((vehicle, "TrailerHitch", -1.0), (towed, "TrailerCoupler", 1.0))
+    )
+    size = towed.child("BoundingBox/Dimensions")
+    return Trailer(name, size.number("length"), size.number("width"), -hitch, reach)
+
+
+def _coupling(vehicle: Element, part: str, end: float) -> float:
+    """Return where the coupling is, from the box's centre ahead [m]; by default at its `end`."""
+    place = vehicle.find(part)
+    box = vehicle.child("BoundingBox")
+    if place is None:
+        return end * 0.5 * box.child("Dimensions").number("length")
+    return place.number("dx") - box.child("Center").number("x")
 
 
 def _vertex(vertex: Element) -> tuple[float, float, float, float]:

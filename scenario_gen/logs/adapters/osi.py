@@ -68,13 +68,13 @@ def read(paths: Sequence[Path], config: LogConfig) -> RawLog:
     trailers: dict[str, str] = {}
     lights = LightTrace()
     log = tracks.read(paths, config, name="omega_prime", load=partial(_table, trailers, lights))
-    notes = [
-        f"trailer {trailer} belongs to {owner}: read as a separate road user"
-        for trailer, owner in trailers.items()
-    ]
+    vehicles = tuple(
+        replace(vehicle, trailer_name=trailers.get(vehicle.id, "")) for vehicle in log.vehicles
+    )
+    notes: list[str] = []
     are_read = config.signals == "recorded"
     signals = tuple(lights.signals(str(paths[0]), notes)) if are_read else ()
-    return replace(log, notes=(*log.notes, *notes), signals=signals)
+    return replace(log, vehicles=vehicles, notes=(*log.notes, *notes), signals=signals)
 
 
 def _table(
@@ -87,7 +87,7 @@ def _table(
 ) -> pd.DataFrame:
     """Return the moving objects as omega-prime's table; without velocities if none has any.
 
-    The owners of `trailers` are added, by their ids, and the traffic lights to `lights`.
+    Trailers are added to `trailers`, by the ids of their vehicles, and traffic lights to `lights`.
     """
     rows: list[Row] = []
     first_offset: Any = None
@@ -106,7 +106,7 @@ def _table(
         for moving in message.moving_object:
             kind = moving.vehicle_classification
             if kind is not None and kind.trailer_id:
-                trailers[str(kind.trailer_id.value)] = str(moving.id.value)
+                trailers[str(moving.id.value)] = str(kind.trailer_id.value)
         check_size(str(path), 0, rows_before + len(rows), config)
     if not rows:
         raise InputError(f"{path}: none of its messages has a moving object")

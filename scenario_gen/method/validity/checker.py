@@ -4,7 +4,7 @@
 """The checker: proves a scenario valid at every instant, or reports each fault."""
 
 from collections.abc import Collection, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -241,15 +241,21 @@ class Checker:
             yield from state_violations(scenario, self.requested, self._limits)
 
     def _footprint_faults(self, scenario: Scenario) -> Iterator[Violation]:
-        """Yield overlaps, and footprints that leave the road."""
-        n, t = scenario.heading.shape
-        half = np.array([vehicle.half for vehicle in scenario.vehicles])
+        """Yield overlaps, and footprints that leave the road; a trailer is its vehicle's part."""
+        bodies = scenario.with_trailers()
+        n, t = bodies.heading.shape
+        half = np.array([vehicle.half for vehicle in bodies.vehicles])
         control = np.empty((n, t - 1, 4, 2))
-        control_points(scenario.time, scenario.position, scenario.heading, scenario.speed, control)
-        yield from contact_violations(scenario, control, half, self._limits)
+        control_points(bodies.time, bodies.position, bodies.heading, bodies.speed, control)
+        faults = list(contact_violations(bodies, control, half, self._limits))
         if self.road is not None:
             resolution = self._limits.time_resolution
-            yield from exit_violations(scenario, control, half, self._ground_of, resolution)
+            faults += exit_violations(bodies, control, half, self._ground_of, resolution)
+        owners = bodies.owners
+        for fault in faults:
+            vehicles = sorted({owners[n] for n in fault.vehicles})
+            if len(vehicles) == len(fault.vehicles):
+                yield replace(fault, vehicles=tuple(vehicles))
 
     def _ground_of(self, vehicle: Vehicle) -> Ground:
         """Return the cells in which vehicles of this type may be."""

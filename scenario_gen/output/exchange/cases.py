@@ -39,7 +39,7 @@ class Exported:
         index: index in `scenarios/info`, otherwise its position in the bag.
         seed: seed of its request.
         sha256: SHA-256 of its message in the bag.
-        others: the vehicles around the ego; all vehicles without an ego.
+        others: the vehicles around the ego, and their trailers; all vehicles without an ego.
         ego: the ego's track, a scenario of one vehicle with the same first instant.
         driven: whether the ego's track is a part of the scenario, validated with the others.
     """
@@ -255,7 +255,9 @@ def _case(
         road_name=name or "road",
         start_ns=group.stamp,
         scenarios=tuple(
-            exported for exported in group.scenarios if not indices or exported.index in indices
+            replace(exported, others=exported.others.with_trailers())
+            for exported in group.scenarios
+            if not indices or exported.index in indices
         ),
         lane_map=lane_map_of(road, everybody, _lane_width(space, group.entry), export.run_out),
         origin=road.lanes.origin if road and road.lanes else (),

@@ -198,12 +198,16 @@ def _objects(moving: _Moving, k: int) -> Iterator[Any]:
         if vehicle.kind.walks:
             yield osi.MovingObject(id=number, type=osi.MovingObject.Type.PEDESTRIAN, base=base)
             continue
+        towed = {}
+        if vehicle.trailer is not None and vehicle.trailer.id in motion.ids:
+            trailer = osi.Identifier(value=moving.numbers[motion.ids.index(vehicle.trailer.id)])
+            towed = {"has_trailer": True, "trailer_id": trailer}
         yield osi.MovingObject(
             id=number,
             type=osi.MovingObject.Type.VEHICLE,
             base=base,
             vehicle_classification=classes(
-                type=classes.Type[vehicle.kind.osi], role=classes.Role.CIVIL
+                type=classes.Type[vehicle.kind.osi], role=classes.Role.CIVIL, **towed
             ),
             vehicle_attributes=_attributes(vehicle),
         )

@@ -40,7 +40,8 @@ MAX_COMPARED_COUNT = 50
 
 def case_data(case: GenerationResult, samples: int) -> dict[str, Any]:
     """Return the drawings of one case for JSON, with at most `samples` scenarios."""
-    ids = case.encounter.ids
+    encounter = case.encounter.with_trailers()
+    ids = encounter.ids
     arms = _arms(case, samples)
     longest = max(
         [case.encounter.duration, *(float(s.time[-1]) for group in arms.values() for s in group)]
@@ -51,11 +52,15 @@ def case_data(case: GenerationResult, samples: int) -> dict[str, Any]:
         "row": case.row_name,
         "vehicles": [
             {"id": v.id, "type": v.type, "length": _short(v.length), "width": _short(v.width)}
-            for v in case.encounter.vehicles
+            for v in encounter.vehicles
         ],
-        "left_out": [n for n, known in enumerate(ids) if known not in case.evaluation.vehicles],
+        "left_out": [
+            n
+            for n, owner in enumerate(encounter.owners)
+            if ids[owner] not in case.evaluation.vehicles
+        ],
         "road": road_data(case.road) if case.road else None,
-        "template": _template(case.encounter, case.segmentation, frames),
+        "template": _template(encounter, case.segmentation, frames),
         "fit": _fit(case.fit, case.routes) if case.fit else [],
         "reactions": _reactions(case),
         "arms": {name: _trajectories(group, frames, ids) for name, group in arms.items() if group},
@@ -73,7 +78,10 @@ def _arms(case: GenerationResult, samples: int) -> dict[str, tuple[Scenario, ...
         "uniform": case.references.get(UNIFORM),
     }
     arms = {
-        name: tuple(result.scenarios[: samples if name == "with" else MAX_COMPARED_COUNT])
+        name: tuple(
+            scenario.with_trailers()
+            for scenario in result.scenarios[: samples if name == "with" else MAX_COMPARED_COUNT]
+        )
         for name, result in sets.items()
         if result is not None
     }
@@ -81,9 +89,9 @@ def _arms(case: GenerationResult, samples: int) -> dict[str, tuple[Scenario, ...
         shown = {scenario.index for scenario in arms["with"]}
         picks = set(case.coverage.picks.values()) - shown
         rest = case.generated.scenarios[samples:] if picks else ()
-        arms["with"] += tuple(scenario for scenario in rest if scenario.index in picks)
+        arms["with"] += tuple(each.with_trailers() for each in rest if each.index in picks)
     if case.replay is not None:
-        arms["replay"] = (case.replay,)
+        arms["replay"] = (case.replay.with_trailers(),)
     return arms
 
 
@@ -204,7 +212,8 @@ def _whole(scenario: Scenario, frames: int, ids: Sequence[str]) -> Floats:
     known = dict(zip(scenario.ids, states(scenario, frames), strict=True))
     missing = next(iter(known.values()))
     if scenario.reference_drive is not None:
-        missing = states(scenario.reference_drive, frames)[0]
+        left_out = scenario.reference_drive.with_trailers()
+        known |= zip(left_out.ids, states(left_out, frames), strict=True)
     return np.stack([known.get(name, missing) for name in ids])
 
 

@@ -106,7 +106,9 @@ class Preview(StageNode):
             scenario, entry = self._newest
             texts = {reaction.who: str(reaction) for reaction in entry.facts.reactions}
             reactions = dict(sorted(texts.items()))
-            self._shown = shown = Shown(scenario, now, reactions, conflicts_of(scenario))
+            self._shown = shown = Shown(
+                scenario.with_trailers(), now, reactions, conflicts_of(scenario)
+            )
         self._publish(shown, min(now - shown.since, float(shown.scenario.time[-1])))
 
     def _publish(self, shown: Shown, time: float) -> None:

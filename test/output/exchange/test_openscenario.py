@@ -17,7 +17,7 @@ from scenario_gen.output.exchange.opendrive import write_opendrive
 from scenario_gen.output.exchange.openscenario import write_openscenario
 from scenario_gen.roads import read_network, RoadConfig
 from scenario_gen.roads.build import build_road
-from scenario_gen.types import Lane, LaneNetwork, RuleKind, TrafficRule
+from scenario_gen.types import Lane, LaneNetwork, RuleKind, TrafficRule, Trailer
 
 
 def written(scenario, ego=None, export=ExportConfig()):
@@ -139,19 +139,19 @@ def test_what_was_written_is_read_back_and_others_have_no_speeds(tmp_path):
             assert np.allclose(track.speed, scenario.speed[n, there] if ours else [], atol=1e-6)
 
 
-def test_trailers_are_named(tmp_path):
-    """One that is an entity by itself is read, one that is part of its vehicle is not."""
+def test_trailers_belong_to_their_vehicles(tmp_path):
     data, _ = written(crossing())
-    parts = (b'<TrailerRef entityRef="1"/>', b'<Trailer name="box"><Vehicle/></Trailer>')
-    for part in parts:
+    box = b"""<Trailer name="box"><Vehicle><BoundingBox><Center x="1" y="0" z="1"/>
+        <Dimensions length="6" width="2.4" height="3"/></BoundingBox><TrailerCoupler dx="5"/>
+        </Vehicle></Trailer>"""
+    for part in (b'<TrailerRef entityRef="vehicle_2"/>', box):
         data = data.replace(b"</Vehicle>", b"<Trailer>" + part + b"</Trailer></Vehicle >", 1)
     path = tmp_path / "trailers.xosc"
     path.write_bytes(data)
-    made = observed(path)
-    assert len(made.vehicles) == 2
-    said = [note for note in made.notes if note.startswith("trailer")]
-    assert any("trailer 1 belongs to " in note for note in said)
-    assert any("trailer box left out: it is part of " in note for note in said)
+    first, second = observed(path).vehicles
+    assert (first.trailer_name, second.trailer_name) == ("vehicle_2", "")
+    assert first.trailer is None
+    assert second.trailer == Trailer("vehicle_2_trailer", 6.0, 2.4, second.length / 2.0, 4.0)
 
 
 THEIRS = {  # what others write in place of what we write, and by how many seconds it is later

@@ -36,7 +36,7 @@ def test_what_is_written_is_read_again(tmp_path, ending):
     path.write_bytes(data)
     read = observed(path).vehicles
     same = {name: name for name in KINDS} | (
-        {"van": "car", "e_scooter": "bicycle"} if ending == "xml" else {}
+        {"van": "car", "trailer": "truck", "e_scooter": "bicycle"} if ending == "xml" else {}
     )  # CommonRoad has none of these
     assert [type_called(seen.kind) for seen in read] == list(same.values())
     assert [(seen.length, seen.width) for seen in read] == [
@@ -48,12 +48,13 @@ def test_what_is_written_is_read_again(tmp_path, ending):
 
 def test_autoware_and_scenarionet_are_told_the_type():
     _, first = decoded(ALL)[TRACKS][0]
-    assert [entry.classification[0].label for entry in first.objects] == [1, 1, 2, 3, 5, 6, 6, 7]
+    labels = [entry.classification[0].label for entry in first.objects]
+    assert labels == [1, 1, 2, 4, 3, 5, 6, 6, 7]
     described = description(*case_of(ALL), ExportConfig())
     assert [track["type"] for track in described["tracks"].values()] == [
-        *["VEHICLE"] * 4,
+        *["VEHICLE"] * 5,
         *["CYCLIST"] * 3,
         "PEDESTRIAN",
     ]
     counted = described["metadata"]["number_summary"]["num_objects_each_type"]
-    assert counted == {"CYCLIST": 3, "PEDESTRIAN": 1, "VEHICLE": 4}
+    assert counted == {"CYCLIST": 3, "PEDESTRIAN": 1, "VEHICLE": 5}
