@@ -3,8 +3,8 @@
 
 """Roads with something in the way, and OMPL's RRTConnect in Dubins space as the peer on them.
 
-Half of the roads have two to five parked cars at random places and angles, half are slaloms of walls that leave 2.6 to 4 m. OMPL
-checks motions with our compiled exact sweep of the rectangle, so that its Python does not stand in its way.
+Half of the roads have two to five parked cars at random places and angles, half are slaloms of walls that leave 2.6 to 4 m; or
+streets have cars parked in a row on the driver's lane. OMPL checks motions with our compiled exact sweep of the rectangle, so that its Python does not stand in its way.
 """
 
 from dataclasses import dataclass
@@ -23,8 +23,10 @@ from scenario_gen.method.routing.search.planner import Budget, path_length, Pose
 from scenario_gen.method.routing.search.steering import steering_cost
 from scenario_gen.method.routing.search.sweep import car_scene
 from scenario_gen.numerics.arrays import Floats
+from scenario_gen.numerics.curve import Curve
+from scenario_gen.roads import build_road, RoadConfig
 from scenario_gen.roads.clearance import footprint_fits, to_cells
-from scenario_gen.roads.obstacles import with_obstacles
+from scenario_gen.roads.obstacles import ParkedConfig, with_obstacles
 from scenario_gen.types import Obstacle
 from scenario_gen.types.road import Road
 
@@ -70,6 +72,27 @@ def obstructed(seed: int) -> Obstructed | None:
     if not footprint_fits(road, ends, *CAR).all():
         return None
     return Obstructed(road, PoseQuery(ends[0], ends[1], *CAR, CURVATURE))
+
+
+def parked(seed: int) -> Obstructed | None:
+    """A street with one to three parked cars on the right lane; None if its start or goal is blocked."""
+    rng = np.random.default_rng(seed)
+    row = ParkedConfig(
+        lanes="1.-1",
+        begin=float(rng.uniform(20.0, 50.0)),
+        count=int(rng.integers(1, 4)),
+        width=float(rng.uniform(1.7, 2.0)),
+        offset=float(rng.uniform(-1.0, 0.8)),
+    )
+    config = RoadConfig(lane_width=float(rng.uniform(2.8, 3.75)), arm_length=80.0, parked=row)
+    road = build_road(("straight", "curve")[seed % 2], config=config)
+    lane = next(lane for lane in road.lanes.lanes if lane.id == row.lanes) if road.lanes else None
+    if lane is None:
+        return None
+    start, goal = Curve.through(lane.centre).at(np.array([6.0, 74.0]))
+    if not footprint_fits(road, np.stack((start, goal)), *CAR).all():
+        return None
+    return Obstructed(road, PoseQuery(start, goal, *CAR, CURVATURE))
 
 
 def rrt_connect(
