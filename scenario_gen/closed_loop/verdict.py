@@ -206,8 +206,8 @@ class DriveVerdict:
     def severity(self) -> tuple[float, ...]:
         """A key that sorts verdicts, the worst last.
 
-        Collisions by speed, then leaving the road, a red light, a missed goal, missed criteria, and
-        the least time to collision.
+        Collisions by speed, then leaving the road, a red light, a missed goal, missed criteria,
+        and the least time to collision.
         """
         hit = self.collision.speed if self.collision else -1.0
         return (

@@ -54,7 +54,7 @@ COLUMNS = {  # of a table
     **dict.fromkeys(("seconds", "gap", "distance", "lat", "lon", "ttc", "pet", "speed"), "double"),
     "tracks": "binary",
 }
-UNREAD_LOGS = ("not in a known format", "cannot be read")  # causes
+UNREAD_LOGS: tuple[str, str] = ("not in a known format", "cannot be read")  # causes
 MEETING_MARGIN_US = 2_000_000  # smooth vehicles meet a little earlier or later than raw ones
 
 

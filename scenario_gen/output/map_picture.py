@@ -31,7 +31,8 @@ STYLE = """
 .ground{fill:#fff} .lane{fill:#d4d9e2} .turn{fill:#c3cad6} .other{fill:#e7c9c5} .walk{fill:#e9e5d6}
 .in{fill:#15803d} .out{fill:#b91c1c} .box{fill:none;stroke:#0f172a;stroke-dasharray:6 4}
 .path{fill:none;stroke-width:2.5;stroke-opacity:0.8}
-.paint{fill:none;stroke:#64748b} .paint.arrow,.paint.obstacle{fill:#64748b} .paint.zebra{stroke-width:3}
+.paint{fill:none;stroke:#64748b} .paint.arrow,.paint.obstacle{fill:#64748b}
+.paint.zebra{stroke-width:3}
 .paint.lane{stroke-dasharray:9 13} .paint.centre{stroke-dasharray:9 5}
 .paint.stop{stroke:#b91c1c;stroke-width:3}
 .paint.give_way{stroke:#d97706;stroke-width:3;stroke-dasharray:4 3}
