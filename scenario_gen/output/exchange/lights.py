@@ -29,6 +29,20 @@ def light_of(
     return None
 
 
+def phases_within(
+    schedule: SignalSchedule, duration: float
+) -> list[tuple[float, float, SignalState]]:
+    """Return begin, end [s] and state of the phases of a scenario with a duration [s]."""
+    inner = [start for start in schedule.between(0.0, duration).starts if 0.0 < start < duration]
+    if 0.0 < schedule.end < duration and not schedule.repeats:
+        inner.append(schedule.end)
+    starts = [0.0, *inner]
+    return [
+        (start, end, schedule.at(start))
+        for start, end in zip(starts, [*inner, duration], strict=True)
+    ]
+
+
 def states_at(schedule: SignalSchedule, times: Floats) -> list[SignalState]:
     """Return the states at times (T,) [s]."""
     return [schedule.at(time) for time in times.tolist()]

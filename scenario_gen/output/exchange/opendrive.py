@@ -31,8 +31,10 @@ from scenario_gen.output.exchange.opendrive_network import (
     Strip,
 )
 from scenario_gen.output.exchange.xml import add, comment, date_of, Element, serialized
-from scenario_gen.types import CARS, DRIVERS, LaneNetwork, OBSTACLE_HEIGHT_M
+from scenario_gen.types import CARS, DRIVERS, LaneNetwork, OBSTACLE_HEIGHT_M, RuleKind
 
+_SIGNALS = {**SIGN_IDS, RuleKind.TRAFFIC_LIGHT: "1000001"}
+"""Types of signals; that of a light is OpenDRIVE's."""
 STRAIGHT_TOLERANCE_RAD = 1e-7  # heading change of a straight piece
 LINEAR_TOLERANCE_M = 1e-5  # deviation of a width or an offset from its linear piece
 _LANE_TYPES = {  # with the drivers that may use them
@@ -231,12 +233,12 @@ def _signals(
     station: Floats,
     places: Mapping[int, Place],
 ) -> None:
-    """Append the signs of a road at their stop lines, or else at its end."""
+    """Append the signs and lights of a road at their stop lines, or else at its end."""
     members = [k for side in strip.lanes.values() for k in side]
     governed = {
         n: [places[k] for k in members if k in rule.lanes]
         for n, rule in enumerate(network.rules)
-        if rule.kind in SIGN_IDS
+        if rule.kind in _SIGNALS
     }
     governed = {n: lanes for n, lanes in governed.items() if lanes}
     if not governed:
@@ -252,19 +254,31 @@ def _signals(
         signal = add(
             group,
             "signal",
-            id=f"{n + 1}.{first.road}",
+            id=_signal_id(n, first),
             s=float(np.interp(along, curve.station, station)),
             t=0.0,
-            type=SIGN_IDS[rule.kind],
+            type=_SIGNALS[rule.kind],
             subtype="-1",
-            country="DE",
+            country="OpenDRIVE" if rule.kind is RuleKind.TRAFFIC_LIGHT else "DE",
             name=rule.id,
-            dynamic="no",
+            dynamic="yes" if rule.kind is RuleKind.TRAFFIC_LIGHT else "no",
             orientation="+" if first.along else "-",
             zOffset=2.0,
         )
         numbers = [place.lane_id for place in lanes]
         add(signal, "validity", fromLane=min(numbers), toLane=max(numbers))
+
+
+def _signal_id(rule: int, place: Place) -> str:
+    """Return the id of the signal of a rule on the road of a lane."""
+    return f"{rule + 1}.{place.road}"
+
+
+def signal_ids(lane_map: LaneMap, rule: int) -> list[str]:
+    """Return the ids of the signals of a rule, one for each of its roads."""
+    places = RoadNetwork(lane_map).places
+    lanes = lane_map.network.rules[rule].lanes
+    return list(dict.fromkeys(_signal_id(rule, places[k]) for k in lanes if k in places))
 
 
 def _junction(

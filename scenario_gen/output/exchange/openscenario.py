@@ -9,12 +9,15 @@ absolute time from the start of the simulation. Their start condition (simulatio
 has no edge: a rising edge would wait for a change that never happens, or happens a step late. A
 vehicle that arrives late is added to the simulation at that time, and one that leaves is deleted.
 The ego, if any, has an initial pose and speed and a routing action to its goal; the controller
-under test drives it.
+under test drives it. Each light whose states are known has a controller with its phases; its
+signals are those of the OpenDRIVE file that is written beside it.
 """
 
 from scenario_gen.logs import OPENSCENARIO_SPEEDS
 from scenario_gen.output.exchange.cases import Case, Exported, scenario_source
 from scenario_gen.output.exchange.config import ExportConfig
+from scenario_gen.output.exchange.lights import light_of, phases_within
+from scenario_gen.output.exchange.opendrive import signal_ids
 from scenario_gen.output.exchange.xml import add, date_of, Element, number, serialized
 from scenario_gen.types import (
     height,
@@ -23,6 +26,7 @@ from scenario_gen.types import (
     rear_axle,
     Scenario,
     shifted,
+    SignalState,
     token,
     Vehicle,
     WHEELBASE_SHARE,
@@ -58,7 +62,10 @@ def write_openscenario(
     )
     add(root, "ParameterDeclarations")
     add(root, "CatalogLocations")
-    add(root, "RoadNetwork/LogicFile", filepath=road_file)
+    network = add(root, "RoadNetwork")
+    add(network, "LogicFile", filepath=road_file)
+    if not export.map:
+        _lights(network, case, exported)
     entities = add(root, "Entities")
     for n, vehicle in enumerate(exported.others.vehicles):
         _entity(entities, entity_name(vehicle), vehicle, _speeds(exported.others, n))
@@ -79,6 +86,22 @@ def write_openscenario(
     _at(add(act, "StartTrigger"), "start", 0.0, "greaterOrEqual")
     _at(add(storyboard, "StopTrigger"), "end", exported.duration, "greaterThan")
     return serialized(root)
+
+
+def _lights(parent: Element, case: Case, exported: Exported) -> None:
+    """Append a controller for each light; unknown states have a phase without a state."""
+    network, scenario = case.lane_map.network, exported.others
+    lights = scenario.facts.lights
+    known = {n: light_of(rule, network, lights) for n, rule in enumerate(network.rules)}
+    shown = {n: light for n, light in known.items() if light is not None}
+    group = add(parent, "TrafficSignals") if shown else parent
+    for n, light in shown.items():
+        controller = add(group, "TrafficSignalController", name=f"light {light.id}")
+        ids = signal_ids(case.lane_map, n)
+        for start, end, state in phases_within(light.schedule, exported.duration):
+            phase = add(controller, "Phase", name=state.value, duration=end - start)
+            for name in ids if state is not SignalState.UNKNOWN else ():
+                add(phase, "TrafficSignalState", trafficSignalId=name, state=state.value)
 
 
 def entity_name(vehicle: Vehicle) -> str:

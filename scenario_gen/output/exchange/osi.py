@@ -24,6 +24,12 @@ from scenario_gen.base.errors import InputError, needs
 from scenario_gen.base.xml_reader import read_xml
 from scenario_gen.numerics import Floats, NS_PER_S, wrap_angle
 from scenario_gen.output.exchange.cases import Case, Exported, scenario_source
+from scenario_gen.output.exchange.osi_lights import (
+    bulbs,
+    lane_lights,
+    LaneLights,
+    lanes_with_lights,
+)
 from scenario_gen.output.exchange.xml import date_of
 from scenario_gen.types import (
     height,
@@ -54,11 +60,13 @@ class Frame:
 
 @dataclass(frozen=True, eq=False)
 class _Moving:
-    """All vehicles, the ego last: their motion, numbers, and yaw rates (N, T) [rad/s]."""
+    """All vehicles, the ego last: their motion, numbers, yaw rates (N, T) [rad/s], and lights."""
 
     motion: Scenario
     numbers: tuple[int, ...]
     yaw_rate: Floats
+    lights: LaneLights
+    lanes: list[Any]
 
 
 def write_osi(path: Path, case: Case, exported: Exported, road: Path) -> tuple[str, ...]:
@@ -79,7 +87,9 @@ def write_osi(path: Path, case: Case, exported: Exported, road: Path) -> tuple[s
 
     numbers, notes = object_numbers(exported)
     motion = exported.everybody
-    moving = _Moving(motion, numbers, _yaw_rates(motion))
+    lights = lane_lights(case, motion)
+    lanes = list(lanes_with_lights(lights, case))
+    moving = _Moving(motion, numbers, _yaw_rates(motion), lights, lanes)
     host = numbers[-1] if exported.ego is not None else numbers[0]
     text, frame = _text(road), _frame(road)
     standing = list(_standing(case, numbers))
@@ -160,6 +170,8 @@ def _ground_truth(
         host_vehicle_id=osi.Identifier(value=host) if has_host else None,
         moving_object=objects,
         stationary_object=standing,
+        traffic_light=list(bulbs(moving.lights, float(moving.motion.time[k]))),
+        lane=moving.lanes,
         map_reference=road_file,
         proj_string=frame.projection or None,
         proj_frame_offset=offset,

@@ -5,6 +5,7 @@
 
 from dataclasses import replace
 import math
+import re
 
 import numpy as np
 import pytest
@@ -65,16 +66,27 @@ def test_a_bag_has_the_states(result, tmp_path):
             assert np.array_equal(light.line, read.line)
     assert [light.id for light in again.encounter.lights] == ["A", "B"]
 
-    export_bag(tmp_path / "bag", tmp_path / "out", "commonroad", indices=[result[0].index])
-    (file,) = (tmp_path / "out").glob("*.xml")
-    (recorded,) = read_log(file).encounters
+    for target, suffix in (("commonroad", "xml"), ("osi", "mcap"), ("openscenario", "xosc")):
+        export_bag(tmp_path / "bag", tmp_path / target, target, indices=[result[0].index])
+        (file,) = (tmp_path / target).glob(f"*.{suffix}")
+        if target != "openscenario":
+            assert_same_states(read_log(file).encounters[0], result[0])
+    text = file.read_text()
+    assert text.count("<TrafficSignalController ") == 2
+    (road,) = (tmp_path / "openscenario").glob("*.xodr")
+    for name in re.findall('trafficSignalId="([^"]+)" state="red"', text):
+        assert f'<signal id="{name}"' in road.read_text()
+
+
+def assert_same_states(recorded, scenario):
+    """Check the states of all lights at all instants but the last one, and their stop lines."""
     assert len(recorded.lights) == 2
     for light in recorded.lights:
-        same = min(result[0].facts.lights, key=lambda each: np.abs(each.line - light.line).max())
+        same = min(scenario.facts.lights, key=lambda each: np.abs(each.line - light.line).max())
         assert np.abs(same.line - light.line).max() < 1e-6
-        for time in result[0].time:
-            shown = light.schedule.at(time - recorded.start_ns * 1e-9 + 1e-6)
-            assert shown == str(same.schedule.at(time)).replace("unknown", "off")
+        for time in scenario.time[:-1]:
+            shown = str(light.schedule.at(time - recorded.start_ns * 1e-9 + 1e-6))
+            assert shown.replace("off", "unknown") == same.schedule.at(time)
 
 
 def test_fixed_program_has_an_offset_that_suits_the_encounter():
