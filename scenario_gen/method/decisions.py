@@ -234,7 +234,7 @@ class DecidedConflict:
         free = free_drive(second, entry, leaves)
         lag = conflict.entry_first - _free_entry(free, entry, time)
         if pair.kind is EncounterKind.MERGING and abs(lag) > MARGINS.max_merge_lag_s:
-            raise RefusedError("who is ahead decides this merge")
+            raise RefusedError("the vehicle ahead decides this merge")
         return cls(pair, free, lag)
 
     @property

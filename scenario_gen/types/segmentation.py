@@ -46,10 +46,9 @@ class Segmentation:
         if len(self.changepoints) or duration <= LONG_SEGMENT_S:
             return ""
         return (
-            f"no changepoint in {duration:.0f} s: speeds and courses looked constant; "
-            "what is generated keeps no other dynamics "
-            "(if they were not: raise segmentation.significance_level, "
-            "lower segmentation.speed_noise and turn_noise)"
+            f"no changepoint in {duration:.0f} s: speeds and courses look constant, so scenarios "
+            "will have constant speed, too (if they are not constant: raise "
+            "segmentation.significance_level, lower segmentation.speed_noise and turn_noise)"
         )
 
 

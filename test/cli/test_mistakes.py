@@ -177,6 +177,6 @@ def test_a_disk_that_is_full_is_one_line_and_loses_nothing(folder):
     (line,) = ended.stderr.splitlines()
     assert (
         line.startswith("error: made")
-        and "File too large; what was there is untouched; make room" in line
+        and "File too large; earlier files are unchanged; make room" in line
     )
     assert files(folder) == before

@@ -131,7 +131,7 @@ def test_what_cannot_be_decided_is_refused_by_name():
     for encounter, why in (
         (beside, "hardly touch each other's paths"),
         (recorded("follows"), "no vehicle crosses"),
-        (recorded("merges", 4), "who is ahead decides this merge"),
+        (recorded("merges", 4), "the vehicle ahead decides this merge"),
         (late, "inside the shared area when its recording begins"),
         (brief, "together for less than 2 s"),
     ):

@@ -22,7 +22,7 @@ from scenario_gen.base.signals import signals_deferred
 MARKER = ".scenario_gen.json"
 FORMAT_VERSION = 1
 UNTOUCHED = (
-    "; what was there is untouched; make room, or name another folder that you may write to"
+    "; earlier files are unchanged; make room, or name another folder that you may write to"
 )
 Kind = NewType("Kind", str)
 """A kind of result, as in the markers."""
@@ -112,7 +112,7 @@ def _place(target: Path, inputs: Iterable[Path]) -> Path:
     else:
         for path in inputs:
             if path.resolve().is_relative_to(place):
-                fault = f"holds {path}, which is read, and would be replaced"
+                fault = f"contains {path}, an input of this command"
     if fault:
         raise InputError(f"{target} {fault}; name another folder")
     return place

@@ -77,7 +77,7 @@ def _prepare(lock: FileLock, folder: Path, purpose: Path, timeout_s: float) -> N
     _acquire(lock, folder, purpose, timeout_s)
     if not _emptied(folder):
         raise InputError(
-            f"{folder / OLD} is an earlier result, in whose place {purpose} now is; "
+            f"{folder / OLD} is an earlier result, but {purpose} exists, too; "
             "move one of them away"
         )
     (folder / NEW).mkdir()

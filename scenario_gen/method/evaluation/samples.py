@@ -181,7 +181,7 @@ def chosen(motion: Motion, ids: Sequence[str]) -> Motion:
 def common_motion(motion: Motion, ids: tuple[str, str], samples: int) -> Motion | None:
     """Return two vehicles, by their ids, at `samples` times spread evenly while both are present.
 
-    None if that is for less than MIN_COMMON_S.
+    None if they are together for less than MIN_COMMON_S.
     """
     known = motion.ids
     i, j = (known.index(name) for name in ids)
