@@ -139,6 +139,8 @@ def world_of(scenario: Scenario, ego: int | str, step: float = 0.1) -> World:
     fill_cells(time, motion, half, spans, CELL_S, cells)
     order = np.empty((n, n, count))
     fill_order(cells, CELL_S, order)
+    for trailer, vehicle in scenario.towed:  # they move as one
+        order[trailer, vehicle] = order[vehicle, trailer] = np.inf
     reacts = _add_reactions(scenario, ego, order)
     meets = np.empty((n, count, 2))
     fill_meetings(cells, ego, CELL_S, meets)

@@ -447,7 +447,7 @@ def _outcome(template: Encounter) -> str:
 def reacting_vehicles(encounter: Encounter) -> list[str]:
     """Return the ids of the vehicles that react, or go second at a conflict, in an encounter.
 
-    Who yields is first, then who follows.
+    Who yields is first, then who follows. No planner drives a vehicle with a trailer.
     """
     situation = Situation.of(encounter)
     edges = sorted(
@@ -455,4 +455,4 @@ def reacting_vehicles(encounter: Encounter) -> list[str]:
     )
     rows = [*(edge.who for edge in edges), *(each.second for each in situation.conflicts)]
     vehicles = [encounter.vehicles[row] for row in dict.fromkeys(rows)]
-    return [vehicle.id for vehicle in vehicles if not vehicle.kind.walks]
+    return [each.id for each in vehicles if not (each.kind.walks or each.trailer)]

@@ -10,6 +10,7 @@ with the same commands are identical.
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from itertools import chain
 import math
 from typing import Protocol
 
@@ -29,7 +30,7 @@ from scenario_gen.closed_loop.step import advance, ego_hits
 from scenario_gen.numerics import Bools, Floats, wrap_angle
 from scenario_gen.numerics.plane import ahead_and_left, edge_lengths
 from scenario_gen.roads import ground_for
-from scenario_gen.types import Dynamics, Facts, Road, Scenario, Vehicle
+from scenario_gen.types import Dynamics, Facts, Road, Scenario, trailer_poses, Vehicle
 
 
 @dataclass(frozen=True, eq=False)
@@ -156,16 +157,22 @@ class ClosedLoop:
             config: the parameters.
 
         Raises:
-            InputError: the scenario has no such vehicle, the road is in another frame, or a
-                criterion is not valid.
+            InputError: the scenario has no such vehicle, or it has a trailer, the road is in
+                another frame, or a criterion is not valid.
         """
         if road is not None and road.frame_id != scenario.frame_id:
             raise InputError(
                 f"scenario {scenario.index} is in frame {scenario.frame_id!r}, "
                 f"its road in {road.frame_id!r}"
             )
+        scenario = scenario.with_trailers()
         self.scenario, self.world = scenario, world_of(scenario, ego, config.step)
         self.ego = self.world.ego
+        if self.ego in chain.from_iterable(scenario.towed):
+            raise InputError(
+                f"vehicle {scenario.ids[self.ego]} has or is a trailer, which no planner can drive; "
+                "choose another ego"
+            )
         self.road = road and ground_for(road, scenario.vehicles[self.ego])
         self.config, self.limits = config, config.limits.of(scenario.vehicles[self.ego].type)
         self.criteria = find_criteria(config.criteria)
@@ -295,6 +302,13 @@ class ClosedLoop:
         passes = state.passes.copy()
         now = self.begin + time
         advance(self.world, self.parameters, now, before, seen, passes, after, vehicles)
+        for row, towing in self.scenario.towed:
+            trailer = self.scenario.vehicles[towing].trailer
+            assert trailer is not None
+            poses = np.stack([state.vehicles[towing, :3], vehicles[towing, :3]])
+            vehicles[row, :3] = trailer_poses(poses, trailer, state.vehicles[row, 2])[1]
+            vehicles[row, 3:] = vehicles[towing, 3:]
+            after[row] = *after[towing, :4], 0.0  # counted once where the order forces it
         clock, rate, acceleration, waited, forced = after.T
         count = state.forced + int(np.count_nonzero(forced))
         delay = config.observation.delay

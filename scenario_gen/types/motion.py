@@ -355,6 +355,11 @@ class Motion:
         towing = {v.trailer.id: n for n, v in enumerate(self.vehicles) if v.trailer}
         return tuple(towing.get(name, n) for n, name in enumerate(self.ids))
 
+    @property
+    def towed(self) -> list[tuple[int, int]]:
+        """The index of each trailer, and of the vehicle that tows it."""
+        return [(n, owner) for n, owner in enumerate(self.owners) if owner != n]
+
     def footprints(self, k: int) -> Floats:
         """Return the corners (N, 4, 2) [m] of all vehicles at sample k.
 

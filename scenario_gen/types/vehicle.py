@@ -128,16 +128,16 @@ def shifted(position: Floats, heading: Floats, ahead: float) -> Floats:
     return np.asarray(position + ahead * unit(heading))
 
 
-def trailer_poses(poses: Floats, trailer: Trailer) -> Floats:
+def trailer_poses(poses: Floats, trailer: Trailer, first: float | None = None) -> Floats:
     """Return the poses (T, 3) x, y [m], yaw [rad] of a trailer behind those of its vehicle.
 
-    It begins straight behind, and follows the hitch without side slip: on a straight way s [m]
+    It begins with the yaw `first` [rad], or else straight behind, and follows the hitch without side slip: on a straight way s [m]
     of the hitch, the tangent of half the angle from the trailer to the way falls with
     exp(-s / reach) (tractrix).
     """
     hitch = shifted(poses[:, :2], poses[:, 2], -trailer.hitch)
     remaining = np.exp(-edge_lengths(hitch) / trailer.reach)
-    yaw = [float(poses[0, 2])]
+    yaw = [float(poses[0, 2]) if first is None else first]
     for way, share in zip(edge_yaws(hitch).tolist(), remaining.tolist(), strict=True):
         angle = math.remainder(way - yaw[-1], 2.0 * math.pi)
         yaw.append(yaw[-1] + angle - 2.0 * math.atan(math.tan(0.5 * angle) * share))
