@@ -10,6 +10,7 @@ In a narrow lane the bicycle rides along the edge line, and the car drives partl
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+import math
 
 import numpy as np
 from scipy.optimize import lsq_linear
@@ -19,6 +20,7 @@ from scenario_gen.numerics.curve import Curve
 from scenario_gen.roads.vector.lane_graph import LaneGraph
 from scenario_gen.roads.vector.lane_path import lane_change_length, LanePath
 from scenario_gen.situation import Abreast, abreast_in_lane, Track
+from scenario_gen.types import Vehicle
 
 
 @dataclass(frozen=True)
@@ -52,7 +54,7 @@ def with_lateral_positions(
         return paths, 0.0
     offsets, missing = _solved(pairs, usual, limits)
     moved = [
-        _moved(path, float(offsets[n]), None if track.vehicle.is_narrow else spans.get(n))
+        _moved(graph, path, track.vehicle, float(offsets[n]), spans.get(n))
         for n, (path, track) in enumerate(zip(paths, tracks, strict=True))
     ]
     return moved, missing
@@ -149,16 +151,26 @@ def _room(
     return room[0], room[1]
 
 
-def _moved(path: LanePath, offset: float, span: Floats | None) -> LanePath:
-    """Return a lane path at an offset [m, left positive], only on a span if there is one."""
+def _moved(
+    graph: LaneGraph, path: LanePath, vehicle: Vehicle, offset: float, span: Floats | None
+) -> LanePath:
+    """Return a lane path at an offset [m, left positive]; of a wide vehicle only on a span.
+
+    It changes its offset as gently as its lanes allow.
+    """
     if abs(offset) < 0.01:
         return path
-    curve, share = path.curve, np.ones(1)
-    if span is not None:
+    curve, offsets = path.curve, np.full(len(path.curve.station), offset)
+    if not vehicle.is_narrow and span is not None:
         low, high = span + path.start
         outside = np.maximum(low - curve.station, curve.station - high).clip(min=0.0)
-        x = np.clip(1.0 - outside / lane_change_length(offset), 0.0, 1.0)
-        share = x**3 * (10.0 - 15.0 * x + 6.0 * np.square(x))
-    moved = Curve.through(curve.at_offset(curve.station, offset * share)[:, :2])
+        driven = (curve.station > path.start) & (curve.station < path.end)
+        for shortening in (1.0, 2.0, 3.0):
+            x = np.clip(1.0 - outside * shortening / lane_change_length(offset), 0.0, 1.0)
+            offsets = offset * x**3 * (10.0 - 15.0 * x + 6.0 * np.square(x))
+            side = offsets + math.copysign(vehicle.width / 2.0, offset)
+            if graph.covers(curve.at_offset(curve.station, side)[driven, :2]).all():
+                break
+    moved = Curve.through(curve.at_offset(curve.station, offsets)[:, :2])
     start, _ = moved.project(curve.at(np.array([path.start]))[:, :2])
     return replace(path, curve=moved, start=float(start[0]))
