@@ -25,6 +25,7 @@ from scenario_gen.corpus.grouping import FoundEncounter, label, read_found
 from scenario_gen.corpus.meetings import MESSAGES_AFTER_US, MESSAGES_BEFORE_US
 from scenario_gen.corpus.messages import digest_of, UNITS_PER_DEGREE
 from scenario_gen.corpus.tables import write_table
+from scenario_gen.corpus.tracks import runs_of
 from scenario_gen.logs import (
     encounters_of,
     NoEncounterError,
@@ -127,37 +128,39 @@ def clean_found(task: CleanTask) -> None:
     write_encounters(task.target, rows, {"refused": refused, "quality": []})
 
 
-def _by_device(tables: Sequence[Any]) -> dict[int, Any]:
-    """Return the messages in data frames by vehicle, ordered by time, without repeated ones."""
+def _by_device(tables: Sequence[Any]) -> dict[int, dict[str, Any]]:
+    """Return the columns of messages by vehicle, ordered by time, without repeated ones."""
     import pandas as pd
 
     messages = pd.concat(tables).drop_duplicates()
     messages = messages.sort_values(["device", "t", "lat", "lon"], kind="stable")
-    return dict(tuple(messages.groupby("device")))
+    columns = {name: messages[name].to_numpy() for name in messages}
+    return {
+        int(columns["device"][first]): {
+            name: values[first:last] for name, values in columns.items()
+        }
+        for first, last in runs_of(columns["device"])
+    }
 
 
-def _raw_log(entry: FoundEncounter, by_device: Mapping[int, Any]) -> RawLog:
+def _raw_log(entry: FoundEncounter, by_device: Mapping[int, Mapping[str, Any]]) -> RawLog:
     """Return the messages of an encounter as a log."""
     vehicles, count = [], 0
-    begin, end = entry.start - MESSAGES_BEFORE_US, entry.end + MESSAGES_AFTER_US
+    window = [entry.start - MESSAGES_BEFORE_US, entry.end + MESSAGES_AFTER_US + 1]
     for device in entry.devices:
         messages = by_device[device]
-        messages = messages[(messages["t"] >= begin) & (messages["t"] <= end)]
-        stamps = messages["t"].to_numpy(np.int64) * 1000 + SPMD_EPOCH_NS
-        numbers = np.arange(count, count + len(messages))
+        rows = slice(*np.searchsorted(messages["t"], window))
+        states = [messages[name][rows] for name in ("lat", "lon", "heading", "speed")]
+        states[0] = states[0] / UNITS_PER_DEGREE
+        states[1] = states[1] / UNITS_PER_DEGREE
+        states[2] = np.pi / 2.0 - states[2].astype(np.float64) * (np.pi / 180.0)
+        stamps = messages["t"][rows] * 1000 + SPMD_EPOCH_NS
+        numbers = np.arange(count, count + len(stamps))
+        unknown = (np.nan, np.nan)
         vehicles.append(
-            Observations(
-                label(device),
-                stamps,
-                messages[["lat", "lon"]].to_numpy() / UNITS_PER_DEGREE,
-                numbers,
-                np.pi / 2.0 - messages["heading"].to_numpy(np.float64) * (np.pi / 180.0),
-                stamps,
-                messages["speed"].to_numpy(np.float64),
-                numbers,
-            )
+            Observations.of_rows(label(device), stamps, np.stack(states, 1), numbers, unknown)
         )
-        count += len(messages)
+        count += len(stamps)
     segment = Segment(0, entry.name, "message", 1)
     return RawLog(entry.name, True, tuple(vehicles), count, (segment,))
 

@@ -53,7 +53,6 @@ from scenario_gen.corpus.schedule import (
 )
 from scenario_gen.corpus.tables import rows_at, rows_of
 from scenario_gen.corpus.tasks import agree, arriving, check_out, held, spread, Task, Workers
-from scenario_gen.situation import Situation
 
 ARCHIVE, PAGE, DETAILS = "archive.json", "encounters.html", "mine.json"
 LEGEND = (
@@ -241,7 +240,7 @@ def _write_gallery(path: Path, contents: _Contents, result: MiningSummary) -> No
             f"{row['count']} vehicles for {row['seconds']:.1f} s; smallest distance"
             f" {row['distance']:.1f} m, space-time gap {row['gap']:.1f} m",
             "; ".join(f"vehicles {pair}: {kind}" for pair, kind in kinds),
-            *Situation.of(encounter).reactions.sentences(encounter.vehicles),
+            *json.loads(row["reactions"])["sentences"],
         ]
         title = f"{row['kind']}: {row['name']}"
         cards.append({"title": title, "lines": lines, "pictures": [sketch(encounter)]})
