@@ -81,7 +81,7 @@ class Remote:
         return self.parent / f"{self.stem}{suffix}"
 
     def file_system(self) -> tuple[Any, str]:
-        """Return fsspec's file system, with its listing cache cleared, and the path in it.
+        """Return fsspec's file system, which caches no listings, and the path in it.
 
         Raises:
             InputError: the library for the store is not installed, or a setting is missing.
@@ -89,9 +89,9 @@ class Remote:
         needs("stores", "fsspec")
         from fsspec.core import url_to_fs
 
+        options = S3 if self.url.startswith("s3:") else {}
         with guarded(self.url):
-            system, path = url_to_fs(self.url, **(S3 if self.url.startswith("s3:") else {}))
-            system.invalidate_cache()
+            system, path = url_to_fs(self.url, use_listings_cache=False, **options)
         return system, path
 
     def call(
@@ -285,9 +285,11 @@ def download(parts: Iterable[Part]) -> None:
 
 def _copy(part: Part) -> None:
     source = part.source
-    # A whole object is read without a range, since some servers do not support ranges.
-    is_whole = part.begin == 0 and part.end == source.size
-    bounds = {} if is_whole else {"start": part.begin, "end": part.end}
+    # The web is read without a range if possible, since some servers do not support ranges. A
+    # store would be asked for the size first; one byte more shows that an object has grown.
+    is_end = part.end == source.size
+    is_whole = part.begin == 0 and is_end and source.url.startswith(READ_ONLY_SCHEMES)
+    bounds = {} if is_whole else {"start": part.begin, "end": part.end + is_end}
     data = source.call(lambda system, path: bytes(system.cat_file(path, **bounds)))
     expected = part.end - part.begin
     if len(data) != expected:

@@ -368,8 +368,7 @@ def _shared_ids(out: Place) -> list[str]:
     from pyarrow import parquet
 
     shared: set[str] = set()
-    tables = [out / "hours" / f"hour-{key}.parquet" for key in searched_hours(out).values()]
-    for _, local in each_fetched(tables):
+    for _, local in each_fetched([*searched_hours(out).values()]):
         metadata = parquet.read_schema(local).metadata or {}
         shared.update(json.loads(metadata.get(b"shared", b"{}")))
     if not shared:

@@ -73,10 +73,13 @@ def current(tasks: Sequence[Target], folder: Place, pattern: str = "[!.]*") -> l
 
 def accounts_of(ranged: Sequence[RangeTask], out: Place) -> dict[Place, dict[str, Any]]:
     """Return the tables of ranges that are parsed, with their accounts."""
-    existing = {path.name for path in (out / "messages").glob("range-*.json")}
-    tables = {task.target.with_suffix(".json"): task.target for task in ranged}
-    present = [account for account in tables if account.name in existing]
-    return {tables[path]: read_json(local, ACCOUNT) for path, local in each_fetched(present)}
+    listed = {path.name: path for path in (out / "messages").glob("range-*")}
+    tables: dict[Place, Place] = {}
+    for task in ranged:
+        account = listed.get(task.target.with_suffix(".json").name)
+        if account is not None and task.target.name in listed:
+            tables[account] = listed[task.target.name]
+    return {tables[path]: read_json(local, ACCOUNT) for path, local in each_fetched([*tables])}
 
 
 class _Hour(NamedTuple):
@@ -141,8 +144,8 @@ def hour_tasks(
 def group_tasks(out: Place, config: CorpusConfig) -> list[GroupTask]:
     """Return tasks for the partitions of all meetings that are not grouped yet."""
     hours = searched_hours(out)
-    tables = [out / "hours" / f"hour-{key}.parquet" for key in hours.values()]
-    start, end = (np.concatenate(parts) for parts in _columns(tables, "start", "end"))
+    columns = _columns([*hours.values()], "start", "end")
+    start, end = (np.concatenate(parts) for parts in columns)
     tasks = []
     for begin, last in partitions(start, end):
         near = _between(hours, begin // HOUR_US, (last - 1) // HOUR_US)
@@ -166,15 +169,17 @@ def clean_tasks(out: Place, config: CorpusConfig) -> list[CleanTask]:
     return current(tasks, out / "encounters", "found-*")
 
 
-def searched_hours(out: Place) -> dict[int, str]:
-    """Return the keys of the hours that are searched, in order."""
-    keys = [path.stem.partition("-")[2] for path in (out / "hours").glob("hour-*.parquet")]
-    return dict(sorted((int(key.partition("-")[0]), key) for key in keys))
+def searched_hours(out: Place) -> dict[int, Place]:
+    """Return the tables of the hours that are searched, in order."""
+    tables = [*(out / "hours").glob("hour-*.parquet")]
+    by_hour = {int(table.stem.split("-")[1]): table for table in tables}
+    return {hour: by_hour[hour] for hour in sorted(by_hour)}
 
 
-def _between(hours: Mapping[int, str], first: int, last: int) -> tuple[str, ...]:
+def _between(hours: Mapping[int, Place], first: int, last: int) -> tuple[str, ...]:
     """Return the keys of the hours from the first to the last."""
-    return tuple(hours[hour] for hour in range(first, last + 1) if hour in hours)
+    near = [hours[hour] for hour in range(first, last + 1) if hour in hours]
+    return tuple(table.stem.partition("-")[2] for table in near)
 
 
 def _columns(tables: Sequence[Place], *names: str) -> list[list[Ints]]:
