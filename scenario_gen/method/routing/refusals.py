@@ -31,7 +31,7 @@ def too_tight(task: VehicleTask) -> str:
     limit = task.max_curvature
     reason = f"it turns with at most {limit:.3f} 1/m ({1.0 / limit:.1f} m)"
     if curvature.max() <= limit:
-        fits = footprint_fits(task.road, middle, vehicle.length, vehicle.width)
+        fits = footprint_fits(task.road.cleared, middle, vehicle.length, vehicle.width)
         curvature = np.where(fits, 0.0, curvature)
         reason = "there its footprint reaches beyond the road"
         if fits.all():
@@ -52,11 +52,15 @@ def too_tight(task: VehicleTask) -> str:
 
 
 def off_road(task: VehicleTask) -> str:
-    """Return where the fitted path leaves the road, or else the parameter that may help."""
+    """Return where the fitted path leaves the road or is blocked, or else what may help."""
     path, vehicle = task.fitted.path, task.vehicle
-    outside = path[~footprint_fits(task.road, path, vehicle.length, vehicle.width)]
-    if not len(outside):
+    outside = path[~footprint_fits(task.road.cleared, path, vehicle.length, vehicle.width)]
+    blocked = path[~footprint_fits(task.road, path, vehicle.length, vehicle.width)]
+    if not len(blocked):
         return "; planning.iterations allows more"
+    if not len(outside):
+        x, y = blocked[0, :2]
+        return f"; an obstacle is in the way from {x:.2f}, {y:.2f} m on"
     x, y = outside[len(outside) // 2, :2]
     return (
         "; the footprint leaves the road where the recording was placed, at "

@@ -5,13 +5,16 @@
 
 from base64 import b64encode
 from collections.abc import Mapping, Sequence
+from functools import partial
 from itertools import combinations
 from typing import Any
 
 import numpy as np
+import shapely
 
 from scenario_gen.method.evaluation import common_motion, mean_feature
-from scenario_gen.numerics import Bools, Floats
+from scenario_gen.numerics import Floats, runs
+from scenario_gen.roads import to_metres
 from scenario_gen.types import (
     DRIVERS,
     Encounter,
@@ -29,7 +32,10 @@ from scenario_gen.types.markings import markings
 FRAME_PERIOD_S = 0.2
 """Period of the stored frames; the page interpolates between them."""
 MAX_FRAMES_COUNT = 240
-MAX_CELLS = 900
+STEP_CELLS = 1.25
+"""The edge of an area of cells may lie this far from that of its cells."""
+SEAM_M = 0.02
+"""Half of a seam between lanes that is closed."""
 MATRIX_SIZE_CELLS = 72
 MAX_LINES = 400
 MAX_STATES_COUNT = 500_000
@@ -109,37 +115,31 @@ def pack(values: Floats) -> dict[str, Any]:
     }
 
 
-def run_lengths(mask: Bools) -> list[int]:
-    """Return the run lengths of a grid (H, W) in row order; the first run is False (may be 0)."""
-    flat = mask.ravel()
-    edges = np.flatnonzero(np.diff(flat)) + 1
-    lengths = np.diff(np.concatenate([[0], edges, [flat.size]]))
-    return [int(length) for length in ([0, *lengths] if flat[0] else lengths)]
-
-
 def _short(value: float, digits: int = 3) -> float:
     return round(float(value), digits)
 
 
 def road_data(road: Road) -> dict[str, Any]:
-    """Return the grid, merged until its longer side has at most MAX_CELLS.
+    """Return the name of a road, the rings of its area, and its markings; x, y, x, y, … [m].
 
-    A merged cell is drivable by majority. Cells for some types only, as of cycle lanes, count as
-    drivable.
+    The area has the borders of lanes, and elsewhere the edges of drivable cells without their
+    steps. Lanes for some types only, as cycle lanes, count as drivable.
     """
-    factor = max(1, -(-max(road.drivable.shape) // MAX_CELLS))
-    height, width = (-(-side // factor) for side in road.drivable.shape)
-    padded = np.zeros((height * factor, width * factor))
-    lanes = road.lanes.others if road.lanes is not None else ()
-    others = road.cells_in(lane for lane in lanes if lane.open_to(DRIVERS))
-    padded[: road.drivable.shape[0], : road.drivable.shape[1]] = road.drivable | others
-    coarse = padded.reshape(height, factor, width, factor).mean(axis=(1, 3)) >= 0.5
+    cells = [
+        (first, row, stop, row + 1)
+        for row, flags in enumerate(road.cleared.drivable)
+        for first, stop in runs(flags)
+    ]
+    steps = shapely.union_all(shapely.box(*np.transpose(cells)))
+    ground = shapely.transform(steps.simplify(STEP_CELLS), partial(to_metres, road))
+    lanes = road.lanes.every_lane if road.lanes is not None else ()
+    shapes = [shapely.Polygon(lane.outline) for lane in lanes if lane.open_to(DRIVERS)]
+    area = shapely.union_all([ground, *shapely.buffer(shapes, SEAM_M)]).simplify(SEAM_M)
+    polygons = [part for part in shapely.get_parts(area) if part.geom_type == "Polygon"]
+    rings = [ring for part in polygons for ring in (part.exterior, *part.interiors)]
     return {
         "name": road.name,
-        "cell": float(road.resolution * factor),
-        "origin": [_short(v) for v in road.origin],
-        "size": [width, height],
-        "runs": run_lengths(coarse),
+        "rings": [np.asarray(ring.coords).ravel().round(2).tolist() for ring in rings],
         "markings": _markings(road),
     }
 

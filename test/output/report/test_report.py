@@ -16,15 +16,17 @@ from hypothesis.extra.numpy import arrays
 import numpy as np
 import pytest
 from rich.console import Console
-from support.evaluation_worlds import cross_road, report_case
+import shapely
+from support.evaluation_worlds import report_case
 
 from scenario_gen.bags.recordings.read import read_recording
 from scenario_gen.method.evaluation import coverage_of, feature_matrix
-from scenario_gen.output.report.data import case_data, MATRIX_SIZE_CELLS, pack, run_lengths
+from scenario_gen.output.report.data import case_data, MATRIX_SIZE_CELLS, pack, road_data
 from scenario_gen.output.report.page import render, ReportInput, write_report
 from scenario_gen.output.report.summary import summary
 from scenario_gen.output.results import write_results
-from scenario_gen.types import formatted, Interval
+from scenario_gen.roads import build_road
+from scenario_gen.types import formatted, Interval, Road
 from scenario_gen.types.fit import Loss
 
 
@@ -86,12 +88,6 @@ def test_packing_loses_less_than_a_sixty_thousandth(values):
     assert (np.abs(found - values) <= extent / 60000 + 1e-6).all()
 
 
-@given(arrays(np.bool_, st.tuples(st.integers(1, 9), st.integers(1, 9))))
-def test_run_lengths_give_the_mask_back(mask):
-    lengths = run_lengths(mask)
-    assert (np.repeat(np.arange(len(lengths)) % 2 == 1, lengths) == mask.ravel()).all()
-
-
 def test_matrices_are_the_mean_feature():
     case = report_case(3)
     entry = case_data(case, 50)["features"][0]
@@ -107,23 +103,22 @@ def test_matrices_are_the_mean_feature():
     )
 
 
-def test_a_fine_road_is_made_coarse():
-    road = cross_road()
-    fine = type(road)(
-        "fine",
-        np.kron(road.drivable, np.ones((4, 4), bool)),
-        0.125,
-        road.origin,
-        road.entries,
-        road.exits,
-    )
-    case = report_case(2)
-    drawn = case_data(type(case)(**{**vars(case), "road": fine}), 1)["road"]
-    assert max(drawn["size"]) <= 900 and drawn["cell"] * drawn["size"][0] == pytest.approx(
-        140.0, abs=0.5
-    )
-    share = sum(drawn["runs"][1::2]) / sum(drawn["runs"])
-    assert share == pytest.approx(road.drivable.mean(), abs=0.01)
+def test_a_road_is_drawn_without_the_steps_of_its_cells():
+    size = 0.2
+    row, column = np.indices((200, 300))
+    slanted = np.abs(row - 60 - 0.3 * column) < 20  # cells along a slanted street
+    slanted[90:110, 140:160] = False  # an island
+    road = Road("r", slanted, size, np.array([5.0, -3.0]), np.zeros((0, 3)), np.zeros((0, 3)))
+    drawn = road_data(road)["rings"]
+    rings = [shapely.Polygon(np.reshape(ring, (-1, 2))) for ring in drawn]
+    area = rings[0].difference(shapely.union_all(rings[1:]))
+    assert area.area == pytest.approx(slanted.sum() * size**2, rel=0.02)
+    assert len(rings) == 2 and sum(len(ring) for ring in drawn) < 60
+    curve = build_road("curve")
+    drawn = shapely.Polygon(np.reshape(road_data(curve)["rings"][0], (-1, 2)))
+    for lane in curve.lanes.lanes:
+        assert drawn.buffer(0.03).covers(shapely.LineString(lane.right))
+        assert drawn.exterior.distance(shapely.Point(lane.right[60])) < 0.2
 
 
 def test_what_the_fitting_lost_and_how_far_a_route_is_from_it_are_said(tmp_path):

@@ -160,9 +160,9 @@ function drawTemplateMap(view, data, template) {
 }
 
 /** Planned routes and fitted changepoints on the road. */
-function drawRoutes(view, data, picture) {
+function drawRoutes(view, data) {
   const context = view.begin();
-  view.road(data.road, picture);
+  view.road(data.road);
   data.fit.forEach((vehicle, n) => {
     context.globalAlpha = 1;
     context.strokeStyle = vehicleColour(n);
@@ -181,9 +181,9 @@ function drawRoutes(view, data, picture) {
 }
 
 /** Figure 4, upper half: all samples of one arm on the road. */
-function drawSamples(view, data, picture, set, arm) {
+function drawSamples(view, data, set, arm) {
   const context = view.begin();
-  view.road(data.road, picture);
+  view.road(data.road);
   data.vehicles.forEach((_, n) => {
     context.strokeStyle = vehicleColour(n);
     context.lineWidth = 1.2;

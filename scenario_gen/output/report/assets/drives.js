@@ -3,7 +3,6 @@
 
 const all = JSON.parse(document.getElementById("data").textContent);
 const byId = (id) => document.getElementById(id);
-const pictures = all.roads.map((road) => (road ? roadPicture(road) : null));
 let shown = null;
 let playing = false;
 let last = 0;
@@ -48,7 +47,7 @@ function draw() {
   const share = Number(byId("time").value);
   const time = share * duration;
   const context = view.begin();
-  view.road(all.roads[drive.road], pictures[drive.road]);
+  view.road(all.roads[drive.road]);
   view.lights(motion.lights[0], time);
   context.globalAlpha = 0.9;
   context.lineWidth = 1;

@@ -30,11 +30,10 @@ function chipLine(vehicle, n, ...rest) {
 
 /** The animation: play, pause, scrub, choose the set and the scenario, or see all scenarios at once. */
 class Player {
-  constructor(section, data, sets, picture, box, record) {
+  constructor(section, data, sets, box, record) {
     this.data = data;
     this.record = record;
     this.sets = sets;
-    this.picture = picture;
     this.find = (role) => section.querySelector(`[data-role="${role}"]`);
     this.view = new View(this.find("stage"), box, 8);
     this.whole = this.view.box;
@@ -247,7 +246,7 @@ class Player {
     view.box = this.frame(states.filter((_, n) => here[n]), this.whole);
     this.drawRecord(share);
     const context = view.begin();
-    view.road(data.road, this.picture);
+    view.road(data.road);
     view.lights(set.lights[sample], this.time);
     const ghosts = this.find("ghosts").checked;
     data.vehicles.forEach((vehicle, n) => {
@@ -335,23 +334,22 @@ class Player {
 function open(section, data) {
   const template = new Trajectories(data.template);
   const sets = Object.fromEntries(Object.entries(data.arms).map(([arm, packed]) => [arm, new Trajectories(packed)]));
-  const picture = data.road && roadPicture(data.road);
   const box = Object.values(sets).reduce((grown, set) => set.grow(grown), [Infinity, Infinity, -Infinity, -Infinity]);
   data.fit.forEach((vehicle) => vehicle.route.forEach(([x, y]) => {
     box[0] = Math.min(box[0], x); box[1] = Math.min(box[1], y); box[2] = Math.max(box[2], x); box[3] = Math.max(box[3], y);
   }));
   const find = (role) => section.querySelector(`[data-role="${role}"]`);
-  const player = Object.keys(sets).length ? new Player(section, data, sets, picture, box, template.turned(data.turn)) : null;
+  const player = Object.keys(sets).length ? new Player(section, data, sets, box, template.turned(data.turn)) : null;
   const ground = template.grow([Infinity, Infinity, -Infinity, -Infinity]);
   const maps = [
     [new View(find("template-map"), ground, 6), (view) => drawTemplateMap(view, data, template)],
   ];
-  if (find("routes")) maps.push([new View(find("routes"), box, 8), (view) => drawRoutes(view, data, picture)]);
+  if (find("routes")) maps.push([new View(find("routes"), box, 8), (view) => drawRoutes(view, data)]);
   let top = 1;
   [template, ...Object.values(sets)].forEach((set) => { for (let i = 3; i < set.values.length; i += 4) top = Math.max(top, set.values[i]); });
   const drawAll = (arm) => drawSpeeds(find(`speeds-${arm}`), data, sets[arm], template, 1.08 * top);
   ["with", "without"].filter((arm) => sets[arm]).forEach((arm) => {
-    maps.push([new View(find(`samples-${arm}`), box, 8), (view) => drawSamples(view, data, picture, sets[arm], arm)]);
+    maps.push([new View(find(`samples-${arm}`), box, 8), (view) => drawSamples(view, data, sets[arm], arm)]);
     drawAll(arm);
   });
   drawTemplate(find("template-speed"), data, template);

@@ -112,25 +112,6 @@ class Trajectories {
   }
 }
 
-/** The road as a picture, one pixel per cell. */
-function roadPicture(road) {
-  const [width, height] = road.size;
-  const canvas = document.createElement("canvas");
-  canvas.width = width;
-  canvas.height = height;
-  const context = canvas.getContext("2d");
-  const image = context.createImageData(width, height);
-  let cell = 0;
-  road.runs.forEach((length, run) => {
-    for (const end = cell + length; cell < end; cell += 1) {
-      const pixel = 4 * ((height - 1 - Math.floor(cell / width)) * width + (cell % width));
-      image.data.set(run % 2 ? [100, 116, 139, 72] : [0, 0, 0, 0], pixel);
-    }
-  });
-  context.putImageData(image, 0, 0);
-  return canvas;
-}
-
 /** A canvas that keeps its sharpness and its proportions, and the map from metres to its pixels. */
 class View {
   constructor(canvas, box, margin) {
@@ -165,13 +146,11 @@ class View {
     return context;
   }
 
-  road(road, picture) {
+  road(road) {
     if (!road) return;
-    const side = road.cell * this.scale;
-    const top = this.y(road.origin[1] + road.size[1] * road.cell);
-    this.context.imageSmoothingEnabled = true;
-    this.context.drawImage(picture, this.x(road.origin[0]), top, road.size[0] * side, road.size[1] * side);
     this.context.globalAlpha = 1;
+    this.context.fillStyle = "rgba(100, 116, 139, 0.28)";
+    this.lines(road.rings, 0);
     this.context.strokeStyle = this.context.fillStyle = themed("lane");
     Object.entries(road.markings).forEach(([kind, lines]) => this.lines(lines, ...PAINT[kind]));
   }
@@ -197,7 +176,7 @@ class View {
     drawn.forEach((line) => {
       for (let i = 0; i < line.length; i += 2) context[i ? "lineTo" : "moveTo"](this.x(line[i]), this.y(line[i + 1]));
     });
-    context[width ? "stroke" : "fill"]();
+    if (width) context.stroke(); else context.fill("evenodd");
     context.setLineDash([]);
     context.lineCap = "round";
   }
