@@ -170,8 +170,8 @@ class ClosedLoop:
         self.ego = self.world.ego
         if self.ego in chain.from_iterable(scenario.towed):
             raise InputError(
-                f"vehicle {scenario.ids[self.ego]} has or is a trailer, which no planner can drive; "
-                "choose another ego"
+                f"vehicle {scenario.ids[self.ego]} has or is a trailer, which no planner can "
+                "drive; choose another ego"
             )
         self.road = road and ground_for(road, scenario.vehicles[self.ego])
         self.config, self.limits = config, config.limits.of(scenario.vehicles[self.ego].type)

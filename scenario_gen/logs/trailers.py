@@ -61,12 +61,15 @@ def coupled(
         if track.id in parts:
             continue
         known = towed.get(track.id) or track.trailer
-        if known is None and track.trailer_name:
-            known = None if track.trailer_name in names else _with_length(track)
-            fate = "left out: no vehicle that keeps its distance behind it, and no length [m]"
-            if known is not None:
-                fate = f"it is {known.length:g} m long"
-            notes.append(f"vehicle {track.id} has the trailer {track.trailer_name}; {fate}")
+        name = track.trailer_name
+        if known is None and name:
+            known = None if name in names else _with_length(track)
+            fate = (
+                f"{known.length:g} m long"
+                if known
+                else "left out: neither a vehicle behind it nor metres"
+            )
+            notes.append(f"vehicle {track.id} has the trailer {name}; {fate}")
         kept.append(replace(piece, track=replace(track, trailer=known)))
     return kept, list(dict.fromkeys(notes))
 

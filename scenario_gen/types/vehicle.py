@@ -131,9 +131,9 @@ def shifted(position: Floats, heading: Floats, ahead: float) -> Floats:
 def trailer_poses(poses: Floats, trailer: Trailer, first: float | None = None) -> Floats:
     """Return the poses (T, 3) x, y [m], yaw [rad] of a trailer behind those of its vehicle.
 
-    It begins with the yaw `first` [rad], or else straight behind, and follows the hitch without side slip: on a straight way s [m]
-    of the hitch, the tangent of half the angle from the trailer to the way falls with
-    exp(-s / reach) (tractrix).
+    It begins with the yaw `first` [rad], or else straight behind, and follows the hitch without
+    side slip: on a straight way s [m] of the hitch, the tangent of half the angle from the trailer
+    to the way falls with exp(-s / reach) (tractrix).
     """
     hitch = shifted(poses[:, :2], poses[:, 2], -trailer.hitch)
     remaining = np.exp(-edge_lengths(hitch) / trailer.reach)

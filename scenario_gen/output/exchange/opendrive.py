@@ -235,33 +235,29 @@ def _signals(
 ) -> None:
     """Append the signs and lights of a road at their stop lines, or else at its end."""
     members = [k for side in strip.lanes.values() for k in side]
-    governed = {
-        n: [places[k] for k in members if k in rule.lanes]
-        for n, rule in enumerate(network.rules)
-        if rule.kind in _SIGNALS
-    }
-    governed = {n: lanes for n, lanes in governed.items() if lanes}
-    if not governed:
-        return
-    group = add(road, "signals")
     curve = Curve(strip.reference)
-    for n, lanes in governed.items():
-        rule, first = network.rules[n], lanes[0]
+    for n, rule in enumerate(network.rules):
+        lanes = [places[k] for k in members if k in rule.lanes]
+        if not lanes or rule.kind not in _SIGNALS:
+            continue
+        first = lanes[0]
         position = strip.reference[-1 if first.along else 0, :2]
         if len(rule.line):
             position = rule.line.mean(axis=0)
         (along,) = curve.project(position[None])[0]
+        is_light = rule.kind is RuleKind.TRAFFIC_LIGHT
+        group = road.find("signals")
         signal = add(
-            group,
+            add(road, "signals") if group is None else group,
             "signal",
             id=_signal_id(n, first),
             s=float(np.interp(along, curve.station, station)),
             t=0.0,
             type=_SIGNALS[rule.kind],
             subtype="-1",
-            country="OpenDRIVE" if rule.kind is RuleKind.TRAFFIC_LIGHT else "DE",
+            country="OpenDRIVE" if is_light else "DE",
             name=rule.id,
-            dynamic="yes" if rule.kind is RuleKind.TRAFFIC_LIGHT else "no",
+            dynamic="yes" if is_light else "no",
             orientation="+" if first.along else "-",
             zOffset=2.0,
         )

@@ -104,7 +104,10 @@ def test_inputs_are_not_replaced(out, tmp_path):
         tmp_path / "link.txt",
         out / ".." / "out" / "one.txt",
     ):
-        with pytest.raises(InputError, match="an input of this command"), replaced_folder(out, KIND, [given]):
+        with (
+            pytest.raises(InputError, match="an input of this command"),
+            replaced_folder(out, KIND, [given]),
+        ):
             pass
     for given in (tmp_path, tmp_path / "missing", Path("z" * 300)):
         with replaced_folder(out, KIND, [given]):
