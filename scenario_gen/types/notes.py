@@ -109,7 +109,7 @@ class NoteKind(Enum):
     TESTS = "for testing: {rate}"
     EGO_TESTS = (
         "for testing ego {ego}: {kept} of {requested} scenarios found in which it has to react "
-        "({stages}). {advice}"
+        "({stages}); {advice}"
     )
     SEARCHED = "failures of {planner}, found by a search: not a random sample of natural scenarios"
 

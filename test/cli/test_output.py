@@ -8,6 +8,7 @@ import io
 import json
 from pathlib import Path
 import sys
+from unittest.mock import Mock
 
 import pytest
 from rich.console import Console
@@ -15,8 +16,9 @@ from rich.text import Text
 import typer
 from typer.testing import CliRunner
 
+from scenario_gen.base.errors import RefusedError
 from scenario_gen.base.terminal import Terminal
-from scenario_gen.cli import output
+from scenario_gen.cli import commands, output
 from scenario_gen.cli.commands import app
 from scenario_gen.cli.corpus import shown
 
@@ -183,3 +185,17 @@ def test_no_word_of_a_help_is_cut_at_80_columns(name, monkeypatch):
 def test_a_pipe_receives_no_markup(capsys):
     output.print_(Text("log.period", style="bold"), " = 0.1", sep="")
     assert capsys.readouterr().out == "log.period = 0.1\n"
+
+
+def test_each_line_of_an_error_is_a_line(monkeypatch, capsys):
+    error = RefusedError("nothing could be generated:", "road merge: no arm", "a\nname: no lane")
+    monkeypatch.setattr(commands, "run", Mock(side_effect=error))
+    monkeypatch.setattr(sys, "argv", ["scenario-gen"])
+    with pytest.raises(SystemExit):
+        commands.main()
+    lines = capsys.readouterr().err.splitlines()
+    assert lines == [
+        "error: nothing could be generated:",
+        "road merge: no arm",
+        r"a\nname: no lane",
+    ]
