@@ -25,6 +25,7 @@ import numpy.typing as npt
 from scenario_gen.base.errors import InputError
 from scenario_gen.closed_loop.config import ClosedLoopConfig
 from scenario_gen.closed_loop.ego import Command, EgoState
+from scenario_gen.closed_loop.lights import crosses_at_red
 from scenario_gen.closed_loop.off_road import is_off_road
 from scenario_gen.closed_loop.origin import Trial
 from scenario_gen.closed_loop.picture import picture
@@ -33,7 +34,7 @@ from scenario_gen.closed_loop.simulation import ClosedLoop, State
 from scenario_gen.closed_loop.trials import read_trials
 from scenario_gen.closed_loop.verdict import judge
 from scenario_gen.numerics import Floats
-from scenario_gen.numerics.plane import ahead_and_left, angle_between, unit
+from scenario_gen.numerics.plane import ahead_and_left, angle_between, place, unit
 from scenario_gen.types import MAX_PLANNED_CURVATURE_PER_M
 
 MAX_OTHERS_COUNT = 8
@@ -63,7 +64,7 @@ class DriveEnv(gymnasium.Env[Array, Array]):  # type: ignore[misc]
     Action (float32, 2): acceleration, from -1 (the body's largest deceleration) to 1 (its largest
     acceleration), and curvature, as a share of the body's sharpest from -1 to 1.
 
-    Reward: distance driven along the route [m]; -100 for a collision or leaving the road, +10 at
+    Reward: distance driven along the route [m]; -100 for a collision, exit or red light, +10 at
     the goal. Each of those terminates the drive; it is truncated when the time is over. Then
     `info["verdict"]` is the verdict.
     """
@@ -153,7 +154,9 @@ class DriveEnv(gymnasium.Env[Array, Array]):  # type: ignore[misc]
         reward = self._station - before
         info: dict[str, Any] = {"time": state.time}
         at_goal = loop.at_goal(state)
-        failed = loop.hit(state) or self._is_off_road(state)
+        failed = loop.hit(state) or self._is_off_road(state) or self._runs_red()
+        if loop.lights:
+            info["lights"] = {light.id: light.state.value for light in loop.observe(state).lights}
         terminated = at_goal or failed
         truncated = not terminated and state.step >= loop.last_step
         if terminated:
@@ -175,6 +178,13 @@ class DriveEnv(gymnasium.Env[Array, Array]):  # type: ignore[misc]
         half = loop.scenario.vehicles[loop.ego].half
         pose = state.vehicles[loop.ego, :3]
         return is_off_road(loop.road, pose, half, self.config.off_road_depth)
+
+    def _runs_red(self) -> bool:
+        """Return whether the ego crosses a stop line at red in the last step."""
+        loop, last = self._loop, self._states[-2:]
+        half = loop.scenario.vehicles[loop.ego].half[0]
+        fronts = [place(state.vehicles[loop.ego], half, 0.0) for state in last]
+        return crosses_at_red(loop.lights, fronts[0], fronts[1], last[1].time)
 
     def render(self) -> npt.NDArray[np.uint8] | None:
         """Return a top view (400, 400, 3) of 100 m x 100 m; None without a render mode."""

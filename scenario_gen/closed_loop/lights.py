@@ -36,6 +36,18 @@ def observed(lights: tuple[TrafficLight, ...], time: float) -> tuple[ObservedLig
     )
 
 
+def crosses_at_red(
+    lights: tuple[TrafficLight, ...], before: Floats, after: Floats, time: float
+) -> bool:
+    """Return whether a front (2,) [m] moves over a stop line that is red at a time [s]."""
+    return any(
+        light.schedule.at(time).stops
+        and float(light.before(before)) > 0.0 >= float(light.before(after))
+        and float(light.distance_to_side(after)) == 0.0
+        for light in lights
+    )
+
+
 def red_phases(scenario: Scenario) -> Floats:
     """Return the phases in which each vehicle waits at a stop line (N, R, 3) [s].
 
