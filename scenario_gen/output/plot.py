@@ -91,7 +91,7 @@ def animate(shown: Motion, file: Path | str, *, road: Road | None = None) -> Pat
     figure, ground = Figure(), BytesIO()
     axes = plot(shown, figure.add_subplot(), road=road)
     figure.savefig(ground, dpi=figure.dpi)
-    film = shown.resampled(_FRAME_PERIOD_S)
+    film = shown.with_trailers().resampled(_FRAME_PERIOD_S)
     picture = Image.open(ground).convert("RGB").quantize()
     frames = []
     for k in range(len(film.time)):
