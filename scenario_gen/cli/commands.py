@@ -203,7 +203,9 @@ def _print_error(message: str) -> None:
     from scenario_gen.base.terminal import Terminal
 
     with suppress(OSError):
-        Terminal(stderr=True).print(Text("error:", style="bold red"), Text(message), soft_wrap=True)
+        Terminal(stderr=True).print(
+            Text("error:", style="bold red"), Text(message), soft_wrap=True
+        )
 
 
 if __name__ == "__main__":
