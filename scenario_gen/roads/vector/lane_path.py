@@ -162,6 +162,11 @@ def bend_cost(lateral: Sequence[LateralAcceleration]) -> float:
     return COSTS.lateral_m2_per_mps2 * float(np.mean(capped))
 
 
+def narrow_cost(missing: float) -> float:
+    """Return the cost [m²] of lanes that are too narrow for a recorded side distance by some m."""
+    return COSTS.narrow_m2_per_m * min(missing, COSTS.max_missing_m)
+
+
 def speeding_cost(
     network: LaneNetwork, paths: Sequence[LanePath], tracks: Sequence[Track]
 ) -> float:

@@ -28,6 +28,7 @@ from scenario_gen.roads.vector.lane_path import (
     LanePath,
     lateral_acceleration,
     LIMITS,
+    narrow_cost,
     off_reserved_cost,
     speeding_cost,
     STEP_M,
@@ -122,13 +123,12 @@ def match(
             return
         paths.append(path)
     paths, missing = with_lateral_positions(graph, paths, tuple(tracks))
-    narrow_cost = COSTS.narrow_m2_per_m * min(missing, COSTS.max_missing_m)
     yield _judged(
         graph,
         _moved_starts(graph.network, paths, tracks, met, scale, []),
         tracks,
         placement,
-        narrow_cost,
+        narrow_cost(missing),
     )
     turning = [
         Equation(((i, 1.0),), start, WEIGHTS.turn)
@@ -141,7 +141,7 @@ def match(
             _moved_starts(graph.network, paths, tracks, met, scale, turning),
             tracks,
             placement,
-            narrow_cost,
+            narrow_cost(missing),
         )
 
 

@@ -25,9 +25,11 @@ from scenario_gen.roads.vector.lane_path import (
     bend_cost,
     LanePath,
     lateral_acceleration,
+    narrow_cost,
     off_reserved_cost,
     speeding_cost,
 )
+from scenario_gen.roads.vector.lateral import with_lateral_positions
 from scenario_gen.roads.vector.match import lane_change_curve, Match
 from scenario_gen.situation import FrenetTracks, to_frenet, Track, turn_of
 from scenario_gen.types import LEVEL_SPACING_M
@@ -250,11 +252,12 @@ def _match_on(
     if any(distance < _MIN_ONCOMING_DISTANCE_M for distance in oncoming):
         return None  # one lane for both directions
 
+    paths, missing = with_lateral_positions(stretch.graph, paths, tracks)
     lateral = [
         lateral_acceleration(path, track) for path, track in zip(paths, tracks, strict=True)
     ]
     speeding = speeding_cost(stretch.graph.network, paths, tracks)
-    cost = stretch.bend / _BEND_RAD_PER_M2 + speeding + bend_cost(lateral)
+    cost = stretch.bend / _BEND_RAD_PER_M2 + speeding + bend_cost(lateral) + narrow_cost(missing)
     forced = max(each.forced for each in lateral)
     off_reserved = off_reserved_cost(stretch.graph, paths, tracks)
     return Match(tuple(paths), cost, "", forced, off_reserved)
