@@ -147,20 +147,23 @@ class _Search:
 
     def add_remedy(self, refusal: RefusedError) -> None:
         """Add to a refusal the lanes that the shortest form of the recording needs."""
-        if not self.refusals:
-            return
-        part, error = self.refusals[-1]
+        whole = self.situation.encounter
+        part, error = self.refusals[-1] if self.refusals else (whole, refusal)
         needed = [
             f"vehicle {track.vehicle.id} {describe_turn(turn_of(track))} within "
             f"{track.travelled:.0f} m"
             for track in Situation.of(part).drivers
             if not track.still
         ]
-        used = in_words(self.situation.encounter, part)
-        refusal.args = (
-            f"{refusal}. Shortened to its interaction ({used}), it needs a road on which "
-            f"{' and '.join(needed)}: {error}",
-        )
+        if len(needed) > 3:
+            needed[3:] = [f"{len(needed) - 3} more vehicles drive"]
+        form = "It needs a road on which "
+        if part is not whole:
+            begin = (part.start_ns - whole.start_ns) * 1e-9
+            used = f"{begin:.1f} to {begin + part.duration:.1f} s of {whole.duration:.1f} s"
+            form = f"Shortened to its interaction ({used}), it needs a road on which "
+        other = "" if str(error) == str(refusal) else f": {error}"
+        refusal.args = (f"{refusal}. {form}{' and '.join(needed)}{other}",)
 
     def _fitting(self, windows: Floats) -> Encounter | None:
         """Return the recording cut to windows (N, 2) [s] if it keeps its interaction and fits."""

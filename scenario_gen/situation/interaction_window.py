@@ -4,7 +4,8 @@
 """When each vehicle is needed for the interaction, so that the rest of a recording can be cut."""
 
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
+from itertools import chain
 
 import numpy as np
 
@@ -25,12 +26,16 @@ def interaction_windows(situation: Situation) -> Floats:
     """Return (N, 2) from when to when [s] each vehicle is needed.
 
     It is needed from 2 s before to 1 s after all its conflicts, reactions and waits, and while it
-    turns. A vehicle without an event is needed all the time.
+    turns. A vehicle that only stands or follows has no such event: it is needed for 5 s in which
+    it comes nearest to another one.
     """
     encounter = situation.encounter
     present = encounter.time[encounter.present]
     windows = np.tile([np.inf, -np.inf], (len(present), 1))
-    for vehicle, begin, end in _events(situation):
+
+    events = list(_events(situation))
+    others = set(range(len(present))) - {vehicle for vehicle, *_ in events}
+    for vehicle, begin, end in chain(events, _nearest(situation, others)):
         windows[vehicle, 0] = min(windows[vehicle, 0], begin - LEAD_S)
         windows[vehicle, 1] = max(windows[vehicle, 1], end + FOLLOW_UP_S)
     for vehicle, track in enumerate(situation.tracks):
@@ -59,7 +64,23 @@ def _events(situation: Situation) -> Iterator[tuple[int, float, float]]:
             yield edge.who, edge.since, shown
             yield edge.whom, edge.since, shown
     for wait in situation.waits:
-        yield wait.vehicle, wait.start, wait.end
+        if not situation.tracks[wait.vehicle].still:
+            yield wait.vehicle, wait.start, wait.end
+
+
+def _nearest(situation: Situation, vehicles: Iterable[int]) -> Iterator[tuple[int, float, float]]:
+    """Yield two seconds in which vehicles come nearest to others, as events of both."""
+    encounter = situation.encounter
+    centres = np.stack([track.poses[:, :2] for track in situation.tracks])
+    for vehicle in vehicles:
+        both = encounter.is_present & encounter.is_present[vehicle]
+        both[vehicle] = False
+        distance = np.where(both, np.hypot(*(centres - centres[vehicle]).T).T, np.inf)
+        other, sample = np.unravel_index(np.argmin(distance), distance.shape)
+        first, last = encounter.time[encounter.present[vehicle]]
+        middle = max(min(encounter.time[sample], last - 2.0), first + 3.0)
+        for each in (vehicle, int(other)):
+            yield each, middle - 1.0, middle + 1.0
 
 
 def _turning(track: Track) -> list[int]:

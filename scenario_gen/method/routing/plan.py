@@ -14,7 +14,7 @@ from scenario_gen.method.routing.config import PLANNERS, PlanningConfig
 from scenario_gen.method.routing.distance import max_distance
 from scenario_gen.method.routing.leg_search import Leg, search_disc_path
 from scenario_gen.method.routing.legs import join_waypoints, Legs
-from scenario_gen.method.routing.refusals import not_drivable, too_tight
+from scenario_gen.method.routing.refusals import not_drivable, too_narrow, too_tight
 from scenario_gen.method.routing.route_points import route_along
 from scenario_gen.method.routing.search.planner import Planner, PosePlanner
 from scenario_gen.method.routing.smooth import Curve, Guess, smooth
@@ -89,7 +89,12 @@ def _route_on_lanes(task: VehicleTask) -> Route:
     """Return the route on the vehicle's lanes if they are known, else on the whole road.
 
     The whole road is also used if an obstacle blocks these lanes, unless `oncoming` forbids it.
+
+    Raises:
+        RefusedError: there is no route, or a lane is too narrow.
     """
+    if narrow := too_narrow(task):
+        raise RefusedError(narrow)
     road, forbidden = task.road, task.config.oncoming == "never"
     lanes = road.lanes if forbidden else road.map_lanes
     ground = own_side(road, task.fitted.path, task.vehicle, lanes)

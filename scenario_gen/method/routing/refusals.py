@@ -4,10 +4,11 @@
 """Why a vehicle has no drivable route: parts of the messages to users."""
 
 import numpy as np
+from scipy.spatial.distance import cdist
 
 from scenario_gen.method.routing.smooth import Curve
 from scenario_gen.method.routing.task import VehicleTask
-from scenario_gen.numerics import wrap_angle
+from scenario_gen.numerics import Floats, wrap_angle
 from scenario_gen.numerics.plane import arc_lengths
 from scenario_gen.roads import footprint_fits
 
@@ -16,32 +17,57 @@ MIN_WINDOW_M = 0.3
 STRAIGHT_PER_M = 0.02  # curvature of a lane that counts as straight
 
 
+def _bends(task: VehicleTask) -> tuple[Floats, Floats]:
+    """Return poses (M, 3) on the fitted path, and its curvature (M,) [1/m] there."""
+    path = task.fitted.path
+    length = arc_lengths(path[:, :2])
+    window = np.maximum(length[WINDOW_STEPS:] - length[:-WINDOW_STEPS], MIN_WINDOW_M)
+    turn = np.abs(wrap_angle(path[WINDOW_STEPS:, 2] - path[:-WINDOW_STEPS, 2]))
+    return path[WINDOW_STEPS // 2 :][: len(window)], turn / window
+
+
+def too_narrow(task: VehicleTask) -> str:
+    """Return where the fitted path is straight, and its lane 30 cm narrower than the vehicle.
+
+    The clause says what helps; it is empty if there is no such place.
+    """
+    vehicle, network = task.vehicle, task.road.map_lanes
+    poses, curvature = _bends(task)
+    fits = footprint_fits(task.road, poses, vehicle.length, vehicle.width)
+    outside = poses[~fits & (curvature < STRAIGHT_PER_M)]
+    for lane in network.lanes if network is not None and len(outside) else ():
+        distance = cdist(outside[:, :2], (lane.left + lane.right) / 2.0)
+        width = np.hypot(*(lane.left - lane.right).T)[distance.argmin(axis=1)]
+        on_lane = distance.min(axis=1) < width / 2.0
+        narrow = np.flatnonzero(on_lane & (width < vehicle.width - 0.3))
+        if len(narrow):
+            k = narrow[len(narrow) // 2]
+            x, y = outside[k, :2]
+            return (
+                f"lane {lane.id} is {width[k]:.1f} m wide at ({x:.1f}, {y:.1f}) m, too narrow for "
+                f"vehicle {vehicle.id} ({vehicle.width:.1f} m); choose another place (#box=…), or "
+                "leave it out (log.vehicles)"
+            )
+    return ""
+
+
 def too_tight(task: VehicleTask) -> str:
     """Return where the fitted path bends too much for the vehicle or for the road's width.
 
     The clause says what the vehicle needs and what helps; it is empty if nothing is too tight.
     """
-    vehicle, path = task.vehicle, task.fitted.path
-    if len(path) <= WINDOW_STEPS:
+    vehicle = task.vehicle
+    if len(task.fitted.path) <= WINDOW_STEPS:
         return ""
-    length = arc_lengths(path[:, :2])
-    window = np.maximum(length[WINDOW_STEPS:] - length[:-WINDOW_STEPS], MIN_WINDOW_M)
-    curvature = np.abs(wrap_angle(path[WINDOW_STEPS:, 2] - path[:-WINDOW_STEPS, 2])) / window
-    middle = path[WINDOW_STEPS // 2 :][: len(window)]
+    middle, curvature = _bends(task)
     limit = task.max_curvature
     reason = f"it turns with at most {limit:.3f} 1/m ({1.0 / limit:.1f} m)"
     if curvature.max() <= limit:
         fits = footprint_fits(task.road.cleared, middle, vehicle.length, vehicle.width)
         curvature = np.where(fits, 0.0, curvature)
         reason = "there its footprint reaches beyond the road"
-        if fits.all():
-            return ""
         if curvature.max() < STRAIGHT_PER_M:
-            x, y = middle[~fits][np.count_nonzero(~fits) // 2, :2]
-            return (
-                f"the road is too narrow for a {vehicle.type} of {vehicle.length:g} m by "
-                f"{vehicle.width:g} m at ({x:.1f}, {y:.1f}) m; choose another place (#box=…)"
-            )
+            return ""
     k = int(np.argmax(curvature))
     return (
         f"the road is too tight for a {vehicle.type} of {vehicle.length:g} m by "

@@ -352,7 +352,7 @@ def places(
         try:
             separate(tracks_on(each, tracks), 0.0, 3.0, sideways=0.0)
         except RefusedError as error:
-            reason = reason or str(error)
+            reason = reason or f"{error}: more lanes side by side are needed"
             continue
         has_place = True
         yield _place_of(graph.network, each)

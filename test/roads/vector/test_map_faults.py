@@ -3,9 +3,14 @@
 
 """Maps with a fault that does not matter, and with static obstacles."""
 
+import numpy as np
+import pytest
 from support.map_builders import commonroad, opendrive, write
+from support.reaction_scenes import lane_encounter
 
-from scenario_gen.roads import build_road
+from scenario_gen.base.errors import RefusedError
+from scenario_gen.pipeline import generate
+from scenario_gen.roads import build_road, NoPlaceError
 from scenario_gen.types import NoteKind
 
 OBSTACLE = """<staticObstacle id="77"><type>parkedVehicle</type><shape><rectangle>
@@ -44,3 +49,13 @@ def test_a_lane_beyond_a_missing_one_costs_only_itself(tmp_path) -> None:
     assert len(road.lanes.lanes) == len(whole.lanes.lanes)
     (note,) = [note for note in road.lanes.notes if note.kind is NoteKind.FAULTY]
     assert "0.0.-3 and those beyond it" in str(note)
+
+
+def test_lanes_that_are_too_narrow_or_too_few_are_named(tmp_path) -> None:
+    speed = np.full(60, 8.0)
+    narrow = write(tmp_path, ".xodr", opendrive().replace('a="3.5"', 'a="1.2"'))
+    with pytest.raises(RefusedError, match=r"lane .* is 1\.2 m wide at .* too narrow for vehicle"):
+        generate(lane_encounter(speed, speed), narrow, count=1)
+    passing = lane_encounter(speed, speed + 4.0, gap=10.0, lane=3.5)
+    with pytest.raises(NoPlaceError, match=r"lanes side by side are needed\. Shortened"):
+        generate(passing, write(tmp_path, ".xodr"), count=1)
