@@ -10,6 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from scenario_gen.numerics import Floats
+from scenario_gen.situation import runs_red
 from scenario_gen.types import Scenario, SignalState, TrafficLight
 
 
@@ -46,6 +47,22 @@ def crosses_at_red(
         and float(light.distance_to_side(after)) == 0.0
         for light in lights
     )
+
+
+def ran_red(motion: Scenario, ego: int, driven: int) -> float:
+    """Return the first time [s] at which an ego crosses a stop line at red; NaN if it never does.
+
+    Args:
+        motion: of all vehicles.
+        ego: its index.
+        driven: number of instants before a jump, which crosses nothing.
+    """
+    lights = motion.facts.lights
+    alone = motion.of_vehicles([ego])
+    if lights and driven < len(motion.time):
+        alone = alone.between(0, max(driven - 1, 1))
+    times = [runs_red(alone, 0, light, 0.0) for light in lights]
+    return min((time for time in times if not math.isnan(time)), default=math.nan)
 
 
 def red_phases(scenario: Scenario) -> Floats:

@@ -20,6 +20,7 @@ from scenario_gen.closed_loop.fault import (
     Runner,
     STANDSTILL_MPS,
 )
+from scenario_gen.closed_loop.lights import ran_red
 from scenario_gen.closed_loop.off_road import (
     first_obstacle,
     RESOLUTION_S,
@@ -33,7 +34,7 @@ from scenario_gen.method.validity import first_contacts, Proof
 from scenario_gen.numerics import Floats
 from scenario_gen.numerics.hermite import control_points
 from scenario_gen.numerics.plane import unit
-from scenario_gen.situation import conflict_of, encroachment, runs_red
+from scenario_gen.situation import conflict_of, encroachment
 from scenario_gen.types import Scenario
 
 __all__ = ["Collision", "DriveVerdict", "Reason", "Runner", "judge"]
@@ -339,20 +340,8 @@ def judge(loop: ClosedLoop, drive: Drive) -> DriveVerdict:
         stood=_stood(motion.speed[drive.ego], config.step),
         terms=terms(drive, hit, not math.isnan(off_road), progress, clearance.ttc_not_behind),
         criteria=tuple(measure(replace(drive, road=loop.road)) for measure in loop.criteria),
-        ran_red=_ran_red(drive),
+        ran_red=ran_red(drive.motion, drive.ego, drive.driven),
     )
-
-
-def _ran_red(drive: Drive) -> float:
-    """Return the first time [s] at which the ego crosses a stop line at red; NaN if it never does.
-
-    A jump crosses nothing.
-    """
-    motion, lights = drive.motion.of_vehicles([drive.ego]), drive.motion.facts.lights
-    if lights and drive.driven < len(motion.time):
-        motion = motion.between(0, max(drive.driven - 1, 1))
-    times = [runs_red(motion, 0, light, 0.0) for light in lights]
-    return min((time for time in times if not math.isnan(time)), default=math.nan)
 
 
 def _contacts(drive: Drive) -> dict[tuple[int, int], float]:
