@@ -23,7 +23,6 @@ from scenario_gen.corpus.sources import is_parquet, message_table, MessageTable
 from scenario_gen.logs import is_bag, is_log, is_table, LOG_FORMATS
 
 HEAD_BYTES = 16_384  # of an object, by which its format is recognised
-END_BYTES = 1 << 18  # of a Parquet table, with its columns
 
 AnyPlace = TypeVar("AnyPlace", bound=Place)
 
@@ -91,7 +90,8 @@ def _inventory_of_store(archive: Remote, option: str) -> Inventory[Place]:
 def _sample(item: Remote, copy: Path) -> Part:
     """Return the bytes of an object that show its format: at the end of Parquet."""
     if is_parquet(copy):
-        return Part(item, max(item.size - END_BYTES, 0), item.size, copy)
+        # The columns of a table are at its end.
+        return Part(item, max(item.size - 16 * HEAD_BYTES, 0), item.size, copy)
     return Part(item, 0, min(item.size, HEAD_BYTES), copy)
 
 

@@ -199,8 +199,11 @@ def most_permissive(states: Iterable[SignalState]) -> SignalState:
     return min(states, key=order.index)
 
 
-def line_across(end: Floats, yaw: float, width: float) -> Floats:
-    """Return the stop line (2, 2) [m] of a lane that ends at a point (2,) [m], left end first."""
+def line_across(end: Floats, yaw: float, width: float = 3.5) -> Floats:
+    """Return the stop line (2, 2) [m] of a lane that ends at a point (2,) [m], left end first.
+
+    Its usual width [m] counts where a format has none.
+    """
     sideways = 0.5 * width * unit_left(yaw)
     return np.stack((end + sideways, end - sideways))
 

@@ -12,7 +12,6 @@ from scenario_gen.logs.formats import head_of, is_spmd
 from scenario_gen.logs.raw import UnknownFormatError
 
 _MAX_HEADER_BYTES = 65_536
-_SAMPLE_BYTES = 4096  # without a NUL if it is text
 _SAMPLE_LINE_COUNT = 20  # lines below the header that may show a decimal comma
 _SEPARATORS = ",;\t|"
 _WHITE_SPACE = r"\s+"
@@ -79,7 +78,7 @@ def _first_lines(path: Path) -> tuple[str, list[str]]:
     encoding = "utf-8-sig"
     if start.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
         encoding = "utf-16"
-    elif b"\0" in start[:_SAMPLE_BYTES]:
+    elif b"\0" in start[:4096]:
         raise UnknownFormatError(
             f"{path} is not a text file (or UTF-16 without a byte order mark); save the table as "
             "UTF-8 text"

@@ -48,8 +48,6 @@ from scenario_gen.logs.signals import line_across, RawSignal, sampled_schedule, 
 from scenario_gen.numerics import Floats
 from scenario_gen.types import SignalState
 
-_LANE_WIDTH_M = 3.5  # of stop lines: the format has no widths
-_MAX_LANE_DISTANCE_M = 5.0  # from a stop line to its lane
 _MOVING_MPS = 2.0  # a faster vehicle has the direction of its velocity
 _MAX_SPEED_MPS = 1000.0  # higher values mark absence
 
@@ -144,7 +142,7 @@ def _signal(path: Path, name: str, entry: Any, edges: Floats) -> RawSignal | Non
     states = [
         SignalState.OFF if word.startswith("flashing") else state_of(word, place) for word in words
     ]
-    line = line_across(points[0], yaw, _LANE_WIDTH_M)
+    line = line_across(points[0], yaw)
     return RawSignal(name, sampled_schedule(times, states, place), str(path), line, (name,))
 
 
@@ -155,7 +153,7 @@ def _lane_yaw(point: Floats, edges: Floats) -> float:
     length = np.maximum(np.hypot(*edge.T), 1e-6)
     share = np.clip(((point - start) * edge).sum(axis=1) / length**2, 0.0, 1.0)
     distance = np.hypot(*(start + share[:, None] * edge - point).T)
-    if not len(edges) or distance.min() > _MAX_LANE_DISTANCE_M:
+    if not len(edges) or distance.min() > 5.0:  # m
         return math.nan
     nearest = edge[np.argmin(distance)]
     return float(np.arctan2(nearest[1], nearest[0]))

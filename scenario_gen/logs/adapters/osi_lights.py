@@ -25,8 +25,6 @@ from scenario_gen.logs.signals import line_across, RawSignal, sampled_schedule
 from scenario_gen.numerics import Floats, NS_PER_S
 from scenario_gen.types import SignalState
 
-_LANE_WIDTH_M = 3.5  # of stop lines
-
 
 @dataclass
 class LightTrace:
@@ -97,4 +95,4 @@ def _line(lane: Any) -> Floats:
     if not len(moved) or not np.isfinite(points).all():
         return np.zeros((0, 2))
     last = steps[moved[-1]]
-    return line_across(points[-1], float(np.arctan2(last[1], last[0])), _LANE_WIDTH_M)
+    return line_across(points[-1], float(np.arctan2(last[1], last[0])))

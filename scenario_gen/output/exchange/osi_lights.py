@@ -13,7 +13,7 @@ from scenario_gen.output.exchange.cases import Case
 from scenario_gen.output.exchange.lights import light_of
 from scenario_gen.types import Lane, Scenario, SignalState, TrafficLight
 
-LANE_ID, BULB_ID = 1_000_000_000, 2_000_000_000  # of the first lane, and of the first bulb
+LANE_ID = 1_000_000_000  # of the first lane
 _BULBS = {
     SignalState.GREEN: ("GREEN",),
     SignalState.YELLOW: ("YELLOW",),
@@ -46,7 +46,7 @@ def bulbs(lights: LaneLights, time: float) -> Iterator[Any]:
         mode = "OFF" if state is SignalState.OFF else "UNKNOWN"
         for n, colour in enumerate(_BULBS.get(state, ("UNKNOWN",))):
             yield osi.TrafficLight(
-                id=osi.Identifier(value=BULB_ID + 2 * k + n),
+                id=osi.Identifier(value=2 * LANE_ID + 2 * k + n),
                 classification=classes(
                     color=classes.Color[colour],
                     mode=classes.Mode["CONSTANT" if state in _BULBS else mode],
