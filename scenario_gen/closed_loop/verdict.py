@@ -40,7 +40,6 @@ from scenario_gen.types import Scenario
 __all__ = ["Collision", "DriveVerdict", "Reason", "Runner", "judge"]
 
 JERK_WINDOW_S = 0.5
-CELL_S = 0.5  # an obstacle is touched so much later than the cells that it closes, at most
 MIN_STANDSTILL_S = 5.0  # an ego that stood so long at the end missed its goal for that reason
 
 
@@ -310,7 +309,8 @@ def judge(loop: ClosedLoop, drive: Drive) -> DriveVerdict:
     road = road_use(drive, loop.road, config.off_road_depth)
     off_road, obstacle = road.time, ""
     touched = first_obstacle(drive, loop.road)
-    if touched is not None and not touched[0] > off_road + CELL_S:
+    # An obstacle is touched at most 0.5 s later than the cells that it closes.
+    if touched is not None and not touched[0] > off_road + 0.5:
         off_road, obstacle = float(np.fmin(off_road, touched[0])), str(touched[1])
     return DriveVerdict(
         index=motion.index,

@@ -22,10 +22,6 @@ from scenario_gen.corpus.store import (
 from scenario_gen.corpus.tables import table_writer
 from scenario_gen.corpus.tasks import arriving, held, spread, Workers
 
-BLOCK_COUNT = 1000  # parts in one table at most
-GROUP_COUNT = 100_000  # rows of a row group, but fewer if they take more memory
-GROUP_BYTES = 512 << 20
-
 
 @dataclass(frozen=True)
 class MergeTask:
@@ -82,7 +78,8 @@ def _merge_task(folder: Place, tables: Tables, run: range) -> MergeTask:
 def _runs(numbers: Iterable[int]) -> list[range]:
     """Return the runs of consecutive numbers within each block."""
     ordered = sorted(numbers)
-    groups = groupby(range(len(ordered)), lambda k: (ordered[k] - k, ordered[k] // BLOCK_COUNT))
+    # A table has at most 1,000 parts.
+    groups = groupby(range(len(ordered)), lambda k: (ordered[k] - k, ordered[k] // 1000))
     runs = [[ordered[k] for k in group] for _, group in groups]
     return [range(run[0], run[-1] + 1) for run in runs]
 
@@ -119,7 +116,8 @@ def _write_merged(path: Path, tables: Sequence[Place]) -> None:
                 group.append(parquet.ParquetFile(local).read())
             writer = writer or table_writer(path, group[0].schema)
             rows = sum(each.num_rows for each in group)
-            if rows >= GROUP_COUNT or sum(each.nbytes for each in group) >= GROUP_BYTES:
+            size = sum(each.nbytes for each in group)
+            if rows >= 100_000 or size >= 512 << 20:  # a group is in memory
                 writer.write_table(pa.concat_tables(group), row_group_size=rows)
                 group = []
         if group:

@@ -22,7 +22,6 @@ from scenario_gen.logs.tables import SPMD_EPOCH_NS
 from scenario_gen.logs.text import Layout, layout_of, SPMD_COLUMNS
 
 EPOCH_US = SPMD_EPOCH_NS // 1000
-LATEST_US = 40 * 365 * 24 * 3_600_000_000  # 40 years after 2004, as in messages.sql
 TYPES = {
     **dict.fromkeys(("vehicle", "clock"), "BIGINT"),
     **dict.fromkeys(("time", "lat", "lon"), "DOUBLE"),
@@ -169,7 +168,8 @@ def _stamp_type(sample: _Sample, columns: Mapping[str, Column]) -> str:
         return "TIMESTAMPTZ"
     factor = 1e6 * columns["time"].factor
     numbers = (factor * float(text) - EPOCH_US for text in stamps if STAMP.fullmatch(text))
-    return "DOUBLE" if any(0.0 < number < LATEST_US for number in numbers) else ""
+    latest_us = 40 * 365 * 24 * 3_600_000_000  # 40 years after 2004, as in messages.sql
+    return "DOUBLE" if any(0.0 < number < latest_us for number in numbers) else ""
 
 
 def _table(sample: _Sample, columns: Mapping[str, Column], stamp: str) -> MessageTable:

@@ -39,7 +39,6 @@ MAX_ORIGIN_M = 1e8  # per axis; every geodetic grid stays within it
 DIRECTION_COUNT = 16
 """The directions that `Road.lane_directions` tells apart."""
 _AGAINST_RAD = np.pi / 2.0 + np.pi / DIRECTION_COUNT  # half a direction's width stays open
-PASSING_M = 30.0  # from an obstacle, within which the oncoming lane may be used
 _CHUNK_CELLS = 4096
 MAX_DEPTH_M = 10.0  # a depth off the road is measured up to this
 
@@ -201,7 +200,8 @@ class Road:
             rows, columns = self._cells_of_lane(lane)
             directions[rows, columns] |= self._directions_in(lane, rows, columns)
         for obstacle in self.obstacles:
-            directions[self.cells_near(obstacle.x, obstacle.y, PASSING_M)] = 0
+            # The oncoming lane may be used within 30 m of an obstacle.
+            directions[self.cells_near(obstacle.x, obstacle.y, 30.0)] = 0
         directions[directions == 0] = np.iinfo(np.uint16).max
         return sealed(directions)
 

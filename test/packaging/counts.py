@@ -73,9 +73,11 @@ BEFORE = {
 # A change that needs more tokens deletes something, or says why in the commit. Splitting dense
 # code into plain steps has cost 14,000 tokens so far; 435,000 are wanted. Fitting the interaction
 # instead of the whole recording, users beside each other in a lane, obstacles from maps, playback at
-# its rate, and arguments that are checked have cost 12,500.
+# its rate, and arguments that are checked have cost 12,500. Traffic lights with a state and their
+# formats have cost 17,000 (9,000 planned), archives that grow and mend by file and tables of
+# trajectories 9,000 (1,000 planned), trailers, rows of parked cars and obstacles in exports 6,500.
 BUDGET = {
-    "tokens": 564_000,
+    "tokens": 600_000,
     "long lines": 0,
     "complex functions": 1,
     "branching functions": 0,

@@ -32,8 +32,6 @@ from scenario_gen.types.markings import markings
 FRAME_PERIOD_S = 0.2
 """Period of the stored frames; the page interpolates between them."""
 MAX_FRAMES_COUNT = 240
-STEP_CELLS = 1.25
-"""The edge of an area of cells may lie this far from that of its cells."""
 SEAM_M = 0.02
 """Half of a seam between lanes that is closed."""
 MATRIX_SIZE_CELLS = 72
@@ -131,7 +129,8 @@ def road_data(road: Road) -> dict[str, Any]:
         for first, stop in runs(flags)
     ]
     steps = shapely.union_all(shapely.box(*np.transpose(cells)))
-    ground = shapely.transform(steps.simplify(STEP_CELLS), partial(to_metres, road))
+    # The simplified edge may lie a cell and a quarter from that of the cells.
+    ground = shapely.transform(steps.simplify(1.25), partial(to_metres, road))
     lanes = road.lanes.every_lane if road.lanes is not None else ()
     shapes = [shapely.Polygon(lane.outline) for lane in lanes if lane.open_to(DRIVERS)]
     area = shapely.union_all([ground, *shapely.buffer(shapes, SEAM_M)]).simplify(SEAM_M)
