@@ -220,5 +220,6 @@ def test_who_drives_against_its_lane_does_so_while_it_is_there():
     found, verdict = causes(scenario, road=road)
     assert found == [Cause.WRONG_WAY]
     assert verdict.violations[0].time == 2.0 and "41 samples" in verdict.violations[0].message
-    passed = replace(road, obstacles=(Obstacle(0.0, 4.0, 0.0, 4.5, 1.8),))
+    obstacles = (Obstacle(0.0, 4.0, 0.0, 4.5, 1.8),)
+    passed = replace(road, lanes=replace(road.lanes, obstacles=obstacles))
     assert causes(scenario, road=passed)[0] == []
