@@ -77,7 +77,7 @@ BEFORE = {
 # formats have cost 17,000 (9,000 planned), archives that grow and mend by file and tables of
 # trajectories 9,000 (1,000 planned), trailers, rows of parked cars and obstacles in exports 6,500.
 BUDGET = {
-    "tokens": 600_000,
+    "tokens": 600_500,
     "long lines": 0,
     "complex functions": 1,
     "branching functions": 0,

@@ -29,6 +29,7 @@ import numpy as np
 
 from scenario_gen.base.errors import InputError
 from scenario_gen.base.xml_reader import Element, read_xml
+from scenario_gen.logs.adapters.openscenario_lights import read_lights
 from scenario_gen.logs.adapters.openscenario_values import resolve_references
 from scenario_gen.logs.config import LogConfig
 from scenario_gen.logs.raw import (
@@ -126,8 +127,18 @@ def read(paths: Sequence[Path], config: LogConfig) -> RawLog:
     if len(observations) < min(len(vehicles) + len(notes) - 1, 2):
         only = ", ".join(observations) or "no vehicle"
         raise InputError(f"{path}: {only} has a trajectory; {'; '.join(notes[1:])}")
+    are_read = config.signals == "recorded"
+    signals = tuple(read_lights(root, path, notes)) if are_read else ()
     segment = Segment(0, str(path), "vertex", 1)
-    return RawLog(path.stem, False, tuple(observations.values()), n_rows, (segment,), tuple(notes))
+    return RawLog(
+        path.stem,
+        False,
+        tuple(observations.values()),
+        n_rows,
+        (segment,),
+        tuple(notes),
+        signals=signals,
+    )
 
 
 def _vehicles(root: Element, notes: list[str]) -> dict[str, Element]:

@@ -31,7 +31,7 @@ from scenario_gen.output.exchange.opendrive_network import (
     Strip,
 )
 from scenario_gen.output.exchange.xml import add, comment, date_of, Element, serialized
-from scenario_gen.types import CARS, DRIVERS, LaneNetwork, OBSTACLE_HEIGHT_M, RuleKind
+from scenario_gen.types import CARS, DRIVERS, LaneNetwork, OBSTACLE_HEIGHT_M, RuleKind, TrafficRule
 
 _SIGNALS = {**SIGN_IDS, RuleKind.TRAFFIC_LIGHT: "1000001"}
 """Types of signals; that of a light is OpenDRIVE's."""
@@ -238,31 +238,56 @@ def _signals(
     curve = Curve(strip.reference)
     for n, rule in enumerate(network.rules):
         lanes = [places[k] for k in members if k in rule.lanes]
-        if not lanes or rule.kind not in _SIGNALS:
-            continue
-        first = lanes[0]
-        position = strip.reference[-1 if first.along else 0, :2]
-        if len(rule.line):
-            position = rule.line.mean(axis=0)
-        (along,) = curve.project(position[None])[0]
-        is_light = rule.kind is RuleKind.TRAFFIC_LIGHT
-        group = road.find("signals")
-        signal = add(
-            add(road, "signals") if group is None else group,
-            "signal",
-            id=_signal_id(n, first),
-            s=float(np.interp(along, curve.station, station)),
-            t=0.0,
-            type=_SIGNALS[rule.kind],
-            subtype="-1",
-            country="OpenDRIVE" if is_light else "DE",
-            name=rule.id,
-            dynamic="yes" if is_light else "no",
-            orientation="+" if first.along else "-",
-            zOffset=2.0,
-        )
-        numbers = [place.lane_id for place in lanes]
-        add(signal, "validity", fromLane=min(numbers), toLane=max(numbers))
+        if lanes and rule.kind in _SIGNALS:
+            group = road.find("signals")
+            group = add(road, "signals") if group is None else group
+            _signal(group, n, rule, lanes, curve, station)
+
+
+def _signal(
+    group: Element,
+    number: int,
+    rule: TrafficRule,
+    lanes: Sequence[Place],
+    curve: Curve,
+    station: Floats,
+) -> None:
+    """Append the sign or light of a rule for some lanes of a road.
+
+    Args:
+        group: the signals of the road.
+        number: of the rule.
+        rule: the rule.
+        lanes: the lanes.
+        curve: reference line of the road.
+        station: (K,) [m] arc lengths in the file of the points of `curve`.
+    """
+    first = lanes[0]
+    position = curve.points[-1 if first.along else 0, :2]
+    if len(rule.line):
+        position = rule.line.mean(axis=0)
+    (along,) = curve.project(position[None])[0]
+    is_light = rule.kind is RuleKind.TRAFFIC_LIGHT
+    signal = add(
+        group,
+        "signal",
+        id=_signal_id(number, first),
+        s=float(np.interp(along, curve.station, station)),
+        t=0.0,
+        type=_SIGNALS[rule.kind],
+        subtype="-1",
+        country="OpenDRIVE" if is_light else "DE",
+        name=rule.id,
+        dynamic="yes" if is_light else "no",
+        orientation="+" if first.along else "-",
+        zOffset=2.0,
+    )
+    numbers = [place.lane_id for place in lanes]
+    add(signal, "validity", fromLane=min(numbers), toLane=max(numbers))
+    if is_light:
+        yaw = float(curve.at(along)[2]) + (0.0 if first.along else np.pi)
+        x, y = position.tolist()
+        add(signal, "positionInertial", x=x, y=y, z=2.0, hdg=yaw, pitch=0.0, roll=0.0)
 
 
 def _signal_id(rule: int, place: Place) -> str:

@@ -12,6 +12,7 @@ import pytest
 from support.signalised import signalised
 
 from scenario_gen import generate, load, read_log
+from scenario_gen.base.errors import InputError
 from scenario_gen.method.validity import Checker
 from scenario_gen.output.exchange import export_bag
 from scenario_gen.output.review.validation import validate_bag
@@ -69,21 +70,34 @@ def test_a_bag_has_the_states(result, tmp_path):
     for target, suffix in (("commonroad", "xml"), ("osi", "mcap"), ("openscenario", "xosc")):
         export_bag(tmp_path / "bag", tmp_path / target, target, indices=[result[0].index])
         (file,) = (tmp_path / target).glob(f"*.{suffix}")
-        if target != "openscenario":
-            assert_same_states(read_log(file).encounters[0], result[0])
+        is_exact = target != "openscenario"  # which has no widths
+        assert_same_states(read_log(file).encounters[0], result[0], 1e-6 if is_exact else 0.6)
     text = file.read_text()
     assert text.count("<TrafficSignalController ") == 2
     (road,) = (tmp_path / "openscenario").glob("*.xodr")
     for name in re.findall('trafficSignalId="([^"]+)" state="red"', text):
         assert f'<signal id="{name}"' in road.read_text()
+    file.write_text(
+        text.replace('state="red"', 'state="on;off;off"').replace('="green"', '="blue"')
+    )
+    recorded = read_log(file)
+    states = {state for light in recorded.encounters[0].lights for state in light.schedule.states}
+    assert "red" in states and "green" not in states
+    assert "unknown signal states are left out: blue" in recorded.quality.notes
+    road.write_text(re.sub("<positionInertial[^>]*>", "", road.read_text()))
+    assert "traffic lights are left out, since" in "; ".join(read_log(file).quality.notes)
+    road.unlink()
+    with pytest.raises(InputError, match="has traffic lights, and its road file"):
+        read_log(file)
 
 
-def assert_same_states(recorded, scenario):
+def assert_same_states(recorded, scenario, tolerance):
     """Check the states of all lights at all instants but the last one, and their stop lines."""
     assert len(recorded.lights) == 2
     for light in recorded.lights:
         same = min(scenario.facts.lights, key=lambda each: np.abs(each.line - light.line).max())
-        assert np.abs(same.line - light.line).max() < 1e-6
+        assert np.abs(same.line - light.line).max() < tolerance
+        np.testing.assert_allclose(same.line.mean(axis=0), light.line.mean(axis=0), atol=1e-6)
         for time in scenario.time[:-1]:
             shown = str(light.schedule.at(time - recorded.start_ns * 1e-9 + 1e-6))
             assert shown.replace("off", "unknown") == same.schedule.at(time)
