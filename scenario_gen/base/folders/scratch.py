@@ -31,7 +31,7 @@ PREFIX = ".scenario_gen-"
 LOCK = "lock"
 NEW = "new"
 OLD = "old"
-NESTED = ("*/", "*/*/")  # where a corpus and a batch write inside of their folder
+NESTED = ("*/", "*/*/", "*/*/*/")  # where a corpus and a batch write inside of their folder
 
 
 @contextmanager
