@@ -95,8 +95,12 @@ def _has_died(future: "Future[str]") -> bool:
 
 
 def _kill_children() -> None:
-    for process in multiprocessing.active_children():
+    """Kill the processes, and wait until their locks are free."""
+    children = multiprocessing.active_children()
+    for process in children:
         process.kill()
+    for process in children:
+        process.join(5.0)
 
 
 @contextmanager
