@@ -77,13 +77,7 @@ def red_phases(scenario: Scenario) -> Floats:
         clock = math.nan if vehicle.kind.walks else light.crossing(scenario, n)
         if math.isnan(clock) or light.schedule.at(clock).stops:
             continue
-        phases = light.schedule.between(0.0, last)
-        ends = (*phases.starts[1:], phases.end)
-        rows[n] += [
-            (clock - 0.01, start, end)
-            for start, end, state in zip(phases.starts, ends, phases.states, strict=True)
-            if state.stops
-        ]
+        rows[n] += [(clock - 0.01, *phase) for phase in light.schedule.red_phases(0.0, last)]
     out = np.zeros((len(rows), max(map(len, rows), default=0), 3))
     for n, phases_of_vehicle in enumerate(rows):
         out[n, : len(phases_of_vehicle)] = np.reshape(phases_of_vehicle, (-1, 3))

@@ -92,8 +92,8 @@ def signals_of_table(frame: "DataFrame", place: str) -> tuple[list[RawSignal], l
     """
     words = frame["signal"].unique()
     known = {word: SignalState.of_word(word) for word in words}
-    unknown = sorted(shown(word, 20) for word, state in known.items() if state is None)
-    notes = [f"unknown signal states are left out: {', '.join(unknown)}"] if unknown else []
+    unknown = [word for word, state in known.items() if state is None]
+    notes = unknown_states(unknown)
     seen = frame[frame["signal"].map(lambda word: bool(word) and known[word] is not None)]
     names = "vehicle " + seen["vehicle"].astype(str)
     if "signal_id" in seen:
@@ -121,6 +121,12 @@ def _passes(frame: "DataFrame", rows: "DataFrame") -> dict[str, float]:
         if len(later):
             times[str(vehicle)] = 0.5e-9 * float(last + later.min())
     return times
+
+
+def unknown_states(words: Iterable[str]) -> list[str]:
+    """Return a note on the words for states that are not known; none without words."""
+    listed = ", ".join(sorted(shown(word, 20) for word in words))
+    return [f"unknown signal states are left out: {listed}"] if listed else []
 
 
 @contextmanager
@@ -215,7 +221,8 @@ def with_lights(encounter: Encounter, signals: Sequence[RawSignal]) -> Encounter
         InputError: a light has no stop line, ends before the encounter, or contradicts another
             one; names the file and the light.
     """
-    lights, places = [], []
+    lights = []
+    straight = []  # lights whose traffic goes straight on, and their places in the log
     start_s = encounter.start_ns * 1e-9
     for signal in signals:
         subject = f"{signal.place}: traffic light {signal.id}"
@@ -229,13 +236,15 @@ def with_lights(encounter: Encounter, signals: Sequence[RawSignal]) -> Encounter
                 f"{subject} ends at {schedule.end:g} s, before {encounter.title} at "
                 f"{encounter.duration:g} s; cut the log (log.end), or set log.signals=ignored"
             )
-        lights.append(TrafficLight(signal.id, schedule, line, signal.lanes))
-        places.append(subject)
-    for a, b in combinations(range(len(lights)), 2):
-        time = _common_green(encounter, lights[a], lights[b])
+        light = TrafficLight(signal.id, schedule, line, signal.lanes)
+        lights.append(light)
+        if _goes_straight(encounter, light):
+            straight.append((light, subject))
+    for (a, _), (b, place) in combinations(straight, 2):
+        time = _common_green(encounter, a, b)
         if not math.isnan(time):
             raise InputError(
-                f"{places[b]} and {lights[a].id} are both green at {time:.1f} s, but their "
+                f"{place} and {a.id} are both green at {time:.1f} s, but their "
                 "traffic crosses; set log.signals=ignored"
             )
     return replace(encounter, lights=tuple(lights))
@@ -278,7 +287,7 @@ def _common_green(encounter: Encounter, a: TrafficLight, b: TrafficLight) -> flo
     """Return when [s] two lights are green whose traffic crosses; NaN: never."""
     low, high = _LIMITS.crossing_rad
     angle = abs(float(wrap_angle(np.array(a.yaw - b.yaw))))
-    if not low < angle < high or not _cross(encounter, a, b):
+    if not low < angle < high or not _cross(a, b):
         return math.nan
     phases = [light.schedule.between(0.0, encounter.duration) for light in (a, b)]
     starts = sorted({0.0, *phases[0].starts, *phases[1].starts})
@@ -289,13 +298,12 @@ def _common_green(encounter: Encounter, a: TrafficLight, b: TrafficLight) -> flo
     return math.nan
 
 
-def _cross(encounter: Encounter, a: TrafficLight, b: TrafficLight) -> bool:
+def _cross(a: TrafficLight, b: TrafficLight) -> bool:
     """Return whether traffic that goes straight on from two lines crosses within 60 m."""
-    straight = [_goes_straight(encounter, light) for light in (a, b)]
     middle = [light.line.mean(axis=0) for light in (a, b)]
     ways = np.column_stack([unit(a.yaw), -unit(b.yaw)])
     distance = np.linalg.solve(ways, middle[1] - middle[0])
-    return all(straight) and bool(((distance > 0.0) & (distance < 60.0)).all())
+    return bool(((distance > 0.0) & (distance < 60.0)).all())
 
 
 def _goes_straight(encounter: Encounter, light: TrafficLight) -> bool:

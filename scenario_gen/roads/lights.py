@@ -16,6 +16,7 @@ from scenario_gen.situation import driver_rows, faced_light, Situation
 from scenario_gen.types import (
     DrawnFor,
     LaneNetwork,
+    rightwards,
     RuleKind,
     SignalSchedule,
     SignalState,
@@ -80,7 +81,7 @@ def lights_of(network: LaneNetwork) -> tuple[TrafficLight, ...]:
         ]
         ids = [network.lanes[k].id for k in rule.lanes]
         if len(rule.line):
-            line = _rightwards(rule.line[[0, -1]], ends[0])
+            line = rightwards(rule.line[[0, -1]], ends[0])
             lights.append(TrafficLight(rule.id, schedule, line, tuple(ids)))
             continue
         lights += [
@@ -88,12 +89,6 @@ def lights_of(network: LaneNetwork) -> tuple[TrafficLight, ...]:
             for name, end in zip(ids, ends, strict=True)
         ]
     return tuple(lights)
-
-
-def _rightwards(line: Floats, end: Floats) -> Floats:
-    """Return a line (2, 2) from left to right, as the end (2, 2) of a lane is."""
-    is_reversed = float(((line[1] - line[0]) * (end[1] - end[0])).sum()) < 0.0
-    return line[::-1] if is_reversed else line
 
 
 def recorded_lights(

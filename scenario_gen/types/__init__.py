@@ -114,6 +114,7 @@ from scenario_gen.types.target import (
 )
 from scenario_gen.types.traffic_light import (
     fronts,
+    rightwards,
     SignalStop,
     TrafficLight,
 )
@@ -239,6 +240,7 @@ __all__ = [
     "read_states",
     "rear_axle",
     "recorded_notes",
+    "rightwards",
     "routes_in_words",
     "shifted",
     "split_off",

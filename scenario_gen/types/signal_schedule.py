@@ -142,16 +142,20 @@ class SignalSchedule:
         inside = [t for t in self.between(first, last).starts if first < t <= last]
         return any(self.at(t).stops for t in (first, *inside))
 
-    def slack(self, time: float) -> float:
-        """Return how far [s] a time is from the nearest one at which nobody may cross."""
-        phases = self.between(time - 300.0, time + 300.0)
+    def red_phases(self, first: float, last: float) -> list[tuple[float, float]]:
+        """Return begin and end [s] of the phases in which nobody may cross, as of `between`."""
+        phases = self.between(first, last)
         ends = (*phases.starts[1:], phases.end)
-        distances = [
-            max(start - time, time - end, 0.0)
+        return [
+            (start, end)
             for start, end, state in zip(phases.starts, ends, phases.states, strict=True)
             if state.stops
         ]
-        return min(distances, default=math.inf)
+
+    def slack(self, time: float) -> float:
+        """Return how far [s] a time is from the nearest one at which nobody may cross."""
+        red = self.red_phases(time - 300.0, time + 300.0)
+        return min((max(start - time, time - end, 0.0) for start, end in red), default=math.inf)
 
     def document(self) -> dict[str, Any]:
         """Return a JSON document."""

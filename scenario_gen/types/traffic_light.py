@@ -105,6 +105,12 @@ class TrafficLight:
         return cls(str(document["id"]), schedule, line, tuple(map(str, document["lanes"])))
 
 
+def rightwards(line: Floats, end: Floats) -> Floats:
+    """Return a line (2, 2) from left to right, as the end (2, 2) of a lane is."""
+    is_reversed = float(((line[1] - line[0]) * (end[1] - end[0])).sum()) < 0.0
+    return line[::-1] if is_reversed else line
+
+
 def fronts(motion: Motion, n: int) -> Floats:
     """Return the places (T, 2) [m] of the front of vehicle n."""
     ahead = 0.5 * motion.vehicles[n].length * unit(motion.heading[n])

@@ -42,7 +42,7 @@ from scenario_gen.logs.raw import (
 )
 from scenario_gen.logs.signals import naming, RawSignal, state_of
 from scenario_gen.numerics import Floats
-from scenario_gen.types import SignalSchedule, SignalState
+from scenario_gen.types import rightwards, SignalSchedule, SignalState
 
 
 def read(paths: Sequence[Path], config: LogConfig) -> RawLog:
@@ -158,9 +158,7 @@ def stop_line(lanelet: Element) -> Floats:
     points = np.array([_point(point) for point in lanelet.findall("stopLine/point")])
     if len(points) < 2:
         return ends
-    line = points[[0, -1]]
-    is_reversed = float(((line[1] - line[0]) * (ends[1] - ends[0])).sum()) < 0.0
-    return line[::-1] if is_reversed else line
+    return rightwards(points[[0, -1]], ends)
 
 
 def _point(point: Element) -> tuple[float, float]:

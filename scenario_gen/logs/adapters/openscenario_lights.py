@@ -21,7 +21,7 @@ import numpy as np
 
 from scenario_gen.base.errors import InputError
 from scenario_gen.base.xml_reader import Element, read_xml
-from scenario_gen.logs.signals import line_across, naming, RawSignal
+from scenario_gen.logs.signals import line_across, naming, RawSignal, unknown_states
 from scenario_gen.numerics import Floats
 from scenario_gen.types import SignalSchedule, SignalState
 
@@ -51,8 +51,7 @@ def read_lights(root: Element, path: Path, notes: list[str]) -> Iterator[RawSign
             schedule = _schedule(controller, name, unknown)
             yield RawSignal(name, schedule, str(path), lines[name])
     without_line = {name for _, name in ids} - set(lines)
-    if unknown:
-        notes.append(f"unknown signal states are left out: {', '.join(sorted(unknown))}")
+    notes += unknown_states(unknown)
     if without_line:
         notes.append(
             "traffic lights are left out, since no signal in the road file has their id and a "

@@ -32,6 +32,7 @@ from scenario_gen.logs.signals import (
     most_permissive,
     RawSignal,
     sampled_schedule,
+    unknown_states,
 )
 from scenario_gen.numerics import Floats
 from scenario_gen.types import SignalState
@@ -110,8 +111,7 @@ class SignalMessages:
         Raises:
             InputError: a light has two states at one time.
         """
-        if self.unknown:
-            notes.append(f"unknown signal states are left out: {', '.join(sorted(self.unknown))}")
+        notes += unknown_states(self.unknown)
         missing = sorted(set(self.samples) - set(self.lanes))
         if missing:
             notes.append(
