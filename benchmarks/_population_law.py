@@ -18,6 +18,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
+from benchmarks._coverage_members import KINDS
 from benchmarks._sampling_cases import DATA
 from scenario_gen.base.errors import InputError
 from scenario_gen.logs import LogConfig, read_log
@@ -28,7 +29,6 @@ from scenario_gen.method.evaluation.encounter_features import (
     JOINT_FEATURES,
 )
 from scenario_gen.method.evaluation.law import SHIPPED
-from scenario_gen.method.evaluation.population import KINDS
 
 WINDOWS = "trajectories/ngsim_commonroad/USA_*_all_vehicles.csv"
 SOURCE = (

@@ -5,12 +5,12 @@
 
 Recorded encounters of two vehicles (SCENARIO_GEN_DATA), each on its own road: with default
 settings, with `sampling.variety=population` (of the template and the shipped law alone: encounters
-that are to be reached say nothing), with `sampling.decisions=drawn`, with both, and with both and
-recombined encounters. Without data the drawn motions of test/worlds.
+that are to be reached say nothing), with `sampling.decisions=drawn`, and with both. Without data the
+drawn motions of test/worlds.
 
 `_coverage_pairs.json` lists 107 pairs within 4 s at the shared area or 15 m, whose road keeps the
 kind, in five sessions. A session counts as one recording: unseen encounters are of other sessions.
-Definitions: `scenario_gen.method.evaluation.population`, with the radius in which four of five
+Definitions: `_coverage_members`, with the radius in which four of five
 recorded encounters have another session's one: so 0.8 is the precision of recordings. Coverage is
 that of the members nearest to their templates, as many as have a precision of 0.75
 (`_coverage_nulls`). *Shifted* moves each vehicle's record in time (1 s) and paces it (6 %), *mixed*
@@ -27,6 +27,7 @@ import sys
 
 import numpy as np
 
+from benchmarks._coverage_members import in_words, Members, members_of
 from benchmarks._coverage_nulls import (
     at_precision,
     coverage_alone,
@@ -47,10 +48,7 @@ from scenario_gen.base.errors import RefusedError, ScenarioGenError
 from scenario_gen.logs import LogConfig, read_log
 from scenario_gen.method.chain import Chain
 from scenario_gen.method.config import PipelineConfig
-from scenario_gen.method.evaluation.population import Members, members_of
-from scenario_gen.method.evaluation.population_result import in_words
 from scenario_gen.method.outcome_sets import for_one_set, outcome_sets
-from scenario_gen.method.recombination import recombinations
 from scenario_gen.method.sampling import SamplingConfig
 from scenario_gen.method.segmentation import segment
 from scenario_gen.roads import road_and_template
@@ -61,7 +59,6 @@ PAIRS = Path(__file__).with_name("_coverage_pairs.json")
 SEED = 3
 COUNT, STRIDE = sized((30, 1), (8, 4))
 TEMPLATES = sized((5, 10), (5,))
-RECOMBINED_COUNT, OF_RECOMBINED_COUNT = sized((60, 10), (10, 3))
 TARGETS = {
     ("recorded", "wide"): {5: 0.38, 10: 0.54},
     ("drawn", "population"): {5: 0.45, 10: 0.60},
@@ -99,19 +96,11 @@ def run() -> list[Row]:
         for session, encounter in encounters
     ]
     rows = list(_shares("shifted", _members(baseline), {}))
-    parents = [encounter for _, encounter in encounters]
-    pairs, refused = recombinations(parents, RECOMBINED_COUNT, SEED)
-    tried = len(pairs) + sum(refused.values())
-    rows.append(higher("pairs that recombine", len(pairs) / max(tried, 1), "", 0.5))
-    recombined = [("recombined", encounter) for encounter in pairs]
     for decisions in ("recorded", "drawn"):
         for variety in ("wide", "population"):
             sampling = SamplingConfig(variety=variety, decisions=decisions)
-            sets = list(_generated(encounters, sampling, COUNT))
+            sets = list(_generated(encounters, sampling))
             rows += _measured(sampling, sets, rng)
-    recorded = replace(sampling, decisions="recorded")
-    sets += _generated(recombined, recorded, OF_RECOMBINED_COUNT)
-    rows += _shares("population, drawn, recombined", _members(sets), {})
     return rows
 
 
@@ -130,7 +119,7 @@ def _measured(
     found = _members(sets)
     yield higher(f"{setting}: encounters", len(found.recorded))
     yield higher(f"{setting}: scenarios", len(found.made))
-    lost = {(member.template, member.other) for member in found.made if member.kind is None}
+    lost = {member.template for member in found.made if member.kind is None}
     yield lower(f"{setting}: sets that lose the shared area", len(lost), "", 0.0)
     yield from _shares(setting, found, TARGETS.get(key, {}))
     pairs = _members([replace(one, members=tuple(mixed(one.members, rng))) for one in sets])
@@ -167,13 +156,13 @@ def _shares(setting: str, found: Members, targets: dict[int, float]) -> Iterator
 
 
 def _generated(
-    encounters: Sequence[tuple[str, Encounter]], sampling: SamplingConfig, count: int
+    encounters: Sequence[tuple[str, Encounter]], sampling: SamplingConfig
 ) -> Iterator[Set]:
     """Yield what is generated from each encounter; drawn outcomes belong to its set."""
     for session, encounter in encounters:
         generate = partial(_generated_set, sampling)
         try:
-            results = outcome_sets(generate, encounter, sampling, Request(), count, SEED)
+            results = outcome_sets(generate, encounter, sampling, Request(), COUNT, SEED)
         except ScenarioGenError as error:
             print(f"{encounter.name}: {error}", file=sys.stderr)
             continue

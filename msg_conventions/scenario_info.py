@@ -34,7 +34,6 @@ from scenario_gen.types import (
     EgoSlot,
     Facts,
     note_kinds,
-    Recombined,
     Recorded,
     recorded_notes,
     Scenario,
@@ -44,7 +43,6 @@ from scenario_gen.types import (
 
 INFO = "scenarios/info"
 REFUSED, ADAPTATION, TARGET = "refused.", "adaptation.", "target."
-RECOMBINED = ("recombined.first", "recombined.second")  # encounters that the vehicles come from
 DECIDED = ("decided.encounter", "decided.decision")  # recording, and the decision as JSON
 KINDS = f"{ADAPTATION}kinds"  # of the adaptations, in their order
 REACTION, CUT = (
@@ -194,18 +192,17 @@ class RequestSummary:
             key: value
             for key, value in self.values.items()
             if key not in known
-            and key not in RECOMBINED + DECIDED
+            and key not in DECIDED
             and not key.startswith((REFUSED, ADAPTATION, TARGET, REACTION, "ego"))
         }
 
     @property
-    def source(self) -> Recorded | Recombined | Decided:
+    def source(self) -> Recorded | Decided:
         """Whether the vehicles of the template were recorded together, as they drive here."""
         decided = [self.values[key] for key in DECIDED if key in self.values]
         if len(decided) == len(DECIDED):
             return Decided(decided[0], decode_decision(decided[1], INFO))
-        names = [self.values[key] for key in RECOMBINED if key in self.values]
-        return Recombined(*names) if len(names) == len(RECOMBINED) else Recorded()
+        return Recorded()
 
     def result(self, scenarios: tuple[Scenario, ...] = ()) -> ScenarioSet:
         """Return the counts as a set of these scenarios.
@@ -283,14 +280,12 @@ class RequestSummary:
 Info = ScenarioEntry | RequestSummary
 
 
-def source_values(source: Recorded | Recombined | Decided) -> dict[str, str]:
+def source_values(source: Recorded | Decided) -> dict[str, str]:
     """Return the values of a summary that name the encounters a template was made from."""
     if isinstance(source, Recorded):
         return {}
-    if isinstance(source, Decided):
-        decision = json.dumps(source.decision.document())
-        return dict(zip(DECIDED, (source.encounter, decision), strict=True))
-    return dict(zip(RECOMBINED, (source.first, source.second), strict=True))
+    decision = json.dumps(source.decision.document())
+    return dict(zip(DECIDED, (source.encounter, decision), strict=True))
 
 
 def encode_info(info: Info, stamp_ns: int) -> bytes:

@@ -31,10 +31,6 @@ from scenario_gen.method.fitting import (
     fit_template as fit_template,
     FittingConfig as FittingConfig,
 )
-from scenario_gen.method.recombination import (
-    recombinations as recombinations,
-    recombined as recombined,
-)
 from scenario_gen.method.routing import (
     plan_routes as plan_routes,
     PlanningConfig as PlanningConfig,

@@ -31,9 +31,6 @@ from scenario_gen.situation import Situation
 from scenario_gen.types import (
     Encounter,
     GenerationResult,
-    Note,
-    NoteKind,
-    Recombined,
     Request,
     Road,
     Scenario,
@@ -120,8 +117,6 @@ def completed(
 ) -> GenerationResult:
     """Return a set of scenarios with its replay, references, evaluation, coverage, provenance."""
     encounter, (road, fit) = result.encounter, result.road_and_fit()
-    if isinstance(encounter.source, Recombined):
-        result = result.noted(Note.of(NoteKind.RECOMBINED, **vars(encounter.source)))
     if config.evaluation.compare:
         situation = Situation.of(encounter)
         result = with_references(result, situation, config, request, population)

@@ -39,7 +39,7 @@ STAGES = (
     "validity",
     "sampling",
     "evaluation",
-    "recombination",
+    "interacting_pair",
     "drives",
     "decisions",
     "outcome_sets",

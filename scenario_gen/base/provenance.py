@@ -14,7 +14,7 @@ from scenario_gen.base.parameters import flatten, parsed, updated
 
 Config = TypeVar("Config")
 RECORDING = "recording"
-"""Key of the name of a template's recording; of both recordings if it was recombined."""
+"""Key of the name of a template's recording."""
 
 _LOG_PREFIX = "log "
 _HASH_PREFIX = "sha256 "

@@ -21,6 +21,7 @@ from scenario_gen.base.errors import (
     ScenarioGenError,
     shown_error,
 )
+from scenario_gen.base.removed import REMOVED
 from scenario_gen.cli import bags, corpus, generation, output, testing
 from scenario_gen.cli.options import Commands
 
@@ -129,6 +130,19 @@ def arguments(words: list[str]) -> list[str]:
     return [*first, *(word for word in words[:end] if word not in first), *words[end:]]
 
 
+def refuse_removed(words: list[str]) -> None:
+    """Refuse the first command or option that an earlier release had.
+
+    Raises:
+        InputError: there is one; the message says what replaces it.
+    """
+    command = next((word for word in words if not word.startswith("-")), "")
+    options = [word.partition("=")[0] for word in words if word.startswith("--")]
+    for name in (command, *options):
+        if name in REMOVED:
+            raise InputError(f"{name} was removed: {REMOVED[name]}")
+
+
 def usage_error(error: Any) -> InputError:
     """Return a usage error of typer as an error of ours, with the help of a missing parameter."""
     message = " ".join(error.format_message().split()).rstrip(".")
@@ -146,6 +160,7 @@ def run(words: list[str]) -> int:
         ScenarioGenError: the command failed; BugError if it did so unexpectedly.
     """
     try:
+        refuse_removed(words)
         code = app(arguments(words) or ["--help"], standalone_mode=False, prog_name=PROGRAM)
         sys.stdout.flush()
     except UsageError as error:

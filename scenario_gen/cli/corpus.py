@@ -129,14 +129,6 @@ class Batch:
     templates: Annotated[
         int, typer.Option(min=0, help="Use only the first N encounters of the corpus. 0: all.")
     ] = 0
-    recombine: Annotated[
-        int,
-        typer.Option(
-            min=0,
-            max=100_000,
-            help="Create up to this many new encounters, as `generate` does, from the corpus.",
-        ),
-    ] = 0
     bags: Annotated[
         Bags,
         typer.Option(help="Scenarios to write to bags, too. `find --bag` generates others again."),
@@ -161,9 +153,7 @@ def batch(options: Batch) -> None:
     out = place(options.out, to_write=True)
     names = [name for text in options.roads for name in text.split(",") if name]
     bags = "hits" if options.hits else options.bags
-    request = BatchRequest(
-        config, options.count, options.seed, options.recombine, bags, options.hits
-    )
+    request = BatchRequest(config, options.count, options.seed, bags, options.hits)
     with workers_of(options.workers, options.scheduler) as who:
         result = run_batch(
             place(options.corpus), names, out, request, templates=options.templates, workers=who
@@ -260,69 +250,3 @@ def _print_matches(listed: Sequence[Mapping[str, object]], count: int) -> None:
     if count:
         summary += "; ttc is capped at evaluation.ttc_horizon (10 s)"
     print_(summary)
-
-
-@commands.command(urls=("corpus",))
-def library(
-    corpus: Annotated[
-        Path,
-        typer.Argument(help="A corpus that `mine` wrote. The library goes to CORPUS/library."),
-    ],
-    most: Annotated[
-        int,
-        typer.Option(
-            min=4,
-            help="Number of vehicle pairs to fit. Further pairs are assigned to the result.",
-        ),
-    ] = 1000,
-    seed: SeedOption = 0,
-    workers: WorkersOption = 0,
-    scheduler: SchedulerOption = "",
-    assignments: Annotated[
-        list[str] | None,
-        typer.Option("--set", help="Set a parameter of the segmentation, as name=value."),
-    ] = None,
-) -> None:
-    """Segment all encounters of a corpus jointly, and write their shared primitives."""
-    from scenario_gen.corpus.library import build, SHARED
-
-    config, source = assigned_all(SHARED, assignments), place(corpus, to_write=True)
-    with workers_of(workers, scheduler) as who:
-        built = build(source, config, most=most, seed=seed, workers=who)
-    conclude(built.lines(), built.failed, source / "library")
-
-
-@commands.command()
-def coverage(
-    bags: Annotated[
-        list[Path],
-        typer.Argument(help="Bags, batches or corpora, with at least two recordings in all."),
-    ],
-    templates: Annotated[
-        list[int] | None,
-        typer.Option(
-            min=1,
-            help="Number of recorded encounters to draw as templates. Repeatable; "
-            "default: 5, 10, 20.",
-        ),
-    ] = None,
-    draws: Annotated[
-        int, typer.Option(min=1, help="Number of draws of templates, for the intervals.")
-    ] = 200,
-    seed: SeedOption = 0,
-    out: Annotated[Path, typer.Option(help="HTML file for the page.")] = Path("coverage.html"),
-) -> None:
-    """Measure how well recordings, and the scenarios from them, represent unseen traffic."""
-    from scenario_gen.corpus.coverage import results_of, write_coverage
-    from scenario_gen.method.evaluation.population import population_of
-
-    if out.suffix.lower() != ".html" or (
-        out.exists() and not out.read_bytes()[:15].lower().startswith(b"<!doctype html>")
-    ):
-        raise InputError(f"--out {out}: name a new .html file, or a page to replace")
-    population = population_of(results_of(bags), templates or (5, 10, 20), draws=draws, seed=seed)
-    write_coverage(out, results_of(bags), population)  # memory has one result at a time
-    emit_json(population=population, page=out)
-    print_(population.lead)
-    print_table(*population.table())
-    print_(*population.remarks(), f"page: {out}", sep="\n")

@@ -17,7 +17,6 @@ from scenario_gen.base.parameters import updated
 from scenario_gen.base.provenance import RECORDING
 from scenario_gen.logs import LogResult, NoEncounterError, read_log
 from scenario_gen.method.nearest import answer_refusal
-from scenario_gen.method.recombination import recombinations
 from scenario_gen.method.sampling import TargetError
 from scenario_gen.output.results import BAG, GENERATED, provenance_of, write_results
 from scenario_gen.pipeline import generate_outcomes, PipelineConfig
@@ -25,7 +24,6 @@ from scenario_gen.types import (
     Encounter,
     GenerationResult,
     NoteKind,
-    Recombined,
     Recorded,
     Request,
 )
@@ -56,7 +54,6 @@ class FolderRequest:
         also_read: further inputs, which the folder must not contain: maps, a parameter file.
         for_testing: whether to search for scenarios in which the ego has to react.
         budget: computing time [s] of that search, per encounter and road.
-        recombine: largest number of encounters to recombine from the recorded ones.
     """
 
     jobs: Sequence[tuple[Sequence[Path], Sequence[str]]]
@@ -69,7 +66,6 @@ class FolderRequest:
     also_read: Sequence[Path] = ()
     for_testing: bool = False
     budget: float = 60.0
-    recombine: int = 0
 
     @property
     def logs(self) -> list[Path]:
@@ -88,10 +84,9 @@ class FolderRequest:
 
     def provenance(self) -> dict[str, str]:
         """Return what is needed to generate the folder again."""
-        values = provenance_of(
+        return provenance_of(
             self.logs, self.seed, self.count, self.roads, self.config, self.request
         )
-        return ({"recombine": str(self.recombine)} if self.recombine else {}) | values
 
 
 @dataclass(frozen=True)
@@ -137,8 +132,6 @@ def generate_folder(
         readings = read_logs(requested, progress, notify)
         sources = sources_of(readings)
         templates = chosen([source.encounter for source in sources.values()], requested.encounters)
-        if requested.recombine:
-            templates += recombine(templates, sources, requested, notify)
         pairs = [
             (template, road) for template in templates for road in sources[template.name].roads
         ]
@@ -191,26 +184,6 @@ def sources_of(readings: Sequence[tuple[LogResult, Sequence[str]]]) -> dict[str,
             numbered = replace(encounter, name=encounter.name + number)
             sources[numbered.name] = Source(numbered, roads, name + number)
     return sources
-
-
-def recombine(
-    recorded: Sequence[Encounter],
-    sources: dict[str, Source],
-    requested: FolderRequest,
-    notify: Notify,
-) -> list[Encounter]:
-    """Return recombined encounters, which are added to the sources; notify how many there are."""
-    made, refused = recombinations(recorded, requested.recombine, requested.seed)
-    for encounter in made:
-        assert isinstance(encounter.source, Recombined)
-        first, second = sources[encounter.source.first], sources[encounter.source.second]
-        recordings = dict.fromkeys((first.recording, second.recording))
-        sources[encounter.name] = Source(encounter, first.roads, ", ".join(recordings))
-    causes = "; ".join(f"{count} × {cause}" for cause, count in refused.most_common())
-    why = causes or "no more pairs of the same kind; add recordings with --recording"
-    why = f" ({why})" if len(made) < requested.recombine else ""
-    notify(f"recombined encounters: {len(made)} of {requested.recombine}{why}")
-    return made
 
 
 def read_logs(

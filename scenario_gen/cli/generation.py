@@ -65,15 +65,6 @@ class Generate:
             help="Another recording for the same roads, with a separate clock. Repeatable."
         ),
     ] = None
-    recombine: Annotated[
-        int,
-        typer.Option(
-            min=0,
-            max=MAX_COUNT,
-            help="Create up to this many new encounters by pairing vehicles from two recordings "
-            "of the same kind.",
-        ),
-    ] = 0
     ego: Annotated[
         str,
         typer.Option(
@@ -201,7 +192,6 @@ def generate(options: Generate) -> None:
         also_read=[options.parameter_file] if options.parameter_file else [],
         for_testing=options.for_testing,
         budget=options.budget,
-        recombine=options.recombine,
     )
     conclude(*generate_folder(options.out, request, progress=progress, notify=print_), options.out)
 

@@ -1,4 +1,4 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Many encounters: mining archives, libraries of primitives, and batches of scenarios."""
+"""Many encounters: mining archives, and batches of scenarios."""

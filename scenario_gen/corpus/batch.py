@@ -15,14 +15,11 @@ import json
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from scenario_gen.base.documents import read_json
 from scenario_gen.base.errors import InputError, needs, RefusedError
 from scenario_gen.base.provenance import parameter_texts, read_parameters
 from scenario_gen.base.stores import fetched, Place
-from scenario_gen.corpus.config import CorpusConfig
-from scenario_gen.corpus.encounters import encounter_of, row_of, tables_of, write_encounters
+from scenario_gen.corpus.encounters import encounter_of, tables_of, write_encounters
 from scenario_gen.corpus.parts import (
     BatchRequest,
     generate_part,
@@ -34,11 +31,9 @@ from scenario_gen.corpus.store import finished_parts, finished_tables, MANIFEST,
 from scenario_gen.corpus.tables import rows_at, rows_of
 from scenario_gen.corpus.tasks import agree, check_out, held, spread, Workers
 from scenario_gen.method.config import PipelineConfig
-from scenario_gen.method.recombination import recombinations
 from scenario_gen.roads import build_road
 
 BAGS = ("none", "hits", "all")
-MAX_PARENT_COUNT = 1000  # encounters that are recombined: each is in memory
 TABLE_TEMPLATE_COUNT = 500
 IDENTITY = ("name", "source", "start_ns", "seconds", "gap", "distance", "speed")
 SCHEMA = {
@@ -48,21 +43,6 @@ SCHEMA = {
 }
 Row = tuple[Place, int]
 """A row of a table, by its number."""
-
-
-@dataclass(frozen=True)
-class RecombineTask:
-    """Templates to recombine, and the table to write; `known` are names of earlier ones."""
-
-    templates: tuple[Row, ...]
-    known: frozenset[str]
-    target: Place
-    request: BatchRequest
-
-    @property
-    def name(self) -> str:
-        """The task in messages."""
-        return "recombination"
 
 
 @dataclass(frozen=True)
@@ -151,12 +131,6 @@ def run_batch(
     with held(out), spread(workers) as run:
         manifest = _grow(out, roads, request)
         _add_templates(out, chosen)
-        failed: list[str] = []
-        if request.recombine > manifest.get("recombined", 0):
-            failed = run(recombine, [_recombine_task(out, request)])
-            if not failed:
-                manifest["recombined"] = request.recombine
-                write_json(out / MANIFEST, manifest)
         used = {token: road for token, road in manifest["roads"].items() if road in roads}
         finished = finished_parts(out)
         tasks = [
@@ -164,7 +138,7 @@ def run_batch(
             for task in part_tasks(out, used, manifest["counts"], request)
             if task.number not in finished.get(f"road={task.token}", ())
         ]
-        failed += run(generate_part, tasks)
+        failed = run(generate_part, tasks)
         return summary(out, failed)
 
 
@@ -244,39 +218,6 @@ def _add_templates(out: Place, chosen: Sequence[tuple[Row, tuple[Any, ...]]]) ->
         rows = [row for row, _ in _read(lacking[k : k + TABLE_TEMPLATE_COUNT])]
         number = len(tables) + k // TABLE_TEMPLATE_COUNT
         write_encounters(out / "templates" / f"templates-{number:05}.parquet", rows, {})
-
-
-def _recombine_task(out: Place, request: BatchRequest) -> RecombineTask:
-    """Return the task that recombines the recorded templates of a batch."""
-    tables = _templates(out)
-    recorded, known = [], set()
-    for table in tables:
-        for number, row in enumerate(rows_of([table], ["name", "parents"])):
-            if row["parents"]:
-                known.add(row["name"])
-            else:
-                recorded.append((table, number))
-    target = out / "templates" / f"templates-{len(tables):05}.parquet"
-    return RecombineTask(tuple(recorded), frozenset(known), target, request)
-
-
-def recombine(task: RecombineTask) -> None:
-    """Recombine templates, if there are very many some of them, and write a table of the result.
-
-    Raises:
-        OSError: the disk is full or fails.
-    """
-    request = task.request
-    order = np.random.default_rng(request.seed).permutation(len(task.templates))
-    chosen = [task.templates[k] for k in sorted(order[:MAX_PARENT_COUNT].tolist())]
-    recorded = [encounter_of(row, table) for row, table in _read(chosen)]
-    made, _ = recombinations(recorded, request.recombine, request.seed)
-    rows = [
-        row_of(encounter, "recombined", CorpusConfig())
-        for encounter in made
-        if encounter.name not in task.known
-    ]
-    write_encounters(task.target, rows, {})
 
 
 def summary(out: Place, failed: list[str]) -> Batch:

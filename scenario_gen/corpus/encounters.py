@@ -8,7 +8,7 @@ formats are read whole.
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import combinations
 import json
 from pathlib import Path
@@ -40,7 +40,7 @@ from scenario_gen.logs.doubts import DoubtError
 from scenario_gen.logs.tables import SPMD_EPOCH_NS
 from scenario_gen.method.evaluation import criticality, EvaluationConfig
 from scenario_gen.situation import Situation
-from scenario_gen.types import Encounter, Recombined, Recorded
+from scenario_gen.types import Encounter
 
 ROW = {  # columns that are read, and their types
     **dict.fromkeys(("name", "kind"), str),
@@ -50,7 +50,7 @@ ROW = {  # columns that are read, and their types
 }
 COLUMNS = {  # of a table
     **dict.fromkeys(("name", "source", "kind", "kinds", "reactions"), "string"),
-    **dict.fromkeys(("vehicles", "parents"), "string[]"),
+    **dict.fromkeys(("vehicles",), "string[]"),
     **dict.fromkeys(("count", "start_ns"), "int64"),
     **dict.fromkeys(("seconds", "gap", "distance", "lat", "lon", "ttc", "pet", "speed"), "double"),
     "tracks": "binary",
@@ -211,7 +211,6 @@ def row_of(encounter: Encounter, source: str, config: CorpusConfig) -> dict[str,
     ids = encounter.ids
     measures = criticality(encounter, EvaluationConfig().ttc_horizon)
     latitude, longitude = encounter.origin or (None, None)
-    origin = encounter.source
     return {
         "name": encounter.name,
         "source": source,
@@ -219,7 +218,6 @@ def row_of(encounter: Encounter, source: str, config: CorpusConfig) -> dict[str,
         "reactions": json.dumps(situation.reactions.document(encounter.vehicles)),
         "kinds": json.dumps({f"{ids[i]} {ids[j]}": kind for (i, j), kind in kinds.items()}),
         "vehicles": ids,
-        "parents": [origin.first, origin.second] if isinstance(origin, Recombined) else [],
         "count": len(ids),
         "start_ns": encounter.start_ns,
         "seconds": encounter.duration,
@@ -306,9 +304,7 @@ def encounter_of(row: Mapping[str, Any], table: object = "an encounter's row") -
                 f"{table}: column {name} holds {shown(row.get(name))}; `mine` writes it anew"
             )
     origin = None if row["lat"] is None or row["lon"] is None else (row["lat"], row["lon"])
-    parents = row.get("parents") or []
-    source = Recombined(*parents) if len(parents) == 2 else Recorded()
     try:
-        return replace(tracks_of(row["tracks"], row["name"], origin), source=source)
+        return tracks_of(row["tracks"], row["name"], origin)
     except InputError as error:
         raise InputError(f"{table}: {error}") from error

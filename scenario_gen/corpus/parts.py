@@ -37,9 +37,7 @@ from scenario_gen.types import (
     Encounter,
     GenerationResult,
     most_exposed,
-    Note,
     NoteKind,
-    Recombined,
     Request,
     Scenario,
 )
@@ -79,7 +77,6 @@ class BatchRequest:
         count: number of scenarios per template and road.
         seed: seed of the batch; the seed of a case follows from it, the template's name and the
             road.
-        recombine: largest number of further templates, recombined from those of the corpus.
         bags: "none", "hits" or "all" of the scenarios are also written to bags.
         hits: condition of the scenarios for bags="hits", as for `find`.
     """
@@ -87,7 +84,6 @@ class BatchRequest:
     config: PipelineConfig = PipelineConfig()
     count: int = 50
     seed: int = 0
-    recombine: int = 0
     bags: str = "none"
     hits: str = ""
 
@@ -290,8 +286,6 @@ def _generate_set(
     config, seed = task.request.config, case["seed"]
     config = replace(config, sampling=for_one_set(config.sampling, encounter))
     result = generate_set(encounter, count, task.road, config=config, seed=seed)
-    if isinstance(encounter.source, Recombined):
-        result = result.noted(Note.of(NoteKind.RECOMBINED, **vars(encounter.source)))
     facts = {"template": encounter.recording, RECORDING: case["recording"], "roads": task.road}
     facts |= {"seed": str(seed), "count": str(count)}
     return replace(result, provenance=facts | versions() | parameter_texts(config))

@@ -161,15 +161,6 @@ def _has_entries(folder: Place) -> bool:
     return any(not path.name.startswith(".") for path in folder.iterdir())
 
 
-def undone(tasks: Sequence[Target]) -> list[Target]:
-    """Return the tasks whose file does not exist; each folder is listed once."""
-    folders = {task.target.parent for task in tasks}
-    existing: set[str] = set()
-    for folder in folders:
-        existing.update(str(path) for path in folder.glob("*"))
-    return [task for task in tasks if str(task.target) not in existing]
-
-
 @dataclass(frozen=True)
 class Workers:
     """The processes that run the tasks of a command.

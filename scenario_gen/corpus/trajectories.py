@@ -3,9 +3,7 @@
 
 """Trajectories of scenarios as Parquet: a row per vehicle, with a list of its samples."""
 
-from collections.abc import Iterator, Mapping, Sequence
-from itertools import chain, groupby
-from pathlib import Path
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -13,7 +11,7 @@ import numpy as np
 from scenario_gen.base.stores import Place
 from scenario_gen.corpus.tables import table_writer
 from scenario_gen.corpus.tasks import arriving
-from scenario_gen.types import Scenario, Vehicle
+from scenario_gen.types import Scenario
 
 SAMPLE = {
     "time": ("t", "s", 0.0),
@@ -69,43 +67,3 @@ def write_trajectories(
     table = table.append_column("trajectory", trajectory)
     with arriving(target) as part, table_writer(part, table.schema) as writer:
         writer.write_table(table)
-
-
-def read_trajectories(table: Path) -> Iterator[tuple[str, Scenario]]:
-    """Yield the templates and scenarios of a table, a thousand rows at a time."""
-    from pyarrow import parquet
-
-    batches = parquet.ParquetFile(table).iter_batches(batch_size=1000)
-    rows = chain.from_iterable(map(_rows, batches))
-    for _, group in groupby(rows, key=lambda row: row["sha256"]):
-        vehicles = list(group)
-        yield vehicles[0]["template"], _scenario(vehicles)
-
-
-def _rows(batch: Any) -> Iterator[dict[str, Any]]:
-    """Yield the rows of a batch, with the samples as arrays (5, M)."""
-    trajectory = batch.column("trajectory")
-    samples = np.array([values.to_numpy() for values in trajectory.flatten().flatten()])
-    offsets = trajectory.offsets.to_numpy() - trajectory.offsets[0].as_py()
-    for k, row in enumerate(batch.drop_columns("trajectory").to_pylist()):
-        yield row | {"samples": samples[:, offsets[k] : offsets[k + 1]]}
-
-
-def _scenario(rows: Sequence[Mapping[str, Any]]) -> Scenario:
-    """Return the scenario with the vehicles in rows."""
-    time = np.unique(np.concatenate([row["samples"][0] for row in rows]))
-    ends = np.array([row["samples"][0, [0, -1]] for row in rows])
-    x, y, heading, speed = (
-        np.array([np.interp(time, row["samples"][0], row["samples"][k]) for row in rows])
-        for k in range(1, len(SAMPLE))
-    )
-    return Scenario(
-        tuple(Vehicle(row["vehicle"], row["length"], row["width"], row["type"]) for row in rows),
-        time,
-        np.stack([x, y], axis=-1),
-        heading,
-        speed,
-        np.gradient(speed, time, axis=1),
-        index=rows[0]["index"],
-        present=np.searchsorted(time, ends),
-    )

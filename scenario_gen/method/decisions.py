@@ -32,12 +32,7 @@ from scenario_gen.base.errors import RefusedError
 from scenario_gen.method.drives import delayed_drive, Drive, free_drive, recorded_drive
 from scenario_gen.method.evaluation.encounter_features import DISTANCE
 from scenario_gen.method.evaluation.law import Law
-from scenario_gen.method.recombination import (
-    InteractingPair,
-    MAX_RARITY_RATIO,
-    MIN_DURATION_S,
-    pair_of,
-)
+from scenario_gen.method.interacting_pair import InteractingPair, pair_of
 from scenario_gen.method.sampling import SamplingConfig
 from scenario_gen.numerics import Floats
 from scenario_gen.situation import conflict_of, EncounterKind, passing
@@ -62,6 +57,7 @@ class DecisionMargins:
 
     Attributes:
         horizon_s: time before the shared area at which a driver decides.
+        min_duration_s: of a new encounter.
         min_together_s: time for which both vehicles are present.
         max_merge_lag_s: in a merge a larger lag leaves nothing to decide.
         min_gap_s: from the first vehicle's exit to the second one's entry.
@@ -71,10 +67,12 @@ class DecisionMargins:
         min_courtesy_ratio: share of its speed that a driver keeps who lets another one go first,
             or who merges from beside.
         usual_sigmas: RMS distance from the mean of a kind; four in five recordings are nearer.
+        max_rarity_ratio: of a new encounter's distance from the mean to the recording's.
         behind_s: after its entry, when a vehicle has its free speed again.
     """
 
     horizon_s: float = 4.0
+    min_duration_s: float = 5.0
     min_together_s: float = 2.0
     max_merge_lag_s: float = 1.5
     min_gap_s: float = 1.0
@@ -83,6 +81,7 @@ class DecisionMargins:
     max_braking_mps2: float = 3.5
     min_courtesy_ratio: float = 0.5
     usual_sigmas: float = 1.5
+    max_rarity_ratio: float = 1.2
     behind_s: float = 2.0
 
 
@@ -285,8 +284,8 @@ class DecidedConflict:
         Raises:
             RefusedError: it does; the message says how.
         """
-        if encounter.duration < MIN_DURATION_S:
-            raise RefusedError(f"it would last less than {MIN_DURATION_S:g} s")
+        if encounter.duration < MARGINS.min_duration_s:
+            raise RefusedError(f"it would last less than {MARGINS.min_duration_s:g} s")
         pair = pair_of(encounter)
         merges = self.pair.conflict.following
         if pair is None or (pair.conflict.first, pair.conflict.following) != (0, merges):
@@ -298,7 +297,7 @@ class DecidedConflict:
         if _hardest_braking(encounter) > allowed:
             raise RefusedError("a driver would brake too hard")
         law = Law.mixed(DECIDED_KINDS)
-        allowed = MAX_RARITY_RATIO * law.distance(self.pair.features)
+        allowed = MARGINS.max_rarity_ratio * law.distance(self.pair.features)
         if law.distance(pair.features) > max(allowed, MARGINS.usual_sigmas):
             raise RefusedError("it would be more unusual than the recording")
 

@@ -22,7 +22,6 @@ from scenario_gen.types.decision import Decision, Outcome
 from scenario_gen.types.encounter import (
     Decided,
     Encounter,
-    Recombined,
     Recorded,
     token,
     tokens,
@@ -196,7 +195,6 @@ __all__ = [
     "Reached",
     "Reaction",
     "ReactionGraph",
-    "Recombined",
     "Recorded",
     "Request",
     "Road",

@@ -26,24 +26,6 @@ class Recorded:
 
 
 @dataclass(frozen=True)
-class Recombined:
-    """Source of an encounter: its vehicles come from two recorded encounters.
-
-    Attributes:
-        first: name of the encounter with the first vehicle.
-        second: name of the encounter with the second vehicle.
-    """
-
-    first: str
-    second: str
-
-    @property
-    def name(self) -> str:
-        """A name for the encounter."""
-        return f"{self.first} + {self.second}"
-
-
-@dataclass(frozen=True)
 class Decided:
     """Source of an encounter: two recorded vehicles with the outcome of a decision.
 
@@ -76,7 +58,7 @@ class Encounter(Motion):
     name: str
     start_ns: int = 0
     origin: tuple[float, float] | None = None
-    source: Recorded | Recombined | Decided = Recorded()
+    source: Recorded | Decided = Recorded()
     lights: tuple[TrafficLight, ...] = ()
 
     def __post_init__(self) -> None:

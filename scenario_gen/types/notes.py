@@ -65,7 +65,6 @@ class NoteKind(Enum):
     # Sampling.
     SHORTENED = "shortened to fit the road: {parts} ({reason})"
     AUTO_ROAD = "road auto: {road}, the first built-in road on which the encounter is unchanged"
-    RECOMBINED = "recombined from {first} and {second}: this encounter was not recorded"
     OUTCOMES = "outcomes of the decision: {mix}"
     OUTCOME_REFUSED = "{decision} is not possible on this road: {reason}"
     NOTHING_DECIDED = "decisions: only the recorded outcome: {reason}"

@@ -9,6 +9,7 @@ import json
 import numpy as np
 import pytest
 
+from benchmarks._coverage_members import Members
 from benchmarks._coverage_nulls import (
     at_precision,
     coverage_alone,
@@ -23,7 +24,6 @@ from benchmarks._coverage_nulls import (
 )
 from benchmarks.coverage import PAIRS
 from scenario_gen.method.evaluation.encounter_features import EncounterFeatures, FEATURES
-from scenario_gen.method.evaluation.population import Members
 
 WIDTH = len(FEATURES)
 

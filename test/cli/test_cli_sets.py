@@ -8,11 +8,10 @@ from pathlib import Path
 from shutil import copyfile
 
 import pytest
-from support.textbook_motions import labelled
 
-from scenario_gen import bundled, generate, load, read_log
+from scenario_gen import load
 from scenario_gen.base.folders import MARKER
-from scenario_gen.types import NoteKind, Recombined, Recorded
+from scenario_gen.types import Recorded
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 
@@ -63,88 +62,6 @@ def test_a_bag_is_evaluated_to_a_page_figures_and_a_table(results, run, tmp_path
     (found,) = [row["values"] for row in again["rows"] if row["name"] == "scenarios"]
     for key in ("e_position", "e_speed", "diversity", "min_distance"):
         assert found[key]["value"] == pytest.approx(expected[key]["value"], rel=1e-4), key
-
-
-def test_coverage_measures_recordings_and_their_sets_and_draws_a_page(run, tmp_path):
-    bags = []
-    for case, road in (("left_turn", "four_way"), ("follower", "curve")):
-        (encounter,) = read_log(bundled(case)).encounters
-        bags.append(generate(encounter, road, count=2, seed=3).save(tmp_path / case))
-    code, said = run("coverage", *bags, "--templates", 1)
-    assert (
-        code == 0
-        and "2 encounters whose vehicles share an area (1 following, 1 left_turn), 4 scenarios"
-        in said
-    )
-    assert "with generated" in said and "never reached" in said
-    page = (tmp_path / "coverage.html").read_text()
-    assert page.count("not reached: ") == 2 and page.count("like nothing recorded: scenario ") == 4
-    code, said = run("coverage", *bags)
-    assert code == 2 and "at most 1 templates can be drawn" in said
-    (tmp_path / "mine.html").write_text("my own notes")
-    assert run("coverage", *bags, "--templates", 1, "--out", "mine.html")[0] == 2
-    assert (tmp_path / "mine.html").read_text() == "my own notes"
-
-
-def test_recordings_are_recombined_and_what_is_generated_from_them_counts_for_both(run, tmp_path):
-    logs = []
-    for kind, seed in (("crossing, stops", 0), ("crossing, stops", 1), ("follows", 0)):
-        logs.append(tmp_path / f"{kind[:7]}{seed}" / "log.csv")
-        logs[-1].parent.mkdir()
-        labelled(kind, seed).encounter.to_dataframe().to_csv(logs[-1], index=False)
-    more = [option for log in logs[1:] for option in ("--recording", log)]
-    code, said = run(
-        "generate",
-        logs[0],
-        *more,
-        "--road",
-        "corridor",
-        "--count",
-        2,
-        "--recombine",
-        9,
-        "--out",
-        tmp_path / "out",
-    )
-    assert code == 0 and "recombined encounters: 2 of 9" in said
-    flat = " ".join(said.split())
-    assert "log + log (2) on corridor" in flat and "log (2) + log on corridor" in flat
-    made = [load(tmp_path / "out" / "bag", name) for name in ("/case_4", "/case_5")]
-    assert all(
-        NoteKind.RECOMBINED in {note.kind for note in case.generated.adaptations} for case in made
-    )
-    assert {case.encounter.source for case in made} == {
-        Recombined("log", "log (2)"),
-        Recombined("log (2)", "log"),
-    }
-    provenance = json.loads((tmp_path / "out" / "evaluation.json").read_text())["provenance"]
-    assert (
-        provenance["recombine"] == "9" and sum(key.startswith("log ") for key in provenance) == 3
-    )
-    code, said = run("coverage", tmp_path / "out" / "bag", "--templates", 1)
-    assert (
-        code == 0
-        and "3 encounters whose vehicles share an area (2 crossing, 1 following), 10 scenarios"
-        in said
-    )
-    code, said = run(
-        "generate",
-        logs[2],
-        "--road",
-        "corridor",
-        "--count",
-        2,
-        "--recombine",
-        9,
-        "--out",
-        tmp_path / "one",
-    )
-    assert (
-        code == 0
-        and "recombined encounters: 0 of 9 (no more pairs of the same kind; add recordings with "
-        "--recording)"
-        in said
-    )
 
 
 def test_a_log_whose_name_has_a_plus_is_a_recording(run, tmp_path):

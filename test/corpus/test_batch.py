@@ -28,7 +28,6 @@ from scenario_gen.cli.commands import main
 from scenario_gen.corpus import parts
 from scenario_gen.corpus.batch import run_batch
 from scenario_gen.corpus.compact import compact
-from scenario_gen.corpus.coverage import results_of
 from scenario_gen.corpus.encounters import encounter_of, tables_of
 from scenario_gen.corpus.find import coverage_lines, export_hits, find
 from scenario_gen.corpus.parts import BatchRequest, LOST_CONFLICT
@@ -37,7 +36,6 @@ from scenario_gen.corpus.tasks import Workers
 from scenario_gen.method.chain import generate_set
 from scenario_gen.method.config import PipelineConfig
 from scenario_gen.method.evaluation import criticality
-from scenario_gen.method.evaluation.population import members_of
 from scenario_gen.method.fitting import LostEncounterError
 from scenario_gen.method.sampling import SamplingConfig
 
@@ -174,16 +172,6 @@ def test_a_batch_is_gone_on_with_but_not_as_another_one(batch, corpus):
             run_batch(corpus[0], ROADS, out, replace(REQUEST, **other), templates=TEMPLATES)
 
 
-def test_coverage_counts_a_template_on_several_roads_once(batch, corpus):
-    """With the recorded encounters of the corpus, from which it also comes."""
-    members = members_of(results_of([batch[0], corpus[0]]))
-    names = {row["name"] for row in rows_of(tables_of(corpus[0]))}
-    assert len(members.names) == len(set(members.names)) > 3 and set(members.names) <= names
-    assert members.recordings > 1 and len(members.made) > 0
-    generated = {row["template"] for row in find(batch[0]).rows}
-    assert {members.name_of(member) for member in members.made} <= generated
-
-
 def test_a_batch_grows_by_what_it_lacks_also_when_it_was_merged(corpus, tmp_path):
     """By templates, roads and scenarios; what is there is neither written again nor changed."""
     out = tmp_path / "out"
@@ -234,20 +222,6 @@ def test_trajectories_are_those_of_the_scenarios(batch, tmp_path):
     assert [(field.name, field.metadata[b"unit"]) for field in sample] == [
         ("t", b"s"), ("x", b"m"), ("y", b"m"), ("heading", b"rad"), ("speed", b"m/s"),
     ]  # fmt: skip
-
-
-def test_a_batch_recombines_the_encounters_of_its_corpus(corpus, tmp_path):
-    request = BatchRequest(count=1, seed=5, recombine=2)
-    run_batch(corpus[0], ROADS[:1], tmp_path, request, templates=6)
-    recombined = [encounter_of(row) for row in rows_of([*tmp_path.glob("templates/*1.parquet")])]
-    names = {row["name"] for row in rows_of(tables_of(corpus[0]))}
-    assert len(recombined) == 2
-    assert all({made.source.first, made.source.second} < names for made in recombined)
-    found = {row["template"] for row in find(tmp_path).rows}
-    assert found & {made.name for made in recombined}
-    before = digests(tmp_path)
-    run_batch(corpus[0], ROADS[:1], tmp_path, request, templates=6)
-    assert digests(tmp_path) == before
 
 
 def at_work(run, folder, pattern):

@@ -8,7 +8,6 @@ from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from itertools import count
 from pathlib import Path
 import re
-import shutil
 import socket
 import subprocess
 import sys
@@ -28,7 +27,6 @@ from scenario_gen.cli.commands import app
 from scenario_gen.corpus.batch import run_batch
 from scenario_gen.corpus.compact import compact
 from scenario_gen.corpus.find import coverage_lines, export_hits, find
-from scenario_gen.corpus.library import build
 from scenario_gen.corpus.mine import mine
 from scenario_gen.corpus.parts import BatchRequest
 
@@ -59,7 +57,7 @@ def tables(out):
 
 
 def contents(out):
-    """{name: bytes} of all files of a batch, or of a library, in a folder or in a store."""
+    """{name: bytes} of all files of a batch in a folder or in a store."""
     if isinstance(out, Path):
         return {
             path.relative_to(out).as_posix(): path.read_bytes()
@@ -125,17 +123,6 @@ def test_a_batch_and_what_it_finds_are_the_same_in_a_store(bucket, corpus, tmp_p
 def remove(one):
     system, path = one.file_system()
     system.rm_file(path)
-
-
-def test_a_library_is_the_same_in_a_store(bucket, corpus, tmp_path):
-    stored, local = place(f"{bucket}/corpus"), tmp_path / "corpus"
-    upload(corpus[0] / "encounters", stored / "encounters")
-    shutil.copytree(corpus[0] / "encounters", local / "encounters")
-    assert build(stored, most=4) == build(local, most=4)
-    in_store = contents(stored / "library")
-    assert in_store.pop("request.json") and in_store == contents(local / "library")
-    with pytest.raises(InputError, match="library with other most"):
-        build(stored, most=5)
 
 
 class Failing(BaseHTTPRequestHandler):
@@ -226,7 +213,6 @@ def test_a_killed_run_is_gone_on_with(bucket, corpus, seconds):
         (("mine", "BUCKET/spmd", "--out", "https://example.org/x"), "https is read-only"),
         (("mine", "ftp://host/a", "--out", "BUCKET/out"), "ftp is not supported"),
         (("batch", "BUCKET/out", "--roads", "straight", "--out", "x"), "out holds no encounters/"),
-        (("library", "BUCKET/out"), "out holds no encounters/"),
         (("find", "BUCKET/out"), "out holds no scenarios"),
         (
             ("roads", "BUCKET/a.xodr", "--out", "x.svg"),

@@ -17,14 +17,12 @@ import tempfile
 import zlib
 
 from mcap.writer import CompressionType, Writer
-import numpy as np
 import pandas as pd
 from PIL import Image
 import pyarrow as pa
 from pyarrow import parquet
 
 from scenario_gen.bags.recordings.write import write_recording
-from scenario_gen.method.segmentation import PrimitiveLibrary
 from support.bag_examples import hand_made_run
 from support.cut_bags import small_bag
 from support.log_builders import crossing, geographic
@@ -46,41 +44,6 @@ def at(document: object, path: str, value: object) -> bytes:
     return json.dumps(changed).encode()
 
 
-@cache
-def library() -> dict[str, object]:
-    """The document of a small library of primitives."""
-    eyes, half = np.stack([np.eye(6)] * 2), np.full((2, 2), 0.5)
-    made = PrimitiveLibrary(
-        2,
-        np.zeros((2, 6)),
-        eyes,
-        half,
-        [0.5, 0.5],
-        [3, 4],
-        [1.0, 2.0],
-        0.5,
-        [1, 2, 0.2, 0.4],
-        ("a", "b"),
-    )
-    with tempfile.TemporaryDirectory() as folder:
-        made.save(Path(folder) / "library.json")
-        return json.loads((Path(folder) / "library.json").read_text())
-
-
-LIBRARY = {
-    "a_window_is_missing": ("windows", [1, 2, 0.2]),
-    "a_window_is_endless": ("windows.0", float("inf")),
-    "a_window_is_no_number": ("windows.1", float("nan")),
-    "means_of_one_number": ("means", [[1.0, 2.0], [3.0, 4.0]]),
-    "a_mean_of_too_many_digits": ("means.0.0", 10**400),
-    "covariances_of_another_size": ("covariances", [[[1.0]], [[1.0]]]),
-    "not_positive_definite": ("covariances.0.0.0", -1.0),
-    "transition_of_one": ("transition", [[1.0, 0.0]]),
-    "initial_of_three": ("initial", [0.2, 0.3, 0.5]),
-    "segments_beyond_64_bits": ("segments.0", 2**70),
-    "a_weight_in_a_list": ("weight", [0.5]),
-    "vehicles_are_text": ("vehicles", "2"),
-}
 CASE = {
     "name": "n",
     "road": "r",
@@ -442,11 +405,6 @@ MAPS: dict[str, Make] = {
 FILES: dict[str, Make] = {
     **TABLES,
     **MAPS,
-    **{
-        f"library/{name}.json": lambda change=change: at(library(), *change)
-        for name, change in LIBRARY.items()
-    },
-    "library/too_deep.json": lambda: b'{"format": ' + b"[" * 100_000,
     **{f"result/{name}.json": lambda text=text: text for name, text in RESULT.items()},
     **{f"meta/{name}.yaml": lambda value=value: versioned(value) for name, value in YAML.items()},
     "meta/a_long_file_name.yaml": lambda: (

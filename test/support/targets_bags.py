@@ -40,7 +40,6 @@ from scenario_gen.method.evaluation import (
     EvaluationConfig,
     read_evaluations,
 )
-from scenario_gen.method.segmentation import assign, build_library, PrimitiveLibrary
 from scenario_gen.output.results import provenance_of
 from scenario_gen.output.review.evaluation import bag_results
 from scenario_gen.output.review.regenerate import regenerate_scenario
@@ -278,18 +277,6 @@ def encounters() -> tuple:
     return tuple(read_log([bundled(case)]).encounters[0] for case in "bc")
 
 
-def libraries(folder: Path) -> list[bytes]:
-    """A primitive library."""
-    library, _ = build_library(encounters(), seed=1)
-    library.save(folder / "library.json")
-    return [(folder / "library.json").read_bytes()]
-
-
-def use_library(path: Path) -> None:
-    """Read a library and use it."""
-    assign(encounters()[0], PrimitiveLibrary.load(path))
-
-
 def evaluations(folder: Path) -> list[bytes]:
     """evaluation.json of a run, and one evaluation alone."""
     found = [
@@ -436,7 +423,6 @@ TARGETS = (
         ("params/*",),
     ),
     Target("assignment", assignments, assign_one, (*BYTES, deep)),
-    Target("library", libraries, in_file("library.json", use_library), JSON, ("library/*",)),
     Target(
         "evaluation_json",
         evaluations,

@@ -6,7 +6,7 @@
 They describe its most critical pair of vehicles; `FEATURES` names them.
 """
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -23,8 +23,6 @@ from scenario_gen.situation import (
 )
 from scenario_gen.types import Encounter, Motion, Pair, Scenario
 
-NO_SHARED_AREA = "apart"
-"""The kind, in words, of a pair that shares no area."""
 VEHICLE_FEATURES = (
     "first speed",
     "least speed before",
@@ -73,9 +71,6 @@ class EncounterFeatures:
         recording: name of the recording; of a generated encounter that of its template.
         template: index of the template among the recorded encounters.
         pair: the vehicles that are described; None if no two share an area.
-        other: of a recombined encounter the index of the recorded one with its second vehicle,
-            else -1.
-        scenario: number of the scenario, -1 of a recorded encounter.
     """
 
     kind: EncounterKind | None
@@ -83,19 +78,12 @@ class EncounterFeatures:
     recording: str
     template: int
     pair: Pair | None
-    other: int = -1
-    scenario: int = -1
     joint: Floats = field(default_factory=lambda: np.zeros(len(JOINT_FEATURES)))
 
     @property
     def every(self) -> Floats:
         """(F + J,) the features and the joint ones."""
         return np.concatenate([self.features, self.joint])
-
-    @property
-    def kind_name(self) -> str:
-        """The kind in words."""
-        return self.kind or NO_SHARED_AREA
 
 
 def features_of(
@@ -149,8 +137,7 @@ def scenario_features(
     """Return the features of the template's pair in a scenario; vehicles may be reordered."""
     ids = scenario.ids
     a, b = sorted(ids.index(encounter.vehicles[n].id) for n in template.pair or (0, 1))
-    features = features_of(scenario, template.recording, template.template, (a, b))
-    return replace(features, scenario=scenario.index)
+    return features_of(scenario, template.recording, template.template, (a, b))
 
 
 def _headway(motion: Motion, conflict: Conflict) -> float:

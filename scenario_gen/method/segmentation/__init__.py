@@ -9,12 +9,6 @@ from scenario_gen.method.segmentation.estimator import (
     StickyHDPHMM,
 )
 from scenario_gen.method.segmentation.hdp_hmm.config import SamplerConfig
-from scenario_gen.method.segmentation.library import (
-    assign,
-    Assignment,
-    build_library,
-    PrimitiveLibrary,
-)
 from scenario_gen.method.segmentation.live import LiveSegmenter
 from scenario_gen.method.segmentation.online import OnlineConfig, OnlineSegmenter
 from scenario_gen.method.segmentation.posterior import Posterior
@@ -29,18 +23,14 @@ from scenario_gen.method.segmentation.series import segment_series
 __all__ = [
     "CONVERGED_R_HAT_RATIO",
     "DEFAULT",
-    "Assignment",
     "LiveSegmenter",
     "OnlineConfig",
     "OnlineSegmenter",
     "Posterior",
-    "PrimitiveLibrary",
     "SamplerConfig",
     "SegmentationConfig",
     "SegmentationWarning",
     "StickyHDPHMM",
-    "assign",
-    "build_library",
     "segment",
     "segment_series",
     "segment_track",

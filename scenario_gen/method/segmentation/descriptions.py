@@ -63,19 +63,3 @@ def _in_segment(encounter: Motion, i: int, a: int, b: int) -> str:
     arrival = f"arrives after {(first - a) * dt:.1f} s and " if first > a else ""
     departure = f", leaves after {(last - a) * dt:.1f} s" if last < b - 1 else ""
     return f"{arrival}{motion}{departure}"
-
-
-def describe_accelerations(mean: Floats) -> str:
-    """Describe a primitive by its mean features (3N,); vehicles are numbered from 0."""
-    parts = []
-    for i, (along, across, moves) in enumerate(mean.reshape(-1, 3)):
-        if moves < 0.5:
-            parts.append(f"vehicle {i} stands")
-            continue
-        pace, bend = "drives steadily", ""
-        if abs(along) >= STEADY_MPS2:
-            pace = f"{'accelerates' if along > 0.0 else 'brakes'} at {abs(along):.1f} m/s²"
-        if abs(across) >= TURNING_MPS2:
-            bend = f", turning {'left' if across > 0.0 else 'right'} at {abs(across):.1f} m/s²"
-        parts.append(f"vehicle {i} {pace}{bend}")
-    return ", ".join(parts)

@@ -3,7 +3,7 @@
 
 """The posterior over segmentations: estimate, changepoint probabilities, intervals, R-hat."""
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 import numpy as np
 from scipy.optimize import linear_sum_assignment
@@ -65,18 +65,6 @@ class Posterior:
         labels, no_chain = np.zeros(int(ends[-1]), np.int64), np.zeros(0, np.bool_)
         probability, chain = np.zeros(len(labels)), np.zeros(1, np.int64)
         return cls(labels, labels[None], probability, ends, chain, (), no_chain)
-
-    def part(self, start: int, stop: int) -> "Posterior":
-        """Return the posterior of samples start to stop - 1."""
-        ends = np.array([stop - start])
-        labels, samples = in_order(self.labels[start:stop]), self.samples[:, start:stop]
-        return replace(
-            self,
-            labels=labels,
-            samples=samples,
-            probability=self.probability[start:stop],
-            ends=ends,
-        )
 
     @property
     def changepoints(self) -> Ints:

@@ -216,11 +216,11 @@ def cut(posterior: Posterior, config: SegmentationConfig, dt: float) -> Ints:
     return np.array(points, dtype=np.int64)
 
 
-def relabel(labels: Ints, points: Ints, *, fresh: bool = True) -> Ints:
+def relabel(labels: Ints, points: Ints) -> Ints:
     """Give each segment between `points` (K,) the most frequent one of its labels (T,).
 
     Neighbours get different labels. A segment that has only its left neighbour's label gets a new
-    one; or, if not `fresh`, that label after all, so that their changepoint disappears.
+    one.
     """
     edges = [0, *(int(c) for c in points), len(labels)]
     result = np.empty_like(labels)
@@ -229,9 +229,7 @@ def relabel(labels: Ints, points: Ints, *, fresh: bool = True) -> Ints:
         votes = np.bincount(labels[a:b])
         if 0 <= previous < len(votes):
             votes[previous] = 0
-        label = int(votes.argmax())
-        if votes.max() == 0:
-            label = new if fresh else previous
+        label = int(votes.argmax()) if votes.any() else new
         new += label == new
         previous = label
         result[a:b] = label

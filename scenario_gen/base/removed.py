@@ -1,0 +1,11 @@
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""What earlier drafts had, and what replaces it. The table is emptied with the next release."""
+
+REMOVED = {
+    "library": "nothing replaces it; `scenario-gen generate` segments each encounter",
+    "coverage": "`python -m benchmarks coverage` measures it",
+    "--recombine": "it gained .01 of coverage; add recordings with --recording instead",
+}
+"""{command or option: what replaces it}."""
