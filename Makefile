@@ -29,7 +29,7 @@ test: $(TEST) tools
 	$(BIN)/ruff format --check .
 	@$(BIN)/mypy & types=$$!; $(PYTEST) --durations=10; tests=$$?; wait $$types && exit $$tests
 
-# Long tests: `make soak PART=kills` runs one part; a part that was stopped goes on where it was. One table at the end.
+# Long tests: `make soak PART=fuzz` runs one part; a part that was stopped goes on where it was. One table at the end.
 soak: $(TEST)
 	$(BIN)/python test/soak $(PART)
 

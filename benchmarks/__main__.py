@@ -43,7 +43,7 @@ OPTIONS: dict[str, tuple[type, str]] = {
     "variety": (str, "naturalness, interaction: the sampler's preset"),
     "out": (str, "paper: the folder of the page"),
     "seed": (int, "paper: same seed, same page"),
-    "part": (str, "corpus: mine, store or batch; kills: a victim"),
+    "part": (str, "corpus: mine or batch"),
     "rows": (str, "a file that gets each row as it is measured, a line of JSON each"),
 }
 

@@ -7,7 +7,6 @@ DuckDB's own copy of the same text to Parquet is the peer, measured in the same 
 """
 
 from collections.abc import Iterable
-from importlib.util import find_spec
 import json
 import os
 from pathlib import Path
@@ -20,7 +19,6 @@ from typing import Any
 import numpy as np
 
 from benchmarks._archive import Planted, read_planted
-from benchmarks._corpus_store import bucket_with, spent, START
 from benchmarks._size import sized
 from benchmarks.row import higher, lower, Row
 from scenario_gen.base.folders import sha256_of
@@ -36,13 +34,12 @@ ARCHIVES = {
 """The sparse one has as many encounters per row as the Safety Pilot's archive."""
 TEMPLATES_COUNT, SCENARIO_COUNT = sized((200, 50), quick=(2, 2))
 ROADS = ("corridor", "t_intersection")
-STORED_ROWS_COUNT, ROUNDS_COUNT = sized((4_000_000, 3), quick=(80_000, 1))
 FIRST_PLANTED_COUNT = 1 << 40
 """Device numbers of planted vehicles are above this."""
 
 
 def run(part: str = "all") -> list[Row]:
-    """Measure; `part` is mine, store or batch."""
+    """Measure; `part` is mine or batch."""
     rows: list[Row] = []
     with tempfile.TemporaryDirectory() as folder:
         for name, function in PARTS.items():
@@ -134,25 +131,14 @@ def _mining(name: str, place: Path) -> list[Row]:
     ]
 
 
-def store(place: Path) -> list[Row]:
-    """Mine an archive in an object store and the same one in folders; needs moto's server."""
-    if find_spec("moto") is None or find_spec("flask") is None:
-        return []
-    archive = _write(place / "stored-archive", STORED_ROWS_COUNT, 40, 20, 6.0)
-    mined = ["-m", "scenario_gen", "mine", "--workers", "1"]
-    cpu: dict[str, list[float]] = {"store": [], "local": [], "start": [], "start local": []}
-    with bucket_with(archive) as (url, environment):
-        for k in range(ROUNDS_COUNT):
-            local = [*mined, str(archive), "--out", str(place / f"stored-{k}")]
-            remote = [*mined, f"{url}/archive", "--out", f"{url}/out-{k}"]
-            cpu["local"].append(spent(local, {}))
-            cpu["store"].append(spent(remote, environment))
-            cpu["start local"].append(spent(["-c", START, str(place)], {}))
-            cpu["start"].append(spent(["-c", START, url], environment))
-    seconds = {name: float(np.median(values)) for name, values in cpu.items()}
-    libraries = f"{seconds['start'] - seconds['start local']:.1f} s to load the store's libraries"
-    ratio = seconds["store"] / seconds["local"]
-    return [lower("CPU of a store over that of folders", ratio, "×", 1.2, libraries)]
+def spent(words: list[str]) -> float:
+    """Return CPU seconds of a Python command and of the processes that it waits for."""
+    before = os.times()
+    subprocess.run([sys.executable, *words], check=True, capture_output=True)
+    after = os.times()
+    return (
+        after.children_user + after.children_system - before.children_user - before.children_system
+    )
 
 
 def _digests(out: Path) -> dict[str, str]:
@@ -170,7 +156,7 @@ def batch(place: Path) -> list[Row]:
     words = ["-m", "scenario_gen", "batch", str(corpus), "--roads", ",".join(ROADS), *counts]
     for workers in (1, 2):
         out = place / f"batch-{workers}"
-        cpu[workers] = spent([*words, "--out", str(out), "--workers", str(workers)], {})
+        cpu[workers] = spent([*words, "--out", str(out), "--workers", str(workers)])
     cases = list(rows_of(sorted((place / "batch-1" / "cases").rglob("*.parquet"))))
     scenarios = sum(int(case["published"]) for case in cases)
     same = _digests(place / "batch-1") == _digests(place / "batch-2")
@@ -184,4 +170,4 @@ def batch(place: Path) -> list[Row]:
     ]
 
 
-PARTS = {"mine": mining, "store": store, "batch": batch}
+PARTS = {"mine": mining, "batch": batch}

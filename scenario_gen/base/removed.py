@@ -7,5 +7,9 @@ REMOVED = {
     "library": "nothing replaces it; `scenario-gen generate` segments each encounter",
     "coverage": "`python -m benchmarks coverage` measures it",
     "--recombine": "it gained .01 of coverage; add recordings with --recording instead",
+    **dict.fromkeys(
+        ("s3://", "gs://", "gcs://", "abfs://", "abfss://", "az://", "http://", "https://"),
+        "mount the store as a folder, or copy it with a tool such as rclone",
+    ),
 }
-"""{command or option: what replaces it}."""
+"""{command, option or scheme: what replaces it}."""

@@ -131,14 +131,15 @@ def arguments(words: list[str]) -> list[str]:
 
 
 def refuse_removed(words: list[str]) -> None:
-    """Refuse the first command or option that an earlier release had.
+    """Refuse the first command, option or kind of address that an earlier release had.
 
     Raises:
         InputError: there is one; the message says what replaces it.
     """
     command = next((word for word in words if not word.startswith("-")), "")
     options = [word.partition("=")[0] for word in words if word.startswith("--")]
-    for name in (command, *options):
+    addresses = [f"{word.partition('://')[0]}://" for word in words if "://" in word]
+    for name in (command, *options, *addresses):
         if name in REMOVED:
             raise InputError(f"{name} was removed: {REMOVED[name]}")
 

@@ -13,7 +13,6 @@ from typing import Annotated, Literal, TYPE_CHECKING
 import typer
 
 from scenario_gen.base.errors import InputError, RefusedError
-from scenario_gen.base.stores import Place, place
 from scenario_gen.cli.options import (
     assigned_all,
     Commands,
@@ -47,7 +46,7 @@ def workers_of(count: int, scheduler: str) -> Iterator["Workers"]:
         yield Workers(count, scheduler, partial(advance, "tasks"))
 
 
-def conclude(summary: list[str], failed: Sequence[str], out: Place, **files: Place) -> None:
+def conclude(summary: list[str], failed: Sequence[str], out: Path, **files: Path) -> None:
     """Print the summary of tasks, and the files.
 
     Raises:
@@ -62,20 +61,15 @@ def conclude(summary: list[str], failed: Sequence[str], out: Place, **files: Pla
         )
 
 
-@commands.command(urls=("archive", "out"))
+@commands.command()
 def mine(
     archive: Annotated[
         list[Path],
-        typer.Argument(
-            help="Folders or files with recordings in any log format, or s3://, gs://, abfs://. "
-            "Repeatable."
-        ),
+        typer.Argument(help="Folders or files with recordings in any log format. Repeatable."),
     ],
     out: Annotated[
         Path,
-        typer.Option(
-            help="Folder for the corpus, or s3://…; only what has changed is done again."
-        ),
+        typer.Option(help="Folder for the corpus; only what has changed is done again."),
     ],
     workers: WorkersOption = 0,
     scheduler: SchedulerOption = "",
@@ -100,27 +94,23 @@ def mine(
 
     allowed = [f"log.allow={allow}"] if allow else []
     config = assigned_all(CorpusConfig(), [*allowed, *(assignments or [])])
-    corpus = place(out, to_write=True)
     with workers_of(workers, scheduler) as who:
-        places = [place(path) for path in archive]
-        result = mined(places, corpus, config, workers=who, strict=strict)
-    files = {"page": corpus / PAGE, "details": corpus / DETAILS}
-    conclude(result.lines(), result.failed, corpus, **files)
+        result = mined(archive, out, config, workers=who, strict=strict)
+    files = {"page": out / PAGE, "details": out / DETAILS}
+    conclude(result.lines(), result.failed, out, **files)
 
 
 @dataclass(frozen=True)
 class Batch:
     """The options of `batch`."""
 
-    corpus: Annotated[Path, typer.Argument(help="A corpus that `mine` wrote, or s3://….")]
+    corpus: Annotated[Path, typer.Argument(help="A corpus that `mine` wrote.")]
     roads: Annotated[
         list[str], typer.Option(help="Roads, as for `generate`, separated by commas. Repeatable.")
     ]
     out: Annotated[
         Path,
-        typer.Option(
-            help="Folder for tables and bags, or s3://…. An existing batch continues and grows."
-        ),
+        typer.Option(help="Folder for tables and bags. An existing batch continues and grows."),
     ]
     count: Annotated[
         int, typer.Option(min=1, max=100_000, help="Scenarios per encounter and road.")
@@ -141,7 +131,7 @@ class Batch:
     assignments: SetOption = None
 
 
-@commands.command(urls=("corpus", "out"))
+@commands.command()
 @takes(Batch)
 def batch(options: Batch) -> None:
     """Generate scenarios from all encounters of a corpus on several roads."""
@@ -150,30 +140,28 @@ def batch(options: Batch) -> None:
     from scenario_gen.method.config import PipelineConfig
 
     config = assigned_all(PipelineConfig(), options.assignments)
-    out = place(options.out, to_write=True)
     names = [name for text in options.roads for name in text.split(",") if name]
     bags = "hits" if options.hits else options.bags
     request = BatchRequest(config, options.count, options.seed, bags, options.hits)
     with workers_of(options.workers, options.scheduler) as who:
         result = run_batch(
-            place(options.corpus), names, out, request, templates=options.templates, workers=who
+            options.corpus, names, options.out, request, templates=options.templates, workers=who
         )
-    conclude(result.lines(), result.failed, out)
+    conclude(result.lines(), result.failed, options.out)
 
 
-@commands.command("compact", urls=("batch",))
+@commands.command("compact")
 def compact_batch(
-    batch: Annotated[Path, typer.Argument(help="A batch, or s3://….")],
+    batch: Annotated[Path, typer.Argument(help="A batch.")],
     workers: WorkersOption = 0,
     scheduler: SchedulerOption = "",
 ) -> None:
     """Merge the many small tables of a batch into few with large row groups."""
     from scenario_gen.corpus.compact import compact
 
-    out = place(batch, to_write=True)
     with workers_of(workers, scheduler) as who:
-        before, after, failed = compact(out, who)
-    conclude([f"{before} tables merged to {after}"], failed, out)
+        before, after, failed = compact(batch, who)
+    conclude([f"{before} tables merged to {after}"], failed, batch)
 
 
 def shown(value: object) -> str:
@@ -184,13 +172,11 @@ def shown(value: object) -> str:
     return f"{value:.{decimals}f}"
 
 
-@commands.command(urls=("batch",))
+@commands.command()
 def find(
     batch: Annotated[
         Path,
-        typer.Argument(
-            help="A batch (also unfinished), or a corpus that `mine` wrote, or s3://…."
-        ),
+        typer.Argument(help="A batch (also unfinished), or a corpus that `mine` wrote."),
     ],
     condition: Annotated[
         str, typer.Argument(help="Condition in SQL, e.g. \"kind = 'crossing' and pet < 1\".")
@@ -217,15 +203,14 @@ def find(
 
     if report is not None and bag is None:
         raise InputError("--report needs --bag, the bag that the page describes; give both")
-    source = place(batch)
     shows_some = not (current.as_json or again or bag)
-    matches = finding.find(source, condition, limit if shows_some else 0)
-    lines = finding.coverage_lines(matches, source)
+    matches = finding.find(batch, condition, limit if shows_some else 0)
+    lines = finding.coverage_lines(matches, batch)
     emit_json(scenarios=matches.rows, coverage=lines)
     _print_matches(matches.rows[: limit or None], matches.count)
     print_(*lines, sep="\n")
     if again or bag is not None:
-        identical = finding.export_hits(source, matches.rows, bag, again=again)
+        identical = finding.export_hits(batch, matches.rows, bag, again=again)
         if again:
             print_(f"{identical} of {len(matches.rows)} scenarios are byte-identical again")
     if bag is not None:

@@ -4,14 +4,13 @@
 """Options and arguments that commands share, and the configuration."""
 
 from collections.abc import Callable, Sequence
-from functools import reduce, wraps
+from functools import reduce
 import inspect
 from pathlib import Path
 from typing import Annotated, Any, get_type_hints, TYPE_CHECKING, TypeVar
 
 import typer
 
-from scenario_gen.cli import places
 from scenario_gen.cli.output import print_
 
 if TYPE_CHECKING:
@@ -39,37 +38,23 @@ WorkersOption = Annotated[
 
 
 class Commands(typer.Typer):
-    """A group of commands in `--help`. Each command accepts URLs of object stores as paths."""
+    """A group of commands in `--help`."""
 
     def __init__(self, panel: str) -> None:
         super().__init__()
         self.panel = panel
 
     def command(
-        self, name: str | None = None, *, panel: str = "", urls: Sequence[str] = (), **options: Any
+        self, name: str | None = None, *, panel: str = "", **options: Any
     ) -> Callable[..., Any]:
         """Return a decorator that registers a function as a command.
 
         Args:
             name: of the command; the function's name by default.
             panel: in `--help`; that of the group by default.
-            urls: names of parameters whose URLs the function itself accepts.
             options: further ones of typer.
         """
-
-        def register(function: Callable[..., None]) -> Callable[..., None]:
-            paths = places.paths_of(function, urls)
-
-            @wraps(function)
-            def run(**values: Any) -> None:
-                with places.as_files(values, paths) as local:
-                    function(**local)
-
-            add = super(Commands, self).command
-            add(name, rich_help_panel=panel or self.panel, **options)(run)
-            return function
-
-        return register
+        return super().command(name, rich_help_panel=panel or self.panel, **options)
 
 
 def takes(options: type[Options]) -> Callable[[Callable[[Options], None]], Callable[..., None]]:

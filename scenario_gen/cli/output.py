@@ -14,8 +14,8 @@ import sys
 from typing import Any
 import webbrowser
 
-from scenario_gen.base.errors import InputError, printable, printable_lines
-from scenario_gen.base.stores import renamed
+from scenario_gen.base.copies import renamed
+from scenario_gen.base.errors import printable, printable_lines
 
 UNBOUNDED_COLUMNS = 10_000
 """Width of a terminal in which no line breaks."""
@@ -154,13 +154,7 @@ def status() -> AbstractContextManager[Callable[[str], None]]:
 
 
 def default_output(path: Path, name: str) -> Path:
-    """Return the path `name` in the folder of an input, where a command writes without --out.
-
-    Raises:
-        InputError: the input is in an object store.
-    """
-    if (url := renamed(str(path))) != str(path):
-        raise InputError(f"--out is missing: give a folder or a URL, as the input {url} is remote")
+    """Return the path `name` in the folder of an input, where a command writes without --out."""
     return path.resolve().with_name(name)
 
 
@@ -169,8 +163,7 @@ def open_page(page: Path) -> bool:
     has_display = sys.platform == "darwin" or any(
         os.environ.get(name) for name in ("DISPLAY", "WAYLAND_DISPLAY")
     )
-    is_remote = renamed(str(page)) != str(page)
-    if is_remote or current.as_json or current.quiet:
+    if current.as_json or current.quiet:
         return False
     if not (has_display and sys.stdout.isatty()):
         return False

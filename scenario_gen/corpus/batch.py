@@ -18,7 +18,6 @@ from typing import Any
 from scenario_gen.base.documents import read_json
 from scenario_gen.base.errors import InputError, needs, RefusedError
 from scenario_gen.base.provenance import parameter_texts, read_parameters
-from scenario_gen.base.stores import fetched, Place
 from scenario_gen.corpus.encounters import encounter_of, tables_of, write_encounters
 from scenario_gen.corpus.parts import (
     BatchRequest,
@@ -41,7 +40,7 @@ SCHEMA = {
     "required": ["seed", "parameters", "roads", "counts"],
     "properties": {"format": {"const": 3}},
 }
-Row = tuple[Place, int]
+Row = tuple[Path, int]
 """A row of a table, by its number."""
 
 
@@ -90,9 +89,9 @@ class Batch:
 
 
 def run_batch(
-    corpus: Place,
+    corpus: Path,
     roads: Sequence[str],
-    out: Place,
+    out: Path,
     request: BatchRequest = BatchRequest(),
     *,
     templates: int = 0,
@@ -142,7 +141,7 @@ def run_batch(
         return summary(out, failed)
 
 
-def _grow(out: Place, roads: Sequence[str], request: BatchRequest) -> dict[str, Any]:
+def _grow(out: Path, roads: Sequence[str], request: BatchRequest) -> dict[str, Any]:
     """Return the manifest with these roads and this number of scenarios, and write it.
 
     Raises:
@@ -173,20 +172,19 @@ def _grow(out: Place, roads: Sequence[str], request: BatchRequest) -> dict[str, 
     return grown
 
 
-def tasks_of(out: Place) -> list[PartTask]:
+def tasks_of(out: Path) -> list[PartTask]:
     """Return all tasks of a batch, as its manifest describes them.
 
     Raises:
         InputError: the manifest is missing or damaged, or of another release.
     """
-    with fetched([out / MANIFEST]) as (path,):
-        manifest = read_json(path, SCHEMA, f"{out / MANIFEST} of another release")
+    manifest = read_json(out / MANIFEST, SCHEMA, f"{out / MANIFEST} of another release")
     config = read_parameters(PipelineConfig(), manifest["parameters"], "", str(out / MANIFEST))
     request = BatchRequest(config, seed=manifest["seed"])
     return part_tasks(out, manifest["roads"], manifest["counts"], request)
 
 
-def _rows(tables: Sequence[Place]) -> list[tuple[Row, tuple[Any, ...]]]:
+def _rows(tables: Sequence[Path]) -> list[tuple[Row, tuple[Any, ...]]]:
     """Return all rows of encounters in tables, with their identities."""
     return [
         ((table, number), tuple(row[name] for name in IDENTITY))
@@ -195,18 +193,18 @@ def _rows(tables: Sequence[Place]) -> list[tuple[Row, tuple[Any, ...]]]:
     ]
 
 
-def _templates(out: Place) -> list[Place]:
-    return sorted((out / "templates").glob("*.parquet"), key=str)
+def _templates(out: Path) -> list[Path]:
+    return sorted((out / "templates").glob("*.parquet"))
 
 
-def _read(rows: Sequence[Row]) -> Iterator[tuple[dict[str, Any], Place]]:
+def _read(rows: Sequence[Row]) -> Iterator[tuple[dict[str, Any], Path]]:
     """Yield the contents of rows and their tables; a table is opened once for its rows."""
     for table, group in groupby(rows, key=lambda row: row[0]):
         for content in rows_at(table, [number for _, number in group]):
             yield content, table
 
 
-def _add_templates(out: Place, chosen: Sequence[tuple[Row, tuple[Any, ...]]]) -> None:
+def _add_templates(out: Path, chosen: Sequence[tuple[Row, tuple[Any, ...]]]) -> None:
     """Add encounters that a batch lacks, as tables of their own.
 
     Its parts are numbered by these tables, so existing ones do not change.
@@ -220,7 +218,7 @@ def _add_templates(out: Place, chosen: Sequence[tuple[Row, tuple[Any, ...]]]) ->
         write_encounters(out / "templates" / f"templates-{number:05}.parquet", rows, {})
 
 
-def summary(out: Place, failed: list[str]) -> Batch:
+def summary(out: Path, failed: list[str]) -> Batch:
     """Return the figures of the finished parts."""
     figures: Counter[str] = Counter()
     failures: Counter[str] = Counter()

@@ -10,7 +10,6 @@ from pathlib import Path
 from typing import Any
 
 from scenario_gen.base.errors import guarded, InputError, needs
-from scenario_gen.base.stores import each_fetched, Place, Remote
 from scenario_gen.corpus.store import (
     finished_parts,
     FOLDERS,
@@ -28,7 +27,7 @@ class MergeTask:
     """Tables to merge, some of which may be merged already."""
 
     tables: Tables
-    target: Place
+    target: Path
 
     @property
     def name(self) -> str:
@@ -36,11 +35,10 @@ class MergeTask:
         return str(self.target)
 
 
-def compact(batch: Place, workers: Workers = Workers()) -> tuple[int, int, list[str]]:
+def compact(batch: Path, workers: Workers = Workers()) -> tuple[int, int, list[str]]:
     """Merge the tables of finished parts; return their numbers before and after, and failures.
 
-    `find` gives the same rows afterwards, and the batch can still grow. In a store, no other
-    command may write the batch at the same time.
+    `find` gives the same rows afterwards, and the batch can still grow.
 
     Raises:
         InputError: there is no batch, or another command writes it.
@@ -54,11 +52,11 @@ def compact(batch: Place, workers: Workers = Workers()) -> tuple[int, int, list[
         return before, _count(batch), failed
 
 
-def _count(batch: Place) -> int:
+def _count(batch: Path) -> int:
     return sum(len(tables) for name in FOLDERS for tables in parts_of(batch / name).values())
 
 
-def _tasks(batch: Place) -> list[MergeTask]:
+def _tasks(batch: Path) -> list[MergeTask]:
     """Return a task for each run of finished parts with several tables."""
     runs = {road: _runs(numbers) for road, numbers in finished_parts(batch).items()}
     tasks = []
@@ -69,7 +67,7 @@ def _tasks(batch: Place) -> list[MergeTask]:
     return [task for task in tasks if len(task.tables) > 1]
 
 
-def _merge_task(folder: Place, tables: Tables, run: range) -> MergeTask:
+def _merge_task(folder: Path, tables: Tables, run: range) -> MergeTask:
     """Return the task that merges the tables of a run of parts in a folder."""
     inside = {table: numbers for table, numbers in tables.items() if numbers[0] in run}
     return MergeTask(inside, folder / f"parts-{run.start:05}-{run.stop - 1:05}.parquet")
@@ -97,13 +95,10 @@ def merge(task: MergeTask) -> None:
             _write_merged(part, list(unique))
         unique = {}
     for table in task.tables.keys() - unique.keys():
-        if isinstance(table, Remote):
-            table.call(lambda system, path: system.rm_file(path))
-        else:
-            table.unlink()
+        table.unlink()
 
 
-def _write_merged(path: Path, tables: Sequence[Place]) -> None:
+def _write_merged(path: Path, tables: Sequence[Path]) -> None:
     """Write the rows of tables to one file; a row group is in memory at a time."""
     import pyarrow as pa
     from pyarrow import parquet
@@ -111,9 +106,9 @@ def _write_merged(path: Path, tables: Sequence[Place]) -> None:
     writer: Any = None
     group: list[Any] = []
     try:
-        for table, local in each_fetched(tables):
+        for table in tables:
             with guarded(f"{table} cannot be read as a table"):
-                group.append(parquet.ParquetFile(local).read())
+                group.append(parquet.ParquetFile(table).read())
             writer = writer or table_writer(path, group[0].schema)
             rows = sum(each.num_rows for each in group)
             size = sum(each.nbytes for each in group)

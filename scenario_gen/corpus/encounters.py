@@ -19,7 +19,6 @@ import numpy as np
 from scenario_gen.bags.recordings.tracks import tracks_bytes, tracks_of
 from scenario_gen.base.documents import parse_json, shown
 from scenario_gen.base.errors import guarded, InputError, UnforeseenError
-from scenario_gen.base.stores import fetched, Place
 from scenario_gen.corpus.config import CorpusConfig
 from scenario_gen.corpus.grouping import FoundEncounter, label, read_found
 from scenario_gen.corpus.meetings import MESSAGES_AFTER_US, MESSAGES_BEFORE_US
@@ -77,7 +76,7 @@ class CleanTask:
     """
 
     name: str
-    corpus: Place
+    corpus: Path
     part: str
     first: int
     last: int
@@ -85,7 +84,7 @@ class CleanTask:
     config: CorpusConfig
 
     @property
-    def target(self) -> Place:
+    def target(self) -> Path:
         """The table to write."""
         begin = self.part.split("-")[1]
         digest = digest_of(self.part, self.first, self.last, self.hours)
@@ -97,8 +96,8 @@ class LogTask:
     """A log in any format that `read_log` reads, and the table to write."""
 
     name: str
-    paths: tuple[Place, ...]
-    target: Place
+    paths: tuple[Path, ...]
+    target: Path
     config: CorpusConfig
 
 
@@ -107,14 +106,13 @@ def clean_found(task: CleanTask) -> None:
     from pyarrow import parquet
 
     hours = [task.corpus / "hours" / f"rows-{key}.parquet" for key in task.hours]
-    with fetched([task.corpus / "found" / f"{task.part}.parquet", *hours]) as (part, *paths):
-        listed = read_found(part, task.first, task.last)
-        begin = min(entry.start for entry in listed) - MESSAGES_BEFORE_US
-        end = max(entry.end for entry in listed) + MESSAGES_AFTER_US
-        devices = sorted({device for entry in listed for device in entry.devices})
-        filters = [("t", ">=", begin), ("t", "<=", end), ("device", "in", devices)]
-        tables = [parquet.read_table(path, filters=filters) for path in paths]
-        by_device = _by_device([table.to_pandas() for table in tables])
+    listed = read_found(task.corpus / "found" / f"{task.part}.parquet", task.first, task.last)
+    begin = min(entry.start for entry in listed) - MESSAGES_BEFORE_US
+    end = max(entry.end for entry in listed) + MESSAGES_AFTER_US
+    devices = sorted({device for entry in listed for device in entry.devices})
+    filters = [("t", ">=", begin), ("t", "<=", end), ("device", "in", devices)]
+    tables = [parquet.read_table(path, filters=filters) for path in hours]
+    by_device = _by_device([table.to_pandas() for table in tables])
     rows: list[dict[str, Any]] = []
     refused = []
     for entry in listed:
@@ -175,18 +173,17 @@ def read_one_log(task: LogTask) -> None:
     """Write the encounters of a log; it has the bounds of every log (`LogConfig`).
 
     Raises:
-        InputError: the files cannot be fetched, or a reader has a bug.
+        InputError: a reader has a bug.
     """
-    with fetched(task.paths) as paths:
-        try:
-            result = read_log(paths, task.config.log)
-        except InputError as error:
-            if isinstance(error, UnforeseenError) or isinstance(error.__cause__, PermissionError):
-                raise
-            # The log is finished until its files change.
-            account = {"refused": [_refusal(task.name, error, UNREAD_LOGS[1])], "quality": []}
-            write_encounters(task.target, [], account)
-            return
+    try:
+        result = read_log(task.paths, task.config.log)
+    except InputError as error:
+        if isinstance(error, UnforeseenError) or isinstance(error.__cause__, PermissionError):
+            raise
+        # The log is finished until its files change.
+        account = {"refused": [_refusal(task.name, error, UNREAD_LOGS[1])], "quality": []}
+        write_encounters(task.target, [], account)
+        return
     source = ", ".join(path.name for path in task.paths)
     rows = [row_of(encounter, source, task.config) for encounter in result.encounters]
     write_encounters(task.target, rows, {"refused": [], "quality": list(result.quality.lines())})
@@ -251,19 +248,19 @@ def _space_time_gaps(
 
 
 def write_encounters(
-    target: Place, rows: Sequence[Mapping[str, Any]], account: Mapping[str, Any]
+    target: Path, rows: Sequence[Mapping[str, Any]], account: Mapping[str, Any]
 ) -> None:
     """Write a table of encounters, with the account in its metadata."""
     write_table(target, rows, COLUMNS, account=account)
 
 
-def tables_of(corpus: Place) -> list[Place]:
+def tables_of(corpus: Path) -> list[Path]:
     """Return the tables of a corpus that `mine` wrote, sorted.
 
     Raises:
         InputError: there is none.
     """
-    tables: list[Place] = sorted((corpus / "encounters").glob("*.parquet"), key=str)
+    tables = sorted((corpus / "encounters").glob("*.parquet"))
     if not tables:
         raise InputError(
             f"{corpus} holds no encounters/*.parquet;"
@@ -272,19 +269,17 @@ def tables_of(corpus: Place) -> list[Place]:
     return tables
 
 
-def account_of(table: Path, name: Place) -> dict[str, Any]:
+def account_of(table: Path) -> dict[str, Any]:
     """Return a table's account: the refused encounters and the quality of its log.
-
-    `name` names the table in messages.
 
     Raises:
         InputError: the table is damaged.
     """
     from pyarrow import parquet
 
-    with guarded(f"{name} cannot be read as a table"):
+    with guarded(f"{table} cannot be read as a table"):
         text = (parquet.read_schema(table).metadata or {}).get(b"account", b"{}").decode()
-    account: dict[str, Any] = parse_json(text, f"{name}: account", {"type": "object"})
+    account: dict[str, Any] = parse_json(text, f"{table}: account", {"type": "object"})
     return account
 
 

@@ -19,9 +19,9 @@ import numpy as np
 from scenario_gen.bags.recordings.write import add_message, add_results
 from scenario_gen.bags.storage.bag import BagMessage
 from scenario_gen.bags.storage.writer import atomic_bag, BagWriter
+from scenario_gen.base.copies import temp_folder
 from scenario_gen.base.errors import InputError, ScenarioGenError
 from scenario_gen.base.folders import scratch
-from scenario_gen.base.stores import fetched, Place, temp_folder, workplace
 from scenario_gen.corpus.batch import tasks_of
 from scenario_gen.corpus.conditions import matching, MAX_SECONDS_S, NAMES
 from scenario_gen.corpus.parts import part_result, PartTask
@@ -67,7 +67,7 @@ class Hits:
 
 
 def find(
-    batch: Place, condition: str = "true", limit: int = 0, seconds: float = MAX_SECONDS_S
+    batch: Path, condition: str = "true", limit: int = 0, seconds: float = MAX_SECONDS_S
 ) -> Hits:
     """Return the scenarios of a batch, or the encounters of a corpus, that meet a condition.
 
@@ -99,14 +99,14 @@ def find(
 
 @contextmanager
 def search(
-    batch: Place, condition: str, seconds: float = MAX_SECONDS_S
+    batch: Path, condition: str, seconds: float = MAX_SECONDS_S
 ) -> Iterator[tuple[Any, Any]]:
     """Give DuckDB's view of all scenarios or encounters, and those that meet a condition.
 
     Arguments and errors as for `find`.
     """
     generated = finished_tables(batch, "scenarios")
-    tables: list[Place] = generated or sorted((batch / "encounters").glob("*.parquet"), key=str)
+    tables = generated or sorted((batch / "encounters").glob("*.parquet"))
     if not tables:
         command = f"scenario-gen batch DIR --roads … --out {batch}"
         raise InputError(f"{batch} holds no scenarios; write them with `{command}`")
@@ -114,22 +114,19 @@ def search(
     if not generated:
         remedy += "; if the corpus is from an older version, mine it again"
     columns = "*" if generated else RECORDED
-    with (
-        fetched(tables) as paths,
-        matching(
-            paths,
-            condition,
-            workplace(batch),
-            columns=columns,
-            source=batch,
-            remedy=remedy,
-            seconds=seconds,
-        ) as (base, matches),
-    ):
+    with matching(
+        tables,
+        condition,
+        batch,
+        columns=columns,
+        source=batch,
+        remedy=remedy,
+        seconds=seconds,
+    ) as (base, matches):
         yield base, matches.order("pet NULLS LAST, ttc, template, road, index")
 
 
-def coverage_lines(hits: Hits, batch: Place) -> list[str]:
+def coverage_lines(hits: Hits, batch: Path) -> list[str]:
     """Return the coverage in words: for each kind and road, the scenarios by PET class."""
     kinds = sorted({kind for kind, *_ in hits.coverage})
     roads = sorted(road.partition("=")[2] for road in parts_of(batch / "cases")) or ["recorded"]
@@ -146,7 +143,7 @@ def coverage_lines(hits: Hits, batch: Place) -> list[str]:
 
 
 def export_hits(
-    batch: Place, rows: Sequence[Mapping[str, Any]], folder: Path | None, *, again: bool = False
+    batch: Path, rows: Sequence[Mapping[str, Any]], folder: Path | None, *, again: bool = False
 ) -> int:
     """Write the scenarios of rows to a bag; return how many have the bytes of the batch.
 
@@ -181,7 +178,7 @@ def _copy(bag: BagWriter, name: str, namespace: str, messages: Sequence[BagMessa
 
 
 def _messages(
-    batch: Place, rows: Sequence[Mapping[str, Any]], again: bool
+    batch: Path, rows: Sequence[Mapping[str, Any]], again: bool
 ) -> Iterator[tuple[int, tuple[BagMessage, ...], str]]:
     """Yield number, messages and SHA-256 of each row's scenario.
 
@@ -205,15 +202,14 @@ def _messages(
             yield k, messages, sha256
 
 
-def _numbered_tasks(batch: Place) -> dict[tuple[str, int], PartTask]:
+def _numbered_tasks(batch: Path) -> dict[tuple[str, int], PartTask]:
     return {(task.token, task.number): task for task in tasks_of(batch)}
 
 
-def _copied(bag: Place, rows: Sequence[Mapping[str, Any]]) -> list[Copy]:
+def _copied(bag: Path, rows: Sequence[Mapping[str, Any]]) -> list[Copy]:
     """Return the scenarios of rows from a bag; none if it lacks one of them."""
     try:
-        with fetched([bag]) as (path,):
-            copies = _scenarios_in(path, rows)
+        copies = _scenarios_in(bag, rows)
     except InputError:
         return []
     same = [sha256 for _, sha256 in copies] == [row["sha256"] for row in rows]

@@ -9,7 +9,6 @@ from typing import Any, TYPE_CHECKING
 
 from scenario_gen.base.errors import RefusedError
 from scenario_gen.base.parameters import dotted, updated
-from scenario_gen.base.stores import Place, place
 from scenario_gen.corpus.batch import run_batch
 from scenario_gen.corpus.config import CorpusConfig
 from scenario_gen.corpus.find import search
@@ -34,7 +33,7 @@ def mine(
 
     Args:
         archive: files, bags or folders, or URLs of them.
-        out: folder or URL of the corpus; an unfinished one is continued.
+        out: folder of the corpus; an unfinished one is continued.
         config: the parameters, or a mapping with their names.
         workers: number of processes; 0 starts one per core. In a script, call this function below
             `if __name__ == "__main__":`.
@@ -54,8 +53,8 @@ def mine(
     archives = [archive] if isinstance(archive, str | Path) else archive
     if isinstance(config, Mapping):
         config = updated(CorpusConfig(), dict(dotted(config)))
-    corpus = place(out, to_write=True)
-    result = run_mine(list(map(place, archives)), corpus, config, workers=Workers(workers))
+    corpus = Path(out)
+    result = run_mine(list(map(Path, archives)), corpus, config, workers=Workers(workers))
     return _table(corpus, result.failed)
 
 
@@ -75,7 +74,7 @@ def batch(
     Args:
         corpus: written by `mine`.
         roads: one or several, as for `generate`.
-        out: folder or URL of the batch; an existing one continues and grows.
+        out: folder of the batch; an existing one continues and grows.
         config: the parameters of every stage, or a mapping with their names.
         count: number of scenarios per encounter and road.
         seed: of the batch.
@@ -94,10 +93,10 @@ def batch(
         >>> scenarios[["template", "road"]].head(1).values.tolist()
         [['my_log', 'four_way']]
     """
-    target, names = place(out, to_write=True), [roads] if isinstance(roads, str) else roads
+    target, names = Path(out), [roads] if isinstance(roads, str) else roads
     request = BatchRequest(config_of(config), count, seed)
     result = run_batch(
-        place(corpus), names, target, request, templates=templates, workers=Workers(workers)
+        Path(corpus), names, target, request, templates=templates, workers=Workers(workers)
     )
     return _table(target, result.failed)
 
@@ -117,12 +116,12 @@ def find(batch: str | Path, condition: str = "true", limit: int = 0) -> "DataFra
         >>> sg.find("out/batch", "pet < 2 and speed < 10").columns[:4].tolist()
         ['template', 'recording', 'kind', 'namespace']
     """
-    with search(place(batch), condition) as (_, matches):
+    with search(Path(batch), condition) as (_, matches):
         table: DataFrame = (matches.limit(limit) if limit else matches).df()
     return table
 
 
-def _table(place: Place, failed: Sequence[str]) -> "DataFrame":
+def _table(folder: Path, failed: Sequence[str]) -> "DataFrame":
     """Return all rows of a corpus or batch.
 
     Raises:
@@ -132,4 +131,4 @@ def _table(place: Place, failed: Sequence[str]) -> "DataFrame":
         raise RefusedError(
             f"{len(failed)} tasks failed; the first: {failed[0]}; call it again to try them again"
         )
-    return find(str(place))
+    return find(folder)

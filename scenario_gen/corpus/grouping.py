@@ -14,7 +14,6 @@ from pathlib import Path
 
 import numpy as np
 
-from scenario_gen.base.stores import fetched, Place
 from scenario_gen.corpus.config import CorpusConfig
 from scenario_gen.corpus.messages import DAY_US, digest_of
 from scenario_gen.corpus.tables import write_table
@@ -75,14 +74,14 @@ class GroupTask:
     """
 
     name: str
-    corpus: Place
+    corpus: Path
     hours: tuple[str, ...]
     begin: int
     end: int
     config: CorpusConfig
 
     @property
-    def target(self) -> Place:
+    def target(self) -> Path:
         """The table of encounters to write."""
         digest = digest_of(self.hours, self.begin, self.end)
         return self.corpus / "found" / f"part-{self.begin:016}-{digest}.parquet"
@@ -139,10 +138,10 @@ def group_partition(task: GroupTask) -> None:
 
     filters = [("start", ">=", task.begin), ("start", "<", task.end)]
     meetings = []
-    with fetched([task.corpus / "hours" / f"hour-{hour}.parquet" for hour in task.hours]) as paths:
-        for path in paths:
-            table = parquet.read_table(path, columns=list(MEETING_COLUMNS), filters=filters)
-            meetings += [Meeting(**row) for row in table.to_pylist()]
+    for hour in task.hours:
+        path = task.corpus / "hours" / f"hour-{hour}.parquet"
+        table = parquet.read_table(path, columns=list(MEETING_COLUMNS), filters=filters)
+        meetings += [Meeting(**row) for row in table.to_pylist()]
     rows = []
     for encounter in group(meetings, task.config.log):
         closest = encounter.meetings[0]

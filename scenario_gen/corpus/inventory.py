@@ -6,28 +6,14 @@
 from collections.abc import Callable, Iterable, Sequence
 import os
 from pathlib import Path
-from typing import Generic, NamedTuple, TypeVar
+from typing import NamedTuple
 
 from scenario_gen.base.errors import InputError
-from scenario_gen.base.folders import scratch
-from scenario_gen.base.stores import (
-    download,
-    naming_objects,
-    Part,
-    Place,
-    relative_name,
-    Remote,
-    temp_folder,
-)
-from scenario_gen.corpus.sources import is_parquet, message_table, MessageTable
+from scenario_gen.corpus.sources import message_table, MessageTable
 from scenario_gen.logs import is_bag, is_log, is_table, LOG_FORMATS
 
-HEAD_BYTES = 16_384  # of an object, by which its format is recognised
 
-AnyPlace = TypeVar("AnyPlace", bound=Place)
-
-
-class Inventory(NamedTuple, Generic[AnyPlace]):
+class Inventory(NamedTuple):
     """What archives contain.
 
     Attributes:
@@ -36,77 +22,27 @@ class Inventory(NamedTuple, Generic[AnyPlace]):
         others: the files that are neither.
     """
 
-    messages: list[tuple[AnyPlace, MessageTable]]
-    logs: list[list[AnyPlace]]
-    others: list[AnyPlace]
+    messages: list[tuple[Path, MessageTable]]
+    logs: list[list[Path]]
+    others: list[Path]
 
 
-def inventory(archives: Sequence[Place], option: str = "") -> Inventory[Place]:
+def inventory(archives: Sequence[Path], option: str = "") -> Inventory:
     """Return the contents of archives; `option` is the parameter `columns` of logs.
 
     Raises:
         InputError: a path does not exist, or contains no log.
     """
-    total = Inventory[Place]([], [], [])
+    total = Inventory([], [], [])
     for archive in archives:
-        contents: Inventory[Place]
-        if isinstance(archive, Remote):
-            contents = _inventory_of_store(archive, option)
-        else:
-            files = _inventory_of_folder(archive, option)
-            contents = Inventory(
-                [*files.messages], [[*log] for log in files.logs], [*files.others]
-            )
+        contents = _inventory_of(archive, option)
         total.messages.extend(contents.messages)
         total.logs.extend(contents.logs)
         total.others.extend(contents.others)
     return total
 
 
-def _inventory_of_store(archive: Remote, option: str) -> Inventory[Place]:
-    """Return the contents of a store, from copies of the beginnings or ends of its objects."""
-    single = archive.with_size()
-    objects = [single] if single.size >= 0 else list(archive.rglob("*"))
-    if not objects:
-        raise InputError(f"{archive} does not exist, or is empty")
-    with scratch(temp_folder()) as folder:
-        root = folder / archive.name
-        places: dict[Path, Place] = {
-            root if item is single else root / relative_name(item, archive): item
-            for item in objects
-        }
-        download(_sample(item, path) for path, item in zip(places, objects, strict=True))
-        for path in list(places):
-            places |= _folder_places(path, root, archive)
-        with naming_objects({str(root): archive.url}):
-            files = _inventory_of_folder(root, option)
-        return Inventory(
-            [(places[path], table) for path, table in files.messages],
-            [[places[path] for path in log] for log in files.logs],
-            [places[path] for path in files.others],
-        )
-
-
-def _sample(item: Remote, copy: Path) -> Part:
-    """Return the bytes of an object that show its format: at the end of Parquet."""
-    if is_parquet(copy):
-        # The columns of a table are at its end.
-        return Part(item, max(item.size - 16 * HEAD_BYTES, 0), item.size, copy)
-    return Part(item, 0, min(item.size, HEAD_BYTES), copy)
-
-
-def _folder_places(path: Path, root: Path, archive: Remote) -> dict[Path, Place]:
-    """Return the folders with a file, up to the root, with their places in the store."""
-    places: dict[Path, Place] = {}
-    for folder in path.parents:
-        if folder == root:
-            places[folder] = archive
-        elif folder.is_relative_to(root):
-            places[folder] = archive / folder.relative_to(root).as_posix()
-    return places
-
-
-def _inventory_of_folder(archive: Path, option: str) -> Inventory[Path]:
+def _inventory_of(archive: Path, option: str) -> Inventory:
     """Return the contents of a folder, or what a file is."""
     if not archive.exists():
         raise InputError(f"{archive} does not exist")

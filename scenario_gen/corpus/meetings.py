@@ -18,7 +18,6 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from scenario_gen.base.stores import fetched, Place, workplace
 from scenario_gen.corpus.config import CorpusConfig
 from scenario_gen.corpus.grouping import SHARED_ID_STEP_COUNT
 from scenario_gen.corpus.messages import (
@@ -76,8 +75,8 @@ class HourTask:
     """
 
     name: str
-    hours: tuple[tuple[int, str, tuple[Place, ...]], ...]
-    folder: Place
+    hours: tuple[tuple[int, str, tuple[Path, ...]], ...]
+    folder: Path
     config: CorpusConfig
 
 
@@ -103,15 +102,10 @@ def search_hours(task: HourTask) -> None:
     ]
     if not remaining:
         return
-    tables = sorted({path for _, _, files in remaining for path in files}, key=str)
-    with (
-        fetched(tables) as paths,
-        database(workplace(corpus), task.config.memory, f"{task.name} of {corpus}") as base,
-    ):
-        local = dict(zip(tables, paths, strict=True))
+    with database(corpus, task.config.memory, f"{task.name} of {corpus}") as base:
         for hour, key, files in remaining:
             with base.cursor() as cursor:  # its tables end with it
-                _search(cursor, hour, [local[path] for path in files], key, task)
+                _search(cursor, hour, files, key, task)
 
 
 def _search(base: Any, hour: int, files: Sequence[Path], key: str, task: HourTask) -> None:

@@ -21,16 +21,7 @@ import zlib
 
 from scenario_gen.base.errors import describe, guarded, InputError, needs
 from scenario_gen.base.folders import scratch, write_text
-from scenario_gen.base.stores import (
-    download,
-    identity_of,
-    Part,
-    Place,
-    Remote,
-    size_of,
-    workplace,
-)
-from scenario_gen.corpus.sources import MAX_LINE_BYTES, MessageTable
+from scenario_gen.corpus.sources import MessageTable
 from scenario_gen.corpus.tasks import arriving
 
 HOUR_US = 3_600_000_000
@@ -81,9 +72,9 @@ class RangeTask:
     """
 
     name: str
-    pieces: tuple[tuple[Place, int, int], ...]
+    pieces: tuple[tuple[Path, int, int], ...]
     table: MessageTable
-    target: Place
+    target: Path
     memory: int
 
 
@@ -93,17 +84,17 @@ def digest_of(*parts: object) -> str:
 
 
 def ranges(
-    messages: Sequence[tuple[Place, MessageTable]], folder: Place, size: int, memory: int
+    messages: Sequence[tuple[Path, MessageTable]], folder: Path, size: int, memory: int
 ) -> list[RangeTask]:
     """Divide files into tasks of at most about `size` bytes.
 
     Small files are combined with their neighbours, at places that depend on their names alone. A
     task is named after the identity of its files, so that a changed file costs its own task.
     """
-    tasks: list[tuple[MessageTable, list[tuple[Place, int, int]]]] = []
+    tasks: list[tuple[MessageTable, list[tuple[Path, int, int]]]] = []
     is_open = False
     for path, table in messages:
-        length = size_of(path)
+        length = path.stat().st_size
         is_small = table.header >= 0 and length * GROUPED_RATIO < size
         step = size if table.header >= 0 else max(length, 1)
         for begin in range(max(table.header, 0), length, step):
@@ -117,6 +108,12 @@ def ranges(
         target = folder / f"range-{digest_of(asdict(table), parts)}.parquet"
         named.append(RangeTask(pieces[0][0].name, tuple(pieces), table, target, memory))
     return named
+
+
+def identity_of(path: Path) -> tuple[str, int, str]:
+    """Return what tells whether a file has changed: name, size and time."""
+    status = path.stat()
+    return str(path.resolve()), status.st_size, str(status.st_mtime_ns)
 
 
 @contextmanager
@@ -157,10 +154,10 @@ def parse_range(task: RangeTask) -> None:
     """
     import duckdb
 
-    folder = workplace(task.target.parent.parent)
+    folder = task.target.parent.parent
     folder.mkdir(parents=True, exist_ok=True)
     with scratch(folder) as temporary:
-        texts = _fetched_text(task, temporary)
+        texts = [path for path, _, _ in task.pieces]
         try:
             account, table = _parse(task, texts, temporary)
         except InputError as error:
@@ -174,21 +171,6 @@ def parse_range(task: RangeTask) -> None:
             write_text(part, json.dumps(account, indent=1) + "\n")
         with arriving(task.target) as part:
             table.replace(part)
-
-
-def _fetched_text(task: RangeTask, folder: Path) -> list[Path]:
-    """Return the files of the pieces.
-
-    The copy of an object is sparse: it has the bytes that `_extract` reads, at the same offsets.
-    """
-    parts = []
-    for k, (path, begin, end) in enumerate(task.pieces):
-        if isinstance(path, Remote):
-            last = min(end + MAX_LINE_BYTES, size_of(path))
-            parts.append(Part(path, max(begin - 1, 0), last, folder / f"{k}.txt"))
-    download(parts)
-    copies = {part.source: part.target for part in parts}
-    return [copies[path] if isinstance(path, Remote) else path for path, _, _ in task.pieces]
 
 
 def _extract(path: Path, begin: int, end: int, target: Path) -> Path:
@@ -249,7 +231,7 @@ def _parse(task: RangeTask, files: Sequence[Path], folder: Path) -> tuple[dict[s
     inputs = [str(path) for path, _, _ in task.pieces]
     names = {}
     for k, (path, (source, begin, end)) in enumerate(zip(files, task.pieces, strict=True)):
-        is_whole = begin == 0 and end == size_of(source)
+        is_whole = begin == 0 and end == source.stat().st_size
         lines = path if is_whole else _extract(path, begin, end, folder / f"{k}.csv")
         names[str(lines)] = inputs[k]
     target = folder / "parsed.parquet"

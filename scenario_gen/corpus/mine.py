@@ -25,7 +25,6 @@ from scenario_gen.base.documents import read_json
 from scenario_gen.base.errors import needs, RefusedError
 from scenario_gen.base.folders import write_text
 from scenario_gen.base.parameters import flatten
-from scenario_gen.base.stores import each_fetched, identity_of, Place
 from scenario_gen.corpus.config import CorpusConfig
 from scenario_gen.corpus.encounters import (
     account_of,
@@ -39,7 +38,7 @@ from scenario_gen.corpus.encounters import (
 from scenario_gen.corpus.grouping import group_partition
 from scenario_gen.corpus.inventory import inventory
 from scenario_gen.corpus.meetings import search_hours
-from scenario_gen.corpus.messages import digest_of, parse_range, ranges, RangeTask
+from scenario_gen.corpus.messages import digest_of, identity_of, parse_range, ranges, RangeTask
 from scenario_gen.corpus.page import sketch, write_page
 from scenario_gen.corpus.schedule import (
     ACCOUNT,
@@ -137,8 +136,8 @@ class MiningSummary:
 
 
 def mine(
-    archives: Sequence[Place],
-    out: Place,
+    archives: Sequence[Path],
+    out: Path,
     config: CorpusConfig = CorpusConfig(),
     *,
     workers: Workers = Workers(),
@@ -212,21 +211,21 @@ class _Contents:
     drawn: list[dict[str, Any]] = field(default_factory=list)
 
 
-def _contents(out: Place) -> _Contents:
+def _contents(out: Path) -> _Contents:
     """Return the contents of the tables of encounters; each is read once.
 
     Raises:
         InputError: a table is damaged.
     """
     contents = _Contents()
-    for path, local in each_fetched(sorted((out / "encounters").glob("*.parquet"), key=str)):
-        contents.accounts.append(account_of(local, path))
+    for table in sorted((out / "encounters").glob("*.parquet")):
+        contents.accounts.append(account_of(table))
         drawn = []
-        for k, row in enumerate(rows_of([local], ["kind"])):
+        for k, row in enumerate(rows_of([table], ["kind"])):
             if contents.kinds[row["kind"]] < DRAWN_COUNT:
                 drawn.append(k)
             contents.kinds[row["kind"]] += 1
-        contents.drawn.extend(rows_at(local, drawn))
+        contents.drawn.extend(rows_at(table, drawn))
     return contents
 
 
@@ -254,23 +253,22 @@ def _parameters(config: CorpusConfig) -> dict[str, Any]:
     return {name: value for name, value in parameters.items() if name not in UNLISTED}
 
 
-def _log_task(paths: list[Place], folder: Place, config: CorpusConfig) -> LogTask:
+def _log_task(paths: list[Path], folder: Path, config: CorpusConfig) -> LogTask:
     """Return the task of a log; its table is named after the identity of its files."""
-    files: list[Place] = []
+    files: list[Path] = []
     for path in paths:
-        is_folder = path.is_dir() if isinstance(path, Path) else path.size < 0
-        files += sorted(path.rglob("*"), key=str) if is_folder else [path]
+        files += sorted(path.rglob("*")) if path.is_dir() else [path]
     name = re.sub(r"\W+", "_", paths[0].stem)[:40]
     target = folder / f"log-{name}-{digest_of([identity_of(file) for file in files])}.parquet"
     return LogTask(paths[0].stem, tuple(paths), target, config)
 
 
-def _stale_files(ranged: Sequence[RangeTask], out: Place) -> list[str]:
+def _stale_files(ranged: Sequence[RangeTask], out: Path) -> list[str]:
     """Return the files of an earlier run that have changed or are gone."""
     wanted = {task.target.stem for task in ranged}
     accounts = (out / "messages").glob("range-*.json")
     stale = [path for path in accounts if path.stem not in wanted]
-    names = (read_json(local, ACCOUNT)["files"] for _, local in each_fetched(stale))
+    names = (read_json(path, ACCOUNT)["files"] for path in stale)
     return sorted(set(chain.from_iterable(names)))
 
 
@@ -320,7 +318,7 @@ def _summary(
 
 
 def _notes(
-    others: Sequence[Place],
+    others: Sequence[Path],
     stale: Sequence[str],
     done: Mapping[str, int],
     accounts: Collection[Mapping[str, Any]],
@@ -363,13 +361,13 @@ def _named(files: Sequence[str]) -> str:
     return f"{len(files)} files ({names}{' …' if len(files) > NAMED_FILES_COUNT else ''})"
 
 
-def _shared_ids(out: Place) -> list[str]:
+def _shared_ids(out: Path) -> list[str]:
     """Return a note if several vehicles share an id."""
     from pyarrow import parquet
 
     shared: set[str] = set()
-    for _, local in each_fetched([*searched_hours(out).values()]):
-        metadata = parquet.read_schema(local).metadata or {}
+    for table in searched_hours(out).values():
+        metadata = parquet.read_schema(table).metadata or {}
         shared.update(json.loads(metadata.get(b"shared", b"{}")))
     if not shared:
         return []

@@ -13,15 +13,16 @@ from functools import partial
 from hashlib import sha256
 from itertools import pairwise
 import json
+from pathlib import Path
 import re
 from textwrap import shorten
 from typing import Any
 
 from scenario_gen.bags.recordings.write import add_results, scenario_bytes
 from scenario_gen.bags.storage.writer import BagWriter
+from scenario_gen.base.copies import temp_folder
 from scenario_gen.base.errors import InputError, RefusedError
 from scenario_gen.base.provenance import parameter_texts, RECORDING, versions
-from scenario_gen.base.stores import each_fetched, fetched, Place, temp_folder
 from scenario_gen.corpus.conditions import matching
 from scenario_gen.corpus.encounters import encounter_of
 from scenario_gen.corpus.tables import rows_at, write_table
@@ -103,7 +104,7 @@ class PartTask:
     step: int
     road: str
     token: str
-    out: Place
+    out: Path
     request: BatchRequest
 
     @property
@@ -112,17 +113,17 @@ class PartTask:
         return f"part {self.number} on {self.token}"
 
     @property
-    def target(self) -> Place:
+    def target(self) -> Path:
         """The table of cases, which is written last."""
         return self.file("cases")
 
-    def file(self, folder: str, suffix: str = ".parquet") -> Place:
+    def file(self, folder: str, suffix: str = ".parquet") -> Path:
         """Return one of the files."""
         return self.out / folder / f"road={self.token}" / f"part-{self.number:05}{suffix}"
 
 
 def part_tasks(
-    out: Place, roads: Mapping[str, str], counts: Sequence[int], request: BatchRequest
+    out: Path, roads: Mapping[str, str], counts: Sequence[int], request: BatchRequest
 ) -> list[PartTask]:
     """Return all tasks of a batch, in the order of its templates.
 
@@ -135,8 +136,8 @@ def part_tasks(
     from pyarrow import parquet
 
     tables = [
-        (table.name, parquet.read_metadata(path).num_rows)
-        for table, path in each_fetched(sorted((out / "templates").glob("*.parquet"), key=str))
+        (table.name, parquet.read_metadata(table).num_rows)
+        for table in sorted((out / "templates").glob("*.parquet"))
     ]
     chunks = [
         (name, first, min(first + TASK_TEMPLATE_COUNT, size))
@@ -213,10 +214,7 @@ def _write_bag(task: PartTask, results: Mapping[str, GenerationResult]) -> None:
     """Write the requested scenarios of results to a bag; the table of scenarios is written."""
     chosen = {(name, scenario.index) for name in results for scenario in results[name]}
     if task.request.bags == "hits":
-        with (
-            fetched([task.file("scenarios")]) as paths,
-            matching(paths, task.request.hits, temp_folder()) as (_, rows),
-        ):
+        with matching([task.file("scenarios")], task.request.hits, temp_folder()) as (_, rows):
             chosen = set(rows.project("namespace, index").fetchall())
     if not chosen:
         return
@@ -229,7 +227,7 @@ def _write_bag(task: PartTask, results: Mapping[str, GenerationResult]) -> None:
 
 
 def _generate_cases(
-    row: Mapping[str, Any], table: Place, namespace: str, task: PartTask
+    row: Mapping[str, Any], table: Path, namespace: str, task: PartTask
 ) -> list[tuple[dict[str, Any], GenerationResult | None]]:
     """Generate the sets of one template; return the row and the result of each.
 

@@ -9,12 +9,12 @@ removed: its files have changed.
 
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from scenario_gen.base.documents import COUNT, read_json
-from scenario_gen.base.stores import each_fetched, Place, remove
 from scenario_gen.corpus.config import CorpusConfig
 from scenario_gen.corpus.encounters import CleanTask
 from scenario_gen.corpus.grouping import GroupTask, partitions
@@ -56,7 +56,7 @@ def least_rows(config: CorpusConfig) -> int:
     return 2 * (int(seconds / max(log.longest_gap, log.period)) + 1)
 
 
-def current(tasks: Sequence[Target], folder: Place, pattern: str = "[!.]*") -> list[Target]:
+def current(tasks: Sequence[Target], folder: Path, pattern: str = "[!.]*") -> list[Target]:
     """Return the tasks that are not done; remove other results of their stage.
 
     Args:
@@ -65,21 +65,23 @@ def current(tasks: Sequence[Target], folder: Place, pattern: str = "[!.]*") -> l
         pattern: of their names.
     """
     wanted = {task.target.stem for task in tasks}
-    existing: list[Place] = list(folder.glob(pattern))
-    remove([path for path in existing if path.stem not in wanted])
+    existing = list(folder.glob(pattern))
+    for path in existing:
+        if path.stem not in wanted:
+            path.unlink()
     names = {path.name for path in existing}
     return [task for task in tasks if task.target.name not in names]
 
 
-def accounts_of(ranged: Sequence[RangeTask], out: Place) -> dict[Place, dict[str, Any]]:
+def accounts_of(ranged: Sequence[RangeTask], out: Path) -> dict[Path, dict[str, Any]]:
     """Return the tables of ranges that are parsed, with their accounts."""
     listed = {path.name: path for path in (out / "messages").glob("range-*")}
-    tables: dict[Place, Place] = {}
+    tables: dict[Path, Path] = {}
     for task in ranged:
         account = listed.get(task.target.with_suffix(".json").name)
         if account is not None and task.target.name in listed:
             tables[account] = listed[task.target.name]
-    return {tables[path]: read_json(local, ACCOUNT) for path, local in each_fetched([*tables])}
+    return {table: read_json(account, ACCOUNT) for account, table in tables.items()}
 
 
 class _Hour(NamedTuple):
@@ -87,13 +89,13 @@ class _Hour(NamedTuple):
 
     hour: int
     rows: int
-    tables: tuple[Place, ...]
+    tables: tuple[Path, ...]
 
 
-def _hours(accounts: Mapping[Place, dict[str, Any]], config: CorpusConfig) -> dict[str, _Hour]:
+def _hours(accounts: Mapping[Path, dict[str, Any]], config: CorpusConfig) -> dict[str, _Hour]:
     """Return the hours to search by key, which has a hash of their messages."""
     rows: Counter[int] = Counter()
-    tables: dict[int, list[Place]] = {}
+    tables: dict[int, list[Path]] = {}
     least = least_rows(config)
     for table, account in accounts.items():
         for name, count in account["hours"].items():
@@ -117,15 +119,17 @@ def _content(hour: int, accounts: Iterable[dict[str, Any]]) -> int:
 
 
 def hour_tasks(
-    accounts: Mapping[Place, dict[str, Any]], out: Place, config: CorpusConfig
+    accounts: Mapping[Path, dict[str, Any]], out: Path, config: CorpusConfig
 ) -> list[HourTask]:
     """Return tasks of about `task_rows` rows for the hours that are not searched yet."""
     hours = _hours(accounts, config)
     folder = out / "hours"
     existing = {path.stem: path for path in folder.glob("[!.]*")}
     names = {f"{kind}-{key}" for kind in ("hour", "rows") for key in hours}
-    remove([path for name, path in existing.items() if name not in names])
-    batches: list[list[tuple[int, str, tuple[Place, ...]]]] = []
+    for name, path in existing.items():
+        if name not in names:
+            path.unlink()
+    batches: list[list[tuple[int, str, tuple[Path, ...]]]] = []
     room = 0
     for key, (hour, rows, tables) in hours.items():
         if f"hour-{key}" in existing:
@@ -141,7 +145,7 @@ def hour_tasks(
     ]
 
 
-def group_tasks(out: Place, config: CorpusConfig) -> list[GroupTask]:
+def group_tasks(out: Path, config: CorpusConfig) -> list[GroupTask]:
     """Return tasks for the partitions of all meetings that are not grouped yet."""
     hours = searched_hours(out)
     columns = _columns([*hours.values()], "start", "end")
@@ -153,10 +157,10 @@ def group_tasks(out: Place, config: CorpusConfig) -> list[GroupTask]:
     return current(tasks, out / "found")
 
 
-def clean_tasks(out: Place, config: CorpusConfig) -> list[CleanTask]:
+def clean_tasks(out: Path, config: CorpusConfig) -> list[CleanTask]:
     """Return tasks for the encounters that are not cleaned yet."""
     hours = searched_hours(out)
-    tables: list[Place] = sorted((out / "found").glob("part-*.parquet"), key=str)
+    tables = sorted((out / "found").glob("part-*.parquet"))
     columns = _columns(tables, "earliest", "end")
     tasks = []
     for table, earliest, end in zip(tables, columns[0][1:], columns[1][1:], strict=True):
@@ -169,23 +173,23 @@ def clean_tasks(out: Place, config: CorpusConfig) -> list[CleanTask]:
     return current(tasks, out / "encounters", "found-*")
 
 
-def searched_hours(out: Place) -> dict[int, Place]:
+def searched_hours(out: Path) -> dict[int, Path]:
     """Return the tables of the hours that are searched, in order."""
     tables = [*(out / "hours").glob("hour-*.parquet")]
     by_hour = {int(table.stem.split("-")[1]): table for table in tables}
     return {hour: by_hour[hour] for hour in sorted(by_hour)}
 
 
-def _between(hours: Mapping[int, Place], first: int, last: int) -> tuple[str, ...]:
+def _between(hours: Mapping[int, Path], first: int, last: int) -> tuple[str, ...]:
     """Return the keys of the hours from the first to the last."""
     near = [hours[hour] for hour in range(first, last + 1) if hour in hours]
     return tuple(table.stem.partition("-")[2] for table in near)
 
 
-def _columns(tables: Sequence[Place], *names: str) -> list[list[Ints]]:
+def _columns(tables: Sequence[Path], *names: str) -> list[list[Ints]]:
     """Return for each column an empty array, and its values (rows,) in each table."""
     from pyarrow import parquet
 
-    read = [parquet.read_table(local, columns=list(names)) for _, local in each_fetched(tables)]
+    read = [parquet.read_table(table, columns=list(names)) for table in tables]
     empty = np.zeros(0, dtype=np.int64)
     return [[empty, *(table[name].to_numpy() for table in read)] for name in names]

@@ -15,21 +15,21 @@ record of progress. `compact` merges parts to `parts-FIRST-LAST.parquet`, and th
 
 from collections import defaultdict
 import json
+from pathlib import Path
 import re
 
 from scenario_gen.base.folders import write_text
-from scenario_gen.base.stores import Place, relative_name
 from scenario_gen.corpus.tasks import arriving
 
 MANIFEST = "batch.json"
 FOLDERS = ("cases", "scenarios", "trajectories")
 PART = re.compile(r"parts?-([0-9]{1,9})(?:-([0-9]{1,9}))?\.parquet")
 
-Tables = dict[Place, range]
+Tables = dict[Path, range]
 """Tables and the numbers of their parts."""
 
 
-def parts_of(folder: Place) -> dict[str, Tables]:
+def parts_of(folder: Path) -> dict[str, Tables]:
     """Return the tables in each partition of a folder, sorted by part.
 
     The first ones contain what others repeat: `compact` was stopped before it removed those.
@@ -38,7 +38,7 @@ def parts_of(folder: Place) -> dict[str, Tables]:
     for table in folder.rglob("*.parquet"):
         if match := PART.fullmatch(table.name):
             first, last = match[1], match[2] or match[1]
-            partition = relative_name(table, folder).rpartition("/")[0]
+            partition = table.parent.relative_to(folder).as_posix()
             partitions[partition][table] = range(int(first), int(last) + 1)
     return {
         partition: dict(sorted(tables.items(), key=lambda item: (item[1].start, -item[1].stop)))
@@ -55,7 +55,7 @@ def without_repeated(tables: Tables) -> Tables:
     return unique
 
 
-def finished_parts(out: Place) -> dict[str, set[int]]:
+def finished_parts(out: Path) -> dict[str, set[int]]:
     """Return the numbers of the finished parts in each partition (`road=NAME`)."""
     return {
         road: {number for numbers in tables.values() for number in numbers}
@@ -63,7 +63,7 @@ def finished_parts(out: Place) -> dict[str, set[int]]:
     }
 
 
-def finished_tables(out: Place, folder: str) -> list[Place]:
+def finished_tables(out: Path, folder: str) -> list[Path]:
     """Return the tables of finished parts, sorted; each part is in one of them."""
     finished = finished_parts(out)
     return [
@@ -74,7 +74,7 @@ def finished_tables(out: Place, folder: str) -> list[Place]:
     ]
 
 
-def write_json(place: Place, document: object) -> None:
+def write_json(path: Path, document: object) -> None:
     """Write a document atomically, in place of an earlier one."""
-    with arriving(place) as part:
+    with arriving(path) as part:
         write_text(part, json.dumps(document, indent=1) + "\n")

@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import Any
 
 from scenario_gen.base.errors import guarded, InputError, needs
-from scenario_gen.base.stores import each_fetched, fetched, Place
 from scenario_gen.corpus.tasks import arriving
 
 # A row group is decoded as a whole, and the tracks of an encounter are long.
@@ -43,7 +42,7 @@ def table_writer(path: Path, schema: Any) -> Any:
 
 
 def write_table(
-    target: Place, rows: Sequence[Mapping[str, Any]], columns: Mapping[str, str], **facts: Any
+    target: Path, rows: Sequence[Mapping[str, Any]], columns: Mapping[str, str], **facts: Any
 ) -> None:
     """Write a table atomically; NaN becomes null.
 
@@ -77,7 +76,7 @@ def write_table(
 
 
 def rows_of(
-    tables: Sequence[Place], columns: Sequence[str] | None = None
+    tables: Sequence[Path], columns: Sequence[str] | None = None
 ) -> Iterator[dict[str, Any]]:
     """Yield the rows of tables, in their order.
 
@@ -86,15 +85,17 @@ def rows_of(
     """
     from pyarrow import parquet
 
-    for table, path in each_fetched(tables):
+    for table in tables:
         with guarded(f"{table} cannot be read as a table"):
-            rows = parquet.read_table(path, columns=list(columns) if columns else None).to_pylist()
+            rows = parquet.read_table(
+                table, columns=list(columns) if columns else None
+            ).to_pylist()
         if rows and (missing := set(columns or ()) - rows[0].keys()):
             raise InputError(f"{table} lacks the columns {', '.join(sorted(missing))}")
         yield from rows
 
 
-def rows_at(table: Place, numbers: Sequence[int]) -> list[dict[str, Any]]:
+def rows_at(table: Path, numbers: Sequence[int]) -> list[dict[str, Any]]:
     """Return the rows of a table with the given row numbers.
 
     Raises:
@@ -103,8 +104,8 @@ def rows_at(table: Place, numbers: Sequence[int]) -> list[dict[str, Any]]:
     from pyarrow import dataset
 
     reading = guarded(f"{table} cannot be read as a table", remedy="run `mine` again")
-    with fetched([table]) as (path,), reading:
+    with reading:
         rows: list[dict[str, Any]] = (
-            dataset.dataset(path, format="parquet").take(list(numbers)).to_pylist()
+            dataset.dataset(table, format="parquet").take(list(numbers)).to_pylist()
         )
     return rows

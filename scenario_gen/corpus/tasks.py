@@ -29,7 +29,6 @@ from scenario_gen.base.folders import naming, scratch, sync, sync_tree, write_te
 from scenario_gen.base.folders.scratch import claimed, PREFIX, sweep_tree
 from scenario_gen.base.provenance import versions
 from scenario_gen.base.signals import cleaned_up
-from scenario_gen.base.stores import create, fetched, Place, Remote, temp_folder, upload
 from scenario_gen.corpus.local_pool import local_pool, LocalPool
 
 
@@ -37,7 +36,7 @@ class _Task(Protocol):
     """A task that writes one file."""
 
     @property
-    def target(self) -> Place:
+    def target(self) -> Path:
         """The file."""
 
 
@@ -49,21 +48,14 @@ MANIFEST = {"type": "object", "properties": {"versions": {"type": "object"}}}
 
 
 @contextmanager
-def arriving(target: Place) -> Iterator[Path]:
+def arriving(target: Path) -> Iterator[Path]:
     """Give a temporary path; at the end its file or folder is synced and renamed to `target`.
 
-    The temporary path is in the folder of `target`. For a store it is in TMPDIR, and copied at the
-    end; an object is never partly written.
+    The temporary path is in the folder of `target`.
 
     Raises:
         OSError: the disk is full or fails; the message names the file.
-        InputError: the store refuses an object or keeps failing.
     """
-    if isinstance(target, Remote):
-        with scratch(temp_folder()) as folder:
-            yield folder / target.name
-            upload(folder / target.name, target)
-        return
     target.parent.mkdir(parents=True, exist_ok=True)
     with scratch(target.parent) as folder:
         temporary = folder / target.name  # the files of a bag are named after its folder
@@ -76,42 +68,33 @@ def arriving(target: Place) -> Iterator[Path]:
         sync(target.parent)
 
 
-def check_out(out: Place, inputs: Sequence[Place]) -> None:
+def check_out(out: Path, inputs: Sequence[Path]) -> None:
     """Refuse a file as the folder for results, and a folder within an input.
 
     Raises:
         InputError: `out` is one of these.
     """
-    if isinstance(out, Path) and out.exists() and not out.is_dir():
+    if out.exists() and not out.is_dir():
         raise InputError(f"--out {out} is a file; name a folder")
     for source in inputs:
-        if _absolute(out).startswith(_absolute(source)):
+        if out.resolve().is_relative_to(source.resolve()):
             raise InputError(f"{out} is within the input {source}; name a folder outside of it")
 
 
-def _absolute(place: Place) -> str:
-    return f"{place.resolve() if isinstance(place, Path) else place}/"
-
-
 @contextmanager
-def held(out: Place) -> Iterator[None]:
+def held(out: Path) -> Iterator[None]:
     """Lock a folder of results against other runs, and remove temporary files at the end.
-
-    A store has no locks. Two runs with the same manifest (`agree`) write the same bytes there.
 
     Raises:
         InputError: another run uses the folder.
     """
-    if isinstance(out, Remote):
-        yield
-        return
     with claimed(out / f"{PREFIX}run", out), cleaned_up(partial(sweep_tree, out)):
         sweep_tree(out)
         yield
         sweep_tree(out)
 
 
-def agree(out: Place, name: str, document: Mapping[str, Any], kind: str) -> dict[str, Any]:
+def agree(out: Path, name: str, document: Mapping[str, Any], kind: str) -> dict[str, Any]:
     """Write the manifest of results, or check that an existing one is the same; return it.
 
     The manifest also has the versions of the release and its libraries.
@@ -131,14 +114,10 @@ def agree(out: Place, name: str, document: Mapping[str, Any], kind: str) -> dict
     if not manifest.exists():
         if _has_entries(out):
             raise InputError(f"{out} is not empty and no {kind}; name another folder")
-        if isinstance(manifest, Path):
-            with arriving(manifest) as part:
-                write_text(part, text)
-            return document
-        if create(manifest, text.encode()):
-            return document
-    with fetched([manifest]) as (path,):
-        existing: dict[str, Any] = read_json(path, MANIFEST)
+        with arriving(manifest) as part:
+            write_text(part, text)
+        return document
+    existing: dict[str, Any] = read_json(manifest, MANIFEST)
     release = existing.get("versions", {}).get("scenario_gen", "")
     if existing.get("format") != document.get("format") or release not in ("", __version__):
         raise InputError(
@@ -154,10 +133,8 @@ def agree(out: Place, name: str, document: Mapping[str, Any], kind: str) -> dict
     return existing
 
 
-def _has_entries(folder: Place) -> bool:
+def _has_entries(folder: Path) -> bool:
     """Whether a folder has entries; hidden files do not count."""
-    if isinstance(folder, Remote):
-        return folder.exists()
     return any(not path.name.startswith(".") for path in folder.iterdir())
 
 

@@ -4,11 +4,11 @@
 """Trajectories of scenarios as Parquet: a row per vehicle, with a list of its samples."""
 
 from collections.abc import Mapping, Sequence
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from scenario_gen.base.stores import Place
 from scenario_gen.corpus.tables import table_writer
 from scenario_gen.corpus.tasks import arriving
 from scenario_gen.types import Scenario
@@ -27,7 +27,7 @@ Rounded binary fractions take a third of the bytes.
 
 
 def write_trajectories(
-    target: Place, scenarios: Sequence[tuple[Mapping[str, Any], Scenario]]
+    target: Path, scenarios: Sequence[tuple[Mapping[str, Any], Scenario]]
 ) -> None:
     """Write a table with a row for each vehicle of each scenario.
 

@@ -8,8 +8,8 @@ from dataclasses import replace
 from pathlib import Path
 
 from scenario_gen.bags.storage.files import files_of, METADATA
+from scenario_gen.base.copies import renamed
 from scenario_gen.base.errors import did_you_mean, guarded, InputError, reading
-from scenario_gen.base.stores import renamed, require_local
 from scenario_gen.logs.config import LogConfig
 from scenario_gen.logs.formats import (
     is_bag,
@@ -74,7 +74,6 @@ def _check_exists(path: Path) -> None:
     elif path.exists():
         raise InputError(f"{path} is neither a file nor a folder")
     else:
-        require_local(path, "a log")
         neighbours = [file.name for file in path.parent.iterdir()] if path.parent.is_dir() else []
         raise InputError(
             f"{path} does not exist; check the name and the folder"

@@ -11,9 +11,9 @@ from typing import IO
 import zipfile
 import zlib
 
+from scenario_gen.base.copies import naming_inputs, temp_folder
 from scenario_gen.base.errors import guarded, InputError
 from scenario_gen.base.folders import scratch
-from scenario_gen.base.stores import naming_objects, temp_folder
 from scenario_gen.logs.config import LogConfig
 from scenario_gen.logs.formats import is_packed, without_packing
 from scenario_gen.logs.raw import check_size
@@ -43,7 +43,7 @@ def unpacked(paths: Sequence[Path], config: LogConfig) -> Iterator[list[Path]]:
     with scratch(temp_folder()) as folder:
         targets = {k: folder / str(k) / without_packing(path).name for k, path in packed.items()}
         names = {str(targets[k]): str(path) for k, path in packed.items()}
-        with naming_objects(names):
+        with naming_inputs(names):
             left_bytes = config.size_limit << 20
             for k, path in packed.items():
                 targets[k].parent.mkdir()

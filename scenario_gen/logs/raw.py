@@ -10,8 +10,8 @@ from pathlib import Path
 
 import numpy as np
 
+from scenario_gen.base.copies import renamed
 from scenario_gen.base.errors import InputError
-from scenario_gen.base.stores import renamed
 from scenario_gen.logs.column import Column
 from scenario_gen.logs.config import LogConfig
 from scenario_gen.logs.doubts import Doubt

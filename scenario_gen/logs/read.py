@@ -13,10 +13,10 @@ from typing import Any, TYPE_CHECKING
 
 import numpy as np
 
+from scenario_gen.base.copies import naming_inputs, temp_folder
 from scenario_gen.base.errors import InputError, printable, reading
 from scenario_gen.base.folders.scratch import scratch
 from scenario_gen.base.parameters import updated
-from scenario_gen.base.stores import naming_objects, temp_folder
 from scenario_gen.logs.checks import copies_in, doubts_of_pieces, doubts_of_rows
 from scenario_gen.logs.cleaning import clean, Drops
 from scenario_gen.logs.clock import check_unit, retimed
@@ -111,7 +111,7 @@ def read_log(
     if hasattr(path, "to_csv"):
         with scratch(temp_folder()) as folder:
             file = folder / _DATAFRAME_FILE
-            with naming_objects({str(file): "the DataFrame"}):
+            with naming_inputs({str(file): "the DataFrame"}):
                 path.to_csv(file, index=False)
                 return read_log(file, config)
     paths = [Path(name) for name in ([path] if isinstance(path, (str, Path)) else path)]

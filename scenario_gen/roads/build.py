@@ -14,7 +14,6 @@ from scipy.spatial.distance import cdist
 from scenario_gen.base.documents import shown
 from scenario_gen.base.errors import did_you_mean, InputError, reading, RefusedError
 from scenario_gen.base.registry import Registry
-from scenario_gen.base.stores import require_local
 from scenario_gen.roads.builtin import draw_corridor, draw_layout, draw_paper, layout_for
 from scenario_gen.roads.config import refuse_too_many_cells, RoadConfig
 from scenario_gen.roads.junctions import draw_junction, draw_roundabout
@@ -170,7 +169,7 @@ def _road_without_obstacles(
     path = Path(name_or_path)
     if path.suffix.lower() in (".yaml", ".yml"):
         with reading(path):
-            return read_map(require_local(path, "a map"), config)
+            return read_map(path, config)
     if name_or_path not in ROADS:
         raise InputError(_unknown_road(name_or_path))
     draw_road = ROADS[name_or_path]

@@ -12,9 +12,9 @@ from typing import Any, TYPE_CHECKING
 
 import numpy as np
 
+from scenario_gen.base.copies import temp_folder
 from scenario_gen.base.errors import InputError
 from scenario_gen.base.folders import scratch
-from scenario_gen.base.stores import temp_folder
 from scenario_gen.types.coverage import Coverage
 from scenario_gen.types.encounter import Encounter
 from scenario_gen.types.evaluation import Evaluation, NARROW, REPLAY, UNIFORM, WITH, WITHOUT

@@ -12,7 +12,11 @@ from scenario_gen.cli.commands import run
 
 @pytest.mark.parametrize("name", REMOVED)
 def test_what_was_removed_names_its_replacement(name):
-    words = ["generate", "log.csv", name, "3"] if name.startswith("--") else [name]
+    words = [name]
+    if name.startswith("--"):
+        words = ["generate", "log.csv", name, "3"]
+    elif name.endswith("://"):
+        words = ["mine", f"{name}bucket/archive", "--out", "corpus"]
     with pytest.raises(InputError, match=f"^{name} was removed: [^\n]+$"):
         run(words)
 

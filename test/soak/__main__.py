@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Long tests, by part: `make soak`, `make soak PART=kills`. A part that was stopped goes on where it was.
+"""Long tests, by part: `make soak`, `make soak PART=fuzz`. A part that was stopped goes on where it was.
 
 Each part is a module here with `run(state: Path) -> Iterable[Figure]`; `state` is a folder of its own that it may keep
 progress in, and that is emptied by `--fresh`. The last figures of all parts are printed as one table.
@@ -23,7 +23,6 @@ from rich.table import Table
 PARTS = (
     "cpu",
     "fuzz",
-    "kills",
     "long",
     "newest",
     "properties",

@@ -12,7 +12,6 @@ from scenario_gen.types import Motion, VehicleType
 
 STEADY_MPS2 = 0.25  # a smaller acceleration is none
 TURNING_RAD = np.deg2rad(15.0)  # a smaller change of heading is no turn
-TURNING_MPS2 = 0.5  # a smaller lateral acceleration is no turn
 
 
 def describe_motion(speed: Floats, heading: Floats, dt: float, kind: VehicleType) -> str:
