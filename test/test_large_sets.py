@@ -1,29 +1,26 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Sets of any size: scenarios drawn again instead of kept, indices for any number of candidates, memory that stays."""
+"""Large sets: indices for any number of candidates, figures of a part."""
 
 from collections import Counter
 import json
 import sys
-import tracemalloc
 
 from hypothesis import given
 from hypothesis import strategies as st
 import numpy as np
 import pytest
 from support.given import answer, Given
-from support.lengths import LONG
 
 from scenario_gen import pipeline
-from scenario_gen.bags.recordings.write import write_recording
 from scenario_gen.base.errors import InputError
 from scenario_gen.logs import read_log
 from scenario_gen.logs.synthetic import bundled
 from scenario_gen.method import reference_sets
 from scenario_gen.method.evaluation import EvaluationConfig, MEASURED_SCENARIOS
 from scenario_gen.method.evaluation.evaluate import measured
-from scenario_gen.method.sampling import draw, Plan, regenerate, sampler
+from scenario_gen.method.sampling import sampler
 from scenario_gen.method.sampling.sampler import (
     BLOCK_CANDIDATES,
     DIRECTED_SLOT,
@@ -35,7 +32,6 @@ from scenario_gen.method.sampling.sampler import (
 from scenario_gen.method.segmentation import segment
 from scenario_gen.output.report.page import render, ReportInput
 from scenario_gen.roads import build_road
-from scenario_gen.situation import Situation
 from scenario_gen.types import UNIFORM, WITH, WITHOUT
 from scenario_gen.types.request import Request
 
@@ -50,30 +46,6 @@ def chain():
 
 def made(chain, count):
     return answer(chain, Request(), count=count).generated
-
-
-def same(one, other):
-    return one.index == other.index and all(
-        np.allclose(getattr(one, f), getattr(other, f), atol=1e-6) for f in FIELDS
-    )
-
-
-def test_drawn_again_are_the_same_bits(chain, monkeypatch):
-    kept = made(chain, 70)
-    monkeypatch.setattr(draw, "MAX_STORED_SCENARIOS", 20)
-    again = made(chain, 70)
-    assert isinstance(kept.scenarios, tuple) and not isinstance(again.scenarios, tuple)
-    assert (again.requested, again.candidates, again.refused) == (
-        kept.requested,
-        kept.candidates,
-        kept.refused,
-    )
-    assert len(again.scenarios) == 70
-    assert all(same(*pair) for pair in zip(kept.scenarios, again.scenarios, strict=True))
-    assert all(
-        same(*pair) for pair in zip(kept.scenarios[5:60:3], again.scenarios[5:60:3], strict=True)
-    )
-    assert same(kept.scenarios[-1], again.scenarios[-1])
 
 
 @given(st.integers(0, len(LEVELS) - 1), st.integers(0, 1 << 40))
@@ -100,20 +72,6 @@ def test_a_level_does_not_run_out_of_candidates(chain, monkeypatch):
         a.position.tobytes() == b.position.tobytes()
         for a, b in zip(plain.scenarios, beyond.scenarios, strict=True)
     )
-    last = beyond.scenarios[-1]
-    placed, waits = (
-        answer(chain, Request(), count=1),
-        Situation.of(chain.encounter).waits_to_keep(chain.segmentation),
-    )
-    plan = Plan(
-        Situation.of(chain.encounter),
-        chain.segmentation,
-        chain.road,
-        placed.routes,
-        placed.fit.requested,
-        waits,
-    )
-    assert same(regenerate(plan, chain.sampling, seed=chain.seed, index=last.index), last)
 
 
 @given(st.integers(MEASURED_SCENARIOS + 1, 10**12))
@@ -125,27 +83,6 @@ def test_of_a_large_set_evenly_spaced_runs_are_measured(size):
     assert steps[1] >= MEASURED_SCENARIOS - 20
     gaps = [step for step in steps if step != 1]
     assert not gaps or max(gaps) - min(gaps) <= 1
-
-
-def test_memory_does_not_grow_with_the_number_of_scenarios(chain, monkeypatch, tmp_path):
-    """Sampled, checked and written: scenarios of some 15 kB each raise the peak by less than a tenth of that (short: a third)."""
-    monkeypatch.setattr(draw, "MAX_STORED_SCENARIOS", 100 if LONG else 40)
-
-    def peak(count):
-        tracemalloc.reset_peak()
-        outcome = answer(chain, Request(), count=count)
-        assert len(outcome.generated.scenarios) == count
-        write_recording(tmp_path / str(count), outcome)
-        return tracemalloc.get_traced_memory()[1]
-
-    small, large, most = (300, 1500, 1_500_000) if LONG else (45, 145, 500_000)
-    peak(50)  # what is loaded and compiled once
-    tracemalloc.start()
-    try:
-        few, many = peak(small), peak(large)
-    finally:
-        tracemalloc.stop()
-    assert many - few < most, f"{few} bytes for {small} scenarios, {many} for {large}"
 
 
 def test_that_only_a_part_was_measured_is_said(chain, monkeypatch):

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Parameters and versions that regenerate a scenario, as texts in the summary of its request."""
+"""Parameters and versions behind a scenario, as texts in the summary of its request."""
 
 from collections.abc import Mapping
 from importlib import metadata
@@ -23,15 +23,6 @@ _HASH_PREFIX = "sha256 "
 def log_texts(hashes: Mapping[str, str]) -> dict[str, str]:
     """Return the provenance entries of logs, from their SHA-256 by name."""
     return {_LOG_PREFIX + name: _HASH_PREFIX + sha256 for name, sha256 in hashes.items()}
-
-
-def read_log_hashes(texts: Mapping[str, str]) -> dict[str, str]:
-    """Return the SHA-256 of each log by its name, from `log_texts`."""
-    return {
-        name.removeprefix(_LOG_PREFIX): text.removeprefix(_HASH_PREFIX)
-        for name, text in texts.items()
-        if name.startswith(_LOG_PREFIX)
-    }
 
 
 def versions() -> dict[str, str]:
@@ -62,8 +53,6 @@ def read_parameters(config: Config, texts: Mapping[str, str], prefix: str, origi
     for name, (entry, _) in flatten(config).items():
         text = texts.get(prefix + name)
         if text is None:
-            raise InputError(
-                f"{origin}: parameter {prefix}{name} is missing, so it cannot be regenerated"
-            )
+            raise InputError(f"{origin}: parameter {prefix}{name} is missing")
         values[name] = parsed(entry, text, f"{origin}: parameter {prefix}{name}")
     return updated(config, values)

@@ -121,7 +121,7 @@ class Batch:
     ] = 0
     bags: Annotated[
         Bags,
-        typer.Option(help="Scenarios to write to bags, too. `find --bag` generates others again."),
+        typer.Option(help="Scenarios to write to bags, too; `find --bag` copies from these."),
     ] = "none"
     hits: Annotated[
         str, typer.Option(help="Condition as for `find`: the scenarios that go to bags.")
@@ -185,17 +185,11 @@ def find(
     bag: Annotated[
         Path | None,
         typer.Option(
-            help="Write the matching scenarios to this bag, with their recordings and roads."
+            help="Copy the matching scenarios from the bags of the batch to this bag, with their "
+            "recordings and roads."
         ),
     ] = None,
     report: Annotated[Path | None, typer.Option(help="Folder for a page about --bag.")] = None,
-    again: Annotated[
-        bool,
-        typer.Option(
-            "--again",
-            help="Generate each matching scenario again, also if it is in a bag, and compare it.",
-        ),
-    ] = False,
 ) -> None:
     """Find scenarios in a batch, or recorded encounters in a corpus, by kind, road, PET or TTC."""
     from scenario_gen.corpus import find as finding
@@ -203,17 +197,14 @@ def find(
 
     if report is not None and bag is None:
         raise InputError("--report needs --bag, the bag that the page describes; give both")
-    shows_some = not (current.as_json or again or bag)
+    shows_some = not (current.as_json or bag)
     matches = finding.find(batch, condition, limit if shows_some else 0)
     lines = finding.coverage_lines(matches, batch)
     emit_json(scenarios=matches.rows, coverage=lines)
     _print_matches(matches.rows[: limit or None], matches.count)
     print_(*lines, sep="\n")
-    if again or bag is not None:
-        identical = finding.export_hits(batch, matches.rows, bag, again=again)
-        if again:
-            print_(f"{identical} of {len(matches.rows)} scenarios are byte-identical again")
     if bag is not None:
+        finding.export_hits(batch, matches.rows, bag)
         emit_json(bag=bag)
         print_(f"bag: {bag}")
         if report is not None:

@@ -16,7 +16,6 @@ from scenario_gen.cli.options import (
     ParametersOption,
     SetOption,
     takes,
-    warn_of_metadata,
 )
 from scenario_gen.cli.output import current, emit_json, print_, progress, status
 
@@ -249,45 +248,6 @@ def roads(
     write_text(out, picture)
     emit_json(picture=out, notes=notes)
     print_(*notes, f"picture: {out}", sep="\n")
-
-
-@commands.command()
-def regenerate(
-    bag: Annotated[Path, typer.Argument(help="A bag that `generate` or the ROS nodes wrote.")],
-    index: Annotated[int, typer.Argument(help="Number of the scenario, as on its page.", min=0)],
-    out: Annotated[
-        Path | None,
-        typer.Option(help="Folder for a bag with this scenario, its recording and its road."),
-    ] = None,
-    namespace: Annotated[
-        str | None, typer.Option(help="Namespace of the scenario, if several have that number.")
-    ] = None,
-    request: Annotated[
-        str | None, typer.Option(help="Id of the request, if several have that number.")
-    ] = None,
-    log: Annotated[
-        Path | None,
-        typer.Option(help="Start from the raw log instead of the bag's tracks and changepoints."),
-    ] = None,
-    assignments: SetOption = None,
-    parameter_file: ParametersOption = None,
-) -> None:
-    """Generate a scenario of a bag again and check that it is the same, to the byte or 1 cm."""
-    from scenario_gen.output.review.regenerate import regenerate_scenario, write_regenerated
-
-    warn_of_metadata(bag)
-    config = configured(parameter_file, assignments).bag
-    result = regenerate_scenario(
-        bag, index, namespace=namespace, request=request, log=log, config=config
-    )
-    emit_json(index=index, bytes=len(result.data), sha256=result.sha256, apart_m=result.distance)
-    print_(
-        f"scenario {index}: {result.comparison}, {len(result.data)} bytes, sha256 {result.sha256}"
-    )
-    if out is not None:
-        written = write_regenerated(result, out, [bag, *([log] if log else ())])
-        emit_json(bag=written)
-        print_(f"bag: {written}")
 
 
 @commands.command()

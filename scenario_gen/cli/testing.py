@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from scenario_gen.closed_loop.results import Drives
     from scenario_gen.closed_loop.search.command import SearchResult
     from scenario_gen.closed_loop.suite import Suite
-    from scenario_gen.output.review.regenerate import Replanned
+    from scenario_gen.output.review.replan import Replanned
 
 commands = Commands("Test a planner")
 MAX_NAMES_COUNT = 12  # of changed scenarios, on the terminal
@@ -278,7 +278,7 @@ def drawn_from(options: Search) -> "Replanned":
     """
     from scenario_gen.cli.folder import FolderRequest, generate_folder
     from scenario_gen.output.results import BAG
-    from scenario_gen.output.review.regenerate import replanned
+    from scenario_gen.output.review.replan import replanned
     from scenario_gen.pipeline import PipelineConfig
 
     if not options.road:

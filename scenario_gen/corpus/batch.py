@@ -15,21 +15,18 @@ import json
 from pathlib import Path
 from typing import Any
 
-from scenario_gen.base.documents import read_json
 from scenario_gen.base.errors import InputError, needs, RefusedError
-from scenario_gen.base.provenance import parameter_texts, read_parameters
+from scenario_gen.base.provenance import parameter_texts
 from scenario_gen.corpus.encounters import encounter_of, tables_of, write_encounters
 from scenario_gen.corpus.parts import (
     BatchRequest,
     generate_part,
     part_tasks,
-    PartTask,
     STEP_COUNT,
 )
 from scenario_gen.corpus.store import finished_parts, finished_tables, MANIFEST, write_json
 from scenario_gen.corpus.tables import rows_at, rows_of
 from scenario_gen.corpus.tasks import agree, check_out, held, spread, Workers
-from scenario_gen.method.config import PipelineConfig
 from scenario_gen.roads import build_road
 
 BAGS = ("none", "hits", "all")
@@ -170,18 +167,6 @@ def _grow(out: Path, roads: Sequence[str], request: BatchRequest) -> dict[str, A
     if grown != manifest:
         write_json(out / MANIFEST, grown)
     return grown
-
-
-def tasks_of(out: Path) -> list[PartTask]:
-    """Return all tasks of a batch, as its manifest describes them.
-
-    Raises:
-        InputError: the manifest is missing or damaged, or of another release.
-    """
-    manifest = read_json(out / MANIFEST, SCHEMA, f"{out / MANIFEST} of another release")
-    config = read_parameters(PipelineConfig(), manifest["parameters"], "", str(out / MANIFEST))
-    request = BatchRequest(config, seed=manifest["seed"])
-    return part_tasks(out, manifest["roads"], manifest["counts"], request)
 
 
 def _rows(tables: Sequence[Path]) -> list[tuple[Row, tuple[Any, ...]]]:

@@ -3,30 +3,23 @@
 
 """`find`: scenarios from a batch, or encounters from a corpus, that meet a condition in SQL.
 
-The scenarios are copied from the batch's bags, or generated again.
+The scenarios are copied from the batch's bags.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager, nullcontext
+from contextlib import contextmanager
 from dataclasses import dataclass
-from functools import cache, partial
 from itertools import product
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
-from scenario_gen.bags.recordings.write import add_message, add_results
+from scenario_gen.bags.recordings.write import add_message
 from scenario_gen.bags.storage.bag import BagMessage
-from scenario_gen.bags.storage.writer import atomic_bag, BagWriter
-from scenario_gen.base.copies import temp_folder
-from scenario_gen.base.errors import InputError, ScenarioGenError
-from scenario_gen.base.folders import scratch
-from scenario_gen.corpus.batch import tasks_of
+from scenario_gen.bags.storage.writer import atomic_bag
+from scenario_gen.base.errors import InputError
 from scenario_gen.corpus.conditions import matching, MAX_SECONDS_S, NAMES
-from scenario_gen.corpus.parts import part_result, PartTask
 from scenario_gen.corpus.store import finished_tables, parts_of
-from scenario_gen.output.review.regenerate import recorded_scenarios
+from scenario_gen.output.review.replan import recorded_scenarios
 
 COLUMNS = (
     "template", "kind", "road", "vehicles", "index", "type", "seconds", "distance", "ttc", "pet",
@@ -37,8 +30,6 @@ RECORDED = (
     "name AS template, source AS recording, kind, 'recorded' AS road, count AS vehicles,"
     " NULL AS index, NULL AS type, seconds, distance, ttc, pet, speed, NULL AS braking, gap"
 )
-FIGURES = ("seconds", "distance", "ttc", "pet", "speed", "braking")
-TOLERANCE_RATIO = 0.01  # of figures on another processor, whose last digits may differ
 PET_BOUNDS_S = (0.0, 1.0, 2.0, 4.0)  # bounds of the PET classes in the coverage table
 PET_CLASSES = (*(f"< {bound:g} s" for bound in PET_BOUNDS_S), "more", "none")
 PET_CLASS_SQL = (
@@ -46,9 +37,6 @@ PET_CLASS_SQL = (
     + " ".join(f"WHEN pet < {bound:g} THEN '< {bound:g} s'" for bound in PET_BOUNDS_S)
     + " ELSE 'more' END"
 )
-
-Copy = tuple[tuple[BagMessage, ...], str]
-"""The messages of a scenario, and its SHA-256."""
 
 
 @dataclass(frozen=True)
@@ -142,104 +130,47 @@ def coverage_lines(hits: Hits, batch: Path) -> list[str]:
     return lines
 
 
-def export_hits(
-    batch: Path, rows: Sequence[Mapping[str, Any]], folder: Path | None, *, again: bool = False
-) -> int:
-    """Write the scenarios of rows to a bag; return how many have the bytes of the batch.
-
-    Each scenario has a namespace with its template and road.
+def export_hits(batch: Path, rows: Sequence[Mapping[str, Any]], folder: Path) -> None:
+    """Write the scenarios of rows to a bag, each in a namespace with its template and road.
 
     Args:
-        batch: written by `run_batch`.
+        batch: written by `run_batch`, with bags.
         rows: from `find`.
-        folder: of the bag; None: only compare.
-        again: also generate scenarios again that the batch has in bags.
+        folder: of the bag.
 
     Raises:
-        InputError: there are no rows, a bag is missing or damaged, or `folder` is not a bag.
-        ScenarioGenError: a scenario differs from the one in the table.
+        InputError: there are no rows, a scenario is in no bag, or `folder` is not a bag.
     """
     if not rows:
         raise InputError("no scenario matches; nothing exported; use a wider condition")
-    identical = 0
-    with nullcontext() if folder is None else atomic_bag(folder) as bag:
-        for k, messages, sha256 in _messages(batch, rows, again):
-            identical += sha256 == rows[k]["sha256"]
-            if bag is not None:
-                _copy(bag, f"/hit_{k + 1}", rows[k]["namespace"], messages)
-    return identical
-
-
-def _copy(bag: BagWriter, name: str, namespace: str, messages: Sequence[BagMessage]) -> None:
-    """Write messages of a namespace under another name."""
-    for message in messages:
-        topic = message.topic.removeprefix(namespace)
-        add_message(bag, f"{name}{topic}", message.data, message.stamp_ns)
+    with atomic_bag(folder) as bag:
+        for k, messages in _messages(batch, rows):
+            for message in messages:
+                topic = message.topic.removeprefix(rows[k]["namespace"])
+                add_message(bag, f"/hit_{k + 1}{topic}", message.data, message.stamp_ns)
 
 
 def _messages(
-    batch: Path, rows: Sequence[Mapping[str, Any]], again: bool
-) -> Iterator[tuple[int, tuple[BagMessage, ...], str]]:
-    """Yield number, messages and SHA-256 of each row's scenario.
-
-    Each bag is read once, and each set is generated once.
-    """
+    batch: Path, rows: Sequence[Mapping[str, Any]]
+) -> Iterator[tuple[int, tuple[BagMessage, ...]]]:
+    """Yield number and messages of each row's scenario; each bag is read once."""
     by_part: dict[tuple[str, int], list[int]] = {}
     for k, row in enumerate(rows):
         if row["index"] is None:
             raise InputError(
                 f"{batch} holds recordings; to get a bag, generate scenarios with"
-                f" `scenario-gen batch {batch} --roads …`"
+                f" `scenario-gen batch {batch} --roads … --bags all`"
             )
         by_part.setdefault((row["road"], row["part"]), []).append(k)
-    tasks = cache(partial(_numbered_tasks, batch))
     for (road, part), numbers in by_part.items():
-        hits = [rows[k] for k in numbers]
         bag = batch / "bags" / f"road={road}" / f"part-{part:05}"
-        scenarios = [] if again else _copied(bag, hits)
-        scenarios = scenarios or _made_again(tasks()[road, part], hits)
-        for k, (messages, sha256) in zip(numbers, scenarios, strict=True):
-            yield k, messages, sha256
-
-
-def _numbered_tasks(batch: Path) -> dict[tuple[str, int], PartTask]:
-    return {(task.token, task.number): task for task in tasks_of(batch)}
-
-
-def _copied(bag: Path, rows: Sequence[Mapping[str, Any]]) -> list[Copy]:
-    """Return the scenarios of rows from a bag; none if it lacks one of them."""
-    try:
-        copies = _scenarios_in(bag, rows)
-    except InputError:
-        return []
-    same = [sha256 for _, sha256 in copies] == [row["sha256"] for row in rows]
-    return copies if same else []
-
-
-def _scenarios_in(bag: Path, rows: Sequence[Mapping[str, Any]]) -> list[Copy]:
-    return list(recorded_scenarios(bag, [(row["namespace"], row["index"]) for row in rows]))
-
-
-def _made_again(task: PartTask, rows: Sequence[Mapping[str, Any]]) -> list[Copy]:
-    """Return the scenarios of rows, generated again.
-
-    Raises:
-        ScenarioGenError: a scenario is missing, or its figures differ from the ones in the table.
-    """
-    part = part_result(task, {row["template"] for row in rows})
-    made = {(row["namespace"], row["index"]): row for row, _ in part.scenarios}
-    for row in rows:
-        scenario = made.get((row["namespace"], row["index"]), {})
-        figures, expected = ([each.get(n) or np.nan for n in FIGURES] for each in (scenario, row))
-        if not np.allclose(figures, expected, atol=TOLERANCE_RATIO, equal_nan=True):
-            raise _differs(task.name, row)
-    with scratch(temp_folder()) as folder:
-        with BagWriter(folder / "bag") as bag:
-            add_results(bag, part.results)
-        return _scenarios_in(folder / "bag", rows)
-
-
-def _differs(source: object, row: Mapping[str, Any]) -> ScenarioGenError:
-    return ScenarioGenError(
-        f"{source}: scenario {row['index']} of {row['namespace']} differs from that in the table"
-    )
+        if not bag.exists():
+            raise InputError(
+                f"{bag} does not exist; write bags with `scenario-gen batch … --bags all`, or "
+                "--hits with this condition"
+            )
+        wanted = [(rows[k]["namespace"], rows[k]["index"]) for k in numbers]
+        for k, (messages, sha256) in zip(numbers, recorded_scenarios(bag, wanted), strict=True):
+            if sha256 != rows[k]["sha256"]:
+                raise InputError(f"{bag}: scenario {rows[k]['index']} differs from the table")
+            yield k, messages

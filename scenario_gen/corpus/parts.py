@@ -6,7 +6,7 @@
 A template has one set, or one for each outcome of its decision (`sampling.decisions=drawn`).
 """
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from datetime import datetime, UTC
 from functools import partial
@@ -178,13 +178,11 @@ class PartResult:
     results: dict[str, GenerationResult]
 
 
-def part_result(task: PartTask, templates: Collection[str] = ()) -> PartResult:
-    """Generate the scenarios of a part, or those of some templates by name."""
+def _part_result(task: PartTask) -> PartResult:
+    """Generate the scenarios of a part."""
     part = PartResult([], [], {})
     table = task.out / "templates" / task.table
     for k, row in enumerate(rows_at(table, range(task.first, task.last))):
-        if templates and row["name"] not in templates:
-            continue
         for case, result in _generate_cases(row, table, f"/case_{k}", task):
             part.cases.append(case)
             if result is not None and len(result):
@@ -199,7 +197,7 @@ def generate_part(task: PartTask) -> None:
     Raises:
         OSError: the disk is full or fails.
     """
-    part = part_result(task)
+    part = _part_result(task)
     kinds = {row["kind"] for row, _ in part.scenarios}
     for kind in sorted(kinds):
         scenarios = [(row, scenario) for row, scenario in part.scenarios if row["kind"] == kind]

@@ -65,7 +65,7 @@ def write_results(
                 replace(case, provenance={**provenance, **case.provenance}) for case in cases
             ]
             add_results(bag, dict(zip(names, results, strict=True)))
-    write_report(folder / REPORT, ReportInput(cases, title, quality, provenance, BAG))
+    write_report(folder / REPORT, ReportInput(cases, title, quality, provenance))
     figures = {"provenance": dict(provenance), "cases": [_figures(case) for case in cases]}
     write_text(folder / FIGURES, json.dumps(figures, indent=2) + "\n")
 
@@ -110,7 +110,7 @@ def write_evaluation(
     ).provenance
     write_report(
         folder / REPORT,
-        ReportInput(cases, f"The scenarios of {bag.name}", provenance=facts, bag=bag.name),
+        ReportInput(cases, f"The scenarios of {bag.name}", provenance=facts),
     )
 
 

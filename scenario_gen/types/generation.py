@@ -110,9 +110,7 @@ class GenerationResult:
         return self.generated[k]
 
     def __add__(self, other: "GenerationResult") -> "GenerationResult":
-        """Return the scenarios of both, all in memory; figures of whole sets are left out.
-
-        The scenarios are numbered again from 0, so `regenerate` cannot make them.
+        """Return the scenarios of both, numbered from 0; figures of whole sets are left out.
 
         Raises:
             InputError: encounter or road differ.

@@ -41,7 +41,7 @@ def test_what_only_looks_like_an_earlier_result_is_none(run, made, tmp_path):
     bag = tmp_path / "generated_bag"
     shutil.copytree(made / "bag", bag)
     before = files(bag)
-    code, said = run("regenerate", made / "bag", 0, "--out", bag)
+    code, said = run("export", made / "bag", "--to", "commonroad", "--out", bag)
     assert code == 2 and "is not an earlier result" in said and files(bag) == before
     (tmp_path / "page").mkdir()
     (tmp_path / "page" / "report.html").write_text("a report of mine")
@@ -70,8 +70,6 @@ def test_inputs_stay(run, made, tmp_path):
             "--out",
             "o2",
         ),
-        ("regenerate", bag, 0, "--out", bag),
-        ("regenerate", bag, 0, "--out", "o2"),
         ("evaluate", bag, "--out", "o2"),
         ("evaluate", bag, "--out", bag),
         ("reindex", bag, "--out", bag),

@@ -75,7 +75,6 @@ MISTAKES = [  # words of the command line, and what the message says: what is wr
         ("drive", "made/bag", "--planner", PLANNER.replace("Follower", "Folower")),
         "did you mean IdmFollower?",
     ),
-    (("regenerate", "made/bag", "99"), "no scenario 99; it has: "),
     # what is missing
     (("generate",), "Missing argument 'log' (The recording: "),
     (("generate", "my log ü.csv"), "Missing option '--road' (straight, curve, "),
@@ -94,11 +93,9 @@ MISTAKES = [  # words of the command line, and what the message says: what is wr
     ((*GENERATE, "--set", "road=1"), "road"),
     ((*GENERATE, "--params", "none.yaml"), "none.yaml"),
     ((*GENERATE, "--goal", "5: 0 0 0"), "goals: no vehicle '5'"),
-    (("regenerate", "none", "0"), "none does not exist"),
     ((*GENERATE, "--start", "a 0 0 0"), "is not of the form `id: x y yaw [speed]`"),
     ((*GENERATE, "--target", "pet=2..1"), "the lower bound must be below the upper one"),
     ((*GENERATE, "--obstacle", "1 2"), "is not of the form `x y yaw length width`"),
-    (("regenerate", "made/bag", "-1"), "No such option: -1"),
     # files that are read
     (
         ("generate", "my log u.csv", *ROAD),
@@ -122,7 +119,6 @@ MISTAKES = [  # words of the command line, and what the message says: what is wr
         for name, *more in (
             ("validate",),
             ("evaluate",),
-            ("regenerate", "0"),
             ("reindex",),
             ("generate", *ROAD),
         )

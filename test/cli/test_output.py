@@ -38,7 +38,6 @@ def one_object(text):
     [
         (("validate", "{bag}"), "valid", True),
         (("evaluate", "{bag}", "--set", "evaluation.resamples=20"), "folder", None),
-        (("regenerate", "{bag}", "0"), "index", 0),
         (("export", "{bag}", "--to", "commonroad", "--out", "written"), "scenarios", 2),
         (("reindex", "{bag}", "--out", "saved"), "bag", "saved"),
         (("report", "{bag}"), "opened", False),

@@ -7,7 +7,6 @@ from dataclasses import replace
 from io import StringIO
 
 import numpy as np
-import pandas as pd
 import pytest
 from rich.console import Console
 from support.textbook_motions import labelled
@@ -19,8 +18,6 @@ from scenario_gen.closed_loop.trials import run_trials, trials_of
 from scenario_gen.method.decisions import goes_first_probability, offered_lags
 from scenario_gen.method.outcome_sets import drawn_sizes, requested_decisions
 from scenario_gen.output.report.summary import summary
-from scenario_gen.output.results import provenance_of
-from scenario_gen.output.review.regenerate import regenerate_scenario
 from scenario_gen.output.review.validation import validate_bag
 from scenario_gen.situation import conflict_of, Situation
 from scenario_gen.types import Decided, NoteKind, Outcome, Request, YIELD
@@ -172,7 +169,6 @@ def test_a_bag_keeps_outcome_and_probability(sets, tmp_path):
     assert [s.facts.decision for s in read] == [s.facts.decision for s in result]
     (validation,) = validate_bag(tmp_path / "bag")
     assert validation.invalid == 0 and set(validation.proven.values()) == {len(result)}
-    assert regenerate_scenario(tmp_path / "bag", result[0].index).scenario is not None
 
 
 def test_the_summary_states_the_mix(sets):
@@ -211,28 +207,3 @@ def test_drives_are_counted_by_outcome(sets):
     assert f"stops: {passed} of {len(sets[0])}" in note and "weighted" in note
     documents = [drive["decision"] for drive in drives.document()["drives"]]
     assert documents == [trial.scenario.facts.decision.document() for trial in trials]
-
-
-def test_an_outcome_is_regenerated_from_the_raw_log(tmp_path):
-    encounter = recorded()
-    rows = [
-        (vehicle.id, time, *position, speed)
-        for n, vehicle in enumerate(encounter.vehicles)
-        for time, position, speed in zip(
-            encounter.time, encounter.position[n].tolist(), encounter.speed[n], strict=True
-        )
-    ]
-    log = tmp_path / "crossing.csv"
-    columns = ["vehicle_id", "t_s", "x_m", "y_m", "speed_mps"]
-    pd.DataFrame(rows, columns=columns).to_csv(log, index=False)
-    (read,) = sg.read_log(log).encounters
-    (first,) = (
-        decision
-        for decision in sg.decisions_of(read).possible
-        if decision.outcome is Outcome.GOES_FIRST
-    )
-    made = sg.generate(sg.decided(read, first), "corridor", DRAWN, count=1, seed=4)
-    provenance = provenance_of([log], 4, 1, ["corridor"], DRAWN)
-    replace(made, provenance=provenance).save(tmp_path / "bag")
-    again = regenerate_scenario(tmp_path / "bag", made[0].index, log=log)
-    assert again.scenario is not None

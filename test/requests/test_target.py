@@ -17,7 +17,6 @@ from scenario_gen.method.evaluation.measures import figures_of, measure, most_cr
 from scenario_gen.method.sampling import SamplingConfig
 from scenario_gen.method.sampling.importance_sampling import TargetError
 from scenario_gen.output.results import provenance_of
-from scenario_gen.output.review.regenerate import regenerate_scenario
 from scenario_gen.output.review.validation import validate_bag
 from scenario_gen.pipeline import generate
 from scenario_gen.types import Facts, join_ego, OrderChange
@@ -78,15 +77,12 @@ def test_a_range_that_cannot_be_had_is_refused_with_what_can(chain):
 @pytest.mark.parametrize(
     "request_", [Request(target=f"pet={LOW}..{HIGH}", ego="1"), Request(order="free")], ids=str
 )
-def test_each_comes_again_bit_for_bit_and_is_valid(chain, request_, tmp_path):
+def test_each_in_a_bag_is_valid(chain, request_, tmp_path):
     config = PipelineConfig()
     config = replace(config, evaluation=replace(config.evaluation, resamples=10))
     made = generate(chain.encounter, chain.road, config, count=3, seed=7, request=request_)
     made = replace(made, provenance=provenance_of([], 7, 3, ["t_intersection"], config, request_))
     bag = write_recording(tmp_path / "bag", made)
-    for scenario in made.generated.scenarios:
-        again = regenerate_scenario(bag, scenario.index).scenario
-        np.testing.assert_allclose(again.position, scenario.position, atol=1e-6)
     (found,) = validate_bag(bag)
     assert found.scenarios == 3 and not found.invalid
     if request_.target:

@@ -42,7 +42,6 @@ from scenario_gen.method.evaluation import (
 )
 from scenario_gen.output.results import provenance_of
 from scenario_gen.output.review.evaluation import bag_results
-from scenario_gen.output.review.regenerate import regenerate_scenario
 from scenario_gen.output.review.validation import validate_bag
 from scenario_gen.pipeline import generate, PipelineConfig
 from scenario_gen.roads import build_road
@@ -403,9 +402,6 @@ TARGETS = (
         "validate", runs, in_file("a.mcap", validate_bag), BAG, ("validate/*", "mcap_reader/*")
     ),
     Target("evaluate", runs, in_file("a.mcap", measure), BAG),
-    Target(
-        "regenerate", generated, in_file("a.mcap", lambda path: regenerate_scenario(path, 1)), BAG
-    ),
     Target(
         "metadata",
         metadata,

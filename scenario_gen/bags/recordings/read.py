@@ -3,7 +3,7 @@
 
 """Reads recordings: template, road, scenarios and requests of each namespace of a bag.
 
-This is the only reader of the conventions' topics: evaluation, validation and regeneration use it.
+This is the only reader of the conventions' topics: evaluation, validation and search use it.
 Messages are decoded when they are needed.
 """
 
@@ -261,12 +261,6 @@ class Namespace(RecordedScenarios):
             if inputs == (entry.map_hash, entry.template_hash):
                 hashes = named
         return hashes
-
-    def published(self, entry: ScenarioEntry) -> tuple[bytes, bytes]:
-        """Return the bytes of a scenario and of its witness; empty if missing."""
-        pairs = zip(self.messages.get(SCENARIOS, ()), self.hashes, strict=True)
-        data = next((message.data for message, sha256 in pairs if sha256 == entry.sha256), b"")
-        return data, self.witnesses[entry.witness].data if entry.witness else b""
 
     def messages_of(
         self, info: BagMessage, entry: ScenarioEntry, summary: RequestSummary

@@ -6,8 +6,6 @@
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 
-import numpy as np
-
 from msg_conventions.changepoints import encode_changepoints, encode_posterior, segmentation_status
 from msg_conventions.diagnostics import encode_diagnostics
 from msg_conventions.ego import ego_messages
@@ -20,7 +18,7 @@ from msg_conventions.pictures import road_markers, scenario_markers
 from msg_conventions.request_messages import footprint_messages, RequestMessages
 from msg_conventions.roads import encode_map, encode_poses
 from msg_conventions.scenario_info import encode_info, INFO, request_summary, source_values
-from msg_conventions.scenarios import decode_scenario, digest, encode_scenario
+from msg_conventions.scenarios import digest, encode_scenario
 from msg_conventions.topics import topic_entry, vehicle_topic
 from msg_conventions.tracks import encode_tracks
 from scenario_gen.bags.storage.metadata import qos_yaml
@@ -135,32 +133,3 @@ def scenario_bytes(scenario: Scenario, encounter: Encounter) -> tuple[bytes, str
     """Return the CDR bytes of a scenario of that template, and their SHA-256."""
     data = encode_scenario(scenario, encounter.start_ns)
     return data, digest(data)
-
-
-def distance_apart(scenario: Scenario, encounter: Encounter, recorded: bytes) -> float | None:
-    """Return the largest distance [m] of a scenario from the recorded one.
-
-    Args:
-        scenario: generated again.
-        encounter: its template.
-        recorded: CDR bytes.
-
-    Returns:
-        None for the same bytes, inf for another scenario.
-    """
-    data, _ = scenario_bytes(scenario, encounter)
-    if data == recorded:
-        return None
-    made, other = (decode_scenario(each)[1] for each in (data, recorded))
-    if (
-        made.vehicles != other.vehicles
-        or not np.array_equal(made.time, other.time)
-        or (made.present != other.present).any()
-    ):
-        return float("inf")
-    return float(np.abs(made.position - other.position).max())
-
-
-def same_tracks(first: Encounter, second: Encounter) -> bool:
-    """Return whether two encounters are the same message."""
-    return encode_tracks(first) == encode_tracks(second)

@@ -5,7 +5,7 @@
 
 from scenario_gen.method.sampling.build_model import kept_reactions
 from scenario_gen.method.sampling.config import SamplingConfig
-from scenario_gen.method.sampling.draw import draw_scenarios, regenerate
+from scenario_gen.method.sampling.draw import draw_scenarios
 from scenario_gen.method.sampling.gp import Features, Observations, Posterior, Regression
 from scenario_gen.method.sampling.importance_sampling import directions, TargetError
 from scenario_gen.method.sampling.natural import NaturalScenarios
@@ -29,7 +29,6 @@ __all__ = [
     "directions",
     "draw_scenarios",
     "kept_reactions",
-    "regenerate",
     "relaxed_states",
     "sample_scenarios",
 ]

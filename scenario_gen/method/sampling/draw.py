@@ -3,16 +3,14 @@
 
 """Draw candidates, filter them, and keep valid ones: candidates → valid → kept."""
 
-from array import array
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 import itertools
-from typing import Any
 
 import numpy as np
 
-from scenario_gen.base.errors import InputError, RefusedError
+from scenario_gen.base.errors import RefusedError
 from scenario_gen.method.sampling.build_model import build_model
 from scenario_gen.method.sampling.candidates import CandidateModel
 from scenario_gen.method.sampling.config import SamplingConfig
@@ -37,8 +35,6 @@ from scenario_gen.method.sampling.sampler import (
     DIRECTED_SLOT,
     Label,
     LEVELS,
-    place_of,
-    RedrawnScenarios,
     Sampler,
 )
 from scenario_gen.situation import Conflict, conflict_of, Situation
@@ -59,7 +55,6 @@ from scenario_gen.types import (
     token,
 )
 
-MAX_STORED_SCENARIOS = 1000  # a larger set keeps indices only
 _MIN_COUNT_FACTOR = 20  # scenarios for which to draw, where clocks vary: levels need candidates
 _DIRECTED_BUDGET_FACTOR = 10  # of a request with a target
 _HOPELESS_CANDIDATES = 20 * BLOCK_CANDIDATES  # of a proposal without any hit
@@ -94,8 +89,7 @@ def draw_scenarios(
 
     Returns:
         At most `count` scenarios; fewer if the budget did not suffice, which the account
-        (`refused`) explains. A set of more than MAX_STORED_SCENARIOS keeps indices only, so its
-        memory hardly grows with its size.
+        (`refused`) explains.
 
     Raises:
         InputError: routes, segmentation and encounter disagree, or the ego does not exist.
@@ -122,7 +116,7 @@ def draw_scenarios(
         reached = run.draw(config.attempts * filters.rarity.valid_per_kept)
         notes = (*built.notes, *filters.notes(), *run.notes)
         drawn = ScenarioSet(
-            count, run.scenarios(), run.candidates, run.refused, notes, slot, reached, kept
+            count, tuple(run.scenarios), run.candidates, run.refused, notes, slot, reached, kept
         )
     if request.moves and not callbacks.cancelled():
         _refuse_empty(drawn)
@@ -138,37 +132,6 @@ def _refuse_empty(drawn: ScenarioSet) -> None:
             f"none of {drawn.candidates} candidate(s) with the requested states is valid "
             f"({reasons})"
         )
-
-
-def regenerate(
-    plan: Plan,
-    config: SamplingConfig = SamplingConfig(),
-    *,
-    seed: int,
-    index: int,
-    request: Request = Request(),
-    check: Check | None = None,
-    measures: Measures | None = None,
-) -> Scenario | None:
-    """Return the scenario with this seed and index, to rounding, without the others.
-
-    The arguments are those of `draw_scenarios`. A scenario of a proposal needs `check` and
-    `measures`, with which the proposal is found again.
-
-    Raises:
-        InputError: no candidate has this index, or the target is not known.
-    """
-    built = build_model(plan, config, request.order)
-    if built.model is None:
-        return None
-    target = TargetSet.of(plan.situation, request, measures)
-    sampler = _sampler(built.model, plan, request, seed, target, measures)
-    if place_of(index)[0] == DIRECTED_SLOT:
-        if target is None or check is None:
-            raise InputError(f"index {index} is from a proposal, but no target was requested")
-        validity = ValidityFilter.of(sampler, check, enough_share(config, request))
-        sampler = find_proposal(sampler, validity, target, lambda: False).sampler
-    return sampler.scenario(index)
 
 
 def _sampler(
@@ -221,8 +184,7 @@ class _Run:
         callbacks: of the caller.
         sampler: draws the candidates.
         on_valid: called with each scenario of the set.
-        index: of all scenarios of the set.
-        stored: the first MAX_STORED_SCENARIOS of them.
+        scenarios: of the set.
         refused: number of refused candidates by cause.
         candidates: number of candidates.
         notes: on what was adapted.
@@ -233,8 +195,7 @@ class _Run:
     callbacks: Callbacks
     sampler: Sampler
     on_valid: Callable[[Scenario], None]
-    index: Any = field(default_factory=lambda: array("q"))
-    stored: list[Scenario] = field(default_factory=list)
+    scenarios: list[Scenario] = field(default_factory=list)
     refused: Counter[Cause] = field(default_factory=Counter)
     candidates: int = 0
     notes: list[Note] = field(default_factory=list)
@@ -255,12 +216,6 @@ class _Run:
             return None
         budget = _DIRECTED_BUDGET_FACTOR * attempts * self.count
         return self._draw_directed(self.filters.target, budget)
-
-    def scenarios(self) -> Sequence[Scenario]:
-        """Return the set; a large one is redrawn at each access."""
-        if len(self.index) <= MAX_STORED_SCENARIOS:
-            return tuple(self.stored)
-        return RedrawnScenarios(self.sampler, np.array(self.index, dtype=np.int64))
 
     def _draw_levels(self, budget: int) -> None:
         """Judge the levels by pilots, then stay with the first one that is enough, or the best."""
@@ -288,7 +243,9 @@ class _Run:
                 self._consume(judged, min(BLOCK_CANDIDATES, budget - self.candidates))
         reached = None
         if self.candidates:
-            weights = np.array([self.sampler.weight(index) for index in self.index])
+            weights = np.array(
+                [self.sampler.weight(scenario.index) for scenario in self.scenarios]
+            )
             share, low, high = estimated_share(weights, self.candidates)
             directed = self.sampler.proposal is not None
             reached = Reached(
@@ -297,15 +254,15 @@ class _Run:
             self.notes.append(reached.note())
             if self.sampler.base:
                 self._note_level(self.sampler.base, 2)
-        if len(self.index) < self.count and not self.callbacks.cancelled():
+        if len(self.scenarios) < self.count and not self.callbacks.cancelled():
             missed = Note.of(
                 NoteKind.TARGET_MISSED,
                 target="; ".join(map(str, target.targets)),
-                found=len(self.index),
+                found=len(self.scenarios),
                 drawn=search.candidates + self.candidates,
                 reachable=search.evaluations.reachable(),
             )
-            if not self.index:
+            if not self.scenarios:
                 raise TargetError(str(missed))
             self.notes.append(missed)
         return reached
@@ -327,7 +284,7 @@ class _Run:
             self.candidates += 1
             self._add(candidate)
             if added % BLOCK_CANDIDATES == 0 or added == most or self._is_complete():
-                self.callbacks.progress(len(self.index), self.count, self.candidates)
+                self.callbacks.progress(len(self.scenarios), self.count, self.candidates)
         return valid / added if added else 0.0
 
     def _add(self, candidate: Candidate) -> None:
@@ -336,19 +293,17 @@ class _Run:
             self.refused[candidate.cause] += 1
         elif candidate.scenario is not None and self.callbacks.accepts(candidate.scenario):
             published = self.sampler.published(candidate.scenario)
-            self.index.append(candidate.index)
-            if len(self.stored) < MAX_STORED_SCENARIOS:
-                self.stored.append(published)
+            self.scenarios.append(published)
             self.on_valid(published)
 
     def _is_complete(self) -> bool:
-        return len(self.index) >= self.count or self.callbacks.cancelled()
+        return len(self.scenarios) >= self.count or self.callbacks.cancelled()
 
     def _is_done(self, budget: int) -> bool:
         return self.candidates >= budget or self._is_complete()
 
     def _is_hopeless(self) -> bool:
-        return not self.index and self.candidates >= _HOPELESS_CANDIDATES
+        return not self.scenarios and self.candidates >= _HOPELESS_CANDIDATES
 
     def _note_level(self, best: int, tried: int) -> None:
         """Note which of the tried levels is used."""

@@ -3,11 +3,11 @@
 
 """Candidates by their index: seed and index determine a candidate."""
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 import hashlib
 import itertools
-from typing import NamedTuple, overload
+from typing import NamedTuple
 
 import numpy as np
 
@@ -15,7 +15,7 @@ from scenario_gen.base.errors import InputError
 from scenario_gen.method.sampling.candidates import CandidateModel
 from scenario_gen.method.sampling.importance_sampling import Proposal
 from scenario_gen.method.sampling.vehicle_model import NoiseScale
-from scenario_gen.numerics import Floats, Ints
+from scenario_gen.numerics import Floats
 from scenario_gen.types import Facts, Scenario, with_witness
 
 Label = Callable[[Scenario], Facts]
@@ -105,18 +105,6 @@ class Sampler:
         for number in itertools.count(first):
             yield self.block(level, number)
 
-    def scenario(self, index: int) -> Scenario | None:
-        """Return the published candidate with this index; None if it has no speed profile.
-
-        It is the same as in a whole set, to rounding.
-        """
-        level, candidate = place_of(index)
-        number, row = divmod(candidate, BLOCK_CANDIDATES)
-        numbers = self.numbers(level, number)[row : row + 1]
-        batch = self.model.draw(numbers, self._scale(level))
-        (whole,) = batch.scenarios(self.seed, [index], self.frame_id)
-        return None if whole is None else self.published(whole)
-
     @property
     def varies(self) -> bool:
         """Whether vehicles have clocks, places, end speeds or sizes that vary."""
@@ -169,32 +157,3 @@ class Sampler:
         generator = np.random.Generator(np.random.PCG64(seed))
         z = generator.standard_normal((BLOCK_CANDIDATES // 2, size))
         return np.stack([z, -z], axis=1).reshape(BLOCK_CANDIDATES, -1)
-
-
-@dataclass(frozen=True, eq=False)
-class RedrawnScenarios(Sequence[Scenario]):
-    """The scenarios of a large set, redrawn at each access: eight bytes of memory for each.
-
-    Attributes:
-        sampler: draws them.
-        indices: (S,) of valid candidates.
-    """
-
-    sampler: Sampler
-    indices: Ints
-
-    def __len__(self) -> int:
-        return len(self.indices)
-
-    @overload
-    def __getitem__(self, at: int) -> Scenario: ...
-
-    @overload
-    def __getitem__(self, at: slice) -> "RedrawnScenarios": ...
-
-    def __getitem__(self, at: int | slice) -> "Scenario | RedrawnScenarios":
-        if isinstance(at, slice):
-            return RedrawnScenarios(self.sampler, self.indices[at])
-        scenario = self.sampler.scenario(int(self.indices[at]))
-        assert scenario is not None
-        return scenario

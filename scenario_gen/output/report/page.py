@@ -7,7 +7,6 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 import math
 from pathlib import Path
-import shlex
 from typing import Any
 
 from scenario_gen.base.folders import write_text
@@ -43,14 +42,12 @@ class ReportInput:
         title: heading and window title.
         quality: the log's data quality, in lines.
         provenance: log, its hash, seed, versions, parameters, by name.
-        bag: path of the bag with the scenarios, for commands on the page; "" if there is none.
     """
 
     cases: Sequence[GenerationResult]
     title: str = "Generated encounters"
     quality: Sequence[str] = ()
     provenance: Mapping[str, str] = field(default_factory=dict)
-    bag: str = ""
 
 
 def write_report(path: Path, report: ReportInput) -> None:
@@ -68,7 +65,6 @@ def render(report: ReportInput) -> str:
         report=report,
         views=views,
         verdict=_verdict(views),
-        bag=shlex.quote(report.bag) if report.bag else "",
         significant=MIN_COMPARED_ERROR_RATIO,
         compared=any(case.references for case in report.cases),
         uncompared=next(

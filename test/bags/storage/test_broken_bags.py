@@ -23,7 +23,6 @@ from scenario_gen.bags.storage.reindex import reindex
 from scenario_gen.bags.storage.writer import BagWriter
 from scenario_gen.base.errors import InputError
 from scenario_gen.output.review.evaluation import bag_results
-from scenario_gen.output.review.regenerate import regenerate_scenario
 from scenario_gen.output.review.validation import UNUSABLE, validate_bag
 
 
@@ -136,7 +135,6 @@ def test_damaged_messages_are_named_or_found(tmp_path, topic, damage):
     elif topic == "/scenarios/info" or damage == "cut":
         assert is_refused(lambda: validate_bag(broken), topic)
     is_refused(lambda: bag_results(broken))
-    assert is_refused(lambda: regenerate_scenario(broken, 0))
 
 
 @pytest.mark.parametrize(

@@ -26,7 +26,7 @@ from scenario_gen.logs.synthetic import bundled
 from scenario_gen.method.decisions import decided, decisions_of
 from scenario_gen.method.evaluation import EvaluationConfig
 from scenario_gen.output.results import provenance_of
-from scenario_gen.output.review.regenerate import replanned
+from scenario_gen.output.review.replan import replanned
 from scenario_gen.output.review.validation import validate_bag
 from scenario_gen.pipeline import generate, PipelineConfig
 from scenario_gen.types import Outcome

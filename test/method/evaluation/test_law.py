@@ -19,7 +19,6 @@ from scenario_gen.method.sampling import (
     checker_of,
     NaturalScenarios,
     Plan,
-    regenerate,
     SamplingConfig,
 )
 from scenario_gen.types import (
@@ -158,13 +157,10 @@ def test_scenarios_say_their_rarity_and_the_others_are_counted(sets):
     assert not wide.refused[Cause.UNUSUAL] and wide[0].facts.rarity is None
 
 
-def test_the_same_seed_gives_the_same_and_an_index_one_alone(sets, encounters):
+def test_the_same_seed_gives_the_same(sets, encounters):
     made = sets[0]
     again = generate(encounters, "corridor", POPULATION, count=5, seed=5)
     assert [one.index for one in again] == [one.index for one in made][:5]
-    plan = Plan.of(again, POPULATION.sampling, POPULATION.limits, Request())
-    alone = regenerate(plan, POPULATION.sampling, seed=5, index=again[4].index)
-    np.testing.assert_allclose(alone.position, made[4].position, atol=1e-9)
 
 
 def test_an_unusual_template_keeps_its_least_rare_ones_and_says_so(encounters):

@@ -12,7 +12,7 @@ from support.sampling_scenes import CLOCK, route, scene_plan, TIME, turn
 from benchmarks._paper_speed_profile import SpeedProfile
 from scenario_gen.base.errors import InputError
 from scenario_gen.base.road_users import Dynamics, TypeLimits
-from scenario_gen.method.sampling import Callbacks, draw_scenarios, regenerate, SamplingConfig
+from scenario_gen.method.sampling import Callbacks, draw_scenarios, SamplingConfig
 from scenario_gen.method.sampling.build_model import build_model
 from scenario_gen.method.sampling.filters import ValidityFilter
 from scenario_gen.method.sampling.sampler import LEVEL_CANDIDATES
@@ -122,7 +122,7 @@ def test_headings_are_smooth(fifty):
         assert turn_rate[:2].max() < 0.2
 
 
-def test_same_seed_same_bytes_and_any_one_again(fifty):
+def test_same_seed_same_bytes(fifty):
     again = drawn()
     more = drawn(count=120)
     for a, b, c in zip(fifty.scenarios, again.scenarios, more.scenarios, strict=False):
@@ -130,10 +130,6 @@ def test_same_seed_same_bytes_and_any_one_again(fifty):
             a.position.tobytes() == b.position.tobytes() and a.speed.tobytes() == b.speed.tobytes()
         )
         np.testing.assert_allclose(c.position, a.position, atol=1e-9)
-    last = more.scenarios[-1]
-    one = regenerate(scene_plan(), PLAIN, seed=5, index=last.index)
-    for name in ("time", "position", "heading", "speed", "acceleration"):
-        np.testing.assert_allclose(getattr(one, name), getattr(last, name), atol=1e-9)
     assert (
         drawn(count=1, seed=6).scenarios[0].position.tobytes()
         != fifty.scenarios[0].position.tobytes()
@@ -240,9 +236,6 @@ def test_refusals_are_counted_by_cause_and_levels_are_tried():
     assert set(found.refused) == {Cause.OFF_ROAD}
     assert NoteKind.LESS_VARIATION in {note.kind for note in found.adaptations}
     assert max(s.index for s in found.scenarios) >= LEVEL_CANDIDATES
-    last = found.scenarios[-1]
-    again = regenerate(scene_plan(), PLAIN, seed=5, index=last.index)
-    np.testing.assert_allclose(again.position, last.position, atol=1e-9)
 
 
 def test_short_set_is_returned_with_its_account():

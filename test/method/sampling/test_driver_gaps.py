@@ -10,15 +10,13 @@ import pytest
 from support.reaction_scenes import answering, crossing, lane_encounter, wander
 
 from scenario_gen.method.chain import Chain
-from scenario_gen.method.evaluation.measures import figures_of
-from scenario_gen.method.sampling import Plan, regenerate, SamplingConfig
+from scenario_gen.method.sampling import SamplingConfig
 from scenario_gen.method.sampling.driver_gaps import DriverGap
 from scenario_gen.method.segmentation import segment
 from scenario_gen.method.validity import allowed_gap
 from scenario_gen.pipeline import PipelineConfig
 from scenario_gen.roads import build_road
 from scenario_gen.situation import conflict_of, lane_gaps, passing, Situation, time_gaps
-from scenario_gen.types import Request
 
 LEADER = wander(np.random.default_rng(3), 200)
 LANE = lane_encounter(LEADER, answering(LEADER, 1.2, 0.9))
@@ -83,14 +81,3 @@ def test_other_drivers_keep_other_headways():
     recorded, other = headways(), headways(headway_sigma=0.3)
     assert other.std() > 1.5 * recorded.std()
     assert np.median(other) == pytest.approx(np.median(recorded), rel=0.1)
-
-
-def test_a_scenario_of_another_driver_is_found_again_by_its_index():
-    drawn = chain(CROSSING, gap_sigma=1.0, strength_sigma=0.4)
-    planned = drawn.plan()
-    scenario = drawn.sample(planned).generated.scenarios[7]
-    config = drawn.config
-    plan = Plan.of(planned, config.sampling, config.limits, Request(), None, drawn.situation)
-    again = regenerate(plan, config.sampling, seed=1, index=scenario.index)
-    assert again.position == pytest.approx(scenario.position, abs=1e-9)
-    assert figures_of(again)[0].pet == pytest.approx(figures_of(scenario)[0].pet)

@@ -13,7 +13,7 @@ from support.textbook_motions import labelled
 from benchmarks._interaction_measures import following, yielding
 from scenario_gen.method.chain import Chain
 from scenario_gen.method.evaluation.measures import figures_of
-from scenario_gen.method.sampling import kept_reactions, Plan, regenerate, SamplingConfig
+from scenario_gen.method.sampling import kept_reactions, Plan, SamplingConfig
 from scenario_gen.method.sampling.build_model import build_model
 from scenario_gen.method.sampling.reaction_transform import advance, lateness, ReactionTransform
 from scenario_gen.method.sampling.vehicle_model import NoiseScale
@@ -22,7 +22,6 @@ from scenario_gen.pipeline import PipelineConfig
 from scenario_gen.roads import build_road
 from scenario_gen.situation import Situation
 from scenario_gen.types import FOLLOW
-from scenario_gen.types.request import Request
 
 LANE = lane_encounter(LEADER := wander(np.random.default_rng(3), 200), answering(LEADER, 1.2, 0.9))
 CROSSING = crossing(8.0)
@@ -167,15 +166,6 @@ def test_who_gives_way_is_slow_when_the_other_one_passes():
         )
     assert np.std(lost[0]) < 0.6 * np.std(lost[1])
     assert min(lost[0]) > 4.0 > min(lost[1])
-
-
-def test_a_scenario_comes_again_by_its_index(case):
-    _, _, made, _ = case
-    for scenario in made.generated.scenarios[3:6]:
-        plan = Plan.of(made, CONFIG.sampling, CONFIG.limits, Request())
-        again = regenerate(plan, CONFIG.sampling, seed=1, index=scenario.index)
-        np.testing.assert_allclose(again.position, scenario.position, atol=1e-9)
-        np.testing.assert_allclose(again.speed, scenario.speed, atol=1e-9)
 
 
 def test_nobody_is_made_to_wait_where_another_order_is_asked_for():

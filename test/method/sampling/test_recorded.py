@@ -11,7 +11,7 @@ import pytest
 from scenario_gen.logs import read_log
 from scenario_gen.method.fitting import fit_template
 from scenario_gen.method.routing import plan_routes
-from scenario_gen.method.sampling import draw_scenarios, Plan, regenerate, SamplingConfig
+from scenario_gen.method.sampling import draw_scenarios, Plan, SamplingConfig
 from scenario_gen.method.segmentation import segment
 from scenario_gen.method.validity import Checker
 from scenario_gen.roads import build_road
@@ -70,6 +70,3 @@ def test_recorded_encounter(data, case, ablation):
             assert (s.speed[wait.vehicle] < WAIT_SPEED_MPS).sum() * 0.1 > 0.7 * (
                 wait.end - wait.start
             )
-    again = regenerate(plan, config, seed=2, index=found.scenarios[-1].index)
-    np.testing.assert_allclose(again.position, found.scenarios[-1].position, atol=1e-9)
-    np.testing.assert_allclose(again.speed, found.scenarios[-1].speed, atol=1e-9)

@@ -59,7 +59,6 @@ class Player {
     this.find("next").addEventListener("click", () => this.step(1));
     this.find("stage").addEventListener("click", () => this.toggle());
     ["csv", "png"].forEach((kind) => this.find(kind).addEventListener("click", () => this.save(kind)));
-    if (this.find("copy")) this.find("copy").addEventListener("click", (event) => this.copy(event.currentTarget));
     this.readouts = data.vehicles.map((vehicle, n) => {
       const value = document.createElement("b");
       this.find("readout").append(chipLine(vehicle, n, value));
@@ -121,19 +120,6 @@ class Player {
       }
     });
     download(name, new Blob([`${rows.join("\n")}\n`], { type: "text/csv" }));
-  }
-
-  /** Copy the command that makes the shown scenario again, as a bag. */
-  copy(button) {
-    const index = this.set.index[this.sample];
-    const area = document.createElement("textarea");
-    area.value = `${button.dataset.command} ${index} --out scenario_${index}`;
-    document.body.append(area);
-    area.select();
-    document.execCommand("copy"); // navigator.clipboard is not there in a page of a file
-    area.remove();
-    button.focus();
-    this.find("said").textContent = `copied: ${area.value}`;
   }
 
   step(by) {
