@@ -44,7 +44,7 @@ ros2 service call /gp_sampler/cancel_request rcl_interfaces/srv/SetParametersAto
 # {result: {successful: true, reason: 'request large is cancelled, … of 100000 scenarios were found'}}
 
 # With ros2 run scenario_gen player --ros-args -p bag:=$LOG -p paused:=true
-ros2 service call /player/resume std_srvs/srv/Trigger
+ros2 service call /player/resume_playing std_srvs/srv/Trigger
 # {success: true, message: playing}
-ros2 service call /player/pause std_srvs/srv/Trigger
+ros2 service call /player/pause_playing std_srvs/srv/Trigger
 # {success: true, message: paused}

@@ -93,19 +93,6 @@ def parameters() -> None:
     output.emit_json(parameters=table)
 
 
-@installation.command()
-def doctor() -> None:
-    """Check Python, packages and ROS 2 (`ros2 doctor` checks the network and QoS)."""
-    from scenario_gen.ros.common.doctor import ERROR, examine
-
-    findings = []
-    for finding in examine():
-        output.print_(finding.line())
-        findings.append(finding)
-    output.emit_json(findings=findings)
-    raise typer.Exit(int(any(finding.level == ERROR for finding in findings)))
-
-
 for commands in (
     generation.commands,
     bags.commands,

@@ -35,10 +35,6 @@ smallest = min(registered(), key=lambda kernel: kernel.size)
 make_ready([smallest])
 assert smallest.mark.exists()
 """,
-    "doctor": """
-from scenario_gen.ros.common.doctor import examine
-print(list(examine()))
-""",
 }
 
 

@@ -151,7 +151,7 @@ def test_a_bag_of_genuine_rosbag2_is_played_and_recorded_again(
     recorder = start("recorder", bag=copy, topics="/topic", split_bytes=100)
     client.until(lambda: client.node.count_subscribers("/topic") > 0, "a subscriber of /topic")
     client.until(lambda: client.node.count_publishers("/topic") > 0, "a publisher of /topic")
-    assert client.call(Trigger, "/player/resume", Trigger.Request()).success
+    assert client.call(Trigger, "/player/resume_playing", Trigger.Request()).success
     client.until(lambda: client.counted("/topic") == 10, "ten messages in the bag")
     ended(recorder)
     ended(player)
@@ -273,9 +273,8 @@ def test_the_player_ends_when_all_is_played_and_heard(start, client):
         )
     client.until(lambda: client.node.count_publishers("/clock") == 1, "one publisher of /clock")
     assert len(set(client.heard["/clock"])) == 1
-    assert client.call(Trigger, "/player/play_next", Trigger.Request()).success
-    client.until(lambda: any(client.heard[topic] for topic in topics), "the first message")
-    assert client.call(Trigger, "/player/resume", Trigger.Request()).success
+    assert not any(client.heard[topic] for topic in topics)
+    assert client.call(Trigger, "/player/resume_playing", Trigger.Request()).success
     output, _ = process.communicate(timeout=180.0)
     assert process.returncode == 0 and "played" in output and "Traceback" not in output, output
     assert {topic: len(client.heard[topic]) for topic in topics} == Counter(

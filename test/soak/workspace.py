@@ -122,7 +122,7 @@ def played(workspace: Workspace, client: Client) -> Iterator[Figure]:
     player = workspace.start("player", bag=bag, clock=True, paused=True)
     client.until(lambda: client.node.count_subscribers("/t0") == 1, "the recorder's subscription")
     started = time.monotonic()
-    assert client.call(Trigger, "/player/resume", Trigger.Request()).success
+    assert client.call(Trigger, "/player/resume_playing", Trigger.Request()).success
     assert player.wait(180.0) == 0
     seconds = time.monotonic() - started
     expected = SECONDS * RATE_HZ

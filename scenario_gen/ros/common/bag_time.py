@@ -14,7 +14,7 @@ MAX_WAIT_S = 0.1  # between two looks at the rate
 class BagTime:
     """Seconds since the bag's beginning; they pass `rate` times as fast as real time.
 
-    One thread waits for the messages' times; any thread may pause, resume, step, seek or end.
+    One thread waits for the messages' times; any thread may pause, resume or end.
     """
 
     def __init__(self, rate: Callable[[], float]) -> None:
@@ -23,8 +23,6 @@ class BagTime:
         self._elapsed = 0.0
         self._updated_at = monotonic()
         self._due = 0.0  # time of the next message
-        self._steps = 0  # messages to play while paused
-        self._target: float | None = None  # of a seek
         self._changed = threading.Condition(threading.RLock())
         self.paused = True
         self.ended = False
@@ -42,49 +40,26 @@ class BagTime:
             self.paused = paused
             self._changed.notify_all()
 
-    def step(self) -> None:
-        """Let one message be played while the time is paused."""
-        with self._changed:
-            self._steps += 1
-            self._changed.notify_all()
-
-    def seek(self, target: float) -> None:
-        """Let the present round end, and the next one begin at a time [s]."""
-        with self._changed:
-            self._target = target
-            self._changed.notify_all()
-
     def end(self) -> None:
         """End all waits."""
         with self._changed:
             self.ended = True
             self._changed.notify_all()
 
-    def begin(self, offset: float) -> float:
-        """Begin a round at the target of a seek, or else at an offset [s]; return where."""
+    def begin(self, offset: float) -> None:
+        """Begin a round at an offset [s]."""
         with self._changed:
-            self._elapsed = self._due = offset if self._target is None else self._target
+            self._elapsed = self._due = offset
             self._updated_at = monotonic()
-            self._target = None
-            return self._elapsed
-
-    @property
-    def round_over(self) -> bool:
-        """Whether the present round ends here: by a seek or the node's end."""
-        return self.ended or self._target is not None
 
     def wait(self, due: float) -> bool:
-        """Wait until a message's time [s]; return False if the round is over before."""
+        """Wait until a message's time [s]; return False if the time ends before."""
         with self._changed:
             self._due = due
-            while not self.round_over:
+            while not self.ended:
                 self._update()
                 if not self.paused and self._elapsed >= due:
                     self._elapsed = min(self._elapsed, due + MAX_LAG_S)
-                    return True
-                if self.paused and self._steps:
-                    self._steps -= 1
-                    self._elapsed = due
                     return True
                 remaining = (due - self._elapsed) / self._rate()
                 self._changed.wait(None if self.paused else min(remaining, MAX_WAIT_S))

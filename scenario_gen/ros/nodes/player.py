@@ -3,8 +3,8 @@
 
 """player: a bag's messages as they were recorded, raw.
 
-It plays any rosbag2 bag, MCAP or SQLite, and has the services of rosbag2's player
-(common/player_services.py).
+It plays any rosbag2 bag, MCAP or SQLite. `~/pause_playing` and `~/resume_playing` stop the time in
+the bag and let it pass.
 
 Each topic has the quality of service of its recording, or the one that the parameters
 `qos_overrides./topic.publisher.reliability` and its siblings set; the history of a volatile topic
@@ -38,8 +38,8 @@ from scenario_gen.base.errors import InputError, ScenarioGenError
 from scenario_gen.base.parameters import parameter, Parameters
 from scenario_gen.ros.common.bag_time import BagTime
 from scenario_gen.ros.common.diagnostics import NodeDiagnostics
-from scenario_gen.ros.common.player_services import offer_player_services
 from scenario_gen.ros.common.ros_parameters import ConfigParameters
+from scenario_gen.ros.common.services import offer_trigger
 from scenario_gen.ros.common.timers import create_steady_timer
 from scenario_gen.ros.common.topics import (
     acknowledgement_warning,
@@ -73,13 +73,15 @@ class Config(Parameters):
         1.0, "how many times as fast as it was recorded", low=0.01, high=1000.0
     )
     start_offset: float = parameter(
-        0.0, "time in the bag at which a round begins, or to which ~/seek jumps", unit="s", low=0.0
+        0.0, "time in the bag at which a round begins", unit="s", low=0.0
     )
     loop: bool = parameter(False, "begin again at the end")
     stay: bool = parameter(
         False, "keep running at the end, so that late subscribers get latched topics"
     )
-    paused: bool = parameter(False, "wait for ~/resume before the first message", fixed=True)
+    paused: bool = parameter(
+        False, "wait for ~/resume_playing before the first message", fixed=True
+    )
     clock: bool = parameter(False, "publish /clock", fixed=True)
     patience: float = parameter(
         60.0,
@@ -126,7 +128,8 @@ class Player(Node):  # type: ignore[misc]
         if self.parameters.config.clock:
             self._clock_publisher = self.create_publisher(Clock, "/clock", 10)
             create_steady_timer(self, TICK_S, self._publish_clock)
-        offer_player_services(self, self._time, self._seek)
+        offer_trigger(self, "~/pause_playing", partial(self._pause, paused=True))
+        offer_trigger(self, "~/resume_playing", partial(self._pause, paused=False))
 
     def autostart(self) -> None:
         """Offer the bag's topics and begin.
@@ -174,7 +177,7 @@ class Player(Node):  # type: ignore[misc]
         try:
             while not self._time.ended:
                 self._play_round(Path(config.bag))
-                if not (self._time.round_over or self.parameters.config.loop):
+                if not self.parameters.config.loop:
                     break
             if self._time.ended:
                 return
@@ -224,8 +227,9 @@ class Player(Node):  # type: ignore[misc]
         self.done = True
 
     def _play_round(self, bag: Path) -> None:
-        """Play the bag from the offset, or from where a seek leads, to its end or a seek."""
-        start = self._time.begin(self.parameters.config.start_offset)
+        """Play the bag from the offset to its end, or to the node's end."""
+        start = self.parameters.config.start_offset
+        self._time.begin(start)
         for message, elapsed in self._from_offset(bag, start):
             if not self._time.wait(elapsed):
                 return
@@ -291,17 +295,17 @@ class Player(Node):  # type: ignore[misc]
             stamp_ns = self._begin_ns + round(self._time.shown() * 1e9)
             publish(self, self._clock_publisher, encode_clock(stamp_ns))
 
-    def _seek(self, stamp_ns: int | None = None) -> str:
-        """Play on from a stamp, or by default from the parameter `start_offset`."""
-        if self._begin_ns is None or self._is_over:
-            raise InputError("nothing is being played")
-        target: float = self.parameters.config.start_offset
-        if stamp_ns is not None:
-            target = (stamp_ns - self._begin_ns) * 1e-9
-        if target < 0.0:
-            raise InputError("the bag begins later")
-        self._time.seek(target)
-        return f"plays on from {target:.3f} s"
+    def _pause(self, *, paused: bool) -> str:
+        """Stop the time in the bag, or let it pass.
+
+        Raises:
+            InputError: it is so already.
+        """
+        state = "paused" if paused else "playing"
+        if paused == self._time.paused:
+            raise InputError(f"it is {state} already")
+        self._time.pause(paused)
+        return state
 
     def destroy_node(self) -> None:
         """End playing, then the node."""
