@@ -63,9 +63,9 @@ judges: $(TEST) .venv-judges-commonroad/.ready .venv-judges-asam/.ready .venv-ju
 core: $(TEST)
 	$(BIN)/python test/packaging/core_install.py
 
-# The counts in CONTRIBUTING.md. A test holds their budget.
+# How large the project is, beside its last release.
 counts: $(TEST)
-	$(BIN)/python test/packaging/counts.py --write CONTRIBUTING.md
+	$(BIN)/python test/packaging/counts.py
 
 # The site, in out/docs: built from the sources, which are not imported.
 docs: .venv-docs/.ready

@@ -19,7 +19,7 @@ setup(
     python_requires=">=3.11,<3.14",  # colcon cannot read it from pyproject.toml
     data_files=[
         ("share/ament_index/resource_index/packages", ["resource/scenario_gen"]),
-        # `colcon build --symlink-install` runs this file in a folder that has only files listed here.
+        # `colcon build --symlink-install` runs this file in a folder with only these files.
         (SHARE, ["package.xml", "pyproject.toml", "README.md"]),
         files("config"),
         files("launch", "*.launch.py"),

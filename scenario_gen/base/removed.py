@@ -6,8 +6,8 @@
 REMOVED = {
     "library": "nothing replaces it; `scenario-gen generate` segments each encounter",
     "coverage": "`python -m benchmarks coverage` measures it",
-    "regenerate": "the bag or the trajectories of a batch have the scenario; `scenario-gen generate` "
-    "with the recorded seed and parameters makes it again",
+    "regenerate": "the bag or the trajectories of a batch have the scenario; "
+    "`scenario-gen generate` with the recorded seed and parameters makes it again",
     "--again": "`scenario-gen batch --bags all` keeps the scenarios in bags",
     "doctor": "`ros2 doctor` and `pip check` examine an installation",
     "--recombine": "it gained .01 of coverage; add recordings with --recording instead",

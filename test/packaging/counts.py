@@ -1,124 +1,64 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Measure the sources and their budget; `make counts` writes the tables into CONTRIBUTING.md.
+"""Print how large the project is, beside the figures of its last release: `make counts`.
 
-    python counts.py [--write PAGE] [--list NAME] [PATH ...]
+    python counts.py [PATH ...]
 
-All figures are those of scenario_gen/ and msg_conventions/, compiled kernels included:
-
-* tokens: names, operators, numbers and strings; no comments and no docstrings;
-* long lines: lines of more than 99 columns;
+* tokens: names, operators, numbers and strings of scenario_gen/ and msg_conventions/, compiled
+  kernels included; no comments and no docstrings;
+* constants: single numbers in constants of their modules;
 * complex functions: functions whose cognitive complexity (complexipy) is above 15;
-* branching functions: functions whose cyclomatic complexity is above 15;
-* nested functions: functions with more than three nested blocks;
-* long functions: more than 60 lines without the docstring;
-* crowded functions: more than 8 parameters, except parameters of a scikit-learn estimator;
-* constants: single numbers in constants of modules;
-* constants without a unit: those whose name does not end with a unit, or with a word that says
-  what the number is (`_RATIO`, `_COUNT`, ...);
-* banned names: names that a reader has to decode (`own`, `found`, `one`, ...); names of parameters
-  are interfaces and stay.
+* files entered: files with a function that one `generate` calls (synthetic_c on four_way);
+* parameters: those that the configurations declare; commands: those of scenario-gen;
+* lines of test/ and benchmarks/; words of docs/*.md.
 
-With `--list NAME`, the places that one figure counts; with paths, only those files.
+With paths, the tokens of these files only.
 """
 
 import argparse
 import ast
-from collections.abc import Iterable, Iterator
-from functools import cache
+from collections.abc import Iterator
 import io
-from operator import attrgetter
 from pathlib import Path
-import re
 import sys
+import threading
 import tokenize
+from types import FrameType
+from typing import cast
 
 from complexipy import file_complexity
+from typer.core import TyperGroup
+from typer.main import get_command
+
+from scenario_gen import generate, read_log
+from scenario_gen.cli.commands import app
 
 ROOT = Path(__file__).resolve().parents[2]
 sys.path.append(str(ROOT / "test"))
 
-from test_architecture import FOUNDATION, PYTHON_FILES, room, rooms_imported  # noqa: E402
+from test_architecture import PACKAGE, PYTHON_FILES, room, ROOMS  # noqa: E402
 
-MARKS = ("<!-- counts -->\n", "<!-- end of counts -->\n")
 DOCUMENTED = (ast.Module, ast.ClassDef, ast.FunctionDef, ast.AsyncFunctionDef)
-FUNCTIONS = (ast.FunctionDef, ast.AsyncFunctionDef)
-BLOCKS = (ast.For, ast.AsyncFor, ast.While, ast.If, ast.With, ast.AsyncWith, ast.Try, ast.Match)
-BRANCHES = (
-    ast.For,
-    ast.AsyncFor,
-    ast.While,
-    ast.If,
-    ast.IfExp,
-    ast.ExceptHandler,
-    ast.comprehension,
-)
-MAX_COLUMNS, MAX_COMPLEXITY, MAX_NESTING = 99, 15, 3
-MAX_PARAMETERS, MAX_FUNCTION_LINES = 8, 60
-
-# Measured at 982257a1, before the code was rewritten for readers.
-BEFORE = {
-    "tokens": 495_999,
-    "long lines": 7_237,
-    "complex functions": 161,
-    "branching functions": 76,
-    "nested functions": 56,
-    "long functions": 0,
-    "crowded functions": 1,
-    "constants": 1_299,
-    "constants without a unit": 917,
-    "banned names": 1_014,
-}
-# A change that needs more tokens deletes something, or says why in the commit. Splitting dense
-# code into plain steps has cost 14,000 tokens so far; 435,000 are wanted. Fitting the interaction
-# instead of the whole recording, users beside each other in a lane, obstacles from maps, playback at
-# its rate, and arguments that are checked have cost 12,500. Traffic lights with a state and their
-# formats have cost 17,000 (9,000 planned), archives that grow and mend by file and tables of
-# trajectories 9,000 (1,000 planned), trailers, rows of parked cars and obstacles in exports 6,500.
-BUDGET = {
-    "tokens": 600_500,
-    "long lines": 0,
-    "complex functions": 1,
-    "branching functions": 0,
-    "nested functions": 0,
-    "long functions": 0,
-    "crowded functions": 0,
+MAX_COMPLEXITY = 15
+RELEASED = {  # measured at 2ba46f00
+    "tokens": 600_218,
     "constants": 980,
-    "constants without a unit": 0,
-    "banned names": 0,
+    "complex functions": 1,
+    "files entered": 204,
+    "parameters": 308,
+    "commands": 20,
+    "lines of test": 47_376,
+    "lines of benchmarks": 9_025,
+    "words of documentation": 18_798,
 }
 
-UNITS = {
-    "M", "M2", "MM", "KM", "S", "MS", "US", "NS", "RAD", "DEG", "MPS", "MPS2", "MPS3", "RADPS", "HZ",
-    "PX", "BYTES", "KIB", "MIB", "GIB", "COLUMNS", "PER_M", "PER_S", "PER_MPS", "RGB", "RGBA",
-}  # fmt: skip
-WORDS = {
-    "RATIO", "SHARE", "COUNT", "WEIGHT", "FACTOR", "ROWS", "STEPS", "ITERATIONS", "PERCENT",
-    "PROBABILITY", "CONFIDENCE", "SIGMAS", "DECIMALS", "EXPONENT", "DEGREE", "INDEX", "CODE",
-    "VERSION", "SEED", "PORT", "DEPTH", "BITS", "CELLS", "SAMPLES", "POINTS", "VEHICLES",
-    "DIGITS", "LEVELS", "LINES", "CHARACTERS", "FILES", "MESSAGES", "ATTEMPTS", "SCENARIOS",
-    "CANDIDATES", "SLOT", "COST", "EPSG", "ID", "YEAR", "LENGTHS", "WIDTHS", "POSES",
-}  # fmt: skip
-BANNED = {
-    "own", "found", "one", "there", "here", "what", "beside", "apart", "likeliest", "unlooking",
-    "minded", "onward", "hardly", "thereof", "late", "take", "give", "tell", "say", "hear",
-    "settle", "let_go", "askew", "aside",
-}  # fmt: skip
 
-
-@cache
 def tree_of(path: Path) -> ast.Module:
     """Return the syntax tree of a file."""
     return ast.parse(path.read_text(encoding="utf-8"))
 
 
-def name_of(path: Path) -> str:
-    """Return the path of a file for people."""
-    return path.relative_to(ROOT).as_posix().removeprefix("scenario_gen/")
-
-
-@cache
 def tokens(path: Path) -> int:
     """Return the number of tokens: the same with every version of Python."""
     docstrings = {
@@ -141,95 +81,10 @@ def tokens(path: Path) -> int:
     return count
 
 
-def long_lines(path: Path) -> Iterator[str]:
-    """Yield the places of lines that are too long."""
-    lines = path.read_text(encoding="utf-8").splitlines()
-    for number, line in enumerate(lines, start=1):
-        if len(line) > MAX_COLUMNS:
-            yield f"{name_of(path)}:{number}"
-
-
-def complex_functions(path: Path) -> Iterator[str]:
-    """Yield the functions that are hard to follow: cognitive complexity."""
-    for function in file_complexity(path.as_posix()).functions:
-        if function.complexity > MAX_COMPLEXITY:
-            yield f"{name_of(path)}: {function.name} {function.complexity}"
-
-
-def functions(path: Path) -> Iterator[ast.FunctionDef | ast.AsyncFunctionDef]:
-    """Yield all functions of a file."""
-    for node in ast.walk(tree_of(path)):
-        if isinstance(node, FUNCTIONS):
-            yield node
-
-
-def within(function: ast.AST) -> Iterator[ast.AST]:
-    """Yield the nodes of a function, without those of functions inside of it."""
-    for node in ast.iter_child_nodes(function):
-        if not isinstance(node, FUNCTIONS):
-            yield node
-            yield from within(node)
-
-
-def branching_functions(path: Path) -> Iterator[str]:
-    """Yield the functions with many branches: cyclomatic complexity."""
-    for function in functions(path):
-        paths = 1
-        for node in within(function):
-            if isinstance(node, BRANCHES):
-                paths += 1 + (len(node.ifs) if isinstance(node, ast.comprehension) else 0)
-            elif isinstance(node, ast.BoolOp):
-                paths += len(node.values) - 1
-            elif isinstance(node, ast.match_case):
-                paths += 1
-        if paths > MAX_COMPLEXITY:
-            yield f"{name_of(path)}: {function.name} {paths}"
-
-
-def depth(node: ast.AST) -> int:
-    """Return how deeply blocks are nested; `elif` is no deeper than its `if`."""
-    deepest = 0
-    for name, value in ast.iter_fields(node):
-        children = value if isinstance(value, list) else [value]
-        is_elif = isinstance(node, ast.If) and name == "orelse" and len(children) == 1
-        for child in children:
-            if not isinstance(child, ast.AST) or isinstance(child, FUNCTIONS):
-                continue
-            is_block = isinstance(child, BLOCKS)
-            below = is_block and not (is_elif and isinstance(child, ast.If))
-            deepest = max(deepest, depth(child) + below)
-    return deepest
-
-
-def nested_functions(path: Path) -> Iterator[str]:
-    """Yield the functions that are deeply nested."""
-    for function in functions(path):
-        if (deep := depth(function)) > MAX_NESTING:
-            yield f"{name_of(path)}: {function.name} {deep}"
-
-
-def long_functions(path: Path) -> Iterator[str]:
-    """Yield the functions of too many lines."""
-    for function in functions(path):
-        lines = (function.end_lineno or 0) - function.lineno
-        if ast.get_docstring(function, clean=False) is not None:
-            lines -= (function.body[0].end_lineno or 0) - function.body[0].lineno + 1
-        if lines > MAX_FUNCTION_LINES:
-            yield f"{name_of(path)}: {function.name} {lines}"
-
-
-def crowded_functions(path: Path) -> Iterator[str]:
-    """Yield the functions of too many parameters, `self` and `cls` included."""
-    for function in functions(path):
-        given = function.args
-        is_estimator = function.name == "__init__" and "random_state" in map(
-            attrgetter("arg"), given.kwonlyargs
-        )
-        if is_estimator:  # scikit-learn reads its parameters from the signature
-            continue
-        parameters = len(given.posonlyargs) + len(given.args) + len(given.kwonlyargs)
-        if parameters > MAX_PARAMETERS:
-            yield f"{name_of(path)}: {function.name} {parameters}"
+def complex_functions(path: Path) -> int:
+    """Return how many functions are hard to follow: cognitive complexity."""
+    functions = file_complexity(path.as_posix()).functions
+    return sum(function.complexity > MAX_COMPLEXITY for function in functions)
 
 
 def numbers_in(value: ast.expr) -> int:
@@ -264,68 +119,34 @@ def constants(path: Path) -> Iterator[tuple[str, int]]:
                     yield name.id, count
 
 
-def has_unit(name: str) -> bool:
-    """Return whether the name of a constant says what its number is."""
-    parts = name.strip("_").upper().split("_")
-    last = parts[-1]
-    return last in UNITS | WORDS or "_".join(parts[-2:]) in UNITS
-
-
-def all_constants(path: Path) -> Iterator[str]:
-    """Yield a place for every single number in the constants of a module."""
-    for name, count in constants(path):
-        yield from [f"{name_of(path)}: {name}"] * count
-
-
-def constants_without_unit(path: Path) -> Iterator[str]:
-    """Yield the constants whose names do not say a unit."""
-    for name, _ in constants(path):
-        if not has_unit(name):
-            yield f"{name_of(path)}: {name}"
-
-
-def defined_names(node: ast.AST) -> Iterator[str]:
-    """Yield the names that a node of the syntax tree defines."""
-    if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store):
-        yield node.id
-    elif isinstance(node, ast.arg):
-        yield node.arg
-    elif isinstance(node, ast.ClassDef | ast.FunctionDef | ast.AsyncFunctionDef):
-        yield node.name
-
-
-def is_parameter(node: ast.AST) -> bool:
-    """Return whether a node declares a parameter that users set by its name."""
-    value = getattr(node, "value", None)
-    return (
-        isinstance(node, ast.AnnAssign)
-        and isinstance(value, ast.Call)
-        and isinstance(value.func, ast.Name)
-        and value.func.id == "parameter"
+def parameters(path: Path) -> int:
+    """Return how many parameters the configurations in a file declare."""
+    return sum(
+        isinstance(node, ast.Call) and ast.unparse(node.func) == "parameter"
+        for node in ast.walk(tree_of(path))
     )
 
 
-def banned_names(path: Path) -> Iterator[str]:
-    """Yield the places where a name is defined that a reader has to decode."""
-    nodes = list(ast.walk(tree_of(path)))
-    interfaces = {node.target for node in nodes if is_parameter(node)}
-    for node in nodes:
-        for name in defined_names(node):
-            if node not in interfaces and re.sub(r"^_+", "", name).lower() in BANNED:
-                yield f"{name_of(path)}:{getattr(node, 'lineno', 0)} {name}"
+def files_entered() -> int:
+    """Return in how many files one `generate` calls a function, after a first one."""
 
+    def run() -> None:
+        log = read_log(PACKAGE / "resources" / "synthetic_c")
+        generate(log.encounters[0], "four_way", count=2, seed=7)
 
-FIGURES = {
-    "long lines": long_lines,
-    "complex functions": complex_functions,
-    "branching functions": branching_functions,
-    "nested functions": nested_functions,
-    "long functions": long_functions,
-    "crowded functions": crowded_functions,
-    "constants": all_constants,
-    "constants without a unit": constants_without_unit,
-    "banned names": banned_names,
-}
+    entered = set()
+
+    def enter(frame: FrameType, event: str, argument: object) -> None:
+        if event == "call" and frame.f_code.co_name != "<module>":
+            entered.add(frame.f_code.co_filename)
+
+    run()
+    threading.setprofile(enter)
+    sys.setprofile(enter)
+    run()
+    sys.setprofile(None)
+    threading.setprofile(None)
+    return len(entered & set(map(str, PYTHON_FILES)))
 
 
 def lines_of(folder: str) -> int:
@@ -334,69 +155,39 @@ def lines_of(folder: str) -> int:
     return sum(len(path.read_text(encoding="utf-8").splitlines()) for path in files)
 
 
-def totals(paths: Iterable[Path] = PYTHON_FILES) -> dict[str, int]:
-    """Return the figures of all files, or of some."""
-    files = list(paths)
-    figures = {"tokens": sum(map(tokens, files))}
-    for name, places in FIGURES.items():
-        figures[name] = sum(1 for path in files for _ in places(path))
-    return figures
-
-
-def tables() -> str:
-    """Return all tables."""
-    lines = ["| | 982257a1 | now | at most |", "|---|---|---|---|"]
-    for name, count in totals().items():
-        before = format(BEFORE[name], ",") if name in BEFORE else ""
-        most = format(BUDGET[name], ",") if name in BUDGET else ""
-        lines.append(f"| {name} | {before} | {count:,} | {most} |")
-    lines += [f"| lines of {name} | | {lines_of(name):,} | |" for name in ("test", "benchmarks")]
-    lines += ["", "| room | files | tokens | imports |", "|---|---|---|---|"]
-    for name, imports in {**rooms_imported(), "msg_conventions": FOUNDATION}.items():
-        files = [path for path in PYTHON_FILES if room_of(path) == name]
-        count = sum(map(tokens, files))
-        lines.append(f"| `{name}` | {len(files)} | {count:,} | {', '.join(sorted(imports))} |")
-    return "\n".join(lines) + "\n"
-
-
-def room_of(path: Path) -> str:
-    """Return the room of a file."""
-    first = path.relative_to(ROOT).parts[0]
-    return room(path) if first == "scenario_gen" else first
-
-
-def chosen(paths: list[str]) -> list[Path]:
-    """Return the source files that some paths name; all without any."""
-    if not paths:
-        return PYTHON_FILES
-    folders = [Path(path).resolve() for path in paths]
-    return [path for path in PYTHON_FILES if any(path.is_relative_to(each) for each in folders)]
+def figures() -> dict[str, int]:
+    """Return all figures by their names."""
+    pages = [path.read_text(encoding="utf-8") for path in (ROOT / "docs").glob("*.md")]
+    return {
+        "tokens": sum(map(tokens, PYTHON_FILES)),
+        "constants": sum(count for path in PYTHON_FILES for _, count in constants(path)),
+        "complex functions": sum(map(complex_functions, PYTHON_FILES)),
+        "files entered": files_entered(),
+        "parameters": sum(map(parameters, PYTHON_FILES)),
+        "commands": len(cast(TyperGroup, get_command(app)).commands),
+        "lines of test": lines_of("test"),
+        "lines of benchmarks": lines_of("benchmarks"),
+        "words of documentation": sum(len(page.split()) for page in pages),
+    }
 
 
 def main() -> None:
-    """Print the figures, or put the tables between their marks in a page."""
+    """Print all figures and the tokens of each room, or the tokens of some files."""
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    parser.add_argument("--write", type=Path)
-    parser.add_argument("--list", choices=FIGURES)
-    parser.add_argument("paths", nargs="*")
-    options = parser.parse_args()
-    files = chosen(options.paths)
-    if options.list:
-        for path in files:
-            for place in FIGURES[options.list](path):
-                print(place)
+    parser.add_argument("paths", nargs="*", type=Path)
+    folders = [path.resolve() for path in parser.parse_args().paths]
+    if folders:
+        files = [path for path in PYTHON_FILES if any(map(path.is_relative_to, folders))]
+        print(f"{sum(map(tokens, files)):,} tokens in {len(files)} files")
         return
-    if options.paths:
-        print(*(f"{name}: {count:,}" for name, count in totals(files).items()), sep="\n")
-        return
-    if options.write is None:
-        print(tables(), end="")
-        return
-    before, _, rest = options.write.read_text(encoding="utf-8").partition(MARKS[0])
-    text = before + MARKS[0] + tables() + MARKS[1] + rest.partition(MARKS[1])[2]
-    options.write.write_text(text, encoding="utf-8")
+    print(f"{'':24}{'2ba46f00':>10}{'now':>10}")
+    for name, count in figures().items():
+        print(f"{name:24}{RELEASED[name]:10,}{count:10,}")
+    for name in ROOMS:
+        files = [path for path in PACKAGE.rglob("*.py") if room(path) == name]
+        print(f"{'tokens of ' + name:34}{sum(map(tokens, files)):10,}")
 
 
 if __name__ == "__main__":
