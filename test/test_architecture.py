@@ -49,7 +49,6 @@ STAGES = (
     "chain",
     "reference_sets",
     "suitable_roads",
-    "nearest",
 )
 # Each concept, its one home, and what would show a second one: a regular expression, searched in the whole text of a file.
 CONCEPTS = {

@@ -13,11 +13,10 @@ from typing import TYPE_CHECKING
 
 from scenario_gen.base.errors import did_you_mean, InputError, RefusedError
 from scenario_gen.base.folders import replaced_folder
-from scenario_gen.base.parameters import updated
 from scenario_gen.base.provenance import RECORDING
 from scenario_gen.logs import LogResult, NoEncounterError, read_log
-from scenario_gen.method.nearest import answer_refusal
 from scenario_gen.method.sampling import TargetError
+from scenario_gen.method.suitable_roads import AUTO, with_suitable_roads
 from scenario_gen.output.results import BAG, GENERATED, provenance_of, write_results
 from scenario_gen.pipeline import generate_outcomes, PipelineConfig
 from scenario_gen.types import (
@@ -336,7 +335,7 @@ def _generate_sets(
     """Generate scenarios for one encounter and road, a set for each outcome of its decision.
 
     Raises:
-        RefusedError: nothing could be generated; the message names the nearest possible request.
+        RefusedError: nothing could be generated; the message names suitable roads.
     """
     config, count, seed = requested.config, requested.count, requested.seed
     request = replace(requested.request, ego=_egos(encounter, requested.request)[0])
@@ -351,8 +350,9 @@ def _generate_sets(
             progress=lambda done, total, _: advance(done, total),
         )
     except RefusedError as error:
-        one_outcome = updated(config, {"sampling.decisions": "recorded"})
-        raise answer_refusal(error, encounter, road, one_outcome, request, count, seed) from error
+        if road == AUTO or request.moves or isinstance(error, TargetError):
+            raise
+        raise with_suitable_roads(error, encounter, road, config, seed) from error
 
 
 def _shortages(sets: Sequence[GenerationResult]) -> Iterator[str]:

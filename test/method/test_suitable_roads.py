@@ -12,10 +12,13 @@ from support.textbook_motions import labelled
 
 from scenario_gen.base.errors import RefusedError
 from scenario_gen.logs import read_log
-from scenario_gen.method.nearest import answer_refusal
 from scenario_gen.method.sampling import TargetError
 from scenario_gen.method.segmentation import segment
-from scenario_gen.method.suitable_roads import on_first_suitable_road, suitable_roads
+from scenario_gen.method.suitable_roads import (
+    on_first_suitable_road,
+    suitable_roads,
+    with_suitable_roads,
+)
 from scenario_gen.pipeline import generate, PipelineConfig
 from scenario_gen.situation import Situation
 from scenario_gen.types import NoteKind
@@ -76,7 +79,7 @@ def test_a_refusal_names_the_roads_that_suit_to_a_command(crossing):
     assert "four_way" in names and names[-1] == "corridor" and "t_intersection" not in names
     with pytest.raises(RefusedError, match=r"choose another road$") as caught:
         generate(crossing, "t_intersection", count=2, seed=7)
-    answer = answer_refusal(caught.value, crossing, "t_intersection", config, Request(), 2, 7)
+    answer = with_suitable_roads(caught.value, crossing, "t_intersection", config, 7)
     assert str(answer).endswith(f"It fits these roads: {', '.join(names)}")
 
 

@@ -13,7 +13,6 @@ from support.lengths import LONG
 
 from scenario_gen.base.errors import RefusedError
 from scenario_gen.base.road_users import Dynamics
-from scenario_gen.method.nearest import ImpossibleError
 from scenario_gen.method.validity import Limits
 from scenario_gen.numerics.arrays import wrap_angle
 from scenario_gen.types.request import Request
@@ -77,34 +76,10 @@ def test_what_is_asked_is_met(chain, plain, change):
 
 
 def refused(chain, **texts):
-    """The error of an impossible request; its suggestions (short: the first) are taken, from the text alone, and work."""
-    with pytest.raises(ImpossibleError) as caught:
+    """The reason why a request is impossible."""
+    with pytest.raises(RefusedError) as caught:
         answer(chain, Request(**texts), count=COUNT)
-    error = caught.value
-    assert error.suggestions, str(error)
-    offers = str(error).partition("Nearest possible: ")[2].split("; or ")
-    assert len(offers) == len(error.suggestions)
-    for offer in offers if LONG else offers[:1]:
-        taken = dict(re.findall(r"(starts|goals):='([^']*)'", offer))
-        longer = re.search(r"max_stretch:=([0-9.]+)", offer)
-        own = (
-            chain
-            if longer is None
-            else replace(chain, sampling=replace(chain.sampling, max_stretch=float(longer[1])))
-        )
-        outcome = answer(own, Request(**(texts | taken)), count=COUNT)
-        assert len(outcome.generated.scenarios) == COUNT
-        assert (achieved(outcome) <= (0.1, 0.1)).all()
-    return error
-
-
-def moved(error, chain, texts, end):
-    """How far [m] the first suggestion is from what was asked."""
-    before, after = (
-        request.rows(end, chain.encounter)[:, :2]
-        for request in (Request(**texts), error.suggestions[0].request)
-    )
-    return float(np.nanmax(np.hypot(*(after - before).T)))
+    return str(caught.value)
 
 
 @pytest.mark.parametrize(
@@ -112,26 +87,30 @@ def moved(error, chain, texts, end):
 )  # the second needs a search along its way
 def test_a_goal_off_the_road(chain, plain, vehicle):
     texts = {"goals": state(plain, "end", vehicle, left=-4.0)}
-    error = refused(chain, **texts)
-    assert "off the road" in str(error)
-    assert 0.0 < moved(error, chain, texts, "goals") < 4.5
+    reason = refused(chain, **texts)
+    assert "off the road" in reason
+    name, asked = texts["goals"].split(": ")
+    pose = re.search(r"the nearest pose with room is '([^']*)'", reason)[1]
+    off = np.subtract([float(value) for value in pose.split()], np.array(asked.split()[:3], float))
+    assert 0.0 < np.hypot(*off[:2]) < 4.5 and off[2] == pytest.approx(0.0, abs=1e-3)
+    speed = "".join(asked.split()[3:])
+    outcome = answer(chain, Request(goals=f"{name}: {pose} {speed}"), count=COUNT)
+    assert len(outcome.generated.scenarios) == COUNT
 
 
 def test_a_start_on_top_of_another_vehicle(following):
-    """Two cars drive the same way: the nearest start without overlap lies behind or in front."""
+    """Two cars drive the same way."""
     made = answer(following, Request(), count=1)
     x, y, yaw, speed = made.fit.requested.start[0]
     texts = {"starts": f"2: {x + 1.0:.2f} {y:.2f} {yaw:.4f} {speed:.2f}"}
-    error = refused(following, **texts)
-    assert "at the requested start vehicles 1 and 2 overlap by" in str(error)
-    assert 3.8 <= moved(error, following, texts, "starts") < 10.0
+    reason = refused(following, **texts)
+    assert "at the requested start vehicles 1 and 2 overlap by" in reason
 
 
 def test_a_goal_too_far_for_the_scale(chain, plain):
     texts = {"goals": state(plain, "end", 0, ahead=-70.0)}
-    error = refused(chain, **texts)
-    assert "scale" in str(error)
-    assert moved(error, chain, texts, "goals") < 50.0
+    reason = refused(chain, **texts)
+    assert "scale" in reason
 
 
 def test_a_goal_too_far_for_the_time(chain, plain):
@@ -144,12 +123,8 @@ def test_a_goal_too_far_for_the_time(chain, plain):
         "starts": state(plain, "start", 0, speed=0.0),
         "goals": state(plain, "end", 0, ahead=10.0),
     }
-    error = refused(slow, **texts)
-    assert "cannot drive" in str(error)
-    assert any(one.max_stretch is not None for one in error.suggestions), (
-        "a longer clock is offered"
-    )
-    assert any(one.max_stretch is None for one in error.suggestions), "and another state"
+    reason = refused(slow, **texts)
+    assert "cannot drive" in reason
 
 
 @pytest.mark.long
@@ -159,29 +134,11 @@ def test_a_start_too_fast_to_stop(chain, plain):
         "starts": state(plain, "start", 0, speed=38.0),
         "goals": state(plain, "end", 0, speed=0.0),
     }
-    error = refused(weak, **texts)
-    assert "cannot drive" in str(error)
-    slower = error.suggestions[0].request.states("starts")["1"]
-    assert (
-        25.0 < slower[3] < 38.0
-        and slower[:2] == error.suggestions[0].request.states("starts")["1"][:2]
-    )
+    reason = refused(weak, **texts)
+    assert "cannot drive" in reason
 
 
 @pytest.mark.long
 def test_a_speed_above_the_limit(chain, plain):
-    error = refused(chain, starts=state(plain, "start", 1, speed=60.0))
-    assert "at most 40 m/s is planned, 8/9 of limits.car.max_speed" in str(error)
-    assert 20.0 < error.suggestions[0].request.states("starts")["2"][3] <= 40.0
-
-
-def test_a_cancelled_search_suggests_nothing(chain, plain):
-    with pytest.raises(ImpossibleError) as caught:
-        answer(
-            chain,
-            Request(goals=state(plain, "end", 1, left=-4.0)),
-            count=COUNT,
-            cancelled=lambda: True,
-        )
-    assert issubclass(ImpossibleError, RefusedError)
-    assert caught.value.suggestions == ()
+    reason = refused(chain, starts=state(plain, "start", 1, speed=60.0))
+    assert "at most 40 m/s is planned, 8/9 of limits.car.max_speed" in reason

@@ -8,18 +8,15 @@ import threading
 import pytest
 
 from scenario_gen.base.cancelling import cancellable, CancelledError, stop_if_cancelled
-from scenario_gen.base.errors import RefusedError
 from scenario_gen.base.worker import Worker
 from scenario_gen.logs import read_log
 from scenario_gen.method.chain import Chain
 from scenario_gen.method.config import PipelineConfig
 from scenario_gen.method.fitting import fit_template
-from scenario_gen.method.nearest import suggest_nearest
 from scenario_gen.method.routing import plan_routes
 from scenario_gen.method.segmentation import segment
 from scenario_gen.roads import build_road
 from scenario_gen.situation import Situation
-from scenario_gen.types import Request
 
 CASE = "scenario_gen/resources/synthetic_c"
 
@@ -36,16 +33,7 @@ def test_every_stage_of_a_node_can_be_cancelled(request):
         lambda fresh=read(): build_road("straight", fresh),
         lambda fresh=read(): fit_template(fresh, segmentation, road),
         lambda: plan_routes(road, fit),
-        lambda: suggest_nearest(
-            RefusedError("no"),
-            Chain(
-                Situation.of(encounter),
-                segmentation,
-                road,
-                PipelineConfig(),
-                Request(starts="1: 0 0 0"),
-            ),
-        ),
+        lambda: Chain(Situation.of(encounter), segmentation, road, PipelineConfig()).run(),
     ):
         with cancellable(lambda: True), pytest.raises(CancelledError):
             work()

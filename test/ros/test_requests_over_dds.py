@@ -111,14 +111,14 @@ def test_the_same_bytes_as_in_process_with_states(suite, client):
     ], "states are valid for their call only"
 
 
-def test_what_is_impossible_is_refused_and_the_nearest_is_possible(suite, client):
+def test_what_is_impossible_is_refused_with_a_pose_that_has_room(suite, client):
     client.hear("/scenarios", "/scenarios/info")
     client.wait("/scenarios/info", 3)
     result = client.generate(count=2, goals="1: 19 18.07 3.1413 11")
     assert not result.successful
     assert "off the road" in result.reason
-    nearest = re.search(r"goals:='([^']*)'", result.reason.partition("Nearest possible: ")[2])[1]
-    taken = client.generate(count=2, goals=nearest)
+    pose = re.search(r"the nearest pose with room is '([^']*)'", result.reason)[1]
+    taken = client.generate(count=2, goals=f"1: {pose} 11")
     assert taken.successful and "2 of 2" in taken.reason
     for values, said in (
         ({"ego": "9"}, "there are: 1, 2"),

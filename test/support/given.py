@@ -5,11 +5,9 @@
 
 from dataclasses import dataclass, field
 
-from scenario_gen.base.errors import RefusedError
 from scenario_gen.method.chain import Chain
 from scenario_gen.method.config import PipelineConfig
 from scenario_gen.method.fitting import FittingConfig
-from scenario_gen.method.nearest import suggest_nearest
 from scenario_gen.method.routing import PlanningConfig
 from scenario_gen.method.sampling import Callbacks, SamplingConfig
 from scenario_gen.method.validity import Limits
@@ -43,7 +41,7 @@ class Given:
 
 
 def answer(given, request, *, count, cancelled=lambda: False):
-    """Return what comes of a request; the nearest possible one is looked for where it cannot be had."""
+    """Return what comes of a request."""
     asked = Chain(
         Situation.of(given.encounter),
         given.segmentation,
@@ -53,7 +51,4 @@ def answer(given, request, *, count, cancelled=lambda: False):
         count,
         given.seed,
     )
-    try:
-        return asked.run(Callbacks(cancelled=cancelled))
-    except RefusedError as error:
-        raise suggest_nearest(error, asked, cancelled) from error
+    return asked.run(Callbacks(cancelled=cancelled))

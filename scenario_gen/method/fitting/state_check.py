@@ -10,10 +10,12 @@ import numpy as np
 from scenario_gen.base.errors import RefusedError
 from scenario_gen.numerics import Floats
 from scenario_gen.numerics.boxes import footprint_gaps
-from scenario_gen.roads import footprint_fits, ground_for
+from scenario_gen.roads import footprint_fits, ground_for, nearest_pose_with_room
 from scenario_gen.types import Encounter, Fit, Road, TypeLimits, Vehicle
 
 _MAX_STANDING_SPEED_MPS = 0.05
+_SEARCH_RADIUS_M = 30.0  # within which a pose with room is searched
+_ROUNDING_M = 0.02  # poses are rounded to centimetres; this much more keeps their room
 
 
 def refuse_impossible(
@@ -44,8 +46,18 @@ def _refuse_impossible_state(
     if not footprint_fits(ground, state[None, :3], vehicle.length, vehicle.width)[0]:
         raise RefusedError(
             f"{subject} is off the road: a footprint of {vehicle.length:g} m by "
-            f"{vehicle.width:g} m has no room there"
+            f"{vehicle.width:g} m has no room there{_pose_with_room(ground, vehicle, state[:3])}"
         )
+
+
+def _pose_with_room(ground: Road, vehicle: Vehicle, pose: Floats) -> str:
+    """Return the nearest pose (3,) with room for a vehicle in words; "" if it is far away."""
+    nearest = nearest_pose_with_room(ground, pose, vehicle.length, vehicle.width, _SEARCH_RADIUS_M)
+    if nearest is None:
+        return ""
+    shift = nearest[0][:2] - pose[:2]
+    x, y = nearest[0][:2] + _ROUNDING_M * shift / np.hypot(*shift)
+    return f"; the nearest pose with room is '{x:.2f} {y:.2f} {pose[2]:.4f}'"
 
 
 def refuse_misfits(fit: Fit, starts: Floats, goals: Floats) -> None:

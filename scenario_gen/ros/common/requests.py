@@ -29,7 +29,7 @@ from msg_conventions.scenario_info import request_summary, RequestSummary
 from scenario_gen.bags.recordings.scenario_publisher import ScenarioPublisher, Send
 from scenario_gen.bags.recordings.template import decode_template
 from scenario_gen.base.cancelling import CancelledError
-from scenario_gen.base.errors import InputError, RefusedError, ScenarioGenError
+from scenario_gen.base.errors import InputError, ScenarioGenError
 from scenario_gen.base.provenance import parameter_texts, versions
 from scenario_gen.method.chain import Chain
 from scenario_gen.method.config import PipelineConfig
@@ -473,7 +473,7 @@ def _sample(
     """Sample scenarios, after a new plan if start or end states are requested.
 
     Raises:
-        RefusedError: the request is impossible; the message names the nearest possible one.
+        RefusedError: the request is impossible.
     """
     stages = PipelineConfig(
         fitting=config.fitting,
@@ -485,10 +485,5 @@ def _sample(
     chain = Chain(
         situation, template.segmentation, road, stages, config, config.count, config.seed
     )
-    try:
-        planned = chain.plan() if config.moves else replace(template, seed=config.seed)
-        return chain.sample(planned, callbacks)
-    except RefusedError as error:
-        from scenario_gen.method.nearest import suggest_nearest  # only a refusal needs it
-
-        raise suggest_nearest(error, chain, callbacks.cancelled) from None
+    planned = chain.plan() if config.moves else replace(template, seed=config.seed)
+    return chain.sample(planned, callbacks)

@@ -4,22 +4,17 @@
 """A fit that loses the template's encounter is refused, unless it is asked for by name."""
 
 from dataclasses import replace
-import re
 
 import numpy as np
 import pytest
 from support.reaction_scenes import crossing, lane_encounter
 
 from scenario_gen.base.errors import InputError
-from scenario_gen.method.chain import Chain
-from scenario_gen.method.config import PipelineConfig
 from scenario_gen.method.fitting import fit, fit_template, FittingConfig, LostEncounterError
 from scenario_gen.method.fitting.losses import find_losses, LOSABLE
 from scenario_gen.method.fitting.placement import Placement
-from scenario_gen.method.nearest import suggest_nearest
 from scenario_gen.method.segmentation import segment
 from scenario_gen.numerics.curve import Curve
-from scenario_gen.situation import Situation
 from scenario_gen.situation.tracks import clean_tracks
 from scenario_gen.types import Encounter, Vehicle
 from scenario_gen.types.request import Request
@@ -161,15 +156,6 @@ def test_what_is_lost_is_refused_by_name_and_taken_by_name(place):
         encounter, segment(encounter), OPEN, FittingConfig(allow="lost_following, lost_merge")
     )
     assert [loss.kind for loss in taken.losses] == ["following"]
-
-
-def test_the_refusal_names_roads_that_keep_it():
-    answer = suggest_nearest(
-        LostEncounterError("lost"),
-        Chain(Situation.of(CROSSING), SEGMENTATION, OPEN, PipelineConfig()),
-    )
-    assert isinstance(answer, LostEncounterError)
-    assert re.match(r"lost\. Nearest possible: road (t_intersection|four_way)", str(answer))
 
 
 def test_only_what_is_known_can_be_allowed():
