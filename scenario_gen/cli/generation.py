@@ -211,18 +211,17 @@ def roads(
         list[str] | None,
         typer.Option(help="Name of the encounter in the log; default: the first."),
     ] = None,
-    out: Annotated[Path, typer.Option(help="SVG file for the picture.")] = Path("roads.svg"),
+    out: Annotated[Path, typer.Option(help="PNG file for the picture.")] = Path("roads.png"),
     assignments: SetOption = None,
     parameter_file: ParametersOption = None,
 ) -> None:
     """Draw a map with lanes and the places that suit a recording, or list the built-in roads."""
     from scenario_gen.base.errors import InputError
-    from scenario_gen.base.folders import write_text
     from scenario_gen.cli.folder import chosen
     from scenario_gen.logs import read_log
     from scenario_gen.method.segmentation import segment
     from scenario_gen.method.suitable_roads import suitable_roads
-    from scenario_gen.output.map_picture import map_picture
+    from scenario_gen.output.plot import draw_map
     from scenario_gen.roads import BUILT_IN
     from scenario_gen.situation import Situation
 
@@ -239,13 +238,12 @@ def roads(
         title = "roads" if template is None else f"roads that suit {template.name}"
         print_(f"{title}: {', '.join(names)}")
         return
-    if out.suffix.lower() != ".svg":
-        raise InputError(f"--out {out}: name a file that ends with .svg")
-    if out.exists() and not out.read_bytes()[:4] == b"<svg":
+    if out.suffix.lower() != ".png":
+        raise InputError(f"--out {out}: name a file that ends with .png")
+    if out.exists() and not out.read_bytes()[:4] == b"\x89PNG":
         raise InputError(f"--out {out} exists and is not a picture of a map; name another file")
-    picture, notes = map_picture(road, template)
     out.parent.mkdir(parents=True, exist_ok=True)
-    write_text(out, picture)
+    notes = draw_map(road, out, template)
     emit_json(picture=out, notes=notes)
     print_(*notes, f"picture: {out}", sep="\n")
 

@@ -3,17 +3,27 @@
 
 """Plots of results, scenarios and encounters with matplotlib (extra `plot`)."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from io import BytesIO
+from itertools import islice
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 from PIL import Image, ImageDraw
 
-from scenario_gen.base.errors import InputError, needs
+from scenario_gen.base.errors import InputError, needs, RefusedError
 from scenario_gen.numerics import Floats
-from scenario_gen.types import DRIVERS, GenerationResult, Motion, Road
+from scenario_gen.roads import build_road, is_vector_map, Place, places, read_network, split
+from scenario_gen.situation import Situation
+from scenario_gen.types import (
+    DRIVERS,
+    Encounter,
+    GenerationResult,
+    LaneNetwork,
+    Motion,
+    Road,
+)
 from scenario_gen.types.markings import Marking, markings
 
 if TYPE_CHECKING:
@@ -21,6 +31,9 @@ if TYPE_CHECKING:
 
 _FRAME_PERIOD_S = 0.1  # of animations
 _MAX_SCENARIOS_COUNT = 200  # more would hide each other
+_MAX_PLACES_COUNT = 8
+_LEGEND = "green arrows: entries, red: exits; red lines: stop, orange: give way"
+_PAINT = {Marking.STOP: "#b91c1c", Marking.GIVE_WAY: "#d97706"}
 
 
 def plot(
@@ -108,6 +121,109 @@ def animate(shown: Motion, file: Path | str, *, road: Road | None = None) -> Pat
     return path
 
 
+def draw_map(name: str, file: Path, encounter: Encounter | None = None) -> list[str]:
+    """Write a picture of a map; return its description: lanes, junctions, arms, notes, places.
+
+    Args:
+        name: path of a vector map, or a road as `build_road` accepts it.
+        file: the picture, with a suffix that matplotlib knows.
+        encounter: the template whose places are drawn; None: no places.
+
+    Raises:
+        InputError: the map cannot be read.
+        RefusedError: the template does not fit the built-in road.
+        MissingExtraError: matplotlib is not installed.
+    """
+    needs("plot", "matplotlib")
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(16.0, 12.0), layout="constrained")
+    axes = figure.add_subplot()
+    if is_vector_map(name):
+        path = split(name)[0]
+        network = read_network(path)
+        _draw_lanes(axes, network)
+        title, lines = network.name, _describe_network(network)
+        if encounter is not None:
+            lines += _draw_places(axes, network, path, encounter)
+    else:
+        road = build_road(name, encounter)
+        plot(road, axes)
+        title, lanes = road.name, "a grid without lanes"
+        if road.lanes is not None:
+            _draw_lanes(axes, road.lanes)
+            lanes = f"{len(road.lanes.lanes)} lanes"
+        arms = f"{len(road.entries)} entries, {len(road.exits)} exits"
+        lines = [f"{road.name}: {road!r}, {lanes}, {arms}"]
+    axes.set(aspect="equal", xlabel="x [m]", ylabel="y [m]", title=f"{title}\n{_LEGEND}")
+    figure.savefig(file)
+    return lines
+
+
+def _describe_network(network: LaneNetwork) -> list[str]:
+    junctions = {lane.junction for lane in network.lanes if lane.junction}
+    return [
+        f"{network.name}: {len(network.lanes)} lanes, {len(junctions)} junctions, "
+        f"{len(network.entries)} entries, {len(network.exits)} exits",
+        *map(str, network.notes),
+    ]
+
+
+def _draw_lanes(axes: "Axes", network: LaneNetwork) -> None:
+    """Draw lanes, markings, arrows at entries and exits, and names of junctions."""
+    _draw_others(axes, network)
+    for lane in network.lanes:
+        colour = "#c3cad6" if lane.junction else "#d4d9e2"
+        axes.fill(*lane.outline.T, color=colour, linewidth=0, zorder=0.5 if lane.junction else 0.4)
+    for marking, lines in markings(network).items():
+        for line in lines:
+            axes.plot(*line.T, color=_PAINT.get(marking, "#64748b"), linewidth=1.0, zorder=0.7)
+    for numbers, ends, colour in (
+        (network.entries, slice(None, 2), "#15803d"),
+        (network.exits, slice(-2, None), "#b91c1c"),
+    ):
+        for k in numbers:
+            tail, head = network.lanes[k].centre[ends]
+            arrow = {"arrowstyle": "-|>", "color": colour, "mutation_scale": 15}
+            axes.annotate("", head, tail, arrowprops=arrow)
+    for name in {lane.junction for lane in network.lanes if lane.junction and not network.drawn}:
+        inside = [lane.centre.mean(axis=0) for lane in network.lanes if lane.junction == name]
+        x, y = np.mean(inside, axis=0)
+        axes.text(x, y, name)
+
+
+def _draw_places(
+    axes: "Axes", network: LaneNetwork, path: Path, encounter: Encounter
+) -> list[str]:
+    """Draw a template's eight best places that do not overlap; return a line on each."""
+    try:
+        found = places(network, Situation.of(encounter).drivers)
+        shown = list(islice(_separate(found), _MAX_PLACES_COUNT))
+    except RefusedError as error:
+        return [f"no place for {encounter.name}: {error}"]
+    lines = []
+    for number, place in enumerate(shown, 1):
+        for n, drive in enumerate(place.paths):
+            axes.plot(*drive.T, color=f"C{n}", linewidth=2.0, alpha=0.8)
+        (west, south), (east, north) = place.box
+        box = [(west, east, east, west, west), (south, south, north, north, south)]
+        axes.plot(*box, color="black", linestyle="--", linewidth=1.0)
+        cost = f"cost {place.cost:.1f} m² (about {place.cost**0.5:.1f} m off the recorded paths)"
+        axes.text(west, north, f"place {number}: {cost}", verticalalignment="bottom")
+        lines.append(f"place {number}: {place.where}, {cost}: --road '{path}{place.part}'")
+    return lines
+
+
+def _separate(candidates: Iterable[Place]) -> Iterator[Place]:
+    """Yield the places that overlap no earlier one; earlier ones fit better."""
+    boxes: list[Floats] = []
+    for place in candidates:
+        low, high = place.box
+        if not any((low < box[1]).all() and (box[0] < high).all() for box in boxes):
+            boxes.append(place.box)
+            yield place
+
+
 def _draw_paths(axes: "Axes", motions: Sequence[Motion]) -> list[Floats]:
     """Draw the paths of all vehicles; return them, (P, 2) [m]."""
     opacity = max(0.1, 1.0 / np.sqrt(max(len(motions), 1)))
@@ -137,12 +253,17 @@ def _draw_road(axes: "Axes", road: Road) -> None:
     )
     if road.lanes is None:
         return
-    for lane in road.lanes.others:
-        if not lane.crossing:
-            colour = "#d9a9a2" if lane.open_to(DRIVERS) else "#e9e5d6"
-            axes.fill(*lane.outline.T, color=colour, zorder=-0.5, linewidth=0)
+    _draw_others(axes, road.lanes)
     marked = markings(road.lanes)
     for bar in marked.get(Marking.ZEBRA, ()):
         axes.plot(*bar.T, color="white", linewidth=1.5, zorder=0.6)
     for outline in marked.get(Marking.OBSTACLE, ()):
         axes.fill(*outline.T, color="0.4", zorder=0.6, linewidth=0)
+
+
+def _draw_others(axes: "Axes", network: LaneNetwork) -> None:
+    """Draw the lanes that are closed to cars."""
+    for lane in network.others:
+        if not lane.crossing:
+            colour = "#d9a9a2" if lane.open_to(DRIVERS) else "#e9e5d6"
+            axes.fill(*lane.outline.T, color=colour, zorder=-0.5, linewidth=0)
