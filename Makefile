@@ -48,10 +48,10 @@ audit: .venv-audit/.ready
 	.venv-audit/bin/python -m pip install --quiet --disable-pip-version-check --require-hashes -r requirements/audit.lock
 	@touch .venv-audit/.ready
 
-# What is exported, before other people's programs (CommonRoad's, ASAM's, omega-prime), each locked in an environment of its own; CommonRoad's
+# What is exported, before other people's programs (CommonRoad's, ASAM's), each locked in an environment of its own; CommonRoad's
 # planner has wheels for Python 3.11 alone: make judges JUDGE_PYTHON=python3.11.
 JUDGE_PYTHON ?= $(PYTHON)
-judges: $(TEST) .venv-judges-commonroad/.ready .venv-judges-asam/.ready .venv-judges-omega/.ready
+judges: $(TEST) .venv-judges-commonroad/.ready .venv-judges-asam/.ready
 	$(BIN)/python -m benchmarks bridges
 
 .venv-judges-%/.ready: requirements/judges-%.lock

@@ -86,14 +86,13 @@ def run(full: bool | None = None) -> list[Row]:
         for target, judge in (
             ("commonroad", _commonroad),
             ("openscenario", _asam),
-            ("osi", _omega),
         ):
             few = sizes.asam if target == "openscenario" else None
             for k, bag in enumerate(bags):
                 known = [one.index for case in read_cases(bag) for one in case.scenarios][:few]
                 export_bag(bag, folder / target / str(k), target, indices=known)
             others.append(judges.submit(judge, folder / target))
-            if target != "osi":  # whose ids are numbers
+            if target == "commonroad":  # which is a log, too
                 rows += _round_trip(folder / target, bags, target)
             _say(f"exported to {target} and read back")
         for judged_rows in (*others, driven):
@@ -226,14 +225,6 @@ def _asam(folder: Path) -> list[Row]:
         issues = sum(path.endswith(kind) for path in found["issues"])
         rows.append(lower(f"bridges.{name}.files_with_issues", issues, "files", 0, peer))
     return rows
-
-
-def _omega(folder: Path) -> list[Row]:
-    found = judged("omega", "omega_files.py", str(folder))
-    if found is None:
-        return []
-    peer = f"omega-prime: {found['files']} files, the map of {found['maps']} of {found['of']}"
-    return _faults(found, "osi", ("faults", "missed"), peer)
 
 
 def _problems(bags: Sequence[Path], folder: Path, most: int) -> int:

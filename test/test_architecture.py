@@ -90,13 +90,16 @@ PYTHON_FILES = sorted([*PACKAGE.rglob("*.py"), *(ROOT / "msg_conventions").rglob
 
 @cache
 def imported(path: Path) -> set[str]:
-    """Return the dotted names of all modules that the file imports, at any depth."""
+    """Return the dotted names of all modules that the file imports, at any depth, also by a string."""
     names: set[str] = set()
     for node in ast.walk(ast.parse(path.read_text())):
         if isinstance(node, ast.Import):
             names |= {alias.name for alias in node.names}
         elif isinstance(node, ast.ImportFrom) and node.module:
             names |= {node.module} | {f"{node.module}.{alias.name}" for alias in node.names}
+        elif isinstance(node, ast.Constant) and isinstance(node.value, str):
+            named = re.fullmatch(r"(scenario_gen(?:\.\w+){2,})(?::\w+)?", node.value)
+            names |= {named[1]} if named else set()
     return names
 
 

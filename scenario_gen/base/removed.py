@@ -3,6 +3,10 @@
 
 """What earlier drafts had, and what replaces it. The table is emptied with the next release."""
 
+from scenario_gen.base.errors import InputError
+
+_TABLE = "convert it to a table with columns vehicle, time, x, y or lat, lon, or write a plugin"
+
 REMOVED = {
     "library": "nothing replaces it; `scenario-gen generate` segments each encounter",
     "coverage": "`python -m benchmarks coverage` measures it",
@@ -15,5 +19,31 @@ REMOVED = {
         ("s3://", "gs://", "gcs://", "abfs://", "abfss://", "az://", "http://", "https://"),
         "mount the store as a folder, or copy it with a tool such as rclone",
     ),
+    "log.format=osi": _TABLE,
+    "log.format=openscenario": f"OpenSCENARIO is only exported; {_TABLE}",
+    ".xosc": f"OpenSCENARIO is only exported; {_TABLE}",
+    "log.format=tum": _TABLE,
+    ".tum": _TABLE,
+    "log.format=gpx": _TABLE,
+    ".gpx": _TABLE,
+    "log.format=nmea": _TABLE,
+    ".nmea": _TABLE,
+    "log.format=kitti": _TABLE,
+    "--to osi": "export openscenario, commonroad or scenarionet",
 }
-"""{command, option or scheme: what replaces it}."""
+"""{command, option, scheme, value or suffix of files: what replaces it}."""
+
+
+def refuse_removed(name: str, place: str = "") -> None:
+    """Refuse what was removed.
+
+    Args:
+        name: as a user writes it: a command, an option, `log.format=value`, or a suffix.
+        place: the file or option that needs it, for the message; empty: the name.
+
+    Raises:
+        InputError: it was removed; the message says what replaces it.
+    """
+    if name in REMOVED:
+        what = f"{place}: {name}" if place else name
+        raise InputError(f"{what} was removed: {REMOVED[name]}")

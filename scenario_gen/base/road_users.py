@@ -82,7 +82,6 @@ class VehicleType:
         autoware: its label in ObjectClassification.
         commonroad: its obstacle type.
         openscenario: its VehicleCategory, or "pedestrian".
-        osi: its name in MovingObject.VehicleClassification.Type, or "PEDESTRIAN".
         scenarionet: its type in MetaDrive's and ScenarioNet's descriptions.
         waits_below: speed [m/s] below which it waits.
         speed_noise: meaningless differences of speed [m/s], on foot those of a step.
@@ -97,7 +96,6 @@ class VehicleType:
     autoware: int = 0
     commonroad: str = "unknown"
     openscenario: str = "car"
-    osi: str = "OTHER"
     scenarionet: str = "VEHICLE"
     waits_below: float = 0.5
     speed_noise: float = 0.1
@@ -132,7 +130,6 @@ _BUILT_IN = {
         autoware=1,
         commonroad="car",
         openscenario="car",
-        osi="CAR",
     ),
     "van": VehicleType(
         length=6.5,
@@ -143,7 +140,6 @@ _BUILT_IN = {
         autoware=1,
         commonroad="car",
         openscenario="van",
-        osi="DELIVERY_VAN",
     ),
     TRUCK: VehicleType(
         length=7.1,
@@ -154,7 +150,6 @@ _BUILT_IN = {
         autoware=2,
         commonroad="truck",
         openscenario="truck",
-        osi="HEAVY_TRUCK",
     ),
     TRAILER: VehicleType(
         length=8.0,
@@ -165,7 +160,6 @@ _BUILT_IN = {
         autoware=4,
         commonroad="truck",
         openscenario=TRAILER,
-        osi="TRAILER",
     ),
     "bus": VehicleType(
         length=12.0,
@@ -176,7 +170,6 @@ _BUILT_IN = {
         autoware=3,
         commonroad="bus",
         openscenario="bus",
-        osi="BUS",
     ),
     "motorcycle": VehicleType(
         length=2.2,
@@ -187,7 +180,6 @@ _BUILT_IN = {
         autoware=5,
         commonroad="motorcycle",
         openscenario="motorbike",
-        osi="MOTORBIKE",
         scenarionet="CYCLIST",
     ),
     "bicycle": VehicleType(
@@ -202,7 +194,6 @@ _BUILT_IN = {
         autoware=6,
         commonroad="bicycle",
         openscenario="bicycle",
-        osi="BICYCLE",
         scenarionet="CYCLIST",
     ),
     "e_scooter": VehicleType(
@@ -217,7 +208,6 @@ _BUILT_IN = {
         autoware=6,
         commonroad="bicycle",
         openscenario="bicycle",
-        osi="STANDUP_SCOOTER",
         scenarionet="CYCLIST",
     ),
     "pedestrian": VehicleType(
@@ -232,7 +222,6 @@ _BUILT_IN = {
         autoware=7,
         commonroad="pedestrian",
         openscenario="pedestrian",
-        osi="PEDESTRIAN",
         scenarionet="PEDESTRIAN",
         waits_below=0.2,
         speed_noise=0.15,

@@ -12,7 +12,7 @@ from typing import Annotated, TYPE_CHECKING
 
 import typer
 
-from scenario_gen.base.errors import did_you_mean, InputError, printable_lines
+from scenario_gen.base.errors import printable_lines
 from scenario_gen.cli.options import (
     assigned_all,
     Commands,
@@ -219,11 +219,8 @@ def export_scenarios(
     ] = None,
 ) -> None:
     """Export scenarios: CommonRoad, OpenSCENARIO with OpenDRIVE, Autoware, ScenarioNet."""
-    from scenario_gen.output.exchange.export import export_bag, EXPORTS
+    from scenario_gen.output.exchange.export import export_bag
 
-    if to not in EXPORTS:
-        known = EXPORTS.names()
-        raise InputError(f"--to {to}: choose one of {', '.join(known)}{did_you_mean(to, known)}")
     configs = _export_configs(ego, road_map, options or [])
     warn_of_metadata(bag)
     folder = out or default_output(bag, f"{bag.resolve().name}_{to}")

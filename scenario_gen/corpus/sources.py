@@ -17,7 +17,8 @@ import re
 from scenario_gen.base.errors import guarded, InputError
 from scenario_gen.logs.column import Column
 from scenario_gen.logs.columns import find_columns
-from scenario_gen.logs.formats import head_of, is_packed, is_spmd, LOG_FORMATS
+from scenario_gen.logs.formats import LOG_FORMATS
+from scenario_gen.logs.recognise import head_of, is_packed, is_spmd
 from scenario_gen.logs.tables import SPMD_EPOCH_NS
 from scenario_gen.logs.text import Layout, layout_of, SPMD_COLUMNS
 

@@ -3,11 +3,10 @@
 
 """Raw files and bags -> encounters (paper II-A)."""
 
-from scenario_gen.logs.adapters.openscenario import OPENSCENARIO_SPEEDS
 from scenario_gen.logs.cleaning import parse_origin
 from scenario_gen.logs.config import LogConfig
 from scenario_gen.logs.files import read_raw
-from scenario_gen.logs.formats import is_bag, is_log, is_spmd, is_table, LOG_FORMATS, LogFormat
+from scenario_gen.logs.formats import is_log, LOG_FORMATS, LogFormat
 from scenario_gen.logs.gap import GAP_RATE_MPS, INTERACTS_M, space_time_gap
 from scenario_gen.logs.geodesy import (
     azimuthal,
@@ -23,6 +22,7 @@ from scenario_gen.logs.growing import Growth, Meeting
 from scenario_gen.logs.no_encounter import NoEncounterError
 from scenario_gen.logs.raw import Observations, RawLog, Rows, Segment, UnknownFormatError
 from scenario_gen.logs.read import encounters_of, LogResult, read_log
+from scenario_gen.logs.recognise import is_bag, is_spmd, is_table
 from scenario_gen.logs.streams import Streams
 from scenario_gen.logs.synthetic import bundled, CASES
 
@@ -31,7 +31,6 @@ __all__ = [
     "GAP_RATE_MPS",
     "INTERACTS_M",
     "LOG_FORMATS",
-    "OPENSCENARIO_SPEEDS",
     "OUT_OF_RANGE_S",
     "Growth",
     "LogConfig",

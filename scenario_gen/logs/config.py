@@ -9,7 +9,6 @@ from dataclasses import dataclass
 from scenario_gen.base.errors import did_you_mean, InputError
 from scenario_gen.base.parameters import parameter, Parameters
 from scenario_gen.logs.doubts import ALLOWED
-from scenario_gen.logs.formats import LOG_FORMATS
 
 _POINTS = {"centre": 0.0, "front": -0.5, "rear": 0.5, "rear_axle": 0.3}
 """Recorded points of a vehicle, and how many lengths its centre is ahead of them.
@@ -24,9 +23,7 @@ class LogConfig(Parameters):
 
     format: str = parameter(
         "auto",
-        "source format; auto looks at the file's name and content",
-        choices=("auto", *LOG_FORMATS.built_in),
-        group=LOG_FORMATS.group,
+        "source format (docs/logs.md); auto looks at the file's name and content",
     )
     columns: str = parameter(
         "",

@@ -10,18 +10,12 @@ from pathlib import Path
 from scenario_gen.bags.storage.files import files_of, METADATA
 from scenario_gen.base.copies import renamed
 from scenario_gen.base.errors import did_you_mean, guarded, InputError, reading
+from scenario_gen.base.removed import refuse_removed
 from scenario_gen.logs.config import LogConfig
-from scenario_gen.logs.formats import (
-    is_bag,
-    is_osi,
-    is_table,
-    is_trajectory,
-    LOG_FORMATS,
-    LogFormat,
-    without_packing,
-)
+from scenario_gen.logs.formats import LOG_FORMATS, LogFormat
 from scenario_gen.logs.packed import unpacked
 from scenario_gen.logs.raw import RawLog, UnknownFormatError
+from scenario_gen.logs.recognise import is_bag, is_table, without_packing
 
 
 def read_raw(paths: Sequence[Path], config: LogConfig) -> RawLog:
@@ -45,14 +39,17 @@ def _format_of(files: Sequence[Path], config: LogConfig) -> LogFormat:
     """Return the format that the parameter names, or the first one that accepts all files.
 
     Raises:
+        InputError: the parameter names no format, or one that was removed.
         UnknownFormatError: no format accepts them.
     """
     if config.format != "auto":
+        refuse_removed(f"log.format={config.format}")
         return LOG_FORMATS[config.format]
     with guarded(str(files[0]), OSError):
         for log_format in LOG_FORMATS.values():
             if all(map(log_format.accepts, files)):
                 return log_format
+    refuse_removed(files[0].suffix.lower(), str(files[0]))
     raise UnknownFormatError(
         f"{files[0]} is not in a known log format ({', '.join(LOG_FORMATS.names())}; each may be "
         "packed as .gz or .zip); if its name misleads, name the format: --set log.format=table"
@@ -94,12 +91,8 @@ def _logs_in_folder(folder: Path) -> list[list[Path]]:
     if not folder.is_dir() or (folder / METADATA).exists():
         return []
     files = files_of(folder).files
-    traces = [[file] for file in files if is_osi(file)]
     tables = sorted(file for file in folder.iterdir() if is_table(file) and file.stat().st_size)
-    if not files or not (tables or traces):
-        return []
-    recordings = [file for file in files if [file] not in traces]
-    return [group for group in (recordings, tables, *traces) if group]
+    return [list(files), tables] if files and tables else []
 
 
 def log_files(path: Path) -> list[Path]:
@@ -111,8 +104,7 @@ def log_files(path: Path) -> list[Path]:
     _check_exists(path)
     if path.is_file() or is_bag(path):
         return [path]
-    names = (file for file in path.iterdir() if is_table(file) or is_trajectory(file))
-    tables = {file for file in names if file.stat().st_size}
+    tables = {file for file in path.iterdir() if is_table(file) and file.stat().st_size}
     packed_again = {
         file
         for file in tables

@@ -15,8 +15,8 @@ from scenario_gen.base.copies import naming_inputs, temp_folder
 from scenario_gen.base.errors import guarded, InputError
 from scenario_gen.base.folders import scratch
 from scenario_gen.logs.config import LogConfig
-from scenario_gen.logs.formats import is_packed, without_packing
 from scenario_gen.logs.raw import check_size
+from scenario_gen.logs.recognise import is_packed, without_packing
 
 _BLOCK_BYTES = 1 << 20
 _DAMAGE = (

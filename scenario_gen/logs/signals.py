@@ -14,7 +14,6 @@ import numpy as np
 
 from scenario_gen.base.documents import shown
 from scenario_gen.base.errors import InputError
-from scenario_gen.logs.geodesy import local_frame
 from scenario_gen.numerics import Floats, Ints, wrap_angle
 from scenario_gen.numerics.plane import unit, unit_left
 from scenario_gen.types import (
@@ -65,7 +64,6 @@ class RawSignal:
             where the front of vehicles is that last saw the light.
         lanes: ids of its lanes.
         seen: until when [s] each vehicle saw it, of those that went on without it.
-        geographic: `line` is in latitude and longitude [degrees].
     """
 
     id: str
@@ -74,7 +72,6 @@ class RawSignal:
     line: Floats = field(default_factory=lambda: np.zeros((0, 2)))
     lanes: tuple[str, ...] = ()
     seen: Mapping[str, float] = field(default_factory=dict)
-    geographic: bool = False
 
 
 def signals_of_table(frame: "DataFrame", place: str) -> tuple[list[RawSignal], list[str]]:
@@ -256,10 +253,6 @@ def _line_in(encounter: Encounter, signal: RawSignal, start_s: float) -> Floats 
     if not len(line):
         is_seen = any(vehicle in encounter.ids for vehicle in signal.seen)
         return _line_of(encounter, signal, start_s) if is_seen else None
-    if signal.geographic:
-        if encounter.origin is None:
-            return None
-        line = local_frame(line[:, 0], line[:, 1], encounter.origin)
     low = encounter.position.min(axis=(0, 1)) - _LIMITS.far_m
     high = encounter.position.max(axis=(0, 1)) + _LIMITS.far_m
     return line if bool(((line > low) & (line < high)).all()) else None

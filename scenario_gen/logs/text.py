@@ -8,8 +8,8 @@ from dataclasses import dataclass
 from pathlib import Path
 import re
 
-from scenario_gen.logs.formats import head_of, is_spmd
 from scenario_gen.logs.raw import UnknownFormatError
+from scenario_gen.logs.recognise import head_of, is_spmd
 
 _MAX_HEADER_BYTES = 65_536
 _SAMPLE_LINE_COUNT = 20  # lines below the header that may show a decimal comma

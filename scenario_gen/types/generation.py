@@ -216,7 +216,7 @@ class GenerationResult:
 
         Args:
             folder: an earlier export in it is replaced.
-            target: "commonroad", "openscenario", "osi", "autoware", "scenarionet" or a plugin's
+            target: "commonroad", "openscenario", "autoware", "scenarionet" or a plugin's
                 name.
 
         Raises:

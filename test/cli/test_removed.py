@@ -3,6 +3,8 @@
 
 """Commands and options of earlier drafts: one line that names what replaces them."""
 
+import re
+
 import pytest
 
 from scenario_gen.base.errors import InputError
@@ -11,13 +13,20 @@ from scenario_gen.cli.commands import run
 
 
 @pytest.mark.parametrize("name", REMOVED)
-def test_what_was_removed_names_its_replacement(name):
-    words = [name]
-    if name.startswith("--"):
+def test_what_was_removed_names_its_replacement(name, tmp_path):
+    words, log = [name], tmp_path / f"log{name if name.startswith('.') else '.csv'}"
+    log.write_text("<x/>")
+    if name.startswith("."):
+        words = ["generate", str(log)]
+    elif name.startswith("log.format="):
+        words = ["generate", str(log), "--set", name]
+    elif name.startswith("--to "):
+        words = ["export", str(tmp_path), *name.split()]
+    elif name.startswith("--"):
         words = ["generate", "log.csv", name, "3"]
     elif name.endswith("://"):
         words = ["mine", f"{name}bucket/archive", "--out", "corpus"]
-    with pytest.raises(InputError, match=f"^{name} was removed: [^\n]+$"):
+    with pytest.raises(InputError, match=f"{re.escape(name)} was removed: [^\n]+$"):
         run(words)
 
 

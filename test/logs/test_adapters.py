@@ -18,7 +18,6 @@ from support.recording_files import (
     motion,
     nocturne,
     omega_prime,
-    osi,
     SIZES,
     tracked,
 )
@@ -26,16 +25,9 @@ from support.recording_files import (
 from scenario_gen.base.errors import InputError
 from scenario_gen.logs import LogConfig, read_log
 
-
-def test_whose_trailer_it_is_is_said(tmp_path):
-    result = read_log(osi(tmp_path)[0])
-    assert any("has the trailer 7; left out" in note for note in result.quality.notes)
-    assert len(result.encounters[0].vehicles) == 3
-
-
 MADE = {
     f.__name__: f
-    for f in (argoverse2, interaction, ind, highd, commonroad, nocturne, omega_prime, osi, tracked)
+    for f in (argoverse2, interaction, ind, highd, commonroad, nocturne, omega_prime, tracked)
 }
 
 

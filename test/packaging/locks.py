@@ -31,7 +31,7 @@ LOCKS = {
     # A sourced Jazzy may replace these wheels, so no other lock builds on them.
     "ros": Lock(("ros",), ("core", "run")),
     "extras": Lock(
-        ("parquet", "plot", "planners", "gym", "corpus", "osi"),
+        ("parquet", "plot", "planners", "gym", "corpus"),
         ("core", "run"),
     ),
     "test": Lock((), ("core", "run", "extras")),

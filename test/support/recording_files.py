@@ -8,7 +8,6 @@ import math
 
 import numpy as np
 import pandas as pd
-import pytest
 
 SIZES = {"7": (4.5, 1.8), "8": (12.0, 2.5)}
 T = np.arange(0.0, 8.0, 0.1)
@@ -197,52 +196,6 @@ def omega_prime(folder):
     names = "total_nanos idx x y z vel_x vel_y yaw length width type subtype role"
     path = folder / "omega.csv"
     pd.DataFrame(rows, columns=names.split()).to_csv(path, index=False)
-    return path, ("car", "bus", "pedestrian")
-
-
-def pulling(betterosi, kind, trailer):
-    """A class of OSI, of a vehicle that may have a trailer."""
-    number = betterosi.Identifier(value=int(trailer)) if trailer else None
-    return betterosi.MovingObject.VehicleClassification(
-        type=kind, has_trailer=bool(trailer), trailer_id=number
-    )
-
-
-def osi(folder):
-    """A trace of OSI, written with its own library."""
-    betterosi = pytest.importorskip("betterosi")
-    path, kinds = folder / "trace.mcap", betterosi.MovingObject.VehicleClassification.Type
-    with betterosi.Writer(path) as writer:
-        for k, t in enumerate(T):
-            things = []
-            for track, kind in (("7", kinds.CAR), ("8", kinds.BUS), ("9", None)):
-                x, y, vx, vy, heading = motion(track, T)
-                length, width = SIZES.get(track, (0.5, 0.5))
-                things.append(
-                    betterosi.MovingObject(
-                        id=betterosi.Identifier(value=int(track)),
-                        type=betterosi.MovingObject.Type.VEHICLE
-                        if kind
-                        else betterosi.MovingObject.Type.PEDESTRIAN,
-                        base=betterosi.BaseMoving(
-                            dimension=betterosi.Dimension3d(
-                                length=length, width=width, height=1.5
-                            ),
-                            position=betterosi.Vector3d(x=float(x[k]), y=float(y[k]), z=0.75),
-                            orientation=betterosi.Orientation3d(roll=0.0, pitch=0.0, yaw=heading),
-                            velocity=betterosi.Vector3d(x=vx, y=vy, z=0.0),
-                        ),
-                        vehicle_classification=kind
-                        and pulling(betterosi, kind, "7" if track == "8" else ""),
-                    )
-                )
-            nanos = round(t * 1e9)
-            stamp = betterosi.Timestamp(seconds=nanos // 10**9, nanos=nanos % 10**9)
-            writer.add(
-                betterosi.GroundTruth(timestamp=stamp, moving_object=things),
-                topic="ground_truth",
-                log_time=nanos,
-            )
     return path, ("car", "bus", "pedestrian")
 
 

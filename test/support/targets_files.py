@@ -25,7 +25,6 @@ from scenario_gen.corpus.sources import message_table
 from scenario_gen.corpus.tables import rows_of
 from scenario_gen.logs import read_log
 from scenario_gen.logs.synthetic import bundled
-from scenario_gen.output.exchange.openscenario import write_openscenario
 from support.harness import Mutator, Target
 from support.mutators import BYTES, header, TEXT, tree
 from support.recording_files import (
@@ -36,9 +35,7 @@ from support.recording_files import (
     interaction,
     nocturne,
     omega_prime,
-    osi,
 )
-from support.small_scenarios import case_of, crossing
 from support.targets_bags import JSON
 from support.targets_logs import PARQUET, safety_messages, SHORT
 from support.targets_maps import MAP
@@ -114,11 +111,6 @@ def read_all(folder: Path) -> None:
     read_log(main[0] if main else folder, SHORT)
 
 
-def openscenario(folder: Path) -> None:
-    """Write a scenario in OpenSCENARIO."""
-    (folder / "one.xosc").write_bytes(write_openscenario(*case_of(crossing()), "r.xodr"))
-
-
 def corpus_tables(folder: Path) -> None:
     """Write a table of two encounters as a corpus has it."""
     rows = [
@@ -170,8 +162,6 @@ TARGETS = (
     files_target("commonroad_log", commonroad, read_all),
     files_target("nocturne", nocturne, read_all),
     files_target("omega_prime", omega_prime, read_all),
-    files_target("osi", osi, read_all),
-    files_target("openscenario", openscenario, read_all),
     files_target("corpus", corpus_tables, read_corpus),
     files_target("archive", archive, parse_archive),
 )

@@ -158,39 +158,6 @@ def simulated(_folder: Path) -> list[bytes]:
     return [f"<fcd-export>{''.join(rows)}</fcd-export>".encode()]
 
 
-def tum(_folder: Path) -> list[bytes]:
-    """The trajectory of one vehicle in TUM's format."""
-    rows = [f"{row.t_s} {row.x_m} {row.y_m} 0 0 0 0 1" for row in cars().itertuples()]
-    return ["\n".join(rows[:61]).encode()]
-
-
-def kitti(_folder: Path) -> list[bytes]:
-    """Poses in KITTI's format."""
-    rows = [f"1 0 0 {row.x_m} 0 1 0 {row.y_m} 0 0 1 0" for row in cars().itertuples()]
-    return ["\n".join(rows[:61]).encode()]
-
-
-def gpx(_folder: Path) -> list[bytes]:
-    """The track of one vehicle in GPX."""
-    points = [
-        f'<trkpt lat="{row.latitude}" lon="{row.longitude}">'
-        f"<time>{pd.Timestamp(row.time_ms, unit='ms').isoformat()}Z</time></trkpt>"
-        for row in on_globe(cars()).head(61).itertuples()
-    ]
-    return [f"<gpx><trk><trkseg>{''.join(points)}</trkseg></trk></gpx>".encode()]
-
-
-def nmea(_folder: Path) -> list[bytes]:
-    """The sentences RMC of one vehicle."""
-    rows = [
-        f"$GPRMC,{pd.Timestamp(row.time_ms, unit='ms'):%H%M%S}.{row.time_ms % 1000 // 100},A,"
-        f"48{60 * (row.latitude - 48):08.5f},N,011{60 * (row.longitude - 11):08.5f},E,15.5,"
-        f"{row.course:.1f},010126,,*00"
-        for row in on_globe(cars()).head(61).itertuples()
-    ]
-    return ["\r\n".join(rows).encode()]
-
-
 def packed(_folder: Path) -> list[bytes]:
     """A table in a .gz."""
     return [gzip.compress(cars().to_csv(index=False).encode())]
@@ -353,10 +320,6 @@ TARGETS = (
     Target(
         "fcd", simulated, read_as("log.xml", replace(SHORT, format="fcd")), (*TEXT, *[tree] * 3)
     ),
-    Target("tum", tum, read_as("log.tum"), TEXT),
-    Target("kitti", kitti, read_as("log.txt"), TEXT),
-    Target("gpx", gpx, read_as("log.gpx"), (*TEXT, *[tree] * 3)),
-    Target("nmea", nmea, read_as("log.nmea"), TEXT),
     Target("packed", packed, read_as("log.csv.gz"), BYTES),
     Target(
         "parquet",

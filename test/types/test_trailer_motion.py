@@ -4,12 +4,12 @@
 """A trailer is a part of its vehicle: it hangs on the hitch, needs room, and travels in messages."""
 
 from dataclasses import replace
+import xml.etree.ElementTree as ET
 
 import numpy as np
-from support.small_scenarios import case_of, moving, observed
+from support.small_scenarios import case_of, moving
 
 from msg_conventions.trajectory import joint_names, vehicle_of
-from scenario_gen.logs.kinds import type_called
 from scenario_gen.method.validity import Checker
 from scenario_gen.output.exchange.cases import Exported
 from scenario_gen.output.exchange.openscenario import write_openscenario
@@ -45,14 +45,12 @@ def test_who_hits_a_trailer_is_refused_but_not_the_trailer_behind_its_truck():
     assert free.valid
 
 
-def test_a_trailer_travels_in_joint_names_and_is_a_second_object_in_openscenario(tmp_path):
+def test_a_trailer_travels_in_joint_names_and_is_a_second_object_in_openscenario():
     assert vehicle_of(joint_names([TRUCK])[0]) == TRUCK
     rows = [[0.0, 0.0, 0.0, 5.0, 0.0, 0.1], [-40.0, 0.0, 0.0, 5.0, 0.0, 0.0]]
     case, exported = case_of(moving(rows, vehicles=[TRUCK, CAR]))
     others = exported.others.with_trailers()
     exported = Exported(3, 7, "", others, None, driven=False)
-    path = tmp_path / "towed.xosc"
-    path.write_bytes(write_openscenario(case, exported, "road.xodr"))
-    tracks = observed(path).vehicles
-    assert [type_called(track.kind) for track in tracks] == ["truck", "car", "trailer"]
-    assert np.allclose(tracks[2].fix, others.position[2], atol=1e-6)
+    root = ET.fromstring(write_openscenario(case, exported, "road.xodr"))
+    vehicles = [each.get("vehicleCategory") for each in root.iter("Vehicle")]
+    assert vehicles == ["truck", "car", "trailer"]

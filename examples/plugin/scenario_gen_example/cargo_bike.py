@@ -19,6 +19,5 @@ CARGO_BIKE = VehicleType(
     words=("cargobike", "cargo bicycle"),
     autoware=6,
     openscenario="bicycle",
-    osi="BICYCLE",
     scenarionet="CYCLIST",
 )

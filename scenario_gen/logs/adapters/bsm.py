@@ -12,7 +12,6 @@
 | heading | heading, degrees | heading, 0.0125 degrees; 28800: unknown | heading_deg |
 | length, width | size, cm | the same | the same |
 
-Traffic lights may be in the same files or in files given with them: SPaT and MAP messages (spat).
 Headings are clockwise from north. If recordGeneratedAt is empty, odeReceivedAt has the date. The
 tables of Wyoming and Tampa on data.transportation.gov have the same values, in columns such as
 coreData_position_lat. A file has one message a line, a list, or messages one after the other. Each
@@ -23,8 +22,6 @@ Source: the samples and data dictionaries of the ITS JPO's sandbox.
 
 from collections.abc import Iterator, Sequence
 import csv
-from dataclasses import replace
-from functools import partial
 import json
 import math
 from pathlib import Path
@@ -35,7 +32,6 @@ import numpy as np
 import pandas as pd
 
 from scenario_gen.base.errors import guarded, InputError
-from scenario_gen.logs.adapters.spat import SignalMessages
 from scenario_gen.logs.config import LogConfig
 from scenario_gen.logs.raw import check_size, RawLog, Segment
 from scenario_gen.logs.stamps import MAX_DATE_LENGTH_COUNT, MAX_STAMP_S
@@ -57,15 +53,12 @@ def read(paths: Sequence[Path], config: LogConfig) -> RawLog:
         InputError: a file is damaged or too large, or a message is incomplete; names the message.
     """
     rows: list[Row] = []
-    lights = SignalMessages()
     segments = []
     for path in paths:
         check_size(str(path), path.stat().st_size, len(rows), config)
         segments.append(Segment(len(rows), str(path), "message", 1))
         for number, record in enumerate(_records(path)):
             place = f"{path}, record {number + 1}"
-            if lights.add(record, partial(_stamp, record), place):
-                continue
             problem = f"{place} is not a known basic safety message"
             with guarded(problem, KeyError, TypeError, ValueError):
                 rows += _rows_of(record, number)
@@ -75,12 +68,7 @@ def read(paths: Sequence[Path], config: LogConfig) -> RawLog:
     frame = pd.DataFrame(rows)
     if {"lat", "x"} <= set(frame.columns):
         raise InputError(f"{paths[0]} mixes latitude/longitude and x/y; read the files separately")
-    log = from_frame(frame, paths, tuple(segments), config)
-    if config.signals != "recorded":
-        return log
-    notes = list(log.notes)
-    signals = tuple(lights.signals(str(paths[0]), notes))
-    return replace(log, signals=signals, notes=tuple(notes))
+    return from_frame(frame, paths, tuple(segments), config)
 
 
 def _records(path: Path) -> Iterator[Any]:

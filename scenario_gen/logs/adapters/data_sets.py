@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The columns of public data sets, by quantity, with their units.
+"""The columns of public data sets, by quantity, with their units; and their recognition.
 
 Positions are those of the centre of the bounding box, except in highD, which has its upper left
 corner; headings are counter-clockwise from +x.
@@ -10,8 +10,13 @@ corner; headings are counter-clockwise from +x.
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 import math
+from pathlib import Path
 
+from scenario_gen.base.errors import needs
 from scenario_gen.logs.column import Column
+
+_INTERACTION = "interaction"
+_PEDESTRIAN_COLUMNS = {"track_id", "timestamp_ms", "agent_type"}
 
 
 @dataclass(frozen=True)
@@ -163,3 +168,50 @@ DATA_SETS = {
     ),
 }
 """By their names in the parameter `log.format`."""
+
+
+def recognised(path: Path) -> str:
+    """Return the name of the data set of a file, or of its tracks; "" if unknown."""
+    for data_set in DATA_SETS.values():
+        if data_set.companions and is_companion(path, data_set.companions):
+            tracks = companion(path, data_set.companions, data_set.companions.tracks)
+            return recognised(tracks) if tracks.is_file() else ""
+    names = _header(path)
+    if has_pedestrians(path, _INTERACTION) and names >= _PEDESTRIAN_COLUMNS:
+        return _INTERACTION
+    return next((name for name, known in DATA_SETS.items() if known.needed <= names), "")
+
+
+def _header(path: Path) -> set[str]:
+    """Return the column names of a CSV or Parquet file; none of other or damaged files."""
+    suffix = path.suffix.lower()
+    if suffix == ".csv":
+        with path.open(encoding="utf-8-sig", errors="replace") as file:
+            return {field.strip() for field in file.readline().split(",")}
+    if suffix != ".parquet":
+        return set()
+    needs("parquet", "pyarrow")
+    from pyarrow import parquet
+
+    try:
+        return set(parquet.read_schema(path).names)
+    except Exception:  # the reader of tables reports the damage
+        return set()
+
+
+def is_companion(path: Path, companions: Companions) -> bool:
+    """Return whether a file belongs to a file of tracks."""
+    return path.name.endswith((companions.classes, companions.frame_rate))
+
+
+def companion(path: Path, companions: Companions, suffix: str) -> Path:
+    """Return the file of the same recording with another suffix."""
+    name = path.name
+    for known in (companions.tracks, companions.classes, companions.frame_rate):
+        name = name.removesuffix(known)
+    return path.with_name(name + suffix)
+
+
+def has_pedestrians(path: Path, name: str) -> bool:
+    """Return whether a file has pedestrians only, which have separate files in INTERACTION."""
+    return name == _INTERACTION and path.name.startswith("pedestrian_tracks")

@@ -13,7 +13,13 @@ import numpy as np
 import pandas as pd
 
 from scenario_gen.base.errors import guarded, InputError, needs
-from scenario_gen.logs.adapters.data_sets import Companions, DATA_SETS, DataSet
+from scenario_gen.logs.adapters.data_sets import (
+    companion,
+    DATA_SETS,
+    DataSet,
+    has_pedestrians,
+    is_companion,
+)
 from scenario_gen.logs.config import LogConfig
 from scenario_gen.logs.raw import check_size, RawLog
 from scenario_gen.logs.stamps import reals
@@ -25,8 +31,6 @@ from scenario_gen.logs.tables import (
     vehicle_name,
 )
 
-_INTERACTION = "interaction"
-_PEDESTRIAN_COLUMNS = {"track_id", "timestamp_ms", "agent_type"}
 _MIN_HEADING_MPS = 0.1  # a slower vehicle has no direction of travel
 
 Load = Callable[[Path, DataSet, int, LogConfig], pd.DataFrame]
@@ -49,8 +53,8 @@ def read(
     """
     data_set = DATA_SETS[name]
     companions = data_set.companions
-    tracks = [path for path in paths if not companions or not _is_companion(path, companions)]
-    pedestrians = [path for path in tracks if _has_pedestrians(path, name)]
+    tracks = [path for path in paths if not companions or not is_companion(path, companions)]
+    pedestrians = [path for path in tracks if has_pedestrians(path, name)]
     main = [path for path in tracks if path not in pedestrians]
     if len(main) != 1:
         names = ", ".join(path.name for path in main) or "none"
@@ -77,53 +81,6 @@ def read(
     return replace(log, rows=n_rows, notes=tuple(notes))
 
 
-def recognised(path: Path) -> str:
-    """Return the name of the data set of a file, or of its tracks; "" if unknown."""
-    for data_set in DATA_SETS.values():
-        if data_set.companions and _is_companion(path, data_set.companions):
-            tracks = _companion(path, data_set.companions, data_set.companions.tracks)
-            return recognised(tracks) if tracks.is_file() else ""
-    names = _header(path)
-    if _has_pedestrians(path, _INTERACTION) and names >= _PEDESTRIAN_COLUMNS:
-        return _INTERACTION
-    return next((name for name, known in DATA_SETS.items() if known.needed <= names), "")
-
-
-def _header(path: Path) -> set[str]:
-    """Return the column names of a CSV or Parquet file; none of other or damaged files."""
-    suffix = path.suffix.lower()
-    if suffix == ".csv":
-        with path.open(encoding="utf-8-sig", errors="replace") as file:
-            return {field.strip() for field in file.readline().split(",")}
-    if suffix != ".parquet":
-        return set()
-    needs("parquet", "pyarrow")
-    from pyarrow import parquet
-
-    try:
-        return set(parquet.read_schema(path).names)
-    except Exception:  # the reader of tables reports the damage
-        return set()
-
-
-def _is_companion(path: Path, companions: Companions) -> bool:
-    """Return whether a file belongs to a file of tracks."""
-    return path.name.endswith((companions.classes, companions.frame_rate))
-
-
-def _companion(path: Path, companions: Companions, suffix: str) -> Path:
-    """Return the file of the same recording with another suffix."""
-    name = path.name
-    for known in (companions.tracks, companions.classes, companions.frame_rate):
-        name = name.removesuffix(known)
-    return path.with_name(name + suffix)
-
-
-def _has_pedestrians(path: Path, name: str) -> bool:
-    """Return whether a file has pedestrians only, which have separate files in INTERACTION."""
-    return name == _INTERACTION and path.name.startswith("pedestrian_tracks")
-
-
 def _read_table(
     path: Path, data_set: DataSet, rows_before: int, config: LogConfig
 ) -> pd.DataFrame:
@@ -142,8 +99,8 @@ def _read_table(
         table = read_text(path, rows_before, config, sep=",")
     table.columns = pd.Index([str(column).strip() for column in table.columns])
     missing = sorted(data_set.needed - set(table.columns))
-    has_pedestrians = data_set is DATA_SETS[_INTERACTION] and _has_pedestrians(path, _INTERACTION)
-    if missing and not has_pedestrians:
+    is_interaction = data_set is DATA_SETS["interaction"]
+    if missing and not (is_interaction and has_pedestrians(path, "interaction")):
         raise InputError(
             f"{path} lacks columns of {data_set.title}: {', '.join(missing)}; "
             f"it has {', '.join(table.columns)}"
@@ -151,7 +108,7 @@ def _read_table(
     return table
 
 
-def _read_companion(
+def _readcompanion(
     path: Path, data_set: DataSet, suffix: str, columns: Sequence[str]
 ) -> pd.DataFrame:
     """Return another file of the recording of a file of tracks.
@@ -160,7 +117,7 @@ def _read_companion(
         InputError: it does not exist, or lacks a column.
     """
     assert data_set.companions is not None
-    file = _companion(path, data_set.companions, suffix)
+    file = companion(path, data_set.companions, suffix)
     if not path.name.endswith(data_set.companions.tracks) or not file.is_file():
         raise InputError(
             f"{path}: {data_set.title} also needs {file.name} in the same folder; copy it there"
@@ -187,7 +144,7 @@ def _kinds(path: Path, data_set: DataSet, table: pd.DataFrame) -> "pd.Series[Any
         return _lower(table[column])
     assert data_set.companions is not None
     column = data_set.columns["vehicle"].name
-    classes = _read_companion(path, data_set, data_set.companions.classes, (column, "class"))
+    classes = _readcompanion(path, data_set, data_set.companions.classes, (column, "class"))
     by_vehicle = dict(
         zip(classes[column].map(vehicle_name), _lower(classes["class"]), strict=True)
     )
@@ -243,7 +200,7 @@ def _frame_period(path: Path, data_set: DataSet) -> float:
         InputError: its frame rate is missing or implausible.
     """
     assert data_set.companions is not None
-    meta = _read_companion(path, data_set, data_set.companions.frame_rate, ("frameRate",))
+    meta = _readcompanion(path, data_set, data_set.companions.frame_rate, ("frameRate",))
     frame_rate = float(reals(meta["frameRate"]).iloc[0])
     if not 0.1 <= frame_rate <= 1000.0:
         raise InputError(

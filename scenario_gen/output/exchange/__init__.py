@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Exports for other software: CommonRoad, OpenSCENARIO, OSI, Autoware and ScenarioNet."""
+"""Exports for other software: CommonRoad, OpenSCENARIO, Autoware and ScenarioNet."""
 
 from scenario_gen.output.exchange.cases import Case, Exported
 from scenario_gen.output.exchange.config import ExportConfig

@@ -15,7 +15,7 @@ class ExportConfig(Parameters):
     ego: str = parameter("", "id of the vehicle that becomes the ego, for sets without an ego")
     map: str = parameter(
         "",
-        "OpenSCENARIO and OSI: the map of the scenarios (.xodr, .osm), which becomes their road",
+        "OpenSCENARIO: the map of the scenarios (.xodr, .osm), which becomes their road",
     )
     projection: str = parameter(
         "mgrs",

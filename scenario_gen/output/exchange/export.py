@@ -23,6 +23,7 @@ from scenario_gen.base.folders import (
     write_text,
 )
 from scenario_gen.base.registry import Registry
+from scenario_gen.base.removed import refuse_removed
 from scenario_gen.numerics import Floats
 from scenario_gen.output.exchange.cases import Case, Exported, read_cases
 from scenario_gen.output.exchange.commonroad import benchmark_id, write_commonroad
@@ -30,7 +31,6 @@ from scenario_gen.output.exchange.config import ExportConfig
 from scenario_gen.output.exchange.derived_lanes import area_of
 from scenario_gen.output.exchange.opendrive import write_opendrive
 from scenario_gen.output.exchange.openscenario import write_openscenario
-from scenario_gen.output.exchange.osi import write_osi
 from scenario_gen.output.exchange.projection import projection_of
 from scenario_gen.output.exchange.scenarionet import dataset_files, description, file_name, pickled
 from scenario_gen.roads import read_network
@@ -186,13 +186,14 @@ def _format(target: str, road: str) -> ExportFormat:
     """Return a format of `EXPORTS`; `road` is a map, or "".
 
     Raises:
-        InputError: the format does not support this map.
+        InputError: the format was removed, is not known, or does not support this map.
     """
+    refuse_removed(f"--to {target}")
     to = EXPORTS[target]
     if road and not to.takes_map:
         raise InputError(
             f"map: --to {target} writes lanes of its own; a map can be given with --to "
-            "openscenario or osi"
+            "openscenario"
         )
     if road and Path(road).suffix.lower() not in to.maps:
         known = "OpenDRIVE (.xodr)" + (" or Lanelet2 (.osm)" if ".osm" in to.maps else "")
@@ -243,11 +244,6 @@ def _to_openscenario(
         write_openscenario(case, exported, _road_file(case, export), export)
     )
     return Written((name, _road_file(case, export)))
-
-
-def _to_osi(folder: Path, case: Case, exported: Exported, export: ExportConfig) -> Written:
-    road, name = _road_file(case, export), f"case_{case.number}_{exported.index}.mcap"
-    return Written((name, road), write_osi(folder / name, case, exported, folder / road))
 
 
 def _to_autoware(folder: Path, case: Case, exported: Exported, _: ExportConfig) -> Written:
@@ -309,7 +305,6 @@ EXPORTS = Registry[ExportFormat](
     {
         "commonroad": ExportFormat(_to_commonroad),
         "openscenario": ExportFormat(_to_openscenario, _roads, _origin_of_map, takes_map=True),
-        "osi": ExportFormat(_to_osi, _roads, takes_map=True, maps=(".xodr",)),
         "autoware": ExportFormat(_to_autoware, projected_from=lambda case, _: case.origin),
         "scenarionet": ExportFormat(_to_scenarionet, closing=dataset_files),
     },

@@ -13,7 +13,6 @@ under test drives it. Each light whose states are known has a controller with it
 signals are those of the OpenDRIVE file that is written beside it.
 """
 
-from scenario_gen.logs import OPENSCENARIO_SPEEDS
 from scenario_gen.output.exchange.cases import Case, Exported, scenario_source
 from scenario_gen.output.exchange.config import ExportConfig
 from scenario_gen.output.exchange.lights import light_of, phases_within
@@ -147,7 +146,7 @@ def _entity(entities: Element, name: str, vehicle: Vehicle, speeds: str) -> None
             )
     properties = add(element, "Properties")
     if speeds:
-        add(properties, "Property", name=OPENSCENARIO_SPEEDS, value=speeds)
+        add(properties, "Property", name="speed_mps", value=speeds)
 
 
 def _standing(entities: Element, actions: Element, name: str, obstacle: Obstacle) -> None:

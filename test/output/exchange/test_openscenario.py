@@ -3,12 +3,11 @@
 
 """OpenSCENARIO and OpenDRIVE: references, reference points and edges, which no schema sees; the road's geometry; and back."""
 
-import re
 import xml.etree.ElementTree as ET
 
 import numpy as np
 import pytest
-from support.small_scenarios import case_of, crossing, observed, one_vehicle
+from support.small_scenarios import case_of, crossing, one_vehicle
 
 from scenario_gen.output.exchange.config import ExportConfig
 from scenario_gen.output.exchange.derived_lanes import lane_map_of
@@ -17,7 +16,7 @@ from scenario_gen.output.exchange.opendrive import write_opendrive
 from scenario_gen.output.exchange.openscenario import write_openscenario
 from scenario_gen.roads import read_network, RoadConfig
 from scenario_gen.roads.build import build_road
-from scenario_gen.types import Lane, LaneNetwork, RuleKind, TrafficRule, Trailer
+from scenario_gen.types import Lane, LaneNetwork, RuleKind, TrafficRule
 
 
 def written(scenario, ego=None, export=ExportConfig()):
@@ -122,117 +121,6 @@ def test_the_ego_is_placed_and_has_a_goal_but_no_trajectory():
         [np.cos(ego.heading[0, -1]), np.sin(ego.heading[0, -1])]
     )
     assert np.allclose([float(goal["x"]), float(goal["y"])], end, atol=1e-8)
-
-
-def test_what_was_written_is_read_back_and_others_have_no_speeds(tmp_path):
-    scenario = crossing(present=[[0, 60], [9, 44]])
-    data, _ = written(scenario, one_vehicle())
-    for ours in (True, False):
-        path = tmp_path / f"one{ours}.xosc"
-        path.write_bytes(data if ours else data.replace(b"speed_mps", b"theirs"))
-        made = observed(path)
-        assert "Ego left out: it follows no trajectory" in made.notes
-        for n, track in enumerate(made.vehicles):
-            there = slice(int(scenario.present[n, 0]), int(scenario.present[n, 1]) + 1)
-            assert np.allclose(track.fix_ns * 1e-9, scenario.time[there], atol=1e-9)
-            assert np.abs(track.fix - scenario.position[n, there]).max() < 1e-6
-            assert np.allclose(track.speed, scenario.speed[n, there] if ours else [], atol=1e-6)
-
-
-def test_trailers_belong_to_their_vehicles(tmp_path):
-    data, _ = written(crossing())
-    box = b"""<Trailer name="box"><Vehicle><BoundingBox><Center x="1" y="0" z="1"/>
-        <Dimensions length="6" width="2.4" height="3"/></BoundingBox><TrailerCoupler dx="5"/>
-        </Vehicle></Trailer>"""
-    for part in (b'<TrailerRef entityRef="vehicle_2"/>', box):
-        data = data.replace(b"</Vehicle>", b"<Trailer>" + part + b"</Trailer></Vehicle >", 1)
-    path = tmp_path / "trailers.xosc"
-    path.write_bytes(data)
-    first, second = observed(path).vehicles
-    assert (first.trailer_name, second.trailer_name) == ("vehicle_2", "")
-    assert first.trailer is None
-    assert second.trailer == Trailer("vehicle_2_trailer", 6.0, 2.4, second.length / 2.0, 4.0)
-
-
-THEIRS = {  # what others write in place of what we write, and by how many seconds it is later
-    "parameters": (b'time="0.5"', b'time="$half"', 0.0),
-    "expressions": (b'time="0.5"', b'time="${($half + sqrt(4) * 1.5 - 3) % 2}"', 0.0),
-    "declared after its use": (b'time="0.5"', b'time="${$later}"', 0.0),
-    "relative times": (b'"absolute" scale="1" offset="0"', b'"relative" scale="1" offset="2"', 2.0),
-    "no heading": (b' h="', b' z="', 0.0),
-    "no time reference": (b'<Timing domainAbsoluteRelative="absolute" scale="1" offset="0"', b"<None", 0.0),
-}  # fmt: skip
-
-
-@pytest.mark.parametrize("kind", THEIRS)
-def test_what_others_write_is_read_as_it_is_meant(tmp_path, kind):
-    scenario = crossing()
-    data, _ = written(scenario)
-    theirs, ours, later = (THEIRS[kind][k] for k in (1, 0, 2))
-    assert ours in data
-    names = b'<ParameterDeclaration name="later" value="$half"/><ParameterDeclaration name="half" value="0.5"/>'
-    data = data.replace(
-        b"<ParameterDeclarations",
-        b"<ParameterDeclarations>" + names + b"</ParameterDeclarations><Gone",
-        1,
-    )
-    path = tmp_path / "one.xosc"
-    path.write_bytes(
-        data.replace(ours, theirs)
-        .replace(b"speed_mps", b"theirs")
-        .replace(b"AbsoluteTargetSpeed", b"Gone")
-    )
-    made = observed(path)
-    for n, track in enumerate(made.vehicles):
-        assert np.allclose(track.fix_ns * 1e-9, scenario.time + later, atol=1e-9)
-        assert np.abs(track.fix - scenario.position[n]).max() < (
-            0.2 if kind == "no heading" else 1e-6
-        )
-    assert len(made.vehicles) == 2 and (kind == "no time reference") == any(
-        "without a time reference" in note for note in made.notes
-    )
-
-
-def test_without_times_a_first_speed_is_kept(tmp_path):
-    data, _ = written(crossing())
-    path = tmp_path / "one.xosc"
-    path.write_bytes(
-        re.sub(
-            rb' time="[^"]*"',
-            b"",
-            data.replace(b"<Timing", b"<None").replace(b"speed_mps", b"theirs"),
-        )
-    )
-    for track, speed in zip(observed(path).vehicles, (9.0, 6.0), strict=True):
-        driven = np.hypot(*np.diff(track.fix, axis=0).T)
-        assert np.allclose(driven / np.diff(track.fix_ns * 1e-9), speed, rtol=0.02)
-
-
-def test_vehicles_may_stand_in_a_catalog(tmp_path):
-    data, _ = written(crossing())
-    first = data.index(b"<Vehicle "), data.index(b"</Vehicle>") + len(b"</Vehicle>")
-    entry = (
-        data[slice(*first)]
-        .replace(b'name="car"', b'name="mine"', 1)
-        .replace(b'length="4.8"', b'length="$long"')
-    )
-    (tmp_path / "catalogs").mkdir()
-    (tmp_path / "catalogs" / "ours.xosc").write_bytes(
-        b'<OpenSCENARIO><Catalog name="Cars">' + entry + b"</Catalog></OpenSCENARIO>"
-    )
-    (tmp_path / "catalogs" / "broken.xosc").write_bytes(b"<OpenSCENARIO>")
-    reference = b'<CatalogReference catalogName="Cars" entryName="mine"><ParameterAssignments><ParameterAssignment parameterRef="long" '
-    reference += b'value="${2 * 2.6}"/></ParameterAssignments></CatalogReference>'
-    folder = b'<CatalogLocations><VehicleCatalog><Directory path="catalogs"/></VehicleCatalog></CatalogLocations><Gone'
-    text = (data[: first[0]] + reference + data[first[1] :]).replace(
-        b"<CatalogLocations", folder, 1
-    )
-    (tmp_path / "one.xosc").write_bytes(text)
-    assert [track.length for track in observed(tmp_path / "one.xosc").vehicles] == [5.2, 4.5]
-    text = text.replace(b'vehicleCategory="car"', b'vehicleCategory="bicycle"')
-    (tmp_path / "one.xosc").write_bytes(text)
-    made = observed(tmp_path / "one.xosc")
-    assert sorted(seen.kind for seen in made.vehicles) == ["bicycle", "car"]
 
 
 def along(geometry, s):

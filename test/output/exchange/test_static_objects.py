@@ -7,7 +7,7 @@ import xml.etree.ElementTree as ET
 
 import numpy as np
 import pytest
-from support.small_scenarios import case_of, crossing, observed
+from support.small_scenarios import case_of, crossing
 
 from scenario_gen.numerics import wrap_angle
 from scenario_gen.numerics.curve import Curve
@@ -17,7 +17,6 @@ from scenario_gen.output.exchange.derived_lanes import lane_map_of
 from scenario_gen.output.exchange.opendrive import write_opendrive
 from scenario_gen.output.exchange.opendrive_network import RoadNetwork
 from scenario_gen.output.exchange.openscenario import write_openscenario
-from scenario_gen.output.exchange.osi import write_osi
 from scenario_gen.output.exchange.scenarionet import description
 from scenario_gen.roads import build_road, RoadConfig
 
@@ -60,7 +59,7 @@ def test_commonroad_is_read_again_as_a_road(case, tmp_path):
     np.testing.assert_allclose(build_road(path).obstacles, PLACES, atol=1e-6)
 
 
-def test_openscenario_and_its_log(case, tmp_path):
+def test_openscenario(case, tmp_path):
     path = tmp_path / "one.xosc"
     path.write_bytes(write_openscenario(*case, "r.xodr"))
     root = ET.parse(path).getroot()
@@ -70,25 +69,6 @@ def test_openscenario_and_its_log(case, tmp_path):
         assert float(box.find("Dimensions").get("width")) == width
         place = root.find(f".//Private[@entityRef='obstacle_{n}']//WorldPosition")
         assert [float(place.get(key)) for key in "xyh"] == [x, y, yaw]
-    assert len(observed(path).vehicles) == 2  # the obstacles are no vehicles
-
-
-def test_osi(case, tmp_path):
-    betterosi = pytest.importorskip("betterosi")
-    road, path = tmp_path / "r.xodr", tmp_path / "one.mcap"
-    road.write_bytes(write_opendrive(case[0].lane_map, "r", 0))
-    write_osi(path, *case, road)
-    for message in betterosi.read(path):
-        if not isinstance(message, betterosi.GroundTruth):
-            continue
-        bases = [thing.base for thing in message.stationary_object]
-        read = [
-            (b.position.x, b.position.y, b.orientation.yaw, b.dimension.length, b.dimension.width)
-            for b in bases
-        ]
-        np.testing.assert_allclose(read, PLACES)
-        things = (*message.stationary_object, *message.moving_object)
-        assert len({thing.id.value for thing in things}) == 4
 
 
 def test_scenarionet(case):
