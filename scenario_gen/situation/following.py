@@ -9,6 +9,7 @@ import math
 import numpy as np
 
 from scenario_gen.numerics import Bools, Floats, Ints
+from scenario_gen.numerics.rounding import ROUNDING_S
 from scenario_gen.situation.evidence import (
     closeness_confidence,
     combined_confidence,
@@ -66,7 +67,7 @@ def _follower(
     speed = smoothed_speed(encounter.speed[who], dt)
     leader_speed = smoothed_speed(encounter.speed[whom], dt)
     stands = len(rows) and speed[rows].max() < encounter.vehicles[who].kind.waits_below
-    if len(rows) * dt < LIMITS.min_following_s or stands:
+    if len(rows) * dt < LIMITS.min_following_s - ROUNDING_S or stands:
         return None
 
     closing = speed[rows] - leader_speed[rows]
@@ -139,7 +140,7 @@ def _best_lag(
     first, last = (round(lag / dt) for lag in LIMITS.lag_s)
     for steps in range(max(first, 1), last + 1):
         rows = np.flatnonzero(behind[steps:]) + steps
-        if len(rows) * dt < LIMITS.min_following_s:
+        if len(rows) * dt < LIMITS.min_following_s - ROUNDING_S:
             break
         a = acceleration[rows] - acceleration[rows].mean()
         b = leader_acceleration[rows - steps] - leader_acceleration[rows - steps].mean()

@@ -12,6 +12,7 @@ import numpy as np
 from scenario_gen.numerics import Bools, Floats, wrap_angle
 from scenario_gen.numerics.boxes import footprint_gaps
 from scenario_gen.numerics.kernels import F2, F3, I, kernel, OUTB1
+from scenario_gen.numerics.rounding import ROUNDING_M, ROUNDING_S
 from scenario_gen.situation.conflicts import Conflict
 from scenario_gen.types import Motion, together
 
@@ -34,7 +35,7 @@ def departure(motion: Motion, n: int, entry: float) -> float:
     """
     threshold = motion.vehicles[n].kind.waits_below
     first, present_until = motion.present[n].tolist()
-    last = max(int(np.searchsorted(motion.time, entry + 1e-9)), first + 1)
+    last = max(int(np.searchsorted(motion.time, entry + ROUNDING_S)), first + 1)
     later = motion.speed[n, last : present_until + 1]
     if motion.speed[n, last - 1] < threshold and len(later):
         moves = later >= threshold
@@ -77,7 +78,7 @@ def passing(motion: Motion, conflict: Conflict, *, merges: bool) -> tuple[float,
     )
     begin, end = motion.present[first].tolist()
     present_gap = gap[begin : end + 1]
-    is_near = present_gap < max(MERGE_CLEARANCE_M, float(present_gap.min()) + 1e-9)
+    is_near = present_gap < max(MERGE_CLEARANCE_M, float(present_gap.min()) + ROUNDING_M)
     k = begin + int(np.flatnonzero(is_near)[-1])
     after = min(k + 1, end)
     share = 0.0

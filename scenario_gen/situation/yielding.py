@@ -10,6 +10,7 @@ import numpy as np
 
 from scenario_gen.numerics import wrap_angle
 from scenario_gen.numerics.plane import ahead_and_left
+from scenario_gen.numerics.rounding import ROUNDING_S
 from scenario_gen.situation.conflicts import Conflict
 from scenario_gen.situation.evidence import (
     closeness_confidence,
@@ -101,7 +102,7 @@ def _enters_from_beside(recording: Recording, conflict: Conflict) -> bool:
     """Whether the second vehicle comes into the first one's lane from beside it."""
     encounter, who = recording.encounter, conflict.second
     half = 0.5 * LIMITS.entry_window_s
-    is_before = np.abs(encounter.time - conflict.entry_second + half) <= half
+    is_before = np.abs(encounter.time - conflict.entry_second + half) <= half + ROUNDING_S
     rows = np.flatnonzero(encounter.is_present[who] & is_before)
     path = recording.tracks[conflict.first].curve
     station, left = path.project(encounter.position[who, rows])
@@ -163,12 +164,12 @@ def _slowing(
     waits = [
         wait
         for wait in recording.waits
-        if wait.vehicle == who and wait.start < clears and wait.end <= enters + 1.0
+        if wait.vehicle == who and wait.start < clears and wait.end <= enters + 1.0 + ROUNDING_S
     ]
     if waits:
         wait = waits[-1]
         entry = position[min(int(np.searchsorted(time, enters)), len(time) - 1)]
-        stand = position[int(np.searchsorted(time, wait.end - 1e-9))]
+        stand = position[int(np.searchsorted(time, wait.end - ROUNDING_S))]
         if np.hypot(*(stand - entry)) < LIMITS.wait_distance_m:
             return wait.start, wait.end, True
 
@@ -189,6 +190,7 @@ def waits_for_leader(reaction: Reaction, leader: Reaction | None, waits: Sequenc
         return False
     longest = LIMITS.lag_s.high + LIMITS.queue_delay_s
     return any(
-        wait.vehicle == leader.whom and 0.0 <= reaction.until - wait.end <= longest
+        wait.vehicle == leader.whom
+        and -ROUNDING_S <= reaction.until - wait.end <= longest + ROUNDING_S
         for wait in waits
     )

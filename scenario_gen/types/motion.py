@@ -15,6 +15,7 @@ from scenario_gen.base.road_users import TRAILER
 from scenario_gen.numerics import Bools, canonical_heading, Floats, freeze, frozen, Ints, sealed
 from scenario_gen.numerics.boxes import corners
 from scenario_gen.numerics.hermite import fill_states
+from scenario_gen.numerics.rounding import ROUNDING_S
 from scenario_gen.types.vehicle import trailer_poses, Vehicle
 
 ALWAYS: Ints = sealed(
@@ -100,8 +101,6 @@ def cut(present: Ints, first: int, last: int) -> Ints:
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from pandas import DataFrame
-
-TIME_TOLERANCE_S = 1e-9  # times are whole nanoseconds
 
 
 class States(NamedTuple):
@@ -233,9 +232,7 @@ class Motion:
         arrays = (self.position, self.heading, self.speed)
         fill_states(self.time, *arrays, self.present, times, out)
         first, last = self.time[self.present].T
-        is_present = (times >= first[:, None] - TIME_TOLERANCE_S) & (
-            times <= last[:, None] + TIME_TOLERANCE_S
-        )
+        is_present = (times >= first[:, None] - ROUNDING_S) & (times <= last[:, None] + ROUNDING_S)
         if np.ndim(time) == 0:
             out, is_present = out[:, 0], is_present[:, 0]
         return States(out[..., :2], out[..., 2], out[..., 3], is_present)
@@ -264,11 +261,11 @@ class Motion:
         A vehicle has two samples at least, be its presence ever so short.
         """
         is_same = self.time.shape == time.shape
-        if is_same and np.abs(time - self.time).max() <= TIME_TOLERANCE_S:
+        if is_same and np.abs(time - self.time).max() <= ROUNDING_S:
             return self
         ends = self.time[self.present]
-        first = np.searchsorted(time, ends[:, 0] - TIME_TOLERANCE_S)
-        last = np.searchsorted(time, ends[:, 1] + TIME_TOLERANCE_S, side="right") - 1
+        first = np.searchsorted(time, ends[:, 0] - ROUNDING_S)
+        last = np.searchsorted(time, ends[:, 1] + ROUNDING_S, side="right") - 1
         first = np.minimum(first, len(time) - 2)
         present = np.column_stack([first, np.maximum(last, first + 1)])
         return replace(self, time=time, present=present, **self._arrays_at(time))

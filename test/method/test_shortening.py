@@ -12,6 +12,7 @@ from support.reaction_scenes import along
 from scenario_gen import read_log
 from scenario_gen.base.errors import RefusedError
 from scenario_gen.method.shortening import cut, fit_what_matters
+from scenario_gen.numerics.rounding import ROUNDING_S
 from scenario_gen.situation import (
     interaction_windows,
     keeps_interaction,
@@ -64,8 +65,11 @@ def test_each_vehicle_keeps_its_events(crossing: Encounter) -> None:
     situation = Situation.of(crossing)
     windows = interaction_windows(situation)
     for conflict in situation.conflicts:
-        assert windows[conflict.first, 0] <= max(conflict.entry_first - 2.0, 0.0)
-        assert windows[conflict.second, 1] >= min(conflict.exit_second, crossing.duration)
+        assert windows[conflict.first, 0] <= max(conflict.entry_first - 2.0, 0.0) + ROUNDING_S
+        assert (
+            windows[conflict.second, 1]
+            >= min(conflict.exit_second, crossing.duration) - ROUNDING_S
+        )
     part = cut(crossing, windows)
     assert part.start_ns - crossing.start_ns == pytest.approx(1e9 * windows[:, 0].min(), abs=1e8)
     assert keeps_interaction(situation, Situation.of(part))

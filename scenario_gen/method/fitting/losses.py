@@ -12,6 +12,7 @@ import numpy as np
 from scenario_gen.base.errors import InputError, RefusedError
 from scenario_gen.numerics import Bools, wrap_angle
 from scenario_gen.numerics.plane import ahead_and_left
+from scenario_gen.numerics.rounding import ROUNDING_S
 from scenario_gen.situation import (
     abreast_in_lane,
     describe_turn,
@@ -313,7 +314,7 @@ def _lost_neighbours(tracks: Tracks, placed: Tracks) -> Iterator[Loss]:
         for side, word in ((1, "left"), (-1, "right")):
             side_by_side: Bools = np.sign(recorded) == side
             seconds = float(side_by_side.sum()) * tracks[0].dt
-            if seconds < MIN_SIDE_BY_SIDE_S:
+            if seconds < MIN_SIDE_BY_SIDE_S - ROUNDING_S:
                 continue
             kept = float((on_road[side_by_side] == side).mean())
             if kept < _LIMITS.min_kept_share:

@@ -11,6 +11,7 @@ import numpy as np
 
 from scenario_gen.method.validity.limits import Limits
 from scenario_gen.numerics import Floats
+from scenario_gen.numerics.rounding import ROUNDING_M, ROUNDING_S
 from scenario_gen.situation import Conflict, departure, LaneGaps, passing, time_gaps
 from scenario_gen.types import Cause, FOLLOW, Reaction, Scenario, Violation
 
@@ -79,7 +80,7 @@ def _following_fault(
     """Return how a follower falls back too far, "" if it does not."""
     gaps = time_gaps(lane_gaps, edge.who, edge.whom)
     high = (1.0 + limits.headway_share) * edge.headway[2]
-    if not len(gaps) or gaps.max() <= high:
+    if not len(gaps) or gaps.max() <= high + ROUNDING_S:
         return ""
     leader = scenario.vehicles[edge.whom].id
     return f"drives up to {gaps.max():.2f} s behind vehicle {leader}; at most {high:.2f} s allowed"
@@ -94,7 +95,7 @@ def _yielding_fault(
     gap = enters - clears
     low, high = allowed_gap(edge, limits)
     message = ""
-    if not low - _EVENT_ROUNDING_S <= gap <= high:
+    if not low - _EVENT_ROUNDING_S <= gap <= high + ROUNDING_S:
         message = (
             f"enters {gap:.2f} s after vehicle {other} has cleared; "
             f"{low:.2f} to {high:.2f} s allowed"
@@ -102,7 +103,7 @@ def _yielding_fault(
     if edge.stands:
         lead = clears - departure(scenario, edge.who, enters)
         max_lead = max(-edge.lag, 0.0) + limits.anticipation
-        if lead > max_lead:
+        if lead > max_lead + ROUNDING_S:
             message = (
                 f"leaves {lead:.2f} s before vehicle {other} has cleared; "
                 f"at most {max_lead:.2f} s allowed"
@@ -146,7 +147,7 @@ def least_gaps(speed: Floats, recorded: Floats, gap: Floats, limits: Limits) -> 
         gap: (m,) metres at these speeds.
         limits: shares and time gaps.
     """
-    similar = np.abs(speed[:, None] - recorded) <= _FOLLOWING.similar_speed
+    similar = np.abs(speed[:, None] - recorded) <= _FOLLOWING.similar_speed + ROUNDING_M
     moving = _FOLLOWING.moving_speed
     smallest = np.min(np.where(similar, gap, np.inf), axis=1, initial=np.inf)
     time_gap = np.where(similar & (recorded > moving), gap / np.maximum(recorded, moving), np.inf)
@@ -154,7 +155,7 @@ def least_gaps(speed: Floats, recorded: Floats, gap: Floats, limits: Limits) -> 
     kept = np.minimum(limits.floor_share * smallest, _ample_gap(speed))
     kept = np.where(np.isfinite(smallest), kept, -np.inf)
 
-    keeps_headway = np.min(time_gap, axis=1, initial=np.inf) >= limits.least_headway
+    keeps_headway = np.min(time_gap, axis=1, initial=np.inf) >= limits.least_headway - ROUNDING_S
     headway = limits.least_headway * speed
     return np.where((speed > moving) & keeps_headway, np.maximum(kept, headway), kept)
 

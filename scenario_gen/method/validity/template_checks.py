@@ -10,10 +10,9 @@ import numpy as np
 from scenario_gen.method.validity.limits import Limits
 from scenario_gen.numerics import Bools, runs
 from scenario_gen.numerics.plane import edge_lengths
+from scenario_gen.numerics.rounding import ROUNDING_M, ROUNDING_S
 from scenario_gen.situation import Abreast, Conflict, MAX_CLEARANCE_CHANGE_M, Wait
 from scenario_gen.types import at_ends, BoundaryStates, Cause, Scenario, Violation
-
-_ROUNDING_M = 1e-9  # and m/s, s
 
 
 def presence_violations(scenario: Scenario, ends: Bools) -> Iterator[Violation]:
@@ -47,8 +46,8 @@ def state_violations(
         for i in range(len(states)):
             step_m, step_mps = _change_in_a_step(scenario, i, k)
             free_m, free_mps = requested.relaxed[i, k].tolist()
-            far = step_m + free_m + limits.position_tolerance + _ROUNDING_M
-            fast = step_mps + free_mps + limits.speed_tolerance + _ROUNDING_M
+            far = step_m + free_m + limits.position_tolerance + ROUNDING_M
+            fast = step_mps + free_mps + limits.speed_tolerance + ROUNDING_M
             if distance[i] <= far and difference[i] <= fast:  # NaN fails
                 continue
             message = (
@@ -164,7 +163,7 @@ def _missing_wait(
     i = waits[0].vehicle
     spans = _slow_spans(scenario, i, speed)
     lengths = [float(scenario.time[b] - scenario.time[a]) for a, b in spans]
-    served = sum(int((length + _ROUNDING_M) / limits.stand_duration) for length in lengths)
+    served = sum(int((length + ROUNDING_S) / limits.stand_duration) for length in lengths)
     if served >= len(waits):
         return None
     durations = ", ".join(f"{length:.1f} s" for length in lengths) or "less than two samples"
@@ -191,4 +190,4 @@ def _waits_throughout(
     if requested is None or wait.start > float(scenario.time[scenario.present[i, 0]]):
         return False
     offset = requested.end[i, :2] - requested.start[i, :2]
-    return bool(np.hypot(*offset) <= limits.position_tolerance)
+    return bool(np.hypot(*offset) <= limits.position_tolerance + ROUNDING_M)

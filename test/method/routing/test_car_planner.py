@@ -28,6 +28,7 @@ from scenario_gen.method.routing.search.planner import (
 )
 from scenario_gen.method.routing.search.sweep import sweep_is_free
 from scenario_gen.numerics import wrap_angle
+from scenario_gen.numerics.rounding import ROUNDING_M
 from scenario_gen.roads import build_road, RoadConfig
 from scenario_gen.roads.obstacles import read_obstacles, with_obstacles
 from scenario_gen.types import Vehicle
@@ -135,7 +136,7 @@ def test_paths_are_arcs_and_keep_clear(obstacles):
     plan = plan_poses(road, query(), Budget(2000), 3)
     first = plan_poses(road, query(), Budget(2000, first=True), 3)
     assert plan.iterations > 1
-    assert plan.cost <= first.cost
+    assert plan.cost <= first.cost + ROUNDING_M
     assert first.cost <= 1.5 * plan.cost
     np.testing.assert_allclose(plan.path[[0, -1]], [query().start, query().goal], atol=1e-6)
     half_turn = 0.5 * wrap_angle(np.diff(plan.path[:, 2]))
@@ -171,7 +172,7 @@ def test_more_iterations_never_make_a_path_dearer():
         plan_poses(street(GATES), query(), Budget(5000), 1, PoseSearchConfig(improve=improve)).cost
         for improve in (0, 100, 400)
     ]
-    assert costs[0] >= costs[1] >= costs[2]
+    assert (np.diff(costs) <= ROUNDING_M).all()
 
 
 def test_room_is_kept_where_the_road_has_it():

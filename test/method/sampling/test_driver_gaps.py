@@ -14,6 +14,7 @@ from scenario_gen.method.sampling import SamplingConfig
 from scenario_gen.method.sampling.driver_gaps import DriverGap
 from scenario_gen.method.segmentation import segment
 from scenario_gen.method.validity import allowed_gap
+from scenario_gen.numerics.rounding import ROUNDING_M
 from scenario_gen.pipeline import PipelineConfig
 from scenario_gen.roads import build_road
 from scenario_gen.situation import conflict_of, lane_gaps, passing, Situation, time_gaps
@@ -51,10 +52,12 @@ def test_half_of_the_drivers_are_nearer_and_all_are_within_the_bounds():
         pytest.approx(1.0, 0.02),
     )
     bounded = DriverGap(nobody, nobody, 1.0, 0.0, -0.5, 2.0).delay(z)
-    assert -0.5 <= bounded.min() < -0.49 and 1.9 < bounded.max() <= 2.0
+    assert -0.5 - ROUNDING_M <= bounded.min() < -0.49
+    assert 1.9 < bounded.max() <= 2.0 + ROUNDING_M
     assert np.median(bounded) == pytest.approx(0.0, abs=0.02)
     follower = DriverGap(nobody, nobody, 0.3, 2.0, -1.0, 1.0).delay(z)
-    assert follower.min() >= 2.0 * (np.exp(-0.3) - 1.0) and follower.max() <= 2.0 * np.expm1(0.3)
+    assert follower.min() >= 2.0 * np.expm1(-0.3) - ROUNDING_M
+    assert follower.max() <= 2.0 * np.expm1(0.3) + ROUNDING_M
     assert DriverGap(nobody, nobody, 1.0, 0.0, 0.0, 0.0).delay(z) == pytest.approx(0.0)
 
 

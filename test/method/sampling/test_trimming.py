@@ -13,6 +13,7 @@ from support.textbook_motions import labelled
 from scenario_gen import generate, PipelineConfig
 from scenario_gen.method.sampling import SamplingConfig
 from scenario_gen.method.sampling.trimming import AFTER_CONFLICT_S, Trimming, trimming_of
+from scenario_gen.numerics.rounding import ROUNDING_S
 from scenario_gen.situation import conflict_of, find_conflicts, Situation
 from scenario_gen.types import Request
 
@@ -59,8 +60,9 @@ def test_where_an_ego_slot_keeps_its_states_nothing_is_left_out(encounter):
 def test_what_stays_is_the_conflict_and_a_second(encounter):
     (conflict,) = find_conflicts(encounter)
     window = trimming_of(Situation.of(encounter), 0.5, FREE)
-    assert window.core[0] == min(conflict.entry_first, conflict.entry_second)
-    assert window.core[1] >= max(conflict.entry_second, conflict.exit_first) + AFTER_CONFLICT_S
+    assert window.core[0] == pytest.approx(min(conflict.entry_first, conflict.entry_second))
+    last = max(conflict.entry_second, conflict.exit_first)
+    assert window.core[1] >= last + AFTER_CONFLICT_S - ROUNDING_S
     assert (
         trimming_of(Situation.of(encounter), 0.0, FREE) is None
         and trimming_of(Situation.of(encounter), 0.5, ~FREE) is None
