@@ -252,21 +252,3 @@ def save_bag(
     result = reindex(bag, target, configured(parameter_file, assignments).bag)
     emit_json(messages=result.messages, bag=target, notes=result.lines())
     print_(f"{result.messages} messages: {target}", *result.lines(), sep="\n")
-
-
-@commands.command("compare")
-def compare_sets(
-    first: Annotated[Path, typer.Argument(help="Folder of results, or its evaluation.json.")],
-    second: Annotated[Path, typer.Argument(help="Another folder or file.")],
-) -> None:
-    """Compare two sets of scenarios: two seeds, two settings or two versions."""
-    from rich.markdown import Markdown
-
-    from scenario_gen.method.evaluation import compare, comparison_table, read_evaluations
-
-    differences = compare(read_evaluations(first), read_evaluations(second))
-    emit_json(differences=differences)
-    print_(
-        Markdown(printable_lines(comparison_table(differences, (first.name, second.name)))),
-        wrap=True,
-    )

@@ -110,7 +110,6 @@ def test_names_are_shown_letter_by_letter(run, tmp_path):
         and rf"report: [out]{literal}[]/report.html" in said
     ), said
     more = (
-        ("compare", out, out),
         ("validate", f"{out}/bag"),
         ("evaluate", log),
         ("generate", NAME, "--road", "straight"),

@@ -16,35 +16,6 @@ from scenario_gen.types import Recorded
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 
 
-def test_two_seeds_are_compared_metric_by_metric(results, run):
-    code, said = run("compare", results / "seed_1", results / "seed_7")
-    assert (
-        code == 0 and "seed_1" in said and "seed_7" in said and "synthetic_c on straight" in said
-    )
-    row = next(line for line in said.splitlines() if "E, position" in line or "E position" in line)
-    figures = [
-        json.loads((results / f"seed_{k}" / "evaluation.json").read_text())["cases"][0]
-        for k in (1, 7)
-    ]
-    values = [
-        next(r for r in case["rows"] if r["name"] == "with changepoints")["values"]["e_position"]
-        for case in figures
-    ]
-    assert values[0]["value"] != values[1]["value"], "another seed, other scenarios"
-    assert all(f"{value['value']:.3g}" in row for value in values)
-    assert not any(
-        row["name"] == "uniform changepoints" for case in figures for row in case["rows"]
-    ), "only with --compare"
-
-
-def test_sets_without_a_case_in_common_are_refused(results, run, tmp_path):
-    document = json.loads((results / "seed_1" / "evaluation.json").read_text())
-    document["cases"][0]["road"] = "elsewhere"
-    (tmp_path / "evaluation.json").write_text(json.dumps(document))
-    code, said = run("compare", results / "seed_1", tmp_path)
-    assert code == 2 and "no encounter on the same road in common" in said
-
-
 def test_a_bag_is_evaluated_to_a_page_figures_and_a_table(results, run, tmp_path):
     out = tmp_path / "again"
     assert run("evaluate", results / "seed_1" / "bag", "--out", out)[0] == 0

@@ -41,7 +41,6 @@ def one_object(text):
         (("export", "{bag}", "--to", "commonroad", "--out", "written"), "scenarios", 2),
         (("reindex", "{bag}", "--out", "saved"), "bag", "saved"),
         (("report", "{bag}"), "opened", False),
-        (("compare", "{made}", "{made}"), "exit_code", 0),
         (("parameters",), "command", "parameters"),
     ],
 )

@@ -44,23 +44,6 @@ def at(document: object, path: str, value: object) -> bytes:
     return json.dumps(changed).encode()
 
 
-CASE = {
-    "name": "n",
-    "road": "r",
-    "rows": [{"name": "with", "figures": {"e_speed": [0.1, 0.0, 0.2]}}],
-}
-RESULT = {
-    "cases_is_no_number": b'{"cases": NaN}',
-    "a_case_is_a_number": b'{"cases": [7]}',
-    "rows_are_a_number": at({"cases": [CASE]}, "cases.0.rows", 3),
-    "a_name_is_a_list": at({"cases": [CASE]}, "cases.0.name", []),
-    "a_figure_is_an_object": at({"cases": [CASE]}, "cases.0.rows.0.figures.e_speed", {"x": 1}),
-    "a_figure_of_too_many_digits": at(
-        {"cases": [CASE]}, "cases.0.rows.0.figures.e_speed", 10**400
-    ),
-    "figures_are_a_number": at({"cases": [CASE]}, "cases.0.rows.0.figures", 1),
-    "too_deep": b"[" * 100_000,
-}
 YAML = {
     "an_integer_of_nothing": '!!int ""',
     "a_number_of_nothing": '!!float ""',
@@ -405,7 +388,6 @@ MAPS: dict[str, Make] = {
 FILES: dict[str, Make] = {
     **TABLES,
     **MAPS,
-    **{f"result/{name}.json": lambda text=text: text for name, text in RESULT.items()},
     **{f"meta/{name}.yaml": lambda value=value: versioned(value) for name, value in YAML.items()},
     "meta/a_long_file_name.yaml": lambda: (
         metadata().replace("bag_0.mcap", "b" * 400 + ".mcap").encode()

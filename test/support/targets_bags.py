@@ -34,12 +34,7 @@ from scenario_gen.closed_loop.search.journal import open_journal, read_journal
 from scenario_gen.closed_loop.search.response import Response
 from scenario_gen.logs import read_log
 from scenario_gen.logs.synthetic import bundled
-from scenario_gen.method.evaluation import (
-    compare,
-    comparison_table,
-    EvaluationConfig,
-    read_evaluations,
-)
+from scenario_gen.method.evaluation import EvaluationConfig
 from scenario_gen.output.results import provenance_of
 from scenario_gen.output.review.evaluation import bag_results
 from scenario_gen.output.review.validation import validate_bag
@@ -276,20 +271,6 @@ def encounters() -> tuple:
     return tuple(read_log([bundled(case)]).encounters[0] for case in "bc")
 
 
-def evaluations(folder: Path) -> list[bytes]:
-    """evaluation.json of a run, and one evaluation alone."""
-    found = [
-        case.evaluation.to_json()
-        for case in bag_results(
-            write_recording(folder / "bag", hand_made_run()), CONFIG.evaluation
-        )
-    ]
-    return [
-        json.dumps({"provenance": {}, "cases": [json.loads(text) for text in found]}).encode(),
-        found[0].encode(),
-    ]
-
-
 def drives(folder: Path) -> list[bytes]:
     """A drives.json of two drives."""
     found = [{"name": str(k), "scenario": "0f" * 8, "passed": k == 1} for k in range(2)]
@@ -313,17 +294,6 @@ def journals(folder: Path) -> list[bytes]:
         ):
             journal.add(response)
     return [(folder / "a.journal.jsonl").read_bytes()]
-
-
-def compare_with_itself(path: Path) -> None:
-    """Read figures, show them and compare them."""
-    found = read_evaluations(path)
-    for evaluation in found:
-        evaluation.to_markdown()
-        evaluation.to_json()
-    rows = [row.name for row in found[0].rows]
-    if rows:
-        comparison_table(compare(found, found, rows[-1]))
 
 
 EXTREMES = '[0, -1, 1, 9007199254740992, 9223372036854775808, 1e308, -1e308, 1e-320, 0.5, null, true, "", "x", [], {}, [[]]]'
@@ -419,13 +389,6 @@ TARGETS = (
         ("params/*",),
     ),
     Target("assignment", assignments, assign_one, (*BYTES, deep)),
-    Target(
-        "evaluation_json",
-        evaluations,
-        in_file("evaluation.json", compare_with_itself),
-        JSON,
-        ("result/*",),
-    ),
     Target("drives_json", drives, in_file("drives.json", refuse_other_drives), JSON),
     Target("journal", journals, in_file("a.journal.jsonl", read_journal), (*BYTES, *TEXT)),
 )

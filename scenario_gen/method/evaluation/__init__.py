@@ -9,12 +9,6 @@ from scenario_gen.method.evaluation.bootstrap import (
     paired_difference,
     wilson,
 )
-from scenario_gen.method.evaluation.comparison import (
-    compare,
-    comparison_table,
-    Difference,
-    read_evaluations,
-)
 from scenario_gen.method.evaluation.config import EvaluationConfig
 from scenario_gen.method.evaluation.coverage import coverage_of
 from scenario_gen.method.evaluation.criticality import criticality
@@ -56,15 +50,12 @@ __all__ = [
     "MEASURES",
     "STANDSTILL_MPS",
     "Bootstrap",
-    "Difference",
     "EvaluationConfig",
     "MetricGroup",
     "Samples",
     "Template",
     "clustered_wilson",
     "common_motion",
-    "compare",
-    "comparison_table",
     "coverage_of",
     "criticality",
     "distance_and_ttc",
@@ -81,7 +72,6 @@ __all__ = [
     "min_time_shift",
     "pair_similarities",
     "paired_difference",
-    "read_evaluations",
     "replay",
     "time_to_collision",
     "uniform_changepoints",

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from itertools import combinations
 
 import numpy as np
-from scipy import special
+from scipy import special, stats
 
 from scenario_gen.base.errors import InputError
 from scenario_gen.method.evaluation.geometry import footprint_distance
@@ -111,19 +111,6 @@ class Comparison:
             )
 
 
-def wasserstein(a: Floats, b: Floats) -> float:
-    """Wasserstein-1 distance of two samples (n,) and (m,): area between their CDFs.
-
-    Source: Vallender 1974.
-    """
-    values = np.sort(np.concatenate([a, b]))
-    below = [
-        np.searchsorted(np.sort(sample), values[:-1], side="right") / sample.size
-        for sample in (a, b)
-    ]
-    return float(np.sum(np.abs(below[0] - below[1]) * np.diff(values)))
-
-
 def compare(
     quantity: Quantity, template: Floats, samples: Sequence[Floats], points: int = 513
 ) -> Comparison:
@@ -186,7 +173,7 @@ def compare(
         template_cdf=below(template) / template.size,
         sample_cdf=np.stack([below(values) for values in samples]),
         sizes=np.array([values.size for values in samples], dtype=np.float64),
-        wasserstein=wasserstein(pooled, template),
+        wasserstein=float(stats.wasserstein_distance(pooled, template)),
     )
 
 
