@@ -17,9 +17,9 @@ def test_what_was_removed_names_its_replacement(name, tmp_path):
     words, log = [name], tmp_path / f"log{name if name.startswith('.') else '.csv'}"
     log.write_text("<x/>")
     if name.startswith("."):
-        words = ["generate", str(log)]
+        words = ["generate", str(log), "--road", "corridor"]
     elif name.startswith("log.format="):
-        words = ["generate", str(log), "--set", name]
+        words = ["generate", str(log), "--road", "corridor", "--set", name]
     elif name.startswith("--to "):
         words = ["export", str(tmp_path), *name.split()]
     elif name.startswith("--"):
