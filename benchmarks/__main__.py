@@ -40,7 +40,7 @@ OPTIONS: dict[str, tuple[type, str]] = {
     "count": (int, "number of scenarios or drives"),
     "cases": (int, "naturalness, interaction: only the first encounters"),
     "roads": (str, "naturalness, interaction: names of roads, separated by commas"),
-    "variety": (str, "naturalness, interaction: the sampler's preset"),
+    "drivers": (float, "naturalness, interaction: how much drivers differ"),
     "out": (str, "paper: the folder of the page"),
     "seed": (int, "paper: same seed, same page"),
     "part": (str, "corpus: mine or batch"),

@@ -119,7 +119,7 @@ def _encounters() -> Iterator[tuple[Encounter, list[str]]]:
 def _evaluations(encounter: Encounter, road: str) -> list[Evaluation]:
     """Return one evaluation per seed; none where the encounter does not fit the road."""
     config = PipelineConfig(
-        sampling=SamplingConfig(variety="narrow"), evaluation=EvaluationConfig(compare=True)
+        sampling=SamplingConfig(drivers=0.0), evaluation=EvaluationConfig(compare=True)
     )
     found = []
     for seed in SEEDS:

@@ -97,7 +97,7 @@ class Case:
 def run(
     cases: int | None = None,
     count: int | None = None,
-    variety: str = "wide",
+    drivers: float = 1.0,
     roads: str = "corridor",
     *,
     held_out: bool = False,
@@ -108,7 +108,7 @@ def run(
     for name, encounter in encounters:
         for road in roads.split(","):
             try:
-                found.append(_case(name, encounter, road, count or COUNT, variety))
+                found.append(_case(name, encounter, road, count or COUNT, drivers))
             except ScenarioGenError as error:
                 print(f"{name} on {road}: {error}", file=sys.stderr, flush=True)
     share = len(found) / max(len(encounters) * len(roads.split(",")), 1)
@@ -135,14 +135,14 @@ def _encounters(*, held_out: bool) -> Iterator[tuple[str, Encounter]]:
             yield f"bundled {letter}", read_log([bundled(letter)]).encounters[0]
 
 
-def _case(name: str, encounter: Encounter, road_name: str, count: int, variety: str) -> Case:
+def _case(name: str, encounter: Encounter, road_name: str, count: int, drivers: float) -> Case:
     """Generate on a road, and measure.
 
     Raises:
         ScenarioGenError: the encounter gives no set on this road.
     """
     config, situation = (
-        PipelineConfig(sampling=SamplingConfig(variety=variety)),
+        PipelineConfig(sampling=SamplingConfig(drivers=drivers)),
         Situation.of(encounter),
     )
     road = build_road(road_name, encounter, config.road)

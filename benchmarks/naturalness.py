@@ -69,7 +69,7 @@ class Case:
 def run(
     cases: int | None = None,
     roads: str | None = None,
-    variety: str = "wide",
+    drivers: float = 1.0,
     *,
     held_out: bool = False,
 ) -> list[Row]:
@@ -78,7 +78,7 @@ def run(
     Args:
         cases: only the first cuts, on the corridor alone unless `roads` is given.
         roads: names, separated by commas; `map` is the map of the recording.
-        variety: the sampler's preset.
+        drivers: how much drivers differ.
         held_out: measure only the held-out cuts.
     """
     cuts = chosen_cuts(DATA, held_out=held_out)[:LOGS][:cases]
@@ -86,7 +86,7 @@ def run(
     rng = np.random.default_rng(0)
     found = []
     for cut in cuts:
-        for case in _cases(cut, names, COUNT_OF_FIRST_CASES if cases else COUNT, variety, rng):
+        for case in _cases(cut, names, COUNT_OF_FIRST_CASES if cases else COUNT, drivers, rng):
             found.append(case)
             print(case, file=sys.stderr, flush=True)
     rows = [higher("recorded encounters", len(cuts), "cases", 1.0)]
@@ -98,7 +98,7 @@ def run(
 
 
 def _cases(
-    cut: Cut, names: Sequence[str], count: int, variety: str, rng: np.random.Generator
+    cut: Cut, names: Sequence[str], count: int, drivers: float, rng: np.random.Generator
 ) -> list[Case]:
     """Put one cut on each of its roads."""
     own_map = str(DATA / "maps" / "occupancy_grids" / f"{cut.map}.yaml") if cut.map else ""
@@ -111,7 +111,7 @@ def _cases(
         ]
     own_roads = ("corridor", own_map)
     return [
-        _case(cut.name, encounter, road, count, variety, rng, own_road=road in own_roads)
+        _case(cut.name, encounter, road, count, drivers, rng, own_road=road in own_roads)
         for road in roads
     ]
 
@@ -121,14 +121,14 @@ def _case(
     encounter: Encounter,
     road: str,
     count: int,
-    variety: str,
+    drivers: float,
     rng: np.random.Generator,
     *,
     own_road: bool,
 ) -> Case:
     """Generate scenarios and compare their motion with the template's."""
     config = PipelineConfig(
-        sampling=SamplingConfig(variety=variety),
+        sampling=SamplingConfig(drivers=drivers),
         evaluation=EvaluationConfig(resamples=10, compare=True),
     )
     started = process_time()

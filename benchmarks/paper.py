@@ -126,7 +126,7 @@ def reproduce(
         InputError: a log cannot be read, or `out` holds something else.
         RefusedError: not one encounter could be placed on a road of the paper; the page is written all the same.
     """
-    config = PipelineConfig(sampling=SamplingConfig(variety="narrow"))  # the paper's variety
+    config = PipelineConfig(sampling=SamplingConfig(drivers=0.0))  # the paper's case
     files = [path for group in logs for path in group]
     with replaced_folder(out, REPRODUCED, files) as partial:
         found = [read_log(list(group), config.log) for group in logs]

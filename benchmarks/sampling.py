@@ -41,21 +41,25 @@ DIVERGENCE_TARGETS_BIT = {"speed": 0.1, "acceleration": 0.2, "gap": 0.1}
 def run() -> list[Row]:
     """Measure."""
     rows = [*_sampling_peers.rows(), *_throughput(), *_crossing()]
-    return [*rows, *_recorded("wide"), *_recorded("narrow")]
+    return [*rows, *_recorded(1.0), *_recorded(0.0)]
 
 
 def _crossing() -> list[Row]:
     """Sample two vehicles that cross, so that the order of arrival is checked, too."""
     case = prepared(group(2, 20.0), "four_way", "two platoons")
     rows = []
-    for variety in ("wide", "narrow"):
+    for drivers in (1.0, 0.0):
         rate = 0.0
         for _ in range(REPEATS):
             started = process_time()
-            found = case.sample(CROSSING_COUNT, config=SamplingConfig(variety=variety))
+            found = case.sample(CROSSING_COUNT, config=SamplingConfig(drivers=drivers))
             rate = max(rate, len(found.scenarios) / (process_time() - started))
         acceptance = f"acceptance {found.acceptance:.2f}"
-        rows.append(higher(f"crossing, {variety}: valid scenarios", rate, "1/s", None, acceptance))
+        rows.append(
+            higher(
+                f"crossing, drivers {drivers:g}: valid scenarios", rate, "1/s", None, acceptance
+            )
+        )
     return rows
 
 
@@ -124,7 +128,7 @@ def _seconds(vehicles: int, duration: float, count: int) -> float:
     return spent
 
 
-def _recorded(variety: str) -> list[Row]:
+def _recorded(drivers: float) -> list[Row]:
     """Measure acceptance, diversity and realism with a preset of the sampler."""
     acceptance: dict[str, list[float]] = {}
     spreads, moved, distances = list[float](), list[float](), list[float]()
@@ -133,7 +137,7 @@ def _recorded(variety: str) -> list[Row]:
     for case in cases():
         if not isinstance(case, Prepared):
             continue
-        found = case.sample(COUNT, config=SamplingConfig(variety=variety))
+        found = case.sample(COUNT, config=SamplingConfig(drivers=drivers))
         acceptance.setdefault(case.name, []).append(found.acceptance)
         short += len(found.scenarios) < COUNT
         if len(found.scenarios) < 2:
@@ -151,18 +155,24 @@ def _recorded(variety: str) -> list[Row]:
     pairs = f"{len(all_roads)} encounters × roads"
     rows = [
         higher(
-            f"{variety}: acceptance, worst encounter on its best road",
+            f"drivers {drivers:g}: acceptance, worst encounter on its best road",
             min(best_roads),
             "",
             0.7,
             pairs,
         ),
-        higher(f"{variety}: acceptance, worst encounter and road", min(all_roads), "", 0.3),
-        lower(f"{variety}: sets with too few scenarios", short, "sets", 0.0),
-        higher(f"{variety}: mean pairwise displacement, least", min(distances), "m", 0.5),
-        higher(f"{variety}: the same without the clock's part, least", min(moved), "m", 0.5),
         higher(
-            f"{variety}: standard deviation of arrival, median",
+            f"drivers {drivers:g}: acceptance, worst encounter and road", min(all_roads), "", 0.3
+        ),
+        lower(f"drivers {drivers:g}: sets with too few scenarios", short, "sets", 0.0),
+        higher(
+            f"drivers {drivers:g}: mean pairwise displacement, least", min(distances), "m", 0.5
+        ),
+        higher(
+            f"drivers {drivers:g}: the same without the clock's part, least", min(moved), "m", 0.5
+        ),
+        higher(
+            f"drivers {drivers:g}: standard deviation of arrival, median",
             float(np.nanmedian(spreads)),
             "s",
             0.5,
@@ -170,7 +180,7 @@ def _recorded(variety: str) -> list[Row]:
     ]
     for name, values in realism.items():
         label, target = (
-            f"{variety}: JS {name} to the fitted template, median",
+            f"drivers {drivers:g}: JS {name} to the fitted template, median",
             DIVERGENCE_TARGETS_BIT[name],
         )
         rows.append(lower(label, float(np.median(values)), "bit", target))

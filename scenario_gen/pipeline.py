@@ -55,7 +55,7 @@ def generate(
     Args:
         encounter: the template: an encounter, or a log with one encounter (a path, a DataFrame, or
             what `read_log` returns). Further encounters in a list show how encounters differ:
-            `sampling.variety=population` keeps scenarios that are usual among them.
+            scenarios that are usual among them are kept.
         road: the target: a road, a name or path for `build_road`, or "auto": the first built-in
             road that is suitable. A template is mirrored on a map with the other side of traffic.
         config: the parameters of every stage, or a mapping like a parameter file;

@@ -22,11 +22,11 @@ from scenario_gen.method.sampling import SamplingConfig
 from scenario_gen.output.report.summary import summary
 from scenario_gen.output.results import write_results
 from scenario_gen.pipeline import generate, PipelineConfig
-from scenario_gen.types import NARROW, REPLAY, UNIFORM, WITH, WITHOUT
+from scenario_gen.types import ONE_DRIVER, REPLAY, UNIFORM, WITH, WITHOUT
 from scenario_gen.types.request import Request
 
 QUICK = EvaluationConfig(resamples=50, compare=True)
-WORDS = {"without": WITHOUT, "uniform": UNIFORM, "narrow": NARROW, "replay": REPLAY}
+WORDS = {"without": WITHOUT, "uniform": UNIFORM, "one driver": ONE_DRIVER, "replay": REPLAY}
 
 
 @pytest.fixture(scope="module")
@@ -58,7 +58,7 @@ def test_every_arm_has_its_row_and_its_account(case):
         WITH,
         WITHOUT,
         UNIFORM,
-        NARROW,
+        ONE_DRIVER,
         REPLAY,
     ]
     assert len(case.references[UNIFORM].scenarios) == 4 and not case.refusals
@@ -90,7 +90,7 @@ def test_by_default_no_further_set_is_drawn_and_nothing_else_changes(encounter, 
         {row["name"]: row for row in json.loads(one.evaluation.to_json())["rows"]}
         for one in (plain, case)
     ]
-    assert set(rows[1]) - set(rows[0]) == {WITHOUT, UNIFORM, NARROW}
+    assert set(rows[1]) - set(rows[0]) == {WITHOUT, UNIFORM, ONE_DRIVER}
     assert all(rows[0][name] == rows[1][name] for name in rows[0])
     page, figures = written(plain, tmp_path)
     assert "--compare" in page and not any(
@@ -108,7 +108,8 @@ def test_what_is_compared_is_drawn_with_the_same_freedom(case):
         sizes = {scenario.vehicles[0].length for scenario in case.references[name].scenarios}
         assert len(sizes) > 1, f"{name}: preset wide draws sizes"
     assert (
-        len({scenario.vehicles[0].length for scenario in case.references[NARROW].scenarios}) == 1
+        len({scenario.vehicles[0].length for scenario in case.references[ONE_DRIVER].scenarios})
+        == 1
     )
     assert case.compared == (WITH, WITHOUT, UNIFORM)
 

@@ -27,7 +27,7 @@ COUNT = 50 if LONG else 5
 CONFIG = PipelineConfig(evaluation=EvaluationConfig(resamples=1000 if LONG else 10))
 NARROW = replace(
     CONFIG,
-    sampling=replace(CONFIG.sampling, variety="narrow"),
+    sampling=replace(CONFIG.sampling, drivers=0.0),
     evaluation=replace(CONFIG.evaluation, compare=True),
 )
 pytestmark = pytest.mark.spread

@@ -110,7 +110,7 @@ class Generate:
         typer.Option(
             "--compare",
             help="Also draw and measure sets without changepoints, with evenly spaced "
-            "changepoints, and with preset narrow. Doubles the run time.",
+            "changepoints, and with one driver. Doubles the run time.",
         ),
     ] = False
     order: Annotated[

@@ -62,14 +62,8 @@ MIN_GAP_S = 1.0  # in which the ego of a template enters behind the others
 TRIED_PER_KEPT_COUNT = 60  # scenarios of a stage, before it is given up
 MAX_MARGIN_S = 0.1  # of scenarios that sampling aims at
 ATTEMPTS_COUNT = 200  # candidates per scenario, at most
-MORE_VARIATION = {
-    "arrival_sigma": 3.0,
-    "wait_sigma": 2.0,
-    "pace_sigma": 0.12,
-    "end_speed_sigma": 2.0,
-    "longitudinal_sigma": 6.0,
-}
-"""Least sampling parameters of a stage that gives no scenario without them."""
+MORE_ARRIVAL_S = 3.0  # `arrival_sigma` of a stage that gives no scenario without it
+MORE_ALONG_M = 6.0  # `longitudinal_sigma`, likewise
 MAX_TURNS_COUNT = 8  # in which stages are drawn from again
 
 
@@ -82,7 +76,7 @@ class Stage:
         planned: the template on its road.
         label: the outcome and the begin, in words.
         top_speed: highest speed of the ego in the template [m/s].
-        extended: whether it has MORE_VARIATION.
+        extended: whether its variation is greater.
         notes: on its template.
     """
 
@@ -94,9 +88,15 @@ class Stage:
     notes: tuple[Note, ...] = ()
 
     def with_more_variation(self) -> "Stage":
-        """Return the stage with MORE_VARIATION at least."""
+        """Return the stage with more variation."""
         config = self.chain.config
-        config = replace(config, sampling=config.sampling.at_least(MORE_VARIATION))
+        sampling = replace(
+            config.sampling,
+            drivers=1.0,
+            arrival_sigma=MORE_ARRIVAL_S,
+            longitudinal_sigma=MORE_ALONG_M,
+        )
+        config = replace(config, sampling=sampling)
         label = f"{self.label}, with more variation"
         return replace(self, chain=replace(self.chain, config=config), label=label, extended=True)
 

@@ -39,8 +39,7 @@ class Chain:
         count: valid scenarios wanted.
         seed: of all randomness.
         waits: that scenarios keep; the template's if None.
-        population: recorded encounters that show how encounters differ, for
-            `sampling.variety=population`.
+        population: recorded encounters that show how encounters differ.
     """
 
     situation: Situation
@@ -93,7 +92,7 @@ class Chain:
             count=self.count,
             plan=Plan.of(*stage, self.waits, self.situation),
             callbacks=callbacks,
-            measures=measures_in(config.sampling.variety, self.encounter, self.population),
+            measures=measures_in(config.sampling.drivers, self.encounter, self.population),
         )
 
     def run(self, callbacks: Callbacks = Callbacks()) -> GenerationResult:

@@ -15,7 +15,7 @@ from scenario_gen.method.evaluation import (
     without_changepoints,
 )
 from scenario_gen.situation import Situation
-from scenario_gen.types import Encounter, GenerationResult, NARROW, Request, UNIFORM, WITHOUT
+from scenario_gen.types import Encounter, GenerationResult, ONE_DRIVER, Request, UNIFORM, WITHOUT
 
 
 def with_references(
@@ -25,7 +25,7 @@ def with_references(
     request: Request = Request(),
     population: Sequence[Encounter] = (),
 ) -> GenerationResult:
-    """Add sets without changepoints, with uniform ones, and with the preset `narrow`.
+    """Add sets without changepoints, with uniform ones, and with one driver.
 
     They have the parameters and the seed of the result. They keep no recorded waits, since the
     ends of a wait would be two more changepoints, and have no target and order; a result with one
@@ -53,13 +53,15 @@ def with_references(
         chains[UNIFORM] = replace(
             plain, segmentation=uniform_changepoints(result.segmentation), waits=()
         )
-    if config.sampling.variety != "narrow":
-        narrow = replace(config, sampling=replace(config.sampling, variety="narrow"))
-        chains[NARROW] = replace(plain, config=narrow)
+    if config.sampling.drivers > 0.0:
+        one_driver = replace(config, sampling=replace(config.sampling, drivers=0.0))
+        chains[ONE_DRIVER] = replace(plain, config=one_driver)
     references, refusals = {}, {}
     for name, chain in chains.items():
         try:
-            references[name] = (chain.sample(result) if name == NARROW else chain.run()).generated
+            references[name] = (
+                chain.sample(result) if name == ONE_DRIVER else chain.run()
+            ).generated
         except RefusedError as error:
             refusals[name] = str(error)
     requested = [

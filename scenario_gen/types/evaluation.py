@@ -20,7 +20,7 @@ from scenario_gen.types.scenario import Cause, ScenarioSet, Verdict
 RECORDING = "recording"
 """The recorded encounter itself."""
 WITH, WITHOUT, UNIFORM = "with changepoints", "without changepoints", "uniform changepoints"
-NARROW = "with changepoints, narrow"
+ONE_DRIVER = "with changepoints, one driver"
 REPLAY = "replay"
 """The recording as fitted to the road."""
 

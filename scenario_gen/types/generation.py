@@ -17,7 +17,7 @@ from scenario_gen.base.errors import InputError
 from scenario_gen.base.folders import scratch
 from scenario_gen.types.coverage import Coverage
 from scenario_gen.types.encounter import Encounter
-from scenario_gen.types.evaluation import Evaluation, NARROW, REPLAY, UNIFORM, WITH, WITHOUT
+from scenario_gen.types.evaluation import Evaluation, ONE_DRIVER, REPLAY, UNIFORM, WITH, WITHOUT
 from scenario_gen.types.fit import Fit
 from scenario_gen.types.html import html_list
 from scenario_gen.types.notes import Note, NoteKind
@@ -50,8 +50,8 @@ class GenerationResult:
         evaluation: of `generated`, `references` and `replay`; without rows if they were not
             evaluated.
         references: sets to measure `generated` against, by row: WITHOUT is the paper's ablation,
-            UNIFORM has as many changepoints evenly spaced, both drawn as `generated` is; NARROW
-            has the same changepoints and preset `narrow`.
+            UNIFORM has as many changepoints evenly spaced, both drawn as `generated` is;
+            ONE_DRIVER has the same changepoints and one driver.
         refusals: why a reference is missing, by row.
         replay: the recording as fitted to the road, replayed.
         row_name: that of the evaluation's row of `generated`.
@@ -286,7 +286,7 @@ class GenerationResult:
         """Return E of `generated` and of the other rows, the best row, and remarks."""
         rows = {row.name for row in self.evaluation.rows}
         compared = [row for row in self.compared if row in rows]
-        references = [row for row in (WITHOUT, UNIFORM, NARROW, REPLAY) if row in rows]
+        references = [row for row in (WITHOUT, UNIFORM, ONE_DRIVER, REPLAY) if row in rows]
         best = {metric: self.best(metric) for metric in ERRORS}
         remarks = list(self.better_references())
         if self.not_compared:

@@ -18,7 +18,7 @@ from scenario_gen.output.review.validation import validate_bag
 from scenario_gen.pipeline import PipelineConfig
 from scenario_gen.roads import build_road
 from scenario_gen.situation import Situation
-from scenario_gen.types import FOLLOW, join_ego
+from scenario_gen.types import Cause, FOLLOW, join_ego
 from scenario_gen.types.request import Request
 
 CONFIG = PipelineConfig()
@@ -59,7 +59,7 @@ def wholes(result):
 
 
 def assert_kept(result, names):
-    """Every scenario names these reactions; followers are as fast as their leaders, at their own gaps; no yielder is early."""
+    """Every scenario names these reactions; followers are as fast as their leaders, at the gaps of drivers who differ; no yielder is early."""
     ids, scenarios = [vehicle.id for vehicle in result.encounter.vehicles], wholes(result)
     edges = result.generated.reactions
     assert [str(edge.named(ids)) for edge in edges] == names
@@ -68,7 +68,7 @@ def assert_kept(result, names):
         if edge.kind == FOLLOW:
             seen = following(edge, result.encounter, scenarios)
             assert (
-                seen.slope > 0.75 and 0.65 < seen.gaps[0] < seen.gaps[1] < 1.35 and seen.own > 0.05
+                seen.slope > 0.75 and 0.5 < seen.gaps[0] < seen.gaps[1] < 1.6 and seen.own > 0.05
             )
         else:
             seen = yielding(edge, scenarios)
@@ -125,7 +125,7 @@ def test_an_ego_slot_of_who_goes_first_or_waits():
     for ego in ("1", "2"):
         result = made(crossing(8.0), Request(ego=ego))
         assert_kept(result, ["2 yields to 1"])
-        assert result.generated.candidates < 40, (
+        assert not result.generated.refused[Cause.BOUNDARY_STATE], (
             "who waits longer makes up for it, so asked ends are met"
         )
         assert yielding(result.generated.reactions[0], wholes(result)).spread > 0.4

@@ -60,7 +60,7 @@ def tight(made_data):
     (log,) = (made_data / "trajectories" / "ngsim_commonroad").glob("encounter_b_left_turn_*.csv")
     encounter = read_log(log).encounters[0]
     config = SamplingConfig(
-        variety="narrow",
+        drivers=0.0,
         lateral_sigma=0.3,
         observation_sigma=0.3,
         longitudinal_sigma=0.5,

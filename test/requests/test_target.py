@@ -93,7 +93,7 @@ def test_each_in_a_bag_is_valid(chain, request_, tmp_path):
 
 def test_another_order_is_named_and_only_then_allowed(chain, tmp_path):
     chain = replace(
-        chain, sampling=SamplingConfig(variety="wide")
+        chain, sampling=SamplingConfig()
     )  # with one clock for all nobody passes anybody
     made = answer(chain, Request(order="swap"), count=3)
     for scenario in made.generated.scenarios:

@@ -26,7 +26,7 @@ class Given:
     fitting: FittingConfig = field(default_factory=FittingConfig)
     planning: PlanningConfig = field(default_factory=PlanningConfig)
     sampling: SamplingConfig = field(
-        default_factory=lambda: SamplingConfig(variety="narrow")
+        default_factory=lambda: SamplingConfig(drivers=0.0)
     )  # all states are as given
     limits: Limits = field(default_factory=Limits)
 

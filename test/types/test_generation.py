@@ -10,7 +10,7 @@ import pytest
 from support.bag_examples import hand_made_run
 
 from scenario_gen import InputError, load
-from scenario_gen.types import NARROW, REPLAY, UNIFORM, Vehicle, WITH, WITHOUT
+from scenario_gen.types import ONE_DRIVER, REPLAY, UNIFORM, Vehicle, WITH, WITHOUT
 from scenario_gen.types.evaluation import Evaluation, Interval, Metric, Row
 from scenario_gen.types.generation import GenerationResult
 from scenario_gen.types.scenario import dataframe, ScenarioSet
@@ -22,7 +22,7 @@ def result(**figures):
         "own": WITH,
         "without": WITHOUT,
         "uniform": UNIFORM,
-        "narrow": NARROW,
+        "narrow": ONE_DRIVER,
         "replay": REPLAY,
     }
     rows = [
@@ -54,7 +54,7 @@ def test_the_delivered_set_stands_first_and_only_what_is_drawn_likewise_is_compa
     assert list(similar["compared"]) == [WITH, WITHOUT, UNIFORM]
     assert similar["compared"][WITH] == {"e_position": 0.1, "e_speed": 0.2, "e_heading": None}
     assert list(similar["beside"]) == [
-        NARROW,
+        ONE_DRIVER,
         REPLAY,
     ]  # nearer, and no match for it: they have less freedom, or none
 
@@ -94,7 +94,7 @@ def test_what_was_asked_of_the_delivered_set_alone_takes_it_out_of_the_compariso
     assert list(similar["compared"]) == [WITH] and list(similar["beside"]) == [
         WITHOUT,
         UNIFORM,
-        NARROW,
+        ONE_DRIVER,
         REPLAY,
     ]
     assert similar["best"] == {}

@@ -258,7 +258,7 @@ def search_failures(
     plain = replace(request.request, target="")
     plan = Plan.of(request.planned, request.sampling, request.limits, plain)
     check = checker_of(plan, request.sampling, request.limits, request.request).check
-    measures = measures_in(request.sampling.variety, plan.encounter)
+    measures = measures_in(request.sampling.drivers, plan.encounter)
     natural = NaturalScenarios.of(plan, check, request.sampling, request.planned.seed, measures)
     if not natural.size:
         raise InputError("all scenarios of this template are equal, so there is nothing to search")

@@ -38,5 +38,5 @@ class EvaluationConfig(Parameters):
     compare: bool = parameter(
         False,
         "`generate`: draw also sets without changepoints, with evenly spaced ones and with "
-        "preset narrow, to compare with",
+        "one driver, to compare with",
     )

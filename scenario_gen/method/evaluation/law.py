@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The distribution of recorded encounters of one kind, for `sampling.variety=population`.
+"""The distribution of recorded encounters of one kind, by which scenarios are filtered.
 
 The law is a Gaussian of an encounter's features (FEATURES and JOINT_FEATURES of
 `scenario_gen.method.evaluation.encounter_features`): speeds, braking and standstills of both
@@ -126,10 +126,10 @@ def rarity_in(
 
 
 def measures_in(
-    variety: str, encounter: Encounter, population: Sequence[Encounter] = ()
+    drivers: float, encounter: Encounter, population: Sequence[Encounter] = ()
 ) -> Measures:
-    """Return the measures of a template's scenarios, with rarity for variety `population`."""
-    if variety != "population":
+    """Return the measures of a template's scenarios, with rarity if drivers differ."""
+    if drivers == 0.0:
         return MEASURES
     return replace(MEASURES, rarity=rarity_in(encounter, population))
 

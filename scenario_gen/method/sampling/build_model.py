@@ -88,7 +88,7 @@ def build_model(plan: Plan, config: SamplingConfig, order: str = "keep") -> Buil
     Raises:
         InputError: routes, segmentation and encounter disagree in their numbers.
     """
-    config = config.effective
+    config = config.scaled
     routed, waits = _route_vehicles(plan, config)
     clock = _nominal_clock(routed, template_grid(plan.encounter), config)
     stretch = _feasible_stretch(routed, clock.clock, config)
@@ -106,7 +106,7 @@ def build_model(plan: Plan, config: SamplingConfig, order: str = "keep") -> Buil
         notes += vehicle.notes
     models = [vehicle.model for vehicle in vehicles]
     reactions, trimming = kept_reactions(plan.situation, config, order), None
-    if config.variety == "wide":
+    if config.drivers > 0.0:
         fixed = (plan.requested.relaxed[..., 0] == 0.0).any(axis=0)
         models = [
             replace(
@@ -294,7 +294,7 @@ def _variation(
     edges: Sequence[Reaction],
     config: SamplingConfig,
 ) -> Variation:
-    """Return what preset `wide` varies of vehicle n.
+    """Return what varies of vehicle n.
 
     Args:
         n: its index.

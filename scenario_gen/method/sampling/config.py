@@ -3,20 +3,25 @@
 
 """Parameters of sampling."""
 
-from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 from scenario_gen.base.parameters import parameter, Parameters
 from scenario_gen.types import VehicleType
 
-POPULATION_LEAST = {
-    "arrival_sigma": 2.0,
-    "pace_sigma": 0.18,
-    "wait_sigma": 2.0,
-    "end_speed_sigma": 1.2,
-    "leave_out": 0.9,
+_SHARES_OF_ONE_DRIVER = {
+    "arrival_sigma": 0.0,
+    "pace_sigma": 0.0,
+    "wait_sigma": 0.0,
+    "end_speed_sigma": 0.0,
+    "gap_sigma": 0.0,
+    "headway_sigma": 0.0,
+    "strength_sigma": 0.0,
+    "leave_out": 0.0,
+    "longitudinal_sigma": 0.6,
+    "time_sigma": 2.0 / 3.0,
+    "duration_tolerance": 1.0 / 3.0,
 }
-"""Least values with `population`: as wide as encounters differ; the population selects."""
+"""By which one driver varies from day to day, over what drivers differ by."""
 
 
 @dataclass(frozen=True)
@@ -26,70 +31,84 @@ class SamplingConfig(Parameters):
     Source: σ_f and l are those of eq 14, σ_ω that of eq 13; the others are not in the paper.
     """
 
-    variety: str = parameter(
-        "wide",
-        "`narrow` keeps one clock, sizes, start and end states; `wide` varies them, each by its "
-        "parameter; `population` varies them more, and keeps scenarios that are usual among "
-        "recorded encounters of the kind",
-        choices=("narrow", "wide", "population"),
+    drivers: float = parameter(
+        1.0,
+        "how much drivers differ; 1: as recorded drivers do, 0: one driver, with one clock and "
+        "recorded sizes, start and end states. Spreads are stated for 1",
+        low=0.0,
+        high=1.0,
     )
     arrival_sigma: float = parameter(
-        1.5,
-        "wide: standard deviation of each vehicle's shift in time relative to the others",
+        2.0,
+        "between drivers: standard deviation of each vehicle's shift in time relative to the "
+        "others",
         unit="s",
         low=0.0,
         high=10.0,
     )
     pace_sigma: float = parameter(
-        0.06, "wide: standard deviation of each vehicle's pace, as a share", low=0.0, high=0.2
+        0.2,
+        "between drivers: standard deviation of each vehicle's pace, as a share",
+        low=0.0,
+        high=0.3,
     )
     wait_sigma: float = parameter(
-        1.0, "wide: standard deviation of the length of each wait", unit="s", low=0.0, high=10.0
+        2.0,
+        "between drivers: standard deviation of the length of each wait",
+        unit="s",
+        low=0.0,
+        high=10.0,
     )
     end_speed_sigma: float = parameter(
-        0.4, "wide: standard deviation of start and end speeds", unit="m/s", low=0.0, high=5.0
+        2.0,
+        "between drivers: standard deviation of start and end speeds",
+        unit="m/s",
+        low=0.0,
+        high=5.0,
     )
     gap_sigma: float = parameter(
-        0.0,
-        "wide: standard deviation, from driver to driver, of the gap behind a vehicle to which it "
-        "yields",
+        1.5,
+        "between drivers: standard deviation of the gap behind a vehicle to which one yields",
         unit="s",
         low=0.0,
         high=5.0,
     )
     headway_sigma: float = parameter(
-        0.0, "wide: the same of the logarithm of a follower's time gap", low=0.0, high=1.0
+        0.6,
+        "between drivers: standard deviation of the logarithm of a follower's time gap",
+        low=0.0,
+        high=1.0,
     )
     strength_sigma: float = parameter(
-        0.0,
-        "wide: the same of the logarithm of braking and of acceleration",
+        0.6,
+        "between drivers: standard deviation of the logarithm of braking and of acceleration",
         low=0.0,
         high=1.0,
     )
     leave_out: float = parameter(
-        0.0,
-        "wide: largest share of the time before the first conflict, and after the last one, that "
-        "a scenario leaves out",
+        0.9,
+        "largest share of the time before the first conflict, and after the last one, that a "
+        "scenario leaves out; scaled by `drivers`",
         low=0.0,
         high=1.0,
     )
     place_sigma: float = parameter(
-        0.2, "wide: standard deviation of the place in the lane", unit="m", low=0.0, high=2.0
+        0.2, "standard deviation of the place in the lane", unit="m", low=0.0, high=2.0
     )
     sizes: str = parameter(
         "catalogue",
-        "wide: sizes of cars, from a catalogue of eight or as recorded",
+        "sizes of cars, from a catalogue of eight or as recorded",
         choices=("catalogue", "recorded"),
     )
     ego: str = parameter(
         "keep",
-        "wide: start and end states of the vehicle that is left out; `keep`: as recorded, `free`: "
+        "start and end states of the vehicle that is left out; `keep`: as recorded, `free`: "
         "varied like those of the others",
         choices=("keep", "free"),
     )
     reactions: str = parameter(
         "keep",
-        "wide: `keep`: followers and yielders of the recording react in the scenarios, too; "
+        "`keep`: followers and yielders of the recording react in the scenarios, too; "
         "`none`: no vehicle reacts",
         choices=("keep", "none"),
     )
@@ -116,7 +135,7 @@ class SamplingConfig(Parameters):
         high=10.0,
     )
     freedom: float = parameter(
-        2.5, "wide: standard deviations at which variations are truncated", low=0.5, high=4.0
+        2.5, "standard deviations at which variations are truncated", low=0.5, high=4.0
     )
     lateral_sigma: float = parameter(
         0.3,
@@ -139,8 +158,9 @@ class SamplingConfig(Parameters):
         1.0, "lateral corrections of a driver, over those in the recording", low=0.0, high=10.0
     )
     longitudinal_sigma: float = parameter(
-        1.2,
-        "σ_s: standard deviation along the route, at the same time as in the recording",
+        2.0,
+        "σ_s: standard deviation along the route, at the same time as in the recording; 60 % of "
+        "it with one driver",
         unit="m",
         low=0.0,
         high=10.0,
@@ -149,14 +169,18 @@ class SamplingConfig(Parameters):
         4.0, "time scale of displacements along the route", unit="s", low=0.1, high=1000.0
     )
     time_sigma: float = parameter(
-        1.0,
-        "σ_t: standard deviation of the changepoint clock that all vehicles share",
+        1.5,
+        "σ_t: standard deviation of the changepoint clock that all vehicles share; two thirds of "
+        "it with one driver",
         unit="s",
         low=0.0,
         high=10.0,
     )
     duration_tolerance: float = parameter(
-        0.1, "share by which a scenario may be longer or shorter", low=0.0, high=0.5
+        0.3,
+        "share by which a scenario may be longer or shorter; a third of it with one driver",
+        low=0.0,
+        high=0.5,
     )
     fixed_duration: bool = parameter(False, "keep the recording's duration")
     max_jerk: float = parameter(
@@ -186,11 +210,13 @@ class SamplingConfig(Parameters):
     )
 
     @property
-    def effective(self) -> "SamplingConfig":
-        """The parameters with which candidates are drawn: `population` is a wider `wide`."""
-        if self.variety != "population":
-            return self
-        return replace(self, variety="wide").at_least(POPULATION_LEAST)
+    def scaled(self) -> "SamplingConfig":
+        """The parameters of candidates: spreads at `drivers`."""
+        spreads = {
+            name: getattr(self, name) * (share + (1.0 - share) * self.drivers)
+            for name, share in _SHARES_OF_ONE_DRIVER.items()
+        }
+        return replace(self, **spreads)
 
     def of(self, kind: VehicleType) -> "SamplingConfig":
         """Return the parameters for a vehicle type: slow types vary less than cars."""
@@ -200,8 +226,3 @@ class SamplingConfig(Parameters):
             end_speed_sigma=share * self.end_speed_sigma,
             longitudinal_sigma=share * self.longitudinal_sigma,
         )
-
-    def at_least(self, least: Mapping[str, float]) -> "SamplingConfig":
-        """Return the parameters, with some of them raised to at least these values."""
-        raised = {name: max(value, getattr(self, name)) for name, value in least.items()}
-        return replace(self, **raised)

@@ -58,8 +58,8 @@ from scenario_gen.types import (
 _MIN_COUNT_FACTOR = 20  # scenarios for which to draw, where clocks vary: levels need candidates
 _DIRECTED_BUDGET_FACTOR = 10  # of a request with a target
 _HOPELESS_CANDIDATES = 20 * BLOCK_CANDIDATES  # of a proposal without any hit
-ENOUGH_SHARE = {"narrow": 0.3, "wide": 0.1}
-"""Share of valid candidates below which the next level is tried."""
+_ENOUGH_SHARE = 0.1  # of valid candidates below which the next level is tried
+_ENOUGH_OF_ONE_DRIVER_SHARE = 0.3
 
 
 def draw_scenarios(
@@ -105,7 +105,10 @@ def draw_scenarios(
         target = TargetSet.of(plan.situation, request, measures)
         sampler = _sampler(built.model, plan, request, seed, target, measures)
         validity = ValidityFilter.of(sampler, check, enough_share(config, request))
-        filters = Filters(validity, target, rarity_filter(sampler, validity, measures))
+        rarity = RarityFilter()  # who asks for a critical range asks for what is rare
+        if target is None:
+            rarity = rarity_filter(sampler, validity, measures)
+        filters = Filters(validity, target, rarity)
         kept = validity.kept(built.model.reactions.edges)
         label = label_of(plan.situation, request, target, measures, kept, validity.lost)
 
@@ -153,7 +156,9 @@ def enough_share(config: SamplingConfig, request: Request = Request()) -> float:
 
     It is 0 for a swapped order, which makes most candidates invalid at any level.
     """
-    return 0.0 if request.order == "swap" else ENOUGH_SHARE[config.effective.variety]
+    if request.order == "swap":
+        return 0.0
+    return _ENOUGH_SHARE if config.drivers > 0.0 else _ENOUGH_OF_ONE_DRIVER_SHARE
 
 
 def rarity_filter(

@@ -230,13 +230,13 @@ class Filters:
                     yield self._with_rarity(Candidate(index, scenario, next(causes)))
 
     def rejudged(self, candidates: Iterable[Candidate]) -> Iterator[Candidate]:
-        """Yield checked candidates, those out of range or rare with that cause."""
+        """Yield checked candidates, those out of range with that cause."""
         for candidate in candidates:
             scenario, cause = candidate.scenario, candidate.cause
             if scenario is not None and cause is None and not self._in_range(scenario):
                 yield replace(candidate, cause=Cause.OUT_OF_RANGE)
             else:
-                yield self._with_rarity(candidate)
+                yield candidate
 
     def notes(self) -> tuple[Note, ...]:
         """Return notes on reactions that cannot be kept, and on rare scenarios that are kept."""

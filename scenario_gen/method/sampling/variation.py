@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The variation of preset `wide`: each vehicle's clock, place in the lane, end speeds and size.
+"""The variation between drivers: each vehicle's clock, place in the lane, end speeds and size.
 
 Every vehicle has a clock: the shared one, shifted by a_n, faster or slower by a share p_n, and
 standing longer or shorter by q_n in each wait. A scenario lasts while all clocks run, so one
@@ -87,10 +87,10 @@ def relaxed_states(
     A vehicle that starts later or earlier starts as far along its lane as it drives in that time.
     """
     encounter = situation.encounter
-    config = config.effective
     relaxed = np.zeros((len(encounter.vehicles), 2, 2))
-    if config.variety != "wide":
+    if config.drivers == 0.0:
         return replace(requested, relaxed=relaxed) if requested.relaxed.any() else requested
+    config = config.scaled
     fixed = _requested_ends(request, situation, config)
     slowest = 1.0 / MIN_RATE_RATIO
     seconds = slowest * _max_time_shift(situation, config)

@@ -49,7 +49,7 @@ class VehicleModel:
         lateral_root: (G, r) square root of the covariance of the lateral deviation.
         room: (G,) metres that the road leaves to either side.
         speed: draws its speeds.
-        variation: what else varies; None with preset `narrow`.
+        variation: what else varies; None with `sampling.drivers=0`.
         numbers: the layout of its standard normal numbers.
     """
 

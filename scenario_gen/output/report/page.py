@@ -18,7 +18,7 @@ from scenario_gen.types import (
     formatted,
     GenerationResult,
     Interval,
-    NARROW,
+    ONE_DRIVER,
     REPLAY,
     Route,
     routes_in_words,
@@ -180,7 +180,7 @@ def _smallest(values: Iterable[float]) -> float:
 def _errors(case: GenerationResult, metric: str) -> dict[str, Any]:
     """Return E of the set, and of the sets below it with whether each is the best."""
     best = case.best(metric)
-    words = {WITHOUT: "without", UNIFORM: "uniform", NARROW: "preset narrow", REPLAY: "replay"}
+    words = {WITHOUT: "without", UNIFORM: "uniform", ONE_DRIVER: "one driver", REPLAY: "replay"}
     others = []
     for row, name in words.items():
         value = case.evaluation.value(row, metric)

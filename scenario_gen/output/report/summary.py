@@ -18,8 +18,8 @@ from scenario_gen.types import (
     ERRORS,
     formatted,
     GenerationResult,
-    NARROW,
     NoteKind,
+    ONE_DRIVER,
     REPLAY,
     routes_in_words,
     Row,
@@ -29,10 +29,10 @@ from scenario_gen.types import (
     WITHOUT,
 )
 
-SHORT_NAMES = {WITHOUT: "without", UNIFORM: "uniform", NARROW: "narrow", REPLAY: "replay"}
+SHORT_NAMES = {WITHOUT: "without", UNIFORM: "uniform", ONE_DRIVER: "one driver", REPLAY: "replay"}
 COMPARED = (
     "; after |: sets without changepoints and with K evenly spaced ones; in brackets, for "
-    "orientation only: preset narrow, replay of the recording"
+    "orientation only: one driver, replay of the recording"
 )
 NOT_COMPARED = (
     "; in brackets, for orientation only: replay of the recording. --compare draws further sets"

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""How encounters of a kind differ, and what `sampling.variety=population` makes of it."""
+"""How encounters of a kind differ, and what sampling makes of it."""
 
 from dataclasses import replace
 import json
@@ -28,7 +28,7 @@ from scenario_gen.types import (
     Scenario,
 )
 
-POPULATION = PipelineConfig(sampling=SamplingConfig(variety="population"))
+POPULATION = PipelineConfig(sampling=SamplingConfig())
 NAMES = FEATURES + JOINT_FEATURES
 APPROACH = FEATURES.index("approach")
 KIND = "crossing, rolls"
@@ -53,10 +53,10 @@ def encounters():
 
 @pytest.fixture(scope="module")
 def sets(encounters):
-    """Of the first encounter: as recorded ones differ, and as by default."""
+    """Of the first encounter: with drivers who differ, and with one driver."""
     return [
         generate(encounters, "corridor", config, count=40, seed=5)
-        for config in (POPULATION, PipelineConfig())
+        for config in (POPULATION, PipelineConfig(sampling=SamplingConfig(drivers=0.0)))
     ]
 
 
@@ -100,20 +100,17 @@ def test_the_joint_features_know_who_answers_the_other():
 
 def test_what_no_recorded_driver_does_is_rarer_and_others_that_do_it_make_it_usual(encounters):
     own, fast = encounters[0], replace(encounters[0], speed=3.0 * encounters[0].speed)
-    rarity = measures_in("population", own).rarity
-    alike = measures_in(
-        "population", own, [replace(fast, name=f"fast {n}") for n in range(9)]
-    ).rarity
+    rarity = measures_in(1.0, own).rarity
+    alike = measures_in(1.0, own, [replace(fast, name=f"fast {n}") for n in range(9)]).rarity
     assert rarity(as_scenario(own, 3.0)) > 1.5 * rarity(as_scenario(own))
     assert alike(as_scenario(own, 3.0)) < 0.7 * rarity(as_scenario(own, 3.0))
-    assert measures_in("wide", own).rarity is None
+    assert measures_in(0.0, own).rarity is None
 
 
 def test_the_template_counts_once_whether_it_is_named_or_not(encounters):
     scenario = as_scenario(encounters[1])
     named, unnamed = (
-        measures_in("population", encounters[0], others).rarity
-        for others in (encounters, encounters[1:])
+        measures_in(1.0, encounters[0], others).rarity for others in (encounters, encounters[1:])
     )
     assert named(scenario) == pytest.approx(unnamed(scenario))
 
@@ -122,18 +119,18 @@ def test_encounters_are_told_apart_by_what_they_are_and_not_by_their_names(encou
     scenario = as_scenario(encounters[1])
     others, copies = [replace(one, name="log") for one in encounters[1:]], 5 * [encounters[0]]
     named, alike, copied = (
-        measures_in("population", encounters[0], given).rarity(scenario)
+        measures_in(1.0, encounters[0], given).rarity(scenario)
         for given in (encounters[1:], others, copies)
     )
     assert alike == pytest.approx(named)
-    assert copied == pytest.approx(measures_in("population", encounters[0]).rarity(scenario))
+    assert copied == pytest.approx(measures_in(1.0, encounters[0]).rarity(scenario))
 
 
 def test_vehicles_that_share_no_area_are_in_no_population(encounters):
     position = encounters[0].position.copy()
     position[0] += 1000.0
     assert (
-        measures_in("population", encounters[0]).rarity(
+        measures_in(1.0, encounters[0]).rarity(
             as_scenario(replace(encounters[0], position=position))
         )
         == np.inf
@@ -144,17 +141,17 @@ def test_approaches_of_a_set_spread_towards_those_of_the_population(sets, encoun
     def spread(motions):
         return np.std([features_of(motion, "", 0).features[APPROACH] for motion in motions])
 
-    population, wide = map(spread, sets)
-    assert 1.2 * wide < population < spread(encounters)
+    population, one_driver = map(spread, sets)
+    assert 1.2 * one_driver < population < spread(encounters)
 
 
 def test_scenarios_say_their_rarity_and_the_others_are_counted(sets):
-    population, wide = (made.generated for made in sets)
+    population, one_driver = (made.generated for made in sets)
     rarities = np.array([scenario.facts.rarity for scenario in population])
     assert len(population) == 40 and population.refused[Cause.UNUSUAL] > 0
     (note,) = (note for note in population.adaptations if note.kind is NoteKind.UNUSUAL)
     assert 1.0 < rarities.max() <= note.values["rarity"] + 1e-9
-    assert not wide.refused[Cause.UNUSUAL] and wide[0].facts.rarity is None
+    assert not one_driver.refused[Cause.UNUSUAL] and one_driver[0].facts.rarity is None
 
 
 def test_the_same_seed_gives_the_same(sets, encounters):
@@ -179,7 +176,7 @@ def test_natural_scenarios_of_a_population_are_usual_too(sets, encounters):
         Plan.of(sets[0], POPULATION.sampling, POPULATION.limits, Request()),
         POPULATION.sampling,
     )
-    measures = measures_in("population", encounters[0], encounters)
+    measures = measures_in(1.0, encounters[0], encounters)
     check = checker_of(plan, sampling, POPULATION.limits, Request()).check
     natural, any_of_them = (
         NaturalScenarios.of(plan, check, sampling, 5, given) for given in (measures, None)
@@ -200,7 +197,7 @@ def test_the_encounters_of_a_command_are_its_population(encounters):
     folder = FolderRequest([], POPULATION, count=5, seed=5)
     for number in (1, 2):
         made = generate_all(pairs[:number], folder)[0][0]
-        rarity = measures_in("population", encounters[0], encounters[:number]).rarity
+        rarity = measures_in(1.0, encounters[0], encounters[:number]).rarity
         assert [one.facts.rarity for one in made] == pytest.approx(
             [rarity(one) for one in made], abs=1e-3
         )

@@ -22,7 +22,7 @@ from scenario_gen.types import Encounter, NoteKind, Vehicle
 
 DT = 0.1
 CONFIG = PipelineConfig()
-NARROW = replace(CONFIG.sampling, variety="narrow")
+NARROW = replace(CONFIG.sampling, drivers=0.0)
 
 
 def track(speed, bend):

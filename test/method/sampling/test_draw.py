@@ -24,7 +24,7 @@ from scenario_gen.types import NoteKind
 from scenario_gen.types.road import Road
 from scenario_gen.types.scenario import BoundaryStates, Cause, Verdict, Violation
 
-PLAIN = SamplingConfig(variety="narrow", bend_acceleration=5.0)
+PLAIN = SamplingConfig(drivers=0.0, bend_acceleration=5.0)
 
 
 def all_valid(scenarios):
@@ -57,9 +57,7 @@ def test_grid_and_duration(fifty):
         assert np.array_equal(s.time, np.round(np.arange(len(s.time)) * 0.1, 9))
         assert 18.0 - 1e-9 <= s.time[-1] <= 22.0 + 1e-9
     assert len({len(s.time) for s in fifty.scenarios}) > 5
-    fixed = drawn(
-        config=SamplingConfig(variety="narrow", fixed_duration=True, bend_acceleration=5.0)
-    )
+    fixed = drawn(config=SamplingConfig(drivers=0.0, fixed_duration=True, bend_acceleration=5.0))
     assert {s.time[-1] for s in fixed.scenarios} == {20.0}
 
 
@@ -216,7 +214,7 @@ def test_lateral_deviation_leaves_room_on_a_narrow_road():
     lane = np.zeros(plan.road.drivable.shape, dtype=bool)
     lane[57:63] = True  # 1.5 m to either side of y = 0
     narrow = replace(plan, road=Road("lane", lane, 0.5, plan.road.origin, [], []))
-    built = build_model(narrow, SamplingConfig(variety="narrow"))
+    built = build_model(narrow, SamplingConfig(drivers=0.0))
     eps = np.random.default_rng(0).standard_normal((500, built.model.size))
     curve = built.model.draw(eps, NoiseScale()).samples[0].paths.curve
     assert np.abs(curve[..., 1]).max() < 1.5 - 0.5 * 1.9
@@ -242,7 +240,7 @@ def test_short_set_is_returned_with_its_account():
     def never(scenarios):
         return [Verdict((Violation(Cause.OVERLAP, 0.0, (0, 1), ""),)) for _ in scenarios]
 
-    found = drawn(count=10, check=never, config=SamplingConfig(variety="narrow", attempts=5))
+    found = drawn(count=10, check=never, config=SamplingConfig(drivers=0.0, attempts=5))
     assert found.scenarios == ()
     assert found.candidates == found.refused[Cause.OVERLAP] == 50
 
@@ -269,7 +267,7 @@ def test_nothing_is_given_out_after_a_cancellation():
 def test_a_wait_stands_where_the_vehicle_does_not_where_it_creeps():
     speed = (
         build_model(
-            replace(scene_plan(), waits=(Wait(1, 6.8, 13.2),)), SamplingConfig(variety="narrow")
+            replace(scene_plan(), waits=(Wait(1, 6.8, 13.2),)), SamplingConfig(drivers=0.0)
         )
         .model.vehicles[1]
         .speed

@@ -47,7 +47,7 @@ def test_recorded_encounter(data, case, ablation):
     conflicts = find_conflicts(encounter)
     checker, config = (
         Checker(road, fit.requested, conflicts, waits),
-        SamplingConfig(variety="narrow"),
+        SamplingConfig(drivers=0.0),
     )
     plan = Plan(Situation.of(encounter), segmentation, road, routes, fit.requested, waits)
     found = draw_scenarios(plan, checker.check, config, count=30, seed=2)

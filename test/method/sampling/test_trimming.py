@@ -82,14 +82,14 @@ def test_the_largest_numbers_leave_out_the_whole_share_and_no_room_is_not_widene
 
 
 @pytest.mark.parametrize(("kind", "seed"), [("crossing, stops", 3), ("crossing, rolls", 2)])
-@pytest.mark.parametrize("variety", ["wide", "population"])
-def test_what_a_recording_holds_by_its_last_sample_is_kept(kind, seed, variety):
+@pytest.mark.parametrize("drivers", [0.5, 1.0])
+def test_what_a_recording_holds_by_its_last_sample_is_kept(kind, seed, drivers):
     """The record ends as the second one enters, and the drive without deviations ends before."""
     whole = labelled(kind, seed).encounter
     last = math.ceil(conflict_of(whole, 0, 1).entry_second / whole.dt) + 1
     cut = whole.between(0, last - 1)
     made = generate(
-        cut, "corridor", PipelineConfig(sampling=SamplingConfig(variety=variety)), count=10, seed=1
+        cut, "corridor", PipelineConfig(sampling=SamplingConfig(drivers=drivers)), count=10, seed=1
     )
     assert len(made) == 10 and all(conflict_of(scenario, 0, 1) is not None for scenario in made)
     assert not made.lost_reactions and made.generated.reactions

@@ -138,7 +138,7 @@ def test_requested_states_hold_and_relaxed_ones_keep_their_bounds():
 
 def test_preset_narrow_relaxes_nothing():
     plan = scene_plan()
-    config = SamplingConfig(variety="narrow")
+    config = SamplingConfig(drivers=0.0)
     states = relaxed_states(plan.requested, plan.situation, config, Request())
     assert states is plan.requested
 

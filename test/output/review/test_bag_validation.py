@@ -40,7 +40,7 @@ from scenario_gen.types.scenario import BoundaryStates
 def run():
     """A real run: the synthetic merging case on a straight road."""
     (encounter,) = read_log([bundled("c")]).encounters
-    config = PipelineConfig(sampling=SamplingConfig(variety="narrow"))
+    config = PipelineConfig(sampling=SamplingConfig(drivers=0.0))
     road = build_road("straight", encounter, config.road)
     return Chain(
         Situation.of(encounter),
