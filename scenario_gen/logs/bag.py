@@ -29,16 +29,20 @@ from scenario_gen.bags.vehicles import (
     TWIST,
 )
 from scenario_gen.base.errors import InputError
-from scenario_gen.logs.bag_clock import (
+from scenario_gen.logs.bag_names import (
+    base_frames,
+    check_fixed_frame,
+    check_frames,
     check_rates,
+    child_vehicle,
     clock_doubt,
+    find_owners,
     LARGE_COUNT,
     received_window,
     stamp_factor,
     TopicClock,
+    without_duplicates,
 )
-from scenario_gen.logs.bag_frames import base_frames, check_fixed_frame, check_frames
-from scenario_gen.logs.bag_names import child_vehicle, find_owners, without_duplicates
 from scenario_gen.logs.config import listed, LogConfig
 from scenario_gen.logs.doubts import Doubt
 from scenario_gen.logs.file_names import file_names

@@ -17,9 +17,9 @@ from scenario_gen.logs.clock import is_out_of_range, time_option
 from scenario_gen.logs.config import chosen_vehicles, LogConfig
 from scenario_gen.logs.degree_hints import degree_hint
 from scenario_gen.logs.geodesy import local_frame, middle_of, on_sphere, sites_of
+from scenario_gen.logs.kinds import with_sizes
 from scenario_gen.logs.quality import Dropped
 from scenario_gen.logs.raw import Observations, RawLog
-from scenario_gen.logs.sizes import with_sizes
 from scenario_gen.numerics import Bools, Floats, Ints
 
 

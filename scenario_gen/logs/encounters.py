@@ -12,10 +12,15 @@ import numpy as np
 from scenario_gen.logs.cleaning import CLEANING, select
 from scenario_gen.logs.config import LogConfig, points_ahead
 from scenario_gen.logs.motion_along_path import UnreconciledError
-from scenario_gen.logs.noise import speed_of_fixes
 from scenario_gen.logs.quality import VehicleQuality
 from scenario_gen.logs.raw import Observations
-from scenario_gen.logs.smoothing import interpolated_piece, Smooth, smooth_piece, standing
+from scenario_gen.logs.smoothing import (
+    interpolated_piece,
+    Smooth,
+    smooth_piece,
+    speed_of_fixes,
+    standing,
+)
 from scenario_gen.numerics import Bools, Floats, running_sum, runs
 from scenario_gen.numerics.plane import edge_lengths, unit
 from scenario_gen.types import CAR, OTHER, VEHICLE_TYPES

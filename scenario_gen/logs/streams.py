@@ -16,8 +16,8 @@ from scenario_gen.base.errors import InputError
 from scenario_gen.logs.cleaning import clean, CLEANING
 from scenario_gen.logs.config import LogConfig
 from scenario_gen.logs.encounters import longest_bridge
-from scenario_gen.logs.noise import speed_of_fixes
 from scenario_gen.logs.raw import natural, Observations, RawLog, Rows, Segment
+from scenario_gen.logs.smoothing import speed_of_fixes
 from scenario_gen.types import Sample, Vehicle
 
 _WINDOW_NS = 3_000_000_000  # cleaned again for every sample: tells a jump from a new place

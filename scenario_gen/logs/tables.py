@@ -23,9 +23,9 @@ from scenario_gen.logs.columns import (
     MAX_LISTED_COUNT,
 )
 from scenario_gen.logs.config import LogConfig
+from scenario_gen.logs.kinds import MAX_LENGTH_M
 from scenario_gen.logs.raw import check_size, check_vehicles, Observations, RawLog, Segment
 from scenario_gen.logs.signals import RawSignal, signals_of_table
-from scenario_gen.logs.sizes import MAX_LENGTH_M
 from scenario_gen.logs.stamps import read_stamps, reals
 from scenario_gen.logs.table_parts import (
     apart_by_scene,

@@ -14,10 +14,9 @@ import numpy as np
 
 from scenario_gen.logs.config import LogConfig
 from scenario_gen.logs.doubts import Doubt, Quantity
-from scenario_gen.logs.headings import interpret_headings
 from scenario_gen.logs.legs import Legs, legs_of, median_period
 from scenario_gen.logs.raw import Observations, RawLog
-from scenario_gen.logs.reading import counts_steps, Reading
+from scenario_gen.logs.reading import counts_steps, interpret_headings, Reading
 from scenario_gen.numerics import Floats, Ints
 
 _SAME_RATIO = 0.03  # tolerance of a ratio of speeds

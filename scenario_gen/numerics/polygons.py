@@ -1,11 +1,12 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Polygons drawn into grids."""
+"""Cells of a grid: those inside polygons, and the distance to the nearest one."""
 
 import numpy as np
 
-from scenario_gen.numerics.arrays import Bools, Floats, Ints
+from scenario_gen.numerics.arrays import Bools, Floats, Ints, sealed
+from scenario_gen.numerics.kernels import B2, kernel, OUT2
 
 
 def polygon_cells(
@@ -57,3 +58,85 @@ def fill_slits(cells: Bools) -> Bools:
     filled[1:-1] |= cells[:-2] & cells[2:]
     filled[:, 1:-1] |= cells[:, :-2] & cells[:, 2:]
     return filled
+
+
+def distance_field(is_open: Bools) -> Floats:
+    """Return distances (H, W) [cells] from cell centres to the nearest closed square, read-only.
+
+    Closed cells are 0; everything outside the grid is closed.
+    """
+    distance = np.empty(is_open.shape)
+    distance_transform(is_open, distance)
+    return sealed(distance)
+
+
+@kernel(B2, OUT2)
+def distance_transform(is_open: Bools, out: Floats) -> None:
+    """Fill `out` (H, W) with the distances [cells] from cell centres to the nearest closed square.
+
+    Source: the lower envelope of parabolas (Felzenszwalb & Huttenlocher 2012), here of squares
+    instead of points.
+    """
+    height, width = is_open.shape
+    _vertical_distances(is_open, out)
+    # The columns on the lower envelope, and the first column that each of them governs.
+    site = np.empty(width + 2, dtype=np.int64)
+    begin = np.empty(width + 3, dtype=np.int64)
+    level = np.empty(width + 2)
+    for i in range(height):
+        _envelope_of_row(out, i, site, begin, level)
+
+
+@kernel(inline=True)
+def _vertical_distances(is_open: Bools, out: Floats) -> None:
+    """Fill `out` (H, W) with the cells to the nearest closed one in each column."""
+    height, width = is_open.shape
+    for i in range(height):  # the nearest closed cell above
+        for j in range(width):
+            above = out[i - 1, j] if i > 0 else 0.0
+            out[i, j] = above + 1.0 if is_open[i, j] else 0.0
+    for i in range(height - 1, -1, -1):  # and below
+        for j in range(width):
+            below = out[i + 1, j] if i < height - 1 else 0.0
+            out[i, j] = min(out[i, j], below + 1.0)
+
+
+@kernel(inline=True)
+def _envelope_of_row(out: Floats, i: int, site: Ints, begin: Ints, level: Floats) -> None:
+    """Replace the vertical distances of row i by the lower envelope of phi(x - j) + h_j^2."""
+    width = out.shape[1]
+    site[0], begin[0], level[0] = -1, 0, 0.0
+    top = 0
+    for j in range(width + 1):
+        height = max(out[i, j] - 0.5, 0.0) if j < width else 0.0
+        square = height * height
+        first = _overtakes(site[top], level[top], j, square)
+        while top > 0 and first <= begin[top]:
+            top -= 1
+            first = _overtakes(site[top], level[top], j, square)
+        if first < width:
+            top += 1
+            site[top], begin[top], level[top] = j, max(first, 0), square
+    begin[top + 1] = width
+    for k in range(top + 1):
+        for j in range(begin[k], begin[k + 1]):
+            across = max(abs(j - site[k]) - 0.5, 0.0)
+            out[i, j] = np.sqrt(across * across + level[k])
+
+
+@kernel(inline=True)
+def _overtakes(i: int, level_i: float, j: int, level_j: float) -> int:
+    """Return the first column at which site j > i is no farther away than site i.
+
+    That is where phi(x - i) - phi(x - j) >= level_j - level_i.
+    """
+    between = float(j - i)
+    rise = level_j - level_i
+    edge = (between - 0.5) * (between - 0.5)
+    if rise > edge:  # right of j
+        return int(np.ceil(0.5 * (rise / between + i + j + 1)))
+    if rise <= -edge:  # at or left of i
+        return min(int(np.ceil(0.5 * (rise / between + i + j - 1))), i)
+    if between < 1.5:
+        return j
+    return min(max(int(np.ceil(0.5 * (rise / (between - 1.0) + i + j))), i + 1), j)

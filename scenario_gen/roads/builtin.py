@@ -26,7 +26,7 @@ from scenario_gen.roads.pavement import (
     swept,
 )
 from scenario_gen.roads.plan import aligned, Arm, Connection, Driven, Plan
-from scenario_gen.roads.vector.raster import VERGE_M
+from scenario_gen.roads.vector.ground import VERGE_M
 from scenario_gen.roads.ways import draw_u_turn
 from scenario_gen.situation import pair_crossings, Situation, to_frenet, Track
 from scenario_gen.types import DrawnFor, Encounter, LaneNetwork, Road, Trailer, trailer_poses

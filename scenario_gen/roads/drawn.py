@@ -24,7 +24,7 @@ from scenario_gen.roads.config import RoadConfig
 from scenario_gen.roads.lights import arm_lights
 from scenario_gen.roads.pavement import drivable_width, inside, paved, ring, strip, swept
 from scenario_gen.roads.plan import Connection, lane_id, Plan
-from scenario_gen.roads.vector.raster import road_of, VERGE_M
+from scenario_gen.roads.vector.ground import road_of, VERGE_M
 from scenario_gen.roads.ways import draw_route, MAX_CAR_CURVATURE_PER_M, reverse
 from scenario_gen.types import Lane, LaneNetwork, Road, RuleKind, TrafficRule
 

@@ -136,7 +136,7 @@ class Road:
 
         Everything outside the grid is closed.
         """
-        from scenario_gen.numerics.distance_field import distance_field  # loads numba
+        from scenario_gen.numerics.polygons import distance_field  # loads numba
 
         return distance_field(self.drivable)
 
@@ -154,7 +154,7 @@ class Road:
     @cached_property
     def depth_cells(self) -> Floats:
         """(H + 2 R, W + 2 R) [cells] from centres of `closed_cells` to the nearest open square."""
-        from scenario_gen.numerics.distance_field import distance_field  # loads numba
+        from scenario_gen.numerics.polygons import distance_field  # loads numba
 
         return distance_field(self.closed_cells)
 

@@ -14,10 +14,9 @@ from scipy.optimize import minimize
 from scenario_gen.logs import LogConfig
 from scenario_gen.logs.encounters import pieces_of
 from scenario_gen.logs.motion_along_path import Motion
-from scenario_gen.logs.noise import white_equivalent
 from scenario_gen.logs.path import fit_path, headings_of, straight_path
 from scenario_gen.logs.raw import Observations
-from scenario_gen.logs.smoothing import smooth_piece, standing
+from scenario_gen.logs.smoothing import smooth_piece, standing, white_equivalent
 
 CONFIG = LogConfig()
 

@@ -4,15 +4,15 @@
 """The fitting: how a recording is placed on a road."""
 
 from functools import lru_cache
+from itertools import pairwise
 
 import numpy as np
 
 from scenario_gen.base.errors import RefusedError
-from scenario_gen.method.fitting.assemble_fit import assemble_fit
 from scenario_gen.method.fitting.config import FittingConfig
 from scenario_gen.method.fitting.lanes import place_on_lanes
-from scenario_gen.method.fitting.losses import refuse_lost
-from scenario_gen.method.fitting.placement import Placement
+from scenario_gen.method.fitting.losses import find_losses, refuse_lost
+from scenario_gen.method.fitting.placement import Placement, STANDING_SPEED_MPS
 from scenario_gen.method.fitting.search import place_by_search
 from scenario_gen.method.fitting.similarity_fit import (
     place_given,
@@ -20,9 +20,180 @@ from scenario_gen.method.fitting.similarity_fit import (
     share_at_home,
 )
 from scenario_gen.method.fitting.state_check import refuse_impossible, refuse_misfits
-from scenario_gen.numerics import Floats
-from scenario_gen.situation import refuse_reversing, Situation
-from scenario_gen.types import Encounter, Fit, Request, Road, Segmentation, TypeLimits
+from scenario_gen.numerics import Bools, Floats, frozen_ints, Ints, runs
+from scenario_gen.roads import ground_for, nearest_pose_with_room
+from scenario_gen.situation import manoeuvre_of, refuse_reversing, Situation, Track, turn_of
+from scenario_gen.types import (
+    BoundaryStates,
+    Encounter,
+    Fit,
+    FittedVehicle,
+    Note,
+    NoteKind,
+    Request,
+    Road,
+    Segmentation,
+    TypeLimits,
+)
+
+
+def assemble_fit(
+    situation: Situation,
+    segmentation: Segmentation,
+    road: Road,
+    placement: Placement,
+    config: FittingConfig,
+    given: Floats | None = None,
+) -> Fit:
+    """Return the fit of a placement, with anchors at the changepoints.
+
+    Args:
+        situation: of the recording.
+        segmentation: its changepoints.
+        road: the target.
+        placement: the recording on the road.
+        config: how far anchors may be moved.
+        given: (N, 2, 4) start and end states to be met exactly, NaN for those that are free.
+
+    Source: eq 9.
+
+    Raises:
+        RefusedError: an anchor is farther than `max_move` from the nearest pose with room.
+    """
+    encounter = situation.encounter
+    last = encounter.speed.shape[1] - 1
+    index = frozen_ints(np.concatenate(([0], segmentation.changepoints, [last])))
+    if given is None:
+        given = np.full((len(placement.tracks), 2, 4), np.nan)
+    notes = list(placement.notes)
+    fitted, states = [], []
+    for i, track in enumerate(placement.tracks):
+        stands = _standing_primitives(track, index)
+        progress = _progress_at_anchors(track, index, stands)
+        anchors, moved, moves = _repaired(
+            ground_for(road, track.vehicle),
+            track,
+            _with_given_ends(track.curve.at(progress), progress, given[i], still=track.still),
+            progress,
+            (index * encounter.dt).tolist(),
+            config,
+        )
+        notes += moves
+        moved = moved + placement.moved[i]
+        if moved.max() > config.max_move:
+            raise RefusedError(
+                f"vehicle {track.vehicle.id} would be moved by {moved.max():.2f} m, away from "
+                f"others and onto road {road.name}; fitting.max_move accepts {config.max_move:g} m"
+            )
+        turns = turn_of(situation.tracks[i]), turn_of(track)
+        scale = float(placement.scale[i])
+        manoeuvre = "wait" if track.still else manoeuvre_of(turns[1])
+        path = _path(track)
+        fitted.append(FittedVehicle(anchors, moved, stands, scale, manoeuvre, turns, path))
+
+        speeds = encounter.speed[i, [0, last]] * scale
+        speeds = _end_speeds(speeds, given[i], still=track.still)
+        states.append(np.column_stack((anchors[[0, -1]], speeds)))
+    start, end = np.stack(states, axis=1)
+    requested = BoundaryStates(start=start, end=end)
+    losses = (*find_losses(situation.tracks, placement.tracks), *placement.unused)
+    return Fit(encounter.vehicles, tuple(fitted), index, requested, tuple(notes), losses)
+
+
+def _end_speeds(speeds: Floats, given: Floats, *, still: bool) -> Floats:
+    """Return the speeds (2,) [m/s] at start and end: recorded ones, or given states (2, 4)."""
+    if still:
+        return np.zeros(2)
+    slow = np.where(speeds < STANDING_SPEED_MPS, 0.0, speeds)
+    return np.where(np.isfinite(given[:, 0]), given[:, 3], slow)
+
+
+def _with_given_ends(anchors: Floats, progress: Floats, given: Floats, *, still: bool) -> Floats:
+    """Return anchors (K + 2, 3) with the given start and end states (2, 4) in their places."""
+    anchors = anchors.copy()
+    if np.isfinite(given[0, 0]):
+        anchors[progress == progress[0]] = given[0, :3]
+    if np.isfinite(given[1, 0]) and not still:
+        anchors[progress == progress[-1]] = given[1, :3]
+    return anchors
+
+
+def _path(track: Track) -> Floats:
+    """Return poses (M, 3) every half metre along the placed path from start to end."""
+    if track.still:
+        return track.curve.points[:1]
+    first, last = float(track.progress[0]), float(track.progress[-1])
+    count = max(int(np.ceil((last - first) / 0.5)), 1) + 1
+    return track.curve.at(np.linspace(first, last, count))
+
+
+def _standing_primitives(track: Track, index: Ints) -> Bools:
+    """Return (K + 1,) in which primitives the vehicle stands: slow, and nearly without a path."""
+    if track.still:
+        return np.ones(len(index) - 1, dtype=np.bool_)
+    primitives = list(pairwise(index))
+    driven = np.array([track.progress[b] - track.progress[a] for a, b in primitives])
+    fastest = np.array([track.speed[a : b + 1].max() for a, b in primitives])
+    slow = (driven < 0.5) & (fastest < STANDING_SPEED_MPS)
+    stands = slow | (driven < 1e-3)
+    if stands.all():  # it does move a little
+        stands[int(np.argmax(driven))] = False
+    return np.asarray(stands)
+
+
+def _progress_at_anchors(track: Track, index: Ints, stands: Bools) -> Floats:
+    """Return the progress (K + 2,) [m] at the anchors; both ends of a dwell are one place.
+
+    The start and the end of the path do not move.
+    """
+    progress = track.progress[index].copy()
+    for first, last in runs(stands):
+        until_end = last == len(stands) and first > 0
+        progress[first : last + 1] = progress[last if until_end else first]
+    return progress
+
+
+def _repaired(
+    road: Road,
+    track: Track,
+    anchors: Floats,
+    progress: Floats,
+    times: list[float],
+    config: FittingConfig,
+) -> tuple[Floats, Floats, list[Note]]:
+    """Move anchors (K + 2, 3) to where they have room.
+
+    Returns:
+        The anchors, how far each was moved (K + 2,) [m], and notes on it.
+
+    Raises:
+        RefusedError: an anchor would be moved by more than `max_move`.
+    """
+    anchors = anchors.copy()
+    moved = np.zeros(len(anchors))
+    notes = []
+    vehicle = track.vehicle
+    for k in range(len(anchors)):
+        if k and progress[k] == progress[k - 1]:
+            anchors[k], moved[k] = anchors[k - 1], moved[k - 1]
+            continue
+        name = {0: "start", len(anchors) - 1: "end"}.get(k, f"changepoint at {times[k]:.1f} s")
+        nearest = nearest_pose_with_room(
+            road, anchors[k], vehicle.length, vehicle.width, config.max_move
+        )
+        if nearest is None:
+            x, y = anchors[k, :2]
+            raise RefusedError(
+                f"vehicle {vehicle.id}: its {name} (x {x:.1f}, y {y:.1f}) is more than "
+                f"{config.max_move:g} m from the nearest pose with room on road {road.name}"
+            )
+        anchors[k], moved[k] = nearest
+        if moved[k] > 0.0:
+            notes.append(
+                Note.of(NoteKind.ANCHOR_MOVED, vehicle=vehicle.id, anchor=name, distance=moved[k])
+            )
+    return anchors, moved, notes
+
 
 # The share of footprints with room in the recording's own frame, with which it is placed there;
 # recorded cars leave recorded maps now and then.

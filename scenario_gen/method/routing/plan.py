@@ -11,15 +11,13 @@ import numpy as np
 from scenario_gen.base.cancelling import stop_if_cancelled
 from scenario_gen.base.errors import RefusedError
 from scenario_gen.method.routing.config import PLANNERS, PlanningConfig
-from scenario_gen.method.routing.distance import max_distance
 from scenario_gen.method.routing.leg_search import Leg, search_disc_path
-from scenario_gen.method.routing.legs import join_waypoints, Legs
+from scenario_gen.method.routing.legs import anchor_weights, choose_waypoints, join_waypoints, Legs
 from scenario_gen.method.routing.refusals import not_drivable, too_narrow, too_tight
-from scenario_gen.method.routing.route_points import route_along
+from scenario_gen.method.routing.route_points import max_distance, route_along
 from scenario_gen.method.routing.search.planner import Planner, PosePlanner
 from scenario_gen.method.routing.smooth import Curve, Guess, smooth
 from scenario_gen.method.routing.task import VehicleTask
-from scenario_gen.method.routing.waypoints import anchor_weights, choose_waypoints
 from scenario_gen.numerics import Floats
 from scenario_gen.numerics.plane import arc_lengths, edge_yaws
 from scenario_gen.roads import footprint_fits, ground_for, own_side

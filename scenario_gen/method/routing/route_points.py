@@ -7,12 +7,40 @@ from collections.abc import Callable
 import itertools
 
 import numpy as np
+import shapely
 
-from scenario_gen.method.routing.matching import monotone_matching, squared_distances
 from scenario_gen.method.routing.task import VehicleTask
-from scenario_gen.numerics import Floats
+from scenario_gen.numerics import Floats, Ints
 from scenario_gen.numerics.plane import ahead_and_left
 from scenario_gen.types import Route
+
+
+def squared_distances(rows: Floats, columns: Floats) -> Floats:
+    """Return the squared distances (A, M) [m²] of points (A, 2) from others (M, 2)."""
+    squares = np.zeros((len(rows), len(columns)))
+    for axis in (0, 1):  # a long drive has many points: no array (A, M, 2)
+        squares += np.square(rows[:, axis, None] - columns[None, :, axis])
+    return squares
+
+
+def monotone_matching(cost: Floats) -> Ints:
+    """Match rows of `cost` (A, M) to non-decreasing columns at the least total cost: (A,) columns.
+
+    Source: dynamic programming (Bellman 1957).
+    """
+    total = cost[0]
+    previous = np.empty(cost.shape, dtype=np.int32)
+    for k in range(1, len(cost)):
+        lowest = np.minimum.accumulate(total)
+        is_lower = np.concatenate(([True], total[1:] < lowest[:-1]))
+        previous[k] = np.maximum.accumulate(np.where(is_lower, np.arange(len(total)), 0))
+        total = lowest + cost[k]
+    column = np.empty(len(cost), dtype=np.int64)
+    column[-1] = np.argmin(total)
+    for k in range(len(cost) - 1, 0, -1):
+        column[k - 1] = previous[k, column[k]]
+    return column
+
 
 PROJECTION_SPACING_M = 0.05  # of points at which anchors may project
 MAX_PROJECTION_POINTS = 20_000  # each is compared with each anchor
@@ -66,3 +94,18 @@ def _anchor_lengths(
     refined = length[nearest] + np.clip(mean_ahead, -step, step)  # between two projection points
     refined[0], refined[-1] = 0.0, total
     return np.maximum.accumulate(np.clip(refined, 0.0, total))[group]
+
+
+def max_distance(line: Floats, other: Floats) -> float:
+    """Return the Hausdorff distance [m] of two polylines' points; NaN if `other` is empty."""
+    if not len(other):
+        return float("nan")
+    return float(max(distances_to_line(line, other).max(), distances_to_line(other, line).max()))
+
+
+def distances_to_line(points: Floats, line: Floats) -> Floats:
+    """Return the distances (M,) [m] from points (M, 2 or more) to a polyline (P, 2 or more)."""
+    corners = line[:, :2] if len(line) > 1 else np.repeat(line[:, :2], 2, axis=0)
+    return np.asarray(
+        shapely.distance(shapely.points(points[:, :2]), shapely.linestrings(corners))
+    )

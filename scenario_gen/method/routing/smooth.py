@@ -16,7 +16,7 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 
 from scenario_gen.method.routing.band import Band, relax, Weights
-from scenario_gen.method.routing.matching import monotone_matching, squared_distances
+from scenario_gen.method.routing.route_points import monotone_matching, squared_distances
 from scenario_gen.method.routing.search.planner import path_length
 from scenario_gen.method.routing.search.sweep import sweep_is_free
 from scenario_gen.method.routing.task import VehicleTask

@@ -18,9 +18,9 @@ from scenario_gen.roads.config import RoadConfig
 from scenario_gen.roads.obstacles import with_obstacles
 from scenario_gen.roads.vector import commonroad, lanelet2, opendrive
 from scenario_gen.roads.vector.drafts import MapLanes
+from scenario_gen.roads.vector.ground import road_of
 from scenario_gen.roads.vector.network import extent, network_of, part_of
 from scenario_gen.roads.vector.place import best_part
-from scenario_gen.roads.vector.raster import road_of
 from scenario_gen.situation import Track
 from scenario_gen.types import LaneNetwork, Note, NoteKind, Road
 

@@ -15,7 +15,7 @@ from benchmarks._planning_obstructed import obstructed
 from scenario_gen.base.errors import RefusedError
 from scenario_gen.base.road_users import Dynamics
 from scenario_gen.method.routing import plan, plan_routes, PlanningConfig
-from scenario_gen.method.routing.distance import max_distance
+from scenario_gen.method.routing.route_points import max_distance
 from scenario_gen.method.routing.search.car_planner import PoseRrtStarConnect, PoseSearchConfig
 from scenario_gen.method.routing.search.dubins import Pose, shortest_curve
 from scenario_gen.method.routing.search.planner import (

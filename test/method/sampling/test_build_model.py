@@ -11,7 +11,7 @@ import pytest
 from scenario_gen.method.chain import Chain
 from scenario_gen.method.config import PipelineConfig
 from scenario_gen.method.evaluation import uniform_changepoints
-from scenario_gen.method.routing.distance import distances_to_line
+from scenario_gen.method.routing.route_points import distances_to_line
 from scenario_gen.method.sampling.build_model import build_model
 from scenario_gen.method.sampling.plan import Plan
 from scenario_gen.method.sampling.vehicle_model import NoiseScale

@@ -12,7 +12,7 @@ from shapely.geometry import Polygon
 from shapely.ops import unary_union
 
 from scenario_gen.roads import RoadConfig
-from scenario_gen.roads.vector.raster import road_of
+from scenario_gen.roads.vector.ground import road_of
 from scenario_gen.roads.vector.read import read_network
 
 lanelet2 = pytest.importorskip(
