@@ -46,5 +46,5 @@ def refuse_removed(name: str, place: str = "") -> None:
         InputError: it was removed; the message says what replaces it.
     """
     if name in REMOVED:
-        what = f"{place}: {name}" if place else name
-        raise InputError(f"{what} was removed: {REMOVED[name]}")
+        subject = f"{place}: {name}" if place else name
+        raise InputError(f"{subject} was removed: {REMOVED[name]}")

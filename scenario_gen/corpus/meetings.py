@@ -42,7 +42,7 @@ from scenario_gen.corpus.tracks import (
     tracks_of,
 )
 from scenario_gen.logs import GAP_RATE_MPS, OUT_OF_RANGE_S, shortest
-from scenario_gen.logs.manoeuvres import AROUND_CROSSING_S, LONGEST_EXTENSION_S
+from scenario_gen.logs.groups import AROUND_CROSSING_S, LONGEST_EXTENSION_S
 from scenario_gen.numerics import Bools, Floats, Ints
 from scenario_gen.numerics.kernels import F, F1, I, I1, kernel, named
 

@@ -197,8 +197,8 @@ def _draw_places(
 ) -> list[str]:
     """Draw a template's eight best places that do not overlap; return a line on each."""
     try:
-        found = places(network, Situation.of(encounter).drivers)
-        shown = list(islice(_separate(found), _MAX_PLACES_COUNT))
+        suitable = places(network, Situation.of(encounter).drivers)
+        shown = list(islice(_separate(suitable), _MAX_PLACES_COUNT))
     except RefusedError as error:
         return [f"no place for {encounter.name}: {error}"]
     lines = []

@@ -38,8 +38,7 @@ from scenario_gen.roads.vector.ground import (
     ground_for,
     own_side,
 )
-from scenario_gen.roads.vector.lane_graph import lane_graph, LaneGraph
-from scenario_gen.roads.vector.lane_path import LanePath
+from scenario_gen.roads.vector.lane_graph import lane_graph, LaneGraph, LanePath
 from scenario_gen.roads.vector.place import (
     NoPlaceError,
     Place,

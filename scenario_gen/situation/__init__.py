@@ -39,15 +39,6 @@ from scenario_gen.situation.interaction_window import (
     MIN_LOSS_S,
 )
 from scenario_gen.situation.kind import EncounterKind, kind_of
-from scenario_gen.situation.manoeuvre import (
-    describe_turn,
-    is_same_turn,
-    manoeuvre_of,
-    MAX_TURN_CHANGE_RAD,
-    sharpness_of,
-    turn_of,
-    turns_to_keep,
-)
 from scenario_gen.situation.path_crossing import pair_crossings, path_crossing
 from scenario_gen.situation.placement_lsq import Equation, solve_placement
 from scenario_gen.situation.separation import separate, smallest_gaps
@@ -63,7 +54,19 @@ from scenario_gen.situation.size import (
     refuse_reversing,
     refuse_too_large,
 )
-from scenario_gen.situation.tracks import clean_tracks, driver_rows, drivers_of, Track
+from scenario_gen.situation.tracks import (
+    clean_tracks,
+    describe_turn,
+    driver_rows,
+    drivers_of,
+    is_same_turn,
+    manoeuvre_of,
+    MAX_TURN_CHANGE_RAD,
+    sharpness_of,
+    Track,
+    turn_of,
+    turns_to_keep,
+)
 from scenario_gen.situation.traffic_side import mirrored, traffic_side
 from scenario_gen.situation.waits import find_waits, STANDSTILL_SPEED_MPS, Wait, WAIT_SPEED_MPS
 

@@ -10,9 +10,8 @@ from itertools import chain
 import numpy as np
 
 from scenario_gen.numerics import Floats
-from scenario_gen.situation.manoeuvre import is_same_turn, manoeuvre_of, turn_of
 from scenario_gen.situation.situation import Situation
-from scenario_gen.situation.tracks import Track
+from scenario_gen.situation.tracks import is_same_turn, manoeuvre_of, Track, turn_of
 from scenario_gen.types import YIELD
 
 LEAD_S = 2.0  # kept before the first event of a vehicle

@@ -17,8 +17,7 @@ from scipy.optimize import lsq_linear
 
 from scenario_gen.numerics import Floats
 from scenario_gen.numerics.curve import Curve
-from scenario_gen.roads.vector.lane_graph import LaneGraph
-from scenario_gen.roads.vector.lane_path import lane_change_length, LanePath
+from scenario_gen.roads.vector.lane_graph import lane_change_length, LaneGraph, LanePath
 from scenario_gen.situation import Abreast, abreast_in_lane, Track
 from scenario_gen.types import Vehicle
 

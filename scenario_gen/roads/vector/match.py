@@ -20,13 +20,15 @@ import numpy as np
 from scenario_gen.numerics import Floats, runs
 from scenario_gen.numerics.curve import crossings, Curve
 from scenario_gen.numerics.plane import angle_between
-from scenario_gen.roads.vector.lane_graph import LaneChain, LaneGraph, LEAD_M
-from scenario_gen.roads.vector.lane_path import (
+from scenario_gen.roads.vector.lane_graph import (
     bend_cost,
     COSTS,
     lane_change_length,
+    LaneChain,
+    LaneGraph,
     LanePath,
     lateral_acceleration,
+    LEAD_M,
     LIMITS,
     narrow_cost,
     off_reserved_cost,

@@ -16,8 +16,7 @@ from scipy.spatial.distance import cdist
 from scenario_gen.base.cancelling import stop_if_cancelled
 from scenario_gen.base.errors import RefusedError
 from scenario_gen.numerics import Floats, frozen
-from scenario_gen.roads.vector.lane_graph import lane_graph, LaneGraph
-from scenario_gen.roads.vector.lane_path import LanePath
+from scenario_gen.roads.vector.lane_graph import lane_graph, LaneGraph, LanePath
 from scenario_gen.roads.vector.match import Match, match
 from scenario_gen.roads.vector.rules import RuleCheck
 from scenario_gen.roads.vector.search import (

@@ -20,11 +20,13 @@ from scenario_gen.base.cancelling import stop_if_cancelled
 from scenario_gen.base.errors import RefusedError
 from scenario_gen.numerics import Floats, running_sum, wrap_angle
 from scenario_gen.numerics.curve import Curve
-from scenario_gen.roads.vector.lane_graph import LaneChain, LaneGraph, LEAD_M
-from scenario_gen.roads.vector.lane_path import (
+from scenario_gen.roads.vector.lane_graph import (
     bend_cost,
+    LaneChain,
+    LaneGraph,
     LanePath,
     lateral_acceleration,
+    LEAD_M,
     narrow_cost,
     off_reserved_cost,
     speeding_cost,
