@@ -14,7 +14,7 @@ from typing import Any, Literal
 from scenario_gen.base.documents import COUNT, NUMBER
 from scenario_gen.base.errors import printable
 from scenario_gen.types.html import html_list, html_table
-from scenario_gen.types.notes import Note, NoteKind
+from scenario_gen.types.notes import Note
 from scenario_gen.types.scenario import Cause, ScenarioSet, Verdict
 
 RECORDING = "recording"
@@ -211,18 +211,6 @@ class Evaluation:
         }
         return json.dumps(document, indent=indent, ensure_ascii=False, allow_nan=False)
 
-    @classmethod
-    def from_document(cls, document: Mapping[str, Any]) -> "Evaluation":
-        """Return the evaluation in a document from `to_json` that satisfies `SCHEMA`."""
-        fields = {name: document[_KEYS.get(name, name)] for name in cls.__dataclass_fields__}
-        fields["vehicles"] = tuple(document["vehicles"])
-        fields["metrics"] = tuple(
-            Metric(**{key: metric[key] for key in METRIC_KEYS}, cap=metric.get("cap"))
-            for metric in document["metrics"]
-        )
-        fields["rows"] = tuple(_row(row) for row in document["rows"])
-        return cls(**fields)
-
     def _table(self) -> list[tuple[str, ...]]:
         """Return the header, then the cells of each metric: label, better, a figure per row."""
         header = ("metric", "better", *(f"{row.name} ({row.samples})" for row in self.rows))
@@ -296,21 +284,3 @@ def formatted(
 
 def _number(value: float) -> float | None:
     return float(f"{value:.6g}") if math.isfinite(value) else None
-
-
-def _row(document: Mapping[str, Any]) -> Row:
-    values = {
-        key: Interval(
-            *(
-                math.nan if entry[bound] is None else entry[bound]
-                for bound in ("value", "low", "high")
-            )
-        )
-        for key, entry in document["values"].items()
-    }
-    return Row(
-        document["name"],
-        document["samples"],
-        values,
-        tuple(Note(NoteKind.TEXT, recorded=text) for text in document["notes"]),
-    )

@@ -3,7 +3,6 @@
 
 """A request for an ego slot, states, targets or an order, by option or ROS parameter."""
 
-from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -12,7 +11,7 @@ from scenario_gen.base.errors import InputError
 from scenario_gen.base.parameters import parameter, Parameters
 from scenario_gen.numerics import Floats
 from scenario_gen.types.encounter import Encounter, vehicle_index
-from scenario_gen.types.target import join_pieces, read_numbers, read_targets, split_pieces, Target
+from scenario_gen.types.target import read_numbers, read_targets, split_pieces, Target
 
 State = tuple[float, ...]  # x [m], y [m], yaw [rad] and, unless it is the template's, speed [m/s]
 ENDS = ("starts", "goals")
@@ -74,14 +73,6 @@ class Request(Parameters):
             InputError: the text is not of the form; the message names the parameter and the piece.
         """
         return read_states(getattr(self, end), end)
-
-    def with_states(self, end: str, states: Mapping[str, State]) -> "Request":
-        """Return the request with other states at one end."""
-        text = join_pieces(
-            f"{name}: {' '.join(f'{value:.10g}' for value in state)}"
-            for name, state in states.items()
-        )
-        return replace(self, **{end: text})
 
     def rows(self, end: str, encounter: Encounter) -> Floats:
         """Return the requested states (N, 4) at one end, NaN where nothing is requested.

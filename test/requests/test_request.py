@@ -15,8 +15,6 @@ def test_states_are_read_by_vehicle_and_written_back():
     assert request.states("starts") == {"1": (10.5, -1.75, 0.0, 8.0), "b 2": (3.0, 4.0, 1.57)}
     assert request.states("goals") == {}
     assert request.moves and not Request(ego="1").moves
-    again = request.with_states("starts", request.states("starts"))
-    assert again.states("starts") == request.states("starts")
 
 
 STATES = [

@@ -15,7 +15,7 @@ from scenario_gen.base.errors import InputError
 from scenario_gen.method.evaluation import evaluate_scenarios, EvaluationConfig, replay
 from scenario_gen.types import ALWAYS, NoteKind
 from scenario_gen.types.encounter import Encounter
-from scenario_gen.types.evaluation import CheckCounts, Evaluation
+from scenario_gen.types.evaluation import CheckCounts
 from scenario_gen.types.fit import Fit, FittedVehicle
 from scenario_gen.types.scenario import BoundaryStates, Cause, ScenarioSet, Verdict, Violation
 
@@ -74,12 +74,7 @@ def test_every_estimate_lies_in_its_interval_and_survives_json_and_markdown():
                 assert estimate.low <= estimate.value <= estimate.high, (row.name, key)
     text = found.to_json()
     assert "NaN" not in text and json.loads(text)["changepoints"] == 2
-    assert (
-        Evaluation.from_document(json.loads(text)).to_json()
-        == text
-        == run(seed=3).to_json()
-        != run(seed=4).to_json()
-    )
+    assert text == run(seed=3).to_json() != run(seed=4).to_json()
     page = found.to_markdown()
     assert "K = 2 changepoints" in page and "| E position |" in page and "–" in page
 
