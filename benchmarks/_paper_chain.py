@@ -14,8 +14,8 @@ import numpy as np
 
 from benchmarks._paper_speed_knots import speed_knots
 from benchmarks._paper_speed_profile import knots_on, SpeedProfile, SpeedProfileQP
+from benchmarks._reference_sets import without_changepoints
 from scenario_gen.base.errors import InputError, RefusedError
-from scenario_gen.method.evaluation import without_changepoints
 from scenario_gen.method.fitting import fit_template, FittingConfig
 from scenario_gen.method.routing import PAPER, plan_routes, PlanningConfig
 from scenario_gen.method.sampling import Features, Observations, Posterior, Regression

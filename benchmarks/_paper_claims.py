@@ -11,7 +11,8 @@ import plotly.graph_objects as go
 
 from benchmarks._paper_figures import figure_2, figure_3, figure_4, figure_5
 from benchmarks._paper_measure import PaperCase
-from scenario_gen.types import UNIFORM, WITH, WITHOUT
+from benchmarks._reference_sets import UNIFORM, WITHOUT
+from scenario_gen.types import WITH
 
 MAX_WAIT_SPEED_MPS = 0.5
 """A vehicle with a lower mean speed waits (docs/method.md)."""

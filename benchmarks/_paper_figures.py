@@ -13,9 +13,10 @@ import plotly.graph_objects as go
 from plotly.subplots import make_subplots
 
 from benchmarks._paper_measure import PaperCase, Regressions
+from benchmarks._reference_sets import WITHOUT
 from scenario_gen.method.evaluation import mean_feature
 from scenario_gen.numerics import Floats
-from scenario_gen.types import Road, WITH, WITHOUT
+from scenario_gen.types import Road, WITH
 
 VEHICLES = ("#2563eb", "#e2590c", "#0d9488", "#9333ea", "#c2185b", "#65780b")
 PRIMITIVES = px.colors.qualitative.T10

@@ -9,14 +9,18 @@ from itertools import pairwise
 import numpy as np
 
 from benchmarks._paper_chain import LENGTH, NOISE, place, rotation, sample, Sampled, SIGMA
+from benchmarks._reference_sets import (
+    UNIFORM,
+    uniform_changepoints,
+    WITHOUT,
+    without_changepoints,
+)
 from scenario_gen.base.errors import RefusedError
 from scenario_gen.method.evaluation import (
     Bootstrap,
     mean_correlation,
     mean_error,
     pair_similarities,
-    uniform_changepoints,
-    without_changepoints,
 )
 from scenario_gen.method.sampling import Features, Observations, Regression
 from scenario_gen.method.segmentation import segment, SegmentationConfig
@@ -28,9 +32,7 @@ from scenario_gen.types import (
     Road,
     Route,
     Segmentation,
-    UNIFORM,
     WITH,
-    WITHOUT,
 )
 
 PRIORS = {"zero mean": -1, "training data mean": 0, "cubic polynomial": 3}

@@ -19,7 +19,6 @@ import numpy as np
 
 from scenario_gen import pipeline
 from scenario_gen.method.config import PipelineConfig
-from scenario_gen.method.evaluation import EvaluationConfig
 from scenario_gen.roads import build_road, RoadConfig
 from scenario_gen.types import Encounter, Vehicle
 
@@ -59,11 +58,9 @@ def group(vehicles: int, seconds: float) -> Encounter:
 
 
 def generate_seconds(vehicles: int, seconds: float, count: int) -> float:
-    """Return CPU seconds of `generate`, with the sets to compare with."""
+    """Return CPU seconds of `generate`."""
     encounter, started = group(vehicles, seconds), process_time()
-    config = PipelineConfig(
-        road=RoadConfig(max_cells=MAX_CELLS_COUNT), evaluation=EvaluationConfig(compare=True)
-    )
+    config = PipelineConfig(road=RoadConfig(max_cells=MAX_CELLS_COUNT))
     pipeline.generate(encounter, ROAD, config, count=count, seed=1)
     return process_time() - started
 

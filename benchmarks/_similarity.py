@@ -7,8 +7,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from benchmarks._reference_sets import UNIFORM, WITHOUT
 from benchmarks.row import higher, lower, Row
-from scenario_gen.types import UNIFORM, WITH, WITHOUT
+from scenario_gen.types import WITH
 from scenario_gen.types.evaluation import Evaluation
 
 SIGNIFICANT_RATIO = 0.03

@@ -18,13 +18,14 @@ from typing import Any
 import numpy as np
 from scipy.spatial.distance import cdist
 
+from benchmarks._reference_sets import evaluate_with_references
 from benchmarks._sampling_cases import DATA
 from benchmarks._similarity import error_rows
 from benchmarks._size import sized
 from benchmarks.row import higher, lower, Row
 from scenario_gen.base.errors import InputError, RefusedError
 from scenario_gen.logs import read_log
-from scenario_gen.method.evaluation import dtw_distance, EvaluationConfig, feature_matrix
+from scenario_gen.method.evaluation import dtw_distance, feature_matrix
 from scenario_gen.method.sampling import SamplingConfig
 from scenario_gen.pipeline import generate, PipelineConfig
 from scenario_gen.types.encounter import Encounter
@@ -118,9 +119,7 @@ def _encounters() -> Iterator[tuple[Encounter, list[str]]]:
 
 def _evaluations(encounter: Encounter, road: str) -> list[Evaluation]:
     """Return one evaluation per seed; none where the encounter does not fit the road."""
-    config = PipelineConfig(
-        sampling=SamplingConfig(drivers=0.0), evaluation=EvaluationConfig(compare=True)
-    )
+    config = PipelineConfig(sampling=SamplingConfig(drivers=0.0))
     found = []
     for seed in SEEDS:
         try:
@@ -128,6 +127,5 @@ def _evaluations(encounter: Encounter, road: str) -> list[Evaluation]:
         except (InputError, RefusedError) as error:
             print(f"{encounter.name} on {Path(road).stem}: {error}", file=sys.stderr, flush=True)
             return []
-        if result.evaluation is not None:
-            found.append(result.evaluation)
+        found.append(evaluate_with_references(result, config))
     return found

@@ -20,6 +20,7 @@ import numpy as np
 from benchmarks._naturalness_classifier import GROUPS, of_sets, told_apart, Windows
 from benchmarks._naturalness_cuts import chosen_cuts, Cut
 from benchmarks._naturalness_motion import arrays, displacement, keeps_turn, roughness, Signals
+from benchmarks._reference_sets import evaluate_with_references
 from benchmarks._sampling_cases import DATA
 from benchmarks._similarity import error_rows
 from benchmarks._size import sized
@@ -129,7 +130,7 @@ def _case(
     """Generate scenarios and compare their motion with the template's."""
     config = PipelineConfig(
         sampling=SamplingConfig(drivers=drivers),
-        evaluation=EvaluationConfig(resamples=10, compare=True),
+        evaluation=EvaluationConfig(resamples=10),
     )
     started = process_time()
     try:
@@ -155,7 +156,8 @@ def _case(
         "seconds": seconds,
     }
     windows = of_sets(name, template, samples, rng)
-    return Case(name, Path(road).stem, own_road, "", figures, windows, result.evaluation)
+    evaluation = evaluate_with_references(result, config)
+    return Case(name, Path(road).stem, own_road, "", figures, windows, evaluation)
 
 
 def _rows(label: str, group: Sequence[Case], *, own_road: bool) -> list[Row]:

@@ -3,7 +3,7 @@
 
 """The whole method on one screen: from an encounter and a road to valid, evaluated scenarios."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -23,11 +23,9 @@ from scenario_gen.method.chain import generate_set
 from scenario_gen.method.config import PipelineConfig
 from scenario_gen.method.evaluation import coverage_of, evaluate, replay
 from scenario_gen.method.outcome_sets import for_one_set, outcome_sets, swapped_order
-from scenario_gen.method.reference_sets import with_references
 from scenario_gen.method.sampling import Callbacks, Progress
 from scenario_gen.method.shortening import fit_what_matters
 from scenario_gen.method.suitable_roads import AUTO, on_first_suitable_road
-from scenario_gen.situation import Situation
 from scenario_gen.types import (
     Encounter,
     GenerationResult,
@@ -58,8 +56,7 @@ def generate(
             scenarios that are usual among them are kept.
         road: the target: a road, a name or path for `build_road`, or "auto": the first built-in
             road that is suitable. A template is mirrored on a map with the other side of traffic.
-        config: the parameters of every stage, or a mapping like a parameter file;
-            `evaluation.compare` adds sets to compare with.
+        config: the parameters of every stage, or a mapping like a parameter file.
         count: valid scenarios wanted.
         seed: of all randomness; None draws one, which the result has.
         request: a vehicle to leave out for a planner under test, start and end states, a target,
@@ -106,20 +103,16 @@ def generate(
 
     shorten = config.fitting.shorten and not request.moves
     result = fit_what_matters(generate_template, encounter, count, shorten=shorten)
-    return completed(result, config, request, population)
+    return completed(result, config, request)
 
 
 def completed(
     result: GenerationResult,
     config: PipelineConfig,
     request: Request,
-    population: Sequence[Encounter] = (),
 ) -> GenerationResult:
-    """Return a set of scenarios with its replay, references, evaluation, coverage, provenance."""
+    """Return a set of scenarios with its replay, evaluation, coverage, provenance."""
     encounter, (road, fit) = result.encounter, result.road_and_fit()
-    if config.evaluation.compare:
-        situation = Situation.of(encounter)
-        result = with_references(result, situation, config, request, population)
     result = replace(result, replay=replay(encounter, fit, road.frame_id))
     return replace(
         result,

@@ -47,7 +47,6 @@ STAGES = (
     "arguments",
     "shortening",
     "chain",
-    "reference_sets",
     "suitable_roads",
 )
 # Each concept, its one home, and what would show a second one: a regular expression, searched in the whole text of a file.

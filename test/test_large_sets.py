@@ -17,7 +17,6 @@ from scenario_gen import pipeline
 from scenario_gen.base.errors import InputError
 from scenario_gen.logs import read_log
 from scenario_gen.logs.synthetic import bundled
-from scenario_gen.method import reference_sets
 from scenario_gen.method.evaluation import EvaluationConfig, MEASURED_SCENARIOS
 from scenario_gen.method.evaluation.evaluate import measured
 from scenario_gen.method.sampling import sampler
@@ -32,7 +31,7 @@ from scenario_gen.method.sampling.sampler import (
 from scenario_gen.method.segmentation import segment
 from scenario_gen.output.report.page import render, ReportInput
 from scenario_gen.roads import build_road
-from scenario_gen.types import UNIFORM, WITH, WITHOUT
+from scenario_gen.types import WITH
 from scenario_gen.types.request import Request
 
 FIELDS = ("time", "position", "heading", "speed", "acceleration")
@@ -86,17 +85,15 @@ def test_of_a_large_set_evenly_spaced_runs_are_measured(size):
 
 
 def test_that_only_a_part_was_measured_is_said(chain, monkeypatch):
-    """In the page and the figures; the references are made no larger than they are measured."""
+    """In the page and the figures."""
     evaluating = sys.modules[measured.__module__]  # the package has a function of that name
-    for module in (evaluating, reference_sets):
-        monkeypatch.setattr(module, "MEASURED_SCENARIOS", 10)
+    monkeypatch.setattr(evaluating, "MEASURED_SCENARIOS", 10)
     monkeypatch.setattr(evaluating, "RUN_COUNT", 2)
-    config = pipeline.PipelineConfig(evaluation=EvaluationConfig(resamples=20, compare=True))
+    config = pipeline.PipelineConfig(evaluation=EvaluationConfig(resamples=20))
     case = pipeline.generate(chain.encounter, "t_intersection", config, count=24, seed=7)
     rows = {row["name"]: row for row in json.loads(case.evaluation.to_json())["rows"]}
-    assert [rows[name]["samples"] for name in (WITH, WITHOUT, UNIFORM)] == [10, 10, 10]
+    assert rows[WITH]["samples"] == 10
     (said,) = [
         note for note in rows[WITH]["notes"] if note.startswith("measured on 10 of 24 scenarios")
     ]
-    assert not rows[WITHOUT]["notes"][1:] and said in render(ReportInput([case]))
-    assert len(case.references[WITHOUT].scenarios) == 10
+    assert said in render(ReportInput([case]))

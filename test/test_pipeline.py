@@ -1,9 +1,8 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The arms of a case: what the segmenter's changepoints are measured against, made by the same chain."""
+"""What terminal, page and figures say of a generated case."""
 
-from dataclasses import replace
 from io import StringIO
 import json
 from pathlib import Path
@@ -22,11 +21,10 @@ from scenario_gen.method.sampling import SamplingConfig
 from scenario_gen.output.report.summary import summary
 from scenario_gen.output.results import write_results
 from scenario_gen.pipeline import generate, PipelineConfig
-from scenario_gen.types import ONE_DRIVER, REPLAY, UNIFORM, WITH, WITHOUT
+from scenario_gen.types import REPLAY, WITH
 from scenario_gen.types.request import Request
 
-QUICK = EvaluationConfig(resamples=50, compare=True)
-WORDS = {"without": WITHOUT, "uniform": UNIFORM, "one driver": ONE_DRIVER, "replay": REPLAY}
+QUICK = EvaluationConfig(resamples=50)
 
 
 @pytest.fixture(scope="module")
@@ -52,101 +50,22 @@ def written(case, folder):
     return (folder / "report.html").read_text(encoding="utf-8"), figures
 
 
-def test_every_arm_has_its_row_and_its_account(case):
-    assert [row.name for row in case.evaluation.rows] == [
-        "recording",
-        WITH,
-        WITHOUT,
-        UNIFORM,
-        ONE_DRIVER,
-        REPLAY,
-    ]
-    assert len(case.references[UNIFORM].scenarios) == 4 and not case.refusals
-    accepted = case.evaluation.value(UNIFORM, "acceptance")
-    assert accepted == pytest.approx(
-        1.0 - sum(case.references[UNIFORM].refused.values()) / case.references[UNIFORM].candidates
-    )
-    same = np.array_equal(
-        case.references[UNIFORM].scenarios[0].speed, case.generated.scenarios[0].speed
-    )
-    assert not same, "other changepoints, other scenarios"
-
-
-def test_by_default_no_further_set_is_drawn_and_nothing_else_changes(encounter, case, tmp_path):
-    plain = generate(
-        encounter,
-        "t_intersection",
-        PipelineConfig(evaluation=replace(QUICK, compare=False)),
-        count=4,
-        seed=3,
-    )
-    assert (
-        not EvaluationConfig().compare
-        and not plain.references
-        and not plain.refusals
-        and plain.compared == (WITH,)
-    )
-    rows = [
-        {row["name"]: row for row in json.loads(one.evaluation.to_json())["rows"]}
-        for one in (plain, case)
-    ]
-    assert set(rows[1]) - set(rows[0]) == {WITHOUT, UNIFORM, ONE_DRIVER}
-    assert all(rows[0][name] == rows[1][name] for name in rows[0])
-    page, figures = written(plain, tmp_path)
-    assert "--compare" in page and not any(
-        f">{name}" in page.lower() for name in (WITHOUT, UNIFORM)
-    )
-    assert set(figures["similarity"]["compared"]) == {WITH} and set(
-        figures["similarity"]["beside"]
-    ) == {REPLAY}
-    text = printed(plain)
-    assert "--compare" in text and "uniform" not in text and "|" not in text
-
-
-def test_what_is_compared_is_drawn_with_the_same_freedom(case):
-    for name in (WITHOUT, UNIFORM):
-        sizes = {scenario.vehicles[0].length for scenario in case.references[name].scenarios}
-        assert len(sizes) > 1, f"{name}: preset wide draws sizes"
-    assert (
-        len({scenario.vehicles[0].length for scenario in case.references[ONE_DRIVER].scenarios})
-        == 1
-    )
-    assert case.compared == (WITH, WITHOUT, UNIFORM)
+def test_rows_of_the_evaluation(case):
+    assert [row.name for row in case.evaluation.rows] == ["recording", WITH, REPLAY]
 
 
 def test_the_first_figures_that_anybody_sees_are_those_of_the_delivered_set(case, tmp_path):
     page, figures = written(case, tmp_path)
-    assert "<h3>Uniform changepoints</h3>" in page and f"<th>{UNIFORM}<small" in page
-    assert (
-        next(iter(figures)) == "similarity"
-        and next(iter(figures["similarity"]["compared"])) == WITH
-    )
+    assert next(iter(figures)) == "similarity" and list(figures["similarity"]) == [WITH, REPLAY]
     delivered = evaluate_scenarios(case.encounter, {WITH: case.generated}, config=QUICK).value(
         WITH, "e_position"
     )
-    assert figures["similarity"]["compared"][WITH]["e_position"] == pytest.approx(
-        delivered, rel=1e-5
-    )
-    said = next(line for line in printed(case).splitlines() if "E position" in line)
-    words = [
-        f"{word} {case.evaluation.value(row, 'e_position'):.3f}" for word, row in WORDS.items()
-    ]
-    assert (
-        said.split()
-        == f"E position {delivered:.3f} | {words[0]}, {words[1]} ({words[2]}, {words[3]})".split()
-    )
-    cell = re.search(r'<td class="(good|bad)">([\d.]+)<small', page)
-    assert float(cell[2]) == pytest.approx(delivered, rel=5e-3)
-    assert (cell[1] == "good") == (case.best("e_position") == WITH)
-
-
-def test_a_set_with_a_target_is_not_compared_with_sets_without_it(encounter):
-    config = PipelineConfig(evaluation=QUICK)
-    made = generate(
-        encounter, "t_intersection", config, count=2, seed=3, request=Request(order="free")
-    )
-    assert made.compared == (WITH,) and "order" in made.not_compared
-    assert "nothing is compared" in printed(made)
+    assert figures["similarity"][WITH]["e_position"] == pytest.approx(delivered, rel=1e-5)
+    replay = case.evaluation.value(REPLAY, "e_position")
+    assert f"E position {delivered:.3g} (replay {replay:.3g})" in printed(case)
+    cell = re.search(r"<td>([\d.]+)<small>([\d.]+) replay", page)
+    assert float(cell[1]) == pytest.approx(delivered, rel=5e-3)
+    assert float(cell[2]) == pytest.approx(replay, rel=5e-3)
 
 
 def test_who_reacts_to_whom_is_said_in_terminal_page_and_figures(case, encounter, tmp_path):

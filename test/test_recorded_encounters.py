@@ -13,12 +13,13 @@ import pytest
 from support.lengths import LONG, SOME_ENCOUNTERS
 
 from benchmarks._recheck import Account, Recheck
+from benchmarks._reference_sets import evaluate_with_references, WITHOUT
 from scenario_gen.base.errors import RefusedError
 from scenario_gen.base.road_users import Dynamics
 from scenario_gen.logs import read_log
 from scenario_gen.method.evaluation import EvaluationConfig
 from scenario_gen.pipeline import generate, PipelineConfig
-from scenario_gen.types import NoteKind, WITHOUT
+from scenario_gen.types import NoteKind, WITH
 from scenario_gen.types.generation import GenerationResult
 
 ROADS = ("corridor", "four_way", "t_intersection", "straight")
@@ -28,7 +29,6 @@ CONFIG = PipelineConfig(evaluation=EvaluationConfig(resamples=1000 if LONG else 
 NARROW = replace(
     CONFIG,
     sampling=replace(CONFIG.sampling, drivers=0.0),
-    evaluation=replace(CONFIG.evaluation, compare=True),
 )
 pytestmark = pytest.mark.spread
 
@@ -52,20 +52,18 @@ def assert_sound(case: GenerationResult) -> None:
     assert len(case.segmentation.changepoints) <= case.encounter.duration / 2.0
 
 
-def assert_nearer(case: GenerationResult, figure: str) -> None:
+def assert_nearer(case: GenerationResult, figure: str, config: PipelineConfig) -> None:
     """Scenarios with changepoints are more like the template than those without."""
-    with_, without = (
-        case.evaluation.value(case.row_name, figure),
-        case.evaluation.value(WITHOUT, figure),
-    )
+    evaluation = evaluate_with_references(case, config)
+    with_, without = (evaluation.value(row, figure) for row in (WITH, WITHOUT))
     if without >= 0.03:
         assert with_ < without, (
             f"{figure}: {with_:.3f} with, {without:.3f} without changepoints on {case.road.name}"
         )
 
 
-def at_the_recorded_pace(case: GenerationResult) -> GenerationResult:
-    """The same with bends taken as fast as recorded.
+def at_the_recorded_pace(case: GenerationResult) -> tuple[GenerationResult, PipelineConfig]:
+    """The same with bends taken as fast as recorded, and its parameters.
 
     E compares at equal shares of the duration, and a clock that is slowed ahead of a bend shifts positions in all rows by more
     than changepoints do.
@@ -80,7 +78,7 @@ def at_the_recorded_pace(case: GenerationResult) -> GenerationResult:
     assert made.generated.scenarios and not any(
         note.kind is NoteKind.SLOWED for note in made.generated.adaptations
     )
-    return made
+    return made, config
 
 
 @pytest.mark.data()
@@ -114,9 +112,10 @@ def test_ngsim_encounters_run_on_their_own_map(name, data):
         seed=7,
     )
     assert_sound(case)
-    assert_nearer(case, "e_speed")
+    assert_nearer(case, "e_speed", NARROW)
     slowed = any(note.kind is NoteKind.SLOWED for note in case.generated.adaptations)
-    assert_nearer(at_the_recorded_pace(case) if slowed else case, "e_position")
+    paced, config = at_the_recorded_pace(case) if slowed else (case, NARROW)
+    assert_nearer(paced, "e_position", config)
 
 
 @pytest.mark.data()

@@ -13,6 +13,7 @@ REMOVED = {
     "regenerate": "the bag or the trajectories of a batch have the scenario; "
     "`scenario-gen generate` with the recorded seed and parameters makes it again",
     "--again": "`scenario-gen batch --bags all` keeps the scenarios in bags",
+    "--compare": "`python -m benchmarks evaluation` compares with other changepoints",
     "compare": "the two evaluation.json have the figures and their intervals",
     "doctor": "`ros2 doctor` and `pip check` examine an installation",
     "--recombine": "it gained .01 of coverage; add recordings with --recording instead",

@@ -15,7 +15,6 @@ from scenario_gen.bags.recordings.write import scenario_bytes
 from scenario_gen.base.errors import InputError, ScenarioGenError
 from scenario_gen.cli.folder import Advance, FolderRequest, generate_folder
 from scenario_gen.logs import bundled
-from scenario_gen.method.evaluation import EvaluationConfig
 from scenario_gen.output.results import namespaces
 from scenario_gen.pipeline import PipelineConfig
 from scenario_gen.types import GenerationResult
@@ -38,7 +37,7 @@ def run_demo(
     progress: Callable[[], AbstractContextManager[Advance]],
     status: Callable[[], AbstractContextManager[Callable[[str], None]]],
 ) -> tuple[list[GenerationResult], list[str]]:
-    """Generate scenarios from the bundled encounters, and sets to compare with.
+    """Generate scenarios from the bundled encounters.
 
     Args:
         out: the folder.
@@ -52,7 +51,7 @@ def run_demo(
         InputError: ROS 2 is not installed, or `out` must not be replaced.
         ScenarioGenError: the scenarios from the nodes differ, which is a bug.
     """
-    config = PipelineConfig(evaluation=EvaluationConfig(compare=True))
+    config = PipelineConfig()
     jobs = [((bundled(case),), (road,)) for case, road in ROADS.items()]
     record = recorder(config, count, seed, status) if ros else None
     return generate_folder(

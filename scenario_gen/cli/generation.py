@@ -105,14 +105,6 @@ class Generate:
             "was found until then is kept.",
         ),
     ] = 60.0
-    compare: Annotated[
-        bool,
-        typer.Option(
-            "--compare",
-            help="Also draw and measure sets without changepoints, with evenly spaced "
-            "changepoints, and with one driver. Doubles the run time.",
-        ),
-    ] = False
     order: Annotated[
         str,
         typer.Option(
@@ -156,7 +148,6 @@ def _config(options: Generate) -> "PipelineConfig":
         {
             "fitting.allow": ",".join(losses) or config.fitting.allow,
             "log.allow": ALLOWED if ALLOWED in accepted else config.log.allow,
-            "evaluation.compare": options.compare or config.evaluation.compare,
             "road.obstacles": join_pieces(obstacles),
         },
     )

@@ -9,9 +9,8 @@ from dataclasses import dataclass, field
 import json
 import math
 import re
-from typing import Any, Literal
+from typing import Literal
 
-from scenario_gen.base.documents import COUNT, NUMBER
 from scenario_gen.base.errors import printable
 from scenario_gen.types.html import html_list, html_table
 from scenario_gen.types.notes import Note
@@ -19,55 +18,13 @@ from scenario_gen.types.scenario import Cause, ScenarioSet, Verdict
 
 RECORDING = "recording"
 """The recorded encounter itself."""
-WITH, WITHOUT, UNIFORM = "with changepoints", "without changepoints", "uniform changepoints"
-ONE_DRIVER = "with changepoints, one driver"
+WITH = "with changepoints"
 REPLAY = "replay"
 """The recording as fitted to the road."""
 
 Better = Literal["lower", "higher", ""]
-TEXT = {"type": "string", "maxLength": 10_000}
-METRIC_KEYS = ("id", "label", "unit", "better", "group", "meaning")
-NUMBER_OR_NULL = {"anyOf": [NUMBER, {"type": "null"}]}
 
 
-def _object(**properties: Any) -> dict[str, Any]:
-    """Return the schema of an object that has all these properties."""
-    return {"type": "object", "required": list(properties), "properties": properties}
-
-
-def _list(items: Any) -> dict[str, Any]:
-    return {"type": "array", "items": items}
-
-
-SCHEMA = _object(
-    encounter=TEXT,
-    road=TEXT,
-    vehicles=_list(TEXT),
-    duration_s={**NUMBER, "minimum": 0.0},
-    changepoints=COUNT,
-    confidence_level={**NUMBER, "exclusiveMinimum": 0.0, "exclusiveMaximum": 1.0},
-    resamples=COUNT,
-    seed=COUNT,
-    metrics=_list(
-        _object(
-            **{**dict.fromkeys(METRIC_KEYS, TEXT), "better": {"enum": ["lower", "higher", ""]}}
-        )
-    ),
-    rows=_list(
-        _object(
-            name=TEXT,
-            samples=COUNT,
-            notes=_list(TEXT),
-            values={
-                "type": "object",
-                "additionalProperties": _object(
-                    value=NUMBER_OR_NULL, low=NUMBER_OR_NULL, high=NUMBER_OR_NULL
-                ),
-            },
-        )
-    ),
-)
-"""Of the JSON that `to_json` writes."""
 _KEYS = {
     "duration": "duration_s",
     "level": "confidence_level",

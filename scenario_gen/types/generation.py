@@ -17,7 +17,7 @@ from scenario_gen.base.errors import InputError
 from scenario_gen.base.folders import scratch
 from scenario_gen.types.coverage import Coverage
 from scenario_gen.types.encounter import Encounter
-from scenario_gen.types.evaluation import Evaluation, ONE_DRIVER, REPLAY, UNIFORM, WITH, WITHOUT
+from scenario_gen.types.evaluation import Evaluation, REPLAY, WITH
 from scenario_gen.types.fit import Fit
 from scenario_gen.types.html import html_list
 from scenario_gen.types.notes import Note, NoteKind
@@ -32,7 +32,6 @@ if TYPE_CHECKING:
 
 ERRORS = {"e_position": "position", "e_speed": "speed", "e_heading": "heading"}
 """The figures of likeness, and what they are of."""
-_WORDS = {WITHOUT: "no changepoints at all keep", UNIFORM: "evenly spaced changepoints keep"}
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,18 +46,11 @@ class GenerationResult:
         routes: one for each vehicle, or none.
         generated: the valid scenarios, and the account of every candidate.
         seed: of the request.
-        evaluation: of `generated`, `references` and `replay`; without rows if they were not
-            evaluated.
-        references: sets to measure `generated` against, by row: WITHOUT is the paper's ablation,
-            UNIFORM has as many changepoints evenly spaced, both drawn as `generated` is;
-            ONE_DRIVER has the same changepoints and one driver.
-        refusals: why a reference is missing, by row.
+        evaluation: of `generated` and `replay`; without rows if they were not evaluated.
         replay: the recording as fitted to the road, replayed.
         row_name: that of the evaluation's row of `generated`.
         provenance: what is needed to make it again: log hashes, versions, parameters.
         coverage: what `generated` covers, None if it was not measured.
-        not_compared: why `generated` is not compared with the references: what was requested of it
-            alone (a target, a choice, an order); "" if it is.
         valid: how many of those scenarios are valid, where all of a bag's are shown; None: all of
             them are.
     """
@@ -71,14 +63,11 @@ class GenerationResult:
     generated: ScenarioSet = ScenarioSet(0, (), 0)
     seed: int = 0
     evaluation: Evaluation = Evaluation.empty()
-    references: Mapping[str, ScenarioSet] = field(default_factory=dict)
-    refusals: Mapping[str, str] = field(default_factory=dict)
     replay: Scenario | None = None
     row_name: str = WITH
     provenance: Mapping[str, str] = field(default_factory=dict)
     valid: int | None = None
     coverage: Coverage | None = None
-    not_compared: str = ""
 
     def __repr__(self) -> str:
         road = self.road.name if self.road is not None else "no road"
@@ -143,8 +132,6 @@ class GenerationResult:
             self,
             generated=generated,
             evaluation=Evaluation.empty(),
-            references={},
-            refusals={},
             coverage=None,
             valid=None,
         )
@@ -249,61 +236,12 @@ class GenerationResult:
 
         return scenario_gen.write_recording(Path(folder), self)
 
-    @property
-    def compared(self) -> tuple[str, ...]:
-        """Rows whose E may be compared: `generated`, then the references of equal freedom."""
-        return (
-            self.row_name,
-            *(
-                name
-                for name in (WITHOUT, UNIFORM)
-                if name in self.references and not self.not_compared
-            ),
-        )
-
-    def best(self, metric: str) -> str:
-        """Return the compared row with the least figure, the first in a tie; "" if none."""
-        values = {row: self.evaluation.value(row, metric) for row in self.compared}
-        known = [row for row, value in values.items() if math.isfinite(value)]
-        return min(known, key=values.__getitem__) if len(known) > 1 else ""
-
-    def better_references(self) -> tuple[str, ...]:
-        """Return a sentence for each reference whose E is lower than `generated` by 0.001."""
-        sentences = []
-        for row in self.compared[1:]:
-            better = []
-            for metric, quantity in ERRORS.items():
-                generated = self.evaluation.value(self.row_name, metric)
-                reference = self.evaluation.value(row, metric)
-                is_known = math.isfinite(generated - reference)
-                if is_known and round(reference, 3) < round(generated, 3):
-                    better.append(f"E {quantity} {reference:.3f} against {generated:.3f}")
-            if better:
-                sentences.append(f"{_WORDS[row]} it better here: {', '.join(better)}")
-        return tuple(sentences)
-
-    def similarity(self) -> dict[str, Any]:
-        """Return E of `generated` and of the other rows, the best row, and remarks."""
-        rows = {row.name for row in self.evaluation.rows}
-        compared = [row for row in self.compared if row in rows]
-        references = [row for row in (WITHOUT, UNIFORM, ONE_DRIVER, REPLAY) if row in rows]
-        best = {metric: self.best(metric) for metric in ERRORS}
-        remarks = list(self.better_references())
-        if self.not_compared:
-            remarks.append(f"nothing is compared: {self.not_compared}")
+    def similarity(self) -> dict[str, dict[str, float | None]]:
+        """Return E of `generated` and of the replay by row and metric; None where unknown."""
         return {
-            "compared": {row: self._errors(row) for row in compared},
-            "beside": {row: self._errors(row) for row in references if row not in self.compared},
-            "best": {metric: row for metric, row in best.items() if row},
-            "said": remarks,
-        }
-
-    def _errors(self, row: str) -> dict[str, float | None]:
-        """Return E of one row by metric, rounded to six digits; None where it is unknown."""
-        values = {metric: self.evaluation.value(row, metric) for metric in ERRORS}
-        return {
-            metric: float(f"{value:.6g}") if math.isfinite(value) else None
-            for metric, value in values.items()
+            row: {metric: _rounded(self.evaluation.value(row, metric)) for metric in ERRORS}
+            for row in (self.row_name, REPLAY)
+            if self.evaluation.row(row) is not None
         }
 
     def road_and_fit(self) -> tuple[Road, Fit]:
@@ -353,3 +291,8 @@ class GenerationResult:
     def published(self) -> int:
         """Number of valid scenarios."""
         return len(self.generated.scenarios) if self.valid is None else self.valid
+
+
+def _rounded(value: float) -> float | None:
+    """Return six digits of a value; None if it is not finite."""
+    return float(f"{value:.6g}") if math.isfinite(value) else None

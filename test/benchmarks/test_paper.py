@@ -15,13 +15,15 @@ from support.evaluation_worlds import crossing
 from benchmarks._paper_chain import place, sample
 from benchmarks._paper_claims import claims_of
 from benchmarks._paper_measure import off_road, run_case
+from benchmarks._reference_sets import UNIFORM, uniform_changepoints, WITHOUT
 from benchmarks.paper import refusals, reproduce, write_page
 from scenario_gen.base.errors import InputError
 from scenario_gen.base.folders import MARKER
 from scenario_gen.logs import read_log
 from scenario_gen.logs.synthetic import bundled
 from scenario_gen.method.segmentation import segment, SegmentationConfig
-from scenario_gen.types import UNIFORM, WITH, WITHOUT
+from scenario_gen.types import WITH
+from scenario_gen.types.segmentation import Segmentation
 
 
 @pytest.fixture(scope="module")
@@ -127,3 +129,11 @@ def test_it_writes_page_and_figures_and_spares_other_folders(tmp_path):
     assert "log synthetic_c" in json.loads((out / "paper.json").read_text())["provenance"]
     with pytest.raises(InputError, match="name another folder"):
         reproduce([[Path(bundled("c"))]], Path(bundled("c")), count=4, seed=1)
+
+
+def test_uniform_changepoints_are_as_many_and_evenly_spaced():
+    labels = np.repeat([0, 1, 0], [11, 70, 40])
+    segmentation = Segmentation(labels, np.array([11, 81]), np.zeros(121), ("a", "b", "c"))
+    even = uniform_changepoints(segmentation)
+    assert even.changepoints.tolist() == [40, 80] and len(even.descriptions) == 3
+    assert (np.flatnonzero(np.diff(even.labels)) + 1).tolist() == [40, 80]

@@ -10,7 +10,7 @@ from scenario_gen.base.errors import InputError
 from scenario_gen.types.request import Request
 
 
-def test_states_are_read_by_vehicle_and_written_back():
+def test_states_are_read_by_vehicle():
     request = Request(starts="1: 10.5 -1.75 0.0 8.0; b 2: 3,4,1.57")
     assert request.states("starts") == {"1": (10.5, -1.75, 0.0, 8.0), "b 2": (3.0, 4.0, 1.57)}
     assert request.states("goals") == {}

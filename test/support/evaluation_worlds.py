@@ -10,7 +10,7 @@ from functools import cache
 import numpy as np
 
 from scenario_gen.method.evaluation import evaluate_scenarios, EvaluationConfig
-from scenario_gen.types import Encounter, Note, NoteKind, Vehicle, with_witness, WITHOUT
+from scenario_gen.types import Encounter, Note, NoteKind, Vehicle, with_witness
 from scenario_gen.types.evaluation import CheckCounts
 from scenario_gen.types.fit import Fit, FittedVehicle
 from scenario_gen.types.generation import GenerationResult
@@ -76,7 +76,7 @@ def cross_road():
 
 
 @cache
-def report_case(count=12, name="crossing", without=True):
+def report_case(count=12, name="crossing"):
     """A whole case of the report, around the crossing."""
     cars = (
         CARS[0],
@@ -111,19 +111,8 @@ def report_case(count=12, name="crossing", without=True):
         Counter({Cause.OVERLAP: 3, Cause.LATERAL_ACCELERATION: 2}),
         (Note.of(NoteKind.STRETCHED, percent=3.0),),
     )
-    far = ScenarioSet(
-        count,
-        tuple(samples(encounter, count, seed=4, spread=1.0, pace=0.0)),
-        count + 1,
-        Counter({Cause.OFF_ROAD: 1}),
-    )
     rows = {"with changepoints": near.scenarios, "replay": [oracle]}
-    if without:
-        rows["without changepoints"] = far.scenarios
-    checks = {
-        "with changepoints": CheckCounts.of_set(near),
-        "without changepoints": CheckCounts.of_set(far),
-    }
+    checks = {"with changepoints": CheckCounts.of_set(near)}
     evaluation = evaluate_scenarios(
         encounter,
         rows,
@@ -132,7 +121,6 @@ def report_case(count=12, name="crossing", without=True):
         road="cross",
         config=EvaluationConfig(resamples=50),
     )
-    references, refusals = ({WITHOUT: far}, {}) if without else ({}, {WITHOUT: "no route exists"})
     return GenerationResult(
         encounter,
         segmentation,
@@ -142,15 +130,13 @@ def report_case(count=12, name="crossing", without=True):
         near,
         0,
         evaluation,
-        references,
-        refusals,
         oracle,
     )
 
 
 def ego_case(count=4):
     """The case of the report without its first vehicle, whose witness is given instead."""
-    case = report_case(count, without=False)
+    case = report_case(count)
 
     left = tuple(with_witness(scenario, 0) for scenario in case.generated.scenarios)
     slot = EgoSlot(case.encounter.vehicles[0], np.zeros(4), np.ones(4))

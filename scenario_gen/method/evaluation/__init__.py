@@ -33,7 +33,6 @@ from scenario_gen.method.evaluation.non_reactive import (
     STANDSTILL_MPS,
     wanted_speeds,
 )
-from scenario_gen.method.evaluation.references import uniform_changepoints, without_changepoints
 from scenario_gen.method.evaluation.replay import replay
 from scenario_gen.method.evaluation.samples import common_motion, Samples, Template
 from scenario_gen.method.evaluation.similarity import (
@@ -74,8 +73,6 @@ __all__ = [
     "paired_difference",
     "replay",
     "time_to_collision",
-    "uniform_changepoints",
     "wanted_speeds",
     "wilson",
-    "without_changepoints",
 ]

@@ -35,8 +35,3 @@ class EvaluationConfig(Parameters):
     ttc_horizon: float = parameter(
         10.0, "times to collision above this count as this", unit="s", low=1.0, high=100.0
     )
-    compare: bool = parameter(
-        False,
-        "`generate`: draw also sets without changepoints, with evenly spaced ones and with "
-        "one driver, to compare with",
-    )

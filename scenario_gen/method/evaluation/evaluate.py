@@ -38,20 +38,19 @@ Scenarios = Sequence[Scenario] | ScenarioSet
 def evaluate(
     result: GenerationResult, config: EvaluationConfig = EvaluationConfig()
 ) -> Evaluation:
-    """Measure the generated set, its references and the replay of the fitted template.
+    """Measure the generated set and the replay of the fitted template.
 
     Args:
         result: as `generate` returns it.
         config: how to measure.
 
     Returns:
-        One row for the recorded template, one for `generated` and for each reference, and `REPLAY`
-        if there is a replay.
+        One row for the recorded template, one for `generated`, and `REPLAY` if there is a replay.
 
     Raises:
         InputError: a scenario has a vehicle that the encounter has not.
     """
-    sets: dict[str, Scenarios] = {result.row_name: result.generated, **result.references}
+    sets: dict[str, Scenarios] = {result.row_name: result.generated}
     if result.replay is not None:
         sets[REPLAY] = (result.replay,)
     road = result.road.name if result.road else ""

@@ -24,8 +24,6 @@ from scenario_gen.types import (
     Route,
     Scenario,
     Segmentation,
-    UNIFORM,
-    WITHOUT,
 )
 from scenario_gen.types.markings import markings
 
@@ -39,7 +37,7 @@ MAX_LINES = 400
 MAX_STATES_COUNT = 500_000
 """States of all drawn scenarios of a set, for pages of a few megabytes."""
 MAX_COMPARED_COUNT = 50
-"""Scenarios of a reference, and those that a matrix shows."""
+"""Scenarios that a matrix shows."""
 
 
 def case_data(case: GenerationResult, samples: int) -> dict[str, Any]:
@@ -75,20 +73,9 @@ def case_data(case: GenerationResult, samples: int) -> dict[str, Any]:
 
 
 def _arms(case: GenerationResult, samples: int) -> dict[str, tuple[Scenario, ...]]:
-    """Return the drawn scenarios of each set; picks of the coverage are always drawn."""
-    sets = {
-        "with": case.generated,
-        "without": case.references.get(WITHOUT),
-        "uniform": case.references.get(UNIFORM),
-    }
-    arms = {
-        name: tuple(
-            scenario.with_trailers()
-            for scenario in result.scenarios[: samples if name == "with" else MAX_COMPARED_COUNT]
-        )
-        for name, result in sets.items()
-        if result is not None
-    }
+    """Return the drawn scenarios and the replay; picks of the coverage are always drawn."""
+    first = case.generated.scenarios[:samples]
+    arms = {"with": tuple(scenario.with_trailers() for scenario in first)}
     if case.coverage is not None:
         shown = {scenario.index for scenario in arms["with"]}
         picks = set(case.coverage.picks.values()) - shown

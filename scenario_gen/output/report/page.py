@@ -18,17 +18,11 @@ from scenario_gen.types import (
     formatted,
     GenerationResult,
     Interval,
-    ONE_DRIVER,
     REPLAY,
     Route,
     routes_in_words,
-    UNIFORM,
-    WITHOUT,
 )
 
-MIN_COMPARED_ERROR_RATIO = 0.03
-"""Least E of a reference for a case to count in the comparison."""
-UNCOMPARED = "not requested; `scenario-gen generate --compare` draws sets to compare with"
 MAX_SAMPLES = 1000
 """Scenarios of a set that a page draws; the figures use all."""
 
@@ -65,11 +59,6 @@ def render(report: ReportInput) -> str:
         report=report,
         views=views,
         verdict=_verdict(views),
-        significant=MIN_COMPARED_ERROR_RATIO,
-        compared=any(case.references for case in report.cases),
-        uncompared=next(
-            (why for case in report.cases for why in case.refusals.values()), UNCOMPARED
-        ),
         facts=[fact for fact in report.provenance.items() if not _is_parameter(fact[0])],
         parameters=[fact for fact in report.provenance.items() if _is_parameter(fact[0])],
     )
@@ -82,30 +71,21 @@ def _is_parameter(name: str) -> bool:
 
 def _view(index: int, case: GenerationResult) -> dict[str, Any]:
     """Return the contents of the page's tables for one case."""
-    sets = [(name, case.references.get(name)) for name in (WITHOUT, UNIFORM)]
     evaluation = case.evaluation
     duration = case.encounter.duration
     changepoints = len(case.segmentation.changepoints)
     return {
         "index": index,
         "case": case,
-        "without": case.references.get(WITHOUT),
-        "refused": [case.refusals.get(name, "") for name in (WITHOUT, UNIFORM)],
-        "arms": [
-            (name, result, causes_in_words(result.refused))
-            for name, result in [(case.row_name, case.generated), *sets]
-            if result is not None
-        ],
+        "causes": causes_in_words(case.generated.refused),
         "rows": [*evaluation.rows[1:], evaluation.rows[0]],
         "ego": case.generated.ego.vehicle.id if case.generated.ego else "",
         "k": changepoints,
         "remark": case.segmentation.remark(duration),
         "rate": changepoints / duration,
         "errors": {key: _errors(case, key) for key in ERRORS},
-        "best": {key: case.best(key) for key in ERRORS},
         "verdict": _in_words(case),
         "reactions": case.reacting,
-        "nearer": case.similarity()["said"],
         "segments": _segments(case),
         "vehicles": _vehicles(case),
         "planned": routes_in_words(case.routes),
@@ -177,50 +157,21 @@ def _smallest(values: Iterable[float]) -> float:
     return min(filter(math.isfinite, values), default=math.nan)
 
 
-def _errors(case: GenerationResult, metric: str) -> dict[str, Any]:
-    """Return E of the set, and of the sets below it with whether each is the best."""
-    best = case.best(metric)
-    words = {WITHOUT: "without", UNIFORM: "uniform", ONE_DRIVER: "one driver", REPLAY: "replay"}
-    others = []
-    for row, name in words.items():
-        value = case.evaluation.value(row, metric)
-        if math.isfinite(value):
-            others.append((f"{formatted(Interval(value), '')} {name}", row == best))
-    outcome = ""
-    if best:
-        outcome = "good" if best == case.row_name else "bad"
-    return {
-        "value": formatted(Interval(case.evaluation.value(case.row_name, metric)), ""),
-        "kind": outcome,
-        "others": others,
-    }
+def _errors(case: GenerationResult, metric: str) -> tuple[str, str]:
+    """Return E of the set, and of the replay."""
+    likeness, replay = (
+        formatted(Interval(case.evaluation.value(row, metric)), "")
+        for row in (case.row_name, REPLAY)
+    )
+    return likeness, replay
 
 
 def _verdict(views: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
-    """Return the figures of the page's first sentences: valid scenarios, and where E is lower."""
+    """Return the figures of the page's first sentence."""
     cases = [view["case"] for view in views]
-    better = {
-        "without changepoints": _wins(cases, WITHOUT),
-        "with as many evenly spaced ones": _wins(cases, UNIFORM),
-    }
     sets = [case.generated for case in cases]
     return {
         "published": sum(case.published for case in cases),
         "requested": sum(result.requested for result in sets),
         "candidates": sum(result.candidates for result in sets),
-        "better": {words: wins for words, wins in better.items() if wins},
     }
-
-
-def _wins(cases: Sequence[GenerationResult], row: str) -> dict[str, tuple[int, int]]:
-    """Return in how many cases, and of how many, E is lower than that of `row`, by quantity."""
-    wins: dict[str, tuple[int, int]] = {}
-    for metric, quantity in ERRORS.items():
-        is_lower = []
-        for case in cases:
-            reference = case.evaluation.value(row, metric)
-            if row in case.compared and reference >= MIN_COMPARED_ERROR_RATIO:
-                is_lower.append(case.evaluation.value(case.row_name, metric) < reference)
-        if is_lower:
-            wins[quantity] = (sum(is_lower), len(is_lower))
-    return wins

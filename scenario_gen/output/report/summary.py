@@ -18,25 +18,15 @@ from scenario_gen.types import (
     ERRORS,
     formatted,
     GenerationResult,
+    Interval,
     NoteKind,
-    ONE_DRIVER,
     REPLAY,
     routes_in_words,
     Row,
     ScenarioSet,
-    UNIFORM,
     WITH,
-    WITHOUT,
 )
 
-SHORT_NAMES = {WITHOUT: "without", UNIFORM: "uniform", ONE_DRIVER: "one driver", REPLAY: "replay"}
-COMPARED = (
-    "; after |: sets without changepoints and with K evenly spaced ones; in brackets, for "
-    "orientation only: one driver, replay of the recording"
-)
-NOT_COMPARED = (
-    "; in brackets, for orientation only: replay of the recording. --compare draws further sets"
-)
 VARIED = ("pet", "gap", "speed")
 """Figures whose range is printed: PET, or the smallest gap if no vehicles cross, and the speed."""
 LABELS = {
@@ -58,8 +48,10 @@ def summary(cases: Sequence[GenerationResult], *, verbose: bool = False) -> Rend
     """
     lines = [line for case in cases for line in _case(case, verbose)]
     if verbose:
-        references = COMPARED if any(case.references for case in cases) else NOT_COMPARED
-        explained = f"K: changepoints. E: distance to the recording, lower is nearer{references}."
+        explained = (
+            "K: changepoints. E: distance to the recording, lower is nearer; in brackets, for "
+            "orientation: replay of the recording."
+        )
         lines.append(Text(explained, style="dim"))
     return Group(*lines)
 
@@ -148,33 +140,16 @@ def _details(case: GenerationResult, row: Row | None) -> list[Text]:
     if planned := routes_in_words(case.routes):
         figures += f"  routes: {planned}"
     metrics = [metric for metric in ERRORS if row and metric in row.values]
-    remarks = [f"  {printable(line)}" for line in case.similarity()["said"]]
-    return [
-        Text(figures),
-        *(_errors(case, metric) for metric in metrics),
-        *(Text(line, WARNING_STYLE) for line in remarks),
-    ]
+    return [Text(figures), *(_errors(case, metric) for metric in metrics)]
 
 
 def _errors(case: GenerationResult, metric: str) -> Text:
-    """Return E of the set, of the sets it is compared with (the best is green), and of others."""
-    compared, best = case.compared, case.best(metric)
-
-    def figure(row: str) -> str:
-        value = case.evaluation.value(row, metric)
-        return f"{value:.3f}" if math.isfinite(value) else "–"
-
-    text = Text(f"  E {ERRORS[metric]} ")
-    style = "bold green" if best == case.row_name else "bold"
-    text.append(figure(case.row_name), style=style)
-    for k, row in enumerate(compared[1:]):
-        text.append(" | " if k == 0 else ", ").append(f"{SHORT_NAMES[row]} ")
-        text.append(figure(row), style="green" if best == row else "")
-    others = [
-        f"{name} {figure(row)}"
-        for row, name in SHORT_NAMES.items()
-        if row not in compared and case.evaluation.row(row) is not None
-    ]
-    if others:
-        text.append(f" ({', '.join(others)})", style="dim")
+    """Return E of the set, and of the replay if there is one."""
+    likeness, replay = (
+        formatted(Interval(case.evaluation.value(row, metric)), "")
+        for row in (case.row_name, REPLAY)
+    )
+    text = Text(f"  E {ERRORS[metric]} ").append(likeness, style="bold")
+    if case.evaluation.row(REPLAY) is not None:
+        text.append(f" (replay {replay})", style="dim")
     return text

@@ -32,7 +32,6 @@ from scenario_gen.types import (
     Scenario,
     ScenarioSet,
     Verdict,
-    WITHOUT,
 )
 
 
@@ -138,7 +137,6 @@ def _result(
         routes=routes,
         generated=generated,
         evaluation=_with_notes(evaluation, namespace, len(scenarios)),
-        refusals={WITHOUT: "the bag has one set of scenarios"},
         row_name=SCENARIOS,
         valid=counts.candidates - sum(counts.refused.values()),
         coverage=coverage_of(encounter, scenarios),

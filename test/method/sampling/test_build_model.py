@@ -8,9 +8,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from benchmarks._reference_sets import uniform_changepoints
 from scenario_gen.method.chain import Chain
 from scenario_gen.method.config import PipelineConfig
-from scenario_gen.method.evaluation import uniform_changepoints
 from scenario_gen.method.routing.route_points import distances_to_line
 from scenario_gen.method.sampling.build_model import build_model
 from scenario_gen.method.sampling.plan import Plan

@@ -19,7 +19,7 @@ from benchmarks.paper import write_page
 from scenario_gen.logs import read_log
 from scenario_gen.logs.synthetic import bundled
 from scenario_gen.output.report.page import render, ReportInput, write_report
-from scenario_gen.types import Note, NoteKind, UNIFORM
+from scenario_gen.types import Note, NoteKind
 
 RUNS = "top.ran=1"
 PAGES = ("report.html", pytest.param("paper.html", marks=pytest.mark.long))
@@ -96,14 +96,12 @@ def hostile_case(names):
             notes=notes,
         ),
         generated=made(case.generated),
-        references={name: made(group) for name, group in case.references.items()},
         evaluation=replace(
             case.evaluation,
             vehicles=ids,
             rows=tuple(replace(row, notes=(*row.notes, *notes)) for row in case.evaluation.rows),
         ),
         replay=replace(case.replay, vehicles=renamed(case.replay.vehicles)),
-        refusals={UNIFORM: names[5]},
     )
 
 

@@ -23,7 +23,7 @@ def report(tmp_path_factory):
     write_report(
         path,
         ReportInput(
-            [report_case(6), report_case(4, "a_name_without_any_space_" * 4, without=False)],
+            [report_case(6), report_case(4, "a_name_without_any_space_" * 4)],
             provenance={"log": "a" * 64},
         ),
     )
@@ -64,9 +64,9 @@ def test_it_loads_without_errors_or_requests(tab, report):
     assert tab.troubles == []
     assert tab.asked() == [report.as_uri()]
     assert (
-        tab.page.locator('[data-case="0"] .plot').count() == 11
-    )  # shown scenario, recording, two arms, motion, six matrices
-    for role in ("stage", "template-map", "routes", "samples-with", "samples-without"):
+        tab.page.locator('[data-case="0"] .plot').count() == 10
+    )  # shown scenario, recording, generated set, motion, six matrices
+    for role in ("stage", "template-map", "routes", "samples-with"):
         pixels = Image.open(io.BytesIO(b64decode(tab.picture(role).partition(",")[2])))
         assert len(pixels.getcolors(1_000_000)) > 10, role
 
@@ -129,7 +129,7 @@ def test_samples_and_sets_can_be_chosen(tab):
     tab.part("arm").select_option("replay")
     assert tab.part("sample").locator("option").count() == 1
     alone = tab.picture("stage")
-    tab.part("arm").select_option("without")
+    tab.part("arm").select_option("with")
     assert tab.picture("stage") != alone
     crowd = tab.picture("stage")
     tab.part("ghosts").uncheck()
@@ -173,7 +173,7 @@ def test_values_are_shown_and_the_chart_is_zoomed_and_moved(tab):
 
 
 def test_scenarios_are_sorted_filtered_and_paged_and_those_listed_are_drawn(browser, tmp_path):
-    case = report_case(60, without=False)
+    case = report_case(60)
     case = replace(case, coverage=coverage_of(case.encounter, case.generated.scenarios))
     write_report(tmp_path / "report.html", ReportInput([case]))
     tab = Report(browser, tmp_path / "report.html", DESKTOP)
@@ -212,7 +212,7 @@ def test_another_case_opens(tab):
         tab.page.locator('[data-case="1"]').is_visible()
         and not tab.page.locator('[data-case="0"]').is_visible()
     )
-    assert "No such set" in tab.page.locator('[data-case="1"]').inner_text()
+    assert "Generated scenarios" in tab.page.locator('[data-case="1"]').inner_text()
     tab.part("scrub", 1).fill("250")
     assert tab.time(1) == 3.0 and tab.troubles == []
 
@@ -270,7 +270,7 @@ def test_an_ego_is_drawn_as_its_witness(browser, tmp_path):
 
 
 def test_who_arrives_late_is_not_shown_before(browser, tmp_path):
-    case = report_case(3, without=False)
+    case = report_case(3)
 
     def late(motion):
         present = motion.present.copy()

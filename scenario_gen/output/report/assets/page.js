@@ -2,7 +2,7 @@
 // The page: which case is shown, and the player.
 
 const CASES = JSON.parse(document.getElementById("data").textContent);
-const ARM_NAMES = { replay: "recording as fitted", with: "with changepoints", without: "without changepoints", uniform: "uniform changepoints" };
+const ARM_NAMES = { replay: "recording as fitted", with: "with changepoints" };
 
 function option(value, text) {
   const element = document.createElement("option");
@@ -334,10 +334,10 @@ function open(section, data) {
   let top = 1;
   [template, ...Object.values(sets)].forEach((set) => { for (let i = 3; i < set.values.length; i += 4) top = Math.max(top, set.values[i]); });
   const drawAll = (arm) => drawSpeeds(find(`speeds-${arm}`), data, sets[arm], template, 1.08 * top);
-  ["with", "without"].filter((arm) => sets[arm]).forEach((arm) => {
-    maps.push([new View(find(`samples-${arm}`), box, 8), (view) => drawSamples(view, data, sets[arm], arm)]);
-    drawAll(arm);
-  });
+  if (sets.with) {
+    maps.push([new View(find("samples-with"), box, 8), (view) => drawSamples(view, data, sets.with, "with")]);
+    drawAll("with");
+  }
   drawTemplate(find("template-speed"), data, template);
   const who = find("motion-vehicle");
   const which = find("motion-sample");
