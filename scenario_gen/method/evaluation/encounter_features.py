@@ -87,12 +87,17 @@ class EncounterFeatures:
 
 
 def features_of(
-    motion: Motion, recording: str, template: int, pair: Pair | None = None
+    motion: Motion,
+    recording: str,
+    template: int,
+    pair: Pair | None = None,
+    kind: EncounterKind | None = None,
 ) -> EncounterFeatures:
     """Return the features of a pair of vehicles, by default of the most critical pair.
 
     That is the crossing or merging pair with the least PET or, without one, the following pair
-    with the least gap. The kind is None if the pair, or every pair, shares no area.
+    with the least gap. The kind is None if the pair, or every pair, shares no area; a given kind
+    is not computed again unless one of them follows the other.
     """
     motion = motion.resampled(FIGURE_PERIOD_S)
     figures = {figure.pair: figure for figure in figures_of(motion) if pair in (None, figure.pair)}
@@ -124,7 +129,8 @@ def features_of(
         *_vehicle_features(motion, conflict.first, conflict.entry_first),
         *_vehicle_features(motion, conflict.second, conflict.entry_second),
     ]
-    kind = kind_of(motion, conflict.first, conflict.second)
+    if kind is None or conflict.following != (kind == EncounterKind.FOLLOWING):
+        kind = kind_of(motion, conflict.first, conflict.second)
     joint = _joint_features(motion, conflict)
     return EncounterFeatures(
         kind, np.array(values), recording, template, chosen, joint=np.array(joint)
@@ -132,12 +138,15 @@ def features_of(
 
 
 def scenario_features(
-    scenario: Scenario, template: EncounterFeatures, encounter: Encounter
+    scenario: Scenario,
+    template: EncounterFeatures,
+    encounter: Encounter,
+    kind: EncounterKind | None = None,
 ) -> EncounterFeatures:
     """Return the features of the template's pair in a scenario; vehicles may be reordered."""
     ids = scenario.ids
     a, b = sorted(ids.index(encounter.vehicles[n].id) for n in template.pair or (0, 1))
-    return features_of(scenario, template.recording, template.template, (a, b))
+    return features_of(scenario, template.recording, template.template, (a, b), kind)
 
 
 def _headway(motion: Motion, conflict: Conflict) -> float:

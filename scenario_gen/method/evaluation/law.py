@@ -98,7 +98,8 @@ def rarity_in(
 ) -> Callable[[Scenario], float]:
     """Return the rarity of a template's scenarios: their distance from the mean over USUAL_SIGMAS.
 
-    The law is that of the scenario's kind, which may differ from the template's on another road.
+    The law is that of the template's kind, unless one vehicle follows the other only in one of
+    them.
     The rarity is infinite if the vehicles share no area.
 
     Args:
@@ -117,7 +118,7 @@ def rarity_in(
     }
 
     def rarity(scenario: Scenario) -> float:
-        member = scenario_features(scenario, template, encounter)
+        member = scenario_features(scenario, template, encounter, template.kind)
         if member.kind is None:
             return math.inf
         return laws[member.kind].distance(member.every) / USUAL_SIGMAS

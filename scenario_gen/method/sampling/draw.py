@@ -20,7 +20,7 @@ from scenario_gen.method.sampling.filters import (
     Check,
     Filters,
     MIN_RARITY_SCENARIOS,
-    PILOT_CANDIDATES,
+    Pilot,
     RarityFilter,
     ValidityFilter,
 )
@@ -105,9 +105,12 @@ def draw_scenarios(
         target = TargetSet.of(plan.situation, request, measures)
         sampler = _sampler(built.model, plan, request, seed, target, measures)
         validity = ValidityFilter.of(sampler, check, enough_share(config, request))
-        rarity = RarityFilter()  # who asks for a critical range asks for what is rare
-        if target is None:
-            rarity = rarity_filter(sampler, validity, measures)
+        pilot, rarity = None, RarityFilter()
+        if target is None:  # who asks for a critical range asks for what is rare
+            law = None if measures is None else measures.rarity
+            minimum = MIN_RARITY_SCENARIOS if law is not None else 0
+            pilot = validity.pilot(sampler, minimum, callbacks.cancelled)
+            rarity = RarityFilter.of(law, pilot.valid)
         filters = Filters(validity, target, rarity)
         kept = validity.kept(built.model.reactions.edges)
         label = label_of(plan.situation, request, target, measures, kept, validity.lost)
@@ -116,7 +119,7 @@ def draw_scenarios(
             callbacks.on_valid(scenario, plan.requested, slot)
 
         run = _Run(filters, count, callbacks, replace(sampler, label=label), on_valid)
-        reached = run.draw(config.attempts * filters.rarity.valid_per_kept)
+        reached = run.draw(config.attempts * filters.rarity.valid_per_kept, pilot)
         notes = (*built.notes, *filters.notes(), *run.notes)
         drawn = ScenarioSet(
             count, tuple(run.scenarios), run.candidates, run.refused, notes, slot, reached, kept
@@ -161,15 +164,6 @@ def enough_share(config: SamplingConfig, request: Request = Request()) -> float:
     return _ENOUGH_SHARE if config.drivers > 0.0 else _ENOUGH_OF_ONE_DRIVER_SHARE
 
 
-def rarity_filter(
-    sampler: Sampler, validity: ValidityFilter, measures: Measures | None
-) -> RarityFilter:
-    """Return the filter with the bound that the first valid candidates give."""
-    if measures is None or measures.rarity is None:
-        return RarityFilter()
-    return RarityFilter.of(measures.rarity, validity.pilot(sampler, MIN_RARITY_SCENARIOS)[1])
-
-
 def _ego_slot(plan: Plan, request: Request) -> EgoSlot | None:
     """Return the slot of the vehicle that is left out, if any."""
     ego = request.ego_of(plan.encounter)
@@ -205,36 +199,33 @@ class _Run:
     candidates: int = 0
     notes: list[Note] = field(default_factory=list)
 
-    def draw(self, attempts: int) -> Reached | None:
+    def draw(self, attempts: int, pilot: Pilot | None) -> Reached | None:
         """Draw the set; return the outcome of a target, if there is one.
 
         Args:
             attempts: candidates per scenario, at most.
+            pilot: the first candidates; None with a target, which has its own.
 
         Raises:
             TargetError: no valid candidate in the range was found; the message states which range
                 can be reached.
         """
         if self.filters.target is None:
+            assert pilot is not None
             minimum = _MIN_COUNT_FACTOR if self.sampler.varies else 1
-            self._draw_levels(attempts * max(self.count, minimum))
+            self._draw_level(pilot, attempts * max(self.count, minimum))
             return None
         budget = _DIRECTED_BUDGET_FACTOR * attempts * self.count
         return self._draw_directed(self.filters.target, budget)
 
-    def _draw_levels(self, budget: int) -> None:
-        """Judge the levels by pilots, then stay with the first one that is enough, or the best."""
-        judged = [self.filters.judged(self.sampler.blocks(level)) for level in range(len(LEVELS))]
-        shares: list[float] = []
-        for candidates in judged:
-            shares.append(
-                self._consume(candidates, min(PILOT_CANDIDATES, budget - self.candidates))
-            )
-            if self._is_done(budget) or shares[-1] >= self.filters.validity.enough:
-                break
-        best = int(np.argmax(shares))
-        self._consume(judged[best], budget - self.candidates)
-        self._note_level(best, len(shares))
+    def _draw_level(self, pilot: Pilot, budget: int) -> None:
+        """Draw from the level of the pilot, which comes first."""
+        first = len(pilot.candidates) // BLOCK_CANDIDATES
+        further = self.filters.judged(self.sampler.blocks(pilot.level, first))
+        self._consume(
+            itertools.chain(map(self.filters.rejudged, pilot.candidates), further), budget
+        )
+        self._note_level(pilot.level, pilot.tried)
 
     def _draw_directed(self, target: TargetSet, budget: int) -> Reached | None:
         """Find a proposal, then draw from it."""
@@ -277,20 +268,17 @@ class _Run:
         if self.sampler.proposal is not None:
             return self.filters.judged(self.sampler.blocks(DIRECTED_SLOT))
         further = self.sampler.blocks(self.sampler.base, STAGE_BLOCKS_COUNT)
-        return itertools.chain(self.filters.rejudged(pilot), self.filters.judged(further))
+        return itertools.chain(map(self.filters.rejudged, pilot), self.filters.judged(further))
 
-    def _consume(self, candidates: Iterator[Candidate], most: int) -> float:
-        """Add up to `most` candidates; return the share of them that is valid."""
-        added = valid = 0
+    def _consume(self, candidates: Iterator[Candidate], most: int) -> None:
+        """Add up to `most` candidates."""
+        added = 0
         while added < most and not self._is_complete():
-            candidate = next(candidates)
+            self._add(next(candidates))
             added += 1
-            valid += candidate.is_valid
             self.candidates += 1
-            self._add(candidate)
             if added % BLOCK_CANDIDATES == 0 or added == most or self._is_complete():
                 self.callbacks.progress(len(self.scenarios), self.count, self.candidates)
-        return valid / added if added else 0.0
 
     def _add(self, candidate: Candidate) -> None:
         """Add a candidate to the set, or to the account of refused ones."""

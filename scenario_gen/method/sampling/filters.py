@@ -6,6 +6,7 @@
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 import math
+from typing import NamedTuple
 
 import numpy as np
 
@@ -40,10 +41,28 @@ class Candidate:
     scenario: Scenario | None
     cause: Cause | None
 
+
+class Pilot(NamedTuple):
+    """The first candidates of the level to use, with the verdicts of the checker.
+
+    Attributes:
+        level: whose standard deviations they have.
+        tried: number of levels that were tried.
+        candidates: in the order of their indices.
+    """
+
+    level: int
+    tried: int
+    candidates: list[Candidate]
+
     @property
-    def is_valid(self) -> bool:
-        """Whether the checker accepts it, however rare it is."""
-        return self.cause in (None, Cause.UNUSUAL)
+    def valid(self) -> list[Scenario]:
+        """The valid ones."""
+        return [
+            each.scenario
+            for each in self.candidates
+            if each.scenario is not None and each.cause is None
+        ]
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,19 +113,16 @@ class ValidityFilter:
 
     def __call__(self, scenarios: Sequence[Scenario]) -> list[Cause | None]:
         """Return the first cause for which each scenario is refused, None for a valid one."""
-        verdicts = self.check(scenarios) if scenarios else []
-        return [
-            self._cause(scenario, verdict)
-            for scenario, verdict in zip(scenarios, verdicts, strict=True)
-        ]
+        is_short = [self._is_short(scenario) for scenario in scenarios]
+        checked = [each for each, short in zip(scenarios, is_short, strict=True) if not short]
+        verdicts = iter(self.check(checked) if checked else [])
+        return [Cause.TOO_SHORT if short else self._cause(next(verdicts)) for short in is_short]
 
-    def _cause(self, scenario: Scenario, verdict: Verdict) -> Cause | None:
+    def _cause(self, verdict: Verdict) -> Cause | None:
         for violation in verdict.violations:
             if violation.cause != Cause.REACTION or violation.vehicles not in self.lost:
                 return violation.cause
-        if verdict.not_applicable > self.max_absent:
-            return Cause.CONFLICT_LOST
-        return Cause.TOO_SHORT if self._is_short(scenario) else None
+        return Cause.CONFLICT_LOST if verdict.not_applicable > self.max_absent else None
 
     def _is_short(self, scenario: Scenario) -> bool:
         """Whether a scenario is short, or a vehicle hardly drives in it."""
@@ -119,30 +135,36 @@ class ValidityFilter:
         """Return the reactions that candidates keep."""
         return tuple(edge for edge in edges if (edge.who, edge.whom) not in self.lost)
 
-    def valid(self, blocks: Iterable[Block]) -> list[Scenario]:
-        """Return the valid candidates of some blocks."""
-        drawn = _scenarios(blocks)
-        return [
-            scenario for scenario, cause in zip(drawn, self(drawn), strict=True) if cause is None
-        ]
+    def judged(self, blocks: Iterable[Block]) -> Iterator[Candidate]:
+        """Yield the candidates of blocks with their verdicts."""
+        for block in blocks:
+            causes = iter(self([each for each in block.scenarios if each is not None]))
+            for index, each in zip(*block, strict=True):
+                cause = Cause.SPEED_PROFILE if each is None else next(causes)
+                yield Candidate(index, each, cause)
 
-    def pilot(self, sampler: Sampler, minimum: int = 0) -> tuple[int, list[Scenario]]:
-        """Return the level to use, and its first valid candidates.
+    def pilot(
+        self,
+        sampler: Sampler,
+        minimum: int = 0,
+        cancelled: Callable[[], bool] = lambda: False,
+    ) -> Pilot:
+        """Return the pilot of the first level with enough valid candidates, or of the best.
 
-        The level is the first with enough valid candidates, or the best. Where it has fewer than
-        `minimum` valid candidates, five times as many are drawn.
+        Where it has fewer than `minimum` valid candidates, five times as many are drawn.
         """
         count = PILOT_CANDIDATES // BLOCK_CANDIDATES
-        valid: list[list[Scenario]] = []
+        pilots: list[Pilot] = []
         for level in range(len(LEVELS)):
-            valid.append(self.valid(sampler.block(level, k) for k in range(count)))
-            if len(valid[level]) >= self.enough * PILOT_CANDIDATES:
+            first = list(self.judged(sampler.block(level, k) for k in range(count)))
+            pilots.append(Pilot(level, level + 1, first))
+            if len(pilots[level].valid) >= self.enough * PILOT_CANDIDATES or cancelled():
                 break
-        best = max(range(len(valid)), key=lambda level: len(valid[level]))
-        if len(valid[best]) < minimum:
-            more = range(count, _LARGE_PILOT_FACTOR * count)
-            valid[best] += self.valid(sampler.block(best, k) for k in more)
-        return best, valid[best]
+        best = max(pilots, key=lambda pilot: len(pilot.valid))._replace(tried=len(pilots))
+        if len(best.valid) < minimum and not cancelled():
+            further = range(count, _LARGE_PILOT_FACTOR * count)
+            best.candidates.extend(self.judged(sampler.block(best.level, k) for k in further))
+        return best
 
 
 def _scenarios(blocks: Iterable[Block]) -> list[Scenario]:
@@ -215,28 +237,29 @@ class Filters:
         """Yield the candidates of blocks, each with the cause for which it is refused."""
         for block in blocks:
             in_range = [each is not None and self._in_range(each) for each in block.scenarios]
-            checked = [
-                each
-                for each, reaches in zip(block.scenarios, in_range, strict=True)
-                if each is not None and reaches
-            ]
-            causes = iter(self.validity(checked))
-            for index, scenario, reaches in zip(*block, in_range, strict=True):
-                if scenario is None:
-                    yield Candidate(index, None, Cause.SPEED_PROFILE)
-                elif not reaches:
-                    yield Candidate(index, scenario, Cause.OUT_OF_RANGE)
+            reaching = Block(
+                block.indices,
+                [
+                    each if reaches else None
+                    for each, reaches in zip(block.scenarios, in_range, strict=True)
+                ],
+            )
+            for candidate, scenario in zip(
+                self.validity.judged([reaching]), block.scenarios, strict=True
+            ):
+                if candidate.scenario is None and scenario is not None:
+                    yield Candidate(candidate.index, scenario, Cause.OUT_OF_RANGE)
                 else:
-                    yield self._with_rarity(Candidate(index, scenario, next(causes)))
+                    yield self.rejudged(candidate)
 
-    def rejudged(self, candidates: Iterable[Candidate]) -> Iterator[Candidate]:
-        """Yield checked candidates, those out of range with that cause."""
-        for candidate in candidates:
-            scenario, cause = candidate.scenario, candidate.cause
-            if scenario is not None and cause is None and not self._in_range(scenario):
-                yield replace(candidate, cause=Cause.OUT_OF_RANGE)
-            else:
-                yield candidate
+    def rejudged(self, candidate: Candidate) -> Candidate:
+        """Return a checked candidate; out of range, or rare, with that cause."""
+        scenario = candidate.scenario
+        if scenario is None or candidate.cause is not None:
+            return candidate
+        if not self._in_range(scenario):
+            return replace(candidate, cause=Cause.OUT_OF_RANGE)
+        return candidate if self.rarity(scenario) else replace(candidate, cause=Cause.UNUSUAL)
 
     def notes(self) -> tuple[Note, ...]:
         """Return notes on reactions that cannot be kept, and on rare scenarios that are kept."""
@@ -246,9 +269,3 @@ class Filters:
 
     def _in_range(self, scenario: Scenario) -> bool:
         return self.target is None or self.target.holds(self.target.values(scenario))
-
-    def _with_rarity(self, candidate: Candidate) -> Candidate:
-        scenario = candidate.scenario
-        if scenario is None or candidate.cause is not None or self.rarity(scenario):
-            return candidate
-        return replace(candidate, cause=Cause.UNUSUAL)

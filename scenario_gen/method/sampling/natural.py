@@ -58,14 +58,14 @@ class NaturalScenarios:
         validity = ValidityFilter.of(sampler, check, enough_share(config))
         rarity = None if measures is None else measures.rarity
         minimum = 0 if rarity is None else MIN_RARITY_SCENARIOS
-        level, valid = validity.pilot(sampler, minimum)
-        if not valid:
+        pilot = validity.pilot(sampler, minimum)
+        if not pilot.valid:
             raise RefusedError(
                 f"none of {PILOT_CANDIDATES * len(LEVELS)} candidates is valid, "
                 "so there is nothing to search"
             )
-        filters = Filters(validity, rarity=RarityFilter.of(rarity, valid))
-        return cls(sampler, filters, level)
+        filters = Filters(validity, rarity=RarityFilter.of(rarity, pilot.valid))
+        return cls(sampler, filters, pilot.level)
 
     @property
     def size(self) -> int:
