@@ -68,7 +68,7 @@ def assert_kept(result, names):
         if edge.kind == FOLLOW:
             seen = following(edge, result.encounter, scenarios)
             assert (
-                seen.slope > 0.75 and 0.5 < seen.gaps[0] < seen.gaps[1] < 1.6 and seen.own > 0.05
+                seen.slope > 0.75 and 0.5 < seen.gaps[0] < seen.gaps[1] < 2.0 and seen.own > 0.05
             )
         else:
             seen = yielding(edge, scenarios)

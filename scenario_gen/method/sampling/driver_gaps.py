@@ -45,7 +45,7 @@ class _Tuning:
     min_approach: float = 1.5
     margin: float = 0.5
     ample_headway: float = 3.0
-    nearer_share: float = 0.15
+    nearer_share: float = 0.35
     farther_share: float = 0.8
 
 
@@ -119,6 +119,8 @@ class Ramp:
         rate = self.rate * value + self.value * share * slope / (end - begin)
         least, most = allowed_gap(edge, limits)
         earliest = -(1.0 - MIN_RATE_RATIO) * (end - begin) / _PEAK_SLOPE_RATIO / max(share, 1e-9)
+        if edge.stands:
+            earliest = max(earliest, -limits.anticipation)
         low = max(min(least - edge.gap + _TUNING.margin, 0.0), earliest)
         high = max(most - edge.gap - _TUNING.margin, 0.0)
         return _bounded(self.value * value, rate, config.gap_sigma, 0.0, (low, high), config)

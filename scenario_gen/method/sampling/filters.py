@@ -24,7 +24,8 @@ PILOT_CANDIDATES = 2 * BLOCK_CANDIDATES  # by which a level is judged
 MIN_RARITY_SCENARIOS = 20  # valid ones from which a bound is taken
 _LARGE_PILOT_FACTOR = 5  # over a pilot that has too few valid candidates
 _MIN_DISTANCE_SHARE = 0.55  # of a route; half of the recorded distance, which may be longer
-_KEPT_SHARE = 0.4  # of the valid candidates that are kept at least
+_KEPT_SHARE = 0.4  # of the valid candidates with a shared area that are kept at least
+_SHARED_AREA_SHARE = 0.1  # of valid candidates, from which all must have one
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,7 +73,8 @@ class ValidityFilter:
     Attributes:
         check: the validity checker.
         max_absent: conflicts of the template that candidates may lose: as many as the undisturbed
-            drive, or, where that loses some, as the best quarter of the first candidates.
+            drive, or, where that loses some, as the best of the first candidates (a share of
+            `enough`).
         enough: share of valid candidates from which a level of standard deviations is used.
         lost: reactions of the template, by their vehicles, that cannot be kept on this road, each
             with a message: neither the undisturbed drive nor those candidates keep them. No
@@ -101,7 +103,7 @@ class ValidityFilter:
         first = _scenarios([sampler.block(0, 0)]) if absent else []
         if first:
             verdicts = sorted(check(first), key=lambda verdict: verdict.not_applicable)
-            absent = min(absent, verdicts[len(verdicts) // 4].not_applicable)
+            absent = min(absent, verdicts[int(enough * len(verdicts))].not_applicable)
             for verdict in verdicts:
                 if verdict.not_applicable <= absent:
                     also_lost = _lost_reactions(verdict)
@@ -186,16 +188,20 @@ class RarityFilter:
     """Refuses valid candidates that are rare among recorded encounters of their kind.
 
     A template may be rare itself, and then so is everything generated from it. So candidates with
-    a rarity of at most 1 are kept, or the two fifths of the valid candidates that are least rare.
+    a rarity of at most 1 are kept, or the two fifths of the valid candidates that are least rare;
+    without a shared area none is.
     The bound is found with the first candidates, and is the same for all.
 
     Attributes:
         rarity: returns the rarity of a scenario; None: all are kept.
-        max_rarity: the greatest rarity that is kept.
+        max_rarity: the greatest rarity that is kept; infinite where vehicles hardly ever share an
+            area.
+        kept_share: of the valid candidates.
     """
 
     rarity: Callable[[Scenario], float] | None = None
     max_rarity: float = math.inf
+    kept_share: float = 1.0
 
     @classmethod
     def of(
@@ -204,8 +210,12 @@ class RarityFilter:
         """Find the bound from the first valid candidates."""
         if rarity is None or not valid:
             return cls(rarity)
-        rarities = sorted(map(rarity, valid))
-        return cls(rarity, max(1.0, rarities[int(_KEPT_SHARE * len(rarities))]))
+        rarities = np.sort([rarity(scenario) for scenario in valid])
+        shared = rarities[np.isfinite(rarities)]
+        if len(shared) < _SHARED_AREA_SHARE * len(rarities):
+            return cls(rarity)
+        bound = max(1.0, float(shared[int(_KEPT_SHARE * len(shared))]))
+        return cls(rarity, bound, float((rarities <= bound).mean()))
 
     def __call__(self, scenario: Scenario) -> bool:
         """Return whether a valid candidate is kept."""
@@ -213,8 +223,8 @@ class RarityFilter:
 
     @property
     def valid_per_kept(self) -> int:
-        """Valid candidates per candidate that is kept, in the worst case."""
-        return 1 if self.rarity is None else math.ceil(1.0 / _KEPT_SHARE)
+        """Valid candidates per candidate that is kept."""
+        return math.ceil(1.0 / self.kept_share)
 
     def notes(self) -> tuple[Note, ...]:
         """Return a note on the bound, unless only usual candidates are kept."""

@@ -69,7 +69,7 @@ class Limits(TypeLimits):
         high=10.0,
     )
     gap_share: float = parameter(
-        0.5,
+        0.8,
         "the second vehicle passes with the recording's gap behind the first one's clearing, "
         "changed by at most this share",
         low=0.0,
@@ -82,15 +82,15 @@ class Limits(TypeLimits):
         unit="s",
         low=0.0,
     )
-    patience: float = parameter(1.0, "or later by this", unit="s", low=0.0)
+    patience: float = parameter(3.0, "or later by this", unit="s", low=0.0)
     headway_share: float = parameter(
-        0.5,
+        1.0,
         "a follower's median time gap exceeds the recording's greatest one by at most this share",
         low=0.0,
         high=10.0,
     )
     floor_share: float = parameter(
-        0.8,
+        0.6,
         "smallest bumper-to-bumper gap to a vehicle ahead in the same lane, as a share of the "
         "smallest one in the recording at a similar speed (2 m/s more or less)",
         low=0.0,

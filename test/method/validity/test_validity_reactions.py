@@ -55,7 +55,8 @@ CLEARS = Situation.of(TEMPLATE).reactions.edges[0].clears
         (0.0, True),
         (2.0, True),
         (3.0, True),
-        (5.0, False),
+        (5.0, True),
+        (9.0, False),
     ],
 )
 def test_a_yielder_leaves_neither_before_the_other_has_cleared_nor_long_after(lag, kept):
@@ -75,8 +76,8 @@ def test_the_bounds_of_a_lag_are_parameters():
     early = as_scenario(crossing(CLEARS - 1.2))
     assert refusals(early, TEMPLATE) != []
     assert refusals(early, TEMPLATE, Limits(anticipation=1.5)) == []
-    late = as_scenario(crossing(CLEARS + 5.0))
-    assert refusals(late, TEMPLATE, Limits(patience=6.0)) == []
+    late = as_scenario(crossing(CLEARS + 9.0))
+    assert refusals(late, TEMPLATE, Limits(patience=9.0)) == []
 
 
 def test_a_yielder_that_no_longer_meets_the_other_does_not_yield():

@@ -118,7 +118,7 @@ def test_the_reactions_that_an_entry_names_are_proven_again(tmp_path):
     (kept,) = validate_bag(bag)
     (edge,) = made.generated.reactions
     assert kept.causes == {} and kept.proven == {edge.words(made.encounter.vehicles): 4}
-    (found,) = validate_bag(bag, Limits(anticipation=0.0, patience=0.0))
+    (found,) = validate_bag(bag, Limits(gap_share=0.1, anticipation=0.0, patience=0.0))
     assert set(found.causes) == {"reaction"}
     assert found.proven == {
         edge.words(made.encounter.vehicles): 4 - found.causes["reaction"].count
@@ -127,9 +127,9 @@ def test_the_reactions_that_an_entry_names_are_proven_again(tmp_path):
     assert measured.published == 4 and measured.generated.reactions == (edge,)
     assert measured.reacting["edges"] == [edge.document(made.encounter.vehicles) | {"kept": True}]
     assert (
-        bag_results(bag, limits=Limits(anticipation=0.0, patience=0.0))[0].generated.refused[
-            "reaction"
-        ]
+        bag_results(bag, limits=Limits(gap_share=0.1, anticipation=0.0, patience=0.0))[
+            0
+        ].generated.refused["reaction"]
         >= 1
     )
     (summary,) = read_recording(bag).namespaces["/here"].summaries
