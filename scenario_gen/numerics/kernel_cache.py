@@ -16,10 +16,9 @@ import platform
 import re
 import tempfile
 
-import numba
-
 from scenario_gen.base.errors import InputError
 from scenario_gen.base.folders.disk import own_folder
+from scenario_gen.numerics.numba_import import numba
 
 OPTIONS = {"nogil": True, "error_model": "numpy", "no_cfunc_wrapper": True}
 """How numba compiles every kernel."""

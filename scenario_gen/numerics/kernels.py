@@ -14,15 +14,14 @@ from pathlib import Path
 from threading import RLock
 from typing import Any, cast, TypeVar
 
-import numba
-from numba import types
-from numba.extending import typeof_impl
 import numpy as np
 
 from scenario_gen.numerics.arrays import sealed
 from scenario_gen.numerics.compiling import make_ready
 from scenario_gen.numerics.kernel_cache import folder, OPTIONS, PACKAGE, sources, used_by_numba
+from scenario_gen.numerics.numba_import import numba
 
+types = numba.types
 Function = TypeVar("Function", bound=Callable[..., Any])
 
 
@@ -167,10 +166,10 @@ class Kernel:
         return self.dispatcher(*arguments)
 
 
-@typeof_impl.register(Kernel)  # type: ignore[untyped-decorator]
+@numba.extending.typeof_impl.register(Kernel)  # type: ignore[untyped-decorator]
 def _typeof_kernel(kernel: Kernel, context: Any) -> Any:
     """Let numba see a kernel as its compiled function."""
-    return typeof_impl(kernel.compile(), context)
+    return numba.extending.typeof_impl(kernel.compile(), context)
 
 
 def _without_literals(compile_types: Callable[[Any], Any]) -> Callable[[Any], Any]:

@@ -48,7 +48,6 @@ def mirrored(encounter: Encounter) -> Encounter:
     lights = (replace(light, line=light.line[::-1] * flip) for light in encounter.lights)
     return replace(
         encounter,
-        name=f"{encounter.name} mirrored",
         position=encounter.position * flip,
         heading=-encounter.heading,
         origin=None,

@@ -48,4 +48,4 @@ def test_a_mirror_image_of_a_mirror_image_is_the_template():
     assert np.array_equal(twice.position, one.position) and np.allclose(
         np.cos(twice.heading), np.cos(one.heading)
     )
-    assert mirrored(one).name == "o mirrored" and np.array_equal(mirrored(one).speed, one.speed)
+    assert mirrored(one).name == "o" and np.array_equal(mirrored(one).speed, one.speed)

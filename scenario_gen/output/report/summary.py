@@ -30,6 +30,7 @@ from scenario_gen.types import (
 VARIED = ("pet", "gap", "speed")
 """Figures whose range is printed: PET, or the smallest gap if no vehicles cross, and the speed."""
 LABELS = {
+    NoteKind.MIRRORED: "note",
     NoteKind.SHORTENED: "length",
     NoteKind.OUTCOMES: "decision",
     NoteKind.OUTCOME_REFUSED: "decision",

@@ -14,6 +14,7 @@ import sys
 from typing import Any
 
 from scenario_gen.base.errors import InputError, print_error
+from scenario_gen.base.working_directory import without_dds_profiles
 from scenario_gen.ros.node_names import COMPOSABLE, SUITE
 
 SUITE_HELP = """\
@@ -52,6 +53,7 @@ def start(name: str) -> None:
     signal.signal(signal.SIGINT, signal.SIG_DFL)  # no traceback while the libraries load
     # Before numpy is loaded: the matrices are small, and BLAS threads would only wait.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+    without_dds_profiles()
     names, arguments = [name], sys.argv
     if name == "suite":
         names, arguments = chosen_nodes(sys.argv)

@@ -52,6 +52,6 @@ def test_a_template_is_mirrored_on_a_map_of_the_other_side(crossroads):
             )
         else:
             assert road.lanes.notes[0] == Note.of(NoteKind.MIRRORED, road=road.name, side=side)
-            assert driven.name == "o mirrored" and np.array_equal(
+            assert driven.name == "o" and np.array_equal(
                 driven.position, mirrored(encounter).position
             )

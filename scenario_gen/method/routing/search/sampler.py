@@ -5,7 +5,6 @@
 
 from typing import NamedTuple
 
-from numba import from_dtype, types
 import numpy as np
 
 from scenario_gen.method.routing.search.dubins import FULL_TURN_RAD, Pose
@@ -14,6 +13,7 @@ from scenario_gen.method.routing.search.sweep import Scene
 from scenario_gen.method.routing.search.trees import Records
 from scenario_gen.numerics import Floats, Ints
 from scenario_gen.numerics.kernels import B, F, F2, I1, kernel, named
+from scenario_gen.numerics.numba_import import numba
 
 STATE = np.dtype(
     [
@@ -24,7 +24,7 @@ STATE = np.dtype(
         ("random", np.uint64),  # state of the generator
     ]
 )
-STATES = types.Array(from_dtype(STATE), 1, "C")
+STATES = numba.types.Array(numba.from_dtype(STATE), 1, "C")
 SPREAD_SHARES = np.array([1.0, 0.5, 0.25, 0.125])  # narrow gaps need samples close to the path
 MAX_ATTEMPTS_COUNT = 100  # to draw a sample that can help
 

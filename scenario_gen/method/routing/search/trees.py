@@ -9,7 +9,6 @@ so that an edge away from its root is driven towards the goal, and the same code
 
 from typing import NamedTuple
 
-from numba import from_dtype, types
 import numpy as np
 from numpy.typing import NDArray
 
@@ -18,6 +17,7 @@ from scenario_gen.method.routing.search.steering import distance, steer
 from scenario_gen.method.routing.search.sweep import Body
 from scenario_gen.numerics import Ints
 from scenario_gen.numerics.kernels import F, kernel, named, OUTI1, OUTI2
+from scenario_gen.numerics.numba_import import numba
 
 NODE = np.dtype(
     [
@@ -64,10 +64,10 @@ TREE = named(
     Tree,
     POSE,
     POSE,
-    types.Array(from_dtype(NODE), 1, "C"),
+    numba.types.Array(numba.from_dtype(NODE), 1, "C"),
     OUTI1,
     OUTI2,
-    types.Array(from_dtype(NEIGHBOUR), 1, "C"),
+    numba.types.Array(numba.from_dtype(NEIGHBOUR), 1, "C"),
     F,
 )
 
