@@ -13,6 +13,7 @@ import numpy as np
 from PIL import Image, ImageDraw
 
 from scenario_gen.base.errors import InputError, needs, RefusedError
+from scenario_gen.base.working_directory import ignored
 from scenario_gen.numerics import Floats
 from scenario_gen.roads import build_road, is_vector_map, Place, places, read_network, split
 from scenario_gen.situation import Situation
@@ -36,6 +37,13 @@ _LEGEND = "green arrows: entries, red: exits; red lines: stop, orange: give way"
 _PAINT = {Marking.STOP: "#b91c1c", Marking.GIVE_WAY: "#d97706"}
 
 
+def _load_matplotlib() -> None:
+    """Import matplotlib without the file `matplotlibrc` of the working directory."""
+    needs("plot", "matplotlib")
+    with ignored():
+        import matplotlib  # noqa: F401
+
+
 def plot(
     shown: GenerationResult | Motion | Road,
     ax: "Axes | None" = None,
@@ -53,7 +61,7 @@ def plot(
     Raises:
         MissingExtraError: matplotlib is not installed.
     """
-    needs("plot", "matplotlib")
+    _load_matplotlib()
     import matplotlib.pyplot as plt
 
     axes = plt.subplots()[1] if ax is None else ax
@@ -97,7 +105,7 @@ def animate(shown: Motion, file: Path | str, *, road: Road | None = None) -> Pat
     path = Path(file)
     if path.suffix.lower() != ".gif":
         raise InputError(f"{path}: an animation is a .gif file")
-    needs("plot", "matplotlib")
+    _load_matplotlib()
     from matplotlib.colors import to_hex
     from matplotlib.figure import Figure
 
@@ -134,7 +142,7 @@ def draw_map(name: str, file: Path, encounter: Encounter | None = None) -> list[
         RefusedError: the template does not fit the built-in road.
         MissingExtraError: matplotlib is not installed.
     """
-    needs("plot", "matplotlib")
+    _load_matplotlib()
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(16.0, 12.0), layout="constrained")
