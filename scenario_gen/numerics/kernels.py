@@ -25,7 +25,7 @@ types = numba.types
 Function = TypeVar("Function", bound=Callable[..., Any])
 
 
-def _array(dtype: Any, ndim: int, *, readonly: bool) -> types.Array:
+def _array(dtype: Any, ndim: int, *, readonly: bool) -> Any:
     return types.Array(dtype, ndim, "C", readonly=readonly)
 
 
