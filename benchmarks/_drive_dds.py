@@ -10,7 +10,7 @@ import tempfile
 import time
 from typing import Any, TypeVar
 
-from benchmarks._messages_processes import environment, nodes
+from benchmarks._suite_processes import environment, nodes
 from scenario_gen.bags.recordings.write import write_recording
 from scenario_gen.base.ros_domain import free_domain
 from scenario_gen.types.generation import GenerationResult

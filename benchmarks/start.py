@@ -16,9 +16,8 @@ import sys
 import tempfile
 import time
 
-from benchmarks._messages_processes import environment
 from benchmarks._size import sized
-from benchmarks.messages import Client, result_of
+from benchmarks._suite_processes import Client, environment, result_of
 from benchmarks.row import higher, lower, Row
 from scenario_gen.bags.storage.bag import read_messages
 from scenario_gen.base.ros_domain import free_domain, this_host_only

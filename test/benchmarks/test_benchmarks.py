@@ -17,7 +17,7 @@ from benchmarks.__main__ import names
 from benchmarks.row import Row
 
 ROOT = Path(__file__).resolve().parents[2]
-WITH_ROS = "messages"
+WITH_ROS = "start"
 CHEAP = ("evaluation",)
 pytestmark = pytest.mark.spread
 

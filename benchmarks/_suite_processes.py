@@ -1,12 +1,9 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Processes of the messages benchmark: the suite's nodes, a publisher, a caller; each on a ROS domain of its own.
+"""The suite's nodes as processes, and a client of theirs; each on a ROS domain of its own."""
 
-`python -m benchmarks._messages_processes publish TOPIC SIZE COUNT RATE` publishes COUNT messages, RATE a second (0: unpaced).
-"""
-
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 import os
@@ -14,7 +11,9 @@ from pathlib import Path
 import signal
 import subprocess
 import sys
+import threading
 import time
+from typing import Any
 
 from scenario_gen.base.ros_domain import this_host_only
 
@@ -72,41 +71,45 @@ def nodes(folder: Path, domain: int, arguments: Mapping[str, Sequence[str]]) -> 
         suite.end()
 
 
-def publisher(
-    domain: int, topic: str, size: int, count: int, rate: float
-) -> "subprocess.Popen[str]":
-    """Start a publisher; it waits for a subscription, and for a second more."""
-    words = ["publish", topic, str(size), str(count), str(rate)]
-    return subprocess.Popen(
-        [sys.executable, "-m", "benchmarks._messages_processes", *words],
-        text=True,
-        env=environment(domain),
-    )
+class Client:
+    """A node of this process; a thread spins it."""
+
+    def __init__(self, domain: int) -> None:
+        import rclpy
+        from rclpy.executors import SingleThreadedExecutor
+
+        self.context = rclpy.Context()
+        rclpy.init(context=self.context, domain_id=domain)
+        self.node = rclpy.create_node("benchmark", context=self.context)
+        self.executor = SingleThreadedExecutor(context=self.context)
+        self.executor.add_node(self.node)
+        self.thread = threading.Thread(target=self.executor.spin, daemon=True)
+        self.thread.start()
+
+    def __enter__(self) -> "Client":
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.executor.shutdown(timeout_sec=2.0)
+        self.thread.join(2.0)
+        self.node.destroy_node()
+        self.context.try_shutdown()
 
 
-def publish(topic: str, size: int, count: int, rate: float) -> None:
-    """Publish `count` strings of `size` bytes, numbered, raw; stay until they have been taken."""
-    import rclpy
-    from rclpy.qos import QoSProfile
-    from std_msgs.msg import String
-
-    from msg_conventions.cdr import encode
-    import scenario_gen.ros.nodes  # noqa: F401  (what the wheels need)
-
-    rclpy.init()
-    node = rclpy.create_node("benchmark_publisher")
-    sender = node.create_publisher(String, topic, QoSProfile(depth=1000))
-    while sender.get_subscription_count() == 0:
-        time.sleep(0.05)
-    time.sleep(1.0)
-    data = encode({"data": "string"}, data="x" * max(0, size - 9))
-    started = time.perf_counter()
-    for k in range(count):
-        if rate:
-            time.sleep(max(0.0, started + k / rate - time.perf_counter()))
-        sender.publish(data)
-    time.sleep(5.0)
+def wait_until(condition: Callable[[], bool], patience: float) -> bool:
+    """Wait up to `patience` seconds; return whether the condition is true."""
+    deadline = time.monotonic() + patience
+    while not condition() and time.monotonic() < deadline:
+        time.sleep(0.001)
+    return condition()
 
 
-if __name__ == "__main__":
-    publish(sys.argv[2], int(sys.argv[3]), int(sys.argv[4]), float(sys.argv[5]))
+def result_of(future: Any) -> Any:
+    """Return the answer of a service.
+
+    Raises:
+        RuntimeError: there is none within 60 s.
+    """
+    if not wait_until(future.done, 60.0):
+        raise RuntimeError("a service did not answer within 60 s")
+    return future.result()
