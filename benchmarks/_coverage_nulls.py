@@ -8,6 +8,7 @@ to their template, as many as give this precision. The nulls have no generator: 
 time and paced, and pairs mixed from different members of a set.
 """
 
+from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
@@ -20,6 +21,7 @@ from scenario_gen.method.evaluation.encounter_features import (
     FEATURES,
     JOINT_FEATURES,
 )
+from scenario_gen.method.evaluation.geometry import footprint_distance
 from scenario_gen.numerics import Bools, Floats
 from scenario_gen.situation import EncounterKind
 from scenario_gen.types import Encounter, Interval, Scenario
@@ -35,6 +37,9 @@ JOINT = (
     *JOINT_FEATURES,
 )  # how one answers the other
 SHIFT_S, PACE_RATIO = 1.0, 0.06
+MIN_SHIFTED_S = 4.0
+MAX_DRAWS_RATIO = 5  # of shifted records over those that are kept
+MIN_UNSEEN_COUNT = 10
 HALVINGS = 6  # by which the kept share is found
 DRAWS = 60  # of templates, while it is looked for
 
@@ -57,9 +62,22 @@ class Shares:
 
 
 def kinds_with(found: Members, count: int) -> list[Members]:
-    """Return members by kind, of kinds with twice as many encounters as templates, in sessions."""
+    """Return members by kind, of kinds in which templates leave MIN_UNSEEN_COUNT unseen ones.
+
+    A session that has all but a few encounters of a kind would leave nothing to cover.
+    """
     kinds = [found.of_kind(kind) for kind in KINDS]
-    return [one for one in kinds if len(one.recorded) >= 2 * count and one.recordings > 1]
+    return [
+        one
+        for one in kinds
+        if len(one.recorded) >= 2 * count and _fewest_unseen(one) >= MIN_UNSEEN_COUNT
+    ]
+
+
+def _fewest_unseen(found: Members) -> int:
+    """Return how many encounters are outside the largest session."""
+    sessions = Counter(one.recording for one in found.recorded)
+    return len(found.recorded) - max(sessions.values(), default=0)
 
 
 def shares_by_kind(kinds: Sequence[Members], count: int, draws: int = 200) -> Shares:
@@ -177,17 +195,34 @@ def _speeds(
     return np.array(rows).reshape(len(rows), int(columns.sum()))
 
 
-def shifted(encounter: Encounter, rng: np.random.Generator) -> Scenario:
-    """Return each vehicle's record, moved in time and paced."""
+def shifted(encounter: Encounter, rng: np.random.Generator, count: int) -> list[Scenario]:
+    """Return up to `count` of the records, moved in time and paced, without overlaps."""
+    made: list[Scenario] = []
+    for _ in range(MAX_DRAWS_RATIO * count):
+        scenario = _shifted_once(encounter, rng)
+        if scenario is not None and footprint_distance(scenario, 0, 1).min() > 0.0:
+            made.append(scenario)
+        if len(made) == count:
+            break
+    return made
+
+
+def _shifted_once(encounter: Encounter, rng: np.random.Generator) -> Scenario | None:
+    """Return the records while all are known; None if that is shorter than MIN_SHIFTED_S."""
     time, rows = encounter.time, []
+    known = np.ones(len(time), dtype=np.bool_)
     for n in range(len(encounter.vehicles)):
         pace = 1.0 + PACE_RATIO * rng.standard_normal()
-        at = np.clip(time * pace + SHIFT_S * rng.standard_normal(), 0.0, time[-1])
+        at = time * pace + SHIFT_S * rng.standard_normal()
+        known &= (at >= 0.0) & (at <= time[-1])
         track = np.column_stack(
             [encounter.position[n], encounter.heading[n], encounter.speed[n] * pace]
         )
         rows.append(np.array([np.interp(at, time, column) for column in track.T]))
-    x, y, heading, speed = np.stack(rows, axis=1)
+    if known.sum() * encounter.dt < MIN_SHIFTED_S:
+        return None
+    x, y, heading, speed = np.stack(rows, axis=1)[..., known]
+    time = time[: int(known.sum())]
     position = np.stack((x, y), axis=-1)
     return Scenario(
         encounter.vehicles, time, position, heading, speed, np.gradient(speed, time, axis=1)

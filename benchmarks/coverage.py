@@ -92,7 +92,7 @@ def run() -> list[Row]:
     ]
     rng = np.random.default_rng(1)
     baseline = [
-        Set(session, encounter, tuple(shifted(encounter, rng) for _ in range(COUNT)))
+        Set(session, encounter, tuple(shifted(encounter, rng, COUNT)))
         for session, encounter in encounters
     ]
     rows = list(_shares("shifted", _members(baseline), {}))

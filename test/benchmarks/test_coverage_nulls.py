@@ -8,6 +8,7 @@ import json
 
 import numpy as np
 import pytest
+from support.textbook_motions import labelled
 
 from benchmarks._coverage_members import Members
 from benchmarks._coverage_nulls import (
@@ -19,11 +20,13 @@ from benchmarks._coverage_nulls import (
     PRECISION,
     RADIUS_SHARE,
     shares_by_kind,
+    shifted,
     speed_spread,
     stands_for,
 )
 from benchmarks.coverage import PAIRS
 from scenario_gen.method.evaluation.encounter_features import EncounterFeatures, FEATURES
+from scenario_gen.method.evaluation.geometry import footprint_distance
 
 WIDTH = len(FEATURES)
 
@@ -81,3 +84,20 @@ def test_windows_of_a_session_are_one_recording():
         for file in row["files"]:
             files.setdefault(file, set()).add(row["name"])
     assert all(len(sessions) == 1 for sessions in files.values())
+
+
+def test_shifted_records_are_cut_at_their_ends_and_do_not_overlap():
+    encounter = labelled("crossing, rolls", 3).encounter
+    made = shifted(encounter, np.random.default_rng(0), 10)
+    assert len(made) == 10
+    for scenario in made:
+        assert scenario.time[-1] < encounter.duration
+        assert footprint_distance(scenario, 0, 1).min() > 0.0
+        moved = np.hypot(*np.diff(scenario.position, axis=1).T) > 0.0
+        assert (moved[-1] | (scenario.speed[:, -1] < 0.1)).all(), "nobody freezes at an end"
+
+
+def test_a_kind_of_one_session_and_few_others_is_left_out():
+    found = members(0.3)
+    one_session = [replace(each, recording="0") for each in found.recorded[:35]]
+    assert kinds_with(replace(found, recorded=[*one_session, *found.recorded[35:]]), 5) == []
