@@ -109,8 +109,10 @@ def test_names_are_shown_letter_by_letter(run, tmp_path):
         and f"{literal} on straight" in said
         and rf"report: [out]{literal}[]/report.html" in said
     ), said
+    bag = (tmp_path / out / "bag").rename(tmp_path / NAME.replace("[/]", ""))
     more = (
-        ("validate", f"{out}/bag"),
+        ("evaluate", bag, "--out", "figures"),
+        ("validate", bag),
         ("evaluate", log),
         ("generate", NAME, "--road", "straight"),
     )
