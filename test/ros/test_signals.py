@@ -94,7 +94,7 @@ def test_ctrl_c_while_the_libraries_load(domain):
     process.send_signal(signal.SIGINT)
     output, _ = process.communicate(timeout=180.0)
     assert "Traceback" not in output
-    assert process.returncode in (0, 130, -2)
+    assert process.returncode == 0
 
 
 STUCK = """
