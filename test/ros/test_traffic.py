@@ -388,6 +388,16 @@ def test_a_planner_that_is_a_node_gets_the_verdicts_that_it_gets_in_process(
         assert said in str(refused.exception), refused.output
 
 
+def test_a_planner_that_calls_step_itself_does_not_stop_the_command(bag, tmp_path):
+    """Both the command and the planner's call of traffic/step wait for one reply."""
+    example = Path(__file__).parents[2] / "examples" / "ego_consumer.py"
+    planner = f"{sys.executable} {example} --ros-args -p lock_step:=true"
+    command = [sys.executable, "-m", "scenario_gen", "drive", str(bag), "--count", "1", "--ros"]
+    command += ["--planner", planner, "--out", str(tmp_path / "out"), "--ego", "1"]
+    ended = subprocess.run(command, check=False, capture_output=True, text=True, timeout=180.0)
+    assert (tmp_path / "out" / "drives.json").is_file(), ended.stdout + ended.stderr
+
+
 def test_the_example_drives_a_whole_bag_in_lock_step(start, client, bag, domain, tmp_path):
     """Scenarios follow on by themselves; the end is said once, with how many drives passed."""
     count = len(read_trials(bag))

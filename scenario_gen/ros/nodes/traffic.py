@@ -351,9 +351,14 @@ class Traffic(Node):  # type: ignore[misc]
         await self._next_command(monotonic() + patience)
 
     async def _next_command(self, deadline: float) -> None:
-        """Return when a command arrives, or at `deadline` [s] on the steady clock."""
-        self._wait_deadline = deadline
-        self._waiting = Future(executor=self.executor)
+        """Return when a command arrives, or at `deadline` [s] on the steady clock, or before.
+
+        A wait that is already in progress is shared; it ends at the earlier deadline.
+        """
+        if self._waiting is None or self._waiting.done():
+            self._wait_deadline = deadline
+            self._waiting = Future(executor=self.executor)
+        self._wait_deadline = min(self._wait_deadline, deadline)
         await self._waiting
 
     def _end_waiting(self) -> None:
