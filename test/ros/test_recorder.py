@@ -6,6 +6,7 @@
 from collections import Counter
 import signal
 import subprocess
+import time
 
 from mcap.reader import make_reader
 import pytest
@@ -308,3 +309,25 @@ def test_a_player_whose_bag_breaks_off_says_so_by_its_exit_code(start, client, t
     process = start("player", bag=bag, rate=1000.0, topics="/vehicle_1/fix")
     output, _ = process.communicate(timeout=180.0)
     assert process.returncode == 2 and "Traceback" not in output, output
+
+
+def test_nothing_is_recorded_before_a_simulated_clock_has_a_time(start, client, tmp_path):
+    from rosgraph_msgs.msg import Clock
+    from std_msgs.msg import String
+
+    bag = tmp_path / "bag"
+    recorder = start("recorder", bag=bag, topics="/chat", use_sim_time=True)
+    chat = client.node.create_publisher(String, "/chat", QUEUE)
+    clock = publisher(client, Clock, "/clock")
+    for _ in range(5):  # the recorder knows the topic by then
+        chat.publish(String(data="early"))
+        time.sleep(0.1)
+    assert chat.get_subscription_count() == 0
+    now = Clock()
+    now.clock.sec = 1000
+    clock.publish(now)
+    client.until(lambda: chat.get_subscription_count() > 0, "the recorder")
+    chat.publish(String(data="in time"))
+    client.until(lambda: client.counted("/chat") == 1, "the message in the bag")
+    ended(recorder)
+    assert [message.stamp_ns for message in read_messages(bag)] == [1_000_000_000_000]

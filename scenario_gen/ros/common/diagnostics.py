@@ -163,14 +163,16 @@ class NodeDiagnostics:
                 self._entries[subject] = replace(entry, over=True)
 
     def publish(self) -> None:
-        """Publish all statuses now."""
+        """Publish all statuses, unless a simulated clock has no time yet to stamp them with."""
+        now_ns = self._node.get_clock().now().nanoseconds
+        if not now_ns:
+            return
         with self._lock:
             statuses = [entry.status for entry in self._entries.values()]
             if self._state:
                 statuses.insert(0, self._state)
             self._changed = False
             self._unpublished.clear()
-        now_ns = self._node.get_clock().now().nanoseconds
         publish(self._node, self._publisher, encode_diagnostics(statuses, now_ns))
 
     def _status(

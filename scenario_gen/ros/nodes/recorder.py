@@ -4,7 +4,8 @@
 """recorder: topics of any type, as raw CDR, to a bag; `~/start` and `~/stop` begin and end one.
 
 Subscriptions adopt the publishers' quality of service, so latched messages are recorded late, too.
-A message's log time is its arrival. `~/stop`, Ctrl-C and SIGTERM close the bag; a killed recorder
+A message's log time is its arrival; with `use_sim_time` nothing is recorded before the first
+/clock. `~/stop`, Ctrl-C and SIGTERM close the bag; a killed recorder
 loses the messages of its last seconds. Messages that are not recorded are reported on the
 terminal, on /diagnostics and in metadata.yaml. Existing files are never overwritten. On a full
 disk the recording ends with an error on /diagnostics, and the written part stays for
@@ -15,7 +16,7 @@ from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 import re
-from time import monotonic
+from time import monotonic, time_ns
 from typing import Any
 
 from rclpy.event_handler import SubscriptionEventCallbacks
@@ -95,7 +96,8 @@ class Recorder(Node):  # type: ignore[misc]
                 split=Split(config.split_bytes, config.split_seconds),
             )
         self._losses, self._warned = MessageLoss(self.count_publishers), {}
-        self._report(Level.OK, f"recording to {folder}")
+        waits = "" if self._has_time() else "; it begins with the first message on /clock"
+        self._report(Level.OK, f"recording to {folder}{waits}")
         self._refused.clear()
         self.diagnostics.resolve("topics")
         self._subscribe_to_new()
@@ -158,7 +160,7 @@ class Recorder(Node):  # type: ignore[misc]
 
     def _subscribe_to_new(self) -> None:
         """Subscribe to topics that are new."""
-        if self._bag is None:
+        if self._bag is None or not self._has_time():
             return
         wanted = re.compile(self.parameters.config.topics or default_topics(self.get_namespace()))
         for topic, kinds in self.get_topic_names_and_types():
@@ -168,6 +170,10 @@ class Recorder(Node):  # type: ignore[misc]
                 and wanted.fullmatch(topic)
             ):
                 self._listen(topic, kinds[0])
+
+    def _has_time(self) -> bool:
+        """Return whether the node's clock shows a time: a simulated one is 0 before /clock."""
+        return bool(self.get_clock().now().nanoseconds)
 
     def _report_counts(self) -> None:
         """Report the recorded messages of each topic, and losses."""
@@ -265,9 +271,7 @@ class Recorder(Node):  # type: ignore[misc]
     def _start_now(self) -> str:
         if self._bag is not None:
             raise InputError(f"{self._bag.folder} is being recorded; call ~/stop first")
-        folder = Path(
-            self.parameters.config.bag or f"bag_{self.get_clock().now().nanoseconds // 1_000_000}"
-        )
+        folder = Path(self.parameters.config.bag or f"bag_{time_ns() // 1_000_000}")
         self._start(folder)
         return str(folder)
 
