@@ -45,6 +45,7 @@ SHARED_SUFFIXES = (
     "/clock",
     "/footprint",
     "/ego/goal",
+    "/tracks/part",
     "/transition_event",
 )
 """Ends of the names of topics that many nodes publish."""
