@@ -11,7 +11,7 @@ from launch.actions import DeclareLaunchArgument, OpaqueFunction
 from launch_ros.actions import Node
 
 from scenario_gen.ros.launch_arguments import descriptions, parse_arguments, SUITE_ARGUMENTS
-from scenario_gen.ros.node_names import SUITE
+from scenario_gen.ros.node_names import RECORDER_END_S, SUITE
 
 SHARE = Path(get_package_share_directory("scenario_gen"))
 
@@ -30,13 +30,21 @@ def start(context):
     }
     names = [name for name in SUITE if name not in launch.excluded]
     if options.composed:  # without a name, which every node of the process would get
-        nodes = [Node(executable="suite", arguments=["--nodes", ",".join(names)], **common)]
+        nodes = [
+            Node(
+                executable="suite",
+                arguments=["--nodes", ",".join(names)],
+                sigterm_timeout=str(RECORDER_END_S),
+                **common,
+            )
+        ]
     else:  # a recorder cannot continue a bag, so it does not respawn
         nodes = [
             Node(
                 executable=name,
                 name=name,
                 respawn=options.respawn and name != "recorder",
+                sigterm_timeout=str(RECORDER_END_S if name == "recorder" else 5.0),
                 **common,
             )
             for name in names

@@ -17,3 +17,6 @@ COMPOSABLE = (*SUITE, "player")
 
 ALL = (*COMPOSABLE, "traffic")
 """Every node."""
+
+RECORDER_END_S = 35.0
+"""In which a recorder closes its bag; launch must not end it before."""

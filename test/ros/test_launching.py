@@ -87,6 +87,8 @@ def test_the_nodes_that_are_started(tmp_path):
         log=LOG, bag=str(tmp_path / "bag"), respawn="true", log_level="debug", namespace="/a"
     )
     assert [node.respawn for node in recording] == [name != "recorder" for name in SUITE]
+    patient = [node.executable for node in recording if float(node.sigterm_timeout) > 30.0]
+    assert patient == ["recorder"]  # it may still be closing its bag
     assert all(
         node.ros_arguments == ["--log-level", "debug"] and node.namespace == "/a"
         for node in recording

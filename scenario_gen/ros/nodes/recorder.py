@@ -34,8 +34,9 @@ from scenario_gen.ros.common.ros_parameters import ConfigParameters
 from scenario_gen.ros.common.services import offer_trigger
 from scenario_gen.ros.common.timers import create_steady_timer
 from scenario_gen.ros.common.topics import adapted_quality, message_class, qos
+from scenario_gen.ros.node_names import RECORDER_END_S
 
-DRAIN_S = 30.0  # at most, at the end, for messages that have arrived
+DRAIN_S = RECORDER_END_S - 5.0  # at most, at the end, for messages that have arrived
 BATCH_MESSAGES = 50  # of one topic, before others have their turn
 DOMAIN_TOPICS = r"diagnostics|clock|tf|tf_static"  # of a whole ROS domain, in any namespace
 SUITE_TOPICS = (
@@ -65,7 +66,7 @@ def _disk_errors(
 class Recorder(Node):  # type: ignore[misc]
     """Records the topics that match a parameter."""
 
-    END_S = DRAIN_S + 5.0
+    END_S = RECORDER_END_S
 
     def __init__(self, namespace: str | None = None) -> None:
         super().__init__("recorder", namespace=namespace)
