@@ -143,7 +143,7 @@ def _of_plugins(config: Any) -> Mapping[str, Parameters]:
 def _unknown(config: Any, name: str, prefix: str = "") -> str:
     """Return the message on an unknown name of a parameter."""
     near = did_you_mean(name, flatten(config))
-    return f"unknown parameter {prefix}{shown(name)}; `scenario-gen parameters` lists them{near}"
+    return f"unknown parameter {prefix}{shown(name)}; `scenario-gen --parameters` lists them{near}"
 
 
 def updated(config: Config, values: dict[str, Any], prefix: str = "") -> Config:

@@ -23,7 +23,6 @@ from scenario_gen.base.errors import (
 )
 from scenario_gen.base.removed import REMOVED
 from scenario_gen.cli import bags, corpus, generation, output, testing
-from scenario_gen.cli.options import Commands
 
 PROGRAM = "scenario-gen"
 GLOBAL_OPTIONS = ("--quiet", "-q", "--verbose", "-v", "--json")
@@ -33,7 +32,6 @@ app = typer.Typer(
     help="Turn recorded encounters of vehicles into new, valid scenarios on other roads.",
     pretty_exceptions_enable=False,
 )
-installation = Commands("This installation")
 
 
 def _print_version(requested: bool) -> None:
@@ -42,12 +40,40 @@ def _print_version(requested: bool) -> None:
         raise typer.Exit
 
 
-@app.callback()
+def _print_parameters() -> None:
+    """Print every parameter with its default, unit, range and meaning."""
+    from rich.text import Text
+
+    from scenario_gen.base.parameters import flatten
+    from scenario_gen.pipeline import PipelineConfig
+
+    keys = ("meaning", "unit", "low", "high", "choices")
+    table = {}
+    for name, (entry, default) in flatten(PipelineConfig()).items():
+        meta = entry.metadata
+        table[name] = {"default": default} | {key: meta[key] for key in keys}
+        bounds = [str(meta[end]) if meta[end] is not None else "" for end in ("low", "high")]
+        allowed = " | ".join(meta["choices"]) or ("…".join(bounds) if any(bounds) else "")
+        allowed = f"({allowed})" if allowed else ""
+        text = f" = {default!r} {meta['unit']} {allowed}\n    {meta['meaning']}"
+        output.print_(Text(name, style="bold"), Text(text), sep="", wrap=True)
+    output.emit_json(parameters=table)
+
+
+@app.callback(invoke_without_command=True)
 def options(
+    context: typer.Context,
     version: Annotated[
         bool,
         typer.Option(
             "--version", callback=_print_version, is_eager=True, help="Print the version."
+        ),
+    ] = False,
+    parameters: Annotated[
+        bool,
+        typer.Option(
+            "--parameters",
+            help="List every parameter with its default, unit, range and meaning.",
         ),
     ] = False,
     quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print errors only.")] = False,
@@ -70,27 +96,11 @@ def options(
     """Turn recorded encounters of vehicles into new, valid scenarios on other roads."""
     del version
     output.configure(quiet=quiet, verbose=verbose, as_json=as_json)
-
-
-@installation.command()
-def parameters() -> None:
-    """List every parameter with its default, unit, range and meaning."""
-    from rich.text import Text
-
-    from scenario_gen.base.parameters import flatten
-    from scenario_gen.pipeline import PipelineConfig
-
-    keys = ("meaning", "unit", "low", "high", "choices")
-    table = {}
-    for name, (entry, default) in flatten(PipelineConfig()).items():
-        meta = entry.metadata
-        table[name] = {"default": default} | {key: meta[key] for key in keys}
-        bounds = [str(meta[end]) if meta[end] is not None else "" for end in ("low", "high")]
-        allowed = " | ".join(meta["choices"]) or ("…".join(bounds) if any(bounds) else "")
-        allowed = f"({allowed})" if allowed else ""
-        text = f" = {default!r} {meta['unit']} {allowed}\n    {meta['meaning']}"
-        output.print_(Text(name, style="bold"), Text(text), sep="", wrap=True)
-    output.emit_json(parameters=table)
+    if parameters:
+        _print_parameters()
+        raise typer.Exit
+    if context.invoked_subcommand is None:
+        context.fail("Missing command.")
 
 
 for commands in (
@@ -98,7 +108,6 @@ for commands in (
     bags.commands,
     testing.commands,
     corpus.commands,
-    installation,
 ):
     app.add_typer(commands)
 

@@ -126,6 +126,12 @@ class Batch:
     hits: Annotated[
         str, typer.Option(help="Condition as for `find`: the scenarios that go to bags.")
     ] = ""
+    compact: Annotated[
+        bool,
+        typer.Option(
+            "--compact", help="At the end merge the small tables into few with large row groups."
+        ),
+    ] = False
     workers: WorkersOption = 0
     scheduler: SchedulerOption = ""
     assignments: SetOption = None
@@ -136,6 +142,7 @@ class Batch:
 def batch(options: Batch) -> None:
     """Generate scenarios from all encounters of a corpus on several roads."""
     from scenario_gen.corpus.batch import run_batch
+    from scenario_gen.corpus.compact import compact
     from scenario_gen.corpus.parts import BatchRequest
     from scenario_gen.method.config import PipelineConfig
 
@@ -147,21 +154,11 @@ def batch(options: Batch) -> None:
         result = run_batch(
             options.corpus, names, options.out, request, templates=options.templates, workers=who
         )
-    conclude(result.lines(), result.failed, options.out)
-
-
-@commands.command("compact")
-def compact_batch(
-    batch: Annotated[Path, typer.Argument(help="A batch.")],
-    workers: WorkersOption = 0,
-    scheduler: SchedulerOption = "",
-) -> None:
-    """Merge the many small tables of a batch into few with large row groups."""
-    from scenario_gen.corpus.compact import compact
-
-    with workers_of(workers, scheduler) as who:
-        before, after, failed = compact(batch, who)
-    conclude([f"{before} tables merged to {after}"], failed, batch)
+        lines, failed = result.lines(), result.failed
+        if options.compact:
+            before, after, unmerged = compact(options.out, who)
+            lines, failed = [*lines, f"{before} tables merged to {after}"], [*failed, *unmerged]
+    conclude(lines, failed, options.out)
 
 
 def shown(value: object) -> str:

@@ -22,7 +22,7 @@ SetOption = Annotated[
     list[str] | None,
     typer.Option(
         "--set",
-        help="Set a parameter, as name=value. Repeatable. `scenario-gen parameters` lists them.",
+        help="Set a parameter, as name=value. Repeatable. `scenario-gen --parameters` lists them.",
     ),
 ]
 ParametersOption = Annotated[

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""`compact`: merges the many small tables of a batch into few with large row groups."""
+"""`batch --compact`: merges the many small tables of a batch into few with large row groups."""
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass

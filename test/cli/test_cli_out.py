@@ -177,7 +177,7 @@ def test_a_signal_ends_it_with_its_code_and_leaves_nothing(made, tmp_path, numbe
     not Path("/proc/self/maps").exists(), reason="no /proc to see what a process has loaded"
 )
 def test_a_signal_while_the_libraries_load(tmp_path):
-    process = started(tmp_path, "parameters")
+    process = started(tmp_path, "--parameters")
     while process.poll() is None and "numpy" not in Path(f"/proc/{process.pid}/maps").read_text():
         time.sleep(0.001)
     process.send_signal(signal.SIGINT)
@@ -187,7 +187,7 @@ def test_a_signal_while_the_libraries_load(tmp_path):
 
 def test_a_full_standard_output_is_an_error_and_a_closed_one_is_quiet(tmp_path):
     with Path("/dev/full").open("w") as full:
-        command = [sys.executable, "-m", "scenario_gen", "parameters"]
+        command = [sys.executable, "-m", "scenario_gen", "--parameters"]
         ended = subprocess.run(
             command, stdout=full, stderr=subprocess.PIPE, text=True, check=False
         )
@@ -196,7 +196,7 @@ def test_a_full_standard_output_is_an_error_and_a_closed_one_is_quiet(tmp_path):
         and "No space left on device" in ended.stderr
         and "Traceback" not in ended.stderr
     )
-    process = started(tmp_path, "parameters")
+    process = started(tmp_path, "--parameters")
     process.stdout.close()  # it writes later: it has libraries to load
     assert "Traceback" not in process.stderr.read()
     process.wait()

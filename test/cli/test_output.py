@@ -41,7 +41,7 @@ def one_object(text):
         (("export", "{bag}", "--to", "commonroad", "--out", "written"), "scenarios", 2),
         (("reindex", "{bag}", "--out", "saved"), "bag", "saved"),
         (("report", "{bag}"), "opened", False),
-        (("parameters",), "command", "parameters"),
+        (("--parameters",), "command", "--parameters"),
     ],
 )
 def test_json_is_one_object_and_messages_go_to_standard_error(ran, made, words, key, value):
@@ -54,7 +54,7 @@ def test_json_is_one_object_and_messages_go_to_standard_error(ran, made, words, 
         words[0],
         value,
     ) and err
-    if words == ["parameters"]:
+    if words == ["--parameters"]:
         assert one_object(ran("--json", *words)[1]) == answer
 
 

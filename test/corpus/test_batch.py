@@ -24,10 +24,9 @@ from scenario_gen.bags.recordings.read import load, read_recording
 from scenario_gen.bags.recordings.write import scenario_bytes
 from scenario_gen.base.errors import InputError, RefusedError
 from scenario_gen.base.folders import sha256_of
-from scenario_gen.cli.commands import main
+from scenario_gen.cli.commands import main, run
 from scenario_gen.corpus import parts
 from scenario_gen.corpus.batch import run_batch
-from scenario_gen.corpus.compact import compact
 from scenario_gen.corpus.encounters import encounter_of, tables_of
 from scenario_gen.corpus.find import coverage_lines, export_hits, find
 from scenario_gen.corpus.parts import BatchRequest, LOST_CONFLICT
@@ -182,7 +181,9 @@ def test_a_batch_grows_by_what_it_lacks_also_when_it_was_merged(corpus, tmp_path
     assert grown(ROADS[:1], 1, 2)[1] == 2
     before = find(out).rows
     tables = len(list(out.rglob("*.parquet")))
-    assert compact(out)[2] == [] and len(list(out.rglob("*.parquet"))) < tables
+    words = ["--roads", ROADS[0], "--count", "1", "--templates", "2", "--out", str(out)]
+    assert run(["batch", str(corpus[0]), *words, "--compact"]) == 0
+    assert len(list(out.rglob("*.parquet"))) < tables
     assert find(out).rows == before
     assert grown(ROADS[:1], 1, 2)[0] == 0
     assert grown(ROADS, 1, 2)[1] == 4
