@@ -11,7 +11,7 @@ from support.reaction_scenes import answering, crossing, lane_encounter, wander
 
 from scenario_gen.method.chain import Chain
 from scenario_gen.method.sampling import SamplingConfig
-from scenario_gen.method.sampling.driver_gaps import DriverGap
+from scenario_gen.method.sampling.driver_gaps import DriverGap, Ramp
 from scenario_gen.method.segmentation import segment
 from scenario_gen.method.validity import allowed_gap
 from scenario_gen.numerics.rounding import ROUNDING_M
@@ -70,6 +70,28 @@ def test_other_drivers_accept_other_gaps_within_the_certificate():
     assert np.median(gaps) == pytest.approx(np.median(recorded), abs=0.4)
     least, most = allowed_gap(edge, other.config.limits)
     assert least - 0.15 <= gaps.min() and gaps.max() <= most + 0.05
+
+
+@pytest.mark.parametrize("sigma", [0.05, 0.1])
+def test_a_sigma_that_is_not_cut_is_what_is_drawn(sigma):
+    z = np.random.default_rng(0).standard_normal(20_000)
+    ramp = Ramp(np.linspace(0.0, 10.0, 11), np.ones(11), np.zeros(11))
+    ((headway,), (gap,)) = (Situation.of(each).reactions.edges for each in (LANE, CROSSING))
+    limits = PipelineConfig().limits
+    config = SamplingConfig(headway_sigma=sigma, gap_sigma=sigma)
+    follower = ramp.gap_of(headway, [], config, limits)
+    farther = np.log1p(follower.delay(z) / follower.headway)
+    assert farther.std() == pytest.approx(sigma, rel=0.05)
+    assert ramp.gap_of(gap, [], config, limits).delay(z).std() == pytest.approx(sigma, rel=0.05)
+
+
+def test_one_driver_keeps_one_headway():
+    (edge,) = Situation.of(LANE).reactions.edges
+    planned = chain(LANE, drivers=0.0)
+    headways = [
+        np.median(time_gaps(lane_gaps(each), edge.who, edge.whom)) for each in planned.run()
+    ]
+    assert np.std(np.log(headways)) < 0.05, "what is left is the residual of one driver"
 
 
 def test_other_drivers_keep_other_headways():
