@@ -392,7 +392,7 @@ def test_a_planner_that_calls_step_itself_does_not_stop_the_command(bag, tmp_pat
     """Both the command and the planner's call of traffic/step wait for one reply."""
     example = Path(__file__).parents[2] / "examples" / "ego_consumer.py"
     planner = f"{sys.executable} {example} --ros-args -p lock_step:=true"
-    command = [sys.executable, "-m", "scenario_gen", "drive", str(bag), "--count", "1", "--ros"]
+    command = [sys.executable, "-m", "scenario_gen", "drive", str(bag), "--count", "2", "--ros"]
     command += ["--planner", planner, "--out", str(tmp_path / "out"), "--ego", "1"]
     ended = subprocess.run(command, check=False, capture_output=True, text=True, timeout=180.0)
     assert (tmp_path / "out" / "drives.json").is_file(), ended.stdout + ended.stderr
