@@ -85,7 +85,8 @@ class VehicleType:
         scenarionet: its type in MetaDrive's and ScenarioNet's descriptions.
         waits_below: speed [m/s] below which it waits.
         speed_noise: meaningless differences of speed [m/s], on foot those of a step.
-        varies: factor of a car's standard deviations of end speeds and of places at a time.
+        varies: factor of a car's standard deviations of end speeds, of places at a time and of
+            the strength of braking.
     """
 
     length: float
@@ -225,7 +226,7 @@ _BUILT_IN = {
         scenarionet="PEDESTRIAN",
         waits_below=0.2,
         speed_noise=0.15,
-        varies=0.3,
+        varies=0.06,
     ),
     OTHER: VehicleType(length=4.8, width=1.9, height=1.5, dynamics=Dynamics()),
 }

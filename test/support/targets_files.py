@@ -122,7 +122,7 @@ def corpus_tables(folder: Path) -> None:
 def read_corpus(folder: Path) -> None:
     """Read all encounters of a corpus."""
     for table in tables_of(folder):
-        account_of(table, table)
+        account_of(table)
         for row in rows_of([table]):
             encounter_of(row, table)
 

@@ -225,4 +225,5 @@ class SamplingConfig(Parameters):
             self,
             end_speed_sigma=share * self.end_speed_sigma,
             longitudinal_sigma=share * self.longitudinal_sigma,
+            strength_sigma=share * self.strength_sigma,
         )
