@@ -9,7 +9,6 @@ chains and the point estimate.
 """
 
 from collections.abc import Iterator, Sequence
-import pickle
 import time
 
 import numpy as np
@@ -21,7 +20,6 @@ from benchmarks._segmentation_scores import changes, f1, hamming, smoother
 from benchmarks._size import sized
 from benchmarks.row import higher, lower, Row
 from scenario_gen.method.segmentation import (
-    OnlineSegmenter,
     SamplerConfig,
     segment,
     segment_series,
@@ -34,8 +32,6 @@ SEEDS_OF_A = range(9101, sized(9141, quick=9102))
 """Sequences of cell A are short, so there are more of them."""
 ROBUST_SEEDS = range(9201, sized(9206, quick=9202))
 LABELLED_SEEDS = range(1, sized(11, quick=2))
-TICKS_COUNT = sized(36_000, quick=80)
-"""Samples of an hour online."""
 RECORDINGS = sized(None, quick=1)
 MAX_SWEEPS_COUNT, MAX_TIME_RATIO = sized((5000, 20.0), quick=(20, 1.0))
 """The limits of jax-moseq's search for our F1."""
@@ -49,7 +45,7 @@ def run() -> list[Row]:
     segment_series(np.random.default_rng(0).normal(size=(50, 2)))
     cells = [row for cell in MAX_LOST for row in _cell(cell)]
     speed = [row for cell in ("A", "B", "D") for row in _against_moseq(cell)]
-    return [*cells, *_driving(), *speed, *_robust(), *_online(), *_hour(), *_labelled()]
+    return [*cells, *_driving(), *speed, *_robust(), *_labelled()]
 
 
 def _row(
@@ -191,46 +187,6 @@ def _robust() -> list[Row]:
             lower(f"B, {name}: Hamming above that without, worst seed", max(values), "", 0.01)
             for name, values in lost.items()
         ),
-    ]
-
-
-def _online() -> list[Row]:
-    """Score the online segmenter on D."""
-    scores, delays = [], []
-    for seed in SEEDS:
-        sequence = driving(seed)
-        encounter = sequence.encounter
-        assert encounter is not None
-        online = OnlineSegmenter(2, 0.1)
-        found = []
-        for t in range(len(sequence.x)):
-            found += online.push(encounter.position[:, t], encounter.speed[:, t])
-        samples = np.array([change.sample for change in found], dtype=np.int64)
-        scores.append(f1(sequence.changepoints, samples, 5))
-        for change in found:
-            nearest = np.abs(sequence.changepoints - change.sample).argmin()
-            truth = sequence.changepoints[nearest]
-            if abs(truth - change.sample) <= 5:
-                delays.append((change.confirmed - truth) * 0.1)
-    return [_f1_row("online D", scores, 0.85), _row("online D: median delay", delays, "s", 1.5)]
-
-
-def _hour() -> list[Row]:
-    """Measure the growth of the pickled state and the CPU time per sample, 8 vehicles, an hour."""
-    encounters = [driving(SEEDS[0] + seed, 6000).encounter for seed in range(4)]
-    position = np.concatenate([one.position for one in encounters if one is not None])
-    speed = np.concatenate([one.speed for one in encounters if one is not None])
-    online = OnlineSegmenter(8, 0.1)
-    sizes, started = [], time.process_time()
-    for t in range(TICKS_COUNT):
-        online.push(position[:, t % 6000], speed[:, t % 6000])
-        if t in (TICKS_COUNT // 4, TICKS_COUNT - 1):
-            sizes.append(len(pickle.dumps(online)))
-    milliseconds = 1e3 * (time.process_time() - started) / TICKS_COUNT
-    growth = (sizes[1] - sizes[0]) / 1024.0
-    return [
-        lower("online: growth of its state over an hour, 8 vehicles", growth, "KiB", 64.0),
-        lower("online: CPU per sample, 8 vehicles", milliseconds, "ms", 100.0),
     ]
 
 

@@ -38,7 +38,6 @@ CONTENTS = {
         "segmenter",
         "a point per changepoint, at samples of the tracks; frame local_enu",
     ),
-    "changepoints/live": ("segmenter", "a message per changepoint of the streams"),
     "clock": ("log_player, player, traffic", "time of what is played"),
     "diagnostics": ("bags", "/diagnostics of a run in process"),
     "ego/cmd_vel": ("you", "linear.x [m/s], angular.z [rad/s]"),

@@ -8,9 +8,7 @@ vehicle there, in the template's frame. It is all that the stages after the segm
 another segmenter may publish it too. `posterior` (sensor_msgs/PointCloud2, frame as tracks) has
 one row per vehicle and one column per sample: x, y, z [m, float32], vehicle, primitive [uint16], t
 [s since the stamp, float64], p [posterior probability of a changepoint, float64]. Both bear the
-stamp of their tracks. QoS: reliable, transient_local, depth 1. `changepoints/live` has the
-changepoints that one sample of the vehicles' streams confirmed; its stamp is that of the first
-sample since which the same vehicles have been there. QoS: reliable, transient_local, depth 1000.
+stamp of their tracks. QoS: reliable, transient_local, depth 1.
 """
 
 from collections.abc import Mapping
@@ -23,9 +21,8 @@ from msg_conventions.cdr import decode, encode
 from msg_conventions.diagnostics import Level, Status
 from msg_conventions.layouts import CLOUD
 from msg_conventions.tracks import encode_samples, FRAME
-from msg_conventions.trajectory import Trajectory
 from scenario_gen.base.errors import InputError
-from scenario_gen.types import Encounter, LiveChangepoints, Segmentation
+from scenario_gen.types import Encounter, Segmentation
 
 POSTERIOR_TYPE = "sensor_msgs/msg/PointCloud2"
 POINT = np.dtype(
@@ -45,14 +42,6 @@ DATATYPES = {"<f4": 7, "<u2": 4, "<f8": 8}  # of sensor_msgs/PointField
 def encode_changepoints(encounter: Encounter, segmentation: Segmentation) -> bytes:
     """Return the states at the changepoints as CDR bytes."""
     return encode_samples(encounter, segmentation.changepoints)
-
-
-def encode_live_changepoints(live: LiveChangepoints) -> bytes:
-    """Return newly confirmed changepoints as CDR bytes; accelerations are still unknown and 0."""
-    states = (live.position, live.heading, live.speed, np.zeros_like(live.speed))
-    return trajectory.encode(
-        Trajectory(live.start_ns, FRAME, live.vehicles, live.time_ns, *states)
-    )
 
 
 def decode_changepoints(

@@ -39,7 +39,7 @@ NEWEST = Quality(depth=1, transient_local=False)
 
 _TABLE: tuple[tuple[str, Quality, str], ...] = (
     (trajectory.TYPE, LATCHED, "tracks tracks/part changepoints fit"),
-    (trajectory.TYPE, MANY, f"changepoints/live scenarios {ego.WITNESS}"),
+    (trajectory.TYPE, MANY, f"scenarios {ego.WITNESS}"),
     (trajectory.TYPE, LIVE, "ego/trajectory"),
     (paths.TYPE, LATCHED, "vehicle_*/route vehicle_*/path ego/route"),
     (paths.TYPE, LIVE, "ego/path"),

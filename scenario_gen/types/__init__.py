@@ -96,7 +96,7 @@ from scenario_gen.types.scenario import (
     Violation,
     with_witness,
 )
-from scenario_gen.types.segmentation import LiveChangepoints, Sample, Segmentation
+from scenario_gen.types.segmentation import Segmentation
 from scenario_gen.types.signal_schedule import SignalSchedule, SignalState
 from scenario_gen.types.target import (
     join_pieces,
@@ -169,7 +169,6 @@ __all__ = [
     "Interval",
     "Lane",
     "LaneNetwork",
-    "LiveChangepoints",
     "Loss",
     "Measure",
     "Measures",
@@ -193,7 +192,6 @@ __all__ = [
     "Route",
     "Row",
     "RuleKind",
-    "Sample",
     "Scenario",
     "ScenarioSet",
     "Segmentation",

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 import math
 
 from scenario_gen.numerics import Floats, freeze, frozen, frozen_ints, Ints
-from scenario_gen.types.vehicle import Vehicle
 
 LONG_SEGMENT_S = 15.0  # an encounter without changepoints that is longer is reported
 
@@ -50,44 +49,3 @@ class Segmentation:
             "will have constant speed, too (if they are not constant: raise "
             "segmentation.significance_level, lower segmentation.speed_noise and turn_noise)"
         )
-
-
-@dataclass(frozen=True, eq=False)
-class LiveChangepoints:
-    """Changepoints that one sample confirmed, with the vehicles' states there.
-
-    Attributes:
-        start_ns: stamp of the stretch's first sample: since then the same vehicles have been there
-            at every tick.
-        vehicles: N identities and footprints.
-        time_ns: (K,) since `start_ns`, increasing.
-        position: (N, K, 2) m.
-        heading: (N, K) rad: the course over ground.
-        speed: (N, K) m/s.
-        probability: (K,) that each is a changepoint rather than noise.
-    """
-
-    start_ns: int
-    vehicles: tuple[Vehicle, ...]
-    time_ns: Ints
-    position: Floats
-    heading: Floats
-    speed: Floats
-    probability: Floats
-
-
-@dataclass(frozen=True, eq=False)
-class Sample:
-    """The vehicles that are there at one tick of the common clock.
-
-    Attributes:
-        stamp_ns: the tick, a whole multiple of the period.
-        vehicles: N >= 2, in the natural order of their ids.
-        position: (N, 2) metres east and north of the streams' origin.
-        speed: (N,) m/s.
-    """
-
-    stamp_ns: int
-    vehicles: tuple[Vehicle, ...]
-    position: Floats
-    speed: Floats

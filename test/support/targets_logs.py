@@ -4,7 +4,6 @@
 """The readers of logs as targets: tables in text and Parquet, basic safety messages, bags in MCAP and SQLite."""
 
 from collections.abc import Callable, Iterator, Sequence
-import contextlib
 from dataclasses import replace
 from functools import cache, partial
 import gzip
@@ -23,7 +22,6 @@ from msg_conventions.tracks import encode_tracks
 from msg_conventions.trajectory import TYPE as TRACKS
 from scenario_gen.bags.storage.definitions import TRACKED, type_store
 from scenario_gen.bags.vehicles import FIX, ODOMETRY, TWIST
-from scenario_gen.base.errors import ScenarioGenError
 from scenario_gen.logs import encounters_of, LogConfig, read_log, Streams
 from scenario_gen.logs.bag import log_of, READABLE_TYPES, Topic
 from scenario_gen.logs.synthetic import bundled
@@ -278,17 +276,12 @@ def put(data: bytes, _folder: Path) -> None:
     """Feed records (vehicle, kind, stamp, two values) to streams as they come, and read what they amount to."""
     streams = Streams(SHORT)
     whole = len(data) // struct.calcsize(RECORD) * struct.calcsize(RECORD)
-    for number, (vehicle, kind, stamp, a, b) in enumerate(
-        struct.iter_unpack(RECORD, data[:whole])
-    ):
+    for vehicle, kind, stamp, a, b in struct.iter_unpack(RECORD, data[:whole]):
         streams.breaks(stamp)
         if kind % 2:
             streams.put_speed(str(vehicle % 5), stamp, a)
         else:
             streams.put_fix(str(vehicle % 5), stamp, a, b)
-        if number % 16 == 0:
-            with contextlib.suppress(ScenarioGenError):  # said, and survived
-                streams.samples()
     log = streams.flush("live")
     if log is not None:
         encounters_of(log, streams.config)

@@ -9,8 +9,6 @@ from scenario_gen.method.segmentation.estimator import (
     StickyHDPHMM,
 )
 from scenario_gen.method.segmentation.hdp_hmm.config import SamplerConfig
-from scenario_gen.method.segmentation.live import LiveSegmenter
-from scenario_gen.method.segmentation.online import OnlineConfig, OnlineSegmenter
 from scenario_gen.method.segmentation.posterior import Posterior
 from scenario_gen.method.segmentation.segmenter import (
     DEFAULT,
@@ -23,9 +21,6 @@ from scenario_gen.method.segmentation.series import segment_series
 __all__ = [
     "CONVERGED_R_HAT_RATIO",
     "DEFAULT",
-    "LiveSegmenter",
-    "OnlineConfig",
-    "OnlineSegmenter",
     "Posterior",
     "SamplerConfig",
     "SegmentationConfig",

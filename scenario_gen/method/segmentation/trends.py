@@ -176,11 +176,8 @@ class Trends:
         knot_misfits(self.signals, self.weights, rising, moved, places, out)
         return out
 
-    def gain(self, points: list[int], i: int) -> float:
-        """Return the increase of the misfit without changepoint i."""
-        return self._gain(points, i, {})
-
     def _gain(self, points: list[int], i: int, memo: Memo) -> float:
+        """Return the increase of the misfit without changepoint i."""
         knots, j = self._neighbours(points, i)
         return self._best_knot(knots[:j] + knots[j + 1 :], j, np.array([knots[j]]), memo)[0]
 

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The vehicles' streams in a node's namespace: subscribed, sampled, buffered, and ended."""
+"""The vehicles' streams in a node's namespace: subscribed, buffered, and ended."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -17,7 +17,7 @@ from scenario_gen.logs import LogConfig, RawLog, Streams
 from scenario_gen.ros.common.timers import create_steady_timer
 from scenario_gen.ros.common.topics import adapted_quality
 from scenario_gen.situation import MAX_VEHICLES
-from scenario_gen.types import Sample, token
+from scenario_gen.types import token
 
 TYPES = {"fix": FIX_TYPE, "speed": TWIST_TYPE}
 
@@ -27,13 +27,6 @@ class LiveConfig(Parameters):
     """Parameters of live streams."""
 
     listen: bool = parameter(True, "listen to vehicle_<id>/fix and vehicle_<id>/speed, too")
-    late: float = parameter(
-        0.5,
-        "longest delay of a message behind the newest one",
-        unit="s",
-        low=0.0,
-        high=10.0,
-    )
     silence: float = parameter(
         2.0, "real time without messages after which the streams have ended", unit="s", low=0.1
     )
@@ -42,8 +35,8 @@ class LiveConfig(Parameters):
 class LiveStreams:
     """Subscribes to the vehicles' streams for a node and buffers them.
 
-    `sampled` gets every sample on the common clock. `ended` gets the buffered log with its
-    configuration: after silence, after `log.max_duration`, or when the clock was set.
+    `ended` gets the buffered log with its configuration: after silence, after `log.max_duration`,
+    or when the clock was set.
     """
 
     def __init__(
@@ -51,16 +44,14 @@ class LiveStreams:
         node: Any,
         config: LiveConfig,
         log: LogConfig,
-        sampled: Callable[[Sample], None],
         ended: Callable[[RawLog, LogConfig], None],
     ) -> None:
         """Check for streams periodically, in real time, because a simulated clock may stop."""
         self._node = node
         self._config = config
         self._log = log
-        self._sampled = sampled
         self._ended = ended
-        self._streams = Streams(log, config.late)
+        self._streams = Streams(log)
         self._last_message = monotonic()
         self._topics: dict[str, tuple[str, str]] = {}  # full name -> vehicle, kind
         self._refused: set[str] = set()  # topics with an error on /diagnostics
@@ -125,7 +116,7 @@ class LiveStreams:
         """Add a message to its stream; a message without a stamp gets the node's time.
 
         Raises:
-            InputError: it is damaged, or a clock stops or runs backwards.
+            InputError: it is damaged.
         """
         vehicle, kind = self._topics[topic]
         decode = decode_fix if kind == "fix" else decode_speed
@@ -136,8 +127,6 @@ class LiveStreams:
             self.end()
         put = self._streams.put_fix if kind == "fix" else self._streams.put_speed
         put(vehicle, stamp_ns, *values)
-        for sample in self._streams.samples():
-            self._sampled(sample)
 
     def end(self) -> bool:
         """Hand the buffered log over; return whether there was one."""

@@ -5,10 +5,9 @@
 
 `~/segment` repeats the segmentation.
 
-While `vehicle_<id>/fix` and `vehicle_<id>/speed` arrive, confirmed changepoints are published on
-`changepoints/live`. At the end of the streams, or on `~/segment`, the buffered messages are read
-like a log and published as `tracks`, for this node and all others; the part that a stage requests
-on `tracks/part` replaces them.
+The messages on `vehicle_<id>/fix` and `vehicle_<id>/speed` are buffered. At the end of the
+streams, or on `~/segment`, they are read like a log and published as `tracks`, for this node and
+all others; the part that a stage requests on `tracks/part` replaces them.
 """
 
 from collections.abc import Callable
@@ -16,7 +15,6 @@ from dataclasses import dataclass, field
 
 from msg_conventions.changepoints import (
     encode_changepoints,
-    encode_live_changepoints,
     encode_posterior,
     segmentation_status,
 )
@@ -26,32 +24,26 @@ from scenario_gen.base.cancelling import stop_if_cancelled
 from scenario_gen.base.errors import InputError
 from scenario_gen.base.parameters import parameter, Parameters
 from scenario_gen.logs import encounters_of, LogConfig, RawLog
-from scenario_gen.method.segmentation import (
-    LiveSegmenter,
-    OnlineConfig,
-    segment,
-    SegmentationConfig,
-)
+from scenario_gen.method.segmentation import segment, SegmentationConfig
 from scenario_gen.ros.common.live_streams import LiveConfig, LiveStreams
 from scenario_gen.ros.common.recording_part import send_part
 from scenario_gen.ros.common.recording_part import TOPIC as PART
 from scenario_gen.ros.common.services import offer_trigger
 from scenario_gen.ros.common.stage_node import StageNode
-from scenario_gen.types import Encounter, Sample
+from scenario_gen.types import Encounter
 
 
 @dataclass(frozen=True)
 class Config(Parameters):
     """The segmenter's parameters.
 
-    `live`, `log` and `online` concern streams and apply from the next activation.
+    `live` and `log` concern streams and apply from the next activation.
     """
 
     segmentation: SegmentationConfig = field(default_factory=SegmentationConfig)
     seed: int = parameter(0, "seed of the sampler", low=0)
     live: LiveConfig = field(default_factory=LiveConfig)
     log: LogConfig = field(default_factory=LogConfig)
-    online: OnlineConfig = field(default_factory=OnlineConfig)
 
 
 class Segmenter(StageNode):
@@ -59,7 +51,7 @@ class Segmenter(StageNode):
 
     INPUTS = ("tracks", PART)
     STAGES = ("method.segmentation",)
-    OUTPUTS = ("changepoints", "posterior", "changepoints/live")
+    OUTPUTS = ("changepoints", "posterior")
 
     def __init__(self, namespace: str | None = None) -> None:
         super().__init__("segmenter", Config(), namespace)
@@ -73,8 +65,7 @@ class Segmenter(StageNode):
         """Start to look for streams."""
         config = self.config
         if config.live.listen:
-            self._online = LiveSegmenter(round(config.log.period * 1e9), config.online)
-            self._live = LiveStreams(self, config.live, config.log, self._sampled, self._ended)
+            self._live = LiveStreams(self, config.live, config.log, self._ended)
 
     def stopped(self) -> None:
         """Stop looking for streams."""
@@ -102,11 +93,6 @@ class Segmenter(StageNode):
         status = segmentation_status(segmentation, node, encounter.duration)
         self.get_logger().info(status.message)
         self.diagnostics.report(status, stamp_ns=encounter.start_ns)
-
-    def _sampled(self, sample: Sample) -> None:
-        changepoints = self._online.push(sample)
-        if changepoints is not None:
-            self.outputs.send("changepoints/live", encode_live_changepoints(changepoints))
 
     def _ended(self, log: RawLog, config: LogConfig) -> None:
         """Read the buffered log as encounters, off the executor's thread."""
