@@ -24,7 +24,7 @@ from typing import Protocol
 import numpy as np
 from scipy.spatial import distance
 
-from scenario_gen.method.evaluation.encounter_features import (
+from scenario_gen.method.evaluation.law import (
     EncounterFeatures,
     features_of,
     scenario_features,

@@ -16,12 +16,12 @@ from typing import Any
 import numpy as np
 
 from benchmarks._coverage_members import KINDS, Members
-from scenario_gen.method.evaluation.encounter_features import (
+from scenario_gen.method.evaluation.criticality import footprint_distance
+from scenario_gen.method.evaluation.law import (
     EncounterFeatures,
     FEATURES,
     JOINT_FEATURES,
 )
-from scenario_gen.method.evaluation.geometry import footprint_distance
 from scenario_gen.numerics import Bools, Floats
 from scenario_gen.situation import EncounterKind
 from scenario_gen.types import Encounter, Interval, Scenario

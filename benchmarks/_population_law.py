@@ -22,13 +22,13 @@ from benchmarks._coverage_members import KINDS
 from benchmarks._sampling_cases import DATA
 from scenario_gen.base.errors import InputError
 from scenario_gen.logs import LogConfig, read_log
-from scenario_gen.method.evaluation.encounter_features import (
+from scenario_gen.method.evaluation.law import (
     EncounterFeatures,
     FEATURES,
     features_of,
     JOINT_FEATURES,
+    SHIPPED,
 )
-from scenario_gen.method.evaluation.law import SHIPPED
 
 WINDOWS = "trajectories/ngsim_commonroad/USA_*_all_vehicles.csv"
 SOURCE = (

@@ -31,11 +31,9 @@ from scenario_gen.situation import (
     Wait,
 )
 from scenario_gen.types.encounter import Encounter
-from scenario_gen.types.fit import Fit
+from scenario_gen.types.fit import Fit, Route, Segmentation
 from scenario_gen.types.road import Road
-from scenario_gen.types.route import Route
 from scenario_gen.types.scenario import Scenario, ScenarioSet, Verdict
-from scenario_gen.types.segmentation import Segmentation
 
 DATA = Path(
     os.environ.get("SCENARIO_GEN_DATA", Path(__file__).resolve().parents[2] / "shared" / "data")

@@ -34,7 +34,7 @@ from scenario_gen.closed_loop.set_selection import Selection
 from scenario_gen.closed_loop.simulation import ClosedLoop, Observation, Planner, State
 from scenario_gen.closed_loop.trials import Outcome, rates, run_trials
 from scenario_gen.closed_loop.verdict import judge
-from scenario_gen.method.evaluation.bootstrap import wilson
+from scenario_gen.method.evaluation.distributions import wilson
 from scenario_gen.numerics.arrays import Floats
 from scenario_gen.types.generation import GenerationResult
 from scenario_gen.types.road import Road

@@ -25,10 +25,9 @@ from scenario_gen.method.validity import Checker
 from scenario_gen.numerics.arrays import Floats
 from scenario_gen.situation import find_conflicts, Situation
 from scenario_gen.types import Encounter, Motion, Vehicle
+from scenario_gen.types.fit import Route, Segmentation
 from scenario_gen.types.road import Road
-from scenario_gen.types.route import Route
 from scenario_gen.types.scenario import BoundaryStates
-from scenario_gen.types.segmentation import Segmentation
 
 COUNT = sized(200, quick=4)
 """Scenarios per recorded encounter and road."""

@@ -61,7 +61,7 @@ from scenario_gen.types.fit import Fit as Fit
 from scenario_gen.types.generation import GenerationResult as GenerationResult
 from scenario_gen.types.request import Request as Request
 from scenario_gen.types.road import Road as Road
-from scenario_gen.types.route import Route as Route
+from scenario_gen.types.fit import Route as Route
 from scenario_gen.types.scenario import (
     Cause as Cause,
     Scenario as Scenario,
@@ -69,7 +69,7 @@ from scenario_gen.types.scenario import (
     Verdict as Verdict,
     Violation as Violation,
 )
-from scenario_gen.types.segmentation import Segmentation as Segmentation
+from scenario_gen.types.fit import Segmentation as Segmentation
 from scenario_gen.types.vehicle import Trailer as Trailer
 from scenario_gen.types.vehicle import Vehicle as Vehicle
 

@@ -133,7 +133,7 @@ class Generate:
 
 def _config(options: Generate) -> "PipelineConfig":
     from scenario_gen.base.parameters import updated
-    from scenario_gen.logs.doubts import ALLOWED
+    from scenario_gen.logs.quality import ALLOWED
     from scenario_gen.roads import read_obstacles
     from scenario_gen.types import join_pieces
 

@@ -35,7 +35,7 @@ from scenario_gen.logs import (
     space_time_gap,
     UnknownFormatError,
 )
-from scenario_gen.logs.doubts import DoubtError
+from scenario_gen.logs.quality import DoubtError
 from scenario_gen.logs.tables import SPMD_EPOCH_NS
 from scenario_gen.method.evaluation import criticality, EvaluationConfig
 from scenario_gen.situation import Situation

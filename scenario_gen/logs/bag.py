@@ -44,9 +44,9 @@ from scenario_gen.logs.bag_names import (
     without_duplicates,
 )
 from scenario_gen.logs.config import listed, LogConfig
-from scenario_gen.logs.doubts import Doubt
 from scenario_gen.logs.file_names import file_names
 from scenario_gen.logs.growing import Span
+from scenario_gen.logs.quality import Doubt
 from scenario_gen.logs.raw import check_size, check_vehicles, Observations, RawLog, Rows, Segment
 from scenario_gen.types import Encounter
 

@@ -17,8 +17,8 @@ from scenario_gen.bags.storage.config import BagConfig
 from scenario_gen.bags.vehicles import ODOMETRY, POSE
 from scenario_gen.base.errors import InputError
 from scenario_gen.logs.config import LogConfig
-from scenario_gen.logs.doubts import Doubt, Quantity
 from scenario_gen.logs.growing import Span
+from scenario_gen.logs.quality import Doubt, Quantity
 from scenario_gen.logs.raw import Rows
 
 _BODY_FRAMES = ("base_link", "base_footprint", "base", "body", "chassis")

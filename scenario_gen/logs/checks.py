@@ -13,8 +13,8 @@ import numpy as np
 from scenario_gen.logs.cleaning import Drops
 from scenario_gen.logs.columns import with_columns
 from scenario_gen.logs.config import LogConfig
-from scenario_gen.logs.doubts import Doubt, Quantity
 from scenario_gen.logs.encounters import Piece
+from scenario_gen.logs.quality import Doubt, Quantity
 from scenario_gen.logs.raw import RawLog
 from scenario_gen.numerics import Bools, Floats, runs
 from scenario_gen.numerics.plane import ahead_and_left

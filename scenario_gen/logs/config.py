@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 from scenario_gen.base.errors import did_you_mean, InputError
 from scenario_gen.base.parameters import parameter, Parameters
-from scenario_gen.logs.doubts import ALLOWED
+from scenario_gen.logs.quality import ALLOWED
 
 _POINTS = {"centre": 0.0, "front": -0.5, "rear": 0.5, "rear_axle": 0.3}
 """Recorded points of a vehicle, and how many lengths its centre is ahead of them.

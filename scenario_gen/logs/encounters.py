@@ -11,7 +11,7 @@ import numpy as np
 
 from scenario_gen.logs.cleaning import CLEANING, select
 from scenario_gen.logs.config import LogConfig, points_ahead
-from scenario_gen.logs.motion_along_path import UnreconciledError
+from scenario_gen.logs.path import UnreconciledError
 from scenario_gen.logs.quality import VehicleQuality
 from scenario_gen.logs.raw import Observations
 from scenario_gen.logs.smoothing import (

@@ -14,7 +14,7 @@ from scenario_gen.base.copies import renamed
 from scenario_gen.base.errors import InputError
 from scenario_gen.logs.column import Column
 from scenario_gen.logs.config import LogConfig
-from scenario_gen.logs.doubts import Doubt
+from scenario_gen.logs.quality import Doubt
 from scenario_gen.logs.signals import RawSignal
 from scenario_gen.numerics import Floats, Ints
 from scenario_gen.types import Encounter, Trailer

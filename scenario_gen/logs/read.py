@@ -21,7 +21,6 @@ from scenario_gen.logs.checks import copies_in, doubts_of_pieces, doubts_of_rows
 from scenario_gen.logs.cleaning import clean, Drops
 from scenario_gen.logs.clock import check_unit, retimed
 from scenario_gen.logs.config import chosen_vehicles, LogConfig
-from scenario_gen.logs.doubts import check_doubts, Doubt
 from scenario_gen.logs.encounters import Piece, pieces_of, plausible
 from scenario_gen.logs.extract import cut_encounter, encounter_quality, recorded_encounters
 from scenario_gen.logs.files import logs_in, read_raw
@@ -34,7 +33,7 @@ from scenario_gen.logs.no_encounter import (
     NoEncounterError,
     unit_advice,
 )
-from scenario_gen.logs.quality import Quality, VehicleQuality
+from scenario_gen.logs.quality import check_doubts, Doubt, Quality, VehicleQuality
 from scenario_gen.logs.raw import natural, Observations, RawLog
 from scenario_gen.logs.signals import moved_signals, with_lights
 from scenario_gen.logs.trailers import coupled

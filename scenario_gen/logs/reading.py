@@ -11,8 +11,8 @@ import numpy as np
 from scenario_gen.logs.column import Column
 from scenario_gen.logs.columns import with_columns
 from scenario_gen.logs.config import LogConfig
-from scenario_gen.logs.doubts import Doubt, Quantity
 from scenario_gen.logs.legs import Legs, legs_of
+from scenario_gen.logs.quality import Doubt, Quantity
 from scenario_gen.logs.raw import Observations, RawLog
 from scenario_gen.numerics import Floats, wrap_angle
 

@@ -20,14 +20,16 @@ from numpy.lib.stride_tricks import sliding_window_view
 from scipy.ndimage import median_filter
 
 from scenario_gen.logs.config import LogConfig
-from scenario_gen.logs.motion_along_path import Motion, SMOOTHING, UnreconciledError
 from scenario_gen.logs.path import (
     fit_path,
     HEADINGS,
     Headings,
     headings_of,
+    Motion,
     Path,
+    SMOOTHING,
     straight_path,
+    UnreconciledError,
 )
 from scenario_gen.logs.raw import Observations
 from scenario_gen.numerics import Bools, Floats, Ints, running_sum, runs, wrap_angle

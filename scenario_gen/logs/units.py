@@ -13,8 +13,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from scenario_gen.logs.config import LogConfig
-from scenario_gen.logs.doubts import Doubt, Quantity
 from scenario_gen.logs.legs import Legs, legs_of, median_period
+from scenario_gen.logs.quality import Doubt, Quantity
 from scenario_gen.logs.raw import Observations, RawLog
 from scenario_gen.logs.reading import counts_steps, interpret_headings, Reading
 from scenario_gen.numerics import Floats, Ints

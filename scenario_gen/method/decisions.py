@@ -30,8 +30,7 @@ from scipy import special
 
 from scenario_gen.base.errors import RefusedError
 from scenario_gen.method.drives import delayed_drive, Drive, free_drive, recorded_drive
-from scenario_gen.method.evaluation.encounter_features import DISTANCE
-from scenario_gen.method.evaluation.law import Law
+from scenario_gen.method.evaluation.law import DISTANCE, Law
 from scenario_gen.method.interacting_pair import InteractingPair, pair_of
 from scenario_gen.method.sampling import SamplingConfig
 from scenario_gen.numerics import Floats

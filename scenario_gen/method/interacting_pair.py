@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from scenario_gen.method.evaluation.encounter_features import features_of
+from scenario_gen.method.evaluation.law import features_of
 from scenario_gen.numerics import Floats
 from scenario_gen.situation import Conflict, EncounterKind, Situation, Track
 from scenario_gen.types import Encounter, Reaction

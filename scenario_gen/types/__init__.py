@@ -33,6 +33,8 @@ from scenario_gen.types.evaluation import (
     Evaluation,
     formatted,
     Interval,
+    Measure,
+    Measures,
     Metric,
     RECORDING,
     REPLAY,
@@ -48,7 +50,14 @@ from scenario_gen.types.facts import (
     PassingOrder,
     YIELD,
 )
-from scenario_gen.types.fit import Fit, FittedVehicle, Loss
+from scenario_gen.types.fit import (
+    Fit,
+    FittedVehicle,
+    Loss,
+    Route,
+    routes_in_words,
+    Segmentation,
+)
 from scenario_gen.types.generation import ERRORS, GenerationResult
 from scenario_gen.types.lanes import (
     CARS,
@@ -62,7 +71,6 @@ from scenario_gen.types.lanes import (
     RuleKind,
     TrafficRule,
 )
-from scenario_gen.types.measures import Measure, Measures
 from scenario_gen.types.motion import (
     ALWAYS,
     always,
@@ -82,7 +90,6 @@ from scenario_gen.types.reaction import (
 )
 from scenario_gen.types.request import ENDS, ORDERS, read_states, Request, State
 from scenario_gen.types.road import MAX_CELL_M, MAX_ORIGIN_M, MIN_CELL_M, Road
-from scenario_gen.types.route import Route, routes_in_words
 from scenario_gen.types.scenario import (
     BoundaryStates,
     Cause,
@@ -96,7 +103,6 @@ from scenario_gen.types.scenario import (
     Violation,
     with_witness,
 )
-from scenario_gen.types.segmentation import Segmentation
 from scenario_gen.types.signal_schedule import SignalSchedule, SignalState
 from scenario_gen.types.target import (
     join_pieces,

@@ -1,10 +1,10 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Results of the evaluation: rows of metrics with intervals, as JSON and as Markdown."""
+"""Results of the evaluation: metrics with intervals, and the measures of one scenario."""
 
 from collections import Counter
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 import json
 import math
@@ -12,9 +12,11 @@ import re
 from typing import Literal
 
 from scenario_gen.base.errors import printable
+from scenario_gen.types.facts import Facts
 from scenario_gen.types.html import html_list, html_table
 from scenario_gen.types.notes import Note
-from scenario_gen.types.scenario import Cause, ScenarioSet, Verdict
+from scenario_gen.types.scenario import Cause, Scenario, ScenarioSet, Verdict
+from scenario_gen.types.target import Pair
 
 RECORDING = "recording"
 """The recorded encounter itself."""
@@ -241,3 +243,34 @@ def formatted(
 
 def _number(value: float) -> float | None:
     return float(f"{value:.6g}") if math.isfinite(value) else None
+
+
+Measure = Callable[
+    [Scenario, str, Pair | None], float
+]  # a figure of a scenario; NaN if it has none
+
+
+@dataclass(frozen=True)
+class Measures:
+    """What measures a scenario of all vehicles.
+
+    Attributes:
+        figure: returns one figure by its name, of a pair or of the most critical one.
+        rarity: returns how unusual a scenario is among recorded encounters of its kind, up to 1 it
+            is usual; None: nobody asks.
+    """
+
+    figure: Measure
+    rarity: Callable[[Scenario], float] | None = None
+
+    def facts(self, scenario: Scenario) -> Facts:
+        """Return how near the vehicles of a scenario come, and how rare that is."""
+        return Facts(
+            closest_approach_m=_known(self.figure(scenario, "gap", None)),
+            pet_s=_known(self.figure(scenario, "pet", None)),
+            rarity=None if self.rarity is None else _known(self.rarity(scenario)),
+        )
+
+
+def _known(value: float) -> float | None:
+    return value if math.isfinite(value) else None

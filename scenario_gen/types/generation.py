@@ -18,13 +18,11 @@ from scenario_gen.base.folders import scratch
 from scenario_gen.types.coverage import Coverage
 from scenario_gen.types.encounter import Encounter
 from scenario_gen.types.evaluation import Evaluation, REPLAY, WITH
-from scenario_gen.types.fit import Fit
+from scenario_gen.types.fit import Fit, Route, Segmentation
 from scenario_gen.types.html import html_list
 from scenario_gen.types.notes import Note, NoteKind
 from scenario_gen.types.road import Road
-from scenario_gen.types.route import Route
 from scenario_gen.types.scenario import causes_in_words, dataframe, Scenario, ScenarioSet
-from scenario_gen.types.segmentation import Segmentation
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

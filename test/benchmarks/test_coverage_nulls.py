@@ -25,8 +25,8 @@ from benchmarks._coverage_nulls import (
     stands_for,
 )
 from benchmarks.coverage import PAIRS
-from scenario_gen.method.evaluation.encounter_features import EncounterFeatures, FEATURES
-from scenario_gen.method.evaluation.geometry import footprint_distance
+from scenario_gen.method.evaluation.criticality import footprint_distance
+from scenario_gen.method.evaluation.law import EncounterFeatures, FEATURES
 
 WIDTH = len(FEATURES)
 

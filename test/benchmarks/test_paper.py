@@ -23,7 +23,7 @@ from scenario_gen.logs import read_log
 from scenario_gen.logs.synthetic import bundled
 from scenario_gen.method.segmentation import segment, SegmentationConfig
 from scenario_gen.types import WITH
-from scenario_gen.types.segmentation import Segmentation
+from scenario_gen.types.fit import Segmentation
 
 
 @pytest.fixture(scope="module")

@@ -21,7 +21,7 @@ from scenario_gen.bags.vehicles import FIX, ODOMETRY, POSE, TRANSFORMS, TWIST
 from scenario_gen.base.errors import InputError
 from scenario_gen.logs import LogConfig, read_log
 import scenario_gen.logs.bag
-from scenario_gen.logs.doubts import DoubtError
+from scenario_gen.logs.quality import DoubtError
 from scenario_gen.types import Encounter, Vehicle
 
 STORES = type_store()

@@ -13,8 +13,7 @@ from scipy.optimize import minimize
 
 from scenario_gen.logs import LogConfig
 from scenario_gen.logs.encounters import pieces_of
-from scenario_gen.logs.motion_along_path import Motion
-from scenario_gen.logs.path import fit_path, headings_of, straight_path
+from scenario_gen.logs.path import fit_path, headings_of, Motion, straight_path
 from scenario_gen.logs.raw import Observations
 from scenario_gen.logs.smoothing import smooth_piece, standing, white_equivalent
 

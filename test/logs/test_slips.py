@@ -14,7 +14,7 @@ from support.log_builders import crossing, geographic, save
 
 from scenario_gen.base.errors import InputError
 from scenario_gen.logs import LogConfig, read_log
-from scenario_gen.logs.doubts import DoubtError
+from scenario_gen.logs.quality import DoubtError
 
 FOOT = 0.3048
 LONG = 9007199254740992

@@ -43,10 +43,9 @@ from scenario_gen.base.errors import InputError
 from scenario_gen.numerics.arrays import canonical_angle
 from scenario_gen.numerics.plane import arc_lengths
 from scenario_gen.types import Note, NoteKind, token, tokens, Vehicle, with_witness
-from scenario_gen.types.fit import Fit, FittedVehicle
+from scenario_gen.types.fit import Fit, FittedVehicle, Route
 from scenario_gen.types.lanes import DrawnFor, Lane, LaneNetwork, RuleKind, TrafficRule
 from scenario_gen.types.road import Road
-from scenario_gen.types.route import Route
 from scenario_gen.types.scenario import BoundaryStates, Cause, EgoSlot, ScenarioSet
 
 

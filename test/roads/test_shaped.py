@@ -16,7 +16,7 @@ from scenario_gen.roads.vector.ground import on_lane
 from scenario_gen.roads.ways import draw_ring_route
 from scenario_gen.situation import Situation
 from scenario_gen.types import Encounter, RuleKind, Vehicle
-from scenario_gen.types.segmentation import Segmentation
+from scenario_gen.types.fit import Segmentation
 
 T = 140
 

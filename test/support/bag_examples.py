@@ -14,12 +14,10 @@ from scenario_gen.bags.storage.bag import BagMessage, read_messages
 from scenario_gen.bags.storage.metadata import qos_yaml
 from scenario_gen.bags.storage.writer import atomic_bag
 from scenario_gen.types import Encounter, Note, NoteKind, Vehicle
-from scenario_gen.types.fit import Fit, FittedVehicle
+from scenario_gen.types.fit import Fit, FittedVehicle, Route, Segmentation
 from scenario_gen.types.generation import GenerationResult
 from scenario_gen.types.road import Road
-from scenario_gen.types.route import Route
 from scenario_gen.types.scenario import BoundaryStates, Cause, Scenario, ScenarioSet
-from scenario_gen.types.segmentation import Segmentation
 
 
 def copied(bag: Path, target: Path, change: Callable[[BagMessage], bytes | None]) -> Path:

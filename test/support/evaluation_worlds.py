@@ -12,12 +12,10 @@ import numpy as np
 from scenario_gen.method.evaluation import evaluate_scenarios, EvaluationConfig
 from scenario_gen.types import Encounter, Note, NoteKind, Vehicle, with_witness
 from scenario_gen.types.evaluation import CheckCounts
-from scenario_gen.types.fit import Fit, FittedVehicle
+from scenario_gen.types.fit import Fit, FittedVehicle, Route, Segmentation
 from scenario_gen.types.generation import GenerationResult
 from scenario_gen.types.road import Road
-from scenario_gen.types.route import Route
 from scenario_gen.types.scenario import BoundaryStates, Cause, EgoSlot, Scenario, ScenarioSet
-from scenario_gen.types.segmentation import Segmentation
 
 CARS = (Vehicle("west", 4.0, 2.0), Vehicle("south", 4.0, 2.0))
 

@@ -13,8 +13,8 @@ from scenario_gen.method.sampling import Callbacks, SamplingConfig
 from scenario_gen.method.validity import Limits
 from scenario_gen.situation import Situation
 from scenario_gen.types.encounter import Encounter
+from scenario_gen.types.fit import Segmentation
 from scenario_gen.types.road import Road
-from scenario_gen.types.segmentation import Segmentation
 
 
 @dataclass(frozen=True, eq=False)

@@ -8,9 +8,8 @@ import numpy as np
 
 from scenario_gen.numerics.plane import arc_lengths
 from scenario_gen.types import Encounter, Vehicle
-from scenario_gen.types.route import Route
+from scenario_gen.types.fit import Route, Segmentation
 from scenario_gen.types.scenario import Scenario
-from scenario_gen.types.segmentation import Segmentation
 
 NASTY_HEADINGS = (
     0.0,

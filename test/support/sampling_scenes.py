@@ -11,10 +11,9 @@ from benchmarks._paper_speed_profile import SpeedProfile
 from scenario_gen.method.sampling import Plan
 from scenario_gen.situation import Situation, Wait
 from scenario_gen.types import Encounter, Vehicle
+from scenario_gen.types.fit import Route, Segmentation
 from scenario_gen.types.road import Road
-from scenario_gen.types.route import Route
 from scenario_gen.types.scenario import BoundaryStates
-from scenario_gen.types.segmentation import Segmentation
 
 TIME = np.arange(201) * 0.1
 CHANGES = (60, 90, 140)

@@ -3,25 +3,25 @@
 
 """DTW features (paper V-B), realism and criticality."""
 
-from scenario_gen.method.evaluation.bootstrap import (
+from scenario_gen.method.evaluation.config import EvaluationConfig
+from scenario_gen.method.evaluation.coverage import coverage_of
+from scenario_gen.method.evaluation.criticality import (
+    criticality,
+    distance_and_ttc,
+    footprint_distance,
+    time_to_collision,
+)
+from scenario_gen.method.evaluation.distributions import (
     Bootstrap,
     clustered_wilson,
     paired_difference,
     wilson,
 )
-from scenario_gen.method.evaluation.config import EvaluationConfig
-from scenario_gen.method.evaluation.coverage import coverage_of
-from scenario_gen.method.evaluation.criticality import criticality
 from scenario_gen.method.evaluation.dtw import dtw_distance, feature_matrix, mean_feature
 from scenario_gen.method.evaluation.evaluate import (
     evaluate,
     evaluate_scenarios,
     MEASURED_SCENARIOS,
-)
-from scenario_gen.method.evaluation.geometry import (
-    distance_and_ttc,
-    footprint_distance,
-    time_to_collision,
 )
 from scenario_gen.method.evaluation.law import measures_in
 from scenario_gen.method.evaluation.measures import MEASURES
@@ -33,8 +33,7 @@ from scenario_gen.method.evaluation.non_reactive import (
     STANDSTILL_MPS,
     wanted_speeds,
 )
-from scenario_gen.method.evaluation.replay import replay
-from scenario_gen.method.evaluation.samples import common_motion, Samples, Template
+from scenario_gen.method.evaluation.samples import common_motion, replay, Samples, Template
 from scenario_gen.method.evaluation.similarity import (
     mean_correlation,
     mean_error,

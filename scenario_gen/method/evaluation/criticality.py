@@ -1,17 +1,101 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Criticality of a motion: distances, time to collision, encroachment, passing order."""
+"""How near vehicles come to each other: distances, time to collision, encroachment, order."""
 
 from dataclasses import dataclass
 from itertools import combinations
 import math
+from typing import NamedTuple
 
 import numpy as np
 
-from scenario_gen.method.evaluation.geometry import least_distance_and_ttc
+from scenario_gen.numerics import Floats
+from scenario_gen.numerics.boxes import Box, box_distance, time_to_touch
+from scenario_gen.numerics.kernels import B, F, F1, F2, kernel, named, OUT1
+from scenario_gen.numerics.plane import unit
 from scenario_gen.situation import encroachment, find_conflicts
 from scenario_gen.types import Motion
+
+
+def footprint_distance(motion: Motion, a: int, b: int) -> Floats:
+    """Return the distance (T,) [m] between footprints a and b; 0 where they overlap."""
+    return distance_and_ttc(motion, a, b)[0]
+
+
+def time_to_collision(motion: Motion, a: int, b: int) -> Floats:
+    """Return the time (T,) [s] until footprints a and b touch at constant velocity, or inf.
+
+    Source: Hayward 1972.
+    """
+    return distance_and_ttc(motion, a, b)[1]
+
+
+def distance_and_ttc(motion: Motion, a: int, b: int) -> tuple[Floats, Floats]:
+    """Return the distance [m] of two footprints and the time to collision [s], (T,) each."""
+    distance, time = np.empty_like(motion.time), np.empty_like(motion.time)
+    rows = slice(None)
+    _fill_nearness(_driven(motion, a, rows), _driven(motion, b, rows), False, distance, time)
+    return distance, time
+
+
+def least_distance_and_ttc(motion: Motion, a: int, b: int) -> tuple[float, float]:
+    """Return the least distance [m] and time to collision [s] while both vehicles are present."""
+    both = motion.present_slice(a, b)
+    distance, time = np.empty_like(motion.time[both]), np.empty_like(motion.time[both])
+    _fill_nearness(_driven(motion, a, both), _driven(motion, b, both), True, distance, time)
+    return float(distance.min()), float(time.min())
+
+
+class _Driven(NamedTuple):
+    """Positions (T, 2) [m], directions (T, 2), speeds (T,) [m/s], half length, half width [m]."""
+
+    position: Floats
+    ahead: Floats
+    speed: Floats
+    length: float
+    width: float
+
+
+def _driven(motion: Motion, n: int, rows: slice) -> _Driven:
+    """Return the motion of one vehicle at some samples."""
+    heading, half = motion.heading[n, rows], motion.vehicles[n].half
+    return _Driven(motion.position[n, rows], unit(heading), motion.speed[n, rows], *half)
+
+
+_DRIVEN = named(_Driven, F2, F2, F1, F, F)
+
+
+@kernel(inline=True)
+def _box(driven: _Driven, t: int) -> Box:
+    position, ahead = driven.position[t], driven.ahead[t]
+    return Box(position[0], position[1], ahead[0], ahead[1], driven.length, driven.width)
+
+
+@kernel(_DRIVEN, _DRIVEN, B, OUT1, OUT1)
+def _fill_nearness(a: _Driven, b: _Driven, least: bool, distance: Floats, time: Floats) -> None:
+    """Fill `distance` (T,) [m] and `time` (T,) [s].
+
+    With `least`, values that cannot be the least ones of all samples may be infinite.
+    """
+    reach = np.hypot(a.length, a.width) + np.hypot(b.length, b.width)
+    nearest, soonest = np.inf, np.inf
+    for t in range(len(time)):
+        first, second = _box(a, t), _box(b, t)
+        dx, dy = second.x - first.x, second.y - first.y
+        room = np.hypot(dx, dy) - reach
+        distance[t] = np.inf
+        if not least or room <= nearest:
+            distance[t] = box_distance(first, second)
+            nearest = min(nearest, distance[t])
+        vx = b.speed[t] * second.cos - a.speed[t] * first.cos
+        vy = b.speed[t] * second.sin - a.speed[t] * first.sin
+        speed = np.hypot(vx, vy)
+        recedes = dx * vx + dy * vy >= 0.0 or abs(dx * vy - dy * vx) > reach * speed
+        time[t] = np.inf
+        if room <= 0.0 or not (recedes or room > soonest * speed):
+            time[t] = time_to_touch(first, second, vx, vy)
+            soonest = min(soonest, time[t])
 
 
 @dataclass(frozen=True)

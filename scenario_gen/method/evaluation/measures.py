@@ -29,7 +29,7 @@ import math
 
 import numpy as np
 
-from scenario_gen.method.evaluation.geometry import least_distance_and_ttc
+from scenario_gen.method.evaluation.criticality import least_distance_and_ttc
 from scenario_gen.method.evaluation.non_reactive import blind_margin
 from scenario_gen.numerics.plane import unit
 from scenario_gen.situation import (

@@ -12,11 +12,10 @@ import numpy as np
 
 from scenario_gen.base.errors import InputError
 from scenario_gen.base.registry import Registry
-from scenario_gen.method.evaluation import diversity, similarity
-from scenario_gen.method.evaluation.bootstrap import wilson
+from scenario_gen.method.evaluation import similarity
 from scenario_gen.method.evaluation.config import EvaluationConfig
 from scenario_gen.method.evaluation.criticality import criticality
-from scenario_gen.method.evaluation.distributions import compare, QUANTITIES, values_of
+from scenario_gen.method.evaluation.distributions import compare, QUANTITIES, values_of, wilson
 from scenario_gen.method.evaluation.samples import Samples, Template
 from scenario_gen.numerics import Floats
 from scenario_gen.situation import is_same_turn
@@ -325,14 +324,14 @@ CRITICALITY = MetricGroup(
 
 def _diversity(samples: Samples) -> Estimates:
     position = np.stack([motion.position for motion in samples.motions])
-    table = diversity.displacements(position, samples.is_present)
+    table = similarity.displacements(position, samples.is_present)
     interval = samples.bootstrap.interval
-    result = {"diversity": interval(partial(diversity.diversity, table))}
+    result = {"diversity": interval(partial(similarity.diversity, table))}
     if samples.template.fitted is not None:
-        error = diversity.displacement_to(
+        error = similarity.displacement_to(
             position, samples.template.fitted.position, samples.is_present
         )
-        result["min_ade"] = interval(partial(diversity.weighted_min, error))
+        result["min_ade"] = interval(partial(similarity.weighted_min, error))
     return result
 
 

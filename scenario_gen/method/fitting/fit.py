@@ -12,13 +12,14 @@ from scenario_gen.base.errors import RefusedError
 from scenario_gen.method.fitting.config import FittingConfig
 from scenario_gen.method.fitting.lanes import place_on_lanes
 from scenario_gen.method.fitting.losses import find_losses, refuse_lost
-from scenario_gen.method.fitting.placement import Placement, STANDING_SPEED_MPS
-from scenario_gen.method.fitting.search import place_by_search
-from scenario_gen.method.fitting.similarity_fit import (
+from scenario_gen.method.fitting.placement import (
     place_given,
     place_in_own_frame,
+    Placement,
     share_at_home,
+    STANDING_SPEED_MPS,
 )
+from scenario_gen.method.fitting.search import place_by_search
 from scenario_gen.method.fitting.state_check import refuse_impossible, refuse_misfits
 from scenario_gen.numerics import Bools, Floats, frozen_ints, Ints, runs
 from scenario_gen.roads import ground_for, nearest_pose_with_room

@@ -1,19 +1,22 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The placement of a recording on a road: its motion there, its scale, and its room."""
+"""Placements of a recording on a road: by similarity, scale, motion and room."""
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
-from scenario_gen.base.errors import RefusedError
+from scenario_gen.base.errors import InputError, RefusedError
 from scenario_gen.method.fitting.config import FittingConfig
-from scenario_gen.numerics import Floats, frozen
-from scenario_gen.roads import footprint_fits, ground_for, nearest_pose_with_room
-from scenario_gen.situation import separate, smallest_gaps, Track
-from scenario_gen.types import Loss, Note, Road, Vehicle
+from scenario_gen.numerics import Bools, Floats, frozen
+from scenario_gen.numerics.curve import Curve
+from scenario_gen.numerics.plane import place
+from scenario_gen.roads import draw_route, footprint_fits, ground_for, nearest_pose_with_room
+from scenario_gen.situation import separate, Situation, smallest_gaps, Track
+from scenario_gen.types import Encounter, Loss, Note, NoteKind, Road, Vehicle
 
 TRIED_SCALES_RATIO = (1.0, 0.9, 1.1, 0.8, 1.2)
 """The scales that are tried, the best first."""
@@ -179,3 +182,228 @@ def _worst_sample(track: Track, road: Road, max_move: float) -> tuple[float, int
         if worst > _MAX_REPORTED_DISTANCE_M:
             break
     return worst, worst_sample
+
+
+_MIN_CHORD_M = 2.0  # a shorter one has no direction (eq 8) and no scale (eq 9)
+_MAX_WAITING_MOVE_M = 0.5  # between start and goal of a vehicle that waits throughout
+_MAX_TURN_ERROR_RAD = np.radians(50.0)  # of a drawn route
+
+
+def place_in_own_frame(situation: Situation, road: Road, config: FittingConfig) -> Placement:
+    """Return the recording where it was recorded; vehicles that overlap are separated.
+
+    Raises:
+        RefusedError: a sampled pose is farther than `max_move` from the nearest one with room.
+    """
+    separation = situation.separation
+    off_road = [track for track in separation.tracks if share_with_room(road, track) < 1.0]
+    max_repair(off_road, road, config.max_move)
+    notes = (Note.of(NoteKind.AT_HOME, road=road.name), *separation.notes)
+    placement = Placement.of(separation.tracks, 1.0, notes)
+    return replace(placement, moved=separation.moved, at_home=True)
+
+
+def share_at_home(tracks: Sequence[Track], road: Road) -> float:
+    """Return the share of sampled footprints with room on a road where they were recorded."""
+    return float(np.mean([share_with_room(road, track) for track in tracks]))
+
+
+def place_given(
+    situation: Situation,
+    road: Road,
+    config: FittingConfig,
+    starts: Floats | None,
+    goals: Floats | None,
+    base: Placement | None = None,
+) -> tuple[Placement, Floats]:
+    """Map every vehicle's start to the given start, and its end to the given goal.
+
+    If a route of line, arc and line can be drawn between the two, eq 9 applies along it: the
+    recorded arc lengths times s. Otherwise it is the similarity of the plane. A vehicle with too
+    short a chord gets rotation and scale from all vehicles (Umeyama 1991).
+
+    Args:
+        situation: of the recording.
+        road: the target.
+        config: which scales are accepted.
+        starts: (N, 3) or (N, 4) x, y [m], yaw [rad], and speed [m/s]; a speed that is NaN or
+            missing is the recorded one.
+        goals: the same for the end.
+        base: another placement. With it, a row of NaN means the state there; a vehicle without a
+            given state keeps its path there.
+
+    Returns:
+        The placement, and (N, 2, 4) the start and end states; NaN for vehicles as in `base`.
+
+    Raises:
+        InputError: shapes disagree with the encounter, or a value is not finite.
+        RefusedError: a scale is out of range, or a vehicle that waits throughout is asked to move.
+    """
+    encounter, tracks = situation.encounter, situation.tracks
+    may_be_free = base is not None
+    states = np.stack(
+        (
+            _checked_states("starts", starts, encounter, 0, may_be_free=may_be_free),
+            _checked_states("goals", goals, encounter, -1, may_be_free=may_be_free),
+        ),
+        axis=1,
+    )
+    is_given: Bools = np.isfinite(states[..., 0])
+    ends = states
+    if base is not None:
+        ends = np.where(is_given[..., None], states, _end_states(base, encounter))
+    joint = _Similarity.of_all(tracks, ends)
+    placed: list[Track] = []
+    scale, moved = np.ones(len(tracks)), np.zeros(len(tracks))
+    notes = [] if base is None else list(base.notes)
+    for n, track in enumerate(tracks):
+        if base is not None and not is_given[n].any():
+            placed.append(base.tracks[n])
+            scale[n], moved[n] = base.scale[n], base.moved[n]
+            continue
+        placed_track, scale[n], method = _placed(track, ends[n], joint, road, config)
+        placed.append(placed_track)
+        notes.append(_note(track, is_given[n], method))
+    given = np.where(np.any(is_given, axis=1, keepdims=True)[..., None], ends, np.nan)
+    return Placement(tuple(placed), frozen(scale), frozen(moved), tuple(notes)), given
+
+
+def _note(track: Track, is_given: Bools, method: str) -> Note:
+    names = [name for name, given in zip(("start", "goal"), is_given, strict=True) if given]
+    states = " and ".join(names)
+    return Note.of(NoteKind.STATE_GIVEN, vehicle=track.vehicle.id, states=states, method=method)
+
+
+def _end_states(base: Placement, encounter: Encounter) -> Floats:
+    """Return (N, 2, 4) the start and end states of a placement."""
+    poses = np.stack([track.poses[[0, -1]] for track in base.tracks])
+    speed = encounter.speed[:, [0, -1]] * base.scale[:, None]
+    speed = np.where(speed < STANDING_SPEED_MPS, 0.0, speed)
+    return np.concatenate((poses, speed[..., None]), axis=-1)
+
+
+def _checked_states(
+    name: str, given: Floats | None, encounter: Encounter, sample: int, *, may_be_free: bool
+) -> Floats:
+    """Return (N, 4) given states with the recorded speed where none is given.
+
+    Free rows are NaN.
+    """
+    count = len(encounter.vehicles)
+    if given is None:
+        raise InputError(f"{name} is missing; give both starts and goals, or neither")
+    states = np.asarray(given, dtype=np.float64)
+    if states.ndim != 2 or states.shape[0] != count or states.shape[1] not in (3, 4):
+        raise InputError(
+            f"{name} has shape {states.shape}; one row of x, y, yaw and optionally speed per "
+            f"vehicle ({count}) is needed"
+        )
+    is_free = np.isnan(states).all(axis=1) & may_be_free
+    recorded = encounter.speed[:, sample]
+    speed = np.where(recorded < STANDING_SPEED_MPS, 0.0, recorded)
+    if states.shape[1] == 4:
+        given_speed = states[:, 3]
+        speed = np.where(np.isnan(given_speed) & may_be_free, speed, given_speed)
+    states = np.column_stack((states[:, :3], speed))
+    if not np.isfinite(states[~is_free]).all() or (states[~is_free, 3] < 0.0).any():
+        raise InputError(f"{name} has a value that is not finite, or a negative speed")
+    states[is_free] = np.nan
+    return states
+
+
+@dataclass(frozen=True)
+class _Similarity:
+    """A rotation [rad] and a scale."""
+
+    rotation: float
+    scale: float
+
+    @classmethod
+    def of_all(cls, tracks: tuple[Track, ...], states: Floats) -> "_Similarity":
+        """Return the least-squares similarity (det R = +1) from all starts and ends to others."""
+        source = np.concatenate([track.poses[[0, -1]] for track in tracks])
+        target = states.reshape(-1, 4)
+        u = source[:, :2] - source[:, :2].mean(axis=0)
+        v = target[:, :2] - target[:, :2].mean(axis=0)
+        spread = np.square(u).sum()
+        if all(track.still for track in tracks) or spread < 1e-6:
+            turn = target[:, 2] - source[:, 2]
+            return cls(float(np.arctan2(np.sin(turn).sum(), np.cos(turn).sum())), 1.0)
+        sine = float((u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0]).sum())
+        cosine = float((u * v).sum())
+        return cls(float(np.arctan2(sine, cosine)), float(np.hypot(sine, cosine) / spread))
+
+    @classmethod
+    def of_chords(cls, u: Floats, v: Floats) -> "_Similarity":
+        """Return the similarity that maps chord u (2,) [m] to v.
+
+        Source: eq 8a, with the sign of the angle.
+        """
+        rotation = float(np.arctan2(u[0] * v[1] - u[1] * v[0], u @ v))
+        return cls(rotation, float(np.hypot(*v) / np.hypot(*u)))
+
+
+def _placed(
+    track: Track, ends: Floats, joint: _Similarity, road: Road, config: FittingConfig
+) -> tuple[Track, float, str]:
+    """Return the track from a start to a goal, (2, 4) states, its scale, and the method."""
+    if track.still:
+        return _placed_wait(track, ends), 1.0, "a wait"
+    route = draw_route(ends[0, :3], ends[1, :3], partial(has_room, road, track.vehicle))
+    recorded_turn = track.curve.points[-1, 2] - track.curve.points[0, 2]
+    if route is not None:
+        turn = route.points[-1, 2] - route.points[0, 2]
+        scale = route.length / track.travelled
+        if abs(turn - recorded_turn) < _MAX_TURN_ERROR_RAD and config.accepts(scale):
+            curve = route.cut(0.0, route.length, 0.25)
+            on_route = replace(track, curve=curve, progress=frozen(scale * track.progress))
+            return on_route, scale, f"along a drawn route (s = {scale:.2f})"
+    return _placed_by_similarity(track, ends, joint, config)
+
+
+def _placed_wait(track: Track, ends: Floats) -> Track:
+    """Return the track of a vehicle that waits throughout at a start.
+
+    Raises:
+        RefusedError: its goal is elsewhere.
+    """
+    start, goal = ends
+    distance = float(np.hypot(*(goal[:2] - start[:2])))
+    if distance > _MAX_WAITING_MOVE_M:
+        raise RefusedError(
+            f"vehicle {track.vehicle.id} waits throughout the recording, but its start and goal "
+            f"are {distance:.1f} m from each other"
+        )
+    ahead = start[:3] + np.array([np.cos(start[2]), np.sin(start[2]), 0.0])
+    return replace(track, curve=Curve(np.array([start[:3], ahead])))
+
+
+def _placed_by_similarity(
+    track: Track, ends: Floats, joint: _Similarity, config: FittingConfig
+) -> tuple[Track, float, str]:
+    """Return the track by a similarity of the plane, its scale, and the method.
+
+    Source: eqs 8b and 9; q = s R (p - p_start) + q_start.
+
+    Raises:
+        RefusedError: the scale is out of range.
+    """
+    start, goal = ends[:, :2]
+    chord = (track.poses[-1] - track.poses[0])[:2]
+    similarity, method = joint, "rotation and scale from all vehicles"
+    if np.hypot(*chord) >= _MIN_CHORD_M:
+        similarity, method = _Similarity.of_chords(chord, goal - start), "similarity"
+    scale, rotation = similarity.scale, similarity.rotation
+    subject = (
+        f"vehicle {track.vehicle.id} (recorded chord {np.hypot(*chord):.1f} m, requested "
+        f"{np.hypot(*(goal - start)):.1f} m)"
+    )
+    check_scale(scale, subject, config)
+    points = track.curve.points[:, :2]
+    points = place(np.array([*start, rotation]), *(scale * (points - points[0])).T)
+    share = track.curve.station / track.curve.length
+    points += share[:, None] * (goal - points[-1])  # not zero for short chords only
+    curve = Curve.through(points)
+    progress = np.interp(track.progress / track.curve.length, share, curve.station)
+    moved = replace(track, curve=curve, progress=frozen(progress))
+    return moved, scale, f"{method} (s = {scale:.2f}, {np.degrees(rotation):.0f}°)"

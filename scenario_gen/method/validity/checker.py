@@ -12,9 +12,8 @@ from scenario_gen.base.errors import InputError
 from scenario_gen.method.validity.collision import contact_violations
 from scenario_gen.method.validity.containment import exit_violations, Ground
 from scenario_gen.method.validity.dynamics import is_motion, LARGEST_VALUE_RATIO, motion_violations
-from scenario_gen.method.validity.lights import light_violations
 from scenario_gen.method.validity.limits import Limits
-from scenario_gen.method.validity.reactions import broken_reactions, tailgaters
+from scenario_gen.method.validity.reactions import broken_reactions, light_violations, tailgaters
 from scenario_gen.method.validity.template_checks import (
     clearance_violations,
     order_violations,

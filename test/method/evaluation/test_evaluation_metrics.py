@@ -13,17 +13,21 @@ from scipy import stats
 from scipy.spatial.distance import jensenshannon
 from support.evaluation_worlds import CARS, crossing, replayed, samples
 
-from scenario_gen.method.evaluation import diversity, evaluate_scenarios, similarity
-from scenario_gen.method.evaluation.bootstrap import Bootstrap, wilson
-from scenario_gen.method.evaluation.criticality import criticality
+from scenario_gen.method.evaluation import evaluate_scenarios, similarity
+from scenario_gen.method.evaluation.criticality import (
+    criticality,
+    footprint_distance,
+    time_to_collision,
+)
 from scenario_gen.method.evaluation.distributions import (
+    Bootstrap,
     compare,
     jensen_shannon,
     QUANTITIES,
     values_of,
+    wilson,
 )
 from scenario_gen.method.evaluation.dtw import feature_matrix
-from scenario_gen.method.evaluation.geometry import footprint_distance, time_to_collision
 from scenario_gen.types import Motion, Vehicle
 
 ONCE = np.ones((1, 1))
@@ -183,13 +187,15 @@ def test_a_matrix_that_is_constant_is_left_out_of_the_mean():
 def test_diversity_by_hand():
     position = np.zeros((3, 1, 4, 2))
     position[1, ..., 0], position[2, ..., 1] = 3.0, 4.0  # samples at (0, 0), (3, 0), (0, 4)
-    table = diversity.displacements(position)
-    assert diversity.diversity(table, np.ones((1, 3)))[0] == pytest.approx((3.0 + 4.0 + 5.0) / 3.0)
-    assert diversity.diversity(table, np.array([[2.0, 1.0, 0.0]]))[0] == pytest.approx(3.0)
-    assert math.isnan(diversity.diversity(np.zeros((1, 1)), ONCE)[0])
-    error = diversity.displacement_to(position, position[0])
+    table = similarity.displacements(position)
+    assert similarity.diversity(table, np.ones((1, 3)))[0] == pytest.approx(
+        (3.0 + 4.0 + 5.0) / 3.0
+    )
+    assert similarity.diversity(table, np.array([[2.0, 1.0, 0.0]]))[0] == pytest.approx(3.0)
+    assert math.isnan(similarity.diversity(np.zeros((1, 1)), ONCE)[0])
+    error = similarity.displacement_to(position, position[0])
     assert error.tolist() == [0.0, 3.0, 4.0]
-    assert diversity.weighted_min(error, np.array([[0.0, 1.0, 1.0]]))[0] == 3.0
+    assert similarity.weighted_min(error, np.array([[0.0, 1.0, 1.0]]))[0] == 3.0
 
 
 def test_interval_of_a_mean_agrees_with_scipy():

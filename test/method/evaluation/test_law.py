@@ -13,8 +13,14 @@ from support.textbook_motions import labelled
 
 from scenario_gen import generate, PipelineConfig
 from scenario_gen.cli.folder import FolderRequest, generate_all
-from scenario_gen.method.evaluation.encounter_features import FEATURES, features_of, JOINT_FEATURES
-from scenario_gen.method.evaluation.law import Law, measures_in, SHIPPED
+from scenario_gen.method.evaluation.law import (
+    FEATURES,
+    features_of,
+    JOINT_FEATURES,
+    Law,
+    measures_in,
+    SHIPPED,
+)
 from scenario_gen.method.sampling import (
     checker_of,
     NaturalScenarios,

@@ -15,8 +15,8 @@ from scenario_gen.roads import build_road, RoadConfig
 from scenario_gen.roads.clearance import footprint_fits
 from scenario_gen.situation import find_conflicts
 from scenario_gen.types import Encounter, Motion, Vehicle
+from scenario_gen.types.fit import Segmentation
 from scenario_gen.types.road import Road
-from scenario_gen.types.segmentation import Segmentation
 
 pytestmark = pytest.mark.spread
 ROADS = ("straight", "t_intersection", "four_way", "corridor")

@@ -32,8 +32,7 @@ from scenario_gen.numerics.rounding import ROUNDING_M
 from scenario_gen.roads import build_road, RoadConfig
 from scenario_gen.roads.obstacles import read_obstacles, with_obstacles
 from scenario_gen.types import Vehicle
-from scenario_gen.types.fit import Fit, FittedVehicle
-from scenario_gen.types.route import Route, routes_in_words
+from scenario_gen.types.fit import Fit, FittedVehicle, Route, routes_in_words
 from scenario_gen.types.scenario import BoundaryStates
 
 CAR = (4.8, 1.9)

@@ -11,7 +11,7 @@ import numpy as np
 
 from scenario_gen.method.segmentation import segment
 from scenario_gen.method.segmentation.features import without_outliers, without_spikes
-from scenario_gen.types.segmentation import Segmentation
+from scenario_gen.types.fit import Segmentation
 
 
 @settings(max_examples=30)

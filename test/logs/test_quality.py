@@ -13,7 +13,7 @@ from support.meeting import degrees, distance, meeting, north_degrees, START_S
 
 from scenario_gen.base.errors import InputError
 from scenario_gen.logs import LogConfig, read_log
-from scenario_gen.logs.doubts import DoubtError, Quantity
+from scenario_gen.logs.quality import DoubtError, Quantity
 
 ROWS = meeting()
 NAMES = {"h": "heading", "v": "speed"}
