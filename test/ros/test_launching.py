@@ -8,10 +8,9 @@ import os
 from pathlib import Path
 import subprocess
 import sys
-from types import SimpleNamespace
-from unittest import mock
 
 import pytest
+from support.launching import launched, words
 from support.node_server import start_nodes
 from support.suite_processes import RESOURCES, ROOT
 import yaml
@@ -31,52 +30,6 @@ from scenario_gen.ros.launch_arguments import (
 from scenario_gen.ros.node_names import SUITE
 
 LOG = str(RESOURCES / "synthetic_c")
-
-
-def launched(file: str = "suite.launch.py", **arguments: str) -> list[SimpleNamespace]:
-    """What a launch file would start; the launch package is not among the wheels, so stand-ins take its place."""
-
-    def node(**keywords):
-        return SimpleNamespace(
-            **{"name": None, "respawn": False, "arguments": [], "parameters": [], **keywords}
-        )
-
-    def declare(name, *, default_value, description):
-        assert description and default_value == ""
-        return name
-
-    stand_ins = {
-        "launch": mock.MagicMock(LaunchDescription=list),
-        "launch.actions": mock.MagicMock(
-            DeclareLaunchArgument=declare, OpaqueFunction=lambda *, function: function
-        ),
-        "launch_ros": mock.MagicMock(),
-        "launch_ros.actions": mock.MagicMock(Node=node),
-        "ament_index_python.packages": mock.MagicMock(
-            get_package_share_directory=lambda _: str(ROOT)
-        ),
-    }
-    with mock.patch.dict(sys.modules, stand_ins):
-        scope: dict[str, object] = {}
-        exec(compile((ROOT / "launch" / file).read_text(), file, "exec"), scope)
-        *declared, begin = scope["generate_launch_description"]()
-        return begin(
-            SimpleNamespace(launch_configurations=dict.fromkeys(declared, "") | arguments)
-        )
-
-
-def words(node: SimpleNamespace) -> list[str]:
-    """The command line with which launch_ros starts a node, behind its executable."""
-    names = ["-r", f"__node:={node.name}"] if node.name else []
-    files = [word for path in node.parameters for word in ("--params-file", path)]
-    return [
-        "--ros-args",
-        *node.ros_arguments,
-        *names,
-        "-r",
-        f"__ns:={node.namespace or '/'}",
-        *files,
-    ]
 
 
 def test_the_nodes_that_are_started(tmp_path):

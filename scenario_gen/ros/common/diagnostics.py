@@ -21,12 +21,7 @@ from msg_conventions.diagnostics import encode_diagnostics, Level, of_template, 
 from scenario_gen.base.errors import MAX_REFUSAL_CHARACTERS, presentable, ScenarioGenError
 from scenario_gen.base.worker import stop_if_abandoned
 from scenario_gen.ros.common.timers import create_steady_timer
-from scenario_gen.ros.common.topics import (
-    create_publisher,
-    other_publishers,
-    own_topics,
-    publish,
-)
+from scenario_gen.ros.common.topics import conflicting_publishers, create_publisher, publish
 
 TICK_S = 0.25  # real time after which changes are published
 FULL_PERIOD_STEPS = 4  # ticks after which all is published, changed or not
@@ -241,8 +236,7 @@ class NodeDiagnostics:
 
         Subscribers cannot tell their messages apart.
         """
-        twins = {topic: other_publishers(self._node, topic) for topic in own_topics(self._node)}
-        twins = {topic: nodes for topic, nodes in twins.items() if nodes}
+        twins = conflicting_publishers(self._node)
         if twins == self._twins:
             return
         self._twins = twins

@@ -24,7 +24,7 @@ from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSPolicyKind, QoSProfile, ReliabilityPolicy
 from rclpy.qos_overriding_options import QoSOverridingOptions
 
-from msg_conventions.topics import topic_entry
+from msg_conventions.topics import ANY_NODE, publishers_of, topic_entry
 from scenario_gen.base.errors import InputError
 from scenario_gen.base.worker import stop_if_abandoned
 from scenario_gen.types import Quality
@@ -36,21 +36,6 @@ OVERRIDABLE = (
     QoSPolicyKind.DURABILITY,
 )
 FIXED_QUALITY = ("/diagnostics", "/tf")  # as other packages expect them
-SHARED_SUFFIXES = (
-    "/diagnostics",
-    "/rosout",
-    "/parameter_events",
-    "/tf",
-    "/tf_static",
-    "/clock",
-    "/footprint",
-    "/ego/goal",
-    "/tracks/part",
-    "/transition_event",
-)
-"""Ends of the names of topics that many nodes publish."""
-TRACKS_PARTNERS = {"log_player": "segmenter", "segmenter": "log_player"}
-"""Both publish `tracks`: one from a log, the other from streams."""
 POLL_S = 0.002  # between two checks for acknowledgements
 
 
@@ -121,11 +106,11 @@ def create_publisher(node: Node, topic: str) -> Any:
 
 
 def create_frames_publisher(node: Node) -> Any:
-    """Return a publisher of /tf, or None with a warning if tf2_msgs is not installed."""
+    """Return a publisher of /tf, or None, which is logged, if tf2_msgs is not installed."""
     try:
         return create_publisher(node, "/tf")
     except InputError as error:
-        node.get_logger().warning(f"no frames are published on /tf: {error}", once=True)
+        node.get_logger().info(f"no frames are published on /tf: {error}", once=True)
         return None
 
 
@@ -332,12 +317,6 @@ class Pace:
         return True
 
 
-def own_topics(node: Node) -> list[str]:
-    """Return the full names of a node's topics that only one node should publish."""
-    names = {publisher.topic_name for publisher in list(node.publishers)}
-    return sorted(name for name in names if not name.endswith(SHARED_SUFFIXES))
-
-
 def other_publishers(node: Node, topic: str) -> list[str]:
     """Return the full names of other nodes that publish a topic.
 
@@ -349,10 +328,21 @@ def other_publishers(node: Node, topic: str) -> list[str]:
     ]
     with suppress(ValueError):
         names.remove(node.get_fully_qualified_name())
-    if topic.endswith("/tracks"):
-        partner = TRACKS_PARTNERS.get(node.get_name())
-        names = [name for name in names if name.rpartition("/")[2] != partner]
     return sorted(names)
+
+
+def conflicting_publishers(node: Node) -> dict[str, list[str]]:
+    """Return the nodes that must not publish a topic beside this node, by topic."""
+    conflicts = {}
+    for topic in sorted({publisher.topic_name for publisher in list(node.publishers)}):
+        allowed = publishers_of(topic)
+        if allowed == ANY_NODE:
+            continue
+        partners = set(allowed) - {node.get_name()}
+        others = other_publishers(node, topic)
+        if names := [name for name in others if name.rpartition("/")[2] not in partners]:
+            conflicts[topic] = names
+    return conflicts
 
 
 def yield_to_executor(executor: Executor | None, stop: Callable[[], bool]) -> None:

@@ -438,7 +438,7 @@ class Traffic(Node):  # type: ignore[misc]
             message = "there is no scenario yet"
             if self._arriving.unmatched:
                 message += f": {self._arriving.unmatched} messages wait for scenarios/info"
-            self._report_status(Level.WARN, message, "driving")
+            self._report_status(Level.OK, message, "driving")
             return
         state = self._states[-1]
         message = (

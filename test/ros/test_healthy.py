@@ -1,0 +1,58 @@
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""A healthy suite with traffic, as the launch files start them, warns of nothing: neither on the terminal nor on /diagnostics."""
+
+import time
+
+import pytest
+from support.launching import launched, words
+from support.node_server import start_nodes
+from support.suite_processes import RESOURCES
+
+from msg_conventions.diagnostics import Level
+from msg_conventions.topics import publishers_of
+from scenario_gen.ros.node_names import SUITE
+
+SCENARIOS = 3
+
+
+@pytest.mark.dds
+def test_a_healthy_suite_is_quiet(domain, client, tmp_path):
+    """Without tf2_msgs, which a small installation does not have."""
+    client.hear("/diagnostics", "/report")
+    where = {"ROS_DOMAIN_ID": str(domain), "ROS_LOG_DIR": str(tmp_path), "WITHOUT_TF2": "1"}
+    suite = launched(
+        log=str(RESOURCES / "synthetic_c"),
+        road="straight",
+        count=str(SCENARIOS),
+        bag=str(tmp_path / "bag"),
+    )
+    nodes = [*suite, *launched("drive.launch.py")]
+    processes = {
+        node.executable: start_nodes(node.executable, *words(node), **where) for node in nodes
+    }
+    try:
+        client.wait("/report")
+        time.sleep(10.0)
+        statuses = client.statuses()
+        reporting = {status.node.removeprefix("/") for status in statuses}
+        assert reporting == {*SUITE, "traffic"}
+        findings = {str(status) for status in statuses if status.level is not Level.OK}
+        lines = [
+            line
+            for process in processes.values()
+            for line in process.output().splitlines()
+            if "[INFO]" not in line
+        ]
+        assert (findings, lines) == (set(), [])
+    finally:
+        for process in processes.values():
+            process.kill()
+
+
+def test_the_table_of_topics_names_the_publishers():
+    assert publishers_of("/a/tracks") == publishers_of("tracks") == ("log_player", "segmenter")
+    assert "planner" in publishers_of("/a/tracks/part")
+    assert publishers_of("/a/planner/transition_event") == publishers_of("/tf") == ("*",)
+    assert publishers_of("/map") == publishers_of("/a/backtracks") == ()
