@@ -8,9 +8,10 @@ from pathlib import Path
 from ament_index_python.packages import get_package_share_directory
 from launch import LaunchDescription
 from launch.actions import DeclareLaunchArgument, OpaqueFunction
+from launch.logging import launch_config
 from launch_ros.actions import Node
 
-from scenario_gen.ros.launch_arguments import descriptions, parse_arguments, SUITE_ARGUMENTS
+from scenario_gen.ros.launch_arguments import parse_arguments, SUITE_FILE
 from scenario_gen.ros.node_names import RECORDER_END_S, SUITE
 
 SHARE = Path(get_package_share_directory("scenario_gen"))
@@ -18,12 +19,14 @@ SHARE = Path(get_package_share_directory("scenario_gen"))
 
 def start(context):
     """Return the processes."""
-    launch = parse_arguments(SUITE_ARGUMENTS, context.launch_configurations)
+    launch = parse_arguments(SUITE_FILE, context.launch_configurations)
     options = launch.options
     common = {
         "package": "scenario_gen",
         "namespace": options.namespace,
-        "parameters": launch.parameter_files(SHARE / "config" / "suite.yaml"),
+        "parameters": launch.parameter_files(
+            launch_config.log_dir, SHARE / "config" / "suite.yaml"
+        ),
         "ros_arguments": ["--log-level", options.log_level],
         "output": "screen",
         "respawn_delay": 2.0,
@@ -68,6 +71,6 @@ def start(context):
 def generate_launch_description():
     arguments = [
         DeclareLaunchArgument(name, default_value="", description=text)
-        for name, text in descriptions(SUITE_ARGUMENTS).items()
+        for name, text in SUITE_FILE.descriptions().items()
     ]
     return LaunchDescription([*arguments, OpaqueFunction(function=start)])

@@ -4,15 +4,17 @@
 """The launch files' arguments: the nodes' parameters, checked before the first process starts.
 
 An argument on the command line has precedence over the parameter file named there, which has
-precedence over config/suite.yaml. An empty argument is not given. This module needs no rclpy.
+precedence over config/suite.yaml. An empty argument is not given. `ros2 launch` has no numba, so
+this module imports no node; resources/launch_arguments.json lists their parameters.
 """
 
-import atexit
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, Field
+import json
 from pathlib import Path
 import re
+import sys
 import tempfile
 from typing import Any
 
@@ -22,7 +24,7 @@ from scenario_gen.base.documents import parse_yaml, shown
 from scenario_gen.base.errors import did_you_mean, InputError
 from scenario_gen.base.parameters import check_value, flatten, parameter, Parameters
 from scenario_gen.base.registry import installed
-from scenario_gen.ros.common import node_parameters
+from scenario_gen.ros.common.node_parameters import check_topics, ROAD_NAMES
 from scenario_gen.ros.node_names import SUITE
 
 LIVE = "live"
@@ -33,19 +35,8 @@ NAMESPACE = re.compile(r"/|/?[A-Za-z_]\w*(/[A-Za-z_]\w*)*", re.ASCII)
 EVERY_NODE = "/**/**"
 _NUMBER = r"[-+]?(\d+\.?\d*|\.\d+)(e[-+]?\d+)?"
 STATES = re.compile(rf"([^;]+:\s*{_NUMBER}(\s+{_NUMBER}){{2,3}}\s*(;|$)\s*)+", re.IGNORECASE)
-
-
-@dataclass(frozen=True)
-class SharedParameters(Parameters):
-    """Parameters that several nodes of the suite, or all, declare for themselves."""
-
-    ego: str = parameter("", "id of the vehicle to leave out for a planner under test")
-    starts: str = parameter(
-        "", "start states on the road, `id:x y yaw [speed]`, vehicles separated by `;`"
-    )
-    goals: str = parameter("", "end states, in the same form")
-    use_sim_time: bool = parameter(False, "the nodes follow /clock")
-    autostart: bool = parameter(True, "the nodes configure and activate themselves")
+TABLE = Path(__file__).resolve().parents[1] / "resources" / "launch_arguments.json"
+ARGUMENT_NAMES = {"log_path": "log", "road_name": "road"}  # parameter -> argument
 
 
 @dataclass(frozen=True)
@@ -56,31 +47,60 @@ class LaunchOptions(Parameters):
     params: str = parameter("", "parameter file; arguments on the command line have precedence")
     log_level: str = parameter("info", "lowest severity that is logged", choices=LOG_LEVELS)
     rviz: bool = parameter(False, "open RViz")
-    composed: bool = parameter(False, "run all nodes in one process, for small machines")
     respawn: bool = parameter(False, "restart a node that ended, after 2 s; never a recorder")
+    composed: bool = parameter(False, "run all nodes in one process, for small machines")
     without: str = parameter("", f"nodes to leave out, separated by commas: {', '.join(SUITE)}")
 
 
-ARGUMENT_NAMES = {"log_path": "log", "road_name": "road"}  # parameter -> argument
-_SUITE_PARAMETERS = (
-    node_parameters.LogPlayerParameters(),
-    node_parameters.RoadServerParameters(),
-    node_parameters.RecorderParameters(),
-    node_parameters.SamplerParameters(),
-    SharedParameters(),
-)
-_DRIVE_PARAMETERS = flatten(node_parameters.TrafficParameters())
-Arguments = Mapping[str, tuple[str, "Field[Any]"]]  # argument -> parameter, declaration
-SUITE_ARGUMENTS: Arguments = {
-    ARGUMENT_NAMES.get(name, name): (name, entry)
-    for config in _SUITE_PARAMETERS
-    for name, (entry, _) in flatten(config).items()
-}
-DRIVE_ARGUMENTS: Arguments = {  # a node's parameter hides one of the drive with the same name
-    name.removeprefix("drive."): (name, _DRIVE_PARAMETERS[name][0])
-    for name in sorted(_DRIVE_PARAMETERS, key=lambda name: "." not in name)
-}
 OPTIONS = {name: entry for name, (entry, _) in flatten(LaunchOptions()).items()}
+
+
+@dataclass(frozen=True)
+class LaunchFile:
+    """A launch file and its arguments.
+
+    Attributes:
+        name: of the file.
+        parameters: of its nodes, by argument.
+        nodes: that have a parameter, by argument; none: all.
+        declarations: of all arguments.
+    """
+
+    name: str
+    parameters: Mapping[str, str]
+    nodes: Mapping[str, Sequence[str]]
+    declarations: Mapping[str, "Field[Any]"]
+
+    def descriptions(self) -> dict[str, str]:
+        """Return the descriptions that `ros2 launch --show-args` prints."""
+        return {
+            name: f"{entry.metadata['meaning']} (default: {entry.default!r})"
+            for name, entry in self.declarations.items()
+        }
+
+
+def _launch_file(name: str, without: Sequence[str] = ()) -> LaunchFile:
+    """Return a launch file whose arguments the table lists, without some of the options.
+
+    A parameter of a drive is also an argument without its prefix, unless a node's hides it.
+    """
+    parameters: dict[str, str] = {}
+    nodes: dict[str, Sequence[str]] = {}
+    declarations: dict[str, Field[Any]] = {}
+    table = json.loads(TABLE.read_text("utf-8"))[name]
+    for parameter_name, row in table.items():
+        short_name = parameter_name.removeprefix("drive.")
+        argument = parameter_name if short_name in table else short_name
+        argument = ARGUMENT_NAMES.get(argument, argument)
+        nodes[argument] = row.pop("nodes")
+        declarations[argument] = parameter(**row)
+        parameters[argument] = parameter_name
+    options = {name: entry for name, entry in OPTIONS.items() if name not in without}
+    return LaunchFile(name, parameters, nodes, declarations | options)
+
+
+SUITE_FILE = _launch_file("suite.launch.py")
+DRIVE_FILE = _launch_file("drive.launch.py", without=("composed", "without"))
 
 
 @dataclass(frozen=True)
@@ -95,10 +115,10 @@ class Launch:
         """The nodes that are not started."""
         return [name.strip() for name in self.options.without.split(",") if name.strip()]
 
-    def parameter_files(self, *defaults: Path) -> list[str]:
+    def parameter_files(self, folder: str, *defaults: Path) -> list[str]:
         """Return each node's parameter files. The last one has precedence.
 
-        It is removed with this process.
+        It is written to `folder`, which has the log of this launch.
         """
         files = [str(path) for path in defaults]
         if self.options.params:
@@ -106,60 +126,50 @@ class Launch:
         if self.parameters:
             body = {EVERY_NODE: {"ros__parameters": dict(self.parameters)}}
             with tempfile.NamedTemporaryFile(
-                "w", prefix="launch_params_", suffix=".yaml", encoding="utf-8", delete=False
+                "w",
+                dir=folder,
+                prefix="arguments_",
+                suffix=".yaml",
+                encoding="utf-8",
+                delete=False,
             ) as file:
                 yaml.safe_dump(body, file, allow_unicode=True)
-            atexit.register(Path(file.name).unlink, missing_ok=True)
             files.append(file.name)
         return files
 
 
-def descriptions(arguments: Arguments) -> dict[str, str]:
-    """Return the descriptions that `ros2 launch --show-args` prints."""
-    return {
-        name: f"{entry.metadata['meaning']} (default: {entry.default!r})"
-        for name, entry in _declarations(arguments).items()
-    }
-
-
-def _declarations(arguments: Arguments) -> dict[str, "Field[Any]"]:
-    return {name: entry for name, (_, entry) in arguments.items()} | OPTIONS
-
-
-def parse_arguments(arguments: Arguments, texts: Mapping[str, str]) -> Launch:
+def parse_arguments(
+    file: LaunchFile, texts: Mapping[str, str], words: Sequence[str] | None = None
+) -> Launch:
     """Parse and check the arguments of a launch file.
 
     Args:
-        arguments: of the launch file, in addition to `OPTIONS`.
-        texts: values on the command line by name, empty if not given. A launch file that includes
+        file: the launch file.
+        texts: values of the arguments by name, empty if not given. A launch file that includes
             ours may add others.
+        words: the command line; by default that of this process.
 
     Raises:
-        InputError: an argument has an unusable value, or resembles one of ours; the message names
-            it.
+        InputError: an argument has an unusable value, or there is no such argument; the message
+            names it.
     """
-    declarations = _declarations(arguments)
-    values: dict[str, Any] = {}
-    for name, text in texts.items():
-        if not text:
-            continue
-        if name in declarations:
-            values[name] = _parse_value(name, declarations[name], text)
-        elif suggestion := did_you_mean(name, declarations):
-            raise InputError(
-                f"{name}:= is no argument of this launch file{suggestion} There are "
-                f"{', '.join(declarations)}"
-            )
+    _refuse_unknown(file, texts, sys.argv if words is None else words)
+    values = {
+        name: _parse_value(name, entry, texts[name])
+        for name, entry in file.declarations.items()
+        if texts.get(name)
+    }
     launch = Launch(
         {
             parameter_name: values[name]
-            for name, (parameter_name, _) in arguments.items()
+            for name, parameter_name in file.parameters.items()
             if name in values and (name, values[name]) != ("log", LIVE)
         },
         LaunchOptions(**{name: value for name, value in values.items() if name in OPTIONS}),
     )
-    is_suite = "log" in arguments
+    is_suite = "log" in file.parameters
     _check_options(launch)
+    _refuse_unused(file, launch, values)
     _check_texts(launch.parameters)
     _check_paths(launch, is_suite=is_suite)
     if is_suite and not (values.get("log") or launch.options.params):
@@ -170,10 +180,37 @@ def parse_arguments(arguments: Arguments, texts: Mapping[str, str]) -> Launch:
     return launch
 
 
+def _refuse_unknown(file: LaunchFile, names: Iterable[str], words: Sequence[str]) -> None:
+    """Raise InputError if an argument is unknown.
+
+    Where another launch file includes this one, only names that resemble an argument are refused.
+    """
+    is_included = file.name not in [Path(word).name for word in words]
+    given = {name for name, assigned, _ in (word.partition(":=") for word in words) if assigned}
+    for name in names:
+        near = did_you_mean(name, file.declarations)
+        is_own = name in given and not is_included
+        if name not in file.declarations and (near or is_own):
+            raise InputError(
+                f"{name}:= is no argument of {file.name}{near or '; --show-args lists them'}"
+            )
+
+
+def _refuse_unused(file: LaunchFile, launch: Launch, names: Iterable[str]) -> None:
+    """Raise InputError if an argument is a parameter only of nodes that are not started."""
+    for name in names:
+        nodes = file.nodes.get(name, ())
+        if nodes and set(nodes) <= set(launch.excluded):
+            raise InputError(f"{name}:= has no effect without {' and '.join(nodes)}")
+
+
 def _parse_value(name: str, declaration: "Field[Any]", text: str) -> Any:
     try:
-        value = text
-        if not isinstance(declaration.default, str):
+        value: Any = text
+        if isinstance(declaration.default, float):
+            with suppress(ValueError):  # YAML reads 1e-6 as a text
+                value = float(text)
+        elif not isinstance(declaration.default, str):
             value = parse_yaml(text, "its value")
         elif len(text) > 1 and text[0] == text[-1] and text[0] in "'\"":
             value = text[1:-1]  # `ros2 run -p` needs quotes around `1: 10 2 0`, a launch does not
@@ -206,9 +243,9 @@ def _check_texts(parameters: Mapping[str, Any]) -> None:
             raise InputError(
                 f"{name}:={shown(text)}: write `id: x y yaw [speed]`, vehicles separated by `;`"
             )
-    node_parameters.RecorderParameters(topics=parameters.get("topics", ""))
+    check_topics(parameters.get("topics", ""))
     road = parameters.get("road_name", "")
-    roads = (*node_parameters.ROAD_NAMES, *installed("scenario_gen.roads"))
+    roads = (*ROAD_NAMES, *installed("scenario_gen.roads"))
     if road and road not in roads and not Path(road).exists():
         raise InputError(
             f"road:={shown(road)}: no map with this name; choose a file, or of {', '.join(roads)}"

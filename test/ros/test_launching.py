@@ -4,12 +4,12 @@
 """The launch files: what they start, what they refuse, and which of several values of a parameter wins in the nodes."""
 
 import json
-import os
 from pathlib import Path
 import subprocess
 import sys
 
 import pytest
+from support.launch_arguments import table_text
 from support.launching import launched, words
 from support.node_server import start_nodes
 from support.suite_processes import RESOURCES, ROOT
@@ -22,10 +22,11 @@ from scenario_gen.ros.common.node_parameters import ROAD_NAMES
 from scenario_gen.ros.common.ros_parameters import config_of
 from scenario_gen.ros.common.start import node_class
 from scenario_gen.ros.launch_arguments import (
-    descriptions,
-    DRIVE_ARGUMENTS,
+    DRIVE_FILE,
     LIVE,
-    SUITE_ARGUMENTS,
+    parse_arguments,
+    SUITE_FILE,
+    TABLE,
 )
 from scenario_gen.ros.node_names import SUITE
 
@@ -61,11 +62,11 @@ def test_the_nodes_that_are_started(tmp_path):
 
 def test_arguments_are_parameters_of_nodes_and_count_only_where_they_are_given():
     known = {name for node in SUITE for name in flatten(config_of(node_class(node)))}
-    assert {name for name, _ in SUITE_ARGUMENTS.values()} - known == {"autostart", "use_sim_time"}
-    assert {name for name, _ in DRIVE_ARGUMENTS.values()} == set(
-        flatten(config_of(node_class("traffic")))
-    ) - {"drive.patience"}
-    assert "(default: 50)" in descriptions(SUITE_ARGUMENTS)["count"]
+    assert set(SUITE_FILE.parameters.values()) == known | {"autostart", "use_sim_time"}
+    assert set(DRIVE_FILE.parameters.values()) == set(flatten(config_of(node_class("traffic"))))
+    assert {"step", "patience", "drive.patience"} <= set(DRIVE_FILE.parameters)
+    assert "(default: 50)" in SUITE_FILE.descriptions()["count"]
+    assert TABLE.read_text("utf-8") == table_text(), "run: python support/launch_arguments.py"
     (node, *_) = launched(log=LOG, count="50")
     assert yaml.safe_load(Path(node.parameters[-1]).read_text())["/**/**"]["ros__parameters"] == {
         "count": 50,
@@ -85,6 +86,13 @@ def test_arguments_are_parameters_of_nodes_and_count_only_where_they_are_given()
         ({"count": "abc"}, "count:=abc: .*whole number"),
         ({"count": "0"}, "count:=0: .*at least 1"),
         ({"cout": "3"}, "cout:= is no argument .*did you mean count"),
+        ({"order": "any"}, "order:=any: .*keep, free, swap"),
+        ({"radius": "-1"}, "radius:=-1: .*at least 0"),
+        ({"limits.car.max_speed": "fast"}, "limits.car.max_speed:=fast: .*a number"),
+        ({"segmentation.min_segmnt": "1"}, "did you mean segmentation.min_segment"),
+        ({"without": "planner", "radius": "1"}, "radius:= has no effect without planner"),
+        ({"file": "drive.launch.py", "composed": "true"}, "composed:= is no argument"),
+        ({"file": "drive.launch.py", "others": "bogus"}, "others:= is no argument"),
         ({"without": "planer"}, "without:=planer: choose of .*did you mean planner"),
         ({"encounter": "[1"}, r"encounter:=\[1"),
         ({"log": "no_such.csv"}, "log:=no_such.csv: it does not exist"),
@@ -170,39 +178,39 @@ def test_the_parameter_file_beats_the_defaults_and_arguments_beat_the_file(
         assert [process.wait(180.0) for process in processes] == [0 for _ in processes]
 
 
+def test_a_launch_file_that_includes_ours_may_have_arguments_of_its_own():
+    texts = {"log": LOG, "robot": "big"}
+    line = ["/opt/ros/jazzy/bin/ros2", "launch", "my_robot", "everything.launch.py", "robot:=big"]
+    assert parse_arguments(SUITE_FILE, texts, line).parameters == {"log_path": LOG}
+    line[2:4] = ["scenario_gen", "suite.launch.py"]
+    with pytest.raises(InputError, match=r"robot:= is no argument of suite\.launch\.py"):
+        parse_arguments(SUITE_FILE, texts, line)
+
+
 IN_ROS_PYTHON = """
 import json, sys
 before = set(sys.modules)
 from pathlib import Path
-from scenario_gen.ros.launch_arguments import DRIVE_ARGUMENTS, parse_arguments, SUITE_ARGUMENTS
+from scenario_gen.ros.launch_arguments import DRIVE_FILE, parse_arguments, SUITE_FILE
 given = {"log": sys.argv[1], "bag": sys.argv[2], "starts": "'1: 31.8 68.45 0.0 10.7'", "goals": "1: 2 3 0", "road": "straight"}
-for arguments, given in ((DRIVE_ARGUMENTS, {}), (SUITE_ARGUMENTS, given)):
-    for name, (_, entry) in arguments.items():
-        text = entry.metadata["choices"][0] if entry.metadata["choices"] else "/tmp" if name == "results" else "1"
+for file, given in ((DRIVE_FILE, {}), (SUITE_FILE, given)):
+    for name in file.parameters:
+        entry = file.declarations[name]
+        choices = entry.metadata["choices"]
+        text = choices[-1] if choices else "/tmp" if name == "results" else "1"
         given.setdefault(name, text if isinstance(entry.default, str) and name != "bag" else json.dumps(entry.default).strip('"'))
-    launch = parse_arguments(arguments, given)
-print(launch.parameter_files(Path("suite.yaml"))[-1])
+    launch = parse_arguments(file, given)
 print(json.dumps(dict(launch.parameters)))
 others = {name.partition(".")[0] for name in set(sys.modules) - before if getattr(sys.modules[name], "__file__", None)}
 assert others <= {*sys.stdlib_module_names, "scenario_gen", "yaml", "_yaml"}, others
 """
 
 
-def test_a_launch_imports_nothing_that_ros_python_lacks_and_removes_what_it_has_written(tmp_path):
+def test_a_launch_imports_nothing_that_ros_python_lacks(tmp_path):
     """Whatever is given: `ros2 launch` runs in ROS's own Python."""
     command = [sys.executable, "-c", IN_ROS_PYTHON, LOG, str(tmp_path / "bag")]
-    answer = subprocess.run(
-        command,
-        capture_output=True,
-        text=True,
-        env=os.environ | {"TMPDIR": str(tmp_path)},
-        check=True,
-    )
-    file, written = answer.stdout.splitlines()
-    assert (
-        Path(file).parent == tmp_path and json.loads(written)["starts"] == "1: 31.8 68.45 0.0 10.7"
-    )
-    assert list(tmp_path.iterdir()) == []
+    answer = subprocess.run(command, capture_output=True, text=True, check=True)
+    assert json.loads(answer.stdout)["starts"] == "1: 31.8 68.45 0.0 10.7"
 
 
 @pytest.mark.dds

@@ -4,10 +4,13 @@
 """What the launch files start: the launch package is not among the wheels, so stand-ins take its place."""
 
 import sys
+import tempfile
 from types import SimpleNamespace
 from unittest import mock
 
 from support.suite_processes import ROOT
+
+LOGS = tempfile.TemporaryDirectory(prefix="launches_of_tests_")
 
 
 def launched(file: str = "suite.launch.py", **arguments: str) -> list[SimpleNamespace]:
@@ -27,13 +30,16 @@ def launched(file: str = "suite.launch.py", **arguments: str) -> list[SimpleName
         "launch.actions": mock.MagicMock(
             DeclareLaunchArgument=declare, OpaqueFunction=lambda *, function: function
         ),
+        "launch.logging": mock.MagicMock(launch_config=SimpleNamespace(log_dir=LOGS.name)),
         "launch_ros": mock.MagicMock(),
         "launch_ros.actions": mock.MagicMock(Node=node),
         "ament_index_python.packages": mock.MagicMock(
             get_package_share_directory=lambda _: str(ROOT)
         ),
     }
-    with mock.patch.dict(sys.modules, stand_ins):
+    given = [f"{name}:={value}" for name, value in arguments.items()]
+    line = ["ros2", "launch", "scenario_gen", file, *given]
+    with mock.patch.dict(sys.modules, stand_ins), mock.patch.object(sys, "argv", line):
         scope: dict[str, object] = {}
         exec(compile((ROOT / "launch" / file).read_text(), file, "exec"), scope)
         *declared, begin = scope["generate_launch_description"]()

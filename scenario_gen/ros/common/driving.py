@@ -3,11 +3,11 @@
 
 """Messages between traffic and a planner under test.
 
-Commands to the ego, live trials, states of a drive.
+Parameters, commands to the ego, live trials, states of a drive.
 """
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 import json
 from time import time_ns
 
@@ -33,6 +33,8 @@ from msg_conventions.scenario_info import Info, ScenarioEntry
 from msg_conventions.topics import vehicle_topic
 from scenario_gen.bags.recordings.scenario_decoder import ScenarioDecoder
 from scenario_gen.base.errors import InputError, ScenarioGenError
+from scenario_gen.base.parameters import parameter, Parameters
+from scenario_gen.closed_loop.config import ClosedLoopConfig
 from scenario_gen.closed_loop.ego import Command, Pose
 from scenario_gen.closed_loop.local_map import local_map
 from scenario_gen.closed_loop.origin import Trial
@@ -46,6 +48,56 @@ INPUTS = ("ego/cmd_vel", "ego/cmd_vel_stamped", "ego/trajectory", "ego/path", "e
 TIMED_INPUTS = ("ego/trajectory", "ego/path")  # their points have times, so they may be old
 FIRST_STAMP_NS = 1_000_000_000  # a drive's clock at its start; ROS regards a time of 0 as unknown
 MAP_PERIOD_S = 0.2  # time of the drive between two local maps
+
+
+@dataclass(frozen=True)
+class Config(Parameters):
+    """The parameters of traffic; those of a drive are `drive.step`, `drive.policy`, …."""
+
+    bag: str = parameter(
+        "",
+        "bag with scenarios; empty: they arrive live on `scenarios`, `scenarios/info` and `map`",
+        fixed=True,
+    )
+    ego: str = parameter(
+        "",
+        "id of the vehicle that the ego replaces; empty: the scenario's ego slot, or its first "
+        "vehicle",
+    )
+    request: str = parameter(
+        "",
+        "request whose live scenarios are driven; empty: all that are sent after the start",
+        fixed=True,
+    )
+    index: int = parameter(0, "index of the first scenario in the bag, from 0", low=0, fixed=True)
+    rate: float = parameter(
+        1.0, "speed as a multiple of real time", low=0.01, high=1000.0, fixed=True
+    )
+    lock_step: bool = parameter(
+        False, "step with each call of ~/step instead of a clock", fixed=True
+    )
+    wait_for_ego: bool = parameter(
+        True, "begin a drive with the ego's first command; false: the ego brakes until one arrives"
+    )
+    silence: float = parameter(
+        0.5, "age after which a command is ignored, and the ego brakes", unit="s", low=0.01
+    )
+    patience: float = parameter(
+        5.0, "longest wait for a command in lock-step, in real time", unit="s", low=0.01
+    )
+    follow_on: bool = parameter(True, "continue with the next scenario; false: wait for ~/next")
+    autoware: bool = parameter(
+        False,
+        "publish predicted objects and the ego's state for Autoware's planners; needs "
+        "autoware_perception_msgs",
+        fixed=True,
+    )
+    results: str = parameter(
+        "",
+        "folder for drives.json and junit.xml, replaced after each drive; empty: none",
+        fixed=True,
+    )
+    drive: ClosedLoopConfig = field(default_factory=ClosedLoopConfig)
 
 
 @dataclass(frozen=True, eq=False)

@@ -18,8 +18,7 @@ from scenario_gen.closed_loop.config import ClosedLoopConfig
 from scenario_gen.closed_loop.origin import Trial
 from scenario_gen.closed_loop.simulation import State
 from scenario_gen.closed_loop.trials import Outcome, summary_on_error, too_long
-from scenario_gen.ros.common.driving import INPUTS
-from scenario_gen.ros.common.node_parameters import TrafficParameters
+from scenario_gen.ros.common.driving import Config, INPUTS
 from scenario_gen.ros.nodes.traffic import Traffic
 
 START_TIMEOUT_S = 60.0  # until a planner's node publishes commands
@@ -41,7 +40,7 @@ class TrialTraffic(Traffic):
     def __init__(
         self, trials: Sequence[Trial], config: ClosedLoopConfig, progress: Progress
     ) -> None:
-        super().__init__(config=TrafficParameters(lock_step=True, follow_on=False, drive=config))
+        super().__init__(config=Config(lock_step=True, follow_on=False, drive=config))
         self._trials = list(trials)
         self._progress = progress
         self._sent: State | None = None  # the last published state

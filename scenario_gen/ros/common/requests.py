@@ -7,9 +7,8 @@ A request arrives by the service `~/generate` or the action `~/generate_scenario
 (generate_action.py).
 """
 
-from collections.abc import Callable, Mapping, Sequence
-from contextlib import AbstractContextManager
-from dataclasses import dataclass, field, replace
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
 from enum import IntEnum
 from itertools import count
 import re
@@ -23,32 +22,20 @@ from rclpy.task import Future
 from std_srvs.srv import Trigger
 
 from msg_conventions.diagnostics import Level, Subject
-from msg_conventions.hashes import template_hashes
-from msg_conventions.request_messages import RequestMessages
-from msg_conventions.scenario_info import request_summary, RequestSummary
-from scenario_gen.bags.recordings.scenario_publisher import ScenarioPublisher, Send
-from scenario_gen.bags.recordings.template import decode_template
+from msg_conventions.scenario_info import RequestSummary
 from scenario_gen.base.cancelling import CancelledError
 from scenario_gen.base.errors import InputError, ScenarioGenError
-from scenario_gen.base.provenance import parameter_texts, versions
-from scenario_gen.method.chain import Chain
-from scenario_gen.method.config import PipelineConfig
+from scenario_gen.base.parameters import parameter
 from scenario_gen.method.fitting import FittingConfig
 from scenario_gen.method.routing import PlanningConfig
-from scenario_gen.method.sampling import Callbacks, SamplingConfig
+from scenario_gen.method.sampling import SamplingConfig
 from scenario_gen.method.validity import Limits
-from scenario_gen.ros.common.node_parameters import SamplerParameters
 from scenario_gen.ros.common.ros_parameters import values_of_call
 from scenario_gen.ros.common.services import offer_trigger, REQUESTS
 from scenario_gen.ros.common.timers import create_steady_timer
-from scenario_gen.situation import Situation
 from scenario_gen.types import (
-    BoundaryStates,
-    EgoSlot,
     GenerationResult,
     Request,
-    Road,
-    Scenario,
 )
 
 MAX_NAMED_COUNT = 20  # waiting requests in a message
@@ -59,12 +46,31 @@ Answer = tuple[GenerationResult, RequestSummary]
 
 
 @dataclass(frozen=True)
-class Config(Request, SamplerParameters):
+class Config(Request):
     """The sampler's parameters.
 
     `fitting` and `planning` apply to requests with start or end states.
     """
 
+    count: int = parameter(50, "scenarios to generate", low=1, high=100_000)
+    seed: int = parameter(
+        0, "seed of the scenarios, and of the planner where states are requested", low=0
+    )
+    generate_on_input: bool = parameter(
+        True, "generate whenever the inputs are complete or change; false: on ~/generate only"
+    )
+    patience: float = parameter(
+        60.0,
+        "time without acknowledgement after which a subscriber of scenarios is no longer waited "
+        "for; 0: wait for ever",
+        unit="s",
+        low=0.0,
+    )
+    pair_map: bool = parameter(
+        True,
+        "use only a map with the recording's stamp; false: the newest map of any map server",
+        fixed=True,
+    )
     fitting: FittingConfig = field(default_factory=FittingConfig)
     planning: PlanningConfig = field(default_factory=PlanningConfig)
     sampling: SamplingConfig = field(default_factory=SamplingConfig)
@@ -404,86 +410,7 @@ class OpenRequests:
 
 def _request_name(parameters: Sequence[Any]) -> str:
     """Return the value of the parameter `request`, "" without one; ROS tools turn '7' into 7."""
-    for parameter in parameters:
-        if parameter.name == "request":
-            return str(Parameter.from_parameter_msg(parameter).value)
+    for message in parameters:
+        if message.name == "request":
+            return str(Parameter.from_parameter_msg(message).value)
     return ""
-
-
-def answer_request(
-    messages: Mapping[str, bytes],
-    config: Config,
-    request: OpenRequest,
-    node: str,
-    cancelled: Callable[[], bool],
-    send: Send,
-    turn: AbstractContextManager[object],
-) -> Answer:
-    """Sample, check and publish; fit and plan again if start or end states are requested.
-
-    Args:
-        messages: of the template, by topic.
-        config: the values of this request.
-        request: gets the progress.
-        node: the node's full name.
-        cancelled: returns whether to stop early; published scenarios stay, and the summary says
-            so.
-        send: called with topic and CDR bytes of every message, as scenarios are drawn.
-        turn: held while the messages of a scenario, or of the end, are sent, so that parallel
-            requests do not mix them.
-
-    Raises:
-        InputError: a message is damaged, or a named vehicle does not exist.
-        RefusedError: the request is impossible; the message says why, and which similar request is
-            possible.
-    """
-    template = decode_template(messages)
-    encounter = template.encounter
-    road, _ = template.road_and_fit()
-    hashes = template_hashes(messages)
-    encoder = RequestMessages(encounter, request.name, node, hashes)
-    publisher = ScenarioPublisher(encoder, road.frame_id, send)
-
-    def advance(done: int, _total: int, candidates: int) -> None:
-        request.progress(done, candidates, encounter.start_ns)
-
-    def publish(scenario: Scenario, requested: BoundaryStates, ego: EgoSlot | None) -> None:
-        with turn:
-            publisher.scenario(scenario, requested, ego)
-
-    outcome = _sample(template, road, config, Callbacks(advance, cancelled, on_valid=publish))
-    result = outcome.generated
-    summary = request_summary(
-        result,
-        request.name,
-        node,
-        config.seed,
-        parameter_texts(config) | versions() | hashes,
-        cancelled=cancelled() and len(result.scenarios) < result.requested,
-        reactions=outcome.reacting,
-    )
-    with turn:
-        publisher.close(result, summary)
-    return outcome, summary
-
-
-def _sample(
-    template: GenerationResult, road: Road, config: Config, callbacks: Callbacks
-) -> GenerationResult:
-    """Sample scenarios, after a new plan if start or end states are requested.
-
-    Raises:
-        RefusedError: the request is impossible.
-    """
-    stages = PipelineConfig(
-        fitting=config.fitting,
-        planning=config.planning,
-        sampling=config.sampling,
-        limits=config.limits,
-    )
-    situation = Situation.of(template.encounter)
-    chain = Chain(
-        situation, template.segmentation, road, stages, config, config.count, config.seed
-    )
-    planned = chain.plan() if config.moves else replace(template, seed=config.seed)
-    return chain.sample(planned, callbacks)

@@ -12,26 +12,42 @@ request, `~/cancel` all.
 """
 
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from functools import partial
 import os
 import threading
 
 from msg_conventions.diagnostics import Level
+from msg_conventions.hashes import template_hashes
 from msg_conventions.lanes import TOPIC as LANES
+from msg_conventions.request_messages import RequestMessages
+from msg_conventions.scenario_info import request_summary
 from msg_conventions.topics import vehicle_topic
 from msg_conventions.tracks import decode_tracks
-from scenario_gen.method.sampling import Cancelled
+from scenario_gen.bags.recordings.scenario_publisher import ScenarioPublisher
+from scenario_gen.bags.recordings.template import decode_template
+from scenario_gen.base.provenance import parameter_texts, versions
+from scenario_gen.method.chain import Chain
+from scenario_gen.method.config import PipelineConfig
+from scenario_gen.method.sampling import Callbacks, Cancelled
 from scenario_gen.ros.common.generate_action import action_type, Goals
 from scenario_gen.ros.common.requests import (
     Answer,
-    answer_request,
     Config,
     OpenRequest,
     OpenRequests,
 )
 from scenario_gen.ros.common.stage_node import Inputs, StageNode
 from scenario_gen.ros.common.topics import acknowledgement_warning, other_publishers
-from scenario_gen.types import tokens
+from scenario_gen.situation import Situation
+from scenario_gen.types import (
+    BoundaryStates,
+    EgoSlot,
+    GenerationResult,
+    Road,
+    Scenario,
+    tokens,
+)
 
 GOAL = "ego/goal"
 ENDS = ("road/entries", "road/exits")  # only requests with start or end states need them
@@ -169,12 +185,8 @@ class GpSampler(StageNode):
                 return None
             self._requests.begin(request)
             report = partial(self._report_pace, request.name)
-            send = partial(self._send, stop=stop)
             with self.outputs.paced(self.OUTPUTS[:2], config.patience, report):
-                node = self.get_fully_qualified_name()
-                result, summary = answer_request(
-                    messages, config, request, node, stop, send, self._turn
-                )
+                result, summary = self._answer(messages, request, config, stop)
             message = summary.status.message
             if summary.cancelled:
                 message = f"{self.stop_reason(messages, cancelled)}: {message}"
@@ -191,6 +203,53 @@ class GpSampler(StageNode):
             message = message or self.stop_reason(messages, cancelled) or "cancelled"
             self._requests.end(request, level, message, **values)
 
+    def _answer(
+        self,
+        messages: Mapping[str, bytes],
+        request: OpenRequest,
+        config: Config,
+        stop: Callable[[], bool],
+    ) -> Answer:
+        """Sample, check and publish; fit and plan again if start or end states are requested.
+
+        Parallel requests do not mix the messages of their scenarios. If `stop` returns True,
+        published scenarios stay, and the summary says so.
+
+        Raises:
+            InputError: a message is damaged, or a named vehicle does not exist.
+            RefusedError: the request is impossible; the message says why, and which similar
+                request is possible.
+        """
+        template = decode_template(messages)
+        encounter = template.encounter
+        road, _ = template.road_and_fit()
+        hashes = template_hashes(messages)
+        node = self.get_fully_qualified_name()
+        encoder = RequestMessages(encounter, request.name, node, hashes)
+        publisher = ScenarioPublisher(encoder, road.frame_id, partial(self._send, stop=stop))
+
+        def advance(done: int, _total: int, candidates: int) -> None:
+            request.progress(done, candidates, encounter.start_ns)
+
+        def publish(scenario: Scenario, requested: BoundaryStates, ego: EgoSlot | None) -> None:
+            with self._turn:
+                publisher.scenario(scenario, requested, ego)
+
+        outcome = _sample(template, road, config, Callbacks(advance, stop, on_valid=publish))
+        result = outcome.generated
+        summary = request_summary(
+            result,
+            request.name,
+            node,
+            config.seed,
+            parameter_texts(config) | versions() | hashes,
+            cancelled=stop() and len(result.scenarios) < result.requested,
+            reactions=outcome.reacting,
+        )
+        with self._turn:
+            publisher.close(result, summary)
+        return outcome, summary
+
     def _report_pace(self, request: str, topic: str, count: int) -> None:
         self.status(
             Level.WARN,
@@ -199,3 +258,25 @@ class GpSampler(StageNode):
             request=request,
             count=str(count),
         )
+
+
+def _sample(
+    template: GenerationResult, road: Road, config: Config, callbacks: Callbacks
+) -> GenerationResult:
+    """Sample scenarios, after a new plan if start or end states are requested.
+
+    Raises:
+        RefusedError: the request is impossible.
+    """
+    stages = PipelineConfig(
+        fitting=config.fitting,
+        planning=config.planning,
+        sampling=config.sampling,
+        limits=config.limits,
+    )
+    situation = Situation.of(template.encounter)
+    chain = Chain(
+        situation, template.segmentation, road, stages, config, config.count, config.seed
+    )
+    planned = chain.plan() if config.moves else replace(template, seed=config.seed)
+    return chain.sample(planned, callbacks)

@@ -23,8 +23,8 @@ from msg_conventions.topics import vehicle_topic
 from msg_conventions.tracks import encode_tracks
 from scenario_gen.base.cancelling import stop_if_cancelled
 from scenario_gen.base.errors import InputError
+from scenario_gen.base.parameters import parameter, Parameters
 from scenario_gen.logs import latitude_longitude, LogConfig, read_log
-from scenario_gen.ros.common.node_parameters import LogPlayerParameters
 from scenario_gen.ros.common.recording_part import send_part
 from scenario_gen.ros.common.recording_part import TOPIC as PART
 from scenario_gen.ros.common.services import offer_trigger
@@ -35,9 +35,21 @@ DISCOVERY_S = 1.0  # for subscribers to find the streams, which are not latched
 
 
 @dataclass(frozen=True)
-class Config(LogPlayerParameters):
+class Config(Parameters):
     """The log player's parameters."""
 
+    log_path: str = parameter("", "log to read: a file, a bag or a folder of files")
+    encounter: int = parameter(0, "which encounter of the log, from 0", low=0)
+    stream: bool = parameter(
+        False,
+        "publish fixes and speeds of each vehicle with /clock instead of tracks",
+    )
+    rate: float = parameter(
+        1.0, "speed of the stream, as a multiple of the recorded one", low=0.01, high=1000.0
+    )
+    wait_matching_subscriptions: int = parameter(
+        0, "subscribers that each stream must have before it begins", low=0
+    )
     log: LogConfig = field(default_factory=LogConfig)
 
 

@@ -14,6 +14,7 @@ disk the recording ends with an error on /diagnostics, and the written part stay
 
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
+from dataclasses import dataclass
 from pathlib import Path
 import re
 from time import monotonic, time_ns
@@ -28,8 +29,9 @@ from scenario_gen.bags.recordings.message_loss import MessageLoss, TopicLoss
 from scenario_gen.bags.storage.metadata import qos_yaml
 from scenario_gen.bags.storage.writer import BagWriter, Split
 from scenario_gen.base.errors import InputError, of_system
+from scenario_gen.base.parameters import parameter, Parameters
 from scenario_gen.ros.common.diagnostics import NodeDiagnostics
-from scenario_gen.ros.common.node_parameters import RecorderParameters as Config
+from scenario_gen.ros.common.node_parameters import check_topics
 from scenario_gen.ros.common.ros_parameters import ConfigParameters
 from scenario_gen.ros.common.services import offer_trigger
 from scenario_gen.ros.common.timers import create_steady_timer
@@ -44,6 +46,32 @@ SUITE_TOPICS = (
     r"tracks|changepoints|posterior|fit(/info)?|vehicle_\w+/(route|footprint|fix|speed)"
     r"|ego/(start|goal|witness)|scenarios(/info)?|markers|report"
 )
+
+
+@dataclass(frozen=True)
+class Config(Parameters):
+    """The recorder's parameters."""
+
+    bag: str = parameter(
+        "", "folder of the bag; empty: wait for ~/start, and name the bag by the time", fixed=True
+    )
+    topics: str = parameter(
+        "",
+        "regular expression of the full names of the topics; empty: those in the node's "
+        "namespace, /clock and /tf",
+        fixed=True,
+    )
+    compress: bool = parameter(True, "compress chunks with zstd")
+    split_bytes: int = parameter(
+        0, "size of the messages after which a new file begins; 0: never", unit="B", low=0
+    )
+    split_seconds: float = parameter(
+        0.0, "time after which a new file begins; 0: never", unit="s", low=0.0
+    )
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        check_topics(self.topics)
 
 
 def default_topics(namespace: str) -> str:

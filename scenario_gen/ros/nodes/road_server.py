@@ -30,8 +30,9 @@ from msg_conventions.roads import encode_map, encode_poses
 from msg_conventions.tracks import decode_tracks
 from scenario_gen.base.cancelling import stop_if_cancelled
 from scenario_gen.base.errors import InputError, RefusedError, ScenarioGenError
+from scenario_gen.base.parameters import parameter, Parameters
 from scenario_gen.roads import build_road, RoadConfig
-from scenario_gen.ros.common.node_parameters import RoadServerParameters
+from scenario_gen.ros.common.node_parameters import ROAD_NAMES
 from scenario_gen.ros.common.recording_part import request_part
 from scenario_gen.ros.common.recording_part import TOPIC as PART
 from scenario_gen.ros.common.services import REQUESTS
@@ -40,9 +41,15 @@ from scenario_gen.types import Encounter, NoteKind
 
 
 @dataclass(frozen=True)
-class Config(RoadServerParameters):
+class Config(Parameters):
     """The road server's parameters."""
 
+    road_name: str = parameter(
+        "t_intersection",
+        f"{', '.join(ROAD_NAMES)}, a map_server YAML file, or a vector map (.osm, .xodr, .xml)",
+    )
+    wait_for_tracks: bool = parameter(False, "publish no road before tracks arrive")
+    shorten: bool = parameter(True, "request a part of a recording that does not fit as a whole")
     road: RoadConfig = field(default_factory=RoadConfig)
 
 

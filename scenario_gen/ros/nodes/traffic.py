@@ -45,6 +45,7 @@ from scenario_gen.closed_loop.verdict import judge
 from scenario_gen.ros.common.diagnostics import NodeDiagnostics
 from scenario_gen.ros.common.driving import (
     ArrivingTrials,
+    Config,
     decode_command,
     EgoCommand,
     encode_verdict,
@@ -53,7 +54,6 @@ from scenario_gen.ros.common.driving import (
     surroundings,
     task_messages,
 )
-from scenario_gen.ros.common.node_parameters import TrafficParameters as Config
 from scenario_gen.ros.common.ros_parameters import ConfigParameters
 from scenario_gen.ros.common.services import offer_trigger
 from scenario_gen.ros.common.timers import create_steady_timer
