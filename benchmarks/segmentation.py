@@ -159,7 +159,7 @@ def _against_moseq(cell: str) -> list[Row]:
 
 
 def _robust() -> list[Row]:
-    """Score cell B with heavy tails, outliers, missing cells and dependent channels."""
+    """Score cell B with heavy tails, outliers and dependent channels."""
     lost: dict[str, list[float]] = {}
     heavy_tails = []
     for seed in ROBUST_SEEDS:
@@ -168,12 +168,10 @@ def _robust() -> list[Row]:
         heavy_tails.append(hamming(heavy.labels, segment_series(heavy.x, seed=1).labels))
         sequence = gaussian_hmm("B", seed)
         x = sequence.x
-        missing = np.where(rng.uniform(size=x.shape) < 0.05, np.nan, x)
         far = (rng.uniform(size=(len(x), 1)) < 0.01) * rng.normal(size=x.shape)
         variants = {
             "twin channel": np.column_stack([x, 2.0 * x[:, 0]]),
             "summed channel": np.column_stack([x[:, 0] + x[:, 1], x]),
-            "5 % of cells missing": missing,
             "1 % outliers of 20 deviations": x + 20.0 * far,
             "1 % outliers of 1000 deviations": x + 1000.0 * far,
         }

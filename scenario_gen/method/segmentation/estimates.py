@@ -7,13 +7,12 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
-from scipy import linalg
+from scipy import linalg, special
 
 from scenario_gen.method.segmentation.hdp_hmm.config import SamplerConfig
-from scenario_gen.method.segmentation.hdp_hmm.problem import Problem
-from scenario_gen.method.segmentation.hdp_hmm.smoother import expected_statistics, Rows
+from scenario_gen.method.segmentation.hdp_hmm.problem import filled_in, Problem
 from scenario_gen.method.segmentation.posterior import Posterior
-from scenario_gen.numerics import Bools, Floats, Ints
+from scenario_gen.numerics import Floats, Ints
 
 MAX_ROUNDS_COUNT, TOLERANCE_RATIO = 50, 1e-7  # of EM, in standardised units
 RIDGE_RATIO = 1e-12  # to a variance: collinear channels make covariances singular
@@ -30,29 +29,50 @@ def regressed(x: Floats, ends: Ints, config: SamplerConfig) -> tuple[Problem, In
     return problem, np.concatenate(rows)
 
 
-def hidden_channels(problem: Problem) -> Bools:
-    """Return which channels of each row were not observed: (T', D)."""
-    hidden = np.zeros(problem.y.shape, np.bool_)
-    hidden[problem.gaps] = problem.hidden
-    return hidden
-
-
-def whitened(regression: Floats, covariance: Floats) -> Floats:
-    """Return the map (D, P + D) of (z, y) to the whitened residual, from A (D, P) and Σ (D, D)."""
-    spread = np.diag(covariance)
-    factor = np.linalg.cholesky(
-        covariance + RIDGE_RATIO * np.diag(np.where(spread > 0.0, spread, 1.0))
-    )
-    root = linalg.solve_triangular(factor, np.eye(len(spread)), lower=True)
-    return np.hstack([-(root @ regression), root])
-
-
 @dataclass(frozen=True, eq=False)
 class Emissions:
-    """A (K, D, P) and Σ (K, D, D) of all states, in standardised units."""
+    """A (K, D, P) and Σ (K, D, D) of all states."""
 
     regression: Floats
     covariance: Floats
+
+
+def whitened_squares(
+    problem: Problem, emissions: Emissions, k: int, channels: Ints
+) -> tuple[Floats, float]:
+    """Return the squared whitened residuals (T',) of state k, and its log|Σ|^(-1/2).
+
+    Only `channels` (D',) count.
+    """
+    covariance = emissions.covariance[k][np.ix_(channels, channels)]
+    spread = np.diag(covariance)
+    ridge = RIDGE_RATIO * np.diag(np.where(spread > 0.0, spread, 1.0))
+    factor = np.linalg.cholesky(covariance + ridge)
+    expected = problem.v[:, : problem.regressors] @ emissions.regression[k][channels].T
+    residual = problem.y[:, channels] - expected
+    white = linalg.solve_triangular(factor, residual.T, lower=True)
+    return np.square(white).sum(axis=0), -float(np.log(np.diag(factor)).sum())
+
+
+def log_densities(
+    problem: Problem, emissions: Emissions, posterior: Posterior, weight: float
+) -> Floats:
+    """Return log p(y_t | z_t, state): (T', K); 0 for rows that were not observed.
+
+    A weight of a sample below 1 tempers the density as in the sampler; the density is then known
+    up to a constant per row. Channels that the sampler left out do not count.
+    """
+    n, dof = weight * len(posterior.channels), posterior.dof
+    columns = []
+    for k in range(len(emissions.regression)):
+        squares, log_root = whitened_squares(problem, emissions, k, posterior.channels)
+        column = weight * log_root - 0.5 * (weight * squares + n * np.log(2.0 * np.pi))
+        if dof > 0.0:
+            column = weight * log_root - 0.5 * (dof + n) * np.log1p(weight * squares / dof)
+            column += special.gammaln(0.5 * (dof + n)) - special.gammaln(0.5 * dof)
+            column -= 0.5 * n * np.log(np.pi * dof)
+        columns.append(np.where(problem.observed > 0.0, column, 0.0))
+    return np.column_stack(columns)
 
 
 def estimate(
@@ -69,27 +89,24 @@ def estimate(
         E Σ = S' / (ν0 + w Σ r - D - 1)
 
     With z = 1, A is the mean and K is κ0. κ0 and ν0 are the drawn ones, and S0 = (ν0 - D - 1) ×
-    the covariance within states. Masses and hidden values have their means given A and Σ, which
-    EM iterates. Channels that the sampler left out are included, but masses ignore them.
+    the covariance within states. Masses have their means given A and Σ, which EM iterates.
+    Channels that the sampler left out are included, but masses ignore them.
 
     Source: Fox et al. 2011.
 
     Args:
-        x: (T, D), NaN where hidden.
+        x: (T, D), NaN for outliers.
         ends: one past the index of the last sample of each sequence.
         posterior: of these samples.
         config: model.
 
     Returns:
-        Means (K, D), covariances (K, D, D) and regressions (K, D, P) in x's units; NaN for a
-        channel that was never observed.
+        Means (K, D), covariances (K, D, D) and regressions (K, D, P) in x's units.
     """
-    absent = np.isnan(x).all(axis=0)
-    seen = np.where(absent, 0.0, x)
-    centre, spread = np.nanmean(seen, axis=0), np.nanstd(seen, axis=0)
-    varies = spread > 1e-9 * np.maximum(np.nanmax(np.abs(seen), axis=0), 1e-300)
+    centre, spread = np.nanmean(x, axis=0), np.nanstd(x, axis=0)
+    varies = spread > 1e-9 * np.maximum(np.nanmax(np.abs(x), axis=0), 1e-300)
     unit = np.where(varies, spread, 1.0)
-    problem, rows = regressed((seen - centre) / unit, ends, config)
+    problem, rows = regressed((x - centre) / unit, ends, config)
     states = int(posterior.labels.max()) + 1
     share = np.stack([(posterior.samples == k).mean(axis=0) for k in range(states)])
     standardised = fit_emissions(problem, share[:, rows], posterior)
@@ -102,37 +119,30 @@ def estimate(
     covariance = standardised.covariance * unit[:, None] * unit
     means = regression[:, :, 0].copy()
     if p > 1:
-        counts = share[:, :, None] * ~np.isnan(seen)
-        total = counts.sum(axis=1)
-        sums = (counts * np.nan_to_num(seen)).sum(axis=1)
-        means = np.where(total > 0.0, sums / np.maximum(total, 1e-300), centre)
-    for values in (means, regression, covariance):
-        values[:, absent] = np.nan
-    covariance[:, :, absent] = np.nan
+        means = share @ filled_in(x, ends) / share.sum(axis=1, keepdims=True)
     return means, covariance, regression
 
 
 def fit_emissions(problem: Problem, share: Floats, posterior: Posterior) -> Emissions:
     """Iterate the equations of `estimate` by EM; `share` (K, T') is that of each row's draws."""
     d, p, states = problem.dimensions, problem.regressors, len(share)
-    hidden = hidden_channels(problem)
-    unused = hidden.copy()
-    unused[:, np.setdiff1d(np.arange(d), posterior.channels)] = True
-    share = np.where(unused.all(axis=1), 0.0, share)
-    weight, freedom = posterior.weight, posterior.extra - 1.0
+    share = share * problem.observed
+    weight, dof, freedom = posterior.weight, posterior.dof, posterior.extra - 1.0
+    degrees = dof + weight * len(posterior.channels)
     mean, precision = problem.mean, problem.precision * posterior.worth
     total = share.sum(axis=1)
     covariance = np.repeat(np.eye(d)[None], states, axis=0)
     fitted = Emissions(np.repeat(mean[None], states, axis=0), covariance)
     if p == 1:
         fitted.regression[:, :, 0] = (share @ problem.y) / np.maximum(total, 1e-300)[:, None]
-    outer, sums = np.empty((p + d, p + d)), np.empty(2)
-    rows = Rows(problem.v, hidden, unused, weight, posterior.dof)
     for _ in range(MAX_ROUNDS_COUNT):
         regression, scatter = np.empty_like(fitted.regression), np.empty_like(covariance)
         for k in range(states):
-            coef = whitened(fitted.regression[k], fitted.covariance[k])
-            expected_statistics(rows, share[k], coef, outer, sums)
+            mass = share[k]
+            if dof > 0.0:
+                squares, _ = whitened_squares(problem, fitted, k, posterior.channels)
+                mass = mass * degrees / (dof + weight * squares)
+            outer = (problem.v * mass[:, None]).T @ problem.v
             pull = mean @ precision + weight * outer[p:, :p]
             a = linalg.solve(precision + weight * outer[:p, :p], pull.T, assume_a="pos").T
             cross = a @ outer[:p, p:]
@@ -149,7 +159,7 @@ def fit_emissions(problem: Problem, share: Floats, posterior: Posterior) -> Emis
             np.abs(covariance - fitted.covariance).max(),
         )
         fitted = Emissions(regression, covariance)
-        if moved < TOLERANCE_RATIO:
+        if dof == 0.0 or moved < TOLERANCE_RATIO:
             break
     return fitted
 

@@ -14,16 +14,17 @@ import numpy.typing as npt
 
 from scenario_gen.base.errors import InputError
 from scenario_gen.method.segmentation.estimates import (
+    Emissions,
     estimate,
-    hidden_channels,
+    log_densities,
     mean_transitions,
     regressed,
-    whitened,
 )
 from scenario_gen.method.segmentation.hdp_hmm.chain import TRACE
 from scenario_gen.method.segmentation.hdp_hmm.config import SamplerConfig
-from scenario_gen.method.segmentation.hdp_hmm.smoother import log_densities, smooth
+from scenario_gen.method.segmentation.hdp_hmm.smoother import smooth
 from scenario_gen.method.segmentation.series import (
+    refuse_not_finite,
     segment_visible,
     usual_distances,
     without_outliers,
@@ -163,7 +164,7 @@ class StickyHDPHMM:
         """Sample the segmentations of X, and estimate each state's parameters from them.
 
         Args:
-            X: (T, D), or a list of sequences (T_i, D); NaN marks missing values.
+            X: (T, D), or a list of sequences (T_i, D), finite.
             lengths: length of each sequence if X concatenates several. An array with one entry
                 per sample is ignored: pipelines pass targets in this position.
             y: ignored; present for API consistency.
@@ -176,7 +177,7 @@ class StickyHDPHMM:
                 or outliers are ignored.
 
         Raises:
-            EstimatorError: fewer than 4 samples, an infinite value, or an invalid parameter.
+            EstimatorError: fewer than 4 samples, NaN or infinity, or an invalid parameter.
         """
         x, ends = stacked(X, lengths)
         config = self._config()
@@ -219,7 +220,7 @@ class StickyHDPHMM:
         """Return the posterior probability (T, K) of each state, by forward-backward smoothing.
 
         The parameters are the estimated ones, and a sample has the weight `posterior_.weight`, as
-        in the fit. Missing values, and outliers by the rule of the fit, are integrated out.
+        in the fit. Outliers by the rule of the fit are interpolated.
 
         Raises:
             EstimatorError: as `fit`, or another number of channels than in the fit.
@@ -303,12 +304,10 @@ class StickyHDPHMM:
         return f"StickyHDPHMM({', '.join(changed)})"
 
     def __sklearn_tags__(self) -> Any:
-        """Return scikit-learn's tags: a density estimator that accepts NaN."""
-        from sklearn.utils import InputTags, Tags, TargetTags
+        """Return scikit-learn's tags: a density estimator."""
+        from sklearn.utils import Tags, TargetTags
 
-        return Tags(
-            "density_estimator", TargetTags(required=False), input_tags=InputTags(allow_nan=True)
-        )
+        return Tags("density_estimator", TargetTags(required=False))
 
     def _config(self) -> SamplerConfig:
         """Validate the parameters."""
@@ -347,26 +346,13 @@ class StickyHDPHMM:
                 f"X has {x.shape[1]} features, but StickyHDPHMM is expecting "
                 f"{self.n_features_in_} features as input"
             )
-        used = self.posterior_.channels
-        absent = np.isnan(self.means_).all(axis=0)
-        visible = np.where(absent, 0.0, without_outliers(x, self._usual, ends))
         with as_value_error():
-            problem, rows = regressed(visible, ends, self._config())
-        hidden = hidden_channels(problem)[:, used]
-        v = np.hstack(
-            [problem.v[:, : problem.regressors], problem.v[:, problem.regressors + used]]
-        )
-        density = np.zeros((len(rows), self.n_states_))
-        if len(used):
-            states = zip(self.coefficients_, self.covariances_, strict=True)
-            coef = np.stack(
-                [whitened(a[used], covariance[np.ix_(used, used)]) for a, covariance in states]
-            )
-            if weight is None:
-                weight = self.posterior_.weight
-            log_densities(v, hidden, coef, weight, self.posterior_.dof, density)
+            problem, rows = regressed(without_outliers(x, self._usual, ends), ends, self._config())
+        if weight is None:
+            weight = self.posterior_.weight
+        emissions = Emissions(self.coefficients_, self.covariances_)
         log_density = np.zeros((len(x), self.n_states_))
-        log_density[rows] = density
+        log_density[rows] = log_densities(problem, emissions, self.posterior_, weight)
         proba = np.empty_like(log_density)
         changed = np.empty(len(x))
         total = smooth(log_density, self.transitions_, self.startprob_, ends, proba, changed)
@@ -395,12 +381,12 @@ class StickyHDPHMM:
         if left_out:
             reasons = ", ".join(f"{i} ({_why_left_out(x[:, i])})" for i in left_out)
             concerns.append(f"channels without information of their own are left out: {reasons}")
-        hidden = np.argwhere(np.isnan(visible) & ~np.isnan(x))
-        if len(hidden):
-            places = [f"sample {t} of channel {i}" for t, i in hidden[:3]]
-            places += ["..."] * (len(hidden) > 3)
+        outliers = np.argwhere(np.isnan(visible))
+        if len(outliers):
+            places = [f"sample {t} of channel {i}" for t, i in outliers[:3]]
+            places += ["..."] * (len(outliers) > 3)
             concerns.append(
-                f"{len(hidden)} values far from their neighbours are treated as missing: "
+                f"{len(outliers)} values far from their neighbours are interpolated: "
                 f"{', '.join(places)}"
             )
         return concerns
@@ -414,10 +400,7 @@ def _default_params() -> dict[str, Any]:
 
 def _why_left_out(column: Floats) -> str:
     """Return why a channel (T,) was left out."""
-    measured = column[~np.isnan(column)]
-    if len(measured) < 2:
-        return "not measured"
-    if np.ptp(measured) <= 1e-9 * np.abs(measured).max():
+    if np.ptp(column) <= 1e-9 * np.abs(column).max():
         return "does not vary"
     return "follows from those before it"
 
@@ -461,7 +444,7 @@ def matrix(X: npt.ArrayLike) -> Floats:
     """Return X as an array (T, D).
 
     Raises:
-        EstimatorError: it has another shape, or a value is complex or infinite.
+        EstimatorError: it has another shape, or a value is complex or not finite.
     """
     values = np.asarray(X)
     if values.dtype.kind == "c":
@@ -476,10 +459,6 @@ def matrix(X: npt.ArrayLike) -> Floats:
         raise EstimatorError(
             f"found 0 feature(s) (shape={x.shape}) while a minimum of 1 is required."
         )
-    if np.isinf(x).any():
-        row, column = np.argwhere(np.isinf(x))[0]
-        raise EstimatorError(
-            f"X holds {x[row, column]} at sample {row}, channel {column}; use NaN for missing "
-            "values"
-        )
+    with as_value_error():
+        refuse_not_finite(x, "X")
     return x

@@ -22,6 +22,7 @@ from numpy.lib.stride_tricks import sliding_window_view
 from scenario_gen.method.segmentation.hdp_hmm.problem import moving_mean
 from scenario_gen.numerics import Floats
 from scenario_gen.types import Motion
+from scenario_gen.types.motion import held
 
 STAND_BLUR_RATIO = 0.2  # differences of `moving` that are noise
 STAND_WINDOW_S = 0.9
@@ -131,7 +132,7 @@ def driving_features(
 ) -> tuple[Floats, Floats]:
     """Return features (T, 3N) of an encounter, vehicle by vehicle, and their noise (3N,).
 
-    Features are NaN where a vehicle is absent.
+    A vehicle's first or last features are held where it is absent.
 
     Args:
         encounter: N vehicles, T samples.
@@ -141,19 +142,19 @@ def driving_features(
         turn_noise: m/s², the same for the lateral one.
     """
     vehicles, dt = encounter.vehicles, encounter.dt
-    features = np.full((encounter.speed.shape[1], len(vehicles), 3), np.nan)
+    features = np.zeros((*encounter.speed.shape, 3))
     for i, (first, last) in enumerate(encounter.present.tolist()):
         present = slice(first, last + 1)
         position, speed = encounter.position[i, present], encounter.speed[i, present]
         moves = moving(speed, dt, vehicles[i].kind.waits_below)
-        features[present, i, 0] = longitudinal_acceleration(speed, dt, speed_window)
-        features[present, i, 1] = lateral_acceleration(position, dt, turn_window) * moves
-        features[present, i, 2] = moves
+        features[i, present, 0] = longitudinal_acceleration(speed, dt, speed_window)
+        features[i, present, 1] = lateral_acceleration(position, dt, turn_window) * moves
+        features[i, present, 2] = moves
     noise = np.tile([speed_noise, turn_noise, STAND_BLUR_RATIO], len(vehicles))
-    return features.reshape(len(features), -1), noise
+    return np.column_stack(list(held(features, encounter.present))), noise
 
 
 def paper_features(encounter: Motion) -> Floats:
-    """Return the paper's positions and speeds (T, 3N); NaN where a vehicle is absent."""
+    """Return the paper's positions and speeds (T, 3N)."""
     stacked = np.concatenate((encounter.position, encounter.speed[..., None]), axis=-1)
-    return np.column_stack(list(np.where(encounter.is_present[..., None], stacked, np.nan)))
+    return np.column_stack(list(stacked))

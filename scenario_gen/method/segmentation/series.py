@@ -44,14 +44,15 @@ def segment_series(
     Source: Fox et al. 2011.
 
     Args:
-        x: (T, D), any units, NaN for missing values; see `standardised`.
+        x: (T, D), any units; see `standardised`.
         config: model and sampler.
         seed: same seed, same answer.
         ends: one past the index of the last sample of each sequence, if x concatenates several.
         blur: (D,) standard deviation of each channel's measurement error, in x's units; None: 0.
 
     Raises:
-        InputError: fewer than 4 samples, an infinite value, or a sequence too short for the order.
+        InputError: fewer than 4 samples, a value that is not finite, or a sequence too short for
+            the order.
     """
     x = np.asarray(x, dtype=np.float64)
     if x.ndim == 1:
@@ -60,12 +61,7 @@ def segment_series(
         raise InputError(
             f"a series to segment needs at least 4 samples in (T, D); its shape is {x.shape}"
         )
-    if np.isinf(x).any():
-        row, column = np.argwhere(np.isinf(x))[0]
-        raise InputError(
-            f"the series to segment holds {x[row, column]} at sample {row}, channel {column}; "
-            "use NaN for missing values"
-        )
+    refuse_not_finite(x, "the series to segment")
     stops = np.array([len(x)] if ends is None else ends, dtype=np.int64)
     if stops[-1] != len(x) or (np.diff(np.concatenate([[0], stops])) < 1).any():
         raise InputError(
@@ -75,6 +71,16 @@ def segment_series(
     error = np.zeros(x.shape[1]) if blur is None else np.asarray(blur)
     visible = without_outliers(x, usual_distances(x, stops), stops)
     return segment_visible(visible, config, seed, stops, error)
+
+
+def refuse_not_finite(x: Floats, name: str) -> None:
+    """Raise InputError if x (T, D) holds NaN or infinity; `name` is for the message."""
+    if not np.isfinite(x).all():
+        row, column = np.argwhere(~np.isfinite(x))[0]
+        raise InputError(
+            f"{name} holds NaN or inf: {x[row, column]} at sample {row}, channel {column}; "
+            "interpolate what is missing, or split the series there"
+        )
 
 
 def segment_visible(
@@ -100,21 +106,20 @@ def standardised(x: Floats, error: Floats) -> tuple[Floats, Floats, Ints]:
     before it adds nothing and would make every covariance singular.
 
     Args:
-        x: (T, D), NaN for missing values and outliers (`without_outliers`).
+        x: (T, D), NaN for outliers (`without_outliers`).
         error: (D,) measurement error of each channel, a standard deviation.
 
     Returns:
         Scaled series (T, D'), variance of its measurement error (D',), indices of its channels
         (D',).
     """
-    filled = without_rare_channels(x)
-    spread, centre = np.nanstd(filled, axis=0), np.nanmean(filled, axis=0)
-    inner = inner_spread(filled)
-    varies = spread > 1e-9 * np.maximum(np.nanmax(np.abs(filled), axis=0), 1e-300)
+    spread, centre = np.nanstd(x, axis=0), np.nanmean(x, axis=0)
+    inner = inner_spread(x)
+    varies = spread > 1e-9 * np.maximum(np.nanmax(np.abs(x), axis=0), 1e-300)
     unit = np.where(inner > 0.1 * spread, inner, spread)
     unit = np.maximum(unit, error)  # a channel of pure noise is not scaled up
     channels = np.flatnonzero(varies)
-    scaled = (filled[:, channels] - centre[channels]) / unit[channels]
+    scaled = (x[:, channels] - centre[channels]) / unit[channels]
     complete = scaled[~np.isnan(scaled).any(axis=1)]
     if len(complete) > 2 * len(channels):
         deviation = complete.std(axis=0)
@@ -129,18 +134,12 @@ def inner_spread(x: Floats) -> Floats:
     return np.asarray(np.nanstd(np.clip(x, low, high), axis=0))
 
 
-def without_rare_channels(x: Floats) -> Floats:
-    """Return x (T, D) with zeros in channels that have fewer than two values."""
-    return np.where((~np.isnan(x)).sum(axis=0) < 2, 0.0, x)
-
-
 def usual_distances(x: Floats, ends: Ints) -> Floats:
     """Return the usual distance (D,) of a sample from the median of the four before it.
 
     It is at least a tenth of the channel's spread. Sequences end before the samples `ends` (Q,);
     the first sample of a sequence does not count.
     """
-    x = without_rare_channels(x)
     before, _ = _from_medians(x, ends)
     with np.errstate(all="ignore"):
         deviation = 1.4826 * np.nanmedian(np.abs(before), axis=0)

@@ -84,7 +84,9 @@ def test_channel_that_varies_less_than_it_is_known_hides_nothing(tremble):
     assert posterior.labels.max() == 1
 
 
-@pytest.mark.parametrize("bad", [np.zeros((3, 2)), np.full((10, 2), np.inf), np.zeros((0, 2))])
+@pytest.mark.parametrize(
+    "bad", [np.zeros((3, 2)), np.full((10, 2), np.inf), np.full((10, 2), np.nan), np.zeros((0, 2))]
+)
 def test_refuses_what_it_cannot_use(bad):
     with pytest.raises(InputError):
         segment_series(bad)
@@ -196,15 +198,6 @@ def test_channels_that_follow_from_others_change_nothing():
     assert found_as_drawn(segment_series(np.column_stack([x[:, 0] + x[:, 1], x]), seed=0), labels)
 
 
-@pytest.mark.parametrize("share", ["cells", "rows"])
-def test_what_was_not_measured_is_left_out(share):
-    x, labels = many_states(4)
-    rng = np.random.default_rng(0)
-    lost = rng.uniform(size=x.shape if share == "cells" else (len(x), 1)) < 0.08
-    posterior = segment_series(np.where(lost, np.nan, x), seed=0)
-    assert found_as_drawn(posterior, labels)
-
-
 def test_heavy_tails_are_told_from_states():
     x, labels = many_states(5)
     rng = np.random.default_rng(0)
@@ -249,15 +242,3 @@ def test_a_sequence_shorter_than_the_order_is_named():
         InputError, match="sequence 1 has 3 samples; an autoregressive emission of order 2 needs 4"
     ):
         segment_series(x, SamplerConfig(emission="autoregressive", order=2), ends=(100, 103, 240))
-
-
-@pytest.mark.parametrize("missing", [0.4])
-def test_what_is_missing_does_not_make_the_rest_look_correlated(missing):
-    """Interpolated gaps must not lower the weight of independent samples."""
-    rng = np.random.default_rng(0)
-    labels = np.repeat([0, 1, 0, 1], 200)
-    x = rng.normal(size=(800, 3)) + 4.0 * labels[:, None]
-    x[rng.random(x.shape) < missing] = np.nan
-    posterior = segment_series(x, seed=1)
-    assert posterior.weight == 1.0
-    assert np.mean(posterior.labels != labels) < 0.01

@@ -34,15 +34,10 @@ from scenario_gen.method.segmentation.hdp_hmm.model import (
     States,
     Statistics,
 )
-from scenario_gen.method.segmentation.hdp_hmm.observed import (
-    draw_hidden,
-    draw_masses,
-    log_masses,
-    observed_log_likelihood,
-)
 from scenario_gen.method.segmentation.hdp_hmm.prior import sample_prior, set_prior
 from scenario_gen.method.segmentation.hdp_hmm.random import pick, State, uniform
 from scenario_gen.method.segmentation.hdp_hmm.split_merge import split_or_merge
+from scenario_gen.method.segmentation.hdp_hmm.tails import draw_masses, log_masses
 from scenario_gen.method.segmentation.hdp_hmm.transitions import (
     count_transitions,
     log_transitions,
@@ -97,27 +92,11 @@ def rescale_small(message: Floats) -> None:
 
 
 @kernel(inline=True, forced=True)
-def replace_gaps(
-    data: Data, gap: int, start: int, emitted: States, hyper: Hyper, block: Floats
-) -> int:
-    """Put the log-likelihoods of samples with hidden channels, from `start` on, into a block.
-
-    `gap` is the index of the last one of them; returns that of the last one before `start`.
-    """
-    while gap >= 0 and data.gaps[gap] >= start:
-        t = data.gaps[gap]
-        out = block[:, t - start]
-        observed_log_likelihood(
-            data.v[t],
-            data.hidden[gap],
-            emitted.coef,
-            emitted.shape,
-            hyper.weight,
-            hyper.dof,
-            out,
-        )
-        gap -= 1
-    return gap
+def ignore_unobserved(mass: Floats, block: Floats) -> None:
+    """Make all states equally likely, in block (L, BLOCK), where the mass (n,) is 0."""
+    for t in range(len(mass)):
+        if not mass[t] > 0.0:
+            block[:, t] = 0.0
 
 
 @kernel(inline=True, merged=True)
@@ -136,12 +115,11 @@ def backward_messages(data: Data, emitted: States, hyper: Hyper, pi: Floats, w: 
         for k in range(states):
             columns[k, j] = pi[j, k]
     last = len(ends) - 1
-    gap = len(data.gaps) - 1
     stop = w.shape[0]
     while stop > 0:
         start = max(0, stop - BLOCK_SAMPLES)
         block_log_likelihood(data.vt, start, stop, emitted, hyper.weight, hyper.dof, block, best)
-        gap = replace_gaps(data, gap, start, emitted, hyper, block)
+        ignore_unobserved(data.mass[start:stop], block)
         block_likelihood(block, stop - start, best, work, w[start:stop])
         for t in range(stop - 1, start - 1, -1):
             if last >= 0 and t + 1 == ends[last]:
@@ -208,7 +186,7 @@ def update_outer(
 def draw_samples(
     state: State, data: Data, emitted: States, hyper: Hyper, pi: Floats, w: Floats, labels: Ints
 ) -> None:
-    """Draw labels (T,), masses and hidden channels, given transitions pi (L + 1, L), emissions.
+    """Draw labels (T,) and masses, given transitions pi (L + 1, L) and emissions.
 
     w (T, L) is work space.
     """
@@ -216,7 +194,6 @@ def draw_samples(
     sample_labels(state, w, pi, data.ends, labels)
     if hyper.dof > 0.0:
         draw_masses(state, data, labels, emitted, hyper)
-    draw_hidden(state, data, labels, emitted.coef)
 
 
 @kernel(inline=True)
@@ -275,7 +252,7 @@ def update_statistics(
 ) -> None:
     """Bring the sums of the statistics from labels `before` (T,) to `labels` (T,)."""
     is_due = sweep < 0 or sweep % REFRESH_ITERATIONS == REFRESH_ITERATIONS - 1
-    if hyper.dof > 0.0 or len(data.gaps) > 0 or is_due:
+    if hyper.dof > 0.0 or is_due:
         accumulate(data.v, labels, data.mass, stats.outer, stats.sums)
     else:
         update_outer(data.v, before, labels, data.mass, stats.outer, stats.sums)

@@ -5,9 +5,8 @@
 
 from typing import NamedTuple
 
-from scenario_gen.numerics import Bools, Floats, Ints
+from scenario_gen.numerics import Floats, Ints
 from scenario_gen.numerics.kernels import (
-    B2,
     F,
     F1,
     F2,
@@ -26,18 +25,14 @@ class Data(NamedTuple):
     """The samples.
 
     Attributes:
-        v: (T, M) samples (z, y); hidden values are drawn anew in every sweep.
+        v: (T, M) samples (z, y).
         vt: (M, T) the same, transposed.
-        gaps: (R,) samples with hidden channels, rising.
-        hidden: (R, D) which channels were not observed.
         mass: (T,) initial masses, see `accumulate`; updated. Of a sample that was not observed, 0.
         ends: one past the index of the last sample of each sequence.
     """
 
     v: Floats
     vt: Floats
-    gaps: Ints
-    hidden: Bools
     mass: Floats
     ends: Ints
 
@@ -154,7 +149,7 @@ class Statistics(NamedTuple):
     n: Ints
 
 
-DATA = named(Data, OUT2, OUT2, I1, B2, OUT1, I1)
+DATA = named(Data, F2, F2, OUT1, I1)
 GRID = named(Grid, F2, F2, F2, F1, F1, F1)
 HYPERS = named(Hyper, F1, F, F, F1, I)
 START = named(Start, I1, OUT1, OUTI1)

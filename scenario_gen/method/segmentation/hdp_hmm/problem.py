@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The sampling problem: the series with its regressors, missing values, and priors."""
+"""The sampling problem: the series with its regressors, outliers, and priors."""
 
 from dataclasses import dataclass
 from itertools import pairwise
@@ -22,7 +22,7 @@ from scenario_gen.method.segmentation.hdp_hmm.emission import (
 )
 from scenario_gen.method.segmentation.hdp_hmm.merge import merge_states
 from scenario_gen.method.segmentation.hdp_hmm.model import Data, Grid, Hyper, Joint, Out, Start
-from scenario_gen.numerics import Bools, Floats, Ints
+from scenario_gen.numerics import Floats, Ints
 from scenario_gen.numerics.kernels import F1, F2, I, I1, kernel, OUT1, OUT2
 
 
@@ -146,7 +146,7 @@ class Problem:
     """The samples and priors, as input of the kernels.
 
     Attributes:
-        v: (T', P + D) rows (z, y): regressors, then the sample; hidden values are interpolated.
+        v: (T', P + D) rows (z, y): regressors, then the sample.
         ends: one past the index of the last row of each sequence.
         regressors: P.
         mean: (D, P) prior mean M of the regression.
@@ -157,8 +157,7 @@ class Problem:
         weight: of a sample.
         dof: degrees of freedom of Student-t noise; 0: Gaussian.
         blur: (D,) variance of each channel's measurement error.
-        gaps: (R,) rows with hidden channels, rising.
-        hidden: (R, D) which channels were not observed.
+        observed: (T',) initial masses: 1, or 0 where nothing was observed.
     """
 
     v: Floats
@@ -172,8 +171,7 @@ class Problem:
     weight: float
     dof: float
     blur: Floats
-    gaps: Ints
-    hidden: Bools
+    observed: Floats
 
     @property
     def dimensions(self) -> int:
@@ -185,18 +183,12 @@ class Problem:
         """(T', D) samples."""
         return self.v[:, self.regressors :]
 
-    @property
-    def observed(self) -> Floats:
-        """(T',) initial masses: 1, or 0 where nothing was observed."""
-        mass = np.ones(len(self.v))
-        mass[self.gaps[self.hidden.all(axis=1)]] = 0.0
-        return mass
-
     @classmethod
     def build(cls, x: Floats, ends: Ints, config: SamplerConfig, blur: Floats) -> "Problem":
-        """Stack regressors and samples of the standardised x (T, D), NaN for missing values.
+        """Stack regressors and samples of the standardised x (T, D), NaN for outliers.
 
-        An autoregressive sample has mass 0 unless it and its regressors were observed.
+        Outliers are interpolated. A sample has mass 0 if all its channels are outliers, an
+        autoregressive one if it or its regressors have any.
 
         Raises:
             InputError: a sequence is shorter than the order requires.
@@ -211,19 +203,19 @@ class Problem:
         for a, b in bounds:
             past = [filled[a + order - lag : b - lag] for lag in lags]
             rows.append(np.hstack([np.ones((b - a - order, 1)), *past, filled[a + order : b]]))
-        lost = np.isnan(x)
-        if order:
-            windows = [sliding_window_view(lost[a:b].any(axis=1), order + 1) for a, b in bounds]
-            broken = np.concatenate([window.any(axis=1) for window in windows])
-            lost = np.repeat(broken[:, None], d, axis=1)
-        gaps = np.flatnonzero(lost.any(axis=1)).astype(np.int64)
+        v = np.ascontiguousarray(np.vstack(rows))
+        is_outlier = np.isnan(x)
+        is_lost = np.asarray(is_outlier.any(axis=1) if order else is_outlier.all(axis=1))
+        windows = [sliding_window_view(is_lost[a:b], order + 1) for a, b in bounds]
+        observed = np.ones(len(v))
+        observed[np.concatenate([window.any(axis=1) for window in windows])] = 0.0
         p = 1 + order * d
         mean = np.zeros((d, p))
         if order:
             mean[:, 1 : 1 + d] = np.eye(d)
         dof = INITIAL_DOF_COUNT if config.dof == 0.0 else config.dof
         return cls(
-            v=np.ascontiguousarray(np.vstack(rows)),
+            v=v,
             ends=ends - order * np.arange(1, len(ends) + 1),
             regressors=p,
             mean=mean,
@@ -234,8 +226,7 @@ class Problem:
             weight=config.weight or 1.0,
             dof=0.0 if dof >= GAUSSIAN_DOF_COUNT else dof,
             blur=blur,
-            gaps=gaps,
-            hidden=lost[gaps],
+            observed=observed,
         )
 
     def unexplained(self, place: Place) -> tuple[Floats, Floats, Floats]:
@@ -292,9 +283,9 @@ class Problem:
                 np.abs(self.worths - prior.worth).argmin(),
             ]
         )
-        v, mass = self.v.copy(), place.mass.copy()
+        mass = place.mass.copy()
         run_chain(
-            Data(v, np.ascontiguousarray(v.T), self.gaps, self.hidden, mass, self.ends),
+            Data(self.v, np.ascontiguousarray(self.v.T), mass, self.ends),
             Grid(self.mean, self.precision, prior.within, EXTRA_DEGREES, self.worths, self.odds),
             Hyper(config.hyper, self.weight, self.dof, self.blur, config.moves),
             Start(place.labels, top, chosen),

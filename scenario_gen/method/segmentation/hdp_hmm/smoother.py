@@ -1,62 +1,15 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""A hidden Markov model with known parameters: densities, smoothing, expected statistics."""
-
-import math
-from typing import NamedTuple
+"""Smoothing of a hidden Markov model with known parameters."""
 
 import numpy as np
 
-from scenario_gen.method.segmentation.hdp_hmm.emission import add_sample
-from scenario_gen.method.segmentation.hdp_hmm.observed import log_radial, without_hidden
-from scenario_gen.numerics import Bools, Floats, Ints
-from scenario_gen.numerics.kernels import B2, F, F1, F2, F3, I1, kernel, named, OUT1, OUT2
+from scenario_gen.numerics import Floats, Ints
+from scenario_gen.numerics.kernels import F1, F2, I1, kernel, OUT1, OUT2
 from scenario_gen.numerics.loops import copy_to
 
 MIN_LOG_RATIO = -600.0  # of a density to the best state's
-
-
-@kernel(F2, B2, F3, F, F, OUT2, on_demand=True)
-def log_densities(
-    v: Floats, hidden: Bools, coef: Floats, weight: float, dof: float, out: Floats
-) -> None:
-    """Fill out (T, K) with log p(y_t | z_t, state), hidden channels integrated out.
-
-    It is 0 where no channel was observed. A weight below 1 tempers the density as in the sampler;
-    the density is then known up to a constant per sample.
-
-    Args:
-        v: (T, P + D) rows (z, y), finite also where hidden.
-        hidden: (T, D) which channels of y were not observed.
-        coef: (K, D, P + D) emissions, see `draw_emission`.
-        weight: of a sample.
-        dof: degrees of freedom of Student-t noise; 0: Gaussian.
-        out: output.
-    """
-    states, d = coef.shape[0], coef.shape[1]
-    p = coef.shape[2] - d
-    factor, shift = np.empty((d, d)), np.empty(d)
-    for k in range(states):
-        whole = 0.0
-        for i in range(d):
-            whole += np.log(coef[k, i, p + i])
-        for t in range(len(v)):
-            seen = d - hidden[t].sum()
-            if seen == 0:
-                out[t, k] = 0.0
-                continue
-            square, half = without_hidden(v[t], hidden[t], coef[k], factor, shift)
-            n = weight * seen
-            out[t, k] = weight * (whole - half) + log_radial(square, n, weight, dof)
-            if dof > 0.0:
-                out[t, k] += (
-                    math.lgamma(0.5 * (dof + n))
-                    - math.lgamma(0.5 * dof)
-                    - 0.5 * n * np.log(math.pi * dof)
-                )
-            else:
-                out[t, k] -= 0.5 * n * np.log(2.0 * math.pi)
 
 
 @kernel(inline=True)
@@ -171,110 +124,3 @@ def smooth(
         changed[t] = 0.0 if begins else change
         scaled(message)
     return total
-
-
-@kernel(inline=True)
-def fill_hidden(
-    hidden: Bools,
-    factor: Floats,
-    shift: Floats,
-    share: float,
-    inverse: Floats,
-    y: Floats,
-    outer: Floats,
-) -> None:
-    """Set the hidden channels of y (D,) to their means given the others.
-
-    Their covariance times `share` is added to outer (D, D).
-
-    Args:
-        hidden: (D,).
-        factor: (D, D) R, see `without_hidden`: the covariance is (R Rᵀ)⁻¹.
-        shift: (D,) see there.
-        share: of the sample.
-        inverse: (D, D) work space, for R⁻¹.
-        y: updated.
-        outer: updated; lower triangle.
-    """
-    channels = np.flatnonzero(hidden)
-    a = len(channels)
-    invert(factor, a, inverse)
-    for b in range(a):
-        i = channels[b]
-        y[i] = 0.0
-        for q in range(a):
-            y[i] -= inverse[q, b] * shift[q]
-        for c in range(b + 1):
-            for q in range(a):
-                outer[i, channels[c]] += share * inverse[q, b] * inverse[q, c]
-
-
-@kernel(inline=True)
-def invert(factor: Floats, n: int, inverse: Floats) -> None:
-    """Fill inverse (D, D) with that of the leading (n, n) part of the triangular factor (D, D)."""
-    for j in range(n):
-        for i in range(n):
-            value = 1.0 if i == j else 0.0
-            for q in range(i):
-                value -= factor[i, q] * inverse[q, j]
-            inverse[i, j] = value / factor[i, i]
-
-
-class Rows(NamedTuple):
-    """Samples and what is known of them.
-
-    Attributes:
-        v: (T, P + D) rows (z, y), finite also where hidden.
-        hidden: (T, D) which channels of y were not observed.
-        unused: (T, D) the same, and all channels that follow from others.
-        weight: of a sample.
-        dof: degrees of freedom of Student-t noise; 0: Gaussian.
-    """
-
-    v: Floats
-    hidden: Bools
-    unused: Bools
-    weight: float
-    dof: float
-
-
-@kernel(named(Rows, F2, B2, B2, F, F), F1, F2, OUT2, OUT1, on_demand=True)
-def expected_statistics(
-    rows: Rows, share: Floats, coef: Floats, outer: Floats, sums: Floats
-) -> None:
-    """Fill the expected statistics of one state, given its emission.
-
-    Hidden channels and the masses of heavy-tailed noise have their conditional means.
-
-    Args:
-        rows: T samples.
-        share: (T,) probability that the sample has this state; samples of 0 do not count.
-        coef: (D, P + D) emission, see `draw_emission`.
-        outer: (P + D, P + D) output, Σ share E[mass v vᵀ].
-        sums: (2,) output, Σ share and Σ share E[mass].
-    """
-    v, hidden, unused, weight, dof = rows
-    d, m = coef.shape
-    p = m - d
-    factor, inverse, shift, row = np.empty((d, d)), np.empty((d, d)), np.empty(d), np.empty(m)
-    outer[:] = 0.0
-    sums[:] = 0.0
-    for t in range(len(v)):
-        if not share[t] > 0.0:
-            continue
-        mass = 1.0
-        if dof > 0.0:
-            seen = weight * (d - unused[t].sum())
-            mass = (dof + seen) / (
-                dof + weight * without_hidden(v[t], unused[t], coef, factor, shift)[0]
-            )
-        copy_to(row, v[t])
-        if hidden[t].any():
-            without_hidden(v[t], hidden[t], coef, factor, shift)
-            fill_hidden(hidden[t], factor, shift, share[t], inverse, row[p:], outer[p:, p:])
-        sums[0] += share[t]
-        sums[1] += share[t] * mass
-        add_sample(row, share[t] * mass, outer)
-    for i in range(m):
-        for j in range(i):
-            outer[j, i] = outer[i, j]

@@ -172,18 +172,15 @@ def sample_weight(problem: Problem, place: Place, initial_correlation: float) ->
 def _autocorrelation(problem: Problem, place: Place) -> float:
     """Return the lag-1 autocorrelation of the residuals, mean over channels.
 
-    Only neighbours with one label count that were both observed.
+    Only neighbours with one label count.
     """
     labels = place.labels
     residual = problem.unexplained(place)[0] * np.sqrt(place.mass)[:, None]
     pairs = labels[:-1] == labels[1:]
     pairs[problem.ends[:-1] - 1] = False
+    observed = problem.observed > 0.0
+    pairs &= observed[:-1] & observed[1:]
     if not pairs.any():
         return 0.0
-    observed = np.ones(residual.shape, np.bool_)
-    observed[problem.gaps] = ~problem.hidden
-    residual[~observed] = 0.0  # interpolated values repeat their neighbours
-    power = np.square(residual).sum(axis=0) / np.maximum(observed.sum(axis=0), 1) + 1e-300
-    both = (observed[:-1] & observed[1:])[pairs].sum(axis=0)
-    products = (residual[:-1] * residual[1:])[pairs].sum(axis=0)
-    return float(np.mean(products / np.maximum(both, 1) / power))
+    power = np.square(residual[observed]).mean(axis=0) + 1e-300
+    return float(np.mean((residual[:-1] * residual[1:])[pairs].mean(axis=0) / power))
