@@ -41,6 +41,7 @@ STAGES = (
     "evaluation",
     "interacting_pair",
     "drives",
+    "approaches",
     "decisions",
     "outcome_sets",
     "config",

@@ -3,38 +3,43 @@
 
 """Decisions: encounters in which a driver goes first, rolls or stops, but did not when recorded.
 
-A decision belongs to a conflict whose recorded first vehicle is i and whose second vehicle is j.
-The *offered lag* x is the time from the instant at which j could enter the shared area to the
-arrival of i, both unhindered. Lags are drawn first, x ~ N(0, σ²), then who goes first:
+A decision belongs to a conflict at which j yields to i. The *offered lag* x is the time by which
+i would enter the shared area later than j, if both drove on freely from one instant: the first one
+at which either is 4 s of free driving before the area. Nobody has decided anything by then. Lags
+are drawn first, x ~ N(0, σ²), then who goes first:
 
     P(j goes first | x) = 1 / (1 + exp(-β x)).
 
 `sampling.offered_lag_sigma` and `sampling.decision_rate` are σ and β. Each outcome that differs
 from the recorded one is a new encounter of the two vehicles on their recorded paths:
 
-- *Goes first*: j approaches without its brake and its stand. i drives as recorded, is moved in
-  time to the lag, and slows down comfortably if it would come too close.
+- *Goes first*: both approach without their brakes and stands, at the lag. i slows down comfortably
+  if it would come too close.
 - *Rolls* or *stops*: i drives as recorded, and j approaches freely until it has to slow down for
   i. It rolls if a least speed suffices, else it stops before the area and departs when i has left.
 
-The result must be as human as the recording (`HumanMargins`), and carries its reaction.
+The result must be as human as the recording (`DecisionMargins`), and carries its reaction.
 """
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-import math
 from typing import NamedTuple
 
 import numpy as np
 from scipy import special
 
 from scenario_gen.base.errors import RefusedError
-from scenario_gen.method.drives import delayed_drive, Drive, free_drive, recorded_drive
-from scenario_gen.method.evaluation.law import DISTANCE, Law
+from scenario_gen.method.approaches import approaches, MARGINS, offered_lag_of, two_drives
+from scenario_gen.method.drives import (
+    delayed_drive,
+    Drive,
+    DRIVING,
+    Stop,
+)
+from scenario_gen.method.evaluation.law import DISTANCE
 from scenario_gen.method.interacting_pair import InteractingPair, pair_of
 from scenario_gen.method.sampling import SamplingConfig
-from scenario_gen.numerics import Floats
-from scenario_gen.situation import conflict_of, EncounterKind, passing
+from scenario_gen.situation import conflict_of, passing, Situation, Track
 from scenario_gen.situation.evidence import heading_difference, LIMITS
 from scenario_gen.types import (
     Decided,
@@ -46,45 +51,7 @@ from scenario_gen.types import (
     YIELD,
 )
 
-DECIDED_KINDS = (EncounterKind.CROSSING, EncounterKind.LEFT_TURN, EncounterKind.MERGING)
 LAG_COUNT = 9  # offered lags, each the median of an equally likely part of their law
-
-
-@dataclass(frozen=True)
-class DecisionMargins:
-    """What drivers decide in time; measured on recorded yields at junctions.
-
-    Attributes:
-        horizon_s: time before the shared area at which a driver decides.
-        min_duration_s: of a new encounter.
-        min_together_s: time for which both vehicles are present.
-        max_merge_lag_s: in a merge a larger lag leaves nothing to decide.
-        min_gap_s: from the first vehicle's exit to the second one's entry.
-        free_gap_s: a driver who would enter later than this does not slow down.
-        approach_s: time before the first entry at which a new encounter begins.
-        max_braking_mps2: of any driver, unless one brakes harder in the recording.
-        min_courtesy_ratio: share of its speed that a driver keeps who lets another one go first,
-            or who merges from beside.
-        usual_sigmas: RMS distance from the mean of a kind; four in five recordings are nearer.
-        max_rarity_ratio: of a new encounter's distance from the mean to the recording's.
-        behind_s: after its entry, when a vehicle has its free speed again.
-    """
-
-    horizon_s: float = 4.0
-    min_duration_s: float = 5.0
-    min_together_s: float = 2.0
-    max_merge_lag_s: float = 1.5
-    min_gap_s: float = 1.0
-    free_gap_s: float = 1.2
-    approach_s: float = 5.0
-    max_braking_mps2: float = 3.5
-    min_courtesy_ratio: float = 0.5
-    usual_sigmas: float = 1.5
-    max_rarity_ratio: float = 1.2
-    behind_s: float = 2.0
-
-
-MARGINS = DecisionMargins()
 
 
 @dataclass(frozen=True)
@@ -92,8 +59,9 @@ class Decisions:
     """The decisions of an encounter.
 
     Attributes:
-        possible: the recorded outcome first; their probabilities add up to 1. Empty without one.
-        refused: outcomes with the reason why no driver would have done that.
+        possible: the recorded outcome first. Empty without a decision.
+        refused: outcomes with the reason why no driver would have done that; the probabilities of
+            all outcomes add up to 1.
         why: why nothing is decided; "" if something is.
     """
 
@@ -124,26 +92,30 @@ def decisions_of(encounter: Encounter, sampling: SamplingConfig = SamplingConfig
         >>> from scenario_gen import decisions_of, read_log
         >>> (encounter,) = read_log("my_log.csv").encounters
         >>> [str(decision.outcome) for decision in decisions_of(encounter).possible]
-        ['rolls', 'stops', 'goes first']
+        ['rolls', 'goes first', 'goes second', 'stops']
     """
     try:
         conflict = DecidedConflict.of(encounter)
     except RefusedError as error:
         return Decisions(why=str(error))
-    by_outcome: dict[Outcome, list[Decision]] = {}
+    by_outcome: dict[Outcome, list[Decision]] = {conflict.recorded: []}
     refused = []
+    recorded_lag = min(
+        offered_lags(sampling.offered_lag_sigma), key=lambda lag: abs(lag - conflict.lag)
+    )
     for offered in _offered(conflict, sampling):
         try:
-            outcome = conflict.meeting(offered).outcome
+            if (offered.outcome, offered.lag) == (Outcome.GOES_SECOND, recorded_lag):
+                outcome = conflict.recorded
+            else:
+                outcome = conflict.meeting(offered).outcome
         except RefusedError as error:
             refused.append((offered, str(error)))
             continue
-        if outcome not in (conflict.recorded, Outcome.GOES_SECOND):
-            by_outcome.setdefault(outcome, []).append(replace(offered, outcome=outcome))
-    possible = [_at_median_lag(decisions) for decisions in by_outcome.values()]
-    rest = 1.0 - math.fsum(decision.probability for decision in possible)
-    recorded = Decision(*conflict.names, conflict.recorded, round(conflict.lag, 2), rest)
-    return Decisions((recorded, *possible), tuple(refused))
+        by_outcome.setdefault(outcome, []).append(replace(offered, outcome=outcome))
+    recorded, *others = (_at_median_lag(decisions) for decisions in by_outcome.values())
+    recorded = replace(recorded, lag=round(conflict.lag, 2))
+    return Decisions((recorded, *others), tuple(refused))
 
 
 def decided(encounter: Encounter, decision: Decision) -> Encounter:
@@ -161,7 +133,7 @@ def decided(encounter: Encounter, decision: Decision) -> Encounter:
     Example:
         >>> from scenario_gen import decided, decisions_of, read_log
         >>> (encounter,) = read_log("my_log.csv").encounters
-        >>> decided(encounter, decisions_of(encounter).possible[-1]).decision.outcome
+        >>> decided(encounter, decisions_of(encounter).possible[1]).decision.outcome
         <Outcome.GOES_FIRST: 'goes first'>
     """
     conflict = DecidedConflict.of(encounter)
@@ -204,36 +176,32 @@ class DecidedConflict:
 
     Attributes:
         pair: of the recorded encounter.
-        free: the second vehicle, as if it were alone.
+        recorded_first: the first vehicle, as recorded.
+        free: the first and the second vehicle, each as if it were alone.
+        stops: where they stop before the area.
         lag: the recorded offered lag [s].
     """
 
     pair: InteractingPair
-    free: Drive
+    recorded_first: Drive
+    free: tuple[Drive, Drive]
+    stops: tuple[Stop, Stop]
     lag: float
 
     @classmethod
     def of(cls, encounter: Encounter) -> "DecidedConflict":
-        """Return the conflict of the two vehicles that interact most.
+        """Return the conflict at which one vehicle yields to another one.
 
         Raises:
             RefusedError: there is nothing to decide; the message says why.
         """
-        pair = pair_of(encounter)
-        if pair is None:
-            raise RefusedError("no two vehicles share an area")
+        pair = _yielding_pair(encounter)
         _refuse_undecided(pair)
-        conflict, time, second = pair.conflict, encounter.time, pair.tracks[1]
-        entry, leaves = np.interp(
-            [conflict.entry_second, conflict.entry_second + MARGINS.behind_s],
-            time,
-            second.progress,
-        ).tolist()
-        free = free_drive(second, entry, leaves)
-        lag = conflict.entry_first - _free_entry(free, entry, time)
-        if pair.kind is EncounterKind.MERGING and abs(lag) > MARGINS.max_merge_lag_s:
+        first, second = approaches(pair)
+        lag = offered_lag_of(first, second)
+        if _merges_from_beside(pair) and abs(lag) > MARGINS.max_merge_lag_s:
             raise RefusedError("the vehicle ahead decides this merge")
-        return cls(pair, free, lag)
+        return cls(pair, first.recorded, (first.free, second.free), (first.stop, second.stop), lag)
 
     @property
     def names(self) -> tuple[str, str]:
@@ -251,14 +219,6 @@ class DecidedConflict:
                 return Outcome.ROLLS if edge.since < edge.until else Outcome.GOES_SECOND
         return Outcome.GOES_SECOND
 
-    @property
-    def _merges_from_beside(self) -> bool:
-        """Whether the second vehicle changes lanes: nobody stops for this in moving traffic."""
-        conflict = self.pair.conflict
-        entries = (conflict.first, conflict.entry_first), (conflict.second, conflict.entry_second)
-        turned = heading_difference(self.pair.encounter, *entries)
-        return self.pair.kind is EncounterKind.MERGING and turned < LIMITS.side_by_side_rad
-
     def meeting(self, decision: Decision) -> Meeting:
         """Return the two vehicles with a decision at its lag, and the outcome.
 
@@ -267,13 +227,14 @@ class DecidedConflict:
         Raises:
             RefusedError: no driver would do that; the message says why.
         """
-        other = recorded_drive(self.pair.tracks[0])
+        least = MARGINS.min_courtesy_ratio if _merges_from_beside(self.pair) else 0.0
+        free_first, free_second = self.free
+        stop_first, stop_second = self.stops
         if decision.outcome is Outcome.GOES_FIRST:
-            meeting = _meeting(self.free, other, decision.lag, MARGINS.min_courtesy_ratio)
+            meeting = _meeting(free_second, free_first, stop_first, decision.lag, least)
             meeting = meeting._replace(outcome=Outcome.GOES_FIRST)
         else:
-            least = MARGINS.min_courtesy_ratio if self._merges_from_beside else 0.0
-            meeting = _meeting(other, self.free, -decision.lag, least)
+            meeting = _meeting(self.recorded_first, free_second, stop_second, -decision.lag, least)
         self._refuse_inhuman(meeting.encounter)
         return meeting
 
@@ -286,19 +247,41 @@ class DecidedConflict:
         if encounter.duration < MARGINS.min_duration_s:
             raise RefusedError(f"it would last less than {MARGINS.min_duration_s:g} s")
         pair = pair_of(encounter)
-        merges = self.pair.conflict.following
-        if pair is None or (pair.conflict.first, pair.conflict.following) != (0, merges):
+        if pair is None or pair.conflict.first != 0:
             raise RefusedError("together they would do something else")
-        clears, enters = passing(encounter, pair.conflict, merges=merges)
+        clears, enters = passing(encounter, pair.conflict, merges=pair.conflict.following)
         if pair.features[DISTANCE] <= 0.0 or enters - clears < MARGINS.min_gap_s:
             raise RefusedError("they would come too close")
         allowed = max(MARGINS.max_braking_mps2, _hardest_braking(self.pair.encounter))
         if _hardest_braking(encounter) > allowed:
             raise RefusedError("a driver would brake too hard")
-        law = Law.mixed(DECIDED_KINDS)
-        allowed = MARGINS.max_rarity_ratio * law.distance(self.pair.features)
-        if law.distance(pair.features) > max(allowed, MARGINS.usual_sigmas):
-            raise RefusedError("it would be more unusual than the recording")
+
+
+def _yielding_pair(encounter: Encounter) -> InteractingPair:
+    """Return the pair of which one vehicle yields: the closest one, or that with most confidence.
+
+    Raises:
+        RefusedError: no vehicle yields and passes behind the other one.
+    """
+    situation = Situation.of(encounter)
+    pair = pair_of(encounter)
+    yields = sorted(
+        (edge for edge in situation.reactions.edges if edge.kind == YIELD),
+        key=lambda edge: edge.confidence,
+        reverse=True,
+    )
+    if not yields:
+        raise RefusedError("no vehicle yields to another one")
+    closest = pair.conflict.pair if pair else ()
+    yields.sort(key=lambda edge: {edge.who, edge.whom} != set(closest))
+    for edge in yields:
+        conflict = situation.conflict(edge.who, edge.whom)
+        if conflict is not None and conflict.second == edge.who:
+            chosen = pair_of(encounter, conflict.pair)
+            if chosen is not None:
+                return chosen
+    who = encounter.vehicles[yields[0].who].id
+    raise RefusedError(f"vehicle {who} has not yet passed when its recording ends")
 
 
 def _refuse_undecided(pair: InteractingPair) -> None:
@@ -307,19 +290,33 @@ def _refuse_undecided(pair: InteractingPair) -> None:
     Raises:
         RefusedError: the message says why.
     """
-    encounter, conflict = pair.encounter, pair.conflict
-    both = encounter.present_slice(*conflict.pair)
-    if (both.stop - both.start) * encounter.dt < MARGINS.min_together_s:
-        raise RefusedError(f"together for less than {MARGINS.min_together_s:g} s")
-    if pair.kind not in DECIDED_KINDS:
-        raise RefusedError("no vehicle crosses another one's path or merges into it")
+    conflict = pair.conflict
     if _follows_before(pair):
         raise RefusedError("the second vehicle follows the first one to the shared area")
+    first, second = pair.tracks
+    if conflict.entry_second <= pair.presence(conflict.second)[0]:
+        raise RefusedError(
+            f"vehicle {second.vehicle.id} is inside the shared area when its recording begins"
+        )
+    if conflict.entry_first <= pair.presence(conflict.first)[0] and _turns_at_first(first):
+        raise RefusedError(
+            f"vehicle {first.vehicle.id} turns in the shared area when its recording begins"
+        )
+
+
+def _turns_at_first(track: Track) -> bool:
+    """Whether a path turns where its record begins."""
+    begin = float(track.progress[0])
+    yaw = track.curve.at(np.array([begin, begin + DRIVING.turning_m]))[:, 2]
+    return bool(abs(yaw[1] - yaw[0]) > DRIVING.turning_rad)
+
+
+def _merges_from_beside(pair: InteractingPair) -> bool:
+    """Whether the second vehicle changes lanes: nobody stops for this in moving traffic."""
+    conflict = pair.conflict
     entries = (conflict.first, conflict.entry_first), (conflict.second, conflict.entry_second)
-    if any(entry <= pair.presence(n)[0] for n, entry in entries):
-        raise RefusedError("a vehicle is inside the shared area when its recording begins")
-    if conflict_of(_narrower(encounter), *conflict.pair) is None:
-        raise RefusedError("the vehicles hardly touch each other's paths")
+    turned = heading_difference(pair.encounter, *entries)
+    return conflict.following and turned < LIMITS.side_by_side_rad
 
 
 def _follows_before(pair: InteractingPair) -> bool:
@@ -336,36 +333,13 @@ def _hardest_braking(encounter: Encounter) -> float:
     return -float(np.diff(encounter.speed).min()) / encounter.dt
 
 
-def _narrower(encounter: Encounter) -> Encounter:
-    """Return an encounter with vehicles of half their widths."""
-    vehicles = tuple(replace(each, width=0.5 * each.width) for each in encounter.vehicles)
-    return replace(encounter, vehicles=vehicles)
-
-
-def _free_entry(free: Drive, entry: float, time: Floats) -> float:
-    """Return when [s] a recorded vehicle would enter an area, had it driven on from its decision.
-
-    It decides the horizon before it enters, or when its recording begins.
-
-    Args:
-        free: its drive as if it were alone.
-        entry: station [m] at which it enters.
-        time: (T,) of the recording.
-    """
-    enters, track = free.time_at(entry), free.track
-    decides = float(np.interp(enters - MARGINS.horizon_s, free.time, free.station))
-    first = int(track.present[0])
-    decides = max(decides, float(track.progress[first]))
-    row = max(int(np.searchsorted(track.progress, decides)), first)
-    return float(time[row]) + enters - free.time_at(decides)
-
-
-def _meeting(first: Drive, second: Drive, later: float, least: float = 0.0) -> Meeting:
+def _meeting(first: Drive, second: Drive, stop: Stop, later: float, least: float = 0.0) -> Meeting:
     """Return the motion of two drives; the second one slows down if it is too early.
 
     Args:
         first: the drive that goes first.
         second: the other one.
+        stop: where the second one stops.
         later: seconds from the first one's entry to the second one's, if it did not slow down.
         least: share of its speed that the second one keeps.
 
@@ -374,24 +348,26 @@ def _meeting(first: Drive, second: Drive, later: float, least: float = 0.0) -> M
     """
     dt = first.track.dt
     after = int(first.time[-1] / dt) + 1
-    consecutive = _together(first, second, after)
+    consecutive = two_drives(first, second, after)
     conflict = conflict_of(consecutive, 0, 1)
     if conflict is None or conflict.first != 0:
         raise RefusedError("they would not meet")
     clears, enters = passing(consecutive, conflict, merges=conflict.following)
     enters -= after * dt
+    if conflict.following:
+        clears = max(clears, _way_is_free(first, second, enters))
     arrives = conflict.entry_first + later
     outcome = Outcome.GOES_SECOND
     if clears + MARGINS.free_gap_s > arrives:
         entry = float(np.interp(enters, second.time, second.station))
         free = second
-        second = delayed_drive(free, entry, enters + clears - arrives)
+        second = delayed_drive(free, entry, enters + clears - arrives, stop)
         if (second.speed < least * free.speed).any():
             who = second.track.vehicle.id
             raise RefusedError(f"vehicle {who} would have to slow down too much")
-        outcome = Outcome.STOPS if second.stand else Outcome.ROLLS
+        outcome = Outcome.STOPS if second.stand.any() else Outcome.ROLLS
     begin = round((arrives - enters) / dt)
-    encounter = _together(first, second, begin)
+    encounter = two_drives(first, second, begin)
     approach = round((conflict.entry_first - MARGINS.approach_s) / dt) + max(-begin, 0)
     start = max(int(encounter.present[:, 0].max()), approach)
     if (encounter.present[:, 1].min() - start) * dt < MARGINS.min_together_s:
@@ -399,16 +375,19 @@ def _meeting(first: Drive, second: Drive, later: float, least: float = 0.0) -> M
     return Meeting(encounter.select((0, 1), start), outcome)
 
 
-def _together(first: Drive, second: Drive, begin: int) -> Encounter:
-    """Return two drives; the second one begins `begin` samples after the first."""
-    states = first.states(), second.states()
-    begins = max(-begin, 0), max(begin, 0)
-    present = np.array([(k, k + len(rows) - 1) for k, rows in zip(begins, states, strict=True)])
-    samples = np.arange(int(present.max()) + 1)
-    rows = np.clip(samples - present[:, :1], 0, np.diff(present))
-    values = np.stack([each[row] for each, row in zip(states, rows, strict=True)])
-    vehicles = (first.track.vehicle, second.track.vehicle)
-    position, heading, speed = values[..., :2], values[..., 2], values[..., 3]
-    return Encounter.sampled(
-        vehicles, first.track.dt, position, heading, speed, "two drives", present=present
-    )
+def _way_is_free(first: Drive, second: Drive, enters: float) -> float:
+    """Return when [s] a vehicle may enter behind another one on a shared path.
+
+    From then on it never reaches the other one, although it may be faster.
+
+    Args:
+        first: the drive ahead, which begins at 0 s.
+        second: the drive behind.
+        enters: when [s] the second one enters the shared path in its own drive.
+    """
+    after = second.time >= enters
+    places, left = first.track.curve.project(second.track.curve.at(second.station[after])[:, :2])
+    length = 0.5 * (first.track.vehicle.length + second.track.vehicle.length)
+    shared = (np.abs(left) < MARGINS.shared_path_m) & (places + length < first.station[-1])
+    leaves = np.interp(places + length, first.station, first.time)
+    return float(np.max(leaves - second.time[after] + enters, where=shared, initial=-np.inf))

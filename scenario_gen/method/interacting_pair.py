@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The two vehicles of an encounter that interact most: what they do, and how they react."""
+"""Two vehicles of an encounter that interact: what they do, and how they react."""
 
 from dataclasses import dataclass
 
@@ -10,12 +10,12 @@ import numpy as np
 from scenario_gen.method.evaluation.law import features_of
 from scenario_gen.numerics import Floats
 from scenario_gen.situation import Conflict, EncounterKind, Situation, Track
-from scenario_gen.types import Encounter, Reaction
+from scenario_gen.types import Encounter, Pair, Reaction
 
 
 @dataclass(frozen=True, eq=False)
 class InteractingPair:
-    """The two vehicles of an encounter that interact most.
+    """Two vehicles of an encounter that interact.
 
     Attributes:
         situation: of the encounter, with all its vehicles.
@@ -47,10 +47,10 @@ class InteractingPair:
         return np.asarray(self.encounter.time[self.encounter.present[n]])
 
 
-def pair_of(encounter: Encounter) -> InteractingPair | None:
-    """Return the pair of an encounter; None if no two vehicles share an area."""
+def pair_of(encounter: Encounter, pair: Pair | None = None) -> InteractingPair | None:
+    """Return a pair of an encounter, by default the closest; None if it shares no area."""
     situation = Situation.of(encounter)
-    member = features_of(encounter, "", 0)
+    member = features_of(encounter, "", 0, pair)
     conflict = None if member.pair is None else situation.conflict(*member.pair)
     if member.kind is None or conflict is None:
         return None

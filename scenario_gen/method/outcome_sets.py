@@ -3,7 +3,7 @@
 
 """One set of scenarios for each outcome of a decision, with sizes drawn by probability."""
 
-from collections import Counter
+from collections import defaultdict
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 
@@ -35,8 +35,8 @@ def outcome_sets(
 ) -> list[GenerationResult]:
     """Return one set for each outcome of an encounter's decision, the recorded one first.
 
-    The scenarios of an outcome that is not possible on the road get the recorded one. Every set
-    has a note on the mix.
+    The scenarios of an outcome that is not possible on the road are drawn from the other ones.
+    Every set has a note on the mix, and on outcomes that are not possible.
 
     Args:
         generate: returns so many scenarios from an encounter.
@@ -55,20 +55,23 @@ def outcome_sets(
     if decisions.why:
         note = Note.of(NoteKind.NOTHING_DECIDED, reason=decisions.why)
         return [generate(encounter, count).noted(note)]
-    recorded, *others = decisions.possible
-    _, *sizes = drawn_sizes(decisions.possible, count, seed)
+    *others, recorded = (*decisions.possible[1:], decisions.possible[0])
+    sizes = np.array(drawn_sizes((*others, recorded), count, seed))
     results, notes = [], []
-    for decision, size in zip(others, sizes, strict=True):
+    for k, decision in enumerate(others, start=1):
+        size = int(sizes[k - 1])
         if size == 0:
             continue
         try:
             results.append(generate(decided(encounter, decision), size))
         except RefusedError as error:
             notes.append(Note.of(NoteKind.OUTCOME_REFUSED, decision=decision, reason=error))
-    left = count - sum(result.generated.requested for result in results)
-    if left:
-        results.insert(0, generate(decided(encounter, recorded), left))
+            sizes[k:] += drawn_sizes((*others, recorded)[k:], size, seed)
+    if sizes[-1]:
+        results.insert(0, generate(decided(encounter, recorded), int(sizes[-1])))
     notes.append(Note.of(NoteKind.OUTCOMES, mix=outcome_mix(results)))
+    if decisions.refused:
+        notes.append(Note.of(NoteKind.OUTCOMES_MISSING, **missing_outcomes(decisions)))
     for note in notes:
         results = [result.noted(note) for result in results]
     return results
@@ -105,19 +108,28 @@ def drawn_sizes(decisions: Sequence[Decision], count: int, seed: int) -> list[in
 
 
 def outcome_mix(results: Sequence[GenerationResult]) -> str:
-    """Return how many scenarios have each outcome, in words."""
-    sizes: Counter[Outcome] = Counter()
-    who = ""
+    """Return how many scenarios have each outcome, and its probability, in words."""
+    parts: list[str] = []
     for result in results:
         decision = result.encounter.decision
         if decision is not None:
+            scenarios = "" if parts else " scenarios"
+            share = f"probability {decision.probability:.2f}"
+            parts.append(f"{decision.outcome} in {len(result)}{scenarios} ({share})")
             who = decision.who
-            sizes[decision.outcome] += len(result)
-    parts = [f"{outcome} in {size}" for outcome, size in sizes.items()]
-    parts[0] += " scenarios"
     *others, last = parts
     mix = f"{', '.join(others)} and {last}" if others else last
     return f"vehicle {who} {mix}"
+
+
+def missing_outcomes(decisions: Decisions) -> dict[str, object]:
+    """Return the probability of outcomes that are not possible, and the reasons."""
+    by_reason: defaultdict[str, float] = defaultdict(float)
+    for decision, reason in decisions.refused:
+        by_reason[reason] += decision.probability
+    common = sorted(by_reason.items(), key=lambda item: -item[1])
+    reasons = [f"{reason} ({share:.2f})" for reason, share in common]
+    return {"probability": f"{sum(by_reason.values()):.2f}", "reasons": "; ".join(reasons)}
 
 
 def swapped_order(encounter: Encounter, sampling: SamplingConfig) -> Encounter | None:

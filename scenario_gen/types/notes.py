@@ -66,6 +66,7 @@ class NoteKind(Enum):
     SHORTENED = "shortened to fit the road: {parts} ({reason})"
     AUTO_ROAD = "road auto: {road}, the first built-in road on which the encounter is unchanged"
     OUTCOMES = "outcomes of the decision: {mix}"
+    OUTCOMES_MISSING = "outcomes that are not possible, probability {probability}: {reasons}"
     OUTCOME_REFUSED = "{decision} is not possible on this road: {reason}"
     NOTHING_DECIDED = "decisions: only the recorded outcome: {reason}"
     NOT_DRIVABLE = "{reasons}"

@@ -384,10 +384,10 @@ def test_a_recording_that_is_too_long_for_a_road_is_shortened(corpus, tmp_path, 
 
 
 def test_drawn_decisions_have_a_set_for_each_outcome(corpus, tmp_path):
-    drawn = BatchRequest(PipelineConfig(sampling=SamplingConfig(decisions="drawn")), 4, 5)
+    drawn = BatchRequest(PipelineConfig(sampling=SamplingConfig(decisions="drawn")), 8, 5)
     made = run_batch(corpus[0], ["corridor"], tmp_path / "out", drawn, templates=3)
     cases = list(rows_of(sorted((tmp_path / "out" / "cases").rglob("*.parquet"))))
-    assert made.cases == 3 < len(cases) and made.requested == 12 and not made.failed
+    assert made.cases == 3 < len(cases) and made.requested == 24 and not made.failed
     assert len({case["namespace"] for case in cases}) == len(cases)
     assert "goes first" in made.outcomes and sum(made.outcomes.values()) <= made.scenarios
     first, *_ = find(tmp_path / "out", "outcome = 'goes first'").rows

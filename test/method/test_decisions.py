@@ -9,18 +9,19 @@ from io import StringIO
 import numpy as np
 import pytest
 from rich.console import Console
-from support.textbook_motions import labelled
+from support.textbook_motions import labelled, REACTIONS
 
 import scenario_gen as sg
 from scenario_gen.closed_loop.config import ClosedLoopConfig
 from scenario_gen.closed_loop.results import Drives
 from scenario_gen.closed_loop.trials import run_trials, trials_of
-from scenario_gen.method.decisions import goes_first_probability, offered_lags
+from scenario_gen.method.decisions import DecidedConflict, goes_first_probability, offered_lags
+from scenario_gen.method.drives import recorded_drive
 from scenario_gen.method.outcome_sets import drawn_sizes, requested_decisions
 from scenario_gen.output.report.summary import summary
 from scenario_gen.output.review.validation import validate_bag
-from scenario_gen.situation import conflict_of, Situation
-from scenario_gen.types import Decided, NoteKind, Outcome, Request, YIELD
+from scenario_gen.situation import conflict_of, passing, Situation
+from scenario_gen.types import Decided, Encounter, NoteKind, Outcome, Request, YIELD
 
 DRAWN = sg.PipelineConfig(sampling=sg.SamplingConfig(decisions="drawn"))
 WAITS = "crossing, stops"
@@ -43,7 +44,9 @@ def first_to_enter(scenario):
 def test_the_probabilities_of_the_outcomes_add_up_to_one():
     for kind in (WAITS, "left turn before oncoming, stops", "merges"):
         decisions = sg.decisions_of(recorded(kind))
-        assert sum(each.probability for each in decisions.possible) == pytest.approx(1.0)
+        refused = sum(each.probability for each, _ in decisions.refused)
+        possible = sum(each.probability for each in decisions.possible)
+        assert refused + possible == pytest.approx(1.0)
         assert Outcome.GOES_FIRST in {each.outcome for each in decisions.possible}
         assert all(reason for _, reason in decisions.refused)
 
@@ -62,7 +65,7 @@ def test_who_goes_first_follows_the_law_of_the_offered_lag():
         )
         for rate in (0.0, 5.0)
     )
-    assert patient < bold
+    assert patient == pytest.approx(bold) == pytest.approx(0.5), "the lags are symmetric"
 
 
 def test_the_sizes_of_the_sets_follow_the_probabilities():
@@ -77,14 +80,15 @@ def test_the_sizes_of_the_sets_follow_the_probabilities():
 
 
 def test_the_drawn_order_holds_in_all_scenarios(sets):
-    assert sum(map(len, sets)) == 12 and len(sets) == 3
+    assert sum(map(len, sets)) == 12 and len(sets) == 4
     for result in sets:
         decision = result.encounter.decision
         assert {first_to_enter(scenario) for scenario in result} == {decision.first}
         assert {scenario.facts.decision for scenario in result} == {decision}
-        assert any(
+        yields = any(
             (edge.kind, edge.confidence) == (YIELD, 1.0) for edge in result.generated.reactions
         )
+        assert yields == (decision.outcome is not Outcome.GOES_SECOND)
         decider = [vehicle.id for vehicle in result.encounter.vehicles].index(decision.who)
         stands = min(scenario.speed[decider].min() for scenario in result) < 0.1
         assert stands == (decision.outcome is Outcome.STOPS)
@@ -118,27 +122,121 @@ def test_the_recorded_outcome_is_the_recording():
 
 
 def test_what_cannot_be_decided_is_refused_by_name():
-    inside = recorded(seed=1)
-    conflict = Situation.of(inside).conflicts[0]
-    late = inside.between(round(conflict.entry_first / inside.dt) + 2, len(inside.time) - 1)
-    brief = replace(inside, present=np.array([[80, len(inside.time) - 1], [0, 95]]))
+    crossing = recorded(seed=1)
+    conflict = Situation.of(crossing).conflicts[0]
+    inside = round(conflict.entry_second / crossing.dt) + 2
+    present = np.tile([0, len(crossing.time) - 1], (2, 1))
+    present[conflict.second, 0] = inside
     merging = recorded("merges")
     shift = np.array([[[0.0, 0.0]], [[0.0, -1.5]]])
     beside = replace(merging, position=merging.position + shift)
     for encounter, why in (
         (beside, "hardly touch each other's paths"),
-        (recorded("follows"), "no vehicle crosses"),
+        (recorded("follows"), "no vehicle yields to another one"),
         (recorded("merges", 4), "the vehicle ahead decides this merge"),
-        (late, "inside the shared area when its recording begins"),
-        (brief, "together for less than 2 s"),
+        (replace(crossing, present=present), "no vehicle yields to another one"),
+        (recorded("meets another one closely"), "has not yet passed when its recording ends"),
     ):
         decisions = sg.decisions_of(encounter)
         assert why in decisions.why and not decisions.possible
         (result,) = sg.generate_outcomes(encounter, "corridor", DRAWN, count=1, seed=1)
         assert any(note.kind is NoteKind.NOTHING_DECIDED for note in result.generated.adaptations)
-    decision = sg.decisions_of(recorded()).possible[-1]
+    merging = recorded("merges", 1)
+    (decision, why), *_ = sg.decisions_of(merging).refused
+    assert "slow down too much" in why
     with pytest.raises(sg.RefusedError, match="slow down too much"):
-        sg.decided(recorded(), replace(decision, lag=-3.0))
+        sg.decided(merging, decision)
+
+
+def crossing(*knots, first_begin=-70.0, second_begin=-55.0):
+    """One vehicle crosses at 10 m/s; the speeds (s, m/s) of the other one are given."""
+    time = np.arange(0.0, 16.0, 0.1)
+    speed = np.stack([np.full(len(time), 10.0), np.interp(time, *np.array(knots).T)])
+    along = np.array([[first_begin], [second_begin]]) + 0.1 * np.cumsum(speed, axis=1)
+    position = np.zeros((2, len(time), 2))
+    position[0, :, 0], position[1, :, 1] = along
+    heading = np.tile([[0.0], [0.5 * np.pi]], len(time))
+    vehicles = (sg.Vehicle("i", 4.6, 1.9), sg.Vehicle("j", 4.6, 1.9))
+    return Encounter.sampled(vehicles, 0.1, position, heading, speed, "crossing")
+
+
+def lag_of(encounter):
+    return DecidedConflict.of(encounter).lag
+
+
+def test_the_offered_lag_frees_both_drivers_before_either_has_decided():
+    rolls = crossing((0.0, 10.0), (2.0, 10.0), (5.0, 3.0), (9.0, 3.0), (12.0, 10.0))
+    stops = crossing((0.0, 10.0), (2.5, 10.0), (6.5, 0.0), (9.0, 0.0), (14.0, 10.0))
+    assert lag_of(rolls) == pytest.approx(1.5, abs=0.1), "15 m at 10 m/s"
+    assert lag_of(stops) == pytest.approx(lag_of(rolls), abs=0.2)
+
+
+def test_a_driver_who_stands_at_its_line_decides_when_the_other_one_is_near():
+    begins = (-60.0, -100.0)
+    lags = [
+        lag_of(crossing((0, 0), (start, 0), (start + 5, 8), first_begin=begin, second_begin=-9.0))
+        for begin, start in zip(begins, (6.5, 10.5), strict=True)
+    ]
+    assert lags[0] == pytest.approx(lags[1], abs=0.2), "however long it has stood"
+    assert goes_first_probability(lags[0], 0.8) == pytest.approx(0.5, abs=0.2)
+
+
+def test_a_wider_gap_is_not_refused_where_a_narrower_one_is_taken():
+    for kind in REACTIONS:
+        decisions = sg.decisions_of(recorded(kind))
+        refused = {each.lag for each, _ in decisions.refused if each.outcome == "goes first"}
+        taken = set(offered_lags(3.0)) - refused
+        assert not refused or not taken or max(refused) < min(taken) or decisions.why, kind
+
+
+@pytest.mark.parametrize("kind", ["crossing, rolls", WAITS])
+def test_a_record_that_ends_in_the_area_is_driven_on(kind):
+    encounter = recorded(kind, 1)
+    (conflict,) = Situation.of(encounter).conflicts
+    brief = encounter.between(0, round((conflict.entry_second + 0.5) / encounter.dt))
+    (first,) = (
+        decision
+        for decision in sg.decisions_of(brief).possible
+        if decision.outcome is Outcome.GOES_FIRST
+    )
+    made = sg.decided(brief, first)
+    (new,) = Situation.of(made).conflicts
+    clears, enters = passing(made, new, merges=new.following)
+    assert enters - clears >= 1.0
+    assert made.time[made.present[new.first, 1]] >= clears + 1.0
+
+
+def test_nobody_knows_how_a_turn_goes_on_that_has_just_begun():
+    turning = recorded("right turn into a stream", 1)
+    (conflict,) = Situation.of(turning).conflicts
+    brief = turning.between(0, round((conflict.entry_second + 0.5) / turning.dt))
+    assert "begins to turn when its recording ends" in sg.decisions_of(brief).why
+
+
+def test_a_record_that_begins_slowly_is_approached_and_not_crept():
+    slow = crossing((0, 1), (7, 1), (12, 10), first_begin=-65.0, second_begin=-12.0)
+    (track,) = (track for track in Situation.of(slow).tracks if track.vehicle.id == "j")
+    drive = recorded_drive(track)
+    before = drive.speed[drive.station < 0.0]
+    assert before[0] > 8.0 and np.all(np.diff(before) <= 1e-9), "it brakes from its free speed"
+
+
+def test_a_driver_who_stopped_departs_when_the_way_is_free():
+    encounter = recorded()
+    (stops,) = (
+        decision
+        for decision in sg.decisions_of(encounter).possible
+        if decision.outcome is Outcome.STOPS
+    )
+    for lag in (0.0, -0.85):
+        try:
+            made = DecidedConflict.of(encounter).meeting(
+                replace(stops, outcome=Outcome.GOES_SECOND, lag=lag)
+            )
+        except sg.RefusedError:
+            continue
+        (conflict,) = Situation.of(made.encounter).conflicts
+        assert 1.0 <= conflict.encroachment <= 4.0
 
 
 def test_one_set_has_one_outcome():
@@ -176,7 +274,7 @@ def test_the_summary_states_the_mix(sets):
     console.print(summary(sets))
     text = console.export_text()
     sizes = {result.encounter.decision.outcome: len(result) for result in sets}
-    assert f"and goes first in {sizes[Outcome.GOES_FIRST]}" in text
+    assert f"goes first in {sizes[Outcome.GOES_FIRST]} (probability 0.50)" in text
     assert f"vehicle 2 stops in {sizes[Outcome.STOPS]} scenarios" in text
 
 

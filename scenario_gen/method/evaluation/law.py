@@ -252,16 +252,6 @@ class Law:
         )
         return cls(mean, np.asarray(np.linalg.inv(shrunk(covariance)), dtype=np.float64))
 
-    @classmethod
-    def mixed(cls, kinds: Sequence[EncounterKind]) -> "Law":
-        """Return the law of encounters of several kinds, each equally likely.
-
-        It has the mean and the covariance of the mixture of the shipped laws.
-        """
-        means, covariances = map(np.stack, zip(*map(_shipped_law, kinds), strict=True))
-        covariance = covariances.mean(axis=0) + np.cov(means.T, bias=True)
-        return cls(means.mean(axis=0), np.asarray(np.linalg.inv(shrunk(covariance))))
-
     def distance(self, features: Floats) -> float:
         """Return the RMS distance of features (F,) from the mean, in standard deviations."""
         off = features - self.mean

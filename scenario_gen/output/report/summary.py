@@ -33,6 +33,7 @@ LABELS = {
     NoteKind.MIRRORED: "note",
     NoteKind.SHORTENED: "length",
     NoteKind.OUTCOMES: "decision",
+    NoteKind.OUTCOMES_MISSING: "decision",
     NoteKind.OUTCOME_REFUSED: "decision",
     NoteKind.NOTHING_DECIDED: "decision",
 }
