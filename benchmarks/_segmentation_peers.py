@@ -13,8 +13,9 @@ import warnings
 
 import numpy as np
 
-from scenario_gen.method.segmentation import Posterior, segment_series, SegmentationConfig
+from scenario_gen.method.segmentation import Posterior, SegmentationConfig
 from scenario_gen.method.segmentation.features import driving_features, without_outliers
+from scenario_gen.method.segmentation.segmenter import sample_features
 from scenario_gen.numerics.arrays import Floats, Ints
 from scenario_gen.types.encounter import Encounter
 
@@ -39,10 +40,10 @@ def posterior_of(
 ) -> tuple[Floats, Posterior]:
     """Return the features (T, D) of an encounter, and the posterior that `segment` draws from them with this seed."""
     clean = without_outliers(encounter)
-    features, blur = driving_features(
+    features, noise = driving_features(
         clean, config.speed_window, config.turn_window, config.speed_noise, config.turn_noise
     )
-    return features, segment_series(features, config.sampler, seed, blur=blur)
+    return features, sample_features(features, noise, config.sampler, seed)
 
 
 @dataclass(frozen=True, eq=False)

@@ -10,6 +10,8 @@ chains and the point estimate.
 
 from collections.abc import Iterator, Sequence
 import time
+from typing import Any
+import warnings
 
 import numpy as np
 
@@ -20,10 +22,11 @@ from benchmarks._segmentation_scores import changes, f1, hamming, smoother
 from benchmarks._size import sized
 from benchmarks.row import higher, lower, Row
 from scenario_gen.method.segmentation import (
-    SamplerConfig,
+    Posterior,
     segment,
-    segment_series,
     SegmentationConfig,
+    SegmentationWarning,
+    StickyHDPHMM,
 )
 from scenario_gen.numerics.arrays import Floats, Ints
 
@@ -42,10 +45,16 @@ DRIVING_CONFIG = SegmentationConfig(max_rate=10.0)
 
 def run() -> list[Row]:
     """Return all rows."""
-    segment_series(np.random.default_rng(0).normal(size=(50, 2)))
+    _posterior(np.random.default_rng(0).normal(size=(50, 2)), 0)
     cells = [row for cell in MAX_LOST for row in _cell(cell)]
     speed = [row for cell in ("A", "B", "D") for row in _against_moseq(cell)]
     return [*cells, *_driving(), *speed, *_robust(), *_labelled()]
+
+
+def _posterior(x: Floats, seed: int, **options: Any) -> Posterior:
+    """Return the posterior of a series (T, D)."""
+    with warnings.catch_warnings(action="ignore", category=SegmentationWarning):
+        return StickyHDPHMM(random_state=seed, **options).fit(x).posterior_
 
 
 def _row(
@@ -78,7 +87,7 @@ def _cell(cell: str) -> list[Row]:
         sequence = gaussian_hmm(cell, seed)
         best = smoother(sequence)
         started = time.process_time()
-        found = segment_series(sequence.x, seed=seed)
+        found = _posterior(sequence.x, seed)
         seconds.append(time.process_time() - started)
         best_f1 = f1(sequence.changepoints, changes(best), 5)
         lost_hamming.append(
@@ -130,7 +139,7 @@ def _against_moseq(cell: str) -> list[Row]:
     sequence: Labelled = driving(seed) if cell == "D" else gaussian_hmm(cell, seed)
     started = time.process_time()
     if sequence.encounter is None:
-        posterior = segment_series(sequence.x, seed=seed)
+        posterior = _posterior(sequence.x, seed)
         ours = time.process_time() - started
     else:
         segment(sequence.encounter, DRIVING_CONFIG, seed)
@@ -165,7 +174,7 @@ def _robust() -> list[Row]:
     for seed in ROBUST_SEEDS:
         rng = np.random.default_rng([seed, 6])
         heavy = gaussian_hmm("B", seed, dof=3.0)
-        heavy_tails.append(hamming(heavy.labels, segment_series(heavy.x, seed=1).labels))
+        heavy_tails.append(hamming(heavy.labels, _posterior(heavy.x, 1).labels))
         sequence = gaussian_hmm("B", seed)
         x = sequence.x
         far = (rng.uniform(size=(len(x), 1)) < 0.01) * rng.normal(size=x.shape)
@@ -175,9 +184,9 @@ def _robust() -> list[Row]:
             "1 % outliers of 20 deviations": x + 20.0 * far,
             "1 % outliers of 1000 deviations": x + 1000.0 * far,
         }
-        base = hamming(sequence.labels, segment_series(x, seed=1).labels)
+        base = hamming(sequence.labels, _posterior(x, 1).labels)
         for name, changed in variants.items():
-            found = segment_series(changed, seed=1)
+            found = _posterior(changed, 1)
             lost.setdefault(name, []).append(hamming(sequence.labels, found.labels) - base)
     return [
         _row("B, Student-t noise of 3 degrees: Hamming", heavy_tails, "", 0.06),
@@ -207,10 +216,10 @@ def _bee_dance() -> Iterator[tuple[Floats, Ints]]:
 
 def _labelled() -> list[Row]:
     """Score labelled recordings; the best peer's figure is the target."""
-    autoregressive = SamplerConfig(emission="autoregressive", order=2)
+    autoregressive: dict[str, Any] = {"emission": "autoregressive", "order": 2}
     rows = []
-    for name, series, config, states, tolerance in (
-        ("mocap6", list(_mocap6())[:RECORDINGS], SamplerConfig(), None, 5),
+    for name, series, options, states, tolerance in (
+        ("mocap6", list(_mocap6())[:RECORDINGS], {}, None, 5),
         ("bee_dance, AR(2)", list(_bee_dance())[:RECORDINGS], autoregressive, 3, 15),
     ):
         if not series:
@@ -219,7 +228,7 @@ def _labelled() -> list[Row]:
         for x, labels in series:
             truth = changes(labels)
             for seed in LABELLED_SEEDS:
-                found = segment_series(x, config, seed=seed)
+                found = _posterior(x, seed, **options)
                 scores.append(f1(truth, found.changepoints, tolerance))
             learned = peers.hmmlearn(x, states or len(np.unique(labels)))
             found_by = {

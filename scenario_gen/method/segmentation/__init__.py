@@ -16,7 +16,6 @@ from scenario_gen.method.segmentation.segmenter import (
     segment_track,
     SegmentationConfig,
 )
-from scenario_gen.method.segmentation.series import segment_series
 
 __all__ = [
     "CONVERGED_R_HAT_RATIO",
@@ -27,6 +26,5 @@ __all__ = [
     "SegmentationWarning",
     "StickyHDPHMM",
     "segment",
-    "segment_series",
     "segment_track",
 ]  # fmt: skip

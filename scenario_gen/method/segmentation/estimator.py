@@ -22,19 +22,17 @@ from scenario_gen.method.segmentation.estimates import (
 )
 from scenario_gen.method.segmentation.hdp_hmm.chain import TRACE
 from scenario_gen.method.segmentation.hdp_hmm.config import SamplerConfig
-from scenario_gen.method.segmentation.hdp_hmm.smoother import smooth
-from scenario_gen.method.segmentation.series import (
-    refuse_not_finite,
-    segment_visible,
+from scenario_gen.method.segmentation.hdp_hmm.sample import (
+    hide_outliers,
+    sample_posterior,
     usual_distances,
-    without_outliers,
 )
+from scenario_gen.method.segmentation.hdp_hmm.smoother import smooth
 from scenario_gen.numerics import Floats, Ints
 
 Data = Any  # an array (T, D), or data that numpy converts to one, or a list of them
 
 DEFAULT = SamplerConfig()
-MIN_SAMPLES = 4
 CONVERGED_R_HAT_RATIO = 1.1  # required where `r_hat` = 1 demands all sweeps
 
 
@@ -181,15 +179,13 @@ class StickyHDPHMM:
         """
         x, ends = stacked(X, lengths)
         config = self._config()
-        if len(x) < MIN_SAMPLES:
-            raise EstimatorError(f"X has n_samples = {len(x)}; at least {MIN_SAMPLES} are needed")
         seed = self.random_state
         if seed is None:
             seed = int(np.random.default_rng().integers(2**62))
-        self._usual = usual_distances(x, ends)
-        visible = without_outliers(x, self._usual, ends)
         with as_value_error():
-            posterior = segment_visible(visible, config, int(seed), ends, np.zeros(x.shape[1]))
+            self._usual = usual_distances(x, ends)
+            visible = hide_outliers(x, self._usual, ends)
+            posterior = sample_posterior(visible, config, int(seed), ends, np.zeros(x.shape[1]))
         self.posterior_ = posterior
         self.n_features_in_ = x.shape[1]
         emissions = estimate(visible, ends, posterior, config)
@@ -347,7 +343,7 @@ class StickyHDPHMM:
                 f"{self.n_features_in_} features as input"
             )
         with as_value_error():
-            problem, rows = regressed(without_outliers(x, self._usual, ends), ends, self._config())
+            problem, rows = regressed(hide_outliers(x, self._usual, ends), ends, self._config())
         if weight is None:
             weight = self.posterior_.weight
         emissions = Emissions(self.coefficients_, self.covariances_)
@@ -459,6 +455,10 @@ def matrix(X: npt.ArrayLike) -> Floats:
         raise EstimatorError(
             f"found 0 feature(s) (shape={x.shape}) while a minimum of 1 is required."
         )
-    with as_value_error():
-        refuse_not_finite(x, "X")
+    if not np.isfinite(x).all():
+        row, column = np.argwhere(~np.isfinite(x))[0]
+        raise EstimatorError(
+            f"X holds NaN or inf: {x[row, column]} at sample {row}, channel {column}; "
+            "interpolate what is missing, or split the series there"
+        )
     return x

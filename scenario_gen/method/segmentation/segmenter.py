@@ -16,8 +16,12 @@ from scenario_gen.method.segmentation.features import (
     without_outliers,
 )
 from scenario_gen.method.segmentation.hdp_hmm.config import SamplerConfig
+from scenario_gen.method.segmentation.hdp_hmm.sample import (
+    hide_outliers,
+    sample_posterior,
+    usual_distances,
+)
 from scenario_gen.method.segmentation.posterior import in_order, Posterior
-from scenario_gen.method.segmentation.series import segment_series
 from scenario_gen.method.segmentation.trends import course, Trends
 from scenario_gen.numerics import Floats, Ints
 from scenario_gen.types import Motion, Segmentation, Vehicle, VehicleType
@@ -160,24 +164,34 @@ def segment(
             f"{type(encounter).__name__}"
         )
     if config.preset == "paper":
-        posterior = segment_series(paper_features(encounter), config.sampler, seed)
+        features = paper_features(encounter)
+        posterior = sample_features(features, np.zeros(features.shape[1]), config.sampler, seed)
         points = cut(posterior, config, encounter.dt)
     else:
         encounter = without_outliers(encounter)
-        features, blur = driving_features(
+        features, noise = driving_features(
             encounter,
             config.speed_window,
             config.turn_window,
             config.speed_noise,
             config.turn_noise,
         )
-        posterior = segment_series(features, config.sampler, seed, blur=blur)
+        posterior = sample_features(features, noise, config.sampler, seed)
         points = on_trends(encounter, posterior, cut(posterior, config, encounter.dt), config)
     labels = in_order(relabel(posterior.labels, points))
     r_hat = float(posterior.r_hat.max())
     return Segmentation(
         labels, points, posterior.probability, describe_segments(encounter, points), r_hat
     )
+
+
+def sample_features(
+    features: Floats, noise: Floats, config: SamplerConfig, seed: int
+) -> Posterior:
+    """Return the posterior of features (T, D) with this noise (D,)."""
+    ends = np.array([len(features)])
+    visible = hide_outliers(features, usual_distances(features, ends), ends)
+    return sample_posterior(visible, config, seed, ends, noise)
 
 
 def segment_track(

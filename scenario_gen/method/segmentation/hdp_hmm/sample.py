@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""A plain (T, D) array -> posterior over its segmentations, for series of any kind."""
+"""A series (T, D) -> posterior over its segmentations."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
@@ -23,6 +23,7 @@ from scenario_gen.method.segmentation.hdp_hmm.start import (
 from scenario_gen.method.segmentation.posterior import pool, Posterior, r_hat
 from scenario_gen.numerics import Floats, Ints
 
+MIN_SAMPLES = 4
 SPARE_COUNT = 5  # states beyond those of the start
 FIRST_CHECK_ITERATIONS = 40  # sweeps before the chains are first compared
 MAX_FULL_SHARE = 0.05  # of a chain's samples that may use all states
@@ -31,62 +32,19 @@ SIDE_SAMPLES = 4  # before, and after, whose median a sample is compared with
 OUTLIER_FACTOR = 8.0  # of the usual distance from both medians
 
 
-def segment_series(
-    x: Floats,
-    config: SamplerConfig = SamplerConfig(),
-    seed: int = 0,
-    *,
-    ends: tuple[int, ...] | None = None,
-    blur: Floats | None = None,
+def sample_posterior(
+    x: Floats, config: SamplerConfig, seed: int, ends: Ints, error: Floats
 ) -> Posterior:
     """Sample the segmentations of a series under the sticky HDP-HMM, with priors from the data.
 
     Source: Fox et al. 2011.
 
     Args:
-        x: (T, D), any units; see `standardised`.
+        x: (T, D), any units, NaN for outliers (`hide_outliers`).
         config: model and sampler.
         seed: same seed, same answer.
-        ends: one past the index of the last sample of each sequence, if x concatenates several.
-        blur: (D,) standard deviation of each channel's measurement error, in x's units; None: 0.
-
-    Raises:
-        InputError: fewer than 4 samples, a value that is not finite, or a sequence too short for
-            the order.
-    """
-    x = np.asarray(x, dtype=np.float64)
-    if x.ndim == 1:
-        x = x[:, None]
-    if x.ndim != 2 or x.shape[0] < 4:
-        raise InputError(
-            f"a series to segment needs at least 4 samples in (T, D); its shape is {x.shape}"
-        )
-    refuse_not_finite(x, "the series to segment")
-    stops = np.array([len(x)] if ends is None else ends, dtype=np.int64)
-    if stops[-1] != len(x) or (np.diff(np.concatenate([[0], stops])) < 1).any():
-        raise InputError(
-            f"the ends of the sequences must rise to the number of samples, {len(x)}; they are "
-            f"{stops.tolist()}"
-        )
-    error = np.zeros(x.shape[1]) if blur is None else np.asarray(blur)
-    visible = without_outliers(x, usual_distances(x, stops), stops)
-    return segment_visible(visible, config, seed, stops, error)
-
-
-def refuse_not_finite(x: Floats, name: str) -> None:
-    """Raise InputError if x (T, D) holds NaN or infinity; `name` is for the message."""
-    if not np.isfinite(x).all():
-        row, column = np.argwhere(~np.isfinite(x))[0]
-        raise InputError(
-            f"{name} holds NaN or inf: {x[row, column]} at sample {row}, channel {column}; "
-            "interpolate what is missing, or split the series there"
-        )
-
-
-def segment_visible(
-    x: Floats, config: SamplerConfig, seed: int, ends: Ints, error: Floats
-) -> Posterior:
-    """Segment x (T, D), whose outliers are already NaN; `error` (D,) is that of each channel.
+        ends: (Q,) one past the index of the last sample of each sequence.
+        error: (D,) standard deviation of each channel's measurement error, in x's units.
 
     Raises:
         InputError: a sequence is too short for the order.
@@ -106,7 +64,7 @@ def standardised(x: Floats, error: Floats) -> tuple[Floats, Floats, Ints]:
     before it adds nothing and would make every covariance singular.
 
     Args:
-        x: (T, D), NaN for outliers (`without_outliers`).
+        x: (T, D), NaN for outliers (`hide_outliers`).
         error: (D,) measurement error of each channel, a standard deviation.
 
     Returns:
@@ -139,14 +97,21 @@ def usual_distances(x: Floats, ends: Ints) -> Floats:
 
     It is at least a tenth of the channel's spread. Sequences end before the samples `ends` (Q,);
     the first sample of a sequence does not count.
+
+    Raises:
+        InputError: fewer than 4 samples.
     """
+    if len(x) < MIN_SAMPLES:
+        raise InputError(
+            f"segmentation needs at least {MIN_SAMPLES} samples; n_samples = {len(x)}"
+        )
     before, _ = _from_medians(x, ends)
     with np.errstate(all="ignore"):
         deviation = 1.4826 * np.nanmedian(np.abs(before), axis=0)
         return np.asarray(np.fmax(deviation, 0.1 * inner_spread(x)))
 
 
-def without_outliers(x: Floats, usual: Floats, ends: Ints) -> Floats:
+def hide_outliers(x: Floats, usual: Floats, ends: Ints) -> Floats:
     """Replace single outliers of x (T, D) by NaN.
 
     An outlier lies more than OUTLIER_FACTOR times `usual` (D,) beyond the medians of both the four
