@@ -10,13 +10,15 @@ from threading import Timer
 from typing import Any
 
 from scenario_gen.base.errors import InputError
-from scenario_gen.corpus.messages import database, quoted
+from scenario_gen.corpus.messages import database, pattern_of, quoted, tables
 
 MAX_SECONDS_S = 60.0  # of one search
 NAMES = (
     "template, recording, kind, road, vehicles, index, type, seconds, distance, ttc, pet, speed,"
     " braking, types, seed, sha256, outcome, probability"
 )
+# The columns of a batch; a road is the name of the folder `road=NAME`.
+GENERATED = "* EXCLUDE filename, parse_filename(parse_dirpath(filename))[6:] AS road"
 
 
 @contextmanager
@@ -25,7 +27,7 @@ def matching(
     condition: str,
     folder: Path,
     *,
-    columns: str = "*",
+    columns: str = GENERATED,
     source: object = "hits",
     remedy: str = f"the columns are {NAMES}",
     seconds: float = MAX_SECONDS_S,
@@ -45,11 +47,11 @@ def matching(
         InputError: the condition is invalid or takes too long.
     """
     task = f"{source}: condition {condition!r}"
-    files = quoted([str(path) for path in paths])
+    names = [str(path.absolute()) for path in paths]
+    files = quoted([*names, *map(pattern_of, names)])
     with database(folder, 400, task, remedy) as base, _time_limit(base, seconds, task):
         base.execute(
-            f"CREATE VIEW scenarios AS SELECT {columns} FROM read_parquet([{files}],"
-            " hive_partitioning=true, hive_types_autocast=false)"
+            f"CREATE VIEW scenarios AS SELECT {columns} FROM {tables(paths, ', filename = true')}"
         )
         base.execute(f"SET allowed_paths = [{files}]")
         base.execute("SET max_temp_directory_size = '4GiB'")

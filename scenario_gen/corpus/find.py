@@ -17,7 +17,7 @@ from scenario_gen.bags.recordings.write import add_message
 from scenario_gen.bags.storage.bag import BagMessage
 from scenario_gen.bags.storage.writer import atomic_bag
 from scenario_gen.base.errors import InputError
-from scenario_gen.corpus.conditions import matching, MAX_SECONDS_S, NAMES
+from scenario_gen.corpus.conditions import GENERATED, matching, MAX_SECONDS_S, NAMES
 from scenario_gen.corpus.store import finished_tables, parts_of
 from scenario_gen.output.review.replan import recorded_scenarios
 
@@ -101,7 +101,7 @@ def search(
     remedy = f"the columns are {NAMES}"
     if not generated:
         remedy += "; if the corpus is from an older version, mine it again"
-    columns = "*" if generated else RECORDED
+    columns = GENERATED if generated else RECORDED
     with matching(
         tables,
         condition,

@@ -24,7 +24,7 @@ from scenario_gen.corpus.messages import (
     database,
     GROUP_ROWS,
     HOUR_US,
-    quoted,
+    tables,
     UNITS_PER_DEGREE,
     write_messages,
 )
@@ -115,12 +115,11 @@ def _search(base: Any, hour: int, files: Sequence[Path], key: str, task: HourTas
     config = task.config
     edge = overlap(config)
     begin, end = hour * HOUR_US - edge, (hour + 1) * HOUR_US + edge
-    names = quoted([str(path) for path in files])
     base.execute(f"""
         CREATE TEMP TABLE messages AS
         SELECT device, t, lat / {UNITS_PER_DEGREE} AS lat, lon / {UNITS_PER_DEGREE} AS lon,
                speed, heading
-        FROM read_parquet([{names}])
+        FROM {tables(files)}
         WHERE t >= {begin} AND t < {end} AND cause = 0""")
     shared = _fill_bins(base)
     pairs = _candidates(base, config)

@@ -21,7 +21,7 @@ import zlib
 
 from scenario_gen.base.errors import describe, guarded, InputError, needs
 from scenario_gen.base.folders import scratch, write_text
-from scenario_gen.corpus.sources import MessageTable
+from scenario_gen.corpus.sources import MessageTable, OPTIONS
 from scenario_gen.corpus.tasks import arriving
 
 HOUR_US = 3_600_000_000
@@ -139,6 +139,8 @@ def database(folder: Path, memory: int, task: str, remedy: str = MEMORY_REMEDY) 
         connection.execute(f"SET memory_limit = '{memory}MiB'")
         connection.execute("SET temp_directory = ?", [str(spill)])
         connection.execute("SET enable_progress_bar = false")
+        connection.execute("SET autoinstall_known_extensions = false")
+        connection.execute("SET autoload_known_extensions = false")
         with guarded(task, duckdb.Error, remedy=remedy):
             yield connection
 
@@ -233,14 +235,15 @@ def _parse(task: RangeTask, files: Sequence[Path], folder: Path) -> tuple[dict[s
     for k, (path, (source, begin, end)) in enumerate(zip(files, task.pieces, strict=True)):
         is_whole = begin == 0 and end == source.stat().st_size
         lines = path if is_whole else _extract(path, begin, end, folder / f"{k}.csv")
-        names[str(lines)] = inputs[k]
+        names[str(lines.absolute())] = inputs[k]
     target = folder / "parsed.parquet"
     with database(folder, task.memory, f"{task.name}: {', '.join(inputs)}") as base:
-        base.execute("SET VARIABLE files = ?", [list(names)])
-        base.execute("SET VARIABLE parsed = ?", [str(target)])
-        base.execute("CREATE TYPE read AS ENUM (SELECT unnest(getvariable('files')))")
+        base.execute("SET VARIABLE names = ?", [list(names)])
+        base.execute("CREATE TYPE read AS ENUM (SELECT unnest(getvariable('names')))")
+        base.execute("SET VARIABLE files = ?", [[pattern_of(name) for name in names]])
         base.execute(f"CREATE VIEW source AS SELECT {task.table.columns} FROM {task.table.reader}")
         write_messages(base.sql(SQL).to_arrow_reader(GROUP_ROWS), target)
+        base.execute(f"CREATE VIEW parsed AS FROM {tables([target])}")
         counts = _counts(base)
         unchecked = _files_with_another_clock(counts)
         if unchecked:
@@ -272,7 +275,7 @@ def _counts(base: Any) -> list[_Count]:
     rows = base.execute(f"""
         SELECT file, cause, CASE WHEN cause = 0 THEN t // {HOUR_US} ELSE 0 END AS hour, count(*),
                count(*) FILTER (back), sum(hash(device, t, lat, lon, speed, heading) >> 24)
-        FROM read_parquet(getvariable('parsed')) GROUP BY file, cause, hour""").fetchall()
+        FROM parsed GROUP BY file, cause, hour""").fetchall()
     return [_Count(*row) for row in rows]
 
 
@@ -330,7 +333,7 @@ def _accept_clocks(base: Any, target: Path, files: Sequence[int]) -> None:
     """Accept the rows with disagreeing clocks in some files."""
     is_accepted = f"cause = {CLOCK_CAUSE_CODE} AND file IN ({', '.join(map(str, files))})"
     cause = f"(CASE WHEN {is_accepted} THEN 0 ELSE cause END)::UTINYINT AS cause"
-    rows = base.sql(f"SELECT * REPLACE ({cause}) FROM read_parquet(getvariable('parsed'))")
+    rows = base.sql(f"SELECT * REPLACE ({cause}) FROM parsed")
     rewritten = target.with_name("again.parquet")
     write_messages(rows.to_arrow_reader(GROUP_ROWS), rewritten)
     rewritten.replace(target)
@@ -348,6 +351,17 @@ def write_messages(batches: Any, target: Path) -> None:
     with parquet.ParquetWriter(target, batches.schema, **PARQUET_OPTIONS) as writer:
         for batch in batches:
             writer.write_batch(batch)
+
+
+def tables(paths: Sequence[Path], options: str = "") -> str:
+    """Return the call that reads Parquet files, with further options; it reads no others."""
+    files = quoted([pattern_of(str(path.absolute())) for path in paths])
+    return f"read_parquet([{files}], {OPTIONS}{options})"
+
+
+def pattern_of(name: str) -> str:
+    """Return the pattern that only a file of this name matches; the database expands patterns."""
+    return re.sub(r"[\[*?]", r"[\g<0>]", name)
 
 
 def quoted(names: Sequence[str]) -> str:

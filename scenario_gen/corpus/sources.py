@@ -31,6 +31,9 @@ TYPES = {
 STAMP = re.compile(r"\d+(\.\d*)?([eE]\+?\d+)?")
 DATE = re.compile(r"\d{4}-\d\d-\d\d[ T]")
 VEHICLE = re.compile(r"\d{1,15}(\.0*)?")
+OPTIONS = "hive_partitioning = false, union_by_name = false"
+"""The database reads the columns of a file, and not those that its folders are named after."""
+FILE = "name of the file"  # a column that no table has
 MAX_LINE_BYTES = 65_536  # a longer line is not a row
 
 
@@ -186,7 +189,7 @@ def _table(sample: _Sample, columns: Mapping[str, Column], stamp: str) -> Messag
     is_plain = not sample.is_quoted and stamp != "TIMESTAMPTZ"
     fields = _fields(sample, "c{}" if is_plain else "trim(c{}, ' \"')")
     values = {name: _cast(fields[k], types[name]) for name, k in places.items()}
-    reader = "read_parquet(getvariable('files'), filename = true)"
+    reader = f"read_parquet(getvariable('files'), {OPTIONS}, filename = '{FILE}')"
     if sample.is_text:
         reader = _text_reader(sample, {places[name]: types[name] for name in places if is_plain})
     return MessageTable(reader, _selected(values, columns, stamp), sample.above, sample.is_text)
@@ -206,8 +209,8 @@ def _text_reader(sample: _Sample, types: Mapping[int, str]) -> str:
     return (
         f"read_csv(getvariable('files'), columns = {columns}, header = false, "
         f"auto_detect = false, delim = '{sample.separator}', quote = '', escape = '', "
-        "strict_mode = false, store_rejects = true, filename = true, "
-        f"max_line_size = {MAX_LINE_BYTES}{packed})"
+        "strict_mode = false, store_rejects = true, "
+        f"{OPTIONS}, filename = '{FILE}', max_line_size = {MAX_LINE_BYTES}{packed})"
     )
 
 
@@ -229,7 +232,8 @@ def _selected(values: Mapping[str, str], columns: Mapping[str, Column], stamp: s
     return (
         f"{values['vehicle']} AS device, {time} AS t, {scaled['lat']} AS lat, "
         f"{scaled['lon']} AS lon, ({scaled['speed']})::FLOAT AS speed, "
-        f"({heading})::FLOAT AS heading, {values.get('clock', 'NULL')} AS clock, filename"
+        f"({heading})::FLOAT AS heading, {values.get('clock', 'NULL')} AS clock, "
+        f'"{FILE}" AS filename'
     )
 
 
