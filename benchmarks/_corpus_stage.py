@@ -27,7 +27,7 @@ STAGES = ("parse", "search", "group", "clean")
 def work(name: str, archive: Path, out: Path) -> Iterator[Callable[[], object]]:
     """Yield the tasks of a stage of `mine` on an archive."""
     config = CorpusConfig()
-    messages, _, _ = inventory([archive])
+    messages = inventory([archive]).messages
     ranged = ranges(messages, out / "messages", config.range_size << 20, config.memory)
     if name == "parse":
         yield from (partial(parse_range, task) for task in ranged)

@@ -1,14 +1,15 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The contents of archives: tables of messages, other logs, and files in no known format."""
+"""The contents of archives: tables of messages, other logs, and what cannot be read."""
 
 from collections.abc import Callable, Iterable, Sequence
 import os
 from pathlib import Path
+import stat
 from typing import NamedTuple
 
-from scenario_gen.base.errors import InputError
+from scenario_gen.base.errors import InputError, printable
 from scenario_gen.corpus.sources import message_table, MessageTable
 from scenario_gen.logs import is_bag, is_log, is_table, LOG_FORMATS
 
@@ -20,11 +21,13 @@ class Inventory(NamedTuple):
         messages: the tables of messages, and how each is read.
         logs: the other logs, each with its files.
         others: the files that are neither.
+        unreadable: sentences about the entries that are no files, by name.
     """
 
     messages: list[tuple[Path, MessageTable]]
     logs: list[list[Path]]
     others: list[Path]
+    unreadable: dict[str, str]
 
 
 def inventory(archives: Sequence[Path], option: str = "") -> Inventory:
@@ -33,12 +36,13 @@ def inventory(archives: Sequence[Path], option: str = "") -> Inventory:
     Raises:
         InputError: a path does not exist, or contains no log.
     """
-    total = Inventory([], [], [])
+    total = Inventory([], [], [], {})
     for archive in archives:
         contents = _inventory_of(archive, option)
         total.messages.extend(contents.messages)
         total.logs.extend(contents.logs)
         total.others.extend(contents.others)
+        total.unreadable.update(contents.unreadable)
     return total
 
 
@@ -47,8 +51,10 @@ def _inventory_of(archive: Path, option: str) -> Inventory:
     if not archive.exists():
         raise InputError(f"{archive} does not exist")
     if archive.is_dir() and is_bag(archive) and not _has_other_logs(archive):
-        return Inventory([], [[archive]], [])
-    paths = [archive] if archive.is_file() else _visible_files(archive)
+        return Inventory([], [[archive]], [], {})
+    entries = [archive] if archive.is_file() else _visible_entries(archive)
+    unreadable = {path: why for path in entries if (why := _fault(path))}
+    paths = [path for path in entries if path not in unreadable]
     tables = {path: message_table(path, option) for path in paths}
     messages = [(path, table) for path, table in tables.items() if table]
     bags, rest = _split_bags([path for path in paths if not tables[path]])
@@ -57,7 +63,8 @@ def _inventory_of(archive: Path, option: str) -> Inventory:
     if len(files) + len(others) == len(paths) and _is_one_log(files, archive):
         logs = [files]
     _check_logs([*messages, *logs], archive)
-    return Inventory(messages, logs, others)
+    named = {printable(str(path)): why for path, why in unreadable.items()}
+    return Inventory(messages, logs, others, named)
 
 
 def _check_logs(logs: Sequence[object], archive: Path) -> None:
@@ -81,7 +88,7 @@ def _may_be_log(path: Path) -> bool:
 
 def _has_other_logs(folder: Path) -> bool:
     """Whether a folder with files of bags has tables, too, and no metadata that makes it a bag."""
-    files = _visible_files(folder)
+    files = _visible_entries(folder)
     is_whole = any(path.name == "metadata.yaml" for path in files)
     return not is_whole and any(is_table(path) for path in files)
 
@@ -99,13 +106,30 @@ def _split_bags(paths: Iterable[Path]) -> tuple[list[Path], list[Path]]:
     return [*sorted(folders), *files], rest
 
 
-def _visible_files(folder: Path) -> list[Path]:
-    return sorted(
-        Path(parent, name)
-        for parent, _, names in os.walk(folder)
-        for name in names
-        if not name.startswith(".")
-    )
+def _visible_entries(folder: Path) -> list[Path]:
+    """Return the files in a folder at any depth, and the folders that cannot be entered."""
+    entries: list[Path] = []
+    walk = os.walk(folder, onerror=lambda error: entries.append(Path(error.filename)))
+    for parent, folders, names in walk:
+        links = [name for name in folders if Path(parent, name).is_symlink()]
+        entries += [Path(parent, name) for name in (*names, *links) if not name.startswith(".")]
+    return sorted(entries)
+
+
+def _fault(path: Path) -> str:
+    """Return why an entry of a folder is no file that can be read; "" if it is one."""
+    name = printable(str(path))
+    try:
+        str(path).encode()
+        mode = path.stat().st_mode
+    except UnicodeEncodeError:
+        return f"{name}: the name is not UTF-8; rename it"
+    except OSError as error:
+        return f"{name}: {error.strerror}{' (a link)' if path.is_symlink() else ''}"
+    if stat.S_ISDIR(mode):
+        remedy = "name its folder as an archive, too" if path.is_symlink() else "check its rights"
+        return f"{name}: folder is not entered; {remedy}"
+    return "" if stat.S_ISREG(mode) else f"{name} is not a file"
 
 
 def _split(paths: Iterable[Path], chosen: Callable[[Path], bool]) -> tuple[list[Path], list[Path]]:

@@ -160,7 +160,7 @@ def mine(
         RefusedError: with `strict`, something is left out.
     """
     needs("corpus", "duckdb", "pyarrow")
-    messages, logs, others = inventory(archives, config.log.columns)
+    messages, logs, others, unreadable = inventory(archives, config.log.columns)
     check_out(out, archives)
     with held(out), spread(workers) as run:
         agree(out, ARCHIVE, {"format": 4, "parameters": _parameters(config)}, "corpus")
@@ -185,8 +185,8 @@ def mine(
         contents = _contents(out)
         notes = _notes(others, stale, done, accounts.values(), least_rows(config))
         notes += _shared_ids(out)
-        n_files = len(messages) + len(logs)
-        result = _summary(contents, accounts.values(), failed, notes, n_files)
+        n_files = len(messages) + len(logs) + len(unreadable)
+        result = _summary(contents, accounts.values(), unreadable, failed, notes, n_files)
         if strict and result.read[0] < n_files:
             raise RefusedError(f"{result.refused[0]['why']}; without --strict it is left out")
         with arriving(out / PAGE) as part:
@@ -257,7 +257,8 @@ def _log_task(paths: list[Path], folder: Path, config: CorpusConfig) -> LogTask:
     """Return the task of a log; its table is named after the identity of its files."""
     files: list[Path] = []
     for path in paths:
-        files += sorted(path.rglob("*")) if path.is_dir() else [path]
+        inside = sorted(path.rglob("*")) if path.is_dir() else [path]
+        files += [file for file in inside if file.is_file()]
     name = re.sub(r"\W+", "_", paths[0].stem)[:40]
     target = folder / f"log-{name}-{digest_of([identity_of(file) for file in files])}.parquet"
     return LogTask(paths[0].stem, tuple(paths), target, config)
@@ -275,6 +276,7 @@ def _stale_files(ranged: Sequence[RangeTask], out: Path) -> list[str]:
 def _summary(
     contents: _Contents,
     accounts: Collection[Mapping[str, Any]],
+    unreadable: Mapping[str, str],
     failed: list[str],
     notes: list[str],
     n_files: int,
@@ -284,9 +286,10 @@ def _summary(
     Args:
         contents: the encounters.
         accounts: of the ranges.
+        unreadable: entries of the archive that are no files, and why.
         failed: a sentence for each failed task.
         notes: on the archive.
-        n_files: number of tables of messages, and of logs.
+        n_files: number of tables of messages, of logs, and of unreadable entries.
     """
     files: dict[str, Counter[str]] = {}
     damaged: dict[str, str] = {}
@@ -300,9 +303,11 @@ def _summary(
     for causes_of_file in faults.values():
         causes_of_file.pop("rows", None)
     refused = [
+        *({"name": name, "cause": UNREAD_LOGS[1], "why": why} for name, why in unreadable.items()),
         *({"name": name, "cause": DAMAGED, "why": why} for name, why in sorted(damaged.items())),
         *chain.from_iterable(account.get("refused", ()) for account in contents.accounts),
     ]
+    refused.sort(key=lambda row: row.get("cause") not in UNREAD)
     n_unread = len(failed) + sum(row.get("cause") in UNREAD for row in refused)
     quality = chain.from_iterable(account.get("quality", ()) for account in contents.accounts)
     return MiningSummary(

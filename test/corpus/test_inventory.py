@@ -3,9 +3,13 @@
 
 """What lies in an archive: SPMD files, logs, bags, others; and a log without an encounter is a result."""
 
+import os
+import socket
+
 import pytest
 from support.source_files import ROOT
 
+from scenario_gen.base.errors import RefusedError
 from scenario_gen.corpus.inventory import inventory
 from scenario_gen.corpus.mine import mine
 
@@ -27,7 +31,7 @@ def test_each_file_of_an_archive_is_one_thing(tmp_path):
     }.items():
         (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
         (tmp_path / name).write_text(text)
-    messages, logs, others = inventory([tmp_path])
+    messages, logs, others, _ = inventory([tmp_path])
     messages = [path for path, _ in messages]
     names = [
         [path.relative_to(tmp_path).as_posix() for path in own]
@@ -63,3 +67,28 @@ def test_a_log_without_an_encounter_is_a_result_and_not_read_again(tmp_path, mon
         "scenario_gen.corpus.encounters.read_log", lambda *_: pytest.fail("it is read again")
     )
     assert mine([logs], tmp_path / "corpus").encounters == 1
+
+
+def test_an_odd_entry_is_named_and_costs_only_itself(tmp_path):
+    logs = tmp_path / "logs"
+    (logs / "sub").mkdir(parents=True)
+    (logs / "sub" / "good.csv").write_text((ROOT / "examples" / "my_log.csv").read_text())
+    (logs / "dangling.csv").symlink_to(tmp_path / "nothing.csv")
+    (logs / "loop.csv").symlink_to(logs / "loop.csv")
+    (logs / "device.csv").symlink_to("/dev/zero")
+    (logs / "folder").symlink_to(tmp_path)
+    os.mkfifo(logs / "fifo.csv")
+    os.mkfifo(logs / "fifo.db3")
+    name = os.fsdecode(b"caf\xe9.csv")
+    (logs / name).write_text(SPMD)
+    with socket.socket(socket.AF_UNIX) as listening:
+        listening.bind(str(logs / "socket.csv"))
+        made = mine([logs], tmp_path / "corpus")
+    assert made.encounters == 1 and not made.failed
+    odd = {"dangling.csv", "loop.csv", "device.csv", "folder", "fifo.csv", "fifo.db3"}
+    odd |= {"socket.csv", "caf\\udce9.csv"}
+    assert {row["name"].removeprefix(f"{logs}/") for row in made.refused} == odd
+    assert all(row["name"] in row["why"] for row in made.refused)
+    assert made.read == (1, 1 + len(odd))
+    with pytest.raises(RefusedError, match="without --strict it is left out"):
+        mine([logs], tmp_path / "strict", strict=True)

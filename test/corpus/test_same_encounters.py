@@ -125,7 +125,7 @@ def test_rows_in_any_form(tmp_path, form):
     """The messages of a column, in a table that is no SPMD text."""
     lines = (column(tmp_path / "spmd", 4, 1.2, 20.0) / "a.csv").read_text().splitlines()
     folder = written(lines, tmp_path / form, form)
-    _, logs, others = inventory([folder])
+    _, logs, others, _ = inventory([folder])
     assert not logs and not others
     mined, read = both(folder, tmp_path / "out")
     assert read == mined and len(mined)
