@@ -25,7 +25,7 @@ from scenario_gen.roads.clearance import (
     to_metres,
 )
 from scenario_gen.roads.config import RoadConfig
-from scenario_gen.roads.connectivity import FreeSpace
+from scenario_gen.roads.connectivity import free_cells, free_space, FreeSpace
 from scenario_gen.roads.drawn import draw_plan
 from scenario_gen.roads.junctions import drives_about_ring
 from scenario_gen.roads.lights import lights_of
@@ -78,7 +78,9 @@ __all__ = [
     "drives_about_ring",
     "drives_against",
     "footprint_fits",
+    "free_cells",
     "free_length",
+    "free_space",
     "ground_for",
     "is_vector_map",
     "lane_along",

@@ -11,7 +11,7 @@ can really make, and two cells of one component are connected by a path.
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 import math
 
 import numpy as np
@@ -24,7 +24,7 @@ from scenario_gen.types import Road
 
 @dataclass(frozen=True, eq=False)
 class FreeSpace:
-    """Where the centre of a disc with `radius` [m] can be on a road."""
+    """Where the centre of a disc with `radius` [m] can be on a road; `free_space` keeps it."""
 
     road: Road
     radius: float
@@ -52,7 +52,7 @@ class FreeSpace:
             in_column = inside[di : di + rows, 1:-1]
             corner |= ~diagonal & in_row & in_column
         corner &= inside[1:-1, 1:-1]
-        return np.flatnonzero(inside[1:-1, 1:-1]), np.flatnonzero(corner)
+        return sealed(np.flatnonzero(inside[1:-1, 1:-1])), sealed(np.flatnonzero(corner))
 
     def component_at(self, xy: Floats) -> int:
         """Return the component that the disc at `xy` (2,) [m] can move to.
@@ -101,3 +101,15 @@ class FreeSpace:
         for k in np.argsort(np.hypot(*(centres - xy).T), kind="stable"):
             if free[k]:
                 yield int(self.labels[i[k], j[k]])
+
+
+@lru_cache(maxsize=4)  # the queries on one road have few radii
+def free_space(road: Road, radius: float) -> FreeSpace:
+    """Return the free space of a disc with `radius` [m]; queries of one road share it."""
+    return FreeSpace(road, radius)
+
+
+@lru_cache(maxsize=4)
+def free_cells(space: FreeSpace, label: int) -> tuple[Ints, Ints]:
+    """Return `space.cells(label)`; queries in one component share it."""
+    return space.cells(label)

@@ -16,7 +16,7 @@ from scenario_gen.roads.clearance import (
     nearest_pose_with_room,
     segments_free,
 )
-from scenario_gen.roads.connectivity import FreeSpace
+from scenario_gen.roads.connectivity import free_cells, free_space, FreeSpace
 from scenario_gen.types.road import Road
 
 
@@ -133,6 +133,17 @@ def test_components_need_the_width():
     assert FreeSpace(road, 0.51).common_component(left, right) is None
     assert FreeSpace(road, 0.0).component_at(np.array([10.5, 0.5])) == 0
     assert FreeSpace(road, 0.51).labels.max() == 2
+
+
+def test_free_space_is_kept_for_each_road_and_radius():
+    open_road = road_of(np.ones((9, 20), dtype=bool))
+    drivable = np.ones((9, 20), dtype=bool)
+    drivable[:, 10] = False
+    divided = road_of(drivable)
+    assert free_space(open_road, 0.4) is free_space(open_road, 0.4)
+    assert [free_space(road, 0.4).labels.max() for road in (open_road, divided)] == [1, 2]
+    assert len(free_cells(free_space(open_road, 2.4), 1)[0]) == 5 * 16
+    assert len(free_cells(free_space(open_road, 0.4), 1)[0]) == 9 * 20
 
 
 def test_the_common_component_is_one_that_both_ends_reach():

@@ -34,7 +34,8 @@ from scenario_gen.numerics import Floats, Ints, wrap_angle
 from scenario_gen.numerics.plane import arc_lengths, edge_yaws
 from scenario_gen.roads import (
     footprint_fits,
-    FreeSpace,
+    free_cells,
+    free_space,
     to_cells,
     to_metres,
 )
@@ -222,9 +223,9 @@ def _disc_path(road: Road, query: PoseQuery, margin: float, seed: int) -> tuple[
 
 def _reachable_cells(road: Road, query: PoseQuery, radius: float) -> Ints:
     """Return the flat indices of the cells that a disc can reach; all drivable ones if unknown."""
-    space = FreeSpace(road, radius)
+    space = free_space(road, radius)
     label = space.common_component(query.start[:2], query.goal[:2]) or 0
-    cells, _ = space.cells(label)
+    cells, _ = free_cells(space, label)
     return cells if label and len(cells) else np.flatnonzero(road.drivable)
 
 

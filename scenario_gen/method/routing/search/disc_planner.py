@@ -23,7 +23,7 @@ from scenario_gen.method.routing.search.search import Search
 from scenario_gen.method.routing.search.shortcuts import string_pulled
 from scenario_gen.method.routing.search.sweep import disc_scene
 from scenario_gen.numerics import Floats
-from scenario_gen.roads import FreeSpace, to_cells
+from scenario_gen.roads import free_cells, free_space, FreeSpace, to_cells
 from scenario_gen.types import Road
 
 MAX_ROUND_ITERATIONS = 512  # between two checks of the budget
@@ -81,7 +81,7 @@ class RrtStarConnect:
         """Return the search of a query before it grows; it samples from a component's cells."""
         config, road = self.config, space.road
         ends = to_cells(road, np.array((query.start, query.goal))).tolist()
-        cells, _ = space.cells(label)
+        cells, _ = free_cells(space, label)
         least_gamma = 2.0 * math.sqrt(1.5 * max(len(cells), 1) / math.pi)  # of eq 10, d = 2
         rules = Rules(
             cells=cells,
@@ -105,7 +105,7 @@ class RrtStarConnect:
         Raises:
             BudgetSpentError: no path was found within the budget.
         """
-        space = FreeSpace(road, query.radius)
+        space = free_space(road, query.radius)
         label = joining_component(space, query)
         search = self.search(space, query, label, seed)
         for improved in search.rounds(budget, MAX_ROUND_ITERATIONS):
@@ -131,6 +131,6 @@ def straight_path(search: Search) -> Floats:
 
 def _corner_poses(space: FreeSpace, label: int) -> Floats:
     """Return poses (c, 3) [cells] in front of convex corners of obstacles, where paths bend."""
-    _, corners = space.cells(label)
+    _, corners = free_cells(space, label)
     row, column = np.divmod(corners, space.road.drivable.shape[1])
     return np.column_stack((column + 0.5, row + 0.5, np.zeros(len(corners))))

@@ -13,7 +13,7 @@ import numpy as np
 from scenario_gen.base.errors import RefusedError
 from scenario_gen.numerics import Floats, frozen, sealed
 from scenario_gen.numerics.plane import edge_lengths
-from scenario_gen.roads import FreeSpace, segments_free
+from scenario_gen.roads import free_space, FreeSpace, segments_free
 from scenario_gen.types import Road
 
 NO_POSES = sealed(np.empty((0, 3)))
@@ -164,7 +164,7 @@ def plan_with_retry(
 
 def check_query(road: Road, query: Query) -> None:
     """Raise BlockedError or NoWayError if no search could succeed."""
-    joining_component(FreeSpace(road, query.radius), query)
+    joining_component(free_space(road, query.radius), query)
 
 
 def joining_component(space: FreeSpace, query: Query) -> int:
