@@ -145,8 +145,8 @@ def fit_emissions(problem: Problem, share: Floats, posterior: Posterior) -> Emis
             outer = (problem.v * mass[:, None]).T @ problem.v
             pull = mean @ precision + weight * outer[p:, :p]
             a = linalg.solve(precision + weight * outer[:p, :p], pull.T, assume_a="pos").T
-            cross = a @ outer[:p, p:]
-            scatter[k] = outer[p:, p:] - cross - cross.T + a @ outer[:p, :p] @ a.T
+            residual = problem.y - problem.v[:, :p] @ a.T
+            scatter[k] = (residual * mass[:, None]).T @ residual
             regression[k] = a
         samples = float(total.sum())
         within = scatter.sum(axis=0) / max(samples - p * states, 0.5 * samples, 1.0)
