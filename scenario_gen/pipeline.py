@@ -26,6 +26,7 @@ from scenario_gen.method.outcome_sets import for_one_set, outcome_sets, swapped_
 from scenario_gen.method.sampling import Callbacks, Progress
 from scenario_gen.method.shortening import fit_what_matters
 from scenario_gen.method.suitable_roads import AUTO, on_first_suitable_road
+from scenario_gen.numerics.blas import one_blas_thread
 from scenario_gen.types import (
     Encounter,
     GenerationResult,
@@ -102,8 +103,9 @@ def generate(
         return on_road(road)
 
     shorten = config.fitting.shorten and not request.moves
-    result = fit_what_matters(generate_template, encounter, count, shorten=shorten)
-    return completed(result, config, request)
+    with one_blas_thread():
+        result = fit_what_matters(generate_template, encounter, count, shorten=shorten)
+        return completed(result, config, request)
 
 
 def completed(

@@ -14,10 +14,9 @@ import pytest
 import scenario_gen
 from scenario_gen import bundled, read_log
 
-MODULES = {"universal-pathlib": "upath"}  # by distribution, where they differ
 EXTRA_MODULES = sorted(
     {
-        MODULES.get(one.name, one.name)
+        one.name
         for name, listed in extras().items()
         if name not in ("core", "ros", "test")
         for one in listed

@@ -327,7 +327,7 @@ def test_works_in_a_pipeline_and_under_cross_validation(fitted):
     assert np.isfinite(cross_val_score(model, x, cv=2)).all()
 
 
-ALLOWED = {"filelock", "numpy", "scipy", "numba", "llvmlite", "scenario_gen"}
+ALLOWED = {"filelock", "numpy", "scipy", "numba", "llvmlite", "threadpoolctl", "scenario_gen"}
 TAKEN_ALONG = {
     "cffi",
     "charset_normalizer",
@@ -337,7 +337,7 @@ TAKEN_ALONG = {
 }  # by numba and numpy.f2py, where they are installed
 
 
-def test_the_segmentation_loads_numpy_scipy_and_numba_alone():
+def test_the_segmentation_loads_few_libraries():
     program = (
         "import json, sys; before = set(sys.modules);"
         "import scenario_gen.method.segmentation as s, numpy as np;"

@@ -22,6 +22,7 @@ from scenario_gen.method.segmentation.hdp_hmm.start import (
 )
 from scenario_gen.method.segmentation.posterior import pool, Posterior, r_hat
 from scenario_gen.numerics import Floats, Ints
+from scenario_gen.numerics.blas import one_blas_thread
 
 MIN_SAMPLES = 4
 SPARE_COUNT = 5  # states beyond those of the start
@@ -52,8 +53,9 @@ def sample_posterior(
     scaled, variance, channels = standardised(x, error)
     if not len(channels):
         return Posterior.constant(ends)
-    problem = Problem.build(scaled, ends, config, variance)
-    return sample(problem, config, seed, ends, channels)
+    with one_blas_thread():
+        problem = Problem.build(scaled, ends, config, variance)
+        return sample(problem, config, seed, ends, channels)
 
 
 def standardised(x: Floats, error: Floats) -> tuple[Floats, Floats, Ints]:
