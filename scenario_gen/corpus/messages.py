@@ -149,7 +149,8 @@ def parse_range(task: RangeTask) -> None:
     """Write the rows of a range, and an account of the rejected rows by file.
 
     The account is a JSON file with the name of the table. If the database refuses a file, the
-    rows that can be decoded are parsed, and the account names the file.
+    rows that can be decoded are parsed. The account names such a file, and a .gz with a wrong
+    checksum, which the database does not compare.
 
     Raises:
         InputError: the database fails (no memory, a full disk).
@@ -160,6 +161,8 @@ def parse_range(task: RangeTask) -> None:
     folder.mkdir(parents=True, exist_ok=True)
     with scratch(folder) as temporary:
         texts = [path for path, _, _ in task.pieces]
+        is_packed = task.table.is_text and task.table.header < 0
+        fault = _fault_of_gzip(texts[0]) if is_packed else ""
         try:
             account, table = _parse(task, texts, temporary)
         except InputError as error:
@@ -167,12 +170,24 @@ def parse_range(task: RangeTask) -> None:
                 raise
             texts = [_decodable(path, task.table, temporary) for path in texts]
             account, table = _parse(task, texts, temporary)
-            reason = describe(error.__cause__ or error)
-            account["damaged"] = {str(path): f"{path}: {reason}" for path, _, _ in task.pieces}
+            fault = fault or describe(error.__cause__ or error)
+        if fault:
+            account["damaged"] = {str(path): f"{path}: {fault}" for path, _, _ in task.pieces}
         with arriving(task.target.with_suffix(".json")) as part:
             write_text(part, json.dumps(account, indent=1) + "\n")
         with arriving(task.target) as part:
             table.replace(part)
+
+
+def _fault_of_gzip(path: Path) -> str:
+    """Return what is wrong with a .gz file, its checksums included; "" if it is sound."""
+    try:
+        with gzip.open(path) as file:
+            while file.read(1 << 20):
+                pass
+    except (EOFError, gzip.BadGzipFile, zlib.error) as error:
+        return describe(error)
+    return ""
 
 
 def _extract(path: Path, begin: int, end: int, target: Path) -> Path:

@@ -62,7 +62,9 @@ DRAWN_COUNT = 20  # encounters of a kind on the page
 NAMED_COUNT = 20  # failures and files that are named; the corpus contains all
 NAMED_FILES_COUNT = 5  # files that a note names
 DAMAGED = "damaged"
+LEFT_OUT = "left out"  # begins the causes of rows that are not used
 UNREAD = (DAMAGED, *UNREAD_LOGS)
+MAX_REJECTED_SHARE = 0.1  # of the rows of a file; one with more is damaged
 UNLISTED = ("memory", "task_rows")  # parameters that do not change results
 
 
@@ -115,7 +117,7 @@ class MiningSummary:
         files = f"read: {self.read[0]} of {self.read[1]} files"
         if not self.account:
             return files
-        left_out = sum(n for cause, n in self.account.items() if cause.startswith("left out"))
+        left_out = sum(n for cause, n in self.account.items() if cause.startswith(LEFT_OUT))
         return f"{files}, {1.0 - left_out / self.account['rows']:.2%} of the rows"
 
     def details(self) -> list[str]:
@@ -299,6 +301,11 @@ def _summary(
         for file, causes in account["files"].items():
             files.setdefault(file, Counter()).update(causes)
     total = sum(files.values(), Counter[str]())
+    for file, causes in files.items():
+        rejected = Counter({c: count for c, count in causes.items() if c.startswith(LEFT_OUT)})
+        if rejected.total() > MAX_REJECTED_SHARE * causes["rows"]:
+            share = f"{rejected.total()} of {causes['rows']} rows"
+            damaged.setdefault(file, f"{file}: {share} {rejected.most_common(1)[0][0]}")
     faults = {file: dict(+causes) for file, causes in files.items()}
     for causes_of_file in faults.values():
         causes_of_file.pop("rows", None)

@@ -22,6 +22,7 @@ LINES = [
     for k in range(COUNT)
 ]
 TEXT = b"\n".join(LINES) + b"\n"
+PACKED = gzip.compress(TEXT)
 HALF = len(TEXT) // 2 + 9  # within a row
 WRONG = LINES[7].replace(b"200000000700000", b"2000000000000000")
 FAULTS = {  # the bytes of a file, and its sound rows
@@ -37,7 +38,9 @@ FAULTS = {  # the bytes of a file, and its sound rows
     "wrong stamp": (TEXT.replace(LINES[7], WRONG), COUNT - 1),
     "lone CR": (TEXT[:HALF] + b"\r" + TEXT[HALF:], COUNT - 1),
     "missing column": (b"\n".join(line[4:] for line in LINES), 0),
-    "packed and cut": (gzip.compress(TEXT)[:-8], COUNT),
+    "packed and cut": (PACKED[:-8], COUNT),
+    "wrong checksum": (PACKED[:-8] + bytes([PACKED[-8] ^ 1]) + PACKED[-7:], COUNT),
+    "one row of eight": (TEXT + b"1,2,3\n" * (COUNT // 7), COUNT),
     "a header, quotes": (
         (",".join(SPMD_COLUMNS) + "\n").encode()
         + b"\n".join(b'"' + b'","'.join(line.split(b",")) + b'"' for line in LINES)
@@ -47,7 +50,14 @@ FAULTS = {  # the bytes of a file, and its sound rows
 }
 
 
-UNREAD = ("empty", "foreign", "missing column", "packed and cut")
+UNREAD = (
+    "empty",
+    "foreign",
+    "missing column",
+    "packed and cut",
+    "wrong checksum",
+    "one row of eight",
+)
 
 
 @pytest.fixture(scope="module")

@@ -152,8 +152,9 @@ def test_a_file_that_cannot_be_read_is_said_and_does_not_end_the_others(archive,
     assert (
         mined.encounters == 0
         and not mined.failed
-        and mined.read == (1, 4)
-        and {"one", "wide", "packed.csv"} == {one["name"] for one in mined.refused}
+        and mined.read == (0, 4)
+        and {"one", "wide", "packed.csv", str(tmp_path / "in" / "a.csv")}
+        == {one["name"] for one in mined.refused}
         and "not a table" in str(mined.refused)
         and "unpacked" in str(mined.refused)
     )
