@@ -143,10 +143,11 @@ def way_at(world: World, i: int, clock: float) -> float:
 
 
 @kernel(inline=True)
-def clock_after(world: World, i: int, clock: float, distance: float, skips: bool) -> float:
+def clock_after(world: World, i: int, clock: float, distance: float, target: float) -> float:
     """Return the clock [s] of vehicle i after a distance [m] on its path.
 
-    It ends where the vehicle stands in the certified motion, unless it skips its waits.
+    It ends where the vehicle stands in the certified motion. Waits that are over at a target
+    clock [s] are skipped.
     """
     if distance <= 0.0:
         return clock
@@ -157,12 +158,55 @@ def clock_after(world: World, i: int, clock: float, distance: float, skips: bool
     k = min(int(clock / world.cell), last)
     while k < last and cells[k + 1, 7] < goal:
         k += 1
-        if not skips and _cell_way(cells, k) < least:
+        if (k + 1) * world.cell > target and _cell_way(cells, k) < least:
             return float(k * world.cell)
     way = _cell_way(cells, k)
+    while k < last and way < least and (k + 2) * world.cell <= target:
+        k += 1
+        way = _cell_way(cells, k)
     if way < least:
         return float(max(clock, (k + 1) * world.cell))
     return float(max(clock, (k + (goal - cells[k, 7]) / way) * world.cell))
+
+
+@kernel(inline=True)
+def stopping_acceleration(parameters: DriverParameters, i: int, way: float, speed: float) -> float:
+    """Return the largest acceleration [m/s²] of driver i that stops at a place.
+
+    It falls to comfortable braking where that just suffices; then the driver brakes as hard as
+    necessary, with a margin.
+
+    Args:
+        parameters: of the drivers.
+        i: index of the driver.
+        way: to the place [m].
+        speed: of the driver [m/s].
+    """
+    a = parameters.acceleration[i]
+    b = parameters.comfortable[i]
+    needed = speed * speed / (2.0 * max(way, 0.01))
+    share = needed / b
+    return float(max(a - (a + b) * share * share, -max(b, MODEL.braking_margin_ratio * needed)))
+
+
+@kernel(inline=True)
+def _way_to_stand(world: World, i: int, clock: float, target: float) -> float:
+    """Return the way [m] to where vehicle i stands next in its certified motion after a clock [s].
+
+    Infinity if it does not stand within the lookahead. Waits that are over at a target clock [s]
+    do not count.
+    """
+    cells = world.cells[i]
+    last = cells.shape[0] - 1
+    start = way_at(world, i, clock)
+    for k in range(min(int(clock / world.cell), last) + 1, last):
+        way = cells[k, 7] - start
+        if way > MODEL.lookahead_m:
+            return np.inf
+        is_over = (k + 1) * world.cell <= target
+        if not is_over and _cell_way(cells, k) < MODEL.min_moving_speed_mps * world.cell:
+            return float(way)
+    return np.inf if world.leaves[i] else way_at(world, i, world.time[-1]) - start
 
 
 @kernel(inline=True)
@@ -262,6 +306,8 @@ def drive_step(
     """Return a driver after a step, at its certified pose (5,), which is changed.
 
     On the record, with nothing in the way, the motion is the certified one, whatever its jerk is.
+    A faster driver brakes for the place where its certified motion stands next, unless no braking
+    suffices: it then goes on.
 
     Args:
         world: the scenario and the step.
@@ -279,6 +325,14 @@ def drive_step(
     if not hurries and (stands or (rate == 1.0 and bound >= pose[4])):
         return DriverState(i, driver.clock + h, 1.0, pose[4] * (not stands))
     speed = rate * pose[3]
+    strongest = parameters.strongest[i]
+    skipped = target
+    if rate > 1.0 or hurries:
+        way = _way_to_stand(world, i, driver.clock, target)
+        if speed * speed <= 2.0 * strongest * way or speed <= strongest * h:
+            bound = min(bound, stopping_acceleration(parameters, i, way, speed))
+        else:
+            skipped = np.inf
     comfortable = parameters.comfortable[i]
     free = _free_acceleration(world, parameters.acceleration[i], driver, pose, target)
     jerk = parameters.jerk
@@ -286,13 +340,12 @@ def drive_step(
         urgency = min(max(-0.5 * (bound / comfortable + 1.0), 0.0), 1.0)
         calm = min(jerk, MODEL.comfortable_jerk_mps3)
         jerk = calm + urgency * (jerk - calm)
-    gain = min(max(free, -comfortable), bound, driver.acceleration + jerk * h)
-    least = max(-parameters.strongest[i], driver.acceleration - jerk * h)
+    slowing = max(comfortable, -rate * rate * pose[4])
+    gain = min(max(free, -slowing), bound, driver.acceleration + jerk * h)
+    least = max(-strongest, driver.acceleration - jerk * h)
     gain = max(gain, least, -_smooth_acceleration(speed, jerk, h))
     new_speed = max(speed + gain * h, 0.0)
-    clock = clock_after(world, i, driver.clock, 0.5 * (speed + new_speed) * h, hurries)
-    if hurries:
-        clock = min(clock, target)
+    clock = clock_after(world, i, driver.clock, 0.5 * (speed + new_speed) * h, skipped)
     pose_at(world.time, world.motion[i], clock, pose)
     if pose[3] < MODEL.min_moving_speed_mps:
         return DriverState(i, clock, 1.0 if new_speed > 0.0 else 0.0, gain)

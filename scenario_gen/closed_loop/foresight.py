@@ -91,7 +91,7 @@ def predict_ego(world: World, seen: Floats, ago: int, out: Floats) -> None:
         if keeps_rate:
             clock += seen[EGO_RATE] * h
         elif on_path:
-            clock = clock_after(world, world.ego, clock, moved, True)
+            clock = clock_after(world, world.ego, clock, moved, np.inf)
         if on_path:
             pose_at(world.time, motion, clock, pose)
             beyond = max(clock - end, 0.0) * pose[3]
@@ -150,28 +150,30 @@ def meeting_acceleration(
 
 @kernel(inline=True)
 def place_to_wait(
-    order: Floats, cell: float, clock: float, other: float, rate: float
+    order: Floats, cell: float, driver: DriverState, other: float, rate: float
 ) -> tuple[float, float]:
     """Return the clock [s] of the place where a driver waits for another vehicle, and how long.
 
-    The time is 0 if the driver need not wait on its record, infinite if the other one stands.
+    The time is 0 if the driver need not wait on its record, or at its rate if that is higher,
+    infinite if the other one stands.
 
     Args:
         order: (K,) of the pair, as in `World`.
         cell: length of a cell [s].
-        clock: of the driver [s].
+        driver: that waits.
         other: clock of the other vehicle [s].
         rate: of that clock.
     """
     k = min(int(other / cell), order.shape[0] - 1)
     limit = order[k]
+    clock = driver.clock
     if limit == np.inf or limit <= clock or limit <= other:
         return np.inf, 0.0
     while k < order.shape[0] and order[k] <= limit:
         k += 1
     clear = k * cell if k < order.shape[0] else np.inf
     wait = (min(clear, limit) - other) / max(rate, 1e-6)
-    if clock + wait <= limit + MODEL.clock_tolerance_s:
+    if clock + max(driver.rate, 1.0) * wait <= limit + MODEL.clock_tolerance_s:
         return limit, 0.0
     return limit, wait if rate > 0.01 else np.inf
 
@@ -232,7 +234,7 @@ def yielding_acceleration(
     """
     i = driver.vehicle
     clock = ego[4]
-    limit, wait = place_to_wait(world.order[i, world.ego], world.cell, driver.clock, clock, rate)
+    limit, wait = place_to_wait(world.order[i, world.ego], world.cell, driver, clock, rate)
     if wait == 0.0:
         return np.inf
     way = way_at(world, i, limit) - way_at(world, i, driver.clock)

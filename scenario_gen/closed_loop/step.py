@@ -169,6 +169,9 @@ def _update_acceleration(
     pose_at(world.time, world.motion[i], before[CLOCK], pose)
     strongest = parameters.strongest[i]
     gained = (speed - before[RATE] * pose[3]) / h
+    is_certified = before[RATE] == 1.0 and after[RATE] == 1.0
+    if not is_certified and gained < -strongest - MODEL.braking_tolerance_mps / h:
+        after[HELD] = 1.0
     if after[HELD] > 0.0:
         sudden = (
             min(before[ACCELERATION], 0.0) - parameters.jerk * h - MODEL.jerk_tolerance_mps / h

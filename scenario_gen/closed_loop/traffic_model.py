@@ -31,6 +31,7 @@ from scenario_gen.closed_loop.driver import (
     MODEL,
     ON_PATH,
     RATE,
+    stopping_acceleration,
     WAITED,
     way_at,
 )
@@ -245,7 +246,7 @@ def _bound_by_others(
             continue
         if now.present[j] and clocks[j] < driver.clock:
             bound = min(bound, _bound_by_leader(world, parameters, now, driver, j))
-        limit, wait = _place_to_wait(world, now, i, j)
+        limit, wait = _place_to_wait(world, now, driver, j)
         bound = min(bound, _bound_by_limit(world, parameters, now, driver, limit, wait))
         blocker = j if wait == np.inf else blocker
     if blocker >= 0 and _is_slow(driver, driver.rate * now.pose[i, 3]):
@@ -257,13 +258,14 @@ def _bound_by_others(
 
 
 @kernel(inline=True)
-def _place_to_wait(world: World, now: Traffic, i: int, j: int) -> tuple[float, float]:
-    """Return the clock [s] of the place where driver i waits for vehicle j, and how long."""
+def _place_to_wait(world: World, now: Traffic, driver: DriverState, j: int) -> tuple[float, float]:
+    """Return the clock [s] of the place where a driver waits for vehicle j, and how long."""
+    i = driver.vehicle
     if now.passes[i, j] or now.passes[j, i]:
         return np.inf, 0.0
     other = now.drivers[j]
     order = world.order[i, j]
-    return place_to_wait(order, world.cell, now.drivers[i, CLOCK], other[CLOCK], other[RATE])
+    return place_to_wait(order, world.cell, driver, other[CLOCK], other[RATE])
 
 
 @kernel(inline=True)
@@ -299,7 +301,11 @@ def _bound_by_limit(
     way = way_at(world, i, limit) - way_at(world, i, driver.clock)
     if way <= MIN_ROOM_M:
         return np.inf
-    return approach_acceleration(parameters, i, way, driver.rate * now.pose[i, 3], wait)
+    speed = driver.rate * now.pose[i, 3]
+    bound = approach_acceleration(parameters, i, way, speed, wait)
+    if speed * wait < 2.0 * way:
+        return bound
+    return min(bound, stopping_acceleration(parameters, i, way, speed))
 
 
 @kernel(inline=True)

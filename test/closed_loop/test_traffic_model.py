@@ -15,6 +15,7 @@ from support.lengths import LONG
 from benchmarks._drive_others import braking_jerks
 from benchmarks._driving_worlds import Anything, as_scenario, draw_scenario, Witness
 from scenario_gen.closed_loop.config import ClosedLoopConfig
+from scenario_gen.closed_loop.driver import MODEL
 from scenario_gen.closed_loop.ego import Command, Pose
 from scenario_gen.closed_loop.simulation import ClosedLoop, reaction_time
 
@@ -287,3 +288,52 @@ def test_a_drive_can_be_branched_anywhere():
         last = drive[-1]
         for name in ("vehicles", "clock", "rate", "acceleration", "waited", "seen"):
             assert (getattr(state, name) == getattr(last, name)).all()
+
+
+@settings(max_examples=EXAMPLES)
+@given(st.integers(0, 10**9), st.sampled_from([None, -3.0, -1.0, 1.0, 2.5]))
+def test_nobody_brakes_harder_than_its_strongest_braking_unless_it_is_counted(seed, gain):
+    """The ego does anything, or speeds up or brakes for 3 s."""
+    scenario = draw_scenario(seed)
+    ego = seed % len(scenario.vehicles)
+    planner = Anything(seed) if gain is None else Braking(-gain)
+    loop = ClosedLoop(scenario, ego)
+    planner.reset(loop.task())
+    drive = [loop.start()]
+    while drive[-1].step < len(scenario.time) + 30:
+        drive.append(loop.step(drive[-1], planner.act(loop.observe(drive[-1]))))
+    gained = np.diff([state.vehicles[:, 3] for state in drive], axis=0) / 0.1
+    stays = np.array([state.present for state in drive])
+    hardest = -loop.parameters.strongest - MODEL.braking_tolerance_mps / 0.1 - 1e-9
+    hard = (gained < hardest) & stays[1:] & stays[:-1]
+    hard[:, ego] = False
+    counted = np.diff([state.forced for state in drive])
+    assert (hard.sum(axis=1) <= counted).all()
+
+
+class Braking:
+    """Brakes by so much [m/s²] for 3 s, then keeps its speed."""
+
+    def __init__(self, braking):
+        self.braking = braking
+
+    def reset(self, task):
+        """Begin."""
+
+    def act(self, seen):
+        return Command(-self.braking * (seen.time < 3.0), 0.0)
+
+
+@pytest.mark.parametrize("ahead", [0.5, 1.0, 1.5])
+@pytest.mark.parametrize("late", [0.0, 0.5, 1.0])
+def test_who_hurries_for_an_early_ego_brakes_for_the_place_where_it_stands(ahead, late):
+    """It crosses behind the ego after a stop; the ego is early by more and more, then late."""
+    time = np.arange(150) * 0.1
+    speed = np.interp(time, [0.0, 1.0, 4.0, 7.0, 10.0], [8.0, 8.0, 0.0, 0.0, 5.0])
+    way = np.concatenate([[0.0], np.cumsum(0.05 * (speed[1:] + speed[:-1]))])
+    other = np.stack([way - 26.0, 0.0 * way], -1), 0.0 * way, speed
+    ego = np.stack([0.0 * way, 6.0 * time - 35.0], -1), np.full(150, np.pi / 2), 6.0 + 0.0 * time
+    loop = ClosedLoop(as_scenario([ego, other], 150), 0)
+    made = states(loop, lambda k: Command(ahead if k < 25 else -late, 0.0), 140)
+    gained = np.diff([state.vehicles[1, 3] for state in made]) / 0.1
+    assert gained.min() >= -5.0 and made[-1].forced == 0
