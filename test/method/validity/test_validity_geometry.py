@@ -223,6 +223,40 @@ def test_a_standing_footprint_is_compared_with_the_cells_exactly(seed):
         assert area.covers(smaller)
 
 
+WALL = road_of(np.pad(np.ones((200, 200), dtype=bool), 10), 0.2, (-22.0, -22.0))  # at ±20 m
+
+
+def beside_the_wall(rng, over):
+    """A drive of one interval, with turns of up to 57°, that reaches `over` metres into a wall, by dense sampling."""
+    car = (Vehicle("a", *rng.uniform((0.5, 0.5), (18.0, 3.0))),)
+    yaw = rng.uniform(-np.pi, np.pi) + rng.uniform(-1.0, 1.0) * np.array([0.0, 1.0])
+    speed = rng.uniform(0.0, 8.0, 2) * rng.integers(0, 2)
+    time = np.array([0.0, rng.choice([0.1, 0.5])])
+    ahead = np.stack((np.cos(yaw), np.sin(yaw)), axis=-1) * speed[:, None]
+    position = np.stack((np.zeros(2), 0.5 * time[1] * ahead.sum(axis=0)))
+
+    def placed(shift):
+        return scenario_of([(position + shift, yaw, speed)], time, car)
+
+    low_x, low_y, high_x, high_y = shapely.bounds(
+        boxes_at(placed(np.zeros(2)), np.linspace(0.0, time[1], 2001))[0]
+    ).T
+    shifts = (
+        (20.0 - high_x.max() + over, 0.0),
+        (-20.0 - low_x.min() - over, 0.0),
+        (0.0, 20.0 - high_y.max() + over),
+        (0.0, -20.0 - low_y.min() - over),
+    )
+    return placed(np.array(shifts[rng.integers(4)]))
+
+
+def test_a_footprint_that_turns_beside_a_wall_is_proven_exactly():
+    rng = np.random.default_rng(0)
+    for over in 10.0 ** rng.uniform(-6.0, -2.0, 3000 if LONG else 400):
+        assert causes(beside_the_wall(rng, over), WALL) == [Cause.OFF_ROAD], over
+        assert causes(beside_the_wall(rng, -over - 5e-4), WALL) == [], over
+
+
 @settings(max_examples=100 if LONG else 10)
 @given(seed=st.integers(0, 2**32 - 1))
 def test_two_turning_cars_agree_with_the_oracle_near_contact(seed):
