@@ -167,6 +167,19 @@ def test_a_stretch_of_wrong_speeds_is_a_doubt_that_does_not_stop(tmp_path):
         assert abs(doubt.start - 5.0) < 0.6 and abs(doubt.end - 8.0) < 0.6
 
 
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+@pytest.mark.parametrize(
+    ("factor", "stops"), [(1.19, []), (1.21, [False]), (1.99, [False]), (2.01, [True])]
+)
+def test_speeds_contradict_positions_from_a_fifth_on(tmp_path, factor, stops, sign):
+    """From a factor of two on, they stop a log whose columns are named."""
+    rows = ROWS.assign(v=ROWS.v * factor**sign).drop(columns="h").rename(columns=NAMES)
+    rows.to_csv(tmp_path / "log.csv", index=False)
+    config = LogConfig(allow="doubt", columns="speed=speed:mps")
+    doubts = read_log(tmp_path / "log.csv", config).doubts
+    assert [doubt.stops for doubt in doubts if "times those" in doubt.cause] == stops
+
+
 @pytest.mark.parametrize("order", ["by time", "by vehicle", "column"])
 def test_every_restart_of_the_clock_is_a_scene(tmp_path, order):
     scenes = []

@@ -8,6 +8,7 @@ import json
 
 import numpy as np
 import pytest
+from scipy.spatial.distance import mahalanobis
 from support.reaction_scenes import answering, lane_encounter, wander
 from support.textbook_motions import labelled
 
@@ -87,6 +88,29 @@ def test_few_encounters_hardly_move_the_shipped_law_and_many_make_it_theirs():
     np.testing.assert_allclose(many.mean, centre, atol=0.1)
     distances = np.array([many.distance(row) for row in seen])
     assert abs(np.square(distances).mean() - 1.0) < 0.05
+
+
+def test_distances_are_those_of_the_pooled_law_with_smaller_correlations():
+    """Two prior encounters for the mean and ten for the covariance; correlations lose 30 %."""
+    shipped = json.loads(SHIPPED.read_text())["kinds"]["crossing"]
+    rng = np.random.default_rng(6)
+    seen = np.array(shipped["mean"]) + rng.normal(size=(7, len(NAMES))) @ rng.normal(
+        size=2 * (len(NAMES),)
+    )
+    mean = np.average([shipped["mean"], *seen], axis=0, weights=[2, *np.ones(7)])
+    pooled = np.average(
+        [shipped["covariance"], *([np.outer(one, one) for one in seen - mean])],
+        axis=0,
+        weights=[10, *np.ones(7)],
+    )
+    sigma = np.sqrt(np.diag(pooled))
+    correlation = 0.7 * pooled / np.outer(sigma, sigma)
+    np.fill_diagonal(correlation, 1.0)
+    inverse = np.linalg.inv(np.outer(sigma, sigma) * correlation)
+    law = Law.of("crossing", list(seen))
+    for row in seen:
+        expected = mahalanobis(row, mean, inverse) / np.sqrt(len(NAMES))
+        assert law.distance(row) == pytest.approx(expected)
 
 
 def test_the_joint_features_know_who_answers_the_other():
