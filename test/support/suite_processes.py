@@ -84,13 +84,13 @@ class Processes:
 class Client:
     """A node of the test's own that hears topics raw and calls services."""
 
-    def __init__(self, domain: int):
+    def __init__(self, domain: int, name: str = "test_client"):
         import rclpy
         from rclpy.executors import SingleThreadedExecutor
 
         self.context = rclpy.Context()
         rclpy.init(context=self.context, domain_id=domain)
-        self.node = rclpy.create_node("test_client", context=self.context)
+        self.node = rclpy.create_node(name, context=self.context)
         self.executor = SingleThreadedExecutor(context=self.context)
         self.executor.add_node(self.node)
         self.heard: dict[str, list[bytes]] = defaultdict(list)
