@@ -9,13 +9,16 @@ Inputs are `F1`, `I2`, …, which the kernel only reads; outputs are `OUT1`, `OU
 
 from collections.abc import Callable, Sequence
 from functools import update_wrapper
+from hashlib import sha256
 import importlib
 from pathlib import Path
 from threading import RLock
 from typing import Any, cast, TypeVar
 
+from filelock import FileLock
 import numpy as np
 
+from scenario_gen.base.folders.disk import sync
 from scenario_gen.numerics.arrays import sealed
 from scenario_gen.numerics.compiling import make_ready
 from scenario_gen.numerics.kernel_cache import folder, OPTIONS, PACKAGE, sources, used_by_numba
@@ -132,29 +135,52 @@ class Kernel:
 
     @property
     def mark(self) -> Path:
-        """The empty file that exists once the kernel is cached."""
-        return folder(Path(self.dispatcher.py_func.__code__.co_filename)) / f"{self.name}.ready"
+        """The file with the hash of the cached kernel, which exists once the kernel is cached."""
+        return folder(Path(self.dispatcher.py_func.__code__.co_filename)) / f"{self.name}.sha256"
 
     def compile(self) -> Any:
         """Compile or load it, once, and return numba's function."""
         with _one_at_a_time:
             if not self._is_ready:
-                self._compile_or_load()
+                if not self._load():
+                    self._replace()
                 self.dispatcher.disable_compile()
-                self.mark.touch()
                 self._is_ready = True
         return self.dispatcher
 
-    def _compile_or_load(self) -> None:
-        """Load the kernel, or compile it if the cache has none, or a damaged one."""
+    def _cached(self) -> list[Path]:
+        """Return its files in the cache."""
+        return sorted(self.mark.parent.glob(f"*.{self.dispatcher.py_func.__name__}-*"))
+
+    def _digest(self) -> str:
+        """Return the hash of its files in the cache."""
+        return sha256(b"".join(file.read_bytes() for file in self._cached())).hexdigest()
+
+    def _load(self) -> bool:
+        """Load the kernel from the cache; return whether that has a whole one.
+
+        A damaged one must not be loaded: LLVM ends the process.
+        """
         try:
+            if self.mark.read_text(encoding="utf-8") != self._digest():
+                return False
             self.dispatcher.compile(self.declared)
-        except Exception:
-            if not self.mark.exists():
-                raise
-            for file in self.mark.parent.iterdir():
-                file.unlink(missing_ok=True)
+        except Exception:  # it is gone, or refers to Python code that is gone
+            return False
+        return True
+
+    def _replace(self) -> None:
+        """Compile the kernel and put it into the cache, unless another process just did."""
+        with FileLock(self.mark.with_suffix(".lock")):
+            if self._load():
+                return
+            for file in self._cached():
+                file.unlink()
             self.dispatcher.compile(self.declared)
+            for file in self._cached():
+                sync(file)
+            self.mark.write_text(self._digest(), encoding="utf-8")
+            sync(self.mark)
 
     def __call__(self, *values: Any) -> Any:
         """Call the compiled function."""

@@ -23,6 +23,13 @@ function = kernel.compile()
 print(sum(function.stats.cache_hits.values()), words(0, 1, 0.0))
 """
 
+DAMAGES = (
+    lambda data: data[:20],
+    lambda data: b"",
+    lambda data: data[: len(data) // 2] + bytes(4096) + data[len(data) // 2 + 4096 :],
+    lambda data: data[:-1] + bytes([data[-1] ^ 1]),
+)
+
 
 def compiled(package, cache):
     """Return how often a new process finds the smallest kernel in the cache, and what it says."""
@@ -47,9 +54,10 @@ def test_a_copy_of_the_package_compiles_nothing_and_a_damaged_cache_is_repaired(
     for name in ("scenario_gen", "msg_conventions"):
         shutil.copytree(ROOT / name, copy / name, copy_function=shutil.copyfile)
     assert compiled(copy, cache)[0] == 1
-    for file in (*cache.rglob("*.nbi"), *cache.rglob("*.nbc")):
-        file.write_bytes(file.read_bytes()[:20])
-    assert [compiled(ROOT, cache)[0] for _ in range(2)] == [0, 1]
+    for damaged in DAMAGES:
+        for file in (*cache.rglob("*.nbi"), *cache.rglob("*.nbc")):
+            file.write_bytes(damaged(file.read_bytes()))
+        assert [compiled(ROOT, cache)[0] for _ in range(2)] == [0, 1]
     cache.chmod(0o777)
     hits, text = compiled(ROOT, cache)
     assert hits == 0
