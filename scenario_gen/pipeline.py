@@ -21,7 +21,7 @@ from scenario_gen.method.arguments import (
 )
 from scenario_gen.method.chain import generate_set
 from scenario_gen.method.config import PipelineConfig
-from scenario_gen.method.evaluation import coverage_of, evaluate, replay
+from scenario_gen.method.evaluation import coverage_of, evaluate, EvaluationConfig, replay
 from scenario_gen.method.outcome_sets import for_one_set, outcome_sets, swapped_order
 from scenario_gen.method.sampling import Callbacks, Progress
 from scenario_gen.method.shortening import fit_what_matters
@@ -29,6 +29,7 @@ from scenario_gen.method.suitable_roads import AUTO, on_first_suitable_road
 from scenario_gen.numerics.blas import one_blas_thread
 from scenario_gen.types import (
     Encounter,
+    Evaluation,
     GenerationResult,
     Request,
     Road,
@@ -113,15 +114,21 @@ def completed(
     config: PipelineConfig,
     request: Request,
 ) -> GenerationResult:
-    """Return a set of scenarios with its replay, evaluation, coverage, provenance."""
+    """Return a set of scenarios with its replay, coverage, provenance; evaluated when read."""
     encounter, (road, fit) = result.encounter, result.road_and_fit()
     result = replace(result, replay=replay(encounter, fit, road.frame_id))
     return replace(
         result,
-        evaluation=evaluate(result, config.evaluation),
+        figures=partial(_evaluated, config=config.evaluation),
         coverage=coverage_of(encounter, result.generated.scenarios),
         provenance=what_makes_it_again(config, request),
     )
+
+
+def _evaluated(result: GenerationResult, config: EvaluationConfig) -> Evaluation:
+    """Return the evaluation of a set."""
+    with one_blas_thread():
+        return evaluate(result, config)
 
 
 def generate_outcomes(

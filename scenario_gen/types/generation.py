@@ -3,8 +3,9 @@
 
 """What one generation came to."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from html import escape
 import math
 from pathlib import Path
@@ -44,7 +45,8 @@ class GenerationResult:
         routes: one for each vehicle, or none.
         generated: the valid scenarios, and the account of every candidate.
         seed: of the request.
-        evaluation: of `generated` and `replay`; without rows if they were not evaluated.
+        figures: the evaluation of `generated` and `replay`, or a function that computes it when
+            `evaluation` is first read; without rows if they are not evaluated.
         replay: the recording as fitted to the road, replayed.
         row_name: that of the evaluation's row of `generated`.
         provenance: what is needed to make it again: log hashes, versions, parameters.
@@ -60,12 +62,17 @@ class GenerationResult:
     routes: Sequence[Route]
     generated: ScenarioSet = ScenarioSet(0, (), 0)
     seed: int = 0
-    evaluation: Evaluation = Evaluation.empty()
+    figures: "Evaluation | Callable[[GenerationResult], Evaluation]" = Evaluation.empty()
     replay: Scenario | None = None
     row_name: str = WITH
     provenance: Mapping[str, str] = field(default_factory=dict)
     valid: int | None = None
     coverage: Coverage | None = None
+
+    @cached_property
+    def evaluation(self) -> Evaluation:
+        """How similar to the recording and how critical the scenarios are."""
+        return self.figures if isinstance(self.figures, Evaluation) else self.figures(self)
 
     def __repr__(self) -> str:
         road = self.road.name if self.road is not None else "no road"
@@ -129,7 +136,7 @@ class GenerationResult:
         return replace(
             self,
             generated=generated,
-            evaluation=Evaluation.empty(),
+            figures=Evaluation.empty(),
             coverage=None,
             valid=None,
         )

@@ -146,4 +146,4 @@ def ego_case(count=4):
         changepoints=len(case.segmentation.changepoints),
         config=EvaluationConfig(resamples=50),
     )
-    return replace(case, generated=made, evaluation=evaluation)
+    return replace(case, generated=made, figures=evaluation)

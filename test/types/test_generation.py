@@ -23,7 +23,7 @@ def evaluated(**figures):
         for name, (position, speed) in figures.items()
     ]
     evaluation = replace(Evaluation.empty(), rows=tuple(rows))
-    return GenerationResult(None, None, None, None, (), evaluation=evaluation)
+    return GenerationResult(None, None, None, None, (), figures=evaluation)
 
 
 def test_the_delivered_set_stands_before_the_replay():

@@ -136,7 +136,7 @@ def _result(
         fit=fit,
         routes=routes,
         generated=generated,
-        evaluation=_with_notes(evaluation, namespace, len(scenarios)),
+        figures=_with_notes(evaluation, namespace, len(scenarios)),
         row_name=SCENARIOS,
         valid=counts.candidates - sum(counts.refused.values()),
         coverage=coverage_of(encounter, scenarios),

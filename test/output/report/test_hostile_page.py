@@ -96,7 +96,7 @@ def hostile_case(names):
             notes=notes,
         ),
         generated=made(case.generated),
-        evaluation=replace(
+        figures=replace(
             case.evaluation,
             vehicles=ids,
             rows=tuple(replace(row, notes=(*row.notes, *notes)) for row in case.evaluation.rows),

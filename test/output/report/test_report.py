@@ -178,7 +178,7 @@ def test_the_verdict_says_how_critical_the_set_is_and_a_cap_is_no_measurement():
         replace(metric, cap=1000.0 if metric.id == "min_ttc" else None)
         for metric in case.evaluation.metrics
     )
-    uncapped = replace(case, evaluation=replace(case.evaluation, metrics=metrics))
+    uncapped = replace(case, figures=replace(case.evaluation, metrics=metrics))
     least = min(filter(math.isfinite, case.coverage.spreads["ttc"].values), default=math.inf)
     assert math.isfinite(least) and f"minimum time to collision {least:.1f} s" in render(
         ReportInput([uncapped])
@@ -187,7 +187,7 @@ def test_the_verdict_says_how_critical_the_set_is_and_a_cap_is_no_measurement():
         replace(metric, cap=least / 2 if metric.id == "min_ttc" else None)
         for metric in case.evaluation.metrics
     )
-    page = render(ReportInput([replace(case, evaluation=replace(case.evaluation, metrics=low))]))
+    page = render(ReportInput([replace(case, figures=replace(case.evaluation, metrics=low))]))
     assert f"time to collision: none below {least / 2:g} s" in page
     assert formatted(Interval(10.0, 10.0, 10.0), "s", cap=10.0) == "none below 10 s"
     assert formatted(Interval(9.9, 9.8, 10.0), "s", cap=10.0) == "9.9 [9.8, 10]"
