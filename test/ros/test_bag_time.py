@@ -43,6 +43,15 @@ def test_the_time_passes_at_its_rate_up_to_the_next_message(clock):
     assert waited.wait(10.0)
 
 
+def test_lateness_is_caught_up_with_at_any_rate(clock):
+    time = BagTime(lambda: 20.0)
+    time.begin(0.0)
+    time.pause(False)
+    clock.seconds += 0.6  # a slow machine
+    assert all(time.wait(due) for due in (0.0, 4.0, 11.5))
+    assert time.shown() == 11.5
+
+
 def test_the_end_wakes_the_waiting_thread(clock):
     time = BagTime(lambda: 1.0)
     time.begin(0.0)

@@ -4,6 +4,7 @@
 """The recorder and the player as processes: types of no concern to the suite, a kill, and bags of genuine rosbag2."""
 
 from collections import Counter
+import re
 import signal
 import subprocess
 import time
@@ -265,9 +266,11 @@ def test_the_player_ends_when_all_is_played_and_heard(start, client):
         m for m in read_messages(bag) if topic_entry(m.topic)[0] == "sensor_msgs/msg/NavSatFix"
     ]
     topics = sorted({f"/{m.topic.lstrip('/')}" for m in played})
-    process = start("player", bag=bag, paused=True, rate=1000.0, clock=True)
     client.hear("/clock", *topics)
-    client.wait("/clock", 2)  # while it is paused
+    began = time.monotonic()
+    process = start("player", bag=bag, paused=True, rate=1000.0, clock=True, clock_rate=10.0)
+    client.wait("/clock", 20)  # while it is paused
+    assert time.monotonic() - began > 1.8, "ten messages a second"
     for topic in topics:
         client.until(
             lambda name=topic: client.node.count_publishers(name) == 1, f"a publisher of {topic}"
@@ -282,6 +285,7 @@ def test_the_player_ends_when_all_is_played_and_heard(start, client):
         f"/{m.topic.lstrip('/')}" for m in played
     )
     assert "without any subscriber: " in output and "speed" in output
+    assert re.search(r"a subscriber of depth 10 could miss \d\d+ of them", output)
 
 
 def test_the_player_stays_if_it_is_told_to(start, client):

@@ -7,7 +7,7 @@ from collections.abc import Callable
 import threading
 from time import monotonic
 
-MAX_LAG_S = 1.0  # of the bag, by which messages may be late before the time waits for them
+MAX_LAG_S = 1.0  # real time by which messages may be late and are caught up with
 MAX_WAIT_S = 0.1  # between two looks at the rate
 
 
@@ -59,7 +59,7 @@ class BagTime:
             while not self.ended:
                 self._update()
                 if not self.paused and self._elapsed >= due:
-                    self._elapsed = min(self._elapsed, due + MAX_LAG_S)
+                    self._elapsed = min(self._elapsed, due + MAX_LAG_S * self._rate())
                     return True
                 remaining = (due - self._elapsed) / self._rate()
                 self._changed.wait(None if self.paused else min(remaining, MAX_WAIT_S))

@@ -11,8 +11,9 @@ Each topic has the quality of service of its recording, or the one that the para
 is longer. Playing begins once the topics have subscribers, or after seconds without. With an
 offset, the earlier messages of latched topics are published first. With `clock`, /clock has the
 bag's time for nodes with `use_sim_time`, also while the player is paused, in place of the bag's
-own /clock. The player ends when all is played and acknowledged, unless it is to `loop`, or to
-`stay` for late subscribers of latched topics.
+own /clock. Messages that are late, by up to a second, are caught up with. The player ends when
+all is played and acknowledged, unless it is to `loop`, or to `stay` for late subscribers of
+latched topics.
 """
 
 from collections import deque
@@ -53,9 +54,11 @@ from scenario_gen.types import Quality
 
 UNBOUNDED = BagConfig(most_bytes=2**62)  # messages are published and dropped: any size will do
 END_PATIENCE_S = 5.0  # for subscribers to receive the last messages
-TICK_S = 0.01  # between two clock messages
+POLL_S = 0.01  # between two looks at subscribers
 MATCH_S = 1.0  # for the topics to get subscribers once one of them has one
 FIRST_MATCH_S = 5.0  # for that first one
+USUAL_DEPTH_COUNT = 10  # messages that a subscription stores if its node does not say more
+BURST_S = 0.02  # in which a subscriber may not have taken any of them
 MIN_ROUND_S = 1.0  # time of the bag between two rounds, for bags with a single stamp
 # Fast DDS asks for acknowledgements every 3 s, or when a history is full: more than that.
 MIN_HISTORY_COUNT = 1000
@@ -83,6 +86,9 @@ class Config(Parameters):
         False, "wait for ~/resume_playing before the first message", fixed=True
     )
     clock: bool = parameter(False, "publish /clock", fixed=True)
+    clock_rate: float = parameter(
+        40.0, "messages on /clock in real time", unit="Hz", low=1.0, high=1000.0, fixed=True
+    )
     patience: float = parameter(
         60.0,
         "time without acknowledgement after which a subscriber is no longer waited for; 0: wait "
@@ -100,6 +106,7 @@ class Offered:
     topic: BagTopic
     publisher: Any
     pace: Pace
+    sent_at: deque[float]  # times of the last messages on the steady clock [s]
 
     @property
     def is_heard(self) -> bool:
@@ -122,12 +129,12 @@ class Player(Node):  # type: ignore[misc]
         self._thread: threading.Thread | None = None
         self._offered: dict[str, Offered] = {}
         self._count = 0  # messages that were played
+        self._burst_count = 0  # of those, ones that shallow subscriptions could miss
         self._unheard: set[str] = set()  # names in the bag of topics without a subscriber so far
         self._clock_publisher = None
-        self._clock_lock = threading.Lock()
         if self.parameters.config.clock:
             self._clock_publisher = self.create_publisher(Clock, "/clock", 10)
-            create_steady_timer(self, TICK_S, self._publish_clock)
+            create_steady_timer(self, 1.0 / self.parameters.config.clock_rate, self._publish_clock)
         offer_trigger(self, "~/pause_playing", partial(self._pause, paused=True))
         offer_trigger(self, "~/resume_playing", partial(self._pause, paused=False))
 
@@ -167,7 +174,9 @@ class Player(Node):  # type: ignore[misc]
             self.diagnostics.status(Level.ERROR, message, "topics", {"error": "InputError"})
             return
         pace = Pace(publisher, patience, partial(self._report_pace, name))
-        self._offered[topic.name] = Offered(topic, publisher, pace)
+        self._offered[topic.name] = Offered(
+            topic, publisher, pace, deque(maxlen=USUAL_DEPTH_COUNT)
+        )
 
     def _play(self, config: Config) -> None:
         if not config.paused:
@@ -198,7 +207,7 @@ class Player(Node):  # type: ignore[misc]
             patience = MATCH_S if any(heard) else FIRST_MATCH_S
             if all(heard) or monotonic() - started > patience:
                 return
-            sleep(TICK_S)
+            sleep(POLL_S)
 
     def _report_end(self, bag: str, seconds: float) -> None:
         """Report how much was played in real time, and which topics nobody subscribed to."""
@@ -206,13 +215,18 @@ class Player(Node):  # type: ignore[misc]
         message = f"{bag}: played, {self._count} messages in {seconds:.1f} s"
         if unheard:
             message += f"; without any subscriber: {', '.join(unheard)}"
+        if self._burst_count:
+            message += (
+                f"; a subscriber of depth {USUAL_DEPTH_COUNT} could miss {self._burst_count} of "
+                f"them, sent within {BURST_S} s of {USUAL_DEPTH_COUNT} others of their topic"
+            )
         level = Level.WARN if len(unheard) == len(self._offered) else Level.OK
         self.diagnostics.status(level, message, "playing", {})
 
     def _wait_for_acknowledgement(self, pace: Pace, deadline: float) -> None:
         """Wait until the subscribers have all messages, the deadline [s] or the node's end."""
         while not (pace.is_acknowledged() or self._time.ended or monotonic() >= deadline):
-            sleep(TICK_S)
+            sleep(POLL_S)
 
     def _end_when_acknowledged(self) -> None:
         """Let `run_nodes` end the node once the subscribers have all messages."""
@@ -233,7 +247,6 @@ class Player(Node):  # type: ignore[misc]
         for message, elapsed in self._from_offset(bag, start):
             if not self._time.wait(elapsed):
                 return
-            self._publish_clock()
             self._publish(message.topic, message.data)
         if self.parameters.config.loop:
             self._time.wait(start + MIN_ROUND_S)
@@ -246,6 +259,10 @@ class Player(Node):  # type: ignore[misc]
         offered.pace.wait(lambda: self._time.ended)
         publish(self, offered.publisher, data)
         self._count += 1
+        now = monotonic()
+        is_full = len(offered.sent_at) == USUAL_DEPTH_COUNT
+        self._burst_count += is_full and now - offered.sent_at[0] < BURST_S
+        offered.sent_at.append(now)
 
     def _report_pace(self, topic: str, count: int) -> None:
         self.diagnostics.status(
@@ -288,10 +305,8 @@ class Player(Node):  # type: ignore[misc]
         self.diagnostics.status(Level.OK, message, "playing", values, log=False)
 
     def _publish_clock(self) -> None:
-        """Publish the bag's time; the lock keeps it from running backwards."""
-        if self._clock_publisher is None or self._begin_ns is None:
-            return
-        with self._clock_lock:
+        """Publish the bag's time."""
+        if self._begin_ns is not None:
             stamp_ns = self._begin_ns + round(self._time.shown() * 1e9)
             publish(self, self._clock_publisher, encode_clock(stamp_ns))
 
