@@ -1,14 +1,17 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Scenarios as moving obstacles for nav2: the newest of `scenarios`, again and again, as the point cloud `obstacles`.
+"""Scenarios as moving obstacles for nav2: the newest of `scenarios`, again and again, as the occupancy grid `obstacles`.
 
-A costmap of nav2 reads it as a source of its obstacle layer, in the frame of the map:
+The grid has the cells of `map`. A costmap of nav2 reads it as a second static layer, after the one of the map:
 
-    obstacle_layer:
-      plugin: nav2_costmap_2d::ObstacleLayer
-      observation_sources: scenario
-      scenario: {topic: /obstacles, data_type: PointCloud2, marking: true, clearing: true, max_obstacle_height: 2.0}
+    plugins: [static_layer, scenario_layer, inflation_layer]
+    scenario_layer:
+      plugin: nav2_costmap_2d::StaticLayer
+      map_topic: /obstacles
+      use_maximum: true
+
+Each grid replaces the layer, so a vehicle that has moved leaves no trace. An obstacle layer would mark only what is near the robot.
 """
 
 from contextlib import suppress
@@ -19,32 +22,30 @@ import numpy as np
 import rclpy
 from rclpy.executors import ExternalShutdownException
 from rclpy.node import Node
-from sensor_msgs.msg import PointCloud2, PointField
 
+from msg_conventions.driving import encode_local_map
+from msg_conventions.roads import decode_map
 from scenario_gen.bags.recordings.scenario_decoder import ScenarioDecoder, TOPICS
-from scenario_gen.ros.common.topics import create_subscription
-from scenario_gen.types import Scenario
+from scenario_gen.ros.common.topics import create_subscription, message_class, qos
+from scenario_gen.types import Quality, Road, Scenario
 
-PERIOD_S, SPACING_M, HEIGHT_M = 0.1, 0.2, 0.5
+PERIOD_S = 0.1
 
 
-def footprint_points(scenario: Scenario, time: float) -> np.ndarray:
-    """Return the points (M, 3) [m] that cover the footprints of the vehicles that are present at a time [s]."""
+def occupied_cells(scenario: Scenario, time: float, road: Road) -> np.ndarray:
+    """Return which cells (H, W) of the map touch the footprint of a vehicle that is present at a time [s]."""
     states = scenario.at(time)
-    clouds = [np.zeros((0, 3))]
+    rows, columns = np.indices(road.drivable.shape) + 0.5
+    centres = road.origin + road.resolution * np.stack([columns, rows], axis=-1)
+    margin = road.resolution / np.sqrt(2.0)  # from a cell's centre to its corners
+    occupied = np.zeros(road.drivable.shape, dtype=bool)
     for n in np.flatnonzero(states.is_present):
         vehicle, (x, y, yaw) = scenario.vehicles[n], states.poses[n]
-        half = np.array([vehicle.length, vehicle.width]) / 2.0
-        axes = [np.linspace(-side, side, max(2, round(2.0 * side / SPACING_M))) for side in half]
-        ahead, left = (grid.ravel() for grid in np.meshgrid(*axes))
-        across = [
-            ahead * np.cos(yaw) - left * np.sin(yaw),
-            ahead * np.sin(yaw) + left * np.cos(yaw),
-        ]
-        clouds.append(
-            np.column_stack([x + across[0], y + across[1], np.full(ahead.shape, HEIGHT_M)])
-        )
-    return np.concatenate(clouds)
+        dx, dy = centres[..., 0] - x, centres[..., 1] - y
+        ahead, left = dx * np.cos(yaw) + dy * np.sin(yaw), dy * np.cos(yaw) - dx * np.sin(yaw)
+        is_in_length = np.abs(ahead) <= vehicle.length / 2.0 + margin
+        occupied |= is_in_length & (np.abs(left) <= vehicle.width / 2.0 + margin)
+    return occupied
 
 
 class Obstacles(Node):
@@ -53,32 +54,33 @@ class Obstacles(Node):
     def __init__(self) -> None:
         super().__init__("nav2_obstacles")
         self.decoder, self.scenario, self.start_ns = ScenarioDecoder(), None, 0
-        self.cloud = self.create_publisher(PointCloud2, "obstacles", 1)
-        for topic in TOPICS:
+        self.road = None
+        latched = qos(Quality())  # the static layer asks for it
+        grid = message_class("nav_msgs/msg/OccupancyGrid")
+        self.grid = self.create_publisher(grid, "obstacles", latched)
+        for topic in ("map", *TOPICS):
             create_subscription(self, topic, partial(self.receive, topic))
         self.create_timer(PERIOD_S, self.publish)
 
     def receive(self, topic: str, data: bytes) -> None:
-        """Keep the newest scenario; a new one begins at once."""
+        """Keep the newest map and the newest scenario; a new one begins at once."""
+        if topic == "map":
+            _, self.road = decode_map(data)
+            return
         for _, _, scenario in self.decoder.add(topic, data):
             self.scenario, self.start_ns = scenario, self.get_clock().now().nanoseconds
 
     def publish(self) -> None:
         """Publish where the vehicles are now."""
-        if self.scenario is None:
+        if self.scenario is None or self.road is None:
             return
-        now = self.get_clock().now()
-        elapsed = (now.nanoseconds - self.start_ns) * 1e-9
-        points = footprint_points(self.scenario, elapsed % self.scenario.time[-1])
-        message = PointCloud2(height=1, width=len(points), point_step=12, is_dense=True)
-        message.header.frame_id, message.header.stamp = self.scenario.frame_id, now.to_msg()
-        message.fields = [
-            PointField(name=name, offset=4 * k, datatype=PointField.FLOAT32, count=1)
-            for k, name in enumerate("xyz")
-        ]
-        message.row_step = 12 * len(points)
-        message.data = points.astype("<f4").tobytes()
-        self.cloud.publish(message)
+        now_ns = self.get_clock().now().nanoseconds
+        elapsed = (now_ns - self.start_ns) * 1e-9
+        occupied = occupied_cells(self.scenario, elapsed % self.scenario.time[-1], self.road)
+        road = self.road
+        self.grid.publish(
+            encode_local_map(occupied, road.resolution, road.origin, road.frame_id, now_ns)
+        )
 
 
 if __name__ == "__main__":

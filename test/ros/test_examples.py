@@ -14,6 +14,7 @@ from support.bag_examples import hand_made_run
 
 from msg_conventions.autoware import OBJECTS
 from msg_conventions.frames import decode_frames
+from msg_conventions.roads import decode_map
 from scenario_gen.bags.recordings.scenario_decoder import TOPICS
 from scenario_gen.bags.recordings.write import result_messages
 
@@ -45,19 +46,31 @@ def load(domain, monkeypatch):
     rclpy.try_shutdown()
 
 
-def test_nav2_sees_the_footprints_of_a_scenario(load):
+def test_nav2_marks_the_vehicles_wherever_they_are_and_clears_where_they_were(load):
+    """As its static layer does: each grid replaces the layer, and is as large as the map, or the costmap is resized."""
     module, node = load("nav2_obstacles", "Obstacles")
     sent = []
-    node.cloud = type("Publisher", (), {"publish": staticmethod(sent.append)})
+    node.grid = type("Publisher", (), {"publish": staticmethod(sent.append)})
     node.publish()
-    (message,) = sent
-    points = np.frombuffer(bytes(message.data), dtype="<f4").reshape(-1, 3)
-    assert message.header.frame_id == node.scenario.frame_id and len(points) == message.width > 100
-    states = node.scenario.at(2.0)
-    points = module.footprint_points(node.scenario, 2.0)[:, :2]
-    reach = [np.hypot(vehicle.length, vehicle.width) / 2 for vehicle in node.scenario.vehicles]
-    distance = np.linalg.norm(points[:, None] - states.position, axis=-1)
-    assert (distance <= np.array(reach) + 1e-6).any(axis=1).all()
+    assert not sent, "no map yet"
+    (grid,) = [data for topic, data, _ in result_messages(hand_made_run()) if topic == "map"]
+    node.receive("map", grid)
+    node.publish()
+    _, road = decode_map(grid)
+    _, shown = decode_map(sent[0])
+    assert shown.drivable.shape == road.drivable.shape and shown.frame_id == road.frame_id
+    assert (shown.resolution, *shown.origin) == (road.resolution, *road.origin)
+    scenario = node.scenario
+    last = scenario.time[-1]
+    lethal = [module.occupied_cells(scenario, time, road) for time in (0.0, last)]
+    for time, cells in zip((0.0, last), lethal, strict=True):
+        states = scenario.at(time)
+        rows, columns = ((states.position - road.origin) / road.resolution).astype(int).T[::-1]
+        assert cells[rows, columns].all()
+        area_m2 = cells.sum() * road.resolution**2
+        footprints_m2 = sum(vehicle.length * vehicle.width for vehicle in scenario.vehicles)
+        assert footprints_m2 < area_m2 < 2.0 * footprints_m2
+    assert not (lethal[0] & lethal[1]).any(), "cells are free again when a vehicle has left them"
 
 
 def test_autoware_gets_objects_frames_and_a_clock_that_goes_on(load):
