@@ -34,10 +34,13 @@ private:
       get_logger(), "%zu vehicles for %.1f s in %s", scenario.joint_names.size(), duration_s,
       scenario.header.frame_id.c_str());
     for (size_t n = 0; n < scenario.joint_names.size(); ++n) {  // <id>:<length>x<width>:<type>
-      const auto & position = last.transforms[n].translation;
+      const auto & position = last.transforms.at(n).translation;
       RCLCPP_INFO(
-        get_logger(), "  %s ends at (%.1f, %.1f) m with %.1f m/s", scenario.joint_names[n].c_str(),
-        position.x, position.y, last.velocities[n].linear.x);
+        get_logger(), "  %s ends at (%.1f, %.1f) m", scenario.joint_names[n].c_str(), position.x,
+        position.y);
+      if (n < last.velocities.size()) {  // they are optional
+        RCLCPP_INFO(get_logger(), "    with %.1f m/s", last.velocities[n].linear.x);
+      }
     }
   }
 

@@ -5,12 +5,14 @@
 
 import importlib.util
 from pathlib import Path
+import shutil
 import subprocess
 import sys
 
 import numpy as np
 import pytest
 from support.bag_examples import hand_made_run
+from support.skips import NO_COMPILER
 
 from msg_conventions.autoware import OBJECTS
 from msg_conventions.frames import decode_frames
@@ -20,6 +22,8 @@ from scenario_gen.bags.recordings.write import result_messages
 
 pytestmark = pytest.mark.dds
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
+STAND_INS = Path(__file__).resolve().parent / "stand_ins"
+HEADERS = Path(sys.prefix) / "include"
 
 
 @pytest.fixture
@@ -94,3 +98,18 @@ def test_without_the_messages_of_autoware_its_example_says_so():
     command = [sys.executable, EXAMPLES / "autoware_objects.py"]
     ran = subprocess.run(command, capture_output=True, text=True, check=False)
     assert ran.stderr.splitlines()[-1].startswith("skipped: message type autoware_perception_msgs")
+
+
+@pytest.mark.skipif(
+    not (shutil.which("g++") and (HEADERS / "trajectory_msgs").is_dir()), reason=NO_COMPILER
+)
+def test_the_example_in_cpp_reads_scenarios_with_and_without_velocities(tmp_path):
+    """Against the genuine headers of the messages; rclcpp, which is not among the wheels, has a stand-in."""
+    folders = [f"-I{folder}" for folder in (STAND_INS, *sorted(HEADERS.iterdir()))]
+    options = ["-std=c++17", "-Wall", "-Wextra", "-Werror", "-D_GLIBCXX_ASSERTIONS", *folders]
+    source = EXAMPLES / "cpp" / "scenario_listener.cpp"
+    subprocess.run(["g++", *options, source, "-o", tmp_path / "listener"], check=True)
+    ran = subprocess.run([tmp_path / "listener"], capture_output=True, text=True, check=True)
+    car = "  1:4.5x1.8:car ends at (0.0, 0.0) m"
+    told = ["1 vehicles for 3.0 s in map", car]
+    assert ran.stdout.splitlines() == [*told, *told, "    with 7.0 m/s"]

@@ -7,4 +7,5 @@ NO_LAUNCH = "launch and launch_testing, or this package as colcon builds it, are
 """`launch` is not among the Jazzy wheels."""
 NO_RECORDS = "recorded data not here"
 """The tests make data of their own; recorded ones are a second judge, where they are."""
-MAY_SKIP = (NO_LAUNCH, NO_RECORDS)
+NO_COMPILER = "no C++ compiler, or no headers of the messages beside Python's"
+MAY_SKIP = (NO_LAUNCH, NO_RECORDS, NO_COMPILER)
