@@ -24,6 +24,7 @@ PARTS = (
     "cpu",
     "fuzz",
     "long",
+    "mutations",
     "newest",
     "properties",
     "recorded",
