@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The nodes under storms: 10⁵ scenarios in a request, hostile messages on every input, 8 clients for 30 min, an end at load 16.
+"""The nodes under storms: 10⁵ scenarios in a request, hostile messages on every input, an end at load 16.
 
 Starts and ends are those of `python -m benchmarks start`; each storm is a module: `ros_many`, `ros_hostile`.
 """

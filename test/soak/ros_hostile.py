@@ -1,26 +1,23 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Hostile messages on every input of every node, then clients that call every service: all nodes live, stay small, and say why.
+"""Hostile messages on every input of every node: all nodes live, stay small, and say why.
 
 `SCENARIO_GEN_SOAK_MESSAGES` well-typed messages per input (10,000 unless given), one after the other: each that a decoder refuses
-must be named on /diagnostics by every node that hears it. `SCENARIO_GEN_SOAK_MINUTES` of eight clients (30). What was measured
-is kept in `state`.
+must be named on /diagnostics by every node that hears it. What was measured is kept in `state`.
 """
 
 from collections.abc import Callable, Iterator
 from contextlib import suppress
 from dataclasses import replace
-from functools import partial
 import json
 import os
 from pathlib import Path
 import random
-import threading
 import time
 from typing import Any
 
-from figures import Figure, kept
+from figures import Figure
 from rosbags.typesys import get_typestore, Stores
 from support.mutators import BYTES
 from support.suite_processes import Client, memory, Processes, RESOURCES
@@ -36,13 +33,9 @@ from scenario_gen.logs import read_log
 from scenario_gen.ros.common.stage_node import refuse_damaged
 
 MESSAGES = int(os.environ.get("SCENARIO_GEN_SOAK_MESSAGES", "10000"))
-MINUTES = float(os.environ.get("SCENARIO_GEN_SOAK_MINUTES", "30"))
 HEAD = 160  # bytes
-CLIENTS, WARM_UP, GROWTH = 8, 1 / 3, 0.05  # a share of the time; of the memory then
-GIBIBYTE, IDLE = (
-    1 << 20,
-    1.0,
-)  # kB; s in which a machine with nothing else to do names what it refuses
+GIBIBYTE = 1 << 20  # kB
+IDLE = 1.0  # s in which a machine with nothing else to do names what it refuses
 STORE = get_typestore(Stores.ROS2_JAZZY)
 NODES = {
     "road_server": ["-p", "road_name:=straight", "-p", "wait_for_tracks:=true"],
@@ -227,130 +220,6 @@ def _storms(state: Path) -> Iterator[Figure]:
     yield Figure("every node lives, in", "less than 1 GiB each, exit code 0", seen, is_small)
 
 
-def _calls(rng: random.Random, suite: Suite) -> list[tuple[Any, str, Callable[[], Any]]]:
-    """Services with requests to make, good and bad."""
-    from nav_msgs.srv import GetMap, GetPlan, LoadMap
-    from rcl_interfaces.srv import SetParametersAtomically
-    from rclpy.parameter import Parameter
-    from std_srvs.srv import Trigger
-
-    def generate() -> Any:
-        values = rng.choice(
-            (
-                {"count": 1},
-                {"count": 2, "seed": rng.randrange(99)},
-                {"count": -1},
-                {"ego": "1"},
-                {"no_such": 1},
-            )
-        )
-        parameters = [
-            Parameter(key, value=value).to_parameter_msg() for key, value in values.items()
-        ]
-        return SetParametersAtomically.Request(parameters=parameters)
-
-    def plan() -> Any:
-        request = GetPlan.Request(tolerance=rng.choice((0.0, -1.0, float("nan"))))
-        start, goal = suite.good.position[0, 0], suite.good.position[0, -1]
-        for stamped, point in ((request.start, start), (request.goal, goal)):
-            stamped.header.frame_id = rng.choice(("map", "map", "elsewhere"))
-            stamped.pose.position.x, stamped.pose.position.y = float(point[0]), float(point[1])
-        return request
-
-    return [
-        (SetParametersAtomically, "/gp_sampler/generate", generate),
-        (SetParametersAtomically, "/gp_sampler/generate", generate),
-        (Trigger, "/gp_sampler/cancel", Trigger.Request),
-        (GetPlan, "/planner/get_plan", plan),
-        (GetMap, "/road_server/get_map", GetMap.Request),
-        (
-            LoadMap,
-            "/road_server/load_map",
-            lambda: LoadMap.Request(map_url=rng.choice(("straight", "corridor", "nonsense"))),
-        ),
-        (Trigger, "/segmenter/segment", Trigger.Request),
-    ]
-
-
-def _clients(state: Path) -> Iterator[Figure]:
-    found = kept(state / f"clients_{MINUTES:g}.json", partial(_call_all, state))
-    seen = f"{found['answered']:,} answers, {found['unanswered']} without one"
-    yield Figure(
-        f"{CLIENTS} clients for {MINUTES:g} min",
-        "every call is answered",
-        seen,
-        found["unanswered"] == 0,
-    )
-    growth = {node: found["last"][node] / max(found["warm"][node], 1) - 1.0 for node in NODES}
-    seen = ", ".join(
-        f"{node} {found['warm'][node] / 1024:.0f} MiB {100 * share:+.1f} %"
-        for node, share in growth.items()
-    )
-    yield Figure(
-        "memory after the warm-up",
-        f"at most {100 * GROWTH:g} % more",
-        seen,
-        max(growth.values()) <= GROWTH,
-    )
-
-
-def _fill_history(suite: Suite) -> None:
-    """Have as many scenarios published as late joiners get: what the sampler keeps of them is no growth later."""
-    from rcl_interfaces.srv import SetParametersAtomically
-    from rclpy.parameter import Parameter
-
-    parameters = [Parameter("count", value=topic_entry("/scenarios")[1].depth).to_parameter_msg()]
-    request = SetParametersAtomically.Request(parameters=parameters)
-    assert suite.client.call(
-        SetParametersAtomically, "/gp_sampler/generate", request, 600.0
-    ).result.successful
-
-
-def _call_all(state: Path) -> dict[str, Any]:
-    with free_domain() as domain:
-        suite = Suite(state, domain)
-        found = _call_suite(suite, domain)
-        suite.end()
-    return found
-
-
-def _call_suite(suite: Suite, domain: int) -> dict[str, Any]:
-    _fill_history(suite)
-    began, seconds, count = time.monotonic(), MINUTES * 60.0, {"answered": 0, "unanswered": 0}
-
-    def work(seed: int) -> None:
-        rng, client = random.Random(seed), Client(domain)
-        calls = _calls(rng, suite)
-        while time.monotonic() - began < seconds:
-            kind, name, request = rng.choice(calls)
-            try:
-                client.call(kind, name, request(), 120.0)
-                count["answered"] += 1
-            except AssertionError:
-                count["unanswered"] += 1
-        client.close()
-
-    threads = [threading.Thread(target=partial(work, seed)) for seed in range(CLIENTS)]
-    for thread in threads:
-        thread.start()
-    warm: dict[str, int] = {}
-    while any(thread.is_alive() for thread in threads):
-        time.sleep(1.0)
-        for messages in list(suite.client.heard.values()):
-            messages.clear()
-        if (
-            time.monotonic() - began < WARM_UP * seconds
-        ):  # the most in the warm-up: a set in the making is no growth
-            for node, pid in suite.made.pids.items():
-                warm[node] = max(warm.get(node, 0), memory(pid, "VmRSS"))
-    return {
-        **count,
-        "warm": warm,
-        "last": {node: memory(pid, "VmRSS") for node, pid in suite.made.pids.items()},
-    }
-
-
 def run(state: Path) -> Iterator[Figure]:
     """Measure what has not been measured yet."""
     yield from _storms(state)
-    yield from _clients(state)

@@ -6,8 +6,6 @@
 from collections.abc import Callable, Sequence
 import contextlib
 import copy
-import dataclasses
-from dataclasses import is_dataclass
 import io
 import math
 import random
@@ -15,17 +13,10 @@ import re
 import sqlite3
 import struct
 import tempfile
-from typing import Any
 from xml.etree import ElementTree
 
-import numpy as np
 import pyarrow as pa
 from pyarrow import parquet as pq
-from rosbags.typesys import get_typestore, Stores
-
-from support.harness import Mutator
-
-STORE = get_typestore(Stores.ROS2_JAZZY)
 
 TEXTS = """nan NaN inf -inf 1e308 -1e308 1e-320 -0 0 1 -1 None null NA True false 9223372036854775807 9223372036854775808
     -9223372036854775809 18446744073709551616 1e400 0x10 1_000 1,5 12:30:05 2024-02-30 9999-12-31 0001-01-01T00:00:00Z
@@ -396,58 +387,3 @@ def tree(rng: random.Random, data: bytes, seeds: Sequence[bytes]) -> bytes:
                 for name in rng.sample(list(child.attrib), min(len(child.attrib), 1)):
                     child.attrib[rng.choice((name, "id", "ref", "x"))] = child.attrib.pop(name)
     return ElementTree.tostring(root)
-
-
-def fields(kind: str) -> Mutator:
-    """Return what changes values of a message's fields and keeps its form: numbers, texts, lengths of lists."""
-
-    def change(rng: random.Random, data: bytes, seeds: Sequence[bytes]) -> bytes:
-        try:
-            message = STORE.deserialize_cdr(data, kind)
-            for _ in range(rng.choice((1, 1, 2, 5))):
-                message = other_value(rng, message)
-            return bytes(STORE.serialize_cdr(message, kind))
-        except (
-            Exception
-        ):  # what was damaged before is no message; a value that its field cannot hold
-            return rng.choice(BYTES)(rng, data, seeds)
-
-    return change
-
-
-def other_value(rng: random.Random, value: Any) -> Any:
-    """Return a value of the same kind with one thing changed, at any depth."""
-    if is_dataclass(value):
-        name = rng.choice(
-            [field.name for field in dataclasses.fields(value) if not field.name.startswith("__")]
-        )
-        return dataclasses.replace(value, **{name: other_value(rng, getattr(value, name))})
-    if isinstance(value, np.ndarray):
-        if not len(value) or rng.random() < 0.3:
-            return (
-                np.resize(value, rng.choice((0, 1, len(value) + 1, 3 * len(value))))
-                if len(value)
-                else value
-            )
-        out = value.copy()
-        few = (
-            (math.nan, math.inf, -1e308, 1e-320, 0.0, -1.0)
-            if out.dtype.kind == "f"
-            else (0, 1, np.iinfo(out.dtype).max)
-        )
-        out[rng.randrange(len(out))] = rng.choice(few)
-        return out
-    if isinstance(value, list):
-        if not value or rng.random() < 0.3:
-            return value * rng.choice((0, 2, 5)) if rng.random() < 0.7 else value[:-1]
-        at = rng.randrange(len(value))
-        return [*value[:at], other_value(rng, value[at]), *value[at + 1 :]]
-    if isinstance(value, bool):
-        return not value
-    if isinstance(value, int):
-        return rng.choice((0, 1, 2, 127, 255, 2**31 - 1, -(2**31), 2**32 - 1, value + 1))
-    if isinstance(value, float):
-        return rng.choice(
-            (math.nan, math.inf, -math.inf, 0.0, -0.0, -1.0, 1e308, 5e-324, value * 1e9, -value)
-        )
-    return rng.choice((*NUMBERS, value + value, value[:-1]))
