@@ -33,6 +33,7 @@ STANDSTILL_MPS = 0.5
 SAME_DIRECTION_RATIO = 0.7  # least cosine of the angle between two headings of one direction
 CONTACT_MARGIN_M = 0.02  # the part of the ego within this of the other is the place of the contact
 PATH_MARGIN_M = 0.2  # an ego that is less far beside its reference path is on it
+MAX_DELAY_S = 0.5  # an ego that is later than its reference drive by more can lose its turn
 # Responsibility-sensitive safety (Shalev-Shwartz, Shammah & Shashua 2017), equation 2.
 # The vehicle behind does not accelerate during its response.
 RSS_RESPONSE_S = 1.0
@@ -53,7 +54,7 @@ class Reason(StrEnum):
     """The reason of a contact."""
 
     JUMP = "jump"  # the ego had been at a place that no vehicle can reach in a step
-    REVERSING = "reversing"  # the ego drove backwards
+    REVERSING = "reversing"  # the ego drove backwards, or had just done so
     OUT_OF_ORDER = "out_of_order"  # the ego entered when it was the other one's turn
     HEAD_ON = "head_on"  # the ego was off its reference path, against the other's direction
     OUT_OF_PATH = "out_of_path"  # the ego was off its reference path otherwise
@@ -179,21 +180,42 @@ class Contact:
         return self.cut_in is not None and self.cut_in.gap > 0.0
 
     @cached_property
+    def response(self) -> Ints:
+        """Instants (K,) before the contact from which on the other one could no longer stop."""
+        left = self.time - self.drive.motion.time
+        speed = self.drive.motion.speed[self.other]
+        return np.flatnonzero(
+            (left >= -1e-9) & (left <= RSS_RESPONSE_S + speed / REAR_BRAKING_MPS2)
+        )
+
+    @cached_property
+    def reference(self) -> Floats:
+        """Poses (P, 3) x, y [m], yaw [rad] of the ego's reference drive, and straight on."""
+        path = self.loop.world.motion[self.drive.ego, :, :3]
+        beyond = place(path[-1:], np.arange(0.0, PAST_GOAL_M, 1.0), 0.0)
+        straight = np.column_stack([beyond, np.full(len(beyond), path[-1, 2])])
+        return np.concatenate([path, straight])
+
+    def _nearest_reference(self, position: Floats) -> Floats:
+        """Return the poses (..., 3) of the reference drive nearest to positions (..., 2) [m]."""
+        offset = position[..., None, :] - self.reference[:, :2]
+        nearest: Floats = self.reference[np.hypot(offset[..., 0], offset[..., 1]).argmin(axis=-1)]
+        return nearest
+
+    @cached_property
     def off_path(self) -> bool:
         """Whether the touching part of the ego is mostly where its reference drive never is.
 
-        The ego is beside its path then by PATH_MARGIN_M at least. Without a conflict the reference
-        drive is never at the place of the contact.
+        The ego is beside its path then by PATH_MARGIN_M at least, or across it. Without a conflict
+        the reference drive is never at the place of the contact.
         """
         drive = self.drive
-        path = self.loop.world.motion[drive.ego, :, :3]
-        # The ego may pass its goal straight on.
-        beyond = place(path[-1:], np.arange(0.0, PAST_GOAL_M, 1.0), 0.0)
-        straight = np.column_stack([beyond, np.full(len(beyond), path[-1, 2])])
-        poses = np.concatenate([path, straight])
-        offset = poses[:, :2] - self.ego_state[:2]
-        nearest = int(np.hypot(*offset.T).argmin())
-        if abs(ahead_and_left(offset[nearest], poses[nearest, 2])[1]) < PATH_MARGIN_M:
+        poses = self.reference
+        x, y, yaw, _ = self.ego_state
+        nearest = self._nearest_reference(np.array([x, y]))
+        if math.cos(yaw - nearest[2]) < SAME_DIRECTION_RATIO:
+            return True
+        if abs(ahead_and_left(nearest[:2] - (x, y), nearest[2])[1]) < PATH_MARGIN_M:
             return False
         if self.conflict is None:
             return True
@@ -211,20 +233,35 @@ class Contact:
     def lost_turn(self) -> bool:
         """Whether the ego, which goes first by the certificate, has let the other one go first.
 
-        The other one entered the shared area before the ego, and at that time the ego could still
-        have stopped before the area.
+        The ego was late, and could still stop before the shared area when the other one could no
+        longer stop comfortably.
         """
         conflict, ego = self.conflict, self.drive.ego
         if conflict is None or conflict.first != ego or conflict.following:
             return False
-        instant = self._entry(conflict.second, conflict.entry_second)
-        ego_instant = self._entry(ego, conflict.entry_first)
-        if instant is None or (ego_instant is not None and ego_instant < instant):
+        comfortable = float(self.loop.traits.braking[conflict.second])
+        instant = self._commitment(conflict.second, conflict.entry_second, comfortable)
+        if instant is None:
             return False
-        clocks = np.array([self.drive.clock[ego, instant], conflict.entry_first])
-        station, area = self.loop.driven_distance(ego, clocks)
-        speed = float(self.drive.motion.speed[ego, instant])
-        return bool(station + speed * RSS_RESPONSE_S + braking_distance(speed) <= area)
+        ego_instant = self._commitment(ego, conflict.entry_first, REAR_BRAKING_MPS2)
+        if ego_instant is not None and ego_instant <= instant:
+            return False
+        time = self.loop.begin + self.drive.motion.time[instant]
+        return bool(self.drive.clock[ego, instant] < time - MAX_DELAY_S)
+
+    def _commitment(self, vehicle: int, clock: float, braking: float) -> int | None:
+        """Return the instant from which on a vehicle could not stop where its clock is `clock`.
+
+        It brakes by `braking` [m/s²]. None if it could stop until the contact.
+        """
+        drive, loop = self.drive, self.loop
+        rows = np.flatnonzero(drive.motion.time <= self.time + 1e-9)
+        area = loop.driven_distance(vehicle, np.array([clock]))
+        way = area - loop.driven_distance(vehicle, drive.clock[vehicle, rows])
+        speed = drive.motion.speed[vehicle, rows]
+        able = np.flatnonzero(way > speed**2 / (2.0 * braking))
+        instant = int(able[-1]) + 1 if len(able) else 0
+        return instant if instant < len(rows) else None
 
     def _entry(self, vehicle: int, clock: float) -> int | None:
         """Return the first instant before the contact at which a vehicle's clock is reached."""
@@ -263,11 +300,18 @@ class Contact:
         if self.same_direction and self.distance_ahead >= half_length:
             return False
         if conflict.first == self.drive.ego:
-            return self.lost_turn and not self.ego_stands()
+            return self.lost_turn and self._moved_into(conflict.entry_first)
         if conflict.following:  # a follower from the start on has no place to enter
             return bool(conflict.entry_second > self.loop.begin + self.loop.scenario.time[1])
         clock = np.interp(self.time, self.drive.motion.time, self.drive.clock[conflict.first])
         return bool(clock < conflict.exit_first)
+
+    def _moved_into(self, clock: float) -> bool:
+        """Whether the ego moves, or entered the area at a clock [s] and moved in the response."""
+        if not self.ego_stands():
+            return True
+        moved = (self.drive.motion.speed[self.drive.ego, self.response] >= STANDSTILL_MPS).any()
+        return bool(moved) and self._entry(self.drive.ego, clock) is not None
 
     def is_head_on(self) -> bool:
         """Whether the ego was off its path, against the other one's direction."""
@@ -294,6 +338,21 @@ class Contact:
     def ego_hit_rear(self) -> bool:
         """Whether the ego drove into a vehicle ahead that had not cut in on it."""
         return self.ego_closed_gap() and not self._other_cut_in()
+
+    def ego_had_reversed(self) -> bool:
+        """Whether the ego drove backwards when the other one could no longer stop."""
+        motion, ego = self.drive.motion, self.drive.ego
+        rows = self.response
+        heading = motion.heading[ego, rows]
+        step = np.diff(motion.position[ego], axis=0, prepend=motion.position[ego, :1])[rows]
+        along = step[:, 0] * np.cos(heading) + step[:, 1] * np.sin(heading)
+        return bool((along < -STANDSTILL_MPS * motion.dt).any())
+
+    def ego_had_turned(self) -> bool:
+        """Whether the ego was across its path when the other one could no longer stop."""
+        poses = self.drive.motion.poses[self.drive.ego, self.response]
+        turn = poses[:, 2] - self._nearest_reference(poses[:, :2])[:, 2]
+        return bool((np.cos(turn) < SAME_DIRECTION_RATIO).any())
 
     def _other_cut_in(self) -> bool:
         """Whether the other one cut in on the ego without a safe gap in the ego's turn."""
@@ -327,6 +386,8 @@ RULES: tuple[tuple[Reason, Callable[[Contact], bool]], ...] = (
     (Reason.OUT_OF_PATH, Contact.ego_left_path),
     (Reason.CUT_IN, Contact.ego_cut_in),
     (Reason.REAR_END, Contact.ego_hit_rear),
+    (Reason.REVERSING, Contact.ego_had_reversed),
+    (Reason.OUT_OF_PATH, Contact.ego_had_turned),
     (Reason.PRIORITY, Contact.ego_closed_gap),  # the other one had cut in
     (Reason.STANDING, Contact.ego_stands),
     (Reason.OTHER_RAN_INTO_EGO, Contact.other_hit_rear),

@@ -54,6 +54,15 @@ def turn(radius=8.0):
     )
 
 
+def right_turn(radius):
+    """Along +x, then right along -y; the turn begins at (0, 0), 100 m from the start."""
+    angle = np.linspace(0.0, np.pi / 2, 20)
+    arc = radius * np.column_stack([np.sin(angle), np.cos(angle) - 1.0])
+    west = np.column_stack([np.linspace(-100.0, -1.0, 100), np.zeros(100)])
+    south = np.column_stack([np.full(80, radius), -radius - np.linspace(1.0, 80.0, 80)])
+    return np.concatenate([west, arc, south])
+
+
 def up():
     return np.column_stack([np.zeros(301), np.arange(-150.0, 151.0)])
 
@@ -187,11 +196,30 @@ def brakes_for_nothing(rng):
 
 
 def has_priority_and_is_hit(rng):
-    fast, slow, when = rng.uniform(8.0, 12.0), rng.uniform(3.0, 5.0), rng.uniform(4.0, 6.0)
+    """The ego is late, but cannot stop any more when the other one still can."""
+    fast, slow, when = rng.uniform(7.0, 9.0), rng.uniform(2.2, 2.6), rng.uniform(5.0, 6.0)
     other = to_pass(lane(0.0), 150.0, when, fast)
-    witness, ego = both_to_pass(
-        up(), 150.0, (when - 2.4, when + rng.uniform(-0.8, 0.8) * 0.5 * LENGTH / slow), slow
-    )
+    witness, ego = both_to_pass(up(), 150.0, (when - 3.0, when - rng.uniform(1.1, 1.3)), slow)
+    return witness, other, ego
+
+
+def comes_late_in_its_turn(rng):
+    """The ego enters when the other one, which lets it go first in the certificate, cannot stop any more."""
+    fast, slow, when = rng.uniform(8.0, 12.0), rng.uniform(3.5, 5.0), rng.uniform(4.0, 6.0)
+    other = to_pass(lane(0.0), 150.0, when, fast)
+    late = rng.uniform(0.0, 0.8) * 0.5 * LENGTH / slow
+    witness, ego = both_to_pass(up(), 150.0, (when - 2.4, when + late), slow)
+    return witness, other, ego
+
+
+def hooks_a_cyclist(rng):
+    """The ego turns right, later than its witness, across one that goes straight on beside it."""
+    slow, cycling, when = rng.uniform(3.0, 5.0), rng.uniform(4.0, 6.0), rng.uniform(5.0, 7.0)
+    half_turn = np.arccos(1.0 - 2.6 / 6.0)  # at a radius of 6 m it is 2.6 m to the right then
+    other = to_pass(lane(-2.6), 150.0 + 6.0 * np.sin(half_turn), when, cycling)
+    path = right_turn(6.0)
+    times = (when - 2.4, when + rng.uniform(-0.2, 0.3))
+    witness, ego = both_to_pass(path, 100.0 + 6.0 * half_turn, times, slow)
     return witness, other, ego
 
 
@@ -240,6 +268,35 @@ def reverses(rng):
     )
 
 
+def backs_up_and_stands(rng):
+    """The ego drives back into the way of one that follows, and stands when it is hit."""
+    speed, gap = rng.uniform(4.0, 8.0), rng.uniform(6.0, 12.0)
+    other = drive_along(lane(0.0), speed, 50.0)
+    witness = drive_along(lane(0.0), speed + 1.0, 50.0 + LENGTH + gap)
+    position, yaw, _ = drive_along(lane(0.0), 0.0, 50.0 + LENGTH + gap)
+    back = np.minimum(3.0 * TIME, 0.3 * gap)
+    return witness, other, (position - np.column_stack([back, 0.0 * TIME]), yaw, 0.0 * TIME)
+
+
+def turns_round_and_stands(rng):
+    """The ego turns by 60 to 180 degrees in its own lane before a follower, and stands."""
+    speed, gap = rng.uniform(6.0, 10.0), rng.uniform(10.0, 14.0)
+    other = drive_along(lane(0.0), speed, 50.0)
+    witness = drive_along(lane(0.0), speed + 1.0, 50.0 + LENGTH + gap)
+    position, yaw, _ = drive_along(lane(0.0), 0.0, 50.0 + LENGTH + gap)
+    angle = rng.uniform(np.pi / 3, np.pi)
+    return witness, other, (position, yaw + np.minimum(TIME / 1.0, 1.0) * angle, 0.0 * TIME)
+
+
+def leaves_its_lane_and_stops(rng):
+    """The ego changes to the lane of a faster one far ahead of it and stops there."""
+    speed = rng.uniform(8.0, 12.0)
+    slow = np.maximum(6.0 - 2.0 * np.maximum(TIME - 3.0, 0.0), 0.0)
+    other = drive_along(lane(0.0), speed, 20.0)
+    ego = drive_along(over(3.5, 0.0, -35.0), slow, 100.0)
+    return drive_along(lane(3.5), 6.0, 100.0), other, ego
+
+
 SITUATIONS = {
     pulls_out_and_is_hit: {"out_of_order"},
     pulls_out_and_hits: {"out_of_order"},
@@ -256,6 +313,11 @@ SITUATIONS = {
     stops_in_the_oncoming_lane: {"head_on"},
     brakes_for_nothing: {"other_ran_into_ego", "standing"},
     has_priority_and_is_hit: {"priority"},
+    comes_late_in_its_turn: {"out_of_order"},
+    hooks_a_cyclist: {"out_of_order"},
+    backs_up_and_stands: {"reversing"},
+    turns_round_and_stands: {"out_of_path", "head_on"},
+    leaves_its_lane_and_stops: {"out_of_path", "cut_in"},
     teleports: {"jump"},
     reverses: {"reversing"},
 }
@@ -329,9 +391,9 @@ def test_a_cut_in_says_its_gap_beside_what_is_asked_for():
     assert float(safe_gap(14.0, 14.0)) == pytest.approx(14.0 + 196.0 / 12.0 - 196.0 / 18.0)
 
 
-def test_who_has_priority_is_at_fault_by_nuplan_alone():
-    shown = [judged(has_priority_and_is_hit, seed) for seed in range(12)]
-    assert not any(one.at_fault for one in shown)
-    assert any(
-        one.terms.no_at_fault_collision == 0.0 for one in shown
-    )  # its front touched the other
+def test_nuplans_rule_sees_no_turn():
+    """It blames who touches with its front, and acquits who is hit in its side out of turn."""
+    assert judged(comes_late_in_its_turn, 0).terms.no_at_fault_collision == 0.0
+    shown = [judged(pulls_out_and_is_hit, seed) for seed in range(12)]
+    assert all(one.at_fault for one in shown)
+    assert any(one.terms.no_at_fault_collision == 1.0 for one in shown)
