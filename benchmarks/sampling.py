@@ -1,13 +1,12 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Sampling: the Gaussian process against its peers, throughput, and acceptance, diversity and realism on recorded data."""
+"""Sampling: throughput, and acceptance, diversity and realism on recorded data."""
 
 from time import process_time
 
 import numpy as np
 
-from benchmarks import _sampling_peers
 from benchmarks._sampling_cases import (
     arrival_spread,
     cases,
@@ -39,7 +38,7 @@ DIVERGENCE_TARGETS_BIT = {"speed": 0.1, "acceleration": 0.2, "gap": 0.1}
 
 def run() -> list[Row]:
     """Measure."""
-    rows = [*_sampling_peers.rows(), *_throughput(), *_crossing()]
+    rows = [*_throughput(), *_crossing()]
     return [*rows, *_recorded(1.0), *_recorded(0.0)]
 
 

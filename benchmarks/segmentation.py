@@ -17,7 +17,7 @@ import numpy as np
 
 from benchmarks import _segmentation_peers as peers
 from benchmarks._sampling_cases import DATA
-from benchmarks._segmentation_data import driving, gaussian_hmm, Labelled, with_gaps, with_outliers
+from benchmarks._segmentation_data import driving, gaussian_hmm, with_gaps, with_outliers
 from benchmarks._segmentation_scores import changes, f1, hamming, smoother
 from benchmarks._size import sized
 from benchmarks.row import higher, lower, Row
@@ -36,8 +36,6 @@ SEEDS_OF_A = range(9101, sized(9141, quick=9102))
 ROBUST_SEEDS = range(9201, sized(9206, quick=9202))
 LABELLED_SEEDS = range(1, sized(11, quick=2))
 RECORDINGS = sized(None, quick=1)
-MAX_SWEEPS_COUNT, MAX_TIME_RATIO = sized((5000, 20.0), quick=(20, 1.0))
-"""The limits of jax-moseq's search for our F1."""
 MAX_LOST = {"A": (0.01, 0.03), "B": (0.01, 0.03), "C": (0.02, 0.05)}
 """By cell: how far Hamming distance and F1 may be from the smoother's."""
 DRIVING_CONFIG = SegmentationConfig(max_rate=10.0)
@@ -47,8 +45,7 @@ def run() -> list[Row]:
     """Return all rows."""
     _posterior(np.random.default_rng(0).normal(size=(50, 2)), 0)
     cells = [row for cell in MAX_LOST for row in _cell(cell)]
-    speed = [row for cell in ("A", "B", "D") for row in _against_moseq(cell)]
-    return [*cells, *_driving(), *speed, *_robust(), *_labelled()]
+    return [*cells, *_driving(), *_robust(), *_labelled()]
 
 
 def _posterior(x: Floats, seed: int, **options: Any) -> Posterior:
@@ -127,44 +124,6 @@ def _driving() -> list[Row]:
     targets = {"D": 0.9, "D, 1 % outliers": 0.9, "D, 5 % lost": 0.92}
     rows = [_f1_row(name, scores[name], target) for name, target in targets.items()]
     return [*rows, _row("D: CPU", seconds, "s", None)]
-
-
-def _against_moseq(cell: str) -> list[Row]:
-    """Return jax-moseq's CPU time over ours: for the same sweeps, and until its F1 reaches ours.
-
-    Both run on the series of the first seed; jax-moseq's compilation does not count. A ratio whose
-    search ends at its limit is a lower bound.
-    """
-    seed = SEEDS[0]
-    sequence: Labelled = driving(seed) if cell == "D" else gaussian_hmm(cell, seed)
-    started = time.process_time()
-    if sequence.encounter is None:
-        posterior = _posterior(sequence.x, seed)
-        ours = time.process_time() - started
-    else:
-        segment(sequence.encounter, DRIVING_CONFIG, seed)
-        ours = time.process_time() - started
-        posterior = peers.posterior_of(sequence.encounter, DRIVING_CONFIG, seed)[1]
-    our_f1 = f1(sequence.changepoints, posterior.changepoints, 5)
-
-    def score(labels: Ints) -> float:
-        return f1(sequence.changepoints, changes(labels), 5)
-
-    def reached(labels: Ints) -> bool:
-        return score(labels) >= our_f1
-
-    limit = MAX_TIME_RATIO * ours
-    same = peers.jax_moseq(sequence.x, peers.sweeps_run(posterior))
-    until = peers.jax_moseq(sequence.x, MAX_SWEEPS_COUNT, done=reached, most=limit)
-    if same is None or until is None:
-        return []
-    scores = f"F1 {score(same.labels):.3f}, ours {our_f1:.3f}"
-    end = f"{'reached' if reached(until.labels) else 'not reached'} after {until.sweeps} sweeps"
-    name = f"{cell}: CPU of jax-moseq over ours"
-    return [
-        higher(f"{name}, same sweeps", same.seconds / ours, "×", None, scores),
-        higher(f"{name}, to our F1", until.seconds / ours, "×", None, end),
-    ]
 
 
 def _robust() -> list[Row]:
