@@ -172,10 +172,10 @@ def _merge_to_count(name: str, arms: list[ArmDirection], tracks: tuple[Track, ..
         ]
         angle, j, k = min(pairs)
         if angle > _MERGED_ARMS_RAD:
-            vehicles = ", ".join(tracks[arm.ends[0].vehicle].vehicle.id for arm in arms)
+            ids = dict.fromkeys(tracks[arm.ends[0].vehicle].vehicle.id for arm in arms)
             raise RefusedError(
                 f"road {name} has {ARM_COUNT[name]} arms, but the recorded vehicles use "
-                f"{len(arms)} (for example vehicles {vehicles}); choose another road"
+                f"{len(arms)} (for example vehicles {', '.join(ids)}); choose another road"
             )
         arms[k].ends += arms[j].ends
         arms[k].yaw = _mean_yaw(arms[k].ends)

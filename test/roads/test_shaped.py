@@ -88,7 +88,7 @@ def test_who_crosses_needs_four_arms_and_a_road_of_three_is_refused():
     assert len(road.lanes.arms) == 4 and fit.losses == ()
     with pytest.raises(
         RefusedError,
-        match="t_intersection has 3 arms, but the recorded vehicles use 4",
+        match=r"t_intersection has 3 arms, but the recorded vehicles use 4 \(for example vehicles 0, 1\)",
     ):
         build_road("t_intersection", encounter)
 

@@ -160,8 +160,9 @@ def test_ctrl_c_ends_everything_cleanly_and_the_bag_is_whole(suite):
     assert codes == dict.fromkeys(CHAIN, 0)
     for node in CHAIN:
         assert "Traceback" not in suite.log(node), suite.log(node)
-        if node != "recorder":
-            assert "effective parameters" in suite.log(node)
+        assert suite.log(node).count("parameters: ") == 1
+    assert "[gp_sampler]: parameters: count=4, seed=7\n" in suite.log("gp_sampler")
+    assert "[planner]: parameters: all have their defaults\n" in suite.log("planner")
     recorded = {message.topic for message in read_messages(suite.folder / "bag")}
     assert {
         "/map",

@@ -8,7 +8,7 @@ and `param load` reads the 1e-06 that `param dump` wrote as a text. So values ar
 declared type.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import Field
 import json
@@ -99,7 +99,7 @@ class ConfigParameters:
     """Keeps a configuration and the ROS parameters of a node equal."""
 
     def __init__(self, node: Node, config: Any) -> None:
-        """Declare every parameter of `config`, apply overrides, and log the values in effect.
+        """Declare every parameter of `config`, apply overrides, and log them.
 
         Raises:
             InputError: an override has the wrong type or is out of range.
@@ -131,10 +131,11 @@ class ConfigParameters:
         node.add_on_set_parameters_callback(self._check)
         node.add_post_set_parameters_callback(self._apply)
         # ROS ignores a parameter file for another node silently; the log shows it.
-        values = ", ".join(
-            f"{name}={value!r}" for name, (_, value) in flatten(self.config).items()
-        )
-        node.get_logger().info(f"effective parameters: {values}")
+        values = {name: value for name, (_, value) in flatten(self.config).items()}
+        node.get_logger().debug(f"all parameters: {_listed(values)}")
+        defaults = flatten(config)
+        given = {name: value for name, value in values.items() if value != defaults[name][1]}
+        node.get_logger().info(f"parameters: {_listed(given) or 'all have their defaults'}")
 
     def _prepare(self, parameters: list[Parameter]) -> list[Parameter]:
         """Convert values to the declared types, and drop read-only parameters that do not change.
@@ -198,6 +199,10 @@ def help_of(name: str, nodes: Sequence[Any]) -> str:
                 f"  {parameter} := {written}{_unit(entry)}\n      {meta['meaning']}{choices}"
             )
     return "\n".join(lines)
+
+
+def _listed(values: Mapping[str, Any]) -> str:
+    return ", ".join(f"{name}={value!r}" for name, value in values.items())
 
 
 def _unit(entry: "Field[Any]") -> str:

@@ -109,12 +109,13 @@ class Recorder(Node):  # type: ignore[misc]
         self._losses = MessageLoss(self.count_publishers)
         self._warned: dict[str, TopicLoss] = {}
         self.diagnostics = NodeDiagnostics(self, self._report_counts)
-        self._report(Level.OK, "nothing is being recorded")
 
     def autostart(self) -> None:
         """Begin the bag named by the parameter."""
         if self.parameters.config.bag:
             self._start(Path(self.parameters.config.bag))
+        else:
+            self._report(Level.OK, "nothing is being recorded; ~/start begins a bag")
 
     def _start(self, folder: Path) -> None:
         config = self.parameters.config
