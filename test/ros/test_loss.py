@@ -8,6 +8,7 @@ from pathlib import Path
 import signal
 import subprocess
 import sys
+import time
 
 import numpy as np
 import pytest
@@ -91,8 +92,9 @@ def test_a_hanging_subscriber_is_waited_for_no_longer_than_patience(domain, clie
     from msg_conventions.cdr import encode
     from scenario_gen.ros.common.topics import Pace
 
-    publisher, told = client.node.create_publisher(String, "/hang", 5), []
-    pace = Pace(publisher, 1.5, told.append)
+    depth = 5
+    publisher, told = client.node.create_publisher(String, "/hang", depth), []
+    pace = Pace(publisher, 120.0, told.append)
     hanging = subprocess.Popen(
         [sys.executable, "-c", HANGING], env=os.environ | {"ROS_DOMAIN_ID": str(domain)}
     )
@@ -105,13 +107,19 @@ def test_a_hanging_subscriber_is_waited_for_no_longer_than_patience(domain, clie
             pace.wait(lambda: False)
             publisher.publish(encode({"data": "string"}, data="x"))
 
-        for _ in range(20):  # it answers at once, not at the next heartbeat of DDS
-            publish()
+        seconds = []
+        for _ in range(6):
+            begun = time.monotonic()
+            for _ in range(depth):
+                publish()
+            seconds.append(time.monotonic() - begun)
         assert told == []
+        assert min(seconds[1:]) < 1.5, "it answers at once, not at the next heartbeat of DDS"
         client.until(
             lambda: publisher.wait_for_all_acked(Duration()), "what it acknowledges while it runs"
         )
         hanging.send_signal(signal.SIGSTOP)
+        pace = Pace(publisher, 0.5, told.append)
         for _ in range(20):  # seconds before DDS gives it up by itself
             publish()
         assert told == [0]
