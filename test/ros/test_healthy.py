@@ -3,14 +3,15 @@
 
 """A healthy suite with traffic, as the launch files start them, warns of nothing: neither on the terminal nor on /diagnostics."""
 
-import time
+from collections import Counter
+from itertools import chain
 
 import pytest
 from support.launching import launched, words
 from support.node_server import start_nodes
 from support.suite_processes import RESOURCES
 
-from msg_conventions.diagnostics import Level
+from msg_conventions.diagnostics import decode_diagnostics, Level
 from msg_conventions.topics import publishers_of
 from scenario_gen.ros.node_names import SUITE
 
@@ -34,10 +35,20 @@ def test_a_healthy_suite_is_quiet(domain, client, tmp_path):
     }
     try:
         client.wait("/report")
-        time.sleep(10.0)
+        begun = len(client.heard["/diagnostics"])
+
+        def all_have_reported() -> bool:
+            """Several times since then: they look for other publishers each second."""
+            reporting = (
+                {status.node.removeprefix("/") for status in decode_diagnostics(data)[1]}
+                for data in client.heard["/diagnostics"][begun:]
+            )
+            nodes = Counter(chain.from_iterable(reporting))
+            return all(nodes[node] >= 4 for node in (*SUITE, "traffic"))
+
+        client.until(all_have_reported, "the statuses of all nodes")
         statuses = client.statuses()
-        reporting = {status.node.removeprefix("/") for status in statuses}
-        assert reporting == {*SUITE, "traffic"}
+        assert {status.node.removeprefix("/") for status in statuses} == {*SUITE, "traffic"}
         findings = {str(status) for status in statuses if status.level is not Level.OK}
         lines = [
             line

@@ -3,11 +3,14 @@
 
 """Two nodes that publish the same topics in one namespace: each of them says so, and names the other."""
 
+from types import SimpleNamespace
+
 import pytest
 from support.bag_examples import hand_made_run
 
 from msg_conventions.diagnostics import Level
 from scenario_gen.bags.recordings.write import result_messages
+from scenario_gen.ros.common.topics import conflicting_publishers
 
 pytestmark = pytest.mark.dds
 
@@ -71,3 +74,18 @@ def test_the_recorder_blames_two_publishers_and_not_the_disk(start, client, tmp_
 
     client.until(blamed, "the recorder to blame the publishers")
     assert "disk" not in blamed()[-1]
+
+
+def test_a_publisher_whose_node_is_not_known_yet_is_no_twin():
+    """Discovery has its name a moment later."""
+    names = ["me", "two", "_NODE_NAME_UNKNOWN_"]
+    infos = [SimpleNamespace(node_namespace="/", node_name=name) for name in names]
+    node = SimpleNamespace(
+        publishers=[SimpleNamespace(topic_name="/map")],
+        get_name=lambda: "me",
+        get_fully_qualified_name=lambda: "/me",
+        get_publishers_info_by_topic=lambda _: infos,
+    )
+    assert conflicting_publishers(node) == {"/map": ["/two"]}
+    del infos[1]
+    assert conflicting_publishers(node) == {}

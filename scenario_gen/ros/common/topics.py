@@ -36,6 +36,7 @@ OVERRIDABLE = (
     QoSPolicyKind.DURABILITY,
 )
 FIXED_QUALITY = ("/diagnostics", "/tf")  # as other packages expect them
+UNKNOWN_NODE = "_NODE_NAME_UNKNOWN_"  # of rmw
 POLL_S = 0.002  # between two checks for acknowledgements
 
 
@@ -317,18 +318,27 @@ class Pace:
         return True
 
 
+def publishing_nodes(node: Node, topic: str) -> list[str]:
+    """Return the full names of the nodes that publish a topic, one for each publisher.
+
+    A new publisher is discovered before the name of its node, and left out until then.
+    """
+    return sorted(
+        f"{info.node_namespace.rstrip('/')}/{info.node_name}"
+        for info in node.get_publishers_info_by_topic(topic)
+        if info.node_name != UNKNOWN_NODE
+    )
+
+
 def other_publishers(node: Node, topic: str) -> list[str]:
     """Return the full names of other nodes that publish a topic.
 
     They include another node with the same name.
     """
-    names = [
-        f"{info.node_namespace.rstrip('/')}/{info.node_name}"
-        for info in node.get_publishers_info_by_topic(topic)
-    ]
+    names = publishing_nodes(node, topic)
     with suppress(ValueError):
         names.remove(node.get_fully_qualified_name())
-    return sorted(names)
+    return names
 
 
 def conflicting_publishers(node: Node) -> dict[str, list[str]]:

@@ -35,7 +35,7 @@ from scenario_gen.ros.common.node_parameters import check_topics
 from scenario_gen.ros.common.ros_parameters import ConfigParameters
 from scenario_gen.ros.common.services import offer_trigger
 from scenario_gen.ros.common.timers import create_steady_timer
-from scenario_gen.ros.common.topics import adapted_quality, message_class, qos
+from scenario_gen.ros.common.topics import adapted_quality, message_class, publishing_nodes, qos
 from scenario_gen.ros.node_names import RECORDER_END_S
 
 DRAIN_S = RECORDER_END_S - 5.0  # at most, at the end, for messages that have arrived
@@ -224,8 +224,7 @@ class Recorder(Node):  # type: ignore[misc]
 
         Two publishers of one topic cause losses.
         """
-        infos = self.get_publishers_info_by_topic(topic)
-        nodes = sorted(f"{info.node_namespace.rstrip('/')}/{info.node_name}" for info in infos)
+        nodes = publishing_nodes(self, topic)
         if len(nodes) > 1:
             publishers = " and ".join(nodes)
             remedy_text = "end one of them, or give it another namespace"

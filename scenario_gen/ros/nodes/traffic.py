@@ -62,6 +62,7 @@ from scenario_gen.ros.common.topics import (
     create_publisher,
     create_subscription,
     publish,
+    publishing_nodes,
 )
 from scenario_gen.types import tokens
 
@@ -262,11 +263,7 @@ class Traffic(Node):  # type: ignore[misc]
 
     def commanding_nodes(self) -> list[str]:
         """Return the nodes that publish commands."""
-        nodes = set()
-        for topic in INPUTS:
-            for info in self.get_publishers_info_by_topic(topic):
-                nodes.add(f"{info.node_namespace.rstrip('/')}/{info.node_name}")
-        return sorted(nodes)
+        return sorted({name for topic in INPUTS for name in publishing_nodes(self, topic)})
 
     # --- steps ---------------------------------------------------------------------------------
 
