@@ -54,9 +54,9 @@ def run_demo(
     config = PipelineConfig()
     jobs = [((bundled(case),), (road,)) for case, road in ROADS.items()]
     record = recorder(config, count, seed, status) if ros else None
-    return generate_folder(
-        out, FolderRequest(jobs, config, count, seed, TITLE), record=record, progress=progress
-    )
+    # A node knows one encounter.
+    requested = FolderRequest(jobs, config, count, seed, TITLE, together=False)
+    return generate_folder(out, requested, record=record, progress=progress)
 
 
 def recorder(

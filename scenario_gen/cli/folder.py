@@ -53,6 +53,7 @@ class FolderRequest:
         also_read: further inputs, which the folder must not contain: maps, a parameter file.
         for_testing: whether to search for scenarios in which the ego has to react.
         budget: computing time [s] of that search, per encounter and road.
+        together: whether the recordings show together how encounters differ.
     """
 
     jobs: Sequence[tuple[Sequence[Path], Sequence[str]]]
@@ -65,6 +66,7 @@ class FolderRequest:
     also_read: Sequence[Path] = ()
     for_testing: bool = False
     budget: float = 60.0
+    together: bool = True
 
     @property
     def logs(self) -> list[Path]:
@@ -251,7 +253,11 @@ def generate_all(
     Returns:
         The cases, and a sentence on each encounter and road that was refused or incomplete.
     """
-    recorded = [encounter for encounter, _ in pairs if isinstance(encounter.source, Recorded)]
+    recorded = [
+        encounter
+        for encounter, _ in pairs
+        if requested.together and isinstance(encounter.source, Recorded)
+    ]
     cases: list[GenerationResult] = []
     refusals: list[str] = []
     for encounter, road in pairs:
