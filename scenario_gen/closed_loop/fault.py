@@ -180,13 +180,16 @@ class Contact:
         return self.cut_in is not None and self.cut_in.gap > 0.0
 
     @cached_property
+    def before(self) -> Bools:
+        """Which instants (T,) of the drive are not after the contact."""
+        return np.asarray(self.drive.motion.time <= self.time + 1e-9)
+
+    @cached_property
     def response(self) -> Ints:
         """Instants (K,) before the contact from which on the other one could no longer stop."""
         left = self.time - self.drive.motion.time
-        speed = self.drive.motion.speed[self.other]
-        return np.flatnonzero(
-            (left >= -1e-9) & (left <= RSS_RESPONSE_S + speed / REAR_BRAKING_MPS2)
-        )
+        stopping = RSS_RESPONSE_S + self.drive.motion.speed[self.other] / REAR_BRAKING_MPS2
+        return np.flatnonzero(self.before & (left <= stopping))
 
     @cached_property
     def reference(self) -> Floats:
@@ -196,11 +199,15 @@ class Contact:
         straight = np.column_stack([beyond, np.full(len(beyond), path[-1, 2])])
         return np.concatenate([path, straight])
 
-    def _nearest_reference(self, position: Floats) -> Floats:
-        """Return the poses (..., 3) of the reference drive nearest to positions (..., 2) [m]."""
-        offset = position[..., None, :] - self.reference[:, :2]
-        nearest: Floats = self.reference[np.hypot(offset[..., 0], offset[..., 1]).argmin(axis=-1)]
-        return nearest
+    def _nearest_reference(self, poses: Floats) -> tuple[Floats, Bools]:
+        """Return the poses (K, 3) of the reference drive nearest to poses (K, 3).
+
+        Returns:
+            They, and which poses (K,) are across the reference drive.
+        """
+        offset = poses[:, None, :2] - self.reference[:, :2]
+        nearest = self.reference[np.hypot(offset[..., 0], offset[..., 1]).argmin(axis=1)]
+        return nearest, np.cos(poses[:, 2] - nearest[:, 2]) < SAME_DIRECTION_RATIO
 
     @cached_property
     def off_path(self) -> bool:
@@ -211,11 +218,11 @@ class Contact:
         """
         drive = self.drive
         poses = self.reference
-        x, y, yaw, _ = self.ego_state
-        nearest = self._nearest_reference(np.array([x, y]))
-        if math.cos(yaw - nearest[2]) < SAME_DIRECTION_RATIO:
+        pose = np.array(self.ego_state[:3])
+        (nearest,), is_across = self._nearest_reference(pose[None])
+        if is_across:
             return True
-        if abs(ahead_and_left(nearest[:2] - (x, y), nearest[2])[1]) < PATH_MARGIN_M:
+        if abs(ahead_and_left(nearest[:2] - pose[:2], nearest[2])[1]) < PATH_MARGIN_M:
             return False
         if self.conflict is None:
             return True
@@ -255,18 +262,17 @@ class Contact:
         It brakes by `braking` [m/s²]. None if it could stop until the contact.
         """
         drive, loop = self.drive, self.loop
-        rows = np.flatnonzero(drive.motion.time <= self.time + 1e-9)
+        rows = np.flatnonzero(self.before)
         area = loop.driven_distance(vehicle, np.array([clock]))
         way = area - loop.driven_distance(vehicle, drive.clock[vehicle, rows])
         speed = drive.motion.speed[vehicle, rows]
-        able = np.flatnonzero(way > speed**2 / (2.0 * braking))
+        able = np.flatnonzero(way > braking_distance(speed, braking))
         instant = int(able[-1]) + 1 if len(able) else 0
         return instant if instant < len(rows) else None
 
     def _entry(self, vehicle: int, clock: float) -> int | None:
         """Return the first instant before the contact at which a vehicle's clock is reached."""
-        before = self.drive.motion.time <= self.time + 1e-9
-        entered = np.flatnonzero(before & (self.drive.clock[vehicle] >= clock))
+        entered = np.flatnonzero(self.before & (self.drive.clock[vehicle] >= clock))
         return int(entered[0]) if len(entered) else None
 
     @property
@@ -281,8 +287,7 @@ class Contact:
 
     def follows_jump(self) -> bool:
         """Whether the ego had jumped before."""
-        times = self.drive.motion.time[list(self.drive.jumps)]
-        return bool((times <= self.time + 1e-9).any())
+        return bool(self.before[list(self.drive.jumps)].any())
 
     def ego_reverses(self) -> bool:
         """Whether the ego drove backwards."""
@@ -342,17 +347,14 @@ class Contact:
     def ego_had_reversed(self) -> bool:
         """Whether the ego drove backwards when the other one could no longer stop."""
         motion, ego = self.drive.motion, self.drive.ego
-        rows = self.response
-        heading = motion.heading[ego, rows]
-        step = np.diff(motion.position[ego], axis=0, prepend=motion.position[ego, :1])[rows]
-        along = step[:, 0] * np.cos(heading) + step[:, 1] * np.sin(heading)
-        return bool((along < -STANDSTILL_MPS * motion.dt).any())
+        step = np.diff(motion.position[ego], axis=0, prepend=motion.position[ego, :1])
+        moved = ahead_and_left(step, motion.heading[ego])[0][self.response]
+        return bool((moved < -STANDSTILL_MPS * motion.dt).any())
 
     def ego_had_turned(self) -> bool:
         """Whether the ego was across its path when the other one could no longer stop."""
         poses = self.drive.motion.poses[self.drive.ego, self.response]
-        turn = poses[:, 2] - self._nearest_reference(poses[:, :2])[:, 2]
-        return bool((np.cos(turn) < SAME_DIRECTION_RATIO).any())
+        return bool(self._nearest_reference(poses)[1].any())
 
     def _other_cut_in(self) -> bool:
         """Whether the other one cut in on the ego without a safe gap in the ego's turn."""
@@ -416,9 +418,9 @@ def safe_gap(behind: Floats | float, ahead: Floats | float) -> Floats:
     return np.maximum(stopping - lead_stopping, 0.0)
 
 
-def braking_distance(speed: Floats | float) -> Floats:
-    """Return the distance [m] in which a vehicle at a speed [m/s] stops once it brakes."""
-    return np.square(speed) / (2.0 * REAR_BRAKING_MPS2)
+def braking_distance(speed: Floats | float, braking: float = REAR_BRAKING_MPS2) -> Floats:
+    """Return the distance [m] in which a vehicle at a speed [m/s] stops by a braking [m/s²]."""
+    return np.square(speed) / (2.0 * braking)
 
 
 def find_cut_in(
