@@ -35,25 +35,6 @@ class FreeSpace:
         free = self.road.clearance_cells > self.radius / self.road.resolution
         return sealed(ndimage.label(free)[0].astype(np.int64))
 
-    def cells(self, label: int) -> tuple[Ints, Ints]:
-        """Return the flat indices of the cells in one component, ascending.
-
-        Returns:
-            All of them (n,), and those (c,) that lie diagonally before a convex corner of the
-            space that the disc cannot enter.
-        """
-        inside = np.pad(self.labels == label, 1)
-        corner = np.zeros(self.road.drivable.shape, dtype=np.bool_)
-        rows, columns = self.road.drivable.shape
-        for di, dj in ((0, 0), (0, 2), (2, 0), (2, 2)):
-            # The diagonal neighbour is closed, the two cells between are open.
-            diagonal = inside[di : di + rows, dj : dj + columns]
-            in_row = inside[1:-1, dj : dj + columns]
-            in_column = inside[di : di + rows, 1:-1]
-            corner |= ~diagonal & in_row & in_column
-        corner &= inside[1:-1, 1:-1]
-        return sealed(np.flatnonzero(inside[1:-1, 1:-1])), sealed(np.flatnonzero(corner))
-
     def component_at(self, xy: Floats) -> int:
         """Return the component that the disc at `xy` (2,) [m] can move to.
 
@@ -111,5 +92,20 @@ def free_space(road: Road, radius: float) -> FreeSpace:
 
 @lru_cache(maxsize=4)
 def free_cells(space: FreeSpace, label: int) -> tuple[Ints, Ints]:
-    """Return `space.cells(label)`; queries in one component share it."""
-    return space.cells(label)
+    """Return the flat indices of the cells in one component, ascending; queries in it share them.
+
+    Returns:
+        All of them (n,), and those (c,) that lie diagonally before a convex corner of the space
+        that the disc cannot enter.
+    """
+    inside = np.pad(space.labels == label, 1)
+    rows, columns = space.road.drivable.shape
+    corner = np.zeros((rows, columns), dtype=np.bool_)
+    for di, dj in ((0, 0), (0, 2), (2, 0), (2, 2)):
+        # The diagonal neighbour is closed, the two cells between are open.
+        diagonal = inside[di : di + rows, dj : dj + columns]
+        in_row = inside[1:-1, dj : dj + columns]
+        in_column = inside[di : di + rows, 1:-1]
+        corner |= ~diagonal & in_row & in_column
+    corner &= inside[1:-1, 1:-1]
+    return sealed(np.flatnonzero(inside[1:-1, 1:-1])), sealed(np.flatnonzero(corner))
