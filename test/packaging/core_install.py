@@ -21,7 +21,7 @@ from packaging.utils import canonicalize_name
 from test_library_alone import EXTRA_MODULES, write_csv
 
 PIP = ("-m", "pip", "--quiet", "--disable-pip-version-check")
-SEGMENTATION = ("numpy", "scipy", "numba", "threadpoolctl")
+SEGMENTATION = ("numpy", "scipy", "numba", "filelock", "threadpoolctl")
 
 
 def lock_of(wanted: Sequence[Requirement]) -> str:
