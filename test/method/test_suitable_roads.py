@@ -77,7 +77,10 @@ def test_a_refusal_names_the_roads_that_suit_to_a_command(crossing):
         suitable_roads(Situation.of(crossing), segment(crossing, config.segmentation, 7), config)
     )
     assert "four_way" in names and names[-1] == "corridor" and "t_intersection" not in names
-    with pytest.raises(RefusedError, match=r"choose another road$") as caught:
+    with pytest.raises(
+        RefusedError,
+        match=r"choose another road\. Shortened .* vehicle 2 goes straight on within 67 m$",
+    ) as caught:
         generate(crossing, "t_intersection", count=2, seed=7)
     answer = with_suitable_roads(caught.value, crossing, "t_intersection", config, 7)
     assert str(answer).endswith(f"It fits these roads: {', '.join(names)}")
