@@ -74,7 +74,9 @@ PUBLISHERS: dict[str, tuple[str, ...]] = {
     "tracks/part": ("planner", "road_server"),
     "ego/goal": ("gp_sampler", "traffic"),
     **dict.fromkeys(("diagnostics", "clock", "tf", "tf_static"), ANY_NODE),
-    **dict.fromkeys(("rosout", "parameter_events", "transition_event"), ANY_NODE),  # of ROS
+    **dict.fromkeys(
+        ("bond", "rosout", "parameter_events", "transition_event"), ANY_NODE
+    ),  # of ROS
 }
 """The nodes that may publish a topic at the same time; only one node publishes any other topic."""
 

@@ -28,6 +28,7 @@ from msg_conventions.topics import LATCHED, topic_entry
 from msg_conventions.tracks import decode_tracks
 from scenario_gen.base.errors import InputError
 from scenario_gen.base.worker import Job, Worker
+from scenario_gen.ros.common.bond import Bond
 from scenario_gen.ros.common.diagnostics import NodeDiagnostics
 from scenario_gen.ros.common.ros_parameters import ConfigParameters
 from scenario_gen.ros.common.topics import create_subscription, Outputs
@@ -214,6 +215,7 @@ class StageNode(LifecycleNode):  # type: ignore[misc]
         self._worker: Worker | None = None
         self.parameters = ConfigParameters(self, config)
         self.declare_parameter("autostart", True)
+        self._bond = Bond(self)
 
     @property
     def default_callback_group(self) -> ReentrantCallbackGroup:
@@ -346,6 +348,7 @@ class StageNode(LifecycleNode):  # type: ignore[misc]
         for topic in self.INPUTS:
             self.listen(topic)
         self.started()
+        self._bond.start()
         return super().on_activate(state)
 
     def on_deactivate(self, state: LifecycleState) -> TransitionCallbackReturn:
@@ -365,6 +368,7 @@ class StageNode(LifecycleNode):  # type: ignore[misc]
         return super().on_shutdown(state)
 
     def _stop(self) -> None:
+        self._bond.stop()
         self.outputs.deactivate()
         self.diagnostics.enable(False)
         for topic in list(self._subscribed):

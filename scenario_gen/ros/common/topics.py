@@ -125,8 +125,11 @@ def create_subscription(
     )
 
 
-def publish(node: Node, publisher: Any, data: bytes) -> None:
-    """Publish CDR bytes from any thread, unless the publisher is None or the node has ended."""
+def publish(node: Node, publisher: Any, data: Any) -> None:
+    """Publish a message or its CDR bytes from any thread.
+
+    Nothing is published if the publisher is None or the node has ended.
+    """
     try:
         if publisher is not None and node.context.ok():
             publisher.publish(data)
