@@ -48,7 +48,7 @@ from scenario_gen.method.segmentation import (
 from scenario_gen.method.validity import Checker as Checker, Limits as Limits
 from scenario_gen.output.exchange.export import export_bag as export_bag
 from scenario_gen.output.plot import animate as animate, plot as plot
-from scenario_gen.output.results import report as report
+from scenario_gen.output.results import report as report, save as save
 from scenario_gen.output.table import filter_scenarios as filter_scenarios, measures as measures
 from scenario_gen.pipeline import (
     generate as generate,

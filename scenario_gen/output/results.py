@@ -3,19 +3,24 @@
 
 """The outputs of a request: a bag, a report and the figures."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import replace
 import json
 from pathlib import Path
+import shutil
 from typing import Any
 
 from scenario_gen.bags.recordings.read import INFO, read_recording
-from scenario_gen.bags.recordings.write import add_results
+from scenario_gen.bags.recordings.write import add_results, write_recording
 from scenario_gen.bags.storage.config import BagConfig
 from scenario_gen.bags.storage.writer import BagWriter
-from scenario_gen.base.folders import Kind, replaced_folder, sha256_of, write_text
+from scenario_gen.base.copies import temp_folder
+from scenario_gen.base.errors import InputError
+from scenario_gen.base.folders import Kind, replaced_folder, scratch, sha256_of, write_text
 from scenario_gen.base.provenance import log_texts, what_makes_it_again
 from scenario_gen.output.report.page import ReportInput, write_report
+from scenario_gen.output.table import TABLES
 from scenario_gen.pipeline import PipelineConfig
 from scenario_gen.types import as_markdown, GenerationResult, Request
 
@@ -23,19 +28,63 @@ BAG, REPORT, FIGURES, TABLE = "bag", "report.html", "evaluation.json", "evaluati
 GENERATED, EVALUATED = Kind("generated"), Kind("evaluated")
 
 
-def report(folder: Path | str, *cases: GenerationResult, title: str = "") -> Path:
+def report(target: Path | str, *cases: GenerationResult, title: str = "") -> Path:
     """Write bag, report and figures of results to a folder, like `scenario-gen generate`.
 
-    Returns the path of the report.
+    A target with the suffix .html becomes the page alone. Returns the path of the page.
 
     Raises:
-        InputError: the folder has other contents.
+        InputError: the folder has other contents, or the page exists.
     """
-    with replaced_folder(Path(folder), GENERATED) as place:
-        write_results(
-            place, cases, title=title or cases[0].title, quality=(), provenance=cases[0].provenance
-        )
-    return Path(folder) / REPORT
+    target, title = Path(target), title or cases[0].title
+    if target.suffix.lower() == ".html":
+        with _new_file(target) as page:
+            write_report(page, ReportInput(cases, title, (), cases[0].provenance))
+        return target
+    with replaced_folder(target, GENERATED) as place:
+        write_results(place, cases, title=title, quality=(), provenance=cases[0].provenance)
+    return target / REPORT
+
+
+def save(result: GenerationResult, target: Path | str) -> Path:
+    """Write a result to a bag, or to one file if the suffix names its kind; return its path.
+
+    Args:
+        result: from `generate`, or read from a bag.
+        target: a folder for a bag; a file .mcap for the bag's messages, or .csv or .parquet for
+            the table of `GenerationResult.to_dataframe`. `load` reads bags and .mcap files.
+
+    Raises:
+        InputError: the folder has other contents, or the file exists.
+        MissingExtraError: pyarrow, which writes .parquet, is not installed.
+    """
+    target = Path(target)
+    suffix = target.suffix.lower().removeprefix(".")
+    if suffix in TABLES:
+        with _new_file(target) as file:
+            file.write_bytes(TABLES[suffix](result.to_dataframe()))
+        return target
+    if suffix == "mcap":
+        with scratch(temp_folder()) as place, _new_file(target) as file:
+            (messages,) = write_recording(place / "bag", result).glob("*.mcap")
+            shutil.copyfile(messages, file)
+        return target
+    return write_recording(target, result)
+
+
+@contextmanager
+def _new_file(target: Path) -> Iterator[Path]:
+    """Return the path of a file that becomes `target` at the end.
+
+    Raises:
+        InputError: `target` exists.
+    """
+    if target.exists():
+        raise InputError(f"{target} exists; delete it, or name another file")
+    target.parent.mkdir(parents=True, exist_ok=True)
+    with scratch(target.parent) as place:
+        yield place / target.name
+        (place / target.name).replace(target)
 
 
 def write_results(

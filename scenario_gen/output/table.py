@@ -1,12 +1,14 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The criticality of each scenario as a table, and scenarios selected by a condition."""
+"""Scenarios and their criticality as tables, and scenarios selected by a condition."""
 
+from collections.abc import Callable, Mapping
 from dataclasses import replace
+import math
 from typing import TYPE_CHECKING
 
-from scenario_gen.base.errors import describe, InputError
+from scenario_gen.base.errors import describe, InputError, needs
 from scenario_gen.method.evaluation import MEASURES
 from scenario_gen.types import GenerationResult, join_ego, Note, NoteKind
 
@@ -14,13 +16,25 @@ if TYPE_CHECKING:
     from pandas import DataFrame
 
 
+def _parquet(table: "DataFrame") -> bytes:
+    needs("parquet", "pyarrow")
+    return bytes(table.to_parquet(engine="pyarrow", index=False))
+
+
+TABLES: Mapping[str, Callable[["DataFrame"], bytes]] = {
+    "csv": lambda table: table.to_csv(index=False).encode(),
+    "parquet": _parquet,
+}
+"""The content of a file with a table, by its suffix."""
+
+
 def measures(result: GenerationResult) -> "DataFrame":
     """Return a row for each scenario of a result; the ego's reference drive counts as a vehicle.
 
     Columns: scenario (its index), seconds [s], ttc [s], pet [s], arrival_gap [s], distance [m] and
     closing_speed [m/s], each of the most critical pair of vehicles, speed [m/s] and braking
-    [m/s²], the largest of all vehicles. A figure that no pair has is NaN; without a collision
-    course, ttc is infinite.
+    [m/s²], the largest of all vehicles. A figure that no pair has is NaN: ttc without a collision
+    course, pet without crossing paths.
     """
     import pandas as pd
 
@@ -36,7 +50,8 @@ def measures(result: GenerationResult) -> "DataFrame":
         for scenario in map(join_ego, result)
     ]
     columns = ["scenario", "seconds", *figures, "speed", "braking"]
-    return pd.DataFrame(rows, columns=columns).rename(columns={"gap": "distance"})
+    table = pd.DataFrame(rows, columns=columns).rename(columns={"gap": "distance"})
+    return table.replace(math.inf, math.nan)
 
 
 def filter_scenarios(result: GenerationResult, condition: str) -> GenerationResult:

@@ -208,8 +208,8 @@ class GenerationResult:
 
         Args:
             folder: an earlier export in it is replaced.
-            target: "commonroad", "openscenario", "autoware", "scenarionet" or a plugin's
-                name.
+            target: "commonroad", "openscenario", "autoware", "scenarionet", "csv", "parquet" or a
+                plugin's name.
 
         Raises:
             InputError: there is no such target, or the folder is something else.
@@ -221,25 +221,28 @@ class GenerationResult:
             scenario_gen.export_bag(self.save(place / "bag"), Path(folder), target)
         return Path(folder)
 
-    def report(self, folder: Path | str) -> Path:
-        """Write page, bag and figures to a folder, as `scenario_gen.report` does.
+    def report(self, target: Path | str) -> Path:
+        """Write page, bag and figures to a folder, or a page .html, as `scenario_gen.report` does.
 
         Raises:
-            InputError: the folder has other contents.
+            InputError: the folder has other contents, or the page exists.
         """
         import scenario_gen
 
-        return scenario_gen.report(folder, self)
+        return scenario_gen.report(target, self)
 
-    def save(self, folder: Path | str) -> Path:
-        """Write the result to a new bag; return its folder. `scenario_gen.load` reads it.
+    def save(self, target: Path | str) -> Path:
+        """Write the result to a bag, or to a file .mcap, .csv or .parquet, as `scenario_gen.save`.
+
+        `scenario_gen.load` reads bags and .mcap files.
 
         Raises:
-            InputError: the folder is something else.
+            InputError: the folder has other contents, or the file exists.
+            MissingExtraError: pyarrow, which writes .parquet, is not installed.
         """
         import scenario_gen
 
-        return scenario_gen.write_recording(Path(folder), self)
+        return scenario_gen.save(self, target)
 
     def similarity(self) -> dict[str, dict[str, float | None]]:
         """Return E of `generated` and of the replay by row and metric; None where unknown."""

@@ -5,6 +5,8 @@
 
 from dataclasses import replace
 
+import numpy as np
+import pandas as pd
 import pytest
 from support.bag_examples import hand_made_run
 
@@ -42,7 +44,32 @@ def test_a_condition_keeps_the_scenarios_it_holds_for_and_says_so():
     assert [scenario.index for scenario in near] == [3, 4]
     assert str(near.generated.adaptations[-1]) == "filtered by 'distance < 1.0': 2 of 5 scenarios"
     assert not near.evaluation.rows and near.coverage is None and len(made) == 5
-    assert len(made.filter("pet < 2")) == 0 and len(made.filter("distance < 1.0 or ttc > 1")) == 5
+    assert (
+        len(made.filter("pet < 2")) == 0 and len(made.filter("distance < 1.0 or ttc.isna()")) == 5
+    )
+
+
+@pytest.mark.parametrize("suffix", ["csv", "parquet"])
+def test_a_table_is_saved_by_its_suffix_and_exported_with_its_cases(tmp_path, suffix):
+    made = hand_made_run()
+    read = {"csv": pd.read_csv, "parquet": pd.read_parquet}[suffix]
+    table = made.to_dataframe().astype({"vehicle": str})
+    saved = read(made.save(tmp_path / "new" / f"m.{suffix}")).astype({"vehicle": str})
+    pd.testing.assert_frame_equal(saved, table, check_dtype=False)
+    exported = read(made.export(tmp_path / "out", suffix) / f"scenarios.{suffix}")
+    assert set(exported["case"]) == {1} and list(exported["scenario"]) == list(table["scenario"])
+    assert list(exported["x"]) == pytest.approx(list(table["x"]))
+    with pytest.raises(InputError, match="exists; delete it"):
+        made.save(tmp_path / "new" / f"m.{suffix}")
+
+
+def test_a_bag_and_a_page_can_be_single_files(tmp_path):
+    made = hand_made_run()
+    file, bag = load(made.save(tmp_path / "m.mcap")), load(made.save(tmp_path / "bag"))
+    assert len(file) == len(made) and all(map(np.array_equal, file, bag))
+    page = made.report(tmp_path / "page.html")
+    assert page.read_text().startswith("<!DOCTYPE html>")
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["bag", "m.mcap", "page.html"]
 
 
 def test_an_encounter_becomes_a_table_and_a_table_a_log_whose_errors_name_it():

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pandas as pd
 from shapely import contains_xy, prepare
 
 from scenario_gen.bags.recordings.autoware import add_autoware
@@ -33,6 +34,7 @@ from scenario_gen.output.exchange.opendrive import write_opendrive
 from scenario_gen.output.exchange.openscenario import write_openscenario
 from scenario_gen.output.exchange.projection import projection_of
 from scenario_gen.output.exchange.scenarionet import dataset_files, description, file_name, pickled
+from scenario_gen.output.table import TABLES
 from scenario_gen.roads import read_network
 from scenario_gen.types import Scenario
 
@@ -265,6 +267,22 @@ def _to_scenarionet(folder: Path, case: Case, exported: Exported, export: Export
     return Written((name,), content={"metadata": described["metadata"]})
 
 
+def _to_table(suffix: str) -> ExportFormat:
+    """Return the format of one table for all scenarios, whose columns name case and scenario."""
+
+    def write(_: Path, case: Case, exported: Exported, __: ExportConfig) -> Written:
+        table = exported.everybody.to_dataframe()
+        table.insert(0, "case", case.number)
+        table["scenario"] = exported.index
+        return Written((f"scenarios.{suffix}",), content=table)
+
+    def closing(contents: Sequence[tuple[str, Any]]) -> Mapping[str, bytes]:
+        tables = [table for _, table in contents]
+        return {contents[0][0]: TABLES[suffix](pd.concat(tables, ignore_index=True))}
+
+    return ExportFormat(write, closing=closing)
+
+
 def _roads(case: Case, export: ExportConfig) -> Mapping[str, bytes]:
     if export.map:
         refuse_other_map(case, Path(export.map))
@@ -307,6 +325,7 @@ EXPORTS = Registry[ExportFormat](
         "openscenario": ExportFormat(_to_openscenario, _roads, _origin_of_map, takes_map=True),
         "autoware": ExportFormat(_to_autoware, projected_from=lambda case, _: case.origin),
         "scenarionet": ExportFormat(_to_scenarionet, closing=dataset_files),
+        **{suffix: _to_table(suffix) for suffix in TABLES},
     },
     ExportFormat,
 )
