@@ -68,7 +68,7 @@ def test_a_bag_and_a_page_can_be_single_files(tmp_path):
     file, bag = load(made.save(tmp_path / "m.mcap")), load(made.save(tmp_path / "bag"))
     assert len(file) == len(made) and all(map(np.array_equal, file, bag))
     page = made.report(tmp_path / "page.html")
-    assert page.read_text().startswith("<!DOCTYPE html>")
+    assert page.read_text().startswith("<!doctype html>")
     assert sorted(path.name for path in tmp_path.iterdir()) == ["bag", "m.mcap", "page.html"]
 
 

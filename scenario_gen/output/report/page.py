@@ -78,7 +78,7 @@ def _view(index: int, case: GenerationResult) -> dict[str, Any]:
         "index": index,
         "case": case,
         "causes": causes_in_words(case.generated.refused),
-        "rows": [*evaluation.rows[1:], evaluation.rows[0]],
+        "rows": [*evaluation.rows[1:], *evaluation.rows[:1]],
         "ego": case.generated.ego.vehicle.id if case.generated.ego else "",
         "k": changepoints,
         "remark": case.segmentation.remark(duration),
