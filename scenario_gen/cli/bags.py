@@ -17,6 +17,7 @@ from scenario_gen.cli.options import (
     assigned_all,
     Commands,
     configured,
+    OUT,
     ParametersOption,
     SetOption,
     warn_of_metadata,
@@ -48,7 +49,7 @@ def evaluate(
     ],
     out: Annotated[
         Path | None,
-        typer.Option(help="Folder for report.html, evaluation.json and evaluation.md."),
+        typer.Option(*OUT, help="Folder for report.html, evaluation.json and evaluation.md."),
     ] = None,
     assignments: SetOption = None,
     parameter_file: ParametersOption = None,
@@ -87,7 +88,8 @@ def report(
         ),
     ],
     out: Annotated[
-        Path | None, typer.Option(help="Folder for the page. Default: BAG_report next to the bag.")
+        Path | None,
+        typer.Option(*OUT, help="Folder for the page. Default: BAG_report next to the bag."),
     ] = None,
     browse: Annotated[
         bool, typer.Option("--open/--no-open", help="Open the page in a browser.")
@@ -184,7 +186,9 @@ def export_scenarios(
     ],
     out: Annotated[
         Path | None,
-        typer.Option(help="Folder for the files. Default: BAG_commonroad etc. next to the bag."),
+        typer.Option(
+            *OUT, help="Folder for the files. Default: BAG_commonroad etc. next to the bag."
+        ),
     ] = None,
     index: Annotated[
         list[int] | None,
@@ -240,7 +244,7 @@ def save_bag(
         typer.Argument(help="Folder of an unclosed or damaged bag, or one of its MCAP files."),
     ],
     out: Annotated[
-        Path | None, typer.Option(help="Folder for the new bag. Default: BAG_reindexed.")
+        Path | None, typer.Option(*OUT, help="Folder for the new bag. Default: BAG_reindexed.")
     ] = None,
     assignments: SetOption = None,
     parameter_file: ParametersOption = None,

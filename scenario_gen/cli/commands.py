@@ -23,6 +23,7 @@ from scenario_gen.base.errors import (
 )
 from scenario_gen.base.removed import REMOVED
 from scenario_gen.cli import bags, corpus, generation, output, testing
+from scenario_gen.cli.options import HELP
 
 PROGRAM = "scenario-gen"
 GLOBAL_OPTIONS = ("--quiet", "-q", "--verbose", "-v", "--json")
@@ -31,6 +32,7 @@ UsageError: Any = typer.BadParameter.__bases__[0]  # typer has its own copy of c
 app = typer.Typer(
     help="Turn recorded encounters of vehicles into new, valid scenarios on other roads.",
     pretty_exceptions_enable=False,
+    context_settings=HELP,
 )
 
 
@@ -165,8 +167,6 @@ def run(words: list[str]) -> int:
     except MemoryError as error:
         message = "not enough memory; use a shorter log, fewer scenarios or a smaller map"
         raise InputError(message) from error
-    except BrokenPipeError:
-        return 1  # the reader of standard output has ended
     except OSError as error:
         name = error.filename or "standard output or an unnamed file"
         raise of_system(error, name) from error
@@ -190,6 +190,7 @@ def _bug(error: Exception) -> BugError:
 
 def main() -> None:
     """Run the command line: an error becomes one message and an exit code, not a traceback."""
+    output.outlive_reader()
     words = sys.argv[1:]
     ended: dict[str, Any] = {}
     try:
@@ -204,7 +205,7 @@ def main() -> None:
         output.configure()
         sys.stdout.flush()
         sys.exit(ended["exit_code"])
-    # The disk is full or the reader has ended: Python must not try to write the rest at its exit.
+    # The disk is full: Python must not try to write the rest at its exit.
     os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
     sys.exit(ended["exit_code"] or 1)
 

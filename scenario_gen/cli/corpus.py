@@ -16,6 +16,7 @@ from scenario_gen.base.errors import InputError, RefusedError
 from scenario_gen.cli.options import (
     assigned_all,
     Commands,
+    OUT,
     SeedOption,
     SetOption,
     takes,
@@ -69,8 +70,8 @@ def mine(
     ],
     out: Annotated[
         Path,
-        typer.Option(help="Folder for the corpus; only what has changed is done again."),
-    ],
+        typer.Option(*OUT, help="Folder for the corpus; only what has changed is done again."),
+    ] = Path("out/mine"),
     workers: WorkersOption = 0,
     scheduler: SchedulerOption = "",
     allow: Annotated[
@@ -106,12 +107,17 @@ class Batch:
 
     corpus: Annotated[Path, typer.Argument(help="A corpus that `mine` wrote.")]
     roads: Annotated[
-        list[str], typer.Option(help="Roads, as for `generate`, separated by commas. Repeatable.")
+        list[str],
+        typer.Option(
+            "--road", "--roads", help="Roads, as for `generate`, separated by commas. Repeatable."
+        ),
     ]
     out: Annotated[
         Path,
-        typer.Option(help="Folder for tables and bags. An existing batch continues and grows."),
-    ]
+        typer.Option(
+            *OUT, help="Folder for tables and bags. An existing batch continues and grows."
+        ),
+    ] = Path("out/batch")
     count: Annotated[
         int, typer.Option(min=1, max=100_000, help="Scenarios per encounter and road.")
     ] = 50

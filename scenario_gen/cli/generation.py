@@ -13,6 +13,7 @@ from scenario_gen.base.errors import RefusedError
 from scenario_gen.cli.options import (
     Commands,
     configured,
+    OUT,
     ParametersOption,
     SetOption,
     takes,
@@ -40,11 +41,13 @@ class Generate:
     road: Annotated[
         list[str],
         typer.Option(
+            "--road",
+            "--roads",
             help="straight, curve, t_intersection, four_way, merge, roundabout, corridor (drawn "
             "around the recording), auto (the first of these that suits), a nav2 map (.yaml), or "
             "a vector map: Lanelet2 (.osm), OpenDRIVE (.xodr), CommonRoad (.xml). Append "
             "#box=x0,y0,x1,y1, #lanelet=ID or #junction=ID for a part of a vector map. "
-            "`scenario-gen roads` draws a map with suitable places. Repeatable."
+            "`scenario-gen roads` draws a map with suitable places. Repeatable.",
         ),
     ]
     count: Annotated[
@@ -53,7 +56,9 @@ class Generate:
     seed: Annotated[
         int, typer.Option(min=0, help="Random seed. The same seed gives the same scenarios.")
     ] = 0
-    out: Annotated[Path, typer.Option(help="Folder for the results.")] = Path("out/generated")
+    out: Annotated[Path, typer.Option(*OUT, help="Folder for the results.")] = Path(
+        "out/generated"
+    )
     encounter: Annotated[
         list[str] | None,
         typer.Option(help="Name of an encounter in the log. Repeatable; default: all."),
@@ -202,7 +207,7 @@ def roads(
         list[str] | None,
         typer.Option(help="Name of the encounter in the log; default: the first."),
     ] = None,
-    out: Annotated[Path, typer.Option(help="PNG file for the picture.")] = Path("roads.png"),
+    out: Annotated[Path, typer.Option(*OUT, help="PNG file for the picture.")] = Path("roads.png"),
     assignments: SetOption = None,
     parameter_file: ParametersOption = None,
 ) -> None:
@@ -245,7 +250,7 @@ def demo(
     seed: Annotated[
         int, typer.Option(min=0, help="Random seed. The same seed gives the same scenarios.")
     ] = 7,
-    out: Annotated[Path, typer.Option(help="Folder for the results.")] = Path("out/demo"),
+    out: Annotated[Path, typer.Option(*OUT, help="Folder for the results.")] = Path("out/demo"),
     ros: Annotated[
         bool, typer.Option("--ros", help="Let the ROS nodes generate the scenarios, over DDS.")
     ] = False,

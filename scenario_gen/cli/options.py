@@ -37,6 +37,12 @@ WorkersOption = Annotated[
 ]
 
 
+HELP = {"help_option_names": ["-h", "--help"]}
+"""Settings of a command."""
+OUT = ("--out", "-o")
+"""The names of the option for a command's folder or file."""
+
+
 class Commands(typer.Typer):
     """A group of commands in `--help`."""
 
@@ -54,7 +60,8 @@ class Commands(typer.Typer):
             panel: in `--help`; that of the group by default.
             options: further ones of typer.
         """
-        return super().command(name, rich_help_panel=panel or self.panel, **options)
+        options = {"rich_help_panel": panel or self.panel, "context_settings": HELP} | options
+        return super().command(name, **options)
 
 
 def takes(options: type[Options]) -> Callable[[Callable[[Options], None]], Callable[..., None]]:

@@ -6,6 +6,7 @@
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, field, fields, is_dataclass
+from io import BufferedWriter, FileIO, TextIOWrapper
 import json
 import math
 import os
@@ -33,6 +34,28 @@ class Output:
 
 current = Output()
 """Set by the options before a command; the command line runs one command per process."""
+
+
+class _Pipe(FileIO):
+    """Standard output that goes nowhere once its reader has ended, as in `| head -1`."""
+
+    def write(self, data: Any) -> int:
+        """Write bytes; a command whose output nobody reads any more does its work nevertheless."""
+        try:
+            return super().write(data)
+        except BrokenPipeError:
+            os.dup2(os.open(os.devnull, os.O_WRONLY), self.fileno())
+            return super().write(data)
+
+
+def outlive_reader() -> None:
+    """Let the command end as usual, with its exit code, when its output is no longer read."""
+    stream = sys.__stdout__
+    if stream is None or sys.stdout is not stream or stream.isatty():
+        return
+    stream.flush()
+    pipe = BufferedWriter(_Pipe(stream.fileno(), "wb", closefd=False))
+    sys.stdout = TextIOWrapper(pipe, stream.encoding, stream.errors)
 
 
 def configure(**options: Any) -> None:

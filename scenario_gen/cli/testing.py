@@ -12,7 +12,14 @@ from typing import Annotated, TYPE_CHECKING
 import typer
 
 from scenario_gen.base.errors import InputError
-from scenario_gen.cli.options import Commands, SeedOption, takes, warn_of_metadata, WorkersOption
+from scenario_gen.cli.options import (
+    Commands,
+    OUT,
+    SeedOption,
+    takes,
+    warn_of_metadata,
+    WorkersOption,
+)
 from scenario_gen.cli.output import emit_json, print_, print_table, progress
 
 if TYPE_CHECKING:
@@ -41,8 +48,8 @@ class Drive:
     planner: Annotated[
         list[str],
         typer.Option(
-            help="MODULE:CLASS of the planner, e.g. mine:MyPlanner. With --ros: the command that "
-            "starts its node. Repeatable: planners side by side."
+            help="MODULE:CLASS of the planner, e.g. mine:MyPlanner, or IdmFollower. With --ros: "
+            "the command that starts its node. Repeatable: planners side by side."
         ),
     ]
     ego: Annotated[
@@ -76,7 +83,7 @@ class Drive:
         ),
     ] = True
     out: Annotated[
-        Path, typer.Option(help="Folder for verdicts (drives.json, junit.xml) and pages.")
+        Path, typer.Option(*OUT, help="Folder for verdicts (drives.json, junit.xml) and pages.")
     ] = Path("out/drives")
     assignments: Annotated[
         list[str] | None,
@@ -210,7 +217,9 @@ class Search:
             help="A bag from `generate` with recording, road and parameters, or a log with --road."
         ),
     ]
-    planner: Annotated[str, typer.Option(help="MODULE:CLASS of the planner, e.g. mine:MyPlanner.")]
+    planner: Annotated[
+        str, typer.Option(help="MODULE:CLASS of the planner, e.g. mine:MyPlanner, or IdmFollower.")
+    ]
     budget: Annotated[
         int,
         typer.Option(
@@ -257,7 +266,7 @@ class Search:
     out: Annotated[
         Path,
         typer.Option(
-            help="Folder for search.json, search.html, junit.xml and the bag of failures."
+            *OUT, help="Folder for search.json, search.html, junit.xml and the bag of failures."
         ),
     ] = Path("out/search")
     assignments: Annotated[

@@ -21,6 +21,8 @@ from scenario_gen.numerics.curve import Curve
 from scenario_gen.numerics.plane import ahead_and_left, place
 from scenario_gen.types import SignalState
 
+BUILT_IN = ("ConstantSpeed", "IdmFollower", "NonReactive", "ReferenceFollower")
+"""The planners that a user names without a module."""
 NEAR_STATIONS = np.linspace(-2.0, 8.0, 41)
 """Distances [m] along the route from the last nearest place to candidates for the next one."""
 

@@ -34,6 +34,7 @@ from scenario_gen.base.errors import did_you_mean, InputError, ScenarioGenError
 from scenario_gen.base.parameters import parameter, Parameters
 from scenario_gen.base.registry import load_class
 from scenario_gen.base.signals import ctrl_c_blocked, worker_pool
+from scenario_gen.closed_loop import planners
 from scenario_gen.closed_loop.config import ClosedLoopConfig
 from scenario_gen.closed_loop.drive import Drive
 from scenario_gen.closed_loop.origin import Origin, origins_of, Trial, units_of
@@ -106,10 +107,19 @@ class Bars(Parameters):
 def find_planner(name: str) -> MakePlanner:
     """Return the class of a planner, named MODULE:CLASS, also from the current folder.
 
+    A built-in planner's class needs no module.
+
     Raises:
         InputError: there is no such module or class.
     """
-    return load_class("--planner", name)  # type: ignore[no-any-return]
+    if ":" in name:
+        return load_class("--planner", name)  # type: ignore[no-any-return]
+    if name not in planners.BUILT_IN:
+        raise InputError(
+            f"--planner {name}: write it as MODULE:CLASS, e.g. my_module:MyClass, or name one of "
+            f"{', '.join(planners.BUILT_IN)}{did_you_mean(name, planners.BUILT_IN)}"
+        )
+    return getattr(planners, name)  # type: ignore[no-any-return]
 
 
 def read_trials(

@@ -201,4 +201,4 @@ def test_a_full_standard_output_is_an_error_and_a_closed_one_is_quiet(tmp_path):
     assert "Traceback" not in process.stderr.read()
     process.wait()
     process.stderr.close()
-    assert process.returncode == 1
+    assert process.returncode == 0

@@ -39,7 +39,7 @@ def test_a_planner_takes_the_place_of_a_vehicle_from_states_that_are_asked_for(r
         "drive",
         "one/bag",
         "--planner",
-        "scenario_gen.closed_loop.planners:IdmFollower",
+        "IdmFollower",
         "--workers",
         1,
         "--out",
@@ -52,7 +52,7 @@ def test_a_planner_takes_the_place_of_a_vehicle_from_states_that_are_asked_for(r
             "drive",
             "one/bag",
             "--planner",
-            "scenario_gen.closed_loop.planners:IdmFollower",
+            "IdmFollower",
             "--ego",
             2,
         )[0]

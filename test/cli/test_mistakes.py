@@ -19,7 +19,7 @@ ROWS = "".join(
 LOG = f"t,id,x,y,speed\n{ROWS}"
 ROAD = ("--road", "four_way", "--count", "2")
 GENERATE = ("generate", "my log ü.csv", *ROAD)
-PLANNER = "scenario_gen.closed_loop.planners:IdmFollower"
+PLANNER = "IdmFollower"
 DRIVE = ("drive", "made/bag", "--planner", PLANNER)
 
 
@@ -62,7 +62,7 @@ MISTAKES = [  # words of the command line, and what the message says: what is wr
     (("genrate", "log.csv"), "'generate'"),
     (
         (*GENERATE, "--raod", "x"),
-        "No such option: --raod (Possible options: --allow, --order, --road)",
+        "No such option: --raod (Possible options: --order, --road, --roads)",
     ),
     (("generate", "my log ü.csv", "--road", "map.yaml"), "map.yaml: cannot be read (No such file"),
     ((*GENERATE, "--encounter", "my lag ü"), "did you mean my log ü?"),
@@ -77,7 +77,7 @@ MISTAKES = [  # words of the command line, and what the message says: what is wr
     ),
     # what is missing
     (("generate",), "Missing argument 'log' (The recording: "),
-    (("generate", "my log ü.csv"), "Missing option '--road' (straight, curve, "),
+    (("generate", "my log ü.csv"), "Missing option '--road' / '--roads' (straight, curve, "),
     (
         (*GENERATE, "--for-testing"),
         "--for-testing: name the vehicle that the planner replaces with --ego",

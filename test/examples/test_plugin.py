@@ -87,10 +87,10 @@ def test_the_command_takes_all_by_name(python):
         {"name": "clearance", "value": None, "threshold": 0.5, "met": True}
     ]
 
-    python("-m", "scenario_gen", "export", "out/bag", "--to", "csv", "--out", "tables")
+    python("-m", "scenario_gen", "export", "out/bag", "--to", "states", "--out", "tables")
     manifest = json.loads((python.folder / "tables" / "export.json").read_text())
     names = [name for entry in manifest["scenarios"] for name in entry["files"]]
-    assert manifest["format"] == "csv" and names == ["case_1_0.csv", "case_1_1.csv"]
+    assert manifest["format"] == "states" and names == ["case_1_0.csv", "case_1_1.csv"]
     lines = (python.folder / "tables" / names[0]).read_text().splitlines()
     assert lines[0] == "time,vehicle,x,y,heading,speed" and len(lines) > 100
 

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""An export format: one CSV table a scenario."""
+"""An export format: one CSV table per scenario."""
 
 from pathlib import Path
 
@@ -23,4 +23,4 @@ def write(folder: Path, case: Case, exported: Exported, _: ExportConfig) -> Writ
     return Written((name,))
 
 
-CSV = ExportFormat(write)
+STATES = ExportFormat(write)
