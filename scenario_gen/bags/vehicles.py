@@ -63,7 +63,9 @@ class Sample:
         position: latitude and longitude [degrees], or x and y [m]; NaN without a fix, None of a
             TwistStamped.
         heading: [rad], or NaN.
+        height: [m], or NaN.
         speed: [m/s], or None.
+        course: direction of the velocity of a TwistStamped in its own frame [rad], or NaN.
         frame: of the position, or "".
         child: frame whose pose it is, or "".
     """
@@ -71,7 +73,9 @@ class Sample:
     stamp_ns: int
     position: tuple[float, float] | None = None
     heading: float = math.nan
+    height: float = math.nan
     speed: float | None = None
+    course: float = math.nan
     frame: str = ""
     child: str = ""
 
@@ -84,6 +88,7 @@ class TrackedObject:
     kind: str
     position: tuple[float, float]
     heading: float
+    height: float
     speed: float
     size: tuple[float, float]
 
@@ -103,6 +108,7 @@ def decode_samples(data: bytes, kind: str, place: str) -> list[Sample]:
             entry.header.stamp.sec * 10**9 + entry.header.stamp.nanosec,
             (entry.transform.translation.x, entry.transform.translation.y),
             _yaw(entry.transform.rotation),
+            entry.transform.translation.z,
             frame=entry.header.frame_id,
             child=entry.child_frame_id,
         )
@@ -120,21 +126,26 @@ def decode_sample(data: bytes, kind: str, place: str) -> Sample:
     if kind == FIX:
         has_fix = message.status.status >= 0
         position = (message.latitude, message.longitude) if has_fix else (math.nan, math.nan)
-        return Sample(stamp, position)
+        return Sample(stamp, position, height=message.altitude)
     if kind == TWIST:
-        return Sample(stamp, speed=speed_of(message.twist.linear.x, message.twist.linear.y))
+        linear = message.twist.linear
+        course = math.atan2(linear.y, linear.x) if linear.y else math.nan
+        return Sample(stamp, speed=speed_of(linear.x, linear.y), course=course)
     pose = message.pose if kind == POSE else message.pose.pose
     if kind in (POSE, POSE_WITH_COVARIANCE):
         position = (pose.position.x, pose.position.y)
-        return Sample(stamp, position, _heading(pose), frame=message.header.frame_id)
+        return Sample(
+            stamp, position, _heading(pose), pose.position.z, frame=message.header.frame_id
+        )
     linear = message.twist.twist.linear  # in the body frame
     return Sample(
         stamp,
         (pose.position.x, pose.position.y),
         _heading(pose),
+        pose.position.z,
         np.hypot(linear.x, linear.y),
-        message.header.frame_id,
-        message.child_frame_id,
+        frame=message.header.frame_id,
+        child=message.child_frame_id,
     )
 
 
@@ -191,6 +202,7 @@ def _object(entry: Any) -> TrackedObject:
         kind=KINDS[label] if label < len(KINDS) else KINDS[0],
         position=(float(pose.position.x), float(pose.position.y)),
         heading=heading,
+        height=float(pose.position.z),
         speed=np.hypot(float(linear.x), float(linear.y)),
         size=(float(entry.shape.dimensions.x), float(entry.shape.dimensions.y)),
     )

@@ -23,19 +23,15 @@ from scenario_gen.bags.vehicles import (
     ODOMETRY,
     POSE,
     POSE_WITH_COVARIANCE,
-    Sample,
     TRACKS,
     TRANSFORMS,
     TWIST,
 )
 from scenario_gen.base.errors import InputError
 from scenario_gen.logs.bag_names import (
-    base_frames,
-    check_fixed_frame,
-    check_frames,
     check_rates,
     child_vehicle,
-    clock_doubt,
+    clock_doubts,
     find_owners,
     LARGE_COUNT,
     received_window,
@@ -45,17 +41,26 @@ from scenario_gen.logs.bag_names import (
 )
 from scenario_gen.logs.config import listed, LogConfig
 from scenario_gen.logs.file_names import file_names
+from scenario_gen.logs.frames import bodies_of, by_vehicle, FrameTree, in_one_frame, Recording
 from scenario_gen.logs.growing import Span
 from scenario_gen.logs.quality import Doubt
-from scenario_gen.logs.raw import check_size, check_vehicles, Observations, RawLog, Rows, Segment
+from scenario_gen.logs.raw import (
+    check_size,
+    check_vehicles,
+    Fix,
+    Observations,
+    RawLog,
+    Rows,
+    Segment,
+    Speed,
+)
 from scenario_gen.types import Encounter
 
 _CLOCK_SAMPLES_COUNT = 1_000  # messages of a topic whose stamps are compared
 _FIRST_MESSAGES_COUNT = 50  # show whether a topic has several vehicles
-_RECORDINGS = (FIX, TWIST, ODOMETRY, TRACKS, TRACKED)
 _POSES = (POSE, POSE_WITH_COVARIANCE)
-READABLE_TYPES = (*_RECORDINGS, *_POSES, TRANSFORMS)
-_REQUESTED_POSES = ("goal_pose", "initialpose", "clicked_point")  # of a person, not of a vehicle
+READABLE_TYPES = (FIX, TWIST, ODOMETRY, TRACKS, TRACKED, *_POSES, TRANSFORMS)
+_REQUESTED_POSES = ("goal", "goal_pose", "initialpose", "clicked_point")  # not of a vehicle
 
 
 @dataclass
@@ -106,17 +111,12 @@ def log_of(topics: Sequence[Topic], name: str, config: LogConfig) -> RawLog:
         InputError: a message is damaged, or the topics do not give positions.
     """
     tracks = [topic for topic in topics if topic.type == TRACKS]
-    tracked = [topic for topic in topics if topic.type == TRACKED]
-    used: set[str] = set()
+    used = {topic.name for topic in tracks}
     if tracks:
         log = _read_encounters(tracks, name)
-    elif tracked:
-        odometries = [topic for topic in topics if topic.type == ODOMETRY]
-        log, used = _read_tracked(tracked, odometries, name, config)
     else:
-        return _read_streams(topics, name, config)
-    kind = TRACKS if tracks else TRACKED
-    others = [topic.name for topic in topics if topic.type != kind and topic.name not in used]
+        log, used = _read_streams(topics, name, config)
+    others = [topic.name for topic in topics if topic.name not in used]
     if not others:
         return log
     note = f"not read: {', '.join(others)}; choose topics with --set log.topics=…"
@@ -138,7 +138,7 @@ def _read_topics(paths: Sequence[Path], config: LogConfig) -> list[Topic]:
         with open_bag(path, bounds, "log.size_limit") as bag:
             offered += bag.topics()
     types = {topic.name: topic.type for topic in offered}
-    is_used = _usable(requested, types)
+    is_used = _usable(requested)
     window: Span | None = None
     if (config.start or config.end) and sum(topic.count for topic in offered) > LARGE_COUNT:
         window = received_window(paths, is_used, config)
@@ -166,22 +166,13 @@ def _read_topics(paths: Sequence[Path], config: LogConfig) -> list[Topic]:
     return _joined([topics[key] for key in sorted(topics)])
 
 
-def _usable(requested: Sequence[str], types: Mapping[str, str]) -> Callable[[str, str], bool]:
-    """Return a function that chooses topics by name and type.
-
-    Poses count if there are no recordings of other types, and transforms if there are no poses.
-    """
-    known = [kind for name, kind in types.items() if not _is_other_trajectory(name, kind)]
-    poses = [n for n, kind in types.items() if kind in _POSES and not n.endswith(_REQUESTED_POSES)]
-    kinds: Sequence[str] = _RECORDINGS
-    if not set(known) & set(_RECORDINGS):
-        kinds = _POSES if poses else (TRANSFORMS,)
+def _usable(requested: Sequence[str]) -> Callable[[str, str], bool]:
+    """Return a function that chooses topics by name and type; transforms are always read."""
 
     def is_used(topic: str, kind: str) -> bool:
-        if requested:
-            return topic in requested and kind in READABLE_TYPES
-        is_excluded = _is_other_trajectory(topic, kind) or topic.endswith(_REQUESTED_POSES)
-        return kind in kinds and not is_excluded
+        if kind not in READABLE_TYPES or kind == TRANSFORMS or requested:
+            return kind == TRANSFORMS or (topic in requested and kind in READABLE_TYPES)
+        return not (_is_other_trajectory(topic, kind) or topic.endswith(_REQUESTED_POSES))
 
     return is_used
 
@@ -238,38 +229,45 @@ def _listing_of(topics: Iterable[Topic]) -> str:
     return _listing({topic.name: topic.type for topic in topics})
 
 
-def _read_streams(topics: Sequence[Topic], name: str, config: LogConfig) -> RawLog:
-    """Collect fixes, speeds and odometry per vehicle.
+def _read_streams(
+    topics: Sequence[Topic], name: str, config: LogConfig
+) -> tuple[RawLog, set[str]]:
+    """Collect positions, speeds and headings per vehicle, in one frame.
+
+    Returns:
+        The log, and the topics that were read.
 
     Raises:
-        InputError: a message is damaged, positions have two types, or a vehicle has none.
+        InputError: a message is damaged, or the topics do not give positions.
     """
     label = topics[0].label
-    if len({topic.type == FIX for topic in topics if topic.type != TWIST}) > 1:
-        raise InputError(
-            f"{label} has both {FIX} and {ODOMETRY} ({_listing_of(topics)}); choose with "
-            "--set log.topics=…"
-        )
-    topics, notes = without_duplicates(topics, ODOMETRY)
+    tree = _frame_tree(topics)
+    transforms = {topic.name for topic in topics if topic.type == TRANSFORMS}
+    topics, notes = without_duplicates(_with_positions(topics), ODOMETRY)
+    is_tracked = any(topic.type == TRACKED for topic in topics)
     owners = find_owners(topics)
-    vehicles: dict[str, Rows] = {}
-    frames: dict[str, str] = {}
+    if is_tracked and len(topics) == 2:
+        owners = ["ego" if topic.type != TRACKED else "" for topic in topics]
+    recordings: list[Recording] = []
     clocks: list[TopicClock] = []
     segments = []
     n_rows = 0
     for topic, owner in zip(topics, owners, strict=True):
         segments.append(topic.segment(n_rows))
-        clock = _collect(topic, owner, vehicles, frames, n_rows, config)
+        recorded, clock = _collect(topic, owner, n_rows, config)
+        recordings += recorded
         clocks.append(clock)
         n_rows += len(topic.data)
     if all(topic.type == TRANSFORMS for topic in topics):
-        vehicles, frames = base_frames(label, vehicles, frames)
-    check_vehicles(label, len(vehicles), config)
-    _check_positions(topics, owners, vehicles)
-    notes += check_frames(label, frames, vehicles)
+        recordings = bodies_of(recordings)
+    _check_positions(label, recordings)
     if topics[0].part:
         check_rates(label, clocks, config)
-    vehicles, doubts = _checked_clocks(vehicles, clocks, notes, config)
+    recordings, frame_notes, frame_doubts = in_one_frame(label, recordings, tree)
+    vehicles = {key: _observed(key, group) for key, group in by_vehicle(recordings).items()}
+    check_vehicles(label, len(vehicles), config)
+    vehicles, clock_notes, doubts = _checked_clocks(vehicles, clocks, config)
+    notes += [*frame_notes, *clock_notes]
     unstamped = [clock.topic for clock in clocks if not clock.has_stamps]
     if unstamped:
         notes.append(
@@ -278,97 +276,178 @@ def _read_streams(topics: Sequence[Topic], name: str, config: LogConfig) -> RawL
         )
     notes += [
         f"vehicle {vehicle} has no speeds: derived from its positions"
-        for vehicle, rows in vehicles.items()
-        if not rows.speeds
+        for vehicle, observed in vehicles.items()
+        if not len(observed.speed_ns)
     ]
-    return RawLog(
+    log = RawLog(
         name=name,
         geographic=any(topic.type == FIX for topic in topics),
-        vehicles=tuple(rows.observations(vehicle) for vehicle, rows in vehicles.items()),
+        vehicles=tuple(vehicles.values()),
         rows=n_rows,
         segments=tuple(segments),
         notes=tuple(notes),
-        doubts=doubts,
+        doubts=(*frame_doubts, *doubts),
+    )
+    return log, transforms | {topic.name for topic in topics}
+
+
+def _with_positions(topics: Sequence[Topic]) -> list[Topic]:
+    """Return the topics with vehicles; transforms only if there are no others.
+
+    Raises:
+        InputError: positions have two types.
+    """
+    kinds = {topic.type for topic in topics}
+    tracked = [topic for topic in topics if topic.type == TRACKED]
+    if len(tracked) > 1:
+        raise InputError(
+            f"{topics[0].label} has {_listing_of(tracked)}; choose one with --set log.topics=…"
+        )
+    if tracked:
+        kind = ODOMETRY if ODOMETRY in kinds else POSE
+        return [topic for topic in topics if topic.type in (TRACKED, kind)]
+    if not kinds & {FIX, TWIST, ODOMETRY, *_POSES}:
+        return list(topics)
+    fixes = [topic.name for topic in topics if topic.type == FIX]
+    others = [topic for topic in topics if topic.type in (ODOMETRY, *_POSES)]
+    if fixes and others:
+        used = ",".join(topic.name for topic in topics if topic.type in (FIX, TWIST))
+        raise InputError(
+            f"{topics[0].label} has both {FIX} and {others[0].type} ({_listing_of(topics)}); "
+            f"choose with --set log.topics={used}"
+        )
+    return [topic for topic in topics if topic.type != TRANSFORMS]
+
+
+def _frame_tree(topics: Sequence[Topic]) -> FrameTree:
+    """Return the frames that the transforms of a bag tie to each other.
+
+    Raises:
+        InputError: a message is damaged.
+    """
+    tree = FrameTree()
+    for topic in topics:
+        if topic.type != TRANSFORMS:
+            continue
+        for number, (received_ns, data) in enumerate(zip(topic.stamps, topic.data, strict=True)):
+            for sample in decode_samples(data, topic.type, topic.where(number + 1)):
+                assert sample.position is not None
+                stamp_ns = sample.stamp_ns or received_ns
+                tree.add(sample.frame, sample.child, stamp_ns, *sample.position, sample.heading)
+    return tree
+
+
+def _observed(name: str, recordings: Sequence[Recording]) -> Observations:
+    """Return what topics recorded of one vehicle."""
+    rows = Rows(
+        [fix for recording in recordings for fix in recording.rows.fixes],
+        [speed for recording in recordings for speed in recording.rows.speeds],
+    )
+    sizes = [size for recording in recordings for size in recording.sizes]
+    kinds = sum((recording.kinds for recording in recordings), Counter[str]())
+    length, width = np.median(np.array(sizes), axis=0).tolist() if sizes else (np.nan, np.nan)
+    return replace(
+        rows.observations(name),
+        length=length,
+        width=width,
+        kind=kinds.most_common(1)[0][0] if kinds else "",
+        ahead=next((each.ahead for each in recordings if each.rows.fixes), np.nan),
     )
 
 
 def _checked_clocks(
-    vehicles: dict[str, Rows], clocks: Sequence[TopicClock], notes: list[str], config: LogConfig
-) -> tuple[dict[str, Rows], tuple[Doubt, ...]]:
-    """Return the vehicles with stamps in seconds, and a doubt if their clocks differ."""
+    vehicles: dict[str, Observations], clocks: Sequence[TopicClock], config: LogConfig
+) -> tuple[dict[str, Observations], list[str], list[Doubt]]:
+    """Return the vehicles with stamps in seconds, notes, and doubts if clocks differ."""
     if config.stamps != "header":
-        return vehicles, ()
+        return vehicles, [], []
     factor = stamp_factor(clocks)
     if factor == 1.0:
-        doubt = clock_doubt(clocks)
-        return vehicles, (doubt,) if doubt else ()
-    notes.append(f"header stamps advance {1 / factor:g} times too fast: they are scaled")
-    return {name: _scaled(rows, factor) for name, rows in vehicles.items()}, ()
+        return vehicles, [], clock_doubts(clocks)
+    scaled = {
+        name: replace(
+            vehicle,
+            fix_ns=np.round(vehicle.fix_ns * factor).astype(np.int64),
+            speed_ns=np.round(vehicle.speed_ns * factor).astype(np.int64),
+        )
+        for name, vehicle in vehicles.items()
+    }
+    note = f"header stamps advance {1 / factor:g} times too fast: they are scaled"
+    return scaled, [note], []
 
 
-def _scaled(rows: Rows, factor: float) -> Rows:
-    """Return rows with scaled stamps."""
-    fixes = [(round(fix[0] * factor), *fix[1:]) for fix in rows.fixes]
-    speeds = [(round(speed[0] * factor), *speed[1:]) for speed in rows.speeds]
-    return Rows(fixes, speeds)
-
-
-def _check_positions(
-    topics: Sequence[Topic], owners: Sequence[str], vehicles: Mapping[str, Rows]
-) -> None:
+def _check_positions(label: str, recordings: Sequence[Recording]) -> None:
     """Check that each vehicle with speeds has positions.
 
     Raises:
         InputError: one has none.
     """
-    owners_of_speeds = [
-        owner for topic, owner in zip(topics, owners, strict=True) if topic.type == TWIST
+    without = [
+        vehicle
+        for vehicle, group in by_vehicle(recordings).items()
+        if not any(recording.rows.fixes for recording in group)
     ]
-    without = [vehicle for vehicle in owners_of_speeds if not vehicles[vehicle].fixes]
     if without:
         raise InputError(
-            f"{topics[0].label}: speeds but no positions of {', '.join(without)}; put {FIX} and "
+            f"{label}: speeds but no positions of {', '.join(without)}; put {FIX} and "
             f"{TWIST} into one namespace"
         )
 
 
 def _collect(
-    topic: Topic,
-    owner: str,
-    vehicles: dict[str, Rows],
-    frames: dict[str, str],
-    first_row: int,
-    config: LogConfig,
-) -> TopicClock:
-    """Add the messages of a topic, rows from `first_row` on, to its vehicles.
+    topic: Topic, owner: str, first_row: int, config: LogConfig
+) -> tuple[list[Recording], TopicClock]:
+    """Return what a topic recorded of each vehicle, in rows of the log from `first_row` on.
 
     Args:
         topic: the messages.
         owner: the vehicle, if all messages have one child frame; else child frames name vehicles.
-        vehicles: receives the rows.
-        frames: receives the first frame of each vehicle with a pose.
         first_row: number of rows of other topics.
         config: chooses stamps.
 
     Returns:
-        The stamps of the headers against the time of reception.
+        The recordings, and the stamps of the headers against the time of reception.
 
     Raises:
         InputError: a message is damaged.
     """
-    clock = TopicClock(topic.name, owner, max(len(topic.data) // _CLOCK_SAMPLES_COUNT, 1))
+    stride = max(len(topic.data) // _CLOCK_SAMPLES_COUNT, 1)
+    clock = TopicClock(topic.name, owner or topic.name, stride)
     by_child = topic.type == TRANSFORMS or _has_several_children(topic)
+    by_vehicle_and_frame: dict[tuple[str, str], Recording] = {}
+
+    def recording_of(name: str, frame: str, child: str) -> Recording:
+        made = Recording(name, topic.name, topic.type, frame, child)
+        return by_vehicle_and_frame.setdefault((name, frame), made)
+
     for number, (received_ns, data) in enumerate(zip(topic.stamps, topic.data, strict=True)):
-        for sample in decode_samples(data, topic.type, topic.where(number + 1)):
-            name = child_vehicle(sample.child) if by_child else owner
-            clock.add(number, sample.stamp_ns, received_ns)
-            uses_header = sample.stamp_ns and config.stamps == "header"
-            stamp_ns = sample.stamp_ns if uses_header else received_ns
-            _add_sample(vehicles.setdefault(name, Rows()), sample, stamp_ns, first_row + number)
-            if sample.frame:
-                frames.setdefault(name, sample.frame)
+        row = first_row + number
+        place = topic.where(number + 1)
+        if topic.type == TRACKED:
+            header_ns, frame, objects = decode_tracked(data, place)
+            clock.add(number, header_ns, received_ns)
+            stamp_ns = header_ns if header_ns and config.stamps == "header" else received_ns
+            for tracked in objects:
+                recording = recording_of(tracked.id, frame, "")
+                state = (*tracked.position, tracked.heading, tracked.height)
+                recording.rows.fixes.append(Fix(stamp_ns, row, *state))
+                recording.rows.speeds.append(Speed(stamp_ns, row, tracked.speed))
+                recording.sizes.append(tracked.size)
+                recording.kinds[tracked.kind] += 1
+        else:
+            for sample in decode_samples(data, topic.type, place):
+                clock.add(number, sample.stamp_ns, received_ns)
+                uses_header = sample.stamp_ns and config.stamps == "header"
+                stamp_ns = sample.stamp_ns if uses_header else received_ns
+                name = child_vehicle(sample.child) if by_child else owner
+                rows = recording_of(name, sample.frame, sample.child).rows
+                if sample.position is not None:
+                    state = (*sample.position, sample.heading, sample.height)
+                    rows.fixes.append(Fix(stamp_ns, row, *state))
+                if sample.speed is not None:
+                    rows.speeds.append(Speed(stamp_ns, row, sample.speed, sample.course))
         topic.data[number] = b""  # bounds the memory
-    return clock
+    return list(by_vehicle_and_frame.values()), clock
 
 
 def _has_several_children(topic: Topic) -> bool:
@@ -378,14 +457,6 @@ def _has_several_children(topic: Topic) -> bool:
     first = enumerate(topic.data[:_FIRST_MESSAGES_COUNT], 1)
     samples = [s for k, data in first for s in decode_samples(data, topic.type, topic.where(k))]
     return len({sample.child for sample in samples}) > 1
-
-
-def _add_sample(vehicle: Rows, sample: Sample, stamp_ns: int, row: int) -> None:
-    """Add a state to a vehicle."""
-    if sample.position is not None:
-        vehicle.fixes.append((stamp_ns, row, *sample.position, sample.heading))
-    if sample.speed is not None:
-        vehicle.speeds.append((stamp_ns, row, sample.speed))
 
 
 def _read_encounters(topics: Sequence[Topic], name: str) -> RawLog:
@@ -406,73 +477,3 @@ def _read_encounters(topics: Sequence[Topic], name: str) -> RawLog:
             suffix = f"-{len(encounters) + 1}" if n_encounters > 1 else ""
             encounters.append(replace(encounter, name=f"{name}{suffix}"))
     return RawLog(name, False, (), n_rows, tuple(segments), encounters=tuple(encounters))
-
-
-@dataclass
-class _TrackedVehicle:
-    """The observations of one tracked object: states, sizes [m] and labels."""
-
-    rows: Rows = field(default_factory=Rows)
-    sizes: list[tuple[float, float]] = field(default_factory=list)
-    kinds: Counter[str] = field(default_factory=Counter)
-
-    def observations(self, name: str) -> Observations:
-        """Return the states with the median size and the most frequent label."""
-        length, width = np.median(np.array(self.sizes), axis=0).tolist()
-        kind = self.kinds.most_common(1)[0][0]
-        return replace(self.rows.observations(name), length=length, width=width, kind=kind)
-
-
-def _read_tracked(
-    topics: Sequence[Topic], odometries: Sequence[Topic], name: str, config: LogConfig
-) -> tuple[RawLog, set[str]]:
-    """Read the objects that a perception tracks, and the ego by its odometry in the same frame.
-
-    Returns:
-        The log, and the topics of odometry that were read.
-
-    Raises:
-        InputError: a message is damaged, or there are several topics or frames.
-    """
-    topic = topics[0]
-    if len(topics) > 1:
-        raise InputError(
-            f"{topic.label} has {_listing_of(topics)}; choose one with --set log.topics=…"
-        )
-    vehicles: dict[str, _TrackedVehicle] = {}
-    first_frame = ""
-    for row, (received_ns, data) in enumerate(zip(topic.stamps, topic.data, strict=True)):
-        where = topic.where(row + 1)
-        header_ns, frame, objects = decode_tracked(data, where)
-        check_fixed_frame(frame, where)
-        first_frame = frame if row == 0 else first_frame
-        if frame != first_frame:
-            raise InputError(f"{where}: frame {frame!r} differs from {first_frame!r} before")
-        stamp_ns = header_ns or received_ns
-        for tracked in objects:
-            vehicle = vehicles.setdefault(tracked.id, _TrackedVehicle())
-            vehicle.rows.fixes.append((stamp_ns, row, *tracked.position, tracked.heading))
-            vehicle.rows.speeds.append((stamp_ns, row, tracked.speed))
-            vehicle.sizes.append(tracked.size)
-            vehicle.kinds[tracked.kind] += 1
-    observations = [vehicle.observations(key) for key, vehicle in vehicles.items()]
-    notes = [f"read from {topic.name} in frame {first_frame!r}"]
-    segments = [topic.segment(0)]
-    n_rows = len(topic.data)
-    used = set()
-    for odometry in odometries:
-        rows: dict[str, Rows] = {}
-        frames: dict[str, str] = {}
-        owner = "ego" if len(odometries) == 1 else find_owners([odometry])[0]
-        _collect(odometry, owner, rows, frames, n_rows, config)
-        if frames.get(owner) != first_frame:
-            continue
-        used.add(odometry.name)
-        observations.append(rows[owner].observations(owner))
-        segments.append(odometry.segment(n_rows))
-        n_rows += len(odometry.data)
-        notes.append(
-            f"vehicle {owner} is read from {odometry.name}: positions are those of its child frame"
-        )
-    log = RawLog(name, False, (*observations,), n_rows, (*segments,), (*notes,))
-    return log, used

@@ -3,10 +3,9 @@
 
 """Topics of a bag: vehicles by name, frames and clocks."""
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
 from itertools import islice
-import math
 from pathlib import Path
 from typing import Protocol, TypeVar
 
@@ -14,12 +13,10 @@ import numpy as np
 
 from scenario_gen.bags.storage.bag import open_bag
 from scenario_gen.bags.storage.config import BagConfig
-from scenario_gen.bags.vehicles import ODOMETRY, POSE
 from scenario_gen.base.errors import InputError
 from scenario_gen.logs.config import LogConfig
 from scenario_gen.logs.growing import Span
 from scenario_gen.logs.quality import Doubt, Quantity
-from scenario_gen.logs.raw import Rows
 
 _BODY_FRAMES = ("base_link", "base_footprint", "base", "body", "chassis")
 _BETTER_NAMES = (
@@ -128,108 +125,14 @@ def _vehicle_of(topic: str) -> str:
     return namespace.rpartition("/")[2].removeprefix("vehicle_") or topic.strip("/")
 
 
-_AT_ORIGIN_M = 0.5  # within it, two vehicles cannot be at the same time
-_SAME_START_NS = 1e9  # a later vehicle may start at the origin, too
-_MAX_START_M = 60.0  # from the origin of its own frame, of a vehicle recorded since it began
-_MAX_OFF_AXIS_M = 0.5  # such a vehicle is still on the x axis
-_MAX_START_TURN_RAD = 0.1
-
-
-def base_frames(
-    label: str, vehicles: dict[str, Rows], frames: dict[str, str]
-) -> tuple[dict[str, Rows], dict[str, str]]:
-    """Return the vehicles among transforms, and their frames: those whose parents have no parent.
-
-    Raises:
-        InputError: an odometry is between a vehicle and the common frame.
-    """
-    roots = {child_vehicle(frame) for frame in frames.values()} - set(vehicles)
-    bodies = [name for name in vehicles if child_vehicle(frames[name]) in roots]
-    odometries = [name for name in bodies if name.rpartition("/")[2] == "odom"]
-    if odometries:
-        raise InputError(
-            f"{label}: {', '.join(odometries)} is between a vehicle and its common frame, and "
-            "chains of transforms are not read; record the pose of each vehicle in map, as "
-            f"{POSE} or {ODOMETRY}"
-        )
-    return {name: vehicles[name] for name in bodies}, {name: frames[name] for name in bodies}
-
-
-def check_frames(label: str, frames: Mapping[str, str], vehicles: Mapping[str, Rows]) -> list[str]:
-    """Return notes on the frames of odometries, by vehicle.
-
-    Raises:
-        InputError: a frame moves, or each odometry starts at its vehicle's start: they have no
-            common frame.
-    """
-    for vehicle, frame in frames.items():
-        check_fixed_frame(frame, f"{label}: the odometry of vehicle {vehicle}")
-    first_fixes = {
-        vehicle: min(vehicles[vehicle].fixes) for vehicle in frames if vehicles[vehicle].fixes
-    }
-    at_origin = [
-        vehicle
-        for vehicle, (_, _, x, y, _) in first_fixes.items()
-        if math.hypot(x, y) < _AT_ORIGIN_M
-    ]
-    starts_ns = [first_fixes[vehicle][0] for vehicle in at_origin]
-    start_together = len(at_origin) >= 2 and np.ptp(starts_ns) < _SAME_START_NS
-    names = ", ".join(f"{vehicle} in {frame!r}" for vehicle, frame in frames.items())
-    if start_together or len({frames[vehicle] for vehicle in at_origin}) >= 2:
-        raise InputError(
-            f"{label}: the odometries of {' and '.join(at_origin)} begin at 0, 0, each where its "
-            f"vehicle started ({names}); record positions in one frame, such as map, or choose "
-            "with --set log.topics=…"
-        )
-    local = _local_odometries(first_fixes, frames)
-    if len(local) >= 2 and len(local) == len(frames):
-        raise InputError(
-            f"{label}: the odometries of {' and '.join(local)} are in frames that begin where "
-            f"each vehicle started ({names}): each is on the x axis of its frame and faces along "
-            "it; record positions in one frame, such as map, or choose with --set log.topics=…"
-        )
-    if len(set(frames.values())) > 1:
-        return [f"the odometries name several frames ({names}); they are read as one"]
-    return []
-
-
-def _local_odometries(
-    first_fixes: Mapping[str, tuple[int, int, float, float, float]], frames: Mapping[str, str]
-) -> list[str]:
-    """Return the vehicles whose odometry counts from their start, by its frame and first fix."""
-    return [
-        vehicle
-        for vehicle, first in first_fixes.items()
-        if _began_at_origin(first) and frames[vehicle].rpartition("/")[2] == "odom"
-    ]
-
-
-def _began_at_origin(first: tuple[int, int, float, float, float]) -> bool:
-    """Return whether a first fix is near the origin, on the x axis and in its direction."""
-    _, _, x, y, heading = first
-    is_on_axis = -_AT_ORIGIN_M < x < _MAX_START_M and abs(y) < _MAX_OFF_AXIS_M
-    return is_on_axis and abs(heading) < _MAX_START_TURN_RAD
-
-
-def check_fixed_frame(frame: str, place: str) -> None:
-    """Check that positions are not in the frame of a moving vehicle.
-
-    Raises:
-        InputError: they are.
-    """
-    if frame.rpartition("/")[2].startswith("base_"):
-        raise InputError(
-            f"{place} is in frame {frame!r}, which moves with its vehicle; record it in a fixed "
-            "frame, such as map"
-        )
-
-
 LARGE_COUNT = 200_000
 """Messages above which a window is read alone; a smaller log is read whole, and cut afterwards."""
 
 _RECEPTION_SLACK_S = 10.0
 _LATEST_NS = 2**63 - 1
-_MAX_CLOCK_DIFFERENCE_S = 0.5  # of two vehicles; latencies differ by less
+_MIN_CLOCK_DIFFERENCE_S = 0.2  # of two topics; latencies differ by less
+_MAX_CLOCK_DIFFERENCE_S = 1.0  # above, the reading stops
+_MAX_RATE_ERROR_RATIO = 0.01
 _MAX_JITTER_S = 0.25  # of the latency; with more, the time of reception tells nothing
 _MIN_MESSAGES_COUNT = 5
 _SAME_RATE_RATIO = 0.1
@@ -272,13 +175,19 @@ class TopicClock:
             return np.nan
         return header / received
 
-    def ahead_s(self) -> float:
-        """Return how far the headers are ahead of the reception [s]; NaN if it varies."""
+    def ahead_s(self) -> tuple[float, float]:
+        """Return how far the headers are ahead of the reception [s] at begin and end, or NaN.
+
+        It varies with the latency, so each is the median of a tenth of the messages.
+        """
         if len(self.header) < _MIN_MESSAGES_COUNT or not self.has_stamps:
-            return np.nan
-        ahead = np.array(self.header) - np.array(self.received)
-        low, median, high = np.percentile(ahead * 1e-9, [10.0, 50.0, 90.0]).tolist()
-        return median if high - low < _MAX_JITTER_S else np.nan
+            return np.nan, np.nan
+        ahead = (np.array(self.header) - np.array(self.received)) * 1e-9
+        count = max(len(ahead) // 10, _MIN_MESSAGES_COUNT)
+        parts = ahead[:count], ahead[-count:]
+        if max(float(np.ptp(np.percentile(part, [20.0, 80.0]))) for part in parts) > _MAX_JITTER_S:
+            return np.nan, np.nan
+        return float(np.median(parts[0])), float(np.median(parts[1]))
 
 
 def stamp_factor(clocks: Sequence[TopicClock]) -> float:
@@ -292,28 +201,43 @@ def stamp_factor(clocks: Sequence[TopicClock]) -> float:
     return 1.0
 
 
-def clock_doubt(clocks: Sequence[TopicClock]) -> Doubt | None:
-    """Return a doubt if the clocks of two vehicles differ; None if they do not, or are unknown."""
-    ahead: dict[str, float] = {}
+def clock_doubts(clocks: Sequence[TopicClock]) -> list[Doubt]:
+    """Return doubts if the clocks of two topics differ, or one is not as fast as the recorder's.
+
+    Latencies differ by less than .2 s; by a second, vehicles are metres away from their places.
+    """
+    ahead = {clock.vehicle: clock.ahead_s() for clock in clocks}
+    ahead = {name: ends for name, ends in ahead.items() if np.isfinite(ends).all()}
+    doubts = []
+    if len(ahead) > 1:
+        values = np.array(list(ahead.values()))
+        difference = float(np.ptp(values, axis=0).max())
+        if difference >= _MIN_CLOCK_DIFFERENCE_S:
+            listed = ", ".join(f"{name} {begin:+.2f} s" for name, (begin, _) in ahead.items())
+            cause = f"clocks differ by {difference:.1f} s (header minus reception: {listed})"
+            doubts.append(_clock_doubt(cause, difference))
     for clock in clocks:
-        seconds = clock.ahead_s()
-        if np.isfinite(seconds):
-            ahead.setdefault(clock.vehicle, seconds)
-    if len(ahead) < 2:
-        return None
-    difference = max(ahead.values()) - min(ahead.values())
-    if difference < _MAX_CLOCK_DIFFERENCE_S:
-        return None
-    listed = ", ".join(f"{name} {seconds:+.2f} s" for name, seconds in ahead.items())
+        if abs(clock.rate - 1.0) > _MAX_RATE_ERROR_RATIO:
+            cause = (
+                f"clock of {clock.vehicle} runs {clock.rate:.3g} times as fast as the recorder's"
+            )
+            doubts.append(replace(_clock_doubt(cause, clock.rate), stops=False))
+    return doubts
+
+
+def _clock_doubt(cause: str, size: float) -> Doubt:
     return Doubt(
         "",
         0.0,
         0.0,
         Quantity.CLOCK,
-        difference,
+        size,
         "s",
-        f"the header clocks differ by {difference:.1f} s (header minus reception: {listed})",
+        f"the header clocks {cause}"
+        if cause.startswith("differ")
+        else f"the header clock {cause}",
         "--set log.stamps=received uses the recorder's clock",
+        stops=size >= _MAX_CLOCK_DIFFERENCE_S,
     )
 
 

@@ -31,8 +31,7 @@ class CleaningLimits:
         max_period_s: longest median time between fixes: a slower source does not show how a
             vehicle drives, or its unit of time is wrong.
         max_coordinate_m: a quarter of the way to the moon; no frame's origin is farther.
-        max_speed_mps: no measured speed of a road vehicle is above it (an SPMD unit sends 163.8
-            for "unknown").
+        max_speed_mps: no road vehicle is faster (an SPMD unit sends 163.8 for "unknown").
         jump_slack_m: distance by which a fix may exceed what the speeds allow: GPS noise.
         jump_slack_mps: possible error of a measured speed before a fix counts as a jump.
         moving_mps: above this speed, a vehicle changes its position between fixes.
@@ -212,6 +211,7 @@ def select(
         fix=vehicle.fix[fixes],
         fix_row=vehicle.fix_row[fixes],
         heading=vehicle.heading[fixes],
+        height=None if vehicle.height is None else vehicle.height[fixes],
     )
     if speeds is None:
         return chosen
@@ -220,6 +220,7 @@ def select(
         speed_ns=vehicle.speed_ns[speeds],
         speed=vehicle.speed[speeds],
         speed_row=vehicle.speed_row[speeds],
+        course=None if vehicle.course is None else vehicle.course[speeds],
     )
 
 

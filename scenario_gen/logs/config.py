@@ -10,7 +10,7 @@ from scenario_gen.base.errors import did_you_mean, InputError
 from scenario_gen.base.parameters import parameter, Parameters
 from scenario_gen.logs.quality import ALLOWED
 
-_POINTS = {"centre": 0.0, "front": -0.5, "rear": 0.5, "rear_axle": 0.3}
+POINTS = {"centre": 0.0, "front": -0.5, "rear": 0.5, "rear_axle": 0.3}
 """Recorded points of a vehicle, and how many lengths its centre is ahead of them.
 
 The rear overhang of a car is a fifth of its length.
@@ -176,9 +176,9 @@ def points_ahead(config: LogConfig) -> float:
         name, _, value = part.partition("=")
         if name.strip() == "point":
             point = value.strip()
-    if point not in _POINTS:
-        raise InputError(f"parameter columns: point is one of {', '.join(_POINTS)}, not {point!r}")
-    return _POINTS[point]
+    if point not in POINTS:
+        raise InputError(f"parameter columns: point is one of {', '.join(POINTS)}, not {point!r}")
+    return POINTS[point]
 
 
 def chosen_vehicles(known: Sequence[str], config: LogConfig, log: str) -> list[str]:

@@ -6,6 +6,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
+import math
 
 import numpy as np
 
@@ -125,7 +126,8 @@ def pieces_of(
         except UnreconciledError:
             smoothed.append((part, None))
             lost_s += float(part.fix_ns[-1] - part.fix_ns[0]) * 1e-9
-    ahead = points_ahead(config) * track.length
+    ahead = points_ahead(config) if math.isnan(track.ahead) else track.ahead
+    ahead *= track.length
     pieces = [
         Piece(part, _moved_ahead(motion, ahead) if ahead else motion)
         for part, motion in smoothed

@@ -252,13 +252,10 @@ def check_doubts(place: str, doubts: Sequence[Doubt], allow: str) -> None:
     """Check that no doubt stops the reading.
 
     Raises:
-        DoubtError: one does; the message names it, its remedy, and the option that continues.
+        DoubtError: one does; the message names it, and its remedy.
     """
     stopping = [doubt for doubt in doubts if doubt.stops]
     if not stopping or allow == ALLOWED:
         return
     more = f" (and {len(stopping) - 1} more doubts)" if len(stopping) > 1 else ""
-    raise DoubtError(
-        f"{place}: {stopping[0]}{more}; --set log.allow={ALLOWED} (generate, mine: --allow "
-        f"{ALLOWED}) reads it as it is"
-    )
+    raise DoubtError(f"{place}: {stopping[0]}{more}")

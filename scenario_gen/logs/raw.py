@@ -6,7 +6,9 @@
 from bisect import bisect_right
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+import math
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
@@ -43,6 +45,10 @@ class Observations:
         trailer_name: the id or the length [m] of its trailer in the log, or "".
         trailer: its trailer, as far as it is known.
         origin: latitude and longitude [degrees] of the frame of a projected `fix`.
+        height: (F,) metres, NaN where it is not recorded; None: nowhere.
+        course: (S,) directions [rad] of recorded velocity vectors; None: not recorded.
+        ahead: how far its centre is ahead of the recorded point, in vehicle lengths; NaN: as the
+            parameter `columns` says.
     """
 
     id: str
@@ -59,6 +65,9 @@ class Observations:
     trailer_name: str = ""
     trailer: Trailer | None = None
     origin: tuple[float, float] | None = None
+    height: Floats | None = None
+    course: Floats | None = None
+    ahead: float = math.nan
 
     @classmethod
     def of_rows(
@@ -99,25 +108,48 @@ class Observations:
         )
 
 
+class Fix(NamedTuple):
+    """A position in a message: stamp, row of the log, place, heading [rad] and height [m]."""
+
+    stamp_ns: int
+    row: int
+    x: float
+    y: float
+    heading: float = math.nan
+    height: float = math.nan
+
+
+class Speed(NamedTuple):
+    """A speed in a message: stamp, row of the log, m/s, and direction of the velocity [rad]."""
+
+    stamp_ns: int
+    row: int
+    speed: float
+    course: float = math.nan
+
+
 @dataclass
 class Rows:
-    """Messages of one vehicle: (stamp [ns], row, values…), as in `Observations`."""
+    """Messages of one vehicle."""
 
-    fixes: list[tuple[int, int, float, float, float]] = field(default_factory=list)
-    speeds: list[tuple[int, int, float]] = field(default_factory=list)
+    fixes: list[Fix] = field(default_factory=list)
+    speeds: list[Speed] = field(default_factory=list)
 
     def observations(self, name: str) -> Observations:
         """Return the rows as arrays."""
-        fixes = np.array([values for _, _, *values in self.fixes], dtype=float).reshape(-1, 3)
+        fixes = np.array([fix[2:] for fix in self.fixes], dtype=float).reshape(-1, 4)
+        speeds = np.array([speed[2:] for speed in self.speeds], dtype=float).reshape(-1, 2)
         return Observations(
             id=name,
-            fix_ns=np.array([stamp for stamp, *_ in self.fixes], dtype=np.int64),
+            fix_ns=np.array([fix.stamp_ns for fix in self.fixes], dtype=np.int64),
             fix=fixes[:, :2],
-            fix_row=np.array([row for _, row, *_ in self.fixes], dtype=np.int64),
+            fix_row=np.array([fix.row for fix in self.fixes], dtype=np.int64),
             heading=fixes[:, 2],
-            speed_ns=np.array([stamp for stamp, *_ in self.speeds], dtype=np.int64),
-            speed=np.array([speed for *_, speed in self.speeds], dtype=float),
-            speed_row=np.array([row for _, row, _ in self.speeds], dtype=np.int64),
+            speed_ns=np.array([speed.stamp_ns for speed in self.speeds], dtype=np.int64),
+            speed=speeds[:, 0],
+            speed_row=np.array([speed.row for speed in self.speeds], dtype=np.int64),
+            height=fixes[:, 3],
+            course=speeds[:, 1],
         )
 
 

@@ -5,11 +5,9 @@
 
 from dataclasses import replace
 
-import numpy as np
-
 from scenario_gen.logs.cleaning import CLEANING
 from scenario_gen.logs.config import LogConfig
-from scenario_gen.logs.raw import RawLog, Rows, Segment
+from scenario_gen.logs.raw import Fix, RawLog, Rows, Segment, Speed
 
 FAR_NS = 10_000_000_000  # stamps farther from the newest one are of another time, or wrong
 _MAX_RATE_HZ = 100  # messages of one kind per vehicle
@@ -56,14 +54,14 @@ class Streams:
         """Add a position [degrees]; NaN without a fix."""
         if self._counts(stamp_ns):
             fixes = self._rows.setdefault(vehicle, Rows()).fixes
-            fixes.append((stamp_ns, self._count, latitude, longitude, np.nan))
+            fixes.append(Fix(stamp_ns, self._count, latitude, longitude))
             del fixes[: -round(_MAX_RATE_HZ * self.config.max_duration)]
 
     def put_speed(self, vehicle: str, stamp_ns: int, speed: float) -> None:
         """Add a speed [m/s]."""
         if self._counts(stamp_ns):
             speeds = self._rows.setdefault(vehicle, Rows()).speeds
-            speeds.append((stamp_ns, self._count, speed))
+            speeds.append(Speed(stamp_ns, self._count, speed))
             del speeds[: -round(_MAX_RATE_HZ * self.config.max_duration)]
 
     def _counts(self, stamp_ns: int) -> bool:

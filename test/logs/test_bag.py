@@ -7,11 +7,13 @@ from dataclasses import dataclass, replace
 
 from mcap.writer import Writer as McapWriter
 import numpy as np
+import pandas as pd
 import pytest
 from rosbags.rosbag1 import Writer as Ros1Writer
 from rosbags.rosbag2 import StoragePlugin, Writer
 from rosbags.typesys import get_types_from_msg, get_typestore, Stores
 from support.log_builders import crossing, geographic, save
+from support.recording_files import tracked
 from support.synthetic_cases import fix_message, nanoseconds_to_time, twist_message
 
 from msg_conventions.tracks import encode_tracks
@@ -258,54 +260,82 @@ def test_the_level_in_which_topics_differ_names_the_vehicle(tmp_path, topic):
 
 
 @pytest.mark.parametrize(
-    ("own", "frame", "said"),
+    ("frame", "said"),
     [
-        (True, "{}/odom", r"begin at 0, 0.*a in 'a/odom', b in 'b/odom'.*one frame"),
-        (True, "odom", "begin at 0, 0"),
-        ("late", "odom", "each is on the x axis of its frame and faces along it"),
-        (False, "{}/odom", None),
-        (False, "a/base_link", "moves with its vehicle"),
+        ("{}/odom", r"nothing ties .*a in 'a/odom', b in 'b/odom'.*one frame|such as map"),
+        ("odom", "counts from where its vehicle started"),
+        ("a/base_link", "moves with its vehicle"),
     ],
 )
-def test_odometries_have_one_frame_that_stands(tmp_path, own, frame, said):
-    rows = crossing()
-    if own:
-        rows[["x_m", "y_m"]] -= rows.groupby("vehicle_id")[["x_m", "y_m"]].transform("first")
-    if own == "late":  # each drives along its own x axis, and was recorded later
-        rows = rows.assign(x_m=rows.x_m + rows.y_m + 7.0, y_m=0.0, yaw=0.0)
-    bag = write(tmp_path / "drive", odometry(rows, frame=frame))
-    if said is None:
-        assert "name several frames" in " ".join(read_log(bag).quality.notes)
-    else:
-        with pytest.raises(InputError, match=said):
-            read_log(bag)
+def test_frames_that_nothing_ties_stop(tmp_path, frame, said):
+    with pytest.raises(InputError, match=said):
+        read_log(write(tmp_path / "drive", odometry(crossing(), frame=frame)))
 
 
 def of(rows, name):
     return rows[rows.vehicle_id == name]
 
 
+def transform(stamp_s, *entries, topic="/tf"):
+    """A message of transforms (parent, child, x, y, turn)."""
+    types = STORES.types
+    made = [
+        types["geometry_msgs/msg/TransformStamped"](
+            header(round(stamp_s * 1e9), parent),
+            child,
+            types["geometry_msgs/msg/Transform"](
+                types["geometry_msgs/msg/Vector3"](x, y, 0.0),
+                types["geometry_msgs/msg/Quaternion"](
+                    x=0.0, y=0.0, z=np.sin(turn / 2.0), w=np.cos(turn / 2.0)
+                ),
+            ),
+        )
+        for parent, child, x, y, turn in entries
+    ]
+    data = STORES.serialize_cdr(types[TRANSFORMS](made), TRANSFORMS)
+    return Line(topic, TRANSFORMS, round(stamp_s * 1e9), bytes(data))
+
+
 def transforms(rows):
     """The rows as transforms of body frames in map."""
-    types = STORES.types
-    lines = []
-    for row in rows.itertuples():
-        turn = types["geometry_msgs/msg/Quaternion"](x=0.0, y=0.0, z=0.0, w=1.0)
-        entries = [
-            types["geometry_msgs/msg/TransformStamped"](
-                header(round(row.t_s * 1e9), parent),
-                child,
-                types["geometry_msgs/msg/Transform"](
-                    types["geometry_msgs/msg/Vector3"](x, y, 0.0), turn
-                ),
-            )
-            for parent, child, x, y in (
-                ("map", f"{row.vehicle_id}/base_link", row.x_m, row.y_m),
-                (f"{row.vehicle_id}/base_link", f"{row.vehicle_id}/lidar", 1.0, 0.0),
-            )
-        ]
-        data = STORES.serialize_cdr(types[TRANSFORMS](entries), TRANSFORMS)
-        lines.append(Line("/tf", TRANSFORMS, round(row.t_s * 1e9), bytes(data)))
+    return [
+        transform(
+            row.t_s,
+            ("map", f"{row.vehicle_id}/base_link", row.x_m, row.y_m, 0.0),
+            (f"{row.vehicle_id}/base_link", f"{row.vehicle_id}/lidar", 1.0, 0.0, 0.0),
+        )
+        for row in rows.itertuples()
+    ]
+
+
+TURNS = {"a": 1.0, "b": -2.0}  # of the frames in which each vehicle's odometry counts
+SHIFTS = {"a": (5.0, 7.0), "b": (-30.0, 2.0)}
+
+
+def local(rows):
+    """The rows in the odometry frame of each vehicle."""
+    yaw = rows.vehicle_id.map({"a": 0.0, "b": np.pi / 2.0}) - rows.vehicle_id.map(TURNS)
+    shift = np.array(rows.vehicle_id.map(SHIFTS).tolist())
+    place = rows[["x_m", "y_m"]].to_numpy() - shift
+    turn = -rows.vehicle_id.map(TURNS).to_numpy()
+    x = np.cos(turn) * place[:, 0] - np.sin(turn) * place[:, 1]
+    y = np.sin(turn) * place[:, 0] + np.cos(turn) * place[:, 1]
+    return rows.assign(x_m=x, y_m=y, yaw=yaw)
+
+
+def tied(stamps, topic):
+    """Transforms from map to the odometry frame of each vehicle."""
+    frames = [("map", f"{name}/odom", *SHIFTS[name], TURNS[name]) for name in "ab"]
+    return [transform(stamp, *frames, topic=topic) for stamp in stamps]
+
+
+def chain(rows):
+    """Transforms map -> odom -> base_link alone."""
+    lines = tied(rows.t_s.unique()[::5], "/tf")
+    for row in local(rows).itertuples():
+        name = row.vehicle_id
+        entry = (f"{name}/odom", f"{name}/base_link", row.x_m, row.y_m, row.yaw)
+        lines.append(transform(row.t_s, entry))
     return lines
 
 
@@ -323,6 +353,30 @@ WAYS = {  # of recording two vehicles in one bag
     "raw and filtered": lambda rows: [*odometry(rows), *odometry(rows, "/{}/odometry/filtered")],
     "transforms": transforms,
     "poses": poses,
+    "poses beside odometry": lambda rows: [*odometry(of(rows, "a")), *poses(of(rows, "b"))],
+    "static transforms to map": lambda rows: [
+        *odometry(local(rows), frame="{}/odom"),
+        *tied([999.0], "/tf_static"),
+    ],
+    "moving transforms to map": lambda rows: [
+        *odometry(local(rows), frame="{}/odom"),
+        *tied(rows.t_s.unique()[::5], "/tf"),
+    ],
+    "a chain of transforms": chain,
+    "localisation beside odometry": lambda rows: [
+        *odometry(local(rows), frame="{}/odom"),
+        *poses(rows[rows.t_s * 10 % 7 < 2.0]),
+    ],
+    "rear axles": lambda rows: [
+        *odometry(
+            rows.assign(
+                x_m=rows.x_m - 1.4 * (rows.vehicle_id == "a"),
+                y_m=rows.y_m - 1.4 * (rows.vehicle_id == "b"),
+            ),
+            child="{}/rear_axle",
+        ),
+        transform(999.0, *((f"{n}/rear_axle", f"{n}/center", 1.4, 0.0, 0.0) for n in "ab")),
+    ],
 }
 
 
@@ -363,6 +417,35 @@ def test_header_clocks_that_differ_stop_and_those_of_the_recorder_agree(tmp_path
         read_log(bag)
     (encounter,) = read_log(bag, LogConfig(stamps="received")).encounters
     np.testing.assert_allclose(encounter.position, plain.position, atol=0.02)
+
+
+@pytest.mark.parametrize(
+    ("ahead_s", "rate", "said"),
+    [(0.4, 1.0, "clocks differ by 0.4 s"), (0.0, 1.03, "runs 1.03 times as fast")],
+)
+def test_a_small_difference_of_clocks_is_said(tmp_path, ahead_s, rate, said):
+    rows = crossing()
+    other = of(rows, "b")
+    late = pd.Series((other.t_s - 1000.0) * (1.0 / rate - 1.0) - ahead_s)
+    lines = odometry(of(rows, "a"))
+    for line, by in zip(odometry(other), late, strict=True):
+        lines.append(replace(line, stamp=line.stamp + round(by * 1e9)))
+    bag = write(tmp_path / "bag", sorted(lines, key=lambda line: line.stamp))
+    assert said in " ".join(map(str, read_log(bag).doubts))
+
+
+def test_clocks_of_tracked_objects_and_the_ego_are_compared(tmp_path):
+    path, _ = tracked(tmp_path)
+    (bag,) = path.glob("*.mcap")
+    lines = [
+        Line(m.topic, m.type, m.stamp_ns, m.data) for m in read_messages(bag, lambda _: True)
+    ][1:]
+    ego = of(crossing(start=2.0), "a").assign(y_m=-2.0)
+    lines += odometry(ego, "/localization/kinematic_state", late=-2.0)
+    both = write(tmp_path / "both", sorted(lines, key=lambda line: line.stamp))
+    with pytest.raises(DoubtError, match=r"clocks differ by 2\.0 s.*--set log\.stamps=received"):
+        read_log(both)
+    assert "ego" in read_log(both, stamps="received").encounters[0].ids
 
 
 def test_the_window_of_a_large_bag_is_that_of_the_whole_one(tmp_path, monkeypatch):

@@ -147,8 +147,6 @@ def test_a_doubt_stops_with_the_option_that_reads_it_right(tmp_path, rows, optio
     rows.rename(columns=NAMES).to_csv(path, index=False)
     with pytest.raises(DoubtError, match=re.escape(option)):
         read_log(path)
-    with pytest.raises(DoubtError, match="--allow doubt"):
-        read_log(path)
     config = LogConfig(columns=option.partition("log.columns=")[2])
     (encounter,) = read_log(path, config).encounters
     start = None if encounter.start_ns > 1e18 else np.arange(0.0, 3.0, 0.04)

@@ -1,0 +1,231 @@
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""Coordinate frames of a bag: which frames transforms tie to each other, and positions in them."""
+
+from collections import Counter, defaultdict
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+import math
+
+import numpy as np
+
+from scenario_gen.base.errors import InputError
+from scenario_gen.logs.config import POINTS
+from scenario_gen.logs.quality import Doubt, Quantity
+from scenario_gen.logs.raw import Fix, Rows
+from scenario_gen.numerics import Floats, Ints, wrap_angle
+
+_MAX_DEPTH_COUNT = 20  # transforms in a chain; more are a circle
+_BODIES = ("base_link", "base_footprint", "base", "body", "chassis")
+_ODOMETRY_FRAME = "odom"
+
+
+@dataclass
+class Recording:
+    """What one topic recorded of one vehicle.
+
+    Attributes:
+        vehicle: its name.
+        topic: name of the topic.
+        type: of its messages.
+        frame: of the positions, or "".
+        child: frame whose pose it is, or "".
+        rows: positions and speeds.
+        sizes: length and width [m] of tracked objects.
+        kinds: labels of tracked objects.
+        ahead: how far the centre is ahead of the positions, in vehicle lengths; NaN if unknown.
+    """
+
+    vehicle: str
+    topic: str
+    type: str
+    frame: str
+    child: str
+    rows: Rows = field(default_factory=Rows)
+    sizes: list[tuple[float, float]] = field(default_factory=list)
+    kinds: Counter[str] = field(default_factory=Counter)
+    ahead: float = math.nan
+
+
+def by_vehicle(recordings: Iterable[Recording]) -> dict[str, list[Recording]]:
+    """Return the recordings of each vehicle."""
+    vehicles: dict[str, list[Recording]] = {}
+    for recording in recordings:
+        vehicles.setdefault(recording.vehicle, []).append(recording)
+    return vehicles
+
+
+def bodies_of(recordings: Sequence[Recording]) -> list[Recording]:
+    """Return the vehicles among transforms: frames called as bodies, else those in a root."""
+    bodies = [each for each in recordings if _last(each.child) in _BODIES]
+    bodies = bodies or [each for each in recordings if each.child.endswith(_BODIES)]
+    if bodies:
+        return bodies
+    children = {each.child.strip("/") for each in recordings}
+    return [each for each in recordings if each.frame.strip("/") not in children]
+
+
+def _last(frame: str) -> str:
+    return frame.rpartition("/")[2]
+
+
+@dataclass
+class FrameTree:
+    """Transforms from frames to their parents: (stamp [ns], x [m], y [m], turn [rad]) of each."""
+
+    transforms: dict[str, list[tuple[int, float, float, float]]] = field(
+        default_factory=lambda: defaultdict(list)
+    )
+    parents: dict[str, str] = field(default_factory=dict)
+
+    def add(self, parent: str, child: str, stamp_ns: int, x: float, y: float, turn: float) -> None:
+        """Add a transform; a second parent of a frame is ignored."""
+        child, parent = child.strip("/"), parent.strip("/")
+        if child != parent and self.parents.setdefault(child, parent) == parent:
+            self.transforms[child].append((stamp_ns, x, y, turn))
+
+    def chain(self, frame: str) -> list[str]:
+        """Return a frame and all above it; the last one is its root."""
+        frames = [frame.strip("/")]
+        while frames[-1] in self.parents and len(frames) < _MAX_DEPTH_COUNT:
+            frames.append(self.parents[frames[-1]])
+        return frames
+
+    def root(self, frame: str) -> str:
+        """Return the frame without a parent that a frame is tied to."""
+        return self.chain(frame)[-1]
+
+    def in_root(self, frame: str, fixes: Sequence[Fix]) -> list[Fix]:
+        """Return fixes in a frame as fixes in its root."""
+        poses = np.array([(fix.x, fix.y, fix.heading) for fix in fixes]).reshape(-1, 3)
+        stamps = np.array([fix.stamp_ns for fix in fixes], dtype=np.int64)
+        for child in self.chain(frame)[:-1]:
+            poses = _joined(self._at(child, stamps), poses)
+        return [
+            fix._replace(x=x, y=y, heading=heading)
+            for fix, (x, y, heading) in zip(fixes, poses.tolist(), strict=True)
+        ]
+
+    def _at(self, child: str, stamps: Ints) -> Floats:
+        """Return the transforms (F, 3) of a frame to its parent at stamps (F,)."""
+        known = sorted(self.transforms[child])
+        seconds = np.array([entry[0] - known[0][0] for entry in known]) * 1e-9
+        values = np.array([entry[1:] for entry in known])
+        values[:, 2] = np.unwrap(values[:, 2])
+        wanted = (stamps - known[0][0]) * 1e-9
+        return np.column_stack([np.interp(wanted, seconds, column) for column in values.T])
+
+    def tie(self, parent: str, child: str, in_parent: Rows, in_child: Rows) -> None:
+        """Add the transforms that two recordings of one vehicle in two frames show."""
+        of_child = FrameTree()
+        for fix in in_child.fixes:
+            of_child.add("frame", "body", fix.stamp_ns, fix.x, fix.y, fix.heading)
+        first, last = in_child.fixes[0].stamp_ns, in_child.fixes[-1].stamp_ns
+        common = [fix for fix in in_parent.fixes if first <= fix.stamp_ns <= last]
+        stamps = np.array([fix.stamp_ns for fix in common], dtype=np.int64)
+        if not len(stamps):
+            return
+        body = of_child._at("body", stamps)
+        target = np.array([(fix.x, fix.y, fix.heading) for fix in common])
+        turn = wrap_angle(target[:, 2] - body[:, 2])
+        offset = target[:, :2] - _turned(body[:, :2], turn)
+        for stamp, (x, y), angle in zip(
+            stamps.tolist(), offset.tolist(), turn.tolist(), strict=True
+        ):
+            self.add(parent, child, stamp, x, y, angle)
+
+
+def _turned(points: Floats, turn: Floats) -> Floats:
+    """Return points (F, 2) turned by angles (F,)."""
+    cosine, sine = np.cos(turn), np.sin(turn)
+    x, y = points.T
+    return np.column_stack([cosine * x - sine * y, sine * x + cosine * y])
+
+
+def _joined(outer: Floats, inner: Floats) -> Floats:
+    """Return poses (F, 3) in the parent frame of poses `inner` (F, 3) in a frame at `outer`."""
+    place = outer[:, :2] + _turned(inner[:, :2], outer[:, 2])
+    return np.column_stack([place, outer[:, 2] + inner[:, 2]])
+
+
+def moved(fixes: Iterable[Fix], offset: tuple[float, float]) -> list[Fix]:
+    """Return the fixes of a point that is at `offset` [m, ahead and left] of the recorded one."""
+    result = []
+    for fix in fixes:
+        ahead, left = offset
+        cosine, sine = np.cos(fix.heading), np.sin(fix.heading)
+        x = float(fix.x + cosine * ahead - sine * left)
+        y = float(fix.y + sine * ahead + cosine * left)
+        result.append(fix._replace(x=x, y=y))
+    return result
+
+
+def in_one_frame(
+    label: str, recordings: Sequence[Recording], tree: FrameTree
+) -> tuple[list[Recording], list[str], list[Doubt]]:
+    """Return one position of each vehicle, in the frame that transforms or other poses tie it to.
+
+    Returns:
+        The recordings, notes, and a doubt if nothing ties the frames of two vehicles.
+
+    Raises:
+        InputError: a frame moves with its vehicle.
+    """
+    used: list[Recording] = []
+    notes: list[str] = []
+    for vehicle, group in by_vehicle(recordings).items():
+        places = sorted((each for each in group if each.rows.fixes), key=_density, reverse=True)
+        used += [each for each in group if not each.rows.fixes]
+        for other in places[1:]:
+            best = places[0]
+            if best.frame and other.frame and tree.root(best.frame) != tree.root(other.frame):
+                notes.append(
+                    f"vehicle {vehicle}: {other.topic} places {best.topic} in {other.frame!r}"
+                )
+                parent, child = tree.root(other.frame), tree.root(best.frame)
+                tree.tie(parent, child, *(_rooted(each, tree) for each in (other, best)))
+            else:
+                notes.append(f"vehicle {vehicle} is read from {best.topic}, not {other.topic}")
+        used += places[:1]
+    centres = {parent: child for child, parent in tree.parents.items() if "cent" in _last(child)}
+    for recording in used:
+        child = recording.child.strip("/")
+        if child in centres:
+            x, y = tree.transforms[centres[child]][0][1:3]
+            recording.rows.fixes = moved(recording.rows.fixes, (x, y))
+            recording.ahead = 0.0
+        elif "rear_axle" in child:
+            recording.ahead = POINTS["rear_axle"]
+            notes.append(f"vehicle {recording.vehicle}: positions are those of its rear axle")
+        if recording.frame and recording.rows.fixes:
+            recording.rows = _rooted(recording, tree)
+            recording.frame = tree.root(recording.frame)
+            if _last(recording.frame).startswith("base_"):
+                raise InputError(
+                    f"{label}, topic {recording.topic}: vehicle {recording.vehicle} is in frame "
+                    f"{recording.frame!r}, which moves with its vehicle; record it in a fixed "
+                    "frame, such as map"
+                )
+    return used, notes, _frame_doubts({r.vehicle: r.frame for r in used if r.rows.fixes})
+
+
+def _density(recording: Recording) -> int:
+    return len(recording.rows.fixes)
+
+
+def _rooted(recording: Recording, tree: FrameTree) -> Rows:
+    return Rows(tree.in_root(recording.frame, recording.rows.fixes), recording.rows.speeds)
+
+
+def _frame_doubts(frames: Mapping[str, str]) -> list[Doubt]:
+    """Return a doubt if vehicles have no common frame."""
+    names = sorted(set(frames.values()))
+    if len(frames) < 2 or (len(names) == 1 and _last(names[0]) != _ODOMETRY_FRAME):
+        return []
+    listed = ", ".join(f"{vehicle} in {frame!r}" for vehicle, frame in frames.items())
+    cause = f"nothing ties the frames of the vehicles ({listed})"
+    if len(names) == 1:
+        cause = f"an odometry counts from where its vehicle started ({listed})"
+    remedy = "record /tf and /tf_static too, or positions in one frame such as map"
+    return [Doubt("", 0.0, 0.0, Quantity.FRAME, float(len(names)), "", cause, remedy)]
