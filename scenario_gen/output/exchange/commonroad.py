@@ -200,16 +200,11 @@ def _signs(network: LaneNetwork, scenario: Scenario) -> list[_Sign]:
         if lane.speed_limit > 0.0:
             limits.setdefault(lane.speed_limit, set()).add(k)
     lights = scenario.facts.lights
-    signs = [
-        (
-            frozenset(rule.lanes),
-            SIGN_IDS.get(rule.kind, ""),
-            "",
-            rule.line,
-            light_of(rule, network, lights),
-        )
-        for rule in network.rules
-    ]
+    signs = []
+    for rule in network.rules:
+        light = light_of(rule, network, lights)
+        line = light.line if light is not None and len(rule.line) else rule.line
+        signs.append((frozenset(rule.lanes), SIGN_IDS.get(rule.kind, ""), "", line, light))
     signs += [
         (frozenset(lanes), MAX_SPEED, number(limit), np.zeros((0, 2)), None)
         for limit, lanes in limits.items()
@@ -228,7 +223,8 @@ def _sign(root: Element, sign: _Sign, scenario: Scenario) -> None:
         if sign.value:
             add(element, "additionalValue", sign.value)
         return
-    cycle = add(add(root, "trafficLight", id=sign.id), "cycle")
+    light = add(root, "trafficLight", id=sign.id)
+    cycle = add(light, "cycle")
     phases = [(SignalState.OFF, 1)]
     if sign.light is not None:
         phases = runs_of_states(sign.light.schedule, scenario)
@@ -236,6 +232,8 @@ def _sign(root: Element, sign: _Sign, scenario: Scenario) -> None:
         element = add(cycle, "cycleElement")
         add(element, "duration", steps)
         add(element, "color", _COLOURS.get(state, "inactive"))
+    if len(sign.line):
+        _point(add(light, "position"), *sign.line.mean(axis=0).tolist())
 
 
 def _lanelet(root: Element, lane_map: LaneMap, k: int, signs: Sequence[_Sign]) -> None:
@@ -257,9 +255,12 @@ def _lanelet(root: Element, lane_map: LaneMap, k: int, signs: Sequence[_Sign]) -
     at_line = [sign for sign in signs if len(sign.line)]
     if at_line:
         stop = add(lanelet, "stopLine")
-        for x, y in at_line[0].line[[0, -1]].tolist():
+        line = at_line[-1].line  # lights are last, and the format has one line
+        for x, y in line[[0, -1]].tolist():
             _point(stop, x, y)
         add(stop, "lineMarking", "solid")
+        for sign in [sign for sign in at_line if np.array_equal(sign.line, line)]:
+            add(stop, sign.tag, ref=sign.id)
     add(lanelet, "laneletType", "unknown" if lane_map.is_derived(k) else _lanelet_type(lane))
     if lane_map.turn(k):
         add(lanelet, "laneletType", "intersection")

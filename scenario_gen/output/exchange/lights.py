@@ -18,10 +18,16 @@ from scenario_gen.types import (
 
 
 def light_of(
-    rule: TrafficRule, network: LaneNetwork, lights: Sequence[TrafficLight]
+    rule: TrafficRule,
+    network: LaneNetwork,
+    lights: Sequence[TrafficLight],
+    lanes: Sequence[int] = (),
 ) -> TrafficLight | None:
-    """Return what the light of a rule shows in a scenario; None if no state is known."""
-    ids = {network.lanes[k].id for k in rule.lanes}
+    """Return what the light of a rule shows in a scenario; None if no state is known.
+
+    Some of the lanes of a rule may have a light of their own.
+    """
+    ids = {network.lanes[k].id for k in lanes or rule.lanes}
     for light in lights:
         is_known = any(state is not SignalState.UNKNOWN for state in light.schedule.states)
         if light.id == rule.id and ids & set(light.lanes) and is_known:

@@ -36,6 +36,7 @@ from scenario_gen.types import CARS, DRIVERS, LaneNetwork, OBSTACLE_HEIGHT_M, Ru
 _SIGNALS = {**SIGN_IDS, RuleKind.TRAFFIC_LIGHT: "1000001"}
 """Types of signals; that of a light is OpenDRIVE's."""
 STRAIGHT_TOLERANCE_RAD = 1e-7  # heading change of a straight piece
+STOP_LINE_M = 0.5  # thickness
 LINEAR_TOLERANCE_M = 1e-5  # deviation of a width or an offset from its linear piece
 _LANE_TYPES = {  # with the drivers that may use them
     "sidewalk": frozenset[str](),
@@ -116,7 +117,8 @@ def _road(root: Element, lane_map: LaneMap, network: RoadNetwork, n: int) -> Non
     for geometry in _merged(strip.reference, pieces, station):
         _geometry(view, geometry)
     _lane_section(road, network, strip, station)
-    if objects := [*_crosswalks(network, n, station), *_obstacles(network, n, station)]:
+    lines = _stop_lines(network, n, station)
+    if objects := [*_crosswalks(network, n, station), *_obstacles(network, n, station), *lines]:
         add(road, "objects").extend(objects)
     _signals(road, lane_map.network, strip, station, network.places)
 
@@ -217,6 +219,27 @@ def _obstacles(network: RoadNetwork, n: int, station: Floats) -> Iterator[Elemen
             width=obstacle.width,
             height=OBSTACLE_HEIGHT_M,
         )
+
+
+def _stop_lines(network: RoadNetwork, n: int, station: Floats) -> Iterator[Element]:
+    """Yield the stop lines of the signs and lights of a road as objects."""
+    strip = network.strips[n]
+    members = {k for side in strip.lanes.values() for k in side}
+    curve = Curve(strip.reference)
+    first = len(network.network.lanes) + len(network.network.obstacles)
+    for number, rule in enumerate(network.network.rules):
+        if len(rule.line) and members & set(rule.lanes):
+            along, left = curve.project(rule.line[[0, -1]])
+            size = {"length": STOP_LINE_M, "width": abs(float(left[1] - left[0])), "height": 0.0}
+            yield _object(
+                first + number,
+                "roadMark",
+                "stop line",
+                s=float(np.interp(along.mean(), curve.station, station)),
+                t=float(left.mean()),
+                hdg=0.0,
+                **size,
+            )
 
 
 def _object(number: int, kind: str, name: str, **attributes: float) -> Element:

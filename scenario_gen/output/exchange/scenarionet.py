@@ -19,6 +19,7 @@ from typing import Any
 
 import numpy as np
 
+from scenario_gen.numerics.curve import Curve
 from scenario_gen.numerics.plane import edge_lengths, unit
 from scenario_gen.output.exchange.cases import Case, evenly_sampled, Exported
 from scenario_gen.output.exchange.config import ExportConfig
@@ -111,16 +112,19 @@ def _lights(lane_map: LaneMap, motion: Scenario) -> dict[str, dict[str, Any]]:
     """Return the states of the lights at each step, by the id of their lane in the file."""
     network, lights = lane_map.network, {}
     for rule in network.rules:
-        light = light_of(rule, network, motion.facts.lights)
-        for k in rule.lanes if light is not None else ():
-            assert light is not None
+        for k in rule.lanes:
+            light = light_of(rule, network, motion.facts.lights, (k,))
+            if light is None:
+                continue
             states = states_at(light.schedule, motion.time)
+            centre = Curve.through(network.lanes[k].centre)
+            at, _ = centre.project(light.line.mean(axis=0)[None])
             lane = str(k + 1)
             lights[lane] = {
                 "type": "TRAFFIC_LIGHT",
                 "state": {"object_state": [_STATES.get(state, _UNKNOWN) for state in states]},
                 "lane": lane,
-                "stop_point": np.array([*network.lanes[k].centre[-1], 0.0], dtype=np.float32),
+                "stop_point": np.array([*centre.at(at)[0, :2], 0.0], dtype=np.float32),
                 "metadata": {
                     "type": "TRAFFIC_LIGHT",
                     "object_id": light.id,
