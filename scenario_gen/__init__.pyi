@@ -55,6 +55,7 @@ from scenario_gen.pipeline import (
     generate_outcomes as generate_outcomes,
 )
 from scenario_gen.roads import build_road as build_road, RoadConfig as RoadConfig
+from scenario_gen.situation import Situation as Situation
 from scenario_gen.types.encounter import Encounter as Encounter
 from scenario_gen.types.evaluation import Evaluation as Evaluation
 from scenario_gen.types.fit import Fit as Fit

@@ -41,7 +41,7 @@ __all__ = ["PipelineConfig", "generate", "generate_outcomes"]
 
 def generate(
     encounter: Templates,
-    road: Road | Path | str = "",
+    road: Road | Path | str = AUTO,
     config: PipelineConfig | Mapping[str, Any] = PipelineConfig(),
     *,
     count: int = 50,
@@ -56,8 +56,9 @@ def generate(
         encounter: the template: an encounter, or a log with one encounter (a path, a DataFrame, or
             what `read_log` returns). Further encounters in a list show how encounters differ:
             scenarios that are usual among them are kept.
-        road: the target: a road, a name or path for `build_road`, or "auto": the first built-in
-            road that is suitable. A template is mirrored on a map with the other side of traffic.
+        road: the target: a road, a name or path for `build_road`, or "auto" (the default):
+            the first built-in road that is suitable. A template is mirrored on a map with the
+            other side of traffic.
         config: the parameters of every stage, or a mapping like a parameter file.
         count: valid scenarios wanted.
         seed: of all randomness; None draws one, which the result has.
@@ -133,7 +134,7 @@ def _evaluated(result: GenerationResult, config: EvaluationConfig) -> Evaluation
 
 def generate_outcomes(
     encounter: Templates,
-    road: Road | Path | str,
+    road: Road | Path | str = AUTO,
     config: PipelineConfig | Mapping[str, Any] = PipelineConfig(),
     *,
     count: int = 50,

@@ -28,14 +28,19 @@ BAG, REPORT, FIGURES, TABLE = "bag", "report.html", "evaluation.json", "evaluati
 GENERATED, EVALUATED = Kind("generated"), Kind("evaluated")
 
 
-def report(target: Path | str, *cases: GenerationResult, title: str = "") -> Path:
+def report(
+    target: Path | str | GenerationResult, *cases: GenerationResult, title: str = ""
+) -> Path:
     """Write bag, report and figures of results to a folder, like `scenario-gen generate`.
 
-    A target with the suffix .html becomes the page alone. Returns the path of the page.
+    A target with the suffix .html becomes the page alone; without a target the folder is
+    out/report. Returns the path of the page.
 
     Raises:
         InputError: the folder has other contents, or the page exists.
     """
+    if isinstance(target, GenerationResult):
+        return report(Path("out/report"), target, *cases, title=title)
     target, title = Path(target), title or cases[0].title
     if target.suffix.lower() == ".html":
         with _new_file(target) as page:

@@ -100,6 +100,23 @@ class Encounter(Motion):
         return f"encounter {self.name}"
 
     @property
+    def reactions(self) -> tuple[str, ...]:
+        """Who reacts to whom, in sentences."""
+        import scenario_gen
+
+        return scenario_gen.Situation.of(self).reactions.sentences(self.vehicles)
+
+    @property
+    def kind(self) -> str:
+        """What its first two vehicles do, e.g. "left_turn", a value of `EncounterKind`.
+
+        `scenario_gen.Situation.of(encounter).kind(a, b)` returns the kind of any two.
+        """
+        import scenario_gen
+
+        return str(scenario_gen.Situation.of(self).kind(0, 1))
+
+    @property
     def decision(self) -> Decision | None:
         """The decision with which it was made; None unless its source is `Decided`."""
         return self.source.decision if isinstance(self.source, Decided) else None

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 import json
 import math
 import re
-from typing import Literal
+from typing import Literal, TYPE_CHECKING
 
 from scenario_gen.base.errors import printable
 from scenario_gen.types.facts import Facts
@@ -17,6 +17,9 @@ from scenario_gen.types.html import html_list, html_table
 from scenario_gen.types.notes import Note
 from scenario_gen.types.scenario import Cause, Scenario, ScenarioSet, Verdict
 from scenario_gen.types.target import Pair
+
+if TYPE_CHECKING:
+    from pandas import DataFrame
 
 RECORDING = "recording"
 """The recorded encounter itself."""
@@ -146,6 +149,15 @@ class Evaluation:
         """Return one figure; NaN if there is none."""
         entry = self.row(row)
         return entry.values[metric].value if entry and metric in entry.values else math.nan
+
+    def to_dataframe(self) -> "DataFrame":
+        """Return a table: a row for each metric, a column for each row's estimate."""
+        import pandas as pd
+
+        rows = {
+            row.name: {m.id: self.value(row.name, m.id) for m in self.metrics} for row in self.rows
+        }
+        return pd.DataFrame(rows)
 
     def to_json(self, indent: int | None = 2) -> str:
         """Return JSON; what is not a number is null, figures have six significant digits."""

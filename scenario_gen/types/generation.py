@@ -268,6 +268,11 @@ class GenerationResult:
         return f"{self.encounter.name} on {self.road.name}" if self.road else self.encounter.name
 
     @property
+    def reactions(self) -> tuple[str, ...]:
+        """Who reacts to whom, in sentences."""
+        return tuple(self.reacting["sentences"])
+
+    @property
     def reacting(self) -> dict[str, Any]:
         """Who reacts to whom in the template, and what the scenarios keep of it, as a document."""
         graph, vehicles = self.generated.graph, self.encounter.vehicles

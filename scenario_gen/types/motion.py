@@ -16,7 +16,7 @@ from scenario_gen.numerics import Bools, canonical_heading, Floats, freeze, froz
 from scenario_gen.numerics.boxes import corners
 from scenario_gen.numerics.hermite import fill_states
 from scenario_gen.numerics.rounding import ROUNDING_S
-from scenario_gen.types.vehicle import trailer_poses, Vehicle
+from scenario_gen.types.vehicle import trailer_poses, Vehicle, Vehicles
 
 ALWAYS: Ints = sealed(
     np.zeros((0, 2), dtype=np.int64)
@@ -176,6 +176,7 @@ class Motion:
         present = canonical_presence(self.present, len(self.vehicles), len(self.time), self.title)
         freeze(
             self,
+            vehicles=Vehicles(self.vehicles),
             time=frozen(np.round(self.time, 9)),
             position=held(frozen(self.position), present),
             heading=held(canonical_heading(self.heading), present),

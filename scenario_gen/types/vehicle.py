@@ -6,10 +6,11 @@
 from collections.abc import Iterable
 from dataclasses import dataclass
 import math
+from typing import Any
 
 import numpy as np
 
-from scenario_gen.base.errors import InputError
+from scenario_gen.base.errors import did_you_mean, InputError
 from scenario_gen.base.road_users import (
     CAR,
     OTHER,
@@ -143,3 +144,28 @@ def trailer_poses(poses: Floats, trailer: Trailer, first: float | None = None) -
         yaw.append(yaw[-1] + angle - 2.0 * math.atan(math.tan(0.5 * angle) * share))
     heading = np.array(yaw)
     return np.column_stack([shifted(hitch, heading, -trailer.reach), heading])
+
+
+class Vehicles(tuple[Vehicle, ...]):
+    """The vehicles of a motion, by index or by id.
+
+    Example:
+        >>> Vehicles([Vehicle("12", 12.0, 2.5), Vehicle("7", 4.5, 1.8)])["7"].length
+        4.5
+    """
+
+    __slots__ = ()
+
+    def __getitem__(self, key: Any) -> Any:
+        """Return the vehicle with an id, or as a tuple does.
+
+        Raises:
+            InputError: no vehicle has this id.
+        """
+        if not isinstance(key, str):
+            return super().__getitem__(key)
+        for vehicle in self:
+            if vehicle.id == key:
+                return vehicle
+        ids = [vehicle.id for vehicle in self]
+        raise InputError(f"no vehicle {key}; there are {', '.join(ids)}{did_you_mean(key, ids)}")

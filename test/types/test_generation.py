@@ -10,6 +10,7 @@ import pytest
 from support.bag_examples import hand_made_run
 
 from scenario_gen import InputError, load
+from scenario_gen.situation import EncounterKind
 from scenario_gen.types import REPLAY, Vehicle, WITH
 from scenario_gen.types.evaluation import Evaluation, Interval, Metric, Row
 from scenario_gen.types.generation import GenerationResult
@@ -94,3 +95,18 @@ def test_a_result_is_exported_for_other_software(tmp_path):
     assert len(list(folder.glob("*.xosc"))) == 5
     with pytest.raises(InputError, match="choose one of commonroad"):
         hand_made_run().export(tmp_path / "other", "oops")
+
+
+def test_what_drivers_do_is_an_attribute_and_vehicles_have_ids():
+    result = hand_made_run()
+    encounter = result.encounter
+    assert encounter.reactions and encounter.kind in list(EncounterKind)
+    assert result.reactions == tuple(result.reacting["sentences"])
+    first = encounter.vehicles[0]
+    assert encounter.vehicles[first.id] is first
+    with pytest.raises(InputError, match=f"no vehicle x; there are {first.id}"):
+        encounter.vehicles["x"]
+    table = evaluated(**{WITH: (0.1, 0.2)})
+    metrics = tuple(Metric(name, name, "", "", "", "") for name in ("e_position", "e_speed"))
+    figures = replace(table.evaluation, metrics=metrics).to_dataframe()
+    assert figures.loc["e_speed", WITH] == 0.2
