@@ -15,6 +15,7 @@ REMOVED = {
     "--again": "`scenario-gen batch --bags all` keeps the scenarios in bags",
     "--compare": "`python -m benchmarks evaluation` compares with other changepoints",
     "compare": "the two evaluation.json have the figures and their intervals",
+    "validate": "`scenario-gen evaluate` checks every scenario of a bag, then measures it",
     "parameters": "`scenario-gen --parameters` lists them",
     "compact": "`scenario-gen batch … --compact` merges the tables of a batch",
     "doctor": "`ros2 doctor` and `pip check` examine an installation",

@@ -8,7 +8,7 @@ from contextlib import nullcontext
 from functools import partial
 import json
 from pathlib import Path
-from typing import Annotated, TYPE_CHECKING
+from typing import Annotated, Any, TYPE_CHECKING
 
 import typer
 
@@ -34,7 +34,7 @@ from scenario_gen.cli.output import (
 if TYPE_CHECKING:
     from scenario_gen.bags.storage.config import BagConfig
     from scenario_gen.output.exchange.config import ExportConfig
-    from scenario_gen.output.review.validation import Validation
+    from scenario_gen.output.review.evaluation import BagEvaluation
 
 commands = Commands("Look at a bag of scenarios")
 
@@ -42,10 +42,7 @@ commands = Commands("Look at a bag of scenarios")
 @commands.command()
 def evaluate(
     bag: Annotated[
-        Path,
-        typer.Argument(
-            help="A bag with the topics `tracks` and `scenarios`, from this suite or another."
-        ),
+        Path, typer.Argument(help="A bag with the topic `scenarios`, from this suite or another.")
     ],
     out: Annotated[
         Path | None,
@@ -54,29 +51,62 @@ def evaluate(
     assignments: SetOption = None,
     parameter_file: ParametersOption = None,
 ) -> None:
-    """Measure the scenarios of a bag against its recorded tracks, and check them again."""
+    """Check the scenarios of a bag in continuous time, and measure them against its tracks.
+
+    Exit code 1: a scenario is invalid.
+    """
     from rich.markdown import Markdown
 
     from scenario_gen.base.folders import replaced_folder
     from scenario_gen.output.results import as_table, EVALUATED, write_evaluation
-    from scenario_gen.output.review.evaluation import bag_results
+    from scenario_gen.output.review.evaluation import evaluate_bag, measured
 
     config = configured(parameter_file, assignments)
     warn_of_metadata(bag)
     inputs = [bag, *([parameter_file] if parameter_file else ())]
     with nullcontext() if out is None else replaced_folder(out, EVALUATED, inputs) as folder:
         with progress() as advance:
-            cases = bag_results(
-                bag,
-                config.evaluation,
-                config.limits,
-                bag=config.bag,
-                progress=partial(advance, "scenarios"),
-            )
+            evaluations = evaluate_bag(bag, config, progress=partial(advance, "scenarios"))
+        cases = [each.result for each in evaluations if each.result]
         if folder is not None:
-            write_evaluation(folder, cases, bag, config.bag)
-    emit_json(cases=[json.loads(case.evaluation.to_json()) for case in cases], folder=out)
+            write_evaluation(folder, measured(evaluations, bag), bag, config.bag)
+    is_valid = all(each.valid == len(each.verdicts) for each in evaluations)
+    emit_json(
+        valid=is_valid,
+        namespaces=[_checks(each) for each in evaluations],
+        cases=[json.loads(case.evaluation.to_json()) for case in cases],
+        folder=out,
+    )
+    for each in evaluations:
+        _print_checks(each)
     print_(Markdown(printable_lines(as_table(cases))), wrap=True)
+    if not is_valid:
+        raise typer.Exit(1)
+
+
+def _checks(evaluation: "BagEvaluation") -> dict[str, Any]:
+    """Return the checks of a namespace as a document."""
+    return {
+        "namespace": evaluation.namespace,
+        "scenarios": len(evaluation.verdicts),
+        "valid": evaluation.valid,
+        "causes": evaluation.causes,
+        "notes": [str(note) for note in evaluation.notes],
+    }
+
+
+def _print_checks(evaluation: "BagEvaluation") -> None:
+    """Print how many scenarios of a namespace are valid, and the violations by cause."""
+    name = f"{evaluation.namespace}: " if evaluation.namespace else ""
+    print_(f"{name}{evaluation.valid} of {len(evaluation.verdicts)} scenarios are valid")
+    rows = [
+        (cause, str(len(messages)), *map(str, next(iter(messages.items()))))
+        for cause, messages in evaluation.causes.items()
+    ]
+    if rows:
+        print_table(("cause", "scenarios", "first", "violation"), rows)
+    if evaluation.result is None:
+        print_(*evaluation.notes, sep="\n")
 
 
 @commands.command()
@@ -110,54 +140,6 @@ def report(
         page = folder / REPORT
     emit_json(report=page, opened=browse and open_page(page))
     print_(f"report: {page}")
-
-
-@commands.command()
-def validate(
-    bag: Annotated[
-        Path, typer.Argument(help="A bag with the topic `scenarios`, from this suite or another.")
-    ],
-    assignments: SetOption = None,
-    parameter_file: ParametersOption = None,
-) -> None:
-    """Check every scenario of a bag in continuous time. Exit code 1: a scenario is invalid."""
-    from scenario_gen.output.review.validation import validate_bag
-
-    config = configured(parameter_file, assignments)
-    warn_of_metadata(bag)
-    with progress() as advance:
-        validations = validate_bag(
-            bag, config.limits, config.bag, progress=partial(advance, "scenarios")
-        )
-    is_valid = not any(validation.invalid for validation in validations)
-    emit_json(valid=is_valid, namespaces=validations)
-    for validation in validations:
-        _print_validation(validation)
-    if not is_valid:
-        raise typer.Exit(1)
-
-
-def _print_validation(validation: "Validation") -> None:
-    """Print the violations, the kept reactions and the skipped checks of a namespace."""
-    from scenario_gen.bags.recordings.read import NO_ENTRY
-
-    valid = validation.scenarios - validation.invalid
-    name = f"{validation.namespace}: " if validation.namespace else ""
-    print_(f"{name}{valid} of {validation.scenarios} scenarios are valid")
-    if validation.causes:
-        rows = [
-            (cause, str(entry.count), str(entry.scenario), entry.message)
-            for cause, entry in validation.causes.items()
-        ]
-        print_table(("cause", "scenarios", "first", "violation"), rows)
-    if validation.unaccounted:
-        print_(f"  {validation.unaccounted} without an entry: {NO_ENTRY}")
-    for message, count in validation.proven.items():
-        print_(f"  {message}: {count} scenarios")
-    for message in validation.missing:
-        print_(f"  {message}")
-    for message, count in validation.left_out.items():
-        print_(f"  not checked in {count}: {message}")
 
 
 def _export_configs(

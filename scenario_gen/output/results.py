@@ -147,7 +147,10 @@ def _figures(case: GenerationResult) -> dict[str, Any]:
 
 
 def write_evaluation(
-    folder: Path, cases: Sequence[GenerationResult], bag: Path, config: BagConfig
+    folder: Path,
+    cases: Sequence[GenerationResult],
+    bag: Path,
+    config: BagConfig = BagConfig(),
 ) -> None:
     """Write report, figures and table about a bag to a `folder` from `replaced_folder`.
 
@@ -169,13 +172,17 @@ def write_evaluation(
 
 
 def as_table(cases: Sequence[GenerationResult]) -> str:
-    """Return the figures of all cases as Markdown."""
-    return "\n\n".join(f"{case.evaluation.to_markdown()}\n{_reactions(case)}" for case in cases)
+    """Return the figures of all cases, with notes, as Markdown."""
+    return "\n\n".join(map(_table, cases))
 
 
-def _reactions(case: GenerationResult) -> str:
+def _table(case: GenerationResult) -> str:
+    notes = [f"- {as_markdown(str(note))}" for note in case.generated.adaptations]
+    lines = [case.evaluation.to_markdown(), *notes]
     sentences = [f"- {as_markdown(line)}" for line in case.reacting["sentences"]]
-    return "\n".join(["Who reacts to whom in the recording:", "", *sentences]) if sentences else ""
+    if sentences:
+        lines += ["", "Who reacts to whom in the recording:", "", *sentences]
+    return "\n".join(lines)
 
 
 def namespaces(count: int) -> list[str]:

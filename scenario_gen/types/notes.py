@@ -125,14 +125,9 @@ class NoteKind(Enum):
     ONE_VEHICLE = "one vehicle is left: no pair to measure"
     E_UNDEFINED = "E for {quantity} is undefined: the recording's matrices are constant"
     CONFLICTS_VANISHED = "{vanished:.3g} of {total:.0f} recorded conflict(s) vanish on average"
-    BAG_MEASURED = (
-        "all scenarios in the bag are shown and measured, valid or not; "
-        "their start and end states were not checked"
-    )
-    BAG_WITHOUT_MAP = "no map in the bag: not checked whether vehicles leave the road"
-    BAG_WITHOUT_CHANGEPOINTS = (
-        "no changepoints in the bag: the recording counts as one primitive, waits were not checked"
-    )
+    BAG_MEASURED = "all scenarios in the bag are shown and measured, valid or not"
+    NOT_MEASURED = "not measured: {reason}"
+    NOT_CHECKED = "not checked in {count} scenarios: {check}"
     UNACCOUNTED = "{count} of {total} scenarios are unaccounted for: {reason}"
 
 

@@ -154,6 +154,8 @@ class Cause(StrEnum):
     TOO_SHORT = "too_short"  # less than 5 s, or than half of a vehicle's recorded distance
     NOT_FINITE = "not_finite"
     OUT_OF_RANGE = "out_of_range"  # not in the requested range; it was not checked
+    UNUSABLE = "unusable_message"  # damaged, or in a frame other than the road's
+    ALTERED = "altered_message"  # its bytes differ from those in its entry on scenarios/info
     UNUSUAL = "unusual"  # valid, but rarer among encounters of its kind than the template
 
 

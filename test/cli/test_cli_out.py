@@ -112,7 +112,7 @@ def test_names_are_shown_letter_by_letter(run, tmp_path):
     bag = (tmp_path / out / "bag").rename(tmp_path / NAME.replace("[/]", ""))
     more = (
         ("evaluate", bag, "--out", "figures"),
-        ("validate", bag),
+        ("evaluate", bag),
         ("evaluate", log),
         ("generate", NAME, "--road", "straight"),
     )

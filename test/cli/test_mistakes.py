@@ -111,12 +111,11 @@ MISTAKES = [  # words of the command line, and what the message says: what is wr
         (*DRIVE, "--against", "bad.json"),
         "bad.json (must be a drives.json from `scenario-gen drive`): not JSON",
     ),
-    (("validate", "none"), "none does not exist; name a folder"),
-    (("validate", "my log ü.csv"), "is not a bag; name a folder"),
+    (("evaluate", "none"), "none does not exist; name a folder"),
+    (("evaluate", "my log ü.csv"), "is not a bag; name a folder"),
     *(
         ((name, "cut.mcap", *more), "cut.mcap")
         for name, *more in (
-            ("validate",),
             ("evaluate",),
             ("reindex",),
             ("generate", *ROAD),

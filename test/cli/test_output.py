@@ -36,8 +36,7 @@ def one_object(text):
 @pytest.mark.parametrize(
     ("words", "key", "value"),
     [
-        (("validate", "{bag}"), "valid", True),
-        (("evaluate", "{bag}", "--set", "evaluation.resamples=20"), "folder", None),
+        (("evaluate", "{bag}"), "valid", True),
         (("export", "{bag}", "--to", "commonroad", "--out", "written"), "scenarios", 2),
         (("reindex", "{bag}", "--out", "saved"), "bag", "saved"),
         (("report", "{bag}"), "opened", False),
@@ -60,7 +59,7 @@ def test_json_is_one_object_and_messages_go_to_standard_error(ran, made, words, 
 
 @pytest.mark.parametrize(
     ("words", "said"),
-    [(("validate", "none"), "none does not exist"), (("validate",), "Missing argument")],
+    [(("evaluate", "none"), "none does not exist"), (("evaluate",), "Missing argument")],
 )
 def test_json_of_an_error_has_it(ran, words, said):
     code, out, err = ran(*words, "--json")
@@ -73,9 +72,9 @@ def test_json_of_an_error_has_it(ran, words, said):
 
 
 def test_quiet_prints_errors_only(ran, made):
-    assert ran("validate", made / "bag", "--quiet") == (0, "", "")
-    assert ran("-q", "validate", made / "bag") == (0, "", "")
-    code, out, err = ran("validate", "none", "-q")
+    assert ran("evaluate", made / "bag", "--quiet") == (0, "", "")
+    assert ran("-q", "evaluate", made / "bag") == (0, "", "")
+    code, out, err = ran("evaluate", "none", "-q")
     assert (code, out) == (2, "") and "does not exist" in err
 
 

@@ -32,4 +32,4 @@ def test_what_was_removed_names_its_replacement(name, tmp_path):
 
 def test_a_folder_with_the_name_of_a_removed_command_is_no_command():
     with pytest.raises(InputError, match="library"):
-        run(["validate", "library"])
+        run(["evaluate", "library"])

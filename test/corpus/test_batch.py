@@ -283,7 +283,7 @@ def test_a_batch_of_two_processes_that_is_ended_leaves_only_what_is_done(corpus,
     assert said.strip() == ("" if number == signal.SIGKILL else "stopped by SIGINT")
     if number == signal.SIGKILL:
         subprocess.run(
-            [*words[:3], "validate", str(out)], env=own, capture_output=True, check=False
+            [*words[:3], "evaluate", str(out)], env=own, capture_output=True, check=False
         )
     assert not list(tmp_path.rglob(".scenario_gen*")) and [
         path.name for path in tmp_path.iterdir()
@@ -317,7 +317,7 @@ def test_a_find_that_is_ended_leaves_nothing(batch, number):
         run.send_signal(number)
     assert len(list(out.glob(".scenario_gen*"))) == (number == signal.SIGKILL)
     if number == signal.SIGKILL:
-        subprocess.run([*words[:3], "validate", str(out)], capture_output=True, check=False)
+        subprocess.run([*words[:3], "evaluate", str(out)], capture_output=True, check=False)
     assert not list(out.glob(".scenario_gen*"))
 
 

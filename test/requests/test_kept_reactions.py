@@ -14,7 +14,7 @@ from scenario_gen.bags.recordings.write import write_recording
 from scenario_gen.method.chain import Chain
 from scenario_gen.method.segmentation import segment
 from scenario_gen.method.validity import Limits
-from scenario_gen.output.review.validation import validate_bag
+from scenario_gen.output.review.evaluation import evaluate_bag
 from scenario_gen.pipeline import PipelineConfig
 from scenario_gen.roads import build_road
 from scenario_gen.situation import Situation
@@ -84,11 +84,10 @@ def test_an_ego_slot_before_a_follower_or_behind_a_leader(ego, tmp_path):
     )
     assert_kept(result, ["2 follows 1"])
     bag = write_recording(tmp_path / "bag", result)
-    (found,) = validate_bag(bag)
-    assert found.causes == {} and list(found.proven.values()) == [
-        30
-    ]  # proven with the witness, from the bag alone
-    (strict,) = validate_bag(bag, Limits(headway_share=0.01))
+    (found,) = evaluate_bag(bag)
+    assert found.causes == {} and found.valid == 30  # with the witness, from the bag alone
+    assert len(found.result.generated.reactions) == 1
+    (strict,) = evaluate_bag(bag, PipelineConfig(limits=Limits(headway_share=0.01)))
     assert set(strict.causes) == {"reaction"}
 
 

@@ -17,7 +17,7 @@ from scenario_gen.method.evaluation.measures import figures_of, measure, most_cr
 from scenario_gen.method.sampling import SamplingConfig
 from scenario_gen.method.sampling.importance_sampling import TargetError
 from scenario_gen.output.results import provenance_of
-from scenario_gen.output.review.validation import validate_bag
+from scenario_gen.output.review.evaluation import evaluate_bag
 from scenario_gen.pipeline import generate
 from scenario_gen.types import Facts, join_ego, OrderChange
 from scenario_gen.types.request import Request
@@ -83,8 +83,8 @@ def test_each_in_a_bag_is_valid(chain, request_, tmp_path):
     made = generate(chain.encounter, chain.road, config, count=3, seed=7, request=request_)
     made = replace(made, provenance=provenance_of([], 7, 3, ["t_intersection"], config, request_))
     bag = write_recording(tmp_path / "bag", made)
-    (found,) = validate_bag(bag)
-    assert found.scenarios == 3 and not found.invalid
+    (found,) = evaluate_bag(bag)
+    assert len(found.verdicts) == 3 == found.valid
     if request_.target:
         assert all(
             LOW <= measure(join_ego(one), "pet") <= HIGH for one in made.generated.scenarios
@@ -103,14 +103,14 @@ def test_another_order_is_named_and_only_then_allowed(chain, tmp_path):
             != most_critical(figures_of(chain.encounter)).first
         )
     bag = write_recording(tmp_path / "bag", replace(made, provenance={}))
-    (found,) = validate_bag(bag)
-    assert not found.invalid
+    (found,) = evaluate_bag(bag)
+    assert found.valid == 3
     kept = replace(
         made.generated,
         scenarios=tuple(replace(one, facts=Facts()) for one in made.generated.scenarios),
     )
-    (found,) = validate_bag(write_recording(tmp_path / "kept", replace(made, generated=kept)))
-    assert "passing_order" in found.causes and found.invalid == 3, (
+    (found,) = evaluate_bag(write_recording(tmp_path / "kept", replace(made, generated=kept)))
+    assert "passing_order" in found.causes and found.valid == 0, (
         "and signs, which a swapped order does not keep"
     )
 

@@ -222,7 +222,7 @@ def test_what_is_lost_is_said_in_all_places(domain, tmp_path):
     assert sentence in output
     info = yaml.safe_load((bag / "metadata.yaml").read_text())["rosbag2_bagfile_information"]
     assert info["custom_data"]["scenario_gen.lost:/scenarios"] == told()
-    answer = CliRunner().invoke(app, ["validate", str(bag)])
+    answer = CliRunner().invoke(app, ["evaluate", str(bag)])
     assert sentence in answer.output.replace("\n", " ") and "by its recorder" in answer.output, (
         answer.output
     )

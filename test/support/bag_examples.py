@@ -13,6 +13,7 @@ from msg_conventions.topics import topic_entry
 from scenario_gen.bags.storage.bag import BagMessage, read_messages
 from scenario_gen.bags.storage.metadata import qos_yaml
 from scenario_gen.bags.storage.writer import atomic_bag
+from scenario_gen.output.review.evaluation import BagEvaluation
 from scenario_gen.types import Encounter, Note, NoteKind, Vehicle
 from scenario_gen.types.fit import Fit, FittedVehicle, Route, Segmentation
 from scenario_gen.types.generation import GenerationResult
@@ -30,6 +31,23 @@ def copied(bag: Path, target: Path, change: Callable[[BagMessage], bytes | None]
                 )
                 writer.write(message.topic, data, message.stamp_ns)
     return target
+
+
+def skipped(evaluation: BagEvaluation) -> dict[str, int]:
+    """Return the number of scenarios by each check that was skipped."""
+    return {
+        note.values["check"]: note.values["count"]
+        for note in evaluation.notes
+        if note.kind is NoteKind.NOT_CHECKED
+    }
+
+
+def unaccounted(evaluation: BagEvaluation) -> int:
+    """Return the number of scenarios without an entry."""
+    counts = [
+        note.values["count"] for note in evaluation.notes if note.kind is NoteKind.UNACCOUNTED
+    ]
+    return sum(counts)
 
 
 def hand_made_run() -> GenerationResult:

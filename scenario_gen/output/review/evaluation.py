@@ -1,193 +1,338 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Evaluation of any bag that has the conventions of the suite."""
+"""Check and measure the scenarios of any bag with the conventions of this suite.
+
+A scenario is checked against the messages with its stamp in its namespace: the requested states
+and their tolerances (its entry on `scenarios/info`); the conflicts of its template (`tracks`) in
+the requested order; the waits of its template (if there are `changepoints`); and the road. The
+road is the `map` that its entry names by hash, otherwise the newest map with its stamp, or the
+newest of all. Checks without data are skipped and reported. Vehicles are matched by id: if some
+are missing, the template is reduced to the others. With a reference drive of the ego, all vehicles
+are checked together. If the bag has entries, no scenario may replace a published one; scenarios
+without an entry are counted, and checked as far as possible.
+"""
 
 from collections import Counter
-from collections.abc import Callable, Sequence
-from dataclasses import replace
+from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
+from dataclasses import dataclass, replace
 from itertools import count
 from pathlib import Path
 
 import numpy as np
 
-from scenario_gen.bags.recordings.read import Namespace, NO_ENTRY, read_recording, SCENARIOS
+from scenario_gen.bags.recordings.read import (
+    INFO,
+    Namespace,
+    NO_ENTRY,
+    read_recording,
+    ScenarioEntry,
+    SCENARIOS,
+    WITNESS,
+)
 from scenario_gen.bags.storage.bag import naming_bag
-from scenario_gen.bags.storage.config import BagConfig
 from scenario_gen.base.errors import InputError
 from scenario_gen.base.folders import replaced_folder
-from scenario_gen.method.evaluation import coverage_of, evaluate_scenarios, EvaluationConfig
-from scenario_gen.method.validity import Limits
+from scenario_gen.method.evaluation import coverage_of, evaluate
+from scenario_gen.method.validity import Checker, Limits
 from scenario_gen.output.results import EVALUATED, write_evaluation
-from scenario_gen.output.review.validation import Checkers, kept_reactions
-from scenario_gen.situation import Situation
+from scenario_gen.pipeline import PipelineConfig
+from scenario_gen.situation import red_runners, required_orders, Situation
 from scenario_gen.types import (
+    at_ends,
+    Cause,
     CheckCounts,
     EgoSlot,
-    Evaluation,
+    Facts,
     GenerationResult,
     join_ego,
+    NamedReaction,
     Note,
     NoteKind,
+    Reaction,
     Scenario,
     ScenarioSet,
+    tokens,
     Verdict,
+    Violation,
 )
 
 
-def bag_results(
+@dataclass(frozen=True, eq=False)
+class BagEvaluation:
+    """The scenarios of one namespace, checked and measured.
+
+    Attributes:
+        namespace: its name.
+        verdicts: one per scenario.
+        notes: on incomplete requests, scenarios without an entry, and checks that were skipped;
+            without a result, the last one has the reason.
+        result: the readable scenarios with their measures; None if they cannot be measured.
+    """
+
+    namespace: str
+    verdicts: tuple[Verdict, ...]
+    notes: tuple[Note, ...]
+    result: GenerationResult | None
+
+    @property
+    def valid(self) -> int:
+        """Number of valid scenarios."""
+        return sum(verdict.valid for verdict in self.verdicts)
+
+    @property
+    def causes(self) -> dict[Cause, dict[int, str]]:
+        """The first violation of each cause by scenario."""
+        causes: dict[Cause, dict[int, str]] = {}
+        for k, verdict in enumerate(self.verdicts):
+            for violation in verdict.violations:
+                causes.setdefault(violation.cause, {}).setdefault(k, violation.message)
+        return causes
+
+
+def evaluate_bag(
     path: Path,
-    config: EvaluationConfig | None = None,
-    limits: Limits | None = None,
-    seed: int = 0,
-    bag: BagConfig = BagConfig(),
+    config: PipelineConfig = PipelineConfig(),
     *,
     progress: Callable[[int, int], None] = lambda *_: None,
-) -> tuple[GenerationResult, ...]:
-    """Evaluate every namespace of a bag that has `tracks` and `scenarios`, for the report.
-
-    The scenarios are checked again, on the bag's map if it has one, but not for the requested
-    boundary states. Data that the bag lacks are left out: without `changepoints`, K is 0; fit and
-    routes are shown if both are present.
+) -> tuple[BagEvaluation, ...]:
+    """Check the scenarios in every namespace of a bag, and measure them if it has `tracks`.
 
     Args:
         path: the bag.
-        config: parameters of the evaluation.
-        limits: limits of validity.
-        seed: seed of the confidence intervals.
-        bag: limits on the size of the bag.
+        config: parameters of the evaluation, limits of validity and of the size of the bag.
         progress: called with the number of checked scenarios and their total.
 
     Raises:
-        InputError: the bag is missing or damaged, or no namespace has both topics.
+        InputError: the bag is missing or damaged, or has no scenarios.
     """
-    namespaces = read_recording(path, bag).namespaces.values()
-    complete = [
-        namespace for namespace in namespaces if {"tracks", SCENARIOS} <= namespace.messages.keys()
+    namespaces = [
+        namespace
+        for namespace in read_recording(path, config.bag).namespaces.values()
+        if SCENARIOS in namespace.messages
     ]
-    if not complete:
-        raise InputError(
-            f"{path}: no namespace has both `tracks` and `scenarios`: nothing to compare"
-        )
+    if not namespaces:
+        raise InputError(f"{path}: no topic `scenarios` in any namespace; nothing to evaluate")
+    total = sum(len(namespace.hashes) for namespace in namespaces)
+    done = count(1)
     with naming_bag(path):
-        total = sum(len(namespace.hashes) for namespace in complete)
-        done = count(1)
         return tuple(
-            _result(
-                namespace,
-                config or EvaluationConfig(),
-                limits,
-                seed,
-                lambda: progress(next(done), total),
-            )
-            for namespace in complete
+            _evaluate(namespace, config, lambda: progress(next(done), total))
+            for namespace in namespaces
         )
 
 
 def write_page(
     bag: Path, folder: Path, *, progress: Callable[[int, int], None] = lambda *_: None
 ) -> None:
-    """Write the report on a bag; `progress` as in `bag_results`.
+    """Write the report on a bag; `progress` as in `evaluate_bag`.
 
     Raises:
-        InputError: the bag is damaged, or the folder must not be replaced.
+        InputError: the bag is damaged or has nothing to measure, or the folder must not be
+            replaced.
     """
     with replaced_folder(folder, EVALUATED, [bag]) as place:
-        write_evaluation(place, bag_results(bag, progress=progress), bag, BagConfig())
+        write_evaluation(place, measured(evaluate_bag(bag, progress=progress), bag), bag)
+
+
+def measured(evaluations: Iterable[BagEvaluation], bag: Path) -> list[GenerationResult]:
+    """Return the results of a bag.
+
+    Raises:
+        InputError: there is none; the message names the reasons.
+    """
+    results = [each.result for each in evaluations if each.result is not None]
+    if not results:
+        raise InputError("; ".join((str(bag), *(str(each.notes[-1]) for each in evaluations))))
+    return results
+
+
+def _evaluate(
+    namespace: Namespace, config: PipelineConfig, tick: Callable[[], None]
+) -> BagEvaluation:
+    """Check the scenarios of a namespace one after the other, and measure the readable ones."""
+    namespace.check_infos()
+    checkers: dict[tuple[object, ...], Checker] = {}
+    scenarios: list[Scenario] = []
+    verdicts: list[Verdict] = []
+    skipped: Counter[str] = Counter()
+    for k in range(len(namespace.hashes)):
+        entry = namespace.entry(k) or namespace.unknown.get(k)
+        violations = list(_alterations(namespace, k, entry))
+        try:
+            stamp, scenario = namespace.scenario(k)
+            checker = _checker(namespace, k, stamp, scenario, config.limits, checkers)
+            (verdict,) = checker.check([join_ego(scenario)])
+        except InputError as error:
+            violations.append(Violation(Cause.UNUSABLE, 0.0, (), str(error)))
+        else:
+            violations += verdict.violations
+            scenarios.append(scenario)
+            skipped.update(checker.not_applicable)
+            skipped.update(_missing_messages(namespace, entry))
+        verdicts.append(Verdict(tuple(violations)))
+        tick()
+    notes = [Note.of(NoteKind.TEXT, text=text) for text in namespace.missing]
+    lost = sum(entry is None for entry in namespace.unknown.values())
+    if lost:
+        values = {"count": lost, "total": len(verdicts), "reason": NO_ENTRY}
+        notes.append(Note.of(NoteKind.UNACCOUNTED, **values))
+    for check, number in skipped.items():
+        notes.append(Note.of(NoteKind.NOT_CHECKED, count=number, check=check))
+    checked = BagEvaluation(namespace.name, tuple(verdicts), tuple(notes), None)
+    try:
+        return replace(checked, result=_result(namespace, checked, scenarios, config))
+    except InputError as error:
+        notes.append(Note.of(NoteKind.NOT_MEASURED, reason=error))
+        return replace(checked, notes=tuple(notes))
 
 
 def _result(
     namespace: Namespace,
-    config: EvaluationConfig,
-    limits: Limits | None,
-    seed: int,
-    tick: Callable[[], None],
+    checked: BagEvaluation,
+    scenarios: Sequence[Scenario],
+    config: PipelineConfig,
 ) -> GenerationResult:
-    """Check and evaluate the scenarios of a namespace."""
-    encounter, segmentation, road = namespace.encounter, namespace.segmentation, namespace.road
-    fit, routes = namespace.fit
+    """Measure the readable scenarios of a namespace.
+
+    Raises:
+        InputError: the bag lacks tracks or a readable scenario, or they cannot be compared.
+    """
+    if "tracks" not in namespace.messages or not scenarios:
+        raise InputError("that needs `tracks` and a readable scenario")
+    encounter = namespace.encounter
     situation = Situation.of(encounter)
-    scenarios, counts = _checked(namespace, limits, tick)
-    evaluation = evaluate_scenarios(
-        encounter,
-        {SCENARIOS: scenarios},
-        changepoints=len(segmentation.changepoints),
-        checks={SCENARIOS: counts},
-        road=road.name if road else "",
-        config=config,
-        seed=seed,
-    )
-    kept = [kept_reactions(situation, namespace.entry(k)) for k in range(len(scenarios))]
-    graph = situation.reactions
+    kept = set.intersection(*(set(scenario.facts.reactions) for scenario in scenarios))
+    total = len(checked.verdicts)
+    outcomes = [Note.of(NoteKind.TEXT, text=summary.sentence()) for summary in namespace.summaries]
     generated = ScenarioSet(
-        len(scenarios),
+        total,
         scenarios,
-        counts.candidates,
-        Counter(counts.refused),
-        _remarks(namespace),
-        _ego_slot(scenarios),
-        reactions=tuple(edge for edge in graph.edges if all(edge in edges for edges in kept)),
-        graph=graph,
+        total,
+        Counter(CheckCounts.of_verdicts(checked.verdicts).refused),
+        (Note.of(NoteKind.BAG_MEASURED), *checked.notes, *outcomes),
+        _ego_slot(scenarios[0]),
+        reactions=tuple(_named(situation, kept)),
+        graph=situation.reactions,
     )
-    return GenerationResult(
+    result = GenerationResult(
         encounter,
-        segmentation,
-        road,
-        fit=fit,
-        routes=routes,
-        generated=generated,
-        figures=_with_notes(evaluation, namespace, len(scenarios)),
+        namespace.segmentation,
+        namespace.road,
+        *namespace.fit,
+        generated,
         row_name=SCENARIOS,
-        valid=counts.candidates - sum(counts.refused.values()),
+        valid=checked.valid,
         coverage=coverage_of(encounter, scenarios),
     )
+    return replace(result, figures=evaluate(result, config.evaluation))
 
 
-def _checked(
-    namespace: Namespace, limits: Limits | None, tick: Callable[[], None]
-) -> tuple[tuple[Scenario, ...], CheckCounts]:
-    """Return the scenarios of a namespace and the counts of their checks."""
-    checkers = Checkers(namespace, limits)
-    scenarios: list[Scenario] = []
-    verdicts: list[Verdict] = []
-    for k in range(len(namespace.hashes)):
-        stamp, scenario = namespace.scenario(k)
-        joined = join_ego(scenario)
-        verdicts += checkers.of(k, stamp, joined, None).check([joined])
-        scenarios.append(scenario)
-        tick()
-    return tuple(scenarios), CheckCounts.of_verdicts(verdicts)
+def _checker(
+    namespace: Namespace,
+    k: int,
+    stamp: int,
+    scenario: Scenario,
+    limits: Limits,
+    known: dict[tuple[object, ...], Checker],
+) -> Checker:
+    """Return the checker of scenario `k`, with its ego; equal requirements share one in `known`.
 
-
-def _ego_slot(scenarios: Sequence[Scenario]) -> EgoSlot | None:
-    """Return the ego slot of a set, from its first reference drive; None without one."""
-    for scenario in scenarios:
-        drive = scenario.reference_drive
-        if drive is not None:
-            states = np.column_stack([drive.position[0], drive.heading[0], drive.speed[0]])
-            return EgoSlot(drive.vehicles[0], states[0], states[-1])
-    return None
-
-
-def _with_notes(evaluation: Evaluation, namespace: Namespace, total: int) -> Evaluation:
-    """Return an evaluation with notes on incomplete requests and scenarios without an entry."""
-    notes = [Note.of(NoteKind.TEXT, text=text) for text in namespace.missing]
-    lost = sum(entry is None for entry in namespace.unknown.values())
-    if lost:
-        notes.append(Note.of(NoteKind.UNACCOUNTED, count=lost, total=total, reason=NO_ENTRY))
-    rows = tuple(
-        replace(row, notes=(*row.notes, *notes)) if row.name == SCENARIOS else row
-        for row in evaluation.rows
+    Raises:
+        InputError: a message with its requirements is damaged.
+    """
+    entry = namespace.entry(k) or namespace.unknown.get(k)
+    facts, states = Facts(), None
+    if entry is not None:
+        has_ego = scenario.reference_drive is not None
+        facts, states = entry.facts, entry.asked(namespace.where(INFO), witness=has_ego)
+    ids = tokens(join_ego(scenario).ids)
+    key = (
+        *(stamp, ids, facts.order, facts.reactions, facts.lost_reactions),
+        entry and (entry.template_hash, entry.map_hash),
+        states and tuple(array.tobytes() for array in vars(states).values()),
     )
-    return replace(evaluation, rows=rows)
+    if key not in known:
+        is_ambiguous = entry is None and k in namespace.unknown and namespace.roads_differ
+        road = None if is_ambiguous else namespace.road_of(entry, stamp)
+        checker = Checker(road, states, None, None, limits)
+        known[key] = _with_template(checker, namespace, entry, stamp, ids, facts)
+    return known[key]
 
 
-def _remarks(namespace: Namespace) -> tuple[Note, ...]:
-    """Return notes on checks that a bag lacks data for, and on the outcomes of its requests."""
-    notes = [Note.of(NoteKind.BAG_MEASURED)]
-    if "map" not in namespace.messages:
-        notes.append(Note.of(NoteKind.BAG_WITHOUT_MAP))
-    if "changepoints" not in namespace.messages:
-        notes.append(Note.of(NoteKind.BAG_WITHOUT_CHANGEPOINTS))
-    outcomes = [summary.sentence() for summary in namespace.summaries]
-    return (*notes, *(Note.of(NoteKind.TEXT, text=text) for text in outcomes))
+def _with_template(
+    checker: Checker,
+    namespace: Namespace,
+    entry: ScenarioEntry | None,
+    stamp: int,
+    ids: Sequence[str],
+    facts: Facts,
+) -> Checker:
+    """Add the requirements of the template, reduced to the vehicles `ids`.
+
+    The checker is unchanged if there is no template with at least two of these vehicles.
+    """
+    encounter = namespace.tracks_of(entry, stamp)
+    if encounter is None:
+        return checker
+    template = tokens(encounter.ids)
+    if len(ids) < 2 or not set(ids) <= set(template):
+        return checker
+    segmentation = namespace.segmentation_of(encounter)
+    encounter = encounter.select([template.index(name) for name in ids])
+    situation = Situation.of(encounter)
+    gaps = {
+        (who, whom): (speed, 0.0 * gap if (ids[who], ids[whom]) in facts.lost_reactions else gap)
+        for (who, whom), (speed, gap) in situation.lane_gaps.items()
+    }
+    is_whole = len(ids) == len(template)
+    return replace(
+        checker,
+        conflicts=situation.conflicts,
+        waits=None if segmentation is None else situation.waits_to_keep(segmentation),
+        first=required_orders(situation.conflicts, facts.order if is_whole else "free"),
+        reactions=_named(situation, facts.reactions),
+        ends=at_ends(encounter.present, len(encounter.time)),
+        lane_gaps=gaps,
+        stops=situation.reactions.stops,
+        at_red=red_runners(encounter),
+    )
+
+
+def _named(situation: Situation, names: Collection[NamedReaction]) -> list[Reaction]:
+    """Return the reactions with these names."""
+    ids = tokens(situation.encounter.ids)
+    return [edge for edge in situation.reactions.edges if edge.named(ids) in names]
+
+
+def _alterations(namespace: Namespace, k: int, entry: ScenarioEntry | None) -> Iterator[Violation]:
+    """Yield how scenario `k` or its reference drive was replaced."""
+    if entry is None:
+        return
+    if k in namespace.unknown:
+        message = (
+            f"message {k} has SHA-256 {namespace.hashes[k][:12]}…, which {INFO} does not know; "
+            f"scenario {entry.index} of request {entry.request} was published as "
+            f"{entry.sha256[:12]}…"
+        )
+        yield Violation(Cause.ALTERED, 0.0, (), message)
+    if namespace.without_witness(entry) and namespace.strange_witnesses:
+        message = f"the ego's reference drive is not what was published for scenario {entry.index}"
+        yield Violation(Cause.ALTERED, 0.0, (), message)
+
+
+def _missing_messages(namespace: Namespace, entry: ScenarioEntry | None) -> Iterator[str]:
+    """Yield the checks that the bag lacks messages for."""
+    if not namespace.entries:
+        yield f"sha256: there is no entry on {INFO}"
+    if entry is not None and namespace.without_witness(entry):
+        yield f"the ego: its reference drive is not on {WITNESS}"
+
+
+def _ego_slot(scenario: Scenario) -> EgoSlot | None:
+    """Return the ego slot by a scenario's reference drive; None without one."""
+    drive = scenario.reference_drive
+    if drive is None:
+        return None
+    states = np.column_stack([drive.position[0], drive.heading[0], drive.speed[0]])
+    return EgoSlot(drive.vehicles[0], states[0], states[-1])

@@ -26,8 +26,8 @@ from scenario_gen.logs.synthetic import bundled
 from scenario_gen.method.decisions import decided, decisions_of
 from scenario_gen.method.evaluation import EvaluationConfig
 from scenario_gen.output.results import provenance_of
+from scenario_gen.output.review.evaluation import evaluate_bag
 from scenario_gen.output.review.replan import replanned
-from scenario_gen.output.review.validation import validate_bag
 from scenario_gen.pipeline import generate, PipelineConfig
 from scenario_gen.types import Outcome
 
@@ -90,8 +90,8 @@ def test_every_finding_is_certified_and_its_witness_passes(found):
     assert result.findings and all(
         one.passed and not one.outcome.verdict.passed for one in result.findings
     )
-    (validation,) = validate_bag(out / "bag")
-    assert (validation.scenarios, validation.invalid) == (len(result.findings), 0)
+    (validation,) = evaluate_bag(out / "bag")
+    assert len(validation.verdicts) == len(result.findings) == validation.valid
 
 
 def test_the_bag_of_failures_fails_again(found):

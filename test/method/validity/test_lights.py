@@ -14,7 +14,7 @@ from support.signalised import signalised
 from scenario_gen import generate, load, read_log
 from scenario_gen.method.validity import Checker
 from scenario_gen.output.exchange import export_bag
-from scenario_gen.output.review.validation import validate_bag
+from scenario_gen.output.review.evaluation import evaluate_bag
 from scenario_gen.types import Facts, SignalSchedule
 
 
@@ -57,8 +57,8 @@ def test_a_vehicle_that_runs_red_is_refused(result):
 
 def test_a_bag_has_the_states(result, tmp_path):
     result.save(tmp_path / "bag")
-    (validation,) = validate_bag(tmp_path / "bag")
-    assert (validation.scenarios, validation.invalid) == (12, 0)
+    (validation,) = evaluate_bag(tmp_path / "bag")
+    assert len(validation.verdicts) == 12 == validation.valid
     again = load(tmp_path / "bag")
     for scenario, other in zip(result, again, strict=True):
         for light, read in zip(scenario.facts.lights, other.facts.lights, strict=True):

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The lanes of a vector map travel in its bag, so that `validate` sees who drives against them."""
+"""The lanes of a vector map travel in its bag, so that `evaluate` sees who drives against them."""
 
 from dataclasses import replace
 
@@ -11,7 +11,7 @@ from support.bag_examples import hand_made_run
 
 from scenario_gen.bags.recordings.read import read_recording
 from scenario_gen.bags.recordings.write import write_recording
-from scenario_gen.output.review.validation import validate_bag
+from scenario_gen.output.review.evaluation import evaluate_bag
 from scenario_gen.types.lanes import Lane, LaneNetwork
 from scenario_gen.types.scenario import Cause
 
@@ -33,8 +33,8 @@ def run_on(*directions):
 def test_a_wrong_way_driver_is_seen_in_a_bag(tmp_path, directions, wrong):
     run = run_on(*directions)
     bag = write_recording(tmp_path / "bag", run)
-    (found,) = validate_bag(bag)
-    assert (found.causes[Cause.WRONG_WAY].count if Cause.WRONG_WAY in found.causes else 0) == wrong
+    (found,) = evaluate_bag(bag)
+    assert len(found.causes.get(Cause.WRONG_WAY, ())) == wrong
     road = read_recording(bag).namespaces[""].road
     assert [lane.id for lane in road.lanes.lanes] == ["0", "1"] and road.lanes.lanes[
         0
