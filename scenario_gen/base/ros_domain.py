@@ -13,6 +13,7 @@ import tempfile
 from filelock import FileLock, Timeout
 
 from scenario_gen.base.errors import RefusedError
+from scenario_gen.base.folders.disk import own_folder
 
 DOMAINS = range(1, 102)  # higher domains would use ephemeral ports
 CHECKED_PARTICIPANTS_COUNT = 20  # the first participants may have ended while a later one lives
@@ -33,18 +34,22 @@ def _quiet(domain: int) -> bool:
 def free_domain() -> Iterator[int]:
     """Reserve a domain id without participants.
 
+    The reservations are those of this account; accounts begin with different domains.
+
     Raises:
+        InputError: another account has taken the folder of the reservations.
         RefusedError: no domain is free.
     """
-    for domain in reversed(DOMAINS):
-        lock = FileLock(
-            Path(tempfile.gettempdir()) / f"scenario_gen_domain_{domain}.lock",
-            blocking=False,
-            thread_local=False,
-        )
+    account = os.geteuid()
+    place = Path(os.environ.get("XDG_RUNTIME_DIR") or tempfile.gettempdir())
+    folder = place / f"scenario_gen_domains_{account}"
+    own_folder(folder)
+    for k in range(len(DOMAINS)):
+        domain = DOMAINS[-1 - (account + k) % len(DOMAINS)]
+        lock = FileLock(folder / f"{domain}.lock", blocking=False, thread_local=False)
         try:
             lock.acquire()
-        except (OSError, Timeout):  # reserved, or the lock of another user
+        except Timeout:  # reserved
             continue
         try:
             if _quiet(domain):

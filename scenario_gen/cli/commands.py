@@ -165,8 +165,10 @@ def run(words: list[str]) -> int:
     except UsageError as error:
         raise usage_error(error) from error
     except MemoryError as error:
-        message = "not enough memory; use a shorter log, fewer scenarios or a smaller map"
-        raise InputError(message) from error
+        raise InputError(
+            f"not enough memory ({error}); check the inputs for a wrong coordinate or time; if"
+            " there is none, use a shorter log, fewer scenarios or a part of the map"
+        ) from error
     except OSError as error:
         name = error.filename or "standard output or an unnamed file"
         raise of_system(error, name) from error

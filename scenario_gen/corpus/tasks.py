@@ -59,9 +59,14 @@ def arriving(target: Path) -> Iterator[Path]:
     target.parent.mkdir(parents=True, exist_ok=True)
     with scratch(target.parent) as folder:
         temporary = folder / target.name  # the files of a bag are named after its folder
-        yield temporary
-        sync_tree(temporary)
+        try:
+            yield temporary
+        except OSError as error:  # libraries name no file, or the temporary one
+            if str(error.filename or temporary).startswith(str(temporary)):
+                error.filename = str(target)
+            raise
         with naming(target):
+            sync_tree(temporary)
             if target.is_dir():  # from a task that was killed before it wrote its last file
                 shutil.rmtree(target)
             temporary.replace(target)

@@ -3,14 +3,16 @@
 
 """Tasks: each is run once; only the task that ends its workers fails."""
 
+import errno
 import multiprocessing
+import os
 from pathlib import Path
 
 import pytest
 from support.refusing import Counted, end_worker, refuse, write_once
 
 from scenario_gen.base.errors import InputError
-from scenario_gen.corpus.tasks import spread, Workers
+from scenario_gen.corpus.tasks import arriving, spread, Workers
 
 ALONE = {"n_workers": 1, "threads_per_worker": 1, "processes": False, "dashboard_address": None}
 
@@ -96,6 +98,17 @@ def test_a_scheduler_that_is_lost_is_named(tmp_path):
         cluster.close()
         with pytest.raises(InputError, match=f"{address} is lost .*resumes where it stopped"):
             go(write_once, [Counted("b", tmp_path)])
+
+
+def test_a_full_disk_is_named_by_the_file_that_was_to_be_written(tmp_path):
+    """Arrow's errors name no file, and others the temporary one."""
+    for name in (None, "a.parquet"):
+        with pytest.raises(OSError, match="No space") as error, arriving(tmp_path / "a") as part:
+            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), name and str(part / name))
+        assert error.value.filename == str(tmp_path / "a")
+    with pytest.raises(FileNotFoundError) as error, arriving(tmp_path / "a"):
+        (tmp_path / "input").read_text()
+    assert error.value.filename == str(tmp_path / "input")
 
 
 def test_a_task_that_is_refused_does_not_end_the_others():

@@ -7,43 +7,41 @@ from contextlib import suppress
 import fcntl
 import os
 from pathlib import Path
-import tempfile
 
 import pytest
 
-from scenario_gen.base.ros_domain import DOMAINS, free_domain, this_host_only
+from scenario_gen.base.errors import InputError
+from scenario_gen.base.ros_domain import free_domain, this_host_only
 
 
-def test_two_runs_get_two_domains(monkeypatch, tmp_path):
-    monkeypatch.setattr(
-        tempfile, "tempdir", str(tmp_path)
-    )  # where no other run of the tests holds one
+@pytest.fixture
+def place(monkeypatch, tmp_path):
+    """Return the folder of the reservations, where no other run of the tests has one."""
+    monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path))
+    return tmp_path / f"scenario_gen_domains_{os.geteuid()}"
+
+
+def test_two_runs_get_two_domains(place):
     with free_domain() as one, free_domain() as two:
-        assert one != two
+        assert one != two and place.stat().st_mode & 0o777 == 0o700
     with free_domain() as again:
         assert again == one
 
 
-def test_domains_that_are_held_or_another_users_are_passed_over(monkeypatch):
-    own = os.geteuid()
-    with (
-        tempfile.TemporaryDirectory() as name,
-        (Path(name) / f"scenario_gen_domain_{DOMAINS[-1]}.lock").open("w") as held,
-    ):
+def test_a_reserved_domain_is_passed_over(place):
+    with free_domain() as first:
+        pass
+    with (place / f"{first}.lock").open("w") as held:
         fcntl.flock(held, fcntl.LOCK_EX)
-        Path(name).chmod(0o1777)
-        for domain in range(81, DOMAINS[-1]):
-            file = Path(name) / f"scenario_gen_domain_{domain}.lock"
-            file.touch()
-            file.chmod(0o444 if domain > 90 else 0o000)
-        monkeypatch.setattr(tempfile, "tempdir", name)
-        if own == 0:  # whom no file mode stops
-            os.seteuid(65534)
-        try:
-            with free_domain() as one, free_domain() as two:
-                assert one != two and max(one, two) <= 80
-        finally:
-            os.seteuid(own)
+        with free_domain() as second:
+            assert second != first
+
+
+def test_no_other_account_reserves_domains(place):
+    place.mkdir()
+    place.chmod(0o777)
+    with pytest.raises(InputError, match="other accounts may write"), free_domain():
+        pass
 
 
 def test_other_middleware_is_kept_on_this_host_by_ros_itself():

@@ -11,7 +11,7 @@ import math
 import numpy as np
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
-from scipy.spatial import distance
+from scipy.spatial import KDTree
 import shapely
 
 from scenario_gen.base.errors import InputError
@@ -199,15 +199,16 @@ def crossing_lanes(network: LaneNetwork) -> Iterator[tuple[int, int]]:
         crossing = shapely.crosses(lines[first], lines[second])
         pairs = np.column_stack((first[crossing], second[crossing])).tolist()
         for i, j in pairs:
-            if not network.has_levels or _on_one_level(network.lanes[i], network.lanes[j]):
+            crossings = shapely.get_coordinates(shapely.intersection(lines[i], lines[j]))
+            lane, other = network.lanes[i], network.lanes[j]
+            if not network.has_levels or _on_one_level(lane, other, crossings):
                 yield i, j
 
 
-def _on_one_level(lane: Lane, other: Lane) -> bool:
-    """Return whether two lanes have the same height where they are nearest, if it is known."""
-    distances = distance.cdist(lane.centre, other.centre)
-    a, b = np.unravel_index(distances.argmin(), distances.shape)
-    return not abs(lane.height[a] - other.height[b]) > LEVEL_SPACING_M
+def _on_one_level(lane: Lane, other: Lane, crossings: Floats) -> bool:
+    """Return whether two lanes have the same height at a crossing (K, 2) [m], if it is known."""
+    a, b = (KDTree(each.centre).query(crossings)[1] for each in (lane, other))
+    return not (np.abs(lane.height[a] - other.height[b]) > LEVEL_SPACING_M).all()
 
 
 @dataclass(frozen=True, eq=False)

@@ -28,9 +28,10 @@ from scenario_gen.logs import geodesy, read_log
 from scenario_gen.logs.synthetic import bundled
 from scenario_gen.roads import build_road, RoadConfig
 from scenario_gen.roads.vector.ground import along_lanes
+from scenario_gen.roads.vector.network import crossing_lanes
 from scenario_gen.roads.vector.plan_view import reference_line
 from scenario_gen.roads.vector.read import read_network
-from scenario_gen.types import NoteKind
+from scenario_gen.types import Lane, LaneNetwork, NoteKind
 
 
 def middles(network):
@@ -377,6 +378,22 @@ def test_what_would_take_too_much_time_or_memory_is_refused(
 def test_lanes_that_cross_are_one_junction_however_long_they_are(tmp_path):
     network = read_network(write(tmp_path, ".xml", across(3, 5000.0)))  # of 10,000 edges each
     assert [lane.junction for lane in network.lanes] == ["1", "1", "1"]
+
+
+def test_long_lanes_that_cross_above_each_other_take_little_memory():
+    """As with one wrong coordinate; each pair of their points would be 1 TB."""
+    along = np.linspace(-2e5, 2e5, 400_001)
+
+    def lane(name, turned, height):
+        left, right = (np.column_stack((along, 0 * along + y)) for y in (1.7, -1.8))
+        if turned:
+            left, right = left[:, ::-1], right[:, ::-1]
+        return Lane(name, left, right, height=height + 0 * along)
+
+    heights = {"bridge": 8.0, "road": 0.0, "unknown": np.nan}
+    lanes = [lane(name, name == "road", height) for name, height in heights.items()]
+    network = LaneNetwork("m", ()).with_lanes(lanes)
+    assert list(crossing_lanes(network)) == [(1, 2)]
 
 
 def test_a_whole_map_that_is_too_long_to_be_searched_is_refused(tmp_path, monkeypatch):
