@@ -35,6 +35,13 @@ def test_a_bag_is_evaluated_to_a_page_figures_and_a_table(results, run, tmp_path
         assert found[key]["value"] == pytest.approx(expected[key]["value"], rel=1e-4), key
 
 
+def test_a_long_run_is_announced_before_it(run, tmp_path, monkeypatch):
+    words = ("generate", EXAMPLES / "my_log.csv", "--road", "four_way", "--count", 1)
+    assert "or more" not in run(*words, "--out", tmp_path / "short")[1]
+    monkeypatch.setattr("scenario_gen.cli.folder.LONG_RUN_S", 0.1)
+    assert "1 encounters on roads take 0.0 min or more" in run(*words, "--out", tmp_path / "b")[1]
+
+
 def test_a_log_whose_name_has_a_plus_is_a_recording(run, tmp_path):
     log = tmp_path / "north + south.csv"
     copyfile(EXAMPLES / "my_log.csv", log)
