@@ -98,7 +98,7 @@ class DriveVerdict:
         hardest_braking: largest deceleration [m/s²].
         hard_braking: duration of hard braking.
         jerk: largest change of acceleration over 0.5 s [m/s³].
-        progress: driven share of the witness' path.
+        progress: share of the witness' path that was driven on the road.
         faults: number of steps with a jump or with a command that was missing or not finite.
         among_others: number of contacts among the others; always 0.
         forced: number of times that one of the others braked harder than the strongest braking, to
@@ -302,7 +302,6 @@ def judge(loop: ClosedLoop, drive: Drive) -> DriveVerdict:
     contacts = _contacts(drive)
     hit = _first_of_ego(drive, contacts)
     goal = _goal_time(loop, drive)
-    progress = _progress(loop, drive) if math.isnan(goal) else 1.0
     clearance = _clearance(drive, config.horizon, hit)
     braking = np.maximum(-drive.accelerations, 0.0)
     hard_braking_count = int(np.count_nonzero(braking[1:] >= config.hard_braking))
@@ -312,6 +311,8 @@ def judge(loop: ClosedLoop, drive: Drive) -> DriveVerdict:
     # An obstacle is touched at most 0.5 s later than the cells that it closes.
     if touched is not None and not touched[0] > off_road + 0.5:
         off_road, obstacle = float(np.fmin(off_road, touched[0])), str(touched[1])
+    is_at_goal = not (math.isnan(goal) or off_road < goal)
+    progress = 1.0 if is_at_goal else _progress(loop, drive, off_road)
     return DriveVerdict(
         index=motion.index,
         seed=motion.seed,
@@ -380,9 +381,10 @@ def _clearance(drive: Drive, horizon: float, hit: tuple[int, float] | None) -> C
     return Clearance(gap, ttc, ttc_not_behind)
 
 
-def _progress(loop: ClosedLoop, drive: Drive) -> float:
-    """Return the share of the witness' path that the ego has driven."""
-    clocks = np.array([drive.clock[drive.ego, -1], np.inf])
+def _progress(loop: ClosedLoop, drive: Drive, off_road: float) -> float:
+    """Return the share of the witness' path that the ego drove until it left the road [s]."""
+    on_road = drive.clock[drive.ego][~(drive.motion.time > off_road)]
+    clocks = np.array([on_road[-1], np.inf])
     driven, length = loop.driven_distance(drive.ego, clocks).tolist()
     return min(driven / length, 1.0) if length > 0.0 else 1.0
 

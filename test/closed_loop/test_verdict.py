@@ -122,6 +122,7 @@ def test_leaving_the_road_goal_progress_and_comfort():
     assert (
         verdict.off_road == pytest.approx(0.6, abs=2e-3) and not verdict.passed
     )  # 1.1 m of room, 0.1 m allowed, at 2 m/s
+    assert verdict.progress == pytest.approx(5.0 / 149.0, abs=0.01), "what is driven on the road"
     verdict, _ = verdict_of(motions, lambda _: Command(-5.0, 0.0), road=road)
     assert math.isnan(verdict.goal) and verdict.progress == pytest.approx(10.0 / 149.0, abs=0.01)
     assert verdict.hardest_braking == pytest.approx(5.0) and verdict.hard_braking == pytest.approx(
