@@ -220,6 +220,9 @@ def drive_blindly(
         before[:] = 0.0
         before[:, CLOCK] = course.begin
         before[:, RATE] = 1.0
+        for i in range(n):
+            has_left = world.leaves[i] and course.begin >= world.spans[i, 1]
+            vehicles[i, 4] = course.begin >= world.spans[i, 0] and not has_left
         passes = np.zeros((n, n), dtype=np.bool_)
         station = 0.0
         speed = course.speed

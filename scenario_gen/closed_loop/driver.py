@@ -249,7 +249,8 @@ def approach_acceleration(
 ) -> float:
     """Return the acceleration [m/s²] of driver i towards a place that is free after a wait.
 
-    It arrives when the wait is over. It brakes no harder than for a vehicle that stands.
+    It arrives when the wait is over, as far as it can without standing before, and brakes no
+    harder than for a vehicle that stands. Otherwise it stops at the place.
 
     Args:
         parameters: of the drivers.
@@ -261,7 +262,8 @@ def approach_acceleration(
     behind = following_acceleration(parameters, i, way + parameters.standstill, speed, 0.0, 0.0)
     if speed * wait < 2.0 * way:
         return max(behind, 2.0 * (way - speed * wait) / (wait * wait))
-    return max(behind, -speed * speed / (2.0 * max(way, 0.01)))
+    needed = speed * speed / (2.0 * max(way, 0.01))
+    return min(max(behind, -needed), stopping_acceleration(parameters, i, way, speed))
 
 
 @kernel(inline=True, forced=True)

@@ -299,6 +299,7 @@ class ClosedLoop:
         seen[0, :6] = ego
         seen[1:] = state.seen[: len(seen) - 1]
         after, vehicles = np.empty((n, 5)), np.empty((n, 5))
+        vehicles[:, 4] = state.present
         passes = state.passes.copy()
         now = self.begin + time
         advance(self.world, self.parameters, now, before, seen, passes, after, vehicles)

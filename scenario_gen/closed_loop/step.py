@@ -19,6 +19,7 @@ from scenario_gen.closed_loop.driver import (
     RATE,
     WAITED,
 )
+from scenario_gen.closed_loop.presence import is_certified, is_in_way, place_at
 from scenario_gen.closed_loop.traffic_model import react
 from scenario_gen.numerics import Bools, Floats
 from scenario_gen.numerics.boxes import boxes_meet, fill_box
@@ -133,14 +134,14 @@ def locate_ego(
 
 
 @kernel(inline=True)
-def fill_vehicles(time: Floats, motion: Floats, drivers: Floats, out: Floats) -> None:
-    """Write x, y [m], yaw [rad], speed [m/s] (N, 5) of motions (N, T, 6).
+def _fill_vehicles(world: World, drivers: Floats, out: Floats) -> None:
+    """Write x, y [m], yaw [rad], speed [m/s] (N, 5) of all vehicles.
 
     The rows of the drivers (N, 5) begin with clock [s] and rate.
     """
     pose = np.empty(5)
     for i in range(out.shape[0]):
-        pose_at(time, motion[i], drivers[i, CLOCK], pose)
+        place_at(world, i, drivers[i, CLOCK], pose)
         copy_to(out[i, :3], pose)
         out[i, 3] = pose[3] * drivers[i, RATE]
 
@@ -166,7 +167,7 @@ def _update_acceleration(
     """
     h = world.step
     pose = np.empty(5)
-    pose_at(world.time, world.motion[i], before[CLOCK], pose)
+    place_at(world, i, before[CLOCK], pose)
     strongest = parameters.strongest[i]
     gained = (speed - before[RATE] * pose[3]) / h
     is_certified = before[RATE] == 1.0 and after[RATE] == 1.0
@@ -207,7 +208,7 @@ def advance(
         after: (N, 5) output, at the end of the step; HELD is 1 where the order makes a driver
             brake harder than the strongest braking, or more suddenly than the jerk limit.
         vehicles: (N, 5) output, x, y [m], yaw [rad], speed [m/s] at the end of the step, and 1 if
-            the vehicle is on the scene then.
+            the vehicle is on the scene then; before, 1 if it was on the scene at the start.
     """
     time = world.time
     ego = world.ego
@@ -215,7 +216,7 @@ def advance(
     matched = seen[0, EGO_CLOCK:]
     locate_ego(now, time, world.motion[ego], body, before[ego, CLOCK], matched)
     if parameters.reacts:
-        react(world, parameters, seen, before, passes, now, after)
+        react(world, parameters, seen, before, vehicles[:, 4] > 0.0, passes, now, after)
     else:
         after[:] = 0.0
         after[:, CLOCK] = min(now, time[-1])
@@ -224,16 +225,20 @@ def advance(
     after[ego, RATE] = matched[1]
     after[ego, WAITED] = 0.0
     after[ego, HELD] = 0.0
-    fill_vehicles(time, world.motion, after, vehicles)
+    _fill_vehicles(world, after, vehicles)
     copy_to(vehicles[ego, :4], body)
+    certified = is_certified(matched, now)
     for i in range(len(world.motion)):
         if i != ego and not world.leaves[i] and after[i, CLOCK] >= time[-1]:
             vehicles[i, 3] = 0.0  # it stands where its motion ended
         _update_acceleration(world, parameters, i, before[i], after[i], vehicles[i, 3])
-        begin, end = world.spans[i]
+    for i in range(len(world.motion)):
         clock = after[i, CLOCK]
-        has_left = world.leaves[i] and clock >= end
-        vehicles[i, 4] = i == ego or (clock >= begin and not has_left)
+        was_present = vehicles[i, 4] > 0.0
+        vehicles[i, 4] = i == ego or clock >= world.spans[i, 0]
+        if i != ego and world.leaves[i] and clock >= world.spans[i, 1]:
+            drives_on = parameters.reacts and was_present and not certified
+            vehicles[i, 4] = drives_on and is_in_way(world, i, vehicles)
 
 
 @kernel(F2, F2, B1, I)

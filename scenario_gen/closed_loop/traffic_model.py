@@ -17,7 +17,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from scenario_gen.closed_loop.coordination_space import pose_at, World
+from scenario_gen.closed_loop.coordination_space import World
 from scenario_gen.closed_loop.driver import (
     ACCELERATION,
     approach_acceleration,
@@ -25,13 +25,13 @@ from scenario_gen.closed_loop.driver import (
     drive_step,
     DriverParameters,
     DriverState,
+    EGO_CLOCK,
     EGO_RATE,
     HELD,
     leader_acceleration,
     MODEL,
     ON_PATH,
     RATE,
-    stopping_acceleration,
     WAITED,
     way_at,
 )
@@ -44,8 +44,9 @@ from scenario_gen.closed_loop.foresight import (
 )
 from scenario_gen.closed_loop.kerb import is_before_kerb, kerb_acceleration
 from scenario_gen.closed_loop.order import enforce_order, may_pass, passing_limit
+from scenario_gen.closed_loop.presence import drive_on, may_enter, place_at
 from scenario_gen.numerics import Bools, Floats
-from scenario_gen.numerics.boxes import boxes_meet, fill_box
+from scenario_gen.numerics.boxes import fill_box
 from scenario_gen.numerics.kernels import kernel
 from scenario_gen.numerics.loops import copy_to
 
@@ -59,7 +60,7 @@ class Traffic(NamedTuple):
         drivers: (N, 4) clock [s], its rate, acceleration [m/s²] and time waited [s], as in
             `State`.
         pose: (N, 5) x, y [m], yaw [rad], certified speed [m/s] and acceleration [m/s²] there.
-        moving: (N,) whether the clock of each vehicle runs.
+        moving: (N,) whether each vehicle has not yet reached the end of its certified motion.
         present: (N,) whether each vehicle is on the scene.
         passes: (N, N) whether vehicle i goes ahead of vehicle j against the certified order.
     """
@@ -77,6 +78,7 @@ def react(
     parameters: DriverParameters,
     seen: Floats,
     drivers: Floats,
+    present: Bools,
     passes: Bools,
     time: float,
     after: Floats,
@@ -88,12 +90,13 @@ def react(
         parameters: of the drivers.
         seen: (K, 9) the ego as in `State.seen`, at the end of this step and before.
         drivers: (N, 4) as in `Traffic`.
+        present: (N,) as in `Traffic`.
         passes: (N, N) as in `Traffic`; pairs whose order is drawn again are added.
         time: at the end of the step [s].
         after: (N, 5) clock [s], rate, acceleration that the driver wanted [m/s²], time waited
             [s], and 1 where the order held the driver back.
     """
-    now = _traffic(world, drivers, passes)
+    now = _traffic(world, drivers, present, passes)
     steps = int(np.ceil(parameters.foresight / world.step)) + 1
     ego = np.empty((steps, 5))
     pose = np.empty(5)
@@ -102,11 +105,16 @@ def react(
         driver = DriverState(i, drivers[i, CLOCK], drivers[i, RATE], drivers[i, ACCELERATION])
         after[i] = 0.0
         _write_driver(driver, after[i])
-        if i == world.ego or not now.moving[i]:
+        if i == world.ego:
+            continue
+        if not now.moving[i]:
+            if now.present[i]:
+                drive_on(world, parameters.acceleration[i], now.pose[i, 3], after[i])
             continue
         if not now.present[i]:
-            after[i, RATE] = _entry_rate(world, now, i, seen[0])
-            after[i, CLOCK] += 0.5 * (driver.rate + after[i, RATE]) * world.step
+            vehicles, clocks = _on_scene(world, now, seen[0])
+            after[i, RATE] = may_enter(world, parameters, driver, vehicles, clocks, time)
+            after[i, CLOCK] += after[i, RATE] * world.step
             continue
         if min(parameters.delay[i], seen.shape[0] - 1) != age:
             age = min(parameters.delay[i], seen.shape[0] - 1)
@@ -132,39 +140,31 @@ def _write_driver(driver: DriverState, out: Floats) -> None:
 
 
 @kernel(inline=True)
-def _traffic(world: World, drivers: Floats, passes: Bools) -> Traffic:
+def _traffic(world: World, drivers: Floats, present: Bools, passes: Bools) -> Traffic:
     """Return all vehicles at the start of a step."""
     n = drivers.shape[0]
     pose = np.empty((n, 5))
     moving = np.empty(n, dtype=np.bool_)
-    present = np.empty(n, dtype=np.bool_)
     for i in range(n):
         clock = drivers[i, CLOCK]
         moving[i] = not (world.leaves[i] and clock >= world.spans[i, 1])
-        present[i] = moving[i] and clock >= world.spans[i, 0]
-        pose_at(world.time, world.motion[i], clock, pose[i])
+        place_at(world, i, clock, pose[i])
     return Traffic(drivers, pose, moving, present, passes)
 
 
 @kernel(inline=True)
-def _entry_rate(world: World, now: Traffic, i: int, seen: Floats) -> float:
-    """Return the rate of a vehicle that is not yet on the scene.
+def _on_scene(world: World, now: Traffic, seen: Floats) -> tuple[Floats, Floats]:
+    """Return x, y [m], yaw [rad], speed [m/s] (N, 4) of all vehicles, and their clocks (N,) [s].
 
-    It enters when it is due, unless the ego (9,) is in its place.
+    The clocks of vehicles that are not on the scene are infinity. `seen` (9,) is the ego; its
+    clock is -infinity beside the path of its witness.
     """
-    clock = now.drivers[i, CLOCK]
-    rate = now.drivers[i, RATE]
-    begin = world.spans[i, 0]
-    if clock + 0.5 * (rate + 1.0) * world.step < begin:
-        return 1.0
-    pose = np.empty(5)
-    entry = np.empty(7)
-    ego = np.empty(7)
-    half = world.half[i]
-    pose_at(world.time, world.motion[i], begin, pose)
-    fill_box(pose[0], pose[1], pose[2], half[0] + MODEL.entry_gap_m, half[1], entry)
-    _fill_ego(world, seen, ego)
-    return 0.0 if boxes_meet(entry, ego) else 1.0
+    vehicles = now.pose[:, :4].copy()
+    vehicles[:, 3] *= now.drivers[:, RATE]
+    clocks = np.where(now.present, now.drivers[:, CLOCK] + world.step, np.inf)
+    copy_to(vehicles[world.ego], seen[:4])
+    clocks[world.ego] = seen[EGO_CLOCK] if seen[ON_PATH] > 0.0 else -np.inf
+    return vehicles, clocks
 
 
 @kernel(inline=True)
@@ -301,11 +301,7 @@ def _bound_by_limit(
     way = way_at(world, i, limit) - way_at(world, i, driver.clock)
     if way <= MIN_ROOM_M:
         return np.inf
-    speed = driver.rate * now.pose[i, 3]
-    bound = approach_acceleration(parameters, i, way, speed, wait)
-    if speed * wait < 2.0 * way:
-        return bound
-    return min(bound, stopping_acceleration(parameters, i, way, speed))
+    return approach_acceleration(parameters, i, way, driver.rate * now.pose[i, 3], wait)
 
 
 @kernel(inline=True)

@@ -150,13 +150,40 @@ def test_who_leaves_the_scene_does_not_brake_for_an_ego_that_passes_there_later(
     assert drive.present[1].sum() == 61
 
 
+@pytest.mark.parametrize(("braking", "first"), [(0.0, 0), (1.0, 0), (4.0, 40)])
+def test_a_follower_enters_when_it_can_still_stop_behind_the_ego(braking, first):
+    """It is recorded from 6 s on; the ego is where it was recorded, drives on more slowly, or stands in its place."""
+    scenario = replace(following(10.0, 6.0), present=np.array([[60, 149], [0, 149]]))
+    loop = ClosedLoop(scenario, 1)
+    brakes = range(first, first + 30)
+    drive = loop.record(states(loop, lambda k: Command(-braking * (k in brakes), 0.0), 140))
+    assert drive.present[0, 61] == (braking == 0.0)
+    assert drive.present[0].any() == (braking < 4.0)
+    gap = drive.motion.position[1, :, 0] - drive.motion.position[0, :, 0] - 4.25
+    assert gap[drive.present[0]].min(initial=10.0) > 2.0
+    change = np.diff(drive.motion.speed[0])[drive.present[0, 1:] & drive.present[0, :-1]]
+    assert change.min(initial=0.0) >= -0.31  # comfortable braking
+
+
+def test_a_leader_drives_on_until_it_is_out_of_the_way_of_the_ego():
+    """Its recording ends 20 m ahead of the ego, which is hardly slower; or far ahead."""
+    scenario = replace(following(10.0, 20.0), present=np.array([[0, 149], [0, 60]]))
+    loop = ClosedLoop(scenario, 0)
+    drive = loop.record(states(loop, lambda k: Command(-2.0 if 10 <= k < 12 else 0.0, 0.0), 140))
+    there = drive.present[1]
+    gap = drive.motion.position[1, :, 0] - drive.motion.position[0, :, 0] - 4.25
+    assert there.sum() > 100 and 24.9 < gap[np.argmin(there)] < 26.0
+    assert np.ptp(np.diff(drive.motion.position[1, there, 0])) < 1e-6
+    late = loop.record(states(loop, braking_after(1, 6.0), 140))
+    assert late.present[1].sum() == 61  # it is 60 m ahead by then
+
+
 @pytest.mark.parametrize("patience", [2.0, 5.0, NEVER])
 def test_who_waits_for_an_ego_that_stands_goes_first_after_its_patience(patience):
     """The ego went first in the template, but stands 20 m before the crossing."""
     loop = ClosedLoop(crossing(), 0, config=ClosedLoopConfig(patience=patience))
     drive = states(loop, braking_after(3, 4.0), 300)
-    speed = np.array([state.vehicles[1, 3] for state in drive])
-    stands = speed < 0.5
+    stands = np.array([state.present[1] and state.vehicles[1, 3] < 0.5 for state in drive])
     assert stands.any()
     assert (drive[-1].vehicles[1, 1] > 5.0) == (patience < NEVER)
     if patience < NEVER:
