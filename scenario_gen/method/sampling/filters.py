@@ -15,7 +15,7 @@ from scenario_gen.method.sampling.sampler import Block, BLOCK_CANDIDATES, LEVELS
 from scenario_gen.method.sampling.time_warp import MIN_RATE_RATIO, SAMPLE_PERIOD_S
 from scenario_gen.method.sampling.trimming import MIN_DURATION_S
 from scenario_gen.numerics import Floats
-from scenario_gen.types import Cause, Note, NoteKind, Reaction, Scenario, Verdict
+from scenario_gen.types import Cause, FOLLOW, Note, NoteKind, Reaction, Scenario, Verdict
 
 Check = Callable[[Sequence[Scenario]], list[Verdict]]
 
@@ -26,6 +26,8 @@ _LARGE_PILOT_FACTOR = 5  # over a pilot that has too few valid candidates
 _MIN_DISTANCE_SHARE = 0.55  # of a route; half of the recorded distance, which may be longer
 _KEPT_SHARE = 0.4  # of the valid candidates with a shared area that are kept at least
 _SHARED_AREA_SHARE = 0.1  # of valid candidates, from which all must have one
+_ENDING_S = 2.5  # before a record's end
+_HARDER_MPS2 = 1.0  # braking at the end over the strongest of the undisturbed drive
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,14 +75,15 @@ class ValidityFilter:
     Attributes:
         check: the validity checker.
         max_absent: conflicts of the template that candidates may lose: as many as the undisturbed
-            drive, or, where that loses some, as the best of the first candidates (a share of
-            `enough`).
+            drive, or, where that loses some, as the best of the first candidates.
         enough: share of valid candidates from which a level of standard deviations is used.
         lost: reactions of the template, by their vehicles, that cannot be kept on this road, each
             with a message: neither the undisturbed drive nor those candidates keep them. No
             candidate is refused for them.
         min_distances: (N,) metres that each vehicle drives at least.
         min_duration: s that a scenario lasts at least.
+        max_end_braking: (N,) m/s² that each vehicle brakes at most shortly before its record
+            ends without a leader; empty: there is no such limit.
     """
 
     check: Check
@@ -89,6 +92,7 @@ class ValidityFilter:
     lost: Mapping[tuple[int, ...], str] = field(default_factory=dict)
     min_distances: Floats = field(default_factory=lambda: np.zeros(0))
     min_duration: float = 0.0
+    max_end_braking: Floats = field(default_factory=lambda: np.zeros(0))
 
     @classmethod
     def of(cls, sampler: Sampler, check: Check, enough: float) -> "ValidityFilter":
@@ -103,7 +107,7 @@ class ValidityFilter:
         first = _scenarios([sampler.block(0, 0)]) if absent else []
         if first:
             verdicts = sorted(check(first), key=lambda verdict: verdict.not_applicable)
-            absent = min(absent, verdicts[int(enough * len(verdicts))].not_applicable)
+            absent = min(absent, verdicts[0].not_applicable)
             for verdict in verdicts:
                 if verdict.not_applicable <= absent:
                     also_lost = _lost_reactions(verdict)
@@ -111,14 +115,29 @@ class ValidityFilter:
         vehicles, nominal = sampler.model.vehicles, sampler.model.warp.nominal
         distances = np.array([_MIN_DISTANCE_SHARE * vehicle.path.length for vehicle in vehicles])
         duration = min(MIN_DURATION_S, MIN_RATE_RATIO * float(nominal.time[-1]))
-        return cls(check, absent, enough, lost, distances, duration)
+        braking = _HARDER_MPS2 + _strongest_braking(undisturbed, math.inf)
+        end = float(nominal.grid[-1]) - _ENDING_S
+        for edge in sampler.model.reactions.edges:
+            if edge.kind == FOLLOW and edge.until > end:
+                braking[edge.who] = math.inf
+        return cls(check, absent, enough, lost, distances, duration, braking)
 
     def __call__(self, scenarios: Sequence[Scenario]) -> list[Cause | None]:
         """Return the first cause for which each scenario is refused, None for a valid one."""
-        is_short = [self._is_short(scenario) for scenario in scenarios]
-        checked = [each for each, short in zip(scenarios, is_short, strict=True) if not short]
+        unfit = [self._unfit(scenario) for scenario in scenarios]
+        checked = [each for each, cause in zip(scenarios, unfit, strict=True) if cause is None]
         verdicts = iter(self.check(checked) if checked else [])
-        return [Cause.TOO_SHORT if short else self._cause(next(verdicts)) for short in is_short]
+        return [cause or self._cause(next(verdicts)) for cause in unfit]
+
+    def _unfit(self, scenario: Scenario) -> Cause | None:
+        """Return why a scenario need not be checked."""
+        if self._is_short(scenario):
+            return Cause.TOO_SHORT
+        if len(self.max_end_braking):
+            braking = _strongest_braking(scenario, _ENDING_S)
+            if (braking > self.max_end_braking).any():
+                return Cause.LATE_BRAKING
+        return None
 
     def _cause(self, verdict: Verdict) -> Cause | None:
         for violation in verdict.violations:
@@ -167,6 +186,13 @@ class ValidityFilter:
             further = range(count, _LARGE_PILOT_FACTOR * count)
             best.candidates.extend(self.judged(sampler.block(best.level, k) for k in further))
         return best
+
+
+def _strongest_braking(scenario: Scenario, seconds: float) -> Floats:
+    """Return each vehicle's strongest braking (N,) [m/s²], at most `seconds` before it leaves."""
+    first = scenario.present[:, 1:] - seconds / SAMPLE_PERIOD_S
+    ending = scenario.is_present & (np.arange(len(scenario.time)) >= first)
+    return np.asarray(np.where(ending, -scenario.acceleration, 0.0).max(axis=1))
 
 
 def _scenarios(blocks: Iterable[Block]) -> list[Scenario]:

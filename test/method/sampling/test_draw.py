@@ -75,6 +75,15 @@ def test_scenarios_in_which_a_vehicle_hardly_drives_are_refused(fifty):
     assert validity([scenario, halted, brief]) == [None, Cause.TOO_SHORT, Cause.TOO_SHORT]
 
 
+def test_a_vehicle_without_a_leader_brakes_no_harder_just_before_its_record_ends(fifty):
+    scenario = fifty.scenarios[0]
+    validity = ValidityFilter(all_valid, 0, 0.1, max_end_braking=np.array([2.0, np.inf, 2.0]))
+    early, late, led = (np.zeros_like(scenario.speed) for _ in range(3))
+    early[0, -28:-26] = late[0, -2:] = led[1, -2:] = -2.5
+    drives = [replace(scenario, acceleration=braking) for braking in (early, late, led)]
+    assert validity(drives) == [None, Cause.LATE_BRAKING, None]
+
+
 def test_asked_states(fifty):
     asked = scene_plan().requested
     for s in fifty.scenarios:
