@@ -78,6 +78,7 @@ CONTENTS = {
         "planner, road_server",
         "the part of a recording that fits the road; the sender of tracks sends it instead",
     ),
+    "tracks/recorded": ("bags", "the recording, if a decision changed the tracks"),
     "traffic/local_map": ("traffic", "the map with the others as obstacles"),
     "traffic/markers": ("traffic", "the drive, to look at"),
     "vehicle_*/fix": ("log_player", "the log as a stream"),

@@ -38,7 +38,7 @@ LIVE = Quality(depth=100, transient_local=False)
 NEWEST = Quality(depth=1, transient_local=False)
 
 _TABLE: tuple[tuple[str, Quality, str], ...] = (
-    (trajectory.TYPE, LATCHED, "tracks tracks/part changepoints fit"),
+    (trajectory.TYPE, LATCHED, "tracks tracks/part tracks/recorded changepoints fit"),
     (trajectory.TYPE, MANY, f"scenarios {ego.WITNESS}"),
     (trajectory.TYPE, LIVE, "ego/trajectory"),
     (paths.TYPE, LATCHED, "vehicle_*/route vehicle_*/path ego/route"),

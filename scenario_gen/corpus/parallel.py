@@ -4,12 +4,13 @@
 """Scenarios from several encounters on several roads; for archives see `scenario-gen batch`."""
 
 from collections.abc import Iterable, Sequence
+from itertools import chain
 import os
 
 from scenario_gen.base.errors import InputError, RefusedError
 from scenario_gen.base.signals import ctrl_c_blocked, worker_pool
 from scenario_gen.method.config import PipelineConfig
-from scenario_gen.pipeline import generate
+from scenario_gen.pipeline import generate_outcomes
 from scenario_gen.types import Encounter, GenerationResult, Road
 
 Case = tuple[Encounter, Road | str]
@@ -38,7 +39,8 @@ def generate_many(
         workers: number of processes; 0 starts one per core.
 
     Returns:
-        For each case, in order, its result or the error that refused it.
+        For each case, in order, its result or the error that refused it. With
+        `sampling.decisions=drawn` a case has a result for each outcome (`generate_outcomes`).
 
     Raises:
         InputError: a case is no pair, or a road or a parameter is invalid.
@@ -57,16 +59,16 @@ def generate_many(
     tasks = [(case, config, count, seed) for case in cases]
     workers = min(workers or os.cpu_count() or 1, len(tasks))
     if workers <= 1:
-        return list(map(_answer, tasks))
+        return list(chain.from_iterable(map(_answers, tasks)))
     with worker_pool(workers) as pool:
         with ctrl_c_blocked():
-            answers = pool.map(_answer, tasks)
-        return list(answers)
+            answers = pool.map(_answers, tasks)
+        return list(chain.from_iterable(answers))
 
 
-def _answer(task: tuple[Case, PipelineConfig, int, int]) -> Answer:
+def _answers(task: tuple[Case, PipelineConfig, int, int]) -> Sequence[Answer]:
     (encounter, road), config, count, seed = task
     try:
-        return generate(encounter, road, config, count=count, seed=seed)
+        return generate_outcomes(encounter, road, config, count=count, seed=seed)
     except RefusedError as error:
-        return error
+        return [error]

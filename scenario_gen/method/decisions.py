@@ -137,7 +137,7 @@ def decided(encounter: Encounter, decision: Decision) -> Encounter:
         <Outcome.GOES_FIRST: 'goes first'>
     """
     conflict = DecidedConflict.of(encounter)
-    source = Decided(encounter.name, decision)
+    source = Decided(encounter.name, decision, encounter)
     if decision.outcome is conflict.recorded:
         return replace(encounter, source=source)
     name = f"{encounter.name}, {decision}, {decision.lag:.1f} s"

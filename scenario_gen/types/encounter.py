@@ -4,7 +4,7 @@
 """A recorded encounter: N vehicles near each other on one clock (paper II-A, eqs 1-2)."""
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 import re
 from typing import Self
 
@@ -32,10 +32,12 @@ class Decided:
     Attributes:
         encounter: name of the recorded encounter.
         decision: its outcome here, as recorded or another one.
+        recorded: the recorded encounter, if it is known.
     """
 
     encounter: str
     decision: Decision
+    recorded: "Encounter | None" = field(default=None, compare=False, repr=False)
 
 
 @dataclass(frozen=True, eq=False)
@@ -125,6 +127,11 @@ class Encounter(Motion):
     def recording(self) -> str:
         """Name of the recorded encounter that it is an outcome of; else its own name."""
         return self.source.encounter if isinstance(self.source, Decided) else self.name
+
+    @property
+    def made(self) -> str:
+        """How its motion came about: "recorded", or "decided" if its decision changed it."""
+        return "recorded" if self.name == self.recording else "decided"
 
     @property
     def dt_ns(self) -> int:

@@ -7,7 +7,14 @@ import numpy as np
 import pytest
 from support.source_files import ROOT
 
-from scenario_gen import generate_many, InputError, read_log, RefusedError
+from scenario_gen import (
+    generate_many,
+    InputError,
+    PipelineConfig,
+    read_log,
+    RefusedError,
+    SamplingConfig,
+)
 
 
 def test_workers_do_not_change_results_and_a_refusal_keeps_its_place():
@@ -21,5 +28,9 @@ def test_workers_do_not_change_results_and_a_refusal_keeps_its_place():
     )
     assert spread[1].evaluation.to_json() == alone[1].evaluation.to_json()
     assert generate_many([]) == []
+    drawn = PipelineConfig(sampling=SamplingConfig(decisions="drawn"))
+    outcomes = generate_many([(encounter, "corridor")], drawn, count=4, seed=2, workers=1)
+    assert sum(map(len, outcomes)) == 4 and len(outcomes) > 1
+    assert all(result.encounter.decision for result in outcomes)
     with pytest.raises(InputError, match="fourway"):
         generate_many([(encounter, "fourway")], count=1)

@@ -5,13 +5,16 @@
 
 from dataclasses import replace
 from io import StringIO
+import re
 
 import numpy as np
 import pytest
 from rich.console import Console
 from support.textbook_motions import labelled, REACTIONS
 
+from msg_conventions.tracks import decode_tracks
 import scenario_gen as sg
+from scenario_gen.bags.storage.bag import read_messages
 from scenario_gen.closed_loop.config import ClosedLoopConfig
 from scenario_gen.closed_loop.results import Drives
 from scenario_gen.closed_loop.trials import run_trials, trials_of
@@ -264,6 +267,12 @@ def test_a_bag_keeps_outcome_and_probability(sets, tmp_path):
     result.save(tmp_path / "bag")
     read = sg.load(tmp_path / "bag")
     assert read.encounter.source == result.encounter.source
+    (original,) = (
+        message.data
+        for message in read_messages(tmp_path / "bag")
+        if message.topic.endswith("tracks/recorded")
+    )
+    np.testing.assert_array_equal(decode_tracks(original).position, recorded().position)
     assert [s.facts.decision for s in read] == [s.facts.decision for s in result]
     (validation,) = evaluate_bag(tmp_path / "bag")
     assert validation.valid == len(result) and validation.result.generated.reactions
@@ -276,6 +285,9 @@ def test_the_summary_states_the_mix(sets):
     sizes = {result.encounter.decision.outcome: len(result) for result in sets}
     assert f"goes first in {sizes[Outcome.GOES_FIRST]} (probability 0.50)" in text
     assert f"vehicle 2 stops in {sizes[Outcome.STOPS]} scenarios" in text
+    _, *made = re.split("vehicle 2 .* on corridor", text)
+    assert len(made) == 3 and not any("record" in words for words in made)
+    assert all("decided" in words for words in made)
 
 
 def test_the_requested_vehicles_take_part(sets):

@@ -23,7 +23,7 @@ from msg_conventions.topics import topic_entry, vehicle_topic
 from msg_conventions.tracks import encode_tracks
 from scenario_gen.bags.storage.metadata import qos_yaml
 from scenario_gen.bags.storage.writer import atomic_bag, BagWriter
-from scenario_gen.types import Encounter, GenerationResult, Scenario, tokens
+from scenario_gen.types import Decided, Encounter, GenerationResult, Scenario, tokens
 
 
 def result_messages(
@@ -62,6 +62,8 @@ def result_messages(
     for topic, data in (*template.items(), *infos.items()):
         yield topic, data, stamp
     yield "road/markings", road_markers(road.lanes, road.frame_id, stamp), stamp
+    if isinstance(encounter.source, Decided) and encounter.source.recorded is not None:
+        yield "tracks/recorded", encode_tracks(encounter.source.recorded), stamp
     yield "posterior", encode_posterior(encounter, result.segmentation), stamp
     for topic, data in footprint_messages(encounter):
         yield topic, data, stamp

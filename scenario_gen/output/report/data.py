@@ -62,6 +62,7 @@ def case_data(case: GenerationResult, samples: int) -> dict[str, Any]:
             if ids[owner] not in case.evaluation.vehicles
         ],
         "road": road_data(case.road) if case.road else None,
+        "made": encounter.made,
         "template": _template(encounter, case.segmentation, frames),
         "fit": _fit(case.fit, case.routes) if case.fit else [],
         "reactions": _reactions(case),

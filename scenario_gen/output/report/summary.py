@@ -63,13 +63,14 @@ def _case(case: GenerationResult, verbose: bool) -> list[RenderableType]:
     row = case.evaluation.row(WITH)
     losses = case.fit.losses if case.fit else ()
     not_kept = [loss.message for loss in losses if loss.kind != "arm"]
-    not_kept += _vanished(row)
+    not_kept += _vanished(row, case.encounter.made)
     not_kept += case.lost_reactions
     notes = [loss.message for loss in losses if loss.kind == "arm"]
     notes += case.route_remarks
     notes += filter(None, [case.segmentation.remark(case.encounter.duration)])
     table = Table.grid(padding=(0, 1))
-    table.add_row("", "recording", _recording(case.encounter))
+    subject = "recording" if case.encounter.made == "recorded" else case.encounter.made
+    table.add_row("", subject, _road_users(case.encounter))
     for sentence in case.reacting["sentences"]:
         table.add_row("", "reaction", printable(sentence))
     table.add_row("", "valid", _validity(case.generated))
@@ -86,8 +87,8 @@ def _case(case: GenerationResult, verbose: bool) -> list[RenderableType]:
     return [title, table, *(_details(case, row) if verbose else ())]
 
 
-def _recording(encounter: Encounter) -> str:
-    """Return number and types of the recorded road users, and the duration."""
+def _road_users(encounter: Encounter) -> str:
+    """Return number and types of the road users of a template, and the duration."""
     types = sorted({vehicle.type for vehicle in encounter.vehicles})
     users = "vehicles" if types == [CAR] else f"road users ({', '.join(types)})"
     return f"{len(encounter.vehicles)} {users} for {encounter.duration:.1f} s"
@@ -106,7 +107,7 @@ def _validity(result: ScenarioSet) -> Text:
 
 
 def _variety(case: GenerationResult) -> str:
-    """Return the ranges of the figures of a set, each with the recorded value in brackets."""
+    """Return the ranges of the figures of a set, each with the template's value in brackets."""
     spreads = {} if case.coverage is None else case.coverage.spreads
     ranges = []
     for name in VARIED:
@@ -116,19 +117,19 @@ def _variety(case: GenerationResult) -> str:
             continue
         figures = f"{spread.label} {min(values):.1f} to {max(values):.1f} {spread.unit}"
         if math.isfinite(spread.template):
-            ranges.append(f"{figures} (recorded {spread.template:.1f})")
+            ranges.append(f"{figures} ({case.encounter.made} {spread.template:.1f})")
         elif name == "speed":
             ranges.append(figures)
     return ", ".join(ranges)
 
 
-def _vanished(row: Row | None) -> list[str]:
-    """Return a sentence on recorded conflicts that vanish in the scenarios."""
+def _vanished(row: Row | None, made: str) -> list[str]:
+    """Return a sentence on conflicts of the template that vanish in the scenarios."""
     if row is None or not {"vanished_conflicts", "conflicts"} <= row.values.keys():
         return []
     vanished = row.values["vanished_conflicts"].value
     total = vanished + row.values["conflicts"].value
-    text = f"{vanished:.3g} of {total:.0f} recorded conflict(s) vanish on average"
+    text = f"{vanished:.3g} of {total:.0f} {made} conflict(s) vanish on average"
     return [text] if vanished > 0.0 else []
 
 

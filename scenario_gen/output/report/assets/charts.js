@@ -42,7 +42,7 @@ function drawTemplate(place, data, template) {
   const marks = bounds.slice(1, -1);
   const likely = { x: probability.map((_, i) => +(i * step).toFixed(2)), y: probability, width: 1, fill: true, name: "probability of a changepoint" };
   chart(place, {
-    label: "recorded speeds, and below them the probability of a changepoint",
+    label: `${data.made} speeds, and below them the probability of a changepoint`,
     x: { title: "time [s]", range: [0, bounds[bounds.length - 1]] },
     zoom: true,
     panels: [
@@ -55,10 +55,10 @@ function drawTemplate(place, data, template) {
 /** The speeds of one scenario, those of the recording on its own clock dashed, under a cursor. */
 function drawSpeedsNow(place, data, set, sample, template, cursor) {
   const lines = data.vehicles.flatMap((vehicle, n) => [
-    { x: clock(template, 0), y: speeds(template, 0, n), colour: vehicleColour(n), width: 1.2, dash: "5 4", name: `${vehicle.id}, recorded` },
+    { x: clock(template, 0), y: speeds(template, 0, n), colour: vehicleColour(n), width: 1.2, dash: "5 4", name: `${vehicle.id}, ${data.made}` },
     { x: clock(set, sample), y: speeds(set, sample, n), colour: vehicleColour(n), width: 2.2, name: vehicle.id },
   ]);
-  chart(place, { label: "speeds of the shown scenario; dashed: recorded", x: { title: "time [s]" }, cursor, zoom: true, panels: [{ title: "speed [m/s]", share: 1, zero: true, lines }] });
+  chart(place, { label: `speeds of the shown scenario; dashed: ${data.made}`, x: { title: "time [s]" }, cursor, zoom: true, panels: [{ title: "speed [m/s]", share: 1, zero: true, lines }] });
 }
 
 /** Figure 4, lower half: the speeds of all scenarios, those of the recording dashed. */
@@ -73,8 +73,8 @@ function drawSpeeds(place, data, set, template, top) {
     }
     lines.push({ x, y, colour: vehicleColour(n), width: isEgo(data, n) ? 2 : 1, dash: isEgo(data, n) ? "7 5" : "", opacity: Math.max(0.3, 1 - set.shown.length / 30), name: vehicle.id });
   });
-  data.vehicles.forEach((vehicle, n) => lines.push({ x: clock(template, 0), y: speeds(template, 0, n), width: 1.5, dash: "6 4", name: `${vehicle.id}, recorded` }));
-  chart(place, { label: "speeds of all scenarios; dashed: recorded", x: { title: "time [s]" }, zoom: true, panels: [{ title: "speed [m/s]", share: 1, range: [0, top], lines }] });
+  data.vehicles.forEach((vehicle, n) => lines.push({ x: clock(template, 0), y: speeds(template, 0, n), width: 1.5, dash: "6 4", name: `${vehicle.id}, ${data.made}` }));
+  chart(place, { label: `speeds of all scenarios; dashed: ${data.made}`, x: { title: "time [s]" }, zoom: true, panels: [{ title: "speed [m/s]", share: 1, range: [0, top], lines }] });
 }
 
 /** One vehicle's speed, acceleration and lateral acceleration: the recording bold, scenarios (the drawn ones, or the one chosen) thin. */
@@ -93,10 +93,10 @@ function drawMotion(place, data, set, template, n, chosen) {
   };
   const drawn = set && !isEgo(data, n) ? set.shown.filter((s) => chosen < 0 || s === chosen) : [];
   drawn.forEach((s) => add(set, s, { colour: vehicleColour(n), width: chosen < 0 ? 1 : 2, opacity: drawn.length > 12 ? 0.4 : 1, name: `scenario ${set.index[s]}` }));
-  add(template, 0, { width: 2.5, name: "recorded" });
+  add(template, 0, { width: 2.5, name: data.made });
   const titles = ["speed [m/s]", "acceleration [m/s²]", "lateral [m/s²]"];
   const panels = titles.map((title, c) => ({ title, share: 1 / 3, zero: c === 0, lines: lines[c] }));
-  chart(place, { label: "speed and accelerations over time; black: recorded", x: { title: "time [s]" }, zoom: true, panels });
+  chart(place, { label: `speed and accelerations over time; black: ${data.made}`, x: { title: "time [s]" }, zoom: true, panels });
 }
 
 /** Figure 5: the mean feature matrices. */
