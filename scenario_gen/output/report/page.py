@@ -89,7 +89,14 @@ def _view(index: int, case: GenerationResult) -> dict[str, Any]:
         "segments": _segments(case),
         "vehicles": _vehicles(case),
         "planned": routes_in_words(case.routes),
+        "spreads": _measured(case),
     }
+
+
+def _measured(case: GenerationResult) -> list[str]:
+    """Return the names of the figures that at least one scenario has."""
+    spreads = case.coverage.spreads if case.coverage is not None else {}
+    return [name for name, spread in spreads.items() if any(map(math.isfinite, spread.values))]
 
 
 def _segments(case: GenerationResult) -> list[dict[str, Any]]:
