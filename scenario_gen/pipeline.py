@@ -28,6 +28,7 @@ from scenario_gen.method.shortening import fit_what_matters
 from scenario_gen.method.suitable_roads import AUTO, on_first_suitable_road
 from scenario_gen.numerics.blas import one_blas_thread
 from scenario_gen.types import (
+    Coverage,
     Encounter,
     Evaluation,
     GenerationResult,
@@ -115,13 +116,13 @@ def completed(
     config: PipelineConfig,
     request: Request,
 ) -> GenerationResult:
-    """Return a set of scenarios with its replay, coverage, provenance; evaluated when read."""
+    """Return a set of scenarios with its replay and provenance; it is evaluated when read."""
     encounter, (road, fit) = result.encounter, result.road_and_fit()
     result = replace(result, replay=replay(encounter, fit, road.frame_id))
     return replace(
         result,
         figures=partial(_evaluated, config=config.evaluation),
-        coverage=coverage_of(encounter, result.generated.scenarios),
+        covered=_coverage,
         provenance=what_makes_it_again(config, request),
     )
 
@@ -130,6 +131,12 @@ def _evaluated(result: GenerationResult, config: EvaluationConfig) -> Evaluation
     """Return the evaluation of a set."""
     with one_blas_thread():
         return evaluate(result, config)
+
+
+def _coverage(result: GenerationResult) -> Coverage:
+    """Return the coverage of a set."""
+    with one_blas_thread():
+        return coverage_of(result.encounter, result.generated.scenarios)
 
 
 def generate_outcomes(

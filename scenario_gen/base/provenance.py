@@ -4,6 +4,7 @@
 """Parameters and versions behind a scenario, as texts in the summary of its request."""
 
 from collections.abc import Mapping
+from functools import cache
 from importlib import metadata
 import platform
 from typing import Any, TypeVar
@@ -18,6 +19,7 @@ RECORDING = "recording"
 
 _LOG_PREFIX = "log "
 _HASH_PREFIX = "sha256 "
+_version = cache(metadata.version)
 
 
 def log_texts(hashes: Mapping[str, str]) -> dict[str, str]:
@@ -28,7 +30,7 @@ def log_texts(hashes: Mapping[str, str]) -> dict[str, str]:
 def versions() -> dict[str, str]:
     """Return the versions that can change the last digits of a scenario."""
     result = {"scenario_gen": scenario_gen.__version__, "python": platform.python_version()}
-    return result | {name: metadata.version(name) for name in ("numpy", "scipy", "numba")}
+    return result | {name: _version(name) for name in ("numpy", "scipy", "numba")}
 
 
 def parameter_texts(config: Any) -> dict[str, str]:

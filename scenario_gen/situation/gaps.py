@@ -3,18 +3,18 @@
 
 """Gaps in time and space that show how drivers react, in recorded and in generated motions."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from itertools import permutations
 import math
 
 import numpy as np
 
-from scenario_gen.numerics import Bools, Floats, wrap_angle
+from scenario_gen.numerics import Bools, Floats, Ints
 from scenario_gen.numerics.boxes import footprint_gaps
-from scenario_gen.numerics.kernels import F2, F3, I, kernel, OUTB1
+from scenario_gen.numerics.kernels import B, F2, F3, I, I2, kernel, OUTB2
 from scenario_gen.numerics.rounding import ROUNDING_M, ROUNDING_S
 from scenario_gen.situation.conflicts import Conflict
-from scenario_gen.types import Motion, together
+from scenario_gen.types import Motion
 
 MAX_FOLLOWING_M = 60.0  # a leader is nearer
 HALF_LANE_M = 2.2  # a follower is nearer to its leader's path
@@ -106,39 +106,55 @@ def is_behind(motion: Motion, follower: int, leader: int) -> Bools:
     It is straight behind the other one, drives where that one was before, or the other one is
     where it will be.
     """
-    behind = np.zeros(len(motion.time), dtype=np.bool_)
+    return np.asarray(_behind(motion, [(follower, leader)], only_alike=False)[0])
+
+
+def _behind(motion: Motion, pairs: Sequence[tuple[int, int]], *, only_alike: bool) -> Bools:
+    """Return (P, T) whether followers are behind leaders, see `is_behind`.
+
+    Args:
+        motion: the vehicles.
+        pairs: P times follower and leader.
+        only_alike: False where their headings differ.
+    """
+    behind = np.zeros((len(pairs), len(motion.time)), dtype=np.bool_)
     step = max(round(PATH_SAMPLE_PERIOD_S / motion.dt), 1)
-    both = together(motion.present, follower, leader)
-    rows = both.start, both.stop, step
-    _fill_behind(motion.position, motion.heading, follower, leader, *rows, behind)
+    rows = np.array(pairs, dtype=np.int64).reshape(-1, 2)
+    poses = motion.position, motion.heading
+    _fill_behind(*poses, motion.present, rows, step, only_alike, behind)
     return behind
 
 
-@kernel(F3, F2, I, I, I, I, I, OUTB1)
+@kernel(F3, F2, I2, I2, I, B, OUTB2)
 def _fill_behind(
     position: Floats,
     heading: Floats,
-    follower: int,
-    leader: int,
-    first: int,
-    last: int,
+    present: Ints,
+    pairs: Ints,
     step: int,
+    only_alike: bool,
     out: Bools,
 ) -> None:
-    """Fill `out` (T,) from sample first to last - 1, as `is_behind`."""
-    path, yaw = position[follower], heading[follower]
-    leader_path, leader_yaw = position[leader], heading[leader]
-    for t in range(first, last):
-        dx, dy = leader_path[t, 0] - path[t, 0], leader_path[t, 1] - path[t, 1]
-        if np.sqrt(dx * dx + dy * dy) >= MAX_FOLLOWING_M:
-            continue
-        cos, sin = np.cos(yaw[t]), np.sin(yaw[t])
-        is_straight = dx * cos + dy * sin > 0.0 and abs(dy * cos - dx * sin) < HALF_LANE_M
-        out[t] = (
-            (is_straight and _is_alike(leader_yaw[t], yaw[t]))
-            or t - _sample_near(leader_path, leader_yaw, path[t], yaw[t], step, t) > step
-            or _sample_near(path, yaw, leader_path[t], leader_yaw[t], step, t) - t > step
-        )
+    """Fill `out` (P, T), as `_behind`."""
+    for k in range(len(pairs)):
+        follower, leader = pairs[k, 0], pairs[k, 1]
+        path, yaw = position[follower], heading[follower]
+        leader_path, leader_yaw = position[leader], heading[leader]
+        first = max(present[follower, 0], present[leader, 0])
+        last = min(present[follower, 1], present[leader, 1])
+        for t in range(first, last + 1):
+            if only_alike and not _is_alike(yaw[t], leader_yaw[t]):
+                continue
+            dx, dy = leader_path[t, 0] - path[t, 0], leader_path[t, 1] - path[t, 1]
+            if np.sqrt(dx * dx + dy * dy) >= MAX_FOLLOWING_M:
+                continue
+            cos, sin = np.cos(yaw[t]), np.sin(yaw[t])
+            is_straight = dx * cos + dy * sin > 0.0 and abs(dy * cos - dx * sin) < HALF_LANE_M
+            out[k, t] = (
+                (is_straight and _is_alike(leader_yaw[t], yaw[t]))
+                or t - _sample_near(leader_path, leader_yaw, path[t], yaw[t], step, t) > step
+                or _sample_near(path, yaw, leader_path[t], leader_yaw[t], step, t) - t > step
+            )
 
 
 @kernel(inline=True)
@@ -174,12 +190,11 @@ def bumper_gaps(motion: Motion, follower: int, leader: int) -> Floats:
 
 def lane_gaps(motion: Motion) -> LaneGaps:
     """Return speeds (k,) [m/s] and bumper-to-bumper gaps (k,) [m] per (follower, leader)."""
+    pairs = list(permutations(range(len(motion.vehicles)), 2))
     gaps = {}
-    for follower, leader in permutations(range(len(motion.vehicles)), 2):
-        turned = np.abs(wrap_angle(motion.heading[follower] - motion.heading[leader]))
-        rows = turned < MAX_HEADING_DIFFERENCE_RAD
-        if rows.any():
-            rows = rows & is_behind(motion, follower, leader)
+    for (follower, leader), rows in zip(
+        pairs, _behind(motion, pairs, only_alike=True), strict=True
+    ):
         if rows.any():
             speed = motion.speed[follower, rows]
             gaps[follower, leader] = speed, bumper_gaps(motion, follower, leader)[rows]

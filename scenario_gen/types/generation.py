@@ -50,7 +50,8 @@ class GenerationResult:
         replay: the recording as fitted to the road, replayed.
         row_name: that of the evaluation's row of `generated`.
         provenance: what is needed to make it again: log hashes, versions, parameters.
-        coverage: what `generated` covers, None if it was not measured.
+        covered: the coverage of `generated`, or a function that measures it when `coverage` is
+            first read; None if it is not measured.
         valid: how many of those scenarios are valid, where all of a bag's are shown; None: all of
             them are.
     """
@@ -67,12 +68,17 @@ class GenerationResult:
     row_name: str = WITH
     provenance: Mapping[str, str] = field(default_factory=dict)
     valid: int | None = None
-    coverage: Coverage | None = None
+    covered: "Coverage | Callable[[GenerationResult], Coverage] | None" = None
 
     @cached_property
     def evaluation(self) -> Evaluation:
         """How similar to the recording and how critical the scenarios are."""
         return self.figures if isinstance(self.figures, Evaluation) else self.figures(self)
+
+    @cached_property
+    def coverage(self) -> Coverage | None:
+        """Which criticality and manoeuvres the scenarios have; None if it was not measured."""
+        return self.covered(self) if callable(self.covered) else self.covered
 
     def __repr__(self) -> str:
         road = self.road.name if self.road is not None else "no road"
@@ -137,7 +143,7 @@ class GenerationResult:
             self,
             generated=generated,
             figures=Evaluation.empty(),
-            coverage=None,
+            covered=None,
             valid=None,
         )
 

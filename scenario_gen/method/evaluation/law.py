@@ -117,7 +117,7 @@ def features_of(
     is not computed again unless one of them follows the other.
     """
     motion = motion.resampled(FIGURE_PERIOD_S)
-    figures = {figure.pair: figure for figure in figures_of(motion) if pair in (None, figure.pair)}
+    figures = {figure.pair: figure for figure in figures_of(motion, pair)}
     conflicts: dict[Pair, Conflict] = {
         known: conflict
         for known, conflict in conflicts_by_pair(find_conflicts(motion)).items()

@@ -83,12 +83,17 @@ def measure(scenario: Motion, name: str, pair: Pair | None = None) -> float:
     return (max if name == "closing_speed" else min)(values, default=math.nan)
 
 
-def figures_of(scenario: Motion) -> tuple[PairFigures, ...]:
-    """Return all figures of each pair that is present together; `arrival_gap` unsigned."""
+def figures_of(scenario: Motion, pair: Pair | None = None) -> tuple[PairFigures, ...]:
+    """Return all figures of each pair that is present together; `arrival_gap` unsigned.
+
+    Args:
+        scenario: with all its vehicles.
+        pair: the only pair (a < b) of interest; None: all pairs.
+    """
     motion = scenario.resampled(FIGURE_PERIOD_S)
     met = conflicts_by_pair(find_conflicts(motion))
     figures = []
-    for a, b in combinations(range(len(motion.vehicles)), 2):
+    for a, b in combinations(range(len(motion.vehicles)), 2) if pair is None else [pair]:
         both = motion.present_slice(a, b)
         if both.stop - both.start < 2:
             continue

@@ -223,7 +223,7 @@ def _result(
         generated,
         row_name=SCENARIOS,
         valid=checked.valid,
-        coverage=coverage_of(encounter, scenarios),
+        covered=coverage_of(encounter, scenarios),
     )
     return replace(result, figures=evaluate(result, config.evaluation))
 

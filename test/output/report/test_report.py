@@ -173,7 +173,7 @@ def test_the_summary_fits_on_a_screen():
 
 def test_the_verdict_says_how_critical_the_set_is_and_a_cap_is_no_measurement():
     case = report_case()
-    case = replace(case, coverage=coverage_of(case.encounter, case.generated.scenarios))
+    case = replace(case, covered=coverage_of(case.encounter, case.generated.scenarios))
     metrics = tuple(
         replace(metric, cap=1000.0 if metric.id == "min_ttc" else None)
         for metric in case.evaluation.metrics

@@ -174,7 +174,7 @@ def test_values_are_shown_and_the_chart_is_zoomed_and_moved(tab):
 
 def test_scenarios_are_sorted_filtered_and_paged_and_those_listed_are_drawn(browser, tmp_path):
     case = report_case(60)
-    case = replace(case, coverage=coverage_of(case.encounter, case.generated.scenarios))
+    case = replace(case, covered=coverage_of(case.encounter, case.generated.scenarios))
     write_report(tmp_path / "report.html", ReportInput([case]))
     tab = Report(browser, tmp_path / "report.html", DESKTOP)
     drawn, lines = tab.part("drawn"), tab.part("list").locator("tr")
