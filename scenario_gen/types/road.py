@@ -220,15 +220,17 @@ class Road:
 
     def _directions_in(self, lane: Lane, rows: Ints, columns: Ints) -> npt.NDArray[np.uint16]:
         """Return the bits (C,) that a lane sets in its cells, from the section nearest to each."""
+        from scipy.spatial.distance import cdist  # is not needed to read a road
+
         bits = np.arange(DIRECTION_COUNT)
         turn = wrap_angle(2.0 * np.pi * bits / DIRECTION_COUNT - lane.yaw[:, None])
         allowed = ((np.abs(turn) <= _AGAINST_RAD) * (1 << bits)).sum(axis=1).astype(np.uint16)
         centres = self.origin + (np.column_stack((columns, rows)) + 0.5) * self.resolution
         nearest = np.empty(len(centres), dtype=np.int64)
         for start in range(0, len(centres), _CHUNK_CELLS):
-            chunk = centres[start : start + _CHUNK_CELLS, None]
-            squared = np.square(chunk - lane.middle).sum(axis=2)
-            nearest[start : start + _CHUNK_CELLS] = np.argmin(squared, axis=1)
+            chunk = slice(start, start + _CHUNK_CELLS)
+            squared = cdist(centres[chunk], lane.middle, "sqeuclidean")
+            nearest[chunk] = np.argmin(squared, axis=1)
         return np.asarray(allowed[nearest])
 
     def cells_in(self, lanes: Iterable[Lane]) -> Bools:

@@ -200,8 +200,9 @@ def _waits_before(motion: Motion, met: Conflict) -> bool:
     n, time = met.second, motion.time
     last = min(met.exit_first, met.entry_second)
     passing: Bools = motion.is_present[n] & (time >= met.entry_first) & (time <= last)
-    if not passing.any():
+    stands = passing & (motion.speed[n] < _LIMITS.stopped_mps)
+    if not stands.any():
         return False
     driven = arc_lengths(motion.position[n])
     near = driven >= np.interp(met.entry_second, time, driven) - _LIMITS.waiting_distance_m
-    return bool((motion.speed[n, passing & near] < _LIMITS.stopped_mps).any())
+    return bool((stands & near).any())
