@@ -18,6 +18,8 @@ REMOVED = {
     "validate": "`scenario-gen evaluate` checks every scenario of a bag, then measures it",
     "parameters": "`scenario-gen --parameters` lists them",
     "compact": "`scenario-gen batch … --compact` merges the tables of a batch",
+    "reindex": "a bag that was cut off is read up to the cut; `mcap recover` and then "
+    "`ros2 bag reindex` make a whole bag of it",
     "doctor": "`ros2 doctor` and `pip check` examine an installation",
     "--recombine": "it gained .01 of coverage; add recordings with --recording instead",
     **dict.fromkeys(

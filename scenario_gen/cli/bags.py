@@ -217,24 +217,3 @@ def export_scenarios(
         )
     emit_json(scenarios=result.scenarios, folder=folder, notes=result.notes)
     print_(*result.notes, f"{result.scenarios} scenarios: {folder}", sep="\n")
-
-
-@commands.command("reindex")
-def save_bag(
-    bag: Annotated[
-        Path,
-        typer.Argument(help="Folder of an unclosed or damaged bag, or one of its MCAP files."),
-    ],
-    out: Annotated[
-        Path | None, typer.Option(*OUT, help="Folder for the new bag. Default: BAG_reindexed.")
-    ] = None,
-    assignments: SetOption = None,
-    parameter_file: ParametersOption = None,
-) -> None:
-    """Recover the intact messages of an unclosed or damaged bag. The old files are not changed."""
-    from scenario_gen.bags.storage.reindex import reindex
-
-    target = out or default_output(bag, f"{bag.resolve().name}_reindexed")
-    result = reindex(bag, target, configured(parameter_file, assignments).bag)
-    emit_json(messages=result.messages, bag=target, notes=result.lines())
-    print_(f"{result.messages} messages: {target}", *result.lines(), sep="\n")

@@ -4,6 +4,7 @@
 """Options and arguments that commands share, and the configuration."""
 
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from functools import reduce
 import inspect
 from pathlib import Path
@@ -11,6 +12,7 @@ from typing import Annotated, Any, get_type_hints, TYPE_CHECKING, TypeVar
 
 import typer
 
+from scenario_gen.base.errors import InputError
 from scenario_gen.cli.output import print_
 
 if TYPE_CHECKING:
@@ -105,8 +107,9 @@ def configured(file: Path | None, assignments: Sequence[str] | None) -> "Pipelin
 
 
 def warn_of_metadata(bag: Path) -> None:
-    """Print what is missing in the metadata of a bag that can be read nevertheless."""
-    from scenario_gen.bags.storage.files import metadata_warnings
+    """Print what is missing in a bag that can be read nevertheless."""
+    from scenario_gen.bags.storage.bag import bag_warnings
 
-    for warning in metadata_warnings(bag):
-        print_(warning)
+    with suppress(InputError):  # the command says why it cannot be read
+        for warning in bag_warnings(bag):
+            print_(warning)

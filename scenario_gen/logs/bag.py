@@ -101,7 +101,9 @@ def read(paths: Sequence[Path], config: LogConfig) -> RawLog:
         InputError: a bag is damaged or too large, or its topics do not give positions.
     """
     name = paths[0].stem if paths[0].is_file() else paths[0].name
-    return log_of(_read_topics(paths, config), name, config)
+    topics, missing = _read_topics(paths, config)
+    log = log_of(topics, name, config)
+    return replace(log, notes=(*missing, *log.notes))
 
 
 def log_of(topics: Sequence[Topic], name: str, config: LogConfig) -> RawLog:
@@ -123,8 +125,8 @@ def log_of(topics: Sequence[Topic], name: str, config: LogConfig) -> RawLog:
     return replace(log, notes=(*log.notes, note))
 
 
-def _read_topics(paths: Sequence[Path], config: LogConfig) -> list[Topic]:
-    """Read the messages of all usable topics, by name.
+def _read_topics(paths: Sequence[Path], config: LogConfig) -> tuple[list[Topic], tuple[str, ...]]:
+    """Read the messages of all usable topics, by name, and what is missing in the bags.
 
     Raises:
         InputError: a file is damaged or too large, or no topic can be used.
@@ -134,9 +136,11 @@ def _read_topics(paths: Sequence[Path], config: LogConfig) -> list[Topic]:
     bounds = BagConfig(most_bytes=config.size_limit << 20)
     bags = file_names([path.resolve() for path in paths])
     offered: list[BagTopic] = []
+    missing: list[str] = []
     for path in paths:
         with open_bag(path, bounds, "log.size_limit") as bag:
             offered += bag.topics()
+            missing += bag.warnings()
     types = {topic.name: topic.type for topic in offered}
     is_used = _usable(requested)
     window: Span | None = None
@@ -163,7 +167,7 @@ def _read_topics(paths: Sequence[Path], config: LogConfig) -> list[Topic]:
             f"with {TWIST}, or {ODOMETRY}; or a topic named tracks of {TRACKED} or {TRACKS}; "
             "choose with --set log.topics=…, or convert others with topic_tools"
         )
-    return _joined([topics[key] for key in sorted(topics)])
+    return _joined([topics[key] for key in sorted(topics)]), tuple(missing)
 
 
 def _usable(requested: Sequence[str]) -> Callable[[str, str], bool]:

@@ -72,7 +72,6 @@ def test_inputs_stay(run, made, tmp_path):
         ),
         ("evaluate", bag, "--out", "o2"),
         ("evaluate", bag, "--out", bag),
-        ("reindex", bag, "--out", bag),
     ):
         code, said = run(*words)
         assert code == 2 and "error:" in said, words
@@ -83,7 +82,7 @@ def test_inputs_stay(run, made, tmp_path):
 def test_an_out_that_cannot_be(run, tmp_path, out):
     (tmp_path / "file").touch()
     (tmp_path / "link").symlink_to("nowhere")
-    for words in (GENERATE, ("demo",), ("reindex", bundled("c"))):
+    for words in (GENERATE, ("demo",)):
         code, said = run(*words, "--out", out)
         assert code == 2 and len(said) <= len("error: \n") + 500 and "Traceback" not in said, said
     assert sorted(path.name for path in tmp_path.iterdir()) == ["file", "link"]

@@ -117,11 +117,9 @@ MISTAKES = [  # words of the command line, and what the message says: what is wr
         ((name, "cut.mcap", *more), "cut.mcap")
         for name, *more in (
             ("evaluate",),
-            ("reindex",),
             ("generate", *ROAD),
         )
     ),
-    (("reindex", "nothing"), "no .mcap file here; name the folder of a recorded bag"),
     # folders that are written
     ((*GENERATE, "--out", "note.txt"), "note.txt is a file; name another folder"),
     ((*GENERATE, "--out", "note.txt/out"), "because"),

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import io
 import json
 from pathlib import Path
+import shutil
 import sys
 from unittest.mock import Mock
 
@@ -38,7 +39,6 @@ def one_object(text):
     [
         (("evaluate", "{bag}"), "valid", True),
         (("export", "{bag}", "--to", "commonroad", "--out", "written"), "scenarios", 2),
-        (("reindex", "{bag}", "--out", "saved"), "bag", "saved"),
         (("report", "{bag}"), "opened", False),
         (("--parameters",), "command", "--parameters"),
     ],
@@ -150,7 +150,7 @@ def test_the_page_of_generate_is_that_of_its_bag_and_another_one_is_written_besi
     for bag in (made, made / "bag"):
         _, out, _ = ran("report", bag, "--no-open")
         assert out.strip() == f"report: {made / 'report.html'}"
-    ran("reindex", made / "bag", "--out", "other")
+    shutil.copytree(made / "bag", "other")
     _, out, _ = ran("report", "other")
     assert out.strip().splitlines()[-1] == f"report: {tmp_path / 'other_report' / 'report.html'}"
     assert (tmp_path / "other_report" / "report.html").is_file()

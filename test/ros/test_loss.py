@@ -23,6 +23,7 @@ from msg_conventions.scenario_info import encode_info, scenario_entry
 from msg_conventions.scenarios import digest, encode_scenario
 from scenario_gen.bags.storage.bag import bag_topics, read_messages
 from scenario_gen.bags.storage.config import BagConfig
+from scenario_gen.base.errors import InputError
 from scenario_gen.cli.commands import app
 from scenario_gen.types import Vehicle
 from scenario_gen.types.scenario import BoundaryStates, Scenario
@@ -242,17 +243,18 @@ def test_a_killed_recorder_keeps_what_came_before_its_last_seconds(domain, tmp_p
         data = encode_diagnostics([Status("/evaluator: row", Level.OK, "")], 0)
         client.say("/report", data)
         client.until(lambda: client.counted("/report") == 1, "the message in the bag")
-        client.until(lambda: _saved(bag, tmp_path, data), "the message on the disk")
+        client.until(lambda: _saved(bag, data), "the message on the disk")
         recorder.kill()
         recorder.wait()
-        assert _saved(bag, tmp_path, data)
+        assert _saved(bag, data)
     finally:
         recorder.kill()
         recorder.communicate()
         client.close()
 
 
-def _saved(bag: Path, folder: Path, data: bytes) -> bool:
-    saved = folder / "saved"
-    answer = CliRunner().invoke(app, ["reindex", str(bag), "--out", str(saved)])
-    return answer.exit_code == 0 and data in [message.data for message in read_messages(saved)]
+def _saved(bag: Path, data: bytes) -> bool:
+    try:
+        return data in [message.data for message in read_messages(bag)]
+    except InputError:  # no chunk is on the disk
+        return False

@@ -11,7 +11,6 @@ import numpy as np
 
 from msg_conventions.topics import topic_entry
 from scenario_gen.bags.storage.bag import BagMessage, read_messages
-from scenario_gen.bags.storage.metadata import qos_yaml
 from scenario_gen.bags.storage.writer import atomic_bag
 from scenario_gen.output.review.evaluation import BagEvaluation
 from scenario_gen.types import Encounter, Note, NoteKind, Vehicle
@@ -26,9 +25,7 @@ def copied(bag: Path, target: Path, change: Callable[[BagMessage], bytes | None]
     with atomic_bag(target) as writer:
         for message in read_messages(bag):
             if (data := change(message)) is not None:
-                writer.add_topic(
-                    message.topic, message.type, qos_yaml(topic_entry(message.topic)[1])
-                )
+                writer.add_topic(message.topic, message.type, topic_entry(message.topic)[1])
                 writer.write(message.topic, data, message.stamp_ns)
     return target
 

@@ -9,8 +9,6 @@ from pathlib import Path
 from mcap.records import Chunk, Message
 from mcap.stream_reader import breakup_chunk, StreamReader
 
-from scenario_gen.bags.storage.config import BagConfig, ReadBudget
-from scenario_gen.bags.storage.mcap import McapFile
 from scenario_gen.bags.storage.writer import BagWriter
 
 
@@ -37,17 +35,3 @@ def chunk_ends(whole: bytes) -> list[tuple[int, int]]:
             count += sum(isinstance(inner, Message) for inner in breakup_chunk(record))
             found.append((stream.tell(), count))
     return found
-
-
-def salvaged(data: bytes, path: Path) -> list[tuple[int, bytes]]:
-    """Return stamp and bytes of the messages that are whole in a file of these bytes and whose topic is known."""
-    path.write_bytes(data)
-    config = BagConfig()
-    with path.open("rb") as file:
-        whole = McapFile(file, len(data), ReadBudget(config, str(path), len(data)))
-        whole.scan()
-        whole.budget = ReadBudget(config, str(path), len(data))
-        known = {
-            channel.id for channel in whole.channels.values() if channel.schema_id in whole.schemas
-        }
-        return [(message.stamp_ns, message.data) for message in whole.messages(known)]

@@ -23,8 +23,6 @@ from msg_conventions.topics import topic_entry
 from scenario_gen.bags.recordings.read import read_recording, read_scenario_set
 from scenario_gen.bags.recordings.write import write_recording
 from scenario_gen.bags.storage.bag import bag_topics, read_messages
-from scenario_gen.bags.storage.metadata import qos_yaml
-from scenario_gen.bags.storage.reindex import reindex
 from scenario_gen.bags.storage.writer import BagWriter
 from scenario_gen.base.errors import ScenarioGenError
 from scenario_gen.base.parameters import assigned, flatten, loaded
@@ -56,7 +54,7 @@ def runs(folder: Path) -> list[bytes]:
         whole = write_recording(folder / "whole", hand_made_run())
         with BagWriter(folder / f"bag{k}", **options) as bag:
             for message in read_messages(whole):
-                bag.add_topic(message.topic, message.type, qos_yaml(topic_entry(message.topic)[1]))
+                bag.add_topic(message.topic, message.type, topic_entry(message.topic)[1])
                 bag.write(message.topic, message.data, message.stamp_ns)
         found.append((folder / f"bag{k}" / f"bag{k}_0.mcap").read_bytes())
     return found
@@ -159,18 +157,6 @@ def with_errors(call: Callable[[], object]) -> None:
         call()
     except ScenarioGenError as error:
         assert 0 < len(str(error)) <= 500
-
-
-def save_and_read(path: Path) -> None:
-    """Save what is whole, and read that: it must be a sound bag."""
-    saved = reindex(path.parent, path.parent / "saved")
-    try:
-        found = list(read_messages(path.parent / "saved"))
-    except ScenarioGenError as error:
-        raise AssertionError(str(error)) from error
-    assert len(found) == saved.messages
-    assert [m.stamp_ns for m in found] == sorted(m.stamp_ns for m in found)
-    assert all(isinstance(line, str) for line in saved.lines())
 
 
 def measure(path: Path) -> None:
@@ -349,7 +335,7 @@ TARGETS = (
         runs,
         in_file("a.mcap", read_bag),
         BYTES,
-        ("mcap_reader/*", "mcap_zstd*", "reindex_huge*"),
+        ("mcap_reader/*", "mcap_zstd*", "reindex/*", "reindex_*"),
         "a.mcap",
     ),
     Target(
@@ -361,13 +347,6 @@ TARGETS = (
         "a.db3",
     ),
     Target("ros1_reader", ros1, in_file("a.bag", read_bag), BYTES, named="a.bag"),
-    Target(
-        "reindex",
-        runs,
-        in_file("a.mcap", save_and_read),
-        BYTES,
-        ("reindex/*", "reindex_*", "mcap_zstd*"),
-    ),
     Target("evaluate", runs, in_file("a.mcap", measure), BAG, ("validate/*", "mcap_reader/*")),
     Target(
         "metadata",

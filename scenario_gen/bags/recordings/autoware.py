@@ -8,7 +8,6 @@ from collections.abc import Iterator
 from msg_conventions import odometry
 from msg_conventions.autoware import AutowareEncoder, EGO, OBJECTS, QUALITY, TRACKS
 from scenario_gen.bags.storage.definitions import PREDICTED, TRACKED
-from scenario_gen.bags.storage.metadata import qos_yaml
 from scenario_gen.bags.storage.writer import BagWriter
 from scenario_gen.types import Scenario
 
@@ -50,5 +49,5 @@ def add_autoware(bag: BagWriter, others: Scenario, ego: Scenario | None, start_n
         OSError: the disk is full, or fails.
     """
     for topic, data, stamp_ns in autoware_messages(others, ego, start_ns):
-        bag.add_topic(topic, TYPES[topic], qos_yaml(QUALITY))
+        bag.add_topic(topic, TYPES[topic], QUALITY)
         bag.write(topic, data, stamp_ns)

@@ -21,7 +21,6 @@ from msg_conventions.scenario_info import encode_info, INFO, request_summary, so
 from msg_conventions.scenarios import digest, encode_scenario
 from msg_conventions.topics import topic_entry, vehicle_topic
 from msg_conventions.tracks import encode_tracks
-from scenario_gen.bags.storage.metadata import qos_yaml
 from scenario_gen.bags.storage.writer import atomic_bag, BagWriter
 from scenario_gen.types import Decided, Encounter, GenerationResult, Scenario, tokens
 
@@ -127,7 +126,7 @@ def add_message(bag: BagWriter, name: str, data: bytes, stamp_ns: int) -> None:
     kind, quality = topic_entry(
         name.lstrip("/")
     )  # in our bags the diagnostics are a latched topic of the namespace
-    bag.add_topic(name, kind, qos_yaml(quality))
+    bag.add_topic(name, kind, quality)
     bag.write(name, data, stamp_ns)
 
 

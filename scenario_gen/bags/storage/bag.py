@@ -15,14 +15,8 @@ from typing import Protocol
 import zstandard
 
 from scenario_gen.bags.storage.config import BagConfig, ReadBudget
-from scenario_gen.bags.storage.files import BagFiles, files_of, METADATA
-from scenario_gen.bags.storage.mcap import (
-    BagTopic,
-    DamagedError,
-    decompress_zstd,
-    LoggedMessage,
-    open_mcap,
-)
+from scenario_gen.bags.storage.files import BagFiles, files_of, NOT_RECORDED
+from scenario_gen.bags.storage.mcap import BagTopic, decompress_zstd, LoggedMessage, McapFile
 from scenario_gen.bags.storage.rosbags_files import open_ros1, open_sqlite
 from scenario_gen.base.documents import shown
 from scenario_gen.base.errors import guarded, InputError
@@ -32,7 +26,9 @@ _BLOCK_BYTES = 1 << 20
 
 
 class _StoredFile(Protocol):
-    """An open file of a bag."""
+    """An open file of a bag; `missing` says what of it cannot be read."""
+
+    missing: str
 
     def list_topics(self) -> list[BagTopic]: ...
     def messages(self, channels: Collection[int]) -> Iterator[LoggedMessage]: ...
@@ -66,13 +62,15 @@ class StoredBag:
     """An open bag.
 
     Attributes:
+        path: its folder or file.
         files: path and contents of each file.
-        is_compressed_by_message: whether each message is compressed on its own.
+        listed: what its metadata says.
         budget: bounds of reading it.
     """
 
+    path: Path
     files: list[tuple[Path, _StoredFile]]
-    is_compressed_by_message: bool
+    listed: BagFiles
     budget: ReadBudget
 
     def topics(self) -> tuple[BagTopic, ...]:
@@ -82,12 +80,27 @@ class StoredBag:
             InputError: a file is damaged.
         """
         topics: dict[str, BagTopic] = {}
-        for path, file in self.files:
-            for topic in _topics(path, file):
+        for _, file in self.files:
+            for topic in file.list_topics():
                 first = topics.get(topic.name)
                 count = topic.count + (first.count if first else 0)
                 topics[topic.name] = replace(first or topic, count=count)
         return tuple(topics[name] for name in sorted(topics))
+
+    def warnings(self) -> tuple[str, ...]:
+        """Return a line for each part that is missing, and for what was not recorded."""
+        lines = [file.missing for _, file in self.files if file.missing]
+        left = sum(topic.count for topic in self.topics())
+        count = self.listed.count
+        if count is not None and left < count:
+            lines.append(f"{self.path}: {count - left} of its {count} messages are missing")
+        lines += [
+            f"not complete, by its recorder: {shown(key.removeprefix(NOT_RECORDED))}: "
+            f"{shown(text, 400)}"
+            for key, text in self.listed.custom.items()
+            if isinstance(key, str) and key.startswith(NOT_RECORDED)
+        ]
+        return tuple(lines)
 
     def messages(
         self,
@@ -117,7 +130,7 @@ class StoredBag:
     def _messages_of_file(
         self, path: Path, file: _StoredFile, wanted: Callable[[str, str], bool]
     ) -> Iterator[BagMessage]:
-        topics = {t.id: t for t in _topics(path, file) if wanted(t.name, t.type)}
+        topics = {t.id: t for t in file.list_topics() if wanted(t.name, t.type)}
         for topic in topics.values():
             if topic.encoding != "cdr" or not topic.type:
                 how = f"is encoded as {shown(topic.encoding)!r}" if topic.type else "has no type"
@@ -127,11 +140,11 @@ class StoredBag:
                 )
         if not topics:
             return
-        with _naming_damaged(path):
+        with guarded(f"{path}: cannot be read", OSError):
             for message in file.messages(topics):
                 topic = topics[message.channel_id]
                 data = message.data
-                if self.is_compressed_by_message:
+                if self.listed.compression == "message":
                     data = self._decompress(data, path)
                 yield BagMessage(topic.name, topic.type, data, message.stamp_ns)
 
@@ -148,26 +161,6 @@ class StoredBag:
         return message
 
 
-def _topics(path: Path, file: _StoredFile) -> list[BagTopic]:
-    with _naming_damaged(path):
-        return file.list_topics()
-
-
-@contextmanager
-def _naming_damaged(path: Path) -> Iterator[None]:
-    """Name the file in errors about damage."""
-    try:
-        yield
-    except DamagedError as error:
-        bag = path.parent if (path.parent / METADATA).exists() else path
-        raise InputError(
-            f"{path}: cut off or damaged at {error}; `scenario-gen reindex {bag}` recovers the "
-            "whole messages"
-        ) from error
-    except OSError as error:
-        raise InputError(f"{path}: cannot be read ({error.strerror or error})") from error
-
-
 @contextmanager
 def open_bag(
     path: Path, config: BagConfig = BagConfig(), parameter: str = "bag.most_bytes"
@@ -180,7 +173,7 @@ def open_bag(
         parameter: name of the parameter that sets `most_bytes`, for messages.
 
     Raises:
-        InputError: the bag does not exist, or one of its files is damaged or was not closed.
+        InputError: the bag does not exist, or no message in it can be read.
     """
     with guarded(f"{shown(str(path))}: not the path of a bag", OSError, ValueError):
         bag_files = files_of(path) if path.is_dir() or path.is_file() else BagFiles(())
@@ -194,7 +187,11 @@ def open_bag(
     is_compressed = bag_files.compression == "file"
     with ExitStack() as stack:
         files = [(file, _open(file, is_compressed, budget, stack)) for file in bag_files.files]
-        yield StoredBag(files, bag_files.compression == "message", budget)
+        bag = StoredBag(path, files, bag_files, budget)
+        lines = [file.missing for _, file in files if file.missing]
+        if lines and not any(topic.count for topic in bag.topics()):
+            raise InputError(lines[0])
+        yield bag
 
 
 def _open(file: Path, is_compressed: bool, budget: ReadBudget, stack: ExitStack) -> _StoredFile:
@@ -203,11 +200,11 @@ def _open(file: Path, is_compressed: bool, budget: ReadBudget, stack: ExitStack)
         raise InputError(f"{file} is empty (0 bytes); record or copy it again")
     path = _decompressed(file, stack, budget) if is_compressed else file
     if path.suffix == ".db3":
-        return stack.enter_context(open_sqlite(path, file, budget))
+        return stack.enter_context(open_sqlite(path, file))
     if path.suffix == ".bag":
         return stack.enter_context(open_ros1(path, budget))
-    with _naming_damaged(file):
-        return open_mcap(stack.enter_context(path.open("rb")), path.stat().st_size, budget)
+    with guarded(f"{file}: cannot be read", OSError):
+        return McapFile(stack.enter_context(path.open("rb")), file, budget)
 
 
 def _decompressed(file: Path, stack: ExitStack, budget: ReadBudget) -> Path:
@@ -255,6 +252,16 @@ def bag_topics(path: Path, config: BagConfig = BagConfig()) -> tuple[BagTopic, .
     """
     with open_bag(path, config) as bag:
         return bag.topics()
+
+
+def bag_warnings(path: Path) -> tuple[str, ...]:
+    """Return a line for each part of a bag that is missing, and for what was not recorded.
+
+    Raises:
+        InputError: it cannot be read as a bag.
+    """
+    with open_bag(path) as bag:
+        return bag.warnings()
 
 
 def read_messages(

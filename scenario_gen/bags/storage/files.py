@@ -1,9 +1,9 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The files of a bag, as its metadata.yaml lists them."""
+"""The files of a bag, and what its metadata.yaml says of them."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -15,14 +15,24 @@ NOT_RECORDED = "scenario_gen.lost:"
 """Prefix of the keys in custom_data that say what of a topic was not recorded."""
 
 _SUFFIXES = (".mcap", ".db3", ".bag")
+_MAX_NAME_BYTES = 255
 
 
 @dataclass(frozen=True)
 class BagFiles:
-    """The files of a bag in order; `compression` is "", "file" or "message", as in rosbag2."""
+    """The files of a bag in order.
+
+    Attributes:
+        files: their paths.
+        compression: "", "file" or "message", as in rosbag2.
+        count: number of messages by metadata.yaml, or None.
+        custom: further entries of metadata.yaml.
+    """
 
     files: tuple[Path, ...]
     compression: str = ""
+    count: int | None = None
+    custom: dict[Any, Any] = field(default_factory=dict)
 
 
 def files_of(path: Path) -> BagFiles:
@@ -37,20 +47,10 @@ def files_of(path: Path) -> BagFiles:
     if not metadata.exists():
         return BagFiles(_files_in(path))
     try:
-        bag_files = _listed(_information(metadata), metadata)
+        return _listed(metadata)
     except InputError as error:
-        remedy = "copy the bag again"
-        files = ", ".join(file.name for file in _files_in(path)[:3])
-        if files:
-            remedy = f"`scenario-gen reindex {path}` writes it from the files ({files}, …)"
-        raise InputError(f"{error}; {remedy}") from error
-    for file in bag_files.files:
-        if not file.is_file():
-            raise InputError(
-                f"{metadata} lists {shown(file.name)}, which does not exist; "
-                f"`scenario-gen reindex {path}` reads the other files"
-            )
-    return bag_files
+        remedy = f"`ros2 bag reindex {path}` writes it" if _files_in(path) else "copy the bag"
+        raise InputError(f"{error}; {remedy} again") from error
 
 
 def _files_in(folder: Path) -> tuple[Path, ...]:
@@ -62,69 +62,39 @@ def _files_in(folder: Path) -> tuple[Path, ...]:
     return tuple(sorted(files, key=lambda file: (len(file.name), file.name)))
 
 
-def _information(metadata: Path) -> dict[str, Any]:
-    """Return the content of metadata.yaml.
+def _listed(metadata: Path) -> BagFiles:
+    """Return the files that metadata.yaml lists.
 
     Raises:
-        InputError: it is not the metadata of a bag.
+        InputError: it is damaged, a file does not exist, or the compression is unknown.
     """
     document = read_yaml(metadata)
-    information = document.get("rosbag2_bagfile_information") if isinstance(document, dict) else 0
-    if not isinstance(information, dict):
-        raise InputError(f"{metadata}: damaged, it has no rosbag2_bagfile_information")
-    return information
-
-
-def _listed(information: dict[str, Any], metadata: Path) -> BagFiles:
-    """Return the listed files.
-
-    Raises:
-        InputError: the list is damaged, or the compression is unknown.
-    """
-    names = information.get("relative_file_paths")
-    if not isinstance(names, list):
-        raise InputError(f"{metadata}: damaged, it has no relative_file_paths")
-    for name in names:
-        if not _is_file_name(name):
-            raise InputError(
-                f"{metadata}: damaged, relative_file_paths contains {shown(name)}, which is not "
-                "the name of a file"
-            )
-    mode = shown(information.get("compression_mode") or "none").lower()
-    compressor = shown(information.get("compression_format") or "")
+    try:
+        information = document["rosbag2_bagfile_information"]
+        names = information["relative_file_paths"]
+        files = tuple(metadata.parent / Path(name).name for name in names)
+        missing = [file for file in files if _is_missing(file)]
+        mode = str(information.get("compression_mode") or "none").lower()
+        compressor = information.get("compression_format")
+    except (KeyError, TypeError, AttributeError, ValueError) as error:
+        raise InputError(
+            f"{metadata}: damaged, it does not list the files of a bag ({error!r})"
+        ) from error
+    if missing:
+        raise InputError(f"{metadata} lists {shown(missing[0].name)}, which does not exist")
     if mode != "none" and (mode not in ("file", "message") or compressor != "zstd"):
         raise InputError(
-            f"{metadata}: compression {compressor!r} by {mode!r} is unknown; zstd by file or by "
-            "message can be read"
+            f"{metadata}: compression {shown(compressor)!r} by {shown(mode)!r} is unknown; zstd "
+            "by file or by message can be read"
         )
-    files = tuple(metadata.parent / Path(name).name for name in names)
-    return BagFiles(files, mode.replace("none", ""))
-
-
-def _is_file_name(name: Any) -> bool:
-    if not isinstance(name, str) or "\0" in name:
-        return False
-    return 0 < len(Path(name).name.encode()) <= 255
-
-
-def metadata_warnings(path: Path) -> tuple[str, ...]:
-    """Return warnings that metadata.yaml of a bag is missing, or names what was not recorded."""
-    if not path.is_dir():
-        return ()
-    metadata = path / METADATA
-    if not metadata.exists():
-        warning = (
-            f"{path} has no metadata.yaml: its files are read in order of their names; "
-            f"`scenario-gen reindex {path}` writes it"
-        )
-        return (warning,) if _files_in(path) else ()
-    try:
-        entries = _information(metadata).get("custom_data")
-    except InputError:
-        return ()
-    return tuple(
-        f"not complete, by its recorder: {shown(str(key).removeprefix(NOT_RECORDED))}: "
-        f"{shown(text, 400)}"
-        for key, text in (entries.items() if isinstance(entries, dict) else ())
-        if str(key).startswith(NOT_RECORDED)
+    count, custom = information.get("message_count"), information.get("custom_data")
+    return BagFiles(
+        files,
+        mode.replace("none", ""),
+        count if isinstance(count, int) else None,
+        custom if isinstance(custom, dict) else {},
     )
+
+
+def _is_missing(file: Path) -> bool:
+    return len(file.name.encode()) > _MAX_NAME_BYTES or not file.is_file()

@@ -1,77 +1,42 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""MCAP files, read within bounds, whole or damaged.
+"""MCAP files by the mcap library: sizes are checked before bytes are read, up to a cut.
 
-The mcap library decodes each record. Its readers are not used, since they trust the lengths that
-a file declares and stop at the first damage. Here each declared length is checked before bytes
-are read or decompressed, and damage is a `DamagedError` with its place: an error for the reader of
-a bag, a gap for `reindex`.
-
-Source: MCAP file format specification, https://mcap.dev/spec.
+The library's readers are not used for messages: they trust the sizes that a file declares, and
+read no file without a footer. Its records are, one at a time.
 """
 
 from collections import Counter
-from collections.abc import Collection, Iterator
-from dataclasses import dataclass, field, replace
+from collections.abc import Collection, Iterable, Iterator
+from dataclasses import dataclass
 import heapq
 import io
-import mmap
-import re
-import struct
+import os
+from pathlib import Path
 from typing import Any, BinaryIO, NamedTuple
 import zlib
 
 import lz4.frame
-from mcap.data_stream import ReadDataStream
+from mcap.exceptions import McapError
 from mcap.opcode import Opcode
-from mcap.records import (
-    Channel,
-    Chunk,
-    ChunkIndex,
-    Footer,
-    Header,
-    MessageIndex,
-    Schema,
-    Statistics,
-)
+from mcap.reader import SeekingReader
+from mcap.records import Channel, Chunk, Footer, Message, Schema
+from mcap.stream_reader import MAGIC_SIZE, StreamReader
 import zstandard
 
 from scenario_gen.bags.storage.config import FIND_COST_BYTES, ReadBudget
 from scenario_gen.bags.storage.metadata import quality_of
 from scenario_gen.base.documents import shown
-from scenario_gen.base.errors import describe, InputError, ScenarioGenError
+from scenario_gen.base.errors import describe, guarded, InputError
 from scenario_gen.types import Quality
 
 MAX_STAMP_NS = 2**63
 """Stamps of rosbag2 are signed."""
 
-_MAGIC = b"\x89MCAP0\r\n"
 _PREFIX_BYTES = 9  # opcode and length of a record
-_FOOTER_BYTES = 29  # with its prefix
 _EXTRA_RECORD_BYTES = 1024  # beside the data of a chunk
-_MESSAGE_OPCODE = int(Opcode.MESSAGE)
-_MESSAGE = struct.Struct("<HIQQ")  # channel, sequence, log time, publish time
-_CHUNK_START = re.compile(rb"(?=\x06.{4}\x00{4})", re.DOTALL)  # of less than 4 GiB
-_RECORDS: dict[int, Any] = {
-    Opcode.HEADER: Header,
-    Opcode.FOOTER: Footer,
-    Opcode.SCHEMA: Schema,
-    Opcode.CHANNEL: Channel,
-    Opcode.CHUNK: Chunk,
-    Opcode.MESSAGE_INDEX: MessageIndex,
-    Opcode.CHUNK_INDEX: ChunkIndex,
-    Opcode.STATISTICS: Statistics,
-}
-
-
-class DamagedError(ScenarioGenError):
-    """There is no whole record at byte `offset` of a file; caught inside this package."""
-
-    def __init__(self, offset: int, problem: str) -> None:
-        super().__init__(f"byte {offset}: {problem}")
-        self.offset = offset
-        self.problem = problem
+_NEEDED = (Opcode.FOOTER, Opcode.SCHEMA, Opcode.CHANNEL, Opcode.MESSAGE, Opcode.CHUNK)
 
 
 @dataclass(frozen=True)
@@ -95,16 +60,6 @@ class BagTopic:
     encoding: str = "cdr"
 
 
-@dataclass(frozen=True)
-class Gap:
-    """Skipped bytes: the first one, their number, the problem, and the known messages in them."""
-
-    offset: int
-    size: int
-    problem: str
-    messages: int = 0
-
-
 class LoggedMessage(NamedTuple):
     """A message in a file; sorted by stamp, then by its place."""
 
@@ -122,342 +77,209 @@ def decompress_zstd(data: bytes, max_bytes: int) -> bytes:
         return bytes(reader.read(max_bytes + 1))
 
 
-def _decompress_chunk(chunk: Chunk, offset: int, budget: ReadBudget) -> bytes:
-    """Return the records of a chunk.
+def _decompress(chunk: Chunk) -> bytes:
+    """Return the records of a chunk of the size and checksum that it declares.
 
     Raises:
-        DamagedError: the chunk is too large, cannot be decompressed, or does not have the size or
-            checksum that it declares.
-        InputError: the bag as a whole is too large.
+        McapError: it has others.
+        Exception: that of the decompressor.
     """
     size = chunk.uncompressed_size
-    max_bytes = budget.config.most_chunk_bytes
-    if size > max_bytes:
-        raise DamagedError(
-            offset,
-            f"a chunk of {size} bytes after decompression; bag.most_chunk_bytes is {max_bytes}",
-        )
-    budget.spend_decompressed(size)
-    try:
-        match chunk.compression:
-            case "zstd":
-                data = decompress_zstd(chunk.data, size)
-            case "lz4":
-                decompressor = lz4.frame.LZ4FrameDecompressor()
-                data = decompressor.decompress(chunk.data, max_length=size + 1)
-            case "":
-                data = chunk.data
-            case unknown:
-                raise DamagedError(
-                    offset, f"compression {shown(unknown, 40)!r} is unknown (known: zstd, lz4)"
-                )
-    except (zstandard.ZstdError, RuntimeError, MemoryError, EOFError) as error:
-        raise DamagedError(
-            offset, f"a chunk cannot be decompressed ({describe(error)})"
-        ) from error
+    match chunk.compression:
+        case "zstd":
+            data = decompress_zstd(chunk.data, size)
+        case "lz4":
+            data = lz4.frame.LZ4FrameDecompressor().decompress(chunk.data, max_length=size + 1)
+        case "":
+            data = chunk.data
+        case unknown:
+            raise McapError(f"compression {shown(unknown, 40)!r} is unknown (known: zstd, lz4)")
     crc = chunk.uncompressed_crc  # 0: not computed
     if len(data) != size or (crc and zlib.crc32(data) != crc):
-        raise DamagedError(offset, f"a chunk differs from its declared size ({size}) or checksum")
+        raise McapError(f"a chunk differs from its declared size ({size}) or checksum")
     return bytes(data)
 
 
-def _split_records(data: bytes, offset: int) -> Iterator[tuple[int, bytes]]:
-    """Yield opcode and content of the records in some bytes from byte `offset` of a file.
-
-    Raises:
-        DamagedError: a record is cut off.
-    """
-    start = 0
-    while start < len(data):
-        content_start = start + _PREFIX_BYTES
-        end = content_start + int.from_bytes(data[start + 1 : content_start], "little")
-        if data[start] == 0 or end > len(data):
-            raise DamagedError(offset, "a record is cut off")
-        yield data[start], data[content_start:end]
-        start = end
+def _records(data: bytes) -> Iterator[Any]:
+    """Yield the records in the data of a chunk."""
+    stream = io.BytesIO(data)
+    records = StreamReader(stream, skip_magic=True, emit_chunks=True).records
+    while stream.tell() < len(data):
+        yield next(records)
 
 
-def _decode(opcode: int, content: bytes, offset: int) -> Any:
-    """Return a record: a LoggedMessage, or a class of mcap.records; None if it is not needed.
-
-    Raises:
-        DamagedError: it is damaged.
-    """
-    try:
-        if opcode == _MESSAGE_OPCODE:
-            channel_id, _, stamp_ns, _ = _MESSAGE.unpack_from(content)
-            if stamp_ns >= MAX_STAMP_NS:
-                raise ValueError(f"log time {stamp_ns} ns is out of range")
-            return LoggedMessage(stamp_ns, offset, 0, channel_id, content[_MESSAGE.size :])
-        kind = _RECORDS.get(opcode)
-        return kind and kind.read(ReadDataStream(io.BytesIO(content)))
-    except Exception as error:  # mcap raises various exceptions on damaged bytes
-        raise DamagedError(offset, describe(error)) from error
-
-
-@dataclass
 class McapFile:
-    """Contents of an MCAP file.
+    """An open MCAP file.
 
     Attributes:
-        file: the open file.
-        size: its size in bytes.
-        budget: bounds of reading it.
-        schemas: by id.
-        channels: by id.
-        counts: number of messages by channel.
-        entries: lower bound of the stamps [ns] in a chunk, or in a message outside of chunks, and
-            its offset.
-        gaps: skipped bytes, in order.
-        closed: whether the recorder closed the file.
+        missing: "" if the file is whole, else a line that says what cannot be read.
     """
 
-    file: BinaryIO
-    size: int
-    budget: ReadBudget
-    schemas: dict[int, Schema] = field(default_factory=dict)
-    channels: dict[int, Channel] = field(default_factory=dict)
-    counts: Counter[int] = field(default_factory=Counter)
-    entries: list[tuple[int, int]] = field(default_factory=list)
-    gaps: list[Gap] = field(default_factory=list)
-    closed: bool = False
+    def __init__(self, stream: BinaryIO, path: Path, budget: ReadBudget) -> None:
+        """Read the summary, or else the file up to its cut.
 
-    def _read(self, start: int, size: int) -> bytes:
-        """Return bytes of the file.
+        Args:
+            stream: the file.
+            path: its name in messages.
+            budget: bounds of reading it.
 
         Raises:
-            DamagedError: the file ends before, or they are more than the bounds allow.
+            InputError: it is larger than the bounds allow.
         """
-        left = self.size - start
-        max_bytes = self.budget.config.most_chunk_bytes
-        if not 0 <= size <= left:
-            raise DamagedError(start, f"{size} bytes are declared, {left} are left")
-        if size > max_bytes + _EXTRA_RECORD_BYTES:
-            raise DamagedError(
-                start, f"a record of {size} bytes; bag.most_chunk_bytes is {max_bytes}"
-            )
-        self.file.seek(start)
-        return self.file.read(size)
+        self.missing = ""
+        self._stream = stream
+        self._size = os.fstat(stream.fileno()).st_size
+        self._path = path
+        self._budget = budget
+        self._schemas: dict[int, Schema] = {}
+        self._channels: dict[int, Channel] = {}
+        self._counts: Counter[int] = Counter()
+        self._entries: list[tuple[int, int]] = []  # first stamp and offset of chunks or messages
+        if not self._has_summary():
+            self._scan()
 
-    def record(self, offset: int) -> tuple[Any, int]:
+    def _has_summary(self) -> bool:
+        """Read topics and chunks from the summary; return whether it is whole."""
+        try:
+            reader = SeekingReader(self._stream, record_size_limit=self._size)
+            summary = reader.get_summary()
+        except Exception:  # mcap raises various exceptions on damaged bytes
+            return False
+        if summary is None or summary.statistics is None:
+            return False
+        statistics, chunks = summary.statistics, summary.chunk_indexes
+        counts = statistics.channel_message_counts
+        if statistics.chunk_count != len(chunks) or not counts.keys() <= summary.channels.keys():
+            return False
+        self._schemas, self._channels = summary.schemas, summary.channels
+        self._counts = Counter(counts)
+        self._entries = [(chunk.message_start_time, chunk.chunk_start_offset) for chunk in chunks]
+        return bool(chunks) or not statistics.message_count
+
+    def _scan(self) -> None:
+        """Read the file for topics and messages, up to the first record that is not whole.
+
+        Raises:
+            InputError: it is larger than the bounds allow.
+        """
+        self._entries, self._counts, offset = [], Counter(), 0
+        try:
+            self._stream.seek(0)
+            SeekingReader(self._stream).get_header()
+            offset = MAGIC_SIZE
+            record: Any = None
+            while not isinstance(record, Footer):
+                record, end = self._record(offset)
+                messages = list(self._messages_of(record, offset))
+                if messages:
+                    self._entries.append((min(messages).stamp_ns, offset))
+                    self._counts.update(message.channel_id for message in messages)
+                offset = end
+        except InputError:
+            raise
+        except Exception as error:
+            self.missing = (
+                f"{self._path}: not closed by its recorder, cut off or damaged: what follows byte "
+                f"{offset} of {self._size} is missing ({describe(error)}); `mcap recover "
+                f"{self._path.name}` makes a whole file of it"
+            )
+
+    def _record(self, offset: int) -> tuple[Any, int]:
         """Return the record at an offset, None if it is not needed, and the next offset.
 
         Raises:
-            DamagedError: there is none, or it is damaged or too large.
+            InputError: it is larger than the bounds allow.
+            Exception: mcap's, if it is not whole.
         """
-        prefix = self._read(offset, _PREFIX_BYTES)
+        self._stream.seek(offset)
+        prefix = self._stream.read(_PREFIX_BYTES)
         length = int.from_bytes(prefix[1:], "little")
-        start = offset + _PREFIX_BYTES
-        if prefix[0] == 0 or length > self.size - start:
-            raise DamagedError(
-                offset, f"{length} bytes are declared, {self.size - start} are left"
+        end = offset + _PREFIX_BYTES + length
+        if len(prefix) < _PREFIX_BYTES or not prefix[0] or end > self._size:
+            raise McapError("no whole record")
+        if prefix[0] not in _NEEDED:
+            return None, end
+        self._check_size(length - _EXTRA_RECORD_BYTES, offset)
+        stream = io.BytesIO(prefix + self._stream.read(length))
+        return next(StreamReader(stream, skip_magic=True, emit_chunks=True).records), end
+
+    def _check_size(self, size: int, offset: int) -> None:
+        max_bytes = self._budget.config.most_chunk_bytes
+        if size > max_bytes:
+            raise InputError(
+                f"{self._path}: a chunk of {size} bytes at byte {offset}; bag.most_chunk_bytes "
+                f"is {max_bytes}"
             )
-        if prefix[0] not in _RECORDS and prefix[0] != _MESSAGE_OPCODE:
-            return None, start + length
-        return _decode(prefix[0], self._read(start, length), offset), start + length
 
-    def has_magic(self, offset: int) -> bool:
-        """Return whether MCAP's magic bytes are at an offset."""
-        return offset + len(_MAGIC) <= self.size and self._read(offset, len(_MAGIC)) == _MAGIC
-
-    def footer_offset(self) -> int:
-        """Return where the footer begins in a file that was closed."""
-        return max(self.size - _FOOTER_BYTES - len(_MAGIC), 0)
-
-    def read_summary(self, footer: Footer) -> bool:
-        """Read topics and chunks from the summary; return whether it is complete.
+    def _messages_of(self, record: Any, offset: int) -> Iterator[LoggedMessage]:
+        """Yield the messages of a chunk, or one outside of chunks; remember topics.
 
         Raises:
-            DamagedError: it is damaged.
+            InputError: they are larger than the bounds allow.
+            Exception: mcap's, if they are damaged.
         """
-        start: int = footer.summary_start
-        if not start:
-            return False
-        statistics = None
-        for opcode, content in _split_records(
-            self._read(start, self.footer_offset() - start), start
-        ):
-            record = _decode(opcode, content, start)
-            if isinstance(record, Statistics):
-                statistics = record
-            elif isinstance(record, ChunkIndex):
-                self.entries.append((record.message_start_time, record.chunk_start_offset))
-            else:
-                self._describe(record)
-        if statistics is None or statistics.chunk_count != len(self.entries):
-            return False
-        self.counts = Counter(statistics.channel_message_counts)
-        is_chunked = bool(self.entries) or not statistics.message_count
-        return is_chunked and self.counts.keys() <= self.channels.keys()
-
-    def scan(self) -> None:
-        """Read the whole file for topics and messages; damaged parts become gaps."""
-        self.entries.clear()
-        self.counts.clear()
-        offset = len(_MAGIC)
-        if not self.has_magic(0):
-            offset = self._skip_to_chunk(0, "the file does not begin as MCAP")
-        while offset < self.size and not self.closed:
-            try:
-                record, next_offset = self.record(offset)
-            except DamagedError as error:
-                offset = self._skip_to_chunk(offset, error.problem)
-                continue
-            self._register(offset, record, next_offset)
-            self.closed = isinstance(record, Footer) and self.has_magic(next_offset)
-            offset = next_offset
-
-    def _skip_to_chunk(self, offset: int, problem: str) -> int:
-        """Note a gap up to the next whole chunk, or to the end of the file; return its end."""
-        end = self._next_chunk(offset + 1)
-        self.gaps.append(Gap(offset, end - offset, problem))
-        return end
-
-    def _next_chunk(self, start: int) -> int:
-        """Return where the next whole chunk begins; the size of the file if there is none."""
-        if start >= self.size:
-            return self.size
-        with mmap.mmap(self.file.fileno(), self.size, access=mmap.ACCESS_READ) as data:
-            for match in _CHUNK_START.finditer(data, start):
-                try:
-                    chunk, _ = self.record(match.start())
-                    self.budget.spend_decompressed(len(chunk.data))
-                    _decompress_chunk(chunk, match.start(), self.budget)
-                    return match.start()
-                except DamagedError:
-                    continue
-                except InputError:
-                    break
-        return self.size
-
-    def _register(self, offset: int, record: Any, next_offset: int) -> None:
-        """Register a record at the top level of the file, or note that its content is lost."""
-        last_gap = self.gaps[-1] if self.gaps else None
-        try:
-            if isinstance(record, (Chunk, LoggedMessage)):
-                messages = list(self._messages_of(record, offset, None))
-                first_ns = min((message.stamp_ns for message in messages), default=0)
-                self.entries.append((first_ns, offset))
-                self.counts.update(message.channel_id for message in messages)
-            elif isinstance(record, MessageIndex) and last_gap and self._follows_gap(offset):
-                known = last_gap.messages + len(record.records)
-                size = next_offset - last_gap.offset
-                self.gaps[-1] = replace(last_gap, messages=known, size=size)
-            else:
-                self._describe(record)
-        except (DamagedError, InputError) as error:
-            problem = error.problem if isinstance(error, DamagedError) else str(error)
-            self.gaps.append(Gap(offset, next_offset - offset, problem))
-
-    def _follows_gap(self, offset: int) -> bool:
-        """Return whether the last gap ends at an offset."""
-        return bool(self.gaps) and self.gaps[-1].offset + self.gaps[-1].size == offset
-
-    def _describe(self, record: Any) -> None:
-        """Remember a schema or a channel."""
-        if isinstance(record, Schema):
-            self.schemas[record.id] = record
-        elif isinstance(record, Channel):
-            self.channels[record.id] = record
+        records: Iterable[Any] = [record]
+        if isinstance(record, Chunk):
+            self._check_size(record.uncompressed_size, offset)
+            self._budget.spend_decompressed(record.uncompressed_size)
+            records = _records(_decompress(record))
+        for number, each in enumerate(records):
+            if isinstance(each, Schema):
+                self._schemas[each.id] = each
+            elif isinstance(each, Channel):
+                self._channels[each.id] = each
+            elif isinstance(each, Message):
+                self._budget.spend_decompressed(FIND_COST_BYTES)
+                if each.log_time >= MAX_STAMP_NS:
+                    raise McapError(f"log time {each.log_time} ns is out of range")
+                yield LoggedMessage(each.log_time, offset, number, each.channel_id, each.data)
 
     def list_topics(self) -> list[BagTopic]:
         """Return the channels with their types and numbers of messages.
 
         Raises:
-            DamagedError: the type of a channel is missing.
+            InputError: the type of a channel is missing.
         """
         topics = []
-        for channel in self.channels.values():
-            schema = self.schemas.get(channel.schema_id)
+        for channel in self._channels.values():
+            schema = self._schemas.get(channel.schema_id)
             if channel.schema_id and schema is None:
-                raise DamagedError(0, f"the type of topic {shown(channel.topic)} is missing")
+                raise InputError(
+                    f"{self._path}: damaged, the type of topic {shown(channel.topic)} is missing"
+                )
             topic = BagTopic(
                 name=channel.topic,
                 type=schema.name if schema else "",
                 quality=quality_of(channel.metadata.get("offered_qos_profiles", "")),
-                count=self.counts[channel.id],
+                count=self._counts[channel.id],
                 id=channel.id,
                 encoding=channel.message_encoding,
             )
             topics.append(topic)
         return topics
 
-    def messages(self, channels: Collection[int] | None = None) -> Iterator[LoggedMessage]:
-        """Yield the messages of some channels (None: all) by their stamps, then by their place.
+    def messages(self, channels: Collection[int]) -> Iterator[LoggedMessage]:
+        """Yield the messages of some channels by their stamps, then by their place.
 
         Raises:
-            DamagedError: a chunk is damaged.
+            InputError: a chunk is damaged, or larger than the bounds allow.
         """
         heap: list[LoggedMessage] = []
-        for start_ns, offset in sorted(self.entries):
+        for start_ns, offset in sorted(self._entries):
             while heap and heap[0].stamp_ns < start_ns:
                 yield heapq.heappop(heap)
-            record, _ = self.record(offset)
-            if not isinstance(record, (Chunk, LoggedMessage)):
-                raise DamagedError(offset, "the index names a chunk that is not there")
-            for message in self._messages_of(record, offset, channels):
-                if message.stamp_ns < start_ns:
-                    raise DamagedError(
-                        offset,
-                        f"a message is logged at {message.stamp_ns} ns, before the start of its "
-                        f"chunk at {start_ns} ns",
-                    )
-                heapq.heappush(heap, message)
+            damage = f"{self._path}: damaged at byte {offset}"
+            with guarded(damage, remedy=f"`mcap recover {self._path.name}` saves what is whole"):
+                record, _ = self._record(offset)
+                if not isinstance(record, (Chunk, Message)):
+                    raise McapError("the index names a chunk that is not there")
+                for message in self._messages_of(record, offset):
+                    if message.stamp_ns < start_ns:
+                        raise McapError(
+                            f"a message is logged at {message.stamp_ns} ns, before the start of "
+                            f"its chunk at {start_ns} ns"
+                        )
+                    if message.channel_id in channels:
+                        heapq.heappush(heap, message)
         while heap:
             yield heapq.heappop(heap)
-
-    def _messages_of(
-        self, record: Chunk | LoggedMessage, offset: int, channels: Collection[int] | None
-    ) -> Iterator[LoggedMessage]:
-        """Yield the messages of a chunk, or a message outside of chunks; register topics.
-
-        Raises:
-            DamagedError: the chunk is damaged.
-        """
-        if isinstance(record, LoggedMessage):
-            self.budget.spend_decompressed(len(record.data) + FIND_COST_BYTES)
-            if channels is None or record.channel_id in channels:
-                yield record
-            return
-        data = _decompress_chunk(record, offset, self.budget)
-        for number, (opcode, content) in enumerate(_split_records(data, offset)):
-            inner = _decode(opcode, content, offset)
-            if not isinstance(inner, LoggedMessage):
-                self._describe(inner)
-                continue
-            self.budget.spend_decompressed(FIND_COST_BYTES)
-            if channels is None or inner.channel_id in channels:
-                yield inner._replace(number=number)
-
-
-def open_mcap(file: BinaryIO, size: int, budget: ReadBudget) -> McapFile:
-    """Return the contents of an MCAP file of `size` bytes.
-
-    Raises:
-        DamagedError: it is damaged, or was not closed.
-        InputError: its messages are those of ROS 1.
-    """
-    mcap = McapFile(file, size, budget)
-    if not mcap.has_magic(0):
-        raise DamagedError(0, "the file does not begin as MCAP")
-    header, _ = mcap.record(len(_MAGIC))
-    if not isinstance(header, Header):
-        raise DamagedError(len(_MAGIC), "the file has no header")
-    if header.profile == "ros1":
-        raise InputError(
-            f"{file.name}: an MCAP file of profile 'ros1'; name the .bag file of its messages"
-        )
-    try:
-        footer, _ = mcap.record(mcap.footer_offset())
-    except DamagedError:
-        footer = None
-    if not isinstance(footer, Footer):
-        raise DamagedError(
-            mcap.footer_offset(),
-            "the file has no footer: its recorder was killed, or it is cut off",
-        )
-    if not mcap.read_summary(footer):
-        mcap.scan()
-        if mcap.gaps:
-            raise DamagedError(mcap.gaps[0].offset, mcap.gaps[0].problem)
-    return mcap

@@ -3,8 +3,9 @@
 
 """rosbag2's metadata.yaml, version 9, and QoS profiles, as any version of rosbag2 writes them."""
 
-from dataclasses import dataclass, field
-from functools import cache, lru_cache
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any
 
 import yaml
@@ -16,17 +17,6 @@ from scenario_gen.types import Quality
 
 _MAX_STAMP_NS = 2**63 - 1
 _INFINITE = {"sec": 9223372036, "nsec": 854775807}  # rmw's infinite duration
-_PROFILE_TYPES: dict[str, Any] = {
-    "history": str | int,
-    "depth": int,
-    "reliability": str | int,
-    "durability": str | int,
-    "deadline": dict,
-    "lifespan": dict,
-    "liveliness": str | int,
-    "liveliness_lease_duration": dict,
-    "avoid_ros_namespace_conventions": bool,
-}
 
 
 class _Dumper(yaml.CSafeDumper):  # type: ignore[misc]
@@ -38,27 +28,13 @@ class _Dumper(yaml.CSafeDumper):  # type: ignore[misc]
 
 @dataclass
 class TopicInfo:
-    """The metadata of a topic; `qos` is a YAML list of profiles."""
+    """The metadata of a topic."""
 
     name: str
     type: str
-    qos: str
+    quality: Quality
     type_hash: str
     count: int = 0
-
-    @property
-    def document(self) -> dict[str, Any]:
-        """The topic as in metadata.yaml."""
-        return {
-            "topic_metadata": {
-                "name": self.name,
-                "type": self.type,
-                "serialization_format": "cdr",
-                "offered_qos_profiles": profiles(self.qos),
-                "type_description_hash": self.type_hash,
-            },
-            "message_count": self.count,
-        }
 
 
 @dataclass
@@ -77,16 +53,7 @@ class FileInfo:
         self.count += 1
 
 
-@dataclass
-class BagInfo:
-    """The metadata of a bag; `not_recorded` says by topic what is missing."""
-
-    topics: list[TopicInfo] = field(default_factory=list)
-    files: list[FileInfo] = field(default_factory=list)
-    not_recorded: dict[str, str] = field(default_factory=dict)
-
-
-def _statistics(files: list[FileInfo]) -> dict[str, Any]:
+def _statistics(files: Sequence[FileInfo]) -> dict[str, Any]:
     """Return first stamp, duration and count of files as in metadata.yaml; zeros if empty."""
     used = [file for file in files if file.count]
     start_ns = min((file.start_ns for file in used), default=0)
@@ -98,19 +65,33 @@ def _statistics(files: list[FileInfo]) -> dict[str, Any]:
     }
 
 
-def metadata_yaml(info: BagInfo) -> str:
-    """Return the text of metadata.yaml."""
-    not_recorded = {f"{NOT_RECORDED}{topic}": text for topic, text in info.not_recorded.items()}
+def metadata_yaml(
+    topics: Sequence[TopicInfo], files: Sequence[FileInfo], not_recorded: Mapping[str, str]
+) -> str:
+    """Return the text of metadata.yaml; `not_recorded` says by topic what is missing."""
+    custom = {f"{NOT_RECORDED}{topic}": text for topic, text in not_recorded.items()}
     document = {
         "version": 9,
         "storage_identifier": "mcap",
-        **_statistics(info.files),
-        "topics_with_message_count": [topic.document for topic in info.topics],
+        **_statistics(files),
+        "topics_with_message_count": [
+            {
+                "topic_metadata": {
+                    "name": topic.name,
+                    "type": topic.type,
+                    "serialization_format": "cdr",
+                    "offered_qos_profiles": _profiles(topic.quality),
+                    "type_description_hash": topic.type_hash,
+                },
+                "message_count": topic.count,
+            }
+            for topic in topics
+        ],
         "compression_format": "",
         "compression_mode": "",
-        "relative_file_paths": [file.path for file in info.files],
-        "files": [{"path": file.path, **_statistics([file])} for file in info.files],
-        "custom_data": not_recorded or None,
+        "relative_file_paths": [file.path for file in files],
+        "files": [{"path": file.path, **_statistics([file])} for file in files],
+        "custom_data": custom or None,
         "ros_distro": "jazzy",
     }
     return _dump({"rosbag2_bagfile_information": document})
@@ -122,9 +103,8 @@ def _dump(value: Any) -> str:
     return text
 
 
-@cache
-def qos_yaml(quality: Quality) -> str:
-    """Return an offered QoS profile as the list that rosbag2 writes."""
+def _profiles(quality: Quality) -> list[dict[str, Any]]:
+    """Return an offered QoS profile in the list that rosbag2 writes."""
     profile = {
         "history": "keep_last",
         "depth": quality.depth,
@@ -136,40 +116,27 @@ def qos_yaml(quality: Quality) -> str:
         "liveliness_lease_duration": _INFINITE,
         "avoid_ros_namespace_conventions": False,
     }
-    return _dump([profile]).rstrip("\n")
+    return [profile]
+
+
+def qos_yaml(quality: Quality) -> str:
+    """Return an offered QoS profile as the text in a file of a bag."""
+    return _dump(_profiles(quality)).rstrip("\n")
 
 
 @lru_cache(maxsize=256)
-def profiles(text: str) -> list[dict[str, Any]]:
-    """Return the profiles in a YAML list; none if it is damaged, since they are not essential."""
-    if not text:
-        return []
-    try:
-        entries = parse_yaml(text, "offered_qos_profiles")
-    except InputError:
-        return []
-    return entries if isinstance(entries, list) and all(map(_is_profile, entries)) else []
-
-
-def _is_profile(entry: Any) -> bool:
-    """Return whether an entry has what every reader needs."""
-    if not isinstance(entry, dict):
-        return False
-    if not all(isinstance(entry.get(key), kind) for key, kind in _PROFILE_TYPES.items()):
-        return False
-    durations = (value for value in entry.values() if isinstance(value, dict))
-    return all({"sec", "nsec"} <= value.keys() for value in durations)
-
-
 def quality_of(text: str) -> Quality:
-    """Return the quality of the first profile in a YAML list; by default volatile, depth 10."""
-    known = profiles(text)
-    if not known:
+    """Return the quality of the first profile in a YAML list.
+
+    It is volatile and of depth 10 if there is none, or a damaged one.
+    """
+    try:
+        profile = parse_yaml(text, "offered_qos_profiles")[0]
+        # rosbag2 wrote rmw's numbers before Jazzy: best effort is 2, transient local is 1.
+        return Quality(
+            depth=max(1, int(profile["depth"])),
+            reliable=str(profile["reliability"]).lower() not in ("best_effort", "2"),
+            transient_local=str(profile["durability"]).lower() in ("transient_local", "1"),
+        )
+    except (InputError, LookupError, TypeError, ValueError, OverflowError):
         return Quality(depth=10, transient_local=False)
-    profile = known[0]
-    # rosbag2 wrote rmw's numbers before Jazzy: best effort is 2, transient local is 1.
-    return Quality(
-        depth=max(1, profile["depth"]),
-        reliable=str(profile["reliability"]).lower() not in ("best_effort", "2"),
-        transient_local=str(profile["durability"]).lower() in ("transient_local", "1"),
-    )

@@ -14,9 +14,10 @@ from mcap.writer import CompressionType, Writer
 
 from scenario_gen.bags.storage.definitions import definition
 from scenario_gen.bags.storage.files import METADATA
-from scenario_gen.bags.storage.metadata import BagInfo, FileInfo, metadata_yaml, TopicInfo
+from scenario_gen.bags.storage.metadata import FileInfo, metadata_yaml, qos_yaml, TopicInfo
 from scenario_gen.base.errors import InputError
 from scenario_gen.base.folders import Kind, naming, replaced_folder, sync, write_text
+from scenario_gen.types import Quality
 
 _WRITTEN = Kind("bag")
 
@@ -33,6 +34,12 @@ class BagWriter:
     """Writes one bag; a context manager.
 
     Each full chunk is flushed, so that a killed process loses its last chunk only; see `flush`.
+
+    Attributes:
+        folder: of the bag.
+        topics: by name.
+        files: in order.
+        not_recorded: by topic, what is missing.
     """
 
     def __init__(
@@ -50,11 +57,12 @@ class BagWriter:
             OSError: it cannot be created.
         """
         self.folder = folder
-        self.info = BagInfo()
+        self.topics: dict[str, TopicInfo] = {}
+        self.files: list[FileInfo] = []
+        self.not_recorded: dict[str, str] = {}
         self._compression = CompressionType.ZSTD if compress else CompressionType.NONE
         self._chunk_bytes = chunk_bytes
         self._split = split
-        self._topics: dict[str, tuple[TopicInfo, tuple[str, str]]] = {}
         self._failed = False
         try:
             folder.mkdir(parents=True)
@@ -65,9 +73,9 @@ class BagWriter:
         self._open_file()
 
     def _open_file(self) -> None:
-        self._file = FileInfo(f"{self.folder.name}_{len(self.info.files)}.mcap")
+        self._file = FileInfo(f"{self.folder.name}_{len(self.files)}.mcap")
         self._bytes = 0
-        self.info.files.append(self._file)
+        self.files.append(self._file)
         path = self.folder / self._file.path
         with naming(path):
             self._stream = path.open("xb")
@@ -81,51 +89,46 @@ class BagWriter:
     def _close_file(self) -> None:
         path = self.folder / self._file.path
         with naming(path):
-            self._writer.add_metadata("rosbag2", {"serialized_metadata": metadata_yaml(self.info)})
+            self._writer.add_metadata("rosbag2", {"serialized_metadata": self._metadata()})
             self._writer.finish()
             self._stream.close()
         sync(path)
 
+    def _metadata(self) -> str:
+        return metadata_yaml(list(self.topics.values()), self.files, self.not_recorded)
+
     def add_topic(
-        self,
-        name: str,
-        kind: str,
-        qos: str = "",
-        type_hash: str = "",
-        schema: tuple[str, str] | None = None,
+        self, name: str, kind: str, quality: Quality = Quality(), type_hash: str = ""
     ) -> None:
         """Add a topic, unless it was added before.
 
         Args:
             name: full name.
             kind: its type, e.g. `nav_msgs/msg/Path`.
-            qos: YAML list of the offered QoS profiles.
+            quality: offered by its publisher.
             type_hash: RIHS01 hash; "": computed from the definition.
-            schema: encoding and text of the type's definition; None: looked up.
 
         Raises:
             InputError: the definition of the type is unknown.
         """
-        if name in self._topics:
-            return
-        if schema is None:
-            text, computed_hash = definition(kind)
-            schema = ("ros2msg", text)
-            type_hash = type_hash or computed_hash
-        topic = TopicInfo(name, kind, qos, type_hash)
-        self._topics[name] = (topic, schema)
-        self.info.topics.append(topic)
-        self._channel(name)
+        if name not in self.topics:
+            type_hash = type_hash or definition(kind)[1]
+            self.topics[name] = TopicInfo(name, kind, quality, type_hash)
+            self._channel(name)
 
     def _channel(self, name: str) -> int:
         """Return the channel of a topic in the current file; create it at its first use."""
         if name not in self._channels:
-            topic, (encoding, text) = self._topics[name]
+            topic = self.topics[name]
             if topic.type not in self._schemas:
+                text, _ = definition(topic.type)
                 self._schemas[topic.type] = self._writer.register_schema(
-                    topic.type, encoding, text.encode()
+                    topic.type, "ros2msg", text.encode()
                 )
-            metadata = {"offered_qos_profiles": topic.qos, "topic_type_hash": topic.type_hash}
+            metadata = {
+                "offered_qos_profiles": qos_yaml(topic.quality),
+                "topic_type_hash": topic.type_hash,
+            }
             self._channels[name] = self._writer.register_channel(
                 name, "cdr", self._schemas[topic.type], metadata
             )
@@ -142,7 +145,7 @@ class BagWriter:
             raise InputError(
                 f"{name}: stamp {stamp_ns} ns is before 1970, which an MCAP file cannot hold"
             )
-        topic, _ = self._topics[name]
+        topic = self.topics[name]
         with self._writing():
             if self._is_full(stamp_ns):
                 self._close_file()
@@ -187,7 +190,7 @@ class BagWriter:
                 self._writer.flush()
 
     def close(self) -> None:
-        """Write indexes and metadata.yaml; after a failed write, leave the files for `reindex`.
+        """Write indexes and metadata.yaml; after a failed write, leave the files as they are.
 
         Raises:
             OSError: the disk is full, or fails.
@@ -196,7 +199,7 @@ class BagWriter:
             if not self._failed:
                 self._close_file()
                 partial = self.folder / f"{METADATA}.partial"
-                write_text(partial, metadata_yaml(self.info))
+                write_text(partial, self._metadata())
                 sync(partial)
                 partial.replace(self.folder / METADATA)
                 sync(self.folder)

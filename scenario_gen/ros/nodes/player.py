@@ -32,7 +32,7 @@ from rosgraph_msgs.msg import Clock
 
 from msg_conventions.diagnostics import Level
 from msg_conventions.driving import encode_clock
-from scenario_gen.bags.storage.bag import bag_topics, BagMessage, read_messages
+from scenario_gen.bags.storage.bag import BagMessage, open_bag, read_messages
 from scenario_gen.bags.storage.config import BagConfig
 from scenario_gen.bags.storage.mcap import BagTopic
 from scenario_gen.base.errors import InputError, ScenarioGenError
@@ -147,7 +147,11 @@ class Player(Node):  # type: ignore[misc]
         config: Config = self.parameters.config
         if not config.bag:
             raise InputError("parameter bag is empty; name the bag to play")
-        for topic in bag_topics(Path(config.bag), UNBOUNDED):
+        with open_bag(Path(config.bag), UNBOUNDED) as bag:
+            topics, missing = bag.topics(), bag.warnings()
+        for warning in missing:
+            self.diagnostics.status(Level.WARN, warning, "bag", {})
+        for topic in topics:
             name = topic.name if topic.name.startswith("/") else f"/{topic.name}"
             if re.fullmatch(config.topics, name) and not (config.clock and name == "/clock"):
                 self._offer(topic, name, config.patience)

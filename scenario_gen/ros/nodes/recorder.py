@@ -8,8 +8,7 @@ A message's log time is its arrival; with `use_sim_time` nothing is recorded bef
 /clock. `~/stop`, Ctrl-C and SIGTERM close the bag; a killed recorder
 loses the messages of its last seconds. Messages that are not recorded are reported on the
 terminal, on /diagnostics and in metadata.yaml. Existing files are never overwritten. On a full
-disk the recording ends with an error on /diagnostics, and the written part stays for
-`scenario-gen reindex`.
+disk the recording ends with an error on /diagnostics, and the written part stays readable.
 """
 
 from collections.abc import Iterator, Mapping
@@ -26,7 +25,6 @@ from rclpy.time import Time
 
 from msg_conventions.diagnostics import Level, Subject
 from scenario_gen.bags.recordings.message_loss import MessageLoss, TopicLoss
-from scenario_gen.bags.storage.metadata import qos_yaml
 from scenario_gen.bags.storage.writer import BagWriter, Split
 from scenario_gen.base.errors import InputError, of_system
 from scenario_gen.base.parameters import parameter, Parameters
@@ -82,7 +80,7 @@ def default_topics(namespace: str) -> str:
 
 @contextmanager
 def _disk_errors(
-    advice: str = "; `scenario-gen reindex` saves the intact part of the bag",
+    advice: str = "; the bag can be read up to this point",
 ) -> Iterator[None]:
     """Turn OSErrors into InputErrors."""
     try:
@@ -148,7 +146,7 @@ class Recorder(Node):  # type: ignore[misc]
         if bag is None:
             return ""
         lost = self._losses.summary(ended=True)
-        bag.info.not_recorded = {topic: str(loss) for topic, loss in lost.items()}
+        bag.not_recorded = {topic: str(loss) for topic, loss in lost.items()}
         self._warn(lost)
         with _disk_errors():
             bag.close()
@@ -209,7 +207,7 @@ class Recorder(Node):  # type: ignore[misc]
         """Report the recorded messages of each topic, and losses."""
         if self._bag is None:
             return
-        counts = {topic.name: str(topic.count) for topic in self._bag.info.topics}
+        counts = {topic.name: str(topic.count) for topic in self._bag.topics.values()}
         folder = str(self._bag.folder)
         self.diagnostics.status(Level.OK, folder, Subject.RECORDED, counts, log=False)
         lost = self._losses.summary()
@@ -253,9 +251,7 @@ class Recorder(Node):  # type: ignore[misc]
         )
         try:
             message = message_class(kind)
-            self._bag.add_topic(
-                topic, kind, qos_yaml(recorded), str(publishers[0].topic_type_hash)
-            )
+            self._bag.add_topic(topic, kind, recorded, str(publishers[0].topic_type_hash))
         except InputError as error:
             self._refused.add(topic)
             self._report(

@@ -79,7 +79,7 @@ def test_a_changed_database_is_an_error(tmp_path, statement):
 
 @pytest.mark.parametrize(
     ("encoding", "profile", "said"),
-    [("json", "ros2", "/t is encoded as 'json'"), ("cdr", "ros1", "profile 'ros1'")],
+    [("json", "ros2", "/t is encoded as 'json'"), ("ros1", "ros1", "/t is encoded as 'ros1'")],
 )
 def test_other_encodings_are_refused_by_name(tmp_path, encoding, profile, said):
     stream = BytesIO()

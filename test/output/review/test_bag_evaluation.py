@@ -21,7 +21,6 @@ from msg_conventions.topics import topic_entry
 from scenario_gen.bags.recordings.read import read_recording
 from scenario_gen.bags.recordings.write import write_recording
 from scenario_gen.bags.storage.bag import read_messages
-from scenario_gen.bags.storage.metadata import qos_yaml
 from scenario_gen.bags.storage.writer import atomic_bag
 from scenario_gen.base.errors import InputError
 from scenario_gen.base.road_users import Dynamics
@@ -179,7 +178,7 @@ def test_what_nodes_say_on_one_topic_is_told_apart_by_their_namespaces(tmp_path)
         for message in read_messages(bag):
             topic = message.topic.replace("/here/diagnostics", "/diagnostics")
             kind, quality = topic_entry(topic)
-            copy.add_topic(topic, kind, qos_yaml(quality))
+            copy.add_topic(topic, kind, quality)
             if topic != "/diagnostics":
                 copy.write(topic, message.data, message.stamp_ns)
                 continue

@@ -16,7 +16,6 @@ from msg_conventions.topics import topic_entry
 from scenario_gen.bags.recordings.read import read_recording
 from scenario_gen.bags.recordings.write import result_messages, write_recording
 from scenario_gen.bags.storage.bag import read_messages
-from scenario_gen.bags.storage.metadata import qos_yaml
 from scenario_gen.bags.storage.writer import atomic_bag
 from scenario_gen.base.errors import InputError
 from scenario_gen.cli.commands import app
@@ -237,7 +236,7 @@ def several_maps(run, target):
         for k, one in enumerate((run, later)):
             for topic, data, stamp in result_messages(one, str(k + 1)):
                 kind, quality = topic_entry(topic)
-                writer.add_topic(f"/here/{topic}", kind, qos_yaml(quality))
+                writer.add_topic(f"/here/{topic}", kind, quality)
                 writer.write(f"/here/{topic}", data, stamp + k * 10**12)
     return target
 
