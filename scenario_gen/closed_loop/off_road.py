@@ -8,25 +8,26 @@ if it reports an exit, the depth is measured, at poses so close together that no
 footprint moves more than POSE_SPACING_M from one to the next.
 """
 
-from functools import lru_cache
 import math
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
+import shapely
+from shapely.geometry.base import BaseGeometry
 
 from scenario_gen.closed_loop.drive import Drive
 from scenario_gen.method.validity import first_exits, Ground, Proof
-from scenario_gen.numerics import Bools, Floats, frozen
-from scenario_gen.numerics.boxes import footprint_gaps
+from scenario_gen.numerics import Bools, Floats
+from scenario_gen.numerics.boxes import corners
 from scenario_gen.numerics.hermite import control_points
-from scenario_gen.numerics.kernels import B2, F, F2, kernel, OUT2
-from scenario_gen.numerics.plane import edge_lengths
-from scenario_gen.roads import footprint_fits, to_cells
+from scenario_gen.numerics.plane import edge_lengths, place
+from scenario_gen.roads import footprint_fits, to_cells, to_metres
 from scenario_gen.types import Motion, Obstacle, Road
 from scenario_gen.types.road import MAX_DEPTH_M
 
 POSE_SPACING_M = 0.05
-POINT_SPACING_M = 0.1  # greatest distance between sampled points of the footprint
+POINTS_COUNT = (25, 11)  # along and across a footprint, of which the deepest is found
+DEPTH_ERROR_M = 0.01
 SUBSTEPS_COUNT = 200  # per step, to locate the beginning of an event
 RESOLUTION_S = 1e-6  # an event that cannot be excluded over such an interval counts
 
@@ -62,28 +63,26 @@ def road_use(drive: Drive, road: Road | None, limit: float) -> RoadUse:
         motion.time, control, motion.heading, np.array([half]), Ground.of(road), RESOLUTION_S, out
     )
     if out[0, 0] == Proof.PROVEN:
-        return RoadUse(max(_least_room(road, motion.poses[0], half), RESOLUTION_S), 0.0, math.nan)
-    return _excursion(road, motion, limit)
-
-
-def _excursion(road: Road, motion: Motion, limit: float) -> RoadUse:
-    """Measure the motion of one vehicle that leaves the road."""
-    half = motion.vehicles[0].half
-    deepest, largest_area, begin = 0.0, 0.0, math.nan
-    for k in range(len(motion.time) - 1):
-        depth, area = _depths_and_areas(road, _poses_in(motion, k, _pose_count(motion, k)), half)
-        if math.isnan(begin) and depth.max() > 0.0 and depth.max() >= limit:
-            reached_at = int(np.argmax((depth >= limit) & (depth > 0.0))) / (len(depth) - 1)
-            last = math.ceil(reached_at * SUBSTEPS_COUNT) + 1
-            fine, _ = _depths_and_areas(road, _poses_in(motion, k, SUBSTEPS_COUNT)[:last], half)
-            reached = (fine >= limit) & (fine > 0.0)
-            share = int(np.argmax(reached)) / SUBSTEPS_COUNT if reached.any() else 1.0
-            begin = float(motion.time[k] + share * (motion.time[k + 1] - motion.time[k]))
-        if deepest >= MAX_DEPTH_M and largest_area > 0.0:
-            break  # greater depths are not reported
-        deepest = max(deepest, float(depth.max()))
-        largest_area = max(largest_area, float(area.max()))
-    return RoadUse(-deepest, largest_area, begin)
+        edge = _pavement(road, motion.poses[0], half).boundary
+        room = shapely.distance(_footprints(motion.poses[0], half), edge).min()
+        return RoadUse(float(np.clip(room, RESOLUTION_S, MAX_DEPTH_M)), 0.0, math.nan)
+    depths = _depths(road, motion.poses[0], half)
+    is_out = (depths >= limit) & (depths > 0.0)
+    first_out = motion.time[np.argmax(is_out)] if is_out.any() else motion.time[-1]
+    time = _fine_times(motion)  # from then on the samples suffice
+    time = np.union1d(time[time <= first_out], motion.time)
+    poses = motion.at(time).poses[0]
+    depths = _depths(road, poses, half)
+    reached = (depths >= limit) & (depths > 0.0)
+    begin = math.nan
+    if reached.any():
+        k = int(np.argmax(reached))
+        between = np.linspace(time[max(k - 1, 0)], time[k], SUBSTEPS_COUNT + 1)
+        fine = _depths(road, motion.at(between).poses[0], half)
+        begin = float(between[np.argmax((fine >= limit) & (fine > 0.0))])
+    pavement = _pavement(road, poses, half)
+    area = shapely.area(shapely.difference(_footprints(poses, half), pavement)).max()
+    return RoadUse(-_depth(road, poses[np.argmax(depths)], half), float(area), begin)
 
 
 def first_obstacle(drive: Drive, road: Road | None) -> tuple[float, Obstacle] | None:
@@ -94,206 +93,87 @@ def first_obstacle(drive: Drive, road: Road | None) -> tuple[float, Obstacle] | 
     if road is None or not road.obstacles or drive.driven < 2:
         return None
     motion = drive.motion.select([drive.ego], 0, drive.driven - 1)
-    for k in range(len(motion.time) - 1):
-        poses = _poses_in(motion, k, _pose_count(motion, k))
-        touches = _touches(road, poses, motion.vehicles[0].half)
-        if touches.any():
-            instant, obstacle = np.argwhere(touches)[0].tolist()
-            share = instant / (len(poses) - 1)
-            time = motion.time[k] + share * (motion.time[k + 1] - motion.time[k])
-            return float(time), road.obstacles[obstacle]
-    return None
+    time = _fine_times(motion)
+    touches = _touches(road, motion.at(time).poses[0], motion.vehicles[0].half)
+    if not touches.any():
+        return None
+    instant, obstacle = np.argwhere(touches)[0].tolist()
+    return float(time[instant]), road.obstacles[obstacle]
 
 
 def _touches(road: Road, poses: Floats, half: tuple[float, float]) -> Bools:
     """Return (P, K) whether a footprint at poses (P, 3) overlaps each obstacle of a road."""
-    touches = np.zeros((len(poses), len(road.obstacles)), dtype=np.bool_)
-    for k, obstacle in enumerate(road.obstacles):
-        place = np.tile(obstacle[:3], (len(poses), 1))
-        size = (obstacle.length / 2.0, obstacle.width / 2.0)
-        touches[:, k] = footprint_gaps(half, poses, size, place)[0] < 0.0
-    return touches
+    obstacles = shapely.polygons([obstacle.outline for obstacle in road.obstacles])
+    return np.asarray(shapely.intersects(_footprints(poses, half)[:, None], obstacles))
 
 
 def is_off_road(road: Road, pose: Floats, half: tuple[float, float], limit: float) -> bool:
     """Whether a footprint at a pose (3,) is off the road, as in `road_use`, or in an obstacle."""
-    if footprint_fits(road, pose, 2.0 * half[0], 2.0 * half[1])[0]:
+    if footprint_fits(road, pose[None], 2.0 * half[0], 2.0 * half[1])[0]:
         return False
-    if _touches(road, pose[None], half).any():
-        return True
-    depth, _ = _depths_and_areas(road, pose[None], half)
-    return bool(depth[0] >= limit)
+    in_obstacle = bool(road.obstacles) and bool(_touches(road, pose[None], half).any())
+    return in_obstacle or _depth(road, pose, half) >= limit
 
 
-def _poses_in(motion: Motion, k: int, count: int) -> Floats:
-    """Return poses (count + 1, 3) of the first vehicle, evenly spread over step k."""
-    start, end = motion.time[k : k + 2]
-    times = start + np.linspace(0.0, 1.0, count + 1) * (end - start)
-    return np.asarray(motion.at(times).poses[0])
+def _fine_times(motion: Motion) -> Floats:
+    """Return times [s] between which no point of a vehicle moves by more than POSE_SPACING_M."""
+    distance = np.maximum(edge_lengths(motion.position[0]), motion.speed[0, 1:] * motion.dt)
+    distance += np.abs(np.diff(motion.heading[0])) * sum(motion.vehicles[0].half)
+    count = math.ceil(np.clip(distance.max() / POSE_SPACING_M, 1.0, SUBSTEPS_COUNT))
+    steps = len(motion.time) - 1
+    place_in_steps = np.linspace(0.0, steps, steps * count + 1)
+    return np.asarray(np.interp(place_in_steps, np.arange(steps + 1), motion.time))
 
 
-def _pose_count(motion: Motion, k: int) -> int:
-    """Return the number of intervals into which step k is divided."""
-    distance = float(edge_lengths(motion.position[0, k : k + 2])[0])
-    step = motion.time[k + 1] - motion.time[k]
-    distance = max(distance, float(motion.speed[0, k : k + 2].max() * step))
-    turn = abs(float(motion.heading[0, k + 1] - motion.heading[0, k]))
-    distance += turn * sum(motion.vehicles[0].half)
-    return min(max(math.ceil(distance / POSE_SPACING_M), 1), SUBSTEPS_COUNT)
-
-
-@lru_cache(maxsize=64)
-def _footprint_points(half: tuple[float, float]) -> Floats:
-    """Return points (A, B, 2) [m] of a footprint in its frame."""
-    along, across = (np.linspace(-h, h, math.ceil(2.0 * h / POINT_SPACING_M) + 1) for h in half)
-    return frozen(np.stack(np.meshgrid(along, across, indexing="ij"), axis=-1))
-
-
-def _cell_poses(road: Road, poses: Floats) -> Floats:
-    """Return poses (P, 3) with x, y in cells."""
-    return np.concatenate([to_cells(road, poses[:, :2]), poses[:, 2:]], axis=1)
-
-
-def _depths_and_areas(
-    road: Road, poses: Floats, half: tuple[float, float]
-) -> tuple[Floats, Floats]:
-    """Return (P,) greatest depths [m] and (P,) areas [m²] of a footprint outside the road."""
-    points = _footprint_points(half).reshape(-1, 2) / road.resolution
-    closed = road.closed_cells
-    rim = (closed.shape[0] - road.drivable.shape[0]) // 2
+def _depths(road: Road, poses: Floats, half: tuple[float, float]) -> Floats:
+    """Return (P,) the depth [m] outside the road of some points of a footprint, 0 inside."""
     outside = ~footprint_fits(road, poses, 2.0 * half[0], 2.0 * half[1])
-    grid = _cell_poses(road, poses[outside])
-    grid[:, :2] += rim
-    outcome = np.empty((len(grid), 2))
-    out = np.zeros((len(poses), 2))
-    limit = MAX_DEPTH_M / road.resolution
-    greatest_depths(closed, road.depth_cells, grid, points, float(rim), limit, outcome)
-    out[outside] = outcome
-    return out[:, 0] * road.resolution, out[:, 1] * (4.0 * half[0] * half[1] / len(points))
+    depths = np.zeros(len(poses))
+    if outside.any():
+        depths[outside] = _outside(road, poses[outside], half, _grid(half)).max(axis=1)
+    return depths
 
 
-def _least_room(road: Road, poses: Floats, half: tuple[float, float]) -> float:
-    """Return the least distance [m] from a footprint at poses (P, 3) to the road's edge."""
-    grid = _footprint_points(half)  # the nearest point is on the outline
-    outline = np.concatenate([grid[0], grid[-1], grid[1:-1, 0], grid[1:-1, -1]]) / road.resolution
-    limit = MAX_DEPTH_M / road.resolution
-    grid = _cell_poses(road, poses)
-    depth = least_depth(road.drivable, road.clearance_cells, grid, outline, limit)
-    return float(depth * road.resolution)
+def _depth(road: Road, pose: Floats, half: tuple[float, float]) -> float:
+    """Return the greatest depth [m] of a footprint at a pose (3,) outside the road, to 1 cm."""
+    points = _grid(half)
+    spacing = 2.0 * max(half) / (min(POINTS_COUNT) - 1)
+    while spacing > DEPTH_ERROR_M:
+        deepest = points[np.argmax(_outside(road, pose[None], half, points))]
+        spacing /= 4.0
+        points = np.clip(deepest + spacing * _grid((4.0, 4.0)), np.negative(half), half)
+    return float(_outside(road, pose[None], half, points).max())
 
 
-@kernel(B2, F2, F2, F2, F, F, OUT2)
-def greatest_depths(
-    solid: Bools,
-    distance: Floats,
-    poses: Floats,
-    points: Floats,
-    rim: float,
-    limit: float,
-    out: Floats,
-) -> None:
-    """Write the depth of the deepest point of a footprint in solid cells, for each pose.
-
-    Args:
-        solid: (H, W) cells in which a point has a depth; elsewhere it is 0.
-        distance: (H, W) distance [cells] from each centre to the nearest square that is not solid.
-        poses: (P, 3) x, y [cells], yaw [rad].
-        points: (M, 2) points of the footprint in its own frame [cells].
-        rim: width of the rim of `solid` [cells]; a point farther than `limit` from the grid inside
-            the rim has the depth `limit`.
-        limit: greatest depth that is reported [cells].
-        out: (P, 2) the depth [cells], and the number of points in solid cells.
-    """
-    for p in range(poses.shape[0]):
-        deepest, count = 0.0, 0
-        c, s = np.cos(poses[p, 2]), np.sin(poses[p, 2])
-        for m in range(points.shape[0]):
-            u, v = _point_at(poses[p], c, s, points[m])
-            low, high = _depth_bounds(solid, distance, u, v, rim, limit)
-            deepest = max(deepest, low)
-            count += high > 0.0
-        for m in range(points.shape[0]):
-            u, v = _point_at(poses[p], c, s, points[m])
-            if _depth_bounds(solid, distance, u, v, rim, limit)[1] > deepest:
-                deepest = max(deepest, _exact_depth(solid, distance, u, v, limit))
-        out[p, 0], out[p, 1] = deepest, count
+def _grid(half: tuple[float, float]) -> Floats:
+    """Return points (M, 2) [m] spread over a footprint in its frame."""
+    along, across = (np.linspace(-h, h, n) for h, n in zip(half, POINTS_COUNT, strict=True))
+    return np.stack(np.meshgrid(along, across), axis=-1).reshape(-1, 2)
 
 
-@kernel(B2, F2, F2, F2, F)
-def least_depth(
-    solid: Bools, distance: Floats, poses: Floats, points: Floats, limit: float
-) -> float:
-    """Return the depth [cells] of the least deep point at all poses; see `greatest_depths`."""
-    least = limit
-    for p in range(poses.shape[0]):
-        c, s = np.cos(poses[p, 2]), np.sin(poses[p, 2])
-        for m in range(points.shape[0]):
-            u, v = _point_at(poses[p], c, s, points[m])
-            least = min(least, _depth_bounds(solid, distance, u, v, 0.0, limit)[1])
-    for p in range(poses.shape[0]):
-        c, s = np.cos(poses[p, 2]), np.sin(poses[p, 2])
-        for m in range(points.shape[0]):
-            u, v = _point_at(poses[p], c, s, points[m])
-            if _depth_bounds(solid, distance, u, v, 0.0, limit)[0] < least:
-                least = min(least, _exact_depth(solid, distance, u, v, limit))
-    return least
+def _outside(road: Road, poses: Floats, half: tuple[float, float], points: Floats) -> Floats:
+    """Return (P, M) how far [m] points (M, 2) of a footprint at poses (P, 3) are outside."""
+    pavement = _pavement(road, poses, half)
+    shapely.prepare(pavement)
+    distance = shapely.distance(shapely.points(place(poses[:, None], *points.T)), pavement)
+    return np.asarray(np.nan_to_num(distance, nan=MAX_DEPTH_M).clip(max=MAX_DEPTH_M))
 
 
-@kernel(inline=True)
-def _point_at(pose: Floats, c: float, s: float, point: Floats) -> tuple[float, float]:
-    """Return x and y [cells] of a point of a footprint at a pose, by its cosine and sine."""
-    return pose[0] + c * point[0] - s * point[1], pose[1] + s * point[0] + c * point[1]
+def _footprints(poses: Floats, half: tuple[float, float]) -> Any:
+    """Return the footprints (P,) at poses (P, 3) as polygons."""
+    return shapely.polygons(corners(poses, 2.0 * half[0], 2.0 * half[1]))
 
 
-@kernel(inline=True)
-def _depth_bounds(
-    solid: Bools, distance: Floats, u: float, v: float, rim: float, limit: float
-) -> tuple[float, float]:
-    """Return bounds of the depth of a point, by the distance of its cell's centre."""
-    height, width = solid.shape
-    if rim > 0.0:
-        beyond_x = max(rim - u, u - (width - rim), 0.0)
-        beyond_y = max(rim - v, v - (height - rim), 0.0)
-        if not beyond_x * beyond_x + beyond_y * beyond_y < limit * limit:
-            return limit, limit
-    i, j = int(np.floor(v)), int(np.floor(u))
-    if i < 0 or j < 0 or i >= height or j >= width or not solid[i, j]:
-        return 0.0, 0.0
-    du, dv = u - j - 0.5, v - i - 0.5  # from the centre of the cell
-    offset = np.sqrt(du * du + dv * dv) + 1e-9
-    low = min(max(distance[i, j] - offset, 0.0), limit)
-    return low, min(distance[i, j] + offset, limit)
-
-
-@kernel(inline=True)
-def _exact_depth(solid: Bools, distance: Floats, u: float, v: float, limit: float) -> float:
-    """Return the distance [cells] from a point in a solid cell to the nearest other square."""
-    i, j = int(np.floor(v)), int(np.floor(u))
-    best = _depth_bounds(solid, distance, u, v, 0.0, limit)[1]
-    reach = int(best) + 1
-    for a in range(i - reach, i + reach + 1):
-        dv = max(a - v, v - a - 1.0, 0.0)
-        if dv < best:
-            # Squares nearer to the centre of the point's cell than `distance` are solid.
-            before = max(abs(a - i) - 0.5, 0.0)
-            solid_reach = np.sqrt(max(distance[i, j] ** 2 - before * before, 0.0))
-            first = int(solid_reach + 0.5 - 1e-6)
-            last = int(np.sqrt(best * best - dv * dv)) + 1
-            best = min(best, _distance_in_row(solid, u, a, first, last, dv))
-    return best
-
-
-@kernel(inline=True)
-def _distance_in_row(solid: Bools, u: float, row: int, first: int, last: int, dv: float) -> float:
-    """Return the distance to the nearest square that is not solid, among some of one row.
-
-    Their columns are `first` to `last` away from that of the point; the row is `dv` away.
-    """
-    height, width = solid.shape
-    best = np.inf
-    for k in range(first, last + 1):
-        for b in (int(np.floor(u)) - k, int(np.floor(u)) + k):
-            if row < 0 or b < 0 or row >= height or b >= width or not solid[row, b]:
-                du = max(b - u, u - b - 1.0, 0.0)
-                best = min(best, np.sqrt(du * du + dv * dv))
-    return best
+def _pavement(road: Road, poses: Floats, half: tuple[float, float]) -> BaseGeometry:
+    """Return the drivable area, as far as it matters for a footprint at poses (P, 3)."""
+    reach = MAX_DEPTH_M + math.hypot(*half)
+    low, high = (
+        np.clip(np.floor(to_cells(road, end)), 0, road.drivable.shape[::-1]).astype(np.int64)
+        for end in (poses[:, :2].min(axis=0) - reach, poses[:, :2].max(axis=0) + reach)
+    )
+    cells = road.drivable[low[1] : high[1] + 1, low[0] : high[0] + 1]
+    change = np.diff(np.pad(cells, ((0, 0), (1, 1))).astype(np.int8), axis=1)
+    rows, first = np.nonzero(change > 0)
+    _, last = np.nonzero(change < 0)
+    runs = shapely.union_all(shapely.box(first, rows, last, rows + 1))
+    return shapely.transform(runs, lambda cells: to_metres(road, cells + low))

@@ -36,6 +36,7 @@ from scenario_gen.numerics.hermite import control_points
 from scenario_gen.numerics.plane import unit
 from scenario_gen.situation import conflict_of, encroachment
 from scenario_gen.types import Scenario
+from scenario_gen.types.road import MAX_DEPTH_M
 
 __all__ = ["Collision", "DriveVerdict", "Reason", "Runner", "judge"]
 
@@ -231,7 +232,9 @@ class DriveVerdict:
             }[hit.ran]
             messages.append(f"{words} at {hit.time:.2f} s and {hit.speed:.1f} m/s ({hit.why})")
         if not math.isnan(self.off_road):
-            depth = f"by {-self.road_margin:.2f} m, {self.off_road_area:.1f} m² of its footprint"
+            is_far = self.road_margin <= -MAX_DEPTH_M
+            depth = f"more than {MAX_DEPTH_M:g} m" if is_far else f"{-self.road_margin:.2f} m"
+            depth = f"by {depth}, {self.off_road_area:.1f} m² of its footprint"
             event = f"ran into obstacle `{self.obstacle}`" if self.obstacle else "left the road"
             messages.append(f"{event} at {self.off_road:.2f} s ({depth})")
         if not math.isnan(self.ran_red):

@@ -3,55 +3,81 @@
 
 """Depth and room of a footprint against every pair of a point and a cell."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
-from scenario_gen.closed_loop.off_road import _depths_and_areas, _least_room, MAX_DEPTH_M
+from scenario_gen.closed_loop.off_road import _depth, MAX_DEPTH_M, road_use
+from scenario_gen.types import Motion, Vehicle
 from scenario_gen.types.road import Road
 
 HALF = (2.0, 0.9)
 
 
-def plain(drivable, res, pose, *, outside):
-    """Greatest depth or least room [m] by comparing points 10 cm apart with every cell."""
-    x, y = np.meshgrid(np.linspace(-HALF[0], HALF[0], 41), np.linspace(-HALF[1], HALF[1], 19))
+def plain(drivable, res, pose):
+    """Greatest depth [m] by comparing points 2 cm apart with every drivable cell."""
+    x, y = np.meshgrid(np.linspace(-HALF[0], HALF[0], 201), np.linspace(-HALF[1], HALF[1], 91))
     c, s = np.cos(pose[2]), np.sin(pose[2])
     px, py = (pose[0] + c * x - s * y).ravel() / res, (pose[1] + s * x + c * y).ravel() / res
-    rim = int(np.ceil(10.0 / res))  # beyond it no cell is the nearest of any point
-    grid = np.pad(drivable, rim)
-    rows, columns = np.nonzero(grid if outside else ~grid)
-    du = np.maximum(np.maximum(columns - rim - px[:, None], px[:, None] - columns + rim - 1), 0.0)
-    dv = np.maximum(np.maximum(rows - rim - py[:, None], py[:, None] - rows + rim - 1), 0.0)
-    nearest = np.sqrt(du * du + dv * dv).min(axis=1) * res
-    return min(nearest.max() if outside else nearest.min(), MAX_DEPTH_M)
+    nearest = np.full(len(px), np.inf)
+    for row, column in np.argwhere(drivable):
+        du = np.maximum(np.maximum(column - px, px - column - 1), 0.0)
+        dv = np.maximum(np.maximum(row - py, py - row - 1), 0.0)
+        nearest = np.minimum(nearest, np.hypot(du, dv))
+    return min(nearest.max() * res, MAX_DEPTH_M)
+
+
+def road_of(drivable, res):
+    """A road without lanes; its lower left corner is the origin."""
+    return Road("patches", drivable, res, np.zeros(2), np.empty((0, 3)), np.empty((0, 3)))
 
 
 @pytest.mark.parametrize("seed", range(2))
-def test_depth_and_room_are_those_of_points_and_cells(seed):
+def test_the_depth_is_that_of_the_deepest_point_to_a_centimetre(seed):
     rng = np.random.default_rng(seed)
-    res = (1.0, 1.5)[seed % 2]
+    res = (1.0, 0.5)[seed]
     drivable = np.zeros((30, 30), dtype=np.bool_)
     drivable[8:22, 4:26] = True
-    drivable[rng.random((30, 30)) < 0.004] ^= True
-    road = Road("patches", drivable, res, np.zeros(2), np.empty((0, 3)), np.empty((0, 3)))
+    drivable[rng.random((30, 30)) < 0.02] ^= True
     poses = np.column_stack(
-        [rng.uniform(-6.0, 30.0 * res + 6.0, (12, 2)), rng.uniform(-3.0, 3.0, 12)]
+        [rng.uniform(-2.0, 30.0 * res + 2.0, (20, 2)), rng.uniform(-3.0, 3.0, 20)]
     )
-    for outside in (True, False):
-        if outside:
-            measured, _ = _depths_and_areas(road, poses, HALF)
-        else:
-            measured = [_least_room(road, pose[None], HALF) for pose in poses]
-        expected = [plain(drivable, res, pose, outside=outside) for pose in poses]
-        assert measured == pytest.approx(expected, abs=0.1)
-        assert np.ptp(expected) > 0.5
+    measured = [_depth(road_of(drivable, res), pose, HALF) for pose in poses]
+    expected = [plain(drivable, res, pose) for pose in poses]
+    assert measured == pytest.approx(expected, abs=0.014)  # a point may lie between two of 2 cm
+    assert np.ptp(expected) > 0.5
 
 
-def test_area_of_a_footprint_half_outside():
-    drivable = np.zeros((40, 40), dtype=np.bool_)
-    drivable[:20] = True
-    road = Road("half", drivable, 0.5, np.zeros(2), np.empty((0, 3)), np.empty((0, 3)))
-    (depth,), (area,) = _depths_and_areas(road, np.array([[10.0, 10.0, 0.0]]), HALF)
-    assert depth == pytest.approx(0.9) and area == pytest.approx(3.6, rel=0.06)
-    (depth,), (area,) = _depths_and_areas(road, np.array([[500.0, 10.0, 0.0]]), HALF)
-    assert depth == MAX_DEPTH_M and area == pytest.approx(7.2)
+def straight_drive(start, end):
+    """A drive of a car, 4 × 1.8 m, from pose to pose (3,) in 2 s."""
+    time = np.linspace(0.0, 2.0, 21)
+    poses = np.linspace(start, end, 21)
+    speed = np.full((1, 21), np.hypot(*(np.subtract(end, start)[:2])) / 2.0)
+    motion = Motion(
+        (Vehicle("ego", 4.0, 1.8),), time, poses[None, :, :2], poses[None, :, 2], speed
+    )
+    return SimpleNamespace(motion=motion, ego=0, driven=21)
+
+
+def test_a_drive_beside_the_edge_and_over_it():
+    drivable = np.zeros((40, 80), dtype=np.bool_)
+    drivable[:20] = True  # up to y = 10 m
+    road = road_of(drivable, 0.5)
+    inside = road_use(straight_drive((5.0, 8.0, 0.0), (25.0, 8.0, 0.0)), road, 0.1)
+    assert inside.margin == pytest.approx(1.1) and inside.area == 0.0 and np.isnan(inside.time)
+    over = road_use(straight_drive((5.0, 7.0, np.pi / 4), (15.0, 17.0, np.pi / 4)), road, 0.1)
+    corner = (2.0 + 0.9) * np.sqrt(0.5)
+    assert over.margin == pytest.approx(-(17.0 + corner - 10.0), abs=1e-6)
+    assert over.area == pytest.approx(7.2)
+    assert over.time == pytest.approx((10.1 - 7.0 - corner) / 5.0, abs=1e-3)
+    far = road_use(straight_drive((10.0, 5.0, 0.0), (500.0, 5.0, 0.0)), road, 0.1)
+    assert far.margin == -MAX_DEPTH_M
+
+
+def test_a_post_under_the_car_is_as_deep_as_its_centre():
+    drivable = np.ones((60, 60), dtype=np.bool_)
+    drivable[20:24, 20:24] = False  # 0.8 m wide
+    assert _depth(road_of(drivable, 0.2), np.array([4.7, 4.3, 0.4]), HALF) == pytest.approx(
+        0.4, abs=0.01
+    )

@@ -105,6 +105,7 @@ def test_off_the_road_counts_from_a_depth(aside, counted):
     assert np.isfinite(verdict.off_road)
     verdict, _ = verdict_of(motions, go_on, road=road)
     assert verdict.road_margin == pytest.approx(1.1)
+    assert "by more than 10 m" in replace(verdict, off_road=1.0, road_margin=-10.0).sentence()
 
 
 def test_an_obstacle_in_the_way_is_named():
