@@ -127,7 +127,7 @@ def _seconds(vehicles: int, duration: float, count: int) -> float:
 
 
 def _recorded(drivers: float) -> list[Row]:
-    """Measure acceptance, diversity and realism with a preset of the sampler."""
+    """Measure acceptance, diversity and realism with a setting of the sampler."""
     acceptance: dict[str, list[float]] = {}
     spreads, moved, distances = list[float](), list[float](), list[float]()
     realism: dict[str, list[float]] = {name: [] for name in DIVERGENCE_TARGETS_BIT}

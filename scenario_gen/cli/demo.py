@@ -54,8 +54,7 @@ def run_demo(
     config = PipelineConfig()
     jobs = [((bundled(case),), (road,)) for case, road in ROADS.items()]
     record = recorder(config, count, seed, status) if ros else None
-    # A node knows one encounter.
-    requested = FolderRequest(jobs, config, count, seed, TITLE, together=False)
+    requested = FolderRequest(jobs, config, count, seed, TITLE)
     return generate_folder(out, requested, record=record, progress=progress)
 
 

@@ -23,7 +23,6 @@ from scenario_gen.types import (
     Encounter,
     GenerationResult,
     NoteKind,
-    Recorded,
     Request,
 )
 
@@ -55,7 +54,6 @@ class FolderRequest:
         also_read: further inputs, which the folder must not contain: maps, a parameter file.
         for_testing: whether to search for scenarios in which the ego has to react.
         budget: computing time [s] of that search, per encounter and road.
-        together: whether the recordings show together how encounters differ.
     """
 
     jobs: Sequence[tuple[Sequence[Path], Sequence[str]]]
@@ -68,7 +66,6 @@ class FolderRequest:
     also_read: Sequence[Path] = ()
     for_testing: bool = False
     budget: float = 60.0
-    together: bool = True
 
     @property
     def logs(self) -> list[Path]:
@@ -255,11 +252,6 @@ def generate_all(
     Returns:
         The cases, and a sentence on each encounter and road that was refused or incomplete.
     """
-    recorded = [
-        encounter
-        for encounter, _ in pairs
-        if requested.together and isinstance(encounter.source, Recorded)
-    ]
     cases: list[GenerationResult] = []
     refusals: list[str] = []
     n_samples = sum(encounter.is_present.sum() for encounter, _ in pairs)
@@ -277,7 +269,7 @@ def generate_all(
                 tests = _generate_tests(encounter, road, requested, report, notify)
                 sets, shortages = tests.results, [tests.shortage] if tests.shortage else []
             else:
-                sets = _generate_sets(encounter, road, requested, recorded, report)
+                sets = _generate_sets(encounter, road, requested, report)
                 shortages = list(_shortages(sets))
         except RefusedError as error:
             refusals.append(f"{encounter.name} on {road}: {error}")
@@ -343,7 +335,6 @@ def _generate_sets(
     encounter: Encounter,
     road: str,
     requested: FolderRequest,
-    recorded: Sequence[Encounter],
     advance: Callable[[int, int], None],
 ) -> list[GenerationResult]:
     """Generate scenarios for one encounter and road, a set for each outcome of its decision.
@@ -355,7 +346,7 @@ def _generate_sets(
     request = replace(requested.request, ego=_egos(encounter, requested.request)[0])
     try:
         return generate_outcomes(
-            [encounter, *recorded],
+            encounter,
             road,
             config,
             count=count,

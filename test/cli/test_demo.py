@@ -3,13 +3,11 @@
 
 """The demo compares what the nodes recorded with its own scenarios."""
 
-from contextlib import nullcontext
-
 import pytest
 
 from scenario_gen import bundled, generate, read_log, report
 from scenario_gen.base.errors import ScenarioGenError
-from scenario_gen.cli.demo import compare_with_nodes, ROADS, run_demo
+from scenario_gen.cli.demo import compare_with_nodes
 
 
 def test_scenarios_in_which_a_vehicle_leaves_early_are_compared_whole(tmp_path):
@@ -20,18 +18,3 @@ def test_scenarios_in_which_a_vehicle_leaves_early_are_compared_whole(tmp_path):
     compare_with_nodes([made], tmp_path / "out" / "bag")
     with pytest.raises(ScenarioGenError, match="the nodes generated other scenarios"):
         compare_with_nodes([other], tmp_path / "out" / "bag")
-
-
-def test_each_case_is_generated_as_by_the_nodes_which_know_one_encounter(tmp_path):
-    cases, refusals = run_demo(
-        tmp_path / "out",
-        count=20,
-        seed=7,
-        ros=False,
-        progress=lambda: nullcontext(lambda *_: None),
-        status=nullcontext,
-    )
-    assert not refusals
-    alone = [generate(bundled(name), road, count=20, seed=7) for name, road in ROADS.items()]
-    assert cases == alone
-    assert [case.generated.refused for case in cases] == [one.generated.refused for one in alone]

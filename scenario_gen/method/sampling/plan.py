@@ -70,7 +70,7 @@ class Plan:
         waits: tuple[Wait, ...] | None = None,
         situation: Situation | None = None,
     ) -> "Plan":
-        """Return the plan of a request, whose states are relaxed where preset `wide` may.
+        """Return the plan of a request, whose states are relaxed where drivers differ.
 
         Args:
             planned: with road, fit and routes.

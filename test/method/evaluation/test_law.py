@@ -222,12 +222,9 @@ def test_natural_scenarios_of_a_population_are_usual_too(sets, encounters):
     )
 
 
-def test_the_encounters_of_a_command_are_its_population(encounters):
-    pairs = [(encounter, "corridor") for encounter in encounters]
-    folder = FolderRequest([], POPULATION, count=5, seed=5)
-    for number in (1, 2):
-        made = generate_all(pairs[:number], folder)[0][0]
-        rarity = measures_in(1.0, encounters[0], encounters[:number]).rarity
-        assert [one.facts.rarity for one in made] == pytest.approx(
-            [rarity(one) for one in made], abs=1e-3
-        )
+def test_a_command_generates_each_encounter_as_a_call_or_a_node_that_knows_it_alone(encounters):
+    pairs = [(encounter, "corridor") for encounter in encounters[:2]]
+    made, _ = generate_all(pairs, FolderRequest([], POPULATION, count=5, seed=5))
+    alone = [generate(*pair, POPULATION, count=5, seed=5) for pair in pairs]
+    assert made == alone
+    assert [each.generated.refused for each in made] == [each.generated.refused for each in alone]
