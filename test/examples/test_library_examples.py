@@ -65,7 +65,7 @@ def test_the_notebook_of_drive_env_was_executed_and_its_first_cells_run(monkeypa
     assert not [
         output for cell in cells for output in cell["outputs"] if output["output_type"] == "error"
     ]
-    monkeypatch.chdir(EXAMPLES.parent)
+    monkeypatch.chdir(EXAMPLES)
     namespace = {}
     for cell in cells[:2]:
         code = "".join(cell["source"]).replace("count=8", "count=2").replace("count=20", "count=1")
