@@ -8,19 +8,21 @@ even if a run was killed, and the existing files are the only record of progress
 or a Dask cluster only run the tasks; they hold no state that a killed run would lose.
 """
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from concurrent.futures import CancelledError
-from contextlib import contextmanager, ExitStack
+from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
+from concurrent.futures import CancelledError, Executor, FIRST_COMPLETED, Future, wait
+from concurrent.futures.process import BrokenProcessPool
+from contextlib import contextmanager, ExitStack, suppress
 from dataclasses import dataclass
 from functools import partial
+from itertools import islice
 import json
 import logging
+import multiprocessing
 import os
 from pathlib import Path
 import shutil
 import traceback
 from typing import Any, Protocol, TypeVar
-from uuid import uuid4
 
 from scenario_gen import __version__
 from scenario_gen.base.documents import read_json
@@ -28,8 +30,12 @@ from scenario_gen.base.errors import describe, InputError, needs, of_system, Sce
 from scenario_gen.base.folders import naming, scratch, sync, sync_tree, write_text
 from scenario_gen.base.folders.scratch import claimed, PREFIX, sweep_tree
 from scenario_gen.base.provenance import versions
-from scenario_gen.base.signals import cleaned_up
-from scenario_gen.corpus.local_pool import local_pool, LocalPool
+from scenario_gen.base.signals import (
+    cleaned_up,
+    ctrl_c_blocked,
+    environment_set,
+    worker_pool,
+)
 
 
 class _Task(Protocol):
@@ -44,6 +50,10 @@ Task = TypeVar("Task")
 Target = TypeVar("Target", bound=_Task)
 Progress = Callable[[int, int], None]
 """Called with the number of finished tasks and the number of all tasks."""
+# One thread for each worker. The processes are started with these variables.
+WORKER_ENVIRONMENT = dict.fromkeys(
+    ("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS"), "1"
+)
 MANIFEST = {"type": "object", "properties": {"versions": {"type": "object"}}}
 
 
@@ -161,16 +171,17 @@ class Workers:
 class Spread:
     """Runs a function on many tasks: in this process, in local processes, or on a Dask cluster.
 
-    Local processes are started when the first task needs them, and are used until the end.
+    Local processes are started when the first task needs them, and are used until the end. They
+    are connected to their parent by pipes, which no other account of the machine can reach.
     """
 
     def __init__(self, workers: Workers, stack: ExitStack) -> None:
-        self._workers = workers.count or os.cpu_count() or 1
+        self._count = workers.count or os.cpu_count() or 1
         self._scheduler = workers.scheduler
         self._on_progress = workers.on_progress
         self._stack = stack
+        self._executor: Executor | None = None
         self._client: Any = None
-        self._pool: LocalPool | None = None
 
     def __call__(self, function: Callable[[Task], Any], tasks: Sequence[Task]) -> list[str]:
         """Run independent tasks.
@@ -195,52 +206,83 @@ class Spread:
 
     def _outcomes(self, function: Callable[[Task], Any], tasks: Sequence[Task]) -> Iterator[str]:
         """Yield the error message of each task as it finishes, "" for success."""
-        if not self._scheduler:
-            yield from self._local(partial(_guarded, function), tasks)
+        run = partial(_guarded, function)
+        if self._count == 1 and not self._scheduler:
+            yield from map(run, tasks)
             return
-        if not tasks:
-            return
-        needs("corpus", "dask", "distributed")
         try:
-            if self._client is None:
-                self._client = self._stack.enter_context(_client(self._scheduler))
-            yield from self._distributed(function, tasks)
+            # Tasks that ran or waited when a process died are repeated alone.
+            for task in (yield from self._attempt(run, tasks)):
+                for error in (yield from self._attempt(run, [task])).values():
+                    name = getattr(task, "name", task)
+                    yield f"{name}: its process died or cannot run it: {describe(error)}"
         except (OSError, TimeoutError, CancelledError) as error:
+            if not self._scheduler:
+                raise
             lost = f"{self._scheduler} is lost or does not answer: {describe(error)}"
             raise InputError(f"{lost}; the same command resumes where it stopped") from error
 
-    def _local(self, run: Callable[[Task], str], tasks: Sequence[Task]) -> Iterator[str]:
-        """Return the outcomes of tasks in this process, or in processes of this machine."""
-        if self._workers == 1 or not tasks:
-            return map(run, tasks)
-        if self._pool is None:
-            self._pool = self._stack.enter_context(local_pool(self._workers))
-        return self._pool.outcomes(run, tasks)
+    def _attempt(
+        self, run: Callable[[Task], str], tasks: Sequence[Task]
+    ) -> Generator[str, None, dict[Task, BaseException]]:
+        """Yield the outcomes of tasks; return the others, whose processes died."""
+        waiting = iter(tasks)
+        running: dict[Future[str], Task] = {}
+        lost: dict[Task, BaseException] = {}
+        while True:
+            for task in islice(waiting, max(self._capacity() - len(running), 0)):
+                running[self._submit(run, task)] = task
+            if not running:
+                return lost
+            done, _ = wait(running, return_when=FIRST_COMPLETED)
+            if not self._scheduler and any(future.exception() for future in done):
+                done, _ = wait(running)
+                self._end()
+            for future in done:
+                task = running.pop(future)
+                if error := future.exception():
+                    lost[task] = error
+                else:
+                    yield future.result()
 
-    def _distributed(
-        self, function: Callable[[Task], Any], tasks: Sequence[Task]
-    ) -> Iterator[str]:
-        """Yield the outcomes of tasks on a cluster.
+    def _capacity(self) -> int:
+        """Return the number of tasks to submit: for each process one that runs, and another."""
+        count = self._count
+        if self._client is not None:
+            count = sum(self._client.nthreads().values()) or 1
+        return 2 * count
 
-        Tasks whose workers died are repeated one at a time at the end, so that only the task that
-        kills its worker fails.
-        """
-        from distributed import as_completed
-
-        group = uuid4().hex  # Dask queues tasks only if their keys form one group
-        keys = [(group, k) for k in range(len(tasks))]
-        futures = self._client.map(partial(_guarded, function), tasks, key=keys)
-        running = dict(zip(futures, tasks, strict=True))
-        suspects = []
-        for future in as_completed(running):
-            if future.status != "error":
-                yield future.result()
-            elif len(tasks) > 1:
-                suspects.append(running[future])
+    def _submit(self, run: Callable[[Task], str], task: Task) -> "Future[str]":
+        """Submit a task, to new processes if one has died."""
+        if self._scheduler:
+            if self._executor is None:
+                self._client = self._stack.enter_context(_client(self._scheduler))
+                self._executor = self._client.get_executor(pure=False)
+            return self._executor.submit(run, task)
+        with ctrl_c_blocked(), environment_set(WORKER_ENVIRONMENT):
+            if self._executor is not None:
+                with suppress(BrokenProcessPool):
+                    return self._executor.submit(run, task)
             else:
-                yield f"{getattr(tasks[0], 'name', 'a task')}: {future.exception()}"
-        for task in suspects:
-            yield from self._distributed(function, [task])
+                self._stack.enter_context(cleaned_up(_kill_children))
+                self._stack.callback(self._end)
+            self._executor = worker_pool(self._count)
+            return self._executor.submit(run, task)
+
+    def _end(self) -> None:
+        """End the local processes at once; they write no more."""
+        _kill_children()
+        if self._executor is not None:
+            self._executor.shutdown(cancel_futures=True)
+
+
+def _kill_children() -> None:
+    """Kill the processes, and wait until their locks are free."""
+    children = multiprocessing.active_children()
+    for process in children:
+        process.kill()
+    for process in children:
+        process.join(5.0)
 
 
 @contextmanager
@@ -269,6 +311,7 @@ def _guarded(function: Callable[[Any], Any], task: Any) -> str:
 @contextmanager
 def _client(scheduler: str) -> Iterator[Any]:
     """Give a client of a running scheduler."""
+    needs("corpus", "dask", "distributed")
     from distributed import Client
 
     # Dead workers and a lost scheduler are reported by the tasks. Each logger has its own level.
