@@ -5,7 +5,7 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import replace
-from functools import partial
+from functools import lru_cache, partial
 from pathlib import Path
 from typing import Any
 
@@ -19,7 +19,7 @@ from scenario_gen.method.arguments import (
     Templates,
     whole_number,
 )
-from scenario_gen.method.chain import generate_set
+from scenario_gen.method.chain import plan_set, Planned
 from scenario_gen.method.config import PipelineConfig
 from scenario_gen.method.evaluation import coverage_of, evaluate, EvaluationConfig, replay
 from scenario_gen.method.outcome_sets import for_one_set, outcome_sets, swapped_order
@@ -89,25 +89,29 @@ def generate(
     if swapped is not None:
         encounter, request = swapped, replace(request, order="keep")
 
+    plan = partial(plan_set, config=config, seed=seed, request=request, population=population)
+    # The last template that fits the road is planned once.
+    planned = lru_cache(maxsize=1)(lambda template: plan(template, road))
+
+    def sampled(template: Planned, size: int) -> GenerationResult:
+        """Return the scenarios of a planned template."""
+        callbacks = Callbacks(progress, accepts=partial(accepts, template.chain.road))
+        return template.sample(size, callbacks)
+
     def generate_template(template: Encounter, size: int) -> GenerationResult:
         """Generate scenarios from the encounter, or from a part of it."""
-        on_road = partial(
-            generate_set,
-            template,
-            size,
-            config=config,
-            seed=seed,
-            request=request,
-            callbacks=lambda road: Callbacks(progress, accepts=partial(accepts, road)),
-            population=population,
+        if road != AUTO:
+            return sampled(planned(template), size)
+        return on_first_suitable_road(
+            lambda name: sampled(plan(template, name), size), template, config, seed
         )
-        if road == AUTO:
-            return on_first_suitable_road(on_road, template, config, seed)
-        return on_road(road)
 
+    attempt = None if road == AUTO else planned
     shorten = config.fitting.shorten and not request.moves
     with one_blas_thread():
-        result = fit_what_matters(generate_template, encounter, count, shorten=shorten)
+        result = fit_what_matters(
+            generate_template, encounter, count, attempt=attempt, shorten=shorten
+        )
         return completed(result, config, request)
 
 

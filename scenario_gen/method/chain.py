@@ -3,9 +3,10 @@
 
 """All stages but the evaluation; those after the segmentation can be repeated with changes."""
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import NamedTuple
 
 from scenario_gen.base.errors import RefusedError
 from scenario_gen.method.config import PipelineConfig
@@ -112,6 +113,56 @@ class EmptySetError(RefusedError):
         self.result = result
 
 
+class Planned(NamedTuple):
+    """A template that is fitted and planned on a road.
+
+    Attributes:
+        chain: the input of the stages.
+        result: the template on the road, without scenarios.
+    """
+
+    chain: Chain
+    result: GenerationResult
+
+    def sample(self, count: int, callbacks: Callbacks = Callbacks()) -> GenerationResult:
+        """Add scenarios.
+
+        Raises:
+            InputError, RefusedError: as `sample_scenarios`.
+            EmptySetError: there is none; the message has the causes of all refusals and the notes.
+        """
+        result = replace(self.chain, count=count).sample(self.result, callbacks)
+        if not len(result):
+            generated = result.generated
+            refused = causes_in_words(generated.refused)
+            causes = ", ".join(f"{number} × {cause}" for cause, number in refused)
+            reasons = "; ".join((causes or "none was drawn", *map(str, generated.adaptations)))
+            message = f"none of {generated.candidates} candidates is valid: {reasons}"
+            raise EmptySetError(message, result)
+        return result
+
+
+def plan_set(
+    encounter: Encounter,
+    road: Road | Path | str,
+    *,
+    config: PipelineConfig,
+    seed: int,
+    request: Request = Request(),
+    population: Sequence[Encounter] = (),
+) -> Planned:
+    """Return a template that is fitted and planned on a road.
+
+    Raises:
+        InputError, RefusedError: as the stages.
+    """
+    road, encounter = road_and_template(road, encounter, config.road)
+    segmentation = segment(encounter, config.segmentation, seed)
+    situation = Situation.of(encounter)
+    chain = Chain(situation, segmentation, road, config, request, seed=seed, population=population)
+    return Planned(chain, chain.plan())
+
+
 def generate_set(
     encounter: Encounter,
     count: int,
@@ -119,34 +170,11 @@ def generate_set(
     *,
     config: PipelineConfig,
     seed: int,
-    request: Request = Request(),
-    callbacks: Callable[[Road], Callbacks] = lambda _: Callbacks(),
-    population: Sequence[Encounter] = (),
 ) -> GenerationResult:
     """Return scenarios from a template on a road.
 
     Raises:
         InputError, RefusedError: as the stages.
-        EmptySetError: there is none; the message has the causes of all refusals, and the notes.
+        EmptySetError: as `Planned.sample`.
     """
-    road, encounter = road_and_template(road, encounter, config.road)
-    segmentation = segment(encounter, config.segmentation, seed)
-    chain = Chain(
-        Situation.of(encounter),
-        segmentation,
-        road,
-        config,
-        request,
-        count,
-        seed,
-        population=population,
-    )
-    result = chain.run(callbacks(road))
-    if not len(result):
-        generated = result.generated
-        refused = causes_in_words(generated.refused)
-        causes = ", ".join(f"{number} × {cause}" for cause, number in refused)
-        reasons = "; ".join((causes or "none was drawn", *map(str, generated.adaptations)))
-        message = f"none of {generated.candidates} candidates is valid: {reasons}"
-        raise EmptySetError(message, result)
-    return result
+    return plan_set(encounter, road, config=config, seed=seed).sample(count)

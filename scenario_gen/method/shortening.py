@@ -10,6 +10,7 @@ has room for is then given back, in quarters.
 """
 
 from collections.abc import Callable, Iterator
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -32,7 +33,12 @@ GenerateSet = Callable[[Encounter, int], GenerationResult]
 
 
 def fit_what_matters(
-    generate: GenerateSet, encounter: Encounter, count: int, *, shorten: bool = True
+    generate: GenerateSet,
+    encounter: Encounter,
+    count: int,
+    *,
+    attempt: Callable[[Encounter], object] | None = None,
+    shorten: bool = True,
 ) -> GenerationResult:
     """Return the scenarios of a recording, or of a shortened one if the whole does not fit.
 
@@ -40,6 +46,8 @@ def fit_what_matters(
         generate: returns so many scenarios from a template.
         encounter: the recording.
         count: scenarios.
+        attempt: raises a RefusedError if a recording does not fit. If it is None, or its part has
+            no scenario, a scenario is generated from each part instead.
         shorten: whether the recording may be shortened.
 
     Raises:
@@ -53,7 +61,12 @@ def fit_what_matters(
     except RefusedError as error:
         if not shorten or isinstance(error, TargetError):
             raise
-        part, note = fitting_part(lambda part: generate(part, 1), encounter, error)
+        refusal = error
+    if attempt is not None:
+        part, note = fitting_part(attempt, encounter, refusal)
+        with suppress(RefusedError):
+            return generate(part, count).noted(note)
+    part, note = fitting_part(lambda part: generate(part, 1), encounter, refusal)
     return generate(part, count).noted(note)
 
 

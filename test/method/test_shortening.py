@@ -56,6 +56,9 @@ def test_the_smallest_loss_that_fits_is_used_and_noted(crossing: Encounter) -> N
     (note,) = result.generated.adaptations
     assert note.kind is NoteKind.SHORTENED and f"of {crossing.duration:.1f} s" in str(note)
 
+    loose = fit_what_matters(short_road, crossing, 7, attempt=lambda part: part)
+    assert np.array_equal(loose.encounter.position, result.encounter.position)
+
     limit = 1.0
     with pytest.raises(RefusedError, match=r"too long. Shortened to its interaction .* within"):
         fit_what_matters(short_road, crossing, 7)

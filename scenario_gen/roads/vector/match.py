@@ -192,15 +192,16 @@ def _candidates(
 ) -> Iterator[_Candidate]:
     """Yield the chains from lanes near the first pose, or from the lane with the id `ends[0]`."""
     lanes, closed = graph.network.lanes, graph.closed_to(track)
-    exits = {k for k, lane in enumerate(lanes) if not ends[1] or lane.id == ends[1]}
-    firsts = [k for k, lane in enumerate(lanes) if lane.id == ends[0]]
+    entry, leave = ends
+    exits = {k for k, lane in enumerate(lanes) if lane.id == leave} if leave else None
+    firsts = [k for k, lane in enumerate(lanes) if lane.id == entry] if entry else []
     if not firsts:
         firsts = [k for k in graph.near(poses[0]) if k not in closed]
     chains = (
         chain
         for first in firsts
         for chain in graph.chains_from(first, driven, closed)
-        if exits.intersection(chain)
+        if exits is None or exits.intersection(chain)
     )
     for chain in dict.fromkeys(islice(chains, LIMITS.chains)):
         curve = _part_around(graph.curve(chain), poses, driven)
