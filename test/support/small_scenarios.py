@@ -7,8 +7,9 @@ import numpy as np
 
 from scenario_gen.logs import LogConfig, read_raw
 from scenario_gen.output.exchange.cases import Case, Exported
-from scenario_gen.output.exchange.derived_lanes import derived_lanes
+from scenario_gen.output.exchange.lanes import LaneMap
 from scenario_gen.types import Vehicle
+from scenario_gen.types.lanes import Lane, LaneNetwork
 from scenario_gen.types.scenario import Scenario
 
 
@@ -71,5 +72,7 @@ def one_vehicle():
 
 def case_of(scenario, ego=None, lane_map=None):
     one = Exported(3, 7, "ab" * 32, scenario, ego, driven=False)
-    lanes = lane_map or derived_lanes([scenario, *([ego] if ego else [])], None, 3.5, 20.0)
+    border = np.array([[-100.0, 100.0], [200.0, 100.0]])
+    network = LaneNetwork("wide", (Lane("1", border, border - (0.0, 200.0)),))
+    lanes = lane_map or LaneMap(network, "wide")
     return Case(1, "/case_1", "some road", 1_767_225_600 * 10**9, (one,), lanes), one

@@ -3,8 +3,7 @@
 
 """The cases of a bag for export: scenarios with the lanes of their road and their ego."""
 
-from collections.abc import Collection, Iterator, Sequence
-from contextlib import suppress
+from collections.abc import Collection, Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -21,11 +20,8 @@ from scenario_gen.bags.recordings.read import (
 from scenario_gen.bags.storage.bag import naming_bag
 from scenario_gen.bags.storage.config import BagConfig
 from scenario_gen.base.errors import InputError, RefusedError
-from scenario_gen.base.provenance import read_parameters
 from scenario_gen.output.exchange.config import ExportConfig
-from scenario_gen.output.exchange.derived_lanes import lane_map_of
 from scenario_gen.output.exchange.lanes import LaneMap
-from scenario_gen.roads import RoadConfig
 from scenario_gen.types import join_ego, Road, Scenario, split_off, tokens
 
 TOPICS = ("tracks", "map", "road/lanes", "fit/info", SCENARIOS, INFO)
@@ -245,9 +241,6 @@ def _case(
     road: Road | None = space.road_of(group.entry, group.stamp)
     if road is None and space.data("map"):
         road = space.road
-    everybody: Sequence[Scenario] = [
-        s for exported in group.scenarios for s in (exported.others, exported.ego) if s is not None
-    ]
     name = group.entry.road if group.entry else ""
     return Case(
         number=number,
@@ -259,20 +252,6 @@ def _case(
             for exported in group.scenarios
             if not indices or exported.index in indices
         ),
-        lane_map=lane_map_of(road, everybody, _lane_width(space, group.entry), export.run_out),
+        lane_map=LaneMap.of(road, export.run_out),
         origin=road.lanes.origin if road and road.lanes else (),
     )
-
-
-def _lane_width(space: Namespace, entry: ScenarioEntry | None) -> float:
-    """Return the lane width [m] of a scenario's request; the default if it was not recorded."""
-    requests = [
-        summary
-        for summary in space.summaries
-        if entry is not None and summary.request == entry.request
-    ]
-    if requests:
-        with suppress(InputError):
-            values = requests[-1].values
-            return read_parameters(RoadConfig(), values, "road.", "export").lane_width
-    return RoadConfig.lane_width

@@ -261,7 +261,7 @@ def _lanelet(root: Element, lane_map: LaneMap, k: int, signs: Sequence[_Sign]) -
         add(stop, "lineMarking", "solid")
         for sign in [sign for sign in at_line if np.array_equal(sign.line, line)]:
             add(stop, sign.tag, ref=sign.id)
-    add(lanelet, "laneletType", "unknown" if lane_map.is_derived(k) else _lanelet_type(lane))
+    add(lanelet, "laneletType", _lanelet_type(lane))
     if lane_map.turn(k):
         add(lanelet, "laneletType", "intersection")
     for user in sorted(lane.users - {"van"}) or ["vehicle"]:  # the format has no vans

@@ -29,7 +29,7 @@ from scenario_gen.numerics import Floats
 from scenario_gen.output.exchange.cases import Case, Exported, read_cases
 from scenario_gen.output.exchange.commonroad import benchmark_id, write_commonroad
 from scenario_gen.output.exchange.config import ExportConfig
-from scenario_gen.output.exchange.derived_lanes import area_of
+from scenario_gen.output.exchange.lanes import LaneMap
 from scenario_gen.output.exchange.opendrive import write_opendrive
 from scenario_gen.output.exchange.openscenario import write_openscenario
 from scenario_gen.output.exchange.projection import projection_of
@@ -71,6 +71,7 @@ class ExportFormat:
         shared: returns the files that all scenarios of a case share, by name.
         closing: returns the files about all scenarios, by name, from the first file and the
             `content` of each scenario.
+        needs_lanes: whether a road without lanes is refused.
         takes_map: whether `ExportConfig.map` can replace the lanes.
         maps: suffixes of such maps.
         projected_from: returns the latitude and longitude of the origin if positions need a
@@ -80,6 +81,7 @@ class ExportFormat:
     write: Callable[[Path, Case, Exported, ExportConfig], Written]
     shared: Callable[[Case, ExportConfig], Mapping[str, bytes]] = lambda *_: {}
     projected_from: Callable[[Case, ExportConfig], tuple[float, ...]] = lambda *_: ()
+    needs_lanes: bool = False
     takes_map: bool = False
     maps: tuple[str, ...] = MAPS
     closing: Callable[[Sequence[tuple[str, Any]]], Mapping[str, bytes]] = lambda _: {}
@@ -156,6 +158,9 @@ class _Exporting:
         title = f"case {case.number}, {case.road_name}{place}"
         frame, moved = projection_of(self.to.projected_from(case, self.export), self.export)
         origins = "; ".join(filter(None, (_origin(case, self.export), frame)))
+        if self.to.needs_lanes and not (case.lane_map.network.lanes or self.export.map):
+            self.notes.append(f"{title}: left out: {origins}; autoware, csv and parquet need none")
+            return
         self.notes.append(f"{title}: {len(case.scenarios)} scenarios; {origins}")
         for name, data in self.to.shared(case, self.export).items():
             (self.folder / name).write_bytes(data)
@@ -218,7 +223,6 @@ def _entry(
         "files": list(names),
         "namespace": case.namespace,
         "road": case.road_name,
-        "lanes": "derived" if case.lane_map.derived and not export.map else "true",
         "index": exported.index,
         "seed": exported.seed,
         "sha256": exported.sha256,
@@ -302,7 +306,7 @@ def refuse_other_map(case: Case, path: Path) -> None:
     Raises:
         InputError: the map cannot be read, or too few positions lie on its lanes.
     """
-    lanes = area_of(read_network(path).whole)
+    lanes = LaneMap(read_network(path).whole, path.name).area
     prepare(lanes)
     places = np.concatenate([_positions(exported.others) for exported in case.scenarios])
     share = float(contains_xy(lanes, places).mean())
@@ -321,10 +325,12 @@ def _positions(scenario: Scenario) -> Floats:
 EXPORTS = Registry[ExportFormat](
     "scenario_gen.exports",
     {
-        "commonroad": ExportFormat(_to_commonroad),
-        "openscenario": ExportFormat(_to_openscenario, _roads, _origin_of_map, takes_map=True),
+        "commonroad": ExportFormat(_to_commonroad, needs_lanes=True),
+        "openscenario": ExportFormat(
+            _to_openscenario, _roads, _origin_of_map, needs_lanes=True, takes_map=True
+        ),
         "autoware": ExportFormat(_to_autoware, projected_from=lambda case, _: case.origin),
-        "scenarionet": ExportFormat(_to_scenarionet, closing=dataset_files),
+        "scenarionet": ExportFormat(_to_scenarionet, closing=dataset_files, needs_lanes=True),
         **{suffix: _to_table(suffix) for suffix in TABLES},
     },
     ExportFormat,

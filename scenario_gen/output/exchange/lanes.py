@@ -7,10 +7,12 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
+from shapely import make_valid, Polygon, union_all
+from shapely.geometry.base import BaseGeometry
 
 from scenario_gen.numerics import Floats
 from scenario_gen.numerics.plane import edge_lengths
-from scenario_gen.types import CARS, DRIVERS, LaneNetwork, RuleKind
+from scenario_gen.types import CARS, DRIVERS, LaneNetwork, Road, RuleKind
 
 SIGN_IDS = {
     RuleKind.STOP: "206",
@@ -25,23 +27,27 @@ class LaneMap:
     """All lanes of a road; lane k of the network has the id k + 1.
 
     Attributes:
-        network: the lanes, of all users.
-        added: number of derived lanes, at the end, which follow driven paths.
+        network: the lanes, of all users; a grid has none.
         origin: origin of the lanes, for people.
     """
 
     network: LaneNetwork
-    added: int
     origin: str
 
-    @property
-    def derived(self) -> bool:
-        """Whether all lanes are derived."""
-        return self.added == len(self.network.lanes)
+    @classmethod
+    def of(cls, road: Road | None, run_out: float) -> "LaneMap":
+        """Return the lanes of a road; those of a built-in one are extended by `run_out` [m]."""
+        if road is None or road.lanes is None:
+            return cls(LaneNetwork("", ()), "the road is a grid without lanes")
+        network = road.lanes.whole
+        if road.lanes.drawn:
+            return cls(with_run_out(network, run_out), f"the true lanes of {network.name}")
+        return cls(network, f"the lanes of map {network.name}")
 
-    def is_derived(self, k: int) -> bool:
-        """Whether lane k is derived."""
-        return k >= len(self.network.lanes) - self.added
+    @property
+    def area(self) -> BaseGeometry:
+        """The union of all lanes."""
+        return union_all(make_valid([Polygon(lane.outline) for lane in self.network.lanes]))
 
     @cached_property
     def side(self) -> str:

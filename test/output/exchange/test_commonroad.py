@@ -178,7 +178,7 @@ def test_signs_lights_and_stop_lines_of_a_vector_map_are_written_and_read_again(
         for k, kind in enumerate(kinds)
     )
     network = LaneNetwork("town", lanes, (), rules)
-    data, _ = write_commonroad(*case_of(crossing(), lane_map=LaneMap(network, 0, "town")))
+    data, _ = write_commonroad(*case_of(crossing(), lane_map=LaneMap(network, "town")))
     root = ET.fromstring(data)
     tags = list(dict.fromkeys(child.tag for child in root))
     assert tags[:5] == ["location", "scenarioTags", "lanelet", "trafficSign", "trafficLight"]

@@ -10,13 +10,15 @@ import numpy as np
 import pyproj
 import pytest
 from rosbags.rosbag2 import Reader
+from support.bag_examples import hand_made_run
 from support.map_builders import lanelet2, opendrive
 from support.small_scenarios import observed
 from typer.testing import CliRunner
 
 from scenario_gen.bags.recordings.read import read_recording
+from scenario_gen.bags.recordings.write import write_recording
 from scenario_gen.bags.storage.definitions import type_store
-from scenario_gen.base.errors import InputError
+from scenario_gen.base.errors import InputError, RefusedError
 from scenario_gen.cli.commands import app
 from scenario_gen.logs import read_log
 from scenario_gen.logs.geodesy import geodetic
@@ -44,7 +46,6 @@ def test_the_same_bag_gives_the_same_bytes(small_bag, tmp_path, target):
         first[name] == second[name] for name in first if "metadata" not in name
     )
     manifest = json.loads(first[MANIFEST])
-    assert [entry["lanes"] for entry in manifest["scenarios"]] == ["true"] * 4
     assert {entry["sha256"] for entry in manifest["scenarios"]} == {
         sha256
         for namespace in read_recording(small_bag).namespaces.values()
@@ -258,10 +259,15 @@ def test_scenarios_are_exported_on_the_map_of_the_user(town, tmp_path):
     assert [ET.parse(file).find("RoadNetwork/LogicFile").attrib["filepath"] for file in files] == [
         "town.xodr"
     ] * 2
-    assert {
-        entry["lanes"]
-        for entry in json.loads((tmp_path / "out" / MANIFEST).read_text())["scenarios"]
-    } == {"true"}
+
+
+@pytest.mark.parametrize("target", ["commonroad", "openscenario", "scenarionet"])
+def test_a_grid_without_lanes_is_refused_where_lanes_are_needed(tmp_path, target):
+    bag = write_recording(tmp_path / "bag", hand_made_run())
+    with pytest.raises(RefusedError, match="left out: the road is a grid without lanes"):
+        export_bag(bag, tmp_path / "out", target)
+    assert not (tmp_path / "out").exists()
+    assert export_bag(bag, tmp_path / "csv", "csv").scenarios == 5
 
 
 def test_another_map_is_refused(town, small_bag, tmp_path):

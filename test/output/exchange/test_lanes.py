@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Lanes: those of a built-in road cover its drivable cells and no more; derived ones hold every footprint."""
+"""Lanes: those of a built-in road cover its drivable cells and no more."""
 
 from dataclasses import replace
 
@@ -12,7 +12,6 @@ from support.small_scenarios import case_of, moving
 
 from scenario_gen.output.exchange.commonroad import write_commonroad
 from scenario_gen.output.exchange.config import ExportConfig
-from scenario_gen.output.exchange.derived_lanes import derived_lanes, footprints, lane_map_of
 from scenario_gen.output.exchange.lanes import LaneMap
 from scenario_gen.output.exchange.opendrive import write_opendrive
 from scenario_gen.output.exchange.scenarionet import description
@@ -28,8 +27,8 @@ def area_of(lanes):
 
 def lanes_on(name, config, run_out=1.0):
     road = build_road(name, None, config)
-    lane_map = lane_map_of(road, [], 3.5, run_out)
-    assert not lane_map.derived and not lane_map.added and lane_map.side == config.traffic_side
+    lane_map = LaneMap.of(road, run_out)
+    assert lane_map.side == config.traffic_side
     return road, lane_map
 
 
@@ -88,32 +87,6 @@ def test_lanes_lead_from_entries_to_exits_in_their_direction(name, side):
         assert ax * by - ay * bx > 0.0  # left is left
 
 
-@pytest.mark.parametrize("side", ["right", "left"])
-def test_who_leaves_the_true_lanes_gets_a_lane_and_that_is_said(side):
-    config = RoadConfig(traffic_side=side)
-    road = build_road("straight", None, config)
-    y = float(road.entries[0, 1])
-    scenario = moving(
-        [
-            [10.0, y, 0.0, 8.0, 0.0, 0.0],
-            [10.0, y - 3.0 if side == "right" else y + 3.0, 0.0, 8.0, 0.0, 0.0],
-        ]
-    )
-    lane_map = lane_map_of(road, [scenario], 3.5, 5.0)
-    assert (
-        lane_map.added == 1
-        and "along the path of vehicle 2, which does not keep to them" in lane_map.origin
-    )
-    area = area_of(lane_map.network.lanes)
-    for n in range(2):
-        assert all(area.covers(Polygon(corners)) for corners in footprints(scenario, n))
-
-    walker = replace(scenario.vehicles[1], type="pedestrian")
-    walked = replace(scenario, vehicles=(scenario.vehicles[0], walker))
-    assert lane_map_of(road, [walked], 3.5, 5.0).added == 0
-    assert derived_lanes([walked], road, 3.5, 5.0).derived == 1
-
-
 def test_a_vector_maps_own_lanes_are_written():
     config = RoadConfig()
     road = build_road("straight", None, config)
@@ -126,56 +99,9 @@ def test_a_vector_maps_own_lanes_are_written():
         VectorLane("a.3", border[2] + (220.0, 0.0), border[1] + (220.0, 0.0)),
     )
     road = replace(road, lanes=LaneNetwork("town", own))
-    scenario = moving([[10.0, y, 0.0, 8.0, 0.0, 0.0], [40.0, y - 3.0, 0.0, 8.0, 0.0, 0.0]])
-    made = lane_map_of(road, [scenario], 3.5, 5.0)
-    assert made.origin.startswith(
-        "the lanes of map town, and a derived one along the path of vehicle 2,"
-    )
-    assert [(made.is_derived(k), lane.successors) for k, lane in enumerate(made.network.lanes)] == [
-        (False, ()), (False, (2,)), (False, ()), (True, ()),
-    ]  # fmt: skip
+    made = LaneMap.of(road, 5.0)
+    assert made.origin == "the lanes of map town" and made.network.lanes == own
     assert made.neighbours(0) == {"left": (1, True)} and made.neighbours(1) == {"right": (0, True)}
-    assert made.network.lanes[:3] == own
-
-
-@pytest.mark.parametrize(("gap", "added"), [(0.15, 0), (0.5, 2)])
-def test_seams_between_lanes_are_no_edge_of_the_road(gap, added):
-    road = build_road("straight", None, RoadConfig())
-    borders = [
-        np.column_stack((np.array(x), np.full(2, y)))
-        for x in ((0.0, 50.0), (50.0 + gap, 100.0))
-        for y in (1.75, -1.75)
-    ]
-    lanes = (
-        VectorLane("a", borders[0], borders[1], (1,)),
-        VectorLane("b", borders[2], borders[3]),
-    )
-    scenario = moving([[30.0, 0.0, 0.0, 8.0, 0.0, 0.0], [5.0, 0.0, 0.0, 8.0, 0.0, 0.0]])
-    made = lane_map_of(replace(road, lanes=LaneNetwork("town", lanes)), [scenario], 3.5, 5.0)
-    assert made.added == added
-
-
-def test_derived_lanes_hold_every_footprint_and_followers_share_one():
-    rows = [
-        [0.0, 0.0, 0.3, 8.0, 0.0, 0.05],
-        [-15.0, -4.64, 0.3, 8.0, 0.0, 0.0],
-        [60.0, 40.0, -2.0, 5.0, -1.2, 0.1],
-    ]
-    scenarios = [moving(rows), moving([[x, y + 0.4, *rest] for x, y, *rest in rows])]
-    lanes = derived_lanes(scenarios, None, 3.5, 20.0).network.lanes
-    area = area_of(lanes)
-    for scenario in scenarios:
-        for n, vehicle in enumerate(scenario.vehicles):
-            for (x, y), yaw in zip(scenario.position[n], scenario.heading[n], strict=True):
-                turn = np.array([[np.cos(yaw), -np.sin(yaw)], [np.sin(yaw), np.cos(yaw)]])
-                half = np.array([[1, 1], [-1, 1], [-1, -1], [1, -1]]) * (
-                    vehicle.length / 2.0,
-                    vehicle.width / 2.0,
-                )
-                assert area.covers(Polygon(half @ turn.T + (x, y)))
-    assert all(lane.successors == () for lane in lanes)
-    platoon = moving([[0.0, 0.0, 0.0, 8.0, 0.0, 0.0], [-12.0, 0.0, 0.0, 8.0, 0.0, 0.0]])
-    assert len(derived_lanes([platoon], None, 3.5, 60.0).network.lanes) == 1
 
 
 STANDING = moving([[5.0, 5.0, 0.0, 0.0, 0.0, 0.0], [15.0, 5.0, 0.0, 0.0, 0.0, 0.0]])
@@ -226,7 +152,7 @@ def test_users_of_the_lanes_of_a_map_are_read_again(tmp_path, users, ending):
     network = LaneNetwork("m", ()).with_lanes(
         [lanes[0], replace(lanes[1], users=frozenset(users.split(",")))]
     )
-    again = written(tmp_path, LaneMap(network.whole, 0, "m"), ending)
+    again = written(tmp_path, LaneMap(network.whole, "m"), ending)
     assert sorted(",".join(sorted(lane.users)) for lane in again.whole.lanes) == [
         "",
         ",".join(sorted(users.split(","))),

@@ -36,7 +36,7 @@ def case():
     network = LaneNetwork("town", (Lane("in", left, right),), rules=(rule,))
     scenario = crossing()
     lit = replace(scenario, facts=replace(scenario.facts, lights=lights_of(network)))
-    return case_of(lit, lane_map=LaneMap(network, 0, "town"))
+    return case_of(lit, lane_map=LaneMap(network, "town"))
 
 
 def test_commonroad():

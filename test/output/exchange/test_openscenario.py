@@ -10,7 +10,6 @@ import pytest
 from support.small_scenarios import case_of, crossing, one_vehicle
 
 from scenario_gen.output.exchange.config import ExportConfig
-from scenario_gen.output.exchange.derived_lanes import lane_map_of
 from scenario_gen.output.exchange.lanes import LaneMap
 from scenario_gen.output.exchange.opendrive import write_opendrive
 from scenario_gen.output.exchange.openscenario import write_openscenario
@@ -141,7 +140,7 @@ def along(geometry, s):
 @pytest.mark.parametrize("side", ["right", "left"])
 def test_the_road_network_is_smooth_and_its_lanes_are_ours(side):
     config = RoadConfig(lanes=2, traffic_side=side)
-    lane_map = lane_map_of(build_road("t_intersection", None, config), [], 3.5, 15.0)
+    lane_map = LaneMap.of(build_road("t_intersection", None, config), 15.0)
     data = write_opendrive(lane_map, "t", 0)
     assert data == write_opendrive(lane_map, "t", 0)
     root = ET.fromstring(data)
@@ -204,7 +203,7 @@ def test_how_a_maps_lanes_are_joined_and_signed_comes_back(tmp_path):
     line = np.array([[48.0, 1.75], [48.0, -1.75]])
     network = LaneNetwork("town", lanes, rules=(TrafficRule("s", RuleKind.STOP, (0,), (), line),))
     path = tmp_path / "town.xodr"
-    path.write_bytes(write_opendrive(LaneMap(network, 0, "town"), "town", 0))
+    path.write_bytes(write_opendrive(LaneMap(network, "town"), "town", 0))
     again = read_network(path)
     assert [one.successors for one in again.lanes] == [one.successors for one in lanes]
     assert [bool(one.junction) for one in again.lanes] == [bool(one.junction) for one in lanes]

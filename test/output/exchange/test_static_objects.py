@@ -13,7 +13,7 @@ from scenario_gen.numerics import wrap_angle
 from scenario_gen.numerics.curve import Curve
 from scenario_gen.output.exchange.commonroad import write_commonroad
 from scenario_gen.output.exchange.config import ExportConfig
-from scenario_gen.output.exchange.derived_lanes import lane_map_of
+from scenario_gen.output.exchange.lanes import LaneMap
 from scenario_gen.output.exchange.opendrive import write_opendrive
 from scenario_gen.output.exchange.opendrive_network import RoadNetwork
 from scenario_gen.output.exchange.openscenario import write_openscenario
@@ -28,7 +28,7 @@ def case():
     text = "; ".join(" ".join(map(str, place)) for place in PLACES)
     road = build_road("straight", config=RoadConfig(obstacles=text))
     scenario = crossing()
-    return case_of(scenario, lane_map=lane_map_of(road, [scenario], 3.5, 15.0))
+    return case_of(scenario, lane_map=LaneMap.of(road, 15.0))
 
 
 def test_opendrive(case):
