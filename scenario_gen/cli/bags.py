@@ -16,6 +16,7 @@ from scenario_gen.base.errors import printable_lines
 from scenario_gen.cli.options import (
     assigned_all,
     Commands,
+    complete_format,
     configured,
     OUT,
     ParametersOption,
@@ -163,7 +164,9 @@ def export_scenarios(
     to: Annotated[
         str,
         typer.Option(
-            help="commonroad, openscenario (with OpenDRIVE), autoware or scenarionet (MetaDrive)."
+            help="commonroad, openscenario (with OpenDRIVE), autoware, scenarionet (MetaDrive), "
+            "csv or parquet.",
+            autocompletion=complete_format,
         ),
     ],
     out: Annotated[

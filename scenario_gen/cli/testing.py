@@ -14,6 +14,7 @@ import typer
 from scenario_gen.base.errors import InputError
 from scenario_gen.cli.options import (
     Commands,
+    complete_planner,
     OUT,
     SeedOption,
     takes,
@@ -49,7 +50,8 @@ class Drive:
         list[str],
         typer.Option(
             help="MODULE:CLASS of the planner, e.g. mine:MyPlanner, or IdmFollower. With --ros: "
-            "the command that starts its node. Repeatable: planners side by side."
+            "the command that starts its node. Repeatable: planners side by side.",
+            autocompletion=complete_planner,
         ),
     ]
     ego: Annotated[
@@ -218,7 +220,11 @@ class Search:
         ),
     ]
     planner: Annotated[
-        str, typer.Option(help="MODULE:CLASS of the planner, e.g. mine:MyPlanner, or IdmFollower.")
+        str,
+        typer.Option(
+            help="MODULE:CLASS of the planner, e.g. mine:MyPlanner, or IdmFollower.",
+            autocompletion=complete_planner,
+        ),
     ]
     budget: Annotated[
         int,

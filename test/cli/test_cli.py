@@ -8,6 +8,7 @@ import json
 import pytest
 
 from scenario_gen.bags.storage.bag import read_messages
+from scenario_gen.cli.options import complete_format, complete_planner, complete_road
 from scenario_gen.logs.synthetic import bundled
 
 LOG = bundled("c")
@@ -45,3 +46,8 @@ def test_an_unknown_topic_type_is_named(run, tmp_path, data):
     )
     assert code == 2
     assert "talker" in printed and "std_msgs/msg/String" in printed
+
+
+def test_a_shell_completes_values_of_options():
+    assert set(complete_road("t_")) == {"t_intersection"} and "auto" in complete_road("a")
+    assert complete_format("com") == ["commonroad"] and complete_planner("I") == ["IdmFollower"]
