@@ -233,9 +233,7 @@ def _clock_doubt(cause: str, size: float) -> Doubt:
         Quantity.CLOCK,
         size,
         "s",
-        f"the header clocks {cause}"
-        if cause.startswith("differ")
-        else f"the header clock {cause}",
+        f"the header {cause}",
         "--set log.stamps=received uses the recorder's clock",
         stops=size >= _MAX_CLOCK_DIFFERENCE_S,
     )

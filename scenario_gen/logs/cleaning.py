@@ -13,9 +13,8 @@ import numpy as np
 from scipy.ndimage import median_filter
 
 from scenario_gen.base.errors import InputError
-from scenario_gen.logs.clock import is_out_of_range, time_option
+from scenario_gen.logs.clock import is_out_of_range
 from scenario_gen.logs.config import chosen_vehicles, LogConfig
-from scenario_gen.logs.degree_hints import degree_hint
 from scenario_gen.logs.geodesy import local_frame, middle_of, on_sphere, sites_of
 from scenario_gen.logs.kinds import with_sizes
 from scenario_gen.logs.quality import Dropped
@@ -38,6 +37,7 @@ class CleaningLimits:
         min_speed_share: share of a measured speed that the positions of a moving vehicle confirm
             at least, in whatever unit the speed is.
         relocation_count: fixes in a row that agree with each other and are then a new place.
+        min_first_jump_m: from 0, 0 to the first real place.
     """
 
     max_period_s: float = 5.0
@@ -48,16 +48,10 @@ class CleaningLimits:
     moving_mps: float = 1.0
     min_speed_share: float = 0.2
     relocation_count: int = 5
+    min_first_jump_m: float = 10.0
 
 
 CLEANING = CleaningLimits()
-
-_USUAL_PERIOD_S = (0.005, 2.0)  # between fixes
-_TIME_UNITS = {
-    "ms": ("milliseconds", 1e-3),
-    "us": ("microseconds", 1e-6),
-    "ns": ("nanoseconds", 1e-9),
-}
 
 
 class Cause(Enum):
@@ -175,6 +169,7 @@ def _without_invalid(vehicle: Observations, geographic: bool, drops: Drops) -> O
         off_earth = (np.abs(fix) > (90.0, 180.0)).any(axis=1)
     else:
         off_earth = (np.abs(fix) > CLEANING.max_coordinate_m).any(axis=1)
+        position_checks[Cause.ZERO_POSITION] = is_before_fix(fix)
     position_checks[Cause.NOT_ON_EARTH] = off_earth
     speed_checks: dict[Cause, Any] = {
         Cause.STAMP_OUT_OF_RANGE: is_out_of_range(vehicle.speed_ns),
@@ -184,6 +179,21 @@ def _without_invalid(vehicle: Observations, geographic: bool, drops: Drops) -> O
     }
     valid_fix = _passing(position_checks, vehicle.fix_row, drops)
     return select(vehicle, valid_fix, _passing(speed_checks, vehicle.speed_row, drops))
+
+
+def is_before_fix(fix: Floats) -> Bools:
+    """Return which positions (F, 2) [m] are 0, 0 at the start, until they jump to a real place."""
+    is_zero = (fix == 0.0).all(axis=1)
+    n_zeros = int(np.argmin(is_zero)) if not is_zero.all() else 0
+    is_far = n_zeros and np.hypot(*fix[n_zeros]) > CLEANING.min_first_jump_m
+    return np.asarray(np.arange(len(fix)) < (n_zeros if is_far else 0))
+
+
+def _no_fix_hint(log: RawLog) -> str:
+    """Return that receivers had no fix, if a log has no latitude and longitude at all."""
+    is_known = log.geographic and any(np.isfinite(v.fix).all(axis=1).any() for v in log.vehicles)
+    is_empty = log.geographic and not is_known
+    return "; the receivers had no fix, or the fields are empty" if is_empty else ""
 
 
 def _passing(checks: Mapping[Cause, Any], rows: Ints, drops: Drops) -> Bools:
@@ -238,7 +248,7 @@ def _time_window(
         raise InputError(
             f"{log.segments[0].label}: no usable position in {log.rows} rows"
             + (f" ({causes})" if causes else "")
-            + degree_hint(log, config)
+            + _no_fix_hint(log)
             + "; check the columns and their units, or name them with --set log.columns=…"
         )
     first_ns = int(stamps.min())
@@ -415,11 +425,9 @@ def _check_clock(vehicles: Sequence[Observations], log: RawLog, config: LogConfi
     steps = np.concatenate([np.diff(vehicle.fix_ns) for vehicle in vehicles])
     period = float(np.median(steps)) * 1e-9
     if period > max(CLEANING.max_period_s, config.longest_gap):
-        unit, hint = _likely_time_unit(period)
         raise InputError(
             f"{log.where(int(vehicles[0].fix_row[1]))}: positions are {period:g} s apart "
-            f"(median); a track needs at most {CLEANING.max_period_s:g} s; {hint}"
-            + (f"name the unit with {time_option(log, unit, config)}" if log.columns else "")
+            f"(median); a track needs at most {CLEANING.max_period_s:g} s; check the unit of time"
         )
     spans = [int(vehicle.fix_ns[-1]) - int(vehicle.fix_ns[0]) for vehicle in vehicles]
     n_ticks = round(sum(spans) / (config.period * 1e9))
@@ -433,15 +441,6 @@ def _check_clock(vehicles: Sequence[Observations], log: RawLog, config: LogConfi
             f"ticks of {config.period:g} s (limit {config.tick_limit}): correct the stamp, cut "
             "the log (log.start, log.end), or raise --set log.tick_limit=…"
         )
-
-
-def _likely_time_unit(period: float) -> tuple[str, str]:
-    """Return a unit in which the time between fixes would be usual, and a hint; or a blank."""
-    shortest, longest = _USUAL_PERIOD_S
-    for unit, (name, factor) in _TIME_UNITS.items():
-        if shortest <= period * factor <= longest:
-            return unit, f"this looks like {name} read as seconds; "
-    return "<unit>", ""
 
 
 def _without_jumps(vehicle: Observations, drops: Drops, geographic: bool) -> Observations:

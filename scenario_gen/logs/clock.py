@@ -13,8 +13,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from scenario_gen.base.errors import InputError
-from scenario_gen.logs.columns import with_columns
 from scenario_gen.logs.config import LogConfig
 from scenario_gen.logs.geodesy import on_sphere
 from scenario_gen.logs.raw import Observations, RawLog
@@ -22,9 +20,6 @@ from scenario_gen.numerics import Bools, Floats, Ints
 
 _S_TO_NS = 10**9
 _MAX_STAMP_NS = 2**62  # years 1823 to 2116: differences of two stamps fit into 64 bits
-_TIME_UNITS_S = {"min": 60.0, "h": 3600.0, "d": 86400.0}
-_MIN_PERIOD_S = 0.005  # between fixes; less has another unit
-_USUAL_PERIOD_S = (0.02, 2.0)
 _SAME_STEP_NS = 2_000_000_000  # steps of two vehicles that are this near are the same
 
 
@@ -107,36 +102,6 @@ def retimed(log: RawLog, config: LogConfig) -> tuple[RawLog, list[str]]:
         log = _shifted(log, [(shift, shift)] * len(log.vehicles))
         notes.append(f"times begin before 1970, or before an event: {seconds} s are added to all")
     return log, notes
-
-
-def check_unit(log: RawLog, config: LogConfig) -> None:
-    """Check that a log is not too short for an encounter because its time has a longer unit.
-
-    Raises:
-        InputError: its time is likely in minutes, hours or days; the message names the unit.
-    """
-    stamps_ns = (vehicle.fix_ns[~is_out_of_range(vehicle.fix_ns)] for vehicle in log.vehicles)
-    tracks = [np.sort(stamps) / _S_TO_NS for stamps in stamps_ns if len(stamps) > 1]
-    if not tracks:
-        return
-    period = float(np.median(np.concatenate([np.diff(stamps) for stamps in tracks])))
-    span = max(float(np.ptp(stamps)) for stamps in tracks)
-    if period >= _MIN_PERIOD_S or span >= config.min_duration:
-        return
-    for unit, factor in _TIME_UNITS_S.items():
-        is_usual = _USUAL_PERIOD_S[0] < period * factor < _USUAL_PERIOD_S[1]
-        if is_usual and config.min_duration < span * factor:
-            raise InputError(
-                f"{log.segments[0].label}: the log lasts {span:g} s, positions are {period:g} s "
-                f"apart (median); the time may be in {unit}: {time_option(log, unit, config)}"
-            )
-
-
-def time_option(log: RawLog, unit: str, config: LogConfig) -> str:
-    """Return the option that reads the time in a unit."""
-    column = log.columns.get("time")
-    name = column.option(unit) if column is not None else f"<column>:{unit}"
-    return with_columns(config.columns, {"time": name})
 
 
 def _shifted(log: RawLog, shifts: Sequence[tuple[Ints, Ints]]) -> RawLog:

@@ -11,7 +11,7 @@ import re
 
 from scenario_gen.base.errors import did_you_mean, InputError
 from scenario_gen.logs.column import Column, normalized
-from scenario_gen.logs.config import listed
+from scenario_gen.logs.config import listed, POINTS
 from scenario_gen.logs.raw import UnknownFormatError
 
 NAMES: dict[str, tuple[str, ...]] = {
@@ -27,13 +27,15 @@ NAMES: dict[str, tuple[str, ...]] = {
         "lat": "lat latitude gps_lat gps_latitude",
         "lon": "lon lng longitude long gps_lon gps_longitude",
         "x": "x e east easting pos_x position_x x_utm utm_x utm_e utm_east utm_easting xcenter "
-        "x_center center_x tx p_rs_r_x px vehicle_x world_x map_x",
+        "x_center center_x tx p_rs_r_x px vehicle_x world_x map_x rear_axle_x",
         "y": "y n north northing pos_y position_y y_utm utm_y utm_n utm_north utm_northing "
-        "ycenter y_center center_y ty p_rs_r_y py vehicle_y world_y map_y",
+        "ycenter y_center center_y ty p_rs_r_y py vehicle_y world_y map_y rear_axle_y",
         "speed": "speed v velocity vel vehicle_speed ground_speed speed_over_ground sog",
         "vx": "vx v_x velocity_x vel_x xvelocity x_velocity speed_x",
         "vy": "vy v_y velocity_y vel_y yvelocity y_velocity speed_y",
         "heading": "heading yaw theta course bearing psi hdg cog course_over_ground vehicle_angle",
+        "height": "z height alt altitude elevation pos_z position_z",
+        "valid": "valid is_valid validity fix_type fix_quality gps_fix fix_status status",
         "length": "length len vehicle_length",
         "width": "width vehicle_width",
         "kind": "type kind class vehicle_type object_type agent_type actor_type obj_type category "
@@ -48,8 +50,7 @@ NAMES: dict[str, tuple[str, ...]] = {
 Clocks that all files share precede those that start with the file.
 """
 
-_LENGTHS_M = {"m": 1.0, "km": 1e3, "ft": 0.3048, "cm": 0.01}
-_SIZES_M = {"m": 1.0, "ft": 0.3048, "cm": 0.01, "mm": 0.001}
+_LENGTHS_M = {"m": 1.0, "km": 1e3, "ft": 0.3048, "dm": 0.1, "cm": 0.01, "mm": 0.001}
 _DEGREES = {
     "deg": 1.0,
     "rad": math.degrees(1.0),
@@ -79,6 +80,7 @@ _TIMES_S = {
     "d": 86400.0,
     "hhmmss": 1.0,
 }
+_CLOCKWISE_UNITS = ("north_deg", "cw_deg", "north_rad")
 UNITS: dict[str, dict[str, float]] = {
     "time": _TIMES_S,
     "date": {},
@@ -92,12 +94,20 @@ UNITS: dict[str, dict[str, float]] = {
     "lon": _DEGREES,
     "x": _LENGTHS_M,
     "y": _LENGTHS_M,
-    "length": _SIZES_M,
-    "width": _SIZES_M,
+    "height": _LENGTHS_M,
+    "valid": {},
+    "length": _LENGTHS_M,
+    "width": _LENGTHS_M,
     "speed": _SPEEDS_MPS,
     "vx": _SPEEDS_MPS,
     "vy": _SPEEDS_MPS,
-    "heading": {"rad": 1.0, "deg": math.pi / 180.0, "north_deg": math.nan, "cw_deg": math.nan},
+    "heading": {
+        "rad": 1.0,
+        "deg": math.pi / 180.0,
+        "north_deg": math.nan,
+        "cw_deg": math.nan,
+        "north_rad": math.nan,
+    },
 }
 """Factors of units to seconds, metres, m/s, radians, or degrees (lat, lon).
 
@@ -121,6 +131,8 @@ _NGSIM = {
 """Columns and units of NGSIM's trajectories; positions are those of the front centre."""
 
 _FRAME_RATE = re.compile(r"(\d+(?:\.\d+)?)fps")  # unit of a time in frames
+_SCALED = ("x", "y", "speed", "vx", "vy", "length", "width", "height")
+_SCALE = re.compile(r"\d*\.?\d+(?:e-?\d+)?")  # our units in one of the column
 _NUMBERED_KIND = re.compile(r"([a-z_]*)(\d+)(?:\+|$)")  # type and number, car2
 _NUMBERED_KINDS = re.compile(r"[a-z_]*\d+(?:\+[a-z_]*\d+)*")
 _CLOCKWISE_NAMES = (
@@ -169,7 +181,7 @@ def _ngsim_columns(by_name: Mapping[str, str]) -> dict[str, Column]:
 
 def _preferred_name(quantity: str, by_name: Mapping[str, str]) -> str | None:
     """Return the column whose name is the preferred alias of a quantity, with or without unit."""
-    suffixes = ("", *(f"_{unit}" for unit in UNITS[quantity]))
+    suffixes = (*(f"_{unit}" for unit in UNITS[quantity]), "")
     candidates = [alias + suffix for alias in NAMES[quantity] for suffix in suffixes]
     plain = {_letters(name): raw for name, raw in by_name.items() if len(name) > 2}
     for candidate in candidates:
@@ -235,6 +247,8 @@ def _check_unit(quantity: str, unit: str) -> None:
         return
     if quantity == "time" and _FRAME_RATE.fullmatch(unit):
         return
+    if quantity in _SCALED and _SCALE.fullmatch(unit) and float(unit):
+        return
     if quantity == "kind" and _NUMBERED_KINDS.fullmatch(unit):
         return
     raise InputError(
@@ -254,6 +268,12 @@ def with_columns(option: str, changes: Mapping[str, str]) -> str:
     text = ",".join(f"{quantity}={column}" for quantity, column in {**parts, **changes}.items())
     assignment = f"log.columns={text}"
     return f"--set '{assignment}'" if re.search(r"[\s()\[\]&;]", text) else f"--set {assignment}"
+
+
+def point_of(columns: Mapping[str, Column]) -> str:
+    """Return the point of a vehicle that the name of the column of x says; "" if none."""
+    words = normalized(columns["x"].name).rpartition("_x") if "x" in columns else ("",)
+    return words[0] if words[0] in POINTS else ""
 
 
 def column_notes(columns: dict[str, Column], option: str, header: Sequence[str]) -> list[str]:
@@ -296,7 +316,7 @@ def _complete(columns: dict[str, Column], path: Path, header: Sequence[str]) -> 
     if "time" not in columns:
         raise _missing_column("time", ["time"], columns, path, header)
     ignored = ["x", "y"] if is_geographic else ["lat", "lon"]
-    if "speed" in columns or not {"vx", "vy"} <= columns.keys():
+    if not {"vx", "vy"} <= columns.keys():
         ignored += ["vx", "vy"]
     return {quantity: column for quantity, column in columns.items() if quantity not in ignored}
 
@@ -314,8 +334,20 @@ def _missing_column(
     aliases = {alias for quantity in quantities for alias in NAMES[quantity]}
     return UnknownFormatError(
         f"{path} has no column for {missing}; it has {', '.join(header)}. Rename it, or name it "
-        f"with --set log.columns={remedy}{_similar(header, aliases)}"
+        f"with --set log.columns={remedy}{_with_unknown_unit(header)}{_similar(header, aliases)}"
     )
+
+
+def _with_unknown_unit(header: Sequence[str]) -> str:
+    """Return how to name the unit of columns such as x_px; "" if there are none."""
+    units = {}
+    for quantity in ("x", "y"):
+        for name in header:
+            alias, _, unit = normalized(name).rpartition("_")
+            if alias in NAMES[quantity] and unit not in UNITS[quantity]:
+                units[quantity] = f"{name}:<metres of one {unit}>"
+    parts = ",".join(f"{quantity}={text}" for quantity, text in units.items())
+    return f", e.g. log.columns={parts}" if parts else ""
 
 
 def _similar(header: Sequence[str], aliases: Collection[str]) -> str:
@@ -346,11 +378,13 @@ def as_column(quantity: str, name: str, unit: str = "") -> Column:
     suffixes = [known for known in UNITS[quantity] if lower.endswith(f"_{known}")]
     unit = unit or max(suffixes, key=len, default="")
     is_clockwise = quantity == "heading" and (
-        unit in ("north_deg", "cw_deg") or lower.removesuffix(f"_{unit}") in _CLOCKWISE_NAMES
+        unit in ("north_deg", "cw_deg", "north_rad")
+        or lower.removesuffix(f"_{unit}") in _CLOCKWISE_NAMES
     )
     if is_clockwise:
-        factor = 1.0 if unit == "rad" else math.pi / 180.0
+        factor = 1.0 if unit in ("rad", "north_rad") else math.pi / 180.0
         return Column(name, factor, clockwise=True, unit=unit or "north_deg")
     if quantity == "time" and not unit and lower == "gentime":
         return Column(name, 1e-6, unit="us")
-    return Column(name, UNITS[quantity].get(unit, 1.0), minutes=unit == "ddmm", unit=unit)
+    factor = float(unit) if _SCALE.fullmatch(unit) else UNITS[quantity].get(unit, 1.0)
+    return Column(name, factor, minutes=unit == "ddmm", unit=unit)

@@ -5,6 +5,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from itertools import pairwise
 import math
 
@@ -80,6 +81,17 @@ class Piece:
     def position(self, first: int, last: int) -> Floats:
         """Return positions (T, 2) [m] from tick `first` to before tick `last`."""
         return self.smooth.position[first - self.first : last - self.first]
+
+    @cached_property
+    def height(self) -> Floats | None:
+        """Heights (T,) [m] at all ticks; None if they are not recorded."""
+        track = self.track
+        if track.height is None or not np.isfinite(track.height).any():
+            return None
+        known = np.isfinite(track.height)
+        seconds = (track.fix_ns - track.fix_ns[0])[known] * 1e-9
+        ticks = np.linspace(0.0, seconds[-1], len(self.smooth.speed))
+        return np.asarray(np.interp(ticks, seconds, track.height[known]))
 
     def speed(self, first: int, last: int) -> Floats:
         """Return speeds (T,) [m/s] from tick `first` to before tick `last`."""

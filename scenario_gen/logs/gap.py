@@ -4,6 +4,7 @@
 """The gap of two motions in space and time: how close vehicles are to one place at one time."""
 
 import numpy as np
+from scipy.spatial.distance import cdist
 
 from scenario_gen.numerics import Floats
 from scenario_gen.numerics.kernels import F2, kernel
@@ -15,6 +16,8 @@ INTERACTS_M = 6.0
 """Gap up to which two vehicles interact."""
 
 _CHORD_S = 0.3  # of straight and steady motion: at 4 m/s² lateral acceleration, 5 cm off
+_MAX_POINT_COUNT = 200  # of a path whose heights are compared
+_SAME_PLACE_M = 2.0
 _GOLDEN_RATIO = 0.6180339887498949
 
 
@@ -130,3 +133,14 @@ def _gap_to_chord(a: Floats, time_a: float, b: Floats) -> tuple[float, float]:
     dx = dx - vx * (time_b - b[4])
     dy = dy - vy * (time_b - b[4])
     return np.sqrt(dx * dx + dy * dy) + GAP_RATE_MPS * abs(time_a - time_b), time_b
+
+
+def height_apart(a: Floats, a_height: Floats | None, b: Floats, b_height: Floats | None) -> float:
+    """Return how far two paths (T, 2) [m] differ in height (T,) where they are nearest; else 0."""
+    if a_height is None or b_height is None:
+        return 0.0
+    first, second = (max(len(path) // _MAX_POINT_COUNT, 1) for path in (a, b))
+    distance = cdist(a[::first], b[::second])
+    nearest = distance <= distance.min() + _SAME_PLACE_M
+    difference = np.abs(a_height[::first][:, None] - b_height[::second][None])
+    return float(np.median(difference[nearest]))

@@ -22,7 +22,7 @@ import numpy as np
 from scenario_gen.base.errors import InputError
 from scenario_gen.logs.config import LogConfig
 from scenario_gen.logs.encounters import Piece
-from scenario_gen.logs.gap import INTERACTS_M, space_time_gap
+from scenario_gen.logs.gap import height_apart, INTERACTS_M, space_time_gap
 from scenario_gen.logs.growing import Group, Growth, Meeting, MIN_MET_SHARE, Span
 from scenario_gen.logs.raw import natural
 from scenario_gen.numerics import Floats, Ints, runs
@@ -103,6 +103,7 @@ _EDGE_S = 1.0  # by which a group is shortened so that its vehicles start and en
 _REST_S = 2.0  # part of a long standstill that belongs to the encounter before or after it
 _STANDING_MPS = 0.1
 _MAX_MEETING_COUNT = 200_000  # grouping takes minutes for more
+_MAX_HEIGHT_M = 4.0  # between two vehicles of one road; more is a bridge
 _NOISE_M = 50.0  # by which the distance of two vehicles may be wrong before smoothing
 
 
@@ -201,9 +202,8 @@ def find_groups(
         within: ticks in which vehicles must meet; None: at any time.
     """
     small = len({piece.track.id for piece in pieces}) <= config.max_vehicles
-    meetings = _find_meetings(pieces, config, within, small=small)
+    meetings, notes = _find_meetings(pieces, config, within, small=small)
     groups = []
-    notes = []
     for group in _PieceGroups(pieces, config, small=small).groups(meetings):
         parts, part_notes = _split(group, pieces, config)
         groups += parts
@@ -265,14 +265,23 @@ def _in_several(groups: Sequence[Group[Meeting]], pieces: Sequence[Piece]) -> se
 
 def _find_meetings(
     pieces: Sequence[Piece], config: LogConfig, within: Span | None, *, small: bool
-) -> list[Meeting]:
-    """Return all meetings of two vehicles, in ticks; in a `small` log each has gap 0.
+) -> tuple[list[Meeting], list[str]]:
+    """Return all meetings of two vehicles, in ticks; in a `small` log each has gap 0; and notes.
 
     Raises:
         InputError: there are too many.
     """
     meetings = []
+    notes = []
     for i, j in near_pairs(pieces, shortest(config), config.proximity):
+        a, b = pieces[i], pieces[j]
+        climb = height_apart(a.smooth.position, a.height, b.smooth.position, b.height)
+        if climb > _MAX_HEIGHT_M:
+            notes.append(
+                f"vehicles {a.track.id} and {b.track.id} are {climb:.1f} m apart in height where "
+                "they are nearest: no pair"
+            )
+            continue
         for span in _near_spans(pieces[i], pieces[j], config, within):
             gap = 0.0 if small else _gap(pieces[i], pieces[j], span, config)
             if gap <= INTERACTS_M:
@@ -282,7 +291,7 @@ def _find_meetings(
                 f"more than {_MAX_MEETING_COUNT} meetings of two vehicles: read a part of the log "
                 "(log.start, log.end, log.vehicles), or lower --set log.proximity=…"
             )
-    return meetings
+    return meetings, notes
 
 
 def _near_spans(

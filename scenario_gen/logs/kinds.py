@@ -12,6 +12,7 @@ import re
 import numpy as np
 
 from scenario_gen.base.errors import did_you_mean, InputError
+from scenario_gen.logs.columns import with_columns
 from scenario_gen.logs.config import listed, LogConfig
 from scenario_gen.logs.raw import Observations, RawLog
 from scenario_gen.types import CAR, OTHER, VEHICLE_TYPES, words
@@ -86,10 +87,24 @@ def typed(log: RawLog, config: LogConfig) -> RawLog:
         if kind is None:
             unknown[word] += 1
         vehicles.append(replace(vehicle, kind=kind or ""))
+    if excluded and not vehicles:
+        remedy = (
+            "; name other types with --set log.types=…" if wanted else _without_types(log, config)
+        )
+        raise InputError(
+            f"{log.segments[0].label}: every road user is left out by its type "
+            f"({counted(excluded)}){remedy}"
+        )
     notes = log.notes
     if unknown:
         notes = (*notes, f"unknown types, guessed from the sizes: {counted(unknown)}")
     return replace(log, vehicles=tuple(vehicles), notes=notes, excluded=excluded)
+
+
+def _without_types(log: RawLog, config: LogConfig) -> str:
+    """Return the option that reads a table without its types."""
+    is_table = "kind" in log.columns
+    return f"; {with_columns(config.columns, {'kind': 'none'})}" if is_table else ""
 
 
 def counted(counts: Mapping[str, int]) -> str:

@@ -33,18 +33,18 @@ class Legs:
         start_ns: (L,) stamp of the first fix.
         seconds: (L,) duration by the stamps.
         step: (L, 2) displacement [m], or in the unit of x and y.
-        swapped: (L, 2) the same if latitude and longitude were swapped; else x and y swapped.
         speed: (L,) mean recorded speed; NaN if unknown.
         heading: (L,) recorded heading in the middle; NaN if unknown.
+        velocity: (L,) direction of the recorded velocity in the middle; NaN if unknown.
     """
 
     vehicle: Ints
     start_ns: Ints
     seconds: Floats
     step: Floats
-    swapped: Floats
     speed: Floats
     heading: Floats
+    velocity: Floats
 
     @property
     def rate(self) -> Floats:
@@ -113,7 +113,7 @@ def _legs_of_vehicle(
     is_forward &= seconds < _MAX_STRETCH_RATIO * usual_s
     first, last, seconds = first[is_forward], last[is_forward], seconds[is_forward]
     begin, end, middle = rows[first], rows[last], rows[(first + last) // 2]
-    step, swapped = _displacements(fix[begin], fix[end], geographic=geographic)
+    step = _displacements(fix[begin], fix[end], geographic=geographic)
     length = np.hypot(*step.T)
     reach = np.percentile(length, _LONG_PERCENT) if len(length) else 0.0
     moving = (length > _MOVING_SHARE * reach) & (length > 0.0)
@@ -122,27 +122,32 @@ def _legs_of_vehicle(
         start_ns=vehicle.fix_ns[begin[moving]],
         seconds=seconds[moving],
         step=step[moving],
-        swapped=swapped[moving],
         speed=_mean_speeds(vehicle, begin[moving], end[moving]),
         heading=vehicle.heading[middle[moving]],
+        velocity=_velocities(vehicle, middle[moving]),
     )
 
 
-def _displacements(first: Floats, last: Floats, *, geographic: bool) -> tuple[Floats, Floats]:
-    """Return displacements (L, 2) between positions (L, 2), and those of swapped columns."""
+def _displacements(first: Floats, last: Floats, *, geographic: bool) -> Floats:
+    """Return displacements (L, 2) [m] between positions (L, 2)."""
     offset = last - first
     if not geographic:
-        return offset, offset[:, ::-1]
+        return offset
     offset[:, 1] = (offset[:, 1] + 180.0) % 360.0 - 180.0
+    degree_m = np.radians(1.0) * EARTH_RADIUS_M
+    parallel = np.cos(np.radians(first[:, 0]))
+    step: Floats = degree_m * np.column_stack([parallel * offset[:, 1], offset[:, 0]])
+    return step
 
-    def east_north(latitude: Floats, by_latitude: Floats, by_longitude: Floats) -> Floats:
-        parallel = np.cos(np.radians(latitude))
-        degree = np.radians(1.0) * EARTH_RADIUS_M
-        offsets: Floats = degree * np.column_stack([parallel * by_longitude, by_latitude])
-        return offsets
 
-    step = east_north(first[:, 0], offset[:, 0], offset[:, 1])
-    return step, east_north(first[:, 1], offset[:, 1], offset[:, 0])
+def _velocities(vehicle: Observations, rows: Ints) -> Floats:
+    """Return the directions (L,) of the recorded velocities at rows of the fixes."""
+    if vehicle.course is None or not len(vehicle.speed_ns):
+        return np.full(len(rows), np.nan)
+    if len(vehicle.course) == len(vehicle.fix):
+        return vehicle.course[rows]
+    nearest = np.searchsorted(vehicle.speed_ns, vehicle.fix_ns[rows])
+    return vehicle.course[np.clip(nearest, 0, len(vehicle.course) - 1)]
 
 
 def _mean_speeds(vehicle: Observations, begin: Ints, end: Ints) -> Floats:

@@ -257,5 +257,4 @@ def check_doubts(place: str, doubts: Sequence[Doubt], allow: str) -> None:
     stopping = [doubt for doubt in doubts if doubt.stops]
     if not stopping or allow == ALLOWED:
         return
-    more = f" (and {len(stopping) - 1} more doubts)" if len(stopping) > 1 else ""
-    raise DoubtError(f"{place}: {stopping[0]}{more}")
+    raise DoubtError(f"{place}: {'; '.join(map(str, stopping[:3]))}")

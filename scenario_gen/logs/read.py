@@ -19,9 +19,10 @@ from scenario_gen.base.folders.scratch import scratch
 from scenario_gen.base.parameters import updated
 from scenario_gen.logs.checks import copies_in, doubts_of_pieces, doubts_of_rows
 from scenario_gen.logs.cleaning import clean, Drops
-from scenario_gen.logs.clock import check_unit, retimed
+from scenario_gen.logs.clock import retimed
 from scenario_gen.logs.config import chosen_vehicles, LogConfig
 from scenario_gen.logs.encounters import Piece, pieces_of, plausible
+from scenario_gen.logs.evidence import interpret
 from scenario_gen.logs.extract import cut_encounter, encounter_quality, recorded_encounters
 from scenario_gen.logs.files import logs_in, read_raw
 from scenario_gen.logs.geodesy import EARTH_RADIUS_M
@@ -37,7 +38,6 @@ from scenario_gen.logs.quality import check_doubts, Doubt, Quality, VehicleQuali
 from scenario_gen.logs.raw import natural, Observations, RawLog
 from scenario_gen.logs.signals import moved_signals, with_lights
 from scenario_gen.logs.trailers import coupled
-from scenario_gen.logs.units import interpret
 from scenario_gen.types import Encounter
 from scenario_gen.types.html import html_list, html_table
 
@@ -167,7 +167,6 @@ def encounters_of(
     """
     if log.encounters:
         return LogResult(*recorded_encounters(log, config))
-    check_unit(log, config)
     log, unit_notes, unit_doubts = interpret(log, config)
     check_doubts(log.segments[0].label, [*log.doubts, *unit_doubts], config.allow)
     log = typed(log, config)
@@ -258,7 +257,8 @@ def _find_encounters(
     """
     groups, group_notes = find_groups(pieces, config, within)
     if not groups:
-        reasons = (explain_no_encounter(log, pieces, config), *doubts)
+        places = [f"{log.segments[0].label}: {note}" for note in group_notes]
+        reasons = (*(places or [explain_no_encounter(log, pieces, config)]), *doubts)
         raise NoEncounterError("; ".join(reasons))
     encounters = []
     cut_notes: list[str] = []

@@ -16,13 +16,14 @@ import numpy as np
 import pandas as pd
 
 from scenario_gen.base.errors import guarded, InputError, needs
-from scenario_gen.logs.column import Column
+from scenario_gen.logs.column import Column, normalized
 from scenario_gen.logs.columns import (
     column_notes,
     find_columns,
     MAX_LISTED_COUNT,
+    point_of,
 )
-from scenario_gen.logs.config import LogConfig
+from scenario_gen.logs.config import LogConfig, POINTS
 from scenario_gen.logs.kinds import MAX_LENGTH_M
 from scenario_gen.logs.raw import check_size, check_vehicles, Observations, RawLog, Segment
 from scenario_gen.logs.signals import RawSignal, signals_of_table
@@ -43,6 +44,7 @@ SPMD_EPOCH_NS = 1_072_915_200 * 10**9
 _PARQUET_SUFFIXES = (".parquet", ".pq")
 _FEW_ROW_COUNT = 10  # each of them may belong to another vehicle
 _NO_TRAILER = frozenset(("", "0", "False", "false", "no", "none"))
+_NOT_VALID = frozenset(("false", "no", "invalid", "v", "n"))  # V is void, as of NMEA
 _STANDING_M = 0.05  # no vehicle of an encounter drives less
 
 
@@ -86,6 +88,11 @@ def read(paths: Sequence[Path], config: LogConfig) -> RawLog:
     else:
         notes += named_by_file(frames, paths)
     log = from_frame(pd.concat(frames, ignore_index=True), paths, tuple(segments), config)
+    point = point_of(columns)
+    if point and "point=" not in config.columns:
+        vehicles = (replace(vehicle, ahead=POINTS[point]) for vehicle in log.vehicles)
+        log = replace(log, vehicles=tuple(vehicles))
+        notes.append(f"positions are those of the point {point}, by the names of their columns")
     return replace(
         log, notes=(*dict.fromkeys(notes), *log.notes), columns=columns, separators=(*separators,)
     )
@@ -281,6 +288,8 @@ def to_numbers(frame: pd.DataFrame, columns: dict[str, Column], path: Path) -> p
             numbers[quantity] = vehicle_names(values)
         elif quantity == "date":
             continue
+        elif quantity == "valid":
+            numbers[quantity] = _are_valid(values, column)
         elif quantity in ("kind", "signal", "signal_id"):
             numbers[quantity] = _words(values, column)
         elif pd.api.types.is_bool_dtype(values):
@@ -295,9 +304,20 @@ def to_numbers(frame: pd.DataFrame, columns: dict[str, Column], path: Path) -> p
             numbers["time"], numbers["time_ok"] = stamps
         else:
             numbers[quantity] = _in_our_unit(reals(values), column)
-    if {"vx", "vy"} <= set(numbers) and "speed" not in numbers:
-        numbers["speed"] = np.hypot(numbers["vx"], numbers["vy"])
+    if {"vx", "vy"} <= set(numbers):
+        speed = np.hypot(numbers["vx"], numbers["vy"])
+        numbers["course"] = np.arctan2(numbers["vy"], numbers["vx"]).where(speed > 0.0)
+        if "speed" not in numbers:
+            numbers["speed"] = speed
     return numbers
+
+
+def _are_valid(values: "pd.Series[Any]", column: Column) -> "pd.Series[bool]":
+    """Return which rows count: not those that are marked as false, void or without a fix."""
+    words = values.astype(str).str.strip().str.lower()
+    numbers = reals(words)
+    limit = 0.0 if normalized(column.name) == "status" else 1.0  # NavSatStatus: -1 is no fix
+    return ~(words.isin(_NOT_VALID) | (numbers < limit)).astype(bool)
 
 
 def _words(values: "pd.Series[Any]", column: Column) -> "pd.Series[Any]":
@@ -372,7 +392,8 @@ def from_frame(
     check_vehicles(str(paths[0]), frame["vehicle"].nunique(), config)
     if "row" not in frame:
         frame = frame.assign(row=np.arange(len(frame)))
-    is_usable = frame["time_ok"] & (frame["vehicle"] != "")
+    is_valid = frame.get("valid", True)
+    is_usable = frame["time_ok"] & (frame["vehicle"] != "") & is_valid
     unusable = frame[~is_usable]
     position = ("lat", "lon") if "lat" in frame else ("x", "y")
     usable, notes = apart_by_scene(frame if unusable.empty else frame[is_usable])
@@ -395,10 +416,19 @@ def from_frame(
         notes=tuple(notes),
         signals=tuple(signals),
         dropped=tuple(
-            ("no vehicle" if is_ok else "stamp is not a number", int(row))
-            for is_ok, row in zip(unusable["time_ok"], unusable["row"], strict=True)
+            (_why_unusable(name, is_ok), int(row))
+            for name, is_ok, row in zip(
+                unusable["vehicle"], unusable["time_ok"], unusable["row"], strict=True
+            )
         ),
     )
+
+
+def _why_unusable(vehicle: str, is_timed: bool) -> str:
+    """Return why a row is left out."""
+    if not is_timed:
+        return "stamp is not a number"
+    return "marked as not valid" if vehicle else "no vehicle"
 
 
 def _observations(name: str, group: pd.DataFrame, position: tuple[str, str]) -> Observations:
@@ -419,6 +449,10 @@ def _observations(name: str, group: pd.DataFrame, position: tuple[str, str]) -> 
         kind=str(group["kind"].mode().iloc[0]) if "kind" in group else "",
         measured="speed" in group,
     )
+    if "height" in group:
+        observed = replace(observed, height=column("height"))
+    if "course" in group:
+        observed = replace(observed, course=column("course"))
     trailers = set(group["trailer"]) - _NO_TRAILER if "trailer" in group else set()
     return replace(observed, trailer_name=str(min(trailers, default="")))
 

@@ -80,6 +80,32 @@ READ = {  # name: rows as they are written, what a note says
         ROWS.assign(type=ROWS.id.map({"A": "car", "B": ""})).drop(columns=["h"]),
         "",
     ),
+    "rows that are not valid": (
+        ROWS.drop(columns="h").assign(
+            valid=(ROWS.t < START_S + 3.0) | (ROWS.t >= START_S + 3.8) | (ROWS.id == "B"),
+            x=lambda own: own.x + 6.0 * ~own.valid,
+        ),
+        "8 × marked as not valid",
+    ),
+    "pixels beside metres": (
+        ROWS[["t", "id", "x", "y"]].assign(
+            x_m=ROWS.x, y_m=ROWS.y, x=2.0 * ROWS.x + 900.0, y=700.0 - 2.0 * ROWS.y
+        ),
+        "x from x_m, y from y_m",
+    ),
+    "rear axles by their name": (
+        ROWS.assign(x=ROWS.x - 1.44 * np.cos(ROWS.h), y=ROWS.y - 1.44 * np.sin(ROWS.h)).rename(
+            columns={"x": "rear_axle_x", "y": "rear_axle_y"}
+        ),
+        "positions are those of the point rear_axle",
+    ),
+    "zeros before the first fix": (
+        ROWS.drop(columns=["h", "v"]).assign(
+            x=ROWS.x.where(ROWS.t > START_S + 1.0, 0.0),
+            y=ROWS.y.where(ROWS.t > START_S + 1.0, 0.0),
+        ),
+        "position is (0, 0)",
+    ),
     "two antennas": (
         pd.concat(
             [
@@ -132,6 +158,24 @@ DOUBTED = {  # name: rows as they are written, the option that reads them right
         "--set log.columns=lat=lon,lon=lat",
     ),
     "y points down": (ROWS.assign(y=-ROWS.y), "--set log.columns=y=-y"),
+    "y points down, vx and vy do not": (
+        ROWS.assign(y=-ROWS.y, vx=ROWS.v * np.cos(ROWS.h), vy=ROWS.v * np.sin(ROWS.h)).drop(
+            columns=["h", "v"]
+        ),
+        "--set log.columns=y=-y",
+    ),
+    "north first": (
+        ROWS.assign(x=ROWS.y, y=ROWS.x, heading_north_deg=north_degrees(ROWS)).drop(columns="h"),
+        "--set log.columns=x=y,y=x",
+    ),
+    "feet and km/h": (
+        ROWS.assign(x=ROWS.x / 0.3048, y=ROWS.y / 0.3048, v=ROWS.v * 3.6).drop(columns="h"),
+        "--set log.columns=x=x:ft,y=y:ft,speed=speed:kmh",
+    ),
+    "types that are no road users": (
+        ROWS.drop(columns="h").assign(type="unknown"),
+        "--set log.columns=kind=none",
+    ),
     "frames without speeds": (
         meeting(25.0)
         .assign(t=lambda own: ((own.t - START_S) * 25).round())[["t", "id", "x", "y"]]
@@ -145,15 +189,57 @@ DOUBTED = {  # name: rows as they are written, the option that reads them right
 def test_a_doubt_stops_with_the_option_that_reads_it_right(tmp_path, rows, option):
     path = tmp_path / "log.csv"
     rows.rename(columns=NAMES).to_csv(path, index=False)
-    with pytest.raises(DoubtError, match=re.escape(option)):
+    with pytest.raises(InputError, match=re.escape(option)):
         read_log(path)
     config = LogConfig(columns=option.partition("log.columns=")[2])
     (encounter,) = read_log(path, config).encounters
     start = None if encounter.start_ns > 1e18 else np.arange(0.0, 3.0, 0.04)
     errors = [distance(encounter, start_s=s) for s in ([None] if start is None else start)]
     assert min(errors) < 0.5
-    allowed = read_log(path, LogConfig(allow="doubt", travel=0.0, min_duration=1.0))
+
+
+def test_a_doubt_can_be_allowed(tmp_path):
+    rows, _ = DOUBTED["y points down"]
+    rows.rename(columns=NAMES).to_csv(tmp_path / "log.csv", index=False)
+    allowed = read_log(tmp_path / "log.csv", LogConfig(allow="doubt"))
     assert any(doubt.stops for doubt in allowed.doubts)
+
+
+STOPPED = {  # what no option reads right, and what is said
+    "each from its own start": (
+        ROWS.assign(
+            x=ROWS.x - ROWS.groupby("id").x.transform("first"),
+            y=ROWS.y - ROWS.groupby("id").y.transform("first"),
+        ),
+        "vehicles A, B all begin at 0, 0",
+    ),
+    "relative to one of them": (
+        ROWS.drop(columns="h").assign(
+            x=ROWS.x - ROWS.t.map(ROWS[ROWS.id == "A"].set_index("t").x),
+            y=ROWS.y - ROWS.t.map(ROWS[ROWS.id == "A"].set_index("t").y),
+        ),
+        "vehicle A stays at 0, 0 while it drives",
+    ),
+    "one of two in feet": (
+        ROWS.drop(columns="h").assign(
+            x=ROWS.x / np.where(ROWS.id == "A", 0.3048, 1.0),
+            y=ROWS.y / np.where(ROWS.id == "A", 0.3048, 1.0),
+        ),
+        "0.30 times for vehicle A, 1.00 times for vehicle B",
+    ),
+    "pixels": (
+        ROWS[["t", "id", "x", "y"]].assign(x=20.0 * ROWS.x, y=20.0 * ROWS.y),
+        "180 m/s by x, y: are they pixels",
+    ),
+    "a bridge": (ROWS.assign(z=np.where(ROWS.id == "A", 300.0, 308.5)), "8.5 m apart in height"),
+}
+
+
+@pytest.mark.parametrize(("rows", "said"), STOPPED.values(), ids=STOPPED)
+def test_a_contradiction_stops(tmp_path, rows, said):
+    rows.rename(columns=NAMES).to_csv(tmp_path / "log.csv", index=False)
+    with pytest.raises(InputError, match=said):
+        read_log(tmp_path / "log.csv")
 
 
 def test_a_stretch_of_wrong_speeds_is_a_doubt_that_does_not_stop(tmp_path):

@@ -207,7 +207,9 @@ SAID = {  # what is read, but looks otherwise
     ),
     "overlaps": (
         lambda rows: rows.assign(
-            x_m=rows.x_m.where(rows.vehicle_id == "a", 1.05 * rows.x_m.shift(1) + 2.0), y_m=0.0
+            x_m=rows.x_m.where(rows.vehicle_id == "a", 1.05 * rows.x_m.shift(1) + 2.0),
+            y_m=0.0,
+            speed_mps=np.nan,
         ),
         "overlap",
     ),
@@ -217,7 +219,7 @@ SAID = {  # what is read, but looks otherwise
     ),
     "swapped axes": (
         lambda rows: with_headings(rows).rename(columns={"x": "y", "y": "x"}),
-        "if x and y are swapped (log.columns=x=…,y=…)",
+        "if x and y are swapped: --set log.columns=x=y,y=x",
     ),
     "km/h": (
         lambda rows: plain(rows).assign(speed=lambda own: own.speed * 3.6),
@@ -365,7 +367,7 @@ REFUSED = {  # name: what is changed, what is said, how the file is written
     ),
     "hours": (
         lambda rows: rows.assign(t_s=(rows.t_s - 1000.0) / 3600.0),
-        "the time may be in h: --set log.columns=time=t_s:h",
+        "the time may be in h; --set log.columns=time=t_s:h",
     ),
     "degrees and minutes": (nmea, "lat=lat_deg:ddmm,lon=lon_deg:ddmm"),
     "1e-7 degrees": (
