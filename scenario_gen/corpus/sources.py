@@ -90,6 +90,7 @@ def message_table(path: Path, option: str = "") -> MessageTable | None:
             return None
         sample = _parquet_sample(path) if is_parquet(path) else _text_sample(path)
         columns = find_columns(sample.header, path, option)
+        columns.pop("height", None)  # a bridge between two receivers is not told from their noise
     except (InputError, OSError):  # the reader of logs names the reason
         return None
     stamp = _stamp_type(sample, columns)

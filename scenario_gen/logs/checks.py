@@ -147,6 +147,8 @@ def _rigid_distance(encounter: Encounter, a: int, b: int) -> float | None:
     if not len(offset) or np.hypot(*offset.T).max() > reach:
         return None
     along, across = ahead_and_left(offset, encounter.heading[a, common])
+    if np.median(np.abs(across)) > min(vehicle.width for vehicle in vehicles):
+        return None  # abreast
     driven = float(encounter.speed[a, common].sum() * encounter.dt)
     spread = max(float(np.ptp(np.percentile(axis, [5.0, 95.0]))) for axis in (along, across))
     if driven < _LIMITS.min_travel_m or spread > _LIMITS.rigid_m:

@@ -37,6 +37,7 @@ class CleaningLimits:
         min_speed_share: share of a measured speed that the positions of a moving vehicle confirm
             at least, in whatever unit the speed is.
         relocation_count: fixes in a row that agree with each other and are then a new place.
+        reversed_share: of the steps of time that go back if the newest rows come first.
         min_first_jump_m: from 0, 0 to the first real place.
     """
 
@@ -48,6 +49,7 @@ class CleaningLimits:
     moving_mps: float = 1.0
     min_speed_share: float = 0.2
     relocation_count: int = 5
+    reversed_share: float = 0.95
     min_first_jump_m: float = 10.0
 
 
@@ -408,8 +410,8 @@ def _without_repeats(vehicle: Observations, drops: Drops, geographic: bool) -> O
 def _check_clock(vehicles: Sequence[Observations], log: RawLog, config: LogConfig) -> None:
     """Check that the common clock has at most `tick_limit` ticks, and the likely unit of time.
 
-    The clock has a tick for every period between a vehicle's first and last stamp: with one wrong
-    stamp these may be years apart, and the clock would need hundreds of gibibytes.
+    The clock has a tick for every period in which a vehicle is recorded; smoothing needs memory
+    for each.
 
     Args:
         vehicles: observations with stamps in order.
@@ -429,18 +431,33 @@ def _check_clock(vehicles: Sequence[Observations], log: RawLog, config: LogConfi
             f"{log.where(int(vehicles[0].fix_row[1]))}: positions are {period:g} s apart "
             f"(median); a track needs at most {CLEANING.max_period_s:g} s; check the unit of time"
         )
-    spans = [int(vehicle.fix_ns[-1]) - int(vehicle.fix_ns[0]) for vehicle in vehicles]
+    spans = [_covered_ns(np.diff(vehicle.fix_ns), config) for vehicle in vehicles]
     n_ticks = round(sum(spans) / (config.period * 1e9))
     if n_ticks > config.tick_limit:
         longest = vehicles[int(np.argmax(spans))]
-        row = int(np.argmax(np.diff(longest.fix_ns))) + 1
-        gap_ns = int(longest.fix_ns[row]) - int(longest.fix_ns[row - 1])
         raise InputError(
-            f"{log.where(int(longest.fix_row[row]))}: the stamp of vehicle {longest.id[:50]} is "
-            f"{gap_ns * 1e-9:g} s after the previous one, so the common clock needs {n_ticks} "
-            f"ticks of {config.period:g} s (limit {config.tick_limit}): correct the stamp, cut "
-            "the log (log.start, log.end), or raise --set log.tick_limit=…"
+            f"{log.where(int(longest.fix_row[0]))}: vehicle {longest.id[:50]} and others are "
+            f"recorded for {n_ticks} ticks of {config.period:g} s (limit {config.tick_limit}): "
+            "cut the log (log.start, log.end), or raise --set log.tick_limit=…"
         )
+
+
+def _covered_ns(steps: Ints, config: LogConfig) -> int:
+    """Return the time in which a vehicle is recorded without long gaps; its track is cut there."""
+    longest_s = max(config.longest_gap, 2.5 * CLEANING.max_period_s)
+    return int(steps[steps <= longest_s * 1e9].sum())
+
+
+def newest_last(log: RawLog) -> RawLog:
+    """Return a log in order of time if its rows are from the newest to the oldest, with a note."""
+    steps = [np.diff(vehicle.fix_ns) for vehicle in log.vehicles if len(vehicle.fix_ns) > 2]
+    if not steps or (np.concatenate(steps) < 0).mean() < CLEANING.reversed_share:
+        return log
+    vehicles = tuple(
+        select(v, np.arange(len(v.fix_ns))[::-1], np.arange(len(v.speed_ns))[::-1])
+        for v in log.vehicles
+    )
+    return replace(log, vehicles=vehicles, notes=(*log.notes, "the newest rows come first"))
 
 
 def _without_jumps(vehicle: Observations, drops: Drops, geographic: bool) -> Observations:

@@ -20,6 +20,15 @@ from scenario_gen.numerics import Bools, Floats, Ints
 
 _S_TO_NS = 10**9
 _MAX_STAMP_NS = 2**62  # years 1823 to 2116: differences of two stamps fit into 64 bits
+_COUNTERS_NS = (  # of 16 and 32 bits in ms, µs and ns; a minute, an hour, a day
+    65_536_000_000,
+    4_294_967_296_000_000,
+    4_294_967_296_000,
+    4_294_967_296,
+    60 * _S_TO_NS,
+    3_600 * _S_TO_NS,
+    86_400 * _S_TO_NS,
+)
 _SAME_STEP_NS = 2_000_000_000  # steps of two vehicles that are this near are the same
 
 
@@ -79,7 +88,7 @@ def is_out_of_range(stamps: Ints) -> Bools:
 
 def retimed(log: RawLog, config: LogConfig) -> tuple[RawLog, list[str]]:
     """Return the log on a clock that increases, from 1970 on; and notes on what was shifted."""
-    notes = []
+    log, notes = _unwrapped(log)
     by_vehicle = [_vehicle_steps(vehicle, log) for vehicle in log.vehicles]
     if any(by_vehicle):
         parts = _parts_by_row(log, by_vehicle) or _parts_by_vehicle(log, by_vehicle)
@@ -102,6 +111,28 @@ def retimed(log: RawLog, config: LogConfig) -> tuple[RawLog, list[str]]:
         log = _shifted(log, [(shift, shift)] * len(log.vehicles))
         notes.append(f"times begin before 1970, or before an event: {seconds} s are added to all")
     return log, notes
+
+
+def _unwrapped(log: RawLog) -> tuple[RawLog, list[str]]:
+    """Return a log whose counter of time, or time of day, begins again, as one that grows."""
+    steps = [np.diff(vehicle.fix_ns) for vehicle in log.vehicles if len(vehicle.fix_ns) > 2]
+    backward = np.concatenate([step[step < 0] for step in steps] or [np.zeros(0, int)])
+    forward = np.concatenate([step[step > 0] for step in steps] or [np.zeros(0, int)])
+    if not len(backward) or not len(forward):
+        return log, []
+    usual_ns = 2.0 * float(np.median(forward))
+    for period_ns in _COUNTERS_NS:
+        is_wrap = (backward + period_ns > 0) & (backward + period_ns <= usual_ns)
+        if not is_wrap.all():
+            continue
+
+        def shifts(stamps: Ints, period_ns: int = period_ns) -> Ints:
+            turns = np.concatenate([[0], np.cumsum(np.diff(stamps) < -period_ns // 2)])
+            return np.asarray(turns[: len(stamps)] * period_ns)
+
+        log = _shifted(log, [(shifts(v.fix_ns), shifts(v.speed_ns)) for v in log.vehicles])
+        return log, [f"the time begins again after {period_ns / _S_TO_NS:g} s: read as one clock"]
+    return log, []
 
 
 def _shifted(log: RawLog, shifts: Sequence[tuple[Ints, Ints]]) -> RawLog:

@@ -162,6 +162,8 @@ def find_columns(header: Sequence[str], path: Path, option: str) -> dict[str, Co
         if column is not None:
             columns[quantity] = column
     time = columns.get("time")
+    if time and time.is_gentime:  # receivers of SPMD have heights of little worth
+        columns.pop("height", None)
     if time and time.is_gentime and "heading" in columns:
         name = columns["heading"].name
         columns["heading"] = Column(name, math.pi / 180.0, clockwise=True)
@@ -321,6 +323,18 @@ def _complete(columns: dict[str, Column], path: Path, header: Sequence[str]) -> 
     return {quantity: column for quantity, column in columns.items() if quantity not in ignored}
 
 
+def _wide_hint(header: Sequence[str]) -> str:
+    """Return a hint if each vehicle has columns of its own; else ""."""
+    names = {normalized(name) for name in header}
+    wide = sorted(name[2:] for name in names if name.startswith("x_") and f"y_{name[2:]}" in names)
+    if len(wide) < 2 or set(wide) & set(UNITS["x"]):
+        return ""
+    return (
+        f". Vehicles {', '.join(wide)} have columns of their own: write a row for each vehicle "
+        "and time, with a column id"
+    )
+
+
 def _missing_column(
     missing: str,
     quantities: Sequence[str],
@@ -331,6 +345,8 @@ def _missing_column(
     """Return the error on a missing column, with all options that the next command needs."""
     needed = ["time", "vehicle"] if "time" in quantities else ["x", "y", "time", "vehicle"]
     remedy = ",".join(f"{name}=…" for name in needed if name in "xy" or name not in columns)
+    if hint := _wide_hint(header):
+        return UnknownFormatError(f"{path} has no column for {missing}{hint}")
     aliases = {alias for quantity in quantities for alias in NAMES[quantity]}
     return UnknownFormatError(
         f"{path} has no column for {missing}; it has {', '.join(header)}. Rename it, or name it "

@@ -104,6 +104,7 @@ _REST_S = 2.0  # part of a long standstill that belongs to the encounter before 
 _STANDING_MPS = 0.1
 _MAX_MEETING_COUNT = 200_000  # grouping takes minutes for more
 _MAX_HEIGHT_M = 4.0  # between two vehicles of one road; more is a bridge
+_MAX_ALTITUDE_M = 6.0  # the same by satellites, whose heights are less exact
 _NOISE_M = 50.0  # by which the distance of two vehicles may be wrong before smoothing
 
 
@@ -276,7 +277,7 @@ def _find_meetings(
     for i, j in near_pairs(pieces, shortest(config), config.proximity):
         a, b = pieces[i], pieces[j]
         climb = height_apart(a.smooth.position, a.height, b.smooth.position, b.height)
-        if climb > _MAX_HEIGHT_M:
+        if climb > (_MAX_HEIGHT_M if a.track.origin is None else _MAX_ALTITUDE_M):
             notes.append(
                 f"vehicles {a.track.id} and {b.track.id} are {climb:.1f} m apart in height where "
                 "they are nearest: no pair"

@@ -18,7 +18,7 @@ from scenario_gen.base.errors import InputError, printable, reading
 from scenario_gen.base.folders.scratch import scratch
 from scenario_gen.base.parameters import updated
 from scenario_gen.logs.checks import copies_in, doubts_of_pieces, doubts_of_rows
-from scenario_gen.logs.cleaning import clean, Drops
+from scenario_gen.logs.cleaning import clean, Drops, newest_last
 from scenario_gen.logs.clock import retimed
 from scenario_gen.logs.config import chosen_vehicles, LogConfig
 from scenario_gen.logs.encounters import Piece, pieces_of, plausible
@@ -167,7 +167,7 @@ def encounters_of(
     """
     if log.encounters:
         return LogResult(*recorded_encounters(log, config))
-    log, unit_notes, unit_doubts = interpret(log, config)
+    log, unit_notes, unit_doubts = interpret(newest_last(log), config)
     check_doubts(log.segments[0].label, [*log.doubts, *unit_doubts], config.allow)
     log = typed(log, config)
     recorded_ns = log.vehicles[0].fix_ns[:1]

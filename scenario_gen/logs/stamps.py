@@ -23,6 +23,7 @@ MAX_DATE_LENGTH_COUNT = 64  # characters; pandas takes minutes for a date of 100
 _USUAL_PERIOD_S = (0.005, 2.0)
 _DAY_S = 86_400.0
 _CLOCK_TIME = r"\s*\d{1,2}:\d{2}:\d{2}(?:[.,]\d+)?\s*"
+_DECIMAL_COMMA = r"^(\s*[-+]?\d*),(\d+)\s*$"
 _COMPACT_DATE = r"\d{6}|\d{8}"  # ddmmyy as of NMEA, yyyymmdd
 
 Stamps = tuple["pd.Series[int]", "pd.Series[bool]"]
@@ -31,7 +32,8 @@ Stamps = tuple["pd.Series[int]", "pd.Series[bool]"]
 def reals(values: "pd.Series[Any]") -> "pd.Series[float]":
     """Return numbers, or texts that are numbers, as float64; NaN for others."""
     if not pd.api.types.is_numeric_dtype(values):
-        values = values.where(values.astype(str).str.len() < MAX_NUMBER_LENGTH_COUNT)
+        texts = values.where(values.astype(str).str.len() < MAX_NUMBER_LENGTH_COUNT)
+        values = texts.replace(_DECIMAL_COMMA, r"\1.\2", regex=True)
     return pd.to_numeric(values, errors="coerce").astype(float)
 
 

@@ -10,6 +10,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 import math
 from pathlib import Path
+import re
 from typing import Any
 
 import numpy as np
@@ -25,7 +26,14 @@ from scenario_gen.logs.columns import (
 )
 from scenario_gen.logs.config import LogConfig, POINTS
 from scenario_gen.logs.kinds import MAX_LENGTH_M
-from scenario_gen.logs.raw import check_size, check_vehicles, Observations, RawLog, Segment
+from scenario_gen.logs.raw import (
+    check_size,
+    check_vehicles,
+    Observations,
+    RawLog,
+    Segment,
+    UnknownFormatError,
+)
 from scenario_gen.logs.signals import RawSignal, signals_of_table
 from scenario_gen.logs.stamps import read_stamps, reals
 from scenario_gen.logs.table_parts import (
@@ -44,6 +52,8 @@ SPMD_EPOCH_NS = 1_072_915_200 * 10**9
 _PARQUET_SUFFIXES = (".parquet", ".pq")
 _FEW_ROW_COUNT = 10  # each of them may belong to another vehicle
 _NO_TRAILER = frozenset(("", "0", "False", "false", "no", "none"))
+_SECONDS = re.compile(r"(.*?)secs?", re.IGNORECASE)
+_NANOSECONDS = re.compile(r".*n(?:ano)?_?secs?", re.IGNORECASE)
 _NOT_VALID = frozenset(("false", "no", "invalid", "v", "n"))  # V is void, as of NMEA
 _STANDING_M = 0.05  # no vehicle of an encounter drives less
 
@@ -70,7 +80,13 @@ def read(paths: Sequence[Path], config: LogConfig) -> RawLog:
         if not has_window(path, config):
             n_bytes += path.stat().st_size
         check_size(str(path), n_bytes, n_read, config)
-        frame, columns, header_lines, names = _read_named(path, n_read, config, notes)
+        try:
+            frame, columns, header_lines, names = _read_named(path, n_read, config, notes)
+        except UnknownFormatError as error:
+            if len(paths) == 1 or (path == paths[-1] and not frames):
+                raise
+            notes.append(f"not read: {error}")
+            continue
         separators |= dict.fromkeys(names)
         if "vehicle" not in frame:
             frame["vehicle"] = "0" if len(paths) == 1 else path.stem
@@ -151,7 +167,10 @@ def _read_text_columns(
     if layout.names:
         options |= {"skiprows": layout.above + 1, "names": list(layout.names), "header": None}
     header = [str(name) for name in read_text(path, rows_before, config, **options, nrows=0)]
-    columns = find_columns(header, path, config.columns)
+    seconds = _seconds_and_nanoseconds(header)
+    is_split = bool(seconds) and "time=" not in config.columns and not has_window(path, config)
+    option = f"{config.columns},time={seconds[0]}:ns" if is_split else config.columns
+    columns = find_columns(header, path, option)
     # Numbers of 64 bits, or in hexadecimal, are not float64.
     texts = ("vehicle", "kind", "trailer", "scene", "date", "signal", "signal_id")
     names = [columns[quantity].name for quantity in texts if quantity in columns]
@@ -160,7 +179,21 @@ def _read_text_columns(
         frame = read_window(path, columns, config, options)
     else:
         frame = read_text(path, rows_before, config, **options)
+    if is_split:
+        whole, part = (frame[name] for name in seconds)
+        frame[seconds[0]] = whole * 10**9 + part
     return with_hemispheres(frame, columns), columns, header
+
+
+def _seconds_and_nanoseconds(header: Sequence[str]) -> list[str]:
+    """Return the columns of a stamp's seconds and nanoseconds, as bags write them, or none."""
+    for name in header:
+        match = _SECONDS.fullmatch(name)
+        rest = [other for other in header if match and other.startswith(match[1])]
+        nanoseconds = [other for other in rest if _NANOSECONDS.fullmatch(other)]
+        if nanoseconds:
+            return [name, nanoseconds[0]]
+    return []
 
 
 def _ignore_unknown_numbers(

@@ -20,6 +20,10 @@ _NUMBER = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?")
 _NUMBER_WITH_COMMA = re.compile(r"[-+]?\d*,\d+")
 
 
+_POSE_COLUMNS = ("timestamp", "x", "y", "z", "qx", "qy", "qz", "qw")
+_POSE_NOTE = "the file has no header: read as the trajectory of one vehicle, as of TUM"
+_MAX_LENGTH_ERROR = 0.01  # of the quaternion of a rotation
+_UNNAMED = "unnamed"
 SPMD_COLUMNS = [
     "RxDevice",
     "FileId",
@@ -43,7 +47,12 @@ SPMD_COLUMNS = [
 ]
 """Columns of basic safety messages in the Safety Pilot Model Deployment, which has no header."""
 
-READ_OPTIONS = {"skipinitialspace": True, "skip_blank_lines": False, "compression": None}
+READ_OPTIONS = {
+    "skipinitialspace": True,
+    "skip_blank_lines": False,
+    "compression": None,
+    "low_memory": False,
+}
 """How pandas reads every text table: a row for each line, and no archive by its suffix."""
 
 
@@ -113,11 +122,16 @@ def layout_of(path: Path) -> Layout:
     pattern = separator if separator == _WHITE_SPACE else re.escape(separator)
     first = re.split(pattern, header.strip())
     names = _names_in_comment(lines[above - 1], pattern, first) if above else ()
+    ends = [row.rstrip() for row in rows if row.strip()]
     if names:
         above -= 1
         rows = [header, *rows]
+    elif _is_pose(first) and separator == _WHITE_SPACE:
+        return Layout(encoding, separator, above=-1, names=_POSE_COLUMNS, notes=(_POSE_NOTE,))
     else:
         _check_names(first, path, above + 1)
+        if ends and all(end.endswith(separator) for end in ends) and first[-1]:
+            names = (*first, _UNNAMED)  # of the field behind the separator at the end of rows
 
     fields = [field.strip() for row in rows for field in re.split(pattern, row)]
     has_comma = separator != "," and any(map(_NUMBER_WITH_COMMA.fullmatch, fields))
@@ -137,6 +151,13 @@ def _names_in_comment(line: str, pattern: str, first: list[str]) -> tuple[str, .
         if len(names) == len(first) and all(names) and not _are_numbers(names):
             return tuple(names)
     return ()
+
+
+def _is_pose(fields: list[str]) -> bool:
+    """Return whether the fields of a row are a stamp, a place and a rotation, as of TUM."""
+    if len(fields) != len(_POSE_COLUMNS) or not all(map(_NUMBER.fullmatch, fields)):
+        return False
+    return abs(sum(float(field) ** 2 for field in fields[4:]) - 1.0) < _MAX_LENGTH_ERROR
 
 
 def _are_numbers(fields: list[str]) -> bool:
