@@ -3,7 +3,6 @@
 
 """Raw files and bags -> encounters (paper II-A)."""
 
-from scenario_gen.logs.cleaning import parse_origin
 from scenario_gen.logs.config import LogConfig
 from scenario_gen.logs.files import read_raw
 from scenario_gen.logs.formats import is_log, LOG_FORMATS, LogFormat
@@ -14,6 +13,7 @@ from scenario_gen.logs.geodesy import (
     local_frame,
     metres_per_degree,
     middle_of,
+    parse_origin,
     reprojected,
     utm,
 )

@@ -15,7 +15,7 @@ from scipy.ndimage import median_filter
 from scenario_gen.base.errors import InputError
 from scenario_gen.logs.clock import is_out_of_range
 from scenario_gen.logs.config import chosen_vehicles, LogConfig
-from scenario_gen.logs.geodesy import local_frame, middle_of, on_sphere, sites_of
+from scenario_gen.logs.geodesy import local_frame, middle_of, on_sphere, parse_origin, sites_of
 from scenario_gen.logs.kinds import with_sizes
 from scenario_gen.logs.quality import Dropped
 from scenario_gen.logs.raw import Observations, RawLog
@@ -303,23 +303,6 @@ def in_metres(vehicles: Sequence[Observations], config: LogConfig) -> list[Obser
             fix = local_frame(part.fix[:, 0], part.fix[:, 1], origins[k])
             projected.append(replace(part, fix=fix, origin=origins[k]))
     return projected
-
-
-def parse_origin(text: str, parameter: str = "origin") -> tuple[float, float]:
-    """Return latitude and longitude [degrees] of a text `latitude,longitude`.
-
-    Raises:
-        InputError: it does not have that form, or is not on the globe; names the parameter.
-    """
-    try:
-        latitude, longitude = (float(part) for part in text.split(","))
-    except ValueError as error:
-        raise InputError(
-            f"parameter {parameter} is {text!r}; write latitude,longitude in degrees"
-        ) from error
-    if not (abs(latitude) <= 90.0 and abs(longitude) <= 180.0):
-        raise InputError(f"parameter {parameter} is {text!r}; that is not a place on Earth")
-    return latitude, longitude
 
 
 def _in_order(vehicle: Observations, log: RawLog, drops: Drops) -> Observations:

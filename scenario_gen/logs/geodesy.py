@@ -163,3 +163,20 @@ def latitude_longitude(encounter: Encounter) -> Floats:
             "no latitudes and longitudes"
         )
     return np.stack(geodetic(encounter.position, encounter.origin), axis=-1)
+
+
+def parse_origin(text: str, parameter: str = "origin") -> tuple[float, float]:
+    """Return latitude and longitude [degrees] of a text `latitude,longitude`.
+
+    Raises:
+        InputError: it does not have that form, or is not on the globe; names the parameter.
+    """
+    try:
+        latitude, longitude = (float(part) for part in text.split(","))
+    except ValueError as error:
+        raise InputError(
+            f"parameter {parameter} is {text!r}; write latitude,longitude in degrees"
+        ) from error
+    if not (abs(latitude) <= 90.0 and abs(longitude) <= 180.0):
+        raise InputError(f"parameter {parameter} is {text!r}; that is not a place on Earth")
+    return latitude, longitude

@@ -22,7 +22,7 @@ _NUMBER_WITH_COMMA = re.compile(r"[-+]?\d*,\d+")
 
 _POSE_COLUMNS = ("timestamp", "x", "y", "z", "qx", "qy", "qz", "qw")
 _POSE_NOTE = "the file has no header: read as the trajectory of one vehicle, as of TUM"
-_MAX_LENGTH_ERROR = 0.01  # of the quaternion of a rotation
+_MAX_LENGTH_ERROR_RATIO = 0.01  # of the quaternion of a rotation
 _UNNAMED = "unnamed"
 SPMD_COLUMNS = [
     "RxDevice",
@@ -157,7 +157,7 @@ def _is_pose(fields: list[str]) -> bool:
     """Return whether the fields of a row are a stamp, a place and a rotation, as of TUM."""
     if len(fields) != len(_POSE_COLUMNS) or not all(map(_NUMBER.fullmatch, fields)):
         return False
-    return abs(sum(float(field) ** 2 for field in fields[4:]) - 1.0) < _MAX_LENGTH_ERROR
+    return abs(sum(float(field) ** 2 for field in fields[4:]) - 1.0) < _MAX_LENGTH_ERROR_RATIO
 
 
 def _are_numbers(fields: list[str]) -> bool:

@@ -319,6 +319,57 @@ def test_lines_above_the_header(tmp_path, above):
     assert str(result.quality.dropped[0]).endswith(f"log.csv, line {above.count(chr(10)) + 5}")
 
 
+def pose_lines(rows):
+    """Rows of one vehicle as TUM writes them: no header; stamp, place, rotation."""
+    return "".join(f"{r.t_s:.1f} {r.x_m} {r.y_m} 0 0 0 0 1\n" for r in rows.itertuples())
+
+
+LAYOUTS = {  # the text of a table, as people have it
+    "a separator at the end of each row": lambda text: text.replace("\n", ",\n").replace(
+        ",\n", "\n", 1
+    ),
+    "decimal commas in quotes": lambda text: re.sub(r"(-?\d+)\.(\d+)", r'"\1,\2"', text),
+    "newest first": lambda text: "\n".join([text.split("\n")[0], *text.split("\n")[:0:-1]]),
+    "seconds and nanoseconds": lambda text: re.sub(
+        r"(?m)^(\d+)\.(\d)", r"\1,\g<2>00000000", text.replace("t_s", "stamp.sec,stamp.nanosec")
+    ),
+    "a counter of 16 bits": lambda text: re.sub(
+        r"(?m)^(\d+)\.(\d)",
+        lambda found: str((int(found[1] + found[2]) * 100 - 940_000) % 65_536),
+        text.replace("t_s", "t_ms"),
+    ),
+}
+
+
+@pytest.mark.parametrize("layout", LAYOUTS.values(), ids=LAYOUTS)
+def test_layouts_of_tables(tmp_path, layout):
+    path = save(crossing().round(6), tmp_path)
+    (plain,) = read_log(path).encounters
+    path.write_text(layout(path.read_text()))
+    (encounter,) = read_log(path).encounters
+    np.testing.assert_allclose(encounter.position[:, 5:-5], plain.position[:, 5:-5], atol=0.5)
+
+
+def test_files_that_are_no_tables_and_days_apart(tmp_path):
+    for name in "ab":
+        (tmp_path / f"{name}.txt").write_text(pose_lines(crossing().query("vehicle_id == @name")))
+    (tmp_path / "notes.txt").write_text("hello\n")
+    result = read_log(tmp_path)
+    assert result.encounters[0].ids == ("a", "b")
+    assert any(
+        note.startswith("not read: ") and "notes.txt" in note for note in result.quality.notes
+    )
+    days = [crossing(start=86_400.0 * k) for k in (20_000, 20_007, 20_014)]
+    paths = [save(day, tmp_path, f"day{k}.csv") for k, day in enumerate(days)]
+    assert len(read_log(paths).encounters) == 3
+
+
+def test_vehicles_abreast_are_two(tmp_path):
+    rows = crossing().query("vehicle_id == 'a'")
+    both = pd.concat([rows, rows.assign(vehicle_id="c", y_m=3.2)])
+    assert read_log(save(both, tmp_path)).encounters[0].ids == ("a", "c")
+
+
 @pytest.mark.parametrize("ending", ["gz", "zip"])
 def test_packed_logs(tmp_path, ending):
     crossing().to_csv(
