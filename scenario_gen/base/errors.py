@@ -5,10 +5,12 @@
 
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
+import copyreg
 from difflib import get_close_matches
 import errno
 from importlib.util import find_spec
 import sys
+from typing import Any
 
 MAX_INPUT_CHARACTERS = 500  # of a message about an input; quotations from files have any length
 MAX_REFUSAL_CHARACTERS = 2_000  # of a refusal, which may join several reasons
@@ -25,6 +27,10 @@ class ScenarioGenError(Exception):
     """
 
     exit_code = 2
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        # By default an error is unpickled from its lines alone, but some take further arguments.
+        return copyreg.__newobj__, (type(self), *self.args), self.__dict__  # type: ignore[attr-defined]
 
     def __str__(self) -> str:
         return "\n".join(printable(str(line)) for line in self.args)

@@ -65,7 +65,7 @@ def outcome_sets(
         try:
             results.append(generate(decided(encounter, decision), size))
         except RefusedError as error:
-            notes.append(Note.of(NoteKind.OUTCOME_REFUSED, decision=decision, reason=error))
+            notes.append(Note.of(NoteKind.OUTCOME_REFUSED, decision=decision, reason=str(error)))
             sizes[k:] += drawn_sizes((*others, recorded)[k:], size, seed)
     if sizes[-1]:
         results.insert(0, generate(decided(encounter, recorded), int(sizes[-1])))

@@ -88,7 +88,7 @@ def fitting_part(
     if part is None:
         search.add_remedy(refusal)
         raise refusal
-    return part, Note.of(NoteKind.SHORTENED, parts=in_words(encounter, part), reason=refusal)
+    return part, Note.of(NoteKind.SHORTENED, parts=in_words(encounter, part), reason=str(refusal))
 
 
 def cut(encounter: Encounter, windows: Floats) -> Encounter:

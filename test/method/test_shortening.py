@@ -4,13 +4,14 @@
 """A recording that is too long for a road is shortened to its interaction."""
 
 from pathlib import Path
+import pickle
 
 import numpy as np
 import pytest
 from support.reaction_scenes import along
 
 from scenario_gen import read_log
-from scenario_gen.base.errors import RefusedError
+from scenario_gen.method.chain import EmptySetError
 from scenario_gen.method.shortening import cut, fit_what_matters
 from scenario_gen.numerics.rounding import ROUNDING_S
 from scenario_gen.situation import (
@@ -43,7 +44,7 @@ def test_the_smallest_loss_that_fits_is_used_and_noted(crossing: Encounter) -> N
         calls.append(count)
         longest = max(track.travelled for track in Situation.of(template).tracks)
         if longest > limit:
-            raise RefusedError("too long")
+            raise EmptySetError("too long", result_of(template))
         return result_of(template)
 
     situation = Situation.of(crossing)
@@ -55,13 +56,21 @@ def test_the_smallest_loss_that_fits_is_used_and_noted(crossing: Encounter) -> N
     assert keeps_interaction(situation, Situation.of(result.encounter))
     (note,) = result.generated.adaptations
     assert note.kind is NoteKind.SHORTENED and f"of {crossing.duration:.1f} s" in str(note)
+    assert dict(note.values)["reason"] == "too long"
+    copied = pickle.loads(pickle.dumps(result))
+    assert list(map(str, copied.generated.adaptations)) == [str(note)]
 
     loose = fit_what_matters(short_road, crossing, 7, attempt=lambda part: part)
     assert np.array_equal(loose.encounter.position, result.encounter.position)
 
     limit = 1.0
-    with pytest.raises(RefusedError, match=r"too long. Shortened to its interaction .* within"):
+    with pytest.raises(
+        EmptySetError, match=r"too long. Shortened to its interaction .* within"
+    ) as caught:
         fit_what_matters(short_road, crossing, 7)
+    error = pickle.loads(pickle.dumps(caught.value))
+    assert (type(error), error.args) == (EmptySetError, caught.value.args)
+    assert error.result.encounter.duration == caught.value.result.encounter.duration
 
 
 def test_each_vehicle_keeps_its_events(crossing: Encounter) -> None:

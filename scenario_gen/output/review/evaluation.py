@@ -183,7 +183,7 @@ def _evaluate(
     try:
         return replace(checked, result=_result(namespace, checked, scenarios, config))
     except InputError as error:
-        notes.append(Note.of(NoteKind.NOT_MEASURED, reason=error))
+        notes.append(Note.of(NoteKind.NOT_MEASURED, reason=str(error)))
         return replace(checked, notes=tuple(notes))
 
 
