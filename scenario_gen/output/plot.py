@@ -186,18 +186,19 @@ def _draw_lanes(axes: "Axes", network: LaneNetwork) -> None:
     for marking, lines in markings(network).items():
         for line in lines:
             axes.plot(*line.T, color=_PAINT.get(marking, "#64748b"), linewidth=1.0, zorder=0.7)
-    for numbers, ends, colour in (
-        (network.entries, slice(None, 2), "#15803d"),
-        (network.exits, slice(-2, None), "#b91c1c"),
-    ):
-        for k in numbers:
-            tail, head = network.lanes[k].centre[ends]
-            arrow = {"arrowstyle": "-|>", "color": colour, "mutation_scale": 15}
-            axes.annotate("", head, tail, arrowprops=arrow)
+    _draw_arrows(axes, [network.lanes[k].centre[:2] for k in network.entries], "#15803d")
+    _draw_arrows(axes, [network.lanes[k].centre[-2:] for k in network.exits], "#b91c1c")
     for name in {lane.junction for lane in network.lanes if lane.junction and not network.drawn}:
         inside = [lane.centre.mean(axis=0) for lane in network.lanes if lane.junction == name]
         x, y = np.mean(inside, axis=0)
         axes.text(x, y, name)
+
+
+def _draw_arrows(axes: "Axes", arrows: Sequence[Floats], colour: str) -> None:
+    """Draw arrows, each from a point to another (2, 2) [m]."""
+    for tail, head in arrows:
+        shape = {"arrowstyle": "-|>", "color": colour, "mutation_scale": 15}
+        axes.annotate("", head, tail, arrowprops=shape)
 
 
 def _draw_places(

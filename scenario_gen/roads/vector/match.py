@@ -191,18 +191,14 @@ def _candidates(
     graph: LaneGraph, track: Track, poses: Floats, driven: float, ends: tuple[str, str]
 ) -> Iterator[_Candidate]:
     """Yield the chains from lanes near the first pose, or from the lane with the id `ends[0]`."""
-    lanes, closed = graph.network.lanes, graph.closed_to(track)
-    entry, leave = ends
-    exits = {k for k, lane in enumerate(lanes) if lane.id == leave} if leave else None
-    firsts = [k for k, lane in enumerate(lanes) if lane.id == entry] if entry else []
-    if not firsts:
-        firsts = [k for k in graph.near(poses[0]) if k not in closed]
-    chains = (
-        chain
-        for first in firsts
-        for chain in graph.chains_from(first, driven, closed)
-        if exits is None or exits.intersection(chain)
+    closed = graph.closed_to(track)
+    firsts, lasts = (
+        {k for k, lane in enumerate(graph.network.lanes) if name and lane.id == name}
+        for name in ends
     )
+    starts = sorted(firsts) or [k for k in graph.near(poses[0]) if k not in closed]
+    chains = (chain for k in starts for chain in graph.chains_from(k, driven, closed))
+    chains = (chain for chain in chains if not ends[1] or lasts.intersection(chain))
     for chain in dict.fromkeys(islice(chains, LIMITS.chains)):
         curve = _part_around(graph.curve(chain), poses, driven)
         costs = _pose_costs(curve, poses)
