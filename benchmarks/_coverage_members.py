@@ -34,6 +34,7 @@ from scenario_gen.situation import EncounterKind
 from scenario_gen.types import Encounter, Interval, join_ego, Scenario
 
 KINDS = tuple(EncounterKind)
+MIN_UNSEEN_COUNT, MIN_UNSEEN_SESSIONS = 10, 2  # of a draw that counts
 MIN_RADIUS_RATIO = 0.05  # of a standard deviation: two files may hold the same encounter
 MIN_SPREAD_RATIO = 0.05  # of the largest spread: a constant feature does not decide alone
 
@@ -219,9 +220,13 @@ class _Near:
         return shuffled[np.argsort(rank, kind="stable")][:count]
 
     def judged(self, chosen: Ints) -> tuple[float, float, float, float]:
-        """Return coverage alone and with generated ones, precision of generated and templates."""
+        """Return coverage alone and with generated ones, precision of generated and templates.
+
+        NaN where the templates leave too few encounters, or sessions, unseen.
+        """
         unseen = ~np.isin(self.recording, self.recording[chosen])
-        if not unseen.any():
+        sessions = np.unique(self.recording[unseen])
+        if unseen.sum() < MIN_UNSEEN_COUNT or len(sessions) < MIN_UNSEEN_SESSIONS:
             return (math.nan,) * 4
         made = np.flatnonzero(np.isin(self.template, chosen))
         members = len(self.recording) + made

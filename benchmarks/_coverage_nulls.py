@@ -3,31 +3,31 @@
 
 """What coverage is compared with, and at which precision.
 
-Sets are compared at one precision, PRECISION: of each set those members are kept that are nearest
-to their template, as many as give this precision. The nulls have no generator: records shifted in
-time and paced, and pairs mixed from different members of a set.
+Sets of a kind are compared at one precision, that of the more precise one: of the other those
+members are kept that are nearest to their template, as many as give this precision. The nulls have
+no generator: records shifted in time and paced that the checker accepts, and pairs mixed from
+different members of a set.
 """
 
-from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from itertools import islice
 from typing import Any
 
 import numpy as np
 
 from benchmarks._coverage_members import KINDS, Members
-from scenario_gen.method.evaluation.criticality import footprint_distance
 from scenario_gen.method.evaluation.law import (
     EncounterFeatures,
     FEATURES,
     JOINT_FEATURES,
 )
+from scenario_gen.method.sampling.filters import Check
 from scenario_gen.numerics import Bools, Floats
 from scenario_gen.situation import EncounterKind
-from scenario_gen.types import Encounter, Interval, Scenario
+from scenario_gen.types import Encounter, Interval, Scenario, Verdict
 
-RADIUS_SHARE = 0.8  # of the recorded encounters have another session's one within the radius
-PRECISION = 0.75  # at which members are compared; that of the recorded encounters is 0.8
+RADIUS_SHARES = (0.8, 0.5)  # of the recorded encounters have another session's one in the radius
 JOINT = (
     "gap",
     "arrival gap",
@@ -38,10 +38,9 @@ JOINT = (
 )  # how one answers the other
 SHIFT_S, PACE_RATIO = 1.0, 0.06
 MIN_SHIFTED_S = 4.0
-MAX_DRAWS_RATIO = 5  # of shifted records over those that are kept
-MIN_UNSEEN_COUNT = 10
+MAX_DRAWS_RATIO = 10  # of shifted records over those that are kept
 HALVINGS = 6  # by which the kept share is found
-DRAWS = 60  # of templates, while it is looked for
+DRAWS = 60  # of templates, by which a kind is chosen
 
 
 @dataclass(frozen=True)
@@ -62,22 +61,13 @@ class Shares:
 
 
 def kinds_with(found: Members, count: int) -> list[Members]:
-    """Return members by kind, of kinds in which templates leave MIN_UNSEEN_COUNT unseen ones.
-
-    A session that has all but a few encounters of a kind would leave nothing to cover.
-    """
+    """Return members by kind, of kinds in which a draw of templates leaves enough unseen ones."""
     kinds = [found.of_kind(kind) for kind in KINDS]
     return [
         one
         for one in kinds
-        if len(one.recorded) >= 2 * count and _fewest_unseen(one) >= MIN_UNSEEN_COUNT
+        if len(one.recorded) >= 2 * count and np.isfinite(one.shares(count, draws=DRAWS)[0].value)
     ]
-
-
-def _fewest_unseen(found: Members) -> int:
-    """Return how many encounters are outside the largest session."""
-    sessions = Counter(one.recording for one in found.recorded)
-    return len(found.recorded) - max(sessions.values(), default=0)
 
 
 def shares_by_kind(kinds: Sequence[Members], count: int, draws: int = 200) -> Shares:
@@ -92,14 +82,14 @@ def shares_by_kind(kinds: Sequence[Members], count: int, draws: int = 200) -> Sh
     return Shares(alone, coverage, precision)
 
 
-def at_precision(kinds: Sequence[Members], count: int) -> Shares:
-    """Return the shares of the members that are nearest to their templates, at PRECISION."""
+def at_precision(kinds: Sequence[Members], count: int, precision: float) -> Shares:
+    """Return the shares of the members that are nearest to their templates, at a precision."""
     low, high = 0.0, 1.0
-    if shares_by_kind(kinds, count, DRAWS).precision.value < PRECISION:
+    if shares_by_kind(kinds, count).precision.value < precision:
         for _ in range(HALVINGS):
             middle = 0.5 * (low + high)
             kept = [nearest(one, middle) for one in kinds]
-            precise = shares_by_kind(kept, count, DRAWS).precision.value >= PRECISION
+            precise = shares_by_kind(kept, count).precision.value >= precision
             low, high = (middle, high) if precise else (low, middle)
     else:
         low = 1.0
@@ -124,27 +114,6 @@ def nearest(found: Members, share: float) -> Members:
     return replace(found, made=[found.made[k] for k in sorted(kept)])
 
 
-def coverage_alone(kinds: Sequence[Members]) -> Floats:
-    """(C,) coverage by 1, 2, … recorded encounters of a kind without members, mean over kinds."""
-    means = []
-    for count in range(1, max(len(one.recorded) for one in kinds)):
-        shares, weights = [], []
-        for one in kinds:
-            templates = min(count, len(one.recorded) - 1)
-            share = replace(one, made=[]).shares(templates, draws=DRAWS)[0].value
-            if np.isfinite(share):
-                shares.append(share)
-                weights.append(len(one.recorded))
-        means.append(np.average(shares, weights=weights) if shares else np.nan)
-    return np.array(means)
-
-
-def stands_for(alone: Floats, coverage: float) -> float:
-    """Return how many recorded encounters cover as much; inf: more than there are."""
-    enough = np.flatnonzero(alone >= coverage)
-    return float(enough[0] + 1) if len(enough) else float("inf")
-
-
 def joint_gain(found: Members, mixed: Members, count: int) -> dict[EncounterKind, float]:
     """Return by kind: precision in JOINT, over that of mixed pairs."""
     gains = {}
@@ -159,7 +128,8 @@ def joint_gain(found: Members, mixed: Members, count: int) -> dict[EncounterKind
             .value
             for sets in of_kind
         ]
-        gains[kind] = precision[0] - precision[1]
+        if np.isfinite(precision).all():
+            gains[kind] = precision[0] - precision[1]
     return gains
 
 
@@ -195,16 +165,17 @@ def _speeds(
     return np.array(rows).reshape(len(rows), int(columns.sum()))
 
 
-def shifted(encounter: Encounter, rng: np.random.Generator, count: int) -> list[Scenario]:
-    """Return up to `count` of the records, moved in time and paced, without overlaps."""
-    made: list[Scenario] = []
-    for _ in range(MAX_DRAWS_RATIO * count):
-        scenario = _shifted_once(encounter, rng)
-        if scenario is not None and footprint_distance(scenario, 0, 1).min() > 0.0:
-            made.append(scenario)
-        if len(made) == count:
-            break
-    return made
+def shifted(
+    encounter: Encounter, check: Check, rng: np.random.Generator, count: int
+) -> list[Scenario]:
+    """Return up to `count` of the records, moved in time and paced, that are valid."""
+    draws = (_shifted_once(encounter, rng) for _ in range(MAX_DRAWS_RATIO * count))
+    valid = (one for one in draws if one is not None and _is_valid(check([one])[0]))
+    return list(islice(valid, count))
+
+
+def _is_valid(verdict: Verdict) -> bool:
+    return not verdict.violations and not verdict.not_applicable
 
 
 def _shifted_once(encounter: Encounter, rng: np.random.Generator) -> Scenario | None:
@@ -216,7 +187,7 @@ def _shifted_once(encounter: Encounter, rng: np.random.Generator) -> Scenario | 
         at = time * pace + SHIFT_S * rng.standard_normal()
         known &= (at >= 0.0) & (at <= time[-1])
         track = np.column_stack(
-            [encounter.position[n], encounter.heading[n], encounter.speed[n] * pace]
+            [encounter.position[n], np.unwrap(encounter.heading[n]), encounter.speed[n] * pace]
         )
         rows.append(np.array([np.interp(at, time, column) for column in track.T]))
     if known.sum() * encounter.dt < MIN_SHIFTED_S:
