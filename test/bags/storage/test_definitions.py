@@ -5,6 +5,7 @@
 
 import pytest
 
+from msg_conventions import diagnostics, markers, paths, pictures, roads, trajectory
 from scenario_gen.bags.storage.definitions import definition, stored_definitions, type_store
 
 
@@ -12,3 +13,9 @@ from scenario_gen.bags.storage.definitions import definition, stored_definitions
 def test_a_kept_definition_is_that_of_rosbags(kind):
     text, _ = type_store().generate_msgdef(kind, ros_version=2)
     assert definition(kind) == (text, type_store().hash_rihs01(kind))
+
+
+def test_writing_a_bag_of_results_loads_no_types_of_rosbags():
+    kinds = {diagnostics.TYPE, markers.TYPE, markers.ARRAY_TYPE, paths.TYPE, trajectory.TYPE}
+    kinds |= {pictures.FOOTPRINT_TYPE, roads.MAP_TYPE, roads.POSES_TYPE}
+    assert kinds <= stored_definitions().keys()
