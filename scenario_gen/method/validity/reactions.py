@@ -164,15 +164,24 @@ def least_gaps(speed: Floats, recorded: Floats, gap: Floats, limits: Limits) -> 
         gap: (m,) metres at these speeds.
         limits: shares and time gaps.
     """
-    similar = np.abs(speed[:, None] - recorded) <= _FOLLOWING.similar_speed + ROUNDING_M
-    moving = _FOLLOWING.moving_speed
-    smallest = np.min(np.where(similar, gap, np.inf), axis=1, initial=np.inf)
-    time_gap = np.where(similar & (recorded > moving), gap / np.maximum(recorded, moving), np.inf)
+    order = np.argsort(recorded)
+    recorded, gap = recorded[order], gap[order]
+    reach, moving = _FOLLOWING.similar_speed + ROUNDING_M, _FOLLOWING.moving_speed
+    first = np.searchsorted(recorded, speed - reach)
+    last = np.searchsorted(recorded, speed + reach, side="right")
+    ranges = np.column_stack((first, last)).ravel()
 
+    def least(values: Floats) -> Floats:
+        """Return the least of the values (m,) at similar speeds (k,), inf without one."""
+        found = np.minimum.reduceat(np.append(values, np.inf), ranges)[::2]
+        return np.where(first < last, found, np.inf)
+
+    smallest = least(gap)
+    time_gap = np.where(recorded > moving, gap / np.maximum(recorded, moving), np.inf)
     kept = np.minimum(limits.floor_share * smallest, _ample_gap(speed))
     kept = np.where(np.isfinite(smallest), kept, -np.inf)
 
-    keeps_headway = np.min(time_gap, axis=1, initial=np.inf) >= limits.least_headway - ROUNDING_S
+    keeps_headway = least(time_gap) >= limits.least_headway - ROUNDING_S
     headway = limits.least_headway * speed
     return np.where((speed > moving) & keeps_headway, np.maximum(kept, headway), kept)
 
