@@ -102,7 +102,8 @@ def on_lane(lane: Lane, poses: Floats, every: int = 1) -> bool:
 
     Only every n-th pose in the lane's bounding box is looked at.
     """
-    return bool(_lies_along(lane, poses[_in_bounding_box(lane, poses)][::every]).any())
+    near = poses[_in_bounding_box(lane, poses)][::every]
+    return len(near) > 0 and bool(_lies_along(lane, near).any())
 
 
 def _in_bounding_box(lane: Lane, poses: Floats) -> Bools:

@@ -124,10 +124,10 @@ class LaneGraph:
         The nearest lane is first.
         """
         distance = np.hypot(self.points[:, 0] - pose[0], self.points[:, 1] - pose[1])
-        turn = np.abs(wrap_angle(self.yaws - pose[2]))
-        fits = (distance <= _MAX_START_DISTANCE_M) & (turn <= _MAX_START_TURN_RAD)
+        close = np.flatnonzero(distance <= _MAX_START_DISTANCE_M)
+        turn = np.abs(wrap_angle(self.yaws[close] - pose[2]))
         nearest: dict[int, float] = {}
-        for k in np.flatnonzero(fits).tolist():
+        for k in close[turn <= _MAX_START_TURN_RAD].tolist():
             lane = int(self.lane_of[k])
             nearest[lane] = min(nearest.get(lane, math.inf), round(float(distance[k]), 6))
         return sorted(nearest, key=lambda lane: (nearest[lane], lane))
