@@ -173,8 +173,8 @@ def least_gaps(speed: Floats, recorded: Floats, gap: Floats, limits: Limits) -> 
 
     def least(values: Floats) -> Floats:
         """Return the least of the values (m,) at similar speeds (k,), inf without one."""
-        found = np.minimum.reduceat(np.append(values, np.inf), ranges)[::2]
-        return np.where(first < last, found, np.inf)
+        minima = np.minimum.reduceat(np.append(values, np.inf), ranges)[::2]
+        return np.where(first < last, minima, np.inf)
 
     smallest = least(gap)
     time_gap = np.where(recorded > moving, gap / np.maximum(recorded, moving), np.inf)
