@@ -146,7 +146,7 @@ def clean(log: RawLog, config: LogConfig) -> tuple[tuple[Observations, ...], Dro
     vehicles = [_without_repeats(vehicle, drops, log.geographic) for vehicle in vehicles]
     _check_clock(vehicles, log, config)
     vehicles = [_without_jumps(vehicle, drops, log.geographic) for vehicle in vehicles]
-    vehicles, size_notes = with_sizes(vehicles, config)
+    vehicles, size_notes = with_sizes(vehicles, log, config)
     drops.notes += size_notes
     if config.strict and drops.count:
         worst = drops.located(log)[0]

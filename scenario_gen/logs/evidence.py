@@ -157,6 +157,9 @@ def _find_degrees(reading: Reading) -> None:
         return
     latitude, longitude = np.median(fix, axis=0).tolist()
     if latitude <= 90.0 and longitude <= 180.0:
+        if np.ptp(fix) > 0.0 and np.abs(fix * 1e4 - np.round(fix * 1e4)).max() < 1e-6:
+            cause = "latitude and longitude have four decimals: places are up to 6 m off"
+            reading.doubt(Quantity.POSITION, 11.0, cause, "record six decimals or more")
         return
     if latitude <= 180.0 and longitude <= 90.0:
         swap = {"lat": reading.column("lon")["lon"], "lon": reading.column("lat")["lat"]}

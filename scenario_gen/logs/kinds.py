@@ -129,7 +129,7 @@ _SIZE_UNITS = {"ft": ("feet", 0.3048), "cm": ("centimetres", 0.01), "mm": ("mill
 
 
 def with_sizes(
-    vehicles: Sequence[Observations], config: LogConfig
+    vehicles: Sequence[Observations], log: RawLog, config: LogConfig
 ) -> tuple[list[Observations], list[str]]:
     """Return the vehicles with lengths and widths, and a note on impossible ones.
 
@@ -154,31 +154,54 @@ def with_sizes(
                 width=width if np.isfinite(width) else usual_width,
             )
         )
-    return sized, [_size_note(impossible, config)] if impossible else []
+    notes = [_size_note(impossible, log, config)] if impossible else []
+    if vehicles and all(map(_is_half, vehicles)) and {"length", "width"} <= log.columns.keys():
+        columns = {name: log.columns[name].option("2") for name in ("length", "width")}
+        notes.append(
+            f"all vehicles are as small as {vehicles[0].length:g} m × {vehicles[0].width:g} m: if "
+            f"these are half sizes: {with_columns(config.columns, columns)}"
+        )
+    return sized, notes
 
 
-def _size_note(impossible: Sequence[Observations], config: LogConfig) -> str:
+def _is_half(vehicle: Observations) -> bool:
+    """Return whether a vehicle has half the size of a car."""
+    is_car = vehicle.kind in ("", CAR)
+    return is_car and 1.8 < vehicle.length < 2.6 and 0.75 < vehicle.width < 1.2
+
+
+def _size_note(impossible: Sequence[Observations], log: RawLog, config: LogConfig) -> str:
     """Return a note on impossible sizes, with the unit that would explain them."""
     vehicle = impossible[0]
     more = f" ({len(impossible)} vehicles have such sizes)" if len(impossible) > 1 else ""
     usual_length, usual_width = usual_size(vehicle.kind, config)
     return (
         f"vehicle {vehicle.id}: {vehicle.length:g} m × {vehicle.width:g} m is not the size of a "
-        f"car{more}{_size_hint(vehicle.length, vehicle.width)}; used instead: "
+        f"car{more}{_size_hint(vehicle.length, vehicle.width, log, config)}; used instead: "
         f"{usual_length:g} m × {usual_width:g} m"
     )
 
 
-def _size_hint(length: float, width: float) -> str:
-    """Return what impossible sizes look like; "" if unknown."""
+def _size_hint(length: float, width: float, log: RawLog, config: LogConfig) -> str:
+    """Return what impossible sizes look like, and the option for it; "" if unknown."""
 
     def is_usual(length: float, width: float) -> bool:
         return 2.5 < length < 20.0 and 1.2 < width < 2.7
 
+    def option(units: Mapping[str, str]) -> str:
+        columns = {q: log.columns[q].option(u) for q, u in units.items() if q in log.columns}
+        return with_columns(config.columns, columns)
+
+    if not {"length", "width"} <= log.columns.keys():
+        return ""
     if is_usual(width, length):
-        return ", it looks swapped (log.columns=length=…,width=…)"
+        names = {"length": log.columns["width"].name, "width": log.columns["length"].name}
+        return f", it looks swapped: {with_columns(config.columns, names)}"
     for unit, (name, factor) in _SIZE_UNITS.items():
         if is_usual(factor * length, factor * width):
-            columns = f"log.columns=length=…:{unit},width=…:{unit}"
-            return f", it looks like {name} (name the unit: {columns})"
+            hint = f", it looks like {name}: {option({'length': unit, 'width': unit})}"
+            if unit == "ft":
+                units = dict.fromkeys(("x", "y", "length", "width"), unit)
+                hint += f", or if x, y are too: {option(units | {'speed': 'fps'})}"
+            return hint
     return ""

