@@ -71,6 +71,14 @@ class Drive:
     ] = False
     count: Annotated[int, typer.Option(min=0, help="Number of scenarios of each bag. 0: all.")] = 0
     workers: WorkersOption = 0
+    repeat: Annotated[
+        int,
+        typer.Option(
+            min=1,
+            max=10,
+            help="Drive each scenario so many times. Exit code 1 if the drives differ.",
+        ),
+    ] = 1
     against: Annotated[
         Path | None,
         typer.Option(
@@ -111,7 +119,7 @@ def drive(options: Drive) -> None:
         options.planner,
         options.ego,
         options.count,
-        options.assignments or [],
+        [f"repeat={options.repeat}", *(options.assignments or [])],
         options.against,
     )
     name = options.planner[0] if len(options.planner) == 1 else "drives"
@@ -169,7 +177,7 @@ def _print_durations(suite: "Suite") -> None:
     if decisions.count:
         print_(
             f"planner step: {1e3 * decisions.longest:.0f} ms at most; {decisions.slow} of "
-            f"{decisions.count} exceed decision_time (not written to files)"
+            f"{decisions.count} exceed the step (not written to files)"
         )
 
 

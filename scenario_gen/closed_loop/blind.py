@@ -4,20 +4,22 @@
 """Blind planners: they follow the route at speeds that do not depend on the other vehicles.
 
 A set of scenarios tests a planner only if every blind planner fails in most of them. The family
-has constant speeds, which are reached softly or at once, and the non-reactive baseline. Its
-members stay exactly on the route, so one compiled loop drives all of them; the others react to
-them as to any ego. A drive ends at the first contact, at the goal, or when its time is over.
+has constant speeds, which are reached softly or at once, and the non-reactive baseline. A second
+family is timed: it stands before it drives at a constant speed, or has the speeds of the reference
+drive, earlier or later. Members stay exactly on the route, so one compiled loop drives all of
+them; the others react to them as to any ego. A drive ends at the first contact, at the goal, or
+when its time is over.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 import math
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from scenario_gen.closed_loop.config import ClosedLoopConfig
-from scenario_gen.closed_loop.coordination_space import WORLD, World
+from scenario_gen.closed_loop.coordination_space import pose_at, WORLD, World
 from scenario_gen.closed_loop.driver import CLOCK, DRIVER_PARAMETERS, DriverParameters, RATE
 from scenario_gen.closed_loop.simulation import ClosedLoop
 from scenario_gen.closed_loop.step import advance, ego_hits
@@ -38,6 +40,9 @@ MIN_SPEED_MPS = 3.0  # a slower planner stands in the way, or misses the goal
 TOP_SPEED_MPS = 15.0  # of the family where no reference drive is faster
 SPEEDS_COUNT = 13  # constant speeds of the family
 GAINS_PER_S = (1.0, 10.0)  # soft as `ConstantSpeed`, and as fast as the body can
+STANDS_S = (1.0, 2.0, 3.0, 4.0, 6.0, 8.0)  # before constant speeds
+SPEEDS_AFTER_STAND_COUNT = 4
+SHIFTS_S = (-4.0, -2.0, -1.0, 1.0, 2.0, 4.0)  # of the speeds of the reference drive
 STATION_STEP_M = 0.5  # between two points of a course
 TRIVIAL_SHARE = 0.9  # a set of which a blind planner passes more hardly tests
 BLIND_COUNT = 50  # scenarios of a set in which blind planners drive
@@ -50,23 +55,46 @@ class BlindPlanner(NamedTuple):
     Attributes:
         speed: constant speed [m/s]; NaN for the non-reactive baseline.
         gain: acceleration per speed error [1/s].
+        stand: duration [s] for which it stands first; it brakes as hard as it can.
+        shift: time [s] by which it is later than the reference drive, whose speeds it has; NaN
+            for the other members.
     """
 
     speed: float
     gain: float = GAINS_PER_S[0]
+    stand: float = 0.0
+    shift: float = math.nan
 
     def __str__(self) -> str:
+        if not math.isnan(self.shift):
+            side = "later" if self.shift > 0.0 else "earlier"
+            return f"the reference drive's speeds {abs(self.shift):g} s {side}"
         if math.isnan(self.speed):
             return "the non-reactive baseline"
+        if self.stand:
+            return f"standing for {self.stand:g} s, then {self.speed:g} m/s"
         return f"a constant {self.speed:g} m/s"
+
+
+def _speeds(top_speed: float, count: int) -> list[float]:
+    """Return some speeds [m/s] for reference drives with a highest speed [m/s]."""
+    top = max(math.ceil(top_speed), TOP_SPEED_MPS)
+    speeds: list[float] = np.round(np.geomspace(MIN_SPEED_MPS, top, count), 1).tolist()
+    return speeds
 
 
 def blind_family(top_speed: float) -> tuple[BlindPlanner, ...]:
     """Return the family for reference drives with a highest speed [m/s]; the baseline is first."""
-    top = max(math.ceil(top_speed), TOP_SPEED_MPS)
-    speeds = np.round(np.geomspace(MIN_SPEED_MPS, top, SPEEDS_COUNT), 1).tolist()
+    speeds = _speeds(top_speed, SPEEDS_COUNT)
     constant = [BlindPlanner(speed, gain) for gain in GAINS_PER_S for speed in speeds]
     return BlindPlanner(math.nan), *constant
+
+
+def timed_family(top_speed: float) -> tuple[BlindPlanner, ...]:
+    """Return the timed family for reference drives with a highest speed [m/s]."""
+    speeds = _speeds(top_speed, SPEEDS_AFTER_STAND_COUNT)
+    standing = [BlindPlanner(speed, stand=stand) for stand in STANDS_S for speed in speeds]
+    return *standing, *(BlindPlanner(math.nan, shift=shift) for shift in SHIFTS_S)
 
 
 class Course(NamedTuple):
@@ -138,12 +166,14 @@ class BlindRate:
         passed: number of scenarios that it passes.
         driven: number of scenarios.
         planners: number of blind planners.
+        timed: how the best of the timed family does; None if it is not known.
     """
 
     planner: BlindPlanner
     passed: int
     driven: int
     planners: int
+    timed: "BlindRate | None" = None
 
     @classmethod
     def of(cls, family: Sequence[BlindPlanner], passed: Ints, driven: int) -> "BlindRate":
@@ -151,9 +181,10 @@ class BlindRate:
         best = int(passed.argmax())
         return cls(family[best], int(passed[best]), driven, len(family))
 
-    def document(self) -> dict[str, str | int]:
+    def document(self) -> dict[str, Any]:
         """Return it as JSON's types."""
-        return {"planner": str(self.planner), "passed": self.passed, "driven": self.driven}
+        document = {"planner": str(self.planner), "passed": self.passed, "driven": self.driven}
+        return document if self.timed is None else document | {"timed": self.timed.document()}
 
     @property
     def is_trivial(self) -> bool:
@@ -162,23 +193,48 @@ class BlindRate:
 
     def __str__(self) -> str:
         prefix = "these scenarios hardly test a planner: " if self.is_trivial else ""
-        rate = f"passes {self.passed} of {self.driven}"
-        return f"{prefix}the best of {self.planners} blind planners, {self.planner}, {rate}"
+        rate = f"{self.planner}, passes {self.passed} of {self.driven}"
+        timed = ""
+        if self.timed is not None:
+            untested = " (waiting is not tested)" if self.timed.is_trivial else ""
+            of_timed = f"{self.timed.planner}, passes {self.timed.passed}"
+            timed = (
+                f"; of {self.timed.planners} that stand first or are shifted, {of_timed}{untested}"
+            )
+        return f"{prefix}the best of {self.planners} blind planners, {rate}{timed}"
 
 
 def blind_rate(loops: Sequence[ClosedLoop]) -> BlindRate | None:
     """Return how the best blind planner does in some scenarios; None without any."""
     if not loops:
         return None
-    family = blind_family(max(loop.task().speed for loop in loops))
-    passed = np.sum([blind_passes(loop, family) for loop in loops], axis=0)
-    return BlindRate.of(family, passed, len(loops))
+    top_speed = max(loop.task().speed for loop in loops)
+    rate, timed = (
+        BlindRate.of(
+            family, np.sum([blind_passes(loop, family) for loop in loops], axis=0), len(loops)
+        )
+        for family in (blind_family(top_speed), timed_family(top_speed))
+    )
+    return replace(rate, timed=timed)
 
 
 @kernel(inline=True)
-def _blind_speed(planner: Floats, course: Course, station: float, speed: float, h: float) -> float:
-    """Return the speed [m/s] of a blind planner (2,) at the end of a step of h seconds."""
-    if np.isnan(planner[0]):
+def _blind_speed(
+    world: World, planner: Floats, course: Course, station: float, speed: float, begin: float
+) -> float:
+    """Return the speed [m/s] of a blind planner (4,) after a step that begins at a time [s].
+
+    The fields of the planner are those of `BlindPlanner`.
+    """
+    h = world.step
+    if not np.isnan(planner[3]):
+        pose = np.empty(5)
+        clock = course.begin + begin + h - planner[3]
+        pose_at(world.time, world.motion[world.ego], max(clock, course.begin), pose)
+        wanted = (pose[3] - speed) / h
+    elif begin < planner[2]:
+        wanted = -course.deceleration
+    elif np.isnan(planner[0]):
         row = min(int(station / STATION_STEP_M), len(course.points) - 1)
         excess = speed / max(course.points[row, 4], 0.1)
         wanted = max(MAX_ACCELERATION_MPS2 * (1.0 - excess * excess), -MAX_BRAKING_MPS2)
@@ -205,7 +261,7 @@ def _fill_ego(course: Course, station: float, speed: float, gained: float, out: 
 def drive_blindly(
     world: World, parameters: DriverParameters, course: Course, family: Floats, out: Bools
 ) -> None:
-    """Write whether each member (M, 2) of a family passes (M,)."""
+    """Write whether each member (M, 4) of a family passes (M,)."""
     n = len(world.motion)
     oldest = 1
     for i in range(n):
@@ -230,7 +286,8 @@ def drive_blindly(
         seen[0, 6] = course.begin
         seen[0, 7:] = 1.0
         for step in range(1, course.steps + 1):
-            end_speed = _blind_speed(family[m], course, station, speed, world.step)
+            begin = (step - 1) * world.step
+            end_speed = _blind_speed(world, family[m], course, station, speed, begin)
             station += 0.5 * (speed + end_speed) * world.step
             known = min(step + 1, oldest)
             for row in range(known - 1, 0, -1):

@@ -133,6 +133,7 @@ def drive_bags(
             outcomes = with_origins(run(trials, planner, config.drive, advance), trials)
             comparison = compared(outcomes, config.drive, earlier) if earlier is not None else None
             broken = broken_bars(rates(outcomes), config.bars)
+            broken += _unusable(outcomes)
             if comparison is not None and comparison.worse:
                 broken.append(comparison.sentence())
             results.append(
@@ -143,6 +144,22 @@ def drive_bags(
         suite = Suite.of(results, bags)
         suite.write(folder)
     return suite
+
+
+def _unusable(outcomes: Sequence[Outcome]) -> list[str]:
+    """Return sentences on drives that an error ended, or that differ when they are repeated."""
+    errors = [outcome for outcome in outcomes if outcome.verdict.error]
+    differ = [outcome for outcome in outcomes if not outcome.repeats]
+    sentences = []
+    if errors:
+        first = f"scenario {errors[0].name}: {errors[0].verdict.error}"
+        sentences.append(f"{len(errors)} drives ended with an error; first {first}")
+    if differ:
+        sentences.append(
+            f"{len(differ)} of {len(outcomes)} drives differ when repeated (first: scenario "
+            f"{differ[0].name}): the planner keeps state between drives, or draws at random"
+        )
+    return sentences
 
 
 def _baseline(

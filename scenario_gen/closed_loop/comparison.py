@@ -38,7 +38,7 @@ DRIVES = {
     },
     "required": ["planner", "parameters", "drives"],
 }
-TIME_LIMITS = {"decision_time", "drive_time"}
+UNCOMPARED = {"drive_time", "repeat"}
 """Parameters that change no verdict."""
 
 
@@ -125,7 +125,7 @@ def refuse_others(digests: Mapping[str, str], config: ClosedLoopConfig, earlier:
         InputError: they differ; the message names the first scenario, or the parameters.
     """
     parameters = {name: value for name, (_, value) in flatten(config).items()}
-    names = (parameters.keys() | earlier.parameters.keys()) - TIME_LIMITS
+    names = (parameters.keys() | earlier.parameters.keys()) - UNCOMPARED
     differ = sorted(name for name in names if parameters.get(name) != earlier.parameters.get(name))
     if differ:
         raise InputError(

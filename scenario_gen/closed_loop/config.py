@@ -163,16 +163,15 @@ class ClosedLoopConfig(Parameters):
         "further criteria that a drive must meet, separated by commas: names of installed ones or "
         "MODULE:CLASS, with e.g. <0.5 for another threshold",
     )
-    decision_time: float = parameter(
-        1.0,
-        "longer decisions of a planner are counted, without a change of the verdict",
-        unit="s",
-        low=0.001,
-        high=600.0,
+    repeat: int = parameter(
+        1,
+        "times that each scenario is driven, to see whether the drives are the same",
+        low=1,
+        high=10,
     )
     drive_time: float = parameter(
         600.0,
-        "longest computation of a planner for one drive; the command fails after it",
+        "longest computation of a planner for one drive; the drive fails after it",
         unit="s",
         low=0.1,
         high=1e6,

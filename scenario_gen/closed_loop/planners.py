@@ -184,7 +184,8 @@ class NonReactive(IdmFollower):
     def act(self, observation: Observation) -> Command:
         """Return the command of the follower on an empty road."""
         others, sizes = observation.others[:0], observation.sizes[:0]
-        return super().act(replace(observation, ids=(), others=others, sizes=sizes, lights=()))
+        empty = replace(observation, ids=(), others=others, sizes=sizes, types=(), lights=())
+        return super().act(empty)
 
 
 class ReferenceFollower:

@@ -251,7 +251,8 @@ class Drives:
 def as_junit(outcomes: Sequence[Outcome], planner: str, facts: Mapping[str, str] = EMPTY) -> str:
     """Return one test case per scenario, as JUnit's XML, and facts as properties.
 
-    Cases fail with the type collision, off_road, jump, goal, or the name of a criterion.
+    Cases fail with the type collision, off_road, jump, goal, or the name of a criterion. A drive
+    that an error of the planner ended has an error with its traceback.
     """
     return junit_text(junit_suite(outcomes, planner, facts))
 
@@ -260,14 +261,15 @@ def junit_suite(
     outcomes: Sequence[Outcome], planner: str, facts: Mapping[str, str] = EMPTY
 ) -> ElementTree.Element:
     """Return the element `testsuite` of one planner; arguments as in `as_junit`."""
+    ended = [outcome for outcome in outcomes if outcome.verdict.error]
     failed = [outcome for outcome in outcomes if not outcome.verdict.passed]
     lasted = math.fsum(outcome.verdict.duration for outcome in outcomes)
     suite = ElementTree.Element(
         "testsuite",
         name=planner,
         tests=str(len(outcomes)),
-        failures=str(len(failed)),
-        errors="0",
+        failures=str(len(failed) - len(ended)),
+        errors=str(len(ended)),
         time=f"{lasted:.3f}",
     )
     properties = ElementTree.SubElement(suite, "properties")
@@ -283,9 +285,11 @@ def junit_suite(
             time=f"{verdict.duration:.3f}",
         )
         if not verdict.passed:
-            ElementTree.SubElement(
-                case, "failure", type=verdict.failure, message=verdict.sentence()
+            kind = "error" if verdict.error else "failure"
+            problem = ElementTree.SubElement(
+                case, kind, type=verdict.failure, message=verdict.sentence()
             )
+            problem.text = outcome.traceback
         message = ElementTree.SubElement(case, "system-out")
         message.text = json.dumps(verdict.document(), ensure_ascii=False)
     return suite

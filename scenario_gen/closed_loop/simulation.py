@@ -8,7 +8,7 @@ the next instant and changes nothing. So drives can be repeated, branched and se
 with the same commands are identical.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from itertools import chain
 import math
@@ -114,6 +114,7 @@ class Observation:
         ids: ids of the others.
         others: (M, 4) x, y [m], yaw [rad], speed [m/s]; (x, y) is the footprint's centre.
         sizes: (M, 2) length and width [m].
+        types: their types, such as car, bicycle or pedestrian.
         lights: traffic lights whose states are known.
     """
 
@@ -122,6 +123,7 @@ class Observation:
     ids: tuple[str, ...]
     others: Floats
     sizes: Floats
+    types: tuple[str, ...] = ()
     lights: tuple[ObservedLight, ...] = ()
 
 
@@ -360,7 +362,8 @@ class ClosedLoop:
         ids = tuple(self._ids[row] for row in rows)
         others, sizes = perceived.vehicles[rows], self._sizes[rows]
         lights = observed(self.lights, state.time)
-        return Observation(state.time, state.ego, ids, others, sizes, lights)
+        types = tuple(self.scenario.vehicles[row].type for row in rows)
+        return Observation(state.time, state.ego, ids, others, sizes, types, lights)
 
     def drive(self, planner: Planner, ended: Callable[[State], bool] | None = None) -> Drive:
         """Drive with a planner until the drive ends.
@@ -370,12 +373,18 @@ class ClosedLoop:
             ended: whether the drive ends at a state; by default at the goal, at a collision (at
                 the instants only) or when the time is over.
         """
+        return self.record([self.start(), *self.steps(planner, ended)])
+
+    def steps(
+        self, planner: Planner, ended: Callable[[State], bool] | None = None
+    ) -> Iterator[State]:
+        """Yield the instants of a drive after its start; arguments as for `drive`."""
         planner.reset(self.task())
-        states = [self.start()]
+        state = self.start()
         over = ended or self.over
-        while not over(states[-1]):
-            states.append(self.step(states[-1], planner.act(self.observe(states[-1]))))
-        return self.record(states)
+        while not over(state):
+            state = self.step(state, planner.act(self.observe(state)))
+            yield state
 
     def over(self, state: State) -> bool:
         """Whether a drive ends: at the goal, at a collision, or when the time is over."""

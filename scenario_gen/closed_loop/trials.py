@@ -8,7 +8,7 @@ The results do not depend on the number of workers.
 
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures.process import BrokenProcessPool
-from contextlib import contextmanager
+from contextlib import contextmanager, redirect_stdout
 from dataclasses import asdict, dataclass, replace
 from functools import lru_cache
 from itertools import chain, islice
@@ -16,6 +16,8 @@ import math
 import os
 from pathlib import Path
 import pickle
+import sys
+import traceback
 from typing import Any
 
 import numpy as np
@@ -30,7 +32,7 @@ from scenario_gen.bags.recordings.read import (
 )
 from scenario_gen.bags.storage.bag import naming_bag
 from scenario_gen.bags.storage.config import BagConfig
-from scenario_gen.base.errors import did_you_mean, InputError, ScenarioGenError
+from scenario_gen.base.errors import did_you_mean, InputError
 from scenario_gen.base.parameters import parameter, Parameters
 from scenario_gen.base.registry import load_class
 from scenario_gen.base.signals import ctrl_c_blocked, worker_pool
@@ -65,6 +67,8 @@ class Outcome:
         drive: the drive.
         origin: the origin of the scenario.
         decisions: durations of the planner's decisions on this machine; no file contains them.
+        traceback: of the error that ended the drive; "" without one.
+        repeats: whether a repeated drive was the same.
     """
 
     name: str
@@ -72,6 +76,8 @@ class Outcome:
     drive: Drive
     origin: Origin = Origin()
     decisions: Decisions = Decisions()
+    traceback: str = ""
+    repeats: bool = True
 
 
 @dataclass(frozen=True)
@@ -92,6 +98,12 @@ class Bars(Parameters):
     )
     jumps: float = parameter(
         0.0, "largest share of drives in which the ego teleports", low=0.0, high=1.0
+    )
+    faults: float = parameter(
+        0.0,
+        "largest share of drives with a command that is missing or not finite, or a teleport",
+        low=0.0,
+        high=1.0,
     )
     criteria: float = parameter(
         0.0, "largest share of drives that miss one of the criteria", low=0.0, high=1.0
@@ -281,37 +293,14 @@ def run_trials(
         progress: called with the number of finished trials and the number of all trials.
 
     Raises:
-        InputError: the planner is not found, or fails; the message names the scenario.
+        InputError: the planner is not found, or ends its process.
     """
     outcomes: list[Outcome] = []
-    with (
-        trial_runner(planner, config, min(workers, max(len(trials), 1))) as run,
-        summary_on_error(outcomes),
-    ):
+    with trial_runner(planner, config, min(workers, max(len(trials), 1))) as run:
         for outcome in run(trials):
             outcomes.append(outcome)
             progress(len(outcomes), len(trials))
     return outcomes
-
-
-@contextmanager
-def summary_on_error(outcomes: Sequence[Outcome]) -> Iterator[None]:
-    """Add the summary of the drives before it to an InputError."""
-    try:
-        yield
-    except InputError as error:
-        if not outcomes:
-            raise
-        summary = ", ".join(f"{name} {rate.count}" for name, rate in rates(outcomes).items())
-        raise InputError(f"{error}; of the {len(outcomes)} drives before: {summary}") from error
-
-
-def too_long(trial: Trial, config: ClosedLoopConfig) -> InputError:
-    """Return the error of a planner that takes too long for a drive."""
-    return InputError(
-        f"scenario {trial.name}: the planner did not finish in {config.drive_time:g} s; "
-        "if it does not hang, increase drive_time"
-    )
 
 
 @contextmanager
@@ -379,26 +368,54 @@ def _run_packed(task: tuple[Trial, bytes, MakePlanner | str, ClosedLoopConfig]) 
 def _run(task: tuple[Trial, MakePlanner | str, ClosedLoopConfig]) -> Outcome:
     trial, planner, config = task
     make = find_planner(planner) if isinstance(planner, str) else planner
-    loop, process = ClosedLoop(trial.scenario, trial.ego, trial.road, config), os.getpid()
+    loop = ClosedLoop(trial.scenario, trial.ego, trial.road, config)
+    outcome = _drive(trial.name, loop, make)
+    for _ in range(1, config.repeat):
+        again = _drive(trial.name, loop, make).drive.motion
+        if not np.array_equal(again.position, outcome.drive.motion.position):
+            outcome = replace(outcome, repeats=False)
+    return replace(outcome, origin=Origin(trial.encounter))
+
+
+def _drive(name: str, loop: ClosedLoop, make: MakePlanner) -> Outcome:
+    """Drive with a new planner; an error of the planner or of a criterion ends the drive.
+
+    What the planner prints goes to the standard error stream.
+    """
+    process, config = os.getpid(), loop.config
+    states, timed = [loop.start()], None
+    error, verdict = None, None
     try:
-        timed = Timed(make(), config.decision_time)
-        with bounded(config.drive_time):
-            drive = loop.drive(timed)
-        verdict = judge(loop, drive)
-    except TooLongError as error:
-        raise too_long(trial, config) from error
-    except InputError as error:
-        raise InputError(f"scenario {trial.name}: {error}") from error
-    except ScenarioGenError:
-        raise
-    except (Exception, SystemExit) as error:  # an exit would hide the failure
-        raise InputError(
-            f"scenario {trial.name}: the planner failed: {type(error).__name__}: {error}"
-        ) from error
+        with redirect_stdout(sys.stderr), bounded(config.drive_time):
+            timed = Timed(make(), config.step)
+            states.extend(loop.steps(timed))
+        verdict = judge(loop, loop.record(states))
+    except (Exception, SystemExit, TooLongError) as failure:
+        error = failure
     finally:
         if os.getpid() != process:  # the planner has forked: only the parent has a result
             os._exit(1)
-    return Outcome(trial.name, verdict, drive, Origin(trial.encounter), timed.decisions)
+    decisions = Decisions() if timed is None else timed.decisions
+    if verdict is not None:
+        return Outcome(name, verdict, loop.record(states), decisions=decisions)
+    assert error is not None
+    if len(states) == 1:
+        states.append(loop.step(states[0], None))
+    drive = loop.record(states)
+    verdict = replace(judge(loop, drive, ()), error=_where(error, config))
+    text = "".join(traceback.format_exception(error))
+    return Outcome(name, verdict, drive, decisions=decisions, traceback=text)
+
+
+def _where(error: BaseException, config: ClosedLoopConfig) -> str:
+    """Return an error in one line, with the file and the line that raised it."""
+    frame = traceback.extract_tb(error.__traceback__)[-1]
+    message = f"{type(error).__name__}: {error}"
+    if isinstance(error, TooLongError):
+        message = (
+            f"not finished in {config.drive_time:g} s; if it does not hang, increase drive_time"
+        )
+    return f"{' '.join(message.split())} ({Path(frame.filename).name}, line {frame.lineno})"
 
 
 CONFIDENCE = 0.95
@@ -452,6 +469,7 @@ def _events(v: DriveVerdict) -> dict[str, bool]:
         "at_fault_nuplan": v.terms.no_at_fault_collision == 0.0,
         "off_road": not math.isnan(v.off_road),
         "jumps": v.jumps > 0,
+        "faults": v.faults > 0,
         "goals": not math.isnan(v.goal),
         "progress": v.terms.making_progress > 0.0,
     }

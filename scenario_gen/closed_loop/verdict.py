@@ -3,6 +3,7 @@
 
 """The verdict on one drive: its failures, their times and causes, and the closest approaches."""
 
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
 from itertools import combinations
 import math
@@ -10,7 +11,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from scenario_gen.closed_loop.criteria import CriterionResult
+from scenario_gen.closed_loop.criteria import CheckedCriterion, CriterionResult
 from scenario_gen.closed_loop.drive import Drive
 from scenario_gen.closed_loop.fault import (
     Contact,
@@ -115,6 +116,7 @@ class DriveVerdict:
         terms: terms of nuPlan's and NAVSIM's scores.
         criteria: results of the user's criteria.
         ran_red: first time at which the ego crossed a stop line at red; NaN if never.
+        error: the error of the planner, or of a criterion, that ended the drive; "" without one.
     """
 
     index: int
@@ -145,6 +147,7 @@ class DriveVerdict:
     terms: Terms
     criteria: tuple[CriterionResult, ...] = ()
     ran_red: float = math.nan
+    error: str = ""
 
     @property
     def missed(self) -> list[CriterionResult]:
@@ -164,6 +167,7 @@ class DriveVerdict:
             and not math.isnan(self.goal)
             and not self.jumps
             and not self.missed
+            and not self.error
         )
 
     @property
@@ -175,8 +179,10 @@ class DriveVerdict:
     def failure(self) -> str:
         """The first that applies; "" if the ego passed.
 
-        One of: jump, collision, off_road, ran_red, goal, the name of a criterion.
+        One of: error, jump, collision, off_road, ran_red, goal, the name of a criterion.
         """
+        if self.error:
+            return "error"
         if self.jumps:
             return "jump"
         if self.collision is not None:
@@ -193,9 +199,11 @@ class DriveVerdict:
     def fault(self) -> str:
         """The cause of the failure; "" if the ego passed.
 
-        One of: jump, the reason of a collision, off_road, obstacle, ran_red, standing (at the end,
-        before the goal), goal (missed otherwise), the name of a criterion.
+        One of: error, jump, the reason of a collision, off_road, obstacle, ran_red, standing (at
+        the end, before the goal), goal (missed otherwise), the name of a criterion.
         """
+        if self.error:
+            return "error"
         if self.collision is not None and not self.jumps:
             return self.collision.reason.value
         if self.failure == "off_road" and self.obstacle:
@@ -223,7 +231,7 @@ class DriveVerdict:
 
     def sentence(self) -> str:
         """Return the verdict in words."""
-        messages = []
+        messages = [f"failed at {self.duration:.1f} s: {self.error}"] if self.error else []
         if (hit := self.collision) is not None:
             words = {
                 Runner.EGO: f"the ego ran into {hit.vehicle}",
@@ -291,8 +299,10 @@ class Clearance(NamedTuple):
     ttc_not_behind: float
 
 
-def judge(loop: ClosedLoop, drive: Drive) -> DriveVerdict:
-    """Judge one drive.
+def judge(
+    loop: ClosedLoop, drive: Drive, criteria: Sequence[CheckedCriterion] | None = None
+) -> DriveVerdict:
+    """Judge one drive, by default with the criteria of the loop.
 
     Collisions and exits from the road are detected in continuous time, on the motion that
     `Scenario` defines between two instants. A jump is not a motion: the ego meets nobody on its
@@ -302,6 +312,7 @@ def judge(loop: ClosedLoop, drive: Drive) -> DriveVerdict:
         InputError: a criterion fails.
     """
     motion, config = drive.motion, loop.config
+    used = loop.criteria if criteria is None else criteria
     contacts = _contacts(drive)
     hit = _first_of_ego(drive, contacts)
     goal = _goal_time(loop, drive)
@@ -343,7 +354,7 @@ def judge(loop: ClosedLoop, drive: Drive) -> DriveVerdict:
         jumps=len(drive.jumps),
         stood=_stood(motion.speed[drive.ego], config.step),
         terms=terms(drive, hit, not math.isnan(off_road), progress, clearance.ttc_not_behind),
-        criteria=tuple(measure(replace(drive, road=loop.road)) for measure in loop.criteria),
+        criteria=tuple(measure(replace(drive, road=loop.road)) for measure in used),
         ran_red=ran_red(drive.motion, drive.ego, drive.driven),
     )
 

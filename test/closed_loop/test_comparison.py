@@ -102,7 +102,7 @@ def test_other_scenarios_or_parameters_are_refused():
         compared(driven(failed[:3], 1), ClosedLoopConfig(), known)
     with pytest.raises(InputError, match=r"other parameters \(step\)"):
         compared(driven(failed, 1), ClosedLoopConfig(step=0.05), known)
-    assert not compared(driven(failed, 1), ClosedLoopConfig(decision_time=3.0), known).worse
+    assert not compared(driven(failed, 1), ClosedLoopConfig(drive_time=3.0), known).worse
 
 
 @pytest.fixture(scope="module")

@@ -7,6 +7,7 @@ from contextlib import suppress
 import json
 import os
 from pathlib import Path
+import re
 import subprocess
 import sys
 import time
@@ -20,7 +21,7 @@ from scenario_gen.bags.recordings.write import write_recording
 from scenario_gen.base.errors import InputError
 from scenario_gen.cli.commands import app
 from scenario_gen.closed_loop.command import drive_bags, DriveRequest, in_processes
-from scenario_gen.closed_loop.ego import Pose
+from scenario_gen.closed_loop.ego import Command, Pose
 from scenario_gen.closed_loop.results import as_junit
 from scenario_gen.closed_loop.trials import read_trials
 
@@ -100,6 +101,11 @@ class NeverMade(Still):
         raise RuntimeError("no model here")
 
 
+class Forward(Still):
+    def act(self, seen):
+        return Command(1.0, 0.0)
+
+
 class Forks(Still):
     def act(self, seen):
         if seen.time == 0.0:
@@ -136,38 +142,83 @@ class Nowhere(Still):
         return Pose(1e300, 0.0, 0.0, 1e300)
 
 
+class FailsInTheSecond(Still):
+    """Prints, and fails in the second scenario."""
+
+    drives = 0
+
+    def reset(self, task):
+        FailsInTheSecond.drives += 1
+        print("a planner prints")
+
+    def act(self, seen):
+        if FailsInTheSecond.drives == 2 and seen.time > 0.45:
+            raise ValueError("no\nway")
+        return Command(0.1 * FailsInTheSecond.drives, 0.0)
+
+
+def driven(bag, out, planner, count=2, workers=1, sets=()):
+    """Return the results of one planner, and the test cases in JUnit's file."""
+    request = DriveRequest(
+        [bag], [f"{__name__}:{planner}"], count=count, assignments=["overtime=1", *sets]
+    )
+    result = drive_bags(request, out, run=in_processes(workers))
+    return result, list(ElementTree.parse(out / "junit.xml").getroot().iter("testcase"))
+
+
 @pytest.mark.parametrize(
     ("planner", "workers", "said"),
     [
-        ("Wrong", 1, "scenario 0: .* returned tuple"),
-        ("Leaves", 1, "scenario 0: .* SystemExit: 0"),
-        ("NeverMade", 1, "scenario 0: .* RuntimeError: no model here"),
-        ("LeavesAtOnce", 2, "ended after 0 of 2 drives"),
+        ("Wrong", 1, "returned tuple"),
+        ("Leaves", 2, r"SystemExit: 0 \(test_drive_command.py, line \d+\)"),
+        ("NeverMade", 1, r"RuntimeError: no model here \(test_drive_command.py, line \d+\)"),
     ],
 )
-def test_a_planner_that_fails_is_said_and_never_passes(bag, tmp_path, planner, workers, said):
-    with pytest.raises(InputError, match=said):
-        drive_bags(
-            DriveRequest([bag], [f"{__name__}:{planner}"], count=2),
-            tmp_path / "out",
-            run=in_processes(workers),
-        )
+def test_a_planner_that_fails_is_an_error_of_each_scenario(bag, tmp_path, planner, workers, said):
+    result, cases = driven(bag, tmp_path / "out", planner, workers=workers)
+    assert "2 drives ended with an error" in result.broken[-1]
+    assert [re.search(said, case.find("error").get("message")) is None for case in cases] == [
+        False,
+        False,
+    ]
+    assert all("Traceback" in case.find("error").text for case in cases)
+
+
+def test_after_an_error_the_rest_is_driven_and_no_print_gets_into_the_output(bag, tmp_path, capfd):
+    FailsInTheSecond.drives = 0
+    result, cases = driven(bag, tmp_path / "out", "FailsInTheSecond", count=3)
+    (drives,) = result.drives
+    assert [outcome.verdict.failure == "error" for outcome in drives.outcomes] == [
+        False,
+        True,
+        False,
+    ]
+    said = drives.outcomes[1].verdict.sentence()
+    assert said.startswith("failed at 0.5 s: ValueError: no way (test_drive_command.py, line ")
+    assert [case.find("error") is not None for case in cases] == [False, True, False]
+    printed = capfd.readouterr()
+    assert "a planner prints" in printed.err and "prints" not in printed.out
+
+
+def test_state_between_drives_is_found_by_a_repetition(bag, tmp_path):
+    FailsInTheSecond.drives = 5
+    result, _ = driven(bag, tmp_path / "out", "FailsInTheSecond", sets=["repeat=2"])
+    assert "2 of 2 drives differ when repeated" in result.broken[-1]
+    result, _ = driven(bag, tmp_path / "out", "Forward", sets=["repeat=2"])
+    assert not any("differ" in sentence for sentence in result.broken)
+
+
+def test_a_planner_that_ends_its_process_ends_the_command(bag, tmp_path):
+    with pytest.raises(InputError, match="ended after 0 of 2 drives"):
+        driven(bag, tmp_path / "out", "LeavesAtOnce", workers=2)
     assert list(tmp_path.iterdir()) == []
 
 
-def test_a_planner_that_hangs_is_ended_and_what_was_found_is_told(bag, tmp_path):
+def test_a_planner_that_hangs_is_ended_and_the_error_says_where(bag, tmp_path):
     Hangs.drives = 0
-    with pytest.raises(
-        InputError, match=r"scenario 1: the planner did not finish in 5 s"
-    ) as caught:
-        request = DriveRequest(
-            [bag], [f"{__name__}:Hangs"], count=2, assignments=["drive_time=5", "overtime=1"]
-        )
-        drive_bags(request, tmp_path / "out", run=in_processes(1))
-    assert (
-        "of the 1 drives before: failures 1, collisions" in str(caught.value)
-        and not (tmp_path / "out").exists()
-    )
+    result, cases = driven(bag, tmp_path / "out", "Hangs", sets=["drive_time=5"])
+    assert "not finished in 5 s" in result.drives[0].outcomes[1].verdict.error
+    assert "time.sleep" in cases[1].find("error").text and cases[0].find("error") is None
 
 
 @pytest.mark.long
@@ -185,7 +236,7 @@ def test_compiled_code_that_hangs_is_ended_with_its_process(bag, tmp_path):
 def test_slow_decisions_are_counted_and_change_nothing_that_is_written(bag, tmp_path):
     known = {}
     for planner in ("Slow", "Still"):
-        sets = ["decision_time=0.04", "overtime=1.0"]
+        sets = ["step=0.04", "overtime=1.0"]
         (result,) = drive_bags(
             DriveRequest([bag], [f"{__name__}:{planner}"], count=1, assignments=sets),
             tmp_path / planner,

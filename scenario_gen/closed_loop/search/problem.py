@@ -6,6 +6,7 @@
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
+from scenario_gen.base.errors import InputError
 from scenario_gen.closed_loop.origin import Trial
 from scenario_gen.closed_loop.search.journal import Journal
 from scenario_gen.closed_loop.search.objective import Objective
@@ -66,6 +67,10 @@ class DrivenScenarios:
         numbered = list(enumerate(candidates, start=first))
         trials = [self.trial(number, scenario) for number, scenario in numbered[len(known) :]]
         for outcome in self.run(trials):
+            if outcome.verdict.error:
+                raise InputError(
+                    f"drive {outcome.name}: the planner failed: {outcome.verdict.error}"
+                )
             results.append(self.objective.response(outcome))
             self.journal.add(results[-1])
             self.progress(first + len(results))

@@ -6,7 +6,8 @@
 Drives all trials in lock-step with a planner that is a node.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from time import monotonic
 
 import rclpy
@@ -17,7 +18,7 @@ from scenario_gen.base.errors import InputError
 from scenario_gen.closed_loop.config import ClosedLoopConfig
 from scenario_gen.closed_loop.origin import Trial
 from scenario_gen.closed_loop.simulation import State
-from scenario_gen.closed_loop.trials import Outcome, summary_on_error, too_long
+from scenario_gen.closed_loop.trials import Outcome, rates
 from scenario_gen.ros.common.driving import Config, INPUTS
 from scenario_gen.ros.nodes.traffic import Traffic
 
@@ -84,13 +85,28 @@ class TrialTraffic(Traffic):
         """Raise InputError if a drive takes too long, or the planner is silent for too long."""
         now = monotonic()
         if now - start > self.config.drive.drive_time:
-            raise too_long(trial, self.config.drive)
+            raise InputError(
+                f"scenario {trial.name}: the planner did not finish in "
+                f"{self.config.drive.drive_time:g} s; if it does not hang, increase drive_time"
+            )
         if now - max(start, self._last_reply_at) > SILENCE_TIMEOUT_S:
             raise InputError(
                 f"scenario {trial.name}: the planner's node has sent no command for "
                 f"{SILENCE_TIMEOUT_S:.0f} s: it hangs, "
                 "or does not answer each odometry of the ego with one command"
             )
+
+
+@contextmanager
+def _summary_on_error(outcomes: Sequence[Outcome]) -> Iterator[None]:
+    """Add the summary of the drives before it to an InputError."""
+    try:
+        yield
+    except InputError as error:
+        if not outcomes:
+            raise
+        summary = ", ".join(f"{name} {rate.count}" for name, rate in rates(outcomes).items())
+        raise InputError(f"{error}; of the {len(outcomes)} drives before: {summary}") from error
 
 
 def _drive_all(
@@ -133,7 +149,7 @@ def drive_trials(
         executor.add_node(node)
         try:
             _wait_for_planner(node, executor, planner, check)
-            with summary_on_error(node.outcomes):
+            with _summary_on_error(node.outcomes):
                 _drive_all(node, executor, check)
             return node.outcomes
         finally:
