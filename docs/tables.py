@@ -15,8 +15,8 @@ import typer
 from msg_conventions.topics import TOPICS
 from scenario_gen.base.parameters import flatten
 from scenario_gen.cli.commands import app
+from scenario_gen.closed_loop.bars import Bars
 from scenario_gen.closed_loop.config import ClosedLoopConfig
-from scenario_gen.closed_loop.trials import Bars
 from scenario_gen.corpus.config import CorpusConfig
 from scenario_gen.logs.columns import NAMES, UNITS
 from scenario_gen.output.exchange import ExportConfig

@@ -71,6 +71,13 @@ class Drive:
     ] = False
     count: Annotated[int, typer.Option(min=0, help="Number of scenarios of each bag. 0: all.")] = 0
     workers: WorkersOption = 0
+    mutants: Annotated[
+        bool,
+        typer.Option(
+            "--mutants",
+            help="Also drive the planner with single faults, and report which of them are caught.",
+        ),
+    ] = False
     repeat: Annotated[
         int,
         typer.Option(
@@ -109,8 +116,15 @@ class Drive:
 @takes(Drive)
 def drive(options: Drive) -> None:
     """Test planners in closed loop in the scenarios of bags. Exit code 1: below a threshold."""
-    from scenario_gen.closed_loop.command import drive_bags, DriveRequest, in_processes
+    from scenario_gen.closed_loop.command import (
+        drive_bags,
+        DriveRequest,
+        in_processes,
+        mutants_in_processes,
+    )
 
+    if options.mutants and options.ros:
+        raise InputError("--mutants: faults are put around a Python planner; leave out --ros")
     for bag in options.bags:
         warn_of_metadata(bag)
     processes = in_processes(options.workers)
@@ -130,6 +144,7 @@ def drive(options: Drive) -> None:
             progress=lambda done, total: advance(name, done, total),
             run=_over_dds() if options.ros else processes,
             baseline=processes if options.baseline else None,
+            mutants=mutants_in_processes(options.workers) if options.mutants else None,
         )
     _report(result, options.out)
     if result.broken:
@@ -145,6 +160,10 @@ def _report(suite: "Suite", out: Path) -> None:
     for drives in suite.drives:
         _print_comparison(drives.comparison)
     _print_durations(suite)
+    for drives in suite.drives:
+        if drives.mutants is not None:
+            rows = [(each.fault, str(each)) for each in drives.mutants.results]
+            print_table(("fault", drives.planner), rows)
     if len(suite.drives) == 1:
         _print_failures(suite.drives[0])
     print_(*map(str, files), sep="\n")

@@ -12,16 +12,16 @@ from pathlib import Path
 from scenario_gen.base.errors import InputError
 from scenario_gen.base.folders import replaced_folder
 from scenario_gen.base.parameters import assigned
+from scenario_gen.closed_loop.bars import Bars, broken_bars
 from scenario_gen.closed_loop.blind import blind_rate, BlindRate
 from scenario_gen.closed_loop.comparison import compared, read_drives, refuse_others
 from scenario_gen.closed_loop.config import ClosedLoopConfig
+from scenario_gen.closed_loop.mutants import mutation_score, MutationScore
 from scenario_gen.closed_loop.origin import origins_of, Trial
 from scenario_gen.closed_loop.results import DRIVEN, Drives
 from scenario_gen.closed_loop.simulation import ClosedLoop
 from scenario_gen.closed_loop.suite import bags_in, read_suite, Suite
 from scenario_gen.closed_loop.trials import (
-    Bars,
-    broken_bars,
     Outcome,
     rates,
     run_trials,
@@ -30,6 +30,7 @@ from scenario_gen.closed_loop.trials import (
 
 Progress = Callable[[int, int], None]  # numbers of finished and of all drives
 RunTrials = Callable[[Sequence[Trial], str, ClosedLoopConfig, Progress], list[Outcome]]
+RunMutants = Callable[[Sequence[Trial], str, Sequence[Outcome], ClosedLoopConfig], MutationScore]
 MAX_BASELINE_COUNT = 200
 BASELINE = "scenario_gen.closed_loop.planners:NonReactive"
 
@@ -46,6 +47,13 @@ def in_processes(workers: int = 0) -> RunTrials:
     """Return a function that drives trials in several processes; 0: one per core."""
     return lambda trials, planner, config, progress: run_trials(
         trials, planner, config, workers or os.cpu_count() or 1, progress
+    )
+
+
+def mutants_in_processes(workers: int = 0) -> RunMutants:
+    """Return a function that drives the mutants of a planner, as `in_processes` drives it."""
+    return lambda trials, planner, outcomes, config: mutation_score(
+        trials, planner, outcomes, config, workers or os.cpu_count() or 1
     )
 
 
@@ -91,6 +99,7 @@ def drive_bags(
     progress: Progress = lambda *_: None,
     run: RunTrials | None = None,
     baseline: RunTrials | None = None,
+    mutants: RunMutants | None = None,
 ) -> Suite:
     """Drive planners through the scenarios of bags and write the results.
 
@@ -101,6 +110,7 @@ def drive_bags(
         run: drives a planner; default: `in_processes()`.
         baseline: drives the non-reactive baseline in at most MAX_BASELINE_COUNT of the scenarios;
             None: no baseline.
+        mutants: drives the mutants of a planner; None: no mutation score.
 
     Raises:
         InputError: a bag, planner, folder, parameter or the file to compare with is invalid.
@@ -136,9 +146,18 @@ def drive_bags(
             broken += _unusable(outcomes)
             if comparison is not None and comparison.worse:
                 broken.append(comparison.sentence())
+            score = mutants(trials, planner, outcomes, config.drive) if mutants else None
             results.append(
                 Drives(
-                    outcomes, planner, config.drive, trials, broken, unreactive, blind, comparison
+                    outcomes,
+                    planner,
+                    config.drive,
+                    trials,
+                    broken,
+                    unreactive,
+                    blind,
+                    comparison,
+                    score,
                 )
             )
         suite = Suite.of(results, bags)

@@ -149,7 +149,11 @@ class ClosedLoopConfig(Parameters):
         8.0, "longest time to collision that counts", unit="s", low=0.1, high=60.0
     )
     hard_braking: float = parameter(
-        4.0, "deceleration that counts as hard braking", unit="m/s²", low=0.1, high=20.0
+        4.0,
+        "deceleration that counts as hard braking, also of a vehicle whose turn the ego takes",
+        unit="m/s²",
+        low=0.1,
+        high=20.0,
     )
     off_road_depth: float = parameter(
         0.1,

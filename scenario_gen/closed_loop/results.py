@@ -23,6 +23,7 @@ from scenario_gen.base.parameters import flatten
 from scenario_gen.closed_loop.blind import BlindRate
 from scenario_gen.closed_loop.comparison import Comparison
 from scenario_gen.closed_loop.config import ClosedLoopConfig
+from scenario_gen.closed_loop.mutants import MutationScore
 from scenario_gen.closed_loop.origin import Trial
 from scenario_gen.closed_loop.trials import Outcome, passed_of, rates
 from scenario_gen.output.report.data import (
@@ -57,6 +58,7 @@ class Drives:
         baseline: outcomes of the non-reactive baseline.
         blind: how the best blind planner does in the same scenarios.
         comparison: the comparison with an earlier planner.
+        mutants: how many faults of the planner the scenarios catch.
     """
 
     outcomes: Sequence[Outcome]
@@ -67,6 +69,7 @@ class Drives:
     baseline: Sequence[Outcome] = ()
     blind: BlindRate | None = None
     comparison: Comparison | None = None
+    mutants: MutationScore | None = None
 
     def by_severity(self) -> list[int]:
         """Return the indices of the outcomes, the worst first."""
@@ -100,6 +103,8 @@ class Drives:
             messages.append(f"observation of the others: {self.config.observation}")
         if self.comparison is not None:
             messages.append(self.comparison.sentence())
+        if self.mutants is not None:
+            messages.append(str(self.mutants))
         messages += [self._faults_note(), self._scores_note()]
         return [message for message in messages if message]
 
@@ -204,6 +209,7 @@ class Drives:
             "baseline_pass": passed_of(self.baseline).document() if self.baseline else None,
             "best_blind": None if self.blind is None else self.blind.document(),
             "against": None if self.comparison is None else self.comparison.document(),
+            "mutants": None if self.mutants is None else self.mutants.document(),
             "notes": self.notes(),
             "drives": drives,
         }

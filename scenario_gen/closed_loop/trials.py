@@ -9,7 +9,7 @@ The results do not depend on the number of workers.
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager, redirect_stdout
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from itertools import chain, islice
 import math
@@ -33,7 +33,6 @@ from scenario_gen.bags.recordings.read import (
 from scenario_gen.bags.storage.bag import naming_bag
 from scenario_gen.bags.storage.config import BagConfig
 from scenario_gen.base.errors import did_you_mean, InputError
-from scenario_gen.base.parameters import parameter, Parameters
 from scenario_gen.base.registry import load_class
 from scenario_gen.base.signals import ctrl_c_blocked, worker_pool
 from scenario_gen.closed_loop import planners
@@ -78,42 +77,6 @@ class Outcome:
     decisions: Decisions = Decisions()
     traceback: str = ""
     repeats: bool = True
-
-
-@dataclass(frozen=True)
-class Bars(Parameters):
-    """The thresholds that a planner must meet to pass."""
-
-    collisions: float = parameter(
-        0.0, "largest share of drives with a collision", low=0.0, high=1.0
-    )
-    off_road: float = parameter(
-        0.0, "largest share of drives that leave the road", low=0.0, high=1.0
-    )
-    goals: float = parameter(
-        1.0, "smallest share of drives that reach the goal", low=0.0, high=1.0
-    )
-    at_fault: float = parameter(
-        0.0, "largest share of drives with a collision by the ego's fault", low=0.0, high=1.0
-    )
-    jumps: float = parameter(
-        0.0, "largest share of drives in which the ego teleports", low=0.0, high=1.0
-    )
-    faults: float = parameter(
-        0.0,
-        "largest share of drives with a command that is missing or not finite, or a teleport",
-        low=0.0,
-        high=1.0,
-    )
-    criteria: float = parameter(
-        0.0, "largest share of drives that miss one of the criteria", low=0.0, high=1.0
-    )
-    progress: float = parameter(
-        0.9,
-        "smallest share of drives with progress: 20 % of the reference drive's path, as in nuPlan",
-        low=0.0,
-        high=1.0,
-    )
 
 
 def find_planner(name: str) -> MakePlanner:
@@ -470,6 +433,7 @@ def _events(v: DriveVerdict) -> dict[str, bool]:
         "off_road": not math.isnan(v.off_road),
         "jumps": v.jumps > 0,
         "faults": v.faults > 0,
+        "took_turn": v.took_turn,
         "goals": not math.isnan(v.goal),
         "progress": v.terms.making_progress > 0.0,
     }
@@ -492,21 +456,3 @@ def _rate(
     hits = np.array(flags, dtype=np.bool_)
     share = clustered_wilson(hits, unit, CONFIDENCE, weight)
     return Rate(sum(flags), len(flags), share, encounters)
-
-
-LOWER_BARS = ("goals", "progress")
-"""The bars that are lower bounds."""
-
-
-def broken_bars(rates_by_name: dict[str, Rate], bars: Bars) -> list[str]:
-    """Return a sentence for each bar that is not met."""
-    messages = []
-    for name, bar in asdict(bars).items():
-        if name not in rates_by_name:
-            continue  # no criteria are used
-        value = rates_by_name[name].share.value
-        is_lower = name in LOWER_BARS
-        if value < bar if is_lower else value > bar:
-            side = "at least" if is_lower else "at most"
-            messages.append(f"{name}: {100 * value:.1f} %; {side} {100 * bar:.1f} % is required")
-    return messages

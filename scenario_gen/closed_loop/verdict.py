@@ -5,12 +5,12 @@
 
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
-from itertools import combinations
 import math
 from typing import Any, NamedTuple
 
 import numpy as np
 
+from scenario_gen.closed_loop.contacts import contact_times
 from scenario_gen.closed_loop.criteria import CheckedCriterion, CriterionResult
 from scenario_gen.closed_loop.drive import Drive
 from scenario_gen.closed_loop.fault import (
@@ -21,22 +21,18 @@ from scenario_gen.closed_loop.fault import (
     Runner,
     STANDSTILL_MPS,
 )
+from scenario_gen.closed_loop.imposed import imposed_braking
 from scenario_gen.closed_loop.lights import ran_red
 from scenario_gen.closed_loop.off_road import (
     first_obstacle,
-    RESOLUTION_S,
     road_use,
-    SUBSTEPS_COUNT,
 )
 from scenario_gen.closed_loop.score import not_behind, Terms, terms
 from scenario_gen.closed_loop.simulation import ClosedLoop
-from scenario_gen.method.evaluation import distance_and_ttc, footprint_distance
-from scenario_gen.method.validity import first_contacts, Proof
+from scenario_gen.method.evaluation import distance_and_ttc
 from scenario_gen.numerics import Floats
-from scenario_gen.numerics.hermite import control_points
 from scenario_gen.numerics.plane import unit
 from scenario_gen.situation import conflict_of, encroachment
-from scenario_gen.types import Scenario
 from scenario_gen.types.road import MAX_DEPTH_M
 
 __all__ = ["Collision", "DriveVerdict", "Reason", "Runner", "judge"]
@@ -117,6 +113,8 @@ class DriveVerdict:
         criteria: results of the user's criteria.
         ran_red: first time at which the ego crossed a stop line at red; NaN if never.
         error: the error of the planner, or of a criterion, that ended the drive; "" without one.
+        imposed_braking: hardest braking [m/s²] of a vehicle whose turn the ego takes.
+        took_turn: whether that is hard braking.
     """
 
     index: int
@@ -148,6 +146,8 @@ class DriveVerdict:
     criteria: tuple[CriterionResult, ...] = ()
     ran_red: float = math.nan
     error: str = ""
+    imposed_braking: float = 0.0
+    took_turn: bool = False
 
     @property
     def missed(self) -> list[CriterionResult]:
@@ -168,6 +168,7 @@ class DriveVerdict:
             and not self.jumps
             and not self.missed
             and not self.error
+            and not self.took_turn
         )
 
     @property
@@ -179,7 +180,8 @@ class DriveVerdict:
     def failure(self) -> str:
         """The first that applies; "" if the ego passed.
 
-        One of: error, jump, collision, off_road, ran_red, goal, the name of a criterion.
+        One of: error, jump, collision, off_road, ran_red, took_turn, goal, the name of a
+        criterion.
         """
         if self.error:
             return "error"
@@ -191,6 +193,8 @@ class DriveVerdict:
             return "off_road"
         if not math.isnan(self.ran_red):
             return "ran_red"
+        if self.took_turn:
+            return "took_turn"
         if math.isnan(self.goal):
             return "goal"
         return self.missed[0].name if self.missed else ""
@@ -199,8 +203,8 @@ class DriveVerdict:
     def fault(self) -> str:
         """The cause of the failure; "" if the ego passed.
 
-        One of: error, jump, the reason of a collision, off_road, obstacle, ran_red, standing (at
-        the end, before the goal), goal (missed otherwise), the name of a criterion.
+        One of: error, jump, the reason of a collision, off_road, obstacle, ran_red, took_turn,
+        standing (at the end, before the goal), goal (missed otherwise), the name of a criterion.
         """
         if self.error:
             return "error"
@@ -215,14 +219,15 @@ class DriveVerdict:
     def severity(self) -> tuple[float, ...]:
         """A key that sorts verdicts, the worst last.
 
-        Collisions by speed, then leaving the road, a red light, a missed goal, missed criteria,
-        and the least time to collision.
+        Collisions by speed, then leaving the road, a red light, taking another one's turn, a
+        missed goal, missed criteria, and the least time to collision.
         """
         hit = self.collision.speed if self.collision else -1.0
         return (
             hit,
             float(not math.isnan(self.off_road)),
             float(not math.isnan(self.ran_red)),
+            float(self.took_turn),
             float(math.isnan(self.goal)),
             float(len(self.missed)),
             -self.min_ttc,
@@ -247,6 +252,9 @@ class DriveVerdict:
             messages.append(f"{event} at {self.off_road:.2f} s ({depth})")
         if not math.isnan(self.ran_red):
             messages.append(f"ran a red light at {self.ran_red:.2f} s")
+        if self.took_turn:
+            braking = f"{self.imposed_braking:.1f} m/s²"
+            messages.append(f"took the turn of a vehicle, which braked by {braking}")
         if self.jumps:
             messages.append(f"{self.jumps} teleport(s): poses that cannot be reached in a step")
         if math.isnan(self.goal):
@@ -313,9 +321,10 @@ def judge(
     """
     motion, config = drive.motion, loop.config
     used = loop.criteria if criteria is None else criteria
-    contacts = _contacts(drive)
+    contacts = contact_times(drive)
     hit = _first_of_ego(drive, contacts)
     goal = _goal_time(loop, drive)
+    imposed = imposed_braking(loop, drive)
     clearance = _clearance(drive, config.horizon, hit)
     braking = np.maximum(-drive.accelerations, 0.0)
     hard_braking_count = int(np.count_nonzero(braking[1:] >= config.hard_braking))
@@ -356,14 +365,9 @@ def judge(
         terms=terms(drive, hit, not math.isnan(off_road), progress, clearance.ttc_not_behind),
         criteria=tuple(measure(replace(drive, road=loop.road)) for measure in used),
         ran_red=ran_red(drive.motion, drive.ego, drive.driven),
+        imposed_braking=imposed,
+        took_turn=imposed >= config.hard_braking,
     )
-
-
-def _contacts(drive: Drive) -> dict[tuple[int, int], float]:
-    """Return the times [s] of the first contacts of all pairs of vehicles that touch."""
-    pairs = combinations(reversed(range(len(drive.motion.vehicles))), 2)
-    times = {pair: _contact(drive, *pair) for pair in pairs}
-    return {pair: time for pair, time in times.items() if time is not None}
 
 
 def _first_of_ego(
@@ -407,47 +411,6 @@ def _stood(speed: Floats, step: float) -> float:
     """Return the duration [s] for which a vehicle stood at the end."""
     moved = np.flatnonzero(speed >= STANDSTILL_MPS)
     return round((len(speed) - 1 - (int(moved[-1]) if len(moved) else 0)) * step, 9)
-
-
-def _contact(drive: Drive, i: int, j: int) -> float | None:
-    """Return the time [s] of the first contact of two vehicles while both are in the scene.
-
-    None if they never touch.
-    """
-    both = np.flatnonzero(drive.present[i] & drive.present[j])
-    parts = np.split(both, np.searchsorted(both, drive.jumps)) if drive.ego in (i, j) else [both]
-    times = (
-        _contact_in(drive.motion, [i, j], slice(part[0], part[-1] + 1))
-        for part in parts
-        if len(part)
-    )
-    return next((time for time in times if time is not None), None)
-
-
-def _contact_in(motion: Scenario, pair: list[int], span: slice) -> float | None:
-    """Return the time [s] of the first contact of two vehicles in a span of instants.
-
-    None if they do not touch in it.
-    """
-    vehicles = (motion.vehicles[pair[0]], motion.vehicles[pair[1]])
-    if span.stop - span.start < 2:
-        touches = footprint_distance(motion, *pair)[span.start] <= 0.0
-        return float(motion.time[span.start]) if touches else None
-    time, position = motion.time[span], motion.position[pair][:, span]
-    heading, speed = motion.heading[pair][:, span], motion.speed[pair][:, span]
-    control, out = np.empty((2, len(time) - 1, 4, 2)), np.empty((1, 3))
-    control_points(time, position, heading, speed, control)
-    half = np.array([vehicle.half for vehicle in vehicles])
-    first_contacts(time, control, heading, half, 0.0, RESOLUTION_S, out)
-    if out[0, 0] == Proof.PROVEN:
-        return None
-    instant, step = float(out[0, 1]), float(motion.time[1])  # any instant of the contact
-    k = min(int(instant / step + 1e-9), len(motion.time) - 2)
-    start = float(motion.time[k])
-    u = np.linspace(0.0, max(instant - start, 0.0) / step, SUBSTEPS_COUNT + 1)
-    fine = motion.of_vehicles(pair).at_times(start + u * step)
-    touch = footprint_distance(fine, 0, 1) <= 0.0
-    return start + float(u[np.argmax(touch)]) * step if touch.any() else instant
 
 
 def _collision(loop: ClosedLoop, drive: Drive, hit: tuple[int, float]) -> Collision:

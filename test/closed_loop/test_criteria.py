@@ -11,11 +11,12 @@ import pytest
 from support.bag_examples import hand_made_run
 
 from scenario_gen.base.errors import InputError
+from scenario_gen.closed_loop.bars import Bars, broken_bars
 from scenario_gen.closed_loop.config import ClosedLoopConfig
 from scenario_gen.closed_loop.criteria import find_criteria
 from scenario_gen.closed_loop.results import Drives
 from scenario_gen.closed_loop.search.objective import Objective
-from scenario_gen.closed_loop.trials import Bars, broken_bars, rates, run_trials, trials_of
+from scenario_gen.closed_loop.trials import rates, run_trials, trials_of
 
 PLANNER = "scenario_gen.closed_loop.planners:NonReactive"
 

@@ -12,13 +12,14 @@ import pytest
 
 from benchmarks._driving_worlds import as_scenario, PERIOD
 from benchmarks.drive import seen_at
+from scenario_gen.closed_loop.bars import Bars, broken_bars
 from scenario_gen.closed_loop.config import ClosedLoopConfig
 from scenario_gen.closed_loop.ego import Command, Pose
 from scenario_gen.closed_loop.origin import Trial
 from scenario_gen.closed_loop.planners import ConstantSpeed
 from scenario_gen.closed_loop.results import as_junit, Drives
 from scenario_gen.closed_loop.simulation import ClosedLoop
-from scenario_gen.closed_loop.trials import Bars, broken_bars, rates, run_trials
+from scenario_gen.closed_loop.trials import rates, run_trials
 from scenario_gen.closed_loop.verdict import judge, Runner
 from scenario_gen.types.road import Road
 

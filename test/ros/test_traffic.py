@@ -367,7 +367,7 @@ def test_a_planner_that_is_a_node_gets_the_verdicts_that_it_gets_in_process(
     words = ["drive", str(bag), "--count", "2", "--set", "bars.goals=0.0"]
     words += [
         word
-        for bar in ("collisions", "at_fault", "off_road")
+        for bar in ("collisions", "at_fault", "off_road", "faults")
         for word in ("--set", f"bars.{bar}=1.0")
     ]
     words += ["--set", "bars.progress=0.0", "--workers", "1"]

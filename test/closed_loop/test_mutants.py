@@ -1,0 +1,91 @@
+# SPDX-FileCopyrightText: 2026 The scenario_gen authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""Mutation score: which single faults of a planner some scenarios catch; and turns that the ego takes."""
+
+import numpy as np
+import pytest
+from support.driving_scenes import crossing, following
+
+from scenario_gen.closed_loop.ego import Command
+from scenario_gen.closed_loop.mutants import COMMANDS, Mutant, MUTANTS, mutation_score
+from scenario_gen.closed_loop.origin import Trial
+from scenario_gen.closed_loop.planners import ConstantSpeed, IdmFollower, ReferenceFollower
+from scenario_gen.closed_loop.simulation import ClosedLoop
+from scenario_gen.closed_loop.trials import run_trials
+from scenario_gen.closed_loop.verdict import judge
+
+
+class Records:
+    """Keeps what it sees; commands 1 m/s² less than the last step did."""
+
+    def reset(self, task):
+        self.seen = []
+
+    def act(self, seen):
+        self.seen.append(seen)
+        return Command(-float(len(self.seen)), 0.1)
+
+
+def drive(fault, steps=12):
+    """Return what the planner saw, and what the mutant commanded, in a crossing with ego 1."""
+    mutant, loop = Mutant(Records, fault), ClosedLoop(crossing(), 1)
+    mutant.reset(loop.task())
+    states, asked = [loop.start()], []
+    for _ in range(steps):
+        asked.append(mutant.act(loop.observe(states[-1])))
+        states.append(loop.step(states[-1], Command(0.0, 0.0)))
+    truth = [loop.observe(state) for state in states]
+    return mutant._planner.seen, asked, truth
+
+
+@pytest.mark.parametrize("fault", MUTANTS)
+def test_each_mutant_has_its_fault_and_no_other(fault):
+    seen, asked, truth = drive(fault)
+    late = {"sees others 0.5 s late": 5, "sees others 1 s late": 10}.get(fault, 0)
+    sound = [Command(-float(k + 1), 0.1) for k in range(12)]
+    if fault in COMMANDS:
+        sound = [COMMANDS[fault](command) for command in sound]
+    if fault == "acts 0.3 s late":
+        sound = [sound[max(k - 3, 0)] for k in range(12)]
+    assert asked == sound
+    assert [each.ego for each in seen] == [each.ego for each in truth[:12]]
+    is_hidden = fault.startswith(("ignores all others", "ignores crossing", "sees 15 m"))
+    is_hidden |= fault in ("ignores vehicles on its left", "ignores the nearest vehicle")
+    for k, each in enumerate(seen):
+        now = truth[max(k - late, 0)]
+        assert len(each.ids) == len(each.types) == len(each.others) == (not is_hidden)
+        if "m/s" in fault and "km/h" in fault:
+            assert each.others[0, 3] in (now.others[0, 3] * 3.6, now.others[0, 3] / 3.6)
+        elif late:
+            assert np.array_equal(each.others, now.others)
+
+
+def test_mutants_are_caught_survive_or_are_never_exercised():
+    trials = [
+        Trial(name, scenario, 0 if name == "follower" else 1, None)
+        for name, scenario in (("follower", following(8.0, 15.0)), ("crossing", crossing()))
+    ]
+    outcomes = run_trials(trials, lambda: IdmFollower(speed=12.0))
+    assert all(outcome.verdict.passed for outcome in outcomes)
+    score = mutation_score(trials, lambda: IdmFollower(speed=12.0), outcomes)
+    results = {each.fault: each for each in score.results}
+    assert list(results) == list(MUTANTS) and score.caught == len(MUTANTS) - sum(
+        "survives" in str(each) for each in score.results
+    )
+    assert results["ignores all others"].killed_by[0] == "follower"
+    assert "never exercise" in str(results["ignores bicycles"])
+    assert set(score.smallest_set()) <= {"follower", "crossing"}
+    assert score.document()["caught"] == score.caught
+
+
+def test_an_ego_that_takes_the_turn_of_another_one_does_not_pass():
+    """Vehicle 0 goes first; it brakes for an ego that is early."""
+    loop = ClosedLoop(crossing(second_start=-48.0), 1)
+    sound = judge(loop, loop.drive(ReferenceFollower(loop)))
+    assert sound.passed and sound.imposed_braking == 0.0
+    driven = [judge(loop, loop.drive(ConstantSpeed(speed=v))) for v in np.arange(8.0, 30.0, 1.0)]
+    assert driven[0].passed
+    taken = [verdict for verdict in driven if verdict.failure == "took_turn"]
+    assert taken and all("took the turn" in verdict.sentence() for verdict in taken)
+    assert all(verdict.imposed_braking >= 4.0 and not verdict.passed for verdict in taken)
