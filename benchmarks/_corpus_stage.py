@@ -15,13 +15,12 @@ import time
 from benchmarks._archive import write_archive
 from scenario_gen.corpus.config import CorpusConfig
 from scenario_gen.corpus.encounters import clean_found
-from scenario_gen.corpus.grouping import group_partition
 from scenario_gen.corpus.inventory import inventory
 from scenario_gen.corpus.meetings import search_hours
 from scenario_gen.corpus.messages import parse_range, ranges
-from scenario_gen.corpus.schedule import accounts_of, clean_tasks, group_tasks, hour_tasks
+from scenario_gen.corpus.schedule import accounts_of, clean_tasks, hour_tasks
 
-STAGES = ("parse", "search", "group", "clean")
+STAGES = ("parse", "search", "clean")
 
 
 def work(name: str, archive: Path, out: Path) -> Iterator[Callable[[], object]]:
@@ -34,8 +33,6 @@ def work(name: str, archive: Path, out: Path) -> Iterator[Callable[[], object]]:
     elif name == "search":
         tasks = hour_tasks(accounts_of(ranged, out), out, config)
         yield from (partial(search_hours, task) for task in tasks)
-    elif name == "group":
-        yield from (partial(group_partition, task) for task in group_tasks(out, config))
     else:
         yield from (partial(clean_found, task) for task in clean_tasks(out, config))
 

@@ -22,8 +22,11 @@ from benchmarks._archive import Planted, read_planted
 from benchmarks._size import sized
 from benchmarks.row import higher, lower, Row
 from scenario_gen.base.folders import sha256_of
+from scenario_gen.corpus.grouping import grouped
 from scenario_gen.corpus.mine import mine
+from scenario_gen.corpus.schedule import meetings_of
 from scenario_gen.corpus.tables import rows_of
+from scenario_gen.logs import LogConfig
 from scenario_gen.logs.text import SPMD_COLUMNS
 
 ROWS_COUNT = sized(10_000_000, quick=40_000)
@@ -66,10 +69,8 @@ def _write(
 
 def _scores(planted: list[Planted], out: Path) -> tuple[float, float]:
     """Return recall and precision; an encounter has a kind once it is cleaned."""
-    from pyarrow import parquet
-
-    rows = parquet.read_table(out / "found").to_pylist()
-    found = {frozenset(device % FIRST_PLANTED_COUNT for device in row["devices"]) for row in rows}
+    rows = list(grouped(meetings_of(out), LogConfig()))
+    found = {frozenset(device % FIRST_PLANTED_COUNT for device in row.devices) for row in rows}
     truth = {frozenset(one.devices) for one in planted if one.inside}
     hits = found & truth
     return len(hits) / len(truth), len(hits) / max(len(rows), 1)
@@ -105,14 +106,14 @@ def _mining(name: str, place: Path) -> list[Row]:
     settings = ARCHIVES[name]
     archive, out = place / f"{name}-archive", place / name
     _stage("write", archive, json.dumps(settings | {"outside": settings["encounters"] // 2}))
-    stages = {stage: _stage(stage, archive, str(out)) for stage in ("parse", "search", "group")}
+    stages = {stage: _stage(stage, archive, str(out)) for stage in ("parse", "search")}
     seconds = {stage: float(np.sum(found["tasks"])) for stage, found in stages.items()}
     memory = {stage: found["mebibytes"] for stage, found in stages.items()}
     slowest = max(float(np.max(found["tasks"])) for found in stages.values())
     recall, precision = _scores(read_planted(archive), out)
     rows = json.loads((archive / "synthetic.json").read_text())["rows"]
     text, total = _size(archive.glob("*.csv")), sum(seconds.values())
-    stored = {stage: _size((out / stage).iterdir()) for stage in ("messages", "hours", "found")}
+    stored = {stage: _size((out / stage).iterdir()) for stage in ("messages", "hours")}
     peer = f"DuckDB's copy to Parquet {rows / _duckdb_seconds(archive, place) / 1e6:.2f}"
     label = f"{rows / 1e6:.1f} M rows, {name}"
     from_text, from_parquet = rows / total / 1e6, rows / (total - seconds["parse"]) / 1e6

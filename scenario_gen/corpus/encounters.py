@@ -8,7 +8,7 @@ formats are read whole.
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import astuple, dataclass
 from itertools import combinations
 import json
 from pathlib import Path
@@ -20,7 +20,7 @@ from scenario_gen.bags.recordings.tracks import tracks_bytes, tracks_of
 from scenario_gen.base.documents import parse_json, shown
 from scenario_gen.base.errors import guarded, InputError, UnforeseenError
 from scenario_gen.corpus.config import CorpusConfig
-from scenario_gen.corpus.grouping import FoundEncounter, label, read_found
+from scenario_gen.corpus.grouping import FoundEncounter, label
 from scenario_gen.corpus.meetings import MESSAGES_AFTER_US, MESSAGES_BEFORE_US
 from scenario_gen.corpus.messages import digest_of, UNITS_PER_DEGREE
 from scenario_gen.corpus.tables import write_table
@@ -62,33 +62,25 @@ MEETING_MARGIN_US = 2_000_000  # smooth vehicles meet a little earlier or later 
 class CleanTask:
     """Encounters to clean.
 
-    A corpus has thousands of these tasks, and each passes through the scheduler: it has keys
-    instead of tables and paths.
-
     Attributes:
-        name: of the task.
+        name: of the task; begins with the time of the first encounter.
         corpus: of the encounters.
-        part: name of the partition.
-        first: first row of the encounters there.
-        last: row after the last one.
+        encounters: the ones to clean.
         hours: keys of the hours with their messages.
         config: the parameters.
     """
 
     name: str
     corpus: Path
-    part: str
-    first: int
-    last: int
+    encounters: tuple[FoundEncounter, ...]
     hours: tuple[str, ...]
     config: CorpusConfig
 
     @property
     def target(self) -> Path:
         """The table to write."""
-        begin = self.part.split("-")[1]
-        digest = digest_of(self.part, self.first, self.last, self.hours)
-        return self.corpus / "encounters" / f"found-{begin}-{self.first:06}-{digest}.parquet"
+        digest = digest_of([astuple(entry) for entry in self.encounters], self.hours)
+        return self.corpus / "encounters" / f"found-{self.name}-{digest}.parquet"
 
 
 @dataclass(frozen=True)
@@ -106,16 +98,15 @@ def clean_found(task: CleanTask) -> None:
     from pyarrow import parquet
 
     hours = [task.corpus / "hours" / f"rows-{key}.parquet" for key in task.hours]
-    listed = read_found(task.corpus / "found" / f"{task.part}.parquet", task.first, task.last)
-    begin = min(entry.start for entry in listed) - MESSAGES_BEFORE_US
-    end = max(entry.end for entry in listed) + MESSAGES_AFTER_US
-    devices = sorted({device for entry in listed for device in entry.devices})
+    begin = min(entry.start for entry in task.encounters) - MESSAGES_BEFORE_US
+    end = max(entry.end for entry in task.encounters) + MESSAGES_AFTER_US
+    devices = sorted({device for entry in task.encounters for device in entry.devices})
     filters = [("t", ">=", begin), ("t", "<=", end), ("device", "in", devices)]
     tables = [parquet.read_table(path, filters=filters) for path in hours]
     by_device = _by_device([table.to_pandas() for table in tables])
     rows: list[dict[str, Any]] = []
     refused = []
-    for entry in listed:
+    for entry in task.encounters:
         try:
             log = _raw_log(entry, by_device)
             encounters = encounters_of(log, task.config.log, _met_ns(entry)).encounters

@@ -267,10 +267,7 @@ def _parse(task: RangeTask, files: Sequence[Path], folder: Path) -> tuple[dict[s
         account = _account(counts, inputs)
         if task.table.is_text:
             _count_rejected(base, names, account["files"])
-    account["notes"] = [
-        f"{inputs[file]}: DSecond disagrees with Gentime in most rows, and is ignored"
-        for file in unchecked
-    ]
+    account["other_clocks"] = [inputs[file] for file in unchecked]
     return account, target
 
 

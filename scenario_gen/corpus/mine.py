@@ -5,8 +5,8 @@
 
     messages/range-*.parquet    messages from text, by hour (`messages.py`)
     hours/hour-*.parquet        meetings of two vehicles (`meetings.py`), and their messages
-    found/part-*.parquet        groups of meetings (`grouping.py`)
-    encounters/*.parquet        cleaned encounters (`encounters.py`); other logs start here
+    encounters/*.parquet        groups of meetings (`grouping.py`), cleaned (`encounters.py`);
+                                other logs start here
 
 An existing file is finished, so a killed run continues where it stopped. Its name depends on its
 inputs, so a changed file costs what depends on it. An unreadable file is named and left out.
@@ -35,7 +35,6 @@ from scenario_gen.corpus.encounters import (
     tables_of,
     UNREAD_LOGS,
 )
-from scenario_gen.corpus.grouping import group_partition
 from scenario_gen.corpus.inventory import inventory
 from scenario_gen.corpus.meetings import search_hours
 from scenario_gen.corpus.messages import digest_of, identity_of, parse_range, ranges, RangeTask
@@ -45,7 +44,6 @@ from scenario_gen.corpus.schedule import (
     accounts_of,
     clean_tasks,
     current,
-    group_tasks,
     hour_tasks,
     least_rows,
     searched_hours,
@@ -93,16 +91,17 @@ class MiningSummary:
     notes: list[str]
 
     def lines(self) -> list[str]:
-        """Return the summary for people: groups with counts and causes, in at most five lines."""
+        """Return the summary for people: each cause once, with its number; damaged files first."""
         lines = [self._first_line()]
         if self.account:
             causes = ", ".join(f"{count} {cause}" for cause, count in sorted(self.account.items()))
             lines.append(f"rows: {causes} (in {len(self.files)} files)")
-        if self.refused:
-            groups = Counter(row.get("cause", "not usable") for row in self.refused)
-            causes = ", ".join(f"{count} × {cause}" for cause, count in groups.most_common())
-            first = self.refused[0]
-            lines.append(f"left out: {causes}; the first, {first['name']}: {first['why']}")
+        groups: dict[str, list[dict[str, str]]] = {}
+        for row in self.refused:
+            groups.setdefault(row.get("cause", "not usable"), []).append(row)
+        for cause, rows in groups.items():
+            named = _named([row["name"] for row in rows], "")
+            lines.append(f"{cause}: {named}; the first: {rows[0]['why']}")
         if self.notes:
             lines.append(f"notes: {len(self.notes)}; the first: {self.notes[0].strip()}")
         if self.failed:
@@ -165,7 +164,7 @@ def mine(
     messages, logs, others, unreadable = inventory(archives, config.log.columns)
     check_out(out, archives)
     with held(out), spread(workers) as run:
-        agree(out, ARCHIVE, {"format": 4, "parameters": _parameters(config)}, "corpus")
+        agree(out, ARCHIVE, {"format": 5, "parameters": _parameters(config)}, "corpus")
         log_tasks = [_log_task(paths, out / "encounters", config) for paths in logs]
         ranged = ranges(messages, out / "messages", config.range_size << 20, config.memory)
         stale = _stale_files(ranged, out)
@@ -182,7 +181,6 @@ def mine(
         work("ranges", parse_range, current(ranged, out / "messages"))
         accounts = accounts_of(ranged, out)
         work("parts of hours", search_hours, hour_tasks(accounts, out, config))
-        work("partitions", group_partition, group_tasks(out, config))
         work("tables of encounters", clean_found, clean_tasks(out, config))
         contents = _contents(out)
         notes = _notes(others, stale, done, accounts.values(), least_rows(config))
@@ -296,7 +294,6 @@ def _summary(
     files: dict[str, Counter[str]] = {}
     damaged: dict[str, str] = {}
     for account in accounts:
-        notes = [*notes, *account["notes"]]
         damaged |= account.get("damaged", {})
         for file, causes in account["files"].items():
             files.setdefault(file, Counter()).update(causes)
@@ -357,6 +354,11 @@ def _notes(
             f"{_named([path.name for path in others])} are in no known format (unpack"
             " compressed ones)"
         )
+    clocks = sorted(chain.from_iterable(account["other_clocks"] for account in accounts))
+    if clocks:
+        notes.append(
+            f"{_named(clocks)}: DSecond disagrees with Gentime in most rows, and is ignored"
+        )
     hours = chain.from_iterable(account["hours"].values() for account in accounts)
     strays = sum(count for count in hours if count < least)
     if strays:
@@ -367,10 +369,10 @@ def _notes(
     return notes
 
 
-def _named(files: Sequence[str]) -> str:
-    """Return the number of files, and the first names."""
-    names = ", ".join(files[:NAMED_FILES_COUNT])
-    return f"{len(files)} files ({names}{' …' if len(files) > NAMED_FILES_COUNT else ''})"
+def _named(names: Sequence[str], noun: str = " files") -> str:
+    """Return a number with its noun, and the first names."""
+    first = ", ".join(names[:NAMED_FILES_COUNT])
+    return f"{len(names)}{noun} ({first}{' …' if len(names) > NAMED_FILES_COUNT else ''})"
 
 
 def _shared_ids(out: Path) -> list[str]:

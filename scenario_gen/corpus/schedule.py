@@ -8,20 +8,19 @@ removed: its files have changed.
 """
 
 from collections import Counter
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from itertools import groupby
 from pathlib import Path
 from typing import Any, NamedTuple
-
-import numpy as np
 
 from scenario_gen.base.documents import COUNT, read_json
 from scenario_gen.corpus.config import CorpusConfig
 from scenario_gen.corpus.encounters import CleanTask
-from scenario_gen.corpus.grouping import GroupTask, partitions
+from scenario_gen.corpus.grouping import grouped, MEETING_COLUMNS
 from scenario_gen.corpus.meetings import HourTask, overlap
-from scenario_gen.corpus.messages import digest_of, HOUR_US, RangeTask
+from scenario_gen.corpus.messages import DAY_US, digest_of, HOUR_US, RangeTask
 from scenario_gen.corpus.tasks import Target
-from scenario_gen.numerics import Ints
+from scenario_gen.logs import Meeting
 
 
 def _by_hour(values: dict[str, Any]) -> dict[str, Any]:
@@ -35,7 +34,7 @@ def _by_hour(values: dict[str, Any]) -> dict[str, Any]:
 _TEXTS = {"type": "object", "additionalProperties": {"type": "string"}}
 ACCOUNT = {  # of a range: rows by cause of each file, rows and hashes of hours, damaged files
     "type": "object",
-    "required": ["files", "hours", "contents", "notes"],
+    "required": ["files", "hours", "contents", "other_clocks"],
     "properties": {
         "files": {
             "type": "object",
@@ -43,7 +42,7 @@ ACCOUNT = {  # of a range: rows by cause of each file, rows and hashes of hours,
         },
         "hours": _by_hour(COUNT),
         "contents": _by_hour({"type": "string", "pattern": "^[0-9a-f]+$"}),
-        "notes": {"type": "array", "items": {"type": "string"}},
+        "other_clocks": {"type": "array", "items": {"type": "string"}},
         "damaged": _TEXTS,
     },
 }
@@ -145,32 +144,34 @@ def hour_tasks(
     ]
 
 
-def group_tasks(out: Path, config: CorpusConfig) -> list[GroupTask]:
-    """Return tasks for the partitions of all meetings that are not grouped yet."""
-    hours = searched_hours(out)
-    columns = _columns([*hours.values()], "start", "end")
-    start, end = (np.concatenate(parts) for parts in columns)
-    tasks = []
-    for begin, last in partitions(start, end):
-        near = _between(hours, begin // HOUR_US, (last - 1) // HOUR_US)
-        tasks.append(GroupTask(f"partition from {begin}", out, near, begin, last, config))
-    return current(tasks, out / "found")
-
-
 def clean_tasks(out: Path, config: CorpusConfig) -> list[CleanTask]:
-    """Return tasks for the encounters that are not cleaned yet."""
+    """Return tasks for the encounters that are not cleaned yet.
+
+    A task has the encounters of one day, so that further days leave it unchanged.
+    """
     hours = searched_hours(out)
-    tables = sorted((out / "found").glob("part-*.parquet"))
-    columns = _columns(tables, "earliest", "end")
+    encounters = grouped(meetings_of(out), config.log)
     tasks = []
-    for table, earliest, end in zip(tables, columns[0][1:], columns[1][1:], strict=True):
-        for first in range(0, len(end), config.task_encounters):
-            rows = slice(first, min(first + config.task_encounters, len(end)))
-            first_hour = int(min(earliest[rows])) // HOUR_US - 1
-            near = _between(hours, first_hour, int(max(end[rows])) // HOUR_US)
-            name = f"{table.stem}, encounters from {first}"
-            tasks.append(CleanTask(name, out, table.stem, first, rows.stop, near, config))
+    for _, day in groupby(encounters, key=lambda entry: entry.start // DAY_US):
+        of_day = list(day)
+        for k in range(0, len(of_day), config.task_encounters):
+            entries = tuple(of_day[k : k + config.task_encounters])
+            first = min(entry.earliest for entry in entries) // HOUR_US - 1
+            last = max(entry.end for entry in entries) // HOUR_US
+            near = [hours[hour] for hour in range(first, last + 1) if hour in hours]
+            keys = tuple(table.stem.partition("-")[2] for table in near)
+            name = f"{entries[0].start:016}-{k:06}"
+            tasks.append(CleanTask(name, out, entries, keys, config))
     return current(tasks, out / "encounters", "found-*")
+
+
+def meetings_of(out: Path) -> Iterator[Meeting]:
+    """Yield the meetings of the hours that are searched, sorted by start."""
+    from pyarrow import parquet
+
+    for table in searched_hours(out).values():
+        rows = parquet.read_table(table, columns=list(MEETING_COLUMNS)).to_pylist()
+        yield from (Meeting(**row) for row in rows)
 
 
 def searched_hours(out: Path) -> dict[int, Path]:
@@ -178,18 +179,3 @@ def searched_hours(out: Path) -> dict[int, Path]:
     tables = [*(out / "hours").glob("hour-*.parquet")]
     by_hour = {int(table.stem.split("-")[1]): table for table in tables}
     return {hour: by_hour[hour] for hour in sorted(by_hour)}
-
-
-def _between(hours: Mapping[int, Path], first: int, last: int) -> tuple[str, ...]:
-    """Return the keys of the hours from the first to the last."""
-    near = [hours[hour] for hour in range(first, last + 1) if hour in hours]
-    return tuple(table.stem.partition("-")[2] for table in near)
-
-
-def _columns(tables: Sequence[Path], *names: str) -> list[list[Ints]]:
-    """Return for each column an empty array, and its values (rows,) in each table."""
-    from pyarrow import parquet
-
-    read = [parquet.read_table(table, columns=list(names)) for table in tables]
-    empty = np.zeros(0, dtype=np.int64)
-    return [[empty, *(table[name].to_numpy() for table in read)] for name in names]

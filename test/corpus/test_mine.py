@@ -3,9 +3,7 @@
 
 """Mining: planted encounters are found and no others, rows left out are counted, the work can be cut off anywhere."""
 
-from dataclasses import replace
 import json
-import pickle
 
 from hypothesis import given, strategies
 import numpy as np
@@ -15,15 +13,14 @@ from support.killed import killed_in
 
 from scenario_gen.base.errors import InputError, RefusedError
 from scenario_gen.base.folders import sha256_of
-from scenario_gen.corpus import grouping
 from scenario_gen.corpus.config import CorpusConfig
 from scenario_gen.corpus.encounters import encounter_of, tables_of
-from scenario_gen.corpus.grouping import group, label, Meeting, partitions
+from scenario_gen.corpus.grouping import group, grouped, label
 from scenario_gen.corpus.inventory import inventory
 from scenario_gen.corpus.messages import NO_ROW, parse_range, ranges
 from scenario_gen.corpus.mine import mine
-from scenario_gen.corpus.schedule import clean_tasks
 from scenario_gen.corpus.tables import rows_of
+from scenario_gen.logs import Meeting
 from scenario_gen.logs.config import LogConfig
 from scenario_gen.situation import Situation
 
@@ -119,7 +116,7 @@ def test_what_is_missing_is_made_again_and_the_same(archive, corpus, tmp_path):
     """As after a kill: of each stage a file is gone, and a torn one lies there."""
     out, _ = corpus
     before = {path.relative_to(out): sha256_of(path) for path in out.rglob("*.parquet")}
-    for stage in ("messages", "hours", "found", "encounters"):
+    for stage in ("messages", "hours", "encounters"):
         sorted((out / stage).glob("*.parquet"))[0].unlink()
         killed_in(out / stage)
     killed_in(out)
@@ -160,7 +157,6 @@ def test_a_file_that_cannot_be_read_is_said_and_does_not_end_the_others(archive,
     )
     with pytest.raises(RefusedError, match="without --strict it is left out"):
         mine([tmp_path / "in"], tmp_path / "out", strict=True)
-    assert not list((tmp_path / "out").glob("found/*"))
     assert mined.account == {
         "rows": 4,
         NO_ROW: 2,
@@ -205,7 +201,7 @@ def test_nothing_to_read_is_an_error(tmp_path):
 
 
 def meeting(a, b, start, end, gap):
-    return Meeting(gap, int(start * 1e6), a, b, int(end * 1e6), gap, 42.0, -83.0)
+    return Meeting(gap, int(start * 1e6), a, b, int(end * 1e6))
 
 
 def test_who_is_joined_to_whom():
@@ -230,34 +226,20 @@ def test_who_is_joined_to_whom():
             lambda row: row[3] >= 3
         ),
         max_size=40,
-    ),
-    least=strategies.integers(1, 6),
+    )
 )
-def test_partitions_of_meetings_give_the_encounters_of_all(rows, least):
+def test_meetings_in_order_of_time_give_the_encounters_of_all(rows):
     config = LogConfig(max_vehicles=3)
     meetings = [
         meeting(a, a + 1 + more, start, start + length, float(gap))
         for a, more, start, length, gap in rows
     ]
-    spans = partitions(
-        np.array([m.start for m in meetings]), np.array([m.end for m in meetings]), least
-    )
-    divided = [[m for m in meetings if begin <= m.start < end] for begin, end in spans]
-    assert sum(map(len, divided)) == len(meetings) and all(
-        len(own) >= least for own in divided[:-1]
-    )
-    assert [one for own in divided for one in group(own, config)] == group(meetings, config)
+    in_order = sorted(meetings, key=lambda meeting: (meeting.start, meeting.a, meeting.b))
+    assert list(grouped(in_order, config)) == group(meetings, config)
 
 
-def test_small_partitions_give_the_same_corpus_by_small_tasks(
-    archive, corpus, tmp_path, monkeypatch
-):
-    monkeypatch.setattr(grouping, "PARTITION_ROWS", 2)
-    config = CorpusConfig(task_encounters=3)
+def test_small_tasks_give_the_same_corpus(archive, corpus, tmp_path):
+    config = CorpusConfig(task_encounters=3, task_rows=10_000)
     mine([archive], tmp_path / "out", config)
-    assert len(list((tmp_path / "out" / "found").glob("*"))) > 3
+    assert len(tables_of(tmp_path / "out")) > 3
     assert list(rows_of(tables_of(tmp_path / "out"))) == list(rows_of(tables_of(corpus[0])))
-    for table in (tmp_path / "out" / "encounters").glob("*.parquet"):
-        table.unlink()
-    tasks = clean_tasks(tmp_path / "out", config)
-    assert max(len(pickle.dumps(replace(t, config=None))) for t in tasks) <= 500
