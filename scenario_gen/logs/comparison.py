@@ -5,6 +5,7 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from itertools import pairwise
 
 import numpy as np
 
@@ -134,26 +135,28 @@ class Comparison:
 def _compare(legs: Legs, n_vehicles: int) -> Comparison:
     """Compare the quantities of each vehicle."""
     values = np.full((7, n_vehicles), np.nan)
-    rate = legs.rate
+    rate, course = legs.rate, legs.course
     is_directed = (np.hypot(*legs.step.T) > EVIDENCE.min_leg_m) & (rate > EVIDENCE.min_leg_m)
-    for k in range(n_vehicles):
-        of_vehicle = legs.vehicle == k
-        speed = np.where(of_vehicle & (rate > 0.0), legs.speed, np.nan)
+    edges = np.searchsorted(legs.vehicle, np.arange(n_vehicles + 1))
+    for k, (begin, end) in enumerate(pairwise(edges.tolist())):
+        part = slice(begin, end)
+        rates = rate[part]
+        speed = np.where(rates > 0.0, legs.speed[part], np.nan)
         known = speed > EVIDENCE.slow_share * np.nanmax([0.0, *speed])  # at a stop, noise moves
         if known.sum() >= EVIDENCE.min_leg_count:
-            ratios = np.log(legs.speed[known] / rate[known])
+            ratios = np.log(speed[known] / rates[known])
             middle = float(np.median(ratios))
             values[0, k] = np.exp(middle)
             values[1, k] = (np.abs(ratios) > np.log(EVIDENCE.wrong_ratio)).mean()
             values[2, k] = (np.abs(ratios) > np.log(EVIDENCE.gross_ratio)).mean()
             values[3, k] = np.percentile(np.abs(ratios - middle), 90.0)
         for row, direction in ((4, legs.heading), (5, legs.velocity)):
-            used = of_vehicle & is_directed & np.isfinite(direction)
+            used = is_directed[part] & np.isfinite(direction[part])
             if used.sum() >= EVIDENCE.min_leg_count:
-                error = np.abs(wrap_angle(direction[used] - legs.course[used]))
+                error = np.abs(wrap_angle(direction[part][used] - course[part][used]))
                 values[row, k] = (error > EVIDENCE.off_rad).mean()
-        if of_vehicle.sum() >= EVIDENCE.min_leg_count:
-            values[6, k] = np.percentile(rate[of_vehicle], 90.0)
+        if len(rates) >= EVIDENCE.min_leg_count:
+            values[6, k] = np.percentile(rates, 90.0)
     return Comparison(*values)
 
 
