@@ -124,8 +124,8 @@ class Generate:
         typer.Option(
             help="What to accept, separated by commas. On the road: lost_conflict, lost_order, "
             "lost_following, lost_merge, lost_lane_change, lost_overtaking, lost_clearance, "
-            "lost_stand, lost_turn. In the log: doubt (read it although the result contradicts "
-            "its data). Repeatable."
+            "lost_stand, lost_turn, lost_light. In the log: doubt (read it although the result "
+            "contradicts its data). Repeatable."
         ),
     ] = None
     obstacle: Annotated[

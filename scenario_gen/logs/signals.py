@@ -34,7 +34,8 @@ class _Limits:
 
     Attributes:
         half_lane_m: of a stop line, beyond the vehicles that cross it.
-        max_gap_s: a state is not known in longer gaps between its samples.
+        max_gap_s: a state is not known in longer gaps between its samples, but for
+        held_s: before its first and after its last sample, in which its vehicle crosses the line.
         crossing_rad: least and greatest angle between traffic that needs alternate greens.
         straight_rad: turning traffic may meet other traffic at green.
         common_green_s: shorter common greens are rounding.
@@ -43,6 +44,7 @@ class _Limits:
 
     half_lane_m: float = 1.75
     max_gap_s: float = 3.0
+    held_s: float = 2.0
     crossing_rad: tuple[float, float] = (math.radians(60.0), math.radians(120.0))
     straight_rad: float = math.radians(30.0)
     common_green_s: float = 0.5
@@ -166,7 +168,7 @@ def sampled_schedule(
 ) -> SignalSchedule:
     """Return the schedule of states that were recorded at ascending times [s].
 
-    In long gaps the state is unknown.
+    It is known for 2 s more at both ends. In long gaps it is unknown.
 
     Raises:
         InputError: two states were recorded at one time.
@@ -178,15 +180,16 @@ def sampled_schedule(
         raise InputError(f"{place} is {states[k]} and {states[k + 1]} at {times[k]:g} s")
     usual = float(np.median(steps[steps > 0.0])) if (steps > 0.0).any() else 0.1
     longest = max(_LIMITS.max_gap_s, 2.5 * usual)
-    known_at, known = [times[0]], [states[0]]
+    known_at, known = [times[0] - _LIMITS.held_s], [states[0]]
     for k, step in enumerate(steps.tolist(), 1):
-        if step > longest:
-            known_at.append(times[k - 1] + usual)
+        held = min(_LIMITS.held_s, 0.4 * step) if step > longest else 0.0
+        if held > 0.0:
+            known_at.append(times[k - 1] + max(held, usual))
             known.append(SignalState.UNKNOWN)
         if step > 0.0:
-            known_at.append(times[k])
+            known_at.append(times[k] - held)
             known.append(states[k])
-    return SignalSchedule.of_samples(known_at, known, times[-1] + usual)
+    return SignalSchedule.of_samples(known_at, known, times[-1] + max(usual, _LIMITS.held_s))
 
 
 def most_permissive(states: Iterable[SignalState]) -> SignalState:

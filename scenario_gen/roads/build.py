@@ -226,7 +226,7 @@ def draw_main_road(name: str, encounter: Encounter | None, config: RoadConfig) -
     tracks = situation.drivers
     config = fitting_width(tracks, config)
     is_junction = name in ("t_intersection", "four_way")
-    if is_junction and config.priority == "signals" and encounter.lights:
+    if is_junction and config.priority in ("auto", "signals") and encounter.lights:
         return draw_junction(name, situation, config)
     try:
         frenet = to_frenet(tracks)

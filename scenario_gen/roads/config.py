@@ -36,7 +36,8 @@ class RoadConfig(Parameters):
     priority: str = parameter(
         "auto",
         "signs of a drawn junction; auto: arms whose recorded vehicles yielded give way, as do "
-        "those into a roundabout; all_way_stop: all stop; signals: traffic lights",
+        "those into a roundabout, and recorded lights are drawn; all_way_stop: all stop; "
+        "signals: traffic lights",
         choices=("none", "auto", "all_way_stop", "signals"),
     )
     signals: str = parameter(

@@ -136,7 +136,9 @@ class _RoadDrawing:
         """Yield the signs at the mouths of arms: to stop, or to give way to other traffic."""
         if not self._plan.has_junction or self._config.priority == "none":
             return
-        signals = self._config.priority == "signals" and not self._plan.ring
+        wanted = self._config.priority
+        is_lit = wanted == "signals" or (wanted == "auto" and bool(self._plan.lights))
+        signals = is_lit and not self._plan.ring
         all_stop = (
             self._config.priority == "all_way_stop"
             and not self._plan.ring

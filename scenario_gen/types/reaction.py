@@ -153,6 +153,11 @@ class ReactionGraph:
             for edge in self.cut
         ]
         sentences += [stop.words(vehicles[stop.who].label) for stop in self.stops]
+        sentences += [
+            f"{vehicles[who].label} crosses its stop line at red"
+            for who, _, slack in self.crossings
+            if slack == 0.0
+        ]
         return tuple(sentences) or (f"no reactions detected{self.why and ': '}{self.why}",)
 
     def document(

@@ -11,7 +11,7 @@ import numpy as np
 from scenario_gen.base.errors import RefusedError
 from scenario_gen.method.fitting.config import FittingConfig
 from scenario_gen.method.fitting.lanes import place_on_lanes
-from scenario_gen.method.fitting.losses import find_losses, refuse_lost
+from scenario_gen.method.fitting.losses import find_losses, lost_lights, refuse_lost
 from scenario_gen.method.fitting.placement import (
     place_given,
     place_in_own_frame,
@@ -97,7 +97,11 @@ def assemble_fit(
         states.append(np.column_stack((anchors[[0, -1]], speeds)))
     start, end = np.stack(states, axis=1)
     requested = BoundaryStates(start=start, end=end)
-    losses = (*find_losses(situation.tracks, placement.tracks), *placement.unused)
+    losses = (
+        *find_losses(situation.tracks, placement.tracks),
+        *lost_lights(situation.reactions.stops, placement.tracks, road),
+        *placement.unused,
+    )
     return Fit(encounter.vehicles, tuple(fitted), index, requested, tuple(notes), losses)
 
 

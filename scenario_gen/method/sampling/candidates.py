@@ -257,7 +257,7 @@ class Batch:
                 lights = self.lights.on_clock(self.clock, s, float(self.presence.begin[s]))
                 facts = Facts(lights=lights)
             x, y, yaw, speed, acceleration = np.moveaxis(states[:, s, : count[s]], -1, 0)
-            scenarios[s] = Scenario(
+            scenario = Scenario(
                 tuple(samples.vehicles[s] for samples in self.samples),
                 time[: count[s]],
                 np.stack([x, y], axis=-1),
@@ -270,4 +270,5 @@ class Batch:
                 facts=facts,
                 present=self.presence.present[s],
             )
+            scenarios[s] = self.lights.with_departures(scenario) if self.lights else scenario
         return scenarios

@@ -3,13 +3,51 @@
 
 """The traffic lights of a road on the clocks of scenarios."""
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from scenario_gen.method.sampling.time_warp import Clock
 from scenario_gen.numerics import Floats
-from scenario_gen.types import TrafficLight
+from scenario_gen.situation.waits import STANDSTILL_SPEED_MPS
+from scenario_gen.types import fronts, Scenario, SignalState, TrafficLight
+
+_MAX_SHIFT_S = 1.5  # of the lights of one scenario
+_OVERRUN_M = 3.0  # beyond the line, where a vehicle still waits for its light
+
+
+@dataclass(frozen=True)
+class Departure:
+    """The first vehicle in line departs after green.
+
+    Attributes:
+        who: index of the vehicle.
+        light: index of the light.
+        lag: seconds from green to its departure in the recording.
+    """
+
+    who: int
+    light: int
+    lag: float
+
+    def lateness(
+        self, lights: Sequence[TrafficLight], scenario: Scenario, offset: float = 0.0
+    ) -> float:
+        """Return how much later [s] it departs in a scenario, if lights are later by `offset`."""
+        light, n = lights[self.light], self.who
+        stands = scenario.is_present[n] & (scenario.speed[n] <= STANDSTILL_SPEED_MPS)
+        stands &= light.before(fronts(scenario, n)) > -_OVERRUN_M
+        if not stands.any():
+            return 0.0
+        departs = float(scenario.time[stands][-1]) - self.lag - offset
+        phases = light.schedule.between(departs - 100.0, departs + 100.0)
+        late = [
+            departs - start
+            for start, state in zip(phases.starts, phases.states, strict=True)
+            if state is SignalState.GREEN
+        ]
+        return min(late, key=abs, default=0.0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -20,10 +58,12 @@ class PlacedLights:
         lights: in the road's frame. Recorded states move with the clock that all vehicles share;
             a cycle moves as a whole.
         anchor: template time [s] at which a cycle and the vehicles fit together.
+        departures: at green, of which each scenario keeps the lag.
     """
 
     lights: tuple[TrafficLight, ...]
     anchor: float = 0.0
+    departures: tuple[Departure, ...] = ()
 
     def on_clock(self, clock: Clock, s: int, begin: float) -> tuple[TrafficLight, ...]:
         """Return the lights of a scenario that begins at `begin` [s] of the clock's sample s."""
@@ -38,3 +78,14 @@ class PlacedLights:
             light.retimed((lambda at: at + by) if light.schedule.repeats else retimed)
             for light in self.lights
         )
+
+    def with_departures(self, scenario: Scenario) -> Scenario:
+        """Return a scenario with all of its lights so late that vehicles depart as recorded."""
+        lights = scenario.facts.lights
+        late = [departure.lateness(lights, scenario) for departure in self.departures]
+        late = [each for each in late if abs(each) <= _MAX_SHIFT_S]
+        if not late:
+            return scenario
+        by = sum(late) / len(late)
+        moved = tuple(replace(light, schedule=light.schedule.moved(by)) for light in lights)
+        return scenario.with_facts(replace(scenario.facts, lights=moved))

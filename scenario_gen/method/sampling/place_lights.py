@@ -3,6 +3,7 @@
 
 """Which light of a road shows what: recorded states by the vehicles that face it, or its cycle."""
 
+from collections.abc import Sequence
 from dataclasses import replace
 import math
 
@@ -10,13 +11,23 @@ import numpy as np
 
 from scenario_gen.base.errors import RefusedError
 from scenario_gen.method.sampling.candidates import CandidateModel
-from scenario_gen.method.sampling.lights import PlacedLights
+from scenario_gen.method.sampling.lights import Departure, PlacedLights
 from scenario_gen.method.sampling.plan import Plan
 from scenario_gen.method.sampling.time_warp import Clock
 from scenario_gen.method.sampling.vehicle_model import NoiseScale
 from scenario_gen.roads import lights_of
 from scenario_gen.situation import faced_light
-from scenario_gen.types import Encounter, Scenario, SignalSchedule, SignalState, TrafficLight
+from scenario_gen.types import (
+    Encounter,
+    ReactionGraph,
+    Scenario,
+    SignalSchedule,
+    SignalState,
+    TrafficLight,
+)
+
+_MAX_LATENESS_S = 1.0  # of a departure that is like the recorded one
+_SLACK_SHARE = 0.01  # of a second, against one by which a departure is unlike the recorded one
 
 
 def with_lights(model: CandidateModel, plan: Plan) -> CandidateModel:
@@ -36,10 +47,13 @@ def with_lights(model: CandidateModel, plan: Plan) -> CandidateModel:
     (nominal,) = batch.scenarios(0, [0], plan.road.frame_id)
     if nominal is None:
         return model
+    graph = plan.situation.reactions
     if encounter.lights and not (network.drawn and has_cycle):
-        return replace(model, lights=PlacedLights(_recorded(lights, nominal, encounter)))
+        shown = _recorded(lights, nominal, encounter)
+        placed = PlacedLights(shown, departures=_departures(shown, nominal, graph))
+        return replace(model, lights=placed)
     begin = float(batch.presence.begin[0])
-    return replace(model, lights=_with_offset(lights, nominal, model.warp.nominal, begin))
+    return replace(model, lights=_with_offset(lights, nominal, model.warp.nominal, begin, graph))
 
 
 def _recorded(
@@ -78,35 +92,66 @@ def _known_from_start(schedule: SignalSchedule, encounter: Encounter) -> SignalS
 
 
 def _with_offset(
-    lights: tuple[TrafficLight, ...], nominal: Scenario, clock: Clock, begin: float
+    lights: tuple[TrafficLight, ...],
+    nominal: Scenario,
+    clock: Clock,
+    begin: float,
+    graph: ReactionGraph,
 ) -> PlacedLights:
-    """Return lights with cycles, later by the offset at which crossings are farthest from red.
+    """Return lights with cycles, later by the offset that suits the encounter best.
+
+    Who stopped at red in the recording departs as late after green as there, who ran red runs
+    red, and all others cross as far from red as possible.
 
     Raises:
-        RefusedError: at each offset a vehicle runs red.
+        RefusedError: no offset does that for all vehicles.
     """
     cycles = [light for light in lights if light.schedule.repeats]
-    crossings = [
-        (faced[0], faced[1])
+    crossings = {
+        n: faced
         for n in range(len(nominal.vehicles))
         if (faced := faced_light(nominal, n, cycles)) is not None and math.isfinite(faced[1])
-    ]
+    }
     if not crossings:
         return PlacedLights(tuple(cycles))
+    runners = {who for who, _, slack in graph.crossings if slack == 0.0}
+    departures = _departures(cycles, nominal, graph)
     period = max(light.schedule.end - light.schedule.starts[0] for light in cycles)
-    offsets = np.arange(0.0, period, 0.25)  # s
-    slacks = [
-        min(light.schedule.slack(time - offset) for light, time in crossings)
+    offsets = np.arange(0.0, period, 0.1)  # s
+    slacks = np.array(
+        [
+            [light.schedule.slack(time - offset) for light, time in crossings.values()]
+            for offset in offsets.tolist()
+        ]
+    )
+    runs = np.array([n in runners for n in crossings])
+    least = np.min(slacks, axis=1, where=~runs, initial=period)
+    late = [
+        [abs(each.lateness(cycles, nominal, offset)) for each in departures]
         for offset in offsets.tolist()
     ]
-    best = int(np.argmax(slacks))
-    if slacks[best] <= 0.0:
+    latest = np.max(late, axis=1, initial=0.0)
+    suits = (least > 0.0) & ~(slacks[:, runs] > 0.0).any(axis=1) & (latest < _MAX_LATENESS_S)
+    if not suits.any():
         raise RefusedError(
-            "traffic lights: at each offset of their cycle a vehicle would cross its line at red;"
+            "traffic lights: at no offset of their cycle all vehicles cross and wait as recorded;"
             " set road.signals=recorded, or road.traffic_rules=ignored"
         )
-    first = min(time for _, time in crossings) + begin
+    best = int(np.argmin(np.where(suits, latest - _SLACK_SHARE * least, np.inf)))
+    first = min(time for _, time in crossings.values()) + begin
     anchor = float(np.interp(first, clock.time, clock.grid))
     by = float(offsets[best]) + begin - (first - anchor)
     moved = tuple(light.retimed(lambda at: at + by) for light in cycles)
-    return PlacedLights(moved, anchor)
+    return PlacedLights(moved, anchor, departures)
+
+
+def _departures(
+    lights: Sequence[TrafficLight], nominal: Scenario, graph: ReactionGraph
+) -> tuple[Departure, ...]:
+    """Return the departures of the first vehicles in line that stopped at red."""
+    stops = [stop for stop in graph.stops if stop.stands and not stop.queue]
+    return tuple(
+        Departure(stop.who, lights.index(faced[0]), stop.lag)
+        for stop in stops
+        if math.isfinite(stop.lag) and (faced := faced_light(nominal, stop.who, lights))
+    )

@@ -11,17 +11,25 @@ import numpy as np
 import pytest
 from support.signalised import signalised
 
-from scenario_gen import generate, load, read_log
+from scenario_gen import generate, load, read_log, RefusedError
 from scenario_gen.method.validity import Checker
 from scenario_gen.output.exchange import export_bag
 from scenario_gen.output.review.evaluation import evaluate_bag
+from scenario_gen.situation import Situation
 from scenario_gen.types import Facts, SignalSchedule
 
 
 @pytest.fixture(scope="module")
 def result():
     (encounter,) = read_log(signalised(queue=2)).encounters
-    return generate(encounter, "four_way", {"road.priority": "signals"}, count=12)
+    return generate(encounter, "four_way", count=12)
+
+
+def departure(scenario):
+    """When vehicle 2 begins to move."""
+    moves = scenario.speed[1] > 0.1
+    stands = np.flatnonzero(~moves)
+    return float(scenario.time[stands[-1]])
 
 
 def test_states_move_with_the_encounter(result):
@@ -34,6 +42,7 @@ def test_states_move_with_the_encounter(result):
         crosses = [light.crossing(scenario, n) for n in range(3)]
         assert math.isnan(crosses[0]) and green < crosses[1] < crosses[2]
         assert crosses[1] - green < 6.0  # about 3.4 s in the recording
+        assert departure(scenario) - green == pytest.approx(1.4, abs=0.15)
     assert len(greens) > 6
 
 
@@ -102,5 +111,42 @@ def test_fixed_program_has_an_offset_that_suits_the_encounter():
             if not math.isnan(light.crossing(scenario, n))
         }
         assert shown <= {"green", "yellow"} and shown
+    (recorded,) = read_log(signalised()).encounters
+    lit = generate(recorded, "four_way", config, count=3)
+    for scenario in lit:
+        (light,) = [light for light in scenario.facts.lights if light.id == "B"]
+        green = max(
+            start
+            for start, state in zip(*phases_of(light.schedule), strict=True)
+            if state == "green" and start < light.crossing(scenario, 1)
+        )
+        assert departure(scenario) - green == pytest.approx(1.4, abs=0.15)
     plain = generate(encounter, "four_way", {"road.priority": "signals"}, count=1)
     assert plain[0].facts.lights == ()  # nothing is invented
+
+
+def phases_of(schedule):
+    phases = schedule.between(-100.0, 100.0)
+    return phases.starts, phases.states
+
+
+def test_a_stop_at_red_is_lost_where_the_road_has_no_light(tmp_path):
+    (encounter,) = read_log(signalised()).encounters
+    lost = "vehicle 2 stops at red, and the road has no light there"
+    result = generate(encounter, "corridor", count=1)
+    assert [loss.message for loss in result.fit.losses if loss.kind == "light"] == [lost]
+    with pytest.raises(RefusedError, match=f"{lost}; fitting.allow=lost_light accepts this"):
+        generate(encounter, "four_way", {"road.priority": "none"}, count=1)
+
+
+def test_a_red_runner_is_named_and_stays_one():
+    table = signalised()
+    table.loc[(table.vehicle == "1") & (table.signal != ""), "signal"] = "red"
+    (encounter,) = read_log(table).encounters
+    said = "vehicle 1 crosses its stop line at red"
+    assert said in Situation.of(encounter).reactions.sentences(encounter.vehicles)
+    for scenario in generate(encounter, "four_way", count=2):
+        (light,) = [light for light in scenario.facts.lights if light.id == "A"]
+        assert light.schedule.at(light.crossing(scenario, 0)) == "red"
+    with pytest.raises(RefusedError, match="at no offset of their cycle"):
+        generate(encounter, "four_way", {"road.signals": "fixed"}, count=2)  # 2 waits at red, too
