@@ -94,6 +94,7 @@ def _document(network: LaneNetwork) -> dict[str, Any]:
                 "line": rule.line.tolist(),
             }
             | ({} if rule.schedule is None else {"schedule": rule.schedule.document()})
+            | ({"turns": list(rule.turns)} if rule.turns else {})
             for rule in network.rules
         ]
         document["rules_kept"] = network.rules_kept
@@ -190,7 +191,8 @@ def _rule(document: dict[str, Any]) -> TrafficRule:
     line = np.array([(float(x), float(y)) for x, y in document["line"]]).reshape(-1, 2)
     schedule = SignalSchedule.of_document(document["schedule"]) if "schedule" in document else None
     kind = RuleKind(document["kind"])
-    return TrafficRule(str(document["id"]), kind, lanes, over, line, schedule)
+    turns = tuple(map(str, document.get("turns", ())))
+    return TrafficRule(str(document["id"]), kind, lanes, over, line, schedule, turns)
 
 
 def _lanes(documents: list[dict[str, Any]], points: Floats, source: str) -> Iterator[Lane]:

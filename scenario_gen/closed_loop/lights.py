@@ -40,13 +40,17 @@ def observed(lights: tuple[TrafficLight, ...], time: float) -> tuple[ObservedLig
 def crosses_at_red(
     lights: tuple[TrafficLight, ...], before: Floats, after: Floats, time: float
 ) -> bool:
-    """Return whether a front (2,) [m] moves over a stop line that is red at a time [s]."""
-    return any(
-        light.schedule.at(time).stops
-        and float(light.before(before)) > 0.0 >= float(light.before(after))
-        and float(light.distance_to_side(after)) == 0.0
+    """Return whether a front (2,) [m] moves over a stop line that is red at a time [s].
+
+    The line is red if the lights of all movements are.
+    """
+    crossed = [
+        light
         for light in lights
-    )
+        if float(light.before(before)) > 0.0 >= float(light.before(after))
+        and float(light.distance_to_side(after)) == 0.0
+    ]
+    return bool(crossed) and all(light.schedule.at(time).stops for light in crossed)
 
 
 def ran_red(motion: Scenario, ego: int, driven: int) -> float:

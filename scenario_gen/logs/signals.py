@@ -66,6 +66,7 @@ class RawSignal:
             where the front of vehicles is that last saw the light.
         lanes: ids of its lanes.
         seen: until when [s] each vehicle saw it, of those that went on without it.
+        turns: as of `TrafficLight`.
     """
 
     id: str
@@ -74,6 +75,7 @@ class RawSignal:
     line: Floats = field(default_factory=lambda: np.zeros((0, 2)))
     lanes: tuple[str, ...] = ()
     seen: Mapping[str, float] = field(default_factory=dict)
+    turns: tuple[str, ...] = ()
 
 
 def signals_of_table(frame: "DataFrame", place: str) -> tuple[list[RawSignal], list[str]]:
@@ -236,7 +238,7 @@ def with_lights(encounter: Encounter, signals: Sequence[RawSignal]) -> Encounter
                 f"{subject} ends at {schedule.end:g} s, before {encounter.title} at "
                 f"{encounter.duration:g} s; cut the log (log.end), or set log.signals=ignored"
             )
-        light = TrafficLight(signal.id, schedule, line, signal.lanes)
+        light = TrafficLight(signal.id, schedule, line, signal.lanes, signal.turns)
         lights.append(light)
         if _goes_straight(encounter, light):
             straight.append((light, subject))

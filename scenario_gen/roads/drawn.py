@@ -134,16 +134,12 @@ class _RoadDrawing:
 
     def rules(self) -> Iterator[TrafficRule]:
         """Yield the signs at the mouths of arms: to stop, or to give way to other traffic."""
-        if not self._plan.has_junction or self._config.priority == "none":
+        priority, plan = self._config.priority, self._plan
+        if not plan.has_junction or priority == "none":
             return
-        wanted = self._config.priority
-        is_lit = wanted == "signals" or (wanted == "auto" and bool(self._plan.lights))
-        signals = is_lit and not self._plan.ring
-        all_stop = (
-            self._config.priority == "all_way_stop"
-            and not self._plan.ring
-            and not self._plan.has_ramp
-        )
+        lit = ("signals", "auto") if plan.lights else ("signals",)
+        signals = priority in lit and not plan.ring
+        all_stop = priority == "all_way_stop" and not plan.ring and not plan.has_ramp
         for arm in range(len(self._plan.arms)):
             lanes = self._lanes_inward(arm)
             if not lanes:

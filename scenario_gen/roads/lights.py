@@ -82,10 +82,10 @@ def lights_of(network: LaneNetwork) -> tuple[TrafficLight, ...]:
         ids = [network.lanes[k].id for k in rule.lanes]
         if len(rule.line):
             line = rightwards(rule.line[[0, -1]], ends[0])
-            lights.append(TrafficLight(rule.id, schedule, line, tuple(ids)))
+            lights.append(TrafficLight(rule.id, schedule, line, tuple(ids), rule.turns))
             continue
         lights += [
-            TrafficLight(rule.id, schedule, end, (name,))
+            TrafficLight(rule.id, schedule, end, (name,), rule.turns)
             for name, end in zip(ids, ends, strict=True)
         ]
     return tuple(lights)

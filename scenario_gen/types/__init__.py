@@ -118,6 +118,7 @@ from scenario_gen.types.traffic_light import (
     rightwards,
     SignalStop,
     TrafficLight,
+    TURNS,
 )
 from scenario_gen.types.vehicle import (
     height,
@@ -151,6 +152,7 @@ __all__ = [
     "REPLAY",
     "TRAILER",
     "TRUCK",
+    "TURNS",
     "UNITS",
     "VEHICLE_TYPES",
     "WHEELBASE_SHARE",

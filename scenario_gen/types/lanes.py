@@ -173,6 +173,7 @@ class TrafficRule:
         line: (K, 2) metres, K >= 2, the stop line; (0, 2): there is none.
         schedule: what a light shows, on the clock of the template that the road is drawn for, or
             as a cycle; None: its states are not known.
+        turns: the movements that a light is for, as of `TrafficLight`.
     """
 
     id: str
@@ -181,6 +182,7 @@ class TrafficRule:
     over: tuple[int, ...] = ()
     line: Floats = field(default_factory=lambda: np.zeros((0, 2)))
     schedule: SignalSchedule | None = None
+    turns: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         freeze(self, line=frozen(np.reshape(self.line, (-1, 2))))

@@ -11,11 +11,14 @@ from typing import Any, Self
 import numpy as np
 
 from scenario_gen.base.errors import InputError
-from scenario_gen.numerics import Floats, freeze, frozen
-from scenario_gen.numerics.plane import unit
+from scenario_gen.numerics import Floats, freeze, frozen, Ints
+from scenario_gen.numerics.plane import angle_between, unit
 from scenario_gen.types.motion import Motion
 from scenario_gen.types.signal_schedule import SignalSchedule
 
+TURNS = ("left", "straight", "right")
+_STRAIGHT_RAD = math.radians(30.0)
+_JUNCTION_M = 30.0  # behind the line, in which a vehicle turns
 _SEARCH_SHARES = np.linspace(0.0, 1.0, 33)  # three such refinements make 3 µs of 0.1 s
 
 
@@ -28,12 +31,14 @@ class TrafficLight:
         schedule: what it shows.
         line: (2, 2) metres, the stop line: the left end, as its traffic sees it, and the right.
         lanes: ids of its lanes in the map or the log; () if they are not known.
+        turns: the movements it is for, of TURNS; (): all.
     """
 
     id: str
     schedule: SignalSchedule
     line: Floats
     lanes: tuple[str, ...] = ()
+    turns: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         line = np.asarray(self.line, dtype=np.float64)
@@ -60,7 +65,10 @@ class TrafficLight:
         return np.asarray(np.maximum(np.maximum(-along, along - width), 0.0))
 
     def crossing(self, motion: Motion, n: int) -> float:
-        """Return when [s] the front of vehicle n crosses the line; NaN if it never does."""
+        """Return when [s] the front of vehicle n crosses the line; NaN if it never does.
+
+        A vehicle whose movement the light is not for does not cross its line.
+        """
         rows = np.flatnonzero(motion.is_present[n])
         if len(rows) < 2:
             return math.nan
@@ -77,8 +85,18 @@ class TrafficLight:
                 first, last = times[behind - 1], times[behind]
             along = math.cos(float(moved.heading[0, behind]) - self.yaw)
             if self.distance_to_side(front[behind]) == 0.0 and along > 0.5:
-                return float(last)
+                is_for_it = not self.turns or self._turn(motion, n, rows[k:]) in self.turns
+                return float(last) if is_for_it else math.nan
         return math.nan
+
+    def _turn(self, motion: Motion, n: int, rows: Ints) -> str:
+        """Return the movement of vehicle n at samples from its crossing on."""
+        steps = np.hypot(*np.diff(motion.position[n, rows], axis=0).T)
+        near = rows[np.concatenate([[True], np.cumsum(steps) < _JUNCTION_M])]
+        turned = angle_between(float(motion.heading[n, near[-1]]), self.yaw)
+        if abs(turned) < _STRAIGHT_RAD:
+            return "straight"
+        return "left" if turned > 0.0 else "right"
 
     def retimed(self, clock: Callable[[Floats], Floats]) -> "TrafficLight":
         """Return the light on another clock."""
@@ -90,6 +108,7 @@ class TrafficLight:
             "id": self.id,
             "line": self.line.tolist(),
             "lanes": list(self.lanes),
+            **({"turns": list(self.turns)} if self.turns else {}),
             **self.schedule.document(),
         }
 
@@ -102,7 +121,8 @@ class TrafficLight:
         """
         line = np.array(document["line"], dtype=np.float64)
         schedule = SignalSchedule.of_document(document)
-        return cls(str(document["id"]), schedule, line, tuple(map(str, document["lanes"])))
+        lanes, turns = (tuple(map(str, document.get(key, ()))) for key in ("lanes", "turns"))
+        return cls(str(document["id"]), schedule, line, lanes, turns)
 
 
 def rightwards(line: Floats, end: Floats) -> Floats:

@@ -4,13 +4,16 @@
 """States of traffic lights in the files of other programs."""
 
 import json
+import re
 
 import numpy as np
 import pytest
-from support.signalised import signalised
+from support.signalised import crossing_map, signalised
 
 from scenario_gen import read_log
 from scenario_gen.base.errors import InputError
+from scenario_gen.roads import lights_of, read_network
+from scenario_gen.types import TrafficLight
 
 GREEN = 13.0
 NET = """<net version="1.16">
@@ -88,6 +91,8 @@ def scene(folder):
         for link, (lane, x, y) in enumerate([("61", -8.0, -1.75), ("62", 1.75, -8.0)])
     }
     lights["63"] = lights["62"] | {"x": [900.0] * len(steps)}
+    place = {"position": {axis: lights["62"].pop(axis) for axis in "xy"}}  # as in its own files
+    lights["62"] |= place
     roads = [
         {"type": "lane", "geometry": [{"x": x, "y": y} for x, y in points]}
         for points in ([(-90, -1.75), (90, -1.75)], [(1.75, -90), (1.75, 90)])
@@ -97,10 +102,10 @@ def scene(folder):
     return file
 
 
-def check(encounter, names):
+def check(encounter, names, also=()):
     """Check the states at 100 instants, and the stop lines."""
     lights = {light.id: light for light in encounter.lights}
-    assert set(lights) == set(names)
+    assert set(lights) == {*names, *also}
     start = encounter.start_ns * 1e-9 % 86_400.0
     start -= 43_200.0 if start > 40_000.0 else 0.0  # messages begin at noon
     words = {"G": "green", "y": "yellow", "r": "red"}
@@ -124,6 +129,32 @@ def test_sumo(tmp_path, recorded):
     files = [vehicles, tmp_path / "net.xml", *[tmp_path / "tls.xml"] * recorded]
     (encounter,) = read_log(files).encounters
     check(encounter, ["J/west_0", "J/south_0"])
+
+
+def test_a_light_is_for_a_lane_and_a_movement(tmp_path):
+    vehicles = sumo(tmp_path)
+    link = (
+        '<connection from="west" to="{}" fromLane="0" toLane="0" tl="J" linkIndex="{}" dir="{}"/>'
+    )
+    plain = link.format("east", 0, "s").replace(' dir="s"', "")
+    both = link.format("east", 0, "s") + link.format("north", 2, "l")
+    (tmp_path / "net.xml").write_text(NET.replace(plain, both))
+    states = (tmp_path / "tls.xml").read_text()
+    (tmp_path / "tls.xml").write_text(re.sub('state="(..)"', r'state="\1r"', states))
+    (encounter,) = read_log([vehicles, tmp_path / "net.xml", tmp_path / "tls.xml"]).encounters
+    check(encounter, ["J/west_0 straight", "J/south_0"], also=["J/west_0 left"])
+    (left,) = [light for light in encounter.lights if light.turns == ("left",)]
+    assert left.schedule.at(3.0) == "red" and np.isnan(left.crossing(encounter, 0))
+    assert TrafficLight.of_document(left.document()).turns == ("left",)
+    again = tmp_path / "map.xml"
+    text = crossing_map(["green:80 yellow:30 red:290", "red:130 green:270"])
+    again.write_text(
+        text.replace("</trafficLight>", "<direction>leftStraight</direction></trafficLight>", 1)
+    )
+    (encounter,) = read_log(again).encounters
+    assert [light.turns for light in encounter.lights] == [("left", "straight"), ()]
+    network = read_network(again)
+    assert [light.turns for light in lights_of(network)] == [("left", "straight"), ()]
 
 
 def test_sumo_without_states_or_net(tmp_path):

@@ -13,7 +13,8 @@
 | heading | orientation/exact | rad, counter-clockwise from +x |
 | speed | velocity/exact | m/s |
 
-| traffic light | trafficLight: cycle/cycleElement: duration, color; cycle/timeOffset | steps |
+| light's cycle | trafficLight: cycle/cycleElement: duration, color; cycle/timeOffset | steps |
+| its movements | trafficLight: direction | |
 
 An interval (intervalStart, intervalEnd) counts as its middle.
 
@@ -42,7 +43,7 @@ from scenario_gen.logs.raw import (
 )
 from scenario_gen.logs.signals import naming, RawSignal, state_of
 from scenario_gen.numerics import Floats
-from scenario_gen.types import rightwards, SignalSchedule, SignalState
+from scenario_gen.types import rightwards, SignalSchedule, SignalState, TURNS
 
 
 def read(paths: Sequence[Path], config: LogConfig) -> RawLog:
@@ -124,9 +125,23 @@ def _signals(root: Element, step_s: float) -> tuple[list[RawSignal], list[str]]:
         for lanelet in lanelets.get(name, ()):
             line = stop_line(lanelet)
             signals.append(
-                RawSignal(name, schedule, light.place, line, (lanelet.attribute("id"),))
+                RawSignal(
+                    name,
+                    schedule,
+                    light.place,
+                    line,
+                    (lanelet.attribute("id"),),
+                    turns=turns_of(light),
+                )
             )
     return signals, without_lane
+
+
+def turns_of(light: Element) -> tuple[str, ...]:
+    """Return the movements that a light is for, as `TrafficLight` has them."""
+    direction = light.find("direction")
+    words = "all" if direction is None else direction.content.lower()
+    return tuple(turn for turn in TURNS if turn in words)
 
 
 def cycle_of(light: Element, step_s: float) -> SignalSchedule | None:

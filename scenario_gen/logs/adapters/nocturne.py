@@ -131,7 +131,8 @@ def _signal(path: Path, name: str, entry: Any, edges: Floats) -> RawSignal | Non
     """
     place = f"{path}: traffic light {name}"
     with guarded(place, LookupError, TypeError, ValueError, OverflowError):
-        points = np.column_stack([entry["x"], entry["y"]]).astype(float)
+        where = entry.get("position", entry)
+        points = np.column_stack([where["x"], where["y"]]).astype(float)
         times = [0.1 * int(step) for step in entry["time_index"]]
         words = [str(word).removeprefix("arrow_") for word in entry["state"]]
     if not len(times) == len(points) == len(words) > 0:

@@ -6,12 +6,13 @@
 | quantity | element: attribute | unit |
 |---|---|---|
 | stop line | lane: shape, width; its end | m |
-| light | connection: tl, linkIndex, from, fromLane | |
+| light | connection: tl, linkIndex, from, fromLane, dir | |
 | cycle, of static programs | tlLogic: offset; phase: duration, state | s |
 | recorded states | tlsState: time, id, state (SaveTLSStates) | s |
 
 The states of `tlsState` come before those of the cycle. A state has a letter for each link. Links
-from one lane share a stop line: the most permissive state counts.
+from one lane share a stop line; those that turn otherwise have a light of their own if its states
+differ. Of several links that turn alike the most permissive state counts.
 
 Source: SUMO's user documentation, Traffic Lights, Networks, Output/Traffic Lights.
 """
@@ -33,6 +34,8 @@ from scenario_gen.logs.signals import (
 )
 from scenario_gen.numerics import Floats
 from scenario_gen.types import SignalSchedule, SignalState
+
+_TURNS = {"l": "left", "t": "left", "r": "right"}  # L and R: less than a turn
 
 
 def read_lights(
@@ -57,23 +60,26 @@ def read_lights(
         return ()
     lanes = {lane.attribute("id"): lane for lane in net.findall("edge/lane")}
     schedule_of = _schedules(net, states)
-    links: dict[tuple[str, str], list[int]] = {}
+    links: dict[tuple[str, str], dict[str, list[int]]] = {}
     for link in net.findall("connection[@tl]"):
         lane = f"{link.attribute('from')}_{link.attribute('fromLane')}"
-        links.setdefault((link.attribute("tl"), lane), []).append(int(link.number("linkIndex")))
+        turn = _TURNS.get(link.get("dir", "s"), "straight")
+        by_turn = links.setdefault((link.attribute("tl"), lane), {})
+        by_turn.setdefault(turn, []).append(int(link.number("linkIndex")))
 
     signals = []
-    for (name, lane), indices in sorted(links.items()):
-        if name in schedule_of and lane in lanes:
-            signals.append(
-                RawSignal(
-                    f"{name}/{lane}",
-                    schedule_of[name](indices),
-                    net.file,
-                    _line(lanes[lane]),
-                    (lane,),
-                )
-            )
+    for (name, lane), by_turn in sorted(links.items()):
+        if name not in schedule_of or lane not in lanes:
+            continue
+        turns: dict[SignalSchedule, tuple[str, ...]] = {}
+        for turn, indices in sorted(by_turn.items()):
+            schedule = schedule_of[name](indices)
+            turns[schedule] = (*turns.get(schedule, ()), turn)
+        for schedule, chosen in turns.items():
+            of_all = len(turns) == 1
+            light = f"{name}/{lane}" if of_all else f"{name}/{lane} {' '.join(chosen)}"
+            line, only = _line(lanes[lane]), () if of_all else chosen
+            signals.append(RawSignal(light, schedule, net.file, line, (lane,), turns=only))
     unknown = sorted({name for name, _ in links} - set(schedule_of))
     if unknown:
         notes.append(

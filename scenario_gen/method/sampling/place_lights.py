@@ -61,23 +61,25 @@ def _recorded(
 ) -> tuple[TrafficLight, ...]:
     """Return the lights with the recorded states of the lights that the vehicles face.
 
-    A light that nobody faces has the states of a recorded light with the same stop line.
+    A light that nobody faces has the states of a recorded light with the same stop line. Where
+    the recorded lights of movements differ, so do those of the road.
     """
-    shown: dict[int, SignalSchedule] = {}
+    shown: dict[int, dict[tuple[str, ...], SignalSchedule]] = {}
     for n in range(len(encounter.vehicles)):
         faced = faced_light(nominal, n, lights)
         recorded = faced_light(encounter, n, encounter.lights)
         if faced is not None and recorded is not None:
-            shown.setdefault(lights.index(faced[0]), recorded[0].schedule)
+            by_turns = shown.setdefault(lights.index(faced[0]), {})
+            by_turns.setdefault(recorded[0].turns, recorded[0].schedule)
     for k, light in enumerate(lights):
         for other in encounter.lights:
             if np.abs(other.line - light.line).max() < 1.0:  # m
-                shown.setdefault(k, other.schedule)
+                shown.setdefault(k, {}).setdefault(other.turns, other.schedule)
     unknown = SignalSchedule((0.0,), (SignalState.UNKNOWN,), encounter.duration)
-    schedules = [shown.get(k, unknown) for k in range(len(lights))]
     return tuple(
-        replace(light, schedule=_known_from_start(schedule, encounter))
-        for light, schedule in zip(lights, schedules, strict=True)
+        replace(light, schedule=_known_from_start(schedule, encounter), turns=turns)
+        for k, light in enumerate(lights)
+        for turns, schedule in shown.get(k, {light.turns: unknown}).items()
     )
 
 

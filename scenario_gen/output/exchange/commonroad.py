@@ -234,6 +234,9 @@ def _sign(root: Element, sign: _Sign, scenario: Scenario) -> None:
         add(element, "color", _COLOURS.get(state, "inactive"))
     if len(sign.line):
         _point(add(light, "position"), *sign.line.mean(axis=0).tolist())
+    if sign.light is not None and sign.light.turns:
+        first, *others = sign.light.turns
+        add(light, "direction", first + "".join(map(str.title, others)))
 
 
 def _lanelet(root: Element, lane_map: LaneMap, k: int, signs: Sequence[_Sign]) -> None:

@@ -16,7 +16,7 @@ import numpy as np
 from scenario_gen.base.documents import shown
 from scenario_gen.base.errors import InputError
 from scenario_gen.base.xml_reader import Element
-from scenario_gen.logs.adapters.commonroad import cycle_of
+from scenario_gen.logs.adapters.commonroad import cycle_of, turns_of
 from scenario_gen.numerics import Floats
 from scenario_gen.roads.vector.drafts import (
     by_id,
@@ -221,6 +221,13 @@ class _Map:
                 schedules[name] = cycle_of(light, step_s)
         return schedules
 
+    @cached_property
+    def turns(self) -> dict[str, tuple[str, ...]]:
+        """The movements that lights are for, by their ids."""
+        return {
+            light.get("id", "?"): turns_of(light) for light in self.root.findall("trafficLight")
+        }
+
     def rules(self) -> Iterator[DraftRule]:
         """Yield a rule for each sign and light to which a lanelet for cars refers."""
         for name in (name for name, users in self.users.items() if users & CARS):
@@ -239,7 +246,8 @@ class _Map:
         for ref in dict.fromkeys(refs):
             if ref in self.rule_kinds:
                 kind, schedule = self.rule_kinds[ref], self.schedules.get(ref[1])
-                yield DraftRule(ref[1], kind, (name,), line=line, schedule=schedule)
+                turns = self.turns.get(ref[1], ())
+                yield DraftRule(ref[1], kind, (name,), line=line, schedule=schedule, turns=turns)
 
     def notes(self) -> Iterator[Note]:
         """Yield the notes on the file."""

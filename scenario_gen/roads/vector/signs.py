@@ -57,6 +57,7 @@ class DraftRule:
         over: whose traffic goes first.
         line: (K, 2) [m] the stop line.
         schedule: what a light shows, if that is known.
+        turns: the movements that a light is for; (): all.
     """
 
     id: str
@@ -65,6 +66,7 @@ class DraftRule:
     over: tuple[str, ...] = ()
     line: Floats = field(default_factory=lambda: np.zeros((0, 2)))
     schedule: SignalSchedule | None = None
+    turns: tuple[str, ...] = ()
 
 
 def kind_of_sign(name: str, subtype: str = "", country: str = "") -> RuleKind | None:
@@ -140,7 +142,9 @@ def _rules_of(
             line = np.stack((network.lanes[k].left[-1], network.lanes[k].right[-1]))
             yield TrafficRule(draft.id, draft.kind, (k,), over, line)
     elif lanes:
-        yield TrafficRule(draft.id, draft.kind, lanes, over, draft.line, draft.schedule)
+        yield TrafficRule(
+            draft.id, draft.kind, lanes, over, draft.line, draft.schedule, draft.turns
+        )
 
 
 def _with_going_first(network: LaneNetwork, rules: Sequence[TrafficRule]) -> list[TrafficRule]:
