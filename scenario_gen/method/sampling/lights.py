@@ -42,12 +42,12 @@ class Departure:
             return 0.0
         departs = float(scenario.time[stands][-1]) - self.lag - offset
         phases = light.schedule.between(departs - 100.0, departs + 100.0)
-        late = [
+        delays = [
             departs - start
             for start, state in zip(phases.starts, phases.states, strict=True)
             if state is SignalState.GREEN
         ]
-        return min(late, key=abs, default=0.0)
+        return min(delays, key=abs, default=0.0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,10 +82,10 @@ class PlacedLights:
     def with_departures(self, scenario: Scenario) -> Scenario:
         """Return a scenario with all of its lights so late that vehicles depart as recorded."""
         lights = scenario.facts.lights
-        late = [departure.lateness(lights, scenario) for departure in self.departures]
-        late = [each for each in late if abs(each) <= _MAX_SHIFT_S]
-        if not late:
+        delays = [departure.lateness(lights, scenario) for departure in self.departures]
+        delays = [each for each in delays if abs(each) <= _MAX_SHIFT_S]
+        if not delays:
             return scenario
-        by = sum(late) / len(late)
+        by = sum(delays) / len(delays)
         moved = tuple(replace(light, schedule=light.schedule.moved(by)) for light in lights)
         return scenario.with_facts(replace(scenario.facts, lights=moved))

@@ -128,11 +128,11 @@ def _with_offset(
     )
     runs = np.array([n in runners for n in crossings])
     least = np.min(slacks, axis=1, where=~runs, initial=period)
-    late = [
+    delays = [
         [abs(each.lateness(cycles, nominal, offset)) for each in departures]
         for offset in offsets.tolist()
     ]
-    latest = np.max(late, axis=1, initial=0.0)
+    latest = np.max(delays, axis=1, initial=0.0)
     suits = (least > 0.0) & ~(slacks[:, runs] > 0.0).any(axis=1) & (latest < _MAX_LATENESS_S)
     if not suits.any():
         raise RefusedError(
