@@ -212,6 +212,9 @@ class DecidedConflict:
     @property
     def recorded(self) -> Outcome:
         """The recorded outcome."""
+        second = self.pair.tracks[1]
+        if second.speed[second.present[0]] < second.vehicle.kind.waits_below:
+            return Outcome.STOPS
         for edge in self.pair.reactions:
             if edge.kind == YIELD and edge.who == self.pair.conflict.second:
                 if edge.stands:
@@ -358,8 +361,13 @@ def _meeting(first: Drive, second: Drive, stop: Stop, later: float, least: float
         clears = max(clears, _way_is_free(first, second, enters))
     arrives = conflict.entry_first + later
     outcome = Outcome.GOES_SECOND
+    entry = float(np.interp(enters, second.time, second.station))
+    stands = np.flatnonzero((second.stand > 0.0) & (second.station < entry))
+    if len(stands):  # since its recording began: it departs at the latest when the way is free
+        way = enters - float(second.time[stands[-1]])
+        arrives = min(arrives, clears + DRIVING.departure_lag_s + way)
+        outcome = Outcome.STOPS
     if clears + MARGINS.free_gap_s > arrives:
-        entry = float(np.interp(enters, second.time, second.station))
         free = second
         second = delayed_drive(free, entry, enters + clears - arrives, stop)
         if (second.speed < least * free.speed).any():
