@@ -20,7 +20,7 @@ from scenario_gen.logs.geodesy import (
 from scenario_gen.logs.groups import OUT_OF_RANGE_S, shortest, ticks, windows
 from scenario_gen.logs.growing import Growth, Meeting
 from scenario_gen.logs.no_encounter import NoEncounterError
-from scenario_gen.logs.raw import Observations, RawLog, Rows, Segment, UnknownFormatError
+from scenario_gen.logs.raw import Fix, Observations, RawLog, Rows, Segment, UnknownFormatError
 from scenario_gen.logs.read import encounters_of, LogResult, read_log
 from scenario_gen.logs.recognise import is_bag, is_spmd, is_table
 from scenario_gen.logs.streams import Streams
@@ -32,6 +32,7 @@ __all__ = [
     "INTERACTS_M",
     "LOG_FORMATS",
     "OUT_OF_RANGE_S",
+    "Fix",
     "Growth",
     "LogConfig",
     "LogFormat",

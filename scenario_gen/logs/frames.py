@@ -174,40 +174,60 @@ def in_one_frame(
     """
     used: list[Recording] = []
     notes: list[str] = []
-    for vehicle, group in by_vehicle(recordings).items():
+    for group in by_vehicle(recordings).values():
         places = sorted((each for each in group if each.rows.fixes), key=_density, reverse=True)
-        used += [each for each in group if not each.rows.fixes]
-        for other in places[1:]:
-            best = places[0]
-            if best.frame and other.frame and tree.root(best.frame) != tree.root(other.frame):
-                notes.append(
-                    f"vehicle {vehicle}: {other.topic} places {best.topic} in {other.frame!r}"
-                )
-                parent, child = tree.root(other.frame), tree.root(best.frame)
-                tree.tie(parent, child, *(_rooted(each, tree) for each in (other, best)))
-            else:
-                notes.append(f"vehicle {vehicle} is read from {best.topic}, not {other.topic}")
-        used += places[:1]
+        used += [*(each for each in group if not each.rows.fixes), *places[:1]]
+        notes += [_tied(places[0], other, tree) for other in places[1:]]
     centres = {parent: child for child, parent in tree.parents.items() if "cent" in _last(child)}
     for recording in used:
-        child = recording.child.strip("/")
-        if child in centres:
-            x, y = tree.transforms[centres[child]][0][1:3]
-            recording.rows.fixes = moved(recording.rows.fixes, (x, y))
-            recording.ahead = 0.0
-        elif "rear_axle" in child:
-            recording.ahead = POINTS["rear_axle"]
-            notes.append(f"vehicle {recording.vehicle}: positions are those of its rear axle")
+        notes += _centred(recording, centres, tree)
         if recording.frame and recording.rows.fixes:
-            recording.rows = _rooted(recording, tree)
-            recording.frame = tree.root(recording.frame)
-            if _last(recording.frame).startswith("base_"):
-                raise InputError(
-                    f"{label}, topic {recording.topic}: vehicle {recording.vehicle} is in frame "
-                    f"{recording.frame!r}, which moves with its vehicle; record it in a fixed "
-                    "frame, such as map"
-                )
+            _move_to_root(label, recording, tree)
     return used, notes, _frame_doubts({r.vehicle: r.frame for r in used if r.rows.fixes})
+
+
+def _tied(best: Recording, other: Recording, tree: FrameTree) -> str:
+    """Tie the frames of two recordings of one vehicle, if nothing does; return a note."""
+    if best.frame and other.frame and tree.root(best.frame) != tree.root(other.frame):
+        parent, child = tree.root(other.frame), tree.root(best.frame)
+        tree.tie(parent, child, _rooted(other, tree), _rooted(best, tree))
+        return f"vehicle {best.vehicle}: {other.topic} places {best.topic} in {other.frame!r}"
+    return f"vehicle {best.vehicle} is read from {best.topic}, not {other.topic}"
+
+
+def _centred(recording: Recording, centres: Mapping[str, str], tree: FrameTree) -> list[str]:
+    """Move positions to the frame of the vehicle's centre, if it is known; return notes.
+
+    Args:
+        recording: of one vehicle.
+        centres: the frames of centres, by their parents.
+        tree: all transforms.
+    """
+    child = recording.child.strip("/")
+    if child in centres:
+        x, y = tree.transforms[centres[child]][0][1:3]
+        recording.rows.fixes = moved(recording.rows.fixes, (x, y))
+        recording.ahead = 0.0
+    elif "rear_axle" in child:
+        recording.ahead = POINTS["rear_axle"]
+        return [f"vehicle {recording.vehicle}: positions are those of its rear axle"]
+    return []
+
+
+def _move_to_root(label: str, recording: Recording, tree: FrameTree) -> None:
+    """Move positions to the root of their frame.
+
+    Raises:
+        InputError: the root moves with its vehicle.
+    """
+    recording.rows = _rooted(recording, tree)
+    recording.frame = tree.root(recording.frame)
+    if _last(recording.frame).startswith("base_"):
+        raise InputError(
+            f"{label}, topic {recording.topic}: vehicle {recording.vehicle} is in frame "
+            f"{recording.frame!r}, which moves with its vehicle; record it in a fixed "
+            "frame, such as map"
+        )
 
 
 def _density(recording: Recording) -> int:

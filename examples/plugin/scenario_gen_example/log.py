@@ -10,7 +10,7 @@ from pathlib import Path
 
 from scenario_gen import LogConfig
 from scenario_gen.base.errors import guarded
-from scenario_gen.logs import LogFormat, RawLog, Rows, Segment
+from scenario_gen.logs import Fix, LogFormat, RawLog, Rows, Segment
 
 
 def read(paths: Sequence[Path], _: LogConfig) -> RawLog:
@@ -21,7 +21,7 @@ def read(paths: Sequence[Path], _: LogConfig) -> RawLog:
         with guarded(f"{path}, line {row + 1}"):
             entry = json.loads(line)
             vehicles[entry["vehicle"]].fixes.append(
-                (round(entry["t"] * 1e9), row, entry["x"], entry["y"], entry["heading"])
+                Fix(round(entry["t"] * 1e9), row, entry["x"], entry["y"], entry["heading"])
             )
     observed = tuple(rows.observations(name) for name, rows in vehicles.items())
     return RawLog(path.stem, False, observed, len(lines), (Segment(0, str(path), "line", 1),))
