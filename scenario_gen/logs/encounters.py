@@ -156,7 +156,10 @@ def _find_cuts(track: Observations, config: LogConfig) -> _Cuts:
     gaps = (seconds > longest_bridge(seconds, config)) | _is_relocation(seconds, distance)
     reversals = np.zeros_like(gaps)
     if not VEHICLE_TYPES[track.kind or CAR].walks:
-        reversals = _reversals(track, config)
+        edges = [0, *(np.flatnonzero(gaps) + 1).tolist(), len(track.fix_ns)]
+        for (begin, end), driven in zip(pairwise(edges), _parts(track, gaps), strict=True):
+            if end - begin > 1:  # a clock of ticks over a gap of years would need all memory
+                reversals[begin : end - 1] = _reversals(driven, config)
     section = (track.fix_ns - track.fix_ns[0]) // round(
         _LIMITS.max_tick_count * config.period * 1e9
     )
@@ -373,11 +376,14 @@ def _course(fix: Floats) -> Floats | None:
 
 def _split(track: Observations, cuts: Bools) -> list[Observations]:
     """Split a track after each True of `cuts` (F-1,); parts of one fix are dropped."""
+    return [part for part in _parts(track, cuts) if len(part.fix_ns) > 1]
+
+
+def _parts(track: Observations, cuts: Bools) -> list[Observations]:
+    """Return the parts of a track after each True of `cuts` (F-1,)."""
     edges = [0, *(np.flatnonzero(cuts) + 1).tolist(), len(track.fix_ns)]
     parts = []
     for begin, end in pairwise(edges):
-        if end - begin < 2:
-            continue
         speeds = (track.speed_ns >= track.fix_ns[begin]) & (
             track.speed_ns <= track.fix_ns[end - 1]
         )

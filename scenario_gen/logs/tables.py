@@ -69,6 +69,7 @@ def read(paths: Sequence[Path], config: LogConfig) -> RawLog:
         InputError: a file is damaged or too large, or a column is missing or unsuitable.
     """
     frames: list[pd.DataFrame] = []
+    read_paths: list[Path] = []
     columns: dict[str, Column] = {}
     separators: dict[str, None] = {}
     segments = []
@@ -92,6 +93,7 @@ def read(paths: Sequence[Path], config: LogConfig) -> RawLog:
             frame["vehicle"] = "0" if len(paths) == 1 else path.stem
         frame["row"] = n_rows + frame.index
         frames.append(frame)
+        read_paths.append(path)
         segments.append(segment_of(path, n_rows, header_lines))
         n_read += len(frame)
         n_rows = int(frame["row"].iloc[-1]) + 1
@@ -99,11 +101,10 @@ def read(paths: Sequence[Path], config: LogConfig) -> RawLog:
         raise InputError(
             f"{paths[0]} and the other files mix latitude/longitude and x/y; read them separately"
         )
-    if columns["time"].is_gentime:  # units and ids are those of SPMD
-        columns = {}
-    else:
-        notes += named_by_file(frames, paths)
+    if not columns["time"].is_gentime:
+        notes += named_by_file(frames, read_paths)
     log = from_frame(pd.concat(frames, ignore_index=True), paths, tuple(segments), config)
+    columns = {} if columns["time"].is_gentime else columns  # units are those of SPMD
     point = point_of(columns)
     if point and "point=" not in config.columns:
         vehicles = (replace(vehicle, ahead=POINTS[point]) for vehicle in log.vehicles)
