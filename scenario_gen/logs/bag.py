@@ -23,8 +23,6 @@ from scenario_gen.bags.vehicles import (
     ODOMETRY,
     POSE,
     POSE_WITH_COVARIANCE,
-    Sample,
-    TrackedObject,
     TRACKS,
     TRANSFORMS,
     TWIST,
@@ -43,18 +41,23 @@ from scenario_gen.logs.bag_names import (
 )
 from scenario_gen.logs.config import listed, LogConfig
 from scenario_gen.logs.file_names import file_names
-from scenario_gen.logs.frames import bodies_of, by_vehicle, FrameTree, in_one_frame, Recording
+from scenario_gen.logs.frames import (
+    bodies_of,
+    by_vehicle,
+    FrameTree,
+    in_one_frame,
+    Recording,
+    Recordings,
+)
 from scenario_gen.logs.growing import Span
 from scenario_gen.logs.quality import Doubt
 from scenario_gen.logs.raw import (
     check_size,
     check_vehicles,
-    Fix,
     Observations,
     RawLog,
     Rows,
     Segment,
-    Speed,
 )
 from scenario_gen.types import Encounter
 
@@ -419,69 +422,25 @@ def _collect(
     """
     stride = max(len(topic.data) // _CLOCK_SAMPLES_COUNT, 1)
     clock = TopicClock(topic.name, owner or topic.name, stride)
-    collected = _Collected(topic, clock, config.stamps == "header")
+    uses_header = config.stamps == "header"
+    collected = Recordings(topic.name, topic.type)
     by_child = topic.type == TRANSFORMS or _has_several_children(topic)
-    for number, data in enumerate(topic.data):
+    for number, (received_ns, data) in enumerate(zip(topic.stamps, topic.data, strict=True)):
         row = first_row + number
         place = topic.where(number + 1)
         if topic.type == TRACKED:
             header_ns, frame, objects = decode_tracked(data, place)
-            collected.add_objects(objects, frame, collected.stamp_ns(number, header_ns), row)
+            clock.add(number, header_ns, received_ns)
+            stamp_ns = header_ns if header_ns and uses_header else received_ns
+            collected.add_objects(objects, frame, stamp_ns, row)
         else:
             for sample in decode_samples(data, topic.type, place):
+                clock.add(number, sample.stamp_ns, received_ns)
                 name = child_vehicle(sample.child) if by_child else owner
-                stamp_ns = collected.stamp_ns(number, sample.stamp_ns)
+                stamp_ns = sample.stamp_ns if sample.stamp_ns and uses_header else received_ns
                 collected.add_sample(sample, name, stamp_ns, row)
         topic.data[number] = b""  # bounds the memory
-    return list(collected.recordings.values()), clock
-
-
-@dataclass
-class _Collected:
-    """What a topic has recorded so far, by vehicle and frame.
-
-    Attributes:
-        topic: the topic.
-        clock: compares its stamps.
-        uses_header: whether the stamps of headers count, where there are some.
-        recordings: by vehicle and frame.
-    """
-
-    topic: Topic
-    clock: TopicClock
-    uses_header: bool
-    recordings: dict[tuple[str, str], Recording] = field(default_factory=dict)
-
-    def stamp_ns(self, number: int, header_ns: int) -> int:
-        """Return the stamp [ns] of a message that counts, and compare its two stamps."""
-        received_ns = self.topic.stamps[number]
-        self.clock.add(number, header_ns, received_ns)
-        return header_ns if header_ns and self.uses_header else received_ns
-
-    def add_objects(
-        self, objects: Iterable[TrackedObject], frame: str, stamp_ns: int, row: int
-    ) -> None:
-        """Add the tracked objects of a message."""
-        for tracked in objects:
-            recording = self._recording_of(tracked.id, frame, "")
-            state = (*tracked.position, tracked.heading, tracked.height)
-            recording.rows.fixes.append(Fix(stamp_ns, row, *state))
-            recording.rows.speeds.append(Speed(stamp_ns, row, tracked.speed))
-            recording.sizes.append(tracked.size)
-            recording.kinds[tracked.kind] += 1
-
-    def add_sample(self, sample: Sample, vehicle: str, stamp_ns: int, row: int) -> None:
-        """Add position and speed of a vehicle, as far as the message has them."""
-        rows = self._recording_of(vehicle, sample.frame, sample.child).rows
-        if sample.position is not None:
-            state = (*sample.position, sample.heading, sample.height)
-            rows.fixes.append(Fix(stamp_ns, row, *state))
-        if sample.speed is not None:
-            rows.speeds.append(Speed(stamp_ns, row, sample.speed, sample.course))
-
-    def _recording_of(self, vehicle: str, frame: str, child: str) -> Recording:
-        made = Recording(vehicle, self.topic.name, self.topic.type, frame, child)
-        return self.recordings.setdefault((vehicle, frame), made)
+    return list(collected.by_vehicle_and_frame.values()), clock
 
 
 def _has_several_children(topic: Topic) -> bool:

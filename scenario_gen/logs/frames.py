@@ -10,10 +10,11 @@ import math
 
 import numpy as np
 
+from scenario_gen.bags.vehicles import Sample, TrackedObject
 from scenario_gen.base.errors import InputError
 from scenario_gen.logs.config import POINTS
 from scenario_gen.logs.quality import Doubt, Quantity
-from scenario_gen.logs.raw import Fix, Rows
+from scenario_gen.logs.raw import Fix, Rows, Speed
 from scenario_gen.numerics import Floats, Ints, wrap_angle
 
 _MAX_DEPTH_COUNT = 20  # transforms in a chain; more are a circle
@@ -46,6 +47,46 @@ class Recording:
     sizes: list[tuple[float, float]] = field(default_factory=list)
     kinds: Counter[str] = field(default_factory=Counter)
     ahead: float = math.nan
+
+
+@dataclass
+class Recordings:
+    """What one topic has recorded so far.
+
+    Attributes:
+        topic: its name.
+        type: of its messages.
+        by_vehicle_and_frame: the recordings.
+    """
+
+    topic: str
+    type: str
+    by_vehicle_and_frame: dict[tuple[str, str], Recording] = field(default_factory=dict)
+
+    def add_objects(
+        self, objects: Iterable[TrackedObject], frame: str, stamp_ns: int, row: int
+    ) -> None:
+        """Add the tracked objects of a message."""
+        for tracked in objects:
+            recording = self._recording_of(tracked.id, frame, "")
+            state = (*tracked.position, tracked.heading, tracked.height)
+            recording.rows.fixes.append(Fix(stamp_ns, row, *state))
+            recording.rows.speeds.append(Speed(stamp_ns, row, tracked.speed))
+            recording.sizes.append(tracked.size)
+            recording.kinds[tracked.kind] += 1
+
+    def add_sample(self, sample: Sample, vehicle: str, stamp_ns: int, row: int) -> None:
+        """Add position and speed of a vehicle, as far as the message has them."""
+        rows = self._recording_of(vehicle, sample.frame, sample.child).rows
+        if sample.position is not None:
+            state = (*sample.position, sample.heading, sample.height)
+            rows.fixes.append(Fix(stamp_ns, row, *state))
+        if sample.speed is not None:
+            rows.speeds.append(Speed(stamp_ns, row, sample.speed, sample.course))
+
+    def _recording_of(self, vehicle: str, frame: str, child: str) -> Recording:
+        made = Recording(vehicle, self.topic, self.type, frame, child)
+        return self.by_vehicle_and_frame.setdefault((vehicle, frame), made)
 
 
 def by_vehicle(recordings: Iterable[Recording]) -> dict[str, list[Recording]]:
