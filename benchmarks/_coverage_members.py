@@ -64,7 +64,7 @@ class GeneratedSet(Protocol):
 
 @dataclass(frozen=True, eq=False)
 class Members:
-    """Recorded encounters with a shared area, and the generated ones.
+    """Recorded encounters with a conflict area, and the generated ones.
 
     r is the quantile `radius_share` of the distances from recorded encounters to the nearest one
     in other recordings, which makes it the precision of the recorded encounters.

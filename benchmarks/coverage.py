@@ -8,7 +8,7 @@ settings (the law is that of the template and the shipped one alone: encounters 
 reached say nothing), and with `sampling.decisions=drawn`. Without data the drawn motions of
 test/support.
 
-`_coverage_pairs.json` lists 107 pairs within 4 s at the shared area or 15 m, whose road keeps the
+`_coverage_pairs.json` lists 107 pairs within 4 s at the conflict area or 15 m, whose road keeps the
 kind, in five sessions. A session counts as one recording: unseen encounters are of other sessions.
 A draw of templates counts if it leaves ten unseen encounters of two sessions. Definitions:
 `_coverage_members`, with the radius in which 80 %, or 50 %, of recorded encounters have another
@@ -152,7 +152,7 @@ def _measured(setting: str, sets: Sequence[Set], rng: np.random.Generator) -> It
     yield higher(f"{setting}: encounters", len(found.recorded))
     yield higher(f"{setting}: scenarios", len(found.made))
     lost = {member.template for member in found.made if member.kind is None}
-    yield lower(f"{setting}: sets that lose the shared area", len(lost), "", 0.0)
+    yield lower(f"{setting}: sets that lose the conflict area", len(lost), "", 0.0)
     for n in TEMPLATES:
         for one in kinds_with(found, n):
             name, shares = f"{one.recorded[0].kind}, {n} templates", shares_by_kind([one], n)

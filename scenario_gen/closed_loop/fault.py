@@ -240,7 +240,7 @@ class Contact:
     def lost_turn(self) -> bool:
         """Whether the ego, which goes first by the certificate, has let the other one go first.
 
-        The ego was late, and could still stop before the shared area when the other one could no
+        The ego was late, and could still stop before the conflict area when the other one could no
         longer stop comfortably.
         """
         conflict, ego = self.conflict, self.drive.ego
@@ -294,7 +294,7 @@ class Contact:
         return self.ego_state.speed < 0.0
 
     def ego_entered_early(self) -> bool:
-        """Whether the ego entered the shared area in the other one's turn, before that one left.
+        """Whether the ego entered the conflict area in the other one's turn, before that one left.
 
         Where both drive in the same direction, an ego behind the other one did not enter early.
         """

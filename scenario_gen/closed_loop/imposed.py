@@ -15,8 +15,8 @@ def imposed_braking(loop: ClosedLoop, drive: Drive) -> float:
     """Return the hardest braking [m/s²] of a vehicle whose turn the ego takes; 0 without one.
 
     The ego takes the turn of a vehicle that goes first in the certified scenario if it enters
-    their shared area before that one has left it; of a vehicle in the same direction, before that
-    one has entered it. The braking of the certified motion itself does not count.
+    their conflict area before that one has left it; of a vehicle in the same direction, before
+    that one has entered it. The braking of the certified motion itself does not count.
     """
     hardest = 0.0
     for other in range(len(drive.motion.vehicles)):

@@ -177,7 +177,7 @@ class Testing:
             first, name = met[0], self.encounter.ids[met[0].first]
             raise TargetError(
                 f"for testing ego {self.request.ego}: nothing is left to react to, since vehicle "
-                f"{name} leaves their shared area {first.exit_first:.1f} s after the recording "
+                f"{name} leaves their conflict area {first.exit_first:.1f} s after the recording "
                 f"begins, and the ego enters it {first.encroachment:.1f} s later: use a recording "
                 "that begins earlier, or another ego"
             )

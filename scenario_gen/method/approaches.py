@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""How two recorded vehicles come to their shared area, as recorded and as if they were alone."""
+"""How two recorded vehicles come to their conflict area, as recorded and as if they were alone."""
 
 from dataclasses import dataclass, replace
 from typing import NamedTuple
@@ -30,7 +30,7 @@ class DecisionMargins:
     """What drivers decide in time; measured on recorded yields at junctions.
 
     Attributes:
-        horizon_s: time of free driving before the shared area at which a driver decides.
+        horizon_s: time of free driving before the conflict area at which a driver decides.
         after_s: for which a vehicle that goes first is present after it has left the area.
         continued_m: distance by which a record is driven on.
         min_duration_s: of a new encounter.
@@ -65,7 +65,7 @@ MARGINS = DecisionMargins()
 
 
 class Approach(NamedTuple):
-    """How a vehicle comes to a shared area.
+    """How a vehicle comes to a conflict area.
 
     Attributes:
         recorded: as recorded, and driven on until it has left the area.
@@ -104,7 +104,7 @@ class Approach(NamedTuple):
 
 
 def approaches(pair: InteractingPair) -> tuple[Approach, Approach]:
-    """Return how the first and the second vehicle of a pair come to the shared area.
+    """Return how the first and the second vehicle of a pair come to the conflict area.
 
     Raises:
         RefusedError: a record ends in the area, and it is unknown how it goes on.
@@ -136,7 +136,7 @@ def approaches(pair: InteractingPair) -> tuple[Approach, Approach]:
 
 
 def _approach(drive: Drive, enters: float, leaves: float, *, follows: bool) -> Approach:
-    """Return how a vehicle comes to a shared area that it enters and leaves at times [s]."""
+    """Return how a vehicle comes to a conflict area that it enters and leaves at times [s]."""
     times = np.array([enters, leaves, enters + MARGINS.behind_s])
     entry, exit_, behind = np.interp(times, drive.time, drive.station).tolist()
     free = free_drive(drive, entry, behind)

@@ -4,9 +4,9 @@
 """Decisions: encounters in which a driver goes first, rolls or stops, but did not when recorded.
 
 A decision belongs to a conflict at which j yields to i. The *offered lag* x is the time by which
-i would enter the shared area later than j, if both drove on freely from one instant: the first one
-at which either is 4 s of free driving before the area. Nobody has decided anything by then. Lags
-are drawn first, x ~ N(0, σ²), then who goes first:
+i would enter the conflict area later than j, if both drove on freely from one instant: the first
+one at which either is 4 s of free driving before the area. Nobody has decided anything by then.
+Lags are drawn first, x ~ N(0, σ²), then who goes first:
 
     P(j goes first | x) = 1 / (1 + exp(-β x)).
 
@@ -295,15 +295,15 @@ def _refuse_undecided(pair: InteractingPair) -> None:
     """
     conflict = pair.conflict
     if _follows_before(pair):
-        raise RefusedError("the second vehicle follows the first one to the shared area")
+        raise RefusedError("the second vehicle follows the first one to the conflict area")
     first, second = pair.tracks
     if conflict.entry_second <= pair.presence(conflict.second)[0]:
         raise RefusedError(
-            f"vehicle {second.vehicle.id} is inside the shared area when its recording begins"
+            f"vehicle {second.vehicle.id} is inside the conflict area when its recording begins"
         )
     if conflict.entry_first <= pair.presence(conflict.first)[0] and _turns_at_first(first):
         raise RefusedError(
-            f"vehicle {first.vehicle.id} turns in the shared area when its recording begins"
+            f"vehicle {first.vehicle.id} turns in the conflict area when its recording begins"
         )
 
 

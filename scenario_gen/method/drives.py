@@ -37,7 +37,7 @@ class DrivingMargins:
         acceleration_mps2: of a driver who goes first.
         max_lateral_mps2: in bends.
         min_rolling_mps: a driver who would have to be slower stops.
-        stop_distance_m: from the standing place to where the shared area is entered.
+        stop_distance_m: from the standing place to where the conflict area is entered.
         own_line_m: a recorded standing place is the line if the area is nearer than this.
         gap_s: from the other vehicle's exit to the entry of a driver who rolls.
         departure_lag_s: from the other vehicle's exit to the departure of a driver who stands.
@@ -124,7 +124,7 @@ class Drive(NamedTuple):
 
 
 class Stop(NamedTuple):
-    """How a driver stops before a shared area.
+    """How a driver stops before a conflict area.
 
     Attributes:
         line: station [m] at which it stands.
@@ -209,7 +209,7 @@ def _continued(track: Track, speed: float) -> Track:
     """
     who = track.vehicle.id
     if speed < track.vehicle.kind.waits_below:
-        raise RefusedError(f"vehicle {who} stands in the shared area when its recording ends")
+        raise RefusedError(f"vehicle {who} stands in the conflict area when its recording ends")
     curve = track.curve
     end = float(track.progress[-1])
     yaw = curve.at(np.array([0.0, end - DRIVING.turning_m, end]))[:, 2]
@@ -228,7 +228,7 @@ def _continued(track: Track, speed: float) -> Track:
 
 
 def free_drive(drive: Drive, entry: float, leaves: float) -> Drive:
-    """Return a recorded drive without the brake and the stand before a shared area.
+    """Return a recorded drive without the brake and the stand before a conflict area.
 
     It has its approach speed, or the speed with which it left the area, as far as its bends allow.
     A driver who stands when the recording begins departs from there.
@@ -273,7 +273,7 @@ def _limited(speed: Floats) -> Floats:
 
 
 def stop_before(drive: Drive, entry: float) -> Stop:
-    """Return where and how a recorded driver stops before a shared area.
+    """Return where and how a recorded driver stops before a conflict area.
 
     Args:
         drive: as recorded.
@@ -294,7 +294,7 @@ def delayed_drive(drive: Drive, entry: float, clears: float, stop: Stop) -> Driv
 
     Args:
         drive: as if it were alone.
-        entry: station [m] at which it enters the shared area.
+        entry: station [m] at which it enters the conflict area.
         clears: when [s] the other vehicle has left the area; 0 s is when the drive begins.
         stop: where and how it stops.
 

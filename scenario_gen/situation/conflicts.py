@@ -3,9 +3,9 @@
 
 """Conflicts: the swept footprints of two vehicles intersect; the order is that of first entry.
 
-The shared area of vehicles a and b is the intersection of their swept footprints. A footprint of a
-lies in the sweep of a, so a is inside the shared area exactly while its footprint meets the sweep
-of b. Therefore two box tests replace polygon clipping.
+The conflict area of vehicles a and b is the intersection of their swept footprints. A footprint of
+a lies in the sweep of a, so a is inside the area exactly while its footprint meets the sweep of b.
+Therefore two box tests replace polygon clipping.
 """
 
 from collections.abc import Iterable, Mapping, Sequence
@@ -28,7 +28,7 @@ POSE_TURN_RAD = 0.1  # largest turn between them
 STANDSTILL_STEP_M = 0.01  # samples that move less add nothing to a sweep
 BLOCK_POSES = 16  # poses that share one bounding circle
 CONTACT_DEPTH_M = 1e-6  # footprints that meet less deeply only touch
-BISECTION_STEPS = 10  # to find when a footprint enters the shared area
+BISECTION_STEPS = 10  # to find when a footprint enters the conflict area
 SAME_WAY_RAD = 0.5  # largest difference of headings on a shared path
 FOLLOWING_LENGTHS = 3.0  # vehicle lengths of shared path from which on a conflict is following
 
@@ -40,10 +40,10 @@ class Conflict:
     """The swept footprints of two vehicles intersect: crossing, merging or following.
 
     Attributes:
-        first: index of the vehicle that enters the shared area first; of followers the leader.
+        first: index of the vehicle that enters the conflict area first; of followers the leader.
         second: index of the other vehicle.
         following: whether they share a long part of their paths.
-        entry_first: when [s] the first one enters the shared area.
+        entry_first: when [s] the first one enters the conflict area.
         exit_first: when [s] the first one has left it.
         entry_second: when [s] the second one enters.
         exit_second: when [s] the second one has left it.

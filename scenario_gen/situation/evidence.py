@@ -64,7 +64,7 @@ class ReactionThresholds:
         slowing_mps: smaller drops of speed are no slowing.
         overtaking_mps: a vehicle that is always faster than the one ahead by this, and does not
             slow down, overtakes it.
-        wait_distance_m: a wait farther from the shared area has another reason.
+        wait_distance_m: a wait farther from the conflict area has another reason.
         entry_window_s: before an entry, in which a merging vehicle is beside the lane.
         queue_delay_s: in addition to the greatest lag, until a driver starts behind its leader.
     """

@@ -58,7 +58,7 @@ def lag_behind(motion: Motion, conflict: Conflict) -> float:
 
 
 def passing(motion: Motion, conflict: Conflict, *, merges: bool) -> tuple[float, float]:
-    """Return when [s] the first vehicle clears the shared area, and when the second one enters.
+    """Return when [s] the first vehicle clears the conflict area, and when the second one enters.
 
     If the second one merges, it shares only the place where it enters, since the first one drives
     on in front of it.
@@ -90,7 +90,7 @@ def passing(motion: Motion, conflict: Conflict, *, merges: bool) -> tuple[float,
 def encroachment(motion: Motion, conflict: Conflict) -> float:
     """Return the post-encroachment time [s]: from the first one's exit to the second one's entry.
 
-    Negative if both were inside the shared area. In a merge that is the place where the second
+    Negative if both were inside the conflict area. In a merge that is the place where the second
     one enters. NaN if the first one is on the shared path from the start: the second one follows.
     """
     first_time = motion.time[motion.present[conflict.first, 0]]

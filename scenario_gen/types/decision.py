@@ -26,7 +26,7 @@ class Decision:
         who: ROS name of the vehicle that decides.
         whom: ROS name of the other vehicle.
         outcome: what `who` does.
-        lag: seconds by which `whom` would enter the shared area later than `who`, if neither
+        lag: seconds by which `whom` would enter the conflict area later than `who`, if neither
             slowed down.
         probability: share of all scenarios from the encounter that have this outcome.
     """

@@ -24,8 +24,8 @@ class Reaction:
         who: the one that reacts.
         whom: the one it reacts to.
         lag: seconds; of a follower from its leader's change of speed to its own, of a yielder from
-            the other's clearing of the shared area to when it drives off, or is slowest (negative
-            if it anticipates).
+            the other's clearing of the conflict area to when it drives off, or is slowest
+            (negative if it anticipates).
         gain: how much of a leader's quick change of speed its follower takes over, 0 to 1; 1 of a
             yielder.
         residual: what is its own: metres of gap of a follower, seconds of lag of a yielder (one
@@ -37,8 +37,8 @@ class Reaction:
             drives; zeros of a yielder.
         stands: whether a yielder stands before it goes; one that does not only slows down, or
             passes (`since` is `until`).
-        gap: seconds from the other's clearing of the shared area to a yielder's entry; infinite if
-            it does not come behind it: it stops, or lets the other one pass close by.
+        gap: seconds from the other's clearing of the conflict area to a yielder's entry; infinite
+            if it does not come behind it: it stops, or lets the other one pass close by.
         merges: whether a yielder enters the other's lane and goes on behind it.
     """
 
@@ -58,12 +58,12 @@ class Reaction:
 
     @property
     def enters(self) -> float:
-        """When [s] a yielder enters the shared area, on the template's clock."""
+        """When [s] a yielder enters the conflict area, on the template's clock."""
         return self.clears + self.gap
 
     @property
     def clears(self) -> float:
-        """When the other one has cleared the shared area [s, template's clock]; for yielders."""
+        """When the other one has cleared the conflict area [s, template's clock]; for yielders."""
         return self.until - self.lag
 
     def named(self, ids: Sequence[str]) -> NamedReaction:

@@ -135,7 +135,7 @@ def test_a_recording_whose_meeting_is_over_is_refused_at_once(tmp_path):
     done = generated(tmp_path / "none", *words)
     output = " ".join(str(done.exception or done.output).split())
     assert done.exit_code != 0
-    assert "vehicle 21019 leaves their shared area 0.2 s after the recording begins" in output
+    assert "vehicle 21019 leaves their conflict area 0.2 s after the recording begins" in output
 
 
 def test_a_recording_that_does_not_fit_is_shortened_if_that_is_allowed(monkeypatch):

@@ -204,7 +204,7 @@ def _joint_features(motion: Motion, conflict: Conflict) -> list[float]:
 
 
 def _vehicle_features(motion: Motion, n: int, entry: float) -> list[float]:
-    """Return the VEHICLE_FEATURES of a vehicle that enters the shared area at `entry` [s]."""
+    """Return the VEHICLE_FEATURES of a vehicle that enters the conflict area at `entry` [s]."""
     present = motion.present_slice(n)
     speed = motion.speed[n, present]
     at = int(np.clip(round(entry / motion.dt) - present.start, 0, len(speed) - 1))

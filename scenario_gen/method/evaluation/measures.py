@@ -14,7 +14,7 @@ They are taken on the published samples (0.1 s). Of a pair a, b:
   footprints; infinite if they are never on a collision course.
 - `gap` [m]: least distance of the two footprints.
 - `closing_speed` [m/s]: rate at which the distance of the two centres shrinks when the first one
-  enters the shared area; of a pair that neither crosses nor merges the greatest rate while both
+  enters the conflict area; of a pair that neither crosses nor merges the greatest rate while both
   are there.
 - `blind_margin` [s]: mean time by which vehicle a, at four constant speeds, would have to be
   shifted to meet b; 0 if it would. See `scenario_gen.method.evaluation.non_reactive`.
@@ -47,7 +47,7 @@ _CONFLICT_FIGURES = ("pet", "arrival_gap", "closing_speed")
 
 @dataclass(frozen=True)
 class PairFigures:
-    """All figures of one pair (a < b), NaN if undefined; `first` enters the shared area first."""
+    """All figures of one pair (a < b), NaN if undefined; `first` enters their area first."""
 
     pair: Pair
     first: int | None

@@ -289,7 +289,7 @@ CRITICALITY = MetricGroup(
             "s",
             "",
             _CRITICAL,
-            "from the first vehicle's exit of the shared area to the second's entry, mean",
+            "from the first vehicle's exit of the conflict area to the second's entry, mean",
         ),
         Metric(
             "order_kept",

@@ -24,7 +24,7 @@ PILOT_CANDIDATES = 2 * BLOCK_CANDIDATES  # by which a level is judged
 MIN_RARITY_SCENARIOS = 20  # valid ones from which a bound is taken
 _LARGE_PILOT_FACTOR = 5  # over a pilot that has too few valid candidates
 _MIN_DISTANCE_SHARE = 0.55  # of a route; half of the recorded distance, which may be longer
-_KEPT_SHARE = 0.4  # of the valid candidates with a shared area that are kept at least
+_KEPT_SHARE = 0.4  # of the valid candidates with a conflict area that are kept at least
 _SHARED_AREA_SHARE = 0.1  # of valid candidates, from which all must have one
 _ENDING_S = 2.5  # before a record's end
 _HARDER_MPS2 = 1.0  # braking at the end over the strongest of the undisturbed drive
@@ -215,7 +215,7 @@ class RarityFilter:
 
     A template may be rare itself, and then so is everything generated from it. So candidates with
     a rarity of at most 1 are kept, or the two fifths of the valid candidates that are least rare;
-    without a shared area none is.
+    without a conflict area none is.
     The bound is found with the first candidates, and is the same for all.
 
     Attributes:

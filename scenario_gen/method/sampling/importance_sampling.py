@@ -80,7 +80,7 @@ class TargetSet:
             margin = min(closest.exit_first - closest.entry_first, _MAX_MARGIN_S)
             if closest.entry_first <= _INSIDE_S:
                 note = (
-                    f"; in the recording vehicle {first} enters the shared area "
+                    f"; in the recording vehicle {first} enters the conflict area "
                     f"{closest.entry_first:.1f} s after the start"
                 )
         if not targets:
