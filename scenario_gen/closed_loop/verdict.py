@@ -254,7 +254,7 @@ class DriveVerdict:
             messages.append(f"ran a red light at {self.ran_red:.2f} s")
         if self.took_turn:
             braking = f"{self.imposed_braking:.1f} m/s²"
-            messages.append(f"took the turn of a vehicle, which braked by {braking}")
+            messages.append(f"took the turn of another vehicle, which braked at {braking}")
         if self.jumps:
             messages.append(f"{self.jumps} teleport(s): poses that cannot be reached in a step")
         if math.isnan(self.goal):
