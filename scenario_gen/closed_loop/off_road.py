@@ -130,19 +130,21 @@ def _depths(road: Road, poses: Floats, half: tuple[float, float]) -> Floats:
     outside = ~footprint_fits(road, poses, 2.0 * half[0], 2.0 * half[1])
     depths = np.zeros(len(poses))
     if outside.any():
-        depths[outside] = _outside(road, poses[outside], half, _grid(half)).max(axis=1)
+        pavement = _pavement(road, poses[outside], half)
+        depths[outside] = _outside(pavement, poses[outside], _grid(half)).max(axis=1)
     return depths
 
 
 def _depth(road: Road, pose: Floats, half: tuple[float, float]) -> float:
     """Return the greatest depth [m] of a footprint at a pose (3,) outside the road, to 1 cm."""
+    pavement = _pavement(road, pose[None], half)
     points = _grid(half)
     spacing = 2.0 * max(half) / (min(POINTS_COUNT) - 1)
     while spacing > DEPTH_ERROR_M:
-        deepest = points[np.argmax(_outside(road, pose[None], half, points))]
+        deepest = points[np.argmax(_outside(pavement, pose[None], points))]
         spacing /= 4.0
         points = np.clip(deepest + spacing * _grid((4.0, 4.0)), np.negative(half), half)
-    return float(_outside(road, pose[None], half, points).max())
+    return float(_outside(pavement, pose[None], points).max())
 
 
 def _grid(half: tuple[float, float]) -> Floats:
@@ -151,9 +153,8 @@ def _grid(half: tuple[float, float]) -> Floats:
     return np.stack(np.meshgrid(along, across), axis=-1).reshape(-1, 2)
 
 
-def _outside(road: Road, poses: Floats, half: tuple[float, float], points: Floats) -> Floats:
+def _outside(pavement: BaseGeometry, poses: Floats, points: Floats) -> Floats:
     """Return (P, M) how far [m] points (M, 2) of a footprint at poses (P, 3) are outside."""
-    pavement = _pavement(road, poses, half)
     shapely.prepare(pavement)
     distance = shapely.distance(shapely.points(place(poses[:, None], *points.T)), pavement)
     return np.asarray(np.nan_to_num(distance, nan=MAX_DEPTH_M).clip(max=MAX_DEPTH_M))

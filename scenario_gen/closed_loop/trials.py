@@ -347,21 +347,21 @@ def _drive(name: str, loop: ClosedLoop, make: MakePlanner) -> Outcome:
     """
     process, config = os.getpid(), loop.config
     states, timed = [loop.start()], None
-    error, verdict = None, None
+    error: BaseException | None = None
     try:
         with redirect_stdout(sys.stderr), bounded(config.drive_time):
             timed = Timed(make(), config.step)
             states.extend(loop.steps(timed))
-        verdict = judge(loop, loop.record(states))
+        drive = loop.record(states)
+        verdict = judge(loop, drive)
     except (Exception, SystemExit, TooLongError) as failure:
         error = failure
     finally:
         if os.getpid() != process:  # the planner has forked: only the parent has a result
             os._exit(1)
     decisions = Decisions() if timed is None else timed.decisions
-    if verdict is not None:
-        return Outcome(name, verdict, loop.record(states), decisions=decisions)
-    assert error is not None
+    if error is None:
+        return Outcome(name, verdict, drive, decisions=decisions)
     if len(states) == 1:
         states.append(loop.step(states[0], None))
     drive = loop.record(states)
