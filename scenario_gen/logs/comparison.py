@@ -199,6 +199,12 @@ class Reading:
         unit = unit or self.changes.get(quantity, "").rpartition(":")[2]
         return {quantity: column.option(unit, flipped=flipped)}
 
+    def swapped(self, first: str, second: str) -> dict[str, str]:
+        """Return two columns that change places, as in the parameter `columns`; empty without."""
+        if not self.has(first, second):
+            return {}
+        return {first: self.column(second)[second], second: self.column(first)[first]}
+
     def units(self, unit: str, *quantities: str) -> dict[str, str]:
         """Return columns in another unit as in the parameter `columns`."""
         return {
@@ -225,11 +231,18 @@ class Reading:
         legs = legs_of(changed, geographic=self.log.geographic, least_steps=least)
         return _compare(legs, len(vehicles))
 
-    def doubt(self, quantity: Quantity, size: float, cause: str, remedy: str = "") -> Doubt:
-        """Add a doubt about the whole log, and return it."""
+    def doubt(
+        self,
+        quantity: Quantity,
+        size: float,
+        cause: str,
+        remedy: str = "",
+        *,
+        stops: bool = True,
+    ) -> None:
+        """Add a doubt about the whole log."""
         doubt = Doubt("", 0.0, 0.0, quantity, size, "", cause, remedy)
-        self.doubts.append(doubt)
-        return doubt
+        self.doubts.append(replace(doubt, stops=stops))
 
 
 def counts_steps(vehicles: Sequence[Observations]) -> bool:

@@ -112,11 +112,6 @@ def _axes(reading: Reading) -> list[tuple[str, dict[str, str], Callable[[Floats]
     """Return the ways in which axes may be mirrored or swapped: text, columns, and conversion."""
     first, second = ("lat", "lon") if reading.log.geographic else ("x", "y")
 
-    def swap() -> dict[str, str]:
-        if not reading.has(first, second):
-            return {}
-        return {first: reading.column(second)[second], second: reading.column(first)[first]}
-
     def flip(axis: int) -> Callable[[Floats], Floats]:
         return lambda fix: fix * ((-1.0, 1.0), (1.0, -1.0))[axis]
 
@@ -128,7 +123,7 @@ def _axes(reading: Reading) -> list[tuple[str, dict[str, str], Callable[[Floats]
         )
     return [
         (texts[1], reading.column(second, flipped=True), flip(1)),
-        (f"{first} and {second} are swapped", swap(), swapped_fix),
+        (f"{first} and {second} are swapped", reading.swapped(first, second), swapped_fix),
         (texts[0], reading.column(first, flipped=True), flip(0)),
     ]
 
@@ -147,6 +142,5 @@ def _other_way(reading: Reading, quantity: str, columns: Mapping[str, str]) -> s
 def _swap_hint(reading: Reading) -> str:
     if reading.log.geographic or not reading.has("x", "y"):
         return ""
-    x, y = reading.column("y")["y"], reading.column("x")["x"]
-    option = with_columns(reading.config.columns, {"x": x, "y": y})
+    option = with_columns(reading.config.columns, reading.swapped("x", "y"))
     return f", or if x and y are swapped: {option}"

@@ -162,9 +162,9 @@ def _find_degrees(reading: Reading) -> None:
             reading.doubt(Quantity.POSITION, 11.0, cause, "record six decimals or more")
         return
     if latitude <= 180.0 and longitude <= 90.0:
-        swap = {"lat": reading.column("lon")["lon"], "lon": reading.column("lat")["lat"]}
         cause = f"a latitude of {latitude:g} is not on Earth: lat and lon may be swapped"
-        reading.doubt(Quantity.POSITION, latitude, cause, reading.option(**swap))
+        option = reading.option(**reading.swapped("lat", "lon"))
+        reading.doubt(Quantity.POSITION, latitude, cause, option)
         return
     units = [unit for unit in _DEGREE_UNITS if _suits_globe(fix, unit)]
     spreads = [reading.compared(_degrees(unit)).spread for unit in units]
@@ -262,11 +262,9 @@ def _check_speeds(reading: Reading) -> None:
     named = assumed or _agreeing(reading, _speed_changes(reading, reading.has))
     if named:
         options = [f"{each.text}; {reading.option(**each.columns)}" for each in named]
-        doubt = reading.doubt(
-            Quantity.SPEED, ratio, f"{fact}; they would fit with {' or with '.join(options)}"
-        )
-        if not assumed and set(named[0].columns) == {"speed"}:  # the positions decide
-            reading.doubts[-1] = replace(doubt, stops=False)
+        positions_decide = not assumed and set(named[0].columns) == {"speed"}
+        cause = f"{fact}; they would fit with {' or with '.join(options)}"
+        reading.doubt(Quantity.SPEED, ratio, cause, stops=not positions_decide)
         return
     is_gross = compared.gross_off[is_known] > EVIDENCE.gross_share
     if np.log(compared.deviation[is_known]).max() < np.log(EVIDENCE.wrong_ratio):
@@ -277,9 +275,8 @@ def _check_speeds(reading: Reading) -> None:
         fact = f"the recorded speeds over those of the positions differ: {', '.join(parts)}"
     cause = f"{fact}: check the units of time, positions and speeds"
     remedy = "name them with --set log.columns=…" if reading.log.columns else ""
-    doubt = reading.doubt(Quantity.SPEED, ratio, cause, remedy)
-    if is_gross.mean() <= EVIDENCE.many_share or not reading.log.columns:
-        reading.doubts[-1] = replace(doubt, stops=False)
+    is_serious = is_gross.mean() > EVIDENCE.many_share and bool(reading.log.columns)
+    reading.doubt(Quantity.SPEED, ratio, cause, remedy, stops=bool(is_serious))
 
 
 def _staying(reading: Reading) -> str:
@@ -352,7 +349,7 @@ def _speed_changes(reading: Reading, may_change: Callable[..., bool]) -> Iterato
             yield Change(text, reading.units(unit, "speed"), scaled(speed=speed[unit]))
     if reading.log.geographic:
         if reading.has("lat", "lon"):
-            swap = {"lat": reading.column("lon")["lon"], "lon": reading.column("lat")["lat"]}
+            swap = reading.swapped("lat", "lon")
             yield Change("lat and lon swapped", swap, with_fix(swapped_fix), is_unit=False)
         if may_change("lat", "lon"):
             text = "latitude and longitude in radians"

@@ -142,13 +142,13 @@ class FrameTree:
         poses = np.array([(fix.x, fix.y, fix.heading) for fix in fixes]).reshape(-1, 3)
         stamps = np.array([fix.stamp_ns for fix in fixes], dtype=np.int64)
         for child in self.chain(frame)[:-1]:
-            poses = _joined(self._at(child, stamps), poses)
+            poses = _joined(self._transforms_at(child, stamps), poses)
         return [
             fix._replace(x=x, y=y, heading=heading)
             for fix, (x, y, heading) in zip(fixes, poses.tolist(), strict=True)
         ]
 
-    def _at(self, child: str, stamps: Ints) -> Floats:
+    def _transforms_at(self, child: str, stamps: Ints) -> Floats:
         """Return the transforms (F, 3) of a frame to its parent at stamps (F,)."""
         known = sorted(self.transforms[child])
         seconds = np.array([entry[0] - known[0][0] for entry in known]) * 1e-9
@@ -167,7 +167,7 @@ class FrameTree:
         stamps = np.array([fix.stamp_ns for fix in common], dtype=np.int64)
         if not len(stamps):
             return
-        body = of_child._at("body", stamps)
+        body = of_child._transforms_at("body", stamps)
         target = np.array([(fix.x, fix.y, fix.heading) for fix in common])
         turn = wrap_angle(target[:, 2] - body[:, 2])
         offset = target[:, :2] - _turned(body[:, :2], turn)
