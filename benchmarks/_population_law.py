@@ -4,8 +4,8 @@
 """Make `scenario_gen/resources/population.json`: how encounters of each kind differ, from NGSIM.
 
 `python -m benchmarks._population_law` reads the windows of NGSIM (US Department of Transportation,
-public domain) in SCENARIO_GEN_DATA: every two vehicles within 4 s at the conflict area, or 15 m. It
-writes the mean and the covariance of the features of each kind. The covariance of a kind is
+public domain) in SCENARIO_GEN_DATA: every two vehicles within 4 s at the conflict area, or 15 m.
+It writes the mean and the covariance of the features of each kind. The covariance of a kind is
 shrunk towards that within all kinds, which counts as POOLED_COUNT encounters, so that a kind with
 four encounters has one, too.
 """

@@ -8,8 +8,8 @@ settings (the law is that of the template and the shipped one alone: encounters 
 reached say nothing), and with `sampling.decisions=drawn`. Without data the drawn motions of
 test/support.
 
-`_coverage_pairs.json` lists 107 pairs within 4 s at the conflict area or 15 m, whose road keeps the
-kind, in five sessions. A session counts as one recording: unseen encounters are of other sessions.
+`_coverage_pairs.json` lists 107 pairs within 4 s at the conflict area or 15 m, whose road keeps
+the kind, in five sessions. A session counts as one recording: unseen encounters are of other sessions.
 A draw of templates counts if it leaves ten unseen encounters of two sessions. Definitions:
 `_coverage_members`, with the radius in which 80 %, or 50 %, of recorded encounters have another
 session's one: so 0.8 or 0.5 is the precision of recordings. *Shifted* moves each vehicle's record
@@ -171,7 +171,7 @@ def _measured(setting: str, sets: Sequence[Set], rng: np.random.Generator) -> It
 
 
 def _beside(found: Members, null: Members) -> Iterator[Row]:
-    """Yield by kind what is generated minus valid shifted records, as they are and at one precision."""
+    """Yield by kind what is generated minus valid shifted records, also at one precision."""
     for n in TEMPLATES:
         pairs = (
             (kind, null.of_kind(kind.recorded[0].kind or "")) for kind in kinds_with(found, n)

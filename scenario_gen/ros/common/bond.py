@@ -17,7 +17,7 @@ from scenario_gen.ros.common.timers import create_steady_timer
 from scenario_gen.ros.common.topics import message_class, publish
 
 TOPIC = "bond"
-DEPTH = 10
+DEPTH_COUNT = 10
 PERIOD_S = 1.0
 TIMEOUT_S = 4.0
 
@@ -34,8 +34,8 @@ class Bond:
         except InputError:
             self._status = None
             return
-        self._publisher = node.create_publisher(self._status, TOPIC, DEPTH)
-        node.create_subscription(self._status, TOPIC, self._receive, DEPTH)
+        self._publisher = node.create_publisher(self._status, TOPIC, DEPTH_COUNT)
+        node.create_subscription(self._status, TOPIC, self._receive, DEPTH_COUNT)
 
     def start(self) -> None:
         """Send heartbeats from now on."""
