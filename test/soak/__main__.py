@@ -23,9 +23,9 @@ from rich.table import Table
 PARTS = (
     "cpu",
     "fuzz",
+    "libraries",
     "long",
     "mutations",
-    "newest",
     "properties",
     "recorded",
     "ros",
