@@ -12,7 +12,7 @@ An existing file is finished, so a killed run continues where it stopped. Its na
 inputs, so a changed file costs what depends on it. An unreadable file is named and left out.
 """
 
-from collections import Counter
+from collections import Counter, defaultdict
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from itertools import chain
@@ -38,7 +38,7 @@ from scenario_gen.corpus.encounters import (
 from scenario_gen.corpus.inventory import inventory
 from scenario_gen.corpus.meetings import search_hours
 from scenario_gen.corpus.messages import digest_of, identity_of, parse_range, ranges, RangeTask
-from scenario_gen.corpus.page import sketch, write_page
+from scenario_gen.corpus.page import PAGE_COLUMNS, sketch, write_page
 from scenario_gen.corpus.schedule import (
     ACCOUNT,
     accounts_of,
@@ -53,10 +53,11 @@ from scenario_gen.corpus.tasks import agree, arriving, check_out, held, spread, 
 
 ARCHIVE, PAGE, DETAILS = "archive.json", "encounters.html", "mine.json"
 LEGEND = (
-    "Lines are paths, dots their starts. Space-time gap: smallest distance between two paths,"
-    " plus 2 m for each second between."
+    "PET: time between the two vehicles in the conflict area; TTC: smallest time to collision;"
+    " distance: smallest one. Pictures show the paths, and the vehicles where they are nearest."
 )
-DRAWN_COUNT = 20  # encounters of a kind on the page
+DRAWN_COUNT = 10  # encounters of a kind of which the page has pictures
+LISTED_COUNT = 2000  # encounters in the table of the page
 NAMED_COUNT = 20  # failures and files that are named; the corpus contains all
 NAMED_FILES_COUNT = 5  # files that a note names
 DAMAGED = "damaged"
@@ -190,7 +191,7 @@ def mine(
         if strict and result.read[0] < n_files:
             raise RefusedError(f"{result.refused[0]['why']}; without --strict it is left out")
         with arriving(out / PAGE) as part:
-            _write_gallery(part, contents, result)
+            _write_page(part, contents, result)
         with arriving(out / DETAILS) as part:
             write_text(part, json.dumps(asdict(result), indent=1) + "\n")
         return result
@@ -203,11 +204,13 @@ class _Contents:
     Attributes:
         accounts: of each table.
         kinds: number of encounters of each kind.
-        drawn: rows for the page, the first ones of each kind.
+        listed: rows of the table on the page, the first ones.
+        drawn: rows with tracks, the first ones of each kind.
     """
 
     accounts: list[dict[str, Any]] = field(default_factory=list)
     kinds: Counter[str] = field(default_factory=Counter)
+    listed: list[dict[str, Any]] = field(default_factory=list)
     drawn: list[dict[str, Any]] = field(default_factory=list)
 
 
@@ -221,7 +224,9 @@ def _contents(out: Path) -> _Contents:
     for table in sorted((out / "encounters").glob("*.parquet")):
         contents.accounts.append(account_of(table))
         drawn = []
-        for k, row in enumerate(rows_of([table], ["kind"])):
+        for k, row in enumerate(rows_of([table], PAGE_COLUMNS)):
+            if len(contents.listed) < LISTED_COUNT:
+                contents.listed.append(row)
             if contents.kinds[row["kind"]] < DRAWN_COUNT:
                 drawn.append(k)
             contents.kinds[row["kind"]] += 1
@@ -229,22 +234,26 @@ def _contents(out: Path) -> _Contents:
     return contents
 
 
-def _write_gallery(path: Path, contents: _Contents, result: MiningSummary) -> None:
-    """Write a page with pictures of encounters."""
-    cards = []
+def _write_page(path: Path, contents: _Contents, result: MiningSummary) -> None:
+    """Write a page with a table of encounters, and pictures of some of each kind."""
+    cards = defaultdict(list)
     for row in contents.drawn:
-        encounter = encounter_of(row)
         kinds = json.loads(row["kinds"]).items()
         lines = [
             f"{row['count']} vehicles for {row['seconds']:.1f} s; smallest distance"
-            f" {row['distance']:.1f} m, space-time gap {row['gap']:.1f} m",
+            f" {row['distance']:.1f} m",
             "; ".join(f"vehicles {pair}: {kind}" for pair, kind in kinds),
             *json.loads(row["reactions"])["sentences"],
         ]
-        title = f"{row['kind']}: {row['name']}"
-        cards.append({"title": title, "lines": lines, "pictures": [sketch(encounter)]})
+        card = {"name": row["name"], "lines": lines, "picture": sketch(encounter_of(row))}
+        cards[row["kind"]].append(card)
+    rows = [
+        row | {"reactions": json.loads(row["reactions"])["sentences"]} for row in contents.listed
+    ]
     first, *rest = result.details()
-    write_page(path, "Encounters mined", f"{first}. {LEGEND}", cards, rest)
+    if (more := result.encounters - len(rows)) > 0:
+        rest = [f"{more:,} more encounters are not listed here; `find` lists all", *rest]
+    write_page(path, f"{first}. {LEGEND}", rows, cards, rest)
 
 
 def _parameters(config: CorpusConfig) -> dict[str, Any]:

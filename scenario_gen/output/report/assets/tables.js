@@ -1,5 +1,5 @@
 "use strict";
-// Of every page: tables are sorted by a click on a head, and a list of contents leads to the headings of the shown case.
+// Of every page: tables are sorted by a click on a head, and filtered by the words that are typed; a list of contents leads to the headings of the shown case.
 
 document.querySelectorAll("table[data-sort]").forEach((table) => {
   const body = table.tBodies[0];
@@ -17,6 +17,18 @@ document.querySelectorAll("table[data-sort]").forEach((table) => {
       const rows = [...body.rows].map((row) => [value(row), row]).sort(([a], [b]) => (up ? order(a, b) : order(b, a)));
       body.append(...rows.map(([, row]) => row));
     });
+  });
+});
+
+document.querySelectorAll("table[data-filter]").forEach((table) => {
+  const label = document.createElement("label");
+  const input = document.createElement("input");
+  input.type = "search";
+  label.append("Show rows with ", input);
+  table.parentElement.before(label);
+  input.addEventListener("input", () => {
+    const words = input.value.toLowerCase().split(/\s+/);
+    [...table.tBodies[0].rows].forEach((row) => { row.hidden = !words.every((word) => row.textContent.toLowerCase().includes(word)); });
   });
 });
 
