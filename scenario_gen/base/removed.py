@@ -17,7 +17,11 @@ REMOVED = {
     "compare": "the two evaluation.json have the figures and their intervals",
     "validate": "`scenario-gen evaluate` checks every scenario of a bag, then measures it",
     "parameters": "`scenario-gen --parameters` lists them",
-    "compact": "`scenario-gen batch … --compact` merges the tables of a batch",
+    **dict.fromkeys(
+        ("compact", "--compact"),
+        "the parts of a batch are large; DuckDB's `COPY (FROM 'scenarios/**/*.parquet') TO "
+        "'scenarios.parquet'` merges them",
+    ),
     "reindex": "a bag that was cut off is read up to the cut; `mcap recover` and then "
     "`ros2 bag reindex` make a whole bag of it",
     "doctor": "`ros2 doctor` and `pip check` examine an installation",

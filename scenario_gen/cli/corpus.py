@@ -132,12 +132,6 @@ class Batch:
     hits: Annotated[
         str, typer.Option(help="Condition as for `find`: the scenarios that go to bags.")
     ] = ""
-    compact: Annotated[
-        bool,
-        typer.Option(
-            "--compact", help="At the end merge the small tables into few with large row groups."
-        ),
-    ] = False
     workers: WorkersOption = 0
     scheduler: SchedulerOption = ""
     assignments: SetOption = None
@@ -148,7 +142,6 @@ class Batch:
 def batch(options: Batch) -> None:
     """Generate scenarios from all encounters of a corpus on several roads."""
     from scenario_gen.corpus.batch import run_batch
-    from scenario_gen.corpus.compact import compact
     from scenario_gen.corpus.parts import BatchRequest
     from scenario_gen.method.config import PipelineConfig
 
@@ -160,11 +153,7 @@ def batch(options: Batch) -> None:
         result = run_batch(
             options.corpus, names, options.out, request, templates=options.templates, workers=who
         )
-        lines, failed = result.lines(), result.failed
-        if options.compact:
-            before, after, unmerged = compact(options.out, who)
-            lines, failed = [*lines, f"{before} tables merged to {after}"], [*failed, *unmerged]
-    conclude(lines, failed, options.out)
+    conclude(result.lines(), result.failed, options.out)
 
 
 def shown(value: object) -> str:

@@ -1,44 +1,38 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""`batch`: templates × roads × scenarios, in parts (`parts.py`) that are files (`store.py`).
+"""`batch`: templates × roads × scenarios, in parts that are files (`parts.py`).
 
 A batch grows: further templates, roads and scenarios cost only what is not there yet.
 """
 
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass
-from itertools import groupby
+from itertools import islice
 import json
 from pathlib import Path
 from typing import Any
 
 from scenario_gen.base.errors import InputError, needs, RefusedError
+from scenario_gen.base.folders import write_text
 from scenario_gen.base.provenance import parameter_texts
 from scenario_gen.corpus.encounters import encounter_of, tables_of, write_encounters
 from scenario_gen.corpus.parts import (
     BatchRequest,
+    finished_tables,
     generate_part,
     part_tasks,
     STEP_COUNT,
 )
-from scenario_gen.corpus.store import finished_parts, finished_tables, MANIFEST, write_json
-from scenario_gen.corpus.tables import rows_at, rows_of
-from scenario_gen.corpus.tasks import agree, check_out, held, spread, Workers
+from scenario_gen.corpus.tables import rows_of
+from scenario_gen.corpus.tasks import agree, arriving, check_out, held, spread, Workers
 from scenario_gen.roads import build_road
 
 BAGS = ("none", "hits", "all")
-TABLE_TEMPLATE_COUNT = 500
+MANIFEST = "batch.json"
 IDENTITY = ("name", "source", "start_ns", "seconds", "gap", "distance", "speed")
-SCHEMA = {
-    "type": "object",
-    "required": ["seed", "parameters", "roads", "counts"],
-    "properties": {"format": {"const": 3}},
-}
-Row = tuple[Path, int]
-"""A row of a table, by its number."""
 
 
 @dataclass(frozen=True)
@@ -115,26 +109,21 @@ def run_batch(
             f"bags {request.bags!r}, hits {request.hits!r}: give bags none or all, or"
             " hits with a condition"
         )
-    chosen = _rows(tables_of(corpus))[: templates or None]
-    if not chosen:
+    tables = tables_of(corpus)
+    row = next(rows_of(tables), None)
+    if row is None:
         raise InputError(f"{corpus} holds no encounter")
-    table, number = chosen[0][0]
-    first = encounter_of(rows_at(table, [number])[0], table)
+    first = encounter_of(row, corpus)
     # An unknown road ends the batch; a road that does not fit one encounter does not.
     for road in roads:
         with suppress(RefusedError):
             build_road(road, first, request.config.road)
     with held(out), spread(workers) as run:
         manifest = _grow(out, roads, request)
-        _add_templates(out, chosen)
+        _add_templates(out, tables, templates, request.count)
         used = {token: road for token, road in manifest["roads"].items() if road in roads}
-        finished = finished_parts(out)
-        tasks = [
-            task
-            for task in part_tasks(out, used, manifest["counts"], request)
-            if task.number not in finished.get(f"road={task.token}", ())
-        ]
-        failed = run(generate_part, tasks)
+        tasks = part_tasks(out, used, manifest["counts"], request)
+        failed = run(generate_part, [task for task in tasks if not task.target.exists()])
         return summary(out, failed)
 
 
@@ -145,7 +134,7 @@ def _grow(out: Path, roads: Sequence[str], request: BatchRequest) -> dict[str, A
         InputError: the batch has another seed, other parameters or more scenarios.
     """
     document = {
-        "format": 3,
+        "format": 4,
         "seed": request.seed,
         "parameters": parameter_texts(request.config),
     }
@@ -165,42 +154,38 @@ def _grow(out: Path, roads: Sequence[str], request: BatchRequest) -> dict[str, A
     counts = sorted({*counts, request.count})
     grown = manifest | {"roads": tokens, "counts": counts}
     if grown != manifest:
-        write_json(out / MANIFEST, grown)
+        with arriving(out / MANIFEST) as part:
+            write_text(part, json.dumps(grown, indent=1) + "\n")
     return grown
 
 
-def _rows(tables: Sequence[Path]) -> list[tuple[Row, tuple[Any, ...]]]:
-    """Return all rows of encounters in tables, with their identities."""
-    return [
-        ((table, number), tuple(row[name] for name in IDENTITY))
-        for table in tables
-        for number, row in enumerate(rows_of([table], IDENTITY))
-    ]
+def _add_templates(out: Path, corpus: Sequence[Path], limit: int, count: int) -> None:
+    """Add the encounters of a corpus that a batch lacks, as tables of their own.
 
+    A table has the templates of a part: at least 10, of a large corpus as many as have 2,000
+    scenarios. Existing tables do not change.
 
-def _templates(out: Path) -> list[Path]:
-    return sorted((out / "templates").glob("*.parquet"))
-
-
-def _read(rows: Sequence[Row]) -> Iterator[tuple[dict[str, Any], Path]]:
-    """Yield the contents of rows and their tables; a table is opened once for its rows."""
-    for table, group in groupby(rows, key=lambda row: row[0]):
-        for content in rows_at(table, [number for _, number in group]):
-            yield content, table
-
-
-def _add_templates(out: Path, chosen: Sequence[tuple[Row, tuple[Any, ...]]]) -> None:
-    """Add encounters that a batch lacks, as tables of their own.
-
-    Its parts are numbered by these tables, so existing ones do not change.
+    Args:
+        out: the batch.
+        corpus: its tables.
+        limit: number of encounters, the first ones; 0: all.
+        count: of the scenarios of each.
     """
-    tables = _templates(out)
-    known = {identity for _, identity in _rows(tables)}
-    lacking = [row for row, identity in chosen if identity not in known]
-    for k in range(0, len(lacking), TABLE_TEMPLATE_COUNT):
-        rows = [row for row, _ in _read(lacking[k : k + TABLE_TEMPLATE_COUNT])]
-        number = len(tables) + k // TABLE_TEMPLATE_COUNT
-        write_encounters(out / "templates" / f"templates-{number:05}.parquet", rows, {})
+    from pyarrow import parquet
+
+    size = sum(parquet.read_metadata(table).num_rows for table in corpus)
+    size = max(10, min((limit or size) // 50, 2000 // count))
+    tables = sorted((out / "templates").glob("part-*.parquet"))
+    known = {tuple(row.values()) for row in rows_of(tables, IDENTITY)}
+    lacking = (
+        row
+        for row in islice(rows_of(corpus), limit or None)
+        if tuple(row[name] for name in IDENTITY) not in known
+    )
+    while rows := list(islice(lacking, size)):
+        table = out / "templates" / f"part-{len(tables):05}.parquet"
+        write_encounters(table, rows, {})
+        tables.append(table)
 
 
 def summary(out: Path, failed: list[str]) -> Batch:

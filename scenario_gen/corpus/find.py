@@ -18,7 +18,7 @@ from scenario_gen.bags.storage.bag import BagMessage
 from scenario_gen.bags.storage.writer import atomic_bag
 from scenario_gen.base.errors import InputError
 from scenario_gen.corpus.conditions import GENERATED, matching, MAX_SECONDS_S, NAMES
-from scenario_gen.corpus.store import finished_tables, parts_of
+from scenario_gen.corpus.parts import finished_tables
 from scenario_gen.output.review.replan import recorded_scenarios
 
 COLUMNS = (
@@ -117,7 +117,8 @@ def search(
 def coverage_lines(hits: Hits, batch: Path) -> list[str]:
     """Return the coverage in words: for each kind and road, the scenarios by PET class."""
     kinds = sorted({kind for kind, *_ in hits.coverage})
-    roads = sorted(road.partition("=")[2] for road in parts_of(batch / "cases")) or ["recorded"]
+    tables = finished_tables(batch, "cases")
+    roads = sorted({table.parent.name.partition("=")[2] for table in tables}) or ["recorded"]
     cells = {(kind, road, pet): count for kind, road, pet, count in hits.coverage}
     size = len(kinds) * len(roads) * len(PET_CLASSES)
     lines = [f"coverage: {len(cells)} of {size} cells of kind × road × PET hold a scenario"]

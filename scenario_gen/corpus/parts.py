@@ -1,15 +1,21 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The tasks of a batch: each generates the scenarios of ten templates on one road.
+"""The parts of a batch: each has the scenarios of some templates on one road.
 
-A template has one set, or one for each outcome of its decision (`sampling.decisions=drawn`).
+    templates/part-00000.parquet                         encounters, with the columns of a corpus
+    scenarios/road=NAME/part-00000.parquet               a row per scenario: its criticality
+    trajectories/kind=KIND/road=NAME/part-00000.parquet  a row per vehicle of a scenario
+    bags/road=NAME/part-00000/                           a bag, where bags were requested
+    cases/road=NAME/part-00000.parquet                   a row per set: counts, causes of refusals
+
+The table of cases is written last, so a part is finished if that table exists. A template has one
+set, or one for each outcome of its decision (`sampling.decisions=drawn`).
 """
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from datetime import datetime, UTC
-from functools import partial
 from hashlib import sha256
 from itertools import pairwise
 import json
@@ -22,28 +28,19 @@ from scenario_gen.bags.recordings.write import add_results, scenario_bytes
 from scenario_gen.bags.storage.writer import BagWriter
 from scenario_gen.base.copies import temp_folder
 from scenario_gen.base.errors import InputError, RefusedError
-from scenario_gen.base.provenance import parameter_texts, RECORDING, versions
+from scenario_gen.base.provenance import RECORDING
 from scenario_gen.corpus.conditions import matching
 from scenario_gen.corpus.encounters import encounter_of
-from scenario_gen.corpus.tables import rows_at, write_table
+from scenario_gen.corpus.tables import rows_of, write_table
 from scenario_gen.corpus.tasks import arriving
 from scenario_gen.corpus.trajectories import write_trajectories
-from scenario_gen.method.chain import EmptySetError, generate_set
+from scenario_gen.method.chain import EmptySetError
 from scenario_gen.method.config import PipelineConfig
 from scenario_gen.method.evaluation import criticality
 from scenario_gen.method.fitting import LostEncounterError
-from scenario_gen.method.outcome_sets import for_one_set, outcome_sets
-from scenario_gen.method.shortening import fit_what_matters
-from scenario_gen.types import (
-    Encounter,
-    GenerationResult,
-    most_exposed,
-    NoteKind,
-    Request,
-    Scenario,
-)
+from scenario_gen.pipeline import generate_outcomes
+from scenario_gen.types import GenerationResult, most_exposed, NoteKind, Scenario
 
-TASK_TEMPLATE_COUNT = 10
 STEP_COUNT = 10_000_000  # numbers of parts for each number of scenarios that a batch has grown to
 MESSAGES = "messages"  # the source of encounters from the messages of an archive
 NO_CANDIDATE = "no valid candidate"
@@ -91,15 +88,13 @@ class BatchRequest:
 
 @dataclass(frozen=True)
 class PartTask:
-    """Templates to place on one road: the rows `first` to `last` - 1 of a table.
+    """A table of templates to place on one road.
 
     The files are `out`/…/road=`token`/part-`number`. Each number of scenarios that the batch has
-    grown to is a `step`, with seeds of its own.
+    grown to is a `step`, with seeds and numbers of its own.
     """
 
-    table: str
-    first: int
-    last: int
+    table: Path
     number: int
     step: int
     road: str
@@ -133,26 +128,20 @@ def part_tasks(
         counts: numbers of scenarios that the batch has grown to, ascending.
         request: the scenarios to generate.
     """
-    from pyarrow import parquet
+    templates = sorted((out / "templates").glob("part-*.parquet"))
+    return [
+        PartTask(table, k, step, road, token, out, replace(request, count=high - low))
+        for step, (low, high) in enumerate(pairwise([0, *counts]))
+        for k, table in enumerate(templates, start=step * STEP_COUNT)
+        for token, road in roads.items()
+    ]
 
-    tables = [
-        (table.name, parquet.read_metadata(table).num_rows)
-        for table in sorted((out / "templates").glob("*.parquet"))
-    ]
-    chunks = [
-        (name, first, min(first + TASK_TEMPLATE_COUNT, size))
-        for name, size in tables
-        for first in range(0, size, TASK_TEMPLATE_COUNT)
-    ]
-    tasks = []
-    for step, (low, high) in enumerate(pairwise([0, *counts])):
-        wanted = replace(request, count=high - low)
-        for k, chunk in enumerate(chunks, start=step * STEP_COUNT):
-            tasks += [
-                PartTask(*chunk, k, step, road, token, out, wanted)
-                for token, road in roads.items()
-            ]
-    return tasks
+
+def finished_tables(out: Path, folder: str) -> list[Path]:
+    """Return the tables of finished parts in a folder of a batch, sorted."""
+    finished = {table.parts[-2:] for table in (out / "cases").glob("road=*/part-*.parquet")}
+    tables = (out / folder).rglob("part-*.parquet")
+    return sorted(table for table in tables if table.parts[-2:] in finished)
 
 
 def recording_of(row: Mapping[str, Any]) -> str:
@@ -181,9 +170,8 @@ class PartResult:
 def _part_result(task: PartTask) -> PartResult:
     """Generate the scenarios of a part."""
     part = PartResult([], [], {})
-    table = task.out / "templates" / task.table
-    for k, row in enumerate(rows_at(table, range(task.first, task.last))):
-        for case, result in _generate_cases(row, table, f"/case_{k}", task):
+    for k, row in enumerate(rows_of([task.table])):
+        for case, result in _generate_cases(row, f"/case_{k}", task):
             part.cases.append(case)
             if result is not None and len(result):
                 part.results[case["namespace"]] = result
@@ -225,7 +213,7 @@ def _write_bag(task: PartTask, results: Mapping[str, GenerationResult]) -> None:
 
 
 def _generate_cases(
-    row: Mapping[str, Any], table: Path, namespace: str, task: PartTask
+    row: Mapping[str, Any], namespace: str, task: PartTask
 ) -> list[tuple[dict[str, Any], GenerationResult | None]]:
     """Generate the sets of one template; return the row and the result of each.
 
@@ -251,40 +239,24 @@ def _generate_cases(
         "outcome": "",
         "shortened": "",
     }
-    generate = partial(
-        fit_what_matters,
-        partial(_generate_set, task, case),
-        shorten=request.config.fitting.shorten,
-    )
-    sampling = request.config.sampling
+    config = request.config
     try:
-        encounter = encounter_of(row, table)
-        sets = outcome_sets(generate, encounter, sampling, Request(), request.count, seed)
+        encounter = encounter_of(row, task.table)
+        sets = generate_outcomes(encounter, task.road, config, count=request.count, seed=seed)
     except EmptySetError as error:
         return [(case | _set_columns(error.result), None)]
     except (RefusedError, InputError) as error:
         return [(case | {"cause": _cause(error), "why": str(error)}, None)]
+    facts = {"template": encounter.recording, RECORDING: case["recording"], "roads": task.road}
+    facts |= {"seed": str(seed), "count": str(request.count)}
     names = [namespace, *(f"{namespace}_{n}" for n in range(1, len(sets)))]
     return [
-        (case | {"namespace": name} | _set_columns(result), result)
+        (
+            case | {"namespace": name} | _set_columns(result),
+            replace(result, provenance={**facts, **result.provenance}),
+        )
         for name, result in zip(names, sets, strict=True)
     ]
-
-
-def _generate_set(
-    task: PartTask, case: Mapping[str, Any], encounter: Encounter, count: int
-) -> GenerationResult:
-    """Return scenarios from an encounter.
-
-    Raises:
-        InputError, RefusedError: as `generate_set`.
-    """
-    config, seed = task.request.config, case["seed"]
-    config = replace(config, sampling=for_one_set(config.sampling, encounter))
-    result = generate_set(encounter, count, task.road, config=config, seed=seed)
-    facts = {"template": encounter.recording, RECORDING: case["recording"], "roads": task.road}
-    facts |= {"seed": str(seed), "count": str(count)}
-    return replace(result, provenance=facts | versions() | parameter_texts(config))
 
 
 def _set_columns(result: GenerationResult) -> dict[str, Any]:

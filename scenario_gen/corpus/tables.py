@@ -21,24 +21,6 @@ UNITS = {
     "speed": "m/s",
     "braking": "m/s²",
 }
-SAMPLES = "trajectory.list.element."  # the fields of samples, of which x, y, … are smooth
-SMOOTH = tuple(SAMPLES + name for name in ("x", "y", "heading", "speed"))
-
-
-def table_writer(path: Path, schema: Any) -> Any:
-    """Return a writer of a Parquet file; smooth columns are stored byte by byte."""
-    from pyarrow import parquet
-
-    smooth = [name for name in SMOOTH if "trajectory" in schema.names]
-    plain = [name for name in (*schema.names, f"{SAMPLES}t") if name != "trajectory"]
-    return parquet.ParquetWriter(
-        path,
-        schema,
-        compression="zstd",
-        compression_level=9,
-        use_dictionary=plain,
-        use_byte_stream_split=smooth,
-    )
 
 
 def write_table(

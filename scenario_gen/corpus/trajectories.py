@@ -9,7 +9,6 @@ from typing import Any
 
 import numpy as np
 
-from scenario_gen.corpus.tables import table_writer
 from scenario_gen.corpus.tasks import arriving
 from scenario_gen.types import Scenario
 
@@ -40,6 +39,7 @@ def write_trajectories(
         scenarios: rows of the table of scenarios, and their motions.
     """
     import pyarrow as pa
+    from pyarrow import parquet
 
     def metres(name: str) -> Any:
         return pa.field(name, pa.float64(), metadata={"unit": "m"})
@@ -62,8 +62,18 @@ def write_trajectories(
         for vehicle in scenario.vehicles
     ]
     texts = [pa.field(name, pa.string()) for name in ("sha256", "template", "vehicle", "type")]
-    columns = [*texts, pa.field("index", pa.int64()), metres("length"), metres("width")]
-    table = pa.Table.from_pylist(vehicles, schema=pa.schema(columns))
+    numbers = [pa.field("index", pa.int64()), metres("length"), metres("width")]
+    columns = pa.schema([*texts, *numbers])
+    table = pa.Table.from_pylist(vehicles, schema=columns)
     table = table.append_column("trajectory", trajectory)
-    with arriving(target) as part, table_writer(part, table.schema) as writer:
-        writer.write_table(table)
+    with arriving(target) as part:
+        parquet.write_table(
+            table,
+            part,
+            compression="zstd",
+            compression_level=9,
+            use_dictionary=[*columns.names, "trajectory.list.element.t"],
+            use_byte_stream_split=[
+                f"trajectory.list.element.{field}" for field, _, steps in SAMPLE.values() if steps
+            ],
+        )

@@ -161,20 +161,3 @@ def plan_set(
     situation = Situation.of(encounter)
     chain = Chain(situation, segmentation, road, config, request, seed=seed, population=population)
     return Planned(chain, chain.plan())
-
-
-def generate_set(
-    encounter: Encounter,
-    count: int,
-    road: Road | Path | str,
-    *,
-    config: PipelineConfig,
-    seed: int,
-) -> GenerationResult:
-    """Return scenarios from a template on a road.
-
-    Raises:
-        InputError, RefusedError: as the stages.
-        EmptySetError: as `Planned.sample`.
-    """
-    return plan_set(encounter, road, config=config, seed=seed).sample(count)
