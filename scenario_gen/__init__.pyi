@@ -9,6 +9,8 @@ from scenario_gen.base.errors import (
     RefusedError as RefusedError,
     ScenarioGenError as ScenarioGenError,
 )
+from scenario_gen.closed_loop.environment import DriveEnv as DriveEnv
+from scenario_gen.closed_loop.planners import IdmFollower as IdmFollower
 from scenario_gen.closed_loop.trials import (
     rates as rates,
     run_trials as run_trials,

@@ -150,12 +150,25 @@ def read_log(
         raise InputError(
             f"read_log: a path, several paths or a DataFrame is needed, not {type(path).__name__}"
         )
-    if hasattr(path, "to_csv"):
+    try:
+        return _read(path, config)
+    except InputError as error:
+        error.add_note("In Python, --set log.NAME=VALUE is read_log(…, NAME='VALUE').")
+        raise
+
+
+def _read(path: "Path | str | Sequence[Path | str] | DataFrame", config: LogConfig) -> LogResult:
+    """Read files, or a DataFrame as a file.
+
+    Raises:
+        InputError: as `read_log`.
+    """
+    if not isinstance(path, (str, Path, Sequence)):
         with scratch(temp_folder()) as folder:
             file = folder / _DATAFRAME_FILE
             with naming_inputs({str(file): "the DataFrame"}):
                 path.to_csv(file, index=False)
-                return read_log(file, config)
+                return _read(file, config)
     paths = [Path(name) for name in ([path] if isinstance(path, (str, Path)) else path)]
     results = [_read_one(group, config) for group in logs_in(paths)]
     return results[0] if len(results) == 1 else _joined(results, paths[0].name)

@@ -29,19 +29,23 @@ GENERATED, EVALUATED = Kind("generated"), Kind("evaluated")
 
 
 def report(
-    target: Path | str | GenerationResult, *cases: GenerationResult, title: str = ""
+    target: Path | str | GenerationResult, *more: GenerationResult | Path | str, title: str = ""
 ) -> Path:
     """Write bag, report and figures of results to a folder, like `scenario-gen generate`.
 
-    A target with the suffix .html becomes the page alone; without a target the folder is
-    out/report. Returns the path of the page.
+    The path stands before the results or after them. One with the suffix .html becomes the page
+    alone; without a path the folder is out/report. Returns the path of the page.
 
     Raises:
-        InputError: the folder has other contents, or the page exists.
+        InputError: no result or several paths are given, the folder has other contents, or the
+            page exists.
     """
-    if isinstance(target, GenerationResult):
-        return report(Path("out/report"), target, *cases, title=title)
-    target, title = Path(target), title or cases[0].title
+    given = (target, *more)
+    cases = [each for each in given if isinstance(each, GenerationResult)]
+    places = [each for each in given if not isinstance(each, GenerationResult)] or ["out/report"]
+    if not cases or len(places) > 1:
+        raise InputError("report: results and at most one path are needed")
+    target, title = Path(places[0]), title or cases[0].title
     if target.suffix.lower() == ".html":
         with _new_file(target) as page:
             write_report(page, ReportInput(cases, title, (), cases[0].provenance))

@@ -103,6 +103,11 @@ class GenerationResult:
     def __len__(self) -> int:
         return len(self.generated)
 
+    @property
+    def scenarios(self) -> Sequence[Scenario]:
+        """The generated scenarios, which the result also has as a sequence."""
+        return self.generated.scenarios
+
     def __iter__(self) -> Iterator[Scenario]:
         return iter(self.generated)
 

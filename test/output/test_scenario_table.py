@@ -90,6 +90,7 @@ def test_an_encounter_becomes_a_table_and_a_table_a_log_whose_errors_name_it():
 def test_results_become_a_folder_with_page_bag_and_figures(tmp_path):
     made = generate(read_log(bundled("follower")).encounters[0], "curve", count=2, seed=3)
     assert report(tmp_path / "made", made).read_text().startswith("<!doctype html>")
+    assert report(made, tmp_path / "page.html").name == "page.html"
     assert len(load(tmp_path / "made" / "bag")) == len(made)
     (tmp_path / "own").mkdir()
     (tmp_path / "own" / "notes.txt").write_text("mine")

@@ -48,8 +48,13 @@ def evaluate(
         One row for the recorded template, one for `generated`, and `REPLAY` if there is a replay.
 
     Raises:
-        InputError: a scenario has a vehicle that the encounter has not.
+        InputError: it is no result, or a scenario has a vehicle that the encounter has not.
     """
+    if not isinstance(result, GenerationResult):
+        raise InputError(
+            f"evaluate: a GenerationResult is needed, not {type(result).__name__}; load(path) "
+            "returns the results in a bag"
+        )
     sets: dict[str, Scenarios] = {result.row_name: result.generated}
     if result.replay is not None:
         sets[REPLAY] = (result.replay,)
