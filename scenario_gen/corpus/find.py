@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from scenario_gen.bags.recordings.write import add_message
-from scenario_gen.bags.storage.bag import BagMessage
+from scenario_gen.bags.storage.messages import BagMessage
 from scenario_gen.bags.storage.writer import atomic_bag
 from scenario_gen.base.errors import InputError
 from scenario_gen.corpus.conditions import GENERATED, matching, MAX_SECONDS_S, NAMES

@@ -14,7 +14,7 @@ import numpy as np
 from scenario_gen.bags.storage.bag import open_bag
 from scenario_gen.bags.storage.config import BagConfig
 from scenario_gen.bags.storage.definitions import TRACKED
-from scenario_gen.bags.storage.mcap import BagTopic
+from scenario_gen.bags.storage.messages import BagTopic
 from scenario_gen.bags.vehicles import (
     decode_samples,
     decode_tracked,

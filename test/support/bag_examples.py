@@ -10,7 +10,8 @@ from pathlib import Path
 import numpy as np
 
 from msg_conventions.topics import topic_entry
-from scenario_gen.bags.storage.bag import BagMessage, read_messages
+from scenario_gen.bags.storage.bag import read_messages
+from scenario_gen.bags.storage.messages import BagMessage
 from scenario_gen.bags.storage.writer import atomic_bag
 from scenario_gen.output.review.evaluation import BagEvaluation
 from scenario_gen.types import Encounter, Note, NoteKind, Vehicle

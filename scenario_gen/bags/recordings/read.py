@@ -35,8 +35,9 @@ from scenario_gen.bags.recordings.template import (
     lanes_beside,
     template_statuses,
 )
-from scenario_gen.bags.storage.bag import BagMessage, naming_bag, read_messages
+from scenario_gen.bags.storage.bag import naming_bag, read_messages
 from scenario_gen.bags.storage.config import BagConfig
+from scenario_gen.bags.storage.messages import BagMessage
 from scenario_gen.base.errors import InputError
 from scenario_gen.types import (
     Decided,

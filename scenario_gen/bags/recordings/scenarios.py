@@ -22,7 +22,7 @@ from msg_conventions.scenario_info import (
 )
 from msg_conventions.scenarios import decode_scenario, digest
 from scenario_gen.bags.recordings.request_tracker import RequestTracker
-from scenario_gen.bags.storage.bag import BagMessage
+from scenario_gen.bags.storage.messages import BagMessage
 from scenario_gen.base.errors import InputError
 from scenario_gen.types import Scenario, ScenarioSet
 

@@ -3,45 +3,24 @@
 
 """Any bag (MCAP, SQLite, ROS 1) of one or several files as raw messages (CDR) by their stamps."""
 
-from collections.abc import Callable, Collection, Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager, ExitStack
 from dataclasses import dataclass, replace
 import heapq
 from operator import attrgetter
 from pathlib import Path
-import tempfile
-from typing import Protocol
 
 import zstandard
 
 from scenario_gen.bags.storage.config import BagConfig, ReadBudget
 from scenario_gen.bags.storage.files import BagFiles, files_of, NOT_RECORDED
-from scenario_gen.bags.storage.mcap import BagTopic, decompress_zstd, LoggedMessage, McapFile
-from scenario_gen.bags.storage.rosbags_files import open_ros1, open_sqlite
+from scenario_gen.bags.storage.mcap import McapFile
+from scenario_gen.bags.storage.messages import BagMessage, BagTopic, StoredFile
+from scenario_gen.bags.storage.rosbags_files import open_with_rosbags
 from scenario_gen.base.documents import shown
 from scenario_gen.base.errors import guarded, InputError
-from scenario_gen.base.folders import scratch
 
-_BLOCK_BYTES = 1 << 20
-
-
-class _StoredFile(Protocol):
-    """An open file of a bag; `missing` says what of it cannot be read."""
-
-    missing: str
-
-    def list_topics(self) -> list[BagTopic]: ...
-    def messages(self, channels: Collection[int]) -> Iterator[LoggedMessage]: ...
-
-
-@dataclass(frozen=True)
-class BagMessage:
-    """A message of a bag: CDR bytes, and the time at which it was logged."""
-
-    topic: str
-    type: str
-    data: bytes
-    stamp_ns: int
+_FRAME_HEADER_BYTES = 18
 
 
 def _within(
@@ -69,7 +48,7 @@ class StoredBag:
     """
 
     path: Path
-    files: list[tuple[Path, _StoredFile]]
+    files: list[tuple[Path, StoredFile]]
     listed: BagFiles
     budget: ReadBudget
 
@@ -81,7 +60,7 @@ class StoredBag:
         """
         topics: dict[str, BagTopic] = {}
         for _, file in self.files:
-            for topic in file.list_topics():
+            for topic in file.topics:
                 first = topics.get(topic.name)
                 count = topic.count + (first.count if first else 0)
                 topics[topic.name] = replace(first or topic, count=count)
@@ -128,37 +107,19 @@ class StoredBag:
             yield message
 
     def _messages_of_file(
-        self, path: Path, file: _StoredFile, wanted: Callable[[str, str], bool]
+        self, path: Path, file: StoredFile, wanted: Callable[[str, str], bool]
     ) -> Iterator[BagMessage]:
-        topics = {t.id: t for t in file.list_topics() if wanted(t.name, t.type)}
-        for topic in topics.values():
+        topics = [topic for topic in file.topics if wanted(topic.name, topic.type)]
+        for topic in topics:
             if topic.encoding != "cdr" or not topic.type:
                 how = f"is encoded as {shown(topic.encoding)!r}" if topic.type else "has no type"
                 raise InputError(
                     f"{path}: topic {shown(topic.name)} {how}; only CDR of a ROS type can be "
                     "read: choose other topics"
                 )
-        if not topics:
-            return
-        with guarded(f"{path}: cannot be read", OSError):
-            for message in file.messages(topics):
-                topic = topics[message.channel_id]
-                data = message.data
-                if self.listed.compression == "message":
-                    data = self._decompress(data, path)
-                yield BagMessage(topic.name, topic.type, data, message.stamp_ns)
-
-    def _decompress(self, data: bytes, path: Path) -> bytes:
-        """Return a message that was compressed on its own."""
-        max_bytes = self.budget.config.most_chunk_bytes
-        with guarded(f"{path}: a message cannot be decompressed"):
-            message = decompress_zstd(data, max_bytes)
-        if len(message) > max_bytes:
-            raise InputError(
-                f"{path}: a message decompresses to more than bag.most_chunk_bytes ({max_bytes})"
-            )
-        self.budget.spend_decompressed(len(message))
-        return message
+        if topics:
+            with guarded(f"{path}: cannot be read", OSError):
+                yield from file.messages(topics)
 
 
 @contextmanager
@@ -184,9 +145,13 @@ def open_bag(
         )
     size = sum(file.stat().st_size for file in bag_files.files)
     budget = ReadBudget(config, str(path), size, parameter)
-    is_compressed = bag_files.compression == "file"
     with ExitStack() as stack:
-        files = [(file, _open(file, is_compressed, budget, stack)) for file in bag_files.files]
+        if bag_files.compression:
+            _check_declared_sizes(bag_files, budget)
+            opened = [path if path.is_dir() else path.parent]
+        else:
+            opened = [*bag_files.files]
+        files = [(file, _open(file, budget, stack)) for file in opened]
         bag = StoredBag(path, files, bag_files, budget)
         lines = [file.missing for _, file in files if file.missing]
         if lines and not any(topic.count for topic in bag.topics()):
@@ -194,35 +159,28 @@ def open_bag(
         yield bag
 
 
-def _open(file: Path, is_compressed: bool, budget: ReadBudget, stack: ExitStack) -> _StoredFile:
-    """Open one file of a bag, which may be compressed as a whole."""
-    if file.stat().st_size == 0:
-        raise InputError(f"{file} is empty (0 bytes); record or copy it again")
-    path = _decompressed(file, stack, budget) if is_compressed else file
-    if path.suffix == ".db3":
-        return stack.enter_context(open_sqlite(path, file))
-    if path.suffix == ".bag":
-        return stack.enter_context(open_ros1(path, budget))
-    with guarded(f"{file}: cannot be read", OSError):
-        return McapFile(stack.enter_context(path.open("rb")), file, budget)
-
-
-def _decompressed(file: Path, stack: ExitStack, budget: ReadBudget) -> Path:
-    """Decompress a file that rosbag2 compressed (`name.mcap.zstd`) to a temporary folder.
+def _check_declared_sizes(bag_files: BagFiles, budget: ReadBudget) -> None:
+    """Count the decompressed sizes that compressed files declare.
 
     Raises:
-        InputError: it is damaged, or too large.
+        InputError: a file is not compressed, or they exceed the bounds.
     """
-    target = stack.enter_context(scratch(Path(tempfile.gettempdir()))) / file.stem
-    damage = guarded(
-        f"{file}: cannot be decompressed", zstandard.ZstdError, remedy="copy it again"
-    )
-    with file.open("rb") as source, target.open("wb") as output, damage:
-        reader = zstandard.ZstdDecompressor().stream_reader(source, read_across_frames=True)
-        while block := reader.read(_BLOCK_BYTES):
-            budget.spend_decompressed(len(block))
-            output.write(block)
-    return target
+    for file in bag_files.files:
+        if bag_files.compression == "file":
+            with guarded(f"{file}: cannot be decompressed", remedy="copy it again"):
+                with file.open("rb") as stream:
+                    head = stream.read(_FRAME_HEADER_BYTES)
+                budget.spend_decompressed(max(0, zstandard.frame_content_size(head)))
+
+
+def _open(path: Path, budget: ReadBudget, stack: ExitStack) -> StoredFile:
+    """Open one file of a bag, or the folder of a bag that rosbag2 compressed."""
+    if path.stat().st_size == 0:
+        raise InputError(f"{path} is empty (0 bytes); record or copy it again")
+    if path.suffix != ".mcap":
+        return stack.enter_context(open_with_rosbags(path, budget))
+    with guarded(f"{path}: cannot be read", OSError):
+        return McapFile(stack.enter_context(path.open("rb")), path, budget)
 
 
 @contextmanager

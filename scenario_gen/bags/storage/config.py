@@ -8,9 +8,6 @@ from dataclasses import dataclass
 from scenario_gen.base.errors import InputError
 from scenario_gen.base.parameters import parameter, Parameters
 
-FIND_COST_BYTES = 1024
-"""Cost of finding a message in a chunk: a chunk of few bytes may hold very many messages."""
-
 _MESSAGE_COST_BYTES = 256
 _MAX_GROWTH_RATIO = 100
 """Growth by decompression above which a file is suspicious; maps grow most, 10 to 50 times."""

@@ -8,14 +8,13 @@ from pathlib import Path
 from typing import Any
 
 from scenario_gen.base.documents import read_yaml, shown
-from scenario_gen.base.errors import InputError
+from scenario_gen.base.errors import guarded, InputError
 
 METADATA = "metadata.yaml"
 NOT_RECORDED = "scenario_gen.lost:"
 """Prefix of the keys in custom_data that say what of a topic was not recorded."""
 
 _SUFFIXES = (".mcap", ".db3", ".bag")
-_MAX_NAME_BYTES = 255
 
 
 @dataclass(frozen=True)
@@ -66,35 +65,20 @@ def _listed(metadata: Path) -> BagFiles:
     """Return the files that metadata.yaml lists.
 
     Raises:
-        InputError: it is damaged, a file does not exist, or the compression is unknown.
+        InputError: it is damaged, or a file does not exist.
     """
-    document = read_yaml(metadata)
-    try:
-        information = document["rosbag2_bagfile_information"]
+    with guarded(f"{metadata}: damaged, it does not list the files of a bag"):
+        information = read_yaml(metadata)["rosbag2_bagfile_information"]
         names = information["relative_file_paths"]
         files = tuple(metadata.parent / Path(name).name for name in names)
-        missing = [file for file in files if _is_missing(file)]
+        missing = [file for file in files if not file.is_file()]
         mode = str(information.get("compression_mode") or "none").lower()
-        compressor = information.get("compression_format")
-    except (KeyError, TypeError, AttributeError, ValueError) as error:
-        raise InputError(
-            f"{metadata}: damaged, it does not list the files of a bag ({error!r})"
-        ) from error
+        count, custom = information.get("message_count"), information.get("custom_data")
     if missing:
         raise InputError(f"{metadata} lists {shown(missing[0].name)}, which does not exist")
-    if mode != "none" and (mode not in ("file", "message") or compressor != "zstd"):
-        raise InputError(
-            f"{metadata}: compression {shown(compressor)!r} by {shown(mode)!r} is unknown; zstd "
-            "by file or by message can be read"
-        )
-    count, custom = information.get("message_count"), information.get("custom_data")
     return BagFiles(
         files,
         mode.replace("none", ""),
         count if isinstance(count, int) else None,
         custom if isinstance(custom, dict) else {},
     )
-
-
-def _is_missing(file: Path) -> bool:
-    return len(file.name.encode()) > _MAX_NAME_BYTES or not file.is_file()

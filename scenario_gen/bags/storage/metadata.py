@@ -5,25 +5,14 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from functools import lru_cache
 from typing import Any
 
 import yaml
 
 from scenario_gen.bags.storage.files import NOT_RECORDED
-from scenario_gen.base.documents import parse_yaml
-from scenario_gen.base.errors import InputError
 from scenario_gen.types import Quality
 
 _MAX_STAMP_NS = 2**63 - 1
-_INFINITE = {"sec": 9223372036, "nsec": 854775807}  # rmw's infinite duration
-
-
-class _Dumper(yaml.CSafeDumper):  # type: ignore[misc]
-    """Writes no anchors: rosbag2's YAML reader does not accept them."""
-
-    def ignore_aliases(self, data: Any) -> bool:
-        return True
 
 
 @dataclass
@@ -98,22 +87,25 @@ def metadata_yaml(
 
 
 def _dump(value: Any) -> str:
-    """Return YAML without anchors, in the given order."""
-    text: str = yaml.dump(value, Dumper=_Dumper, sort_keys=False, default_flow_style=False)
+    """Return YAML in the given order."""
+    text: str = yaml.dump(value, Dumper=yaml.CSafeDumper, sort_keys=False)
     return text
 
 
 def _profiles(quality: Quality) -> list[dict[str, Any]]:
-    """Return an offered QoS profile in the list that rosbag2 writes."""
+    """Return an offered QoS profile in the list that rosbag2 writes.
+
+    Each duration is rmw's infinite one, and an object of its own: rosbag2's YAML reader accepts no
+    anchors.
+    """
+    durations = ("deadline", "lifespan", "liveliness_lease_duration")
     profile = {
         "history": "keep_last",
         "depth": quality.depth,
         "reliability": "reliable" if quality.reliable else "best_effort",
         "durability": "transient_local" if quality.transient_local else "volatile",
-        "deadline": _INFINITE,
-        "lifespan": _INFINITE,
+        **{name: {"sec": 9223372036, "nsec": 854775807} for name in durations},
         "liveliness": "automatic",
-        "liveliness_lease_duration": _INFINITE,
         "avoid_ros_namespace_conventions": False,
     }
     return [profile]
@@ -124,19 +116,19 @@ def qos_yaml(quality: Quality) -> str:
     return _dump(_profiles(quality)).rstrip("\n")
 
 
-@lru_cache(maxsize=256)
-def quality_of(text: str) -> Quality:
-    """Return the quality of the first profile in a YAML list.
+def quality_of(profiles: Any) -> Quality:
+    """Return the quality of the first of offered profiles with the fields that rosbag2 writes.
 
     It is volatile and of depth 10 if there is none, or a damaged one.
     """
     try:
-        profile = parse_yaml(text, "offered_qos_profiles")[0]
+        profile = profiles[0]
+        names = [str(profile[key]).lower() for key in ("reliability", "durability")]
         # rosbag2 wrote rmw's numbers before Jazzy: best effort is 2, transient local is 1.
         return Quality(
             depth=max(1, int(profile["depth"])),
-            reliable=str(profile["reliability"]).lower() not in ("best_effort", "2"),
-            transient_local=str(profile["durability"]).lower() in ("transient_local", "1"),
+            reliable=not names[0].endswith(("best_effort", "2")),
+            transient_local=names[1].endswith(("transient_local", "1")),
         )
-    except (InputError, LookupError, TypeError, ValueError, OverflowError):
+    except (LookupError, TypeError, ValueError, OverflowError):
         return Quality(depth=10, transient_local=False)

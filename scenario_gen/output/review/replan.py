@@ -15,8 +15,9 @@ from scenario_gen.bags.recordings.read import (
     ScenarioEntry,
 )
 from scenario_gen.bags.recordings.template import decode_template, missing_topics
-from scenario_gen.bags.storage.bag import BagMessage, naming_bag
+from scenario_gen.bags.storage.bag import naming_bag
 from scenario_gen.bags.storage.config import BagConfig
+from scenario_gen.bags.storage.messages import BagMessage
 from scenario_gen.base.errors import InputError
 from scenario_gen.base.provenance import read_parameters
 from scenario_gen.method.fitting import fit_template, FittingConfig

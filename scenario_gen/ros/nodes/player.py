@@ -32,9 +32,9 @@ from rosgraph_msgs.msg import Clock
 
 from msg_conventions.diagnostics import Level
 from msg_conventions.driving import encode_clock
-from scenario_gen.bags.storage.bag import BagMessage, open_bag, read_messages
+from scenario_gen.bags.storage.bag import open_bag, read_messages
 from scenario_gen.bags.storage.config import BagConfig
-from scenario_gen.bags.storage.mcap import BagTopic
+from scenario_gen.bags.storage.messages import BagMessage, BagTopic
 from scenario_gen.base.errors import InputError, ScenarioGenError
 from scenario_gen.base.parameters import parameter, Parameters
 from scenario_gen.ros.common.bag_time import BagTime
