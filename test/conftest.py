@@ -19,9 +19,6 @@ os.environ.setdefault(
     "OPENBLAS_NUM_THREADS", "1"
 )  # read when numpy is loaded; threads of several workers wait for one another
 
-JUDGES = ("made", pytest.param("recorded", marks=pytest.mark.recorded))
-"""By what a test is run: what the tests make themselves, always; what was recorded, where `-m recorded` asks for it."""
-
 
 def recorded_folder(folder: Path) -> Path:
     """Return a folder of recorded files; the test skips where it is missing."""
@@ -53,14 +50,6 @@ def once(
 
 
 @pytest.fixture(scope="session")
-def made_data(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A folder laid out as the recorded data is, made here."""
-    from support import recordlike
-
-    return made_once(tmp_path_factory, "made_data", recordlike.write)
-
-
-@pytest.fixture(scope="session")
 def made_crashes(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A folder laid out as the one of files that once broke a reader, made here with the same faults."""
     from support import broken
@@ -68,17 +57,9 @@ def made_crashes(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return made_once(tmp_path_factory, "made_crashes", broken.write)
 
 
-@pytest.fixture(scope="session", params=JUDGES)
-def data(request: pytest.FixtureRequest) -> Path:
-    """The folder of data, first made here, then recorded."""
-    return (
-        request.getfixturevalue("made_data") if request.param == "made" else recorded_folder(DATA)
-    )
-
-
 @pytest.fixture(scope="session")
-def recorded() -> Path:
-    """The folder of recorded data."""
+def data() -> Path:
+    """The folder of recorded data; whoever uses it is marked `recorded`."""
     return recorded_folder(DATA)
 
 
@@ -122,9 +103,12 @@ def pytest_configure(config: pytest.Config) -> None:
     config.option.loadscopereorder = False
 
 
-@pytest.hookimpl(tryfirst=True)  # before xdist reads the groups
+@pytest.hookimpl(tryfirst=True)  # before marks are chosen, and before xdist reads the groups
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
     """In the short form leave out what is marked `long`; let one worker run a file (or a group), unless it is marked `spread`."""
+    for item in items:
+        if "data" in getattr(item, "fixturenames", ()):
+            item.add_marker(pytest.mark.recorded)
     left_out = [] if LONG else [item for item in items if item.get_closest_marker("long")]
     if left_out:
         config.hook.pytest_deselected(items=left_out)

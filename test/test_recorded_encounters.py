@@ -1,16 +1,16 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The main job on hard encounters, made or recorded: valid new scenarios on at least two roads, re-checked by independent means.
+"""The main job on recorded encounters: valid new scenarios on at least two roads, re-checked by independent means.
 
-The short form takes three encounters and few scenarios; the long one, `make soak PART=tests`, all of both.
+The short form takes those that the package ships and few scenarios.
 """
 
 from dataclasses import replace
 
 import numpy as np
 import pytest
-from support.lengths import LONG, SOME_ENCOUNTERS
+from support.lengths import LOGS, LONG, SHIPPED
 
 from benchmarks._recheck import Account, Recheck
 from benchmarks._reference_sets import evaluate_with_references, WITHOUT
@@ -81,10 +81,9 @@ def at_the_recorded_pace(case: GenerationResult) -> tuple[GenerationResult, Pipe
     return made, config
 
 
-@pytest.mark.data()
-@pytest.mark.parametrize("name", SOME_ENCOUNTERS)
-def test_generates_valid_scenarios_on_at_least_two_roads(name, data):
-    (encounter,) = read_log(data / "trajectories" / name).encounters
+@pytest.mark.parametrize("path", LOGS)
+def test_generates_valid_scenarios_on_at_least_two_roads(path):
+    (encounter,) = read_log(path).encounters
     done, refusals = [], []
     for road in ROADS:
         try:
@@ -99,11 +98,11 @@ def test_generates_valid_scenarios_on_at_least_two_roads(name, data):
     assert len(done) == 2, refusals
 
 
-@pytest.mark.data()
-@pytest.mark.parametrize("name", [name for name in SOME_ENCOUNTERS if name.startswith("ngsim")])
-def test_ngsim_encounters_run_on_their_own_map(name, data):
-    (encounter,) = read_log(data / "trajectories" / name).encounters
-    own = next(one for one in OWN_MAPS if one.split("-")[0].removeprefix("USA_") in name)
+@pytest.mark.parametrize("own", OWN_MAPS)
+def test_ngsim_encounters_run_on_their_own_map(own, data):
+    place = own.split("-")[0].removeprefix("USA_")
+    path = next(data.glob(f"trajectories/ngsim_commonroad/encounter_*{place}*.csv"))
+    (encounter,) = read_log(path).encounters
     case = generate(
         encounter,
         str(data / "maps" / "occupancy_grids" / f"{own}.yaml"),
@@ -118,10 +117,8 @@ def test_ngsim_encounters_run_on_their_own_map(name, data):
     assert_nearer(paced, "e_position", config)
 
 
-@pytest.mark.data()
-def test_same_seed_same_scenarios_and_another_seed_others(data):
-    (path,) = data.glob("trajectories/*/encounter_b*.csv")
-    (encounter,) = read_log(path).encounters
+def test_same_seed_same_scenarios_and_another_seed_others():
+    (encounter,) = read_log(SHIPPED / "ngsim_left_turn.csv").encounters
     first, again, other = (
         generate(encounter, "corridor", CONFIG, count=3, seed=seed) for seed in (7, 7, 8)
     )

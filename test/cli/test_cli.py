@@ -40,14 +40,6 @@ def test_generate_leaves_bag_report_and_figures_and_is_reproducible(ran, made, t
     assert [path.name for path in tmp_path.iterdir()] == ["out"]
 
 
-def test_an_unknown_topic_type_is_named(run, tmp_path, data):
-    code, printed = run(
-        "generate", data / "bags" / "mcap" / "talker", "--road", "straight", "--out", "out"
-    )
-    assert code == 2
-    assert "talker" in printed and "std_msgs/msg/String" in printed
-
-
 def test_a_shell_completes_values_of_options():
     assert set(complete_road("t_")) == {"t_intersection"} and "auto" in complete_road("a")
     assert complete_format("com") == ["commonroad"] and complete_planner("I") == ["IdmFollower"]

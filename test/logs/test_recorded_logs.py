@@ -1,28 +1,25 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Every file, recorded or made as hard, reads without options, and what comes out is a drive that a car can do."""
+"""Every recorded log reads without options, and what comes out is a drive that a car can do."""
 
 import numpy as np
 import pandas as pd
 import pytest
-from support.lengths import VEHICLES
+from support.lengths import LOGS, SHIPPED, VEHICLES
 
 from scenario_gen.logs import LogConfig, read_log
 from scenario_gen.situation import find_waits
 
 
 def test_the_list_is_complete(data):
-    found = {
-        str(path.relative_to(data / "trajectories"))
-        for path in data.glob("trajectories/*/encounter_*.csv")
-    }
+    found = {*data.glob("trajectories/*/encounter_*.csv"), *SHIPPED.glob("*.csv")}
     assert found == set(VEHICLES)
 
 
-@pytest.fixture(scope="module", params=VEHICLES, ids=lambda name: name.partition("/")[2][:30])
-def one(request, data):
-    return request.param, read_log(data / "trajectories" / request.param)
+@pytest.fixture(scope="module", params=LOGS)
+def one(request):
+    return request.param, read_log(request.param)
 
 
 def assert_drivable(encounter, config):
@@ -60,9 +57,9 @@ def assert_driven(position, heading, speed, dt, config):
 
 
 def test_an_encounter_file_is_one_encounter_of_all_its_vehicles(one):
-    name, result = one
-    assert [len(encounter.vehicles) for encounter in result.encounters] == [VEHICLES[name]]
+    path, result = one
     (encounter,) = result.encounters
+    assert len(encounter.vehicles) == VEHICLES[path]
     assert encounter.dt_ns == 100_000_000
     assert encounter.duration >= 5.0
     assert_drivable(encounter, LogConfig())
@@ -73,13 +70,12 @@ def test_an_encounter_file_is_one_encounter_of_all_its_vehicles(one):
         for vehicle in quality.vehicles
     )
     assert all(vehicle.moved < 0.6 for vehicle in quality.vehicles)
-    assert quality.lines()[0].startswith(name.rpartition("/")[2].removesuffix(".csv"))
+    assert quality.lines()[0].startswith(path.stem)
 
 
 def test_recorded_overlaps_are_reported(data):
-    quality = read_log(
-        data / "trajectories" / next(name for name in VEHICLES if "four_vehicles" in name)
-    ).quality
+    (path,) = data.glob("trajectories/*/*four_vehicles*.csv")
+    quality = read_log(path).quality
     (overlap,) = quality.encounters[0].overlaps
     assert (overlap.first, overlap.second) == ("1", "2")
     assert 0.4 < overlap.share < 0.7  # the data folder's README: they overlap for half of it
@@ -87,27 +83,26 @@ def test_recorded_overlaps_are_reported(data):
 
 
 def test_who_waits_in_the_record_waits_in_the_encounter(data):
-    name = next(name for name in VEHICLES if "one_stops" in name)
-    encounter = read_log(data / "trajectories" / name).encounters[0]
+    (path,) = data.glob("trajectories/*/*one_stops*.csv")
+    encounter = read_log(path).encounters[0]
     waits = find_waits(encounter)
     assert [(wait.vehicle, wait.start) for wait in waits] == [(0, 0.0)]
     still = encounter.position[0, : int(waits[0].end / encounter.dt) - 5]
     assert np.ptp(still, axis=0).max() < 0.02
 
 
-def test_sizes_and_frame_of_ngsim_are_kept(data):
-    name = next(name for name in VEHICLES if "left_turn_vs" in name)
-    path = data / "trajectories" / name
+def test_sizes_and_frame_of_ngsim_are_kept():
+    path = SHIPPED / "ngsim_left_turn.csv"
     encounter = read_log(path).encounters[0]
     first = pd.read_csv(path).query("vehicle_id == 2839").iloc[0]
     assert (encounter.vehicles[0].length, encounter.vehicles[0].width) == (3.81, 1.9812)
     assert encounter.origin is None
-    assert np.linalg.norm(encounter.position[0, 0] - first[["x_m", "y_m"]].astype(float)) < 0.3
+    assert np.linalg.norm(encounter.position[0, 0] - first[["x", "y"]].astype(float)) < 0.3
 
 
 def test_jittering_vehicles_have_steady_headings(data):
-    name = next(name for name in VEHICLES if "four_vehicles" in name)
-    encounter = read_log(data / "trajectories" / name).encounters[0]
+    (path,) = data.glob("trajectories/*/*four_vehicles*.csv")
+    encounter = read_log(path).encounters[0]
     turned = np.degrees(np.abs(np.diff(encounter.heading, axis=1))).max(axis=1) / encounter.dt
     assert (turned < 45.0).all()  # raw: jumps of 180 degrees within a sample
     assert np.degrees(encounter.heading.std(axis=1)).max() < 8.0
@@ -158,9 +153,9 @@ def test_window_and_vehicles_can_be_chosen(data):
     assert encounter.duration == pytest.approx(20.0, abs=0.11)
 
 
-def test_reading_twice_gives_the_same_bytes(one, data):
-    name, first = one
-    again = read_log(data / "trajectories" / name)
+def test_reading_twice_gives_the_same_bytes(one):
+    path, first = one
+    again = read_log(path)
     for a, b in zip(first.encounters, again.encounters, strict=True):
         for field in ("position", "heading", "speed"):
             assert getattr(a, field).tobytes() == getattr(b, field).tobytes()

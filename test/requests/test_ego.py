@@ -12,7 +12,7 @@ from support.lengths import LONG
 
 from msg_conventions.scenarios import encode_scenario
 from scenario_gen.base.errors import RefusedError
-from scenario_gen.logs import read_log
+from scenario_gen.logs import bundled, read_log
 from scenario_gen.method.chain import Chain
 from scenario_gen.method.segmentation import segment
 from scenario_gen.method.validity import Checker
@@ -94,11 +94,9 @@ def test_parted_and_together_again():
     assert np.array_equal(back.position[[0, 2, 1]], whole.position)
 
 
-@pytest.mark.data
 @pytest.mark.parametrize("ego", range(3) if LONG else [1])
-def test_the_others_stay_valid_among_themselves(data, ego):
-    (log,) = (data / "trajectories" / "ngsim_commonroad").glob("encounter_3plus_*.csv")
-    encounter = read_log(log).encounters[0]
+def test_the_others_stay_valid_among_themselves(ego):
+    encounter = read_log(bundled("ngsim_two_left_turns")).encounters[0]
     chain = Given(encounter, segment(encounter), build_road("t_intersection", encounter), 0)
     outcome = answer(chain, Request(ego=encounter.vehicles[ego].id), count=3)
     kept = [n for n in range(len(encounter.vehicles)) if n != ego]

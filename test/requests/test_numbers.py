@@ -10,7 +10,7 @@ import pytest
 from support.given import answer, Given
 from support.lengths import LONG
 
-from scenario_gen.logs import read_log
+from scenario_gen.logs import bundled, read_log
 from scenario_gen.method.sampling import SamplingConfig
 from scenario_gen.method.sampling.sampler import LEVEL_CANDIDATES
 from scenario_gen.method.segmentation import segment
@@ -55,10 +55,9 @@ def test_two_to_eight_vehicles(count):
 
 
 @pytest.fixture(scope="module")
-def tight(made_data):
-    """A left turn on a T-intersection, checked without any tolerance for accelerations."""
-    (log,) = (made_data / "trajectories" / "ngsim_commonroad").glob("encounter_b_left_turn_*.csv")
-    encounter = read_log(log).encounters[0]
+def tight():
+    """A wait and a turn on a T-intersection, checked without any tolerance for accelerations."""
+    encounter = read_log(bundled("a")).encounters[0]
     config = SamplingConfig(
         drivers=0.0,
         lateral_sigma=0.3,

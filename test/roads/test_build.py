@@ -5,6 +5,7 @@
 
 import numpy as np
 import pytest
+from support.lengths import LOGS
 
 from scenario_gen.base.errors import InputError
 from scenario_gen.logs import read_log
@@ -72,18 +73,13 @@ def test_unknown_and_impossible_roads_are_named():
         build_road("four_way", None, RoadConfig(paper=True))
 
 
-@pytest.mark.data
-def test_every_recorded_encounter_has_a_corridor_in_which_its_separated_paths_fit(data):
-    paths = sorted((data / "trajectories").glob("*/encounter_*.csv"))
-    assert paths
-    for path in paths:
-        for encounter in read_log(path).encounters:
-            road = build_road("corridor", encounter)
-            separation = Situation.of(encounter).separation
-            assert smallest_gaps(separation.tracks).min() > 0.49
-            assert separation.moved.max() <= 3.0
-            for track in separation.tracks:
-                roomy = footprint_fits(
-                    road, track.poses, track.vehicle.length, track.vehicle.width + 1.0
-                )
-                assert roomy.all(), (path.name, track.vehicle.id)
+@pytest.mark.parametrize("path", LOGS)
+def test_every_recorded_encounter_has_a_corridor_in_which_its_separated_paths_fit(path):
+    (encounter,) = read_log(path).encounters
+    road = build_road("corridor", encounter)
+    separation = Situation.of(encounter).separation
+    assert smallest_gaps(separation.tracks).min() > 0.49
+    assert separation.moved.max() <= 3.0
+    for track in separation.tracks:
+        size = track.vehicle.length, track.vehicle.width + 1.0
+        assert footprint_fits(road, track.poses, *size).all(), track.vehicle.id

@@ -179,7 +179,6 @@ def test_openings_keep_to_the_side_of_the_road():
     ]
 
 
-@pytest.mark.data
 def test_every_recorded_map_is_read(data):
     paths = sorted((data / "maps").glob("*/*.yaml"))
     assert paths

@@ -11,10 +11,13 @@ import time
 
 from mcap.reader import make_reader
 import pytest
+from support.lengths import DATA
 from support.suite_processes import Client, RESOURCES
 import yaml
 
+from msg_conventions.cdr import encode
 from scenario_gen.bags.storage.bag import bag_topics, read_messages
+from scenario_gen.bags.storage.writer import BagWriter
 
 pytestmark = pytest.mark.dds
 
@@ -127,46 +130,60 @@ def test_a_full_disk_ends_the_recording_and_says_so(start, client, tmp_path):
         subprocess.run(["umount", str(disk)], check=True)
 
 
-@pytest.mark.data
-@pytest.mark.parametrize("storage", [pytest.param("mcap", marks=pytest.mark.long), "sqlite3"])
-def test_a_bag_of_genuine_rosbag2_is_played_and_recorded_again(
-    start, client, data, tmp_path, storage
-):
-    """What `ros2 bag record` wrote goes through the player and the recorder unchanged, and is split by size."""
+@pytest.mark.parametrize(
+    "source",
+    [
+        "made",
+        *(  # by `ros2 bag record`
+            pytest.param(DATA / "bags" / name / "talker", marks=pytest.mark.recorded)
+            for name in ("mcap", "sqlite3")
+        ),
+    ],
+)
+def test_what_is_played_is_recorded_unchanged(start, client, tmp_path, source):
+    """And the copy is split by size."""
     from std_srvs.srv import Trigger
 
-    source, copy = data / "bags" / storage / "talker", tmp_path / "copy"
+    topic, copy = "/topic", tmp_path / "copy"
+    if source == "made":
+        source = tmp_path / "made"
+        with BagWriter(source) as bag:
+            bag.add_topic(topic, "std_msgs/msg/String")
+            for k in range(10):
+                bag.write(topic, encode({"data": "string"}, data=f"Hello {k}"), 10**9 + k)
+    played = [m.data for m in read_messages(source, lambda name: name == topic)]
     kept = [
         word
-        for p in ("durability:=transient_local", "depth:=10")
-        for word in ("-p", f"qos_overrides./topic.publisher.{p}")
+        for p in ("durability:=transient_local", f"depth:={len(played)}")
+        for word in ("-p", f"qos_overrides.{topic}.publisher.{p}")
     ]
     player = start(
-        "player", *kept, bag=source, topics="/topic", paused=True, rate=100.0
+        "player", *kept, bag=source, topics=topic, paused=True, rate=100.0
     )  # a late match loses nothing
-    recorder = start("recorder", bag=copy, topics="/topic", split_bytes=100)
-    client.until(lambda: client.node.count_subscribers("/topic") > 0, "a subscriber of /topic")
-    client.until(lambda: client.node.count_publishers("/topic") > 0, "a publisher of /topic")
+    recorder = start("recorder", bag=copy, topics=topic, split_bytes=100)
+    client.until(lambda: client.node.count_subscribers(topic) > 0, "a subscriber")
+    client.until(lambda: client.node.count_publishers(topic) > 0, "a publisher")
     assert client.call(Trigger, "/player/resume_playing", Trigger.Request()).success
-    client.until(lambda: client.counted("/topic") == 10, "ten messages in the bag")
+    client.until(lambda: client.counted(topic) == len(played), "all messages in the bag")
     ended(recorder)
     ended(player)
-    played = [m.data for m in read_messages(source, lambda name: name == "/topic")]
     assert [m.data for m in read_messages(copy)] == played
     info = yaml.safe_load((copy / "metadata.yaml").read_text())["rosbag2_bagfile_information"]
-    assert info["message_count"] == 10 and len(info["relative_file_paths"]) > 1
+    assert info["message_count"] == len(played) and len(info["relative_file_paths"]) > 1
 
 
-@pytest.mark.data
-def test_the_player_takes_other_names_and_other_qualities_of_service(start, client, data):
+def test_the_player_takes_other_names_and_other_qualities_of_service(start, client):
     from rclpy.qos import DurabilityPolicy, ReliabilityPolicy
 
-    bag = data / "bags" / "mcap" / "talker"
+    bag, topic = RESOURCES / "synthetic_c", "/vehicle_1/fix"
     overrides = ("reliability:=best_effort", "durability:=transient_local", "depth:=3")
     words = [
-        word for policy in overrides for word in ("-p", f"qos_overrides./topic.publisher.{policy}")
+        word
+        for policy in overrides
+        for word in ("-p", f"qos_overrides.{topic}.publisher.{policy}")
     ]
-    start("player", "-r", "/topic:=/here/other", *words, bag=bag, topics="/topic", paused=True)
+    renamed = ("-r", f"{topic}:=/here/other")
+    start("player", *renamed, *words, bag=bag, topics=topic, paused=True)
     client.until(
         lambda: client.node.count_publishers("/here/other") > 0, "the topic under its other name"
     )
@@ -174,19 +191,9 @@ def test_the_player_takes_other_names_and_other_qualities_of_service(start, clie
     assert (
         offer.qos_profile.reliability == ReliabilityPolicy.RELIABLE
     )  # the override names the topic as it is published
-    assert client.node.count_publishers("/topic") == 0
-    words = [word.replace("/topic.", "/here/other.") for word in words]
-    start(
-        "player",
-        "-r",
-        "/topic:=/here/other",
-        "-r",
-        "__node:=second",
-        *words,
-        bag=bag,
-        topics="/topic",
-        paused=True,
-    )
+    assert client.node.count_publishers(topic) == 0
+    words = [word.replace(f"{topic}.", "/here/other.") for word in words]
+    start("player", *renamed, "-r", "__node:=second", *words, bag=bag, topics=topic, paused=True)
     client.until(lambda: client.node.count_publishers("/here/other") == 2, "the second player")
     offers = [info.qos_profile for info in client.node.get_publishers_info_by_topic("/here/other")]
     changed = (ReliabilityPolicy.BEST_EFFORT, DurabilityPolicy.TRANSIENT_LOCAL)

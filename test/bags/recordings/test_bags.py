@@ -283,7 +283,6 @@ def test_a_type_of_an_installed_package_is_found(tmp_path, monkeypatch):
     assert bag_topics(tmp_path / "bag")[0].type == "my_msgs/msg/Outer"
 
 
-@pytest.mark.data
 @pytest.mark.parametrize("name", ["wbag", "talker", "cdr_test", "test_bag_for_seek"])
 def test_bags_of_genuine_rosbag2_are_read_alike_in_both_storages(data: Path, name):
     read = {}

@@ -5,7 +5,7 @@
 
 import numpy as np
 import pytest
-from support.lengths import SOME_ENCOUNTERS
+from support.lengths import LOGS
 
 from scenario_gen.base.errors import InputError, RefusedError
 from scenario_gen.logs import read_log
@@ -85,33 +85,30 @@ def relative(pose, other):
     )
 
 
-@pytest.fixture(scope="module")
-def recorded(data):
-    assert len(SOME_ENCOUNTERS) >= 3
-    return {name: read_log(data / "trajectories" / name).encounters[0] for name in SOME_ENCOUNTERS}
+@pytest.fixture(scope="module", params=LOGS)
+def encounter(request):
+    return read_log(request.param).encounters[0]
 
 
-@pytest.mark.data
-def test_every_recorded_encounter_fits_two_roads_and_refusals_say_why(recorded):
-    for name, encounter in recorded.items():
-        fitted = 0
-        for road_name in ROADS:
-            road = build_road(road_name, encounter)
-            try:
-                fit = fit_template(encounter, every(encounter), road)
-            except RefusedError as error:
-                assert "vehicle" in str(error)
-                assert road_name == "straight", (name, road_name, error)
-                continue
-            fitted += 1
-            for vehicle, f in zip(fit.vehicles, fit.fitted, strict=True):
-                assert footprint_fits(road, f.anchors, vehicle.length, vehicle.width).all()
-                assert 0.8 <= f.scale <= 1.25
-                assert f.moved.max() <= 3.0
-            assert turned_otherwise(encounter, fit) <= {
-                loss.vehicles[0] for loss in fit.losses if loss.kind == "turn"
-            }
-        assert fitted >= 2, name
+def test_every_recorded_encounter_fits_two_roads_and_refusals_say_why(encounter):
+    fitted = 0
+    for road_name in ROADS:
+        road = build_road(road_name, encounter)
+        try:
+            fit = fit_template(encounter, every(encounter), road)
+        except RefusedError as error:
+            assert "vehicle" in str(error)
+            assert road_name == "straight", (road_name, error)
+            continue
+        fitted += 1
+        for vehicle, f in zip(fit.vehicles, fit.fitted, strict=True):
+            assert footprint_fits(road, f.anchors, vehicle.length, vehicle.width).all()
+            assert 0.8 <= f.scale <= 1.25
+            assert f.moved.max() <= 3.0
+        assert turned_otherwise(encounter, fit) <= {
+            loss.vehicles[0] for loss in fit.losses if loss.kind == "turn"
+        }
+    assert fitted >= 2
 
 
 def turned_otherwise(encounter, fit):
@@ -126,17 +123,14 @@ def turned_otherwise(encounter, fit):
     return found
 
 
-@pytest.mark.data
 def test_who_goes_straight_on_has_an_arm_ahead_even_where_its_record_ends_before(data):
-    files = sorted((data / "trajectories").glob("*/encounter_*.csv"))
-    for name in (
-        "a_cross",
-        "b_left",
-    ):  # one vehicle's record begins, or ends, in the middle of the junction
-        encounter = read_log([next(file for file in files if name in file.stem)]).encounters[0]
+    """One vehicle's record begins, or ends, in the middle of the junction."""
+    for pattern in ("encounter_a_cross*", "encounter_b_left*"):
+        (path,) = data.glob(f"trajectories/ngsim_commonroad/{pattern}.csv")
+        encounter = read_log(path).encounters[0]
         for road_name in ("t_intersection", "four_way"):
             fit = fit_template(encounter, every(encounter), build_road(road_name, encounter))
-            assert not turned_otherwise(encounter, fit), (name, road_name)
+            assert not turned_otherwise(encounter, fit), road_name
             assert not any(loss.kind in ("turn", "conflict") for loss in fit.losses)
 
 
@@ -158,51 +152,46 @@ def test_oncoming_vehicles_stay_as_far_apart_where_there_are_lanes():
         assert abs(relative(one, two)[1]) == pytest.approx(apart, abs=0.1)
 
 
-@pytest.mark.data
-def test_ends_do_not_depend_on_changepoints(recorded):
-    for encounter in recorded.values():
-        for road_name in ("four_way", "corridor"):
-            road = build_road(road_name, encounter)
-            with_, without = (
-                fit_template(encounter, s, road)
-                for s in (every(encounter, 10), segmented(encounter))
-            )
-            assert np.array_equal(with_.requested.start, without.requested.start)
-            assert np.array_equal(with_.requested.end, without.requested.end)
-            assert [f.manoeuvre for f in with_.fitted] == [f.manoeuvre for f in without.fitted]
+def test_ends_do_not_depend_on_changepoints(encounter):
+    for road_name in ("four_way", "corridor"):
+        road = build_road(road_name, encounter)
+        with_, without = (
+            fit_template(encounter, s, road) for s in (every(encounter, 10), segmented(encounter))
+        )
+        assert np.array_equal(with_.requested.start, without.requested.start)
+        assert np.array_equal(with_.requested.end, without.requested.end)
+        assert [f.manoeuvre for f in with_.fitted] == [f.manoeuvre for f in without.fitted]
 
 
-@pytest.mark.data
-def test_the_template_is_replayed_without_overlap_in_its_order_and_speed(recorded):
-    for name, encounter in recorded.items():
-        for road_name in ("four_way", "corridor"):
-            road = build_road(road_name, encounter)
-            fit = fit_template(
-                encounter, every(encounter, 1), road
-            )  # every sample an anchor: the dense placement
-            poses = np.stack([f.anchors for f in fit.fitted])
-            heading = np.unwrap(poses[..., 2], axis=1)
-            found = find_conflicts(
-                Motion(
-                    fit.vehicles,
-                    encounter.time[fit.anchor_index],
-                    poses[..., :2],
-                    heading,
-                    np.zeros_like(heading),
-                )
+def test_the_template_is_replayed_without_overlap_in_its_order_and_speed(encounter):
+    for road_name in ("four_way", "corridor"):
+        road = build_road(road_name, encounter)
+        fit = fit_template(
+            encounter, every(encounter, 1), road
+        )  # every sample an anchor: the dense placement
+        poses = np.stack([f.anchors for f in fit.fitted])
+        heading = np.unwrap(poses[..., 2], axis=1)
+        found = find_conflicts(
+            Motion(
+                fit.vehicles,
+                encounter.time[fit.anchor_index],
+                poses[..., :2],
+                heading,
+                np.zeros_like(heading),
             )
-            order = {frozenset((c.first, c.second)): c.first for c in found}
-            template = find_conflicts(encounter)
-            for conflict in template:
-                pair = frozenset((conflict.first, conflict.second))
-                assert order.get(pair, conflict.first) == conflict.first, (name, road_name)
-            step = np.hypot(*np.moveaxis(np.diff(poses[..., :2], axis=1), 2, 0)) / np.diff(
-                encounter.time[fit.anchor_index]
-            )
-            recorded_speed = encounter.speed[:, fit.anchor_index]
-            middle = (recorded_speed[:, 1:] + recorded_speed[:, :-1]) / 2.0
-            scale = np.array([[vehicle.scale] for vehicle in fit.fitted])
-            assert np.median(np.abs(step - scale * middle)) < 0.1, (name, road_name)
+        )
+        order = {frozenset((c.first, c.second)): c.first for c in found}
+        template = find_conflicts(encounter)
+        for conflict in template:
+            pair = frozenset((conflict.first, conflict.second))
+            assert order.get(pair, conflict.first) == conflict.first, road_name
+        step = np.hypot(*np.moveaxis(np.diff(poses[..., :2], axis=1), 2, 0)) / np.diff(
+            encounter.time[fit.anchor_index]
+        )
+        recorded_speed = encounter.speed[:, fit.anchor_index]
+        middle = (recorded_speed[:, 1:] + recorded_speed[:, :-1]) / 2.0
+        scale = np.array([[vehicle.scale] for vehicle in fit.fitted])
+        assert np.median(np.abs(step - scale * middle)) < 0.1, road_name
 
 
 def crossing_pair():

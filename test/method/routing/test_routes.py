@@ -198,7 +198,6 @@ def test_refusals_name_vehicle_and_anchor():
         PlanningConfig(traffic_side="middle")
 
 
-@pytest.mark.data
 @pytest.mark.parametrize(
     "name",
     ["b_left_turn_vs_opposite_Lanker-2_13_2839_21019", "c_opposite_stop_go_Peach-4_2_134_334"],

@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from support.lengths import LOGS, VEHICLES
 
 from scenario_gen.logs import read_log
 from scenario_gen.method.fitting import fit_template
@@ -23,17 +24,11 @@ from scenario_gen.situation import (
     WAIT_SPEED_MPS,
 )
 
-CASES = (
-    "ngsim_commonroad/encounter_b_left_turn_vs_opposite_Lanker-2_13_2839_21019.csv",
-    "psu_2obu/encounter_c_opposite_approach_then_stop_meet_300-340s.csv",
-)
 
-
-@pytest.mark.data
-@pytest.mark.parametrize("case", CASES)
+@pytest.mark.parametrize("path", [one for one in LOGS if VEHICLES[one.values[0]] == 2])
 @pytest.mark.parametrize("ablation", [False, True])
-def test_recorded_encounter(data, case, ablation):
-    encounter = read_log(data / "trajectories" / case).encounters[0]
+def test_recorded_encounter(path, ablation):
+    encounter = read_log(path).encounters[0]
     segmentation = segment(encounter)
     if ablation:
         labels, changes = np.zeros_like(segmentation.labels), np.zeros(0, dtype=np.int64)

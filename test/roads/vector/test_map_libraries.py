@@ -3,6 +3,7 @@
 
 """The formats' own libraries as judges, on made maps and real ones: the grid against their polygons, lanes against routing."""
 
+import itertools
 import re
 
 import numpy as np
@@ -10,7 +11,9 @@ import pytest
 from shapely import contains_xy
 from shapely.geometry import Polygon
 from shapely.ops import unary_union
+from support import map_builders
 
+from scenario_gen.logs.geodesy import geodetic
 from scenario_gen.roads import RoadConfig
 from scenario_gen.roads.vector.ground import road_of
 from scenario_gen.roads.vector.read import read_network
@@ -37,10 +40,68 @@ def grid_agrees(road, area):
     assert not road.drivable[outside].any()
 
 
-@pytest.fixture(scope="module", params=["kashiwanoha", "mapping_example", "simple_cross_map"])
-def lanelet2_map(request, data):
+def recorded(*names):
+    """Maps of the recorded data as parameters of `map_file`."""
+    return [pytest.param(name, marks=pytest.mark.recorded) for name in names]
+
+
+@pytest.fixture(scope="module")
+def map_file(request, tmp_path_factory):
+    """A map: made here, or recorded."""
+    if request.param not in MADE:
+        return request.getfixturevalue("data") / "maps" / request.param
+    path = tmp_path_factory.mktemp("map") / request.param
+    path.write_text(MADE[request.param]())
+    return path
+
+
+def in_degrees(x, y):
+    """The attributes of a Lanelet2 node."""
+    latitude, longitude = geodetic(np.array([x, y]), (48.2, 11.6))
+    return f'lat="{float(latitude)!r}" lon="{float(longitude)!r}">'
+
+
+def two_lanes():
+    """A road of two lanes with a dashed line between them that both share, each in two parts."""
+    nodes, ways, relations = "", "", ""
+    for row, part in itertools.product(range(3), range(3)):
+        nodes += f'<node id="{1 + 3 * row + part}" {in_degrees(60.0 * part, 3.5 * row)}</node>'
+    for row, part in itertools.product(range(3), range(2)):
+        refs = "".join(f'<nd ref="{1 + 3 * row + part + k}"/>' for k in range(2))
+        kind = "dashed" if row == 1 else "solid"
+        tags = f'<tag k="type" v="line_thin"/><tag k="subtype" v="{kind}"/>'
+        ways += f'<way id="{100 + 2 * row + part}">{refs}{tags}</way>'
+    facts = {"type": "lanelet", "subtype": "road", "location": "urban", "one_way": "yes"}
+    tags = "".join(f'<tag k="{key}" v="{value}"/>' for key, value in facts.items())
+    for lane, part in itertools.product(range(2), range(2)):
+        members = "".join(
+            f'<member type="way" ref="{100 + 2 * row + part}" role="{role}"/>'
+            for row, role in ((lane + 1, "left"), (lane, "right"))
+        )
+        limit = '<tag k="speed_limit" v="50"/>'
+        relations += f'<relation id="{200 + 2 * lane + part}">{members}{tags}{limit}</relation>'
+    return f'<?xml version="1.0"?><osm version="0.6">{nodes}{ways}{relations}</osm>'
+
+
+MADE = {
+    "crossroads.xml": map_builders.commonroad,
+    "crossroads.osm": lambda: map_builders.lanelet2(in_degrees),
+    "two_lanes.osm": two_lanes,
+    "crossroads.xodr": map_builders.opendrive,
+}
+LANELET2 = ("kashiwanoha", "mapping_example", "simple_cross_map")
+lanelet2_maps = pytest.mark.parametrize(
+    "map_file",
+    ["crossroads.osm", "two_lanes.osm", *recorded(*(f"lanelet2/{name}.osm" for name in LANELET2))],
+    indirect=True,
+    scope="module",
+)
+
+
+@pytest.fixture(scope="module")
+def lanelet2_map(map_file):
     """Our network; the library's map, its lanelets for cars and its routing graph, in the same frame."""
-    path = data / "maps" / "lanelet2" / f"{request.param}.osm"
+    path = map_file
     network = read_network(path)
     stated = re.search(r"north of (-?[0-9.]+), (-?[0-9.]+)", str(network.notes[0]))
     origin = (
@@ -55,6 +116,7 @@ def lanelet2_map(request, data):
     return network, library, cars, lanelet2.routing.RoutingGraph(library, rules), rules
 
 
+@lanelet2_maps
 def test_lanes_for_cars_their_order_and_limits_are_those_of_the_routing_graph(lanelet2_map):
     network, _, cars, graph, rules = lanelet2_map
     own = {lane.id: lane for lane in network.lanes if lane.id in cars}
@@ -77,6 +139,7 @@ def test_lanes_for_cars_their_order_and_limits_are_those_of_the_routing_graph(la
     assert exits == {name for name, one in cars.items() if not graph.following(one)}
 
 
+@lanelet2_maps
 def test_the_grid_is_that_of_the_library_s_polygons(lanelet2_map):
     network, _, cars, _, _ = lanelet2_map
     tagged = all("local_x" in point.attributes for one in cars.values() for point in one.leftBound)
@@ -96,18 +159,26 @@ def test_the_grid_is_that_of_the_library_s_polygons(lanelet2_map):
     grid_agrees(road_of(network, None, RoadConfig(resolution=resolution)), unary_union(polygons))
 
 
-@pytest.mark.parametrize(
-    "name",
-    ["fabriksgatan", "multi_lane_3way_intersection", "simple_4way_intersection", "jolengatan"],
+OPENDRIVE = (
+    "fabriksgatan",
+    "multi_lane_3way_intersection",
+    "simple_4way_intersection",
+    "jolengatan",
 )
-def test_the_grid_is_that_of_pyxodr_s_lanes(data, name):
+
+
+@pytest.mark.parametrize(
+    "map_file",
+    ["crossroads.xodr", *recorded(*(f"opendrive/{name}.xodr" for name in OPENDRIVE))],
+    indirect=True,
+)
+def test_the_grid_is_that_of_pyxodr_s_lanes(map_file):
     network_module = pytest.importorskip(
         "pyxodr.road_objects.network", reason="pyxodr is not installed"
     )
-    path = data / "maps" / "opendrive" / f"{name}.xodr"
-    network = read_network(path)
+    network = read_network(map_file)
     polygons, count = [], 0
-    for road in network_module.RoadNetwork(str(path), resolution=0.5).get_roads():
+    for road in network_module.RoadNetwork(str(map_file), resolution=0.5).get_roads():
         for section in road.lane_sections:
             for lane in section.lanes:
                 if lane.type == "driving" and lane.id != 0:
@@ -115,20 +186,26 @@ def test_the_grid_is_that_of_pyxodr_s_lanes(data, name):
                     outer, inner = lane.boundary_line[:, :2], lane.lane_reference_line[:, :2]
                     polygons.append(Polygon(np.concatenate((outer, inner[::-1]))).buffer(0))
     assert count >= len(network.lanes) > 0
-    resolution = 0.5 if name == "jolengatan" else 0.2
+    resolution = 0.5 if map_file.stem == "jolengatan" else 0.2
     grid_agrees(
         road_of(network, None, RoadConfig(resolution=resolution)),
         unary_union(polygons).buffer(0.02),
     )
 
 
-@pytest.mark.parametrize("name", ["USA_Lanker-2_13_T-1", "USA_Peach-4_2_T-1"])
-def test_the_grid_is_that_of_commonroad_s_lanelets(data, name):
+COMMONROAD = ("USA_Lanker-2_13_T-1", "USA_Peach-4_2_T-1")
+
+
+@pytest.mark.parametrize(
+    "map_file",
+    ["crossroads.xml", *recorded(*(f"commonroad/{name}.xml" for name in COMMONROAD))],
+    indirect=True,
+)
+def test_the_grid_is_that_of_commonroad_s_lanelets(map_file):
     """Their bounds, read by the standard library's parser."""
     from xml.etree import ElementTree
 
-    path = data / "maps" / "commonroad" / f"{name}.xml"
-    root = ElementTree.parse(path).getroot()
+    root = ElementTree.parse(map_file).getroot()
     lanelets = {one.get("id"): one for one in root.findall("lanelet")}
     polygons = []
     for one in lanelets.values():
@@ -137,7 +214,7 @@ def test_the_grid_is_that_of_commonroad_s_lanelets(data, name):
             for tag in ("leftBound", "rightBound")
         )
         polygons.append(Polygon([*left, *right[::-1]]).buffer(0))
-    network = read_network(path)
+    network = read_network(map_file)
     followed = {ref.get("ref") for one in lanelets.values() for ref in one.findall("successor")}
     assert {network.lanes[k].id for k in network.entries} == set(lanelets) - followed
     assert {network.lanes[k].id for k in network.exits} == {
