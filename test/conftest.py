@@ -52,7 +52,7 @@ def once(
 @pytest.fixture(scope="session")
 def made_crashes(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A folder laid out as the one of files that once broke a reader, made here with the same faults."""
-    from support import broken
+    from fuzzing import broken
 
     return made_once(tmp_path_factory, "made_crashes", broken.write)
 

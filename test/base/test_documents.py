@@ -5,10 +5,10 @@
 
 import os
 
+from fuzzing.crash_files import crash_files, is_refused
 from hypothesis import given, settings
 from hypothesis import strategies as st
 import pytest
-from support.crash_files import crash_files, is_refused
 
 from scenario_gen.base.documents import parse_json, parse_yaml, read_text, shown
 from scenario_gen.base.errors import InputError

@@ -5,8 +5,8 @@
 
 import shutil
 
+from fuzzing.crash_files import crash_files, is_refused
 import pytest
-from support.crash_files import crash_files, is_refused
 
 from scenario_gen.roads import build_road
 

@@ -12,7 +12,7 @@ from pathlib import Path
 import sys
 
 from figures import Figure
-from support.harness import fuzz, MEMORY, SECONDS, targets
+from fuzzing.harness import fuzz, MEMORY, SECONDS, targets
 
 MINUTES = float(os.environ.get("MINUTES", "10"))
 

@@ -18,8 +18,8 @@ import time
 from typing import Any
 
 from figures import Figure
+from fuzzing.mutators import BYTES
 from rosbags.typesys import get_typestore, Stores
-from support.mutators import BYTES
 from support.suite_processes import Client, memory, Processes, RESOURCES
 
 from msg_conventions.cdr import CdrReader

@@ -8,15 +8,14 @@ from pathlib import Path
 
 import pytest
 
+_ROOT = Path(__file__).resolve().parents[2]
 LONG = os.environ.get("SCENARIO_GEN_TESTS") == "long"
 """Whether this is the long form: also what is marked `long`, and larger counts."""
 
-DATA = Path(
-    os.environ.get("SCENARIO_GEN_DATA", Path(__file__).resolve().parents[2] / "shared" / "data")
-)
+DATA = Path(os.environ.get("SCENARIO_GEN_DATA", _ROOT.parent / "shared" / "data"))
 """Where recorded data lies, if it does; the fixture `data` gives it."""
 
-SHIPPED = Path(__file__).resolve().parents[2] / "scenario_gen" / "resources" / "recorded"
+SHIPPED = _ROOT / "scenario_gen" / "resources" / "recorded"
 """Where the recorded logs lie that the package ships."""
 
 _TRAJECTORIES = DATA / "trajectories"

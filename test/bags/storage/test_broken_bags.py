@@ -8,11 +8,11 @@ import re
 import resource
 import shutil
 
+from fuzzing.crash_files import is_refused
 from mcap.writer import CompressionType, Writer
 import numpy as np
 import pytest
 from support.bag_examples import copied, hand_made_run
-from support.crash_files import is_refused
 
 from msg_conventions import trajectory
 from scenario_gen.bags.recordings.template import decode_template

@@ -12,6 +12,8 @@ from pathlib import Path
 import struct
 import tempfile
 
+from fuzzing.harness import Target
+from fuzzing.mutators import BYTES, columns, records, TEXT, tree
 import numpy as np
 import pandas as pd
 from rosbags.rosbag2 import Reader, StoragePlugin, Writer
@@ -28,8 +30,6 @@ from scenario_gen.logs.synthetic import bundled
 from scenario_gen.logs.text import SPMD_COLUMNS
 from scenario_gen.types.encounter import Encounter
 from scenario_gen.types.scenario import Scenario
-from support.harness import Target
-from support.mutators import BYTES, columns, records, TEXT, tree
 
 RECORD = "<BBqdd"  # vehicle, kind, stamp [ns], two values
 SHORT = LogConfig(min_duration=1.0, travel=1.0)

@@ -6,11 +6,11 @@
 from fnmatch import fnmatch
 from pathlib import Path
 
+from fuzzing import broken
+from fuzzing.harness import CRASHES
 import pytest
 
 from scenario_gen.base.errors import InputError, MAX_INPUT_CHARACTERS
-from support import broken
-from support.harness import CRASHES
 
 
 def crash_files(*patterns: str) -> list:

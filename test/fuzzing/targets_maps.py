@@ -10,8 +10,12 @@ from pathlib import Path
 import random
 import re
 
+from fuzzing.harness import Target
+from fuzzing.mutators import BYTES, NUMBERS, TEXT, tree
+from fuzzing.targets_bags import in_file, values
 import numpy as np
 from rosbags.typesys import get_typestore, Stores
+from support.map_builders import FORMATS
 
 from msg_conventions.lanes import decode_lanes, encode_lanes
 from msg_conventions.markers import TYPE as MARKER_TYPE
@@ -19,10 +23,6 @@ from scenario_gen.logs import read_log
 from scenario_gen.logs.synthetic import bundled
 from scenario_gen.roads import build_road
 from scenario_gen.types.lanes import Lane, LaneNetwork
-from support.harness import Target
-from support.map_builders import FORMATS
-from support.mutators import BYTES, NUMBERS, TEXT, tree
-from support.targets_bags import in_file, values
 
 STORE = get_typestore(Stores.ROS2_JAZZY)
 

@@ -13,11 +13,16 @@ import random
 import re
 import tempfile
 
+from fuzzing.broken import small
+from fuzzing.harness import Target
+from fuzzing.mutators import BYTES, records, TEXT, TEXTS, WORDS
+from fuzzing.targets_logs import bags
 import numpy as np
 from PIL import Image
 from rosbags.rosbag1 import Writer
 from rosbags.rosbag2 import StoragePlugin
 from rosbags.typesys import get_typestore, Stores
+from support.bag_examples import hand_made_run
 
 from msg_conventions.topics import topic_entry
 from scenario_gen.bags.recordings.read import read_recording, read_scenario_set
@@ -37,11 +42,6 @@ from scenario_gen.output.results import provenance_of
 from scenario_gen.output.review.evaluation import evaluate_bag
 from scenario_gen.pipeline import generate, PipelineConfig
 from scenario_gen.roads import build_road
-from support.bag_examples import hand_made_run
-from support.broken import small
-from support.harness import Target
-from support.mutators import BYTES, records, TEXT, TEXTS, WORDS
-from support.targets_logs import bags
 
 CONFIG = PipelineConfig(evaluation=EvaluationConfig(resamples=10))
 PARTED = b"\n# ---- image ----\n"  # a map as one input: its YAML, this, and its image

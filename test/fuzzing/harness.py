@@ -31,10 +31,11 @@ import traceback
 from typing import TextIO
 import warnings
 
+from support.lengths import DATA
+
 from scenario_gen.base.errors import MAX_INPUT_CHARACTERS, ScenarioGenError, UnforeseenError
 
 HERE = Path(__file__).resolve().parent
-DATA = Path(os.environ.get("SCENARIO_GEN_DATA", HERE.parents[2] / "shared" / "data"))
 CRASHES = DATA.parent / "crashes"
 SECONDS = 5.0  # of CPU that one execution may take
 MEMORY = 1 << 30  # bytes that the process may hold at its peak
@@ -96,13 +97,13 @@ class OverTimeError(BaseException):
 def targets() -> dict[str, Target]:
     """Return all targets by name."""
     names = sorted(path.stem for path in HERE.glob("targets_*.py"))
-    modules = [importlib.import_module(f"support.{name}") for name in names]
+    modules = [importlib.import_module(f"fuzzing.{name}") for name in names]
     return {target.name: target for module in modules for target in module.TARGETS}
 
 
 def corpus(target: Target, *, found: bool = True) -> list[bytes]:
     """Return the valid inputs of a target, files made with faults that once broke it, and if asked for those found."""
-    from support import broken
+    from fuzzing import broken
 
     with tempfile.TemporaryDirectory() as folder:
         seeds = list(target.seeds(Path(folder)))

@@ -3,8 +3,8 @@
 
 """Every reader and every decoder gets its valid inputs and some damaged ones; more of it: `make soak PART=fuzz`."""
 
+from fuzzing.harness import corpus, CRASHES, found_crashes, fuzz, targets
 import pytest
-from support.harness import corpus, CRASHES, found_crashes, fuzz, targets
 from support.lengths import LONG
 from support.skips import NO_RECORDS
 

@@ -8,7 +8,21 @@ from pathlib import Path
 import random
 import re
 
+from fuzzing.harness import Mutator, Target
+from fuzzing.mutators import BYTES, header, TEXT, tree
+from fuzzing.targets_bags import JSON
+from fuzzing.targets_logs import PARQUET, safety_messages, SHORT
+from fuzzing.targets_maps import MAP
 import pandas as pd
+from support.recording_files import (
+    argoverse2,
+    commonroad,
+    highd,
+    ind,
+    interaction,
+    nocturne,
+    omega_prime,
+)
 
 from scenario_gen.corpus.config import CorpusConfig
 from scenario_gen.corpus.encounters import (
@@ -25,20 +39,6 @@ from scenario_gen.corpus.sources import message_table
 from scenario_gen.corpus.tables import rows_of
 from scenario_gen.logs import read_log
 from scenario_gen.logs.synthetic import bundled
-from support.harness import Mutator, Target
-from support.mutators import BYTES, header, TEXT, tree
-from support.recording_files import (
-    argoverse2,
-    commonroad,
-    highd,
-    ind,
-    interaction,
-    nocturne,
-    omega_prime,
-)
-from support.targets_bags import JSON
-from support.targets_logs import PARQUET, safety_messages, SHORT
-from support.targets_maps import MAP
 
 FILE = re.compile(rb"\n\x00FILE ([\w./=-]+)\x00\n")  # begins a file of an input of several
 WAYS: dict[str, Sequence[Mutator]] = {

@@ -21,11 +21,11 @@ import pandas as pd
 from PIL import Image
 import pyarrow as pa
 from pyarrow import parquet
-
-from scenario_gen.bags.recordings.write import write_recording
 from support.bag_examples import hand_made_run
 from support.cut_bags import small_bag
 from support.log_builders import crossing, geographic
+
+from scenario_gen.bags.recordings.write import write_recording
 
 Make = Callable[[], bytes]
 LONG = "a" * 20_000
