@@ -1,11 +1,12 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Write the tables of the reference, docs/tables/*.csv, from the code: `python docs/tables.py`."""
+"""Write docs/tables/*.csv and config/default.yaml from the code: `python docs/tables.py`."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 import csv
 import io
+import json
 from pathlib import Path
 import re
 from typing import Any
@@ -19,15 +20,24 @@ from scenario_gen.closed_loop.bars import Bars
 from scenario_gen.closed_loop.config import ClosedLoopConfig
 from scenario_gen.corpus.config import CorpusConfig
 from scenario_gen.logs.columns import NAMES, UNITS
+from scenario_gen.method.config import PipelineConfig
 from scenario_gen.output.exchange import ExportConfig
 
 FOLDER = Path(__file__).with_name("tables")
+DEFAULT_YAML = FOLDER.parents[1] / "config" / "default.yaml"
 # Parameters of single commands, without those of config/default.yaml.
 SINGLE = {
     "drive": [ClosedLoopConfig(), Bars()],
     "mine": [CorpusConfig()],
     "export": [ExportConfig()],
 }
+DEFAULTS = """\
+# Every parameter of the stages with its default, for the nodes (in any namespace) and for `scenario-gen --params`.
+# A node takes those it declares and leaves the others alone.
+# Written by: python docs/tables.py
+/**:
+  ros__parameters:
+"""
 SHARED = ("limits.", "log.", "bag.")
 Row = tuple[str, ...]
 CONTENTS = {
@@ -106,7 +116,7 @@ def columns() -> Iterator[Row]:
 
 def parameters() -> Iterator[Row]:
     """Yield the parameters of single commands."""
-    yield "command", "parameter", "default", "meaning"
+    yield "command", "parameter", "default", "range", "meaning"
     for command, configs in SINGLE.items():
         for config in configs:
             prefix = "bars." if isinstance(config, Bars) else ""
@@ -114,7 +124,15 @@ def parameters() -> Iterator[Row]:
                 if not name.startswith(SHARED):
                     unit = f" {entry.metadata['unit']}" if entry.metadata["unit"] else ""
                     value = f"{code(str(default))}{unit}"
-                    yield command, code(name), value, literal(entry.metadata["meaning"])
+                    meaning = literal(entry.metadata["meaning"])
+                    yield command, code(name), value, range_of(entry.metadata), meaning
+
+
+def range_of(metadata: Mapping[str, Any]) -> str:
+    """Return the range of a number in words."""
+    low, high = metadata["low"], metadata["high"]
+    bounds = ("at least", low), ("at most", high)
+    return ", ".join(f"{word} {bound:g}" for word, bound in bounds if bound is not None)
 
 
 def commands() -> Iterator[Row]:
@@ -165,6 +183,24 @@ def tables() -> dict[str, str]:
     return {f"{name}.csv": written(list(table())) for name, table in made.items()}
 
 
+def default_yaml() -> str:
+    """Return the text of config/default.yaml, as YAML 1.1 reads it back: a real number always has a point."""
+    lines, stage = [], ""
+    for name, (entry, value) in flatten(PipelineConfig()).items():
+        head, _, rest = name.partition(".")
+        if head != stage:
+            lines.append(f"    {head}:")
+            stage = head
+        text = json.dumps(value)
+        text = (
+            re.sub(r"^(-?\d+)(e[+-]?\d+)$", r"\1.0\2", text) if isinstance(value, float) else text
+        )
+        facts = ", ".join(filter(None, (entry.metadata["unit"], range_of(entry.metadata))))
+        facts = f" [{facts}]" if facts else ""
+        lines += [f"      # {entry.metadata['meaning']}{facts}", f"      {rest}: {text}"]
+    return DEFAULTS + "\n".join(lines) + "\n"
+
+
 def written(lines: list[Row]) -> str:
     """Return rows as CSV."""
     text = io.StringIO()
@@ -176,3 +212,4 @@ if __name__ == "__main__":
     FOLDER.mkdir(exist_ok=True)
     for name, text in tables().items():
         (FOLDER / name).write_text(text, encoding="utf-8")
+    DEFAULT_YAML.write_text(default_yaml(), encoding="utf-8")

@@ -1,12 +1,19 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
+"""Parameters: names, values that are refused, and the reference that is made of them."""
+
+import csv
 from dataclasses import dataclass, field
+import runpy
 
 import pytest
+from support.source_files import ROOT
+import yaml
 
 from scenario_gen.base.errors import InputError
 from scenario_gen.base.parameters import flatten, parameter, Parameters, updated
+from scenario_gen.method.config import PipelineConfig
 
 
 @dataclass(frozen=True)
@@ -20,6 +27,22 @@ class Outer:
     inner: Inner = field(default_factory=Inner)
     count: int = parameter(3, "how many", low=1)
     on: bool = parameter(True, "whether")
+
+
+def test_the_reference_has_all_defaults_and_ranges():
+    """Help texts aside, so a better one needs no new table at once."""
+    reference = runpy.run_path(ROOT / "docs" / "tables.py")
+    text = reference["DEFAULT_YAML"].read_text(encoding="utf-8")
+    nested = yaml.safe_load(text)["/**"]["ros__parameters"]
+    values = {f"{head}.{name}": value for head in nested for name, value in nested[head].items()}
+    assert values == {name: value for name, (_, value) in flatten(PipelineConfig()).items()}
+    assert text == reference["default_yaml"](), "run: python docs/tables.py"
+    table = (reference["FOLDER"] / "parameters.csv").read_text(encoding="utf-8")
+    rows = [
+        [row[:-1] for row in csv.reader(lines.splitlines())]
+        for lines in (table, reference["tables"]()["parameters.csv"])
+    ]
+    assert rows[0] == rows[1], "run: python docs/tables.py"
 
 
 def test_flatten_gives_dotted_names():

@@ -32,6 +32,7 @@ TESTS = {  # folder of scenario_gen: folders of its tests
     "closed_loop": ("closed_loop",),
     "logs": ("logs",),
 }
+RANGES = "base/test_parameters.py"  # of parameters, in each folder's configuration
 SWAPPED = {"min": "max", "max": "min", "minimum": "maximum", "maximum": "minimum"}
 OPERATORS = {ast.Add: ast.Sub, ast.Sub: ast.Add, ast.Mult: ast.Div, ast.Div: ast.Mult}
 COMPARISONS = {ast.Lt: ast.GtE, ast.GtE: ast.Lt, ast.Gt: ast.LtE, ast.LtE: ast.Gt}
@@ -110,7 +111,7 @@ def drawn(folder: str) -> list[Mutant]:
 
 def tests_pass(copy: Path, folder: str) -> bool:
     """Return whether the tests of a folder pass in the copy; a run that does not end fails."""
-    places = [f"test/{place}" for place in TESTS[folder]]
+    places = [f"test/{place}" for place in (*TESTS[folder], RANGES)]
     command = [sys.executable, "-m", "pytest", "-q", "-x", "-p", "no:cacheprovider", *places]
     options = {"capture_output": True, "timeout": TIMEOUT_S}
     try:

@@ -3,6 +3,8 @@
 
 """Overlap and off-road: known hard cases, and agreement with an independent dense re-check on random motions."""
 
+import itertools
+
 from hypothesis import given, settings
 from hypothesis import strategies as st
 import numpy as np
@@ -119,6 +121,25 @@ def test_a_lane_as_wide_as_the_car_suffices_and_a_hair_less_does_not():
     assert causes(
         scenario_of([straight(5, 1.5, 1e-3, 20, FINE)], FINE, (Vehicle("a", 4.0, 2.0),)), road
     ) == [Cause.OFF_ROAD]
+
+
+@pytest.mark.parametrize(
+    ("quarters", "over"),
+    [(0, 0.0), *itertools.product(range(4), (-2e-6, 1e-6))],  # multiples of π are no floats
+)
+def test_the_border_of_the_grid_is_road_and_beyond_it_is_none(quarters, over):
+    """A car of 4 m by 2 m stands along each side of a road of 24 m by 20 m, cells of which end there."""
+    road = road_of(np.ones((80, 96), dtype=bool), 0.25)
+    x, y = (1.0, 2.0) if quarters % 2 else (2.0, 1.0)
+    for place in (
+        (x - over, 9.0),
+        (24.0 - x + over, 9.0),
+        (9.0, y - over),
+        (9.0, 20.0 - y + over),
+    ):
+        stands = straight(*place, 0.5 * np.pi * quarters, 0.0, COARSE)
+        found = causes(scenario_of([stands], COARSE, (Vehicle("a", 4.0, 2.0),)), road)
+        assert found == ([Cause.OFF_ROAD] if over > 0.0 else []), place
 
 
 def test_outside_the_grid_is_off_road():
