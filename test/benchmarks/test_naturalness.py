@@ -6,9 +6,9 @@
 import numpy as np
 import pytest
 
-from benchmarks._naturalness_classifier import FEATURES, GROUPS, told_apart, Windows, windows
+from benchmarks._naturalness_classifier import FEATURES, windows
 from benchmarks._naturalness_cuts import cuts
-from benchmarks._naturalness_motion import keeps_turn, roughness, Signals, turns
+from benchmarks._naturalness_motion import roughness, Signals
 
 
 def drive(speed, turn=0.0, count=2):
@@ -40,16 +40,6 @@ def test_roughness_of_a_known_drive():
     assert staircase["jerk"] == pytest.approx([20.0, 20.0])  # from 1 to -1 m/s² within 0.1 s
 
 
-@pytest.mark.parametrize(
-    ("other", "kept"), [(60.0, True), (80.0, True), (90.0, False), (10.0, False), (-60.0, False)]
-)
-def test_a_turn_is_kept_within_25_degrees_and_by_its_kind(other, kept):
-    speed = np.full(101, 8.0)
-    template, sample = drive(speed, 60.0), drive(speed, other)
-    assert turns(template) == pytest.approx([60.0, 60.0])
-    assert keeps_turn(template, sample).tolist() == [kept, kept]
-
-
 def test_windows_see_noise_and_nothing_else():
     time = 0.1 * np.arange(101)
     rng = np.random.default_rng(0)
@@ -79,28 +69,3 @@ def test_the_list_of_cuts_is_whole_and_its_last_third_is_apart():
                 vehicle,
                 start,
             )
-
-
-@pytest.mark.long()
-def test_the_classifier_tells_rough_from_calm_and_calm_from_calm_not():
-    time = 0.1 * np.arange(101)
-    rng = np.random.default_rng(0)
-
-    def drives(noise):
-        phase, size = rng.uniform(0.0, 6.0), rng.uniform(0.5, 2.0)
-        return [
-            drive(8.0 + size * np.sin(time + phase) + rng.normal(0.0, noise, 101))
-            for _ in range(2)
-        ]
-
-    calm = [drives(0.01) for _ in range(8)]
-    alike = [Windows(str(k), windows(one), windows(other)) for k, (one, other) in enumerate(calm)]
-    rough = [
-        Windows(str(k), windows(one), windows(drives(0.05)[0])) for k, (one, _) in enumerate(calm)
-    ]
-    told = told_apart(rough, GROUPS["longitudinal"], importances=True)
-    assert told.area > 0.95 and told.giveaways(1).startswith(
-        ("jerk", "acceleration", "speed: high")
-    )
-    assert told_apart(alike, GROUPS["longitudinal"]).area < 0.75
-    assert told_apart(rough[:4], GROUPS["lateral"]) is None  # fewer than folds

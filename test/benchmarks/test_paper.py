@@ -12,18 +12,15 @@ import numpy as np
 import pytest
 from support.evaluation_worlds import crossing
 
-from benchmarks._paper_chain import place, sample
 from benchmarks._paper_claims import claims_of
-from benchmarks._paper_measure import off_road, run_case
-from benchmarks._reference_sets import UNIFORM, uniform_changepoints, WITHOUT
+from benchmarks._paper_measure import run_case
+from benchmarks._reference_sets import UNIFORM, WITHOUT
 from benchmarks.paper import refusals, reproduce, write_page
 from scenario_gen.base.errors import InputError
 from scenario_gen.base.folders import MARKER
 from scenario_gen.logs import read_log
 from scenario_gen.logs.synthetic import bundled
-from scenario_gen.method.segmentation import segment, SegmentationConfig
 from scenario_gen.types import WITH
-from scenario_gen.types.fit import Segmentation
 
 
 @pytest.fixture(scope="module")
@@ -51,17 +48,6 @@ def test_the_stop_is_kept_with_changepoints_and_lost_without(case):
         assert case.similarity[WITH][kind].high < 0.5 * case.similarity[WITHOUT][kind].low
     assert UNIFORM in case.similarity
     assert case.off_road[WITH] == 0.0
-
-
-def test_all_vehicles_get_one_scale():
-    """Else differences of speed between vehicles would not survive eq 9."""
-    encounter = read_log(Path(bundled("b"))).encounters[0]
-    segmentation = segment(encounter, SegmentationConfig(preset="paper"), 7)
-    road, *ends = place(encounter, segmentation)
-    found = sample(encounter, segmentation, road, (ends[0], ends[1]), count=3, seed=7)
-    scales = [fitted.scale for fitted in found.fit.fitted]
-    assert scales[0] == pytest.approx(scales[1], rel=1e-3) and scales[0] > 2.0
-    assert off_road(road, found.position) == 0.0
 
 
 def test_priors_are_compared_on_a_path_that_bends(case):
@@ -129,11 +115,3 @@ def test_it_writes_page_and_figures_and_spares_other_folders(tmp_path):
     assert "log synthetic_c" in json.loads((out / "paper.json").read_text())["provenance"]
     with pytest.raises(InputError, match="name another folder"):
         reproduce([[Path(bundled("c"))]], Path(bundled("c")), count=4, seed=1)
-
-
-def test_uniform_changepoints_are_as_many_and_evenly_spaced():
-    labels = np.repeat([0, 1, 0], [11, 70, 40])
-    segmentation = Segmentation(labels, np.array([11, 81]), np.zeros(121), ("a", "b", "c"))
-    even = uniform_changepoints(segmentation)
-    assert even.changepoints.tolist() == [40, 80] and len(even.descriptions) == 3
-    assert (np.flatnonzero(np.diff(even.labels)) + 1).tolist() == [40, 80]

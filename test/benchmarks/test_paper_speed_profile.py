@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 import numpy as np
 import pytest
 
-from benchmarks._paper_speed_knots import best_knot, speed_knots
+from benchmarks._paper_speed_knots import speed_knots
 from benchmarks._paper_speed_profile import SpeedProfile, SpeedProfileQP
 from scenario_gen.types import Dynamics
 
@@ -46,24 +46,6 @@ def test_lengths_ends_and_limits_hold(factors, depth, first):
     assert (speed[0] >= 0.0).all()
     assert acceleration.max() <= limits.max_acceleration + 1e-5
     assert acceleration.min() >= -limits.max_deceleration - 1e-5
-
-
-def test_constant_acceleration_within_primitives_is_given_back():
-    """Where the template keeps to its primitives, so does the profile: no interior knot bends."""
-    template = np.interp(TIME, CLOCK, [8.0, 11.0, 4.0, 4.0, 9.0])
-    knots = speed_knots(CLOCK, NO_DWELL, [], TIME, template, (8.0, 9.0))
-    speed, ok = SpeedProfileQP(knots, Dynamics().planned).solve(
-        knots.knot[None], driven(template)[None]
-    )
-    assert ok[0]
-    assert speed[0] == pytest.approx(np.interp(knots.knot, TIME, template), abs=1e-5)
-
-
-def test_primitives_shorter_than_the_samples_are_apart():
-    coarse = np.arange(0.0, 21.0)
-    clock = np.array([0.0, 6.2, 6.6, 14.0, 20.0])
-    knots = speed_knots(clock, NO_DWELL, [], coarse, np.full(21, 7.0), (7.0, 7.0))
-    assert knots.moments == pytest.approx(np.full((len(knots.knot) - 1, 2), 3.5))
 
 
 def test_chained_law_would_ring_and_this_does_not():
@@ -105,17 +87,3 @@ def test_impossible_lengths_are_refused_and_slid():
     assert slid[0][-1] == pytest.approx(0.0, abs=1e-5)
     assert 1.0 < np.abs(slid).max() < 100.0
     assert not qp.slide(knots.knot[None], 10.0 * wrong[None])[1][0]
-
-
-def test_knot_is_where_the_template_bends():
-    speed = np.where(TIME < 4.3, 10.0, 10.0 - 2.0 * (TIME - 4.3))
-    assert best_knot(TIME, speed, 2.0, 8.0) == pytest.approx(4.3, abs=0.11)
-
-
-def test_knot_can_be_put_elsewhere_and_keeps_its_distance():
-    one = speed_knots(CLOCK, NO_DWELL, [], TIME, dip(), (10.0, 10.0), 0.25)
-    assert one.knot == pytest.approx([0.0, 1.5, 6.0, 6.75, 9.0, 10.25, 14.0, 15.5, 20.0])
-    short = speed_knots(
-        np.array([0.0, 1.0, 20.0]), NO_DWELL[:2], [], TIME, dip(), (10.0, 10.0), 0.1
-    )
-    assert short.knot[1] == pytest.approx(0.25)

@@ -3,36 +3,13 @@
 
 """Sets of results on the command line: two seeds side by side, and any bag as a page."""
 
-import json
 from pathlib import Path
 from shutil import copyfile
 
-import pytest
-
 from scenario_gen import load
-from scenario_gen.base.folders import MARKER
 from scenario_gen.types import Recorded
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
-
-
-def test_a_bag_is_evaluated_to_a_page_figures_and_a_table(results, run, tmp_path):
-    out = tmp_path / "again"
-    assert run("evaluate", results / "seed_1" / "bag", "--out", out)[0] == 0
-    assert sorted(path.name for path in out.iterdir()) == [
-        MARKER,
-        "evaluation.json",
-        "evaluation.md",
-        "report.html",
-    ]
-    page = (out / "report.html").read_text()
-    assert page.startswith("<!doctype html>") and "<b>2</b> of 2 requested scenarios" in page
-    made = json.loads((results / "seed_1" / "evaluation.json").read_text())["cases"][0]
-    again = json.loads((out / "evaluation.json").read_text())["cases"][0]
-    (expected,) = [row["values"] for row in made["rows"] if row["name"] == "with changepoints"]
-    (found,) = [row["values"] for row in again["rows"] if row["name"] == "scenarios"]
-    for key in ("e_position", "e_speed", "diversity", "min_distance"):
-        assert found[key]["value"] == pytest.approx(expected[key]["value"], rel=1e-4), key
 
 
 def test_a_long_run_is_announced_before_it(run, tmp_path, monkeypatch):

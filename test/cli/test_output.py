@@ -3,17 +3,14 @@
 
 """What commands print: --version, --quiet, --json; tables in which nothing is cut off; the page of a bag."""
 
-from dataclasses import dataclass
 import io
 import json
-from pathlib import Path
 import shutil
 import sys
 from unittest.mock import Mock
 
 import pytest
 from rich.console import Console
-from rich.text import Text
 import typer
 from typer.testing import CliRunner
 
@@ -78,28 +75,6 @@ def test_quiet_prints_errors_only(ran, made):
     assert (code, out) == (2, "") and "does not exist" in err
 
 
-@dataclass
-class Body:
-    name: str
-    size: float
-
-
-def test_plain_values_are_json():
-    value = {
-        "path": Path("a"),
-        "body": Body("x", float("nan")),
-        1: (1, True, None, float("inf")),
-        "odd": "\x1b",
-    }
-    expected = {
-        "path": "a",
-        "body": {"name": "x", "size": None},
-        "1": [1, True, None, None],
-        "odd": "\\x1b",
-    }
-    assert output.json_value(value) == expected
-
-
 class Narrow(Terminal):
     """A terminal of 80 columns that keeps what it prints."""
 
@@ -116,11 +91,6 @@ ROW = (
     "t_intersection",
     *("123.45" for _ in range(8)),
 )
-
-
-def test_a_table_for_a_program_has_tabs(capsys):
-    output.print_table(COLUMNS, [ROW], names=3)
-    assert capsys.readouterr().out == "\t".join(COLUMNS) + "\n" + "\t".join(ROW) + "\n"
 
 
 def test_figures_are_short():
@@ -177,11 +147,6 @@ def test_no_word_of_a_help_is_cut_at_80_columns(name, monkeypatch):
     )
     helps = " ".join(option.help or "" for option in options).replace("\\[", "[")
     assert "Usage" in shown and not [word for word in helps.split() if word not in shown]
-
-
-def test_a_pipe_receives_no_markup(capsys):
-    output.print_(Text("log.period", style="bold"), " = 0.1", sep="")
-    assert capsys.readouterr().out == "log.period = 0.1\n"
 
 
 def test_each_line_of_an_error_is_a_line(monkeypatch, capsys):

@@ -28,8 +28,3 @@ def test_what_was_removed_names_its_replacement(name, tmp_path):
         words = ["mine", f"{name}bucket/archive", "--out", "corpus"]
     with pytest.raises(InputError, match=f"{re.escape(name)} was removed: [^\n]+$"):
         run(words)
-
-
-def test_a_folder_with_the_name_of_a_removed_command_is_no_command():
-    with pytest.raises(InputError, match="library"):
-        run(["evaluate", "library"])

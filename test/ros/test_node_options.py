@@ -55,24 +55,6 @@ def test_a_rule_for_one_node_leaves_the_others_of_its_process(start, client):
     )
 
 
-def test_a_parameter_file_of_wildcards_names_and_namespaces(start, client, tmp_path):
-    file = tmp_path / "own.yaml"
-    file.write_text(
-        "/**:\n  ros__parameters: {road_name: straight}\n"
-        "/a/road_server:\n  ros__parameters: {road_name: curve}\n/b/road_server:\n  ros__parameters: {road_name: merge}\n"
-    )
-    start("road_server", "-r", "__ns:=/a", "--params-file", str(file))
-    start("road_server", "-r", "__ns:=/c", "--params-file", str(file))
-    from rcl_interfaces.srv import GetParameters
-
-    request = GetParameters.Request(names=["road_name"])
-    names = [
-        client.call(GetParameters, f"/{space}/road_server/get_parameters", request).values[0]
-        for space in "ac"
-    ]
-    assert [name.string_value for name in names] == ["curve", "straight"]
-
-
 def test_simulated_time_stamps_what_a_node_says(start, client):
     client.hear("/diagnostics")
     start("road_server", use_sim_time=True, road_name="straight")

@@ -6,18 +6,14 @@
 import math
 
 import pytest
-from support.suite_processes import Client, RESOURCES, whole_chain
+from support.suite_processes import Client, whole_chain
 
 from msg_conventions.diagnostics import decode_diagnostics
 from msg_conventions.fits import decode_fit
 from msg_conventions.roads import decode_map
-from msg_conventions.scenarios import digest, encode_scenario
 from scenario_gen.bags.storage.bag import read_messages
-from scenario_gen.logs import read_log
-from scenario_gen.pipeline import generate, PipelineConfig
 
 pytestmark = pytest.mark.dds
-LOG = RESOURCES / "synthetic_c"
 CHAIN = (
     "log_player",
     "segmenter",
@@ -65,16 +61,6 @@ def test_a_late_joiner_gets_everything(suite, client):
         assert math.isfinite(float(rows["/evaluator: with changepoints"]["e_position"]))
     finally:
         late.close()
-
-
-def test_in_process_gives_the_same_bytes(suite, client):
-    client.hear("/scenarios")
-    heard = client.wait("/scenarios", 4)
-    (encounter,) = read_log(LOG).encounters
-    case = generate(encounter, "straight", PipelineConfig(), count=4, seed=7)
-    assert [digest(encode_scenario(s, encounter.start_ns)) for s in case.generated.scenarios] == [
-        digest(data) for data in heard[:4]
-    ]
 
 
 def test_parameters_are_checked_on_set_with_a_reason(suite, client):

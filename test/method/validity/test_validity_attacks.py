@@ -174,17 +174,6 @@ def test_no_size_lets_two_stand_in_one_place(size):
             causes(scenario)
 
 
-def test_a_jump_there_and_back_is_refused():
-    for field, at, value in (
-        ("position", (0, 50, 0), 300.0),
-        ("heading", (0, 50), np.pi),
-        ("speed", (0, 50), 40.0),
-    ):
-        values = getattr(passing(), field).copy()
-        values[at] = value
-        assert causes(replace(passing(), **{field: values}))
-
-
 def test_what_no_kernel_filled_in_is_refused(monkeypatch):
     monkeypatch.setattr(dynamics, "worst_excess", lambda *_: None)
     monkeypatch.setattr(containment, "first_exits", lambda *_: None)

@@ -281,12 +281,6 @@ def test_what_does_not_suit_the_request_is_an_error():
         Dynamics(max_speed=-1.0)
 
 
-def test_a_batch_is_answered_in_order():
-    scenarios = [good(), good(straight(-50, 0, 0, 50, TIME)), good()]
-    verdicts = Checker(ROAD, None, None, None).check(scenarios)
-    assert [verdict.valid for verdict in verdicts] == [True, False, True]
-
-
 def test_the_least_gap_follows_the_template_unless_it_is_given():
     time = np.arange(51) * 0.1
     position = np.stack(

@@ -80,14 +80,6 @@ def test_nobody_stands_where_another_one_has_just_vanished(comes, valid):
     assert found == ([] if valid else [Cause.OVERLAP])
 
 
-def test_who_follows_may_come_where_the_leader_drove():
-    """Half a second behind at 10 m/s: the leader has driven on."""
-    scenario = scenario_of(
-        [straight(-50, 0, 0, 10.0, TIME), straight(-60, 0, 0, 10.0, TIME)], TIME
-    )
-    assert causes(replace(scenario, present=np.array([[0, 50], [55, 100]])))[0] == []
-
-
 def test_a_pair_that_nothing_looks_at_is_refused(monkeypatch):
     monkeypatch.setattr(collision, "first_contacts", lambda *_: None)
     for present in ([[0, 100], [0, 100]], [[0, 60], [40, 100]], [[0, 50], [50, 100]]):

@@ -12,7 +12,6 @@ import pytest
 from rosbags.rosbag2 import Reader
 from support.bag_examples import hand_made_run
 from support.map_builders import lanelet2, opendrive
-from support.small_scenarios import observed
 from typer.testing import CliRunner
 
 from scenario_gen.bags.recordings.read import read_recording
@@ -93,27 +92,6 @@ def test_lanes_do_not_depend_on_what_is_chosen(small_bag):
         assert all(np.array_equal(a.left, b.left) for a, b in lanes)
 
 
-def test_round_trips_close(small_bag, tmp_path):
-    scenarios = {
-        (case.namespace, one.index): one
-        for case in read_cases(small_bag)
-        for one in case.scenarios
-    }
-    for target in ("commonroad",):
-        out = tmp_path / target
-        export_bag(small_bag, out, target)
-        manifest = json.loads((out / MANIFEST).read_text())
-        for entry in manifest["scenarios"]:
-            path = out / entry["files"][0]
-            tracks = observed(path).vehicles
-            scenario = scenarios[entry["namespace"], entry["index"]].others
-            for n, track in enumerate(tracks):
-                assert np.abs(track.fix - scenario.position[n]).max() < 1e-3
-                assert np.abs(track.speed - scenario.speed[n]).max() < 1e-2
-        (encounter,) = read_log(path).encounters  # a log like any other
-        assert len(encounter.vehicles) == 2
-
-
 @pytest.mark.parametrize(
     ("options", "said"),
     [
@@ -140,11 +118,6 @@ def test_what_cannot_be_is_refused_by_name(small_bag, tmp_path, options, said):
         )
     assert said in str(error.value)
     assert not (tmp_path / "o").exists()
-
-
-def test_a_bag_may_not_be_replaced_by_its_export(small_bag):
-    with pytest.raises(InputError):
-        export_bag(small_bag, small_bag, "commonroad", ExportConfig())
 
 
 def made_on(path, text):
