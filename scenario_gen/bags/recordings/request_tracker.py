@@ -7,9 +7,10 @@ Messages arrive in any order. A message that arrives twice (from a restarted sam
 reconnection) counts once.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 import heapq
+from typing import Generic, TypeVar
 
 from msg_conventions.diagnostics import Level, Status
 from msg_conventions.scenario_info import decode_info, Info, RequestSummary, ScenarioEntry
@@ -18,7 +19,36 @@ from scenario_gen.base.errors import InputError
 
 _MAX_ENTRY_COUNT = 300_000  # of open requests; the oldest requests are dropped
 _MAX_COMPLETE_COUNT = 1000  # remembered complete requests
-_NO_STATUS = Status("", Level.OK, "")  # entries wait without their long texts
+_NO_STATUS = Status("", Level.OK, "")
+_Message = TypeVar("_Message")
+
+
+class MessagePool(Generic[_Message]):
+    """Messages by their SHA-256, each of which is taken once."""
+
+    def __init__(self, max_count: int) -> None:
+        """Hold the messages with the last `max_count` hashes."""
+        self._messages: dict[str, list[_Message]] = {}
+        self._max_count = max_count
+
+    def add(self, sha256: str, message: _Message) -> None:
+        """Add a message; beyond the bound, drop the oldest."""
+        self._messages.setdefault(sha256, []).append(message)
+        while len(self._messages) > self._max_count:
+            self._messages.pop(next(iter(self._messages)))
+
+    def pop_all(self, hashes: Sequence[str]) -> list[_Message]:
+        """Remove and return a message for each hash; none if one is missing."""
+        if not all(sha256 in self._messages for sha256 in hashes):
+            return []
+        return [self._pop_one(sha256) for sha256 in hashes]
+
+    def _pop_one(self, sha256: str) -> _Message:
+        messages = self._messages[sha256]
+        if len(messages) == 1:
+            del self._messages[sha256]
+            return messages[0]
+        return messages.pop()
 
 
 @dataclass
@@ -29,7 +59,7 @@ class TrackedRequest:
         request: id.
         seed: None before the first entry.
         entries: SHA-256 of its scenarios by index, in the order of the entries.
-        awaited: entries whose scenarios have not arrived, by SHA-256.
+        awaited: entries whose scenarios have not arrived, by index.
         arrived: number of scenarios.
         summary: None before it arrives.
         stored: scenarios for which `store` was called.
@@ -38,7 +68,7 @@ class TrackedRequest:
     request: str
     seed: int | None = None
     entries: dict[int, str] = field(default_factory=dict)
-    awaited: dict[str, ScenarioEntry] = field(default_factory=dict)
+    awaited: dict[int, ScenarioEntry] = field(default_factory=dict)
     arrived: int = 0
     summary: RequestSummary | None = None
     stored: list[tuple[str, int, ScenarioEntry, bytes]] = field(default_factory=list)
@@ -82,42 +112,47 @@ class TrackedRequest:
         )
 
 
-Match = tuple[TrackedRequest, ScenarioEntry, bytes]
-"""A request, one of its entries, and the data of the scenario."""
+Match = tuple[TrackedRequest, ScenarioEntry, list[bytes]]
+"""A request, one of its entries, and the messages of the scenario."""
 
 
 class RequestTracker:
     """The requests of one namespace; `open` are those that are not complete, by id."""
 
-    def __init__(self, max_unmatched: int = 10_000) -> None:
+    def __init__(self, max_unmatched: int = 10_000, *, with_witness: bool = False) -> None:
+        """Hold the last messages without an entry.
+
+        Args:
+            max_unmatched: their number.
+            with_witness: a scenario has arrived with the reference drive that its entry names,
+                which `add_scenario` gets, too. Otherwise entries lose their values.
+        """
         self.open: dict[str, TrackedRequest] = {}
-        self._max_unmatched = max_unmatched
+        self._with_witness = with_witness
         self._n_entries = 0  # of all open requests
-        self._awaited: dict[str, list[str]] = {}  # requests by SHA-256 of a scenario
-        self._unmatched: dict[str, list[bytes]] = {}  # data by SHA-256, before the entry
+        self._awaiting: dict[str, list[ScenarioEntry]] = {}  # by SHA-256 of a message
+        self._unmatched = MessagePool[bytes](max_unmatched)
         self._complete: dict[str, tuple[int | None, int]] = {}  # seed and number of scenarios
-        # By SHA-256 of a message: those of all messages of its scenario, then the scenario's.
-        self._parts: dict[str, tuple[str, ...]] = {}
 
     def add_scenario(self, sha256: str, data: bytes = b"") -> Match | None:
-        """Add a scenario; return it with its entry, if that has arrived.
+        """Add a message of a scenario; return the scenario if it is complete, with its entry."""
+        self._unmatched.add(sha256, data)
+        return next(filter(None, map(self._match, self._awaiting.get(sha256, ()))), None)
 
-        A message of a scenario with several messages waits for the others and the entry.
-        """
-        if sha256 in self._parts:
-            self._unmatched.setdefault(sha256, []).append(data)
-            joined = self._join(self._parts[sha256])
-            return None if joined is None else self.add_scenario(*joined)
-        requests = self._awaited.get(sha256)
-        if not requests:
-            self._unmatched.setdefault(sha256, []).append(data)
-            while len(self._unmatched) > self._max_unmatched:
-                self._unmatched.pop(next(iter(self._unmatched)))
+    def _match(self, entry: ScenarioEntry) -> Match | None:
+        """Return an entry with the messages that it names, if all have arrived."""
+        messages = self._unmatched.pop_all(self._named(entry))
+        if not messages:
             return None
-        tracked = self.open[requests[0]]
-        self._stop_awaiting(sha256, tracked.request)
+        tracked = self.open[entry.request]
+        self._stop_awaiting(tracked, entry)
         tracked.arrived += 1
-        return tracked, tracked.awaited.pop(sha256), data
+        return tracked, entry, messages
+
+    def _named(self, entry: ScenarioEntry) -> tuple[str, ...]:
+        """Return the hashes of an entry's messages."""
+        has_witness = self._with_witness and entry.witness
+        return (*entry.messages, entry.witness) if has_witness else entry.messages
 
     def add_message(self, data: bytes) -> None:
         """Add a message of `scenarios/info`; a damaged one is ignored."""
@@ -132,23 +167,19 @@ class RequestTracker:
         if isinstance(info, RequestSummary):
             self.open.setdefault(info.request, TrackedRequest(info.request)).summary = info
             return None
-        self._join_parts(info)
         tracked = self._request_of(info)
-        is_repeated = info.index in tracked.entries
-        if not is_repeated:
-            tracked.entries[info.index] = info.sha256
-            self._n_entries += 1
-            while self._n_entries > _MAX_ENTRY_COUNT and len(self.open) > 1:
-                self.forget(next(iter(self.open)))
-        data = self._pop_unmatched(info.sha256)
-        if is_repeated:
+        if info.index in tracked.entries:
+            self._unmatched.pop_all(self._named(info))
             return None
-        if data is None and info.sha256 not in tracked.awaited:
-            tracked.awaited[info.sha256] = replace(info, status=_NO_STATUS)
-            self._awaited.setdefault(info.sha256, []).append(info.request)
-            return None
-        tracked.arrived += 1  # a second scenario with the same bytes counts with the first
-        return tracked, info, data or b""
+        tracked.entries[info.index] = info.sha256
+        self._n_entries += 1
+        while self._n_entries > _MAX_ENTRY_COUNT and len(self.open) > 1:
+            self.forget(next(iter(self.open)))
+        entry = info if self._with_witness else replace(info, status=_NO_STATUS)
+        tracked.awaited[entry.index] = entry
+        for sha256 in self._named(entry):
+            self._awaiting.setdefault(sha256, []).append(entry)
+        return self._match(entry)
 
     def _request_of(self, entry: ScenarioEntry) -> TrackedRequest:
         """Return the request of an entry; of another sampler, it replaces the earlier one."""
@@ -163,52 +194,21 @@ class RequestTracker:
         self.open[request] = TrackedRequest(request, entry.seed)
         return self.open[request]
 
-    def _join_parts(self, entry: ScenarioEntry) -> None:
-        """Remember the messages of an entry's scenario, if there are several; join them."""
-        if len(entry.messages) == 1:
-            return
-        parts = (*entry.messages, entry.sha256)
-        self._parts.update(dict.fromkeys(entry.messages, parts))
-        while len(self._parts) > self._max_unmatched:
-            self._parts.pop(next(iter(self._parts)))
-        joined = self._join(parts)
-        if joined is not None:
-            self._unmatched.setdefault(entry.sha256, []).append(joined[1])
-
-    def _join(self, parts: tuple[str, ...]) -> tuple[str, bytes] | None:
-        """Return SHA-256 and bytes of a scenario with all its messages; forget these."""
-        *messages, sha256 = parts
-        if not all(message in self._unmatched for message in messages):
-            return None
-        data = b"".join(self._pop_unmatched(message) or b"" for message in messages)
-        for message in messages:
-            self._parts.pop(message, None)
-        return sha256, data
-
-    def _pop_unmatched(self, sha256: str) -> bytes | None:
-        """Remove and return the data of a scenario without entry; None if there is none."""
-        waiting = self._unmatched.get(sha256)
-        if not waiting:
-            return None
-        data = waiting.pop()
-        if not waiting:
-            del self._unmatched[sha256]
-        return data
-
-    def _stop_awaiting(self, sha256: str, request: str) -> None:
-        waiting = self._awaited.get(sha256, [])
-        if request in waiting:
-            waiting.remove(request)
-        if not waiting:
-            self._awaited.pop(sha256, None)
+    def _stop_awaiting(self, tracked: TrackedRequest, entry: ScenarioEntry) -> None:
+        del tracked.awaited[entry.index]
+        for sha256 in self._named(entry):
+            waiting = self._awaiting[sha256]
+            waiting.remove(entry)
+            if not waiting:
+                del self._awaiting[sha256]
 
     def forget(self, request: str) -> None:
         """Stop waiting for scenarios of a request."""
         tracked = self.open.pop(request, None)
         if tracked is not None:
             self._n_entries -= len(tracked.entries)
-            for sha256 in tracked.awaited:
-                self._stop_awaiting(sha256, request)
+            for entry in list(tracked.awaited.values()):
+                self._stop_awaiting(tracked, entry)
 
     def forget_complete(self) -> None:
         """Forget the complete requests."""

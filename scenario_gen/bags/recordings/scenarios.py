@@ -16,12 +16,11 @@ from msg_conventions.scenario_info import (
     decode_info,
     INFO,
     Info,
-    MESSAGES,
     RequestSummary,
     ScenarioEntry,
 )
 from msg_conventions.scenarios import decode_scenario, digest
-from scenario_gen.bags.recordings.request_tracker import RequestTracker
+from scenario_gen.bags.recordings.request_tracker import MessagePool, RequestTracker
 from scenario_gen.bags.storage.messages import BagMessage
 from scenario_gen.base.errors import InputError
 from scenario_gen.types import Scenario, ScenarioSet
@@ -114,9 +113,10 @@ class RecordedScenarios:
     @cached_property
     def missing(self) -> tuple[str, ...]:
         """A sentence for each incomplete request."""
-        tracker = RequestTracker(max_unmatched=len(self.hashes))
-        for sha256 in self.hashes:
-            tracker.add_scenario(sha256)
+        messages = self._recorded.get(SCENARIOS, ())
+        tracker = RequestTracker(max_unmatched=len(messages))
+        for message in messages:
+            tracker.add_scenario(digest(message.data))
         for _, infos in self.infos:
             for info in infos:
                 tracker.add_info(info)
@@ -287,30 +287,21 @@ def joined_messages(
     A scenario with a missing message is not joined: its entry then has no scenario, which
     `missing` reports.
     """
-    several = [entry for entry in entries if MESSAGES in entry.status.values]
+    several = [entry for entry in entries if len(entry.messages) > 1]
     if not several:
         return messages
-    indices: dict[str, list[int]] = {}
-    for k, message in enumerate(messages):
-        indices.setdefault(digest(message.data), []).append(k)
+    pool = MessagePool[int](len(messages))
+    for k in reversed(range(len(messages))):  # of equal ones the first is taken
+        pool.add(digest(messages[k].data), k)
     joined = dict(enumerate(messages))
     for entry in several:
-        parts = _parts_of(entry, indices)
+        parts = pool.pop_all(entry.messages)
         if parts:
             data = b"".join(messages[k].data for k in parts)
             for k in parts:
                 joined.pop(k)
             joined[parts[0]] = replace(messages[parts[0]], data=data)
     return [joined[k] for k in sorted(joined)]
-
-
-def _parts_of(entry: ScenarioEntry, indices: Mapping[str, list[int]]) -> list[int]:
-    """Remove and return the indices of an entry's messages; none if one is missing."""
-    try:
-        parts = [indices[sha256].pop(0) for sha256 in entry.messages if indices.get(sha256)]
-        return parts if len(parts) == len(entry.messages) else []
-    except InputError:  # the entry is damaged
-        return []
 
 
 def _numbered(texts: Iterable[str]) -> Iterable[tuple[str, int]]:

@@ -95,8 +95,8 @@ class Evaluator(StageNode):
 
     def _keep(self, match: Match | None) -> None:
         if match is not None:
-            request, entry, data = match
-            request.store(entry, data, self.config.seed, self.config.measured)
+            request, entry, messages = match
+            request.store(entry, b"".join(messages), self.config.seed, self.config.measured)
 
     def _drop_excess(self) -> None:
         """Drop the oldest requests above the limits of closed requests and of stored scenarios."""
