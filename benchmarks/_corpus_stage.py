@@ -16,7 +16,7 @@ from benchmarks._archive import write_archive
 from scenario_gen.corpus.config import CorpusConfig
 from scenario_gen.corpus.encounters import clean_found
 from scenario_gen.corpus.inventory import inventory
-from scenario_gen.corpus.meetings import search_hours
+from scenario_gen.corpus.meetings import search_hour
 from scenario_gen.corpus.messages import parse_range, ranges
 from scenario_gen.corpus.schedule import accounts_of, clean_tasks, hour_tasks
 
@@ -30,11 +30,12 @@ def work(name: str, archive: Path, out: Path) -> Iterator[Callable[[], object]]:
     ranged = ranges(messages, out / "messages", config.range_size << 20, config.memory)
     if name == "parse":
         yield from (partial(parse_range, task) for task in ranged)
-    elif name == "search":
-        tasks = hour_tasks(accounts_of(ranged, out), out, config)
-        yield from (partial(search_hours, task) for task in tasks)
+        return
+    hours = hour_tasks(accounts_of(ranged), out, config)
+    if name == "search":
+        yield from (partial(search_hour, task) for task in hours)
     else:
-        yield from (partial(clean_found, task) for task in clean_tasks(out, config))
+        yield from (partial(clean_found, task) for task in clean_tasks(hours, out, config))
 
 
 def warm(name: str) -> None:

@@ -69,7 +69,8 @@ def _write(
 
 def _scores(planted: list[Planted], out: Path) -> tuple[float, float]:
     """Return recall and precision; an encounter has a kind once it is cleaned."""
-    rows = list(grouped(meetings_of(out), LogConfig()))
+    hours = sorted((out / "hours").iterdir(), key=lambda hour: int(hour.name.partition("-")[0]))
+    rows = list(grouped(meetings_of(hours), LogConfig()))
     found = {frozenset(device % FIRST_PLANTED_COUNT for device in row.devices) for row in rows}
     truth = {frozenset(one.devices) for one in planted if one.inside}
     hits = found & truth
@@ -113,7 +114,7 @@ def _mining(name: str, place: Path) -> list[Row]:
     recall, precision = _scores(read_planted(archive), out)
     rows = json.loads((archive / "synthetic.json").read_text())["rows"]
     text, total = _size(archive.glob("*.csv")), sum(seconds.values())
-    stored = {stage: _size((out / stage).iterdir()) for stage in ("messages", "hours")}
+    stored = {stage: _size((out / stage).rglob("*.parquet")) for stage in ("messages", "hours")}
     peer = f"DuckDB's copy to Parquet {rows / _duckdb_seconds(archive, place) / 1e6:.2f}"
     label = f"{rows / 1e6:.1f} M rows, {name}"
     from_text, from_parquet = rows / total / 1e6, rows / (total - seconds["parse"]) / 1e6

@@ -184,7 +184,7 @@ def _add_templates(out: Path, corpus: Sequence[Path], limit: int, count: int) ->
     )
     while rows := list(islice(lacking, size)):
         table = out / "templates" / f"part-{len(tables):05}.parquet"
-        write_encounters(table, rows, {})
+        write_encounters(table, rows)
         tables.append(table)
 
 

@@ -20,11 +20,6 @@ class CorpusConfig(Parameters):
         low=1,
         high=4096,
     )
-    task_rows: int = parameter(
-        10_000_000,
-        "rows that one task searches for encounters; fewer rows take less time than its start",
-        low=1000,
-    )
     task_encounters: int = parameter(100, "encounters that one task cleans", low=1, high=100_000)
     memory: int = parameter(
         400,

@@ -21,7 +21,7 @@ from scenario_gen.base.documents import parse_json, shown
 from scenario_gen.base.errors import guarded, InputError, UnforeseenError
 from scenario_gen.corpus.config import CorpusConfig
 from scenario_gen.corpus.grouping import FoundEncounter, label
-from scenario_gen.corpus.meetings import MESSAGES_AFTER_US, MESSAGES_BEFORE_US
+from scenario_gen.corpus.meetings import MESSAGES_AFTER_US, MESSAGES_BEFORE_US, ROWS
 from scenario_gen.corpus.messages import digest_of, UNITS_PER_DEGREE
 from scenario_gen.corpus.tables import write_table
 from scenario_gen.corpus.tracks import runs_of
@@ -54,6 +54,15 @@ COLUMNS = {  # of a table
     **dict.fromkeys(("seconds", "gap", "distance", "lat", "lon", "ttc", "pet", "speed"), "double"),
     "tracks": "binary",
 }
+QUALITY = "quality of logs"
+NOTES = {  # of a table: what was left out, and remarks
+    "type": "array",
+    "items": {
+        "type": "object",
+        "required": ["name", "cause", "why"],
+        "additionalProperties": {"type": "string"},
+    },
+}
 UNREAD_LOGS: tuple[str, str] = ("not in a known format", "cannot be read")  # causes
 MEETING_MARGIN_US = 2_000_000  # smooth vehicles meet a little earlier or later than raw ones
 
@@ -66,20 +75,21 @@ class CleanTask:
         name: of the task; begins with the time of the first encounter.
         corpus: of the encounters.
         encounters: the ones to clean.
-        hours: keys of the hours with their messages.
+        hours: the folders of the hours with their messages.
         config: the parameters.
     """
 
     name: str
     corpus: Path
     encounters: tuple[FoundEncounter, ...]
-    hours: tuple[str, ...]
+    hours: tuple[Path, ...]
     config: CorpusConfig
 
     @property
     def target(self) -> Path:
         """The table to write."""
-        digest = digest_of([astuple(entry) for entry in self.encounters], self.hours)
+        hours = [hour.name for hour in self.hours]
+        digest = digest_of([astuple(entry) for entry in self.encounters], hours)
         return self.corpus / "encounters" / f"found-{self.name}-{digest}.parquet"
 
 
@@ -97,12 +107,11 @@ def clean_found(task: CleanTask) -> None:
     """Write a row for each encounter that survives cleaning, and why others do not."""
     from pyarrow import parquet
 
-    hours = [task.corpus / "hours" / f"rows-{key}.parquet" for key in task.hours]
     begin = min(entry.start for entry in task.encounters) - MESSAGES_BEFORE_US
     end = max(entry.end for entry in task.encounters) + MESSAGES_AFTER_US
     devices = sorted({device for entry in task.encounters for device in entry.devices})
     filters = [("t", ">=", begin), ("t", "<=", end), ("device", "in", devices)]
-    tables = [parquet.read_table(path, filters=filters) for path in hours]
+    tables = [parquet.read_table(hour / ROWS, filters=filters) for hour in task.hours]
     by_device = _by_device([table.to_pandas() for table in tables])
     rows: list[dict[str, Any]] = []
     refused = []
@@ -114,7 +123,7 @@ def clean_found(task: CleanTask) -> None:
             refused.append(_refusal(entry.name, error, "not usable"))
             continue
         rows += [row_of(encounter, "messages", task.config) for encounter in encounters]
-    write_encounters(task.target, rows, {"refused": refused, "quality": []})
+    write_encounters(task.target, rows, refused)
 
 
 def _by_device(tables: Sequence[Any]) -> dict[int, dict[str, Any]]:
@@ -172,12 +181,14 @@ def read_one_log(task: LogTask) -> None:
         if isinstance(error, UnforeseenError) or isinstance(error.__cause__, PermissionError):
             raise
         # The log is finished until its files change.
-        account = {"refused": [_refusal(task.name, error, UNREAD_LOGS[1])], "quality": []}
-        write_encounters(task.target, [], account)
+        write_encounters(task.target, [], [_refusal(str(task.paths[0]), error, UNREAD_LOGS[1])])
         return
     source = ", ".join(path.name for path in task.paths)
     rows = [row_of(encounter, source, task.config) for encounter in result.encounters]
-    write_encounters(task.target, rows, {"refused": [], "quality": list(result.quality.lines())})
+    lines = "\n".join(result.quality.lines())
+    write_encounters(
+        task.target, rows, [{"name": str(task.paths[0]), "cause": QUALITY, "why": lines}]
+    )
 
 
 def _refusal(name: str, error: InputError, otherwise: str) -> dict[str, str]:
@@ -239,10 +250,10 @@ def _space_time_gaps(
 
 
 def write_encounters(
-    target: Path, rows: Sequence[Mapping[str, Any]], account: Mapping[str, Any]
+    target: Path, rows: Sequence[Mapping[str, Any]], notes: Sequence[Mapping[str, str]] = ()
 ) -> None:
-    """Write a table of encounters, with the account in its metadata."""
-    write_table(target, rows, COLUMNS, account=account)
+    """Write a table of encounters, with notes in its metadata."""
+    write_table(target, rows, COLUMNS, account=list(notes))
 
 
 def tables_of(corpus: Path) -> list[Path]:
@@ -260,8 +271,8 @@ def tables_of(corpus: Path) -> list[Path]:
     return tables
 
 
-def account_of(table: Path) -> dict[str, Any]:
-    """Return a table's account: the refused encounters and the quality of its log.
+def account_of(table: Path) -> list[dict[str, str]]:
+    """Return a table's notes: name, cause and why of what is left out, and the quality of its log.
 
     Raises:
         InputError: the table is damaged.
@@ -269,8 +280,8 @@ def account_of(table: Path) -> dict[str, Any]:
     from pyarrow import parquet
 
     with guarded(f"{table} cannot be read as a table"):
-        text = (parquet.read_schema(table).metadata or {}).get(b"account", b"{}").decode()
-    account: dict[str, Any] = parse_json(text, f"{table}: account", {"type": "object"})
+        text = (parquet.read_schema(table).metadata or {}).get(b"account", b"[]").decode()
+    account: list[dict[str, str]] = parse_json(text, f"{table}: account", NOTES)
     return account
 
 

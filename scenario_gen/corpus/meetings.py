@@ -58,6 +58,7 @@ SENDERS_RATIO = 1.4  # of the messages of one vehicle in a bin, from which on tw
 _SMOOTHING_S = 2.0  # messages before and after an encounter, for smoothing its ends
 MESSAGES_BEFORE_US = round(1e6 * (AROUND_CROSSING_S + _SMOOTHING_S))
 MESSAGES_AFTER_US = round(1e6 * (LONGEST_EXTENSION_S + AROUND_CROSSING_S + _SMOOTHING_S))
+MEETINGS, ROWS = "meetings.parquet", "rows.parquet"
 MAX_GAP_COUNT = 4  # bins without candidates, between which a meeting is one
 
 Columns = Mapping[str, Any]  # arrays (M,) by column
@@ -65,19 +66,24 @@ Columns = Mapping[str, Any]  # arrays (M,) by column
 
 @dataclass(frozen=True)
 class HourTask:
-    """Hours to search.
+    """An hour to search.
 
     Attributes:
-        name: of the task.
-        hours: (hour since 2004, its key, the files with this hour or a neighbour).
-        folder: where `meetings` are written.
+        hour: since 2004.
+        tables: the messages of this hour and its neighbours.
+        target: the folder to write, with the tables `MEETINGS` and `ROWS`.
         config: the parameters.
     """
 
-    name: str
-    hours: tuple[tuple[int, str, tuple[Path, ...]], ...]
-    folder: Path
+    hour: int
+    tables: tuple[Path, ...]
+    target: Path
     config: CorpusConfig
+
+    @property
+    def name(self) -> str:
+        """The task in messages."""
+        return f"hour {self.target.name}"
 
 
 def overlap(config: CorpusConfig) -> int:
@@ -90,41 +96,34 @@ def overlap(config: CorpusConfig) -> int:
     return round(seconds / MICROSECOND_S) + MESSAGES_AFTER_US
 
 
-def search_hours(task: HourTask) -> None:
-    """Write the meetings of each hour and their messages; hours with a table are finished.
+def search_hour(task: HourTask) -> None:
+    """Write the meetings of an hour, and their messages.
 
     Raises:
         InputError: the database fails.
     """
-    corpus = task.folder.parent
-    remaining = [
-        entry for entry in task.hours if not (task.folder / f"hour-{entry[1]}.parquet").exists()
-    ]
-    if not remaining:
-        return
+    corpus = task.target.parent.parent
     with database(corpus, task.config.memory, f"{task.name} of {corpus}") as base:
-        for hour, key, files in remaining:
-            with base.cursor() as cursor:  # its tables end with it
-                _search(cursor, hour, files, key, task)
+        _search(base, task)
 
 
-def _search(base: Any, hour: int, files: Sequence[Path], key: str, task: HourTask) -> None:
+def _search(base: Any, task: HourTask) -> None:
     import pyarrow as pa
     from pyarrow import parquet
 
     config = task.config
     edge = overlap(config)
-    begin, end = hour * HOUR_US - edge, (hour + 1) * HOUR_US + edge
+    begin, end = task.hour * HOUR_US - edge, (task.hour + 1) * HOUR_US + edge
     base.execute(f"""
         CREATE TEMP TABLE messages AS
         SELECT device, t, lat / {UNITS_PER_DEGREE} AS lat, lon / {UNITS_PER_DEGREE} AS lon,
                speed, heading
-        FROM {tables(files)}
+        FROM {tables(task.tables)}
         WHERE t >= {begin} AND t < {end} AND cause = 0""")
     shared = _fill_bins(base)
     pairs = _candidates(base, config)
     rows = _messages(base, "separated" if shared else "messages")
-    in_hour = _meetings_in_hour(pairs, tracks_of(rows), hour, config)
+    in_hour = _meetings_in_hour(pairs, tracks_of(rows), task.hour, config)
     schema = [
         *((name, pa.int64()) for name in ("a", "b", "start", "end")),
         *((name, pa.float64()) for name in ("gap", "distance", "travel", "lat", "lon")),
@@ -134,11 +133,11 @@ def _search(base: Any, hour: int, files: Sequence[Path], key: str, task: HourTas
     excerpt = {name: values[wanted] for name, values in rows.items()}
     for name in ("lat", "lon"):  # exactly the recorded numbers
         excerpt[name] = np.rint(excerpt[name] * UNITS_PER_DEGREE).astype(np.int32)
-    with arriving(task.folder / f"rows-{key}.parquet") as part:
-        write_messages(pa.table(excerpt).to_reader(GROUP_ROWS), part)
-    with arriving(task.folder / f"hour-{key}.parquet") as part:
+    with arriving(task.target) as folder:
+        folder.mkdir()
+        write_messages(pa.table(excerpt).to_reader(GROUP_ROWS), folder / ROWS)
         described = table.replace_schema_metadata({"shared": json.dumps(shared)})
-        parquet.write_table(described, part, compression="zstd")
+        parquet.write_table(described, folder / MEETINGS, compression="zstd")
 
 
 def _meetings_in_hour(

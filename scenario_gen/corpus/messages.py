@@ -3,12 +3,11 @@
 
 """Tables of messages -> Parquet, sorted by hour, vehicle and time.
 
-An account counts the rejected rows by cause. A task parses one byte range of a text, so a file may
-have any size. DuckDB parses the rows, and counts those that it cannot parse.
+An account counts the rows by file, cause of being left out, and hour. A task parses one byte range
+of a text, so a file may have any size. DuckDB parses the rows, and counts those that it cannot.
 """
 
-from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import asdict, dataclass
 import gzip
@@ -16,25 +15,20 @@ from hashlib import sha256
 import json
 from pathlib import Path
 import re
-from typing import Any, IO, NamedTuple
+from typing import Any, IO
 import zlib
 
 from scenario_gen.base.errors import describe, guarded, InputError, needs
-from scenario_gen.base.folders import scratch, write_text
+from scenario_gen.base.folders import scratch
 from scenario_gen.corpus.sources import MessageTable, OPTIONS
 from scenario_gen.corpus.tasks import arriving
 
 HOUR_US = 3_600_000_000
 DAY_US = 24 * HOUR_US
-# If the clocks of more rows differ, the second clock of a file has another meaning and is ignored.
-MAX_DISAGREEING_SHARE = 0.5
-MEMORY_REMEDY = (
-    "free disk space at the results, or change the parameters memory, task_rows and range_size"
-)
-FILE_DAY = re.compile(r"_(4\d{4})(?:_|\.)")
-EPOCH_DAY_INDEX = 37_987  # 2004-01-01 in the day numbers of file names
+MEMORY_REMEDY = "free disk space at the results, or change the parameters memory and range_size"
 # Causes in the order of messages.sql; a row counts under the first cause that holds.
 CAUSES = (
+    "",
     "left out: no vehicle",
     "left out: no stamp, or one outside of 2004 to 2044",
     "left out: no position, or (0, 0)",
@@ -43,9 +37,11 @@ CAUSES = (
     "left out: no vehicle's speed",
     "left out: its clocks disagree (Gentime, DSecond)",
 )
-CLOCK_CAUSE_CODE = len(CAUSES)
 NO_ROW = "left out: fields are missing, or are no numbers"
+DAMAGED = "damaged"
+OTHER_CLOCK = "kept: DSecond disagrees with Gentime in most rows of the file, and is ignored"
 SQL = Path(__file__).with_suffix(".sql").read_text(encoding="utf-8")
+ACCOUNT = "range-*.account"  # pattern of the names of accounts
 GROUP_ROWS = 122_880  # row group of a table
 # Tables store differences between rows, which are small for one vehicle in order of time.
 PARQUET_OPTIONS: dict[str, Any] = {
@@ -133,24 +129,28 @@ def database(folder: Path, memory: int, task: str, remedy: str = MEMORY_REMEDY) 
     import duckdb
 
     folder.mkdir(parents=True, exist_ok=True)
-    with scratch(folder) as spill, duckdb.connect() as connection:
-        connection.execute("SET threads = 1")
+    settings = {
+        "threads": 1,
+        "memory_limit": f"{memory}MiB",
+        "autoinstall_known_extensions": False,
+        "autoload_known_extensions": False,
+    }
+    with (
+        scratch(folder) as spill,
+        duckdb.connect(config=settings | {"temp_directory": str(spill)}) as connection,
+    ):
         connection.execute("SET TimeZone = 'UTC'")
-        connection.execute(f"SET memory_limit = '{memory}MiB'")
-        connection.execute("SET temp_directory = ?", [str(spill)])
         connection.execute("SET enable_progress_bar = false")
-        connection.execute("SET autoinstall_known_extensions = false")
-        connection.execute("SET autoload_known_extensions = false")
         with guarded(task, duckdb.Error, remedy=remedy):
             yield connection
 
 
 def parse_range(task: RangeTask) -> None:
-    """Write the rows of a range, and an account of the rejected rows by file.
+    """Write the rows of a range, and their account in a table with the suffix .account.
 
-    The account is a JSON file with the name of the table. If the database refuses a file, the
-    rows that can be decoded are parsed. The account names such a file, and a .gz with a wrong
-    checksum, which the database does not compare.
+    Its columns are file, cause ("" of rows that are kept), hour of these, rows. If the database
+    refuses a file, the rows that can be decoded are parsed. The account names such a file, and a
+    .gz with a wrong checksum, which the database does not compare.
 
     Raises:
         InputError: the database fails (no memory, a full disk).
@@ -164,19 +164,12 @@ def parse_range(task: RangeTask) -> None:
         is_packed = task.table.is_text and task.table.header < 0
         fault = _fault_of_gzip(texts[0]) if is_packed else ""
         try:
-            account, table = _parse(task, texts, temporary)
+            _parse(task, texts, temporary, fault)
         except InputError as error:
             if task.table.header >= 0 or isinstance(error.__cause__, duckdb.OutOfMemoryException):
                 raise
             texts = [_decodable(path, task.table, temporary) for path in texts]
-            account, table = _parse(task, texts, temporary)
-            fault = fault or describe(error.__cause__ or error)
-        if fault:
-            account["damaged"] = {str(path): f"{path}: {fault}" for path, _, _ in task.pieces}
-        with arriving(task.target.with_suffix(".json")) as part:
-            write_text(part, json.dumps(account, indent=1) + "\n")
-        with arriving(task.target) as part:
-            table.replace(part)
+            _parse(task, texts, temporary, fault or describe(error.__cause__ or error))
 
 
 def _fault_of_gzip(path: Path) -> str:
@@ -236,114 +229,74 @@ def _unpacked_blocks(source: IO[bytes]) -> Iterator[bytes]:
             yield unpacker.decompress(block)
 
 
-def _parse(task: RangeTask, files: Sequence[Path], folder: Path) -> tuple[dict[str, Any], Path]:
-    """Parse the pieces in files into one table with messages.sql.
-
-    Returns:
-        The account, and the table in `folder`.
+def _parse(task: RangeTask, files: Sequence[Path], folder: Path, fault: str) -> None:
+    """Parse the pieces in files into one table with messages.sql, and write its account.
 
     Raises:
         InputError: the database fails.
     """
     inputs = [str(path) for path, _, _ in task.pieces]
-    names = {}
+    names = []
     for k, (path, (source, begin, end)) in enumerate(zip(files, task.pieces, strict=True)):
         is_whole = begin == 0 and end == source.stat().st_size
         lines = path if is_whole else _extract(path, begin, end, folder / f"{k}.csv")
-        names[str(lines.absolute())] = inputs[k]
-    target = folder / "parsed.parquet"
-    with database(folder, task.memory, f"{task.name}: {', '.join(inputs)}") as base:
-        base.execute("SET VARIABLE names = ?", [list(names)])
+        names.append(str(lines.absolute()))
+    with (
+        arriving(task.target) as target,
+        arriving(task.target.with_suffix(".account")) as account,
+        database(folder, task.memory, f"{task.name}: {', '.join(inputs)}") as base,
+    ):
+        for name, value in (
+            ("names", names),
+            ("inputs", inputs),
+            ("files", [pattern_of(name) for name in names]),
+            ("causes", CAUSES),
+        ):
+            base.execute(f"SET VARIABLE {name} = ?", [value])
         base.execute("CREATE TYPE read AS ENUM (SELECT unnest(getvariable('names')))")
-        base.execute("SET VARIABLE files = ?", [[pattern_of(name) for name in names]])
         base.execute(f"CREATE VIEW source AS SELECT {task.table.columns} FROM {task.table.reader}")
         write_messages(base.sql(SQL).to_arrow_reader(GROUP_ROWS), target)
         base.execute(f"CREATE VIEW parsed AS FROM {tables([target])}")
-        counts = _counts(base)
-        unchecked = _files_with_another_clock(counts)
+        unchecked = base.execute(OTHER_CLOCKS).fetchall()
         if unchecked:
-            _accept_clocks(base, target, unchecked)
-            counts = _counts(base)
-        account = _account(counts, inputs)
+            _accept_clocks(base, target, [str(file) for (file,) in unchecked])
+        facts = [(name, f"{DAMAGED}: {fault}") for name in inputs if fault]
+        facts += [(inputs[file], OTHER_CLOCK) for (file,) in unchecked]
+        base.execute("CREATE TABLE account AS " + COUNTS)
+        for fact in facts:
+            base.execute("INSERT INTO account VALUES (?, ?, NULL, 0)", fact)
         if task.table.is_text:
-            _count_rejected(base, names, account["files"])
-    account["other_clocks"] = [inputs[file] for file in unchecked]
-    return account, target
+            base.execute(f"INSERT INTO account {REJECTED}", [NO_ROW])
+        base.execute(f"COPY account TO {quoted([str(account)])} (FORMAT parquet)")
 
 
-class _Count(NamedTuple):
-    """Rows of a file with a cause in an hour; those that run backwards, and a sum of hashes."""
-
-    file: int
-    cause: int
-    hour: int
-    rows: int
-    backwards: int
-    content: int
-
-
-def _counts(base: Any) -> list[_Count]:
-    """Return the numbers of parsed rows; the hour of rows that are left out is 0."""
-    rows = base.execute(f"""
-        SELECT file, cause, CASE WHEN cause = 0 THEN t // {HOUR_US} ELSE 0 END AS hour, count(*),
-               count(*) FILTER (back), sum(hash(device, t, lat, lon, speed, heading) >> 24)
-        FROM parsed GROUP BY file, cause, hour""").fetchall()
-    return [_Count(*row) for row in rows]
-
-
-def _account(counts: Sequence[_Count], inputs: Sequence[str]) -> dict[str, Any]:
-    """Return the rows of each input by cause, and the rows and hashes of each hour."""
-    files = {name: Counter[str]() for name in inputs}
-    hours: Counter[int] = Counter()
-    contents: Counter[int] = Counter()
-    for count in counts:
-        causes = files[inputs[count.file]]
-        causes["rows"] += count.rows
-        if count.cause:
-            causes[CAUSES[count.cause - 1]] += count.rows
-            continue
-        causes["kept: stamps that run backwards"] += count.backwards
-        hours[count.hour] += count.rows
-        contents[count.hour] += count.content
-        match = FILE_DAY.search(Path(inputs[count.file]).name)
-        if match and abs(count.hour // 24 - (int(match[1]) - EPOCH_DAY_INDEX)) > 1:
-            causes["kept: stamps of another day"] += count.rows
-    return {
-        "files": {name: dict(sorted((+causes).items())) for name, causes in sorted(files.items())},
-        "hours": {str(hour): hours[hour] for hour in sorted(hours)},
-        "contents": {str(hour): f"{contents[hour]:x}" for hour in sorted(contents)},
-    }
+# If the clocks of more than half of the rows differ, the second clock has another meaning.
+OTHER_CLOCKS = """
+    SELECT file FROM parsed WHERE cause IN (0, 7) GROUP BY file
+    HAVING avg((cause = 7)::INTEGER) > 0.5 ORDER BY file"""
+COUNTS = f"""
+    WITH counted AS (
+        SELECT getvariable('inputs')[file + 1] AS file, getvariable('causes')[cause + 1] AS cause,
+               CASE WHEN cause = 0 THEN t // {HOUR_US} END AS hour, count(*) AS rows,
+               count(*) FILTER (back AND cause = 0) AS backwards
+        FROM parsed GROUP BY ALL),
+    dated AS (  -- names of files may have their day, counted from 1899-12-30
+        SELECT *, regexp_extract(parse_filename(file), '_(4[0-9]{{4}})[_.]', 1) AS day
+        FROM counted)
+    SELECT file, cause, hour, rows FROM counted
+    UNION ALL SELECT file, 'kept: stamps that run backwards', NULL, backwards FROM counted
+    UNION ALL SELECT file, 'kept: stamps of another day', NULL, rows FROM dated
+        WHERE abs(TRY_CAST(day AS INTEGER) - 37_987 - hour // 24) > 1"""
+# A row with several errors counts once.
+REJECTED = """
+    SELECT getvariable('inputs')[list_position(getvariable('names'), file_path)], ?, NULL,
+           count(DISTINCT line)
+    FROM reject_errors JOIN reject_scans USING (scan_id, file_id) GROUP BY ALL"""
 
 
-def _count_rejected(base: Any, names: Mapping[str, str], files: dict[str, dict[str, int]]) -> None:
-    """Add the rows that the database rejected; one with several errors counts once."""
-    rejected = base.execute(
-        "SELECT file_path, count(DISTINCT line)"
-        " FROM reject_errors JOIN reject_scans USING (scan_id, file_id) GROUP BY ALL"
-    )
-    for path, count in rejected.fetchall():
-        causes = files[names[path]]
-        causes["rows"] = causes.get("rows", 0) + count
-        causes[NO_ROW] = count
-
-
-def _files_with_another_clock(counts: Sequence[_Count]) -> list[int]:
-    """Return the files in which the clocks of most rows disagree."""
-    all_rows: Counter[int] = Counter()
-    disagreeing: Counter[int] = Counter()
-    for count in counts:
-        all_rows[count.file] += count.rows * (count.cause in (0, CLOCK_CAUSE_CODE))
-        disagreeing[count.file] += count.rows * (count.cause == CLOCK_CAUSE_CODE)
-    return [
-        file
-        for file, rows in sorted(all_rows.items())
-        if disagreeing[file] > MAX_DISAGREEING_SHARE * rows
-    ]
-
-
-def _accept_clocks(base: Any, target: Path, files: Sequence[int]) -> None:
+def _accept_clocks(base: Any, target: Path, files: Sequence[str]) -> None:
     """Accept the rows with disagreeing clocks in some files."""
-    is_accepted = f"cause = {CLOCK_CAUSE_CODE} AND file IN ({', '.join(map(str, files))})"
+    is_accepted = f"cause = 7 AND file IN ({', '.join(files)})"
     cause = f"(CASE WHEN {is_accepted} THEN 0 ELSE cause END)::UTINYINT AS cause"
     rows = base.sql(f"SELECT * REPLACE ({cause}) FROM parsed")
     rewritten = target.with_name("again.parquet")

@@ -3,8 +3,8 @@
 
 """`mine`: from an archive to a corpus of encounters, in stages of tasks that write files.
 
-    messages/range-*.parquet    messages from text, by hour (`messages.py`)
-    hours/hour-*.parquet        meetings of two vehicles (`meetings.py`), and their messages
+    messages/range-*            messages from text, by hour, and their account (`messages.py`)
+    hours/HOUR-*/               meetings of two vehicles (`meetings.py`), and their messages
     encounters/*.parquet        groups of meetings (`grouping.py`), cleaned (`encounters.py`);
                                 other logs start here
 
@@ -13,15 +13,15 @@ inputs, so a changed file costs what depends on it. An unreadable file is named 
 """
 
 from collections import Counter, defaultdict
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
+from datetime import timedelta
 from itertools import chain
 import json
 from pathlib import Path
 import re
 from typing import Any
 
-from scenario_gen.base.documents import read_json
 from scenario_gen.base.errors import needs, RefusedError
 from scenario_gen.base.folders import write_text
 from scenario_gen.base.parameters import flatten
@@ -31,24 +31,35 @@ from scenario_gen.corpus.encounters import (
     clean_found,
     encounter_of,
     LogTask,
+    QUALITY,
     read_one_log,
     tables_of,
     UNREAD_LOGS,
 )
+from scenario_gen.corpus.grouping import EPOCH
 from scenario_gen.corpus.inventory import inventory
-from scenario_gen.corpus.meetings import search_hours
-from scenario_gen.corpus.messages import digest_of, identity_of, parse_range, ranges, RangeTask
+from scenario_gen.corpus.meetings import HourTask, MEETINGS, search_hour
+from scenario_gen.corpus.messages import (
+    ACCOUNT,
+    DAMAGED,
+    digest_of,
+    identity_of,
+    OTHER_CLOCK,
+    parse_range,
+    ranges,
+    RangeTask,
+)
 from scenario_gen.corpus.page import PAGE_COLUMNS, sketch, write_page
 from scenario_gen.corpus.schedule import (
-    ACCOUNT,
+    Accounts,
     accounts_of,
     clean_tasks,
     current,
     hour_tasks,
     least_rows,
-    searched_hours,
+    rows_by_hour,
 )
-from scenario_gen.corpus.tables import rows_at, rows_of
+from scenario_gen.corpus.tables import rows_of
 from scenario_gen.corpus.tasks import agree, arriving, check_out, held, spread, Task, Workers
 
 ARCHIVE, PAGE, DETAILS = "archive.json", "encounters.html", "mine.json"
@@ -58,13 +69,40 @@ LEGEND = (
 )
 DRAWN_COUNT = 10  # encounters of a kind of which the page has pictures
 LISTED_COUNT = 2000  # encounters in the table of the page
-NAMED_COUNT = 20  # failures and files that are named; the corpus contains all
-NAMED_FILES_COUNT = 5  # files that a note names
-DAMAGED = "damaged"
+NAMED_COUNT = 20  # files and findings of a kind that the page names
+NAMED_FILES_COUNT = 5  # that a line names
 LEFT_OUT = "left out"  # begins the causes of rows that are not used
+OTHERS = "files that are no logs"
+CHANGED = "files that changed or are gone since the last run"
+SPARSE = "hours that are not searched (few rows, wrong stamps?)"
+SHARED = "ids that several vehicles share"
 UNREAD = (DAMAGED, *UNREAD_LOGS)
+LAST = (CHANGED, OTHERS, OTHER_CLOCK, SPARSE, SHARED, QUALITY)  # findings below all others
 MAX_REJECTED_SHARE = 0.1  # of the rows of a file; one with more is damaged
-UNLISTED = ("memory", "task_rows")  # parameters that do not change results
+
+Note = tuple[str, str, str]
+"""Kind of a finding, name (a file, log, encounter or id), sentence."""
+
+
+@dataclass(frozen=True)
+class Finding:
+    """What else is to be said about an archive, by kind.
+
+    Attributes:
+        kind: of the finding.
+        count: number of entries.
+        entries: a sentence for each file, log, encounter or id.
+    """
+
+    kind: str
+    count: int
+    entries: dict[str, str]
+
+    def __str__(self) -> str:
+        names = ", ".join(list(self.entries)[:NAMED_FILES_COUNT])
+        more = " …" if self.count > NAMED_FILES_COUNT else ""
+        first = next(iter(self.entries.values())).strip().partition("\n")[0]
+        return f"{self.kind}: {self.count} ({names}{more}); {first}"
 
 
 @dataclass(frozen=True)
@@ -75,11 +113,10 @@ class MiningSummary:
         encounters: number of encounters in the corpus.
         kinds: number of encounters of each kind.
         read: number of tables and logs that were read, and of all.
-        account: number of rows left out, by cause.
+        account: number of rows, and of those that are left out or doubtful, by cause.
         files: the same by file, without files that have none.
-        refused: encounters and logs that are left out: name, cause (a group) and reason.
+        findings: damaged and unread files first.
         failed: a sentence for each task that failed.
-        notes: further remarks.
     """
 
     encounters: int
@@ -87,54 +124,33 @@ class MiningSummary:
     read: tuple[int, int]
     account: dict[str, int]
     files: dict[str, dict[str, int]]
-    refused: list[dict[str, str]]
+    findings: list[Finding]
     failed: list[str]
-    notes: list[str]
 
     def lines(self) -> list[str]:
-        """Return the summary for people: each cause once, with its number; damaged files first."""
-        lines = [self._first_line()]
-        if self.account:
-            causes = ", ".join(f"{count} {cause}" for cause, count in sorted(self.account.items()))
-            lines.append(f"rows: {causes} (in {len(self.files)} files)")
-        groups: dict[str, list[dict[str, str]]] = {}
-        for row in self.refused:
-            groups.setdefault(row.get("cause", "not usable"), []).append(row)
-        for cause, rows in groups.items():
-            named = _named([row["name"] for row in rows], "")
-            lines.append(f"{cause}: {named}; the first: {rows[0]['why']}")
-        if self.notes:
-            lines.append(f"notes: {len(self.notes)}; the first: {self.notes[0].strip()}")
-        if self.failed:
-            lines.append(f"failed tasks: {len(self.failed)}; the first: {self.failed[0]}")
-        return lines
-
-    def _first_line(self) -> str:
+        """Return the summary for people: each kind of finding once, the worst first."""
         kinds = ", ".join(f"{count} {kind}" for kind, count in sorted(self.kinds.items()))
-        return f"{self.encounters} encounters: {kinds or 'none'}; {self._share_read()}"
+        read = f"read: {self.read[0]} of {self.read[1]} files"
+        rows = []
+        if self.account:
+            causes = dict(self.account)
+            total = causes.pop("rows")
+            left_out = sum(n for cause, n in causes.items() if cause.startswith(LEFT_OUT))
+            read += f", {1.0 - left_out / max(total, 1):.2%} of the rows"
+            counts = (f"{count} {cause}" for cause, count in sorted(causes.items()))
+            rows.append(f"{total} rows: {', '.join(counts) or 'all sound'}")
+        failed = [f"failed tasks: {len(self.failed)}; {self.failed[0]}"] if self.failed else []
+        first = f"{self.encounters} encounters: {kinds or 'none'}; {read}"
+        return [first, *failed, *map(str, self.findings), *rows]
 
-    def _share_read(self) -> str:
-        files = f"read: {self.read[0]} of {self.read[1]} files"
-        if not self.account:
-            return files
-        left_out = sum(n for cause, n in self.account.items() if cause.startswith(LEFT_OUT))
-        return f"{files}, {1.0 - left_out / self.account['rows']:.2%} of the rows"
-
-    def details(self) -> list[str]:
-        """Return the summary with all causes and notes, for the page."""
-        lines = [self._first_line()]
-        lines += [f"{count} {cause}" for cause, count in sorted(self.account.items())]
+    def details(self) -> Iterator[str]:
+        """Yield the first files and findings of each kind, for the page."""
+        yield from self.failed[:NAMED_COUNT]
+        for finding in self.findings:
+            for name, sentence in list(finding.entries.items())[:NAMED_COUNT]:
+                yield f"{finding.kind}: {name}: {sentence}"
         for file, causes in list(self.files.items())[:NAMED_COUNT]:
-            lines.append(f"{file}: " + ", ".join(f"{n} {cause}" for cause, n in causes.items()))
-        for row in self.refused[:NAMED_COUNT]:
-            lines.append(f"encounter {row['name']} is left out: {row['why']}")
-        for name, count in (
-            ("files", len(self.files)),
-            ("encounters left out", len(self.refused)),
-        ):
-            if count > NAMED_COUNT:
-                lines.append(f"… and {count - NAMED_COUNT} more {name}")
-        return [*lines, *self.notes, *self.failed]
+            yield f"{file}: " + ", ".join(f"{n} {cause}" for cause, n in causes.items())
 
 
 def mine(
@@ -165,31 +181,47 @@ def mine(
     messages, logs, others, unreadable = inventory(archives, config.log.columns)
     check_out(out, archives)
     with held(out), spread(workers) as run:
-        agree(out, ARCHIVE, {"format": 5, "parameters": _parameters(config)}, "corpus")
+        agree(out, ARCHIVE, {"format": 6, "parameters": _parameters(config)}, "corpus")
         log_tasks = [_log_task(paths, out / "encounters", config) for paths in logs]
         ranged = ranges(messages, out / "messages", config.range_size << 20, config.memory)
         stale = _stale_files(ranged, out)
-        done: Counter[str] = Counter()
         failed: list[str] = []
 
-        def work(name: str, function: Callable[[Task], None], tasks: Sequence[Task]) -> None:
-            done[name] += len(tasks)
+        def work(function: Callable[[Task], None], tasks: Sequence[Task]) -> None:
             failed.extend(run(function, tasks))
             if strict and failed:
                 raise RefusedError(f"{failed[0]}; without --strict it is left out")
 
-        work("logs", read_one_log, current(log_tasks, out / "encounters", "log-*"))
-        work("ranges", parse_range, current(ranged, out / "messages"))
-        accounts = accounts_of(ranged, out)
-        work("parts of hours", search_hours, hour_tasks(accounts, out, config))
-        work("tables of encounters", clean_found, clean_tasks(out, config))
+        work(read_one_log, current(log_tasks, out / "encounters", "log-*"))
+        work(parse_range, current(ranged, out / "messages"))
+        accounts = accounts_of(ranged)
+        hours = hour_tasks(accounts, out, config)
+        work(search_hour, current(hours, out / "hours"))
+        cleaning = clean_tasks(hours, out, config)
+        work(clean_found, current(cleaning, out / "encounters", "found-*"))
         contents = _contents(out)
-        notes = _notes(others, stale, done, accounts.values(), least_rows(config))
-        notes += _shared_ids(out)
+        notes = [*contents.notes]
+        notes += [(UNREAD_LOGS[1], name, why) for name, why in unreadable.items()]
+        files, faults = _by_file(chain.from_iterable(accounts.values()))
+        notes += faults
+        unread = [note for note in notes if note[0] in UNREAD]
         n_files = len(messages) + len(logs) + len(unreadable)
-        result = _summary(contents, accounts.values(), unreadable, failed, notes, n_files)
-        if strict and result.read[0] < n_files:
-            raise RefusedError(f"{result.refused[0]['why']}; without --strict it is left out")
+        notes += [(CHANGED, name, "what depends on it was done again") for name in stale]
+        notes += [(OTHERS, path.name, "unpack compressed ones") for path in others]
+        notes += _sparse_hours(accounts, least_rows(config))
+        notes += _shared_ids(hours)
+        result = MiningSummary(
+            encounters=contents.kinds.total(),
+            kinds=dict(contents.kinds),
+            read=(n_files - len(failed) - len(unread), n_files),
+            account=dict(+sum(files.values(), Counter[str]())),
+            files={file: dict(causes) for file, causes in files.items() if len(causes) > 1},
+            findings=_findings(notes),
+            failed=failed,
+        )
+        if strict and unread:
+            why = next(iter(result.findings[0].entries.values()))
+            raise RefusedError(f"{why}; without --strict it is left out")
         with arriving(out / PAGE) as part:
             _write_page(part, contents, result)
         with arriving(out / DETAILS) as part:
@@ -202,13 +234,13 @@ class _Contents:
     """The contents of the tables of encounters.
 
     Attributes:
-        accounts: of each table.
+        notes: of each table.
         kinds: number of encounters of each kind.
         listed: rows of the table on the page, the first ones.
         drawn: rows with tracks, the first ones of each kind.
     """
 
-    accounts: list[dict[str, Any]] = field(default_factory=list)
+    notes: list[Note] = field(default_factory=list)
     kinds: Counter[str] = field(default_factory=Counter)
     listed: list[dict[str, Any]] = field(default_factory=list)
     drawn: list[dict[str, Any]] = field(default_factory=list)
@@ -222,15 +254,17 @@ def _contents(out: Path) -> _Contents:
     """
     contents = _Contents()
     for table in sorted((out / "encounters").glob("*.parquet")):
-        contents.accounts.append(account_of(table))
-        drawn = []
-        for k, row in enumerate(rows_of([table], PAGE_COLUMNS)):
+        notes = ((note["cause"], note["name"], note["why"]) for note in account_of(table))
+        contents.notes.extend(notes)
+        drawn = set()
+        for row in rows_of([table], PAGE_COLUMNS):
             if len(contents.listed) < LISTED_COUNT:
                 contents.listed.append(row)
             if contents.kinds[row["kind"]] < DRAWN_COUNT:
-                drawn.append(k)
+                drawn.add(row["name"])
             contents.kinds[row["kind"]] += 1
-        contents.drawn.extend(rows_at(table, drawn))
+        if drawn:
+            contents.drawn.extend(row for row in rows_of([table]) if row["name"] in drawn)
     return contents
 
 
@@ -250,7 +284,7 @@ def _write_page(path: Path, contents: _Contents, result: MiningSummary) -> None:
     rows = [
         row | {"reactions": json.loads(row["reactions"])["sentences"]} for row in contents.listed
     ]
-    first, *rest = result.details()
+    first, *rest = [*result.lines(), *result.details()]
     if (more := result.encounters - len(rows)) > 0:
         rest = [f"{more:,} more encounters are not listed here; `find` lists all", *rest]
     write_page(path, f"{first}. {LEGEND}", rows, cards, rest)
@@ -258,8 +292,7 @@ def _write_page(path: Path, contents: _Contents, result: MiningSummary) -> None:
 
 def _parameters(config: CorpusConfig) -> dict[str, Any]:
     """Return the parameters on which results depend."""
-    parameters = {name: value for name, (_, value) in flatten(config).items()}
-    return {name: value for name, value in parameters.items() if name not in UNLISTED}
+    return {name: value for name, (_, value) in flatten(config).items() if name != "memory"}
 
 
 def _log_task(paths: list[Path], folder: Path, config: CorpusConfig) -> LogTask:
@@ -276,129 +309,76 @@ def _log_task(paths: list[Path], folder: Path, config: CorpusConfig) -> LogTask:
 def _stale_files(ranged: Sequence[RangeTask], out: Path) -> list[str]:
     """Return the files of an earlier run that have changed or are gone."""
     wanted = {task.target.stem for task in ranged}
-    accounts = (out / "messages").glob("range-*.json")
+    accounts = (out / "messages").glob(ACCOUNT)
     stale = [path for path in accounts if path.stem not in wanted]
-    names = (read_json(path, ACCOUNT)["files"] for path in stale)
-    return sorted(set(chain.from_iterable(names)))
+    return sorted({row["file"] for row in rows_of(stale, ["file"])})
 
 
-def _summary(
-    contents: _Contents,
-    accounts: Collection[Mapping[str, Any]],
-    unreadable: Mapping[str, str],
-    failed: list[str],
-    notes: list[str],
-    n_files: int,
-) -> MiningSummary:
-    """Return the summary of a corpus.
+def _by_file(
+    account: Iterable[Mapping[str, Any]],
+) -> tuple[dict[str, Counter[str]], list[Note]]:
+    """Return the rows of each file by cause, and notes on damaged files and other clocks.
 
     Args:
-        contents: the encounters.
-        accounts: of the ranges.
-        unreadable: entries of the archive that are no files, and why.
-        failed: a sentence for each failed task.
-        notes: on the archive.
-        n_files: number of tables of messages, of logs, and of unreadable entries.
+        account: rows of the tables' accounts.
     """
     files: dict[str, Counter[str]] = {}
+    notes: list[Note] = []
     damaged: dict[str, str] = {}
-    for account in accounts:
-        damaged |= account.get("damaged", {})
-        for file, causes in account["files"].items():
-            files.setdefault(file, Counter()).update(causes)
-    total = sum(files.values(), Counter[str]())
+    for row in account:
+        file, cause = row["file"], row["cause"]
+        kind, _, why = cause.partition(": ")
+        causes = files.setdefault(file, Counter())
+        causes["rows"] += row["rows"] if cause == "" or kind == LEFT_OUT else 0
+        if kind == DAMAGED:
+            damaged[file] = f"{file}: {why}"
+        elif cause == OTHER_CLOCK:
+            notes.append((OTHER_CLOCK, file, "its stamps are those of Gentime"))
+        elif cause:
+            causes[cause] += row["rows"]
     for file, causes in files.items():
-        rejected = Counter({c: count for c, count in causes.items() if c.startswith(LEFT_OUT)})
-        if rejected.total() > MAX_REJECTED_SHARE * causes["rows"]:
-            share = f"{rejected.total()} of {causes['rows']} rows"
-            damaged.setdefault(file, f"{file}: {share} {rejected.most_common(1)[0][0]}")
-    faults = {file: dict(+causes) for file, causes in files.items()}
-    for causes_of_file in faults.values():
-        causes_of_file.pop("rows", None)
-    refused = [
-        *({"name": name, "cause": UNREAD_LOGS[1], "why": why} for name, why in unreadable.items()),
-        *({"name": name, "cause": DAMAGED, "why": why} for name, why in sorted(damaged.items())),
-        *chain.from_iterable(account.get("refused", ()) for account in contents.accounts),
+        left_out = Counter({c: count for c, count in causes.items() if c.startswith(LEFT_OUT)})
+        if left_out.total() > MAX_REJECTED_SHARE * causes["rows"]:
+            share = f"{left_out.total()} of {causes['rows']} rows"
+            cause = left_out.most_common(1)[0][0]
+            damaged.setdefault(file, f"{file}: {share} {cause}")
+    notes += [(DAMAGED, file, why) for file, why in damaged.items()]
+    return {file: +causes for file, causes in sorted(files.items())}, notes
+
+
+def _findings(notes: Iterable[Note]) -> list[Finding]:
+    """Return notes by kind: unread files first, then what else is left out, then the others."""
+    by_kind: dict[str, dict[str, str]] = {}
+    for kind, name, sentence in notes:
+        by_kind.setdefault(kind, {}).setdefault(name, sentence)
+
+    def rank(kind: str) -> int:
+        if kind in UNREAD:
+            return UNREAD.index(kind)
+        return len(UNREAD) + (LAST.index(kind) + 1 if kind in LAST else 0)
+
+    return [
+        Finding(kind, len(by_kind[kind]), dict(sorted(by_kind[kind].items())))
+        for kind in sorted(by_kind, key=rank)
     ]
-    refused.sort(key=lambda row: row.get("cause") not in UNREAD)
-    n_unread = len(failed) + sum(row.get("cause") in UNREAD for row in refused)
-    quality = chain.from_iterable(account.get("quality", ()) for account in contents.accounts)
-    return MiningSummary(
-        encounters=contents.kinds.total(),
-        kinds=dict(contents.kinds),
-        read=(n_files - n_unread, n_files),
-        account=dict(+total),
-        files={file: causes for file, causes in faults.items() if causes},
-        refused=refused,
-        failed=failed,
-        notes=[*notes, *quality],
-    )
 
 
-def _notes(
-    others: Sequence[Path],
-    stale: Sequence[str],
-    done: Mapping[str, int],
-    accounts: Collection[Mapping[str, Any]],
-    least: int,
-) -> list[str]:
-    """Return notes on files and rows that were not read, and on what was done again.
-
-    Args:
-        others: files of the archive in no known format.
-        stale: files that have changed since the last run.
-        done: number of tasks of each stage in this run.
-        accounts: of the ranges.
-        least: number of rows in an hour, below which they are not searched.
-    """
-    notes = []
-    if stale:
-        tasks = ", ".join(f"{count} {name}" for name, count in done.items())
-        notes.append(
-            f"{_named(stale)} changed or are gone since the last run; done again, with what"
-            f" depends on them: {tasks}"
-        )
-    if others:
-        notes.append(
-            f"{_named([path.name for path in others])} are in no known format (unpack"
-            " compressed ones)"
-        )
-    clocks = sorted(chain.from_iterable(account["other_clocks"] for account in accounts))
-    if clocks:
-        notes.append(
-            f"{_named(clocks)}: DSecond disagrees with Gentime in most rows, and is ignored"
-        )
-    hours = chain.from_iterable(account["hours"].values() for account in accounts)
-    strays = sum(count for count in hours if count < least)
-    if strays:
-        notes.append(
-            f"{strays} rows lie in an hour of which their range of text has fewer than {least}"
-            " (wrong stamps?): not searched"
-        )
-    return notes
+def _sparse_hours(accounts: Accounts, least: int) -> Iterator[Note]:
+    """Yield the hours of which a table has fewer than `least` rows: these are not searched."""
+    for (hour, _), rows in rows_by_hour(accounts).items():
+        if rows < least:
+            yield SPARSE, f"{EPOCH + timedelta(hours=hour):%Y-%m-%d %H:00}", f"{rows} rows"
 
 
-def _named(names: Sequence[str], noun: str = " files") -> str:
-    """Return a number with its noun, and the first names."""
-    first = ", ".join(names[:NAMED_FILES_COUNT])
-    return f"{len(names)}{noun} ({first}{' …' if len(names) > NAMED_FILES_COUNT else ''})"
-
-
-def _shared_ids(out: Path) -> list[str]:
-    """Return a note if several vehicles share an id."""
+def _shared_ids(hours: Iterable[HourTask]) -> Iterator[Note]:
+    """Yield the ids that several vehicles share."""
     from pyarrow import parquet
 
-    shared: set[str] = set()
-    for table in searched_hours(out).values():
-        metadata = parquet.read_schema(table).metadata or {}
-        shared.update(json.loads(metadata.get(b"shared", b"{}")))
-    if not shared:
-        return []
-    names = ", ".join(sorted(shared)[:10])
-    return [
-        f"{len(shared)} ids are shared by several vehicles at once, and separated by place:"
-        f" {names} …"
-    ]
+    for hour in hours:
+        if hour.target.exists():
+            metadata = parquet.read_schema(hour.target / MEETINGS).metadata or {}
+            for name in json.loads(metadata.get(b"shared", b"{}")):
+                yield SHARED, name, "they are separated by place"
 
 
 __all__ = ["ARCHIVE", "DETAILS", "PAGE", "MiningSummary", "mine", "tables_of"]

@@ -75,19 +75,3 @@ def rows_of(
         if rows and (missing := set(columns or ()) - rows[0].keys()):
             raise InputError(f"{table} lacks the columns {', '.join(sorted(missing))}")
         yield from rows
-
-
-def rows_at(table: Path, numbers: Sequence[int]) -> list[dict[str, Any]]:
-    """Return the rows of a table with the given row numbers.
-
-    Raises:
-        InputError: the table is damaged, or has no such row.
-    """
-    from pyarrow import dataset
-
-    reading = guarded(f"{table} cannot be read as a table", remedy="run `mine` again")
-    with reading:
-        rows: list[dict[str, Any]] = (
-            dataset.dataset(table, format="parquet").take(list(numbers)).to_pylist()
-        )
-    return rows

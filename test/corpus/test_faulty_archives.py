@@ -3,8 +3,8 @@
 
 """A fault costs what it touches: sound rows are mined, the rest is counted and named; a mended file is parsed again alone."""
 
+from collections import Counter
 import gzip
-import json
 import os
 from pathlib import Path
 
@@ -12,7 +12,9 @@ import numpy as np
 import pytest
 
 from scenario_gen.corpus.config import CorpusConfig
-from scenario_gen.corpus.mine import mine
+from scenario_gen.corpus.mine import CHANGED, mine
+from scenario_gen.corpus.mine import UNREAD as UNREAD_KINDS
+from scenario_gen.corpus.tables import rows_of
 from scenario_gen.logs.text import SPMD_COLUMNS
 
 COUNT = 2000
@@ -69,12 +71,9 @@ def mined(tmp_path_factory):
         suffix = ".csv.gz" if data[:2] == b"\x1f\x8b" else ".csv"
         (archive / (name + suffix)).write_bytes(data)
     result = mine([archive], archive.with_name("out"))
-    kept = {}
-    for path in archive.with_name("out").glob("messages/*.json"):
-        account = json.loads(path.read_text())
-        for file, causes in account["files"].items():
-            left_out = sum(count for cause, count in causes.items() if "left out" in cause)
-            kept[Path(file).name.partition(".")[0]] = causes.get("rows", 0) - left_out
+    kept = Counter()
+    for row in rows_of(sorted(archive.with_name("out").glob("messages/*.account"))):
+        kept[Path(row["file"]).name.partition(".")[0]] += row["rows"] * (not row["cause"])
     return result, kept
 
 
@@ -83,7 +82,9 @@ def test_a_fault_costs_its_rows(mined, fault):
     result, kept = mined
     sound = FAULTS[fault][1]
     assert 0.999 * sound - 1 <= kept.get(fault, 0) <= sound and not result.failed
-    is_named = any(f"/{fault}." in row["why"] for row in result.refused)
+    unread = [finding for finding in result.findings if finding.kind in UNREAD_KINDS]
+    assert result.findings[: len(unread)] == unread
+    is_named = any(f"/{fault}." in why for one in unread for why in one.entries.values())
     assert is_named == (fault in UNREAD)
     assert result.read == (len(FAULTS) - len(UNREAD), len(FAULTS))
 
@@ -107,9 +108,8 @@ def test_a_changed_a_new_and_a_removed_file_cost_their_own_ranges(archive, tmp_p
     mended = mine([folder], out, config)
     ranges = [path for path in tables() if "range-" in path.name]
     assert len(ranges) == 5 and sum(before.get(path) == tables()[path] for path in ranges) == 4
-    assert "1 files (" in mended.notes[0] and "1 ranges" in mended.notes[0]
-    found = {path.name for path in (out / "encounters").glob("*")}
+    entries = {finding.kind: list(finding.entries) for finding in mended.findings}
+    assert entries[CHANGED] == [str(folder / "1.csv")]
     (folder / "0.csv").rename(folder / "new.csv")
     assert mine([folder], out, config).encounters == mended.encounters
-    assert {path.name for path in (out / "encounters").glob("*")} == found
     assert len(list((out / "messages").glob("*.parquet"))) == 5

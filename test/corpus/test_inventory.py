@@ -4,12 +4,14 @@
 """What lies in an archive: SPMD files, logs, bags, others; and a log without an encounter is a result."""
 
 import os
+from pathlib import Path
 import socket
 
 import pytest
 from support.source_files import ROOT
 
 from scenario_gen.base.errors import RefusedError
+from scenario_gen.corpus.encounters import QUALITY
 from scenario_gen.corpus.inventory import inventory
 from scenario_gen.corpus.mine import mine
 
@@ -59,9 +61,12 @@ def test_a_log_without_an_encounter_is_a_result_and_not_read_again(tmp_path, mon
     (logs / "notes.txt").write_text("Recorded in May.\nTwo, three, four, five words\n")
     made = mine([logs], tmp_path / "corpus")
     assert made.encounters == 1 and not made.failed
-    assert {one["name"] for one in made.refused} == {"alone", "apart", "labels", "notes"}
+    left_out = [one for one in made.findings if one.kind != QUALITY]
+    assert {Path(name).stem for one in left_out for name in one.entries} == {
+        *("alone", "apart", "labels", "notes"),
+    }
     assert "--set log.proximity=510 accepts two" in [
-        one["why"].rpartition("; ")[2] for one in made.refused
+        why.rpartition("; ")[2] for one in left_out for why in one.entries.values()
     ]
     monkeypatch.setattr(
         "scenario_gen.corpus.encounters.read_log", lambda *_: pytest.fail("it is read again")
@@ -87,8 +92,9 @@ def test_an_odd_entry_is_named_and_costs_only_itself(tmp_path):
     assert made.encounters == 1 and not made.failed
     odd = {"dangling.csv", "loop.csv", "device.csv", "folder", "fifo.csv", "fifo.db3"}
     odd |= {"socket.csv", "caf\\udce9.csv"}
-    assert {row["name"].removeprefix(f"{logs}/") for row in made.refused} == odd
-    assert all(row["name"] in row["why"] for row in made.refused)
+    (unread, _) = made.findings
+    assert {name.removeprefix(f"{logs}/") for name in unread.entries} == odd
+    assert all(name in why for name, why in unread.entries.items())
     assert made.read == (1, 1 + len(odd))
     with pytest.raises(RefusedError, match="without --strict it is left out"):
         mine([logs], tmp_path / "strict", strict=True)

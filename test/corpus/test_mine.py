@@ -4,6 +4,7 @@
 """Mining: planted encounters are found and no others, rows left out are counted, the work can be cut off anywhere."""
 
 import json
+import shutil
 
 from hypothesis import given, strategies
 import numpy as np
@@ -17,8 +18,8 @@ from scenario_gen.corpus.config import CorpusConfig
 from scenario_gen.corpus.encounters import encounter_of, tables_of
 from scenario_gen.corpus.grouping import group, grouped, label
 from scenario_gen.corpus.inventory import inventory
-from scenario_gen.corpus.messages import NO_ROW, parse_range, ranges
-from scenario_gen.corpus.mine import mine
+from scenario_gen.corpus.messages import NO_ROW, OTHER_CLOCK, parse_range, ranges
+from scenario_gen.corpus.mine import mine, SHARED
 from scenario_gen.corpus.tables import rows_of
 from scenario_gen.logs import Meeting
 from scenario_gen.logs.config import LogConfig
@@ -55,7 +56,7 @@ def test_every_row_that_is_left_out_is_counted_by_file(archive, corpus):
     assert (
         0.9 * truth["wrong_times"] <= wrong <= truth["wrong_times"]
     )  # a few agree with the other clock by chance
-    assert any("shared by several vehicles" in note for note in mined.notes)
+    assert SHARED in [finding.kind for finding in mined.findings]
     page = (corpus[0] / "encounters.html").read_text()
     assert page.count("<svg") == sum(min(n, 10) for n in mined.kinds.values())
     assert page.count("<tr><td>") == mined.encounters
@@ -102,11 +103,11 @@ def test_ranges_and_whole_files_give_the_same_rows(archive, tmp_path):
             ],
             1,
         )
-        counts = [json.loads(t.with_suffix(".json").read_text())["files"] for t in tables]
+        account = rows_of([table.with_suffix(".account") for table in tables])
         seen.append(
             (
                 rows[:, np.lexsort(rows)],
-                sum(causes["rows"] for one in counts for causes in one.values()),
+                sum(row["rows"] for row in account if not row["cause"].startswith("kept")),
             )
         )
     assert len(tables) > 5
@@ -117,8 +118,10 @@ def test_what_is_missing_is_made_again_and_the_same(archive, corpus, tmp_path):
     """As after a kill: of each stage a file is gone, and a torn one lies there."""
     out, _ = corpus
     before = {path.relative_to(out): sha256_of(path) for path in out.rglob("*.parquet")}
+    shutil.rmtree(min((out / "hours").iterdir()))
     for stage in ("messages", "hours", "encounters"):
-        sorted((out / stage).glob("*.parquet"))[0].unlink()
+        for table in sorted((out / stage).glob("*.parquet"))[:1]:
+            table.unlink()
         killed_in(out / stage)
     killed_in(out)
     mine([archive], out)
@@ -151,11 +154,19 @@ def test_a_file_that_cannot_be_read_is_said_and_does_not_end_the_others(archive,
         mined.encounters == 0
         and not mined.failed
         and mined.read == (0, 4)
-        and {"one", "wide", "packed.csv", str(tmp_path / "in" / "a.csv")}
-        == {one["name"] for one in mined.refused}
-        and "not a table" in str(mined.refused)
-        and "unpacked" in str(mined.refused)
+        and {str(file) for file in (tmp_path / "in").iterdir()}
+        == {name for finding in mined.findings[:-1] for name in finding.entries}
+        and "not a table" in str(mined.findings)
+        and "unpacked" in str(mined.findings)
     )
+    told = mined.lines()
+    assert told[1].startswith("damaged: 1 (") and "a.csv: 3 of 4 rows left out: " in told[1]
+    assert len({line.partition(":")[0] for line in told}) == len(told) == 2 + len(mined.findings)
+    details = json.loads((tmp_path / "out" / "mine.json").read_text())["findings"]
+    assert [(one["kind"], one["count"]) for one in details] == [
+        (finding.kind, len(finding.entries)) for finding in mined.findings
+    ]
+    assert details[0]["kind"] == "damaged"
     with pytest.raises(RefusedError, match="without --strict it is left out"):
         mine([tmp_path / "in"], tmp_path / "out", strict=True)
     assert mined.account == {
@@ -178,9 +189,9 @@ def test_a_second_clock_that_is_another_one_is_not_asked_and_said(archive, tmp_p
         ]
         (tmp_path / "in" / name).write_text("\n".join(map(",".join, rows)) + "\n")
     mined = mine([tmp_path / "in"], tmp_path / "out")
-    assert [
-        note for note in mined.notes if "DSecond" in note and "41000" in note
-    ] and not mined.failed
+    entries = {finding.kind: list(finding.entries) for finding in mined.findings}
+    assert len(entries[OTHER_CLOCK]) == 1 and "41000" in entries[OTHER_CLOCK][0]
+    assert not mined.failed
     off, good = (
         mined.files[str(tmp_path / "in" / name)]
         for name in ("TripStart_bsmrx_41000_p001.csv", "plain.csv")
@@ -240,7 +251,7 @@ def test_meetings_in_order_of_time_give_the_encounters_of_all(rows):
 
 
 def test_small_tasks_give_the_same_corpus(archive, corpus, tmp_path):
-    config = CorpusConfig(task_encounters=3, task_rows=10_000)
+    config = CorpusConfig(task_encounters=3)
     mine([archive], tmp_path / "out", config)
     assert len(tables_of(tmp_path / "out")) > 3
     assert list(rows_of(tables_of(tmp_path / "out"))) == list(rows_of(tables_of(corpus[0])))

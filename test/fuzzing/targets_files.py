@@ -116,7 +116,7 @@ def corpus_tables(folder: Path) -> None:
     rows = [
         row_of(read_log([bundled(case)]).encounters[0], "log", CorpusConfig()) for case in "bc"
     ]
-    write_encounters(folder / "encounters" / "log-0.parquet", rows, {"refused": [], "quality": []})
+    write_encounters(folder / "encounters" / "log-0.parquet", rows)
 
 
 def read_corpus(folder: Path) -> None:
