@@ -4,7 +4,7 @@
 """Bags of rosbag2 and ROS 1: fixes, speeds, odometry, tracked objects or encounters."""
 
 from collections import Counter
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
 from pathlib import Path
@@ -29,13 +29,11 @@ from scenario_gen.bags.vehicles import (
 )
 from scenario_gen.base.errors import InputError
 from scenario_gen.logs.bag_names import (
-    check_rates,
     child_vehicle,
     clock_doubts,
     find_owners,
     LARGE_COUNT,
     received_window,
-    stamp_factor,
     TopicClock,
     without_duplicates,
 )
@@ -62,7 +60,6 @@ from scenario_gen.logs.raw import (
 from scenario_gen.types import Encounter
 
 _CLOCK_SAMPLES_COUNT = 1_000  # messages of a topic whose stamps are compared
-_FIRST_MESSAGES_COUNT = 50  # show whether a topic has several vehicles
 _POSES = (POSE, POSE_WITH_COVARIANCE)
 READABLE_TYPES = (FIX, TWIST, ODOMETRY, TRACKS, TRACKED, *_POSES, TRANSFORMS)
 _REQUESTED_POSES = ("goal", "goal_pose", "initialpose", "clicked_point")  # not of a vehicle
@@ -253,10 +250,38 @@ def _read_streams(
     tree = _frame_tree(topics)
     transforms = {topic.name for topic in topics if topic.type == TRANSFORMS}
     topics, notes = without_duplicates(_with_positions(topics), ODOMETRY)
-    is_tracked = any(topic.type == TRACKED for topic in topics)
+    recordings, clocks, segments = _collect_all(topics, config)
+    _check_positions(label, recordings)
+    recordings, frame_notes, frame_doubts = in_one_frame(label, recordings, tree)
+    vehicles = {key: _observed(key, group) for key, group in by_vehicle(recordings).items()}
+    check_vehicles(label, len(vehicles), config)
+    doubts: list[Doubt] = []
+    if config.stamps == "header":
+        doubts = clock_doubts(clocks, is_part=bool(topics[0].part))
+    log = RawLog(
+        name=name,
+        geographic=any(topic.type == FIX for topic in topics),
+        vehicles=tuple(vehicles.values()),
+        rows=sum(len(topic.data) for topic in topics),
+        segments=tuple(segments),
+        notes=(*notes, *frame_notes, *_notes(vehicles, clocks)),
+        doubts=(*frame_doubts, *doubts),
+    )
+    return log, transforms | {topic.name for topic in topics}
+
+
+def _collect_all(
+    topics: Sequence[Topic], config: LogConfig
+) -> tuple[list[Recording], list[TopicClock], list[Segment]]:
+    """Return what topics recorded, their clocks, and the places of their rows.
+
+    Raises:
+        InputError: a message is damaged, or two topics are of one vehicle.
+    """
     owners = find_owners(topics)
-    if is_tracked and len(topics) == 2:
-        owners = ["ego" if topic.type != TRACKED else "" for topic in topics]
+    types = [topic.type for topic in topics]
+    if TRACKED in types and len(topics) == 2:
+        owners = ["" if kind == TRACKED else "ego" for kind in types]
     recordings: list[Recording] = []
     clocks: list[TopicClock] = []
     segments = []
@@ -267,37 +292,20 @@ def _read_streams(
         recordings += recorded
         clocks.append(clock)
         n_rows += len(topic.data)
-    if all(topic.type == TRANSFORMS for topic in topics):
+    if set(types) == {TRANSFORMS}:
         recordings = bodies_of(recordings)
-    _check_positions(label, recordings)
-    if topics[0].part:
-        check_rates(label, clocks, config)
-    recordings, frame_notes, frame_doubts = in_one_frame(label, recordings, tree)
-    vehicles = {key: _observed(key, group) for key, group in by_vehicle(recordings).items()}
-    check_vehicles(label, len(vehicles), config)
-    vehicles, clock_notes, doubts = _checked_clocks(vehicles, clocks, config)
-    notes += [*frame_notes, *clock_notes]
+    return recordings, clocks, segments
+
+
+def _notes(vehicles: Mapping[str, Observations], clocks: Sequence[TopicClock]) -> Iterator[str]:
+    """Yield notes on missing stamps and speeds."""
     unstamped = [clock.topic for clock in clocks if not clock.has_stamps]
     if unstamped:
-        notes.append(
-            f"{len(unstamped)} topic(s) have no header stamps; the time of reception is used: "
-            f"{', '.join(unstamped)}"
-        )
-    notes += [
-        f"vehicle {vehicle} has no speeds: derived from its positions"
-        for vehicle, observed in vehicles.items()
-        if not len(observed.speed_ns)
-    ]
-    log = RawLog(
-        name=name,
-        geographic=any(topic.type == FIX for topic in topics),
-        vehicles=tuple(vehicles.values()),
-        rows=n_rows,
-        segments=tuple(segments),
-        notes=tuple(notes),
-        doubts=(*frame_doubts, *doubts),
-    )
-    return log, transforms | {topic.name for topic in topics}
+        names = ", ".join(unstamped)
+        yield f"no header stamps, so the time of reception is used: topics {names}"
+    for name, vehicle in vehicles.items():
+        if not len(vehicle.speed_ns):
+            yield f"vehicle {name} has no speeds: derived from its positions"
 
 
 def _with_positions(topics: Sequence[Topic]) -> list[Topic]:
@@ -306,26 +314,27 @@ def _with_positions(topics: Sequence[Topic]) -> list[Topic]:
     Raises:
         InputError: positions have two types.
     """
-    kinds = {topic.type for topic in topics}
-    tracked = [topic for topic in topics if topic.type == TRACKED]
+
+    def of(*kinds: str) -> list[Topic]:
+        return [topic for topic in topics if topic.type in kinds]
+
+    tracked = of(TRACKED)
     if len(tracked) > 1:
-        raise InputError(
-            f"{topics[0].label} has {_listing_of(tracked)}; choose one with --set log.topics=…"
-        )
+        raise _ambiguous(tracked, tracked[:1])
     if tracked:
-        kind = ODOMETRY if ODOMETRY in kinds else POSE
-        return [topic for topic in topics if topic.type in (TRACKED, kind)]
-    if not kinds & {FIX, TWIST, ODOMETRY, *_POSES}:
-        return list(topics)
-    fixes = [topic.name for topic in topics if topic.type == FIX]
-    others = [topic for topic in topics if topic.type in (ODOMETRY, *_POSES)]
-    if fixes and others:
-        used = ",".join(topic.name for topic in topics if topic.type in (FIX, TWIST))
-        raise InputError(
-            f"{topics[0].label} has both {FIX} and {others[0].type} ({_listing_of(topics)}); "
-            f"choose with --set log.topics={used}"
-        )
-    return [topic for topic in topics if topic.type != TRANSFORMS]
+        return of(TRACKED, ODOMETRY if of(ODOMETRY) else POSE)
+    if of(FIX) and of(ODOMETRY, *_POSES):
+        raise _ambiguous(topics, of(FIX, TWIST))
+    return of(FIX, TWIST, ODOMETRY, *_POSES) or list(topics)
+
+
+def _ambiguous(topics: Sequence[Topic], usable: Sequence[Topic]) -> InputError:
+    """Return the error on topics that cannot be read together, with those that can."""
+    names = ",".join(topic.name for topic in usable)
+    return InputError(
+        f"{topics[0].label} has several kinds of positions ({_listing_of(topics)}); choose "
+        f"with --set log.topics={names}"
+    )
 
 
 def _frame_tree(topics: Sequence[Topic]) -> FrameTree:
@@ -364,27 +373,6 @@ def _observed(name: str, recordings: Sequence[Recording]) -> Observations:
     )
 
 
-def _checked_clocks(
-    vehicles: dict[str, Observations], clocks: Sequence[TopicClock], config: LogConfig
-) -> tuple[dict[str, Observations], list[str], list[Doubt]]:
-    """Return the vehicles with stamps in seconds, notes, and doubts if clocks differ."""
-    if config.stamps != "header":
-        return vehicles, [], []
-    factor = stamp_factor(clocks)
-    if factor == 1.0:
-        return vehicles, [], clock_doubts(clocks)
-    scaled = {
-        name: replace(
-            vehicle,
-            fix_ns=np.round(vehicle.fix_ns * factor).astype(np.int64),
-            speed_ns=np.round(vehicle.speed_ns * factor).astype(np.int64),
-        )
-        for name, vehicle in vehicles.items()
-    }
-    note = f"header stamps advance {1 / factor:g} times too fast: they are scaled"
-    return scaled, [note], []
-
-
 def _check_positions(label: str, recordings: Sequence[Recording]) -> None:
     """Check that each vehicle with speeds has positions.
 
@@ -410,7 +398,7 @@ def _collect(
 
     Args:
         topic: the messages.
-        owner: the vehicle, if all messages have one child frame; else child frames name vehicles.
+        owner: the vehicle, if all messages have one child frame; else these name vehicles.
         first_row: number of rows of other topics.
         config: chooses stamps.
 
@@ -421,35 +409,23 @@ def _collect(
         InputError: a message is damaged.
     """
     stride = max(len(topic.data) // _CLOCK_SAMPLES_COUNT, 1)
-    clock = TopicClock(topic.name, owner or topic.name, stride)
-    uses_header = config.stamps == "header"
+    clock = TopicClock(topic.name, owner or topic.name, config.stamps == "header", stride)
     collected = Recordings(topic.name, topic.type)
-    by_child = topic.type == TRANSFORMS or _has_several_children(topic)
     for number, (received_ns, data) in enumerate(zip(topic.stamps, topic.data, strict=True)):
         row = first_row + number
         place = topic.where(number + 1)
         if topic.type == TRACKED:
             header_ns, frame, objects = decode_tracked(data, place)
-            clock.add(number, header_ns, received_ns)
-            stamp_ns = header_ns if header_ns and uses_header else received_ns
+            stamp_ns = clock.add(number, header_ns, received_ns)
             collected.add_objects(objects, frame, stamp_ns, row)
         else:
             for sample in decode_samples(data, topic.type, place):
-                clock.add(number, sample.stamp_ns, received_ns)
-                name = child_vehicle(sample.child) if by_child else owner
-                stamp_ns = sample.stamp_ns if sample.stamp_ns and uses_header else received_ns
-                collected.add_sample(sample, name, stamp_ns, row)
+                stamp_ns = clock.add(number, sample.stamp_ns, received_ns)
+                collected.add_sample(sample, child_vehicle(sample.child), stamp_ns, row)
         topic.data[number] = b""  # bounds the memory
+    if topic.type not in (TRACKED, TRANSFORMS):
+        collected.rename_only(owner)
     return list(collected.by_vehicle_and_frame.values()), clock
-
-
-def _has_several_children(topic: Topic) -> bool:
-    """Return whether the first odometries of a topic are those of several body frames."""
-    if topic.type != ODOMETRY:
-        return False
-    first = enumerate(topic.data[:_FIRST_MESSAGES_COUNT], 1)
-    samples = [s for k, data in first for s in decode_samples(data, topic.type, topic.where(k))]
-    return len({sample.child for sample in samples}) > 1
 
 
 def _read_encounters(topics: Sequence[Topic], name: str) -> RawLog:

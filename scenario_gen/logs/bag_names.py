@@ -135,8 +135,7 @@ _MAX_CLOCK_DIFFERENCE_S = 1.0  # above, the reading stops
 _MAX_RATE_ERROR_RATIO = 0.01
 _MAX_JITTER_S = 0.25  # of the latency; with more, the time of reception tells nothing
 _MIN_MESSAGES_COUNT = 5
-_SAME_RATE_RATIO = 0.1
-_STAMP_UNITS_S = (1e-3, 1e-6, 1e-9)
+_OTHER_UNIT_RATIO = 100.0  # of the rates; no simulation is so fast
 
 
 @dataclass
@@ -146,6 +145,7 @@ class TopicClock:
     Attributes:
         topic: its name.
         vehicle: its owner.
+        uses_header: whether the stamps of the headers count.
         stride: every how many messages the stamps are kept.
         header: stamps of some messages.
         received: stamps of the same messages.
@@ -154,17 +154,19 @@ class TopicClock:
 
     topic: str
     vehicle: str
+    uses_header: bool = True
     stride: int = 1
     header: list[int] = field(default_factory=list)
     received: list[int] = field(default_factory=list)
     has_stamps: bool = True
 
-    def add(self, number: int, header_ns: int, received_ns: int) -> None:
-        """Add a message by its number."""
+    def add(self, number: int, header_ns: int, received_ns: int) -> int:
+        """Add a message by its number; return the stamp that counts."""
         self.has_stamps = self.has_stamps and header_ns != 0
         if number % self.stride == 0:
             self.header.append(header_ns)
             self.received.append(received_ns)
+        return header_ns if header_ns and self.uses_header else received_ns
 
     @property
     def rate(self) -> float:
@@ -190,21 +192,11 @@ class TopicClock:
         return float(np.median(parts[0])), float(np.median(parts[1]))
 
 
-def stamp_factor(clocks: Sequence[TopicClock]) -> float:
-    """Return the factor to seconds of headers that have another unit; 1.0 if they have not."""
-    rates = np.array([clock.rate for clock in clocks])
-    if not len(rates) or not np.isfinite(rates).all():
-        return 1.0
-    for factor in _STAMP_UNITS_S:
-        if (np.abs(rates * factor - 1.0) < _SAME_RATE_RATIO).all():
-            return factor
-    return 1.0
-
-
-def clock_doubts(clocks: Sequence[TopicClock]) -> list[Doubt]:
+def clock_doubts(clocks: Sequence[TopicClock], *, is_part: bool) -> list[Doubt]:
     """Return doubts if the clocks of two topics differ, or one is not as fast as the recorder's.
 
     Latencies differ by less than .2 s; by a second, vehicles are metres away from their places.
+    A part of a large log is cut by the time of reception, so its headers must be as fast.
     """
     ahead = {clock.vehicle: clock.ahead_s() for clock in clocks}
     ahead = {name: ends for name, ends in ahead.items() if np.isfinite(ends).all()}
@@ -221,7 +213,8 @@ def clock_doubts(clocks: Sequence[TopicClock]) -> list[Doubt]:
             cause = (
                 f"clock of {clock.vehicle} runs {clock.rate:.3g} times as fast as the recorder's"
             )
-            doubts.append(replace(_clock_doubt(cause, clock.rate), stops=False))
+            doubt = _clock_doubt(cause, clock.rate)
+            doubts.append(replace(doubt, stops=is_part or clock.rate > _OTHER_UNIT_RATIO))
     return doubts
 
 
@@ -237,22 +230,6 @@ def _clock_doubt(cause: str, size: float) -> Doubt:
         "--set log.stamps=received uses the recorder's clock",
         stops=size >= _MAX_CLOCK_DIFFERENCE_S,
     )
-
-
-def check_rates(label: str, clocks: Sequence[TopicClock], config: LogConfig) -> None:
-    """Check that a window of the time of reception is one of the headers' time.
-
-    Raises:
-        InputError: the clocks of the headers are slower or faster.
-    """
-    if config.stamps == "header" and any(
-        abs(clock.rate - 1.0) > _SAME_RATE_RATIO for clock in clocks
-    ):
-        raise InputError(
-            f"{label}: the clock of the headers is not as fast as that of the recorder, so a "
-            "window of a large bag cannot be read by the headers: --set log.stamps=received uses "
-            "the recorder's clock"
-        )
 
 
 def received_window(

@@ -1,18 +1,20 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The clock of a log: stamps before 1970, and clocks that are set back or restart while recording.
+"""The clock of a log: counters that begin again, clocks that are set back, stamps before 1970.
 
 The order of the rows shows when a clock is set back: stamps restart while the vehicle drives on,
 so sorting them would put two motions into one time. The rows after such a step are moved to a
-later time, after a gap, so that no encounter spans it.
+later time, after a gap, so that no encounter spans it. A counter that begins again is continued.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+import pandas as pd
 
+from scenario_gen.base.errors import InputError
 from scenario_gen.logs.config import LogConfig
 from scenario_gen.logs.geodesy import on_sphere
 from scenario_gen.logs.raw import Observations, RawLog
@@ -29,7 +31,6 @@ _COUNTERS_NS = (  # of 16 and 32 bits in ms, µs and ns; a minute, an hour, a da
     3_600 * _S_TO_NS,
     86_400 * _S_TO_NS,
 )
-_SAME_STEP_NS = 2_000_000_000  # steps of two vehicles that are this near are the same
 
 
 @dataclass(frozen=True)
@@ -47,8 +48,6 @@ class StepLimits:
             drives on and its clock does not.
         replay_share: share of the time before a step that is recorded again, as a new scene.
         min_replay_m: distance of a second drive from the first; nearer rows are copies.
-        shared_share: share of the parts between steps in which several vehicles are recorded, if
-            the rows are sorted by time.
     """
 
     min_row_count: int = 5
@@ -60,7 +59,6 @@ class StepLimits:
     continuation_share: float = 0.5
     replay_share: float = 0.5
     min_replay_m: float = 0.01
-    shared_share: float = 0.5
 
 
 _STEP = StepLimits()
@@ -68,17 +66,19 @@ _STEP = StepLimits()
 
 @dataclass(frozen=True)
 class _ClockStep:
-    """The stamps [ns] before and after a step of the clock, and the rows of the log around it."""
+    """A step of the clock between two rows of the log.
+
+    Attributes:
+        before, after: stamps [ns].
+        previous_row, row: of the log.
+        period: of a counter that begins again [ns]; 0: the clock was set back.
+    """
 
     before: int
     after: int
     previous_row: int
     row: int
-
-    def matches(self, before: int, after: int) -> bool:
-        """Return whether two stamps belong to this step."""
-        near_before = abs(before - self.before) < _SAME_STEP_NS
-        return near_before and abs(after - self.after) < _SAME_STEP_NS
+    period: int
 
 
 def is_out_of_range(stamps: Ints) -> Bools:
@@ -87,22 +87,30 @@ def is_out_of_range(stamps: Ints) -> Bools:
 
 
 def retimed(log: RawLog, config: LogConfig) -> tuple[RawLog, list[str]]:
-    """Return the log on a clock that increases, from 1970 on; and notes on what was shifted."""
-    log, notes = _unwrapped(log)
-    by_vehicle = [_vehicle_steps(vehicle, log) for vehicle in log.vehicles]
-    if any(by_vehicle):
-        parts = _parts_by_row(log, by_vehicle) or _parts_by_vehicle(log, by_vehicle)
-        log, n_parts = _parts_in_turn(log, parts, config)
-        steps = sorted(
-            (step for vehicle_steps in by_vehicle for step in vehicle_steps),
-            key=lambda step: step.row,
-        )
-        more = f" and {n_parts - 2} more times" if n_parts > 2 else ""
-        notes.append(
-            f"the clock steps from {steps[0].before / _S_TO_NS:.10g} to "
-            f"{steps[0].after / _S_TO_NS:.10g} s at {log.where(steps[0].row)}{more}: later rows "
-            "are read as a separate, later part"
-        )
+    """Return the log on a clock that increases, from 1970 on; and notes on what was shifted.
+
+    Raises:
+        InputError: the vehicles do not tell which of their rows follow a step of the clock.
+    """
+    notes = []
+    by_vehicle = [list(_steps_of(vehicle, log)) for vehicle in log.vehicles]
+    steps = sorted((s for steps in by_vehicle for s in steps), key=lambda step: step.row)
+    if steps:
+        parts = _parts(log, by_vehicle)
+        n_parts = 1 + max(int(part.max(initial=0)) for pair in parts for part in pair)
+        period = steps[0].period
+        shifts = np.arange(n_parts) * period
+        note = f"the time begins again after {period / _S_TO_NS:g} s: read as one clock"
+        if not period or len({step.period for step in steps}) > 1:
+            shifts = _shifts_in_turn(log, parts, n_parts, config)
+            more = f" and {n_parts - 2} more times" if n_parts > 2 else ""
+            note = (
+                f"the clock steps from {steps[0].before / _S_TO_NS:.10g} to "
+                f"{steps[0].after / _S_TO_NS:.10g} s at {log.where(steps[0].row)}{more}: later "
+                "rows are read as a separate, later part"
+            )
+        log = _shifted(log, [(shifts[fixes], shifts[speeds]) for fixes, speeds in parts])
+        notes.append(note)
     stamps = np.concatenate([vehicle.fix_ns for vehicle in log.vehicles] or [np.zeros(0, int)])
     first_ns = int(stamps[~is_out_of_range(stamps)].min(initial=0))
     if first_ns < 0:
@@ -111,28 +119,6 @@ def retimed(log: RawLog, config: LogConfig) -> tuple[RawLog, list[str]]:
         log = _shifted(log, [(shift, shift)] * len(log.vehicles))
         notes.append(f"times begin before 1970, or before an event: {seconds} s are added to all")
     return log, notes
-
-
-def _unwrapped(log: RawLog) -> tuple[RawLog, list[str]]:
-    """Return a log whose counter of time, or time of day, begins again, as one that grows."""
-    steps = [np.diff(vehicle.fix_ns) for vehicle in log.vehicles if len(vehicle.fix_ns) > 2]
-    backward = np.concatenate([step[step < 0] for step in steps] or [np.zeros(0, int)])
-    forward = np.concatenate([step[step > 0] for step in steps] or [np.zeros(0, int)])
-    if not len(backward) or not len(forward):
-        return log, []
-    usual_ns = 2.0 * float(np.median(forward))
-    for period_ns in _COUNTERS_NS:
-        is_wrap = (backward + period_ns > 0) & (backward + period_ns <= usual_ns)
-        if not is_wrap.all():
-            continue
-
-        def shifts(stamps: Ints, period_ns: int = period_ns) -> Ints:
-            turns = np.concatenate([[0], np.cumsum(np.diff(stamps) < -period_ns // 2)])
-            return np.asarray(turns[: len(stamps)] * period_ns)
-
-        log = _shifted(log, [(shifts(v.fix_ns), shifts(v.speed_ns)) for v in log.vehicles])
-        return log, [f"the time begins again after {period_ns / _S_TO_NS:g} s: read as one clock"]
-    return log, []
 
 
 def _shifted(log: RawLog, shifts: Sequence[tuple[Ints, Ints]]) -> RawLog:
@@ -152,23 +138,34 @@ def _shifted(log: RawLog, shifts: Sequence[tuple[Ints, Ints]]) -> RawLog:
     return replace(log, vehicles=vehicles)
 
 
-def _vehicle_steps(vehicle: Observations, log: RawLog) -> list[_ClockStep]:
-    """Return where a vehicle's stamps go back while it is not where it was at those stamps."""
+def _steps_of(vehicle: Observations, log: RawLog) -> Iterator[_ClockStep]:
+    """Yield where a vehicle's stamps go back while it is not where it was at those stamps."""
     valid = np.isfinite(vehicle.fix).all(axis=1) & ~is_out_of_range(vehicle.fix_ns)
     stamps = vehicle.fix_ns[valid]
-    rows = vehicle.fix_row[valid]
+    rows = vehicle.fix_row[valid].tolist()
     places = on_sphere(vehicle.fix[valid]) if log.geographic else vehicle.fix[valid]
-    backward = _backward_rows(stamps)
-    edges = np.concatenate([[0], backward, [len(stamps)]]).tolist()
-    steps = []
+    steps = np.diff(stamps)
+    counts_repeats = (steps == 0).sum() <= _STEP.max_standing_count
+    backward = np.flatnonzero((steps < 0) | ((steps == 0) & counts_repeats)) + 1
+    edges = [0, *backward.tolist(), len(stamps)]
     for begin, row, end in zip(edges, edges[1:], edges[2:], strict=False):
         is_long = min(row - begin, end - row) >= _STEP.min_row_count
-        if not is_long or log.segment(int(rows[row])) != log.segment(int(rows[row - 1])):
+        if not is_long or log.segment(rows[row]) != log.segment(rows[row - 1]):
             continue
-        if _is_clock_step(stamps[begin:end], places[begin:end], row - begin, np.diff(stamps)):
-            before, after = int(stamps[row - 1]), int(stamps[row])
-            steps.append(_ClockStep(before, after, int(rows[row - 1]), int(rows[row])))
-    return steps
+        period = _period_of(stamps, int(steps[row - 1]))
+        part = slice(begin, end)
+        if period or _is_clock_step(stamps[part], places[part], row - begin, steps):
+            before, after = stamps[row - 1 : row + 1].tolist()
+            yield _ClockStep(before, after, rows[row - 1], rows[row], period)
+
+
+def _period_of(stamps: Ints, step: int) -> int:
+    """Return the period [ns] of the counter that begins again with a step [ns]; 0: none does."""
+    longest = 2.0 * float(np.median(np.abs(np.diff(stamps))))
+    for period in _COUNTERS_NS:
+        if 0 < step + period <= longest and stamps.min() >= 0 and stamps.max() < period:
+            return period
+    return 0
 
 
 def _is_clock_step(stamps: Ints, places: Floats, row: int, all_steps: Ints) -> bool:
@@ -203,14 +200,6 @@ def _is_clock_step(stamps: Ints, places: Floats, row: int, all_steps: Ints) -> b
     return distance > _STEP.min_distance_m / 4.0 and drives_on
 
 
-def _backward_rows(stamps: Ints) -> Ints:
-    """Return the rows whose stamps go back, or repeat if few do, in stamps (T,)."""
-    step = np.diff(stamps)
-    repeats = step == 0
-    counts_repeats = repeats.sum() <= _STEP.max_standing_count
-    return np.flatnonzero((step < 0) | (repeats & counts_repeats)) + 1
-
-
 def _interpolate(stamps: Ints, places: Floats, wanted: Ints) -> Floats:
     """Return the places (K, D) of a vehicle at stamps (K,) [ns]."""
     seconds = (stamps - stamps[0]) / _S_TO_NS
@@ -222,97 +211,61 @@ _Parts = list[tuple[Ints, Ints]]
 """Numbers of the parts between steps, for the fixes and the speeds of each vehicle."""
 
 
-def _parts_by_row(log: RawLog, by_vehicle: Sequence[Sequence[_ClockStep]]) -> _Parts | None:
-    """Return the parts if the log is sorted by time between steps of a common clock, else None.
+def _parts(log: RawLog, by_vehicle: Sequence[Sequence[_ClockStep]]) -> _Parts:
+    """Return the parts: by the rows of a log that is sorted by time, else by each vehicle's steps.
 
-    A step is then a row, for all vehicles, wherever each of them is recorded next.
+    Raises:
+        InputError: it is not sorted, and not every vehicle shows every step.
     """
+    steps = [step for vehicle_steps in by_vehicle for step in vehicle_steps]
     rows = np.concatenate([vehicle.fix_row for vehicle in log.vehicles])
     stamps = np.concatenate([vehicle.fix_ns for vehicle in log.vehicles])
-    owner = np.repeat(
-        np.arange(len(log.vehicles)), [len(vehicle.fix_row) for vehicle in log.vehicles]
-    )
     order = np.argsort(rows, kind="stable")
-    steps = [step for vehicle_steps in by_vehicle for step in vehicle_steps]
+    order = order[~is_out_of_range(stamps[order])]
     least_ns = min(step.before - step.after for step in steps) / 2
-    backward = np.flatnonzero(np.diff(stamps[order]) < -max(least_ns, 0)) + 1
-    part = np.searchsorted(backward, np.arange(len(order)), side="right")
-    pairs = np.unique(np.column_stack([part, owner[order]]), axis=0)
-    n_vehicles = np.bincount(pairs[:, 0])
-    if (n_vehicles > 1).mean() < _STEP.shared_share:
-        return None
-    edges = rows[order][backward]
-    is_step = np.zeros(len(edges), dtype=bool)
-    for step in steps:
-        first, last = np.searchsorted(edges, (step.previous_row, step.row), side="right")
-        if first == last:
-            return None
-        is_step[first:last] = True
-    starts = edges[is_step]
+    edges = rows[order][1:][np.diff(stamps[order]) < -least_ns]
+    between = [(step.previous_row, step.row) for step in steps]
+    first, last = np.searchsorted(edges, between, side="right").T
+    is_sorted = (last - first <= 1).all() and len(edges) <= len(set(first.tolist()))
+    by_own_steps = [[step.row for step in vehicle_steps] for vehicle_steps in by_vehicle]
+    starts = by_own_steps
+    if is_sorted:
+        starts = [edges.tolist() or max(by_own_steps, key=len)] * len(log.vehicles)
+    elif len(set(map(len, starts))) > 1:
+        raise InputError(
+            f"{log.where(steps[0].row)}: the clock steps back, but not for every vehicle; cut "
+            "the log there, or keep its rows in the order in which they were recorded"
+        )
     return [
         (
-            np.searchsorted(starts, vehicle.fix_row, side="right"),
-            np.searchsorted(starts, vehicle.speed_row, side="right"),
+            np.searchsorted(start, vehicle.fix_row, side="right"),
+            np.searchsorted(start, vehicle.speed_row, side="right"),
         )
-        for vehicle in log.vehicles
+        for start, vehicle in zip(starts, log.vehicles, strict=True)
     ]
 
 
-def _parts_by_vehicle(log: RawLog, by_vehicle: Sequence[Sequence[_ClockStep]]) -> _Parts:
-    """Return the parts if each vehicle has rows of its own: its steps are counted.
+def _shifts_in_turn(log: RawLog, parts: _Parts, n_parts: int, config: LogConfig) -> Ints:
+    """Return how far [ns] each part is moved, so that more than a bridged gap precedes it."""
+    part = np.concatenate([fixes for fixes, _ in parts])
+    stamps = np.concatenate([vehicle.fix_ns for vehicle in log.vehicles])
+    valid = ~is_out_of_range(stamps)
+    spans = pd.Series(stamps[valid]).groupby(part[valid]).agg(["min", "max"])
+    shifts = in_turn(spans, round((2.5 * config.longest_gap + 15.0) * _S_TO_NS))
+    return np.asarray(shifts.reindex(range(n_parts), method="ffill", fill_value=0))
 
-    A vehicle whose stamps show none of the steps is divided by the rows of the steps.
+
+def in_turn(spans: pd.DataFrame, gap_ns: int) -> "pd.Series[int]":
+    """Return by how many whole seconds [ns] spans are moved, so that each follows the last one.
+
+    Args:
+        spans: their first and last stamps [ns], in columns min and max.
+        gap_ns: between two of them, at least.
     """
-    steps = sorted(
-        (step for vehicle_steps in by_vehicle for step in vehicle_steps), key=lambda step: step.row
-    )
-    distinct: list[_ClockStep] = []
-    for step in steps:
-        if not any(known.matches(step.before, step.after) for known in distinct):
-            distinct.append(step)
-    rows = [step.row for step in distinct]
-
-    def part_of(stamps: Ints, row: Ints) -> Ints:
-        starts = [
-            k
-            for k in _backward_rows(stamps).tolist()
-            if any(step.matches(int(stamps[k - 1]), int(stamps[k])) for step in distinct)
-        ]
-        if starts:
-            return np.searchsorted(starts, np.arange(len(stamps)), side="right")
-        return np.searchsorted(rows, row, side="right")
-
-    return [
-        (
-            part_of(vehicle.fix_ns, vehicle.fix_row),
-            part_of(vehicle.speed_ns, vehicle.speed_row),
-        )
-        for vehicle in log.vehicles
-    ]
-
-
-def _parts_in_turn(log: RawLog, parts: _Parts, config: LogConfig) -> tuple[RawLog, int]:
-    """Return the log with each part moved later, by more than a bridged gap; and their number."""
-    gap_ns = round((2.5 * config.longest_gap + 15.0) * _S_TO_NS)
-    n_parts = 1 + max(int(fixes.max(initial=0)) for fixes, _ in parts)
-    n_parts = max(n_parts, 1 + max(int(speeds.max(initial=0)) for _, speeds in parts))
-    firsts = np.full(n_parts, np.iinfo(np.int64).max)
-    lasts = np.full(n_parts, np.iinfo(np.int64).min)
-    for vehicle, (part, _) in zip(log.vehicles, parts, strict=True):
-        valid = ~is_out_of_range(vehicle.fix_ns)
-        np.minimum.at(firsts, part[valid], vehicle.fix_ns[valid])
-        np.maximum.at(lasts, part[valid], vehicle.fix_ns[valid])
     shifts = [0]
-    last_ns: int | None = None
-    for k, (first, last) in enumerate(zip(firsts.tolist(), lasts.tolist(), strict=True)):
-        if k:
-            shifts.append(shifts[-1])
-        if first > last:
-            continue  # no fix is in this part
-        if last_ns is not None:
-            lag_ns = last_ns + gap_ns - first
-            whole_seconds = -(-lag_ns // _S_TO_NS)
-            shifts[-1] = whole_seconds * _S_TO_NS if lag_ns > 0 else shifts[-1]
-        last_ns = last + shifts[-1]
-    by_part = np.array(shifts)
-    return _shifted(log, [(by_part[fixes], by_part[speeds]) for fixes, speeds in parts]), n_parts
+    end = int(spans["max"].iloc[0])
+    for first, last in spans.iloc[1:][["min", "max"]].to_numpy().tolist():
+        lag = end + gap_ns - first
+        shifts.append(-(-lag // _S_TO_NS) * _S_TO_NS if lag > 0 else shifts[-1])
+        end = last + shifts[-1]
+    return pd.Series(shifts, index=spans.index)

@@ -84,7 +84,7 @@ class Change:
     """Another reading of some columns.
 
     Attributes:
-        text: the reading, for people.
+        text: the reading, for people, as a clause.
         columns: as in the parameter `columns`, by quantity.
         convert: applies it to a vehicle.
         is_unit: whether only units change; else the order of columns.
@@ -181,7 +181,7 @@ class Reading:
     def is_assumed(self, *quantities: str) -> bool:
         """Return whether neither the names of columns nor the parameter name their units."""
         columns = [self.log.columns.get(quantity) for quantity in quantities]
-        return all(column is not None and not column.unit for column in columns)
+        return bool(columns) and all(column and not column.unit for column in columns)
 
     def has(self, *quantities: str) -> bool:
         """Return whether the log is a table with columns of all quantities."""
@@ -217,6 +217,30 @@ class Reading:
         """Read every vehicle so."""
         self.changes |= change.columns
         self.log = replace(self.log, vehicles=tuple(map(change.convert, self.log.vehicles)))
+
+    def settle(
+        self,
+        quantity: Quantity,
+        size: float,
+        fact: str,
+        changes: Sequence[Change],
+        *,
+        stops: bool = True,
+    ) -> None:
+        """Use the only change to a unit that nothing names, and note it; else add a doubt."""
+        options = [
+            f"{each.text}: {self.option(**each.columns)}" if each.columns else each.text
+            for each in changes
+        ]
+        units = [each.is_unit and self.is_assumed(*each.columns) for each in changes]
+        if sum(units) == 1:
+            used = units.index(True)
+            self.apply(changes[used])
+            text = f"{fact}, so it is assumed that {options.pop(used)}"
+            self.notes.append(", or if ".join([text, *options]))
+        else:
+            cause = f"{fact}; it fits if {' or if '.join(options)}"
+            self.doubt(quantity, size, cause, stops=stops)
 
     def tried(self) -> Sequence[Observations]:
         """Return the vehicles with which a reading is tried."""
@@ -274,11 +298,6 @@ def with_fix(change: Callable[[Floats], Floats]) -> Convert:
 def with_heading(change: Callable[[Floats], Floats]) -> Convert:
     """Return the conversion of headings (F,)."""
     return lambda vehicle: replace(vehicle, heading=change(vehicle.heading))
-
-
-def both(first: Convert, second: Convert) -> Convert:
-    """Return two conversions in turn."""
-    return lambda vehicle: second(first(vehicle))
 
 
 def swapped_fix(fix: Floats) -> Floats:

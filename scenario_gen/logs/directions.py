@@ -3,15 +3,12 @@
 
 """Directions of a vehicle: its headings and velocities against its displacements."""
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
-from itertools import product
+from collections.abc import Callable, Iterator
+from dataclasses import replace
 
 import numpy as np
 
-from scenario_gen.logs.columns import with_columns
 from scenario_gen.logs.comparison import (
-    both,
     Change,
     Comparison,
     Convert,
@@ -22,125 +19,117 @@ from scenario_gen.logs.comparison import (
     with_heading,
 )
 from scenario_gen.logs.quality import Quantity
+from scenario_gen.logs.raw import Observations
 from scenario_gen.numerics import Floats
 
-
-@dataclass(frozen=True)
-class _Heading:
-    """A convention of headings that a column may have: `convert` returns ours."""
-
-    text: str
-    unit: str
-    convert: Callable[[Floats], Floats]
-
-
 _QUARTER_RAD = float(np.pi / 2.0)
-_RECORDED = _Heading("as recorded", "", lambda h: h)
-_CONVENTIONS = (
-    _Heading("in degrees", "deg", np.radians),
-    _Heading(
-        "in degrees clockwise from north", "north_deg", lambda h: _QUARTER_RAD - np.radians(h)
+_CONVENTIONS: tuple[tuple[str, str, Callable[[Floats], Floats]], ...] = (
+    ("deg", "headings are in degrees", np.radians),
+    (
+        "north_deg",
+        "headings are in degrees clockwise from north",
+        lambda heading: _QUARTER_RAD - np.radians(heading),
     ),
-    _Heading("clockwise from north, in radians", "north_rad", lambda h: _QUARTER_RAD - h),
+    (
+        "north_rad",
+        "headings are clockwise from north, in radians",
+        lambda heading: _QUARTER_RAD - heading,
+    ),
 )
-_OTHER_HEADINGS = (
-    *_CONVENTIONS,
-    _Heading("clockwise", "", lambda h: -h),
-    _Heading("turned by 180°", "", lambda h: h + np.pi),
-)
+"""Conventions of headings that a column may have: unit, text, and conversion to ours."""
 
 
 def check_directions(reading: Reading) -> None:
     """Use the convention of headings that agrees with the positions, or doubt an axis."""
     compared = _without_body_frames(reading)
-    quantity = next((q for q in ("heading", "course") if compared.contradicts(f"{q}_off")), "")
+    names = {"heading": "headings", "course": "velocities"}
+    quantity = next((name for name in names if compared.contradicts(f"{name}_off")), "")
     if not quantity:
         return
-    shares = getattr(compared, f"{quantity}_off")
-    share = float(np.nanmean(shares))
-    name = "headings" if quantity == "heading" else "velocities"
-    fact = f"{100.0 * share:.0f} % of the recorded {name} are far off the direction of travel"
-    conventions = _CONVENTIONS if reading.is_assumed("heading") else ()
-    if quantity == "heading":
-        for heading in conventions:
-            convert = with_heading(heading.convert)
-            if _directions_agree(reading, convert):
-                swap = "" if heading.unit != "north_rad" else _swap_hint(reading)
-                reading.apply(Change("", reading.units(heading.unit, "heading"), convert))
-                text = f"{fact}: read as {heading.text}: {reading.option()}{swap}"
-                reading.notes.append(text)
-                return
-    for (text, columns, turned), heading in product(_axes(reading), (_RECORDED, *conventions)):
-        convert = both(with_fix(turned), with_heading(heading.convert))
-        if _directions_agree(reading, convert):
-            units = reading.units(heading.unit, "heading") if heading.unit else {}
-            remedy = reading.option(**columns, **units) if columns else ""
-            remedy += _other_way(reading, quantity, columns)
-            reading.doubt(Quantity.FRAME, share, f"{fact}; they fit if {text}", remedy)
-            return
-    hints = [
-        f"; they would fit if they were {each.text}"
-        for each in _OTHER_HEADINGS
-        if quantity == "heading" and _directions_agree(reading, with_heading(each.convert))
-    ]
-    hint = hints[0] if hints else ""
-    reading.notes.append(f"{fact}; {name} that contradict it are not used{hint}")
+    share = float(np.nanmean(getattr(compared, f"{quantity}_off")))
+    fact = (
+        f"{100.0 * share:.0f} % of the recorded {names[quantity]} are far off the direction of "
+        "travel"
+    )
+    conventions = list(_conventions(reading))
+    changes = _agreeing(reading, conventions)
+    if not changes or quantity != "heading":
+        mirrors = list(_mirrors(reading))
+        axes = [mirror for mirror in mirrors if "heading" not in mirror.columns]
+        both = [_both(axis, convention) for axis in axes for convention in conventions]
+        changes = _agreeing(reading, mirrors) or _agreeing(reading, both)
+    elif changes[0].columns == reading.units("north_rad", "heading"):
+        changes += [each for each in _mirrors(reading) if each.columns.keys() == {"x", "y"}]
+    if changes:
+        reading.settle(Quantity.FRAME, share, fact, changes)
+    else:
+        reading.notes.append(f"{fact}; {names[quantity]} that contradict it are not used")
 
 
 def _without_body_frames(reading: Reading) -> Comparison:
     """Compare directions; velocities that point ahead all the time are those of a body frame."""
-    ahead = [
-        vehicle.course is not None
-        and np.nanpercentile(np.abs([0.0, *vehicle.course]), 90.0) < EVIDENCE.off_rad
-        for vehicle in reading.log.vehicles
-    ]
-    if any(ahead):
-        vehicles = [
-            replace(vehicle, course=None) if is_ahead else vehicle
-            for vehicle, is_ahead in zip(reading.log.vehicles, ahead, strict=True)
-        ]
-        reading.log = replace(reading.log, vehicles=tuple(vehicles))
+
+    def in_frame(vehicle: Observations) -> Observations:
+        angles = np.abs([0.0, *(() if vehicle.course is None else vehicle.course)])
+        is_ahead = np.nanpercentile(angles, 90.0) < EVIDENCE.off_rad
+        return replace(vehicle, course=None) if is_ahead else vehicle
+
+    vehicles = tuple(map(in_frame, reading.log.vehicles))
+    reading.log = replace(reading.log, vehicles=vehicles)
     return reading.compared()
 
 
-def _directions_agree(reading: Reading, convert: Convert) -> bool:
-    compared = reading.compared(convert)
-    return not (compared.contradicts("heading_off") or compared.contradicts("course_off"))
+def _agreeing(reading: Reading, changes: list[Change]) -> list[Change]:
+    """Return the changes with which all directions agree."""
+    agreeing = []
+    for change in changes:
+        compared = reading.compared(change.convert)
+        if not (compared.contradicts("heading_off") or compared.contradicts("course_off")):
+            agreeing.append(change)
+    return agreeing
 
 
-def _axes(reading: Reading) -> list[tuple[str, dict[str, str], Callable[[Floats], Floats]]]:
-    """Return the ways in which axes may be mirrored or swapped: text, columns, and conversion."""
+def _conventions(reading: Reading) -> Iterator[Change]:
+    """Yield the conventions of headings whose unit nothing names."""
+    if reading.is_assumed("heading"):
+        for unit, text, convert in _CONVENTIONS:
+            yield Change(text, reading.units(unit, "heading"), with_heading(convert))
+
+
+def _mirrors(reading: Reading) -> Iterator[Change]:
+    """Yield the ways in which axes or directions may be mirrored or swapped."""
     first, second = ("lat", "lon") if reading.log.geographic else ("x", "y")
+    texts = {
+        "x": "x points the other way",
+        "y": "y points the other way",
+        "lat": "latitude is counted positive to the south",
+        "lon": "longitude is counted positive to the west",
+        "heading": "headings are counted clockwise",
+        "vy": "vy points the other way",
+    }
 
-    def flip(axis: int) -> Callable[[Floats], Floats]:
-        return lambda fix: fix * ((-1.0, 1.0), (1.0, -1.0))[axis]
+    def change(name: str, convert: Convert) -> Change:
+        return Change(texts[name], reading.column(name, flipped=True), convert, is_unit=False)
 
-    texts = ("x points the other way", "y points the other way")
-    if reading.log.geographic:
-        texts = (
-            "latitude is counted positive to the south",
-            "longitude is counted positive to the west",
-        )
-    return [
-        (texts[1], reading.column(second, flipped=True), flip(1)),
-        (f"{first} and {second} are swapped", reading.swapped(first, second), swapped_fix),
-        (texts[0], reading.column(first, flipped=True), flip(0)),
-    ]
-
-
-def _other_way(reading: Reading, quantity: str, columns: Mapping[str, str]) -> str:
-    """Return the option for the case that the directions, not y, are the other way round."""
-    if list(columns) != ["y"]:
-        return ""
-    other = "heading" if quantity == "heading" else "vy"
-    if not reading.has(other):
-        return ""
-    option = reading.option(**reading.column(other, flipped=True))
-    return f" (if {other}, not y, is the other way round: {option})"
+    yield change(second, with_fix(lambda fix: fix * (1.0, -1.0)))
+    swap = reading.swapped(first, second)
+    yield Change(f"{first} and {second} are swapped", swap, with_fix(swapped_fix), is_unit=False)
+    yield change(first, with_fix(lambda fix: fix * (-1.0, 1.0)))
+    if reading.has("heading"):
+        yield change("heading", with_heading(np.negative))
+    if reading.has("vy"):
+        yield change("vy", _with_other_course)
 
 
-def _swap_hint(reading: Reading) -> str:
-    if reading.log.geographic or not reading.has("x", "y"):
-        return ""
-    option = with_columns(reading.config.columns, reading.swapped("x", "y"))
-    return f", or if x and y are swapped: {option}"
+def _with_other_course(vehicle: Observations) -> Observations:
+    return replace(vehicle, course=None if vehicle.course is None else -vehicle.course)
+
+
+def _both(mirror: Change, convention: Change) -> Change:
+    """Return two changes in turn."""
+    return Change(
+        f"{mirror.text}, and {convention.text}",
+        {**mirror.columns, **convention.columns},
+        lambda vehicle: convention.convert(mirror.convert(vehicle)),
+        is_unit=False,
+    )

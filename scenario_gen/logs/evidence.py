@@ -6,11 +6,12 @@
 The displacements of a vehicle are compared with its recorded speeds, with the direction of its
 recorded velocities and with its headings. Where a pair contradicts, other readings of the columns
 are tried. The only one with which every vehicle agrees is used if it is a unit that no column
-names, and said; else it is a `Doubt` with the option for it.
+names, and said; else it is a `Doubt` with the option for it (`Reading.settle`).
 """
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
+from functools import partial
 from itertools import product
 
 import numpy as np
@@ -21,7 +22,6 @@ from scenario_gen.logs.columns import UNITS
 from scenario_gen.logs.comparison import (
     Change,
     Comparison,
-    Convert,
     counts_steps,
     EVIDENCE,
     Reading,
@@ -37,14 +37,8 @@ from scenario_gen.logs.raw import RawLog
 from scenario_gen.numerics import Floats
 
 _FRAME_RATES_HZ = (10, 12.5, 15, 20, 24, 25, 30, 29.97, 50, 60, 100)
-_SPEED_UNITS = {
-    "kmh": "speeds in km/h",
-    "mph": "speeds in mph",
-    "kn": "speeds in knots",
-    "fps": "speeds in ft/s",
-    "cmps": "speeds in cm/s",
-}
-_POSITION_UNITS = {"ft": "x, y in feet", "cm": "x, y in centimetres", "km": "x, y in kilometres"}
+_SPEED_UNITS = {"kmh": "km/h", "mph": "mph", "kn": "knots", "fps": "ft/s", "cmps": "cm/s"}
+_POSITION_UNITS = {"ft": "feet", "cm": "centimetres", "km": "kilometres"}
 _DEGREE_UNITS = ("e7", "ddmm", "min")
 _TIME_UNITS = ("ms", "us", "ns")
 _LONG_TIME_UNITS = ("min", "h", "d")
@@ -70,30 +64,25 @@ def interpret(log: RawLog, config: LogConfig) -> tuple[RawLog, list[str], list[D
 
 def _check_time_unit(reading: Reading) -> None:
     """Use the unit of times whose steps are too long for seconds; doubt too short ones."""
+    if not reading.has("time"):
+        return
     vehicles = [
         replace(v, fix_ns=np.sort(v.fix_ns[~is_out_of_range(v.fix_ns)]))
         for v in reading.log.vehicles
     ]
     period = median_period(vehicles)
-    if not reading.has("time"):
-        return
-    shortest, longest = EVIDENCE.usual_period_s
-    factors = UNITS["time"]
-    fact = f"positions are {period:g} s apart (median)"
     span = max((float(np.ptp(v.fix_ns)) * 1e-9 for v in vehicles if len(v.fix_ns)), default=0.0)
     is_short = period < EVIDENCE.fastest_period_s and span < reading.config.min_duration
-    units = _TIME_UNITS if period > EVIDENCE.slowest_period_s else _LONG_TIME_UNITS * is_short
-    for unit in units:
-        columns = reading.units(unit, "time")
-        if not shortest <= period * factors[unit] <= longest:
-            continue
-        if reading.is_assumed("time") and not is_short:
-            reading.apply(Change("", columns, scaled(time=factors[unit])))
-            reading.notes.append(f"{fact}, so the time is in {unit}: {reading.option()}")
-        elif not is_short or span * factors[unit] > reading.config.min_duration:
-            cause = f"{fact}, and the log lasts {span:g} s: the time may be in {unit}"
-            reading.doubt(Quantity.CLOCK, span, cause, reading.option(**columns))
-        return
+    shortest, longest = EVIDENCE.usual_period_s
+    fact = f"positions are {period:g} s apart (median), and the log lasts {span:g} s"
+    for unit in _TIME_UNITS if period > EVIDENCE.slowest_period_s else _LONG_TIME_UNITS * is_short:
+        factor = UNITS["time"][unit]
+        is_long = not is_short or span * factor > reading.config.min_duration
+        if shortest <= period * factor <= longest and is_long:
+            columns = reading.units(unit, "time")
+            change = Change(f"the time is in {unit}", columns, scaled(time=factor), not is_short)
+            reading.settle(Quantity.CLOCK, span, fact, [change])
+            return
 
 
 def _check_frame_rate(reading: Reading) -> None:
@@ -155,59 +144,51 @@ def _find_degrees(reading: Reading) -> None:
     fix = np.abs(fix[np.isfinite(fix).all(axis=1)])
     if not len(fix) or not reading.has("lat", "lon"):
         return
-    latitude, longitude = np.median(fix, axis=0).tolist()
-    if latitude <= 90.0 and longitude <= 180.0:
+    if _suits_globe(fix):
         if np.ptp(fix) > 0.0 and np.abs(fix * 1e4 - np.round(fix * 1e4)).max() < 1e-6:
             cause = "latitude and longitude have four decimals: places are up to 6 m off"
             reading.doubt(Quantity.POSITION, 11.0, cause, "record six decimals or more")
         return
-    if latitude <= 180.0 and longitude <= 90.0:
-        cause = f"a latitude of {latitude:g} is not on Earth: lat and lon may be swapped"
-        option = reading.option(**reading.swapped("lat", "lon"))
-        reading.doubt(Quantity.POSITION, latitude, cause, option)
+    latitude = float(np.median(fix[:, 0]))
+    fact = f"a latitude of {latitude:g} is not on Earth"
+    swap = Change(
+        "lat and lon are swapped", reading.swapped("lat", "lon"), with_fix(swapped_fix), False
+    )
+    if _suits_globe(swapped_fix(fix)):
+        reading.settle(Quantity.POSITION, latitude, fact, [swap])
         return
-    units = [unit for unit in _DEGREE_UNITS if _suits_globe(fix, unit)]
-    spreads = [reading.compared(_degrees(unit)).spread for unit in units]
-    known = [float(np.nanmax(spread)) for spread in spreads if np.isfinite(spread).any()]
-    if len(known) > 1:
-        best = int(np.argmin(known))
-        rest = min(value for k, value in enumerate(known) if k != best)
-        units = [units[best]] if rest > 2.0 * known[best] + 0.02 else units
-    if not units:
-        cause = f"latitudes such as {latitude:g} are no degrees"
-        reading.doubt(Quantity.POSITION, latitude, cause, "name their unit")
-        return
-    changes = [Change(unit, reading.units(unit, "lat", "lon"), _degrees(unit)) for unit in units]
-    options = [reading.option(**change.columns) for change in changes]
-    if not reading.is_assumed("lat", "lon"):
-        cause = f"latitudes such as {latitude:g} are no degrees"
-        reading.doubt(Quantity.POSITION, latitude, cause, " or ".join(options))
-    elif len(units) > 1:
-        cause = f"latitudes may be in {' or '.join(units)}, and no speeds tell which"
-        reading.doubt(Quantity.POSITION, latitude, cause, " or ".join(options))
-    reading.apply(changes[0])
-    text = f"latitude and longitude are read in the unit {units[0]}: {reading.option()}"
-    reading.notes.append(text)
+    changes = [
+        Change(
+            f"lat and lon are in the unit {unit}",
+            reading.units(unit, "lat", "lon"),
+            with_fix(partial(_in_degrees, unit=unit)),
+        )
+        for unit in _DEGREE_UNITS
+        if _suits_globe(_in_degrees(fix, unit))
+    ]
+    spreads = [np.nanmax([0.0, *reading.compared(c.convert).spread]) for c in changes]
+    if min(spreads, default=0.0) > 0.0:  # speeds are known
+        clear = [c for c, s in zip(changes, spreads, strict=True) if s < 2.0 * min(spreads) + 0.02]
+        changes = clear if len(clear) == 1 else changes
+    if changes:
+        reading.settle(Quantity.POSITION, latitude, fact, changes)
+    else:
+        reading.doubt(Quantity.POSITION, latitude, fact, "name the unit of lat and lon")
 
 
-def _suits_globe(fix: Floats, unit: str) -> bool:
-    """Return whether absolute latitudes and longitudes (F, 2) in a unit are on the globe."""
-    if unit == "ddmm" and (fix % 100.0 >= 60.0).any():
-        return False
-    degrees = np.median(_in_degrees(fix, unit), axis=0)
-    is_small = unit == "e7" and degrees.max() < 0.01
-    return bool((degrees <= (90.0, 180.0)).all()) and not is_small
+def _suits_globe(degrees: Floats) -> bool:
+    """Return whether most absolute latitudes and longitudes (F, 2) are on the globe, not at 0."""
+    middle = np.median(degrees, axis=0)
+    return bool((middle <= (90.0, 180.0)).all()) and bool(middle.max() > 0.01)
 
 
 def _in_degrees(values: Floats, unit: str) -> Floats:
+    """Return values (F, 2) in degrees; NaN if they cannot have the unit."""
     if unit != "ddmm":
         return values * UNITS["lat"][unit]
     degrees = np.trunc(values / 100.0)
-    return degrees + (values - 100.0 * degrees) / 60.0
-
-
-def _degrees(unit: str) -> Convert:
-    return with_fix(lambda fix: _in_degrees(fix, unit))
+    minutes = values - 100.0 * degrees
+    return degrees + (minutes / 60.0 if (np.abs(minutes) < 60.0).all() else np.nan)
 
 
 def _check_starts(reading: Reading) -> None:
@@ -254,17 +235,11 @@ def _check_speeds(reading: Reading) -> None:
     ratios = compared.ratio[is_known]
     ratio = float(np.median(ratios))
     fact = f"the recorded speeds are {ratio:.2f} times those of the positions"
-    assumed = _agreeing(reading, _speed_changes(reading, reading.is_assumed))
-    if len(assumed) == 1 and assumed[0].is_unit:
-        reading.apply(assumed[0])
-        reading.notes.append(f"{fact}: read with {assumed[0].text}: {reading.option()}")
-        return
-    named = assumed or _agreeing(reading, _speed_changes(reading, reading.has))
-    if named:
-        options = [f"{each.text}; {reading.option(**each.columns)}" for each in named]
-        positions_decide = not assumed and set(named[0].columns) == {"speed"}
-        cause = f"{fact}; they would fit with {' or with '.join(options)}"
-        reading.doubt(Quantity.SPEED, ratio, cause, stops=not positions_decide)
+    changes = _agreeing(reading, [*_frame_rates(reading), *_units(reading)])
+    if changes:
+        is_named = not any(reading.is_assumed(*change.columns) for change in changes)
+        positions_decide = is_named and set(changes[0].columns) == {"speed"}
+        reading.settle(Quantity.SPEED, ratio, fact, changes, stops=not positions_decide)
         return
     is_gross = compared.gross_off[is_known] > EVIDENCE.gross_share
     if np.log(compared.deviation[is_known]).max() < np.log(EVIDENCE.wrong_ratio):
@@ -306,7 +281,7 @@ def _extent(fix: Floats) -> float:
     return float(np.hypot(*np.ptp(known, axis=0))) if len(known) else -1.0
 
 
-def _agreeing(reading: Reading, changes: Iterator[Change]) -> list[Change]:
+def _agreeing(reading: Reading, changes: Sequence[Change]) -> list[Change]:
     """Return the changes with which the speeds of nearly all vehicles agree."""
     agreeing = []
     for change in changes:
@@ -328,57 +303,61 @@ def _distinct(changes: Sequence[Change]) -> list[Change]:
     return [each for names, each in first.items() if not any(other < names for other in first)]
 
 
-def _speed_changes(reading: Reading, may_change: Callable[..., bool]) -> Iterator[Change]:
-    """Yield the changes of units, and of the order of columns, that speeds may ask for."""
-    speed = UNITS["speed"]
-    time = reading.log.columns.get("time")
-    if may_change("time") and counts_steps(reading.log.vehicles):
-        for unit, rate in product(("", *_SPEED_UNITS), _FRAME_RATES_HZ):
-            if unit and not (reading.is_assumed("speed") and reading.is_assumed("time")):
-                continue
-            columns = reading.units(f"{rate:g}fps", "time")
-            text = f"time in frames, {rate:g} per second"
-            if unit:
-                columns |= reading.units(unit, "speed")
-                text += f", and {_SPEED_UNITS[unit]}"
-            yield Change(text, columns, scaled(time=1.0 / rate, speed=speed.get(unit, 1.0)))
-        if time is not None and time.counts_frames:
-            return
-    if may_change("speed"):
-        for unit, text in _SPEED_UNITS.items():
-            yield Change(text, reading.units(unit, "speed"), scaled(speed=speed[unit]))
-    if reading.log.geographic:
-        if reading.has("lat", "lon"):
-            swap = reading.swapped("lat", "lon")
-            yield Change("lat and lon swapped", swap, with_fix(swapped_fix), is_unit=False)
-        if may_change("lat", "lon"):
-            text = "latitude and longitude in radians"
-            yield Change(text, reading.units("rad", "lat", "lon"), with_fix(np.degrees))
-    elif may_change("x", "y"):
-        for unit, text in _POSITION_UNITS.items():
+def _frame_rates(reading: Reading) -> Iterator[Change]:
+    """Yield the rates of a time that may count frames; maybe the speeds have another unit, too."""
+    if not reading.has("time") or not counts_steps(reading.log.vehicles):
+        return
+    units = _SPEED_UNITS if reading.is_assumed("speed", "time") else {}
+    for unit, rate in product(("", *units), _FRAME_RATES_HZ):
+        columns = reading.units(f"{rate:g}fps", "time")
+        text = f"the time is in frames, {rate:g} per second"
+        if unit:
+            columns |= reading.units(unit, "speed")
+            text += f", and speeds are in {units[unit]}"
+        yield Change(text, columns, scaled(time=1.0 / rate, speed=UNITS["speed"].get(unit, 1.0)))
+
+
+def _units(reading: Reading) -> Iterator[Change]:
+    """Yield the units, and the order of columns, that speeds may ask for."""
+    if reading.has("time") and reading.log.columns["time"].counts_frames:
+        return
+    if reading.has("speed"):
+        for unit, name in _SPEED_UNITS.items():
+            columns = reading.units(unit, "speed")
+            yield Change(f"speeds are in {name}", columns, scaled(speed=UNITS["speed"][unit]))
+    if reading.has("lat", "lon"):
+        swap = reading.swapped("lat", "lon")
+        yield Change("lat and lon are swapped", swap, with_fix(swapped_fix), is_unit=False)
+        columns = reading.units("rad", "lat", "lon")
+        yield Change("lat and lon are in radians", columns, with_fix(np.degrees))
+    if reading.has("x", "y"):
+        for unit, name in _POSITION_UNITS.items():
             factor = UNITS["x"][unit]
-            yield Change(text, reading.units(unit, "x", "y"), scaled(x=factor, y=factor))
+            columns = reading.units(unit, "x", "y")
+            yield Change(f"x, y are in {name}", columns, scaled(x=factor, y=factor))
 
 
 def _check_pairs(reading: Reading, compared: Comparison) -> None:
     """Add a doubt if units of both positions and speeds explain a small, steady ratio."""
-    known = np.isfinite(compared.ratio)
-    ratios = np.log(compared.ratio[known])
-    is_steady = np.ptp(ratios) < np.log(EVIDENCE.tight_ratio) and np.nanmedian(
-        compared.spread
-    ) < np.log(EVIDENCE.tight_ratio)
+    if not reading.is_assumed("x", "y", "speed"):
+        return
+    ratios = np.log(compared.ratio[np.isfinite(compared.ratio)])
     middle = float(np.median(ratios))
-    if not is_steady or abs(middle) < np.log(EVIDENCE.same_ratio):
+    scatter = max(float(np.ptp(ratios)), float(np.nanmedian(compared.spread)))
+    if scatter > np.log(EVIDENCE.tight_ratio) or abs(middle) < np.log(EVIDENCE.same_ratio):
         return
-    if reading.log.geographic or not reading.is_assumed("x", "y", "speed"):
-        return
-    for (place, text), (unit, words) in product(_POSITION_UNITS.items(), _SPEED_UNITS.items()):
-        factor = UNITS["speed"][unit] / UNITS["x"][place]
-        if abs(middle + np.log(factor)) < np.log(EVIDENCE.exact_ratio):
-            columns = reading.units(place, "x", "y") | reading.units(unit, "speed")
-            cause = (
-                f"the recorded speeds are {np.exp(middle):.2f} times those of the positions; they "
-                f"fit with {text} and {words}"
-            )
-            reading.doubt(Quantity.SPEED, np.exp(middle), cause, reading.option(**columns))
-            return
+    pairs = [
+        Change(
+            f"x, y are in {_POSITION_UNITS[place]} and speeds in {_SPEED_UNITS[unit]}",
+            reading.units(place, "x", "y") | reading.units(unit, "speed"),
+            scaled(),
+            is_unit=False,
+        )
+        for place, unit in product(_POSITION_UNITS, _SPEED_UNITS)
+        if abs(middle + np.log(UNITS["speed"][unit] / UNITS["x"][place]))
+        < np.log(EVIDENCE.exact_ratio)
+    ]
+    if pairs:
+        ratio = float(np.exp(middle))
+        fact = f"the recorded speeds are {ratio:.2f} times those of the positions"
+        reading.settle(Quantity.SPEED, ratio, fact, pairs)

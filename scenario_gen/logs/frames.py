@@ -84,6 +84,13 @@ class Recordings:
         if sample.speed is not None:
             rows.speeds.append(Speed(stamp_ns, row, sample.speed, sample.course))
 
+    def rename_only(self, vehicle: str) -> None:
+        """Name the vehicle if there is only one."""
+        recordings = self.by_vehicle_and_frame.values()
+        if len({recording.vehicle for recording in recordings}) == 1:
+            for recording in recordings:
+                recording.vehicle = vehicle
+
     def _recording_of(self, vehicle: str, frame: str, child: str) -> Recording:
         made = Recording(vehicle, self.topic, self.type, frame, child)
         return self.by_vehicle_and_frame.setdefault((vehicle, frame), made)

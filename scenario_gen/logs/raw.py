@@ -246,13 +246,12 @@ def check_size(where: str, size: int, rows: int, config: LogConfig) -> None:
     if size > config.size_limit << 20:
         raise InputError(
             f"{where} has at least {size / 2**20:.1f} MiB after decompression (limit "
-            f"{config.size_limit} MiB): read a part of it with --set log.start=… and log.end=…, "
-            "cut the log, or raise --set log.size_limit=…"
+            f"{config.size_limit} MiB): cut the log, or raise --set log.size_limit=…"
         )
     if rows > config.row_limit:
         raise InputError(
-            f"{where} has at least {rows} rows (limit {config.row_limit}): read a part of it "
-            "with --set log.start=… and log.end=…, cut the log, or raise --set log.row_limit=…"
+            f"{where} has at least {rows} rows (limit {config.row_limit}): cut the log, "
+            "or raise --set log.row_limit=…"
         )
 
 

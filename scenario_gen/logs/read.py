@@ -80,8 +80,11 @@ class LogResult(Sequence[Encounter]):
 
     def __repr__(self) -> str:
         """Return the numbers of encounters, vehicles and doubts in a line."""
-        vehicles, doubts = len(self.quality.vehicles), len(self.doubts)
-        return f"LogResult({len(self)} encounters, {vehicles} vehicles, {doubts} doubts)"
+        vehicles = {vehicle.id for vehicle in self.quality.vehicles}
+        return (
+            f"LogResult({len(self)} encounters, {len(vehicles)} vehicles, "
+            f"{len(self.doubts)} doubts)"
+        )
 
     def to_dataframe(self) -> "DataFrame":
         """Return the tables of the encounters in one, with a column encounter."""

@@ -6,21 +6,20 @@
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pandas as pd
 
+from scenario_gen.logs.clock import in_turn
 from scenario_gen.logs.column import Column
 from scenario_gen.logs.columns import MAX_LISTED_COUNT
 from scenario_gen.logs.file_names import file_names
-from scenario_gen.numerics import Bools, Floats
 
-_MIN_SCENE_GAP_S = 60  # more than any gap that is bridged
+_MIN_SCENE_GAP_NS = 60_000_000_000  # more than any gap that is bridged
 _MIN_SCENE_GAP_ROWS_COUNT = 200  # periods of a vehicle, in whatever unit the time is
 _MIN_SHARED_SCENE_SHARE = 0.5  # of the scenes; in fewer with two vehicles, a scene is a trip
 _TRACK_GAP_NS = 10_000_000_000  # after a longer gap, an id may be given to another vehicle
-_SAME_SIZE_RATIO = 0.1  # sizes of one vehicle differ less
+_TRACK_GAP_ROWS_COUNT = 20  # the same in periods of the vehicle
 _SAME_PLACE_M = 2.0  # nearer positions at one time are those of one vehicle
 _SAME_PLACE_DEG = 2e-5
 _HEMISPHERES = {"lat": ("N", "S"), "lon": ("E", "W")}
@@ -33,21 +32,17 @@ def with_hemispheres(frame: pd.DataFrame, columns: dict[str, Column]) -> pd.Data
     Unsigned values above 180 are degrees and minutes, as receivers write them: their unit is set
     in `columns`.
     """
-    texts = [name for name in frame.columns if not pd.api.types.is_numeric_dtype(frame[name])]
-    for quantity, letters in _HEMISPHERES.items():
-        if quantity not in columns:
-            continue
-        column = columns[quantity]
-        for name in texts:
-            values = frame[name].dropna().astype(str).str.strip().str.upper()
-            if not len(values) or not values.isin(letters).all():
+    for name in frame.columns[[not pd.api.types.is_numeric_dtype(kind) for kind in frame.dtypes]]:
+        letters = {str(letter).strip().upper() for letter in frame[name].dropna().unique()}
+        for quantity, (positive, negative) in _HEMISPHERES.items():
+            if quantity not in columns or not letters or letters - {positive, negative}:
                 continue
-            degrees = pd.to_numeric(frame[column.name], errors="coerce")
-            is_negative = frame[name].astype(str).str.strip().str.upper() == letters[1]
-            frame = frame.assign(**{column.name: degrees.abs() * np.where(is_negative, -1.0, 1.0)})
-            if not column.unit and degrees.abs().median() > _MAX_DEGREES[quantity]:
+            column = columns[quantity]
+            degrees = pd.to_numeric(frame[column.name], errors="coerce").abs()
+            is_positive = frame[name].astype(str).str.strip().str.upper() == positive
+            frame = frame.assign(**{column.name: degrees.where(is_positive, -degrees)})
+            if not column.unit and degrees.median() > _MAX_DEGREES[quantity]:
                 columns[quantity] = replace(column, minutes=True, unit="ddmm")
-            break
     return frame
 
 
@@ -121,46 +116,20 @@ def apart_by_scene(frame: pd.DataFrame) -> tuple[pd.DataFrame, list[str]]:
         return frame.drop(columns="scene"), []
     steps = frame.groupby(["scene", "vehicle"], sort=False)["time"].diff()
     usual = float(steps[steps > 0].median()) if (steps > 0).any() else 0.0
-    second = 10**9
-    gap = max(_MIN_SCENE_GAP_S, round(_MIN_SCENE_GAP_ROWS_COUNT * usual / second)) * second
-    shifts: dict[Any, int] = {}
-    end = int(spans["max"].iloc[0])
-    for name, (first, last) in zip(spans.index, spans.to_numpy().tolist(), strict=True):
-        seconds = -(-(end + gap - first) // second) if shifts else 0
-        shifts[name] = seconds * second
-        end = last + shifts[name]
+    gap = max(_MIN_SCENE_GAP_NS, round(_MIN_SCENE_GAP_ROWS_COUNT * usual))
+    shifts = in_turn(spans, gap)
     shifted = frame["time"] + frame["scene"].map(shifts).astype(np.int64)
     note = f"{len(spans)} scenes that overlap in time are read one after the other"
     return frame.assign(time=shifted), [note]
 
 
 def tracks_of(group: pd.DataFrame) -> Iterator[pd.DataFrame]:
-    """Yield the rows of one id in parts between long gaps, if their sizes or types differ."""
+    """Yield the rows of one id, in parts between long gaps if its sizes or types differ."""
     labels = [name for name in ("length", "width", "kind") if name in group]
     if not any(group[name].nunique() > 1 for name in labels):
         yield group
         return
-    starts = np.abs(np.diff(group["time"].to_numpy(np.int64))) > _TRACK_GAP_NS
-    parts = np.split(np.arange(len(group)), np.flatnonzero(starts) + 1)
-    signatures = [_signature(group.iloc[rows]) for rows in parts]
-    rows = parts[0]
-    for part, before, after in zip(parts[1:], signatures, signatures[1:], strict=False):
-        if _is_same(before, after):
-            rows = np.concatenate([rows, part])
-            continue
+    steps = np.abs(np.diff(group["time"].to_numpy(np.int64)))
+    is_start = steps > max(_TRACK_GAP_NS, _TRACK_GAP_ROWS_COUNT * np.median(steps))
+    for rows in np.split(np.arange(len(group)), np.flatnonzero(is_start) + 1):
         yield group.iloc[rows]
-        rows = part
-    yield group.iloc[rows]
-
-
-def _signature(rows: pd.DataFrame) -> tuple[Floats, str]:
-    """Return the typical sizes and the most frequent type of some rows."""
-    sizes = [rows[name].median() if name in rows else np.nan for name in ("length", "width")]
-    kinds: Any = rows["kind"].mode() if "kind" in rows else ()
-    return np.array(sizes, dtype=float), str(kinds.iloc[0]) if len(kinds) else ""
-
-
-def _is_same(first: tuple[Floats, str], second: tuple[Floats, str]) -> bool:
-    ratio = np.abs(np.log(np.maximum(first[0], 1e-3) / np.maximum(second[0], 1e-3)))
-    differs: Bools = ratio > _SAME_SIZE_RATIO
-    return first[1] == second[1] and not differs.any()

@@ -42,7 +42,6 @@ from scenario_gen.logs.table_parts import (
     tracks_of,
     with_hemispheres,
 )
-from scenario_gen.logs.table_window import has_window, read_window
 from scenario_gen.logs.text import Layout, layout_of, READ_OPTIONS
 from scenario_gen.numerics import Floats
 
@@ -78,8 +77,7 @@ def read(paths: Sequence[Path], config: LogConfig) -> RawLog:
     n_read = 0
     n_bytes = 0
     for path in paths:
-        if not has_window(path, config):
-            n_bytes += path.stat().st_size
+        n_bytes += path.stat().st_size
         check_size(str(path), n_bytes, n_read, config)
         try:
             frame, columns, header_lines, names = _read_named(path, n_read, config, notes)
@@ -169,17 +167,14 @@ def _read_text_columns(
         options |= {"skiprows": layout.above + 1, "names": list(layout.names), "header": None}
     header = [str(name) for name in read_text(path, rows_before, config, **options, nrows=0)]
     seconds = _seconds_and_nanoseconds(header)
-    is_split = bool(seconds) and "time=" not in config.columns and not has_window(path, config)
+    is_split = bool(seconds) and "time=" not in config.columns
     option = f"{config.columns},time={seconds[0]}:ns" if is_split else config.columns
     columns = find_columns(header, path, option)
     # Numbers of 64 bits, or in hexadecimal, are not float64.
     texts = ("vehicle", "kind", "trailer", "scene", "date", "signal", "signal_id")
     names = [columns[quantity].name for quantity in texts if quantity in columns]
     options["dtype"] = dict.fromkeys(names, object)
-    if has_window(path, config):
-        frame = read_window(path, columns, config, options)
-    else:
-        frame = read_text(path, rows_before, config, **options)
+    frame = read_text(path, rows_before, config, **options)
     if is_split:
         whole, part = (frame[name] for name in seconds)
         frame[seconds[0]] = whole * 10**9 + part

@@ -460,11 +460,14 @@ def test_the_window_of_a_large_bag_is_that_of_the_whole_one(tmp_path, monkeypatc
     assert part.quality.rows < whole.quality.rows
 
 
-def test_stamps_in_milliseconds_are_scaled(tmp_path):
+def test_stamps_in_milliseconds_stop(tmp_path):
     lines = odometry(crossing().assign(t_s=lambda own: own.t_s * 1000.0))
     for line in lines:
         line.stamp //= 1000
-    assert read_log(write(tmp_path / "bag", lines)).encounters[0].speed.max() < 8.5
+    bag = write(tmp_path / "bag", lines)
+    with pytest.raises(DoubtError, match=r"1e\+03 times as fast.*--set log\.stamps=received"):
+        read_log(bag)
+    assert read_log(bag, stamps="received").encounters[0].speed.max() < 8.5
 
 
 def test_two_odometries_of_one_robot_are_one_vehicle(tmp_path):

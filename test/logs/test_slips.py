@@ -159,7 +159,7 @@ READ = {  # name: what is changed, columns, what is said (None: nothing), how th
     "headings in degrees": (
         lambda rows: with_headings(rows).assign(heading=lambda own: np.degrees(own.heading)),
         "",
-        "read as in degrees: --set log.columns=heading=heading:deg",
+        "it is assumed that headings are in degrees: --set log.columns=heading=heading:deg",
     ),
     "headings clockwise from north": (
         lambda rows: with_headings(rows).assign(heading=lambda own: np.pi / 2.0 - own.heading),
@@ -203,7 +203,7 @@ def test_it_is_read_as_it_was_driven(tmp_path, change, columns, said, options):
 SAID = {  # what is read, but looks otherwise
     "knots": (
         lambda rows: rows.assign(speed_mps=rows.speed_mps * 3600 / 1852),
-        "knots; --set log.columns=speed=speed_mps:kn",
+        "knots: --set log.columns=speed=speed_mps:kn",
     ),
     "overlaps": (
         lambda rows: rows.assign(
@@ -223,7 +223,7 @@ SAID = {  # what is read, but looks otherwise
     ),
     "km/h": (
         lambda rows: plain(rows).assign(speed=lambda own: own.speed * 3.6),
-        "read with speeds in km/h: --set log.columns=speed=speed:kmh",
+        "it is assumed that speeds are in km/h: --set log.columns=speed=speed:kmh",
     ),
 }
 
@@ -418,7 +418,7 @@ REFUSED = {  # name: what is changed, what is said, how the file is written
     ),
     "hours": (
         lambda rows: rows.assign(t_s=(rows.t_s - 1000.0) / 3600.0),
-        "the time may be in h; --set log.columns=time=t_s:h",
+        "it fits if the time is in h: --set log.columns=time=t_s:h",
     ),
     "degrees and minutes": (nmea, "lat=lat_deg:ddmm,lon=lon_deg:ddmm"),
     "1e-7 degrees": (
@@ -466,7 +466,7 @@ REFUSED = {  # name: what is changed, what is said, how the file is written
             .assign(lon=48.0 + rows.x_m * 1e-5, lat=111.0 + rows.y_m * 1e-5)
             .drop(columns=["x", "y"])
         ),
-        "lat and lon may be swapped",
+        "lat and lon are swapped",
     ),
 }
 
