@@ -218,7 +218,7 @@ class Reading:
         self.changes |= change.columns
         self.log = replace(self.log, vehicles=tuple(map(change.convert, self.log.vehicles)))
 
-    def settle(
+    def resolve(
         self,
         quantity: Quantity,
         size: float,

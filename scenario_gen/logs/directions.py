@@ -61,7 +61,7 @@ def check_directions(reading: Reading) -> None:
     elif changes[0].columns == reading.units("north_rad", "heading"):
         changes += [each for each in _mirrors(reading) if each.columns.keys() == {"x", "y"}]
     if changes:
-        reading.settle(Quantity.FRAME, share, fact, changes)
+        reading.resolve(Quantity.FRAME, share, fact, changes)
     else:
         reading.notes.append(f"{fact}; {names[quantity]} that contradict it are not used")
 

@@ -185,15 +185,10 @@ def _vehicle_quality(
     """Return how well a vehicle was recorded."""
     smooths = [piece.smooth for piece in pieces]
 
-    def joined(name: str) -> Floats:
-        return np.concatenate([np.zeros(0), *(getattr(smooth, name) for smooth in smooths)])
-
     def rms(name: str) -> float:
-        values = joined(name)
+        values = np.concatenate([np.zeros(0), *(getattr(smooth, name) for smooth in smooths)])
         return float(np.sqrt(np.square(values).mean())) if len(values) else 0.0
 
-    turned = np.abs(joined("turned"))
-    used_headings = joined("headings")
     n_steps = sum(piece.last - piece.first - 1 for piece in pieces)
     return VehicleQuality(
         id=track.id,
@@ -207,12 +202,8 @@ def _vehicle_quality(
         reversals=int((cuts.reversals & ~cuts.gaps).sum()) + extra_reversals,
         speed_before=rms("before"),
         speed_after=rms("after"),
-        changed=rms("changed"),
         moved=rms("moved"),
-        moved_most=float(joined("moved").max(initial=0.0)),
         noise=max((smooth.noise for smooth in smooths), default=np.nan),
-        turned=float(np.median(turned)) if len(turned) else np.nan,
-        headings=float(used_headings.mean()) if len(used_headings) else np.nan,
         lost=lost_s,
         smoothed=not pieces or any(len(smooth.moved) for smooth in smooths),
     )

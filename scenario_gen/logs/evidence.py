@@ -6,7 +6,7 @@
 The displacements of a vehicle are compared with its recorded speeds, with the direction of its
 recorded velocities and with its headings. Where a pair contradicts, other readings of the columns
 are tried. The only one with which every vehicle agrees is used if it is a unit that no column
-names, and said; else it is a `Doubt` with the option for it (`Reading.settle`).
+names, and said; else it is a `Doubt` with the option for it (`Reading.resolve`).
 """
 
 from collections.abc import Iterator, Sequence
@@ -81,7 +81,7 @@ def _check_time_unit(reading: Reading) -> None:
         if shortest <= period * factor <= longest and is_long:
             columns = reading.units(unit, "time")
             change = Change(f"the time is in {unit}", columns, scaled(time=factor), not is_short)
-            reading.settle(Quantity.CLOCK, span, fact, [change])
+            reading.resolve(Quantity.CLOCK, span, fact, [change])
             return
 
 
@@ -149,13 +149,13 @@ def _find_degrees(reading: Reading) -> None:
             cause = "latitude and longitude have four decimals: places are up to 6 m off"
             reading.doubt(Quantity.POSITION, 11.0, cause, "record six decimals or more")
         return
-    latitude = float(np.median(fix[:, 0]))
-    fact = f"a latitude of {latitude:g} is not on Earth"
+    latitude, longitude = np.median(fix, axis=0).tolist()
+    fact = f"latitude {latitude:g}, longitude {longitude:g} is not on Earth"
     swap = Change(
         "lat and lon are swapped", reading.swapped("lat", "lon"), with_fix(swapped_fix), False
     )
     if _suits_globe(swapped_fix(fix)):
-        reading.settle(Quantity.POSITION, latitude, fact, [swap])
+        reading.resolve(Quantity.POSITION, latitude, fact, [swap])
         return
     changes = [
         Change(
@@ -164,22 +164,21 @@ def _find_degrees(reading: Reading) -> None:
             with_fix(partial(_in_degrees, unit=unit)),
         )
         for unit in _DEGREE_UNITS
-        if _suits_globe(_in_degrees(fix, unit))
+        if _suits_globe(degrees := _in_degrees(fix, unit)) and np.median(degrees) > 0.01
     ]
     spreads = [np.nanmax([0.0, *reading.compared(c.convert).spread]) for c in changes]
     if min(spreads, default=0.0) > 0.0:  # speeds are known
         clear = [c for c, s in zip(changes, spreads, strict=True) if s < 2.0 * min(spreads) + 0.02]
         changes = clear if len(clear) == 1 else changes
     if changes:
-        reading.settle(Quantity.POSITION, latitude, fact, changes)
+        reading.resolve(Quantity.POSITION, latitude, fact, changes)
     else:
         reading.doubt(Quantity.POSITION, latitude, fact, "name the unit of lat and lon")
 
 
 def _suits_globe(degrees: Floats) -> bool:
-    """Return whether most absolute latitudes and longitudes (F, 2) are on the globe, not at 0."""
-    middle = np.median(degrees, axis=0)
-    return bool((middle <= (90.0, 180.0)).all()) and bool(middle.max() > 0.01)
+    """Return whether most absolute latitudes and longitudes (F, 2) are on the globe."""
+    return bool((np.median(degrees, axis=0) <= (90.0, 180.0)).all())
 
 
 def _in_degrees(values: Floats, unit: str) -> Floats:
@@ -239,7 +238,7 @@ def _check_speeds(reading: Reading) -> None:
     if changes:
         is_named = not any(reading.is_assumed(*change.columns) for change in changes)
         positions_decide = is_named and set(changes[0].columns) == {"speed"}
-        reading.settle(Quantity.SPEED, ratio, fact, changes, stops=not positions_decide)
+        reading.resolve(Quantity.SPEED, ratio, fact, changes, stops=not positions_decide)
         return
     is_gross = compared.gross_off[is_known] > EVIDENCE.gross_share
     if np.log(compared.deviation[is_known]).max() < np.log(EVIDENCE.wrong_ratio):
@@ -360,4 +359,4 @@ def _check_pairs(reading: Reading, compared: Comparison) -> None:
     if pairs:
         ratio = float(np.exp(middle))
         fact = f"the recorded speeds are {ratio:.2f} times those of the positions"
-        reading.settle(Quantity.SPEED, ratio, fact, pairs)
+        reading.resolve(Quantity.SPEED, ratio, fact, pairs)

@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 import math
 
 import numpy as np
+from numpy.typing import NDArray
 
 from scenario_gen.bags.vehicles import Sample, TrackedObject
 from scenario_gen.base.errors import InputError
@@ -17,9 +18,11 @@ from scenario_gen.logs.quality import Doubt, Quantity
 from scenario_gen.logs.raw import Fix, Rows, Speed
 from scenario_gen.numerics import Floats, Ints, wrap_angle
 
+Complexes = NDArray[np.complex128]
 _MAX_DEPTH_COUNT = 20  # transforms in a chain; more are a circle
 _BODIES = ("base_link", "base_footprint", "base", "body", "chassis")
 _ODOMETRY_FRAME = "odom"
+_NORTH_FIRST = "ned"  # x north, y east, z down
 
 
 @dataclass
@@ -145,24 +148,27 @@ class FrameTree:
         return self.chain(frame)[-1]
 
     def in_root(self, frame: str, fixes: Sequence[Fix]) -> list[Fix]:
-        """Return fixes in a frame as fixes in its root."""
-        poses = np.array([(fix.x, fix.y, fix.heading) for fix in fixes]).reshape(-1, 3)
+        """Return fixes in a frame as fixes in its root, with x east and y north."""
         stamps = np.array([fix.stamp_ns for fix in fixes], dtype=np.int64)
-        for child in self.chain(frame)[:-1]:
-            poses = _joined(self._transforms_at(child, stamps), poses)
-        return [
-            fix._replace(x=x, y=y, heading=heading)
-            for fix, (x, y, heading) in zip(fixes, poses.tolist(), strict=True)
-        ]
+        place, heading = _poses(fixes)
+        for child in self.chain(frame):
+            points_north = child.endswith(_NORTH_FIRST)
+            if points_north:
+                place, heading = 1j * np.conj(place), 0.5 * np.pi - heading
+            if child in self.parents:
+                origin, turn = self._transforms_at(child, stamps)
+                turn = turn * (not points_north)
+                place, heading = origin + np.exp(1j * turn) * place, heading + turn
+        return _at(fixes, place, heading)
 
-    def _transforms_at(self, child: str, stamps: Ints) -> Floats:
-        """Return the transforms (F, 3) of a frame to its parent at stamps (F,)."""
+    def _transforms_at(self, child: str, stamps: Ints) -> tuple[Complexes, Floats]:
+        """Return origin (F,) and turn (F,) of a frame in its parent at stamps (F,)."""
         known = sorted(self.transforms[child])
         seconds = np.array([entry[0] - known[0][0] for entry in known]) * 1e-9
-        values = np.array([entry[1:] for entry in known])
-        values[:, 2] = np.unwrap(values[:, 2])
+        x, y, turn = np.array([entry[1:] for entry in known]).T
         wanted = (stamps - known[0][0]) * 1e-9
-        return np.column_stack([np.interp(wanted, seconds, column) for column in values.T])
+        origin = np.interp(wanted, seconds, x + 1j * y)
+        return np.asarray(origin), np.interp(wanted, seconds, np.unwrap(turn))
 
     def tie(self, parent: str, child: str, in_parent: Rows, in_child: Rows) -> None:
         """Add the transforms that two recordings of one vehicle in two frames show."""
@@ -171,42 +177,27 @@ class FrameTree:
             of_child.add("frame", "body", fix.stamp_ns, fix.x, fix.y, fix.heading)
         first, last = in_child.fixes[0].stamp_ns, in_child.fixes[-1].stamp_ns
         common = [fix for fix in in_parent.fixes if first <= fix.stamp_ns <= last]
-        stamps = np.array([fix.stamp_ns for fix in common], dtype=np.int64)
-        if not len(stamps):
+        if not common:
             return
-        body = of_child._transforms_at("body", stamps)
-        target = np.array([(fix.x, fix.y, fix.heading) for fix in common])
-        turn = wrap_angle(target[:, 2] - body[:, 2])
-        offset = target[:, :2] - _turned(body[:, :2], turn)
-        for stamp, (x, y), angle in zip(
-            stamps.tolist(), offset.tolist(), turn.tolist(), strict=True
-        ):
-            self.add(parent, child, stamp, x, y, angle)
+        stamps = np.array([fix.stamp_ns for fix in common], dtype=np.int64)
+        body, body_heading = of_child._transforms_at("body", stamps)
+        place, heading = _poses(common)
+        turn = wrap_angle(heading - body_heading)
+        origin = place - np.exp(1j * turn) * body
+        for fix, point, angle in zip(common, origin.tolist(), turn.tolist(), strict=True):
+            self.add(parent, child, fix.stamp_ns, point.real, point.imag, angle)
 
 
-def _turned(points: Floats, turn: Floats) -> Floats:
-    """Return points (F, 2) turned by angles (F,)."""
-    cosine, sine = np.cos(turn), np.sin(turn)
-    x, y = points.T
-    return np.column_stack([cosine * x - sine * y, sine * x + cosine * y])
+def _poses(fixes: Sequence[Fix]) -> tuple[Complexes, Floats]:
+    """Return places (F,) [m], x + iy, and headings (F,)."""
+    place = np.array([complex(fix.x, fix.y) for fix in fixes], dtype=complex)
+    return place, np.array([fix.heading for fix in fixes], dtype=float)
 
 
-def _joined(outer: Floats, inner: Floats) -> Floats:
-    """Return poses (F, 3) in the parent frame of poses `inner` (F, 3) in a frame at `outer`."""
-    place = outer[:, :2] + _turned(inner[:, :2], outer[:, 2])
-    return np.column_stack([place, outer[:, 2] + inner[:, 2]])
-
-
-def moved(fixes: Iterable[Fix], offset: tuple[float, float]) -> list[Fix]:
-    """Return the fixes of a point that is at `offset` [m, ahead and left] of the recorded one."""
-    result = []
-    for fix in fixes:
-        ahead, left = offset
-        cosine, sine = np.cos(fix.heading), np.sin(fix.heading)
-        x = float(fix.x + cosine * ahead - sine * left)
-        y = float(fix.y + sine * ahead + cosine * left)
-        result.append(fix._replace(x=x, y=y))
-    return result
+def _at(fixes: Sequence[Fix], place: Complexes, heading: Floats) -> list[Fix]:
+    """Return the fixes at other places (F,) with other headings (F,)."""
+    poses = zip(fixes, place.tolist(), heading.tolist(), strict=True)
+    return [fix._replace(x=z.real, y=z.imag, heading=yaw) for fix, z, yaw in poses]
 
 
 def in_one_frame(
@@ -253,8 +244,10 @@ def _centred(recording: Recording, centres: Mapping[str, str], tree: FrameTree) 
     """
     child = recording.child.strip("/")
     if child in centres:
-        x, y = tree.transforms[centres[child]][0][1:3]
-        recording.rows.fixes = moved(recording.rows.fixes, (x, y))
+        ahead, left = tree.transforms[centres[child]][0][1:3]
+        place, heading = _poses(recording.rows.fixes)
+        place = place + np.exp(1j * heading) * complex(ahead, left)
+        recording.rows.fixes = _at(recording.rows.fixes, place, heading)
         recording.ahead = 0.0
     elif "rear_axle" in child:
         recording.ahead = POINTS["rear_axle"]

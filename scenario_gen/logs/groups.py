@@ -24,7 +24,6 @@ from scenario_gen.logs.config import LogConfig
 from scenario_gen.logs.encounters import Piece
 from scenario_gen.logs.gap import height_apart, INTERACTS_M, space_time_gap
 from scenario_gen.logs.growing import Group, Growth, Meeting, MIN_MET_SHARE, Span
-from scenario_gen.logs.raw import natural
 from scenario_gen.numerics import Floats, Ints, runs
 from scenario_gen.numerics.curve import crossings, Curve
 from scenario_gen.numerics.plane import arc_lengths
@@ -195,7 +194,7 @@ class _PieceGroups(Growth[Meeting]):
 def find_groups(
     pieces: Sequence[Piece], config: LogConfig, within: Span | None = None
 ) -> tuple[list[Group[Meeting]], list[str]]:
-    """Return the encounters by time, and notes on vehicles left out or present partly.
+    """Return the encounters by time, and notes on vehicles that are left out.
 
     Args:
         pieces: all pieces of a log.
@@ -210,16 +209,8 @@ def find_groups(
         groups += parts
         notes += [*group.notes, *part_notes] if parts else []
     groups.sort(key=_by_time)
-    shared = sorted(_in_several(groups, pieces), key=natural)
-    if shared:
-        notes.append(
-            "in several encounters at the same time, since each meets half of its vehicles: "
-            f"vehicle {', '.join(shared)}"
-        )
     if not config.whole:
         groups = sorted((_completed(group, pieces, config) for group in groups), key=_by_time)
-    for group in groups:
-        notes += _presence_notes(group, pieces, config)
     return groups, notes
 
 
@@ -236,32 +227,6 @@ def _completed(
     spans = complete_spans(group.spans, members, config.period)
     start = min(begin for begin, _ in spans.values())
     return Group(start, max(end for _, end in spans.values()), spans, group.meetings)
-
-
-def _presence_notes(
-    group: Group[Meeting], pieces: Sequence[Piece], config: LogConfig
-) -> Iterator[str]:
-    """Yield a note on each vehicle that arrives late or leaves early."""
-    for member, (start, end) in group.spans.items():
-        if (start, end) != (group.start, group.end):
-            yield (
-                f"vehicle {pieces[member].track.id} is recorded from "
-                f"{_seconds((group.start, start + 1), config)} to "
-                f"{_seconds((group.start, end), config)} s of "
-                f"{_seconds((group.start, group.end), config)} s"
-            )
-
-
-def _in_several(groups: Sequence[Group[Meeting]], pieces: Sequence[Piece]) -> set[str]:
-    """Return the vehicles that are in several groups at the same time; groups are by time."""
-    shared = set()
-    busy_until: dict[int, int] = {}
-    for group in groups:
-        for member in group.spans:
-            if busy_until.get(member, group.start) > group.start:
-                shared.add(pieces[member].track.id)
-            busy_until[member] = max(busy_until.get(member, group.end), group.end)
-    return shared
 
 
 def _find_meetings(
@@ -322,22 +287,12 @@ def vehicles_near(pieces: Sequence[Piece], config: LogConfig) -> set[str]:
 
 
 def near_pairs(pieces: Sequence[Piece], least: int, reach: float) -> Iterator[tuple[int, int]]:
-    """Yield simultaneous pieces whose rectangles are within `reach` [m], as `simultaneous`."""
-    for i, others, bounds in simultaneous(pieces, least):
-        for j in others[bounds < reach].tolist():
-            yield i, j
-
-
-def simultaneous(pieces: Sequence[Piece], least: int) -> Iterator[tuple[int, Ints, Floats]]:
-    """Yield each piece with the later ones of other vehicles at its site, by first tick.
+    """Yield pairs of simultaneous pieces of two vehicles at one site, by first tick.
 
     Args:
         pieces: all pieces of a log.
         least: ticks that two pieces share at least.
-
-    Yields:
-        The number of a piece, numbers (K,) of the others, and lower bounds (K,) of the distances
-        to them [m], by the rectangles around their positions.
+        reach: distance [m] of the rectangles around their positions.
     """
     first = np.array([piece.first for piece in pieces])
     low = np.array([piece.smooth.position.min(axis=0) for piece in pieces])
@@ -350,7 +305,9 @@ def simultaneous(pieces: Sequence[Piece], least: int) -> Iterator[tuple[int, Int
         others = others[: np.searchsorted(first[others], pieces[i].last - least, side="right")]
         others = others[(vehicle[others] != vehicle[i]) & (site[others] == site[i])]
         space = np.maximum(low[others] - high[i], low[i] - high[others])
-        yield i, others, np.hypot(*np.maximum(space, 0.0).T)
+        is_near = np.hypot(*np.maximum(space, 0.0).T) < reach
+        for j in others[is_near].tolist():
+            yield i, j
 
 
 def _gap(a: Piece, b: Piece, span: Span, config: LogConfig) -> float:

@@ -125,6 +125,7 @@ MAX_LENGTH_M = 100.0
 """Longest road vehicle."""
 
 _MAX_WIDTH_M = 4.0
+_SIZE_RATIO = 4.0  # of a length to the usual one of its type, or its inverse
 _SIZE_UNITS = {"ft": ("feet", 0.3048), "cm": ("centimetres", 0.01), "mm": ("millimetres", 0.001)}
 
 
@@ -140,13 +141,16 @@ def with_sizes(
     for vehicle in vehicles:
         length, width = vehicle.length, vehicle.width  # comparisons with NaN are false
         walks = VEHICLE_TYPES[vehicle.kind or CAR].walks  # wider than long
+        usual_length, usual_width = usual_size(vehicle.kind, config)
+        shortest, longest = 0.0, MAX_LENGTH_M
+        if vehicle.kind not in ("", OTHER):
+            shortest, longest = usual_length / _SIZE_RATIO, usual_length * _SIZE_RATIO
         if width <= 0.0 or width > _MAX_WIDTH_M or (width > length and not walks):
             impossible.append(vehicle)
             length = width = np.nan
-        elif length <= 0.0 or length > MAX_LENGTH_M:
+        elif length <= shortest or length > longest:
             impossible.append(vehicle)
             length = np.nan
-        usual_length, usual_width = usual_size(vehicle.kind, config)
         sized.append(
             replace(
                 vehicle,
@@ -177,7 +181,8 @@ def _size_note(impossible: Sequence[Observations], log: RawLog, config: LogConfi
     usual_length, usual_width = usual_size(vehicle.kind, config)
     return (
         f"vehicle {vehicle.id}: {vehicle.length:g} m × {vehicle.width:g} m is not the size of a "
-        f"car{more}{_size_hint(vehicle.length, vehicle.width, log, config)}; used instead: "
+        f"{vehicle.kind or CAR}{more}"
+        f"{_size_hint(vehicle.length, vehicle.width, log, config)}; used instead: "
         f"{usual_length:g} m × {usual_width:g} m"
     )
 

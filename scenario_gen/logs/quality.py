@@ -45,12 +45,8 @@ class VehicleQuality:
         reversals: stops at which the track was cut because the vehicle reversed.
         speed_before: RMS of measured speed minus speed of the raw positions [m/s].
         speed_after: RMS of smooth speed minus speed of the smooth positions [m/s].
-        changed: RMS of measured minus smooth speed [m/s].
         moved: RMS distance between raw and smooth positions [m].
-        moved_most: the largest such distance [m].
         noise: standard deviation of the fixes [m], estimated or given; determines smoothness.
-        turned: median difference of recorded and smooth headings while it moves [rad], or NaN.
-        headings: share of the recorded headings that were used; others contradict the path.
         lost: seconds of pieces left out, since no motion of a car fits them.
         smoothed: whether its motion was smoothed; not if it comes near no other vehicle.
     """
@@ -66,12 +62,8 @@ class VehicleQuality:
     reversals: int
     speed_before: float
     speed_after: float
-    changed: float
     moved: float
-    moved_most: float
     noise: float = math.nan
-    turned: float = math.nan
-    headings: float = math.nan
     lost: float = 0.0
     smoothed: bool = True
 
@@ -163,16 +155,10 @@ def _vehicle_line(vehicle: VehicleQuality) -> str:
     recorded = f"  vehicle {vehicle.id}: {vehicle.fixes} fixes, {vehicle.seconds:.1f} s; {gaps}; "
     if not vehicle.smoothed:
         return f"{recorded}not smoothed, since it comes near no other vehicle"
-    headings = ""
-    if math.isfinite(vehicle.headings):
-        headings = f"; {100.0 * vehicle.headings:.0f} % of its headings used"
-    if headings and math.isfinite(vehicle.turned):
-        headings += f", changed by {math.degrees(vehicle.turned):.1f}° (median)"
     return (
         f"{recorded}speed against position {vehicle.speed_before:.2f} → "
-        f"{vehicle.speed_after:.2f} m/s RMS, speeds changed by {vehicle.changed:.2f} m/s, "
-        f"positions by {vehicle.moved:.2f} m RMS (at most "
-        f"{vehicle.moved_most:.1f} m; noise of the fixes {vehicle.noise:.2f} m){headings}"
+        f"{vehicle.speed_after:.2f} m/s RMS, positions changed by {vehicle.moved:.2f} m RMS "
+        f"(noise of the fixes {vehicle.noise:.2f} m)"
     )
 
 

@@ -7,11 +7,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import chain
 import logging
-import math
 from pathlib import Path
 from typing import Any, overload, TYPE_CHECKING
-
-import numpy as np
 
 from scenario_gen.base.copies import naming_inputs, temp_folder
 from scenario_gen.base.errors import InputError, printable, reading
@@ -25,14 +22,12 @@ from scenario_gen.logs.encounters import Piece, pieces_of, plausible
 from scenario_gen.logs.evidence import interpret
 from scenario_gen.logs.extract import cut_encounter, encounter_quality, recorded_encounters
 from scenario_gen.logs.files import logs_in, read_raw
-from scenario_gen.logs.geodesy import EARTH_RADIUS_M
 from scenario_gen.logs.groups import find_groups, vehicles_near
 from scenario_gen.logs.kinds import counted, typed
 from scenario_gen.logs.no_encounter import (
     explain_few_vehicles,
     explain_no_encounter,
     NoEncounterError,
-    unit_advice,
 )
 from scenario_gen.logs.quality import check_doubts, Doubt, Quality, VehicleQuality
 from scenario_gen.logs.raw import natural, Observations, RawLog
@@ -46,7 +41,6 @@ if TYPE_CHECKING:
     from pandas import DataFrame
 
 _DATAFRAME_FILE = "dataframe.csv"
-_FAR_FROM_ORIGIN_M = 200_000.0  # there, distances are 0.02 % too long
 _MANY_TICK_COUNT = 30_000  # the user is told that smoothing takes long
 _TICK_S = 8e-5  # of one tick
 _MANY_DROPS_SHARE = 0.02  # of the rows; the user is told at once
@@ -260,7 +254,6 @@ def encounters_of(
         *grouping.group_notes,
         *doubts,
         *map(str, contradictions),
-        *_origin_notes(tracks, config),
         *_vehicle_notes(vehicles, _unusable(log, tracks, config), grouping.members, config),
         *grouping.cut_notes,
     )
@@ -390,22 +383,7 @@ def _drop_notes(log: RawLog, drops: Drops) -> list[str]:
     if sum(drops.count.values()) <= _MANY_DROPS_SHARE * log.rows:
         return []
     causes = "; ".join(map(str, drops.located(log)))
-    return [f"of {log.rows} rows these were dropped or sorted: {causes}{unit_advice(log, drops)}"]
-
-
-def _origin_notes(tracks: Sequence[Observations], config: LogConfig) -> list[str]:
-    """Return a note if the parameter `origin` is so far away that distances are wrong."""
-    if not config.origin:
-        return []
-    distance = max(float(np.hypot(*track.fix.T).max()) for track in tracks)
-    if distance < _FAR_FROM_ORIGIN_M:
-        return []
-    angle = distance / EARTH_RADIUS_M
-    excess = angle / max(math.sin(angle), 1e-3) - 1.0
-    return [
-        f"positions are up to {distance / 1000.0:.0f} km from the parameter origin: distances "
-        f"there are up to {100 * excess:.1g} % too long; name a nearer origin, or none"
-    ]
+    return [f"of {log.rows} rows these were dropped or sorted: {causes}"]
 
 
 def _vehicle_notes(

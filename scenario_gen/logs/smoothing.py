@@ -55,9 +55,7 @@ def estimated_noise(fix: Floats) -> float:
     if half < 3:
         return 0.5
     lag = np.arange(-half, half + 1)
-    square = np.square(lag) - np.square(lag).mean()
-    # Value at lag 0 of the parabola that fits best.
-    parabola = 1.0 / len(lag) - np.square(lag).mean() * square / np.square(square).sum()
+    parabola = np.linalg.pinv(np.vander(lag, 3))[2]  # its value at lag 0, from the fixes
     residual = fix[half : len(fix) - half] - sliding_window_view(fix, len(lag), axis=0) @ parabola
     noise = max(white_equivalent(residual[:, 0]), white_equivalent(residual[:, 1]))
     return float(np.clip(noise, *_NOISE_M))
@@ -120,12 +118,10 @@ class Smooth:
         speed: (T,) m/s.
         before: (S,) measured speed minus the speed of the raw fixes [m/s].
         after: (T,) smooth speed minus the speed of the smooth positions [m/s].
-        changed: (S,) measured speed minus the smooth speed [m/s].
         moved: (F,) distance between the raw fixes and the smooth positions [m]; empty if the
             piece is not smoothed.
         noise: standard deviation of the fixes [m], estimated or given.
         turned: (H,) recorded minus smooth headings [rad] while the vehicle moves.
-        headings: (H',) whether each recorded heading was used.
         believed: (S,) whether each measured speed was used.
     """
 
@@ -135,11 +131,9 @@ class Smooth:
     speed: Floats
     before: Floats
     after: Floats
-    changed: Floats
     moved: Floats
     noise: float
     turned: Floats
-    headings: Bools
     believed: Bools
 
 
@@ -159,13 +153,6 @@ class _Fit(NamedTuple):
     coefficients: Floats
     noise: float
     headings: Headings | None
-
-
-def _used_headings(fit: _Fit, is_known: Bools, travel_m: float) -> Bools:
-    """Return which of the recorded headings (F,) determine the result."""
-    if travel_m < SMOOTHING.straight_m:
-        return is_known
-    return ~is_known if fit.headings is None else fit.headings.weight > 0.0
 
 
 def interpolated_piece(piece: Observations, origin_ns: int, config: LogConfig) -> Smooth | None:
@@ -197,11 +184,9 @@ def interpolated_piece(piece: Observations, origin_ns: int, config: LogConfig) -
         speed=np.interp(ticks, speed_t, speed),
         before=difference,
         after=np.zeros(0),
-        changed=np.zeros(0),
         moved=np.zeros(0),
         noise=noise,
         turned=np.zeros(0),
-        headings=np.zeros(0, dtype=bool),
         believed=believed,
     )
 
@@ -257,11 +242,9 @@ def smooth_piece(piece: Observations, origin_ns: int, config: LogConfig) -> Smoo
         heading=heading,
         speed=smooth_speed,
         after=smooth_speed - speed_of_fixes(ticks, position),
-        changed=piece.speed - np.interp(speed_t, ticks, smooth_speed),
         moved=np.hypot(*(piece.fix - fit.path.pose(fit.distance)[0]).T),
         noise=fit.noise,
         turned=wrap_angle(piece.heading[rolling] - np.interp(fix_t[rolling], ticks, heading)),
-        headings=_used_headings(fit, is_known, float(np.ptp(distance)))[is_known],
     )
 
 

@@ -475,7 +475,7 @@ def _observations(name: str, group: pd.DataFrame, position: tuple[str, str]) -> 
         np.column_stack([column(quantity) for quantity in (*position, "heading", "speed")]),
         group["row"].to_numpy(np.int64),
         (_typical_size(column("length")), _typical_size(column("width"))),
-        kind=str(group["kind"].mode().iloc[0]) if "kind" in group else "",
+        kind=str(group["kind"].fillna("").mode().iloc[0]) if "kind" in group else "",
         measured="speed" in group,
     )
     if "height" in group:

@@ -142,7 +142,7 @@ def test_a_broken_scenario_is_named_with_its_line(tmp_path):
             read_log(path)
 
 
-def test_the_unit_of_headings_of_a_scene_is_told_from_its_velocities(tmp_path):
+def test_headings_of_a_scene_above_a_turn_are_degrees(tmp_path):
     in_degrees = read_log(nocturne(tmp_path)[0])
     in_radians = read_log(nocturne(tmp_path, float)[0])
     assert any("headings in degrees" in note for note in in_degrees.quality.notes)

@@ -132,7 +132,7 @@ def test_a_slow_source_is_not_cut_to_bits(tmp_path):
         ),
         (
             lambda rows: rows.assign(x_m=rows["x_m"] + 500.0 * (rows["vehicle_id"] == "a")),
-            "come closest, to 4",
+            "come as near as 4",
         ),
         (lambda rows: rows.iloc[:40], "no two vehicles"),
         (
@@ -161,7 +161,7 @@ def test_what_cannot_be_used_is_refused(tmp_path, damage, words):
         (LogConfig(start=100.0), "only 12.0 s long"),
         (LogConfig(start=5.0, end=4.0), "must be after start"),
         (LogConfig(start=8.0, end=9.0), "no two vehicles"),
-        (LogConfig(proximity=2.0), r"--set log\.proximity=\d+ accepts two"),
+        (LogConfig(proximity=2.0), r"--set log\.proximity=\d+ accepts them"),
     ],
 )
 def test_parameters_that_leave_nothing(tmp_path, config, words):
@@ -222,10 +222,13 @@ def test_whatever_the_damage_no_nan_leaves(tmp_path, seed, noise, lost, repeated
 @pytest.mark.parametrize(
     ("config", "words"),
     [
-        (LogConfig(proximity=2.0), r"come closest, to 12 m; --set log\.proximity=\d+ accepts two"),
+        (
+            LogConfig(proximity=2.0),
+            r"come as near as 12 m.*; --set log\.proximity=\d+ accepts them",
+        ),
         (
             LogConfig(min_duration=30.0),
-            r"are within 100 m for \d+\.\d s and come as near as 12 m; --set log\.min_duration=[\d.]+ accepts",
+            r"are within 100 m for \d+\.\d s and come as near as 12 m.*; --set log\.min_duration=[\d.]+ accepts",
         ),
         (
             LogConfig(travel=1000.0),

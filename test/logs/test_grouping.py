@@ -72,7 +72,6 @@ def test_a_vehicle_may_arrive_late_and_leave_early(tmp_path):
     (encounter,) = result.encounters
     assert encounter.position[2, 80] == pytest.approx([84.0, 0.0], abs=0.1)
     assert (encounter.position[3, 91:] == encounter.position[3, 90]).all()
-    assert "vehicle 3 is recorded from 8.0 to 20.0 s of 20.0 s" in result.quality.notes
     assert any("vehicle 4 from 5.0 to 9.0 s" in line for line in result.quality.lines())
 
 
@@ -207,12 +206,9 @@ def test_a_reversal_cuts_the_track(tmp_path):
     assert [name for name, _ in found] == ["1,2", "1,2"]
 
 
-def test_a_column_of_13_is_encounters_of_three_and_who_is_in_two_is_named(tmp_path):
-    found, quality = groups(
-        tmp_path, *(car(str(k + 1), 0, 19.9, -66 * k, 0, 33) for k in range(13))
-    )
+def test_a_column_of_13_is_encounters_of_three(tmp_path):
+    found, _ = groups(tmp_path, *(car(str(k + 1), 0, 19.9, -66 * k, 0, 33) for k in range(13)))
     assert [names for names, _ in found] == [f"{k},{k + 1},{k + 2}" for k in range(1, 13, 2)]
-    assert [note for note in quality.notes if note.endswith("vehicle 3, 5, 7, 9, 11")]
 
 
 def test_a_left_turn_is_complete_though_the_oncoming_car_is_far_away(tmp_path):
@@ -237,7 +233,6 @@ def test_a_left_turn_is_complete_though_the_oncoming_car_is_far_away(tmp_path):
     heading = encounter.heading[row, : spans["turner"][1] + 1]
     assert np.degrees(heading[-1] - heading[0]) == pytest.approx(90.0, abs=3.0)
     assert encounter.time[spans["oncoming"][1]] < 17.0
-    assert any("vehicle oncoming is recorded from" in note for note in result.quality.notes)
     assert Situation.of(encounter).kind(0, 1) == EncounterKind.LEFT_TURN
 
 
@@ -249,5 +244,5 @@ def test_only_vehicles_that_come_near_another_one_are_smoothed(tmp_path, monkeyp
     assert quality.notes == ("vehicle 3 is in no encounter; it was recorded for 10.0 s",)
 
     monkeypatch.delattr("scenario_gen.logs.encounters.smooth_piece")
-    with pytest.raises(InputError, match=r"2 and 3 come closest, to 4996 m; .*proximity=5000"):
+    with pytest.raises(InputError, match=r"2 and 3 .* come as near as 4996 m"):
         groups(tmp_path, near[1], car("3", 0, 10, 0, 5000, 8))

@@ -176,7 +176,6 @@ def test_recorded_headings_are_used_where_a_car_is_slow():
     ]
     assert off[0] < 2.0
     assert off[1] > 4.0
-    assert with_them.headings.all()
     assert np.degrees(np.abs(with_them.turned)).max() < 10.0
 
 
@@ -187,7 +186,6 @@ def test_headings_that_are_none_have_no_say(wrong):
     heading = np.full(120, wrong) if wrong else np.where(np.arange(120) < 10, -1.5, course)
     smooth = smooth_piece(replace(track, heading=heading), 0, CONFIG)
     assert np.degrees(np.abs(smooth.heading - course)).max() < 8.0
-    assert smooth.headings.sum() == (0 if wrong else 110)
 
 
 def test_a_heading_is_weighed_by_its_scatter():

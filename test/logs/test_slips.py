@@ -402,7 +402,7 @@ def test_files_without_a_vehicle_column_are_one_vehicle_each(tmp_path):
 REFUSED = {  # name: what is changed, what is said, how the file is written
     "ms since 1970": (
         lambda rows: rows.assign(t_s=((rows.t_s + 1.66e9) * 1000).round()),
-        "looks like ms since 1970: --set log.columns=time=t_s:ms",
+        "looks like ms: --set log.columns=time=t_s:ms",
     ),
     "dates of another order": (
         lambda rows: rows.assign(t_s="31.08.2022 at noon"),

@@ -20,7 +20,7 @@
 | time | time_index, times 0.1 s | |
 | place | x, y: where the lane's traffic stops | m |
 
-The unit of the headings is determined from the velocities. The direction of a stop line is that of
+Headings above a turn of 2π are degrees. The direction of a stop line is that of
 the lane in `roads` at its place.
 
 Source: the documentation of Nocturne's and of GPUDrive's scenes.
@@ -48,8 +48,7 @@ from scenario_gen.logs.signals import line_across, RawSignal, sampled_schedule, 
 from scenario_gen.numerics import Floats
 from scenario_gen.types import SignalState
 
-_MOVING_MPS = 2.0  # a faster vehicle has the direction of its velocity
-_MAX_SPEED_MPS = 1000.0  # higher values mark absence
+_MAX_HEADING_RAD = 2.0 * math.pi  # larger values are degrees
 
 
 def read(paths: Sequence[Path], config: LogConfig) -> RawLog:
@@ -73,7 +72,8 @@ def read(paths: Sequence[Path], config: LogConfig) -> RawLog:
         n_rows += len(states[-1])
         check_size(str(path), 0, n_rows, config)
 
-    are_degrees = _are_headings_degrees(np.concatenate(states))
+    rows = np.concatenate(states)
+    are_degrees = bool((np.abs(rows[rows[:, 5] > 0.0, 2]) > _MAX_HEADING_RAD).any())
     vehicles = []
     first_row = 0
     for name, item, state in zip(names, objects, states, strict=True):
@@ -234,21 +234,6 @@ def _vectors(entries: Any) -> Floats:
     """Return vectors (T, 2) of a list of objects with x and y."""
     vectors = [(entry["x"], entry["y"]) for entry in entries]
     return np.array(vectors, dtype=float).reshape(-1, 2)
-
-
-def _are_headings_degrees(states: Floats) -> bool:
-    """Return whether headings agree better with the velocities as degrees than as radians."""
-    is_present = states[:, 5] > 0.0
-    heading = states[:, 2]
-    speed = np.hypot(states[:, 3], states[:, 4])
-    is_moving = (speed > _MOVING_MPS) & (speed < _MAX_SPEED_MPS)
-    rows = is_present & is_moving & np.isfinite(heading)
-    if not rows.any():
-        return bool((np.abs(heading[is_present]) > 2.0 * np.pi).any())
-    course = np.arctan2(states[rows, 4], states[rows, 3])
-    as_degrees = float(np.cos(course - np.radians(heading[rows])).mean())
-    as_radians = float(np.cos(course - heading[rows]).mean())
-    return as_degrees > as_radians
 
 
 def _positive(item: Mapping[str, Any], key: str) -> float:
