@@ -6,18 +6,16 @@
 The same drives give the same bytes.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 import json
 import math
 from pathlib import Path
-from types import MappingProxyType
 from typing import Any
-from xml.etree import ElementTree
 
 import numpy as np
 
-from scenario_gen.base.errors import printable, printable_lines
 from scenario_gen.base.folders import Kind, write_text
 from scenario_gen.base.parameters import flatten
 from scenario_gen.closed_loop.blind import BlindRate
@@ -34,12 +32,11 @@ from scenario_gen.output.report.data import (
     road_data,
     states,
 )
-from scenario_gen.output.report.html import render_page
+from scenario_gen.output.report.html import render_page, render_xml
 from scenario_gen.types import Decision
 
 JSON, JUNIT, PAGE = "drives.json", "junit.xml", "drives.html"
 DRIVEN = Kind("driven")
-EMPTY: Mapping[str, str] = MappingProxyType({})
 MAX_REPLAYS_COUNT = 100
 """The page replays the worst drives; its table lists all."""
 
@@ -249,69 +246,19 @@ class Drives:
             OSError: the disk is full, or the folder is not writable.
         """
         write_text(folder / JSON, self.json())
-        write_text(folder / JUNIT, as_junit(self.outcomes, self.planner, self.facts()))
+        write_text(folder / JUNIT, as_junit(self))
         if self.trials:
             write_text(folder / PAGE, self.page())
 
 
-def as_junit(outcomes: Sequence[Outcome], planner: str, facts: Mapping[str, str] = EMPTY) -> str:
+def as_junit(*suites: Drives) -> str:
     """Return one test case per scenario, as JUnit's XML, and facts as properties.
 
     Cases fail with the type collision, off_road, jump, goal, or the name of a criterion. A drive
     that an error of the planner ended has an error with its traceback.
     """
-    return junit_text(junit_suite(outcomes, planner, facts))
-
-
-def junit_suite(
-    outcomes: Sequence[Outcome], planner: str, facts: Mapping[str, str] = EMPTY
-) -> ElementTree.Element:
-    """Return the element `testsuite` of one planner; arguments as in `as_junit`."""
-    ended = [outcome for outcome in outcomes if outcome.verdict.error]
-    failed = [outcome for outcome in outcomes if not outcome.verdict.passed]
-    lasted = math.fsum(outcome.verdict.duration for outcome in outcomes)
-    suite = ElementTree.Element(
-        "testsuite",
-        name=planner,
-        tests=str(len(outcomes)),
-        failures=str(len(failed) - len(ended)),
-        errors=str(len(ended)),
-        time=f"{lasted:.3f}",
-    )
-    properties = ElementTree.SubElement(suite, "properties")
-    for name, value in facts.items():
-        ElementTree.SubElement(properties, "property", name=name, value=value)
-    for outcome in outcomes:
-        verdict = outcome.verdict
-        case = ElementTree.SubElement(
-            suite,
-            "testcase",
-            classname=planner,
-            name=f"scenario {outcome.name}",
-            time=f"{verdict.duration:.3f}",
-        )
-        if not verdict.passed:
-            kind = "error" if verdict.error else "failure"
-            problem = ElementTree.SubElement(
-                case, kind, type=verdict.failure, message=verdict.sentence()
-            )
-            problem.text = outcome.traceback
-        message = ElementTree.SubElement(case, "system-out")
-        message.text = json.dumps(verdict.document(), ensure_ascii=False)
-    return suite
-
-
-def junit_text(root: ElementTree.Element) -> str:
-    """Return the text of a document in JUnit's XML."""
-    ElementTree.indent(root)
-    for element in root.iter():  # XML has no form for control characters
-        element.attrib.update({name: printable(value) for name, value in element.attrib.items()})
-        element.text = printable_lines(element.text) if element.text else None
-    return (
-        '<?xml version="1.0" encoding="UTF-8"?>\n'
-        + ElementTree.tostring(root, encoding="unicode")
-        + "\n"
-    )
+    as_json = partial(json.dumps, ensure_ascii=False)
+    return render_xml("junit.xml.j2", suites=suites, as_json=as_json)
 
 
 def drawings(

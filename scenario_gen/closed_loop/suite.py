@@ -9,7 +9,6 @@ import json
 import os
 from pathlib import Path
 from typing import Any, NamedTuple
-from xml.etree import ElementTree
 
 import numpy as np
 
@@ -18,7 +17,7 @@ from scenario_gen.base.documents import read_text
 from scenario_gen.base.errors import InputError
 from scenario_gen.base.folders import write_text
 from scenario_gen.closed_loop.origin import Trial
-from scenario_gen.closed_loop.results import drawings, Drives, JUNIT, junit_suite, junit_text
+from scenario_gen.closed_loop.results import as_junit, drawings, Drives, JUNIT
 from scenario_gen.closed_loop.trials import passed_of, Rate, read_trials
 from scenario_gen.method.evaluation import footprint_distance
 from scenario_gen.numerics import Floats
@@ -226,9 +225,7 @@ class Suite:
         else:
             for number, drives in enumerate(self.drives, start=1):
                 write_text(folder / f"drives-{number}.json", drives.json())
-            root = ElementTree.Element("testsuites")
-            root.extend(junit_suite(d.outcomes, d.planner, d.facts()) for d in self.drives)
-            write_text(folder / JUNIT, junit_text(root))
+            write_text(folder / JUNIT, as_junit(*self.drives))
         if not self.is_single:
             text = json.dumps(self.document(), indent=1, ensure_ascii=False, allow_nan=False)
             write_text(folder / JSON, text + "\n")

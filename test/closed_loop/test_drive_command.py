@@ -21,8 +21,9 @@ from scenario_gen.bags.recordings.write import write_recording
 from scenario_gen.base.errors import InputError
 from scenario_gen.cli.commands import app
 from scenario_gen.closed_loop.command import drive_bags, DriveRequest, in_processes
+from scenario_gen.closed_loop.config import ClosedLoopConfig
 from scenario_gen.closed_loop.ego import Command, Pose
-from scenario_gen.closed_loop.results import as_junit
+from scenario_gen.closed_loop.results import as_junit, Drives
 from scenario_gen.closed_loop.trials import read_trials
 
 PLANNER = "scenario_gen.closed_loop.planners:IdmFollower"
@@ -264,7 +265,7 @@ def test_a_planner_that_forks_or_leaves_every_road_is_judged_once(bag, tmp_path,
 
 
 def test_junit_is_xml_whatever_things_are_called():
-    suite = ElementTree.fromstring(as_junit([], "no\x01 name\ufffe"))
+    suite = ElementTree.fromstring(as_junit(Drives([], "no\x01 name\ufffe", ClosedLoopConfig())))
     assert suite.get("name") == r"no\x01 name\ufffe" and suite.get("tests") == "0"
 
 

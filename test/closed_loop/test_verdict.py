@@ -167,7 +167,7 @@ def test_many_drives_give_the_same_bytes_with_two_workers(trials):
     name, config = "scenario_gen.closed_loop.planners:IdmFollower", ClosedLoopConfig()
     one, two = (run_trials(trials, name, config, workers) for workers in (1, 2))
     first, second = (Drives(outcomes, name, config, trials) for outcomes in (one, two))
-    assert first.json() == second.json() and as_junit(one, name) == as_junit(two, name)
+    assert first.json() == second.json() and as_junit(first) == as_junit(second)
     assert first.page() == second.page() and all(trial.name in first.page() for trial in trials)
     assert [outcome.name for outcome in one] == ["meet", "free", "first"] and all(
         o.verdict.passed for o in one
@@ -184,7 +184,7 @@ def test_json_junit_rates_and_bars(trials):
         found["collisions"].count == len([o for o in outcomes if o.verdict.collision]) == 1
         and found["goals"].count == 2
     )
-    suite = ElementTree.fromstring(as_junit(outcomes, "p:C"))
+    suite = ElementTree.fromstring(as_junit(Drives(outcomes, "p:C", ClosedLoopConfig())))
     assert suite.get("tests") == "3" and suite.get("failures") == str(len(failed))
     assert [case.get("name") for case in suite if case.find("failure") is not None] == [
         f"scenario {o.name}" for o in failed

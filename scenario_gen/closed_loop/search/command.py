@@ -23,7 +23,7 @@ from scenario_gen.base.parameters import assigned, flatten
 from scenario_gen.base.provenance import parameter_texts, versions
 from scenario_gen.closed_loop.config import ClosedLoopConfig
 from scenario_gen.closed_loop.criteria import find_criteria
-from scenario_gen.closed_loop.results import as_junit, drawings, JUNIT
+from scenario_gen.closed_loop.results import as_junit, drawings, Drives, JUNIT
 from scenario_gen.closed_loop.search.estimate import Estimate, Search
 from scenario_gen.closed_loop.search.findings import Finding, findings_of
 from scenario_gen.closed_loop.search.journal import open_journal
@@ -307,7 +307,8 @@ def _write(
     text = json.dumps(document, indent=1, ensure_ascii=False, allow_nan=False)
     write_text(folder / JSON, text + "\n")
     outcomes = [finding.outcome for finding in result.findings]
-    write_text(folder / JUNIT, as_junit(outcomes, request.planner, request.drive_config().facts()))
+    drives = Drives(outcomes, request.planner, request.drive_config())
+    write_text(folder / JUNIT, as_junit(drives))
     write_text(folder / PAGE, _page(result, request))
     if result.findings:
         with BagWriter(folder / BAG) as bag:

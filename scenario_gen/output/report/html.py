@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Self-contained HTML pages that work offline.
+"""Self-contained HTML pages that work offline, and XML documents, by templates.
 
 A content security policy allows only our own scripts, by their hashes. Names from a log therefore
 stay text even if escaping were forgotten: no other script element, no event handler, no
@@ -9,7 +9,7 @@ stay text even if escaping were forgotten: no other script element, no event han
 """
 
 from base64 import b64encode
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from hashlib import sha256
 from importlib.resources import files
 import json
@@ -19,6 +19,7 @@ from typing import Any
 import jinja2
 from markupsafe import Markup
 
+from scenario_gen.base.errors import printable_lines
 from scenario_gen.types import formatted
 
 
@@ -41,20 +42,13 @@ def render_page(
         folder: with further templates and scripts.
         **values: further variables of the template.
     """
-    assets = files("scenario_gen.output.report") / "assets"
 
     def asset(name: str) -> str:
         if folder is not None and (folder / name).is_file():
             return (folder / name).read_text(encoding="utf-8")
-        return (assets / name).read_text(encoding="utf-8")
+        return _asset(name)
 
-    environment = jinja2.Environment(
-        loader=jinja2.FunctionLoader(asset),
-        autoescape=True,
-        trim_blocks=True,
-        lstrip_blocks=True,
-        undefined=jinja2.StrictUndefined,
-    )
+    environment = _environment(asset)
     environment.filters["estimate"] = lambda value, unit="", bounds=True, cap=None: formatted(
         value, unit, bounds=bounds, cap=cap
     )
@@ -67,6 +61,27 @@ def render_page(
             json.dumps(data, separators=(",", ":"), allow_nan=False).replace("<", "\\u003c")
         ),
         **values,
+    )
+
+
+def render_xml(template: str, **values: Any) -> str:
+    """Return an XML document by a template; control characters, which XML lacks, are escaped."""
+    environment = _environment(_asset)
+    environment.finalize = lambda value: printable_lines(str(value))
+    return environment.get_template(template).render(**values) + "\n"
+
+
+def _asset(name: str) -> str:
+    return (files("scenario_gen.output.report") / "assets" / name).read_text(encoding="utf-8")
+
+
+def _environment(asset: Callable[[str], str]) -> jinja2.Environment:
+    return jinja2.Environment(
+        loader=jinja2.FunctionLoader(asset),
+        autoescape=True,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        undefined=jinja2.StrictUndefined,
     )
 
 
