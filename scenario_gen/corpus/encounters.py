@@ -22,7 +22,7 @@ from scenario_gen.base.errors import guarded, InputError, UnforeseenError
 from scenario_gen.corpus.config import CorpusConfig
 from scenario_gen.corpus.grouping import FoundEncounter, label
 from scenario_gen.corpus.meetings import MESSAGES_AFTER_US, MESSAGES_BEFORE_US, ROWS
-from scenario_gen.corpus.messages import digest_of, UNITS_PER_DEGREE
+from scenario_gen.corpus.messages import database, digest_of, tables, UNITS_PER_DEGREE
 from scenario_gen.corpus.tables import write_table
 from scenario_gen.corpus.tracks import runs_of
 from scenario_gen.logs import (
@@ -105,14 +105,7 @@ class LogTask:
 
 def clean_found(task: CleanTask) -> None:
     """Write a row for each encounter that survives cleaning, and why others do not."""
-    from pyarrow import parquet
-
-    begin = min(entry.start for entry in task.encounters) - MESSAGES_BEFORE_US
-    end = max(entry.end for entry in task.encounters) + MESSAGES_AFTER_US
-    devices = sorted({device for entry in task.encounters for device in entry.devices})
-    filters = [("t", ">=", begin), ("t", "<=", end), ("device", "in", devices)]
-    tables = [parquet.read_table(hour / ROWS, filters=filters) for hour in task.hours]
-    by_device = _by_device([table.to_pandas() for table in tables])
+    by_device = _by_device(task)
     rows: list[dict[str, Any]] = []
     refused = []
     for entry in task.encounters:
@@ -126,16 +119,20 @@ def clean_found(task: CleanTask) -> None:
     write_encounters(task.target, rows, refused)
 
 
-def _by_device(tables: Sequence[Any]) -> dict[int, dict[str, Any]]:
+def _by_device(task: CleanTask) -> dict[int, dict[str, Any]]:
     """Return the columns of messages by vehicle, ordered by time, without repeated ones."""
-    import pandas as pd
-
-    messages = pd.concat(tables).drop_duplicates()
-    messages = messages.sort_values(["device", "t", "lat", "lon"], kind="stable")
-    columns = {name: messages[name].to_numpy() for name in messages}
+    begin = min(entry.start for entry in task.encounters) - MESSAGES_BEFORE_US
+    end = max(entry.end for entry in task.encounters) + MESSAGES_AFTER_US
+    devices = {str(device) for entry in task.encounters for device in entry.devices}
+    with database(task.corpus, task.config.memory, f"{task.name} of {task.corpus}") as base:
+        columns = base.execute(f"""
+            SELECT DISTINCT device, t, lat, lon, speed, heading
+            FROM {tables([hour / ROWS for hour in task.hours])}
+            WHERE t BETWEEN {begin} AND {end} AND device IN ({", ".join(devices)})
+            ORDER BY ALL""").fetchnumpy()
     return {
         int(columns["device"][first]): {
-            name: values[first:last] for name, values in columns.items()
+            name: np.asarray(values[first:last]) for name, values in columns.items()
         }
         for first, last in runs_of(columns["device"])
     }

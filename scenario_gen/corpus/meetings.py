@@ -14,7 +14,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 import json
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -32,8 +32,6 @@ from scenario_gen.corpus.tasks import arriving
 from scenario_gen.corpus.tracks import (
     LATITUDE_M,
     LONGITUDE_M,
-    MAX_LATITUDE_M,
-    MAX_SPEED_MPS,
     meetings,
     MICROSECOND_S,
     runs_of,
@@ -41,10 +39,9 @@ from scenario_gen.corpus.tracks import (
     Track,
     tracks_of,
 )
-from scenario_gen.logs import GAP_RATE_MPS, OUT_OF_RANGE_S, shortest
+from scenario_gen.logs import OUT_OF_RANGE_S, shortest
 from scenario_gen.logs.groups import AROUND_CROSSING_S, LONGEST_EXTENSION_S
-from scenario_gen.numerics import Bools, Floats, Ints
-from scenario_gen.numerics.kernels import F, F1, I, I1, kernel, named
+from scenario_gen.numerics import Bools, Ints
 
 BIN_US = 500_000
 BIN_S = BIN_US * MICROSECOND_S
@@ -156,31 +153,17 @@ def _meetings_in_hour(
 
 
 def _messages(base: Any, source: str) -> Columns:
-    """Return the messages (M,) of all candidates, by vehicle and time, one for each stamp."""
-    rows = base.execute(f"""
-        SELECT * FROM {source}
-        WHERE device IN (SELECT a FROM candidates UNION SELECT b FROM candidates)""").fetchnumpy()
-    order = in_order(rows)
-    device, t = rows["device"][order], rows["t"][order]
-    is_first = np.ones(len(t), dtype=bool)
-    is_first[1:] = (np.diff(t) != 0) | (np.diff(device) != 0)
-    return {name: np.asarray(values[order[is_first]]) for name, values in rows.items()}
-
-
-def in_order(rows: Columns) -> Ints:
-    """(M,) the order of messages by vehicle and time.
+    """Return the messages (M,) of all candidates, by vehicle and time, one for each stamp.
 
     The other columns order messages with the same stamp, independently of the order of reading.
     """
-    order = np.lexsort((rows["t"], rows["device"]))
-    device, t = rows["device"][order], rows["t"][order]
-    same = np.zeros(len(t) + 1, dtype=bool)
-    same[1:-1] = (np.diff(t) == 0) & (np.diff(device) == 0)
-    tied = np.flatnonzero(same[1:] | same[:-1])
-    ties = order[tied]
-    keys = ("heading", "speed", "lon", "lat", "t", "device")
-    order[tied] = ties[np.lexsort([rows[name][ties] for name in keys])]
-    return order
+    rows = base.execute(f"""
+        SELECT * FROM {source}
+        WHERE device IN (SELECT a FROM candidates UNION SELECT b FROM candidates)
+        ORDER BY device, t, lat, lon, speed, heading""").fetchnumpy()
+    is_first = np.ones(len(rows["t"]), dtype=bool)
+    is_first[1:] = (np.diff(rows["t"]) != 0) | (np.diff(rows["device"]) != 0)
+    return {name: np.asarray(values[is_first]) for name, values in rows.items()}
 
 
 def _excerpt(rows: Columns, meetings_in_hour: Sequence[Mapping[str, Any]]) -> Bools:
@@ -288,8 +271,6 @@ def _candidates(base: Any, config: CorpusConfig) -> dict[str, Ints]:
 
     Its rows are pairs a, b and the bins first, last in which they are roughly near each other.
     """
-    import pyarrow as pa
-
     reach = config.log.proximity + config.slack
     least = max(int(shortest(config.log) * config.log.period / BIN_S) - 2, 1)
     key, above = f"r * {CELLS_PER_ROW_COUNT} + c", f"(r + 1) * {CELLS_PER_ROW_COUNT} + d"
@@ -312,70 +293,4 @@ def _candidates(base: Any, config: CorpusConfig) -> dict[str, Ints]:
               FROM (SELECT a, b, bin, {begins}::INTEGER AS new FROM near))
         GROUP BY a, b, part HAVING count(*) >= {max(least // 2, 1)} ORDER BY a, b, first""")
     pairs: dict[str, Ints] = base.execute("FROM candidates").fetchnumpy()
-    is_near = _near_in_time(base, pairs, config)
-    pairs = {name: np.asarray(values[is_near]) for name, values in pairs.items()}
-    base.register("remaining", pa.table(pairs))
-    base.execute("CREATE OR REPLACE TEMP TABLE candidates AS FROM remaining")
     return pairs
-
-
-def _near_in_time(base: Any, pairs: Mapping[str, Ints], config: CorpusConfig) -> Bools:
-    """(C,) which candidates may interact: somewhere they are near within the relevant seconds.
-
-    Bins of half a second miss places by the distance driven in a quarter of a second.
-    """
-    rows = base.execute("""
-        SELECT device, bin, lat, lon FROM binned
-        WHERE device IN (SELECT a FROM candidates UNION SELECT b FROM candidates)
-        ORDER BY device, bin""").fetchnumpy()
-    sent = {
-        int(rows["device"][first]): _Sent(
-            rows["bin"][first:last],
-            rows["lat"][first:last] * MAX_LATITUDE_M,
-            rows["lon"][first:last],
-        )
-        for first, last in runs_of(rows["device"])
-    }
-    latitude = {int(rows["device"][k]): float(rows["lat"][k]) for k, _ in runs_of(rows["device"])}
-    steps = int(config.interaction / GAP_RATE_MPS / BIN_S) + 1
-    reach = config.interaction + config.slack + MAX_SPEED_MPS * BIN_S / 4.0
-    is_near = np.zeros(len(pairs["a"]), dtype=bool)
-    columns = (pairs[name].tolist() for name in ("a", "b", "first", "last"))
-    for k, (a, b, first, last) in enumerate(zip(*columns, strict=True)):
-        degree = LONGITUDE_M * np.cos(latitude[a] * np.pi / 180.0)
-        square = _least_square(sent[a], sent[b], degree, first, last, steps)
-        is_near[k] = square <= reach * reach
-    return is_near
-
-
-class _Sent(NamedTuple):
-    """Bins (M,) in which a vehicle sends, metres north and degrees east in each."""
-
-    bins: Ints
-    north: Floats
-    lon: Floats
-
-
-_SENT = named(_Sent, I1, F1, F1)
-
-
-@kernel(_SENT, _SENT, F, I, I, I)
-def _least_square(a: _Sent, b: _Sent, degree: float, first: int, last: int, steps: int) -> float:
-    """Least square distance [m²] of a, from bin first to last, to b, at most `steps` bins away.
-
-    `degree` is the length of a degree of longitude [m].
-    """
-    least = np.inf
-    begin = 0
-    for m in range(len(a.bins)):
-        if a.bins[m] < first or a.bins[m] > last:
-            continue
-        while begin < len(b.bins) and b.bins[begin] < a.bins[m] - steps:
-            begin += 1
-        n = begin
-        while n < len(b.bins) and b.bins[n] <= a.bins[m] + steps:
-            north = a.north[m] - b.north[n]
-            east = (a.lon[m] - b.lon[n]) * degree
-            least = min(least, north * north + east * east)
-            n += 1
-    return least

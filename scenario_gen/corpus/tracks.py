@@ -6,12 +6,13 @@
 Vehicles that share an id are separated, and outliers are left out.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any
 
 import numpy as np
+from scipy.ndimage import maximum_filter1d, median_filter, minimum_filter1d
 
 from scenario_gen.corpus.config import CorpusConfig
 from scenario_gen.logs import (
@@ -27,7 +28,6 @@ from scenario_gen.numerics.kernels import F1, I1, kernel, OUT2, OUTI1
 
 MAX_SPEED_MPS = 35.0  # the distance driven in a bin widens the cells
 LATITUDE_M = 110_574.0  # length of a degree of latitude, at least
-MAX_LATITUDE_M = 111_120.0  # and within 0.5 % anywhere
 LONGITUDE_M = 111_320.0  # length of a degree of longitude at the equator
 MICROSECOND_S = 1e-6
 MAX_SENDERS_COUNT = 64  # vehicles that share an id in an hour
@@ -72,38 +72,30 @@ def tracks_of(rows: Mapping[str, Any]) -> dict[int, Track]:
         rows: (M,) by column, ordered by vehicle and time, one for each stamp; heading in degrees
             clockwise from north.
     """
-    device, t = rows["device"], rows["t"]
-    spans = runs_of(device)
-    if not spans:
-        return {}
-    is_good = ~_outliers(rows, spans)
-    heading = np.pi / 2.0 - rows["heading"].astype(np.float64) * (np.pi / 180.0)
-    speed = rows["speed"].astype(np.float64)
     tracks = {}
-    for begin, end in spans:
-        index = np.flatnonzero(is_good[begin:end]) + begin
+    for begin, end in runs_of(rows["device"]):
+        sent = {name: values[begin:end] for name, values in rows.items()}
+        index = np.flatnonzero(~_outliers(sent))
         if len(index) > 1:
-            name = int(device[begin])
-            lat, lon = rows["lat"][index], rows["lon"][index]
-            tracks[name] = Track(name, t[index], lat, lon, speed[index], heading[index])
+            name = int(sent["device"][0])
+            heading = np.pi / 2.0 - sent["heading"].astype(np.float64) * (np.pi / 180.0)
+            values = sent["t"], sent["lat"], sent["lon"], sent["speed"].astype(np.float64), heading
+            tracks[name] = Track(name, *(each[index] for each in values))
     return tracks
 
 
-def _outliers(rows: Mapping[str, Any], spans: Sequence[tuple[int, int]]) -> Bools:
-    """(M,) whether a message lies far from the median of the five messages around it."""
-    t = rows["t"]
-    lengths = [last - first for first, last in spans]
-    first = np.repeat([span[0] for span in spans], lengths)
-    last = np.repeat([span[1] for span in spans], lengths)
-    index = np.arange(len(t))
-    around = [np.clip(index + k, first, last - 1) for k in (-2, -1, 0, 1, 2)]
-    seconds = np.minimum((t[around[4]] - t[around[0]]) * MICROSECOND_S, MAX_OUTLIER_GAP_S)
-    limit = OUTLIER_M + MAX_SPEED_MPS * seconds
-    east = LONGITUDE_M * np.cos(rows["lat"] * (np.pi / 180.0))
-    is_outlier = np.zeros(len(t), dtype=bool)
+def _outliers(sent: Mapping[str, Any]) -> Bools:
+    """(M,) whether a vehicle's message lies far from the median of the five messages around it."""
+    latest, earliest = (
+        limit(sent["t"], 5, mode="nearest") for limit in (maximum_filter1d, minimum_filter1d)
+    )
+    seconds = np.minimum((latest - earliest) * MICROSECOND_S, MAX_OUTLIER_GAP_S)
+    east = LONGITUDE_M * np.cos(sent["lat"] * (np.pi / 180.0))
+    is_outlier = np.zeros(len(seconds), dtype=bool)
     for name, metres in (("lat", LATITUDE_M), ("lon", east)):
-        median = np.sort([rows[name][index] for index in around], axis=0)[2]
-        is_outlier |= ~(np.abs(rows[name] - median) * metres < limit)
+        median = median_filter(sent[name], 5, mode="nearest")
+        distance = np.abs(sent[name] - median) * metres
+        is_outlier |= ~(distance < OUTLIER_M + MAX_SPEED_MPS * seconds)
     return is_outlier
 
 
