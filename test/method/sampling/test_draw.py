@@ -4,6 +4,8 @@
 """Whole sets on hand-made routes: a straight crossed by a quarter turn, with a wait."""
 
 from dataclasses import replace
+import math
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -14,13 +16,14 @@ from scenario_gen.base.errors import InputError
 from scenario_gen.base.road_users import Dynamics, TypeLimits
 from scenario_gen.method.sampling import Callbacks, draw_scenarios, SamplingConfig
 from scenario_gen.method.sampling.build_model import build_model
-from scenario_gen.method.sampling.filters import ValidityFilter
-from scenario_gen.method.sampling.sampler import LEVEL_CANDIDATES
+from scenario_gen.method.sampling.filters import PILOT_CANDIDATES, ValidityFilter
+from scenario_gen.method.sampling.plan import _placed_abreast
+from scenario_gen.method.sampling.sampler import LEVEL_CANDIDATES, place_of
 from scenario_gen.method.sampling.vehicle_model import NoiseScale
 from scenario_gen.method.validity import Checker
 from scenario_gen.numerics.arrays import wrap_angle
-from scenario_gen.situation import find_waits, Situation, Wait
-from scenario_gen.types import NoteKind
+from scenario_gen.situation import Abreast, find_waits, Situation, Wait
+from scenario_gen.types import Loss, NoteKind, Vehicle
 from scenario_gen.types.road import Road
 from scenario_gen.types.scenario import BoundaryStates, Cause, Verdict, Violation
 
@@ -245,6 +248,22 @@ def test_refusals_are_counted_by_cause_and_levels_are_tried():
     assert max(s.index for s in found.scenarios) >= LEVEL_CANDIDATES
 
 
+@pytest.mark.parametrize(("drivers", "share"), [(0.0, 0.3), (1.0, 0.1)])
+def test_other_levels_are_tried_below_a_share_of_valid_candidates(drivers, share):
+    """Three in ten where one driver is drawn, one in ten where drivers differ, too."""
+    enough = math.ceil(share * PILOT_CANDIDATES)
+    for accepted in (enough, enough - 1):
+
+        def first_ones(scenarios, accepted=accepted):
+            fault = Verdict((Violation(Cause.OVERLAP, 0.0, (0, 1), ""),))
+            numbers = (place_of(scenario.index)[1] for scenario in scenarios)
+            return [Verdict() if number < accepted else fault for number in numbers]
+
+        found = drawn(count=5, check=first_ones, config=replace(PLAIN, drivers=drivers))
+        tried = NoteKind.FEW_VALID in {note.kind for note in found.adaptations}
+        assert tried == (accepted < enough)
+
+
 def test_short_set_is_returned_with_its_account():
     def never(scenarios):
         return [Verdict((Violation(Cause.OVERLAP, 0.0, (0, 1), ""),)) for _ in scenarios]
@@ -331,3 +350,17 @@ def test_routes_that_do_not_suit():
     plan = scene_plan()
     with pytest.raises(InputError, match="routes do not suit"):
         draw_scenarios(replace(plan, routes=plan.routes[:2]), all_valid, count=5)
+
+
+@pytest.mark.parametrize(("left", "is_lost"), [(-3.05, True), (-2.05, True), (-3.05, False)])
+def test_two_in_a_lane_are_held_to_the_side_distance_that_the_road_leaves(left, is_lost):
+    """Recorded 2.55 m apart with 1.3 m between their sides; the road may not have room for it."""
+    pair = Abreast((0, 1), -2.55, 1.3, np.ones(3, dtype=bool), np.zeros((2, 2)))
+    ways = np.stack([np.linspace(0.0, 60.0, 61), np.zeros(61), np.zeros(61)], axis=-1)
+    paths = [SimpleNamespace(path=ways + np.array([0.0, y, 0.0])) for y in (0.0, left)]
+    losses = (Loss("side", ("a", "b"), ""),) if is_lost else ()
+    fit = SimpleNamespace(vehicles=(Vehicle("a"), Vehicle("b")), fitted=paths, losses=losses)
+    placed = _placed_abreast(pair, fit)
+    shown = left if is_lost else -2.55
+    assert placed.offset == pytest.approx(shown)
+    assert placed.clearance == pytest.approx(1.3 + abs(shown) - 2.55)

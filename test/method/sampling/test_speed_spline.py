@@ -13,7 +13,11 @@ from scipy.optimize import minimize
 from benchmarks._paper_speed_knots import speed_knots as paper_speed_knots
 from scenario_gen.method.sampling.nominal_clock import clock_from_rate, slowed_clock, SLOWING_S
 from scenario_gen.method.sampling.speed_profile import mean as mean_module
-from scenario_gen.method.sampling.speed_profile.knots import speed_knots
+from scenario_gen.method.sampling.speed_profile.knots import (
+    lengthened_waits,
+    MIN_WAIT_S,
+    speed_knots,
+)
 from scenario_gen.method.sampling.speed_profile.mean import (
     Bounds,
     fixed_coefficients,
@@ -25,6 +29,7 @@ from scenario_gen.method.sampling.speed_profile.mean import (
 )
 from scenario_gen.method.sampling.speed_profile.model import kernel_root, SpeedModel
 from scenario_gen.method.sampling.speed_profile.spline import KNOT_SPACING_S, SpeedSpline
+from scenario_gen.situation import Wait
 
 TIME = np.arange(201) * 0.1
 CLOCK = np.array([0.0, 6.0, 9.0, 14.0, 20.0])
@@ -246,3 +251,16 @@ def test_motion_on_a_slowed_clock_is_the_chain_rule():
     rate = clock.at(tau)[1]
     slope = (speed(tau + h) - speed(tau - h)) / (2.0 * h)
     assert (motion.acceleration @ c)[5:-5] == pytest.approx(slope / rate, abs=1e-2)
+
+
+@pytest.mark.parametrize("seconds", [0.3, 1.0, MIN_WAIT_S, 4.0])
+def test_short_waits_are_lengthened_about_their_middle(seconds):
+    waits = [
+        Wait(0, 1.0, 9.0),
+        Wait(1, 6.0, 6.0 + seconds),
+        Wait(1, 12.0, 15.0, moves_slowly=True),
+    ]
+    ((start, end),) = lengthened_waits(1, waits, creeping=False)
+    assert end - start == pytest.approx(max(seconds, MIN_WAIT_S))
+    assert start + end == pytest.approx(12.0 + seconds)
+    assert lengthened_waits(1, waits, creeping=True) == [(12.0, 15.0)]

@@ -298,19 +298,6 @@ def without_infos(bag, target, infos):
     )
 
 
-def test_the_command_answers_with_its_exit_code(run, tmp_path):
-    bag = write_recording(tmp_path / "run", {"/here": run})
-    assert CliRunner().invoke(app, ["evaluate", str(bag)]).exit_code == 0
-    cut = rewritten(bag, tmp_path / "cut", lambda k, data: data[:200] if k == 2 else data)
-    answer = CliRunner().invoke(app, ["evaluate", str(cut)])
-    assert answer.exit_code == 1
-    assert "3 of 4" in answer.output and Cause.UNUSABLE in answer.output
-    with pytest.raises(InputError, match="does not exist"):
-        evaluate_bag(tmp_path / "none")
-    with pytest.raises(InputError, match="nothing to evaluate"):
-        evaluate_bag(rewritten(bag, tmp_path / "empty", without=("scenarios",)))
-
-
 def test_an_ego_is_checked_with_its_witness(run, tmp_path):
     """The witness is a part of what is proven: one that hits another is found, one that is lost or altered is said."""
     slot = Chain(
