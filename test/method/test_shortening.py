@@ -8,7 +8,6 @@ import pickle
 
 import numpy as np
 import pytest
-from support.reaction_scenes import along
 
 from scenario_gen import read_log
 from scenario_gen.method.chain import EmptySetError
@@ -19,7 +18,7 @@ from scenario_gen.situation import (
     keeps_interaction,
     Situation,
 )
-from scenario_gen.types import Encounter, GenerationResult, NoteKind, Segmentation, Vehicle
+from scenario_gen.types import Encounter, GenerationResult, NoteKind, Segmentation
 
 LOG = Path(__file__).resolve().parents[2] / "examples" / "my_log.csv"
 
@@ -88,16 +87,3 @@ def test_each_vehicle_keeps_its_events(crossing: Encounter) -> None:
     lost = windows.copy()
     lost[:, 1] = situation.conflicts[0].entry_first - 1.0
     assert not keeps_interaction(situation, Situation.of(cut(crossing, lost)))
-
-
-def test_vehicles_without_events_are_needed_when_they_are_nearest() -> None:
-    time = np.arange(101) * 0.1
-    position = np.stack(
-        [along(np.full(101, 8.0), 0.0), [100.0, 3.5] - along(np.full(101, 8.0), 0.0)]
-    )
-    heading = np.repeat([[0.0], [np.pi]], len(time), axis=1)
-    speed = np.full((2, len(time)), 8.0)
-    vehicles = (Vehicle("1"), Vehicle("2"))
-    passing = Encounter.sampled(vehicles, 0.1, position, heading, speed, "passing")
-    windows = interaction_windows(Situation.of(passing))
-    assert windows == pytest.approx(np.tile([3.2, 8.2], (2, 1)), abs=0.2)

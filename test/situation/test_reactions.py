@@ -3,7 +3,7 @@
 
 """Who reacts to whom: planted reactions are found with their lag, independent drives have none, circles are cut."""
 
-from dataclasses import replace
+from dataclasses import astuple, replace
 import itertools
 
 import numpy as np
@@ -11,8 +11,9 @@ import pytest
 from support.reaction_scenes import answering, crossing, lane_encounter, wander
 from support.textbook_motions import CHANCE, labelled, NOTHING, REACTIONS
 
-from scenario_gen.situation import Situation
+from scenario_gen.situation import interaction_windows, kind_of, Situation
 from scenario_gen.situation.reactions import without_circles
+from scenario_gen.situation.separation import least_gaps
 from scenario_gen.types import FOLLOW, Reaction, Vehicle, YIELD
 
 TWO, AB = (tuple(map(Vehicle, names)) for names in ("12", "ab"))
@@ -50,6 +51,14 @@ def test_who_waits_for_another_one_and_leaves_behind_it_yields(lag):
     assert (edge.kind, edge.who, edge.whom, edge.stands) == (YIELD, 1, 0, True)
     assert edge.lag == pytest.approx(lag, abs=0.35)  # it leaves when it is faster than 0.5 m/s
     assert graph.sentences(TWO)[0].startswith("vehicle 2 waits for vehicle 1, then passes")
+
+
+@pytest.mark.parametrize("speed", [2.0, 3.9, 4.4, 6.0])
+def test_a_follower_is_less_surely_one_the_longer_its_time_gap(speed):
+    """0.9 at 2 s, 0.5 at 4 s and in between on a line; who is slower than 4 m/s counts as so fast."""
+    steady, bumper = np.full(150, speed), 20.0 - 4.8
+    (edge,) = Situation.of(lane_encounter(steady, steady, 20.0)).reactions.edges
+    assert edge.confidence == pytest.approx(0.9 - 0.2 * (bumper / max(speed, 4.0) - 2.0))
 
 
 def test_who_leaves_long_after_waits_for_something_else():
@@ -147,3 +156,48 @@ def test_a_doubtful_edge_is_said_to_be():
         .document(AB)["words"]
         .startswith("vehicle a follows vehicle b, 1.0 s bumper to bumper")
     )
+
+
+def figures(encounter):
+    """Reactions, conflicts, waits, kind, gaps and windows of an encounter of two."""
+    situation = Situation.of(encounter)
+    names = [
+        "kind",
+        "who",
+        "whom",
+        "stands",
+        "merges",
+        "lag",
+        "gain",
+        "residual",
+        "confidence",
+        "since",
+        "until",
+    ]
+    edges = [[getattr(one, name) for name in names] for one in situation.reactions.edges]
+    windows = interaction_windows(situation).ravel()
+    return [
+        *edges,
+        *map(astuple, situation.conflicts),
+        *map(astuple, situation.waits),
+        (kind_of(encounter, 0, 1),),
+        tuple(least_gaps(encounter)),
+        tuple(windows),
+    ]
+
+
+@pytest.mark.parametrize("kind", [*REACTIONS, *NOTHING])
+def test_nothing_depends_on_the_frame(kind):
+    """Turned by 126° and 760 m away, it is the same encounter."""
+    encounter = labelled(kind, 0).encounter
+    cos, sin = np.cos(2.2), np.sin(2.2)
+    position = encounter.position @ np.array([[cos, sin], [-sin, cos]]) + (700.0, -300.0)
+    moved = replace(encounter, position=position, heading=encounter.heading + 2.2)
+    for before, after in zip(figures(encounter), figures(moved), strict=True):
+        assert after == pytest.approx(before, abs=1e-6)
+
+
+def test_a_conflict_is_found_by_its_pair_in_either_order():
+    situation = Situation.of(crossing(8.0))
+    (found,) = situation.conflicts
+    assert situation.conflict(0, 1) is found and situation.conflict(1, 0) is found

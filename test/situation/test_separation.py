@@ -6,7 +6,7 @@
 import numpy as np
 import pytest
 
-from scenario_gen.situation import Situation
+from scenario_gen.situation import interaction_windows, Situation
 from scenario_gen.situation.separation import least_gaps
 from scenario_gen.types import ALWAYS, Encounter, Vehicle
 
@@ -32,3 +32,18 @@ def test_the_least_gap_of_each_is_to_its_nearest():
 def test_gaps_of_two_that_never_meet_and_of_two_in_one_place():
     assert Situation.of(queue(0.0, 5.0, present=np.array([[0, 9], [20, 29]]))).least_gap == np.inf
     assert (least_gaps(queue(0.0, 1.0)) < 0.0).all()
+
+
+def test_vehicles_without_events_are_needed_when_they_are_nearest():
+    """For 5 s about the middle of 6.25 s, at which two pass each other that react to nothing."""
+    time = np.arange(101) * 0.1
+    along = np.column_stack([8.0 * time, np.zeros(101)])
+    position = np.stack([along, [100.0, 3.5] - along])
+    heading = np.repeat([[0.0], [np.pi]], 101, axis=1)
+    vehicles = (Vehicle("1"), Vehicle("2"))
+    passing = Encounter.sampled(
+        vehicles, 0.1, position, heading, np.full((2, 101), 8.0), "passing"
+    )
+    windows = interaction_windows(Situation.of(passing))
+    assert windows[:, 1] - windows[:, 0] == pytest.approx(5.0)
+    assert windows[:, 0] == pytest.approx(3.25, abs=0.06)
