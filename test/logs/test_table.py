@@ -162,3 +162,18 @@ def test_frames_cannot_be_mixed(tmp_path):
     paths = [save(crossing(), tmp_path, "a.csv"), save(geographic(crossing()), tmp_path, "b.csv")]
     with pytest.raises(InputError, match="mix latitude"):
         read_log(paths)
+
+
+@pytest.mark.parametrize("lon", [174.8, -179.5, 11.6])
+@pytest.mark.parametrize("lat", [-41.3, 88.0, 0.2])
+def test_degrees_that_are_called_metres_are_refused(tmp_path, lon, lat):
+    """From New Zealand to the pole: as metres nobody would move."""
+    rows = [
+        f"{k / 10},{who},{lon + 1e-5 * k},{lat + shift},10"
+        for who, shift in (("a", 0.0), ("b", 1e-4))
+        for k in range(100)
+    ]
+    path = tmp_path / "log.csv"
+    path.write_text("\n".join(["t,id,x,y,speed", *rows]) + "\n")
+    with pytest.raises(InputError, match="lon=x,lat=y"):
+        read_log(path)

@@ -50,6 +50,7 @@ def test_rows_say_what_happened():
         "replay",
     ]
     assert found.changepoints == 2 and found.vehicles == ("west", "south")
+    assert NoteKind.PAIRS_LEFT_OUT not in kinds_of(found.row("x"))
     assert found.value("replay", "e_position") < 1e-6 and found.value("replay", "min_ade") < 1e-6
     for key in ("e_position", "e_speed", "js_speed", "js_acceleration", "wasserstein_speed"):
         assert found.value("with changepoints", key) < found.value("without changepoints", key)

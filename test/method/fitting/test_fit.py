@@ -3,6 +3,8 @@
 
 """Templates on roads: ends, lanes, who crosses whom, repair, refusals."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from support.lengths import LOGS
@@ -10,6 +12,7 @@ from support.lengths import LOGS
 from scenario_gen.base.errors import InputError, RefusedError
 from scenario_gen.logs import read_log
 from scenario_gen.method.fitting import fit_template, FittingConfig
+from scenario_gen.method.fitting.state_check import refuse_misfits
 from scenario_gen.numerics.curve import Curve
 from scenario_gen.roads import build_road, RoadConfig
 from scenario_gen.roads.clearance import footprint_fits
@@ -17,6 +20,7 @@ from scenario_gen.situation import find_conflicts
 from scenario_gen.types import Encounter, Motion, Vehicle
 from scenario_gen.types.fit import Segmentation
 from scenario_gen.types.road import Road
+from scenario_gen.types.scenario import BoundaryStates
 
 pytestmark = pytest.mark.spread
 ROADS = ("straight", "t_intersection", "four_way", "corridor")
@@ -400,3 +404,30 @@ def test_search_finds_a_road_of_the_templates_shape_wherever_it_is():
     )
     with pytest.raises(RefusedError, match="no placement on road narrow has room"):
         fit_template(encounter, every(encounter), narrow)
+
+
+@pytest.mark.parametrize("end", ["start", "goal"])
+def test_requested_states_suit_each_other_and_who_stands(end):
+    """The second vehicle stands in the primitive at this end; both are 4.8 m long."""
+    stands = np.array([True, False] if end == "start" else [False, True])
+    fitted = (SimpleNamespace(stands=np.zeros(2, dtype=bool)), SimpleNamespace(stands=stands))
+    free, row = np.full((2, 4), np.nan), int(end == "goal")
+
+    def refused(vehicle, speed, apart=9.0):
+        states = np.zeros((2, 4))
+        states[1, 0] = apart
+        asked = [free.copy(), free.copy()]
+        asked[row][vehicle] = [states[vehicle, 0], 0.0, 0.0, speed]
+        ends = [states, states + np.array([[0.0], [1.0]]) * [9.0, 0.0, 0.0, 0.0]][:: 1 - 2 * row]
+        fit = SimpleNamespace(
+            vehicles=(Vehicle("a"), Vehicle("b")), fitted=fitted, requested=BoundaryStates(*ends)
+        )
+        try:
+            refuse_misfits(fit, *asked)
+        except RefusedError as error:
+            return str(error)
+        return ""
+
+    assert not refused(0, 8.0) and not refused(1, 0.05) and not refused(0, 8.0, 4.81)
+    assert "vehicle b stands there" in refused(1, 0.06)
+    assert f"requested {end} vehicles a and b overlap by 0.10 m" in refused(0, 8.0, 4.7)
