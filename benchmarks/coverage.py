@@ -85,7 +85,7 @@ def run() -> list[Row]:
     """Measure."""
     encounters = [
         (session, replace(encounter, name=str(k)))
-        for k, (session, encounter) in enumerate(list(_encounters())[::STRIDE])
+        for k, (session, encounter) in enumerate(list(recorded_pairs())[::STRIDE])
     ]
     rng = np.random.default_rng(1)
     null = list(_shifted(encounters, rng))
@@ -221,7 +221,7 @@ def _generated_set(sampling: SamplingConfig, encounter: Encounter, count: int) -
     return result
 
 
-def _encounters() -> Iterator[tuple[str, Encounter]]:
+def recorded_pairs() -> Iterator[tuple[str, Encounter]]:
     """Yield the encounters with the names of their sessions."""
     if not (DATA / "trajectories").is_dir():
         sys.path.append(str(Path(__file__).resolve().parents[1] / "test"))

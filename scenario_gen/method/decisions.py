@@ -196,7 +196,7 @@ class DecidedConflict:
             RefusedError: there is nothing to decide; the message says why.
         """
         pair = _yielding_pair(encounter)
-        _refuse_undecided(pair)
+        refuse_undecided(pair)
         first, second = approaches(pair)
         lag = offered_lag_of(first, second)
         if _merges_from_beside(pair) and abs(lag) > MARGINS.max_merge_lag_s:
@@ -287,7 +287,7 @@ def _yielding_pair(encounter: Encounter) -> InteractingPair:
     raise RefusedError(f"vehicle {who} has not yet passed when its recording ends")
 
 
-def _refuse_undecided(pair: InteractingPair) -> None:
+def refuse_undecided(pair: InteractingPair) -> None:
     """Refuse a pair without a decision about who goes first.
 
     Raises:

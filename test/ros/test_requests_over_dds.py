@@ -11,12 +11,13 @@ from support.suite_processes import Processes, RESOURCES
 
 from msg_conventions.ego import decode_state, ego_messages
 from msg_conventions.scenarios import digest, encode_scenario
-from scenario_gen.bags.recordings.read import read_recording
+from scenario_gen.bags.recordings.read import load, read_recording
+from scenario_gen.bags.recordings.write import result_messages
 from scenario_gen.logs import read_log
-from scenario_gen.method.evaluation import EvaluationConfig
+from scenario_gen.method.sampling import SamplingConfig
 from scenario_gen.output.review.evaluation import evaluate_bag
-from scenario_gen.pipeline import generate, PipelineConfig
-from scenario_gen.types.request import Request
+from scenario_gen.pipeline import generate, generate_outcomes, PipelineConfig
+from scenario_gen.types import Request, token
 
 pytestmark = pytest.mark.dds
 LOG, ROAD, SEED = RESOURCES / "synthetic_b", "t_intersection", 7
@@ -41,11 +42,14 @@ def suite(tmp_path_factory, domain):
     made.kill()
 
 
-def in_process(count, **asked):
+def in_process_result(count, **asked):
     (encounter,) = read_log(LOG).encounters
-    config = PipelineConfig(evaluation=EvaluationConfig(resamples=10))
-    case = generate(encounter, ROAD, config, count=count, seed=SEED, request=Request(**asked))
-    return encounter, case.generated
+    return generate(encounter, ROAD, count=count, seed=SEED, request=Request(**asked))
+
+
+def in_process(count, **asked):
+    result = in_process_result(count, **asked)
+    return result.encounter, result.generated
 
 
 def published(client, result):
@@ -130,6 +134,29 @@ def test_what_is_impossible_is_refused_with_a_pose_that_has_room(suite, client):
         assert not refused.successful and said in refused.reason
 
 
+def test_the_same_bytes_as_in_process_for_each_outcome(suite, client):
+    plain = in_process_result(1)
+    config = PipelineConfig(sampling=SamplingConfig(decisions="drawn"))
+    recorded, *others = generate_outcomes(plain.encounter, plain.road, config, count=8, seed=SEED)
+    assert len(others) > 1
+    client.hear("/scenarios", "/scenarios/info")
+    client.wait("/scenarios/info", 3)
+    result = client.generate(**{"sampling.decisions": "drawn", "count": 8})
+    assert result.successful, result.reason
+    sets = [("", recorded)]
+    sets += [(f"/{token(made.encounter.decision.outcome)}", made) for made in others]
+    for namespace, made in sets:
+        wanted = [data for topic, data, _ in result_messages(made) if topic == "scenarios"]
+        topic = f"{namespace}/scenarios"
+        client.hear(topic)
+        client.until(
+            lambda topic=topic, wanted=wanted: set(wanted) <= set(client.heard[topic]), topic
+        )
+        client.until(
+            lambda topic=topic, wanted=wanted: client.counted(topic) >= len(wanted), "the bag"
+        )
+
+
 def test_all_of_it_is_in_the_bag(suite, client):
     client.hear("/scenarios", "/scenarios/info")
     client.wait("/scenarios/info", 3)
@@ -142,7 +169,11 @@ def test_all_of_it_is_in_the_bag(suite, client):
         )
     suite.end()
     bag = suite.folder / "bag"
-    (found,) = evaluate_bag(bag)
-    assert (found.causes, skipped(found)) == ({}, {})
+    evaluations = evaluate_bag(bag)
+    assert [(found.causes, skipped(found)) for found in evaluations] == [({}, {})] * len(
+        evaluations
+    )
+    outcomes = {str(load(bag, found.namespace).encounter.decision) for found in evaluations[1:]}
+    assert len(outcomes) == len(evaluations) - 1 > 1
     hashes = read_recording(bag).namespaces[""].hashes
     assert {sha256 for own in digests for sha256 in own} <= set(hashes)

@@ -120,8 +120,8 @@ class SamplingConfig(Parameters):
     )
     decision_rate: float = parameter(
         0.8,
-        "drawn: β of P(goes first) = 1 / (1 + exp(-β lag)), fitted to 67 recorded left turns and "
-        "crossings (0.86 ± 0.21)",
+        "drawn: β of P(goes first) = 1 / (1 + exp(-β lag)), fitted to recorded turns, crossings "
+        "and merges",
         unit="1/s",
         low=0.0,
         high=10.0,

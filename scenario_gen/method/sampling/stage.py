@@ -46,8 +46,7 @@ def sample_scenarios(
     if sampling.decisions == "drawn" and planned.encounter.decision is None:
         raise InputError(
             "sampling.decisions=drawn gives a set for each outcome: use `scenario-gen generate` "
-            "without --for-testing, `scenario-gen batch` or `generate_outcomes`; "
-            "nodes need sampling.decisions=recorded"
+            "without --for-testing, `scenario-gen batch` or `generate_outcomes`"
         )
     plan = plan or Plan.of(planned, sampling, limits, request)
     generated = draw_scenarios(

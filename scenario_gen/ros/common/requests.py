@@ -29,6 +29,7 @@ from scenario_gen.base.parameters import parameter
 from scenario_gen.method.fitting import FittingConfig
 from scenario_gen.method.routing import PlanningConfig
 from scenario_gen.method.sampling import SamplingConfig
+from scenario_gen.method.segmentation import SegmentationConfig
 from scenario_gen.method.validity import Limits
 from scenario_gen.ros.common.ros_parameters import values_of_call
 from scenario_gen.ros.common.services import offer_trigger, REQUESTS
@@ -49,7 +50,8 @@ Answer = tuple[GenerationResult, RequestSummary]
 class Config(Request):
     """The sampler's parameters.
 
-    `fitting` and `planning` apply to requests with start or end states.
+    `fitting` and `planning` apply to requests with start or end states, and, as `segmentation`,
+    to drawn decisions.
     """
 
     count: int = parameter(50, "scenarios to generate", low=1, high=100_000)
@@ -71,6 +73,7 @@ class Config(Request):
         "use only a map with the recording's stamp; false: the newest map of any map server",
         fixed=True,
     )
+    segmentation: SegmentationConfig = field(default_factory=SegmentationConfig)
     fitting: FittingConfig = field(default_factory=FittingConfig)
     planning: PlanningConfig = field(default_factory=PlanningConfig)
     sampling: SamplingConfig = field(default_factory=SamplingConfig)

@@ -220,7 +220,7 @@ class Outputs:
         finally:
             with self._lock:
                 self._pacing_count -= 1
-                for topic in topics if self._pacing_count == 0 else ():
+                for topic in list(self._paces) if self._pacing_count == 0 else ():
                     self._paces.pop(topic).end()
 
     def send_paced(self, topic: str, data: bytes, stop: Callable[[], bool]) -> None:

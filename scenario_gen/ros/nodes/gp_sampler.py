@@ -3,7 +3,9 @@
 
 """gp_sampler: a template with road, fit and routes in; checked `scenarios` out.
 
-`scenarios/info` describes each scenario.
+`scenarios/info` describes each scenario. With `sampling.decisions=drawn` each outcome that differs
+from the recorded one is a namespace with a template of its own: `goes_first/tracks`,
+`goes_first/scenarios`, …
 
 It generates when the inputs are complete, for the action `~/generate_scenarios`, and for the
 service `~/generate`. Their parameters are the node's own, valid for that request only, and
@@ -26,10 +28,13 @@ from msg_conventions.topics import vehicle_topic
 from msg_conventions.tracks import decode_tracks
 from scenario_gen.bags.recordings.scenario_publisher import ScenarioPublisher
 from scenario_gen.bags.recordings.template import decode_template
+from scenario_gen.bags.recordings.write import result_messages
 from scenario_gen.base.provenance import parameter_texts, versions
-from scenario_gen.method.chain import Chain
+from scenario_gen.method.chain import Chain, Planned
 from scenario_gen.method.config import PipelineConfig
+from scenario_gen.method.outcome_sets import for_one_set, outcome_sets
 from scenario_gen.method.sampling import Callbacks, Cancelled
+from scenario_gen.method.segmentation import segment
 from scenario_gen.ros.common.generate_action import action_type, Goals
 from scenario_gen.ros.common.requests import (
     Answer,
@@ -43,9 +48,12 @@ from scenario_gen.situation import Situation
 from scenario_gen.types import (
     BoundaryStates,
     EgoSlot,
+    Encounter,
     GenerationResult,
     Road,
     Scenario,
+    Segmentation,
+    token,
     tokens,
 )
 
@@ -60,6 +68,7 @@ class GpSampler(StageNode):
     STAGES = (
         "situation",
         "roads",
+        "method.segmentation",
         "method.fitting",
         "method.routing",
         "method.sampling",
@@ -228,27 +237,63 @@ class GpSampler(StageNode):
         encoder = RequestMessages(encounter, request.name, node, hashes)
         publisher = ScenarioPublisher(encoder, road.frame_id, partial(self._send, stop=stop))
 
+        sets: list[GenerationResult] = []
+
         def advance(done: int, _total: int, candidates: int) -> None:
-            request.progress(done, candidates, encounter.start_ns)
+            request.progress(done + sum(map(len, sets)), candidates, encounter.start_ns)
 
         def publish(scenario: Scenario, requested: BoundaryStates, ego: EgoSlot | None) -> None:
             with self._turn:
                 publisher.scenario(scenario, requested, ego)
 
-        outcome = _sample(template, road, config, Callbacks(advance, stop, on_valid=publish))
+        def generate(part: Encounter, count: int) -> GenerationResult:
+            if part.made == "recorded":
+                callbacks = Callbacks(advance, stop, on_valid=publish)
+                return _sample(replace(template, encounter=part), config, count, callbacks)
+            segmentation = segment(part, config.segmentation, config.seed)
+            chain = _chain(part, segmentation, road, config)
+            made = Planned(chain, chain.plan()).sample(count, Callbacks(advance, stop))
+            sets.append(made)
+            return made
+
+        results = outcome_sets(
+            generate, encounter, config.sampling, config, config.count, config.seed
+        )
+        provenance = parameter_texts(config) | versions()
+        for each in results:
+            if each.encounter.made != "recorded":
+                self._send_outcome(replace(each, provenance=provenance), request, config, stop)
+        outcome = results[0]
         result = outcome.generated
         summary = request_summary(
             result,
             request.name,
             node,
             config.seed,
-            parameter_texts(config) | versions() | hashes,
+            provenance | hashes,
             cancelled=stop() and len(result.scenarios) < result.requested,
             reactions=outcome.reacting,
         )
-        with self._turn:
-            publisher.close(result, summary)
+        if outcome.encounter.made == "recorded":
+            with self._turn:
+                publisher.close(result, summary)
         return outcome, summary
+
+    def _send_outcome(
+        self,
+        result: GenerationResult,
+        request: OpenRequest,
+        config: Config,
+        stop: Callable[[], bool],
+    ) -> None:
+        """Publish all messages of an outcome in a namespace of its own."""
+        assert result.encounter.decision
+        namespace = token(result.encounter.decision.outcome)
+        report = partial(self._report_pace, request.name)
+        paced = [f"{namespace}/{topic}" for topic in self.OUTPUTS[:2]]
+        with self._turn, self.outputs.paced(paced, config.patience, report):
+            for topic, data, _ in result_messages(result, request.name):
+                self.outputs.send_paced(f"{namespace}/{topic}", data, stop)
 
     def _report_pace(self, request: str, topic: str, count: int) -> None:
         self.status(
@@ -261,22 +306,26 @@ class GpSampler(StageNode):
 
 
 def _sample(
-    template: GenerationResult, road: Road, config: Config, callbacks: Callbacks
+    template: GenerationResult, config: Config, count: int, callbacks: Callbacks
 ) -> GenerationResult:
     """Sample scenarios, after a new plan if start or end states are requested.
 
     Raises:
         RefusedError: the request is impossible.
     """
+    road, _ = template.road_and_fit()
+    chain = _chain(template.encounter, template.segmentation, road, config)
+    planned = chain.plan() if config.moves else replace(template, seed=config.seed)
+    return replace(chain, count=count).sample(planned, callbacks)
+
+
+def _chain(encounter: Encounter, segmentation: Segmentation, road: Road, config: Config) -> Chain:
+    """Return the stages of a request, for the recorded or another outcome."""
     stages = PipelineConfig(
         fitting=config.fitting,
         planning=config.planning,
-        sampling=config.sampling,
+        sampling=for_one_set(config.sampling, encounter),
         limits=config.limits,
     )
-    situation = Situation.of(template.encounter)
-    chain = Chain(
-        situation, template.segmentation, road, stages, config, config.count, config.seed
-    )
-    planned = chain.plan() if config.moves else replace(template, seed=config.seed)
-    return chain.sample(planned, callbacks)
+    situation = Situation.of(encounter)
+    return Chain(situation, segmentation, road, stages, config, config.count, config.seed)
