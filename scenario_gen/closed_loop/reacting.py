@@ -25,6 +25,7 @@ from scenario_gen.closed_loop.config import ClosedLoopConfig
 from scenario_gen.closed_loop.set_selection import Selection
 from scenario_gen.closed_loop.simulation import ClosedLoop
 from scenario_gen.method.chain import Chain
+from scenario_gen.method.continuation import driven_on
 from scenario_gen.method.decisions import decided
 from scenario_gen.method.evaluation import replay
 from scenario_gen.method.outcome_sets import requested_decisions
@@ -236,7 +237,8 @@ class Testing:
         """
 
         def stage_of(part: Encounter) -> Stage:
-            return self._stage(*road_and_template(road, part, self.config.road), 0)
+            whole, _ = driven_on(part)
+            return self._stage(*road_and_template(road, whole, self.config.road), 0)
 
         try:
             return stage_of(template)

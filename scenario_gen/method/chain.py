@@ -10,6 +10,7 @@ from typing import NamedTuple
 
 from scenario_gen.base.errors import RefusedError
 from scenario_gen.method.config import PipelineConfig
+from scenario_gen.method.continuation import driven_on
 from scenario_gen.method.evaluation import measures_in
 from scenario_gen.method.fitting import fit_template
 from scenario_gen.method.routing import plan_routes
@@ -156,8 +157,11 @@ def plan_set(
     Raises:
         InputError, RefusedError: as the stages.
     """
+    encounter, notes = driven_on(encounter)
     road, encounter = road_and_template(road, encounter, config.road)
     segmentation = segment(encounter, config.segmentation, seed)
     situation = Situation.of(encounter)
     chain = Chain(situation, segmentation, road, config, request, seed=seed, population=population)
-    return Planned(chain, chain.plan())
+    planned = chain.plan()
+    _, fit = planned.road_and_fit()
+    return Planned(chain, replace(planned, fit=replace(fit, notes=(*notes, *fit.notes))))

@@ -47,6 +47,10 @@ class NoteKind(Enum):
     BEST_PLACE = "best place for the recording: {place}: {part} (cost {cost:.1f} m²)"
 
     # Fitting.
+    DRIVEN_ON = (
+        "vehicle {vehicle} drives on for {time:.1f} s after its record, which ends in another "
+        "vehicle's way"
+    )
     AT_HOME = "placed on road {road} in the recording's own frame"
     AS_ONE_PIECE = (
         "placed on road {road} as one piece: rotated by {degrees:.0f}°, scale {scale:g}, "

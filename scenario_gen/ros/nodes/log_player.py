@@ -25,6 +25,7 @@ from scenario_gen.base.cancelling import stop_if_cancelled
 from scenario_gen.base.errors import InputError
 from scenario_gen.base.parameters import parameter, Parameters
 from scenario_gen.logs import latitude_longitude, LogConfig, read_log
+from scenario_gen.method.continuation import driven_on
 from scenario_gen.ros.common.recording_part import send_part
 from scenario_gen.ros.common.recording_part import TOPIC as PART
 from scenario_gen.ros.common.services import offer_trigger
@@ -81,7 +82,7 @@ class LogPlayer(StageNode):
                 f"parameter encounter is {config.encounter}; {config.log_path} holds "
                 f"{len(result.encounters)}, counted from 0"
             )
-        encounter = result.encounters[config.encounter]
+        encounter, driven = driven_on(result.encounters[config.encounter])
         stop_if_cancelled()
         if not config.stream:
             self._sent = encounter
@@ -90,7 +91,8 @@ class LogPlayer(StageNode):
         message = (
             f"{encounter.name}: {n} vehicles, {samples} samples over {encounter.duration:.1f} s"
         )
-        notes = {f"note.{k}": note for k, note in enumerate(result.quality.remarks())}
+        remarks = (*result.quality.remarks(), *map(str, driven))
+        notes = {f"note.{k}": note for k, note in enumerate(remarks)}
         if encounter.origin is not None:
             notes["origin"] = "{!r},{!r}".format(*encounter.origin)
         self.status(Level.OK, message, "encounter", encounter.start_ns, **notes)

@@ -24,6 +24,7 @@ from scenario_gen.base.cancelling import stop_if_cancelled
 from scenario_gen.base.errors import InputError
 from scenario_gen.base.parameters import parameter, Parameters
 from scenario_gen.logs import encounters_of, LogConfig, RawLog
+from scenario_gen.method.continuation import driven_on
 from scenario_gen.method.segmentation import segment, SegmentationConfig
 from scenario_gen.ros.common.live_streams import LiveConfig, LiveStreams
 from scenario_gen.ros.common.recording_part import send_part
@@ -101,7 +102,9 @@ class Segmenter(StageNode):
         def job(_: Callable[[], bool]) -> None:
             result = encounters_of(log, config)
             encounter = max(result.encounters, key=lambda e: e.speed.size)
-            notes = {f"note.{k}": note for k, note in enumerate(result.quality.lines())}
+            encounter, driven = driven_on(encounter)
+            remarks = (*result.quality.lines(), *map(str, driven))
+            notes = {f"note.{k}": note for k, note in enumerate(remarks)}
             n, samples = encounter.speed.shape
             message = (
                 f"streams of {n} vehicles, {samples} samples; the largest of "
