@@ -17,6 +17,7 @@ from scenario_gen.base.registry import Registry
 from scenario_gen.roads.builtin import draw_corridor, draw_layout, draw_paper, layout_for
 from scenario_gen.roads.config import refuse_too_many_cells, RoadConfig
 from scenario_gen.roads.junctions import draw_junction, draw_roundabout
+from scenario_gen.roads.lights import LIT
 from scenario_gen.roads.nav2 import read_map
 from scenario_gen.roads.obstacles import parked_cars, read_obstacles, with_obstacles
 from scenario_gen.roads.outline import road_of_shape, Shape
@@ -226,7 +227,7 @@ def draw_main_road(name: str, encounter: Encounter | None, config: RoadConfig) -
     tracks = situation.drivers
     config = fitting_width(tracks, config)
     is_junction = name in ("t_intersection", "four_way")
-    if is_junction and config.priority in ("auto", "signals") and encounter.lights:
+    if is_junction and config.priority in LIT and encounter.lights:
         return draw_junction(name, situation, config)
     try:
         frenet = to_frenet(tracks)

@@ -14,6 +14,7 @@ from scenario_gen.numerics.curve import Curve
 from scenario_gen.roads.along import lane_along, sharing_lanes
 from scenario_gen.roads.config import RoadConfig
 from scenario_gen.roads.drawn import crossing_lane, draw_lanes, draw_plan, middle_stations
+from scenario_gen.roads.lights import LIT, recorded_rules
 from scenario_gen.roads.pavement import (
     ARM_COUNT,
     drivable_width,
@@ -29,7 +30,15 @@ from scenario_gen.roads.plan import aligned, Arm, Connection, Driven, Plan
 from scenario_gen.roads.vector.ground import VERGE_M
 from scenario_gen.roads.ways import draw_u_turn
 from scenario_gen.situation import pair_crossings, Situation, to_frenet, Track
-from scenario_gen.types import DrawnFor, Encounter, LaneNetwork, Road, Trailer, trailer_poses
+from scenario_gen.types import (
+    DrawnFor,
+    Encounter,
+    Lane,
+    LaneNetwork,
+    Road,
+    Trailer,
+    trailer_poses,
+)
 
 _DEFAULT_ARM_M = 60.0  # without a recording
 _U_TURN_WIDTH_M = 12.0  # between the lanes of a U-turn
@@ -256,7 +265,7 @@ def draw_corridor(name: str, encounter: Encounter | None, config: RoadConfig) ->
             paths[vehicle.id] = path
         if vehicle.trailer is not None:
             trailers[vehicle.id] = vehicle.trailer
-    lanes = []
+    lanes: list[Lane] = []
     for lane_name, sharing in sharing_lanes(paths).items():
         path = paths[lane_name]
         line = path.cut(0.0, path.length, 1.0)
@@ -266,7 +275,9 @@ def draw_corridor(name: str, encounter: Encounter | None, config: RoadConfig) ->
             station, offset = line.project(towed[:, :2])
             half += np.interp(line.station, station, np.abs(offset))
         lanes.append(lane_along(f"along vehicle {lane_name}", line, half))
-    network = LaneNetwork(name, tuple(lanes), drawn=True)
+    lines = [paths[lane_name].points[:, :2] for lane_name in sharing_lanes(paths)]
+    rules = tuple(recorded_rules(encounter, lines)) if config.priority in LIT else ()
+    network = LaneNetwork(name, tuple(lanes), rules=rules, drawn=True)
     road = draw_lanes(network, paved(surface, 0.0), config)
     if config.crossing == "none" or road.lanes is None:
         return road

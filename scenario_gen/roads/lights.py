@@ -15,6 +15,7 @@ from scenario_gen.roads.config import RoadConfig
 from scenario_gen.situation import driver_rows, faced_light, Situation
 from scenario_gen.types import (
     DrawnFor,
+    Encounter,
     LaneNetwork,
     rightwards,
     RuleKind,
@@ -24,6 +25,7 @@ from scenario_gen.types import (
     TrafficRule,
 )
 
+LIT = ("auto", "signals")  # values of `RoadConfig.priority` with which recorded lights are drawn
 _UNRECORDED = SignalSchedule((0.0,), (SignalState.UNKNOWN,), 1.0)
 
 
@@ -64,6 +66,16 @@ def arm_lights(
             schedule = SignalSchedule.cycle((20.0, 3.0, 25.0), states, offset)
         chosen = tuple(lanes[first:last])
         yield TrafficRule(light_id, RuleKind.TRAFFIC_LIGHT, chosen, (), ends, schedule)
+
+
+def recorded_rules(encounter: Encounter, lines: Sequence[Floats]) -> Iterator[TrafficRule]:
+    """Yield the recorded lights in the recording's frame, for lanes along lines (M, 2) [m]."""
+    for light in encounter.lights:
+        lanes = tuple(k for k, line in enumerate(lines) if light.leads_over(line))
+        if lanes:
+            schedule = light.schedule.between(0.0, encounter.duration)
+            kind = RuleKind.TRAFFIC_LIGHT
+            yield TrafficRule(light.id, kind, lanes, (), light.line, schedule, light.turns)
 
 
 def lights_of(network: LaneNetwork) -> tuple[TrafficLight, ...]:

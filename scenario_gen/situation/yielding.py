@@ -53,8 +53,10 @@ def yielding_evidence(recording: Recording, conflict: Conflict) -> Evidence | No
     departs = stands and lag > -LIMITS.anticipation_s
     fade = (LIMITS.crossing_time_s.high, 2.0 * LIMITS.crossing_time_s.high)
     need = need_confidence(recording, who, whom) * float(np.interp(gap, fade, [1.0, 0.0]))
+    # Who drives on steadily answers only one that is close.
+    is_close = since < until or time_gap <= LIMITS.crossing_time_s.low
     confidence = combined_confidence(
-        closeness_confidence(time_gap, LIMITS.crossing_time_s),
+        closeness_confidence(time_gap, LIMITS.crossing_time_s) if is_close else 0.0,
         need,
         _answers_clearing(lag, encounter.duration) if departs else 0.0,
     )

@@ -18,6 +18,7 @@ from scenario_gen.types.signal_schedule import SignalSchedule
 
 TURNS = ("left", "straight", "right")
 _STRAIGHT_RAD = math.radians(30.0)
+_BESIDE_LINE_M = 1.5  # from a line's end to a path that leads over it
 _JUNCTION_M = 30.0  # behind the line, in which a vehicle turns
 _SEARCH_SHARES = np.linspace(0.0, 1.0, 33)  # three such refinements make 3 µs of 0.1 s
 
@@ -63,6 +64,12 @@ class TrafficLight:
         width = float(np.hypot(*across))
         along = (points - self.line[0]) @ (across / width)
         return np.asarray(np.maximum(np.maximum(-along, along - width), 0.0))
+
+    def leads_over(self, points: Floats) -> bool:
+        """Return whether a path of points (M, 2) leads over the line, or closely beside it."""
+        before = self.before(points)
+        crosses = np.flatnonzero((before[:-1] > 0.0) & (before[1:] <= 0.0))
+        return bool((self.distance_to_side(points[crosses]) < _BESIDE_LINE_M).any())
 
     def crossing(self, motion: Motion, n: int) -> float:
         """Return when [s] the front of vehicle n crosses the line; NaN if it never does.

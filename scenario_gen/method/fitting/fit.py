@@ -257,8 +257,8 @@ def fit_template(
         return assemble_fit(situation, segmentation, road, placement, config, given)
     placement = _place(situation, road.cleared, config)
     fit = assemble_fit(situation, segmentation, road, placement, config)
-    if not placement.at_home:
-        refuse_lost(fit.losses, config.allow, road.name)
+    losses = [loss for loss in fit.losses if loss.kind == "light" or not placement.at_home]
+    refuse_lost(losses, config.allow, road.name)
     return fit
 
 

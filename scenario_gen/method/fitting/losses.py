@@ -10,7 +10,7 @@ from itertools import combinations, permutations
 import numpy as np
 
 from scenario_gen.base.errors import InputError, RefusedError
-from scenario_gen.numerics import Bools, Floats, wrap_angle
+from scenario_gen.numerics import Bools, wrap_angle
 from scenario_gen.numerics.plane import ahead_and_left
 from scenario_gen.numerics.rounding import ROUNDING_S
 from scenario_gen.roads import lights_of
@@ -29,7 +29,7 @@ from scenario_gen.situation import (
     turn_of,
     turns_to_keep,
 )
-from scenario_gen.types import LaneNetwork, Loss, Road, SignalStop, TrafficLight
+from scenario_gen.types import LaneNetwork, Loss, Road, SignalStop
 
 LOSABLE = {
     "conflict": "vehicles whose paths cross or merge do not meet",
@@ -63,7 +63,6 @@ class _Limits:
     next_lane_m: float = 2.3  # and from which it is in another lane
     max_extrapolation_m: float = 30.0  # beyond the ends of a path, straight on,
     max_drift_m: float = 1.0  # if this leaves the lane by less
-    beside_line_m: float = 1.5  # from a stop line's end to a path that leads over it
     passing_distance_m: float = 2.0  # by which a passing vehicle is behind, and later ahead
 
 
@@ -135,16 +134,9 @@ def lost_lights(stops: Iterable[SignalStop], placed: Tracks, road: Road) -> Iter
     for stop in stops:
         curve, name = placed[stop.who].curve, placed[stop.who].vehicle.id
         points = curve.at(np.arange(0.0, curve.length + _LIMITS.max_extrapolation_m, 0.5))
-        if stop.stands and not any(_leads_over(light, points) for light in lights):
+        if stop.stands and not any(light.leads_over(points[:, :2]) for light in lights):
             message = f"vehicle {name} stops at red, and the road has no light there"
             yield Loss("light", (name,), message)
-
-
-def _leads_over(light: TrafficLight, points: Floats) -> bool:
-    """Return whether a path of points (M, 3) leads over the stop line of a light."""
-    before = light.before(points[:, :2])
-    crosses = np.flatnonzero((before[:-1] > 0.0) & (before[1:] <= 0.0))
-    return bool((light.distance_to_side(points[crosses, :2]) < _LIMITS.beside_line_m).any())
 
 
 def find_losses(tracks: Tracks, placed: Tracks) -> tuple[Loss, ...]:

@@ -130,13 +130,22 @@ def phases_of(schedule):
     return phases.starts, phases.states
 
 
-def test_a_stop_at_red_is_lost_where_the_road_has_no_light(tmp_path):
+def test_a_stop_at_red_is_lost_where_the_road_has_no_light():
     (encounter,) = read_log(signalised()).encounters
     lost = "vehicle 2 stops at red, and the road has no light there"
-    result = generate(encounter, "corridor", count=1)
-    assert [loss.message for loss in result.fit.losses if loss.kind == "light"] == [lost]
-    with pytest.raises(RefusedError, match=f"{lost}; fitting.allow=lost_light accepts this"):
-        generate(encounter, "four_way", {"road.priority": "none"}, count=1)
+    for road in ("four_way", "corridor"):
+        with pytest.raises(RefusedError, match=f"{lost}; fitting.allow=lost_light accepts this"):
+            generate(encounter, road, {"road.priority": "none"}, count=1)
+
+
+def test_a_corridor_has_the_recorded_lights():
+    (encounter,) = read_log(signalised()).encounters
+    result = generate(encounter, "corridor", count=2)
+    assert not result.fit.losses
+    for scenario in result:
+        assert {light.id for light in scenario.facts.lights} == {"A", "B"}
+        (light,) = [light for light in scenario.facts.lights if light.id == "B"]
+        assert light.schedule.at(light.crossing(scenario, 1)) == "green"
 
 
 def test_a_red_runner_is_named_and_stays_one():
