@@ -42,6 +42,7 @@ STAGES = (
     "interacting_pair",
     "drives",
     "approaches",
+    "continuation",
     "decisions",
     "outcome_sets",
     "config",

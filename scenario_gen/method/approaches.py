@@ -36,7 +36,6 @@ class DecisionMargins:
         min_duration_s: of a new encounter.
         min_together_s: time for which both vehicles are present.
         max_merge_lag_s: in a merge a larger lag leaves nothing to decide.
-        min_gap_s: from the first vehicle's exit to the second one's entry.
         free_gap_s: a driver who would enter later than this does not slow down.
         shared_path_m: vehicles that are laterally nearer drive behind each other.
         approach_s: time before the first entry at which a new encounter begins.
@@ -52,7 +51,6 @@ class DecisionMargins:
     min_duration_s: float = 5.0
     min_together_s: float = 2.0
     max_merge_lag_s: float = 1.5
-    min_gap_s: float = 1.0
     free_gap_s: float = 1.5
     shared_path_m: float = 1.5
     approach_s: float = 5.0

@@ -253,7 +253,7 @@ class DecidedConflict:
         if pair is None or pair.conflict.first != 0:
             raise RefusedError("together they would do something else")
         clears, enters = passing(encounter, pair.conflict, merges=pair.conflict.following)
-        if pair.features[DISTANCE] <= 0.0 or enters - clears < MARGINS.min_gap_s:
+        if pair.features[DISTANCE] <= 0.0 or enters - clears < DRIVING.min_gap_s:
             raise RefusedError("they would come too close")
         allowed = max(MARGINS.max_braking_mps2, _hardest_braking(self.pair.encounter))
         if _hardest_braking(encounter) > allowed:

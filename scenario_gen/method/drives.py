@@ -40,6 +40,7 @@ class DrivingMargins:
         stop_distance_m: from the standing place to where the conflict area is entered.
         own_line_m: a recorded standing place is the line if the area is nearer than this.
         gap_s: from the other vehicle's exit to the entry of a driver who rolls.
+        min_gap_s: the least one, of a driver who would stand more briefly than `min_stand_s`.
         departure_lag_s: from the other vehicle's exit to the departure of a driver who stands.
         departed_m: way from a standing place over which a driver's departure is measured.
         own_departure_mps2: least and greatest acceleration of a recorded departure; who is slower
@@ -63,6 +64,7 @@ class DrivingMargins:
     stop_distance_m: float = 4.0
     own_line_m: float = 15.0
     gap_s: float = 1.5
+    min_gap_s: float = 1.0
     departure_lag_s: float = 0.8
     departed_m: float = 5.0
     own_departure_mps2: tuple[float, float] = (1.2, 2.5)
@@ -302,9 +304,9 @@ def delayed_drive(drive: Drive, entry: float, clears: float, stop: Stop) -> Driv
         RefusedError: it would have to brake too hard.
     """
     line = int(np.searchsorted(drive.station, stop.line))
-    stands = np.flatnonzero(drive.stand[: line + 1])
-    if len(stands):  # since the recording began
-        return _stopped(drive, int(stands[-1]), clears)
+    stood = np.flatnonzero(drive.stand[: line + 1])
+    if len(stood):  # since the recording began
+        return _stopped(drive, int(stood[-1]), clears)
 
     def slowed(least: float) -> Drive:
         """Return the drive with a speed [m/s] at the line."""
@@ -315,7 +317,9 @@ def delayed_drive(drive: Drive, entry: float, clears: float, stop: Stop) -> Driv
     entries = np.array([slowed(speed).time_at(entry) for speed in speeds])  # later if slower
     enters = clears + DRIVING.gap_s
     later = slowed(0.0)
-    if entries[0] >= enters or later.time[line] > clears:
+    stands = clears + DRIVING.departure_lag_s - later.time[line]
+    is_brief = stands < DRIVING.min_stand_s and entries[0] >= clears + DRIVING.min_gap_s
+    if entries[0] >= enters or is_brief:
         later = slowed(float(np.interp(-enters, -entries, speeds)))
     else:
         later = _stopped(later, line, clears)

@@ -37,7 +37,7 @@ def recorded(kind=WAITS, seed=0):
 @pytest.fixture(scope="module")
 def sets():
     """The sets of a crossing whose recorded second vehicle stops."""
-    return sg.generate_outcomes(recorded(), "corridor", DRAWN, count=12, seed=4)
+    return sg.generate_outcomes(recorded(), "corridor", DRAWN, count=12, seed=6)
 
 
 def first_to_enter(scenario):
@@ -255,7 +255,7 @@ def test_one_set_has_one_outcome():
 
 
 def test_one_seed_gives_the_same_scenarios(sets):
-    again = sg.generate_outcomes(recorded(), "corridor", DRAWN, count=12, seed=4)
+    again = sg.generate_outcomes(recorded(), "corridor", DRAWN, count=12, seed=6)
     for result, other in zip(sets, again, strict=True):
         assert [s.facts for s in result] == [s.facts for s in other]
         for scenario, same in zip(result, other, strict=True):
