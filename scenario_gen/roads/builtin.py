@@ -14,7 +14,7 @@ from scenario_gen.numerics.curve import Curve
 from scenario_gen.roads.along import lane_along, sharing_lanes
 from scenario_gen.roads.config import RoadConfig
 from scenario_gen.roads.drawn import crossing_lane, draw_lanes, draw_plan, middle_stations
-from scenario_gen.roads.lights import LIT, recorded_rules
+from scenario_gen.roads.lights import recorded_rules
 from scenario_gen.roads.pavement import (
     ARM_COUNT,
     drivable_width,
@@ -275,8 +275,7 @@ def draw_corridor(name: str, encounter: Encounter | None, config: RoadConfig) ->
             station, offset = line.project(towed[:, :2])
             half += np.interp(line.station, station, np.abs(offset))
         lanes.append(lane_along(f"along vehicle {lane_name}", line, half))
-    lines = [paths[lane_name].points[:, :2] for lane_name in sharing_lanes(paths)]
-    rules = tuple(recorded_rules(encounter, lines)) if config.priority in LIT else ()
+    rules = tuple(recorded_rules(encounter, lanes, config.priority))
     network = LaneNetwork(name, tuple(lanes), rules=rules, drawn=True)
     road = draw_lanes(network, paved(surface, 0.0), config)
     if config.crossing == "none" or road.lanes is None:

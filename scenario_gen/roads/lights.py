@@ -16,6 +16,7 @@ from scenario_gen.situation import driver_rows, faced_light, Situation
 from scenario_gen.types import (
     DrawnFor,
     Encounter,
+    Lane,
     LaneNetwork,
     rightwards,
     RuleKind,
@@ -68,14 +69,16 @@ def arm_lights(
         yield TrafficRule(light_id, RuleKind.TRAFFIC_LIGHT, chosen, (), ends, schedule)
 
 
-def recorded_rules(encounter: Encounter, lines: Sequence[Floats]) -> Iterator[TrafficRule]:
-    """Yield the recorded lights in the recording's frame, for lanes along lines (M, 2) [m]."""
-    for light in encounter.lights:
-        lanes = tuple(k for k, line in enumerate(lines) if light.leads_over(line))
-        if lanes:
+def recorded_rules(
+    encounter: Encounter, lanes: Sequence[Lane], priority: str
+) -> Iterator[TrafficRule]:
+    """Yield the recorded lights of lanes in the recording's frame, if a priority has lights."""
+    for light in encounter.lights if priority in LIT else ():
+        led = tuple(k for k, lane in enumerate(lanes) if light.leads_over(lane.centre))
+        if led:
             schedule = light.schedule.between(0.0, encounter.duration)
             kind = RuleKind.TRAFFIC_LIGHT
-            yield TrafficRule(light.id, kind, lanes, (), light.line, schedule, light.turns)
+            yield TrafficRule(light.id, kind, led, (), light.line, schedule, light.turns)
 
 
 def lights_of(network: LaneNetwork) -> tuple[TrafficLight, ...]:
