@@ -54,17 +54,21 @@ def _inventory_of(archive: Path, option: str) -> Inventory:
         return Inventory([], [[archive]], [], {})
     entries = [archive] if archive.is_file() else _visible_entries(archive)
     unreadable = {path: why for path in entries if (why := _fault(path))}
-    paths = [path for path in entries if path not in unreadable]
+    contents = _sorted_files([path for path in entries if path not in unreadable], option)
+    if not contents.messages and _is_one_log(contents.logs, archive):
+        contents = contents._replace(logs=[[path for (path,) in contents.logs]])
+    _check_logs([*contents.messages, *contents.logs], archive)
+    named = {printable(str(path)): why for path, why in unreadable.items()}
+    return contents._replace(unreadable=named)
+
+
+def _sorted_files(paths: Sequence[Path], option: str) -> Inventory:
+    """Return files by what they are."""
     tables = {path: message_table(path, option) for path in paths}
     messages = [(path, table) for path, table in tables.items() if table]
     bags, rest = _split_bags([path for path in paths if not tables[path]])
     files, others = _split(rest, _may_be_log)
-    logs = [[path] for path in (*files, *bags)]
-    if len(files) + len(others) == len(paths) and _is_one_log(files, archive):
-        logs = [files]
-    _check_logs([*messages, *logs], archive)
-    named = {printable(str(path)): why for path, why in unreadable.items()}
-    return Inventory(messages, logs, others, named)
+    return Inventory(messages, [[path] for path in (*files, *bags)], others, {})
 
 
 def _check_logs(logs: Sequence[object], archive: Path) -> None:
@@ -93,8 +97,9 @@ def _has_other_logs(folder: Path) -> bool:
     return not is_whole and any(is_table(path) for path in files)
 
 
-def _is_one_log(files: Sequence[Path], folder: Path) -> bool:
-    """Whether the files of a folder are the tables of one log."""
+def _is_one_log(logs: Sequence[Sequence[Path]], folder: Path) -> bool:
+    """Whether the logs of a folder are the tables of one log, and no bags."""
+    files = [path for log in logs for path in log]
     return bool(files) and all(path.parent == folder and is_table(path) for path in files)
 
 

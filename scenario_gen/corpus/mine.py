@@ -256,13 +256,13 @@ def _contents(out: Path) -> _Contents:
     for table in sorted((out / "encounters").glob("*.parquet")):
         notes = ((note["cause"], note["name"], note["why"]) for note in account_of(table))
         contents.notes.extend(notes)
+        rows = list(rows_of([table], PAGE_COLUMNS))
+        contents.listed.extend(rows[: LISTED_COUNT - len(contents.listed)])
         drawn = set()
-        for row in rows_of([table], PAGE_COLUMNS):
-            if len(contents.listed) < LISTED_COUNT:
-                contents.listed.append(row)
-            if contents.kinds[row["kind"]] < DRAWN_COUNT:
-                drawn.add(row["name"])
+        for row in rows:
             contents.kinds[row["kind"]] += 1
+            if contents.kinds[row["kind"]] <= DRAWN_COUNT:
+                drawn.add(row["name"])
         if drawn:
             contents.drawn.extend(row for row in rows_of([table]) if row["name"] in drawn)
     return contents
@@ -323,27 +323,26 @@ def _by_file(
         account: rows of the tables' accounts.
     """
     files: dict[str, Counter[str]] = {}
-    notes: list[Note] = []
-    damaged: dict[str, str] = {}
+    notes: dict[tuple[str, str], str] = {}
     for row in account:
         file, cause = row["file"], row["cause"]
         kind, _, why = cause.partition(": ")
         causes = files.setdefault(file, Counter())
-        causes["rows"] += row["rows"] if cause == "" or kind == LEFT_OUT else 0
+        causes["rows"] += row["rows"] if kind in ("", LEFT_OUT) else 0
         if kind == DAMAGED:
-            damaged[file] = f"{file}: {why}"
+            notes[DAMAGED, file] = f"{file}: {why}"
         elif cause == OTHER_CLOCK:
-            notes.append((OTHER_CLOCK, file, "its stamps are those of Gentime"))
+            notes[OTHER_CLOCK, file] = "its stamps are those of Gentime"
         elif cause:
             causes[cause] += row["rows"]
     for file, causes in files.items():
         left_out = Counter({c: count for c, count in causes.items() if c.startswith(LEFT_OUT)})
         if left_out.total() > MAX_REJECTED_SHARE * causes["rows"]:
             share = f"{left_out.total()} of {causes['rows']} rows"
-            cause = left_out.most_common(1)[0][0]
-            damaged.setdefault(file, f"{file}: {share} {cause}")
-    notes += [(DAMAGED, file, why) for file, why in damaged.items()]
-    return {file: +causes for file, causes in sorted(files.items())}, notes
+            first = f"{file}: {share} {left_out.most_common(1)[0][0]}"
+            notes.setdefault((DAMAGED, file), first)
+    listed = [(kind, file, why) for (kind, file), why in notes.items()]
+    return {file: +causes for file, causes in sorted(files.items())}, listed
 
 
 def _findings(notes: Iterable[Note]) -> list[Finding]:

@@ -176,12 +176,10 @@ class Spread:
     """
 
     def __init__(self, workers: Workers, stack: ExitStack) -> None:
+        self._workers = workers
         self._count = workers.count or os.cpu_count() or 1
-        self._scheduler = workers.scheduler
-        self._on_progress = workers.on_progress
         self._stack = stack
         self._executor: Executor | None = None
-        self._client: Any = None
 
     def __call__(self, function: Callable[[Task], Any], tasks: Sequence[Task]) -> list[str]:
         """Run independent tasks.
@@ -201,13 +199,13 @@ class Spread:
         for count, message in enumerate(self._outcomes(function, tasks), start=1):
             if message:
                 failed.append(message)
-            self._on_progress(count, len(tasks))
+            self._workers.on_progress(count, len(tasks))
         return sorted(failed)
 
     def _outcomes(self, function: Callable[[Task], Any], tasks: Sequence[Task]) -> Iterator[str]:
         """Yield the error message of each task as it finishes, "" for success."""
-        run = partial(_guarded, function)
-        if self._count == 1 and not self._scheduler:
+        run, scheduler = partial(_guarded, function), self._workers.scheduler
+        if self._count == 1 and not scheduler:
             yield from map(run, tasks)
             return
         try:
@@ -217,25 +215,29 @@ class Spread:
                     name = getattr(task, "name", task)
                     yield f"{name}: its process died or cannot run it: {describe(error)}"
         except (OSError, TimeoutError, CancelledError) as error:
-            if not self._scheduler:
+            if not scheduler:
                 raise
-            lost = f"{self._scheduler} is lost or does not answer: {describe(error)}"
+            lost = f"{scheduler} is lost or does not answer: {describe(error)}"
             raise InputError(f"{lost}; the same command resumes where it stopped") from error
 
     def _attempt(
         self, run: Callable[[Task], str], tasks: Sequence[Task]
     ) -> Generator[str, None, dict[Task, BaseException]]:
-        """Yield the outcomes of tasks; return the others, whose processes died."""
+        """Yield the outcomes of tasks; return the others, whose processes died.
+
+        A cluster has all tasks; local processes have two each, so that few are lost with one.
+        """
         waiting = iter(tasks)
+        room = len(tasks) if self._workers.scheduler else 2 * self._count
         running: dict[Future[str], Task] = {}
         lost: dict[Task, BaseException] = {}
         while True:
-            for task in islice(waiting, max(self._capacity() - len(running), 0)):
+            for task in islice(waiting, room - len(running)):
                 running[self._submit(run, task)] = task
             if not running:
                 return lost
             done, _ = wait(running, return_when=FIRST_COMPLETED)
-            if not self._scheduler and any(future.exception() for future in done):
+            if not self._workers.scheduler and any(future.exception() for future in done):
                 done, _ = wait(running)
                 self._end()
             for future in done:
@@ -245,35 +247,31 @@ class Spread:
                 else:
                     yield future.result()
 
-    def _capacity(self) -> int:
-        """Return the number of tasks to submit: for each process one that runs, and another."""
-        count = self._count
-        if self._client is not None:
-            count = sum(self._client.nthreads().values()) or 1
-        return 2 * count
-
     def _submit(self, run: Callable[[Task], str], task: Task) -> "Future[str]":
         """Submit a task, to new processes if one has died."""
-        if self._scheduler:
-            if self._executor is None:
-                self._client = self._stack.enter_context(_client(self._scheduler))
-                self._executor = self._client.get_executor(pure=False)
-            return self._executor.submit(run, task)
         with ctrl_c_blocked(), environment_set(WORKER_ENVIRONMENT):
-            if self._executor is not None:
-                with suppress(BrokenProcessPool):
-                    return self._executor.submit(run, task)
-            else:
-                self._stack.enter_context(cleaned_up(_kill_children))
-                self._stack.callback(self._end)
+            with suppress(BrokenProcessPool):
+                return self._processes().submit(run, task)
+            self._end()
+            return self._processes().submit(run, task)
+
+    def _processes(self) -> Executor:
+        """Return the processes, which are started if there are none."""
+        if self._executor is None and self._workers.scheduler:
+            client = self._stack.enter_context(_client(self._workers.scheduler))
+            self._executor = client.get_executor(pure=False)
+        elif self._executor is None:
+            self._stack.enter_context(cleaned_up(_kill_children))
+            self._stack.callback(self._end)
             self._executor = worker_pool(self._count)
-            return self._executor.submit(run, task)
+        return self._executor
 
     def _end(self) -> None:
         """End the local processes at once; they write no more."""
         _kill_children()
         if self._executor is not None:
             self._executor.shutdown(cancel_futures=True)
+            self._executor = None
 
 
 def _kill_children() -> None:
