@@ -206,7 +206,7 @@ def _draw_places(
 ) -> list[str]:
     """Draw a template's eight best places that do not overlap; return a line on each."""
     try:
-        suitable = places(network, Situation.of(encounter).drivers)
+        suitable = places(network, Situation.of(encounter).tracks)
         shown = list(islice(_separate(suitable), _MAX_PLACES_COUNT))
     except RefusedError as error:
         return [f"no place for {encounter.name}: {error}"]

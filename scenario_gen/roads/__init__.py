@@ -32,6 +32,8 @@ from scenario_gen.roads.lights import lights_of
 from scenario_gen.roads.obstacles import read_obstacles
 from scenario_gen.roads.pavement import drivable_width
 from scenario_gen.roads.plan import Arm, Connection, Driven, Plan, ways_through
+from scenario_gen.roads.room import has_room, max_repair, share_with_room
+from scenario_gen.roads.vector.candidate import PlaceLimits
 from scenario_gen.roads.vector.ground import (
     along_lanes,
     drives_against,
@@ -40,11 +42,11 @@ from scenario_gen.roads.vector.ground import (
 )
 from scenario_gen.roads.vector.lane_graph import lane_graph, LaneGraph, LanePath
 from scenario_gen.roads.vector.place import (
+    best_place,
+    find_places,
     NoPlaceError,
     Place,
-    placements,
     places,
-    tracks_on,
     users_of,
 )
 from scenario_gen.roads.vector.read import is_vector_map, read_network, split
@@ -66,10 +68,12 @@ __all__ = [
     "LanePath",
     "NoPlaceError",
     "Place",
+    "PlaceLimits",
     "Plan",
     "RoadConfig",
     "RuleCheck",
     "along_lanes",
+    "best_place",
     "build_road",
     "draw_layout",
     "draw_plan",
@@ -77,30 +81,32 @@ __all__ = [
     "drivable_width",
     "drives_about_ring",
     "drives_against",
+    "find_places",
     "footprint_fits",
     "free_cells",
     "free_length",
     "free_space",
     "ground_for",
+    "has_room",
     "is_vector_map",
     "lane_along",
     "lane_graph",
     "layout_for",
     "lights_of",
+    "max_repair",
     "nearest_pose_with_room",
     "own_side",
-    "placements",
     "places",
     "read_network",
     "read_obstacles",
     "road_and_template",
     "segment_free",
     "segments_free",
+    "share_with_room",
     "sharing_lanes",
     "split",
     "to_cells",
     "to_metres",
-    "tracks_on",
     "users_of",
     "ways_through",
 ]

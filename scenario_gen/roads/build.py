@@ -165,7 +165,7 @@ def _road_without_obstacles(
     if config.paper and name_or_path in BUILT_IN:
         return draw_paper(name_or_path, config)
     if is_vector_map(name_or_path):
-        tracks = None if encounter is None else Situation.of(encounter).drivers
+        tracks = None if encounter is None else Situation.of(encounter).tracks
         return vector_road(name_or_path, tracks, config)
     path = Path(name_or_path)
     if path.suffix.lower() in (".yaml", ".yml"):

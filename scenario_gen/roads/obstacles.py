@@ -89,6 +89,8 @@ def with_obstacles(
         InputError: an obstacle overlaps no drivable cell, or all cells are blocked.
         RefusedError: an obstacle lies outside the part of a vector map.
     """
+    if not obstacles:
+        return road
     blocked = np.zeros(road.drivable.shape, dtype=np.bool_)
     standing, known = [], [each for each in road.obstacles if each not in obstacles]
     for obstacle in obstacles:

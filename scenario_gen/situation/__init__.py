@@ -39,9 +39,10 @@ from scenario_gen.situation.interaction_window import (
     MIN_LOSS_S,
 )
 from scenario_gen.situation.kind import EncounterKind, kind_of
+from scenario_gen.situation.losses import find_losses, LOSABLE
 from scenario_gen.situation.path_crossing import pair_crossings, path_crossing
 from scenario_gen.situation.placement_lsq import Equation, solve_placement
-from scenario_gen.situation.separation import separate, smallest_gaps
+from scenario_gen.situation.separation import separate, Separation, smallest_gaps
 from scenario_gen.situation.signal_stops import (
     faced_light,
     red_runners,
@@ -71,6 +72,7 @@ from scenario_gen.situation.traffic_side import mirrored, traffic_side
 from scenario_gen.situation.waits import find_waits, STANDSTILL_SPEED_MPS, Wait, WAIT_SPEED_MPS
 
 __all__ = [
+    "LOSABLE",
     "MAX_CLEARANCE_CHANGE_M",
     "MAX_SAMPLES",
     "MAX_SIDE_OFFSET_M",
@@ -89,6 +91,7 @@ __all__ = [
     "LaneGaps",
     "MainLine",
     "PairConflicts",
+    "Separation",
     "Situation",
     "Track",
     "Wait",
@@ -104,6 +107,7 @@ __all__ = [
     "encroachment",
     "faced_light",
     "find_conflicts",
+    "find_losses",
     "find_waits",
     "interaction_windows",
     "is_same_turn",

@@ -6,7 +6,9 @@
 from dataclasses import dataclass
 
 from scenario_gen.base.parameters import parameter, Parameters
-from scenario_gen.method.fitting.losses import allowed_losses, LOSABLE
+from scenario_gen.method.fitting.losses import allowed_losses
+from scenario_gen.roads import PlaceLimits
+from scenario_gen.situation import LOSABLE
 
 
 @dataclass(frozen=True)
@@ -48,6 +50,17 @@ class FittingConfig(Parameters):
     def __post_init__(self) -> None:
         super().__post_init__()
         allowed_losses(self.allow)
+
+    @property
+    def place_limits(self) -> PlaceLimits:
+        """What may change where a recording is placed on lanes."""
+        return PlaceLimits(
+            self.scale_low,
+            self.scale_high,
+            self.clearance,
+            self.max_move,
+            allowed_losses(self.allow),
+        )
 
     def accepts(self, scale: float) -> bool:
         """Return whether a scale s of eq 9 is near enough to one."""

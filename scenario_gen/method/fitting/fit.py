@@ -11,7 +11,7 @@ import numpy as np
 from scenario_gen.base.errors import RefusedError
 from scenario_gen.method.fitting.config import FittingConfig
 from scenario_gen.method.fitting.lanes import place_on_lanes
-from scenario_gen.method.fitting.losses import find_losses, lost_lights, refuse_lost
+from scenario_gen.method.fitting.losses import lost_lights, refuse_lost
 from scenario_gen.method.fitting.placement import (
     place_given,
     place_in_own_frame,
@@ -23,7 +23,14 @@ from scenario_gen.method.fitting.search import place_by_search
 from scenario_gen.method.fitting.state_check import refuse_impossible, refuse_misfits
 from scenario_gen.numerics import Bools, Floats, frozen_ints, Ints, runs
 from scenario_gen.roads import ground_for, nearest_pose_with_room
-from scenario_gen.situation import manoeuvre_of, refuse_reversing, Situation, Track, turn_of
+from scenario_gen.situation import (
+    find_losses,
+    manoeuvre_of,
+    refuse_reversing,
+    Situation,
+    Track,
+    turn_of,
+)
 from scenario_gen.types import (
     BoundaryStates,
     Encounter,

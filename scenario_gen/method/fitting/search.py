@@ -19,18 +19,13 @@ import numpy as np
 from scenario_gen.base.cancelling import stop_if_cancelled
 from scenario_gen.base.errors import RefusedError
 from scenario_gen.method.fitting.config import FittingConfig
-from scenario_gen.method.fitting.placement import (
-    max_repair,
-    Placement,
-    separated,
-    share_with_room,
-    TRIED_SCALES_RATIO,
-)
+from scenario_gen.method.fitting.placement import Placement
 from scenario_gen.numerics import Floats, frozen
 from scenario_gen.numerics.curve import Curve
 from scenario_gen.numerics.pattern_search import pattern_search
 from scenario_gen.numerics.plane import place
-from scenario_gen.situation import Track
+from scenario_gen.roads import max_repair, share_with_room
+from scenario_gen.situation import separate, Track
 from scenario_gen.types import Note, NoteKind, Road
 
 _COARSE_CELL_M = 1.0
@@ -79,9 +74,9 @@ def place_by_search(tracks: tuple[Track, ...], road: Road, config: FittingConfig
     for similarity in search.candidates(config):
         stop_if_cancelled()
         moved = search.moved(tracks, similarity)
-        placed = Placement.of(moved, similarity.scale, [similarity.note(road)])
         try:
-            placement = separated(placed, config, sideways=1.0)
+            separation = separate(moved, config.clearance, config.max_move)
+            placement = Placement.separated(separation, similarity.scale, [similarity.note(road)])
             repair = max_repair(placement.tracks, road, config.max_move)
         except RefusedError as error:
             reason = str(error)
@@ -135,7 +130,7 @@ class _GridSearch:
 
     def candidates(self, config: FittingConfig) -> Iterator[_Similarity]:
         """Yield the best similarities with each accepted scale, the best first."""
-        for scale in filter(config.accepts, TRIED_SCALES_RATIO):
+        for scale in config.place_limits.scales:
             coarse = sorted(self._coarse(scale), key=lambda each: each.rank)
             refined = map(self._refined, coarse[:10])
             yield from sorted(refined, key=lambda each: each.rank)

@@ -220,7 +220,6 @@ class StartWeights:
 class MatchLimits:
     """Where two things count as the same, and what cars can drive."""
 
-    samples: int = 24  # of a path that are compared with a chain
     chains: int = 96  # tried for a vehicle: recorded maps have at most 15
     changing_chains: int = 4  # the best, between which lane changes are tried
     noticeable_turn_error_rad: float = math.radians(12.0)  # from which another start is tried

@@ -3,10 +3,10 @@
 
 """A recording on the lanes of a map: the lanes that each vehicle follows, and its start there.
 
-A rigid placement (`search`) gives the approximate pose of the recording. Each vehicle then gets
-the chain of lanes that its path is nearest to, with at most one lane change where the map allows
-it. A least squares problem moves the starts along the chains, so that distances to crossings and
-gaps between vehicles in one lane stay as recorded.
+A hypothesis gives the approximate poses of the recorded vehicles. Each vehicle then gets the chain
+of lanes that its poses are nearest to, with at most one lane change where the map allows it. A
+least squares problem moves the starts along the chains, so that distances to crossings and gaps
+between vehicles in one lane stay as recorded.
 """
 
 from collections.abc import Iterator, Sequence
@@ -20,6 +20,7 @@ import numpy as np
 from scenario_gen.numerics import Floats, runs
 from scenario_gen.numerics.curve import crossings, Curve
 from scenario_gen.numerics.plane import angle_between
+from scenario_gen.roads.vector.hypotheses import Hypothesis
 from scenario_gen.roads.vector.lane_graph import (
     bend_cost,
     COSTS,
@@ -37,16 +38,12 @@ from scenario_gen.roads.vector.lane_graph import (
     WEIGHTS,
 )
 from scenario_gen.roads.vector.lateral import with_lateral_positions
-from scenario_gen.roads.vector.search import RigidPlacement
 from scenario_gen.situation import (
-    describe_turn,
     Equation,
-    MAX_TURN_CHANGE_RAD,
     pair_crossings,
     PairConflicts,
     solve_placement,
     Track,
-    turn_of,
     turns_to_keep,
     WAIT_SPEED_MPS,
 )
@@ -64,6 +61,7 @@ class Match:
         forced_lateral: [m/s²] the largest lateral acceleration that the recorded speeds at the
             ends force (`lateral_acceleration`).
         off_reserved_cost: [m²] the extra cost of vehicles that leave their reserved lanes.
+        lost_crossings: recorded crossings that both vehicles drive to, and these lanes lack.
     """
 
     paths: tuple[LanePath, ...]
@@ -71,6 +69,7 @@ class Match:
     reason: str
     forced_lateral: float = 0.0
     off_reserved_cost: float = 0.0
+    lost_crossings: int = 0
 
 
 class _Candidate(NamedTuple):
@@ -86,13 +85,11 @@ def match(
     graph: LaneGraph,
     tracks: Sequence[Track],
     met: PairConflicts,
-    placement: RigidPlacement,
-    scale: float = 1.0,
-    ends: Sequence[tuple[str, str]] = (),
+    hypothesis: Hypothesis,
     *,
     prefer_reserved: bool = False,
 ) -> Iterator[Match]:
-    """Yield lane paths for all vehicles near a rigid placement.
+    """Yield lane paths for all vehicles near the poses of a hypothesis.
 
     There is one match; if a vehicle would turn otherwise than recorded, there is a second one in
     which it turns as recorded, and may leave a crossing.
@@ -101,57 +98,49 @@ def match(
         graph: of the map or a part of it.
         tracks: the recording.
         met: its conflicts.
-        placement: its approximate pose on the map.
-        scale: s of eq 9, of the distances driven.
-        ends: ids of the lanes by which each vehicle enters and leaves, "" for any; () for all.
+        hypothesis: its approximate poses on the map.
         prefer_reserved: whether vehicles with reserved lanes are put onto these if some are near.
     """
-    paths = []
-    for track, named in zip(tracks, ends or [("", "")] * len(tracks), strict=True):
-        is_free = prefer_reserved and graph.reserved_for(track)  # the named lanes are for cars
-        path = _lane_path(
-            graph,
-            track,
-            _placed_poses(track, placement),
-            scale,
-            ("", "") if is_free else named,
-            prefer_reserved=prefer_reserved,
-        )
+    scale, paths = hypothesis.scale, []
+    for n, (track, poses) in enumerate(zip(tracks, hypothesis.poses, strict=True)):
+        ends = hypothesis.ends[n] if hypothesis.ends else ("", "")
+        if prefer_reserved and graph.reserved_for(track):  # the named lanes are for cars
+            ends = "", ""
+        path = _lane_path(graph, track, poses, scale, ends, prefer_reserved=prefer_reserved)
         if path is None:
             reason = (
                 f"no lanes lead along the path of vehicle {track.vehicle.id} from start to end"
             )
             yield Match((), math.inf, reason)
             return
+        if hypothesis.swerve is not None and hypothesis.swerve[n].any():
+            path = _swerving(path, hypothesis.swerve[n])
         paths.append(path)
     paths, missing = with_lateral_positions(graph, paths, tuple(tracks))
-    yield _judged(
-        graph,
-        _moved_starts(graph.network, paths, tracks, met, scale, []),
-        tracks,
-        placement,
-        narrow_cost(missing),
-    )
+    cost = narrow_cost(missing) + hypothesis.extra
+
+    def judged(turning: Sequence[Equation]) -> Match:
+        moved = _moved_starts(graph.network, paths, tracks, met, scale, turning)
+        return _judged(graph, moved, tracks, hypothesis.poses, cost)
+
+    yield judged([])
     turning = [
         Equation(((i, 1.0),), start, WEIGHTS.turn)
         for i, (path, track) in enumerate(zip(paths, tracks, strict=True))
         if (start := _start_to_turn(path, track)) is not None
     ]
     if turning:
-        yield _judged(
-            graph,
-            _moved_starts(graph.network, paths, tracks, met, scale, turning),
-            tracks,
-            placement,
-            narrow_cost(missing),
-        )
+        yield judged(turning)
 
 
-def _placed_poses(track: Track, placement: RigidPlacement) -> Floats:
-    """Return poses (K, 3) along a recorded path, on the map."""
-    count = 1 if track.still else LIMITS.samples
-    poses = track.curve.at(np.linspace(0.0, track.travelled, count))
-    return np.column_stack((placement.apply(poses[:, :2]), poses[:, 2] + placement.yaw))
+def _swerving(path: LanePath, swerve: Floats) -> LanePath:
+    """Return a lane path with recorded offsets (T,) [m, left positive] from the lanes."""
+    lane, at = path.curve, path.start + path.progress
+    s = np.linspace(0.0, lane.length, max(math.ceil(lane.length / STEP_M), 1) + 1)
+    moves = np.concatenate(([True], np.diff(at) > 0.0))
+    curve = Curve.through(lane.at_offset(s, np.interp(s, at[moves], swerve[moves]))[:, :2])
+    driven = np.interp(at, s, curve.station)
+    return LanePath(path.lanes, curve, float(driven[0]), driven - driven[0])
 
 
 def _lane_path(
@@ -403,20 +392,22 @@ def _judged(
     graph: LaneGraph,
     paths: Sequence[LanePath],
     tracks: Sequence[Track],
-    placement: RigidPlacement,
+    poses: Floats,
     cost: float,
 ) -> Match:
-    """Return the match of lane paths, with a further cost, and the reason against it."""
+    """Return the match of lane paths near poses (N, K, 3), with a further cost, and a reason."""
     driven = list(zip(paths, tracks, strict=True))
-    for path, track in driven:
-        cost += _resemblance_cost(path, _placed_poses(track, placement)) / len(tracks)
-    for a, b, crossing in pair_crossings(tracks):
-        if not len(crossings(paths[a].curve, paths[b].curve, LIMITS.crossing_angle_rad)):
-            lost = COSTS.lost_driven_crossing_m2 if crossing.driven else COSTS.lost_crossing_m2
-            cost += lost
+    cost += sum(map(_resemblance_cost, paths, poses)) / len(tracks)
+    lost = [
+        crossing.driven
+        for a, b, crossing in pair_crossings(tracks)
+        if not len(crossings(paths[a].curve, paths[b].curve, LIMITS.crossing_angle_rad))
+    ]
+    cost += COSTS.lost_driven_crossing_m2 * sum(lost)
+    cost += COSTS.lost_crossing_m2 * (len(lost) - sum(lost))
     lateral = [lateral_acceleration(path, track) for path, track in driven]
     cost += speeding_cost(graph.network, paths, tracks) + bend_cost(lateral)
-    reasons = [reason for path, track in driven for reason in _misfits(path, track)]
+    reasons = [reason for path, track in driven for reason in _missing_length(path, track)]
     reasons += [
         f"the lanes bend too sharply for the speed of vehicle {track.vehicle.id}"
         for each, track in zip(lateral, tracks, strict=True)
@@ -428,22 +419,16 @@ def _judged(
         next(iter(reasons), ""),
         max(each.forced for each in lateral),
         off_reserved_cost(graph, paths, tracks),
+        sum(lost),
     )
 
 
-def _misfits(path: LanePath, track: Track) -> Iterator[str]:
-    """Yield the reasons against the lane path of a vehicle."""
-    vehicle = track.vehicle
-    half = vehicle.length / 2.0 + LIMITS.end_room_m
+def _missing_length(path: LanePath, track: Track) -> Iterator[str]:
+    """Yield by how much the lane path of a vehicle is too short."""
+    half = track.vehicle.length / 2.0 + LIMITS.end_room_m
     short = max(half - path.start, path.end + half - path.curve.length)
     if short > 0.0:
-        yield f"the lanes of vehicle {vehicle.id} are {short:.1f} m too short"
-    recorded = turn_of(track)
-    if abs(path.turn - recorded) > MAX_TURN_CHANGE_RAD:
-        yield (
-            f"vehicle {vehicle.id} {describe_turn(recorded)} in the recording, "
-            f"{describe_turn(path.turn)} on these lanes"
-        )
+        yield f"the lanes of vehicle {track.vehicle.id} are {short:.1f} m too short"
 
 
 def _resemblance_cost(path: LanePath, poses: Floats) -> float:

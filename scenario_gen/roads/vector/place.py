@@ -1,318 +1,237 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""All ways of placing a recording on the lanes of a map, the best first."""
+"""The places for a recording on the lanes of a map or of a drawn road, the best first.
+
+A candidate is a lane path and a start on it for every vehicle, and a scale. The first ones lose
+nothing of the encounter (`situation.find_losses`); of several, the one that resembles the
+recording most is the first.
+"""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property
-from itertools import combinations, islice
+from functools import lru_cache
+from itertools import islice
 import math
 
 import numpy as np
-from scipy.spatial import KDTree
-from scipy.spatial.distance import cdist
 
 from scenario_gen.base.cancelling import stop_if_cancelled
 from scenario_gen.base.errors import RefusedError
 from scenario_gen.numerics import Floats, frozen
+from scenario_gen.roads.room import max_repair
+from scenario_gen.roads.vector.candidate import Candidate, PlaceLimits, PlacingTask
+from scenario_gen.roads.vector.hypotheses import (
+    crossing_hypotheses,
+    Hypothesis,
+    hypothesis_at,
+    rigid_hypotheses,
+    street_hypotheses,
+)
 from scenario_gen.roads.vector.lane_graph import lane_graph, LaneGraph, LanePath
 from scenario_gen.roads.vector.match import Match, match
-from scenario_gen.roads.vector.rules import RuleCheck
-from scenario_gen.roads.vector.search import (
-    crossing_placements,
-    placement_at,
-    rigid_placements,
-    RigidPlacement,
-)
-from scenario_gen.roads.vector.street import street_matches
 from scenario_gen.situation import (
-    Conflict,
-    find_conflicts,
-    PairConflicts,
-    separate,
+    drivers_of,
+    to_frenet,
     Track,
-    track_conflicts,
 )
-from scenario_gen.types import LaneNetwork, LEVEL_SPACING_M, Motion, Note, NoteKind
+from scenario_gen.types import LaneNetwork, Note, NoteKind, Road
 
-MATCHED_PLACEMENTS_COUNT = 15
-"""Rigid placements that are matched with lanes at a time."""
-_HOME_COST_M2 = 1.0  # of a rigid placement that is where the recording was made
+MATCHED_COUNT = 15
+"""Rigid hypotheses that are matched with lanes at a time."""
+_MATCHED_STREETS_COUNT = 8
+_JUDGED_COUNT = 40  # candidates with all losses before others are not looked for
+_LOSING_COUNT = 6  # candidates that lose something and are compared
+_SCALED_COUNT = 16  # hypotheses of a batch that are tried with other scales
+_TRIED_ROOM_COUNT = 12  # candidates whose room is looked at
+_HOME_COST_M2 = 1.0  # of a hypothesis that is where the recording was made
 _MAX_COST_M2 = 40.0  # of a match
-_MAX_FORCED_LATERAL_MPS2 = (
-    4.2  # a little less than scenarios may have; else other scales are tried
-)
+_MAX_REPAIR_M = 0.3  # of a candidate that is used at once
+_TOO_FAR = "the vehicles would be too far from their recorded positions"
 _BOX_MARGIN_M = 12.0  # around the driven paths
 _BOX_LEAD_M = 20.0  # along the lanes before and after the driven paths
-_OVERLAP_M = 5.0  # between two vehicles of which one may be above the other
 
 
 class NoPlaceError(RefusedError):
     """A map has no place for a recording."""
 
 
-def placements(
-    graph: LaneGraph,
-    tracks: tuple[Track, ...],
-    lanes: Sequence[int] | None = None,
-    scales: Sequence[float] = (1.0, 0.9, 1.1),
-) -> Iterator[tuple[Match, float]]:
-    """Yield the ways of placing a recording on lanes, with their scales.
-
-    The place where it was recorded comes first, then those that resemble it most. Places come
-    earlier where all vehicles whose paths cross or merge meet and, if the map has rights of way,
-    where a vehicle that must give way does so. Places that break a rule are left out if the
-    network's rules are kept. Last come the places with bends that cannot be driven at the first
-    and last recorded speeds; at a smaller scale, the recording is slower, too.
-
-    Args:
-        graph: of a map or a part of it.
-        tracks: of all recorded vehicles.
-        lanes: a vehicle is put onto one of these; None: onto any lane.
-        scales: s of eq 9; the first one with a place is used.
-
-    Raises:
-        NoPlaceError: there is none. The message has the reason where it was recorded, and the
-            reason at the place that is nearest to being usable.
-    """
-    search = _Search(graph, tracks, scales)
-    home = search.at_home() if lanes is None else None
-    home_refusal = "" if home is None else home.refusal
-    has_place = home is not None and not home_refusal
-    if home is not None and has_place:
-        yield home.match, 1.0
-
-    streets = street_matches(graph, tracks, lanes)
-    for candidates in search.batches(lanes):
-        for placed in search.near(candidates, list(islice(streets, 8))):
-            has_place = True
-            yield placed
-        if not has_place:
-            raise NoPlaceError(_refusal(search, home_refusal))
-
-
-def _refusal(search: "_Search", at_home: str) -> str:
-    """Return the message for a recording without a place."""
-    network = search.graph.network
-    _, _, reason = min(search.failures, default=(True, 0.0, "no lanes have its directions"))
-    reasons = [f"where it was recorded, {at_home}; elsewhere, {reason}" if at_home else reason]
-    kind = "road" if network.drawn else "map"
-    if network.drawn:
-        reasons += map(str, network.notes)
-    return f"the recording does not fit {kind} {network.name}: {'; '.join(reasons)}"
-
-
 @dataclass(frozen=True, eq=False)
-class _JudgedMatch:
-    """A match with the motion that it gives, its conflicts and the rules that it breaks."""
-
-    match: Match
-    search: "_Search"
-
-    @cached_property
-    def motion(self) -> Motion:
-        """The recorded motion on the lanes, unchecked."""
-        placed = tracks_on(self.match, self.search.tracks)
-        poses = np.stack([track.poses for track in placed])
-        return Motion(
-            vehicles=tuple(track.vehicle for track in placed),
-            time=frozen(np.arange(poses.shape[1]) * placed[0].dt),
-            position=poses[..., :2],
-            heading=poses[..., 2],
-            speed=np.stack([track.speed for track in placed]),
-            present=np.stack([track.present for track in placed]),
-        )
-
-    @cached_property
-    def conflicts(self) -> tuple[Conflict, ...]:
-        """The conflicts in this motion."""
-        return find_conflicts(self.motion)
-
-    @cached_property
-    def refusal(self) -> str:
-        """Why it cannot be used; "" if it can."""
-        if self.match.reason:
-            return self.match.reason
-        if self.search.graph.network.has_levels and (above := self._stacked_vehicles()):
-            return above
-        check = self.search.check
-        if not check.rules:
-            return ""
-        breach = next(iter(check.breaches(self.motion, self.conflicts)), None)
-        if breach is None:
-            return ""
-        vehicle = self.motion.vehicles[breach.vehicles[0]].id
-        return f"vehicle {vehicle} {breach.message}; road.traffic_rules=ignored allows it"
-
-    @cached_property
-    def lost_meetings(self) -> int:
-        """How many pairs meet in the recording, but not on the lanes."""
-        if not self.search.crossing_pairs:
-            return 0
-        return len(self.search.crossing_pairs - {conflict.pair for conflict in self.conflicts})
-
-    @cached_property
-    def yields(self) -> bool:
-        """Whether a vehicle gives way that has to by the rules."""
-        check = self.search.check
-        return bool(check.rules) and bool(check.kept_orders(self.motion, self.conflicts))
-
-    @property
-    def is_comfortable(self) -> bool:
-        """Whether the bends can be driven at the first and last recorded speeds."""
-        return self.match.forced_lateral <= _MAX_FORCED_LATERAL_MPS2
-
-    @property
-    def rank(self) -> tuple[float, ...]:
-        """Order by lost meetings, reserved lanes on drawn roads, right of way, and cost."""
-        off_reserved = self.search.graph.network.drawn and self.match.off_reserved_cost > 0.0
-        cost = round(self.match.cost + self.match.off_reserved_cost, 3)
-        return self.lost_meetings, off_reserved, not self.yields, cost
-
-    def _stacked_vehicles(self) -> str:
-        """Return which two vehicles would be above each other, as on a bridge; "" if none."""
-        lanes = self.search.graph.network.lanes
-        driven = []
-        for path in self.match.paths:
-            count = max(math.ceil((path.end - path.start) / 2.0), 1) + 1  # every two metres
-            places = path.curve.at(np.linspace(path.start, path.end, count))[:, :2]
-            centres = KDTree(np.concatenate([lanes[k].centre for k in path.lanes]))
-            heights = np.concatenate([lanes[k].height for k in path.lanes])
-            driven.append((places, heights[centres.query(places)[1]]))
-        for i, j in combinations(range(len(driven)), 2):
-            (places, height), (other_places, other_height) = driven[i], driven[j]
-            on_two_levels = np.abs(height[:, None] - other_height) > LEVEL_SPACING_M
-            if (on_two_levels & (cdist(places, other_places) < _OVERLAP_M)).any():
-                first, second = (self.search.tracks[n].vehicle.id for n in (i, j))
-                return (
-                    f"vehicles {first} and {second} would be above each other, as on a bridge, "
-                    "and not meet"
-                )
-        return ""
-
-
-@dataclass(frozen=True, eq=False)
-class _Search:
+class _Search(PlacingTask):
     """The search for places.
 
     Attributes:
-        graph, tracks, scales: as in `placements`.
         failures: of each match that cannot be used: whether it is none, its cost, and the reason.
+        losing: candidates that are not good.
+        unscaled: hypotheses that may be good with another scale.
     """
 
-    graph: LaneGraph
-    tracks: tuple[Track, ...]
-    scales: Sequence[float]
     failures: list[tuple[bool, float, str]] = field(default_factory=list)
+    losing: list[Candidate] = field(default_factory=list)
+    unscaled: list[Hypothesis] = field(default_factory=list)
 
-    @cached_property
-    def check(self) -> RuleCheck:
-        """The traffic rules."""
-        return RuleCheck(self.graph.network)
+    def home(self) -> list[Hypothesis]:
+        """Return where the recording was made, if lanes of its directions are there."""
+        if self.graph.network.drawn and self.has_reserved:
+            return []
+        home = hypothesis_at(self.graph, self.drivers, np.zeros(3))
+        return [home] if home.cost <= _HOME_COST_M2 else []
 
-    @cached_property
-    def met(self) -> PairConflicts:
-        """The recorded conflicts."""
-        return track_conflicts(self.tracks)
-
-    @cached_property
-    def crossing_pairs(self) -> set[tuple[int, int]]:
-        """The pairs that cross or merge in the recording."""
-        return {pair for pair, conflict in self.met.items() if not conflict.following}
-
-    @cached_property
-    def has_reserved(self) -> bool:
-        """Whether a vehicle has lanes that are closed to cars."""
-        return any(map(self.graph.reserved_for, self.tracks))
-
-    @cached_property
-    def drawn_place(self) -> RigidPlacement | None:
-        """Where the road was drawn for the recording; None if it was not."""
+    def drawn_place(self) -> list[Hypothesis]:
+        """Return where the road was drawn for the recording, if it was."""
         drawn_for = self.graph.network.drawn_for
-        if drawn_for is None or len(drawn_for.lanes) != len(self.tracks):
-            return None
-        return placement_at(self.graph, self.tracks, drawn_for.frame)
+        if drawn_for is None or len(drawn_for.lanes) != len(self.drivers):
+            return []
+        at = hypothesis_at(self.graph, self.drivers, drawn_for.frame)
+        return [replace(at, ends=drawn_for.lanes)]
 
-    def at_home(self) -> _JudgedMatch | None:
-        """Return the match where the recording was made, if lanes of its directions are there."""
-        home = placement_at(self.graph, self.tracks, np.zeros(3))
-        if home.cost > _HOME_COST_M2 or (self.graph.network.drawn and self.has_reserved):
-            return None
-        return _JudgedMatch(next(match(self.graph, self.tracks, self.met, home)), self)
-
-    def batches(self, lanes: Sequence[int] | None) -> Iterator[list[RigidPlacement]]:
-        """Yield the rigid placements to be matched, some at a time, the best first."""
-        rigid = rigid_placements(self.graph, self.tracks, lanes)
-        crossed = crossing_placements(self.graph, self.tracks) if lanes is None else []
-        first = [] if self.drawn_place is None else [self.drawn_place]
-        size = MATCHED_PLACEMENTS_COUNT
-        for k in range(0, max(len(rigid), len(crossed), 1), size):
-            yield [*first, *rigid[k : k + size], *crossed[k : k + size]]
+    def batches(
+        self, lanes: Sequence[int] | None
+    ) -> Iterator[tuple[list[Hypothesis], tuple[float, ...]]]:
+        """Yield the hypotheses to be matched, some at a time, the best first, and their scales."""
+        scales = self.limits.scales or (1.0,)
+        if lanes is None and (home := self.home()):
+            yield home, (1.0,)
+        streets: list[Hypothesis] = []
+        try:
+            streets = street_hypotheses(self.graph, self.drivers, lanes, self.limits.scale_low)
+        except RefusedError as error:
+            self.failures.append((True, 0.0, str(error)))
+        rigid = rigid_hypotheses(self.graph, self.drivers, lanes)
+        crossed = crossing_hypotheses(self.graph, self.drivers) if lanes is None else []
+        first, size = self.drawn_place(), MATCHED_COUNT
+        for n in range(math.ceil(max(len(rigid), len(crossed), 1) / size)):
+            part = slice(n * size, (n + 1) * size)
+            along = streets[n * _MATCHED_STREETS_COUNT : (n + 1) * _MATCHED_STREETS_COUNT]
+            yield [*first, *along, *rigid[part], *crossed[part]], scales
             first = []
 
-    def near(
-        self, rigid: Sequence[RigidPlacement], streets: Sequence[Match]
-    ) -> Iterator[tuple[Match, float]]:
-        """Yield the usable matches near rigid placements and on streets, with their scales."""
-        others: list[tuple[_JudgedMatch, float]] = []
-        for scale in self.scales:
-            matches = list(streets) if scale == 1.0 else []
-            for placement in rigid:
-                stop_if_cancelled()
-                matches += self._matches_near(placement, scale)
-            usable = sorted(self._usable(matches), key=lambda judged: judged.rank)
-            good = [each for each in usable if each.is_comfortable and not each.lost_meetings]
-            others += [(each, scale) for each in usable if each not in good]
-            yield from ((each.match, scale) for each in good)
-            if good:
-                break
-        others.sort(key=lambda other: (not other[0].is_comfortable, other[0].lost_meetings))
-        yield from ((each.match, scale) for each, scale in others)
-
-    def _matches_near(self, placement: RigidPlacement, scale: float) -> Iterator[Match]:
-        """Yield the matches that resemble a rigid placement; the others become failures."""
-        is_drawn_place = placement is self.drawn_place
-        drawn_for = self.graph.network.drawn_for
-        ends = drawn_for.lanes if is_drawn_place and drawn_for is not None else ()
+    def candidates(self, hypothesis: Hypothesis) -> Iterator[Candidate]:
+        """Yield the matches that resemble a hypothesis; the others become failures."""
+        stop_if_cancelled()
         for prefer_reserved in (True, False) if self.has_reserved else (False,):
             for each in match(
-                self.graph,
-                self.tracks,
-                self.met,
-                placement,
-                scale,
-                ends,
-                prefer_reserved=prefer_reserved,
+                self.graph, self.drivers, self.met, hypothesis, prefer_reserved=prefer_reserved
             ):
                 reason = each.reason
-                if not reason and each.cost > _MAX_COST_M2 and not is_drawn_place:
-                    reason = "the vehicles would be too far from their recorded positions"
+                if each.cost > _MAX_COST_M2 and not hypothesis.ends:
+                    reason = reason or _TOO_FAR
+                elif reason:
+                    self.unscaled.append(hypothesis)
                 if reason:
                     self.failures.append((True, each.cost, reason))
                 else:
-                    yield each
+                    yield Candidate(each, hypothesis, self)
 
-    def _usable(self, matches: Sequence[Match]) -> Iterator[_JudgedMatch]:
-        """Yield the matches that break no rule; the others become failures."""
-        for each in matches:
-            judged = _JudgedMatch(each, self)
-            if judged.refusal:
-                self.failures.append((False, each.cost, judged.refusal))
+    def good_ones(self, batch: Sequence[Hypothesis]) -> Iterator[Candidate]:
+        """Yield the candidates near some hypotheses that are good, in order of `rank`."""
+        self.unscaled.clear()
+        candidates = [candidate for each in batch for candidate in self.candidates(each)]
+        for each in sorted(candidates, key=lambda candidate: candidate.rank):
+            if not each.surely_lost and each.refusal:
+                self.failures.append((False, each.match.cost, each.refusal))
+            elif each.is_good:
+                yield each
             else:
-                yield judged
+                self.losing.append(each)
+                if each.depends_on_scale:
+                    self.unscaled.append(each.hypothesis)
+
+    def scaled(self, batch: Sequence[Hypothesis], scale: float) -> list[Hypothesis]:
+        """Return the first hypotheses with a further scale, as far as it is accepted."""
+        scaled = [replace(each, scale=each.scale * scale) for each in batch[:_SCALED_COUNT]]
+        return [each for each in scaled if each.scale >= self.limits.scale_low]
+
+    def best_losing(self) -> list[Candidate]:
+        """Return some candidates that are not good, the one with the fewest losses first."""
+        ranked = sorted(self.losing, key=lambda candidate: candidate.rank)
+        usable = (each for each in ranked if not each.refusal)
+        return sorted(islice(usable, _LOSING_COUNT), key=lambda each: each.score)
 
 
-def tracks_on(match: Match, tracks: Sequence[Track]) -> tuple[Track, ...]:
-    """Return the recorded tracks on their lane paths."""
-    placed = []
-    for path, track in zip(match.paths, tracks, strict=True):
-        driven = float(path.progress[-1])
-        curve = path.curve.cut(path.start, path.start + max(driven, 1.0), 0.25)
-        progress = path.progress * (curve.length / driven if driven > 1.0 else 1.0)
-        on_curve = frozen(np.minimum(progress, curve.length))
-        placed.append(replace(track, curve=curve, progress=on_curve, lane=path.curve))
-    return tuple(placed)
+def find_places(
+    graph: LaneGraph,
+    tracks: tuple[Track, ...],
+    limits: PlaceLimits = PlaceLimits(),
+    lanes: Sequence[int] | None = None,
+) -> Iterator[Candidate]:
+    """Yield the places for a recording, those that lose nothing first.
+
+    Places come earlier where, if the map has rights of way, a vehicle that must give way does so.
+    Places that break a rule are left out if the network's rules are kept.
+
+    Args:
+        graph: of a map or a part of it.
+        tracks: of all recorded road users.
+        limits: what may change.
+        lanes: a vehicle is put onto one of these; None: onto any lane.
+
+    Raises:
+        NoPlaceError: there is none. The message has the reason at the place that is nearest to
+            being usable.
+        RefusedError: the recording needs a junction, and the drawn road has none.
+    """
+    search = _Search(graph, tracks, limits)
+    if graph.network.drawn and not any(lane.junction for lane in graph.network.lanes):
+        to_frenet(search.drivers)
+    has_place = False
+    for batch, scales in search.batches(lanes):
+        is_good = False
+        for each in search.good_ones(batch):
+            is_good = True
+            yield each
+        unscaled = list(dict.fromkeys(search.unscaled))
+        for scale in scales[1:]:
+            if is_good:
+                break
+            for each in search.good_ones(search.scaled(unscaled, scale)):
+                is_good = True
+                yield each
+        has_place |= is_good
+        if sum(not each.surely_lost for each in search.losing) >= _JUDGED_COUNT:
+            break
+    losing = search.best_losing()
+    yield from losing
+    if not has_place and not losing:
+        raise NoPlaceError(_refusal(search))
+
+
+def _refusal(search: _Search) -> str:
+    """Return the message for a recording without a place."""
+    network = search.graph.network
+    _, _, reason = min(search.failures, default=(True, 0.0, "no lanes have its directions"))
+    kind = "road" if network.drawn else "map"
+    notes = "".join(f"; {note}" for note in network.notes if network.drawn)
+    return f"the recording does not fit {kind} {network.name}: {reason}{notes}"
+
+
+@lru_cache(maxsize=4)  # a map's part is chosen by it, and the recording fitted
+def best_place(
+    road: Road, tracks: tuple[Track, ...], limits: PlaceLimits = PlaceLimits()
+) -> Candidate:
+    """Return the best place for a recording on a road's lanes, with room for all vehicles.
+
+    Raises:
+        NoPlaceError: there is none; the message has the reason of the best attempt.
+        RefusedError: as `find_places`.
+    """
+    assert road.lanes is not None
+    graph = lane_graph(road.lanes, users_of(drivers_of(tracks)))
+    reason, best, lowest = "", None, math.inf
+    for candidate in islice(find_places(graph, tracks, limits), _TRIED_ROOM_COUNT):
+        try:
+            repair = max_repair(candidate.separation.tracks, road, limits.max_move)
+        except RefusedError as error:
+            reason = reason or str(error)
+            continue
+        rank = len(candidate.refused_losses) + 0.5 * (repair > _MAX_REPAIR_M)
+        if rank < lowest:
+            lowest, best = rank, candidate
+        if rank == 0.0 or candidate.refused_losses:  # the next ones lose as much
+            break
+    if best is None:
+        raise NoPlaceError(f"the recording does not fit the lanes of road {road.name}: {reason}")
+    return best
 
 
 @dataclass(frozen=True, eq=False)
@@ -336,27 +255,27 @@ class Place:
         """The part of the map, to be appended to its name."""
         return f"#box={','.join(f'{value:g}' for value in self.box.ravel())}"
 
+    @property
+    def note(self) -> Note:
+        """The note that this part of the map is used."""
+        return Note.of(NoteKind.BEST_PLACE, place=self.where, part=self.part, cost=self.cost)
+
 
 def places(
     network: LaneNetwork, tracks: tuple[Track, ...], lanes: Sequence[int] | None = None
 ) -> Iterator[Place]:
-    """Yield the places for a recording on a map, the best first; see `placements`.
+    """Yield the places for a recording on a map, the best first; see `find_places`.
+
+    Of those that lose something there is only the best.
 
     Raises:
         NoPlaceError: there is none.
     """
-    graph = lane_graph(network, users_of(tracks))
-    reason, has_place = "", False
-    for each, _ in placements(graph, tracks, lanes):
-        try:
-            separate(tracks_on(each, tracks), 0.0, 3.0, sideways=0.0)
-        except RefusedError as error:
-            reason = reason or f"{error}: more lanes side by side are needed"
-            continue
-        has_place = True
-        yield _place_of(graph.network, each)
-    if not has_place:
-        raise NoPlaceError(f"the recording does not fit map {network.name}: {reason}")
+    graph = lane_graph(network, users_of(drivers_of(tracks)))
+    for candidate in find_places(graph, tracks, lanes=lanes):
+        yield _place_of(graph.network, candidate.match)
+        if not candidate.is_good:
+            break
 
 
 def _place_of(network: LaneNetwork, match: Match) -> Place:
@@ -375,19 +294,6 @@ def _with_lead(path: LanePath) -> Floats:
     return path.curve.at(stations)[:, :2]
 
 
-def users_of(tracks: Sequence[Track]) -> frozenset[str]:
-    """Return the kinds of lane users among the recorded vehicles."""
-    return frozenset().union(*(track.vehicle.kind.lane_user for track in tracks))
-
-
-def best_part(
-    network: LaneNetwork, tracks: tuple[Track, ...], lanes: Sequence[int] | None = None
-) -> tuple[Floats, Note]:
-    """Return the box (2, 2) [m] around the best place for a recording, and a note on it.
-
-    Raises:
-        NoPlaceError: there is no place for it.
-    """
-    best = next(places(network, tracks, lanes))
-    note = Note.of(NoteKind.BEST_PLACE, place=best.where, part=best.part, cost=best.cost)
-    return best.box, note
+def users_of(drivers: Sequence[Track]) -> frozenset[str]:
+    """Return the kinds of lane users among the recorded drivers."""
+    return frozenset().union(*(track.vehicle.kind.lane_user for track in drivers))

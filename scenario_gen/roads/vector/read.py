@@ -6,12 +6,14 @@
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import lru_cache
+from itertools import islice
+import math
 from pathlib import Path
 
 import numpy as np
 
 from scenario_gen.base.documents import shown
-from scenario_gen.base.errors import InputError, of_system, reading
+from scenario_gen.base.errors import InputError, of_system, reading, RefusedError
 from scenario_gen.base.xml_reader import Element, read_xml, to_number
 from scenario_gen.numerics import Floats, frozen
 from scenario_gen.roads.config import RoadConfig
@@ -20,7 +22,7 @@ from scenario_gen.roads.vector import commonroad, lanelet2, opendrive
 from scenario_gen.roads.vector.drafts import MapLanes
 from scenario_gen.roads.vector.ground import road_of
 from scenario_gen.roads.vector.network import extent, network_of, part_of
-from scenario_gen.roads.vector.place import best_part
+from scenario_gen.roads.vector.place import best_place, places
 from scenario_gen.situation import Track
 from scenario_gen.types import LaneNetwork, Note, NoteKind, Road
 
@@ -48,6 +50,7 @@ FORMATS = {
 """By the suffix of a file's name."""
 PART_KINDS = ("lanelet", "junction", "box")
 _MARGIN_M = 40.0  # around requested lanes
+_TRIED_PLACES_COUNT = 6  # around which a part is drawn
 
 
 def split(name: str) -> tuple[Path, str]:
@@ -156,30 +159,60 @@ def vector_road(name: str, tracks: tuple[Track, ...] | None, config: RoadConfig)
     if part and kind not in PART_KINDS:
         kinds = ", ".join(f"#{each}=…" for each in PART_KINDS)
         raise InputError(f"map {path.name}: part {shown(part, 40)!r}; choose one of {kinds}")
-    road = _road_of_lanes(path, part, tracks, config)
-    assert road.lanes is not None
-    others = road.cells_in(road.lanes.others)
-    return with_obstacles(road, road.lanes.obstacles, others, elsewhere=True)
-
-
-def _road_of_lanes(
-    path: Path, part: str, tracks: tuple[Track, ...] | None, config: RoadConfig
-) -> Road:
-    """Return the road of `vector_road`, without the obstacles of the map."""
-    kind = part.partition("=")[0]
     network = read_network(path)
     if config.traffic_rules == "ignored":
         network = replace(network, rules_kept=False)
     if kind == "box":
         box = box_of(network, part)
-        return road_of(part_of(network, box, Note.of(NoteKind.MAP_PART, part=part)), box, config)
+        return _part(network, box, Note.of(NoteKind.MAP_PART, part=part), config)
     lanes = chosen_lanes(network, part) if part else None
     if tracks is not None:
-        box, note = best_part(network, tracks, lanes)
-        return road_of(part_of(network, box, note), box, config)
+        return _best_part(network, tracks, lanes, config)
     if lanes is None:
-        return road_of(network, None, config)
+        return _with_map_obstacles(road_of(network, None, config))
     points = np.concatenate([network.lanes[k].outline for k in lanes])
     box = np.stack((points.min(axis=0) - _MARGIN_M, points.max(axis=0) + _MARGIN_M))
-    note = Note.of(NoteKind.MAP_AROUND, distance=_MARGIN_M, part=part)
-    return road_of(part_of(network, box, note), box, config)
+    return _part(network, box, Note.of(NoteKind.MAP_AROUND, distance=_MARGIN_M, part=part), config)
+
+
+def _best_part(
+    network: LaneNetwork,
+    tracks: tuple[Track, ...],
+    lanes: tuple[int, ...] | None,
+    config: RoadConfig,
+) -> Road:
+    """Return the road around the best place for a recording, with room for it.
+
+    Raises:
+        NoPlaceError: there is no place for it.
+    """
+    best: Road | None = None
+    fewest_losses = math.inf
+    refusal: RefusedError | None = None
+    for place in islice(places(network, tracks, lanes), _TRIED_PLACES_COUNT):
+        road = _part(network, place.box, place.note, config)
+        try:
+            lost = len(best_place(road, tracks).refused_losses)
+        except RefusedError as error:
+            refusal = refusal or error
+            continue
+        if lost < fewest_losses:
+            best, fewest_losses = road, lost
+        if not lost:
+            break
+    if best is None:
+        assert refusal is not None
+        raise refusal
+    return best
+
+
+def _part(network: LaneNetwork, box: Floats, note: Note, config: RoadConfig) -> Road:
+    """Return the road of the part of a map in a box (2, 2) [m]."""
+    return _with_map_obstacles(road_of(part_of(network, box, note), box, config))
+
+
+def _with_map_obstacles(road: Road) -> Road:
+    """Return a road with the obstacles of its map."""
+    assert road.lanes is not None
+    others = road.cells_in(road.lanes.others)
+    return with_obstacles(road, road.lanes.obstacles, others, elsewhere=True)

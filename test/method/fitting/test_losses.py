@@ -11,11 +11,10 @@ from support.reaction_scenes import crossing, lane_encounter
 
 from scenario_gen.base.errors import InputError
 from scenario_gen.method.fitting import fit, fit_template, FittingConfig, LostEncounterError
-from scenario_gen.method.fitting.losses import find_losses, LOSABLE
 from scenario_gen.method.fitting.placement import Placement
 from scenario_gen.method.segmentation import segment
 from scenario_gen.numerics.curve import Curve
-from scenario_gen.situation.tracks import clean_tracks
+from scenario_gen.situation import clean_tracks, find_losses, LOSABLE
 from scenario_gen.types import Encounter, Vehicle
 from scenario_gen.types.request import Request
 from scenario_gen.types.road import Road

@@ -10,7 +10,7 @@ import pytest
 from support.map_builders import FORMATS, write
 
 from scenario_gen.logs import read_log
-from scenario_gen.roads import lane_graph, placements, read_network, tracks_on
+from scenario_gen.roads import find_places, lane_graph, read_network
 from scenario_gen.situation import clean_tracks, find_conflicts
 from scenario_gen.types import Encounter, Motion, Vehicle
 
@@ -53,10 +53,11 @@ def meet(tracks):
 def test_a_left_turn_crosses_the_oncoming_lane(tmp_path, suffix, median, start):
     tracks = clean_tracks(left_turn(median, start))
     assert meet(tracks)
-    placed = list(islice(placements(lane_graph(read_network(write(tmp_path, suffix))), tracks), 2))
+    graph = lane_graph(read_network(write(tmp_path, suffix)))
+    placed = list(islice(find_places(graph, tracks), 2))
     assert placed
-    for match, _ in placed:
-        assert meet(tracks_on(match, tracks))
+    for place in placed:
+        assert meet(place.separation.tracks)
 
 
 @pytest.mark.recorded
@@ -67,9 +68,5 @@ def test_a_recorded_left_turn_crosses_the_oncoming_lane(recorded, name):
     """Of a wide crossroads: as one piece it resembles right turns of a narrow one more."""
     log = next((recorded / "trajectories" / "ngsim_commonroad").glob("encounter_b_left_turn*.csv"))
     tracks = clean_tracks(read_log(log).encounters[0])
-    match, _ = next(
-        placements(
-            lane_graph(read_network(recorded / "maps" / "opendrive" / f"{name}.xodr")), tracks
-        )
-    )
-    assert meet(tracks_on(match, tracks))
+    graph = lane_graph(read_network(recorded / "maps" / "opendrive" / f"{name}.xodr"))
+    assert meet(next(find_places(graph, tracks)).separation.tracks)

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from scenario_gen.roads import lane_graph
+from scenario_gen.roads.vector.hypotheses import hypothesis_at
 from scenario_gen.roads.vector.match import match
-from scenario_gen.roads.vector.search import RigidPlacement
 from scenario_gen.situation import clean_tracks, find_conflicts
 from scenario_gen.types import Encounter, Lane, LaneNetwork, Vehicle
 
@@ -57,8 +57,9 @@ def lanes_of(encounter, neighbours=True):
         ),
     )
     tracks = clean_tracks(encounter)
-    placement = RigidPlacement(0.0, 0.0, 0.0, 0.0)
-    found = next(match(lane_graph(network), tracks, find_conflicts(encounter), placement))
+    graph = lane_graph(network)
+    home = hypothesis_at(graph, tracks, np.zeros(3))
+    found = next(match(graph, tracks, find_conflicts(encounter), home))
     return found.paths[0].lanes
 
 

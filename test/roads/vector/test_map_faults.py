@@ -10,7 +10,7 @@ from support.reaction_scenes import lane_encounter
 
 from scenario_gen.base.errors import RefusedError
 from scenario_gen.pipeline import generate
-from scenario_gen.roads import build_road, NoPlaceError
+from scenario_gen.roads import build_road
 from scenario_gen.types import NoteKind
 
 OBSTACLE = """<staticObstacle id="77"><type>parkedVehicle</type><shape><rectangle>
@@ -57,5 +57,7 @@ def test_lanes_that_are_too_narrow_or_too_few_are_named(tmp_path) -> None:
     with pytest.raises(RefusedError, match=r"lane .* is 1\.2 m wide at .* too narrow for vehicle"):
         generate(lane_encounter(speed, speed), narrow, count=1)
     passing = lane_encounter(speed, speed + 4.0, gap=10.0, lane=3.5)
-    with pytest.raises(NoPlaceError, match=r"lanes side by side are needed\. Shortened"):
+    with pytest.raises(
+        RefusedError, match=r"drive in two lanes in the recording, otherwise .* Shortened"
+    ):
         generate(passing, write(tmp_path, ".xodr"), count=1)

@@ -13,7 +13,7 @@ from test_rules import crossing, template
 
 from scenario_gen.base.errors import RefusedError
 from scenario_gen.logs import geodesy
-from scenario_gen.roads import lane_graph, placements, read_network, tracks_on
+from scenario_gen.roads import find_places, lane_graph, read_network
 from scenario_gen.roads.vector.signs import kind_of_sign
 from scenario_gen.situation import clean_tracks
 from scenario_gen.types import (
@@ -308,12 +308,11 @@ def test_who_drives_on_a_bridge_meets_nobody_under_it(tmp_path, suffix):
         lane.junction for lane in above.lanes
     } == {""}
     tracks = clean_tracks(template(crossing()))
-    match, _ = next(placements(lane_graph(flat), tracks))
-    assert meet(tracks_on(match, tracks))
+    assert meet(next(find_places(lane_graph(flat), tracks)).separation.tracks)
     with pytest.raises(
         RefusedError, match="vehicles 1 and 2 would be above each other, as on a bridge"
     ):
-        next(placements(lane_graph(above), tracks))
+        next(find_places(lane_graph(above), tracks))
 
 
 def test_a_map_on_the_180th_meridian_is_one_map(tmp_path):
@@ -329,8 +328,10 @@ def test_places_beyond_the_shortlist_are_looked_at_where_nobody_takes_those_on_i
     tmp_path, monkeypatch
 ):
     network, tracks = read_network(write(tmp_path, ".xodr")), clean_tracks(template(crossing()))
-    everywhere = {match.paths[0].lanes for match, _ in placements(lane_graph(network), tracks)}
-    monkeypatch.setattr("scenario_gen.roads.vector.place.MATCHED_PLACEMENTS_COUNT", 1)
-    assert {
-        match.paths[0].lanes for match, _ in placements(lane_graph(network), tracks)
-    } == everywhere and len(everywhere) > 3
+
+    def lanes():
+        return {place.match.paths[0].lanes for place in find_places(lane_graph(network), tracks)}
+
+    everywhere = lanes()
+    monkeypatch.setattr("scenario_gen.roads.vector.place.MATCHED_COUNT", 1)
+    assert lanes() == everywhere and len(everywhere) > 3

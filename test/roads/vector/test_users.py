@@ -11,9 +11,9 @@ from test_reported_maps import lane, read, road, section
 from scenario_gen.base.errors import RefusedError
 from scenario_gen.roads import (
     build_road,
+    find_places,
     ground_for,
     lane_graph,
-    placements,
     read_network,
     RoadConfig,
     users_of,
@@ -177,7 +177,7 @@ def test_who_drives_is_placed_where_its_type_may_and_kept_there(tmp_path, kind, 
     built = build_road(street(tmp_path, lanes) + "#box=0,-12,100,2", encounter)
     tracks = clean_tracks(encounter)
     graph = lane_graph(built.lanes, users_of(tracks))
-    match, _ = next(placements(graph, tracks))
+    match = next(find_places(graph, tracks)).match
     assert [[graph.network.lanes[k].id for k in path.lanes] for path in match.paths] == [
         ["1.0.-1"],
         [f"1.0.{placed}"],
