@@ -111,7 +111,8 @@ def columns() -> Iterator[Row]:
     """Yield the recognised columns of a table, with their units."""
     yield "quantity", "names, the preferred first", "units, the default first"
     for quantity, names in NAMES.items():
-        yield quantity, ", ".join(map(code, names)), ", ".join(map(code, UNITS[quantity]))
+        if names:
+            yield quantity, ", ".join(map(code, names)), ", ".join(map(code, UNITS[quantity]))
 
 
 def parameters() -> Iterator[Row]:

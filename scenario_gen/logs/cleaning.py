@@ -164,15 +164,15 @@ def _without_invalid(vehicle: Observations, geographic: bool, drops: Drops) -> O
     speed = vehicle.speed
     position_checks: dict[Cause, Any] = {
         Cause.STAMP_OUT_OF_RANGE: is_out_of_range(vehicle.fix_ns),
-        Cause.NO_POSITION: ~np.isfinite(fix).all(axis=1),
+        Cause.NO_POSITION: ~(np.isfinite(fix[:, 0]) & np.isfinite(fix[:, 1])),
+        Cause.ZERO_POSITION: is_before_fix(fix),
     }
+    x, y = np.abs(fix).T
+    limits = (CLEANING.max_coordinate_m,) * 2
     if geographic:
-        position_checks[Cause.ZERO_POSITION] = (np.abs(fix) < 1e-6).all(axis=1)
-        off_earth = (np.abs(fix) > (90.0, 180.0)).any(axis=1)
-    else:
-        off_earth = (np.abs(fix) > CLEANING.max_coordinate_m).any(axis=1)
-        position_checks[Cause.ZERO_POSITION] = is_before_fix(fix)
-    position_checks[Cause.NOT_ON_EARTH] = off_earth
+        position_checks[Cause.ZERO_POSITION] = (x < 1e-6) & (y < 1e-6)
+        limits = (90.0, 180.0)
+    position_checks[Cause.NOT_ON_EARTH] = (x > limits[0]) | (y > limits[1])
     speed_checks: dict[Cause, Any] = {
         Cause.STAMP_OUT_OF_RANGE: is_out_of_range(vehicle.speed_ns),
         Cause.NO_SPEED: ~np.isfinite(speed),
@@ -185,7 +185,7 @@ def _without_invalid(vehicle: Observations, geographic: bool, drops: Drops) -> O
 
 def is_before_fix(fix: Floats) -> Bools:
     """Return which positions (F, 2) [m] are 0, 0 at the start, until they jump to a real place."""
-    is_zero = (fix == 0.0).all(axis=1)
+    is_zero = (fix[:, 0] == 0.0) & (fix[:, 1] == 0.0)
     n_zeros = int(np.argmin(is_zero)) if not is_zero.all() else 0
     is_far = n_zeros and np.hypot(*fix[n_zeros]) > CLEANING.min_first_jump_m
     return np.asarray(np.arange(len(fix)) < (n_zeros if is_far else 0))

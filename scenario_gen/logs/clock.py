@@ -140,7 +140,8 @@ def _shifted(log: RawLog, shifts: Sequence[tuple[Ints, Ints]]) -> RawLog:
 
 def _steps_of(vehicle: Observations, log: RawLog) -> Iterator[_ClockStep]:
     """Yield where a vehicle's stamps go back while it is not where it was at those stamps."""
-    valid = np.isfinite(vehicle.fix).all(axis=1) & ~is_out_of_range(vehicle.fix_ns)
+    x, y = vehicle.fix.T
+    valid = np.isfinite(x) & np.isfinite(y) & ~is_out_of_range(vehicle.fix_ns)
     stamps = vehicle.fix_ns[valid]
     rows = vehicle.fix_row[valid].tolist()
     places = on_sphere(vehicle.fix[valid]) if log.geographic else vehicle.fix[valid]

@@ -40,6 +40,7 @@ NAMES: dict[str, tuple[str, ...]] = {
         "width": "width vehicle_width",
         "kind": "type kind class vehicle_type object_type agent_type actor_type obj_type category "
         "classification vehicle_class object_class road_user road_user_type",
+        "subkind": "",
         "signal": "signal signal_state traffic_light traffic_light_state light_state",
         "signal_id": "signal_id traffic_light_id light_id signal_group",
         "trailer": "trailer trailer_id trailer_length",
@@ -80,13 +81,13 @@ _TIMES_S = {
     "d": 86400.0,
     "hhmmss": 1.0,
 }
-_CLOCKWISE_UNITS = ("north_deg", "cw_deg", "north_rad")
 UNITS: dict[str, dict[str, float]] = {
     "time": _TIMES_S,
     "date": {},
     "scene": {},
     "vehicle": {},
     "kind": {},
+    "subkind": {},
     "signal": {},
     "signal_id": {},
     "trailer": {},
@@ -133,6 +134,7 @@ _NGSIM = {
 _FRAME_RATE = re.compile(r"(\d+(?:\.\d+)?)fps")  # unit of a time in frames
 _SCALED = ("x", "y", "speed", "vx", "vy", "length", "width", "height")
 _SCALE = re.compile(r"\d*\.?\d+(?:e-?\d+)?")  # our units in one of the column
+_KINDS = ("kind", "subkind")
 _NUMBERED_KIND = re.compile(r"([a-z_]*)(\d+)(?:\+|$)")  # type and number, car2
 _NUMBERED_KINDS = re.compile(r"[a-z_]*\d+(?:\+[a-z_]*\d+)*")
 _CLOCKWISE_NAMES = (
@@ -251,7 +253,7 @@ def _check_unit(quantity: str, unit: str) -> None:
         return
     if quantity in _SCALED and _SCALE.fullmatch(unit) and float(unit):
         return
-    if quantity == "kind" and _NUMBERED_KINDS.fullmatch(unit):
+    if quantity in _KINDS and _NUMBERED_KINDS.fullmatch(unit):
         return
     raise InputError(
         f"parameter columns: {quantity} has no unit {unit!r}; "
@@ -385,7 +387,7 @@ def _kind_column(name: str, kinds: str) -> Column:
 
 def as_column(quantity: str, name: str, unit: str = "") -> Column:
     """Return the column in a unit; by default, its suffix names the unit."""
-    if quantity == "kind":
+    if quantity in _KINDS:
         return _kind_column(name, unit)
     lower = normalized(name)
     frame_rate = _FRAME_RATE.fullmatch(unit) if quantity == "time" else None

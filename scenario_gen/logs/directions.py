@@ -41,6 +41,9 @@ _CONVENTIONS: tuple[tuple[str, str, Callable[[Floats], Floats]], ...] = (
 
 def check_directions(reading: Reading) -> None:
     """Use the convention of headings that agrees with the positions, or doubt an axis."""
+    vehicles = reading.log.vehicles
+    if not any(v.course is not None or np.isfinite(v.heading).any() for v in vehicles):
+        return
     compared = _without_body_frames(reading)
     names = {"heading": "headings", "course": "velocities"}
     quantity = next((name for name in names if compared.contradicts(f"{name}_off")), "")
@@ -51,27 +54,36 @@ def check_directions(reading: Reading) -> None:
         f"{100.0 * share:.0f} % of the recorded {names[quantity]} are far off the direction of "
         "travel"
     )
-    conventions = list(_conventions(reading))
-    changes = _agreeing(reading, conventions)
-    if not changes or quantity != "heading":
-        mirrors = list(_mirrors(reading))
-        axes = [mirror for mirror in mirrors if "heading" not in mirror.columns]
-        both = [_both(axis, convention) for axis in axes for convention in conventions]
-        changes = _agreeing(reading, mirrors) or _agreeing(reading, both)
-    elif changes[0].columns == reading.units("north_rad", "heading"):
-        changes += [each for each in _mirrors(reading) if each.columns.keys() == {"x", "y"}]
+    changes = _agreeing_changes(reading, quantity)
     if changes:
         reading.resolve(Quantity.FRAME, share, fact, changes)
     else:
         reading.notes.append(f"{fact}; {names[quantity]} that contradict it are not used")
 
 
+def _agreeing_changes(reading: Reading, quantity: str) -> list[Change]:
+    """Return the conventions of headings, or else of axes, with which all directions agree."""
+    conventions = list(_conventions(reading))
+    mirrors = list(_mirrors(reading))
+    changes = _agreeing(reading, conventions) if quantity == "heading" else []
+    if changes:
+        is_turned = changes[0].columns == reading.units("north_rad", "heading")
+        return changes + [m for m in mirrors if is_turned and m.columns.keys() == {"x", "y"}]
+    axes = [mirror for mirror in mirrors if "heading" not in mirror.columns]
+    return _agreeing(reading, mirrors) or _agreeing(
+        reading, [_both(axis, convention) for axis in axes for convention in conventions]
+    )
+
+
 def _without_body_frames(reading: Reading) -> Comparison:
     """Compare directions; velocities that point ahead all the time are those of a body frame."""
 
     def in_frame(vehicle: Observations) -> Observations:
-        angles = np.abs([0.0, *(() if vehicle.course is None else vehicle.course)])
-        is_ahead = np.nanpercentile(angles, 90.0) < EVIDENCE.off_rad
+        if vehicle.course is None:
+            return vehicle
+        is_ahead = (
+            np.nanpercentile(np.abs(np.append(0.0, vehicle.course)), 90.0) < EVIDENCE.off_rad
+        )
         return replace(vehicle, course=None) if is_ahead else vehicle
 
     vehicles = tuple(map(in_frame, reading.log.vehicles))

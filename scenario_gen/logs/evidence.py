@@ -39,6 +39,7 @@ from scenario_gen.numerics import Floats
 _FRAME_RATES_HZ = (10, 12.5, 15, 20, 24, 25, 30, 29.97, 50, 60, 100)
 _SPEED_UNITS = {"kmh": "km/h", "mph": "mph", "kn": "knots", "fps": "ft/s", "cmps": "cm/s"}
 _POSITION_UNITS = {"ft": "feet", "cm": "centimetres", "km": "kilometres"}
+_SPEED_FACT = "the recorded speeds are {:.2f} times those of the positions"
 _DEGREE_UNITS = ("e7", "ddmm", "min")
 _TIME_UNITS = ("ms", "us", "ns")
 _LONG_TIME_UNITS = ("min", "h", "d")
@@ -50,9 +51,12 @@ def interpret(log: RawLog, config: LogConfig) -> tuple[RawLog, list[str], list[D
     _check_time_unit(reading)
     if log.geographic:
         _find_degrees(reading)
+    else:
+        _check_metres(reading)
+        _check_staying(reading)
+        _check_starts(reading)
     if reading.doubts:
         return reading.log, reading.notes, reading.doubts
-    _check_starts(reading)
     _check_speeds(reading)
     _check_frame_rate(reading)
     check_directions(reading)
@@ -90,16 +94,15 @@ def _check_frame_rate(reading: Reading) -> None:
     time = reading.log.columns.get("time")
     if time is None or "time" in reading.changes or time.unit or reading.doubts:
         return
-    compared = reading.compared()
     if not time.counts_frames:
-        if not (counts_steps(reading.log.vehicles) and _crawls(reading, compared)):
+        if not (counts_steps(reading.log.vehicles) and _crawls(reading)):
             return
         cause = (
             f"column {time.name} counts in steps of 1 and no vehicle is faster than "
             f"{EVIDENCE.max_crawl_mps:g} m/s: it looks like a number of frames"
         )
     else:
-        if np.nanmedian([1e9, *compared.deviation]) < EVIDENCE.wrong_ratio:
+        if np.nanmedian([1e9, *reading.compared().deviation]) < EVIDENCE.wrong_ratio:
             return
         cause = f"column {time.name} counts frames, and no speeds show how many there are a second"
     changes = reading.units("25fps", "time")
@@ -121,14 +124,14 @@ def _scale(speed: float) -> str:
     return f"{10.0 / speed:.1g}"
 
 
-def _crawls(reading: Reading, compared: Comparison) -> bool:
+def _crawls(reading: Reading) -> bool:
     """Return whether vehicles without measured speeds drive far, all of them very slowly."""
     vehicles = reading.log.vehicles
     if any(len(vehicle.speed_ns) for vehicle in vehicles) or len(vehicles) < 2:
         return False
     if abs(median_period(vehicles) - 1.0) > 1e-6:
         return False
-    if not np.nanmax([0.0, *compared.fastest]) <= EVIDENCE.max_crawl_mps:
+    if not np.nanmax([0.0, *reading.compared().fastest]) <= EVIDENCE.max_crawl_mps:
         return False
     extent = max(float(np.hypot(*np.ptp(vehicle.fix, axis=0))) for vehicle in vehicles)
     n_fixes = max(len(vehicle.fix_ns) for vehicle in vehicles)
@@ -144,19 +147,23 @@ def _find_degrees(reading: Reading) -> None:
     fix = np.abs(fix[np.isfinite(fix).all(axis=1)])
     if not len(fix) or not reading.has("lat", "lon"):
         return
+    latitude, longitude = np.median(fix, axis=0).tolist()
+    fact = f"latitude {latitude:g}, longitude {longitude:g} is not on Earth"
     if _suits_globe(fix):
         if np.ptp(fix) > 0.0 and np.abs(fix * 1e4 - np.round(fix * 1e4)).max() < 1e-6:
             cause = "latitude and longitude have four decimals: places are up to 6 m off"
             reading.doubt(Quantity.POSITION, 11.0, cause, "record six decimals or more")
-        return
-    latitude, longitude = np.median(fix, axis=0).tolist()
-    fact = f"latitude {latitude:g}, longitude {longitude:g} is not on Earth"
-    swap = Change(
-        "lat and lon are swapped", reading.swapped("lat", "lon"), with_fix(swapped_fix), False
-    )
+    elif changes := _degree_changes(reading, fix):
+        reading.resolve(Quantity.POSITION, latitude, fact, changes)
+    else:
+        reading.doubt(Quantity.POSITION, latitude, fact, "name the unit of lat and lon")
+
+
+def _degree_changes(reading: Reading, fix: Floats) -> list[Change]:
+    """Return the readings that bring absolute latitudes and longitudes (F, 2) onto the globe."""
+    swap = reading.swapped("lat", "lon")
     if _suits_globe(swapped_fix(fix)):
-        reading.resolve(Quantity.POSITION, latitude, fact, [swap])
-        return
+        return [Change("lat and lon are swapped", swap, with_fix(swapped_fix), is_unit=False)]
     changes = [
         Change(
             f"lat and lon are in the unit {unit}",
@@ -167,13 +174,9 @@ def _find_degrees(reading: Reading) -> None:
         if _suits_globe(degrees := _in_degrees(fix, unit)) and np.median(degrees) > 0.01
     ]
     spreads = [np.nanmax([0.0, *reading.compared(c.convert).spread]) for c in changes]
-    if min(spreads, default=0.0) > 0.0:  # speeds are known
-        clear = [c for c, s in zip(changes, spreads, strict=True) if s < 2.0 * min(spreads) + 0.02]
-        changes = clear if len(clear) == 1 else changes
-    if changes:
-        reading.resolve(Quantity.POSITION, latitude, fact, changes)
-    else:
-        reading.doubt(Quantity.POSITION, latitude, fact, "name the unit of lat and lon")
+    limit = 2.0 * min(spreads, default=0.0) + 0.02
+    clear = [change for change, s in zip(changes, spreads, strict=True) if 0.0 < s < limit]
+    return clear if len(clear) == 1 else changes
 
 
 def _suits_globe(degrees: Floats) -> bool:
@@ -190,11 +193,47 @@ def _in_degrees(values: Floats, unit: str) -> Floats:
     return degrees + (minutes / 60.0 if (np.abs(minutes) < 60.0).all() else np.nan)
 
 
+def _check_metres(reading: Reading) -> None:
+    """Add a doubt if x and y are degrees: as metres, no vehicle would move."""
+    vehicles = reading.log.vehicles
+    farthest = max((_extent(vehicle.fix) for vehicle in vehicles), default=0.0)
+    if not reading.has("x", "y") or not 0.0 < farthest < EVIDENCE.degrees_m:
+        return
+    largest = np.nanmax(np.abs(np.concatenate([vehicle.fix for vehicle in vehicles])), axis=0)
+    fastest = np.nanmax(np.concatenate([[0.0], *(vehicle.speed for vehicle in vehicles)]))
+    drives = fastest >= 1.0 or not any(len(vehicle.speed) for vehicle in vehicles)
+    if drives and (largest <= (180.0, 90.0)).all() and largest.max() > 1.0:
+        x, y = (reading.log.columns[name].name for name in ("x", "y"))
+        cause = f"no vehicle drives farther than {farthest:.2g} m by x, y: they may be degrees"
+        reading.doubt(Quantity.POSITION, farthest, cause, reading.option(lon=x, lat=y))
+
+
+def _check_staying(reading: Reading) -> None:
+    """Add a doubt if vehicles stay in one place while their speeds say that they drive."""
+    staying = [
+        vehicle
+        for vehicle in reading.log.vehicles
+        if len(vehicle.speed) >= EVIDENCE.min_leg_count
+        and 0.0 <= _extent(vehicle.fix) < EVIDENCE.standing_m
+        and np.nanmedian(np.append(0.0, np.abs(vehicle.speed))) > EVIDENCE.max_crawl_mps
+    ]
+    if len(staying) <= EVIDENCE.many_share * len(reading.log.vehicles):
+        return
+    vehicle = staying[0]
+    x, y = vehicle.fix[0].tolist()
+    speed = float(np.nanmedian(vehicle.speed))
+    cause = (
+        f"vehicle {vehicle.id} stays at {x:g}, {y:g} while it drives at {speed:.1f} m/s: "
+        "positions may be relative to it, which moves"
+    )
+    reading.doubt(Quantity.SPEED, speed, cause, "record positions on the ground")
+
+
 def _check_starts(reading: Reading) -> None:
     """Add a doubt if several vehicles begin at the origin at the same time."""
     starts = {}
     for vehicle in reading.log.vehicles:
-        if reading.log.geographic or not len(vehicle.fix) or is_before_fix(vehicle.fix).any():
+        if not len(vehicle.fix) or is_before_fix(vehicle.fix).any():
             continue
         is_at_origin = np.hypot(*vehicle.fix[0]) < EVIDENCE.origin_m
         if is_at_origin and _extent(vehicle.fix) > EVIDENCE.min_driven_m:
@@ -210,74 +249,62 @@ def _check_starts(reading: Reading) -> None:
 def _check_speeds(reading: Reading) -> None:
     """Use the unit that makes all speeds agree with the positions, or add a doubt."""
     compared = reading.compared()
-    stays = _staying(reading)
-    if stays:
-        reading.doubt(Quantity.SPEED, 0.0, stays, "record positions on the ground")
-        return
-    speed = _typical_speed(compared)
-    is_known = np.isfinite(compared.ratio)
-    if not is_known.any():
-        time = reading.log.columns.get("time")
-        is_time = time is not None and not time.counts_frames
-        if speed > EVIDENCE.max_speed_mps and is_time and reading.is_assumed("x", "y"):
-            cause = f"vehicles drive at {speed:.0f} m/s by x, y: are they pixels, or in feet?"
-            option = reading.option(**reading.units(_scale(speed), "x", "y"))
-            reading.doubt(
-                Quantity.POSITION, speed, cause, f"name the metres of one, e.g. {option}"
-            )
+    ratios = compared.ratio[np.isfinite(compared.ratio)]
+    if not len(ratios):
+        _check_pixels(reading, compared)
         return
     if median_period(reading.log.vehicles) > EVIDENCE.slowest_period_s:
         return  # cleaning says that fixes are too far apart
     if not compared.contradicts("speed_off"):
         _check_pairs(reading, compared)
         return
-    ratios = compared.ratio[is_known]
     ratio = float(np.median(ratios))
-    fact = f"the recorded speeds are {ratio:.2f} times those of the positions"
     changes = _agreeing(reading, [*_frame_rates(reading), *_units(reading)])
     if changes:
         is_named = not any(reading.is_assumed(*change.columns) for change in changes)
         positions_decide = is_named and set(changes[0].columns) == {"speed"}
+        fact = _SPEED_FACT.format(ratio)
         reading.resolve(Quantity.SPEED, ratio, fact, changes, stops=not positions_decide)
-        return
-    is_gross = compared.gross_off[is_known] > EVIDENCE.gross_share
-    if np.log(compared.deviation[is_known]).max() < np.log(EVIDENCE.wrong_ratio):
-        return  # parts of the recording are off, which the check of the result says
-    names = [v.id for v, r in zip(reading.tried(), compared.ratio, strict=True) if np.isfinite(r)]
+    elif np.log(compared.deviation[np.isfinite(compared.ratio)]).max() >= np.log(
+        EVIDENCE.wrong_ratio
+    ):  # else parts of the recording are off, which the check of the result says
+        _doubt_speeds(reading, compared)
+
+
+def _check_pixels(reading: Reading, compared: Comparison) -> None:
+    """Add a doubt if vehicles without speeds drive as no vehicle does."""
+    speed = _typical_speed(compared)
+    is_time = reading.has("time") and not reading.log.columns["time"].counts_frames
+    if speed > EVIDENCE.max_speed_mps and is_time and reading.is_assumed("x", "y"):
+        cause = f"vehicles drive at {speed:.0f} m/s by x, y: are they pixels, or in feet?"
+        option = reading.option(**reading.units(_scale(speed), "x", "y"))
+        reading.doubt(Quantity.POSITION, speed, cause, f"name the metres of one, e.g. {option}")
+
+
+def _doubt_speeds(reading: Reading, compared: Comparison) -> None:
+    """Add a doubt about speeds that no unit explains."""
+    is_known = np.isfinite(compared.ratio)
+    ratios = compared.ratio[is_known]
+    ratio = float(np.median(ratios))
+    fact = _SPEED_FACT.format(ratio)
+    names = [v.id for v, known in zip(reading.tried(), is_known, strict=True) if known]
     if len(names) <= 5 and np.ptp(ratios) > 0.2 * ratio:
         parts = [f"{r:.2f} times for vehicle {n}" for n, r in zip(names, ratios, strict=True)]
         fact = f"the recorded speeds over those of the positions differ: {', '.join(parts)}"
     cause = f"{fact}: check the units of time, positions and speeds"
     remedy = "name them with --set log.columns=…" if reading.log.columns else ""
+    is_gross = compared.gross_off[is_known] > EVIDENCE.gross_share
     is_serious = is_gross.mean() > EVIDENCE.many_share and bool(reading.log.columns)
     reading.doubt(Quantity.SPEED, ratio, cause, remedy, stops=bool(is_serious))
 
 
-def _staying(reading: Reading) -> str:
-    """Return a text on a vehicle that stays in one place while its speeds say that it drives."""
-    staying = [
-        vehicle
-        for vehicle in reading.log.vehicles
-        if len(vehicle.speed) >= EVIDENCE.min_leg_count
-        and np.nanmedian([0.0, *np.abs(vehicle.speed)]) > EVIDENCE.max_crawl_mps
-        and 0.0 <= _extent(vehicle.fix) < EVIDENCE.standing_m
-        and not reading.log.geographic
-    ]
-    if len(staying) <= EVIDENCE.many_share * len(reading.log.vehicles):
-        return ""
-    vehicle = staying[0]
-    x, y = vehicle.fix[0].tolist()
-    return (
-        f"vehicle {vehicle.id} stays at {x:g}, {y:g} while it drives at "
-        f"{float(np.nanmedian(vehicle.speed)):.1f} m/s: positions may be relative to it, which "
-        "moves"
-    )
-
-
 def _extent(fix: Floats) -> float:
     """Return the diagonal [m] of the rectangle around positions (F, 2); -1 without any."""
-    known = fix[np.isfinite(fix).all(axis=1)]
-    return float(np.hypot(*np.ptp(known, axis=0))) if len(known) else -1.0
+    sides = [
+        np.fmax.reduce(axis, initial=-np.inf) - np.fmin.reduce(axis, initial=np.inf)
+        for axis in fix.T
+    ]
+    return float(np.hypot(*sides)) if np.isfinite(sides).all() else -1.0
 
 
 def _agreeing(reading: Reading, changes: Sequence[Change]) -> list[Change]:
@@ -358,5 +385,4 @@ def _check_pairs(reading: Reading, compared: Comparison) -> None:
     ]
     if pairs:
         ratio = float(np.exp(middle))
-        fact = f"the recorded speeds are {ratio:.2f} times those of the positions"
-        reading.resolve(Quantity.SPEED, ratio, fact, pairs)
+        reading.resolve(Quantity.SPEED, ratio, _SPEED_FACT.format(ratio), pairs)

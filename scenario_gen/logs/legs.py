@@ -30,7 +30,6 @@ class Legs:
 
     Attributes:
         vehicle: (L,) index of the vehicle.
-        start_ns: (L,) stamp of the first fix.
         seconds: (L,) duration by the stamps.
         step: (L, 2) displacement [m], or in the unit of x and y.
         speed: (L,) mean recorded speed; NaN if unknown.
@@ -39,7 +38,6 @@ class Legs:
     """
 
     vehicle: Ints
-    start_ns: Ints
     seconds: Floats
     step: Floats
     speed: Floats
@@ -119,7 +117,6 @@ def _legs_of_vehicle(
     moving = (length > _MOVING_SHARE * reach) & (length > 0.0)
     return Legs(
         vehicle=np.full(moving.sum(), number),
-        start_ns=vehicle.fix_ns[begin[moving]],
         seconds=seconds[moving],
         step=step[moving],
         speed=_mean_speeds(vehicle, begin[moving], end[moving]),

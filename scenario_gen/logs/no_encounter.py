@@ -57,7 +57,7 @@ def explain_no_encounter(log: RawLog, pieces: Sequence[Piece], config: LogConfig
     near: list[_Approach] = []
     while not near and reach < _MAX_REACH_M:
         near = [_approach(pieces[i], pieces[j], config) for i, j in near_pairs(pieces, 1, reach)]
-        reach *= 4.0
+        reach *= 8.0
     if not near:
         return f"{rule}: no two vehicles are recorded at the same time and place"
     best = max(near, key=lambda pair: (pair.seconds, pair.driven_m, -pair.nearest_m))

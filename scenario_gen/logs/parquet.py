@@ -9,7 +9,6 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pandas as pd
 import pyarrow as pa
 from pyarrow import compute, parquet
@@ -37,7 +36,7 @@ def read_columns(
     columns = find_columns(header, path, config.columns)
     for quantity, column in list(columns.items()):
         kind = _value_type(schema.field(column.name).type)
-        if quantity in ("kind", "date") and not _is_text(kind):
+        if quantity in ("kind", "date") and not (_is_text(kind) or column.types):
             del columns[quantity]  # numbers of unknown meaning, or whole days
             continue
         unit_s = _time_unit_s(kind)
@@ -50,7 +49,7 @@ def read_columns(
         if quantity == "time" and unit_s is not None:
             columns[quantity] = replace(column, factor=unit_s)
     names = sorted({column.name for column in columns.values()})
-    return read_table(path, names, rows_before, config), columns, header
+    return _read_table(path, names, rows_before, config), columns, header
 
 
 def _read_schema(path: Path) -> pa.Schema:
@@ -68,7 +67,7 @@ def _read_schema(path: Path) -> pa.Schema:
     return schema
 
 
-def read_table(
+def _read_table(
     path: Path, names: Sequence[str], rows_before: int, config: LogConfig
 ) -> pd.DataFrame:
     """Read some columns unchanged; missing ones are omitted.
@@ -162,19 +161,12 @@ def _time_unit_s(kind: pa.DataType) -> float | None:
 
 
 def _to_series(values: pa.ChunkedArray) -> "pd.Series[Any]":
-    """Return exact integers (some may be missing), numbers or texts; times as integers."""
-    if pa.types.is_dictionary(values.type):
-        if _is_text(values.type.value_type):
-            return values.to_pandas().astype(object)
-        values = compute.cast(values, values.type.value_type)
-    if pa.types.is_null(values.type):
-        return pd.Series(np.full(len(values), np.nan))
-    if _is_text(values.type):
-        return values.to_pandas()
-    if pa.types.is_date32(values.type):
+    """Return integers (some may be missing), numbers or texts; times as integers."""
+    kind = _value_type(values.type)
+    if pa.types.is_date32(kind):
         values = values.cast(pa.int32())
-    if _time_unit_s(values.type) is None and not pa.types.is_integer(values.type):
-        return values.cast(pa.float64(), safe=False).to_pandas()
-    integer = pa.uint64() if pa.types.is_uint64(values.type) else pa.int64()
+    if pa.types.is_integer(kind) or _time_unit_s(kind) is not None:
+        values = values.cast(pa.uint64() if pa.types.is_uint64(kind) else pa.int64())
     nullable = {pa.int64(): pd.Int64Dtype(), pa.uint64(): pd.UInt64Dtype()}
-    return values.cast(integer).to_pandas(types_mapper=nullable.get)
+    series = values.to_pandas(types_mapper=nullable.get)
+    return series.astype(object) if isinstance(series.dtype, pd.CategoricalDtype) else series

@@ -190,7 +190,6 @@ class Quantity(Enum):
 
     POSITION = "position"
     SPEED = "speed"
-    HEADING = "heading"
     CLOCK = "clock"
     FRAME = "frame"
     ROWS = "rows"

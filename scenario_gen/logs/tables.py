@@ -6,8 +6,8 @@
 SPMD is the Safety Pilot Model Deployment.
 """
 
-from collections.abc import Sequence
-from dataclasses import replace
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
 import math
 from pathlib import Path
 import re
@@ -54,7 +54,25 @@ _NO_TRAILER = frozenset(("", "0", "False", "false", "no", "none"))
 _SECONDS = re.compile(r"(.*?)secs?", re.IGNORECASE)
 _NANOSECONDS = re.compile(r".*n(?:ano)?_?secs?", re.IGNORECASE)
 _NOT_VALID = frozenset(("false", "no", "invalid", "v", "n"))  # V is void, as of NMEA
-_STANDING_M = 0.05  # no vehicle of an encounter drives less
+
+
+@dataclass(frozen=True, eq=False)
+class Table:
+    """A table in our units.
+
+    Attributes:
+        path: its file.
+        frame: its rows.
+        columns: by quantity.
+        header_lines: number of lines above its first row.
+        separators: further columns that tell apart rows of one vehicle with the same stamp.
+    """
+
+    path: Path
+    frame: pd.DataFrame
+    columns: dict[str, Column]
+    header_lines: int
+    separators: list[str]
 
 
 def read(paths: Sequence[Path], config: LogConfig) -> RawLog:
@@ -67,55 +85,52 @@ def read(paths: Sequence[Path], config: LogConfig) -> RawLog:
     Raises:
         InputError: a file is damaged or too large, or a column is missing or unsuitable.
     """
-    frames: list[pd.DataFrame] = []
-    read_paths: list[Path] = []
-    columns: dict[str, Column] = {}
-    separators: dict[str, None] = {}
-    segments = []
     notes: list[str] = []
-    n_rows = 0
-    n_read = 0
-    n_bytes = 0
-    for path in paths:
-        n_bytes += path.stat().st_size
-        check_size(str(path), n_bytes, n_read, config)
-        try:
-            frame, columns, header_lines, names = _read_named(path, n_read, config, notes)
-        except UnknownFormatError as error:
-            if len(paths) == 1 or (path == paths[-1] and not frames):
-                raise
-            notes.append(f"not read: {error}")
-            continue
-        separators |= dict.fromkeys(names)
-        if "vehicle" not in frame:
-            frame["vehicle"] = "0" if len(paths) == 1 else path.stem
-        frame["row"] = n_rows + frame.index
-        frames.append(frame)
-        read_paths.append(path)
-        segments.append(segment_of(path, n_rows, header_lines))
-        n_read += len(frame)
-        n_rows = int(frame["row"].iloc[-1]) + 1
+    tables = list(_read_tables(paths, config, notes))
+    frames = [table.frame for table in tables]
     if len({"lat" in frame for frame in frames}) > 1:
         raise InputError(
             f"{paths[0]} and the other files mix latitude/longitude and x/y; read them separately"
         )
-    if not columns["time"].is_gentime:
-        notes += named_by_file(frames, read_paths)
+    columns = tables[-1].columns
+    if columns["time"].is_gentime:
+        columns = {}  # units are those of SPMD
+    else:
+        notes += named_by_file(frames, [table.path for table in tables])
+    segments = [segment_of(t.path, int(t.frame["row"].iloc[0]), t.header_lines) for t in tables]
     log = from_frame(pd.concat(frames, ignore_index=True), paths, tuple(segments), config)
-    columns = {} if columns["time"].is_gentime else columns  # units are those of SPMD
     point = point_of(columns)
     if point and "point=" not in config.columns:
         vehicles = (replace(vehicle, ahead=POINTS[point]) for vehicle in log.vehicles)
         log = replace(log, vehicles=tuple(vehicles))
         notes.append(f"positions are those of the point {point}, by the names of their columns")
-    return replace(
-        log, notes=(*dict.fromkeys(notes), *log.notes), columns=columns, separators=(*separators,)
-    )
+    separators = dict.fromkeys(name for table in tables for name in table.separators)
+    notes = [*dict.fromkeys(notes), *log.notes]
+    return replace(log, notes=tuple(notes), columns=columns, separators=tuple(separators))
 
 
-def _read_named(
-    path: Path, rows_before: int, config: LogConfig, notes: list[str]
-) -> tuple[pd.DataFrame, dict[str, Column], int, list[str]]:
+def _read_tables(paths: Sequence[Path], config: LogConfig, notes: list[str]) -> Iterator[Table]:
+    """Yield the tables; notes, also on files that are no tables, are appended.
+
+    Raises:
+        InputError: as `read`.
+    """
+    n_bytes = n_rows = 0
+    for path in paths:
+        n_bytes += path.stat().st_size
+        check_size(str(path), n_bytes, n_rows, config)
+        try:
+            table = read_table(path, n_rows, config, notes)
+        except UnknownFormatError as error:
+            if path == paths[-1] and not n_rows:
+                raise
+            notes.append(f"not read: {error}")
+            continue
+        n_rows += len(table.frame)
+        yield table
+
+
+def read_table(path: Path, rows_before: int, config: LogConfig, notes: list[str]) -> Table:
     """Read the needed columns of one table in our units.
 
     Args:
@@ -123,10 +138,6 @@ def _read_named(
         rows_before: number of rows from other files.
         config: names columns, and bounds sizes.
         notes: notes on the table are appended.
-
-    Returns:
-        The table, its columns by quantity, the number of lines above its first row, and further
-        columns that tell apart rows of one vehicle with the same stamp.
 
     Raises:
         InputError: as `read`, or stamps repeat and no column names the vehicle.
@@ -149,8 +160,11 @@ def _read_named(
         numbers["time"] += SPMD_EPOCH_NS
     if "vehicle=none" not in config.columns.replace(" ", ""):
         _check_vehicle_column(frame, columns, numbers, path)
-    _check_metres(numbers, columns, path)
-    return numbers, columns, layout.above + 1, _separating_columns(frame, columns, numbers)
+    separators = _separating_columns(frame, columns, numbers)
+    if "vehicle" not in numbers:
+        numbers["vehicle"] = path.stem
+    numbers["row"] = rows_before + np.arange(len(numbers))
+    return Table(path, numbers, columns, layout.above + 1, separators)
 
 
 def _read_text_columns(
@@ -171,7 +185,7 @@ def _read_text_columns(
     option = f"{config.columns},time={seconds[0]}:ns" if is_split else config.columns
     columns = find_columns(header, path, option)
     # Numbers of 64 bits, or in hexadecimal, are not float64.
-    texts = ("vehicle", "kind", "trailer", "scene", "date", "signal", "signal_id")
+    texts = ("vehicle", "kind", "subkind", "trailer", "scene", "date", "signal", "signal_id")
     names = [columns[quantity].name for quantity in texts if quantity in columns]
     options["dtype"] = dict.fromkeys(names, object)
     frame = read_text(path, rows_before, config, **options)
@@ -311,34 +325,32 @@ def to_numbers(frame: pd.DataFrame, columns: dict[str, Column], path: Path) -> p
     numbers = pd.DataFrame(index=frame.index)
     for quantity, column in columns.items():
         values = frame[column.name]
+        place = f"{path}, column {column.name!r} ({quantity})"
         if isinstance(values, pd.DataFrame):
             raise InputError(f"{path} has several columns {column.name!r}; rename all but one")
         if quantity in ("vehicle", "scene", "trailer"):
             numbers[quantity] = vehicle_names(values)
-        elif quantity == "date":
-            continue
         elif quantity == "valid":
             numbers[quantity] = _are_valid(values, column)
-        elif quantity in ("kind", "signal", "signal_id"):
+        elif quantity in ("kind", "subkind", "signal", "signal_id"):
             numbers[quantity] = _words(values, column)
         elif pd.api.types.is_bool_dtype(values):
-            raise InputError(
-                f"{path}, column {column.name!r} ({quantity}): true or false is not a {quantity}; "
-                "name another column"
-            )
+            raise InputError(f"{place}: true or false is not a {quantity}; name another column")
         elif quantity == "time":
             dates = frame[columns["date"].name] if "date" in columns else None
-            place = f"{path}, column {column.name!r} (time)"
-            stamps = read_stamps(values, column, dates, place)
-            numbers["time"], numbers["time_ok"] = stamps
-        else:
+            numbers["time"], numbers["time_ok"] = read_stamps(values, column, dates, place)
+        elif quantity != "date":
             numbers[quantity] = _in_our_unit(reals(values), column)
-    if {"vx", "vy"} <= set(numbers):
-        speed = np.hypot(numbers["vx"], numbers["vy"])
-        numbers["course"] = np.arctan2(numbers["vy"], numbers["vx"]).where(speed > 0.0)
-        if "speed" not in numbers:
-            numbers["speed"] = speed
-    return numbers
+    return _with_directions(numbers)
+
+
+def _with_directions(numbers: pd.DataFrame) -> pd.DataFrame:
+    """Return a table with the directions of its velocities, and their speeds if it has none."""
+    if not {"vx", "vy"} <= set(numbers):
+        return numbers
+    speed = np.hypot(numbers["vx"], numbers["vy"])
+    course = np.arctan2(numbers["vy"], numbers["vx"]).where(speed > 0.0)
+    return numbers.assign(course=course, speed=numbers.get("speed", speed))
 
 
 def _are_valid(values: "pd.Series[Any]", column: Column) -> "pd.Series[bool]":
@@ -385,29 +397,6 @@ def vehicle_names(values: "pd.Series[Any]") -> "pd.Series[Any]":
         unique = unique.map(lambda name: name and str(int(name.partition(".")[0])))
     code_of_unique, names = pd.factorize(unique)
     return pd.Series(pd.Categorical.from_codes(code_of_unique[codes], names), index=values.index)
-
-
-def _check_metres(frame: pd.DataFrame, columns: dict[str, Column], path: Path) -> None:
-    """Check that x and y are not degrees: as metres, no vehicle would move.
-
-    Raises:
-        InputError: they are.
-    """
-    if "x" not in frame:
-        return
-    limits = frame[["x", "y"]].abs().max()
-    if not (limits["x"] <= 180.0 and limits["y"] <= 90.0 and limits.max() > 1.0):
-        return
-    if "speed" in frame and frame["speed"].max() < 1.0:
-        return  # nobody moves
-    vehicle = frame["vehicle"] if "vehicle" in frame else frame.index * 0
-    spread = float(frame.groupby(vehicle)[["x", "y"]].agg(np.ptp).max().max())
-    if 0.0 < spread < _STANDING_M:
-        raise InputError(
-            f"{path}: no vehicle drives farther than {spread:.2g} m by its x and y; they look "
-            f"like degrees of longitude and latitude: "
-            f"--set log.columns=lon={columns['x'].name},lat={columns['y'].name}"
-        )
 
 
 def from_frame(

@@ -122,23 +122,31 @@ def layout_of(path: Path) -> Layout:
     pattern = separator if separator == _WHITE_SPACE else re.escape(separator)
     first = re.split(pattern, header.strip())
     names = _names_in_comment(lines[above - 1], pattern, first) if above else ()
-    ends = [row.rstrip() for row in rows if row.strip()]
     if names:
         above -= 1
-        rows = [header, *rows]
     elif _is_pose(first) and separator == _WHITE_SPACE:
         return Layout(encoding, separator, above=-1, names=_POSE_COLUMNS, notes=(_POSE_NOTE,))
     else:
         _check_names(first, path, above + 1)
-        if ends and all(end.endswith(separator) for end in ends) and first[-1]:
-            names = (*first, _UNNAMED)  # of the field behind the separator at the end of rows
-
-    fields = [field.strip() for row in rows for field in re.split(pattern, row)]
-    has_comma = separator != "," and any(map(_NUMBER_WITH_COMMA.fullmatch, fields))
+        names = _names_with_rest(first, rows, separator)
     notes = ["the file is UTF-16"] if encoding == "utf-16" else []
-    if has_comma:
+    decimal = _decimal_sign([header, *rows], separator, pattern)
+    if decimal == ",":
         notes.append("its numbers have a decimal comma")
-    return Layout(encoding, separator, "," if has_comma else ".", above, names, tuple(notes))
+    return Layout(encoding, separator, decimal, above, names, tuple(notes))
+
+
+def _names_with_rest(first: list[str], rows: list[str], separator: str) -> tuple[str, ...]:
+    """Return the names if there is a field behind the separator at the end of rows, else none."""
+    ends = [row.rstrip() for row in rows if row.strip()]
+    has_rest = bool(ends) and all(end.endswith(separator) for end in ends) and bool(first[-1])
+    return (*first, _UNNAMED) if has_rest else ()
+
+
+def _decimal_sign(lines: list[str], separator: str, pattern: str) -> str:
+    """Return the sign before decimals in lines whose fields a pattern separates."""
+    fields = (field.strip() for line in lines for field in re.split(pattern, line))
+    return "," if separator != "," and any(map(_NUMBER_WITH_COMMA.fullmatch, fields)) else "."
 
 
 def _names_in_comment(line: str, pattern: str, first: list[str]) -> tuple[str, ...]:

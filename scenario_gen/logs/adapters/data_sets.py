@@ -8,12 +8,10 @@ corner; headings are counter-clockwise from +x.
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
-import math
+from dataclasses import dataclass
 from pathlib import Path
 
 from scenario_gen.base.errors import needs
-from scenario_gen.logs.column import Column
 
 _INTERACTION = "interaction"
 _PEDESTRIAN_COLUMNS = {"track_id", "timestamp_ms", "agent_type"}
@@ -35,9 +33,7 @@ class DataSet:
     Attributes:
         title: for people.
         source: its definition.
-        columns: by quantity, with factors to s, m, m/s or rad: vehicle, time, x, y, vx, vy,
-            heading, length, width, kind, and subkind, which refines the kind "vehicle".
-        names: texts of the numbers in `kind` and `subkind`, if these are numbers.
+        columns: by quantity, as in the parameter `columns`; `subkind` refines the kind "vehicle".
         optional: quantities that a file may lack.
         companions: suffixes, if a recording has three files.
         is_image_frame: y increases downwards, and positions are corners (highD).
@@ -46,67 +42,41 @@ class DataSet:
 
     title: str
     source: str
-    columns: dict[str, Column]
+    columns: Mapping[str, str]
     companions: Companions | None = None
     is_image_frame: bool = False
     signs: tuple[str, ...] = ()
-    names: Mapping[str, Mapping[str, str]] = field(default_factory=dict)
     optional: frozenset[str] = frozenset()
 
     @property
     def needed(self) -> frozenset[str]:
         """The columns that a file must have."""
         required = (
-            column.name
-            for quantity, column in self.columns.items()
+            column_name(text)
+            for quantity, text in self.columns.items()
             if quantity not in self.optional
         )
         return frozenset((*required, *self.signs))
 
-    @property
-    def useful(self) -> frozenset[str]:
-        """The columns that are read if a file has them."""
-        return self.needed | {column.name for column in self.columns.values()}
+
+def column_name(text: str) -> str:
+    """Return the name of a column that is written as in the parameter `columns`."""
+    return text.partition(":")[0]
 
 
-def _columns(names: str, **scaled: tuple[str, float]) -> dict[str, Column]:
-    """Return columns by quantity: of a text `x=xCenter y=yCenter`, and those with factors."""
-    plain = (part.split("=") for part in names.split())
-    columns = {quantity: Column(name) for quantity, name in plain}
-    return columns | {quantity: Column(*column) for quantity, column in scaled.items()}
+def _columns(text: str) -> dict[str, str]:
+    """Return columns by quantity, of a text `x=xCenter y=yCenter`."""
+    return dict(part.split("=") for part in text.split())
 
 
-_OSI_TYPES = ("unknown", "other", "vehicle", "pedestrian", "animal")
-_OSI_VEHICLES = (  # 0 and 1 are unknown and other
-    "vehicle",
-    "vehicle",
-    "small car",
-    "compact car",
-    "car",
-    "luxury car",
-    "delivery van",
-    "heavy truck",
-    "semitrailer",
-    "trailer",
-    "motorbike",
-    "bicycle",
-    "bus",
-    "tram",
-    "train",
-    "wheelchair",
-    "semitractor",
-    "standup scooter",
-    "micromobility device",
-    "work machine",
-    "watercraft",
-    "aircraft",
-    "land vehicle",
+_OSI_TYPES = "unknown0+other1+vehicle2+pedestrian3+animal4"
+_OSI_VEHICLES = (
+    "vehicle0+vehicle1+small_car2+compact_car3+car4+luxury_car5+delivery_van6+heavy_truck7+"
+    "semitrailer8+trailer9+motorbike10+bicycle11+bus12+tram13+train14+wheelchair15+semitractor16+"
+    "standup_scooter17+micromobility_device18+work_machine19+watercraft20+aircraft21+"
+    "land_vehicle22"
 )
 _LEVELX = Companions("_tracks.csv", "_tracksMeta.csv", "_recordingMeta.csv")
-
-
-def _numbered(names: tuple[str, ...]) -> dict[str, str]:
-    return {str(number): name for number, name in enumerate(names)}
 
 
 DATA_SETS = {
@@ -115,9 +85,8 @@ DATA_SETS = {
         source="av2-api: av2.datasets.motion_forecasting.data_schema (Track, ObjectState); "
         "steps of 0.1 s",
         columns=_columns(
-            "vehicle=track_id x=position_x y=position_y vx=velocity_x vy=velocity_y "
-            "heading=heading kind=object_type",
-            time=("timestep", 0.1),
+            "vehicle=track_id time=timestep:10fps x=position_x y=position_y vx=velocity_x "
+            "vy=velocity_y heading=heading kind=object_type"
         ),
         signs=("scenario_id",),
     ),
@@ -125,9 +94,8 @@ DATA_SETS = {
         title="INTERACTION",
         source="Zhan et al. 2019, and the README of INTERACTION's tools",
         columns=_columns(
-            "vehicle=track_id x=x y=y vx=vx vy=vy heading=psi_rad length=length width=width "
-            "kind=agent_type scene=case_id",
-            time=("timestamp_ms", 1e-3),
+            "vehicle=track_id time=timestamp_ms x=x y=y vx=vx vy=vy heading=psi_rad "
+            "length=length width=width kind=agent_type scene=case_id"
         ),
         signs=("frame_id",),
         optional=frozenset(("scene",)),
@@ -137,8 +105,7 @@ DATA_SETS = {
         source="format pages of inD and rounD (Bock et al. 2020, Krajewski et al. 2020)",
         columns=_columns(
             "vehicle=trackId time=frame x=xCenter y=yCenter vx=xVelocity vy=yVelocity "
-            "length=length width=width",
-            heading=("heading", math.pi / 180.0),
+            "length=length width=width heading=heading:deg"
         ),
         companions=_LEVELX,
     ),
@@ -156,14 +123,9 @@ DATA_SETS = {
         title="omega-prime",
         source="omega-prime 0.3.7, omega_prime.schemas; types by OSI 3.8, MovingObject",
         columns=_columns(
-            "vehicle=idx x=x y=y vx=vel_x vy=vel_y heading=yaw length=length width=width "
-            "kind=type subkind=subtype",
-            time=("total_nanos", 1e-9),
+            "vehicle=idx time=total_nanos:ns x=x y=y vx=vel_x vy=vel_y heading=yaw "
+            f"length=length width=width kind=type:{_OSI_TYPES} subkind=subtype:{_OSI_VEHICLES}"
         ),
-        names={
-            "kind": _numbered(_OSI_TYPES),
-            "subkind": {"-1": "vehicle", **_numbered(_OSI_VEHICLES)},
-        },
         optional=frozenset(("vx", "vy", "heading", "length", "width", "subkind")),
     ),
 }
@@ -176,13 +138,13 @@ def recognised(path: Path) -> str:
         if data_set.companions and is_companion(path, data_set.companions):
             tracks = companion(path, data_set.companions, data_set.companions.tracks)
             return recognised(tracks) if tracks.is_file() else ""
-    names = _header(path)
+    names = header_of(path)
     if has_pedestrians(path, _INTERACTION) and names >= _PEDESTRIAN_COLUMNS:
         return _INTERACTION
     return next((name for name, known in DATA_SETS.items() if known.needed <= names), "")
 
 
-def _header(path: Path) -> set[str]:
+def header_of(path: Path) -> set[str]:
     """Return the column names of a CSV or Parquet file; none of other or damaged files."""
     suffix = path.suffix.lower()
     if suffix == ".csv":

@@ -17,7 +17,7 @@ differ. Of several links that turn alike the most permissive state counts.
 Source: SUMO's user documentation, Traffic Lights, Networks, Output/Traffic Lights.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import partial
 
 import numpy as np
@@ -67,19 +67,11 @@ def read_lights(
         by_turn = links.setdefault((link.attribute("tl"), lane), {})
         by_turn.setdefault(turn, []).append(int(link.number("linkIndex")))
 
-    signals = []
+    signals: list[RawSignal] = []
     for (name, lane), by_turn in sorted(links.items()):
-        if name not in schedule_of or lane not in lanes:
-            continue
-        turns: dict[SignalSchedule, tuple[str, ...]] = {}
-        for turn, indices in sorted(by_turn.items()):
-            schedule = schedule_of[name](indices)
-            turns[schedule] = (*turns.get(schedule, ()), turn)
-        for schedule, chosen in turns.items():
-            of_all = len(turns) == 1
-            light = f"{name}/{lane}" if of_all else f"{name}/{lane} {' '.join(chosen)}"
-            line, only = _line(lanes[lane]), () if of_all else chosen
-            signals.append(RawSignal(light, schedule, net.file, line, (lane,), turns=only))
+        if name in schedule_of and lane in lanes:
+            turns = _turns_by_schedule(schedule_of[name], by_turn)
+            signals += _signals_of(f"{name}/{lane}", lanes[lane], turns)
     unknown = sorted({name for name, _ in links} - set(schedule_of))
     if unknown:
         notes.append(
@@ -87,6 +79,28 @@ def read_lights(
             '; record them with <timedEvent type="SaveTLSStates">'
         )
     return signals
+
+
+def _turns_by_schedule(
+    schedule_of: Callable[[Sequence[int]], SignalSchedule], by_turn: Mapping[str, Sequence[int]]
+) -> dict[SignalSchedule, tuple[str, ...]]:
+    """Return the turns that share a schedule, of the links of a lane by turn."""
+    turns: dict[SignalSchedule, tuple[str, ...]] = {}
+    for turn, indices in sorted(by_turn.items()):
+        schedule = schedule_of(indices)
+        turns[schedule] = (*turns.get(schedule, ()), turn)
+    return turns
+
+
+def _signals_of(
+    name: str, lane: Element, turns: Mapping[SignalSchedule, tuple[str, ...]]
+) -> Iterator[RawSignal]:
+    """Yield the lights of a lane, one for each schedule."""
+    for schedule, chosen in turns.items():
+        only = chosen if len(turns) > 1 else ()
+        light = " ".join([name, *only])
+        lanes = (lane.attribute("id"),)
+        yield RawSignal(light, schedule, lane.file, _line(lane), lanes, turns=only)
 
 
 def _schedules(
