@@ -32,7 +32,7 @@ def mine(
     """Find the encounters in an archive, as `scenario-gen mine` does; return a row for each.
 
     Args:
-        archive: files, bags or folders, or URLs of them.
+        archive: files, bags or folders.
         out: folder of the corpus; an unfinished one is continued.
         config: the parameters, or a mapping with their names.
         workers: number of processes; 0 starts one per core. In a script, call this function below

@@ -63,7 +63,7 @@ def test_a_log_without_an_encounter_is_a_result_and_not_read_again(tmp_path, mon
     assert made.encounters == 1 and not made.failed
     left_out = [one for one in made.findings if one.kind != QUALITY]
     assert {Path(name).stem for one in left_out for name in one.entries} == {
-        *("alone", "apart", "labels", "notes"),
+        *("alone", "apart", "labels", "notes")
     }
     assert "--set log.proximity=510 accepts them" in [
         why.rpartition("; ")[2] for one in left_out for why in one.entries.values()

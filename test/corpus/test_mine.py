@@ -169,11 +169,7 @@ def test_a_file_that_cannot_be_read_is_said_and_does_not_end_the_others(archive,
     assert details[0]["kind"] == "damaged"
     with pytest.raises(RefusedError, match="without --strict it is left out"):
         mine([tmp_path / "in"], tmp_path / "out", strict=True)
-    assert mined.account == {
-        "rows": 4,
-        NO_ROW: 2,
-        "left out: no vehicle": 1,
-    }
+    assert mined.account == {"rows": 4, NO_ROW: 2, "left out: no vehicle": 1}
 
 
 def test_a_second_clock_that_is_another_one_is_not_asked_and_said(archive, tmp_path):
