@@ -244,6 +244,27 @@ def test_a_standing_footprint_is_compared_with_the_cells_exactly(seed):
         assert area.covers(smaller)
 
 
+def test_one_blocked_cell_under_or_beside_a_footprint_decides():
+    """A truck stands askew on open ground; the cell lies anywhere below it, or up to 1 m beside it."""
+    rng, seen = np.random.default_rng(5), set()
+    for _ in range(600 if LONG else 120):
+        truck = Vehicle("a", *rng.uniform((6.0, 1.0), (14.0, 2.5)))
+        track = straight(*rng.uniform(-0.1, 0.1, 2), rng.uniform(-np.pi, np.pi), 0.0, COARSE)
+        box = footprints(track[0][:1], track[1][:1], truck.length, truck.width)[0]
+        x, y = rng.uniform(-8.0, 8.0, 2)
+        if shapely.distance(box, shapely.Point(x, y)) > 1.0:
+            continue
+        cells = np.ones((200, 200), dtype=bool)
+        row, column = int((y + 10.0) / 0.1), int((x + 10.0) / 0.1)
+        cells[row, column] = False
+        corner = np.array([column, row]) * 0.1 - 10.0
+        gap = shapely.distance(box, shapely.box(*corner, *(corner + 0.1)))
+        found = causes(scenario_of([track], COARSE, (truck,)), road_of(cells, 0.1, (-10.0, -10.0)))
+        assert found == ([] if gap > 1e-6 else [Cause.OFF_ROAD])
+        seen.add(gap > 1e-6)
+    assert len(seen) == 2
+
+
 WALL = road_of(np.pad(np.ones((200, 200), dtype=bool), 10), 0.2, (-22.0, -22.0))  # at ±20 m
 
 

@@ -14,7 +14,7 @@ from scenario_gen.method.validity import allowed_gap, Checker, Limits
 from scenario_gen.method.validity.dynamics import Check, MotionLimits, worst_excess
 from scenario_gen.method.validity.reactions import least_gaps
 from scenario_gen.method.validity.template_checks import clearance_violations
-from scenario_gen.situation import Abreast, MAX_CLEARANCE_CHANGE_M
+from scenario_gen.situation import Abreast, MAX_CLEARANCE_CHANGE_M, Wait
 from scenario_gen.types import Cause, FOLLOW, Reaction, YIELD
 from scenario_gen.types.scenario import BoundaryStates
 
@@ -53,7 +53,18 @@ def excesses(time, track, acceleration, limits):
         - limits.tolerance,
         Check.PATH_LATERAL: np.abs(bend.imag) - limits.lateral - limits.tolerance,
     }
-    return np.array([max(found[check].max(initial=0.0), 0.0) for check in Check])
+    at_limit = dict.fromkeys(
+        (
+            Check.MAX_SPEED,
+            Check.ACCELERATION,
+            Check.DECELERATION,
+            Check.SPEED_CHANGE,
+            Check.LATERAL,
+        ),
+        1e-6,  # m/s, m/s²: for a value exactly at its limit
+    )
+    worst = {check: found[check].max(initial=0.0) - at_limit.get(check, 0.0) for check in Check}
+    return np.array([max(worst[check], 0.0) for check in Check])
 
 
 @pytest.mark.parametrize("seed", range(12))
@@ -71,7 +82,7 @@ def test_excesses_are_those_of_whole_arrays(seed):
     arrays = (values[None] for values in (*track, acceleration))
     worst_excess(time, *arrays, limits, out)
     expected = excesses(time, track, acceleration, limits)
-    np.testing.assert_allclose(out[0, :, 0], expected, atol=2e-6)
+    np.testing.assert_allclose(out[0, :, 0], expected, atol=1e-9)
     assert seed % 2 == 0 or (expected > 0.0).sum() >= 9
 
 
@@ -109,6 +120,16 @@ def test_least_gaps_are_those_of_brute_force(seed):
     np.testing.assert_allclose(least_gaps(speed, recorded, gap, limits), expected)
 
 
+def test_a_time_gap_exactly_at_its_limit_counts_as_kept():
+    """Whatever the division rounds to: 0.3 s at speeds that no float holds."""
+    limits = Limits(least_headway=0.3, floor_share=0.1)
+    for speed in np.arange(3.1, 15.0, 0.1):
+        (least,) = least_gaps(
+            np.array([speed]), np.array([speed]), np.array([0.3 * speed]), limits
+        )
+        assert least == pytest.approx(0.3 * speed)
+
+
 @pytest.mark.parametrize(
     ("gap", "low", "high"),
     [(3.0, 0.1, 5.4 + 3.0), (10.0, 1.5, 18.0 + 3.0), (0.4, 0.0, 0.72 + 3.0), (-0.3, -0.3, 3.0)],
@@ -141,6 +162,46 @@ def test_who_comes_or_goes_between_samples_is_off_by_a_step_at_most(end, row, of
             changed[0, column] += off * error
             requested = BoundaryStates(**(asked | {end: changed}))
             assert verdict(scenario, requested, limits=limits) == fault
+
+
+@pytest.mark.parametrize("first", range(20, 60, 3))
+def test_a_stand_of_exactly_a_second_is_one(first):
+    """Between samples of which differences are no whole seconds."""
+    stands = np.zeros(len(TIME), dtype=bool)
+    stands[first : first + 11] = True
+    speed = np.where(stands, 0.0, 5.0)
+    way = np.concatenate(([0.0], np.cumsum(0.05 * (speed[1:] + speed[:-1]))))
+    track = np.stack([way, 0.0 * way], axis=-1), 0.0 * way, speed
+    for samples, fault in ((11, []), (10, [Cause.STOP_NOT_KEPT])):
+        shorter = track[2].copy()
+        shorter[first + samples : first + 11] = 1.0
+        scenario = scenario_of([(*track[:2], shorter)], TIME)
+        assert verdict(scenario, waits=[Wait(0, 2.0, 3.0)]) == fault
+
+
+@pytest.mark.parametrize("column", [0, 3])
+def test_a_state_exactly_at_its_tolerance_is_the_requested_one(column):
+    """0.1 m or 0.1 m/s off, by numbers that no float holds."""
+    scenario = scenario_of([straight(0.7, 0.0, 0.0, 0.7, TIME)], TIME)
+    states = np.array([[0.7, 0.0, 0.0, 0.7]]), np.array([[0.7 + 0.7 * 10.0, 0.0, 0.0, 0.7]])
+    for error, fault in ((0.8, []), (0.8 + 1e-7, [Cause.BOUNDARY_STATE])):
+        start = states[0].copy()
+        start[0, column] = error
+        assert abs(start[0, column] - states[0][0, column]) > 0.1
+        limits = replace(FREE, position_tolerance=0.1, speed_tolerance=0.1)
+        assert verdict(scenario, BoundaryStates(start, states[1]), limits=limits) == fault
+
+
+def test_who_is_to_end_a_tolerance_away_waits_throughout():
+    """0.1 m by coordinates that no float holds; within it a vehicle may stand, but not twitch."""
+    stands = straight(0.7, 0.0, 0.0, 0.0, TIME)
+    twitch = np.where(TIME[50] == TIME, 0.4, 0.0)
+    asked = BoundaryStates(np.array([[0.7, 0.0, 0.0, 0.0]]), np.array([[0.8, 0.0, 0.0, 0.0]]))
+    waits = [Wait(0, 0.0, 10.0)]
+    assert asked.end[0, 0] - asked.start[0, 0] > 0.1
+    assert verdict(scenario_of([stands], TIME), asked, waits=waits) == []
+    moving = scenario_of([(*stands[:2], twitch)], TIME)
+    assert verdict(moving, asked, waits=waits) == [Cause.STOP_NOT_KEPT]
 
 
 @pytest.mark.parametrize("offset", [-2.5, 2.5])
