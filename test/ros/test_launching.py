@@ -124,7 +124,7 @@ def test_what_cannot_be_is_refused_before_a_process_starts(given, said):
 
 
 @pytest.mark.dds
-@pytest.mark.parametrize("composed", ["false", "true"])
+@pytest.mark.parametrize("composed", [pytest.param("false", marks=pytest.mark.long), "true"])
 def test_the_parameter_file_beats_the_defaults_and_arguments_beat_the_file(
     domain, client, tmp_path, composed
 ):
