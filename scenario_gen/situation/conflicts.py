@@ -11,7 +11,6 @@ Therefore two box tests replace polygon clipping.
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import combinations
-from typing import NamedTuple
 from weakref import WeakKeyDictionary
 
 import numpy as np
@@ -19,9 +18,9 @@ import numpy as np
 from scenario_gen.base.errors import RefusedError
 from scenario_gen.numerics import Bools, Floats, Ints
 from scenario_gen.numerics.boxes import Box, box_gap
-from scenario_gen.numerics.kernels import F1, F2, kernel, OUT1
+from scenario_gen.numerics.kernels import F1, F2, F3, I2, kernel, OUT2
 from scenario_gen.situation.tracks import Track
-from scenario_gen.types import Motion, together
+from scenario_gen.types import Motion
 
 POSE_STEP_M = 1.0  # longest distance between two neighbouring poses of a sweep
 POSE_TURN_RAD = 0.1  # largest turn between them
@@ -78,14 +77,6 @@ _conflicts_of: WeakKeyDictionary[Motion, tuple[Conflict, ...]] = WeakKeyDictiona
 PairConflicts = Mapping[tuple[int, int], Conflict]  # by vehicles, the lower index first
 
 
-class _Sweep(NamedTuple):
-    """Poses (M, 5), circles (B, 3) as from `_swept`, and the size (2,) [m] of a vehicle."""
-
-    poses: Floats
-    circles: Floats
-    size: Floats
-
-
 def find_conflicts(
     motion: Motion, pairs: Iterable[tuple[int, int]] | None = None
 ) -> tuple[Conflict, ...]:
@@ -104,11 +95,23 @@ def find_conflicts(
 
 def _conflicts(motion: Motion, pairs: Iterable[tuple[int, int]]) -> tuple[Conflict, ...]:
     """Return the conflicts of some pairs."""
-    chosen = sorted({(min(pair), max(pair)) for pair in pairs})
-    vehicles = {n for pair in chosen for n in pair}
-    sweeps = {n: _sweep_of(motion, n) for n in vehicles}
-    conflicts = [_pair_conflict(a, b, sweeps[a], sweeps[b]) for a, b in chosen]
-    return tuple(conflict for conflict in conflicts if conflict is not None)
+    chosen = np.array(sorted({(min(pair), max(pair)) for pair in pairs}), dtype=np.int64)
+    half = np.array([vehicle.half for vehicle in motion.vehicles])
+    conflicts = np.empty((len(chosen), 8))
+    _fill_conflicts(
+        motion.time,
+        motion.position,
+        motion.heading,
+        motion.present,
+        half,
+        chosen.reshape(-1, 2),
+        conflicts,
+    )
+    return tuple(
+        Conflict(int(first), int(second), bool(following), *times)
+        for exists, first, second, following, *times in conflicts.tolist()
+        if exists
+    )
 
 
 def conflict_of(motion: Motion, a: int, b: int) -> Conflict | None:
@@ -167,26 +170,6 @@ def closest_crossing(conflicts: Sequence[Conflict]) -> Conflict | None:
     """Return the crossing or merging with the least post-encroachment time; None without one."""
     crossing = [conflict for conflict in conflicts if not conflict.following]
     return min(crossing, key=lambda conflict: conflict.encroachment, default=None)
-
-
-def _sweep_of(motion: Motion, n: int) -> _Sweep:
-    rows = together(motion.present, n, n)
-    poses, circles = _swept(motion.time[rows], motion.position[n, rows], motion.heading[n, rows])
-    vehicle = motion.vehicles[n]
-    return _Sweep(poses, circles, np.array((vehicle.length, vehicle.width)))
-
-
-def _pair_conflict(a: int, b: int, sweep_a: _Sweep, sweep_b: _Sweep) -> Conflict | None:
-    """Return the conflict of vehicles a < b; None if their sweeps do not intersect."""
-    out = np.empty(7)
-    _conflict(*sweep_a, *sweep_b, out)
-    exists, a_first, following, *times = out.tolist()
-    if not exists:
-        return None
-    entry_a, exit_a, entry_b, exit_b = times
-    if a_first:
-        return Conflict(a, b, bool(following), entry_a, exit_a, entry_b, exit_b)
-    return Conflict(b, a, bool(following), entry_b, exit_b, entry_a, exit_a)
 
 
 @kernel(inline=True)
@@ -391,27 +374,17 @@ def _shared_path(
     return shared, lead
 
 
-@kernel(F1, F2, F1)
-def _swept(time: Floats, position: Floats, heading: Floats) -> tuple[Floats, Floats]:
-    """Return the poses (M, 5) of a sweep, and the circles (B, 3) around its blocks."""
-    poses = _sweep_poses(time, position, heading)
-    return poses, _block_circles(poses)
-
-
-@kernel(F2, F2, F1, F2, F2, F1, OUT1)
-def _conflict(
+@kernel(inline=True)
+def _fill_conflict(
     a: Floats,
     circles_a: Floats,
-    size_a: Floats,
+    half_a: HalfSize,
     b: Floats,
     circles_b: Floats,
-    size_b: Floats,
+    half_b: HalfSize,
     out: Floats,
 ) -> None:
-    """Fill `out` (7,): exists, a first, following, entry and exit of a, entry and exit of b."""
-    out[0] = 0.0
-    half_a = (0.5 * size_a[0], 0.5 * size_a[1])
-    half_b = (0.5 * size_b[0], 0.5 * size_b[1])
+    """Fill the row (8,) of a pair, as `_fill_conflicts`."""
     reach = np.hypot(half_a[0], half_a[1]) + np.hypot(half_b[0], half_b[1]) + CONTACT_DEPTH_M
     near_a = _near_blocks(circles_a, circles_b, reach)
     near_b = _near_blocks(circles_b, circles_a, reach)
@@ -420,11 +393,52 @@ def _conflict(
     if not (np.isfinite(entry_a) and np.isfinite(entry_b)):
         return
     shared, lead = _shared_path(a, near_a, b, circles_b, half_a, half_b)
-    following = shared >= FOLLOWING_LENGTHS * max(size_a[0], size_b[0])
+    following = shared >= FOLLOWING_LENGTHS * 2.0 * max(half_a[0], half_b[0])
     a_first = entry_a <= entry_b
     if (following or entry_a == entry_b) and lead != 0.0:
         a_first = lead > 0.0
     out[0] = 1.0
-    out[1] = 1.0 if a_first else 0.0
-    out[2] = 1.0 if following else 0.0
-    out[3], out[4], out[5], out[6] = entry_a, exit_a, entry_b, exit_b
+    out[3] = 1.0 if following else 0.0
+    out[4], out[5], out[6], out[7] = entry_a, exit_a, entry_b, exit_b
+    if not a_first:
+        out[1], out[2] = out[2], out[1]
+        out[4], out[5], out[6], out[7] = entry_b, exit_b, entry_a, exit_a
+
+
+@kernel(F1, F3, F2, I2, F2, I2, OUT2)
+def _fill_conflicts(
+    time: Floats,
+    position: Floats,
+    heading: Floats,
+    present: Ints,
+    half: Floats,
+    pairs: Ints,
+    out: Floats,
+) -> None:
+    """Fill `out` (P, 8) with the conflicts of pairs.
+
+    Args:
+        time: (T,) seconds.
+        position: (N, T, 2) metres.
+        heading: (N, T) rad.
+        present: (N, 2) first and last sample of each vehicle.
+        half: (N, 2) half length and half width [m].
+        pairs: (P, 2) vehicles.
+        out: exists (the rest is not defined otherwise), first, second, following, entry and exit
+            of the first, entry and exit of the second [s].
+    """
+    used = np.zeros(len(half), dtype=np.bool_)
+    for k in range(len(pairs)):
+        used[pairs[k, 0]], used[pairs[k, 1]] = True, True
+    sweeps = []
+    for n in range(len(half)):
+        begin = present[n, 0]
+        end = present[n, 1] + 1 if used[n] else begin
+        poses = _sweep_poses(time[begin:end], position[n, begin:end], heading[n, begin:end])
+        sweeps.append((poses, _block_circles(poses), (half[n, 0], half[n, 1])))
+    for k in range(len(pairs)):
+        a, b = pairs[k, 0], pairs[k, 1]
+        out[k, 0], out[k, 1], out[k, 2] = 0.0, a, b
+        poses_a, circles_a, half_a = sweeps[a]
+        poses_b, circles_b, half_b = sweeps[b]
+        _fill_conflict(poses_a, circles_a, half_a, poses_b, circles_b, half_b, out[k])

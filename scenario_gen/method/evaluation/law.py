@@ -23,6 +23,7 @@ from functools import cache
 import json
 import math
 from pathlib import Path
+from weakref import WeakKeyDictionary
 
 import numpy as np
 
@@ -288,11 +289,18 @@ def rarity_in(
         for kind in EncounterKind
     }
 
+    # A pilot's scenario is measured for the bound, as a candidate, and for its facts.
+    known: WeakKeyDictionary[Scenario, float] = WeakKeyDictionary()
+
     def rarity(scenario: Scenario) -> float:
-        member = scenario_features(scenario, template, encounter, template.kind)
-        if member.kind is None:
-            return math.inf
-        return laws[member.kind].distance(member.every) / USUAL_SIGMAS
+        if scenario not in known:
+            member = scenario_features(scenario, template, encounter, template.kind)
+            known[scenario] = (
+                math.inf
+                if member.kind is None
+                else laws[member.kind].distance(member.every) / USUAL_SIGMAS
+            )
+        return known[scenario]
 
     return rarity
 
