@@ -108,10 +108,9 @@ def generate(
 
     attempt = None if road == AUTO else planned
     shorten = config.fitting.shorten and not request.moves
+    fitting = replace(config.fitting, shorten=shorten)
     with one_blas_thread():
-        result = fit_what_matters(
-            generate_template, encounter, count, attempt=attempt, shorten=shorten
-        )
+        result = fit_what_matters(generate_template, encounter, count, fitting, attempt=attempt)
         return completed(result, config, request)
 
 

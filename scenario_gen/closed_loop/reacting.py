@@ -245,7 +245,7 @@ class Testing:
         except RefusedError as error:
             if not self.config.fitting.shorten or self.request.moves:
                 raise
-            part, note = fitting_part(stage_of, template, error)
+            part, note = fitting_part(stage_of, template, error, self.config.fitting)
         return replace(stage_of(part), notes=(note,))
 
     def _stages_from(self, whole: Stage, drawing: "_Drawing") -> Iterator[Stage]:

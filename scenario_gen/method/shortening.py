@@ -4,18 +4,21 @@
 """A recording that is too long for a road is shortened to its interaction, as little as possible.
 
 Each vehicle's track may lose its begin and its end, as long as all conflicts, orders, reactions,
-waits and turns remain (`interaction_windows`). Three ways are tried, the one with the smallest
-loss first: the same time for all vehicles; then other ends; then other begins, too. What the road
-has room for is then given back, in quarters.
+waits and turns remain (`interaction_windows`). Four ways are tried, the one with the smallest
+loss first: the same time for all vehicles; then other ends; then other begins, too; and at last
+the beginning of a braking may be lost. If the shortest part does not fit, no longer one is tried.
+What the road has room for is then given back, in quarters.
 """
 
 from collections.abc import Callable, Iterator
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
+from typing import NamedTuple
 
 import numpy as np
 
 from scenario_gen.base.errors import RefusedError
+from scenario_gen.method.fitting import FittingConfig
 from scenario_gen.method.sampling import TargetError
 from scenario_gen.numerics import Floats
 from scenario_gen.situation import (
@@ -27,7 +30,7 @@ from scenario_gen.situation import (
     Situation,
     turn_of,
 )
-from scenario_gen.types import Encounter, GenerationResult, Note, NoteKind
+from scenario_gen.types import Encounter, GenerationResult, Note, NoteKind, YIELD
 
 GenerateSet = Callable[[Encounter, int], GenerationResult]
 
@@ -36,9 +39,9 @@ def fit_what_matters(
     generate: GenerateSet,
     encounter: Encounter,
     count: int,
+    config: FittingConfig = FittingConfig(),
     *,
     attempt: Callable[[Encounter], object] | None = None,
-    shorten: bool = True,
 ) -> GenerationResult:
     """Return the scenarios of a recording, or of a shortened one if the whole does not fit.
 
@@ -46,9 +49,9 @@ def fit_what_matters(
         generate: returns so many scenarios from a template.
         encounter: the recording.
         count: scenarios.
+        config: whether and how the recording may be shortened.
         attempt: raises a RefusedError if a recording does not fit. If it is None, or its part has
             no scenario, a scenario is generated from each part instead.
-        shorten: whether the recording may be shortened.
 
     Raises:
         RefusedError: as `generate` for the whole recording; the message has the lanes that its
@@ -59,19 +62,22 @@ def fit_what_matters(
     try:
         return generate(encounter, count)
     except RefusedError as error:
-        if not shorten or isinstance(error, TargetError):
+        if not config.shorten or isinstance(error, TargetError):
             raise
         refusal = error
     if attempt is not None:
-        part, note = fitting_part(attempt, encounter, refusal)
+        part, note = fitting_part(attempt, encounter, refusal, config)
         with suppress(RefusedError):
             return generate(part, count).noted(note)
-    part, note = fitting_part(lambda part: generate(part, 1), encounter, refusal)
+    part, note = fitting_part(lambda part: generate(part, 1), encounter, refusal, config)
     return generate(part, count).noted(note)
 
 
 def fitting_part(
-    attempt: Callable[[Encounter], object], encounter: Encounter, refusal: RefusedError
+    attempt: Callable[[Encounter], object],
+    encounter: Encounter,
+    refusal: RefusedError,
+    config: FittingConfig = FittingConfig(),
 ) -> tuple[Encounter, Note]:
     """Return the part of a recording that fits with the smallest loss, and a note on it.
 
@@ -79,16 +85,18 @@ def fitting_part(
         attempt: raises a RefusedError if a recording does not fit.
         encounter: the recording.
         refusal: why the whole does not fit.
+        config: what is kept before and after the interaction.
 
     Raises:
         RefusedError: the refusal, with the lanes that the shortest form needs: it does not fit.
     """
-    search = _Search(attempt, Situation.of(encounter))
+    search = _Search(attempt, Situation.of(encounter), config)
     part = search.shortest_loss()
     if part is None:
         search.add_remedy(refusal)
         raise refusal
-    return part, Note.of(NoteKind.SHORTENED, parts=in_words(encounter, part), reason=str(refusal))
+    parts = in_words(encounter, part) + search.lost_braking(part)
+    return part, Note.of(NoteKind.SHORTENED, parts=parts, reason=str(refusal))
 
 
 def cut(encounter: Encounter, windows: Floats) -> Encounter:
@@ -111,45 +119,71 @@ def in_words(encounter: Encounter, part: Encounter) -> str:
     return f"{', '.join(each)} of {encounter.duration:.1f} s"
 
 
+class _Way(NamedTuple):
+    """A way of shortening: the tightest windows (N, 2) [s], and whether brakings remain whole."""
+
+    windows: Floats
+    whole_braking: bool
+
+
 @dataclass(eq=False)
 class _Search:
     """The search for the shortest loss with which a recording fits."""
 
     attempt: Callable[[Encounter], object]
     situation: Situation
+    config: FittingConfig
     refusals: list[tuple[Encounter, RefusedError]] = field(default_factory=list)
 
     def shortest_loss(self) -> Encounter | None:
         """Return the recording with the smallest loss found; None if it does not fit shortened."""
         encounter = self.situation.encounter
         whole = encounter.time[encounter.present]
-        for tightest in self._ways():
-            loss = np.abs(tightest - whole)
-            if loss.max() >= MIN_LOSS_S and (best := self._fitting(tightest)):
-                return self._restored(whole, best, tightest - whole)
-        return None
+        ways = list(self._ways(whole))
+        if not ways:
+            return None
+        tightest = self._fitting(ways[-1])
+        if tightest is None:  # the others are longer
+            return None
+        for way in ways[:-1]:
+            if best := self._fitting(way):
+                return self._restored(whole, best, way)
+        return self._restored(whole, tightest, ways[-1])
 
-    def _ways(self) -> Iterator[Floats]:
-        """Yield the tightest windows (N, 2) [s] of each way of shortening."""
-        each = interaction_windows(self.situation)
+    def _ways(self, whole: Floats) -> Iterator[_Way]:
+        """Yield the ways of shortening that keep the interaction, the longest first."""
+        each, braking = (
+            interaction_windows(
+                self.situation, self.config.lead, self.config.follow_up, whole_braking=kept
+            )
+            for kept in (True, False)
+        )
         common = np.tile((each[:, 0].min(), each[:, 1].max()), (len(each), 1))
-        ways = common, np.column_stack((common[:, 0], each[:, 1])), each
+        ways = [
+            _Way(common, True),
+            _Way(np.column_stack((common[:, 0], each[:, 1])), True),
+            _Way(each, True),
+            _Way(braking, False),
+        ]
         for k, way in enumerate(ways):
-            if not any(np.array_equal(way, earlier) for earlier in ways[:k]):
+            new = not any(np.array_equal(way.windows, other.windows) for other in ways[:k])
+            shortens = np.abs(way.windows - whole).max() >= MIN_LOSS_S
+            if new and shortens and self._part(way) is not None:
                 yield way
 
-    def _restored(self, whole: Floats, best: Encounter, change: Floats) -> Encounter:
-        """Return the fitting part with the smallest share of a change (N, 2) [s] of the windows.
+    def _restored(self, whole: Floats, best: Encounter, way: _Way) -> Encounter:
+        """Return the fitting part with the smallest share of a way's change of the windows.
 
         First the begins are restored as far as possible, then the ends: to all, half or a quarter.
         """
+        change = way.windows - whole
         shares = np.ones(2)
         for end in (0, 1):
             lowest, highest = 0.0, 1.0
             for step in range(3):
                 share = 0.0 if step == 0 else (lowest + highest) / 2.0
                 tried = np.where(np.arange(2) == end, share, shares)
-                part = self._fitting(whole + tried * change)
+                part = self._fitting(_Way(whole + tried * change, way.whole_braking))
                 if part is None:
                     lowest = share
                     continue
@@ -171,17 +205,38 @@ class _Search:
         if len(needed) > 3:
             needed[3:] = [f"{len(needed) - 3} more vehicles drive"]
         form = "It needs a road on which "
-        if part is not whole:
+        if whole.duration - part.duration >= MIN_LOSS_S:
             begin = (part.start_ns - whole.start_ns) * 1e-9
             used = f"{begin:.1f} to {begin + part.duration:.1f} s of {whole.duration:.1f} s"
             form = f"Shortened to its interaction ({used}), it needs a road on which "
-        other = "" if str(error) == str(refusal) else f": {error}"
-        refusal.args = (f"{refusal}. {form}{' and '.join(needed)}{other}",)
+        other = "" if type(error) is type(refusal) else f": {error}"
+        hint = "" if self.refusals else "; log.start and log.end choose a part of it"
+        refusal.args = (f"{refusal}. {form}{' and '.join(needed)}{other}{hint}",)
 
-    def _fitting(self, windows: Floats) -> Encounter | None:
-        """Return the recording cut to windows (N, 2) [s] if it keeps its interaction and fits."""
-        part = cut(self.situation.encounter, windows)
-        if not keeps_interaction(self.situation, Situation.of(part)):
+    def lost_braking(self, part: Encounter) -> str:
+        """Return which vehicles begin to brake before their part begins, for the note on it."""
+        whole = self.situation.encounter
+        offset = (part.start_ns - whole.start_ns) * 1e-9
+        begins = part.time[part.present[:, 0]] + offset
+        who = {
+            whole.ids[edge.who]: None
+            for edge in self.situation.reactions.edges
+            if edge.kind == YIELD and edge.since < begins[edge.who] - whole.dt
+        }
+        return f"; lost: the beginning of the braking of vehicle {', '.join(who)}" if who else ""
+
+    def _part(self, way: _Way) -> Encounter | None:
+        """Return the recording cut to windows if it keeps its interaction."""
+        part = cut(self.situation.encounter, way.windows)
+        kept = keeps_interaction(
+            self.situation, Situation.of(part), whole_braking=way.whole_braking
+        )
+        return part if kept else None
+
+    def _fitting(self, way: _Way) -> Encounter | None:
+        """Return the recording cut to windows if it keeps its interaction and fits."""
+        part = self._part(way)
+        if part is None:
             return None
         try:
             self.attempt(part)

@@ -34,8 +34,10 @@ from scenario_gen.situation.gaps import (
     time_gaps,
 )
 from scenario_gen.situation.interaction_window import (
+    FOLLOW_UP_S,
     interaction_windows,
     keeps_interaction,
+    LEAD_S,
     MIN_LOSS_S,
 )
 from scenario_gen.situation.kind import EncounterKind, kind_of
@@ -72,6 +74,8 @@ from scenario_gen.situation.traffic_side import mirrored, traffic_side
 from scenario_gen.situation.waits import find_waits, STANDSTILL_SPEED_MPS, Wait, WAIT_SPEED_MPS
 
 __all__ = [
+    "FOLLOW_UP_S",
+    "LEAD_S",
     "LOSABLE",
     "MAX_CLEARANCE_CHANGE_M",
     "MAX_SAMPLES",

@@ -21,22 +21,34 @@ MIN_LOSS_S = 0.5  # a recording that can lose less is not shortened
 TURN_ENDS_SHARE = 0.05  # of a turn that may be missing at each end
 
 
-def interaction_windows(situation: Situation) -> Floats:
+def interaction_windows(
+    situation: Situation,
+    lead: float = LEAD_S,
+    follow_up: float = FOLLOW_UP_S,
+    *,
+    whole_braking: bool = True,
+) -> Floats:
     """Return (N, 2) from when to when [s] each vehicle is needed.
 
-    It is needed from 2 s before to 1 s after all its conflicts, reactions and waits, and while it
-    turns. A vehicle that only stands or follows has no such event: it is needed for 5 s in which
-    it comes nearest to another one.
+    It is needed from `lead` before to `follow_up` [s] after all its conflicts, reactions and
+    waits, and while it turns. A vehicle that only stands or follows has no such event: it is
+    needed for 2 s in which it comes nearest to another one.
+
+    Args:
+        situation: of the recording.
+        lead: [s] kept before the first event of a vehicle.
+        follow_up: [s] kept after its last one.
+        whole_braking: whether who gives way is needed from the beginning of its braking.
     """
     encounter = situation.encounter
     present = encounter.time[encounter.present]
     windows = np.tile([np.inf, -np.inf], (len(present), 1))
 
-    events = list(_events(situation))
+    events = list(_events(situation, whole_braking=whole_braking))
     others = set(range(len(present))) - {vehicle for vehicle, *_ in events}
     for vehicle, begin, end in chain(events, _nearest(situation, others)):
-        windows[vehicle, 0] = min(windows[vehicle, 0], begin - LEAD_S)
-        windows[vehicle, 1] = max(windows[vehicle, 1], end + FOLLOW_UP_S)
+        windows[vehicle, 0] = min(windows[vehicle, 0], begin - lead)
+        windows[vehicle, 1] = max(windows[vehicle, 1], end + follow_up)
     for vehicle, track in enumerate(situation.tracks):
         if windows[vehicle, 0] < np.inf and manoeuvre_of(turn_of(track)) != "straight":
             begin, end = encounter.time[_turning(track)]
@@ -45,7 +57,7 @@ def interaction_windows(situation: Situation) -> Floats:
     return np.where(needed, np.clip(windows, present[:, :1], present[:, 1:]), present)
 
 
-def _events(situation: Situation) -> Iterator[tuple[int, float, float]]:
+def _events(situation: Situation, *, whole_braking: bool) -> Iterator[tuple[int, float, float]]:
     """Yield the vehicle, begin and end [s] of each event."""
     for conflict in situation.conflicts:
         first, second, entry = conflict.first, conflict.second, conflict.entry_first
@@ -57,7 +69,7 @@ def _events(situation: Situation) -> Iterator[tuple[int, float, float]]:
             yield second, conflict.entry_second, conflict.entry_second
     for edge in situation.reactions.edges:
         if edge.kind == YIELD:
-            yield edge.who, edge.since, edge.until
+            yield edge.who, edge.since if whole_braking else edge.until, edge.until
         elif edge.since > situation.encounter.dt:  # after a merge
             shown = min(edge.since + MIN_FOLLOWING_S, edge.until)
             yield edge.who, edge.since, shown
@@ -91,15 +103,23 @@ def _turning(track: Track) -> list[int]:
     return [int(begun), int(max(unfinished, begun))]
 
 
-def keeps_interaction(recorded: Situation, cut: Situation) -> bool:
-    """Return whether a cut recording has the same conflicts, reactions, waits and turns."""
+def keeps_interaction(recorded: Situation, cut: Situation, *, whole_braking: bool = True) -> bool:
+    """Return whether a cut recording has the same conflicts, reactions, waits and turns.
+
+    Without the whole braking, it may have fewer vehicles that give way.
+    """
+    before, after = (
+        {(edge.kind, edge.who, edge.whom) for edge in each.reactions.edges}
+        for each in (recorded, cut)
+    )
+    lost = {kind for kind, _, _ in before - after}
     turns = zip(recorded.tracks, cut.tracks, strict=True)
     return (
         {(each.first, each.second) for each in recorded.conflicts}
         == {(each.first, each.second) for each in cut.conflicts}
         and Counter(wait.vehicle for wait in recorded.waits)
         == Counter(wait.vehicle for wait in cut.waits)
-        and {(edge.kind, edge.who, edge.whom) for edge in recorded.reactions.edges}
-        == {(edge.kind, edge.who, edge.whom) for edge in cut.reactions.edges}
+        and after <= before
+        and lost <= (set() if whole_braking else {YIELD})
         and all(is_same_turn(turn_of(whole), turn_of(part)) for whole, part in turns)
     )

@@ -72,6 +72,26 @@ def test_the_smallest_loss_that_fits_is_used_and_noted(crossing: Encounter) -> N
     assert error.result.encounter.duration == caught.value.result.encounter.duration
 
 
+def test_the_beginning_of_a_braking_is_the_last_that_is_lost(crossing: Encounter) -> None:
+    situation = Situation.of(crossing)
+    windows, shorter = (
+        interaction_windows(situation, whole_braking=kept) for kept in (True, False)
+    )
+    (who,) = {edge.who for edge in situation.reactions.edges}
+    assert (shorter[who, 0] > windows[who, 0] + 0.5) and (shorter >= windows).all(axis=0)[0]
+    limit = 1.01 * Situation.of(cut(crossing, shorter)).tracks[who].travelled
+
+    def short_road(template: Encounter, _: int) -> GenerationResult:
+        if Situation.of(template).tracks[who].travelled > limit:
+            raise EmptySetError("too long", result_of(template))
+        return result_of(template)
+
+    result = fit_what_matters(short_road, crossing, 7)
+    (note,) = result.generated.adaptations
+    assert f"lost: the beginning of the braking of vehicle {crossing.ids[who]}" in str(note)
+    assert keeps_interaction(situation, Situation.of(result.encounter), whole_braking=False)
+
+
 def test_each_vehicle_keeps_its_events(crossing: Encounter) -> None:
     situation = Situation.of(crossing)
     windows = interaction_windows(situation)

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from scenario_gen.base.parameters import parameter, Parameters
 from scenario_gen.method.fitting.losses import allowed_losses
 from scenario_gen.roads import PlaceLimits
-from scenario_gen.situation import LOSABLE
+from scenario_gen.situation import FOLLOW_UP_S, LEAD_S, LOSABLE
 
 
 @dataclass(frozen=True)
@@ -30,6 +30,16 @@ class FittingConfig(Parameters):
         True,
         "shorten a recording at its begin and end if it does not fit as a whole, as long as "
         "conflicts, orders, reactions, waits and turns remain",
+    )
+    lead: float = parameter(
+        LEAD_S,
+        "kept of a shortened track before the vehicle's first event",
+        unit="s",
+        low=0.0,
+        high=60.0,
+    )
+    follow_up: float = parameter(
+        FOLLOW_UP_S, "kept after its last event", unit="s", low=0.0, high=60.0
     )
     scale_low: float = parameter(0.8, "smallest accepted scale s of eq 9", low=0.01, high=1.0)
     scale_high: float = parameter(1.25, "largest accepted scale s of eq 9", low=1.0, high=1000.0)

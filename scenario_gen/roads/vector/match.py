@@ -49,6 +49,8 @@ from scenario_gen.situation import (
 )
 from scenario_gen.types import LaneNetwork, RuleKind, TrafficRule
 
+_NO_LANES = "no lanes lead along the path of vehicle {} from start to end"
+
 
 @dataclass(frozen=True, eq=False)
 class Match:
@@ -108,10 +110,7 @@ def match(
             ends = "", ""
         path = _lane_path(graph, track, poses, scale, ends, prefer_reserved=prefer_reserved)
         if path is None:
-            reason = (
-                f"no lanes lead along the path of vehicle {track.vehicle.id} from start to end"
-            )
-            yield Match((), math.inf, reason)
+            yield Match((), math.inf, _NO_LANES.format(track.vehicle.id))
             return
         if hypothesis.swerve is not None and hypothesis.swerve[n].any():
             path = _swerving(path, hypothesis.swerve[n])
@@ -427,7 +426,9 @@ def _missing_length(path: LanePath, track: Track) -> Iterator[str]:
     """Yield by how much the lane path of a vehicle is too short."""
     half = track.vehicle.length / 2.0 + LIMITS.end_room_m
     short = max(half - path.start, path.end + half - path.curve.length)
-    if short > 0.0:
+    if short > float(path.progress[-1]):  # it would drive beyond them
+        yield _NO_LANES.format(track.vehicle.id)
+    elif short > 0.0:
         yield f"the lanes of vehicle {track.vehicle.id} are {short:.1f} m too short"
 
 

@@ -13,6 +13,7 @@ import numpy as np
 from msg_conventions.diagnostics import Level
 from msg_conventions.tracks import decode_tracks, encode_tracks
 from scenario_gen.base.errors import RefusedError
+from scenario_gen.method.fitting import FittingConfig
 from scenario_gen.method.shortening import cut, fitting_part
 from scenario_gen.ros.common.stage_node import StageNode
 from scenario_gen.types import Encounter
@@ -25,6 +26,7 @@ def request_part(
     attempt: Callable[[Encounter], object],
     encounter: Encounter,
     refusal: RefusedError,
+    config: FittingConfig = FittingConfig(),
 ) -> None:
     """Request the part of a recording that fits with the smallest loss.
 
@@ -35,11 +37,12 @@ def request_part(
         attempt: raises a RefusedError if a recording does not fit.
         encounter: the recording.
         refusal: why the whole does not fit.
+        config: what is kept before and after the interaction.
 
     Raises:
         RefusedError: no part fits.
     """
-    part, note = fitting_part(attempt, encounter, refusal)
+    part, note = fitting_part(attempt, encounter, refusal, config)
     if part.start_ns == encounter.start_ns:
         part = cut(part, np.maximum(part.time[part.present], part.dt))
     node.outputs.send(TOPIC, encode_tracks(part))

@@ -127,7 +127,7 @@ class Planner(StageNode):
         except RefusedError as error:
             if not config.fitting.shorten:
                 raise
-            request_part(self, plan, encounter, error)
+            request_part(self, plan, encounter, error, config.fitting)
             return
         (_, fit), routes = planned.road_and_fit(), planned.routes
         stop_if_cancelled()
