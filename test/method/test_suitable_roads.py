@@ -79,7 +79,7 @@ def test_a_refusal_names_the_roads_that_suit_to_a_command(crossing):
     assert "four_way" in names and names[-1] == "corridor" and "t_intersection" not in names
     with pytest.raises(
         RefusedError,
-        match=r"choose another road\. Shortened .* vehicle 2 goes straight on within 67 m$",
+        match=r"choose another road\. Shortened .* vehicle 2 goes straight on within 27 m$",
     ) as caught:
         generate(crossing, "t_intersection", count=2, seed=7)
     answer = with_suitable_roads(caught.value, crossing, "t_intersection", config, 7)
