@@ -11,10 +11,12 @@ import pytest
 from support.reaction_scenes import answering, crossing, lane_encounter, wander
 from support.textbook_motions import CHANCE, labelled, NOTHING, REACTIONS
 
-from scenario_gen.situation import interaction_windows, kind_of, Situation
+from scenario_gen.situation import Conflict, interaction_windows, kind_of, Situation
+from scenario_gen.situation.evidence import Recording
 from scenario_gen.situation.reactions import without_circles
 from scenario_gen.situation.separation import least_gaps
-from scenario_gen.types import FOLLOW, Reaction, Vehicle, YIELD
+from scenario_gen.situation.yielding import _enters_from_beside
+from scenario_gen.types import Encounter, FOLLOW, Reaction, Vehicle, YIELD
 
 TWO, AB = (tuple(map(Vehicle, names)) for names in ("12", "ab"))
 
@@ -201,3 +203,23 @@ def test_a_conflict_is_found_by_its_pair_in_either_order():
     situation = Situation.of(crossing(8.0))
     (found,) = situation.conflicts
     assert situation.conflict(0, 1) is found and situation.conflict(1, 0) is found
+
+
+@pytest.mark.parametrize("frame", [0.0, 2.2])
+@pytest.mark.parametrize(
+    ("left", "turned", "beside"),
+    [(1.0, 0.0, False), (2.3, 0.0, True), (1.0, 0.6, True), (1.0, -0.6, True), (0.0, 0.4, False)],
+)
+def test_who_enters_at_an_angle_or_from_the_next_lane_comes_from_beside(
+    frame, left, turned, beside
+):
+    """Within half a lane and half a radian it is behind; 10 m after the other one's start."""
+    along = np.array([[np.cos(frame), np.sin(frame)], [-np.sin(frame), np.cos(frame)]])
+    time = np.arange(101) * 0.1
+    ways = np.stack([[8.0 * time, 0.0 * time], [8.0 * time + 10.0, 0.0 * time + left]])
+    position = np.moveaxis(ways, 1, 2) @ along
+    heading = np.full((2, 101), frame) + np.array([[0.0], [turned]])
+    encounter = Encounter.sampled(AB, 0.1, position, heading, np.full((2, 101), 8.0), "two")
+    recording = Recording(encounter, Situation.of(encounter).tracks, (), ())
+    conflict = Conflict(0, 1, False, 3.0, 4.0, 5.0, 6.0)
+    assert _enters_from_beside(recording, conflict) == beside

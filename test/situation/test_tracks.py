@@ -12,7 +12,8 @@ import pytest
 
 from scenario_gen.base.errors import RefusedError
 from scenario_gen.numerics.curve import crossings, Curve
-from scenario_gen.situation.frenet import to_frenet
+from scenario_gen.situation import Equation, solve_placement
+from scenario_gen.situation.frenet import _extended, to_frenet
 from scenario_gen.situation.separation import separate, smallest_gaps
 from scenario_gen.situation.tracks import clean_tracks
 from scenario_gen.types import Encounter, Vehicle
@@ -184,3 +185,28 @@ def test_a_bend_no_car_can_steer_is_eased_and_turns_as_far():
     turned = track.curve.points[-1, 2] - track.curve.points[0, 2]
     assert turned == pytest.approx(tight[-1, 2] - tight[0, 2], abs=0.05)
     assert track.deviation < 3.0
+
+
+@pytest.mark.parametrize("beyond", [0.9, 6.0])
+@pytest.mark.parametrize("aside", [0.0, 1.5])
+def test_a_line_goes_on_along_what_leads_a_metre_beyond_its_ends(beyond, aside):
+    own = Curve(np.array([[0.0, 0.0, 0.0], [50.0, 0.0, 0.0]]))
+    x = np.linspace(-beyond, 50.0 + beyond, 200)
+    found = _extended(own, Curve.through(np.column_stack([x, np.full(200, aside)])))
+    if beyond < 1.0:
+        assert found is own
+    else:
+        assert found.length == pytest.approx(50.0 + 2.0 * beyond, abs=0.5)
+        assert np.abs(found.points[:, 1]).max() < 0.01
+
+
+def test_placements_are_the_weighted_least_squares_of_their_equations():
+    """A chain without contradiction, and one of two places with weights of 1 and 2: 4 m of 5 m."""
+    chain = [
+        Equation(((7, 1.0),), 2.0, 1.0),
+        Equation(((3, 1.0), (7, -1.0)), 10.0, 1.0),
+        Equation(((5, 1.0), (3, -1.0)), -4.0, 2.0),
+    ]
+    assert solve_placement([7, 3, 5], chain) == pytest.approx({7: 2.0, 3: 12.0, 5: 8.0})
+    apart = [Equation(((1, 1.0),), value, weight) for value, weight in ((0.0, 1.0), (5.0, 2.0))]
+    assert solve_placement([1], apart) == pytest.approx({1: 4.0})
