@@ -8,12 +8,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from scenario_gen.method.sampling.time_warp import Clock
+from scenario_gen.method.sampling.time_warp import Clock, SAMPLE_PERIOD_S
 from scenario_gen.numerics import Floats
 from scenario_gen.situation.waits import STANDSTILL_SPEED_MPS
 from scenario_gen.types import fronts, Scenario, SignalState, TrafficLight
 
 _MAX_SHIFT_S = 1.5  # of the lights of one scenario
+_HELD_S = 2.0  # before a vehicle crosses, since a state was known
 _OVERRUN_M = 3.0  # beyond the line, where a vehicle still waits for its light
 
 
@@ -80,12 +81,25 @@ class PlacedLights:
         )
 
     def with_departures(self, scenario: Scenario) -> Scenario:
-        """Return a scenario with all of its lights so late that vehicles depart as recorded."""
+        """Return a scenario with all of its lights so late that vehicles depart as recorded.
+
+        A state that was recorded until a vehicle crossed is known until it crosses here.
+        """
         lights = scenario.facts.lights
         delays = [departure.lateness(lights, scenario) for departure in self.departures]
         delays = [each for each in delays if abs(each) <= _MAX_SHIFT_S]
-        if not delays:
-            return scenario
-        by = sum(delays) / len(delays)
-        moved = tuple(replace(light, schedule=light.schedule.moved(by)) for light in lights)
-        return scenario.with_facts(replace(scenario.facts, lights=moved))
+        by = sum(delays) / max(len(delays), 1)
+        moved = [replace(light, schedule=light.schedule.moved(by)) for light in lights]
+        known = tuple(_known_until_crossed(light, scenario) for light in moved)
+        return scenario.with_facts(replace(scenario.facts, lights=known))
+
+
+def _known_until_crossed(light: TrafficLight, scenario: Scenario) -> TrafficLight:
+    """Return a light whose last recorded state lasts until the vehicles behind it have crossed."""
+    schedule = light.schedule
+    if schedule.repeats:
+        return light
+    crossings = [light.crossing(scenario, n) for n in range(len(scenario.vehicles))]
+    held = [time for time in crossings if 0.0 <= time - schedule.end < _HELD_S]
+    end = max(held, default=schedule.end - SAMPLE_PERIOD_S) + SAMPLE_PERIOD_S
+    return replace(light, schedule=replace(schedule, end=end))

@@ -12,6 +12,7 @@ import pytest
 from support.signalised import signalised
 
 from scenario_gen import generate, load, read_log, RefusedError
+from scenario_gen.method.sampling.lights import PlacedLights
 from scenario_gen.method.validity import Checker
 from scenario_gen.output.exchange import export_bag
 from scenario_gen.output.review.evaluation import evaluate_bag
@@ -44,6 +45,19 @@ def test_states_move_with_the_encounter(result):
         assert crosses[1] - green < 6.0  # about 3.4 s in the recording
         assert departure(scenario) - green == pytest.approx(1.4, abs=0.15)
     assert len(greens) > 6
+
+
+def test_a_state_is_known_until_a_vehicle_crosses(result):
+    scenario = result[0]
+    (light,) = [light for light in scenario.facts.lights if light.id == "A"]
+    crosses = light.crossing(scenario, 0)
+    for ends_s, expected in ((0.0, "green"), (1.5, "green"), (2.5, "unknown")):
+        schedule = SignalSchedule.of_samples((-60.0,), ("green",), crosses - ends_s)
+        placed = PlacedLights((replace(light, schedule=schedule),))
+        (shown,) = placed.with_departures(
+            scenario.with_facts(Facts(lights=placed.lights))
+        ).facts.lights
+        assert shown.schedule.at(crosses) == expected
 
 
 def test_a_vehicle_that_runs_red_is_refused(result):
