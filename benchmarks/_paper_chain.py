@@ -12,12 +12,13 @@ from itertools import product
 
 import numpy as np
 
+from benchmarks._disc_routes import plan_polylines
 from benchmarks._paper_speed_knots import speed_knots
 from benchmarks._paper_speed_profile import knots_on, SpeedProfile, SpeedProfileQP
 from benchmarks._reference_sets import without_changepoints
 from scenario_gen.base.errors import InputError, RefusedError
 from scenario_gen.method.fitting import fit_template, FittingConfig
-from scenario_gen.method.routing import PAPER, plan_routes, PlanningConfig
+from scenario_gen.method.routing import PlanningConfig
 from scenario_gen.method.sampling import Features, Observations, Posterior, Regression
 from scenario_gen.numerics import Bools, Floats, wrap_angle
 from scenario_gen.roads import build_road, draw_layout, layout_for, RoadConfig
@@ -38,7 +39,7 @@ END_SPEEDS, KNOTS = (1.0, 0.75, 0.5, 0.25, 0.0), (0.5, None, 0.3, 0.7, 0.1, 0.9)
 FITTING = FittingConfig(
     allow="lost_conflict", scale_low=0.01, scale_high=1000.0, max_move=100.0, clearance=0.0
 )
-PLANNING = PlanningConfig(iterations=ITERATIONS, drivable=False, rrt_star_connect=PAPER)
+PLANNING = PlanningConfig(iterations=ITERATIONS)
 UNLIMITED = Dynamics(
     max_speed=1e6, max_acceleration=1e6, max_deceleration=1e6, max_lateral_acceleration=1e6
 )
@@ -217,7 +218,7 @@ def sample(
     """
     try:
         fit = fit_template(encounter, segmentation, road, FITTING, starts=ends[0], goals=ends[1])
-        routes = plan_routes(road, fit, PLANNING, seed)
+        routes = plan_polylines(road, fit, PLANNING, seed)
         waits = find_waits(encounter) if segmentation.changepoints.size else ()
         drawn = [
             _vehicle(encounter, fit, n, route, waits=waits, count=count, seed=seed)

@@ -10,10 +10,8 @@ streets have cars parked in a row on the driver's lane. OMPL checks motions with
 from dataclasses import dataclass
 from itertools import pairwise
 from time import process_time
-from typing import Any
 
 import numpy as np
-from ompl import base, geometric, util
 
 from benchmarks._planning_maps import road_of
 from scenario_gen.base.errors import RefusedError
@@ -21,14 +19,16 @@ from scenario_gen.method.routing.search.car_planner import PoseRrtStarConnect
 from scenario_gen.method.routing.search.dubins import Pose
 from scenario_gen.method.routing.search.planner import Budget, path_length, PoseQuery
 from scenario_gen.method.routing.search.steering import steering_cost
-from scenario_gen.method.routing.search.sweep import car_scene
+from scenario_gen.method.routing.search.sweep import car_scene, poses_in_cells
 from scenario_gen.numerics.arrays import Floats
 from scenario_gen.numerics.curve import Curve
 from scenario_gen.roads import build_road, RoadConfig
-from scenario_gen.roads.clearance import footprint_fits, to_cells
+from scenario_gen.roads.clearance import footprint_fits
 from scenario_gen.roads.obstacles import ParkedConfig, with_obstacles
-from scenario_gen.types import Obstacle
+from scenario_gen.types import Obstacle, Vehicle
+from scenario_gen.types.fit import Fit, FittedVehicle
 from scenario_gen.types.road import Road
+from scenario_gen.types.scenario import BoundaryStates
 
 LENGTH, WIDTH, WALL = 80.0, 8.0, 1.0  # [m]
 CELL = 0.2  # [m]
@@ -98,62 +98,20 @@ def parked(seed: int) -> Obstructed | None:
 def rrt_connect(
     case: Obstructed, seconds: float, reach: float = REACH, *, simplify: bool = False
 ) -> tuple[Floats, float]:
-    """OMPL's path (P, 3) in cells, no row if it found none in so much CPU time, and the time without the simplifier's."""
-    util.setLogLevel(util.LOG_NONE)
+    """OMPL's path (P, 3) in cells, no row if it found none in so much CPU time, and the time."""
+    from scenario_gen.method.routing.search.ompl.solve import curves, solve
+
     started = process_time()
     road, query = case.road, case.query
-    scene, cell = car_scene(road, query), road.resolution
-    space = base.DubinsStateSpace(scene.body.turn_radius)
-    bounds = base.RealVectorBounds(2)
-    for axis, extent in enumerate(road.drivable.shape[::-1]):
-        bounds.setLow(axis, 0.0)
-        bounds.setHigh(axis, float(extent))
-    space.setBounds(bounds)
-    information = base.SpaceInformation(space)
 
-    def free(a: Any, b: Any) -> bool:
-        return (
-            steering_cost(
-                Pose(a.getX(), a.getY(), a.getYaw()), Pose(b.getX(), b.getY(), b.getYaw()), scene
-            )
-            < np.inf
-        )
+    def is_over(_: int) -> bool:
+        return process_time() - started > seconds
 
-    def valid(_: Any) -> bool:
-        return True  # the sweep of a motion says so of all its poses
-
-    class Motions(base.MotionValidator):  # type: ignore[misc]
-        """The exact sweep of the rectangle."""
-
-        def checkMotion(self, a: Any, b: Any, *_: Any) -> bool:  # noqa: N802 - OMPL's name
-            return free(a, b)
-
-    motions = Motions(information)
-    information.setStateValidityChecker(valid)
-    information.setMotionValidator(motions)
-    information.setup()
-    problem = base.ProblemDefinition(information)
-    states = []
-    for pose in (query.start, query.goal):
-        state = space.allocState()
-        x, y = to_cells(road, pose[:2])
-        state.setXY(float(x), float(y))
-        state.setYaw(float(pose[2]))
-        states.append(state)
-    problem.setStartAndGoalStates(*states)
-    search = geometric.RRTConnect(information)
-    search.setRange(reach / cell)
-    search.setProblemDefinition(problem)
-    search.setup()
-    search.solve(base.PlannerTerminationCondition(lambda: process_time() - started > seconds))
-    took = process_time() - started
-    if not problem.hasExactSolution():
-        return np.empty((0, 3)), took
-    path = problem.getSolutionPath()
-    if simplify:
-        geometric.PathSimplifier(information).simplifyMax(path)
-    vertices = [path.getState(k) for k in range(path.getStateCount())]
-    return np.array([[s.getX(), s.getY(), s.getYaw()] for s in vertices]), took
+    ends = poses_in_cells(road, np.stack((query.start, query.goal)))
+    step = reach / road.resolution
+    information = curves(car_scene(road, query))
+    path, _ = solve(information, ends, "ompl_rrt_connect", is_over, step=step, simplify=simplify)
+    return path, process_time() - started
 
 
 def dubins_length(case: Obstructed, path: Floats) -> float:
@@ -175,3 +133,11 @@ def first_path(case: Obstructed, seconds: float, seed: int) -> tuple[float, floa
     except RefusedError:
         return None
     return process_time() - started, path_length(plan.path)
+
+
+def straight_fit(query: PoseQuery) -> Fit:
+    """A fit of one vehicle without a changepoint."""
+    poses = np.stack((query.start, query.goal))
+    fitted = FittedVehicle(poses, np.zeros(2), np.zeros(1, dtype=bool), 1.0, "straight")
+    states = BoundaryStates(*(np.append(pose, 5.0)[None] for pose in poses))
+    return Fit((Vehicle("a", *CAR),), (fitted,), np.array([0, 1]), states, ())

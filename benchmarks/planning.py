@@ -26,35 +26,36 @@ from benchmarks._planning_maps import (
     t_intersection,
 )
 from benchmarks._planning_obstructed import (
-    CAR,
     dubins_length,
     first_path,
     Obstructed,
     obstructed,
     parked,
     rrt_connect,
+    straight_fit,
 )
+from benchmarks._planning_plane import exact_plane, solve
 from benchmarks._sampling_cases import DATA
 from benchmarks._size import sized
 from benchmarks.row import higher, lower, Row
 from scenario_gen.base.errors import RefusedError
 from scenario_gen.method.routing import plan_routes, PlanningConfig
 from scenario_gen.method.routing.search.car_planner import PoseRrtStarConnect
-from scenario_gen.method.routing.search.disc_planner import RrtStarConnect, RrtStarConnectConfig
-from scenario_gen.method.routing.search.ompl.solve import exact_plane, PLANNERS, solve
+from scenario_gen.method.routing.search.disc_planner import (
+    plan_with_retry,
+    RrtStarConnect,
+    RrtStarConnectConfig,
+)
+from scenario_gen.method.routing.search.ompl.solve import PLANNERS
 from scenario_gen.method.routing.search.planner import (
     Budget,
     BudgetSpentError,
     path_length,
-    plan_with_retry,
     Query,
 )
 from scenario_gen.numerics.arrays import Floats
 from scenario_gen.roads.connectivity import FreeSpace
-from scenario_gen.types import Vehicle
-from scenario_gen.types.fit import Fit, FittedVehicle
 from scenario_gen.types.road import Road
-from scenario_gen.types.scenario import BoundaryStates
 
 SEEDS_COUNT = sized(20, quick=1)
 BUDGETS_S = sized((0.01, 0.1, 1.0), quick=(0.01,))
@@ -227,7 +228,7 @@ def _obstructed(kind: str, case_of: Callable[[int], Obstructed | None], count: i
         first, (path, seconds) = first_path(case, LIMIT_S, 0), rrt_connect(case, LIMIT_S)
         ours += [first[0]] if first else []
         theirs += [seconds] if len(path) else []
-        fit = _straight_fit(case.query.start, case.query.goal)
+        fit = straight_fit(case.query)
         started = process_time()
         try:
             plan_routes(case.road, fit, PlanningConfig(), 0)
@@ -254,11 +255,3 @@ def _obstructed(kind: str, case_of: Callable[[int], Obstructed | None], count: i
         higher(f"{name}: routes published", 100.0 * len(routes) / feasible, "%", 99.0),
         lower(f"{name}: time of a route", 1e3 * median(routes or [np.inf]), "ms"),
     ]
-
-
-def _straight_fit(start: Floats, goal: Floats) -> Fit:
-    """Return a fit of one vehicle without a changepoint."""
-    poses = np.stack((start, goal))
-    fitted = FittedVehicle(poses, np.zeros(2), np.zeros(1, dtype=bool), 1.0, "straight")
-    states = BoundaryStates(*(np.append(pose, 5.0)[None] for pose in poses))
-    return Fit((Vehicle("a", *CAR),), (fitted,), np.array([0, 1]), states, ())

@@ -26,7 +26,7 @@ INTERFACES = {
     "scenario_gen.closed_loop.simulation": ["Observation", "Planner", "Task"],
     "scenario_gen.logs": ["LogFormat", "RawLog", "Rows", "Segment"],
     "scenario_gen.method.evaluation": ["MetricGroup", "Samples"],
-    "scenario_gen.method.routing": ["MakePlanner", "Plan", "Planner", "PosePlanner", "Query"],
+    "scenario_gen.method.routing": ["MakePlanner", "Plan", "Planner", "PoseQuery"],
     "scenario_gen.output.exchange": ["Case", "ExportFormat", "Exported"],
     "scenario_gen.roads": ["Arm", "DrawRoad", "Plan", "draw_plan"],
     "scenario_gen.situation": ["Situation"],

@@ -103,7 +103,7 @@ from scenario_gen.method.evaluation import replay
 (encounter,) = read_log("log.jsonl").encounters  # its format is found by its name
 road = build_road("skew_crossing", encounter)
 fit = fit_template(encounter, segment(encounter), road)
-config = PlanningConfig(planner="one_corner", drivable=False)
+config = PlanningConfig(planner="one_corner")
 routes = plan_routes(road, fit, config, seed=1)
 assert [len(route.points) > 1 for route in routes] == [not fitted.stands.all() for fitted in fit.fitted]
 evaluation = evaluate_scenarios(encounter, {"replay": [replay(encounter, fit)]})

@@ -6,7 +6,7 @@
 import numpy as np
 
 from scenario_gen import PlanningConfig, Road
-from scenario_gen.method.routing import Budget, BudgetSpentError, check_query, Plan, Query
+from scenario_gen.method.routing import Budget, BudgetSpentError, Plan, PoseQuery
 from scenario_gen.roads import segments_free
 
 
@@ -16,33 +16,22 @@ class OneCorner:
     def __init__(self, _: PlanningConfig) -> None:
         pass
 
-    def plan(self, road: Road, query: Query, budget: Budget, seed: int) -> Plan:
-        """Return the way; the same seed gives the same one."""
-        check_query(road, query)
-        rng, size = (
-            np.random.default_rng(seed),
-            np.array(road.drivable.shape[::-1]) * road.resolution,
-        )
-        corners = np.vstack(
-            [
-                0.5 * (query.start + query.goal),
-                road.origin + size * rng.random((budget.iterations or 1000, 2)),
-            ]
-        )
-        start, goal = (
-            np.broadcast_to(query.start, corners.shape),
-            np.broadcast_to(query.goal, corners.shape),
-        )
-        free = segments_free(road, start, corners, query.radius) & segments_free(
-            road, corners, goal, query.radius
-        )
+    def plan_poses(self, road: Road, query: PoseQuery, budget: Budget, seed: int) -> Plan:
+        """Return the way, whose corner is rounded later; the same seed gives the same one."""
+        rng = np.random.default_rng(seed)
+        size = np.array(road.drivable.shape[::-1]) * road.resolution
+        ends = np.stack((query.start, query.goal))[:, :2]
+        drawn = road.origin + size * rng.random((budget.iterations or 1000, 2))
+        corners = np.vstack([ends.mean(axis=0), drawn])
+        start, goal = (np.broadcast_to(end, corners.shape) for end in ends)
+        radius = 0.5 * query.width
+        free = segments_free(road, start, corners, radius)
+        free &= segments_free(road, corners, goal, radius)
         if not free.any():
             raise BudgetSpentError(f"no way with one corner on road {road.name!r}")
         lengths = np.linalg.norm(corners - start, axis=1) + np.linalg.norm(goal - corners, axis=1)
         best = int(np.argmin(np.where(free, lengths, np.inf)))
-        return Plan(
-            np.array([query.start, corners[best], query.goal]),
-            float(lengths[best]),
-            len(corners),
-            np.zeros((0, 3)),
-        )
+        points = np.array([ends[0], corners[best], ends[1]])
+        yaw = [query.start[2], np.arctan2(*(ends[1] - corners[best])[::-1]), query.goal[2]]
+        poses = np.column_stack((points, yaw))
+        return Plan(poses, float(lengths[best]), len(corners), np.zeros((0, 3)))

@@ -5,33 +5,25 @@
 
 from scenario_gen.method.routing.config import MakePlanner, PlanningConfig
 from scenario_gen.method.routing.plan import deviations, make_planner, plan_routes
-from scenario_gen.method.routing.search.disc_planner import PAPER
 from scenario_gen.method.routing.search.planner import (
     Budget,
     BudgetSpentError,
-    check_query,
     Plan,
-    plan_with_retry,
     Planner,
-    PosePlanner,
     PoseQuery,
     Query,
 )
 
 __all__ = [
-    "PAPER",
     "Budget",
     "BudgetSpentError",
     "MakePlanner",
     "Plan",
     "Planner",
     "PlanningConfig",
-    "PosePlanner",
     "PoseQuery",
     "Query",
-    "check_query",
     "deviations",
     "make_planner",
     "plan_routes",
-    "plan_with_retry",
 ]

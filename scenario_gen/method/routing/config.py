@@ -10,7 +10,6 @@ from typing import Protocol
 from scenario_gen.base.parameters import parameter, Parameters
 from scenario_gen.base.registry import Registry
 from scenario_gen.method.routing.search.car_planner import PoseRrtStarConnect, PoseSearchConfig
-from scenario_gen.method.routing.search.disc_planner import RrtStarConnect, RrtStarConnectConfig
 from scenario_gen.method.routing.search.ompl.planners import OmplConfig, OmplPlanner
 from scenario_gen.method.routing.search.planner import Planner
 
@@ -23,12 +22,9 @@ class MakePlanner(Protocol):
         ...
 
 
-class PaperPlanner(RrtStarConnect):
-    """RRT*-Connect: in the plane for a disc, and from pose to pose for a vehicle."""
-
-    def __init__(self, config: "PlanningConfig") -> None:
-        super().__init__(config.rrt_star_connect)
-        self.plan_poses = PoseRrtStarConnect(config.pose).plan_poses
+def make_rrt_star_connect(config: "PlanningConfig") -> Planner:
+    """Return the paper's search, from pose to pose for a vehicle."""
+    return PoseRrtStarConnect(config.pose)
 
 
 def _ompl(name: str, config: "PlanningConfig") -> Planner:
@@ -38,7 +34,10 @@ def _ompl(name: str, config: "PlanningConfig") -> Planner:
 _OMPL_NAMES = ("ompl_rrt_connect", "ompl_rrt_star", "ompl_informed_rrt_star", "ompl_bit_star")
 PLANNERS = Registry[MakePlanner](
     "scenario_gen.planners",
-    {"rrt_star_connect": PaperPlanner, **{name: partial(_ompl, name) for name in _OMPL_NAMES}},
+    {
+        "rrt_star_connect": make_rrt_star_connect,
+        **{name: partial(_ompl, name) for name in _OMPL_NAMES},
+    },
 )
 """The geometric planners by name."""
 
@@ -63,9 +62,6 @@ class PlanningConfig(Parameters):
         low=0.0,
         high=5.0,
     )
-    drivable: bool = parameter(
-        True, "smooth routes that can be driven; false: the planner's polylines"
-    )
     spacing: float = parameter(
         0.5, "largest distance between two points of a route", unit="m", low=0.05, high=0.5
     )
@@ -87,6 +83,5 @@ class PlanningConfig(Parameters):
         choices=("around_obstacles", "never"),
     )
 
-    rrt_star_connect: RrtStarConnectConfig = field(default_factory=RrtStarConnectConfig)
     pose: PoseSearchConfig = field(default_factory=PoseSearchConfig)
     ompl: OmplConfig = field(default_factory=OmplConfig)

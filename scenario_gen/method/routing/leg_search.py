@@ -19,11 +19,8 @@ from scenario_gen.method.routing.search.planner import (
     BudgetSpentError,
     NoWayError,
     Plan,
-    plan_with_retry,
-    PosePlanner,
     PoseQuery,
     Preferences,
-    Query,
 )
 from scenario_gen.method.routing.task import VehicleTask
 from scenario_gen.numerics import Floats
@@ -59,42 +56,19 @@ class Leg:
 
 
 def search_path(task: VehicleTask, leg: Leg) -> Floats:
-    """Return a free path (P, 2) of a leg, for the vehicle if the planner can, else for a disc.
+    """Return a free path (P, 2) of a leg.
 
     Raises:
         RefusedError: there is none, or none was found; the message names the anchors.
     """
-    if not isinstance(task.planner, PosePlanner):
-        return search_disc_path(task, leg)
     failure: Exception | None = None
     for query, budget in _attempts(task, leg):
         plan = partial(task.planner.plan_poses, task.road, query, budget, task.seed + leg.first)
         try:
-            return _checked_path(task, plan, 3)[:, :2]
+            return _checked_path(task, plan)[:, :2]
         except (BlockedError, NoWayError, BudgetSpentError) as error:
             failure = error
     raise _refusal(task, leg, failure)
-
-
-def search_disc_path(task: VehicleTask, leg: Leg) -> Floats:
-    """Return a path (P, 2) of a leg for a disc as wide as the vehicle.
-
-    Raises:
-        RefusedError: there is none, or none was found; the message names the anchors.
-    """
-    ends = np.stack((leg.start, leg.end))[:, :2]
-    row, column, _ = task.road.cells(ends)
-    room = float(task.road.clearance[row, column].min()) - task.road.resolution
-    radius = max(min(0.5 * task.vehicle.width + task.config.margin, room), 0.0)
-    query = Query(leg.start[:2], leg.end[:2], radius)
-    seed = task.seed + leg.first
-    plan = partial(plan_with_retry, task.planner, task.road, query, task.config.iterations, seed)
-    try:
-        return _checked_path(task, plan, 2)[:, :2]
-    except RefusedError as error:
-        if isinstance(error, BlockedError):
-            raise _refusal(task, leg, error) from error
-        raise RefusedError(f"{_between(task, leg)}: {error}") from error
 
 
 def _attempts(task: VehicleTask, leg: Leg) -> Iterator[tuple[PoseQuery, Budget]]:
@@ -133,12 +107,12 @@ def _poses_on_side(guide: Floats, config: PlanningConfig) -> Floats:
     return np.concatenate([guide + metres * away for metres in range(4)])
 
 
-def _checked_path(task: VehicleTask, plan: Callable[[], Plan], columns: int) -> Floats:
-    """Return the path (P, columns) of a plan; a plugin's planner may return anything."""
+def _checked_path(task: VehicleTask, plan: Callable[[], Plan]) -> Floats:
+    """Return the path (P, 3) of a plan; a plugin's planner may return anything."""
     with PLANNERS.running(task.config.planner):
         path = np.asarray(plan().path, dtype=np.float64)
-        if path.ndim != 2 or len(path) < 2 or path.shape[1] < columns:
-            raise ValueError(f"its path is no array of two or more rows of {columns} numbers")
+        if path.ndim != 2 or len(path) < 2 or path.shape[1] < 3:
+            raise ValueError("its path is no array of two or more rows of 3 numbers")
         if not np.isfinite(path).all():
             raise ValueError("its path is not finite")
         return path

@@ -4,22 +4,19 @@
 """The planning stage: one route per vehicle through its fitted anchors."""
 
 from dataclasses import replace
-import itertools
 
 import numpy as np
 
 from scenario_gen.base.cancelling import stop_if_cancelled
 from scenario_gen.base.errors import RefusedError
 from scenario_gen.method.routing.config import PLANNERS, PlanningConfig
-from scenario_gen.method.routing.leg_search import Leg, search_disc_path
 from scenario_gen.method.routing.legs import anchor_weights, choose_waypoints, join_waypoints, Legs
 from scenario_gen.method.routing.refusals import not_drivable, too_narrow, too_tight
 from scenario_gen.method.routing.route_points import max_distance, route_along
-from scenario_gen.method.routing.search.planner import Planner, PosePlanner
+from scenario_gen.method.routing.search.planner import Planner
 from scenario_gen.method.routing.smooth import Curve, Guess, smooth
 from scenario_gen.method.routing.task import VehicleTask
 from scenario_gen.numerics import Floats
-from scenario_gen.numerics.plane import arc_lengths, edge_yaws
 from scenario_gen.roads import footprint_fits, ground_for, own_side
 from scenario_gen.types import Fit, FittedVehicle, Road, Route, TypeLimits
 
@@ -38,8 +35,8 @@ def plan_routes(
     """Plan one route per vehicle through its anchors.
 
     Start and end are met exactly, with their headings; interior anchors attract the route (see
-    `deviations`). In drivable mode the footprint stays on the road along the whole route, and the
-    curvature within the limit.
+    `deviations`). The footprint stays on the road along the whole route, and the curvature within
+    the limit.
 
     Source: paper III-B, between consecutive changepoints.
 
@@ -78,8 +75,9 @@ def make_planner(config: PlanningConfig) -> Planner:
     make = PLANNERS[config.planner]
     with PLANNERS.running(config.planner):
         planner = make(config)
-        if not (hasattr(planner, "plan") or isinstance(planner, PosePlanner)):
-            raise TypeError(f"it returned {type(planner).__name__}, which has no method `plan`")
+        if not hasattr(planner, "plan_poses"):
+            name = type(planner).__name__
+            raise TypeError(f"it returned {name}, which has no method `plan_poses`")
         return planner
 
 
@@ -118,8 +116,6 @@ def _route(task: VehicleTask) -> Route:
         standing = np.zeros(len(anchors), dtype=np.int64)
         return Route(anchors[:1], standing, np.zeros(1), joined=0, searched=0)
     waypoints = choose_waypoints(anchors, task.fitted.stands, task.max_curvature)
-    if not task.config.drivable:
-        return _polyline(task, waypoints)
     refusal: RefusedError | None = None
     for share in CURVATURE_SHARE:
         try:
@@ -167,24 +163,3 @@ def _smoothed(task: VehicleTask, legs: Legs) -> Curve:
         if curve.is_drivable(task.max_curvature):
             break
     return curve
-
-
-def _polyline(task: VehicleTask, waypoints: list[int]) -> Route:
-    """Return the planner's path through the waypoints: the shortest, with corners.
-
-    Only its ends have the requested headings.
-    """
-    paths = []
-    for a, b in itertools.pairwise(waypoints):
-        leg = Leg(a, b, task.anchors[a], task.anchors[b], task.max_curvature, len(waypoints) == 2)
-        paths.append(Guess.even(search_disc_path(task, leg), 1.0))
-    path = Guess.joined(paths).points
-    corners = arc_lengths(path)
-    yaw = np.unwrap(edge_yaws(path))
-
-    def poses_at(length: Floats) -> Floats:
-        edge = np.searchsorted(corners, length, side="right") - 1
-        points = [np.interp(length, corners, path[:, axis]) for axis in range(2)]
-        return np.column_stack((*points, yaw[np.clip(edge, 0, len(yaw) - 1)]))
-
-    return route_along(task, poses_at, float(corners[-1]))

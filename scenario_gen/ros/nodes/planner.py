@@ -33,12 +33,8 @@ from scenario_gen.base.parameters import parameter, Parameters
 from scenario_gen.method.chain import Chain
 from scenario_gen.method.config import PipelineConfig
 from scenario_gen.method.fitting import FittingConfig
-from scenario_gen.method.routing import (
-    make_planner,
-    plan_with_retry,
-    PlanningConfig,
-    Query,
-)
+from scenario_gen.method.routing import PlanningConfig, Query
+from scenario_gen.method.routing.search.disc_planner import plan_with_retry, RrtStarConnect
 from scenario_gen.method.validity import Limits
 from scenario_gen.numerics import Floats
 from scenario_gen.ros.common.recording_part import request_part
@@ -224,7 +220,7 @@ def plan_poses(road: Road, query: Query, config: PlanningConfig, seed: int) -> F
     Raises:
         RefusedError: the start or goal is blocked, there is no route, or the budget is spent.
     """
-    path = plan_with_retry(make_planner(config), road, query, config.iterations, seed).path
+    path = plan_with_retry(RrtStarConnect(), road, query, config.iterations, seed).path
     edges = np.diff(path, axis=0) if len(path) > 1 else np.zeros((1, 2))
     heading = np.arctan2(edges[:, 1], edges[:, 0])
     return np.column_stack([path, np.append(heading, heading[-1])[: len(path)]])

@@ -20,6 +20,7 @@ from benchmarks._planning_maps import (
 from scenario_gen.base.errors import RefusedError
 from scenario_gen.method.routing.search.disc_planner import (
     PAPER,
+    plan_with_retry,
     RrtStarConnect,
     RrtStarConnectConfig,
     straight_path,
@@ -30,7 +31,6 @@ from scenario_gen.method.routing.search.planner import (
     BudgetSpentError,
     NoWayError,
     path_length,
-    plan_with_retry,
     Query,
 )
 from scenario_gen.roads.clearance import segments_free

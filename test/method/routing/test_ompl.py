@@ -1,34 +1,61 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""OMPL's planners behind the Protocol: sound answers; the caller survives hangs and crashes."""
+"""OMPL's planners behind the Protocol: sound curves of a car; the caller survives hangs and crashes."""
 
 import numpy as np
 import pytest
 
-from benchmarks._planning_maps import enters_blocked, optimum, t_intersection
+pytest.importorskip("ompl", reason="OMPL is not installed: pip install 'scenario_gen[planners]'")
+
+from benchmarks._planning_obstructed import parked, straight_fit
+from scenario_gen.method.routing import plan_routes, PlanningConfig
+from scenario_gen.method.routing.search.car_planner import PoseRrtStarConnect
 from scenario_gen.method.routing.search.ompl.planners import OmplConfig, OmplPlanner
 from scenario_gen.method.routing.search.ompl.solve import PLANNERS
-from scenario_gen.method.routing.search.planner import Budget, BudgetSpentError, Query
+from scenario_gen.method.routing.search.planner import (
+    Budget,
+    BudgetSpentError,
+    path_length,
+)
+from scenario_gen.method.routing.search.sweep import sweep_is_free
+from scenario_gen.numerics import wrap_angle
 
-ROAD, ENDS = t_intersection()
+CASE = parked(2)
+ROAD, QUERY = CASE.road, CASE.query
 
 
 @pytest.mark.parametrize("name", PLANNERS)
-def test_each_planner_finds_a_sound_path_and_keeps_its_seed(name):
-    plans = [OmplPlanner(name).plan(ROAD, Query(*ENDS), Budget(3000), 7) for _ in range(2)]
-    np.testing.assert_array_equal(plans[0].path, plans[1].path)
-    np.testing.assert_array_equal(plans[0].path[[0, -1]], ENDS)
-    assert not enters_blocked(ROAD.drivable, plans[0].path)
-    best = optimum(ROAD, ENDS)
-    assert best - 1e-9 <= plans[0].cost <= 1.1 * best
+def test_each_planner_finds_a_sound_curve_and_keeps_its_seed(name):
+    plans = [OmplPlanner(name).plan_poses(ROAD, QUERY, Budget(200), 7) for _ in range(2)]
+    path = plans[0].path
+    np.testing.assert_array_equal(path, plans[1].path)
+    np.testing.assert_allclose(path[[0, -1]], [QUERY.start, QUERY.goal], atol=1e-9)
+    free = sweep_is_free(ROAD, path, QUERY.length, QUERY.width)[:, 0] > 0.0
+    assert free.all()
+    turn = np.abs(wrap_angle(np.diff(path[:, 2])))
+    lengths = np.hypot(*np.diff(path[:, :2], axis=0).T)
+    assert (turn <= QUERY.curvature * lengths * 1.02 + 1e-9).all()
+    ours = PoseRrtStarConnect().plan_poses(ROAD, QUERY, Budget(1000), 7)
+    assert plans[0].cost == pytest.approx(path_length(path)) and plans[0].cost < 1.3 * ours.cost
+
+
+@pytest.mark.parametrize("name", PLANNERS)
+def test_routes_are_planned_by_the_planner_that_is_chosen(name):
+    fit = straight_fit(QUERY)
+    (route,) = plan_routes(ROAD, fit, PlanningConfig(planner=name), 1)
+    assert route.searched == 1
+    free = sweep_is_free(ROAD, route.points, QUERY.length, QUERY.width)[:, 0] > 0.0
+    assert free.all()
 
 
 def test_a_hang_a_crash_and_a_change_of_mind_are_answers():
-    query, endless = Query(*ENDS), Budget(None)
+    endless = Budget(None)
     with pytest.raises(BudgetSpentError, match="did not answer within 1 s and was ended"):
-        OmplPlanner("ompl_rrt_star", OmplConfig(time_limit=1.0)).plan(ROAD, query, endless, 0)
+        config = OmplConfig(time_limit=1.0)
+        OmplPlanner("ompl_rrt_star", config).plan_poses(ROAD, QUERY, endless, 0)
     with pytest.raises(BudgetSpentError, match="without an answer"):
-        OmplPlanner("no such planner").plan(ROAD, query, endless, 0)
+        OmplPlanner("no such planner").plan_poses(ROAD, QUERY, endless, 0)
     with pytest.raises(BudgetSpentError, match="cancelled"):
-        OmplPlanner("ompl_rrt_star").plan(ROAD, query, Budget(None, cancelled=lambda: True), 0)
+        cancelled = Budget(None, cancelled=lambda: True)
+        OmplPlanner("ompl_rrt_star").plan_poses(ROAD, QUERY, cancelled, 0)

@@ -168,16 +168,6 @@ def test_same_seed_same_bytes():
     assert a.length.tobytes() == b.length.tobytes()
 
 
-def test_bare_polylines():
-    anchors = [[51.75, 10, UP], [51.75, 30, UP], [51.75, 30, UP], [10, 51.75, LEFT]]
-    (route,) = routes_of(T, (anchors, [False, True, False]), config=PlanningConfig(drivable=False))
-    np.testing.assert_allclose(route.points[[0, -1]], np.array(anchors)[[0, -1]], atol=1e-8)
-    assert (np.diff(route.length) <= 0.5 + 1e-9).all()
-    assert route.anchor[1] == route.anchor[2]
-    (smooth,) = routes_of(T, (anchors, [False, True, False]))
-    assert route.length[-1] < smooth.length[-1]
-
-
 def test_refusals_name_vehicle_and_anchor():
     goal = [10, 51.75, LEFT]
     with pytest.raises(RefusedError, match=r"start of vehicle car0 .*is blocked"):

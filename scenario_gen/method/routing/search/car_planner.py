@@ -101,7 +101,7 @@ class PoseRrtStarConnect:
         self.config = config
 
     def plan_poses(self, road: Road, query: PoseQuery, budget: Budget, seed: int) -> Plan:
-        """See `PosePlanner.plan_poses`; the budget is that of a first path, `improve` come after.
+        """See `Planner.plan_poses`; the budget is that of a first path, `improve` come after.
 
         With a budget in iterations the answer depends on the seed only.
 
@@ -110,7 +110,7 @@ class PoseRrtStarConnect:
             NoWayError: not even a disc as wide as the footprint can get there.
             BudgetSpentError: none was found within the budget.
         """
-        _refuse_blocked(road, query)
+        refuse_blocked(road, query)
         search = self._search(road, query, seed)
         next_disc = 1
         for improved in search.rounds(budget, MAX_ROUND_ITERATIONS):
@@ -183,7 +183,7 @@ class PoseRrtStarConnect:
         )
 
 
-def _refuse_blocked(road: Road, query: PoseQuery) -> None:
+def refuse_blocked(road: Road, query: PoseQuery) -> None:
     """Raise BlockedError if the footprint has no room at the start or the goal."""
     ends = np.stack((query.start, query.goal))
     fits = footprint_fits(road, ends, query.length, query.width)
@@ -196,14 +196,19 @@ def _refuse_blocked(road: Road, query: PoseQuery) -> None:
             )
 
 
+def least_radius(road: Road, query: PoseQuery) -> float:
+    """Return the radius [m] of a disc without a way where the footprint has certainly none."""
+    half = 0.5 * min(query.width, query.length)
+    return max(half - 0.75 * road.resolution, 0.0)  # components may miss gaps between centres
+
+
 def _disc_path(road: Road, query: PoseQuery, margin: float, seed: int) -> tuple[Floats, float]:
     """Return a path (P, 2) [m] for the largest disc of three that finds one, and its radius [m].
 
     Raises:
         NoWayError: not even the smallest disc has a route.
     """
-    half = 0.5 * min(query.width, query.length)
-    least = max(half - 0.75 * road.resolution, 0.0)  # components may miss gaps between centres
+    half, least = 0.5 * min(query.width, query.length), least_radius(road, query)
     failure: RefusedError | None = None
     for radius in (half + margin, half, least):
         disc = Query(query.start[:2], query.goal[:2], radius)

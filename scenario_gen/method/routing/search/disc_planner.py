@@ -8,10 +8,10 @@ import math
 
 import numpy as np
 
-from scenario_gen.base.parameters import parameter, Parameters
 from scenario_gen.method.routing.search.dubins import Pose
 from scenario_gen.method.routing.search.planner import (
     Budget,
+    BudgetSpentError,
     joining_component,
     NO_POSES,
     path_length,
@@ -27,40 +27,31 @@ from scenario_gen.roads import free_cells, free_space, FreeSpace, to_cells
 from scenario_gen.types import Road
 
 MAX_ROUND_ITERATIONS = 512  # between two checks of the budget
+RETRY_FACTOR = 100  # more iterations for a first path where connected components prove a route
 CORNER_SPREAD_CELLS = 0.5  # of samples near convex corners
 
 
 @dataclass(frozen=True)
-class RrtStarConnectConfig(Parameters):
-    """Settings of RRT*-Connect; lengths in cells, as in the paper."""
+class RrtStarConnectConfig:
+    """Settings of RRT*-Connect; lengths in cells, as in the paper.
 
-    step: float = parameter(
-        120.0, "longest new edge (the paper's preset: 5)", unit="cells", low=0.1, high=1e6
-    )
-    zeta: float = parameter(
-        120.0,
-        "largest near radius, zeta of eq 10; it decides quality (the paper's preset: 30)",
-        unit="cells",
-        low=0.1,
-        high=1e6,
-    )
-    gamma_factor: float = parameter(
-        1.1,
-        "gamma of eq 10 as a multiple of the minimum that is asymptotically optimal",
-        low=1.0,
-        high=10.0,
-    )
-    greedy: bool = parameter(
-        True, "extend as far as possible until the first path is found (the paper: one step)"
-    )
-    corners: float = parameter(
-        0.5,
-        "share of samples near convex corners of obstacles (the paper: 0)",
-        low=0.0,
-        high=0.9,
-    )
-    informed: bool = parameter(True, "sample only where a shorter path can lie, once there is one")
-    pull: bool = parameter(True, "pull the path taut at the end (string pulling)")
+    Attributes:
+        step: longest new edge (the paper's preset: 5).
+        zeta: largest near radius, zeta of eq 10; it decides quality (the paper's preset: 30).
+        gamma_factor: gamma of eq 10 as a multiple of the minimum that is asymptotically optimal.
+        greedy: extend as far as possible until the first path is found (the paper: one step).
+        corners: share of samples near convex corners of obstacles (the paper: 0).
+        informed: sample only where a shorter path can lie, once there is one.
+        pull: pull the path taut at the end (string pulling).
+    """
+
+    step: float = 120.0
+    zeta: float = 120.0
+    gamma_factor: float = 1.1
+    greedy: bool = True
+    corners: float = 0.5
+    informed: bool = True
+    pull: bool = True
 
 
 PAPER = RrtStarConnectConfig(
@@ -100,9 +91,11 @@ class RrtStarConnect:
         return Search(road, disc_scene(road, query.radius), rules, (start, goal), seed)
 
     def plan(self, road: Road, query: Query, budget: Budget, seed: int) -> Plan:
-        """See `Planner.plan`; with a budget in iterations the answer depends on the seed only.
+        """Return the best path; with a budget in iterations it depends on the seed only.
 
         Raises:
+            BlockedError: start or goal collides.
+            NoWayError: there is no route.
             BudgetSpentError: no path was found within the budget.
         """
         space = free_space(road, query.radius)
@@ -121,6 +114,20 @@ class RrtStarConnect:
             if search.path is not None and (budget.first or search.is_straight()):
                 break
         return search.plan(query.start, query.goal)
+
+
+def plan_with_retry(
+    planner: RrtStarConnect, road: Road, query: Query, iterations: int, seed: int
+) -> Plan:
+    """Return the best path within `iterations`, or else the first path of a longer search.
+
+    Raises:
+        BlockedError, NoWayError, BudgetSpentError: as `RrtStarConnect.plan`.
+    """
+    try:
+        return planner.plan(road, query, Budget(iterations), seed)
+    except BudgetSpentError:
+        return planner.plan(road, query, Budget(RETRY_FACTOR * iterations, first=True), seed)
 
 
 def straight_path(search: Search) -> Floats:

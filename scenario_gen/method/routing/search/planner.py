@@ -1,23 +1,22 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The interface of all geometric planners: queries, budget, answer, and the two protocols."""
+"""The interface of all geometric planners: queries, budget, answer, and the protocol."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
 import math
-from typing import Protocol, runtime_checkable
+from typing import Protocol
 
 import numpy as np
 
 from scenario_gen.base.errors import RefusedError
 from scenario_gen.numerics import Floats, frozen, sealed
 from scenario_gen.numerics.plane import edge_lengths
-from scenario_gen.roads import free_space, FreeSpace, segments_free
+from scenario_gen.roads import FreeSpace, segments_free
 from scenario_gen.types import Road
 
 NO_POSES = sealed(np.empty((0, 3)))
-RETRY_FACTOR = 100  # more iterations for a first path where connected components prove a route
 
 
 class BlockedError(RefusedError):
@@ -120,22 +119,7 @@ class Plan:
 
 
 class Planner(Protocol):
-    """Finds a short free path for a disc on a road."""
-
-    def plan(self, road: Road, query: Query, budget: Budget, seed: int) -> Plan:
-        """Return the best path found within the budget.
-
-        Raises:
-            BlockedError: start or goal collides.
-            NoWayError: there is no route.
-            BudgetSpentError: none was found in time.
-        """
-        ...
-
-
-@runtime_checkable
-class PosePlanner(Protocol):
-    """Finds a short drivable path for a vehicle; routes are then searched with this method."""
+    """Finds a short drivable path for a vehicle."""
 
     def plan_poses(self, road: Road, query: PoseQuery, budget: Budget, seed: int) -> Plan:
         """Return the best path found within the budget.
@@ -146,25 +130,6 @@ class PosePlanner(Protocol):
             BudgetSpentError: none was found within the budget.
         """
         ...
-
-
-def plan_with_retry(
-    planner: Planner, road: Road, query: Query, iterations: int, seed: int
-) -> Plan:
-    """Return the best path within `iterations`, or else the first path of a longer search.
-
-    Raises:
-        BlockedError, NoWayError, BudgetSpentError: as `Planner.plan`.
-    """
-    try:
-        return planner.plan(road, query, Budget(iterations), seed)
-    except BudgetSpentError:
-        return planner.plan(road, query, Budget(RETRY_FACTOR * iterations, first=True), seed)
-
-
-def check_query(road: Road, query: Query) -> None:
-    """Raise BlockedError or NoWayError if no search could succeed."""
-    joining_component(free_space(road, query.radius), query)
 
 
 def joining_component(space: FreeSpace, query: Query) -> int:

@@ -20,18 +20,28 @@ import numpy as np
 from scenario_gen.base.errors import needs
 from scenario_gen.base.parameters import parameter, Parameters
 from scenario_gen.base.signals import environment_set
+from scenario_gen.method.routing.search.car_planner import (
+    least_radius,
+    refuse_blocked,
+    SPACING_M,
+)
 from scenario_gen.method.routing.search.planner import (
     Budget,
     BudgetSpentError,
-    check_query,
+    joining_component,
     path_length,
     Plan,
+    PoseQuery,
     Query,
 )
+from scenario_gen.method.routing.search.shortcuts import dense_path
+from scenario_gen.method.routing.search.sweep import car_scene, poses_in_cells
 from scenario_gen.numerics import Floats
-from scenario_gen.roads import to_cells, to_metres
+from scenario_gen.roads import free_space, to_metres
 from scenario_gen.types import Road
 
+CHECKS_COUNT = 10  # of OMPL's termination condition, in the time of one of our own iterations
+MAX_EDGE_M = 100_000.0
 POLL_S = 0.05  # between two checks of the child and of the caller's `cancelled`
 
 
@@ -40,7 +50,7 @@ class OmplConfig(Parameters):
     """Settings of the planners from OMPL."""
 
     step: float = parameter(
-        0.0, "longest new edge; 0: OMPL's own choice", unit="cells", low=0.0, high=1e6
+        0.0, "longest new edge; 0: of any length", unit="m", low=0.0, high=10_000.0
     )
     simplify: bool = parameter(True, "run OMPL's path simplifier at the end")
     time_limit: float = parameter(
@@ -62,13 +72,19 @@ class OmplPlanner:
         self.name = name
         self.config = config
 
-    def plan(self, road: Road, query: Query, budget: Budget, seed: int) -> Plan:
-        """See `Planner.plan`; an iteration is one check of OMPL's termination condition.
+    def plan_poses(self, road: Road, query: PoseQuery, budget: Budget, seed: int) -> Plan:
+        """See `Planner.plan_poses`; an iteration is ten checks of OMPL's termination condition.
+
+        Of the query's preferences, the bounds on the offset from the guide hold.
 
         Raises:
+            BlockedError: the footprint has no room at start or goal.
+            NoWayError: not even a disc as wide as the footprint can get there.
             BudgetSpentError: no path was found within the budget.
         """
-        check_query(road, query)
+        refuse_blocked(road, query)
+        radius = least_radius(road, query)
+        joining_component(free_space(road, radius), Query(query.start[:2], query.goal[:2], radius))
         needs("planners", "ompl")
         from scenario_gen.method.routing.search.ompl.solve import solve_in_child  # loads OMPL
 
@@ -76,17 +92,22 @@ class OmplPlanner:
         context = multiprocessing.get_context("forkserver")
         context.set_forkserver_preload(["scenario_gen.method.routing.search.ompl.solve"])
         receiver, sender = context.Pipe(duplex=False)
-        options = {"step": self.config.step or None, "simplify": self.config.simplify}
+        cell, scene = road.resolution, car_scene(road, query)
+        options = {
+            "step": (self.config.step or MAX_EDGE_M) / cell,
+            "simplify": self.config.simplify,
+            "first": budget.first,
+        }
+        checks = None if budget.iterations is None else CHECKS_COUNT * budget.iterations
         child = context.Process(
             target=solve_in_child,
             args=(
                 sender,
-                road.clearance_cells,
-                to_cells(road, np.stack((query.start, query.goal))),
-                query.radius / road.resolution,
+                scene,
+                poses_in_cells(road, np.stack((query.start, query.goal))),
                 self.name,
                 options,
-                (budget.iterations, budget.seconds, seed),
+                (checks, budget.seconds, seed),
             ),
             daemon=True,
         )
@@ -94,26 +115,27 @@ class OmplPlanner:
             child.start()
         sender.close()
         try:
-            path, iterations, seconds = self._answer(receiver, child, budget)
+            path, calls, seconds = self._answer(receiver, child, budget)
         finally:
             child.kill()  # OMPL's destructors may crash
             child.join()
             receiver.close()
+        iterations = calls // CHECKS_COUNT
         if not len(path):
             raise BudgetSpentError(
                 f"{self.name} found no path on road {road.name!r} within {iterations} iterations, "
                 f"{seconds:.2f} s"
             )
-        metres = to_metres(road, path)
-        metres[0], metres[-1] = query.start, query.goal
-        cost = path_length(metres)
+        poses = dense_path(path, scene.body.turn_radius, SPACING_M / cell)
+        poses[:, :2] = to_metres(road, poses[:, :2])
+        cost = path_length(poses)
         history = np.array([[iterations, seconds + thread_time() - started, cost]])
-        return Plan(metres, cost, iterations, history)
+        return Plan(poses, cost, iterations, history)
 
     def _answer(
         self, receiver: Connection, child: Any, budget: Budget
     ) -> tuple[Floats, int, float]:
-        """Return the child's path, iterations and CPU seconds.
+        """Return the child's poses, checks and CPU seconds.
 
         Raises:
             BudgetSpentError: it died or took too long, or the caller cancelled.

@@ -3,9 +3,8 @@
 
 """A query for one of OMPL's planners, in this process; `planners` protects the caller from it.
 
-OMPL uses the exact edge check of our own planner through a motion validator around the compiled
-kernel. So neither its default checking resolution, 1 % of the extent, nor a Python callback per
-state slows it down.
+OMPL searches the space of Dubins curves, with the exact sweep of our own planner as its motion
+validator: a compiled kernel in place of its own checks at a resolution of 1 % of the extent.
 """
 
 from collections.abc import Callable
@@ -15,8 +14,10 @@ from typing import Any
 import numpy as np
 from ompl import base, geometric, util
 
+from scenario_gen.method.routing.search.dubins import Pose
+from scenario_gen.method.routing.search.steering import steering_cost
+from scenario_gen.method.routing.search.sweep import Scene
 from scenario_gen.numerics import Floats
-from scenario_gen.roads import segment_free
 
 PLANNERS = {
     "ompl_rrt_connect": "RRTConnect",
@@ -26,35 +27,33 @@ PLANNERS = {
 }
 
 
-class ExactEdges(base.MotionValidator):  # type: ignore[misc]
-    """The exact edge check, for a disc in a clearance field (H, W); in cells."""
+class ExactSweeps(base.MotionValidator):  # type: ignore[misc]
+    """The exact sweep of a vehicle's footprint along a Dubins curve, in cells."""
 
-    def __init__(self, information: Any, clearance: Floats, radius: float) -> None:
+    def __init__(self, information: Any, scene: Scene) -> None:
         super().__init__(information)
-        self.clearance, self.radius = clearance, radius
+        self.scene = scene
 
     def checkMotion(self, a: Any, b: Any, *_: Any) -> bool:  # noqa: N802 - OMPL's name
-        """Whether the straight line between two states is free."""
-        return bool(segment_free(self.clearance, a[0], a[1], b[0], b[1], self.radius))
+        """Whether the shortest curve between two states is free."""
+        return bool(steering_cost(Pose(*_pose(a)), Pose(*_pose(b)), self.scene) < np.inf)
 
 
-def plane(clearance: Floats) -> Any:
-    """Return OMPL's space information for the plane of a grid (H, W) in cells, without checks."""
-    space = base.RealVectorStateSpace(2)
+def _pose(state: Any) -> tuple[float, float, float]:
+    return state.getX(), state.getY(), state.getYaw()
+
+
+def curves(scene: Scene) -> Any:
+    """Return OMPL's space information for the Dubins curves of a vehicle, with exact checks."""
+    space = base.DubinsStateSpace(scene.body.turn_radius)
     bounds = base.RealVectorBounds(2)
-    for axis, extent in enumerate(clearance.shape[::-1]):
+    for axis, extent in enumerate(scene.clearance.shape[::-1]):
         bounds.setLow(axis, 0.0)
         bounds.setHigh(axis, float(extent))
     space.setBounds(bounds)
-    return base.SpaceInformation(space)
-
-
-def exact_plane(clearance: Floats, radius: float) -> Any:
-    """Return OMPL's space information for the plane, with exact checks for a disc."""
-    information = plane(clearance)
-    validator = ExactEdges(information, clearance, radius)
-    information.setStateValidityChecker(lambda state: validator.checkMotion(state, state))
-    information.setMotionValidator(validator)
+    information = base.SpaceInformation(space)
+    information.setStateValidityChecker(lambda _: True)  # the sweep of a motion checks its poses
+    information.setMotionValidator(ExactSweeps(information, scene))
     information.setup()
     return information
 
@@ -65,33 +64,37 @@ def solve(
     planner: str,
     stop: Callable[[int], bool],
     *,
-    step: float | None = None,
+    step: float,
     simplify: bool = True,
+    first: bool = False,
 ) -> tuple[Floats, int]:
     """Search for a path with one of OMPL's planners.
 
     Args:
-        information: the plane and its checks.
-        ends: (2, 2) start and goal [cells].
+        information: the curves and their checks.
+        ends: (2, 3) poses of start and goal [cells, rad].
         planner: a name of PLANNERS.
         stop: called with the number of calls so far (about one per iteration); True ends it.
-        step: longest edge [cells]; None: OMPL's default.
+        step: longest edge [cells].
         simplify: whether to run OMPL's path simplifier.
+        first: whether the first path ends the search.
 
     Returns:
-        The path (P, 2) in cells, without a row if none was found; and the number of calls.
+        Poses (P, 3) joined by Dubins curves, without a row if no path was found; and the number of
+        calls.
     """
     util.setLogLevel(util.LOG_NONE)
     problem = base.ProblemDefinition(information)
     states = []
-    for end in ends:
+    for x, y, yaw in ends.tolist():
         state = information.getStateSpace().allocState()
-        state[0], state[1] = float(end[0]), float(end[1])
+        state.setXY(x, y)
+        state.setYaw(yaw)
         states.append(state)
     problem.setStartAndGoalStates(*states)
     problem.setOptimizationObjective(base.PathLengthOptimizationObjective(information))
     search = getattr(geometric, PLANNERS[planner])(information)
-    if step is not None:
+    if planner != "ompl_bit_star":  # it has no range
         search.setRange(step)
     search.setProblemDefinition(problem)
     search.setup()
@@ -100,41 +103,38 @@ def solve(
     def is_over() -> bool:
         nonlocal calls
         calls += 1
-        return stop(calls)
+        return stop(calls) or (first and problem.hasExactSolution())
 
     search.solve(base.PlannerTerminationCondition(is_over))
     if not problem.hasExactSolution():
-        return np.empty((0, 2)), calls
+        return np.empty((0, 3)), calls
     path = problem.getSolutionPath()
     if simplify:
         geometric.PathSimplifier(information).simplifyMax(path)
-    states = [path.getState(k) for k in range(path.getStateCount())]
-    return np.array([[state[0], state[1]] for state in states]), calls
+    return np.array([_pose(path.getState(k)) for k in range(path.getStateCount())]), calls
 
 
 def solve_in_child(
     answer: Any,
-    clearance: Floats,
+    scene: Scene,
     ends: Floats,
-    radius: float,
     planner: str,
     options: dict[str, Any],
     limits: tuple[int | None, float | None, int],
 ) -> None:
-    """Search in a child process, and send path, calls and CPU seconds through a connection.
+    """Search in a child process, and send poses, calls and CPU seconds through a connection.
 
-    `limits` are iterations, seconds and the seed: only a process's first search can set it.
+    `limits` are checks, seconds and the seed: only a process's first search can set it.
     """
-    iterations, seconds, seed = limits
+    checks, seconds, seed = limits
     util.RNG.setSeed(seed % (2**31 - 1) + 1)
     started = process_time()
 
     def stop(calls: int) -> bool:
-        if iterations is not None and calls > iterations:
+        if checks is not None and calls > checks:
             return True
         return seconds is not None and process_time() - started > seconds
 
-    information = exact_plane(clearance, radius)
-    path, calls = solve(information, ends, planner, stop, **options)
+    path, calls = solve(curves(scene), ends, planner, stop, **options)
     answer.send((path, calls, process_time() - started))
     answer.close()
