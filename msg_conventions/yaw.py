@@ -59,7 +59,7 @@ def yaw(quaternions: Floats) -> Floats:
 
     Its canonical angle is the encoded one.
     """
-    x, y, z, w = np.moveaxis(quaternions, -1, 0)
+    x, y, z, w = (quaternions[..., k] for k in range(4))
     angle: Floats = np.where(
         (x == 0.0) & (y == 0.0),
         2.0 * np.arctan2(z, w),

@@ -29,7 +29,6 @@ from scenario_gen.bags.vehicles import (
 )
 from scenario_gen.base.errors import InputError
 from scenario_gen.logs.bag_names import (
-    child_vehicle,
     clock_doubts,
     find_owners,
     LARGE_COUNT,
@@ -421,7 +420,7 @@ def _collect(
         else:
             for sample in decode_samples(data, topic.type, place):
                 stamp_ns = clock.add(number, sample.stamp_ns, received_ns)
-                collected.add_sample(sample, child_vehicle(sample.child), stamp_ns, row)
+                collected.add_sample(sample, stamp_ns, row)
         topic.data[number] = b""  # bounds the memory
     if topic.type not in (TRACKED, TRANSFORMS):
         collected.rename_only(owner)

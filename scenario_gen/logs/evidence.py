@@ -53,6 +53,7 @@ def interpret(log: RawLog, config: LogConfig) -> tuple[RawLog, list[str], list[D
         _find_degrees(reading)
     else:
         _check_metres(reading)
+    if not (log.geographic or reading.doubts):
         _check_staying(reading)
         _check_starts(reading)
     if reading.doubts:

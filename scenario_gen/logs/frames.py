@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from scenario_gen.bags.vehicles import Sample, TrackedObject
 from scenario_gen.base.errors import InputError
+from scenario_gen.logs.bag_names import child_vehicle
 from scenario_gen.logs.config import POINTS
 from scenario_gen.logs.quality import Doubt, Quantity
 from scenario_gen.logs.raw import Fix, Rows, Speed
@@ -60,11 +61,13 @@ class Recordings:
         topic: its name.
         type: of its messages.
         by_vehicle_and_frame: the recordings.
+        vehicles: by their child frames.
     """
 
     topic: str
     type: str
     by_vehicle_and_frame: dict[tuple[str, str], Recording] = field(default_factory=dict)
+    vehicles: dict[str, str] = field(default_factory=dict)
 
     def add_objects(
         self, objects: Iterable[TrackedObject], frame: str, stamp_ns: int, row: int
@@ -78,8 +81,11 @@ class Recordings:
             recording.sizes.append(tracked.size)
             recording.kinds[tracked.kind] += 1
 
-    def add_sample(self, sample: Sample, vehicle: str, stamp_ns: int, row: int) -> None:
+    def add_sample(self, sample: Sample, stamp_ns: int, row: int) -> None:
         """Add position and speed of a vehicle, as far as the message has them."""
+        if sample.child not in self.vehicles:
+            self.vehicles[sample.child] = child_vehicle(sample.child)
+        vehicle = self.vehicles[sample.child]
         rows = self._recording_of(vehicle, sample.frame, sample.child).rows
         if sample.position is not None:
             state = (*sample.position, sample.heading, sample.height)
@@ -95,8 +101,11 @@ class Recordings:
                 recording.vehicle = vehicle
 
     def _recording_of(self, vehicle: str, frame: str, child: str) -> Recording:
-        made = Recording(vehicle, self.topic, self.type, frame, child)
-        return self.by_vehicle_and_frame.setdefault((vehicle, frame), made)
+        key = vehicle, frame
+        if key not in self.by_vehicle_and_frame:
+            made = Recording(vehicle, self.topic, self.type, frame, child)
+            self.by_vehicle_and_frame[key] = made
+        return self.by_vehicle_and_frame[key]
 
 
 def by_vehicle(recordings: Iterable[Recording]) -> dict[str, list[Recording]]:

@@ -352,6 +352,12 @@ WAYS = {  # of recording two vehicles in one bag
     "child frames": lambda rows: odometry(rows, "/odom", child="{}/base_link"),
     "raw and filtered": lambda rows: [*odometry(rows), *odometry(rows, "/{}/odometry/filtered")],
     "transforms": transforms,
+    "x points north": lambda rows: odometry(
+        rows.assign(
+            x_m=rows.y_m, y_m=rows.x_m, yaw=np.where(rows.vehicle_id == "a", np.pi / 2.0, 0.0)
+        ),
+        frame="map_ned",
+    ),
     "poses": poses,
     "poses beside odometry": lambda rows: [*odometry(of(rows, "a")), *poses(of(rows, "b"))],
     "static transforms to map": lambda rows: [

@@ -364,6 +364,21 @@ def test_files_that_are_no_tables_and_days_apart(tmp_path):
     assert len(read_log(paths).encounters) == 3
 
 
+def test_types_decide_sizes_and_may_be_missing_in_a_file(tmp_path):
+    rows = crossing().assign(type="car", length=1.0, width=0.8)
+    save(rows.query("vehicle_id == 'a'"), tmp_path, "a.csv")
+    save(crossing().query("vehicle_id == 'b'"), tmp_path, "b.csv")
+    result = read_log(tmp_path)
+    assert [vehicle.length for vehicle in result.encounters[0].vehicles] == [4.8, 4.8]
+    assert "1 m × 0.8 m is not the size of a car" in " ".join(result.quality.notes)
+
+
+def test_numbers_of_types_are_read_from_parquet(tmp_path):
+    crossing().assign(type=2).to_parquet(tmp_path / "log.parquet")
+    (encounter,) = read_log(tmp_path / "log.parquet", columns="kind=type:car1+truck2")
+    assert {vehicle.type for vehicle in encounter.vehicles} == {"truck"}
+
+
 def test_vehicles_abreast_are_two(tmp_path):
     rows = crossing().query("vehicle_id == 'a'")
     both = pd.concat([rows, rows.assign(vehicle_id="c", y_m=3.2)])
