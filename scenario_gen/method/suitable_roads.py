@@ -52,10 +52,10 @@ def fits_road(
         built, template = road_and_template(road, encounter, config.road)
         if template is not encounter:  # mirrored for the other side of traffic
             situation = Situation.of(template)
-        fit_template(situation, segmentation, built, replace(config.fitting, allow=""))
+        fit = fit_template(situation, segmentation, built, replace(config.fitting, allow=""))
     except (RefusedError, InputError):
         return False
-    return True
+    return all(loss.kind != "bend" for loss in fit.losses)
 
 
 def suitable_roads(

@@ -24,6 +24,7 @@ from scenario_gen.situation.abreast import (
 from scenario_gen.situation.conflicts import track_conflicts
 from scenario_gen.situation.tracks import (
     describe_turn,
+    follows_bend,
     is_same_turn,
     Track,
     turn_of,
@@ -92,7 +93,8 @@ def _lost_turns(tracks: Tracks, placed: Tracks) -> Iterator[Loss]:
         if lost is not None:
             recorded, placed_turn = describe_turn(lost), describe_turn(turn)
             message = f"vehicle {name} {recorded} in the recording, {placed_turn} on this road"
-            yield Loss("turn", (name,), message)
+            is_bend = follows_bend(track) and follows_bend(placed_track)
+            yield Loss("bend" if is_bend else "turn", (name,), message)
 
 
 def _lost_conflicts(tracks: Tracks, placed: Tracks) -> Iterator[Loss]:

@@ -43,6 +43,7 @@ LATERAL_SHARE = 2.0 / 3.0  # of a type's lateral acceleration; for a car 4 m/s²
 MAX_DEVIATION_M = 0.6  # from the recording
 TURN_RAD = math.radians(45.0)
 TURN_WINDOW_M = 30.0  # a bend of a road turns less within it
+MAX_BEND_RAD = math.radians(25.0)  # of a bend of a road, within it
 U_TURN_RAD = math.radians(140.0)
 U_TURN_WINDOW_M = 45.0
 MIN_PATH_M = 0.5  # a vehicle with a shorter path stands
@@ -335,6 +336,12 @@ def is_same_turn(recorded: float, turn: float) -> bool:
     if change <= SURELY_SAME_TURN_RAD:
         return True
     return change <= MAX_TURN_CHANGE_RAD and manoeuvre_of(recorded) == manoeuvre_of(turn)
+
+
+def follows_bend(track: Track) -> bool:
+    """Whether a track turns no more than a road bends: at most 25° within 30 m."""
+    share = min(track.travelled / TURN_WINDOW_M, 1.0)
+    return abs(track.turning(TURN_WINDOW_M)) <= share * MAX_BEND_RAD
 
 
 def turns_to_keep(track: Track) -> list[float]:

@@ -144,7 +144,7 @@ def test_a_recording_that_does_not_fit_is_shortened_if_that_is_allowed(monkeypat
     def refuse(road, template, config):
         raise RefusedError("the road is too short")
 
-    def no_part(attempt, template, refusal):
+    def no_part(attempt, template, refusal, _):
         with pytest.raises(RefusedError, match="too short"):
             attempt(template)
         raise RefusedError(f"{refusal} for all parts")

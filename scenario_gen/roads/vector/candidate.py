@@ -26,6 +26,7 @@ from scenario_gen.situation import (
     drivers_of,
     find_conflicts,
     find_losses,
+    follows_bend,
     is_same_turn,
     LOSABLE,
     PairConflicts,
@@ -179,6 +180,7 @@ class Candidate:
         turns = sum(
             not all(is_same_turn(turn, path.turn) for turn in turns_to_keep(track))
             for track, path in zip(self.task.drivers, self.match.paths, strict=True)
+            if not follows_bend(track)
         )
         return self.match.lost_crossings + turns * ("turn" not in self.task.limits.allowed)
 

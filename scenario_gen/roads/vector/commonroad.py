@@ -12,12 +12,14 @@ from functools import cached_property
 import math
 
 import numpy as np
+import shapely
 
 from scenario_gen.base.documents import shown
 from scenario_gen.base.errors import InputError
 from scenario_gen.base.xml_reader import Element
 from scenario_gen.logs.adapters.commonroad import cycle_of, turns_of
 from scenario_gen.numerics import Floats
+from scenario_gen.numerics.plane import place
 from scenario_gen.roads.vector.drafts import (
     by_id,
     Draft,
@@ -190,14 +192,7 @@ class _Map:
         static = [each for each, role in roles if role is not None and role.content == "static"]
         for obstacle in (*self.root.findall("staticObstacle"), *static):
             with self.faults.leaving_out("static obstacle", obstacle.get("id", "?")):
-                state = obstacle.child("initialState")
-                point = state.child("position/point")
-                circle = obstacle.find("shape/circle/radius")
-                size = [2.0 * circle.value()] * 2 if circle is not None else []
-                sides = ("shape/rectangle/length", "shape/rectangle/width")
-                size = size or [obstacle.child(side).value() for side in sides]
-                yaw = state.child("orientation/exact").value()
-                yield Obstacle(point.child("x").value(), point.child("y").value(), yaw, *size)
+                yield _obstacle_of(obstacle)
 
     @cached_property
     def rule_kinds(self) -> dict[tuple[str, str], RuleKind]:
@@ -346,3 +341,34 @@ def _points(bound: Element) -> Floats:
         z = math.nan if height is None else height.value()
         points.append((point.child("x").value(), point.child("y").value(), z))
     return np.array(points, dtype=np.float64).reshape(-1, 3)
+
+
+def _obstacle_of(element: Element) -> Obstacle:
+    """Return a static obstacle; a polygon counts as the smallest rectangle around it."""
+    state = element.child("initialState")
+    yaw = state.child("orientation/exact").value()
+    pose = np.array([*_point(state.child("position/point")), yaw])
+    centre, turn = np.zeros(2), 0.0
+    circle, polygon = element.find("shape/circle/radius"), element.find("shape/polygon")
+    if polygon is not None:
+        corners = [_point(point) for point in polygon.findall("point")]
+        box = shapely.oriented_envelope(shapely.MultiPoint(corners))
+        outline = shapely.get_coordinates(box)
+        if len(outline) != 5:
+            raise InputError(f"{element.place}: its polygon has no area")
+        centre = outline[:4].mean(axis=0)
+        ahead, left = outline[1] - outline[0], outline[2] - outline[1]
+        turn = float(np.arctan2(ahead[1], ahead[0]))
+        size = [float(np.hypot(*ahead)), float(np.hypot(*left))]
+    elif circle is not None:
+        size = [2.0 * circle.value()] * 2
+    else:
+        sides = ("shape/rectangle/length", "shape/rectangle/width")
+        size = [element.child(side).value() for side in sides]
+    x, y = place(pose, *centre.tolist()).tolist()
+    return Obstacle(x, y, yaw + turn, *size)
+
+
+def _point(element: Element) -> tuple[float, float]:
+    """Return x, y [m] of a point."""
+    return element.child("x").value(), element.child("y").value()

@@ -110,7 +110,7 @@ def test_every_recorded_encounter_fits_two_roads_and_refusals_say_why(encounter)
             assert 0.8 <= f.scale <= 1.25
             assert f.moved.max() <= 3.0
         assert turned_otherwise(encounter, fit) <= {
-            loss.vehicles[0] for loss in fit.losses if loss.kind == "turn"
+            loss.vehicles[0] for loss in fit.losses if loss.kind in ("turn", "bend")
         }
     assert fitted >= 2
 
@@ -253,7 +253,7 @@ def test_turns_take_the_arm_on_their_side():
 
 
 @pytest.mark.parametrize("road_name", ["curve", "t_intersection", "four_way"])
-def test_a_platoon_on_a_bend_keeps_its_bend_and_its_gaps_and_is_refused_on_a_straight_road(
+def test_a_platoon_on_a_bend_keeps_its_bend_and_its_gaps_and_loses_it_on_a_straight_road(
     road_name,
 ):
     bend = turn(0.0, 0.0, 0.0, 20.0, 1.4, 120.0, 400.0)
@@ -265,11 +265,9 @@ def test_a_platoon_on_a_bend_keeps_its_bend_and_its_gaps_and_is_refused_on_a_str
     for f in fit.fitted:
         assert f.turned[1] == pytest.approx(f.turned[0], abs=np.radians(5.0))
     assert not [loss for loss in fit.losses if loss.kind != "arm"]
-    with pytest.raises(
-        RefusedError,
-        match=r"vehicle 0 turns left by 80° in the recording, goes straight on on this road",
-    ):
-        fit_template(encounter, every(encounter), build_road("straight", encounter))
+    losses = fit_template(encounter, every(encounter), build_road("straight", encounter)).losses
+    assert {loss.kind for loss in losses} == {"bend"}
+    assert "vehicle 0 turns left by 80° in the recording, goes straight on" in losses[0].message
 
 
 def test_scale_out_of_range_is_refused_with_the_figure():

@@ -30,6 +30,20 @@ def test_static_obstacles_of_commonroad_block_cells(tmp_path) -> None:
     assert NoteKind.MAP_OBSTACLES in {note.kind for note in road.lanes.notes}
 
 
+def test_a_polygon_blocks_the_smallest_rectangle_around_it(tmp_path) -> None:
+    corners = [(-1.0, -0.5), (1.0, -0.5), (1.0, 1.5), (-1.0, 1.5)]
+    points = "".join(f"<point><x>{x}</x><y>{y}</y></point>" for x, y in corners)
+    begin, end = OBSTACLE.index("<rectangle>"), OBSTACLE.index("</shape>")
+    polygon = f"{OBSTACLE[:begin]}<polygon>{points}</polygon>{OBSTACLE[end:]}"
+    road = build_road(str(write(tmp_path, ".xml", commonroad(extra=polygon))))
+    (obstacle,) = road.obstacles
+    assert obstacle.outline.min(axis=0) == pytest.approx([-31.0, -3.5])
+    assert obstacle.outline.max(axis=0) == pytest.approx([-29.0, -1.5])
+    line = polygon.replace("<y>1.5</y>", "<y>-0.5</y>")
+    road = build_road(str(write(tmp_path, ".xml", commonroad(extra=line))))
+    assert any("its polygon has no area" in str(note) for note in road.lanes.notes)
+
+
 def test_a_spiral_of_a_centimetre_and_a_missing_header_do_not_matter(tmp_path) -> None:
     text = opendrive()
     begin, end = text.index("<header"), text.index("<road")
