@@ -242,3 +242,13 @@ def test_who_walks_slowly_does_not_wait():
     assert [wait.end - wait.start for wait in find_waits(encounter(speed))] == pytest.approx(
         [10.0, 10.0]
     )
+
+
+@pytest.mark.parametrize(("dt", "late"), [(0.1, 0.2), (0.05, 0.2), (0.02, 0.18)])
+def test_a_wait_is_that_of_the_mean_speed_over_half_a_second(dt, late):
+    """From 4 m/s at once to a stand from 2 s to 6 s: the mean falls below 0.5 m/s when an eighth moves."""
+    time = np.arange(round(10.0 / dt) + 1) * dt
+    speed = np.where((time > 2.0 - 1e-9) & (time < 6.0 + 1e-9), 0.0, 4.0)[None]
+    flat = np.zeros_like(speed)
+    (wait,) = find_waits(Motion.sampled(CARS[:1], dt, np.zeros((1, len(time), 2)), flat, speed))
+    assert (wait.start, wait.end) == pytest.approx((2.0 + late, 6.0 - late), abs=1e-6)

@@ -221,10 +221,12 @@ def test_clocks_are_monotone_and_shared_and_end_on_the_grid():
     assert np.abs(rate[:, [0, -1]] - 1.0).max() < 1e-6  # speeds are given at both ends
 
 
-def test_lateral_deviation_leaves_room_on_a_narrow_road():
+@pytest.mark.parametrize("rows", [(57, 63), (47, 63), (57, 73)])
+def test_lateral_deviation_leaves_room_on_a_narrow_road(rows):
+    """1.5 m to the nearer side of y = 0, whichever that is."""
     plan = scene_plan()
     lane = np.zeros(plan.road.drivable.shape, dtype=bool)
-    lane[57:63] = True  # 1.5 m to either side of y = 0
+    lane[slice(*rows)] = True
     narrow = replace(plan, road=Road("lane", lane, 0.5, plan.road.origin, [], []))
     built = build_model(narrow, SamplingConfig(drivers=0.0))
     eps = np.random.default_rng(0).standard_normal((500, built.model.size))

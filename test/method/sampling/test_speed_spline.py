@@ -3,6 +3,8 @@
 
 """The speed on the template's clock: basis, mean, and what is drawn about it."""
 
+from types import SimpleNamespace
+
 from hypothesis import given, settings
 from hypothesis import strategies as st
 import numpy as np
@@ -264,3 +266,11 @@ def test_short_waits_are_lengthened_about_their_middle(seconds):
     assert end - start == pytest.approx(max(seconds, MIN_WAIT_S))
     assert start + end == pytest.approx(12.0 + seconds)
     assert lengthened_waits(1, waits, creeping=True) == [(12.0, 15.0)]
+
+
+def test_who_stands_at_an_end_has_no_speed_there():
+    """Whatever speed is given for that end."""
+    stands = SimpleNamespace(still=np.array([True, True, False, False]), size=4)
+    given, value = fixed_coefficients(stands, (0.3, 5.0))
+    assert given.tolist() == [True, True, False, True]
+    assert value.tolist() == [0.0, 0.0, 0.0, 5.0]
