@@ -8,7 +8,7 @@ import pytest
 
 from scenario_gen.base.errors import RefusedError
 from scenario_gen.pipeline import generate, PipelineConfig
-from scenario_gen.situation.size import refuse_too_large
+from scenario_gen.situation.size import refuse_reversing, refuse_too_large
 from scenario_gen.types import Encounter, Vehicle
 
 
@@ -64,3 +64,21 @@ def test_too_many_samples_are_refused_however_short_their_period():
     ):
         refuse_too_large(driving(samples=100_000, period_ns=1_000_000))
     refuse_too_large(driving(samples=20_000, period_ns=50_000_000))
+
+
+@pytest.mark.parametrize("frame", [0.0, 2.2, -1.6])
+@pytest.mark.parametrize("metres", [1.9, 2.1])
+def test_who_drives_backwards_for_two_metres_is_refused(frame, metres):
+    """Whatever its direction; and when it began is said."""
+    along = np.interp(np.arange(100) * 0.1, [0.0, 4.0, 7.0, 9.9], [0.0, 20.0, 20.0 - metres, 30.0])
+    ahead = np.array([np.cos(frame), np.sin(frame)])
+    position = along[None, :, None] * ahead
+    flat = np.zeros((2, 100))
+    both = np.concatenate([position, position + 9.0])
+    vehicles = (Vehicle("a"), Vehicle("b"))
+    made = Encounter.sampled(vehicles, 0.1, both, flat + frame, flat + 5.0, "tracks")
+    if metres < 2.0:
+        refuse_reversing(made)
+        return
+    with pytest.raises(RefusedError, match=f"drives backwards for {metres} m, from 4.0 s on"):
+        refuse_reversing(made)

@@ -112,6 +112,9 @@ def test_gaps_survive_when_a_winding_road_is_laid_out_straight():
     frenet = to_frenet(clean_tracks(encounter))
     assert np.abs(frenet.station[0] - frenet.station[1] - 60.0).max() < 0.1
     assert frenet.direction.tolist() == [1, 1] and frenet.lanes == 1
+    low, high = frenet.span(clean_tracks(encounter))
+    assert low == pytest.approx(frenet.station[1, 0] - 2.4)  # half a car
+    assert high == pytest.approx(frenet.station[0, -1] + 2.4)
 
 
 def test_lanes_and_changes_of_lane_are_told_from_offsets():
