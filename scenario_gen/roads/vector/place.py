@@ -137,6 +137,22 @@ class _Search(PlacingTask):
                 if each.depends_on_scale:
                     self.unscaled.append(each.hypothesis)
 
+    def good_at_scales(
+        self, batch: Sequence[Hypothesis], scales: Sequence[float]
+    ) -> Iterator[Candidate]:
+        """Yield the good candidates near some hypotheses with the first scale that has any."""
+        unscaled: list[Hypothesis] = []
+        for scale in scales:
+            tried = batch if scale == 1.0 else self.scaled(unscaled, scale)
+            is_good = False
+            for each in self.good_ones(tried):
+                is_good = True
+                yield each
+            if is_good:
+                return
+            if scale == 1.0:
+                unscaled = list(dict.fromkeys(self.unscaled))
+
     def scaled(self, batch: Sequence[Hypothesis], scale: float) -> list[Hypothesis]:
         """Return the first hypotheses with a further scale, as far as it is accepted."""
         scaled = [replace(each, scale=each.scale * scale) for each in batch[:_SCALED_COUNT]]
@@ -176,18 +192,9 @@ def find_places(
         to_frenet(search.drivers)
     has_place = False
     for batch, scales in search.batches(lanes):
-        is_good = False
-        for each in search.good_ones(batch):
-            is_good = True
+        for each in search.good_at_scales(batch, scales):
+            has_place = True
             yield each
-        unscaled = list(dict.fromkeys(search.unscaled))
-        for scale in scales[1:]:
-            if is_good:
-                break
-            for each in search.good_ones(search.scaled(unscaled, scale)):
-                is_good = True
-                yield each
-        has_place |= is_good
         if sum(not each.surely_lost for each in search.losing) >= _JUDGED_COUNT:
             break
     losing = search.best_losing()

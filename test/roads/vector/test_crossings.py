@@ -64,9 +64,9 @@ def test_a_left_turn_crosses_the_oncoming_lane(tmp_path, suffix, median, start):
 @pytest.mark.parametrize(
     "name", ["simple_4way_intersection", "fabriksgatan", "multi_intersections"]
 )
-def test_a_recorded_left_turn_crosses_the_oncoming_lane(recorded, name):
+def test_a_recorded_left_turn_crosses_the_oncoming_lane(data, name):
     """Of a wide crossroads: as one piece it resembles right turns of a narrow one more."""
-    log = next((recorded / "trajectories" / "ngsim_commonroad").glob("encounter_b_left_turn*.csv"))
+    log = next((data / "trajectories" / "ngsim_commonroad").glob("encounter_b_left_turn*.csv"))
     tracks = clean_tracks(read_log(log).encounters[0])
-    graph = lane_graph(read_network(recorded / "maps" / "opendrive" / f"{name}.xodr"))
+    graph = lane_graph(read_network(data / "maps" / "opendrive" / f"{name}.xodr"))
     assert meet(next(find_places(graph, tracks)).separation.tracks)
