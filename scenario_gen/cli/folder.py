@@ -162,14 +162,18 @@ def _with_recording(case: GenerationResult, sources: dict[str, Source]) -> Gener
 
 
 def _blind_rates(cases: Sequence[GenerationResult], requested: FolderRequest) -> list[str]:
-    """Return a sentence on each set with an ego slot: how the best blind planner does in it."""
+    """Return a sentence on each encounter and road with an ego slot: the best speed law."""
     if not requested.request.ego:
         return []
     from scenario_gen.closed_loop.blind import blind_sentence
     from scenario_gen.closed_loop.config import ClosedLoopConfig
 
     config = ClosedLoopConfig(limits=requested.config.limits)
-    return [sentence for case in cases if (sentence := blind_sentence(case, config))]
+    groups: dict[tuple[str, str], list[GenerationResult]] = {}
+    for case in cases:
+        place = case.road.name if case.road else ""
+        groups.setdefault((case.encounter.recording, place), []).append(case)
+    return [text for group in groups.values() if (text := blind_sentence(group, config))]
 
 
 def sources_of(readings: Sequence[tuple[LogResult, Sequence[str]]]) -> dict[str, Source]:

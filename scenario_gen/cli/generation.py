@@ -99,8 +99,8 @@ class Generate:
         bool,
         typer.Option(
             "--for-testing",
-            help="Search for scenarios in which the --ego has to react: planners that ignore the "
-            "others fail in 90 % of the set, and a simple reactive planner passes.",
+            help="Search for scenarios in which the --ego has to react: speed laws that ignore "
+            "the others fail in 90 % of the set, and a simple reactive planner passes.",
         ),
     ] = False
     budget: Annotated[
@@ -111,7 +111,7 @@ class Generate:
             help="Computing time (s) of the search of --for-testing, per encounter and road; what "
             "was found until then is kept.",
         ),
-    ] = 60.0
+    ] = 180.0
     order: Annotated[
         str,
         typer.Option(

@@ -1,18 +1,17 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Blind planners: they follow the route at speeds that do not depend on the other vehicles.
+"""Open-loop planners: they follow the route by speed laws that do not depend on the others.
 
-A set of scenarios tests a planner only if every blind planner fails in most of them. The family
-has constant speeds, which are reached softly or at once, and the non-reactive baseline. A second
-family is timed: it stands before it drives at a constant speed, or has the speeds of the reference
-drive, earlier or later. Members stay exactly on the route, so one compiled loop drives all of
-them; the others react to them as to any ego. A drive ends at the first contact, at the goal, or
-when its time is over.
+A set of scenarios tests a planner only if every speed law fails in most of them. The family has
+waits before constant speeds, stops on the way, and the speeds of the reference drive, earlier or
+later. Where the others drive as certified, a law passes if it is never where one of them is, and
+reaches the goal in time. So all laws are compared; those that pass most often are driven.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
+from itertools import product
 import math
 from typing import Any, NamedTuple
 
@@ -20,171 +19,214 @@ import numpy as np
 
 from scenario_gen.closed_loop.config import ClosedLoopConfig
 from scenario_gen.closed_loop.coordination_space import pose_at, WORLD, World
-from scenario_gen.closed_loop.driver import CLOCK, DRIVER_PARAMETERS, DriverParameters, RATE
-from scenario_gen.closed_loop.simulation import ClosedLoop
-from scenario_gen.closed_loop.step import advance, ego_hits
-from scenario_gen.method.evaluation import (
-    MAX_ACCELERATION_MPS2,
-    MAX_BRAKING_MPS2,
-    STANDSTILL_MPS,
-    wanted_speeds,
-)
+from scenario_gen.closed_loop.ego import Command
+from scenario_gen.closed_loop.planners import RouteFollower
+from scenario_gen.closed_loop.simulation import ClosedLoop, Observation
+from scenario_gen.closed_loop.verdict import judge
 from scenario_gen.numerics import Bools, Floats, Ints
+from scenario_gen.numerics.boxes import boxes_meet, fill_box
 from scenario_gen.numerics.curve import Curve
-from scenario_gen.numerics.kernels import F, F2, I, kernel, named, OUTB1
-from scenario_gen.numerics.loops import copy_rows, copy_to
+from scenario_gen.numerics.kernels import B1, F, F2, kernel, OUTB2
 from scenario_gen.numerics.plane import edge_lengths
 from scenario_gen.types import GenerationResult, join_ego
 
-MIN_SPEED_MPS = 3.0  # a slower planner stands in the way, or misses the goal
-TOP_SPEED_MPS = 15.0  # of the family where no reference drive is faster
-SPEEDS_COUNT = 13  # constant speeds of the family
+WAITS_S = tuple(0.5 * k for k in range(61))
+SPEEDS_MPS = (2.0, 3.0, 4.0, 6.0, 8.0, 10.0, 12.0, 14.0)
 GAINS_PER_S = (1.0, 10.0)  # soft as `ConstantSpeed`, and as fast as the body can
-STANDS_S = (1.0, 2.0, 3.0, 4.0, 6.0, 8.0)  # before constant speeds
-SPEEDS_AFTER_STAND_COUNT = 4
-SHIFTS_S = (-4.0, -2.0, -1.0, 1.0, 2.0, 4.0)  # of the speeds of the reference drive
-STATION_STEP_M = 0.5  # between two points of a course
-TRIVIAL_SHARE = 0.9  # a set of which a blind planner passes more hardly tests
-BLIND_COUNT = 50  # scenarios of a set in which blind planners drive
+STOPS_S = (2.0, 4.0, 6.0)  # on the way
+STOPS_AFTER_S = (3.0, 4.0, 5.0, 6.0)
+SHIFTS_S = (-4.0, -3.0, -2.5, -2.0, 2.0, 2.5, 3.0, 4.0)  # of the speeds of the reference drive
+INSISTING_S = 1.0  # for which a vehicle that insists on its turn needs its way
+STATION_STEP_M = 0.5  # between two points of a route
+TRIVIAL_SHARE = 0.9  # a set of which a speed law passes more hardly tests
+BLIND_COUNT = 50  # scenarios of a set in which speed laws drive
+DRIVEN_COUNT = 3  # speed laws that are driven
 GOAL_MARGIN_M = 0.2  # before the end of the route, as in `ClosedLoop.reached`
 
 
-class BlindPlanner(NamedTuple):
+class SpeedLaw(NamedTuple):
     """A member of the family.
 
     Attributes:
-        speed: constant speed [m/s]; NaN for the non-reactive baseline.
+        wait: duration [s] for which it stands first; it brakes as hard as it can.
+        speed: speed after it [m/s].
         gain: acceleration per speed error [1/s].
-        stand: duration [s] for which it stands first; it brakes as hard as it can.
-        shift: time [s] by which it is later than the reference drive, whose speeds it has; NaN
-            for the other members.
+        after: duration [s] after the wait until it stands again.
+        stop: for which it stands then [s].
+        shift: time [s] by which it is later than the reference drive, whose speeds it has; NaN for
+            the other members.
     """
 
+    wait: float
     speed: float
     gain: float = GAINS_PER_S[0]
-    stand: float = 0.0
+    after: float = math.inf
+    stop: float = 0.0
     shift: float = math.nan
 
     def __str__(self) -> str:
         if not math.isnan(self.shift):
             side = "later" if self.shift > 0.0 else "earlier"
             return f"the reference drive's speeds {abs(self.shift):g} s {side}"
-        if math.isnan(self.speed):
-            return "the non-reactive baseline"
-        if self.stand:
-            return f"standing for {self.stand:g} s, then {self.speed:g} m/s"
-        return f"a constant {self.speed:g} m/s"
+        stop = f", a stop of {self.stop:g} s after {self.after:g} s" if self.stop else ""
+        wait = f"standing for {self.wait:g} s, then " if self.wait else "a constant "
+        return f"{wait}{self.speed:g} m/s{stop}"
 
 
-def _speeds(top_speed: float, count: int) -> list[float]:
-    """Return some speeds [m/s] for reference drives with a highest speed [m/s]."""
-    top = max(math.ceil(top_speed), TOP_SPEED_MPS)
-    speeds: list[float] = np.round(np.geomspace(MIN_SPEED_MPS, top, count), 1).tolist()
-    return speeds
+FAMILY: tuple[SpeedLaw, ...] = (
+    *(SpeedLaw(*values) for values in product(WAITS_S, SPEEDS_MPS, GAINS_PER_S)),
+    *(
+        SpeedLaw(*values)
+        for values in product(WAITS_S[::2], (4.0, 8.0), GAINS_PER_S[:1], STOPS_AFTER_S, STOPS_S)
+    ),
+    *(SpeedLaw(0.0, 0.0, shift=shift) for shift in SHIFTS_S),
+)
 
 
-def blind_family(top_speed: float) -> tuple[BlindPlanner, ...]:
-    """Return the family for reference drives with a highest speed [m/s]; the baseline is first."""
-    speeds = _speeds(top_speed, SPEEDS_COUNT)
-    constant = [BlindPlanner(speed, gain) for gain in GAINS_PER_S for speed in speeds]
-    return BlindPlanner(math.nan), *constant
-
-
-def timed_family(top_speed: float) -> tuple[BlindPlanner, ...]:
-    """Return the timed family for reference drives with a highest speed [m/s]."""
-    speeds = _speeds(top_speed, SPEEDS_AFTER_STAND_COUNT)
-    standing = [BlindPlanner(speed, stand=stand) for stand in STANDS_S for speed in speeds]
-    return *standing, *(BlindPlanner(math.nan, shift=shift) for shift in SHIFTS_S)
-
-
-class Course(NamedTuple):
-    """The route of blind planners from a clock on, with its points STATION_STEP_M apart.
+@dataclass(frozen=True, eq=False)
+class Course:
+    """What a speed law needs of a scenario.
 
     Attributes:
-        begin: certified time [s] at which they begin.
-        speed: their first speed [m/s].
-        acceleration: the body's largest acceleration [m/s²].
-        deceleration: its largest deceleration [m/s²].
+        points: (P, 3) x, y [m], yaw [rad] of the route, STATION_STEP_M apart.
         length: way to the goal [m].
-        steps: largest number of steps.
-        points: (P, 5) x, y [m], yaw [rad], curvature [1/m], and speed of the baseline [m/s].
+        reference: (T + 1,) speeds of the reference drive at the steps [m/s].
+        loop: the scenario.
     """
 
-    begin: float
-    speed: float
-    acceleration: float
-    deceleration: float
-    length: float
-    steps: int
     points: Floats
+    length: float
+    reference: Floats
+    loop: ClosedLoop
+
+    @classmethod
+    def of(cls, loop: ClosedLoop) -> "Course | None":
+        """Return the course of a scenario; None if the reference drive hardly moves."""
+        witness = loop.world.motion[loop.ego, int(loop.scenario.present[loop.ego, 0]) :]
+        way = edge_lengths(witness[:, :2])
+        if way.sum() < 1.0:
+            return None
+        route = Curve.through(witness[np.concatenate([[True], way > 1e-3]), :2])
+        stations = np.arange(0.0, route.length + STATION_STEP_M, STATION_STEP_M)
+        times = loop.begin + loop.config.step * np.arange(loop.last_step + 1)
+        end = loop.begin + loop.duration
+        reference = np.interp(
+            np.minimum(times, end), loop.scenario.time, loop.scenario.speed[loop.ego]
+        )
+        return cls(route.at(stations), route.length - GOAL_MARGIN_M, reference, loop)
+
+    def speeds(self, laws: Sequence[SpeedLaw]) -> Floats:
+        """Return the speeds (M, T + 1) [m/s] of laws at the steps."""
+        step, limits = self.loop.config.step, self.loop.limits
+        wait, speed, gain, after, stop, shift = np.array(laws).T
+        count = len(self.reference)
+        speeds = np.empty((len(laws), count))
+        speeds[:, 0] = self.reference[0]
+        is_shifted = ~np.isnan(shift)
+        for k in range(1, count):
+            time = (k - 1) * step + 1e-9
+            left = time - wait
+            stands = (left < 0.0) | ((left >= after) & (left < after + stop))
+            wanted = np.where(stands, -np.inf, gain * (speed - speeds[:, k - 1]))
+            source = np.clip(k * step - shift[is_shifted], 0.0, (count - 1) * step) / step
+            target = np.interp(source, np.arange(count), self.reference)
+            wanted[is_shifted] = (target - speeds[is_shifted, k - 1]) / step
+            gained = step * np.clip(wanted, -limits.max_deceleration, limits.max_acceleration)
+            speeds[:, k] = np.maximum(speeds[:, k - 1] + gained, 0.0)
+        return speeds
+
+    def passes(self, laws: Sequence[SpeedLaw]) -> Bools:
+        """Return (M,) whether laws pass where the others drive as certified."""
+        speeds = self.speeds(laws)
+        ways = 0.5 * self.loop.config.step * (speeds[:, 1:] + speeds[:, :-1])
+        stations = np.concatenate([np.zeros((len(laws), 1)), ways.cumsum(axis=1)], axis=1)
+        occupied = np.zeros((stations.shape[1], len(self.points)), dtype=np.bool_)
+        world, begin, no_one = self.loop.world, self.loop.begin, np.zeros_like(self.loop.insists)
+        fill_occupied(world, begin, 0.0, no_one, self.points, occupied)
+        for ahead in (0.5 * INSISTING_S, INSISTING_S):
+            fill_occupied(world, begin, ahead, ~self.loop.insists, self.points, occupied)
+        rows = np.minimum(
+            (stations / STATION_STEP_M).round().astype(np.int64), len(self.points) - 1
+        )
+        hits = occupied[np.arange(stations.shape[1]), rows]
+        arrived = stations >= self.length
+        goal = np.where(arrived.any(axis=1), arrived.argmax(axis=1), stations.shape[1])
+        before = np.arange(stations.shape[1]) < goal[:, None]
+        return np.asarray(arrived.any(axis=1) & ~(hits & before).any(axis=1))
 
 
-COURSE = named(Course, F, F, F, F, F, I, F2)
+@kernel(WORLD, F, F, B1, F2, OUTB2)
+def fill_occupied(
+    world: World, begin: float, ahead: float, ignored: Bools, points: Floats, out: Bools
+) -> None:
+    """Mark where another vehicle is where the ego would be, as certified.
+
+    Args:
+        world: the scenario.
+        begin: certified time [s] of the first step.
+        ahead: time [s] by which the others are ahead.
+        ignored: (N,) vehicles that do not count.
+        points: (P, 3) poses of the ego.
+        out: (T, P) for each step and pose.
+    """
+    pose = np.empty(5)
+    box = np.empty(7)
+    own = np.empty(7)
+    half = world.half[world.ego]
+    for pair in range(out.shape[0] * len(world.motion)):
+        step = pair // len(world.motion)
+        i = pair % len(world.motion)
+        clock = begin + step * world.step
+        has_left = world.leaves[i] and clock > world.spans[i, 1]
+        if i == world.ego or ignored[i] or clock < world.spans[i, 0] or has_left:
+            continue
+        pose_at(world.time, world.motion[i], clock + ahead, pose)
+        fill_box(pose[0], pose[1], pose[2], world.half[i, 0], world.half[i, 1], box)
+        for p in range(len(points)):
+            fill_box(points[p, 0], points[p, 1], points[p, 2], half[0], half[1], own)
+            out[step, p] = out[step, p] or boxes_meet(own, box)
 
 
-def course_of(loop: ClosedLoop, begin: float) -> Course | None:
-    """Return the course from a clock [s] of the reference drive on; None if it hardly moves."""
-    world, limits = loop.world, loop.limits
-    witness = world.motion[loop.ego, int(np.searchsorted(world.time, begin - 1e-9)) :]
-    way = edge_lengths(witness[:, :2])
-    if way.sum() < 1.0:
-        return None
-    route = Curve.through(witness[np.concatenate([[True], way > 1e-3]), :2])
-    stations = np.arange(0.0, route.length + STATION_STEP_M, STATION_STEP_M)
-    poses = route.at(stations)
-    stops = bool(witness[-1, 3] < STANDSTILL_MPS)
-    wanted = wanted_speeds(route, stations, float(witness[:, 3].max()), stops=stops)
-    curvature = np.gradient(poses[:, 2], STATION_STEP_M)
-    return Course(
-        begin,
-        float(witness[0, 3]),
-        limits.max_acceleration,
-        limits.max_deceleration,
-        route.length - GOAL_MARGIN_M,
-        loop.steps_from(begin),
-        np.column_stack([poses, curvature, wanted]),
-    )
+class LawFollower(RouteFollower):
+    """Follows its route by a speed law."""
+
+    def __init__(self, speeds: Floats) -> None:
+        """Take the speeds (T + 1,) [m/s] of the law at the steps."""
+        self.speeds = speeds
+
+    def act(self, observation: Observation) -> Command:
+        """Return the command that reaches the speed of the next step."""
+        ego = observation.ego
+        k = min(round(observation.time / self.task.step) + 1, len(self.speeds) - 1)
+        gained = float(self.speeds[k]) - ego.speed
+        return Command(gained / self.task.step, self.steer(ego)[0])
 
 
-def blind_passes(
-    loop: ClosedLoop, family: Sequence[BlindPlanner], begin: float | None = None
-) -> Bools:
-    """Return (M,) whether each member of a family passes a scenario, from a clock [s] on."""
-    out = np.ones(len(family), dtype=np.bool_)
-    course = course_of(loop, loop.begin if begin is None else begin)
-    if course is not None:
-        drive_blindly(loop.world, loop.parameters, course, np.array(family), out)
-    return out
+def drive_passes(loop: ClosedLoop, law: SpeedLaw) -> bool:
+    """Return whether a speed law passes a scenario; the others react."""
+    course = Course.of(loop)
+    if course is None:
+        return True
+    return judge(loop, loop.drive(LawFollower(course.speeds([law])[0]))).passed
 
 
 @dataclass(frozen=True)
 class BlindRate:
-    """How the best blind planner does in a set.
+    """How the best speed law does in a set.
 
     Attributes:
-        planner: the best one.
+        law: the best of those that are driven.
         passed: number of scenarios that it passes.
         driven: number of scenarios.
-        planners: number of blind planners.
-        timed: how the best of the timed family does; None if it is not known.
     """
 
-    planner: BlindPlanner
+    law: SpeedLaw
     passed: int
     driven: int
-    planners: int
-    timed: "BlindRate | None" = None
-
-    @classmethod
-    def of(cls, family: Sequence[BlindPlanner], passed: Ints, driven: int) -> "BlindRate":
-        """Return the rate of the best member of a family that passes some scenarios (M,)."""
-        best = int(passed.argmax())
-        return cls(family[best], int(passed[best]), driven, len(family))
 
     def document(self) -> dict[str, Any]:
         """Return it as JSON's types."""
-        document = {"planner": str(self.planner), "passed": self.passed, "driven": self.driven}
-        return document if self.timed is None else document | {"timed": self.timed.document()}
+        return {"planner": str(self.law), "passed": self.passed, "driven": self.driven}
 
     @property
     def is_trivial(self) -> bool:
@@ -193,127 +235,49 @@ class BlindRate:
 
     def __str__(self) -> str:
         prefix = "these scenarios hardly test a planner: " if self.is_trivial else ""
-        rate = f"{self.planner}, passes {self.passed} of {self.driven}"
-        timed = ""
-        if self.timed is not None:
-            untested = " (waiting is not tested)" if self.timed.is_trivial else ""
-            of_timed = f"{self.timed.planner}, passes {self.timed.passed}"
-            timed = (
-                f"; of {self.timed.planners} that stand first or are shifted, {of_timed}{untested}"
-            )
-        return f"{prefix}the best of {self.planners} blind planners, {rate}{timed}"
+        rate = f"{self.law}, passes {self.passed} of {self.driven}"
+        return f"{prefix}the best of {len(FAMILY)} open-loop speed laws, {rate}"
 
 
 def blind_rate(loops: Sequence[ClosedLoop]) -> BlindRate | None:
-    """Return how the best blind planner does in some scenarios; None without any."""
+    """Return how the best speed law does in some scenarios; None without any."""
     if not loops:
         return None
-    top_speed = max(loop.task().speed for loop in loops)
-    rate, timed = (
-        BlindRate.of(
-            family, np.sum([blind_passes(loop, family) for loop in loops], axis=0), len(loops)
-        )
-        for family in (blind_family(top_speed), timed_family(top_speed))
-    )
-    return replace(rate, timed=timed)
+    passes: Ints = np.sum([law_passes(loop) for loop in loops], axis=0)
+    best = [FAMILY[row] for row in np.argsort(-passes, kind="stable")[:DRIVEN_COUNT]]
+    rates = [
+        BlindRate(law, sum(drive_passes(loop, law) for loop in loops), len(loops)) for law in best
+    ]
+    return max(rates, key=lambda rate: rate.passed)
 
 
-@kernel(inline=True)
-def _blind_speed(
-    world: World, planner: Floats, course: Course, station: float, speed: float, begin: float
-) -> float:
-    """Return the speed [m/s] of a blind planner (4,) after a step that begins at a time [s].
+def law_passes(loop: ClosedLoop) -> Bools:
+    """Return (M,) whether each law of the family passes where the others drive as certified."""
+    course = Course.of(loop)
+    return np.ones(len(FAMILY), dtype=np.bool_) if course is None else course.passes(FAMILY)
 
-    The fields of the planner are those of `BlindPlanner`.
+
+def blind_sentence(
+    cases: Sequence[GenerationResult], config: ClosedLoopConfig = ClosedLoopConfig()
+) -> str:
+    """Return in words how the best speed law does in sets from one recorded encounter.
+
+    It drives in the first BLIND_COUNT scenarios with an ego slot; "" if there is none.
     """
-    h = world.step
-    if not np.isnan(planner[3]):
-        pose = np.empty(5)
-        clock = course.begin + begin + h - planner[3]
-        pose_at(world.time, world.motion[world.ego], max(clock, course.begin), pose)
-        wanted = (pose[3] - speed) / h
-    elif begin < planner[2]:
-        wanted = -course.deceleration
-    elif np.isnan(planner[0]):
-        row = min(int(station / STATION_STEP_M), len(course.points) - 1)
-        excess = speed / max(course.points[row, 4], 0.1)
-        wanted = max(MAX_ACCELERATION_MPS2 * (1.0 - excess * excess), -MAX_BRAKING_MPS2)
-    else:
-        wanted = planner[1] * (planner[0] - speed)
-    return float(max(speed + h * min(max(wanted, -course.deceleration), course.acceleration), 0.0))
-
-
-@kernel(inline=True)
-def _fill_ego(course: Course, station: float, speed: float, gained: float, out: Floats) -> None:
-    """Write the `EgoState` (6,) on a course at a station [m]."""
-    last = len(course.points) - 1
-    row = min(int(station / STATION_STEP_M), last - 1)
-    share = station / STATION_STEP_M - row
-    for k in range(3):
-        out[k] = course.points[row, k]
-        out[k] += share * (course.points[row + 1, k] - course.points[row, k])
-    out[3] = speed
-    out[4] = course.points[row, 3]
-    out[5] = gained
-
-
-@kernel(WORLD, DRIVER_PARAMETERS, COURSE, F2, OUTB1)
-def drive_blindly(
-    world: World, parameters: DriverParameters, course: Course, family: Floats, out: Bools
-) -> None:
-    """Write whether each member (M, 4) of a family passes (M,)."""
-    n = len(world.motion)
-    oldest = 1
-    for i in range(n):
-        oldest = max(oldest, parameters.delay[i] + 1)
-    before = np.empty((n, 4))
-    after = np.empty((n, 5))
-    vehicles = np.empty((n, 5))
-    poses = np.empty((n, 4))
-    seen = np.empty((oldest, 9))
-    for m in range(len(family)):
-        out[m] = False
-        before[:] = 0.0
-        before[:, CLOCK] = course.begin
-        before[:, RATE] = 1.0
-        for i in range(n):
-            has_left = world.leaves[i] and course.begin >= world.spans[i, 1]
-            vehicles[i, 4] = course.begin >= world.spans[i, 0] and not has_left
-        passes = np.zeros((n, n), dtype=np.bool_)
-        station = 0.0
-        speed = course.speed
-        _fill_ego(course, station, speed, 0.0, seen[0])
-        seen[0, 6] = course.begin
-        seen[0, 7:] = 1.0
-        for step in range(1, course.steps + 1):
-            begin = (step - 1) * world.step
-            end_speed = _blind_speed(world, family[m], course, station, speed, begin)
-            station += 0.5 * (speed + end_speed) * world.step
-            known = min(step + 1, oldest)
-            for row in range(known - 1, 0, -1):
-                copy_to(seen[row], seen[row - 1])
-            _fill_ego(course, station, end_speed, (end_speed - speed) / world.step, seen[0])
-            speed = end_speed
-            now = course.begin + step * world.step
-            advance(world, parameters, now, before, seen[:known], passes, after, vehicles)
-            copy_rows(before, after)
-            copy_rows(poses, vehicles)
-            if ego_hits(poses, world.half, vehicles[:, 4] > 0.0, world.ego):
-                break
-            if station >= course.length:
-                out[m] = True
-                break
-
-
-def blind_sentence(case: GenerationResult, config: ClosedLoopConfig = ClosedLoopConfig()) -> str:
-    """Return in words how the best blind planner does in a set; "" without an ego slot.
-
-    It drives in the first BLIND_COUNT scenarios at most.
-    """
-    drawn = case.generated
-    if drawn.ego is None or not drawn.scenarios:
+    slots = [
+        (case, scenario)
+        for case in cases
+        for scenario in case.generated.scenarios
+        if case.generated.ego is not None
+    ]
+    loops = [
+        ClosedLoop(join_ego(scenario), case.generated.ego.vehicle.id, case.road, config)
+        for case, scenario in slots[:BLIND_COUNT]
+        if case.generated.ego is not None
+    ]
+    rate = blind_rate(loops)
+    if rate is None:
         return ""
-    ego = drawn.ego.vehicle.id
-    scenarios = map(join_ego, drawn.scenarios[:BLIND_COUNT])
-    rate = blind_rate([ClosedLoop(scenario, ego, case.road, config) for scenario in scenarios])
-    return f"{case.title}, ego {ego}: {rate}"
+    first = slots[0][0]
+    place = f" on {first.road.name}" if first.road else ""
+    return f"{first.encounter.recording}{place}, ego {loops[0].task().vehicle.id}: {rate}"

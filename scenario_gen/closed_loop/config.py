@@ -133,7 +133,7 @@ class ClosedLoopConfig(Parameters):
         high=20.0,
     )
     overtime: float = parameter(
-        1.5,
+        1.0,
         "longest drive: this multiple of the scenario's duration, plus 5 s",
         low=1.0,
         high=10.0,

@@ -12,9 +12,9 @@ from typing import NamedTuple
 import numpy as np
 
 from scenario_gen.closed_loop.coordination_space import pose_at, World
-from scenario_gen.numerics import Floats, Ints
+from scenario_gen.numerics import Bools, Floats, Ints
 from scenario_gen.numerics.boxes import boxes_meet, fill_box
-from scenario_gen.numerics.kernels import B, F, F1, I1, kernel, named
+from scenario_gen.numerics.kernels import B, B1, F, F1, I1, kernel, named
 
 GAP_BISECTION_STEPS = 4  # within a cell of the clock, so that the gap does not jump
 
@@ -103,8 +103,8 @@ class DriverParameters(NamedTuple):
         jerk: largest jerk [m/s³].
         patience: (N,) waiting times [s] before a driver goes ahead of a vehicle that stands.
         margin: (N,) least time [s] between a driver that goes ahead of the ego, and the ego.
-        foresight: prediction horizon [s].
-        yields: whether drivers wait for the ego where the template did.
+        foresight: (N,) prediction horizons [s].
+        yields: (N,) whether drivers wait for the ego where the template did.
         reacts: whether drivers react at all.
         delay: (N,) reaction times in steps.
     """
@@ -117,13 +117,13 @@ class DriverParameters(NamedTuple):
     jerk: float
     patience: Floats
     margin: Floats
-    foresight: float
-    yields: bool
+    foresight: Floats
+    yields: Bools
     reacts: bool
     delay: Ints
 
 
-DRIVER_PARAMETERS = named(DriverParameters, F1, F, F1, F1, F1, F, F1, F1, F, B, B, I1)
+DRIVER_PARAMETERS = named(DriverParameters, F1, F, F1, F1, F1, F, F1, F1, F1, B1, B, I1)
 
 
 @kernel(inline=True, forced=True)

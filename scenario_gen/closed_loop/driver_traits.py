@@ -3,14 +3,15 @@
 
 """What distinguishes the drivers: fitted to the certified motion of each, or else drawn."""
 
+from collections.abc import Mapping
 from typing import NamedTuple
 from zlib import crc32
 
 import numpy as np
 
 from scenario_gen.closed_loop.config import ClosedLoopConfig
-from scenario_gen.numerics import Floats
-from scenario_gen.situation import lane_gaps
+from scenario_gen.numerics import Bools, Floats
+from scenario_gen.situation import Conflict, lane_gaps
 from scenario_gen.situation.gaps import MIN_HEADWAY_SPEED_MPS
 from scenario_gen.types import Scenario
 
@@ -19,6 +20,7 @@ HEADWAY_SPREAD_RATIO = 0.3  # standard deviation of the logarithm of the time ga
 PATIENCE_SPREAD_RATIO = 0.38  # of that of the patience
 LAG_LOGISTIC_PER_S = 0.8  # P(goes first at a lag of x) = logistic(0.8 x) at recorded conflicts
 LEAST_TRAIT_RATIO = 0.7  # of the parameter, that a calm recording shows of a driver
+SAME_WAY_RATIO = 0.7  # least cosine of the angle between the headings of one stream
 MIN_MARGIN_S = 1.0  # post-encroachment time that a driver who goes first leaves at least
 
 
@@ -69,6 +71,33 @@ def driver_traits(scenario: Scenario, config: ClosedLoopConfig) -> DriverTraits:
         acceleration, braking = np.clip(usual, LEAST_TRAIT_RATIO * most, most)
         rows.append((recorded.get(n, headway), acceleration, braking, patience, margin))
     return DriverTraits(*np.array(rows).T)
+
+
+def insisting(scenario: Scenario, ego: int, conflicts: Mapping[int, Conflict]) -> Bools:
+    """Return (N,) which vehicles insist on their turn: those of a stream that the ego crosses.
+
+    The ego waits for one of them, and another one comes behind it in the same direction: who gives
+    way to the one gives way to the other.
+
+    Args:
+        scenario: certified.
+        ego: index of the witness of the ego.
+        conflicts: those of the witness, by the index of the other vehicle.
+    """
+    insists = np.zeros(len(scenario.vehicles), dtype=np.bool_)
+    yaws: dict[bool, dict[int, float]] = {True: {}, False: {}}  # by whether it goes first
+    begin = scenario.time[scenario.present[ego, 0]]
+    for other, conflict in conflicts.items():
+        goes_first = conflict.first == other
+        entries = conflict.entry_first, conflict.entry_second
+        entry, ego_entry = entries if goes_first else entries[::-1]
+        if ego_entry > begin and not scenario.vehicles[other].kind.walks:
+            yaw = np.interp(entry, scenario.time, scenario.heading[other])
+            yaws[goes_first][other] = float(yaw)
+    for first, yaw in yaws[True].items():
+        for second, other_yaw in yaws[False].items():
+            insists[[first, second]] |= np.cos(yaw - other_yaw) >= SAME_WAY_RATIO
+    return insists
 
 
 def _recorded_headways(scenario: Scenario, standstill: float) -> dict[int, float]:

@@ -26,7 +26,7 @@ from scenario_gen.numerics import Bools, Floats, Ints
 from scenario_gen.numerics.boxes import corners
 from scenario_gen.numerics.curve import Curve
 from scenario_gen.numerics.plane import ahead_and_left, edge_lengths, place
-from scenario_gen.situation import Conflict, conflict_of
+from scenario_gen.situation import Conflict
 from scenario_gen.types import Vehicle
 
 STANDSTILL_MPS = 0.5
@@ -144,7 +144,7 @@ class Contact:
     @cached_property
     def conflict(self) -> Conflict | None:
         """Their conflict in the certified scenario."""
-        return conflict_of(self.loop.scenario, self.drive.ego, self.other)
+        return self.loop.conflicts.get(self.other)
 
     @cached_property
     def direction_ratio(self) -> float:

@@ -8,7 +8,6 @@ import numpy as np
 from scenario_gen.closed_loop.drive import Drive
 from scenario_gen.closed_loop.simulation import ClosedLoop
 from scenario_gen.numerics import Floats
-from scenario_gen.situation import conflict_of
 
 
 def imposed_braking(loop: ClosedLoop, drive: Drive) -> float:
@@ -16,16 +15,21 @@ def imposed_braking(loop: ClosedLoop, drive: Drive) -> float:
 
     The ego takes the turn of a vehicle that goes first in the certified scenario if it enters
     their conflict area before that one has left it; of a vehicle in the same direction, before
-    that one has entered it. The braking of the certified motion itself does not count.
+    that one has entered it. It also takes the turn of one that goes second and insists on it, if
+    that one brakes while the ego is there. The braking of the certified motion itself does not
+    count.
     """
     hardest = 0.0
-    for other in range(len(drive.motion.vehicles)):
-        conflict = None if other == drive.ego else conflict_of(loop.scenario, drive.ego, other)
-        if conflict is None or conflict.first != other:
+    for other, conflict in loop.conflicts.items():
+        if conflict.first == other:
+            until = conflict.entry_first if conflict.following else conflict.exit_first
+            entry = conflict.entry_second
+        elif loop.insists[other]:
+            until, entry = conflict.entry_second, conflict.entry_first
+        else:
             continue
-        until = conflict.entry_first if conflict.following else conflict.exit_first
         before = drive.present[other] & (drive.clock[other] < until)
-        entered = drive.clock[drive.ego] >= conflict.entry_second
+        entered = drive.clock[drive.ego] >= entry
         if (before & entered).any():
             braking = _reactive_braking(loop, drive, other)[before[:-1]]
             hardest = max(hardest, float(braking.max(initial=0.0)))

@@ -153,13 +153,14 @@ class IdmFollower(RouteFollower):
         turn = self.route.at(stations)[:, 2].reshape(shape) - seen.others[:, 2:3]
         along, across = np.abs(np.cos(turn)), np.abs(np.sin(turn))
         length, width = 0.5 * seen.sizes[:, 0:1], 0.5 * seen.sizes[:, 1:2]
-        reach = half_length + length * along + width * across
-        gap = stations.reshape(shape) - station - reach
+        extent = half_length + length * along + width * across
+        gap = stations.reshape(shape) - station - extent
         lateral_reach = half_width + length * across + width * along
         lateral_gap = np.abs(offset.reshape(shape)) - lateral_reach
         direction = np.cos(turn[:, 0])
         crosses = direction[:, None] < 0.7
-        before_ego = seen.ego.speed * times < gap + 4.0 * half_length
+        reach = seen.ego.speed * times + 0.5 * self.acceleration * times**2
+        before_ego = reach < gap + 4.0 * half_length
         on_route = (lateral_gap < self.room) & (gap > -half_length)
         counts = on_route & ((times == 0.0) | (crosses & before_ego))
         entry_gap = gap[np.arange(len(gap)), counts.argmax(axis=1)]

@@ -17,12 +17,18 @@ from typing import Protocol
 import numpy as np
 
 from scenario_gen.base.errors import InputError
-from scenario_gen.closed_loop.config import ClosedLoopConfig, FORESIGHT, REPLAY, TEMPLATE
+from scenario_gen.closed_loop.config import (
+    ClosedLoopConfig,
+    COMMITTED,
+    FORESIGHT,
+    REPLAY,
+    TEMPLATE,
+)
 from scenario_gen.closed_loop.coordination_space import world_of
 from scenario_gen.closed_loop.criteria import find_criteria
 from scenario_gen.closed_loop.drive import Drive
 from scenario_gen.closed_loop.driver import DriverParameters
-from scenario_gen.closed_loop.driver_traits import driver_traits, reaction_time
+from scenario_gen.closed_loop.driver_traits import driver_traits, insisting, reaction_time
 from scenario_gen.closed_loop.ego import Command, EgoState, move, Pose
 from scenario_gen.closed_loop.lights import observed, ObservedLight
 from scenario_gen.closed_loop.sensor import Sensor
@@ -30,6 +36,7 @@ from scenario_gen.closed_loop.step import advance, ego_hits
 from scenario_gen.numerics import Bools, Floats, wrap_angle
 from scenario_gen.numerics.plane import ahead_and_left, edge_lengths
 from scenario_gen.roads import ground_for
+from scenario_gen.situation import find_conflicts
 from scenario_gen.types import Dynamics, Facts, Road, Scenario, trailer_poses, Vehicle
 
 
@@ -182,6 +189,10 @@ class ClosedLoop:
         self._sensor = (
             None if observation.is_perfect else Sensor(observation, scenario, self.ego, road)
         )
+        pairs = [(self.ego, other) for other in range(len(scenario.vehicles)) if other != self.ego]
+        found = find_conflicts(scenario, pairs)
+        self.conflicts = {sum(conflict.pair) - self.ego: conflict for conflict in found}
+        self.insists = insisting(scenario, self.ego, self.conflicts)
         self.reactions = self._reaction_times()
         self.traits = driver_traits(scenario, config)
         self.parameters = self._driver_parameters()
@@ -221,6 +232,7 @@ class ClosedLoop:
     def _driver_parameters(self) -> DriverParameters:
         config = self.config
         traits = self.traits
+        foresight = FORESIGHT.get(config.policy, 0.0)
         strongest_braking = [
             min(config.strongest_braking, config.limits.of(vehicle.type).max_deceleration)
             for vehicle in self.scenario.vehicles
@@ -234,8 +246,8 @@ class ClosedLoop:
             config.jerk,
             traits.patience,
             traits.margin,
-            FORESIGHT.get(config.policy, 0.0),
-            config.yield_to_ego == TEMPLATE,
+            np.where(self.insists, FORESIGHT[COMMITTED], foresight),
+            ~self.insists & (config.yield_to_ego == TEMPLATE),
             config.policy != REPLAY,
             np.round(self.reactions / config.step).astype(np.int64),
         )

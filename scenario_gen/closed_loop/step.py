@@ -231,7 +231,8 @@ def advance(
     for i in range(len(world.motion)):
         if i != ego and not world.leaves[i] and after[i, CLOCK] >= time[-1]:
             vehicles[i, 3] = 0.0  # it stands where its motion ended
-        _update_acceleration(world, parameters, i, before[i], after[i], vehicles[i, 3])
+        if vehicles[i, 4] > 0.0:
+            _update_acceleration(world, parameters, i, before[i], after[i], vehicles[i, 3])
     for i in range(len(world.motion)):
         clock = after[i, CLOCK]
         was_present = vehicles[i, 4] > 0.0

@@ -97,8 +97,7 @@ def react(
             [s], and 1 where the order held the driver back.
     """
     now = _traffic(world, drivers, present, passes)
-    steps = int(np.ceil(parameters.foresight / world.step)) + 1
-    ego = np.empty((steps, 5))
+    ego = np.empty((_steps(world, parameters.foresight.max()), 5))
     pose = np.empty(5)
     age = -1  # of the observation in the prediction, which drivers with the same delay share
     for i in range(drivers.shape[0]):
@@ -174,6 +173,12 @@ def _fill_ego(world: World, pose: Floats, out: Floats) -> None:
 
 
 @kernel(inline=True, forced=True)
+def _steps(world: World, foresight: float) -> int:
+    """Return the number of predicted instants within a horizon [s]."""
+    return int(np.ceil(foresight / world.step)) + 1
+
+
+@kernel(inline=True, forced=True)
 def _is_slow(driver: DriverState, speed: float) -> bool:
     """Return whether a driver hardly moves, unlike its certified motion."""
     return driver.rate < 0.5 and speed <= MODEL.max_blocking_speed_mps
@@ -210,7 +215,7 @@ def _bound_by_ego(
     )
     waited = now.drivers[i, WAITED]
     yielding = np.inf
-    if parameters.yields and seen[ON_PATH] > 0.0 and ego[0, 4] < ego_end(world):
+    if parameters.yields[i] and seen[ON_PATH] > 0.0 and ego[0, 4] < ego_end(world):
         yielding = yielding_acceleration(
             world, parameters, driver, speed, ego[0], seen[EGO_RATE], waited
         )
@@ -223,7 +228,8 @@ def _bound_by_ego(
         return min(bound, kerb)
     if world.walks[i]:
         return bound
-    meeting = meeting_acceleration(world, parameters, driver, speed, ego)
+    predicted = ego[: _steps(world, parameters.foresight[i])]
+    meeting = meeting_acceleration(world, parameters, driver, speed, predicted)
     return min(bound, yielding, meeting)
 
 

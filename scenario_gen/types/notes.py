@@ -110,10 +110,9 @@ class NoteKind(Enum):
     TARGET_MISSED = "target {target}: {found} found in {drawn} candidates; reachable: {reachable}"
     CANCELLED = "cancelled"
     FILTERED = "filtered by {condition!r}: {kept} of {total} scenarios"
-    TESTS = "for testing: {rate}"
     EGO_TESTS = (
         "for testing ego {ego}: {kept} of {requested} scenarios found in which it has to react "
-        "({stages}); {advice}"
+        "({causes}); {advice}"
     )
     SEARCHED = "failures of {planner}, found by a search: not a random sample of natural scenarios"
 

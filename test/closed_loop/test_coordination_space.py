@@ -10,6 +10,7 @@ import pytest
 from support.reaction_scenes import led_crossing, platoon
 
 from benchmarks._driving_worlds import Witness
+from scenario_gen.closed_loop.config import ClosedLoopConfig
 from scenario_gen.closed_loop.ego import Command
 from scenario_gen.closed_loop.simulation import ClosedLoop
 from scenario_gen.method.chain import Chain
@@ -64,7 +65,8 @@ def test_a_yielder_among_the_others_waits_for_one_that_the_ego_holds_up(led, sha
         driven = join_ego(with_witness(scenario, 2)) if slot else scenario
         own = lag_behind(driven, conflict_of(driven, 1, 0))
         for facts, kept in ((driven.facts, True), (Facts(), False)):
-            loop = ClosedLoop(replace(driven, facts=facts), "3")
+            config = ClosedLoopConfig(overtime=1.5)
+            loop = ClosedLoop(replace(driven, facts=facts), "3", config=config)
             motion = loop.drive(Slower(share)).motion
             conflict = conflict_of(motion, 1, 0)
             assert conflict.second == 1
