@@ -109,47 +109,7 @@ def test_who_waits_for_nobody_is_refused_with_the_reason(tmp_path):
     words = (str(bundled("b")), "--road", "t_intersection", "--ego", "1", "--count", "1")
     done = generated(tmp_path / "none", *words)
     output = " ".join(str(done.exception or done.output).split())
-<<<<<<< HEAD
-    assert done.exit_code != 0 and "for testing ego 1: 0 of 1 scenarios found" in output
-    assert "--ego 2" in output
-
-
-def test_a_recording_whose_meeting_is_over_is_refused_at_once(tmp_path):
-    words = (
-        str(bundled("ngsim_left_turn")),
-        "--road",
-        "four_way",
-        "--ego",
-        "auto",
-        "--count",
-        "1",
-    )
-    done = generated(tmp_path / "none", *words)
-    output = " ".join(str(done.exception or done.output).split())
-    assert done.exit_code != 0
-    assert "vehicle 21019 leaves their conflict area 0.2 s after the recording begins" in output
-
-
-def test_a_recording_that_does_not_fit_is_shortened_if_that_is_allowed(monkeypatch):
-    whole = read_log("examples/my_log.csv").encounters[0]
-
-    def refuse(road, template, config):
-        raise RefusedError("the road is too short")
-
-    def no_part(attempt, template, refusal, _):
-        with pytest.raises(RefusedError, match="too short"):
-            attempt(template)
-        raise RefusedError(f"{refusal} for all parts")
-
-    monkeypatch.setattr(reacting, "road_and_template", refuse)
-    monkeypatch.setattr(reacting, "fitting_part", no_part)
-    for allowed, why in ((True, "too short for all parts"), (False, "too short;")):
-        config = updated(PipelineConfig(), {"fitting.shorten": allowed})
-        with pytest.raises(TargetError, match=why):
-            reacting.Testing(whole, "four_way", config, Request(ego="2"), 7).run(1)
-=======
     assert done.exit_code != 0 and "for testing ego 1: vehicle 1 waits for nobody" in output
->>>>>>> 5c1ca6a6 (Sets for testing: streams with one gap fail every open-loop speed law)
 
 
 def test_a_search_ends_with_its_budget(tmp_path):
