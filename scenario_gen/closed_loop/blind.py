@@ -171,7 +171,7 @@ def fill_occupied(
     """
     pose = np.empty(5)
     box = np.empty(7)
-    own = np.empty(7)
+    ego_box = np.empty(7)
     half = world.half[world.ego]
     for pair in range(out.shape[0] * len(world.motion)):
         step = pair // len(world.motion)
@@ -183,8 +183,8 @@ def fill_occupied(
         pose_at(world.time, world.motion[i], clock + ahead, pose)
         fill_box(pose[0], pose[1], pose[2], world.half[i, 0], world.half[i, 1], box)
         for p in range(len(points)):
-            fill_box(points[p, 0], points[p, 1], points[p, 2], half[0], half[1], own)
-            out[step, p] = out[step, p] or boxes_meet(own, box)
+            fill_box(points[p, 0], points[p, 1], points[p, 2], half[0], half[1], ego_box)
+            out[step, p] = out[step, p] or boxes_meet(ego_box, box)
 
 
 class LawFollower(RouteFollower):

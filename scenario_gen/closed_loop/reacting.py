@@ -148,14 +148,14 @@ class Testing:
         causes = ", ".join(f"{number} {cause}" for cause, number in selection.unfit.most_common())
         shortage = ""
         if selection.kept < count:
-            late = process_time() > end
+            is_over = process_time() > end
             note = Note.of(
                 NoteKind.EGO_TESTS,
                 ego=self.request.ego,
                 kept=selection.kept,
                 requested=count,
                 causes=causes,
-                advice=f"search for more than {self.budget:g} s: --budget" if late else "",
+                advice=f"search for more than {self.budget:g} s: --budget" if is_over else "",
             )
             shortage = str(note)
         if not results:

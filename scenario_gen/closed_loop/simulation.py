@@ -190,8 +190,8 @@ class ClosedLoop:
             None if observation.is_perfect else Sensor(observation, scenario, self.ego, road)
         )
         pairs = [(self.ego, other) for other in range(len(scenario.vehicles)) if other != self.ego]
-        found = find_conflicts(scenario, pairs)
-        self.conflicts = {sum(conflict.pair) - self.ego: conflict for conflict in found}
+        conflicts = find_conflicts(scenario, pairs)
+        self.conflicts = {sum(conflict.pair) - self.ego: conflict for conflict in conflicts}
         self.insists = insisting(scenario, self.ego, self.conflicts)
         self.reactions = self._reaction_times()
         self.traits = driver_traits(scenario, config)

@@ -84,19 +84,19 @@ class Stream:
         """
         situation = Situation.of(encounter)
         begin = encounter.time[encounter.present[:, 0]]
-        found = [
+        waits = [
             conflict
             for conflict in situation.conflicts
             if conflict.second == ego
             and conflict.entry_second > begin[ego]
             and not (conflict.following and conflict.entry_first <= begin[conflict.first])
         ]
-        if not found:
+        if not waits:
             raise RefusedError(
                 f"vehicle {encounter.ids[ego]} waits for nobody: it crosses no path after another "
                 "vehicle, and joins none"
             )
-        recorded = min(found, key=lambda conflict: conflict.entry_second)
+        recorded = min(waits, key=lambda conflict: conflict.entry_second)
         tracks = situation.tracks[ego], situation.tracks[recorded.first]
         return cls._of_tracks(encounter, *tracks, recorded)
 
