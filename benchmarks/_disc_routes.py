@@ -71,7 +71,7 @@ def _leg(task: VehicleTask, first: int, second: int) -> Floats:
     """Return a path (P, 2) between two anchors for a disc as wide as the vehicle, where it has that room."""
     ends = task.anchors[[first, second], :2]
     row, column, _ = task.road.cells(ends)
-    room = float(task.road.clearance[row, column].min()) - task.road.resolution
+    room = float(task.road.clearance_at(row, column).min()) - task.road.resolution
     radius = max(min(0.5 * task.vehicle.width + task.config.margin, room), 0.0)
     iterations, seed = task.config.iterations, task.seed + first
     try:

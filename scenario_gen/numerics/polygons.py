@@ -11,8 +11,8 @@ from scenario_gen.numerics.kernels import B2, kernel, OUT2
 
 def polygon_cells(
     outline: Floats, cell_size: float, first: Ints, shape: tuple[int, int]
-) -> tuple[Ints, Bools]:
-    """Return the cells of a grid whose centres lie in a polygon.
+) -> tuple[Ints, Ints]:
+    """Return the rows and columns (C,) of the cells of a grid whose centres lie in a polygon.
 
     A cell is inside if its winding number is not zero, so a part that the polygon covers twice, as
     in a sharp bend, is inside, too.
@@ -22,9 +22,6 @@ def polygon_cells(
         cell_size: [m].
         first: (2,) column and row of the grid's first cell, counted from the frame's origin.
         shape: rows and columns of the grid.
-
-    Returns:
-        The first column and row (2,) of a window in the grid, and which of its cells are inside.
     """
     points = outline / cell_size - first  # [cells]
     limit = np.array([shape[1], shape[0]])
@@ -44,9 +41,13 @@ def polygon_cells(
     crossed = a[edge, 0] + share * (b[edge, 0] - a[edge, 0])
     column = np.clip(np.ceil(crossed - 0.5).astype(np.int64), 0, columns)
 
-    winding = np.zeros((rows, columns + 1), dtype=np.int32)
-    np.add.at(winding, (row, column), np.where(b[edge, 1] > a[edge, 1], 1, -1))
-    return low, np.asarray(np.cumsum(winding, axis=1)[:, :columns] != 0)
+    # Fill each row from a crossing to the next one where the winding number is not zero.
+    order = np.lexsort((column, row))
+    row, column = row[order], column[order]
+    winding = np.cumsum(np.where(b[edge, 1] > a[edge, 1], 1, -1)[order])
+    width = np.where(winding != 0, np.diff(column, append=0), 0)
+    offset = np.arange(width.sum()) - np.repeat(np.cumsum(width) - width, width)
+    return np.repeat(row + low[1], width), np.repeat(column + low[0], width) + offset
 
 
 def fill_slits(cells: Bools) -> Bools:

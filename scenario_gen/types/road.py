@@ -140,10 +140,9 @@ class Road:
 
         return distance_field(self.drivable)
 
-    @cached_property
-    def clearance(self) -> Floats:
-        """(H, W) [m]: `clearance_cells` in metres."""
-        return sealed(self.clearance_cells * self.resolution)
+    def clearance_at(self, rows: Ints | slice, columns: Ints | slice) -> Floats:
+        """Return the `clearance_cells` of some cells [m]; a second grid would be large."""
+        return np.asarray(self.clearance_cells[rows, columns] * self.resolution)
 
     @cached_property
     def closed_cells(self) -> Bools:
@@ -161,8 +160,10 @@ class Road:
     @cached_property
     def closed_before(self) -> Counts:
         """(H, W + 1): number of closed cells left of each column, to count in any run."""
-        closed = np.cumsum(~self.drivable, axis=1, dtype=np.int32)
-        return sealed(np.pad(closed, ((0, 0), (1, 0))))
+        height, width = self.drivable.shape
+        closed = np.zeros((height, width + 1), dtype=np.int32)
+        np.cumsum(~self.drivable, axis=1, out=closed[:, 1:])
+        return sealed(closed)
 
     @cached_property
     def walkable(self) -> "Road":
@@ -214,9 +215,7 @@ class Road:
     def _cells_of_lane(self, lane: Lane) -> tuple[Ints, Ints]:
         """Return the rows and columns (C,) of the cells whose centres lie in a lane."""
         first = np.round(self.origin / self.resolution).astype(np.int64)
-        corner, inside = polygon_cells(lane.outline, self.resolution, first, self.drivable.shape)
-        rows, columns = np.nonzero(inside)
-        return rows + corner[1], columns + corner[0]
+        return polygon_cells(lane.outline, self.resolution, first, self.drivable.shape)
 
     def _directions_in(self, lane: Lane, rows: Ints, columns: Ints) -> npt.NDArray[np.uint16]:
         """Return the bits (C,) that a lane sets in its cells, from the section nearest to each."""

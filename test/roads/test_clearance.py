@@ -65,7 +65,7 @@ def test_field_is_the_distance_to_the_nearest_blocked_square(seed, density):
             for i in range(road.drivable.shape[0])
         ]
     )
-    np.testing.assert_allclose(road.clearance, expected, atol=1e-12)
+    np.testing.assert_allclose(road.clearance_cells * road.resolution, expected, atol=1e-12)
 
 
 @pytest.mark.parametrize("radius", [0.0, 0.3, 0.9])

@@ -165,8 +165,8 @@ class _GridSearch:
 
         Space outside the map counts as blocked, and is zero in the sum.
         """
-        first = self._stride // 2
-        field = self._penalty(self.road.clearance[first :: self._stride, first :: self._stride])
+        every = slice(self._stride // 2, None, self._stride)
+        field = self._penalty(self.road.clearance_at(every, every))
         return field - float(self._penalty(np.zeros(1))[0])
 
     @cached_property
@@ -203,7 +203,7 @@ class _GridSearch:
         def costs(states: Floats) -> Floats:
             points = place(states[:, None], *(coarse.scale * self.discs).T)
             row, column, inside = self.road.cells(points)
-            clearance = np.where(inside, self.road.clearance[row, column], 0.0)
+            clearance = np.where(inside, self.road.clearance_at(row, column), 0.0)
             return np.asarray(self._penalty(clearance).mean(axis=1))
 
         start = np.array([[*coarse.centre, coarse.yaw]])

@@ -38,7 +38,7 @@ class Band:
     """What attracts a band of M points, and what it avoids; in metres from the grid's corner.
 
     Attributes:
-        field: (H, W) clearance.
+        field: (H, W) clearance [cells].
         resolution: size of a cell.
         guess: (M, 2) the first guess.
         hold: (M,) its weight.
@@ -174,7 +174,7 @@ def _add_obstacles(problem: _Problem, band: Band, push: Floats, points: Floats) 
     norm = np.maximum(np.hypot(*tangent.T), 1e-9)
     lever = band.disc[:, None] / norm  # (D, M - 2)
     centre = points[1:-1] + lever[..., None] * tangent
-    room, gradient = _clearance_at(band.field, centre / band.resolution)
+    room, gradient = _clearance_at(band, centre)
     slope = np.hypot(gradient[..., 0], gradient[..., 1])
     required = band.required[1:-1].T
     is_short = room < required
@@ -191,14 +191,16 @@ def _add_obstacles(problem: _Problem, band: Band, push: Floats, points: Floats) 
     return np.asarray(lack.max(axis=0))
 
 
-def _clearance_at(field: Floats, cells: Floats) -> tuple[Floats, Floats]:
-    """Return clearance (...) and gradient (..., 2) at points (..., 2) [cells], bilinear."""
-    highest = np.array(field.shape[::-1]) - 2
+def _clearance_at(band: Band, points: Floats) -> tuple[Floats, Floats]:
+    """Return clearance (...) [m] and its gradient (..., 2) per cell at points (..., 2) [m]."""
+    cells = points / band.resolution
+    highest = np.array(band.field.shape[::-1]) - 2
     corner = np.clip(np.floor(cells - 0.5), 0, highest).astype(np.int64)
     u, v = np.moveaxis(np.clip(cells - 0.5 - corner, 0.0, 1.0), -1, 0)
     column, row = np.moveaxis(corner, -1, 0)
-    a, b = field[row, column], field[row, column + 1]
-    c, d = field[row + 1, column], field[row + 1, column + 1]
+    a, b, c, d = (
+        band.field[row + i, column + j] * band.resolution for i in (0, 1) for j in (0, 1)
+    )
     low = a + u * (b - a)
     high = c + u * (d - c)
     across = (b - a) + v * ((d - c) - (b - a))
@@ -336,7 +338,7 @@ def _band(task: VehicleTask, weights: Floats, guess: Guess, points: Floats, disc
         on_path = float(np.median(_clearance_along(task, task.fitted.path[:, :2], disc)))
         wish = min(wish, max(on_path, cover))
     return Band(
-        field=road.clearance,
+        field=road.clearance_cells,
         resolution=road.resolution,
         guess=guess.points - road.origin,
         hold=guess.hold,
@@ -357,19 +359,19 @@ def _clearance_along(task: VehicleTask, points: Floats, disc: Floats) -> Floats:
     tangent /= np.maximum(np.hypot(*tangent.T), 1e-9)[:, None]
     centres = points[:, None] + disc[None, :, None] * tangent[:, None]
     row, column, inside = task.road.cells(centres)
-    return np.where(inside, task.road.clearance[row, column], 0.0)
+    return np.where(inside, task.road.clearance_at(row, column), 0.0)
 
 
 def _wanted_clearance(
     task: VehicleTask, disc: Floats, wish: float, spacing: float, count: int
 ) -> Floats:
     """Return the wanted clearance (count,) [m]: at the ends what there is, rising to `wish`."""
-    field = task.road.clearance
     distance = np.arange(count) * spacing
     wanted = np.full(count, wish)
     for pose, from_pose in ((task.anchors[0], distance), (task.anchors[-1], distance[::-1])):
         row, column, _ = task.road.cells(pose[:2] + disc[:, None] * unit(pose[2]))
-        wanted = np.minimum(wanted, field[row, column].min() + TAPER_RATIO * from_pose)
+        room = task.road.clearance_at(row, column).min()
+        wanted = np.minimum(wanted, room + TAPER_RATIO * from_pose)
     return wanted
 
 

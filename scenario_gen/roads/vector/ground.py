@@ -77,7 +77,8 @@ def own_side(road: Road, path: Floats, vehicle: Vehicle, network: LaneNetwork | 
         return road
     near = cells
     if not cells.all():
-        near = cells | (replace(road, drivable=~cells, lanes=None).clearance <= _KERB_M)
+        from_lane = replace(road, drivable=~cells, lanes=None).clearance_cells
+        near = cells | (from_lane * road.resolution <= _KERB_M)
     part = replace(road, drivable=road.drivable & near)
     ends = path[[0, -1]]
     return part if footprint_fits(part, ends, vehicle.length, vehicle.width).all() else road
@@ -152,10 +153,8 @@ def road_of(
     outlines += [(lane.outline, True) for lane in network.lanes]
     drivable = np.zeros((height, width), dtype=np.bool_)
     for outline, is_road in outlines:
-        corner, inside = polygon_cells(np.asarray(outline), cell_size, first, drivable.shape)
-        rows, columns = inside.shape
-        window = drivable[corner[1] : corner[1] + rows, corner[0] : corner[0] + columns]
-        window[inside] = is_road
+        cells = polygon_cells(np.asarray(outline), cell_size, first, drivable.shape)
+        drivable[cells] = is_road
 
     entries, exits = lane_ends(network)
     return Road(
