@@ -186,8 +186,8 @@ class Testing:
         plans = []
         for k, time in enumerate(OPEN_S):
             queue = 0.0 if stream.joins else QUEUE_S[k % len(QUEUE_S)]
-            template = stream.open_at(time, queue, 1.0 / len(OPEN_S))
             try:
+                template = stream.open_at(time, queue, 1.0 / len(OPEN_S))
                 if road == AUTO:
                     parts = segment(template, config.segmentation, self.seed)
                     names = suitable_roads(Situation.of(template), parts, config)

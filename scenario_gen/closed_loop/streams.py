@@ -157,6 +157,9 @@ class Stream:
             queue: for which the ego stands behind the conflict area [s], where another vehicle
                 stands ahead of it; 0 for none.
             share: of all scenarios that have this time and queue.
+
+        Raises:
+            RefusedError: the recording has too few samples.
         """
         dt = self.encounter.dt
         ego, other = self.ego, self.other
@@ -195,6 +198,8 @@ class Stream:
             vehicles.append(_named(ego.vehicle, 0))
             paths.append(ego.path)
         rows = np.flatnonzero(near.sum(axis=1) > MIN_SAMPLES)
+        if len(rows) < 2:
+            raise RefusedError(f"a vehicle of the stream would have {MIN_SAMPLES} samples or less")
         poses = np.stack([paths[row].at(stations[row]) for row in rows])
         begins = near[rows].argmax(axis=1)
         who, whom = token(ego.vehicle.id), token(vehicles[rows[1]].id)
