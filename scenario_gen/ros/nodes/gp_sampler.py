@@ -15,7 +15,7 @@ request, `~/cancel` all.
 
 from collections.abc import Callable, Mapping
 from dataclasses import replace
-from functools import partial
+from functools import lru_cache, partial
 import os
 import threading
 
@@ -30,11 +30,11 @@ from scenario_gen.bags.recordings.scenario_publisher import ScenarioPublisher
 from scenario_gen.bags.recordings.template import decode_template
 from scenario_gen.bags.recordings.write import result_messages
 from scenario_gen.base.provenance import parameter_texts, versions
-from scenario_gen.method.chain import Chain, Planned
+from scenario_gen.method.chain import Chain, plan_set
 from scenario_gen.method.config import PipelineConfig
 from scenario_gen.method.outcome_sets import for_one_set, outcome_sets
 from scenario_gen.method.sampling import Callbacks, Cancelled
-from scenario_gen.method.segmentation import segment
+from scenario_gen.method.shortening import fit_what_matters
 from scenario_gen.ros.common.generate_action import action_type, Goals
 from scenario_gen.ros.common.requests import (
     Answer,
@@ -50,9 +50,7 @@ from scenario_gen.types import (
     EgoSlot,
     Encounter,
     GenerationResult,
-    Road,
     Scenario,
-    Segmentation,
     token,
     tokens,
 )
@@ -250,9 +248,20 @@ class GpSampler(StageNode):
             if part.made == "recorded":
                 callbacks = Callbacks(advance, stop, on_valid=publish)
                 return _sample(replace(template, encounter=part), config, count, callbacks)
-            segmentation = segment(part, config.segmentation, config.seed)
-            chain = _chain(part, segmentation, road, config)
-            made = Planned(chain, chain.plan()).sample(count, Callbacks(advance, stop))
+            plan = lru_cache(maxsize=1)(
+                partial(
+                    plan_set,
+                    road=road,
+                    config=_stages(part, config),
+                    seed=config.seed,
+                    request=config,
+                )
+            )
+
+            def sampled(template: Encounter, size: int) -> GenerationResult:
+                return plan(template).sample(size, Callbacks(advance, stop))
+
+            made = fit_what_matters(sampled, part, count, config.fitting, attempt=plan)
             sets.append(made)
             return made
 
@@ -314,18 +323,25 @@ def _sample(
         RefusedError: the request is impossible.
     """
     road, _ = template.road_and_fit()
-    chain = _chain(template.encounter, template.segmentation, road, config)
+    chain = Chain(
+        Situation.of(template.encounter),
+        template.segmentation,
+        road,
+        _stages(template.encounter, config),
+        config,
+        config.count,
+        config.seed,
+    )
     planned = chain.plan() if config.moves else replace(template, seed=config.seed)
     return replace(chain, count=count).sample(planned, callbacks)
 
 
-def _chain(encounter: Encounter, segmentation: Segmentation, road: Road, config: Config) -> Chain:
-    """Return the stages of a request, for the recorded or another outcome."""
-    stages = PipelineConfig(
+def _stages(encounter: Encounter, config: Config) -> PipelineConfig:
+    """Return the parameters of the stages, for the recorded or another outcome."""
+    return PipelineConfig(
         fitting=config.fitting,
         planning=config.planning,
         sampling=for_one_set(config.sampling, encounter),
         limits=config.limits,
+        segmentation=config.segmentation,
     )
-    situation = Situation.of(encounter)
-    return Chain(situation, segmentation, road, stages, config, config.count, config.seed)
