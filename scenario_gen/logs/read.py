@@ -31,7 +31,7 @@ from scenario_gen.logs.no_encounter import (
 )
 from scenario_gen.logs.quality import check_doubts, Doubt, Quality, VehicleQuality
 from scenario_gen.logs.raw import natural, Observations, RawLog
-from scenario_gen.logs.signals import moved_signals, with_lights
+from scenario_gen.logs.signals import lines_where_vehicles_stop, moved_signals, with_lights
 from scenario_gen.logs.trailers import coupled
 from scenario_gen.types import Encounter
 from scenario_gen.types.html import html_list, html_table
@@ -249,6 +249,7 @@ def encounters_of(
     contradictions = [*doubts_of_rows(log, drops, config), *doubts_of_pieces(pieces, origin_ns)]
     check_doubts(log.segments[0].label, contradictions, config.allow)
     all_doubts = (*log.doubts, *unit_doubts, *contradictions, *copies.values())
+    signals, line_notes = lines_where_vehicles_stop(signals, grouping.encounters)
     excluded = (f"left out: {counted(log.excluded)}",) if log.excluded else ()
     notes_by_vehicle = (
         *grouping.group_notes,
@@ -271,6 +272,7 @@ def encounters_of(
             *drops.notes,
             *log.notes,
             *excluded,
+            *line_notes,
             *dict.fromkeys(notes_by_vehicle),
         ),
     )

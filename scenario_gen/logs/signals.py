@@ -40,6 +40,9 @@ class _Limits:
         straight_rad: turning traffic may meet other traffic at green.
         common_green_s: shorter common greens are rounding.
         far_m: lights farther from all vehicles do not belong to an encounter.
+        beyond_m: least and greatest distance at which vehicles stand beyond a misplaced line.
+        standstill_mps: slower vehicles stand.
+        before_line_m: at which drivers stop before a line.
     """
 
     half_lane_m: float = 1.75
@@ -49,6 +52,9 @@ class _Limits:
     straight_rad: float = math.radians(30.0)
     common_green_s: float = 0.5
     far_m: float = 100.0
+    beyond_m: tuple[float, float] = (3.0, 15.0)
+    standstill_mps: float = 0.3
+    before_line_m: float = 0.5
 
 
 _LIMITS = _Limits()
@@ -250,6 +256,59 @@ def with_lights(encounter: Encounter, signals: Sequence[RawSignal]) -> Encounter
                 "traffic crosses; set log.signals=ignored"
             )
     return replace(encounter, lights=tuple(lights))
+
+
+def lines_where_vehicles_stop(
+    signals: Sequence[RawSignal], encounters: Sequence[Encounter]
+) -> tuple[list[RawSignal], list[str]]:
+    """Return lights with their stop lines no nearer than where vehicles stop at red, and notes.
+
+    In some maps lanes end before the painted line. Two vehicles or more show that.
+    """
+    by_light: dict[str, dict[str, float]] = {}
+    for signal in (signal for signal in signals if len(signal.line)):
+        for encounter in encounters:
+            schedule = signal.schedule.moved(-encounter.start_ns * 1e-9)
+            light = TrafficLight(signal.id, schedule, signal.line)
+            by_light.setdefault(signal.id, {}).update(_beyond(encounter, light))
+    shifts, notes = {}, []
+    for name, beyond in by_light.items():
+        if len(beyond) > 1:
+            shifts[name] = max(beyond.values()) + _LIMITS.before_line_m
+            notes.append(
+                f"vehicles {', '.join(beyond)} stop at red {min(beyond.values()):.1f} to "
+                f"{max(beyond.values()):.1f} m beyond the stop line of traffic light {name}, so "
+                f"it is moved forward by {shifts[name]:.1f} m; correct it in the map"
+            )
+    moved = []
+    for signal in signals:
+        line = signal.line
+        if signal.id in shifts and len(line):
+            yaw = TrafficLight(signal.id, signal.schedule, line).yaw
+            line = line + shifts[signal.id] * unit(yaw)
+        moved.append(replace(signal, line=line))
+    return moved, notes
+
+
+def _beyond(encounter: Encounter, light: TrafficLight) -> dict[str, float]:
+    """Return how far [m] beyond a line vehicles stand for red, by their ids."""
+    low, high = _LIMITS.beyond_m
+    depths = {}
+    for n, name in enumerate(encounter.ids):
+        front = fronts(encounter, n)
+        depth = -light.before(front)
+        stands = encounter.is_present[n] & (encounter.speed[n] < _LIMITS.standstill_mps)
+        stands &= (depth > low) & (depth < high) & (light.distance_to_side(front) == 0.0)
+        stands &= np.cos(encounter.heading[n] - light.yaw) > math.cos(_LIMITS.straight_rad)
+        rows = np.flatnonzero(stands)
+        if not len(rows):
+            continue
+        since, until = encounter.time[rows[[0, -1]]].tolist()
+        departs = rows[-1] < encounter.present[n, 1]
+        at_red = light.schedule.at(until).stops
+        if light.schedule.stops_within(since, until) and not (departs and at_red):
+            depths[name] = float(depth[rows[-1]])
+    return depths
 
 
 def _line_in(encounter: Encounter, signal: RawSignal, start_s: float) -> Floats | None:

@@ -13,6 +13,7 @@ from support.signalised import crossing_map, signalised
 from scenario_gen import read_log
 from scenario_gen.base.errors import InputError
 from scenario_gen.roads import lights_of, read_network
+from scenario_gen.situation import Situation
 from scenario_gen.types import TrafficLight
 
 GREEN = 13.0
@@ -155,6 +156,20 @@ def test_a_light_is_for_a_lane_and_a_movement(tmp_path):
     assert [light.turns for light in encounter.lights] == [("left", "straight"), ()]
     network = read_network(again)
     assert [light.turns for light in lights_of(network)] == [("left", "straight"), ()]
+
+
+def test_a_line_is_where_vehicles_stop_at_red(tmp_path):
+    file = tmp_path / "map.xml"
+    file.write_text(crossing_map(["green:80 yellow:30 red:290", "red:130 green:270"], "", 2, -20))
+    result = read_log(file)
+    (note,) = [note for note in result.quality.notes if "beyond the stop line" in note]
+    assert note.startswith("vehicles 102, 103 stop at red 4.0 to 11.0 m beyond")
+    (encounter,) = result.encounters
+    middle = {light.id: light.line.mean(axis=0) for light in encounter.lights}
+    np.testing.assert_allclose(middle["12"], [0.0, -8.5], atol=0.05)
+    np.testing.assert_allclose(middle["11"], [-20.0, 0.0])
+    stops = Situation.of(encounter).reactions.stops
+    assert [(stop.who, stop.queue) for stop in stops] == [(1, 0), (2, 1)]
 
 
 def test_sumo_without_states_or_net(tmp_path):

@@ -51,19 +51,20 @@ def signalised(green=13.0, lag=1.4, queue=1, lights=True):
     return pd.DataFrame(rows, columns=COLUMNS)
 
 
-def crossing_map(cycles, stamps="", queue=1):
+def crossing_map(cycles, stamps="", queue=1, end=-8.0):
     """Return a CommonRoad file with two crossing lanes, their lights, and two vehicles.
 
     Args:
         cycles: states of the two lights, each with its steps of 0.1 s, as in `"green:120 red:80"`.
         stamps: further elements of each light.
         queue: as in `signalised`.
+        end: where the lanes end [m]; the queue stands 1 m before -8.
     """
     lanes, lights, cars = [], [], []
     for k, (ahead, left) in enumerate([((1, 0), (0, 1)), ((0, 1), (-1, 0))]):
 
         def points(side, ahead=ahead, left=left):
-            ends = [np.multiply(ahead, s) + 1.75 * side * np.array(left) for s in (-80, -8)]
+            ends = [np.multiply(ahead, s) + 1.75 * side * np.array(left) for s in (-80, end)]
             return "".join(f"<point><x>{x}</x><y>{y}</y></point>" for x, y in ends)
 
         lanes.append(

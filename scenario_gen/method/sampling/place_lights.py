@@ -27,6 +27,7 @@ from scenario_gen.types import (
 )
 
 _MAX_LATENESS_S = 1.0  # of a departure that is like the recorded one
+_SAME_LIGHT_M = 20.0  # of two places of a stop line
 _SLACK_SHARE = 0.01  # of a second, against one by which a departure is unlike the recorded one
 
 
@@ -39,7 +40,7 @@ def with_lights(model: CandidateModel, plan: Plan) -> CandidateModel:
     network, encounter = plan.road.lanes, plan.encounter
     if network is None or not network.rules_kept:
         return model
-    lights = lights_of(network)
+    lights = _with_recorded_lines(lights_of(network), encounter.lights)
     has_cycle = any(light.schedule.repeats for light in lights)
     if not lights or not (has_cycle or encounter.lights):
         return model
@@ -54,6 +55,19 @@ def with_lights(model: CandidateModel, plan: Plan) -> CandidateModel:
         return replace(model, lights=placed)
     begin = float(batch.presence.begin[0])
     return replace(model, lights=_with_offset(lights, nominal, model.warp.nominal, begin, graph))
+
+
+def _with_recorded_lines(
+    lights: Sequence[TrafficLight], recorded: Sequence[TrafficLight]
+) -> tuple[TrafficLight, ...]:
+    """Return lights, those of the recording's own map at the stop lines of the recording."""
+    lines = {(light.id, light.lanes): light.line for light in recorded if light.lanes}
+    moved = []
+    for light in lights:
+        line = lines.get((light.id, light.lanes), light.line)
+        is_near = np.abs(line - light.line).max() < _SAME_LIGHT_M
+        moved.append(replace(light, line=line) if is_near else light)
+    return tuple(moved)
 
 
 def _recorded(
