@@ -50,7 +50,7 @@ def test_rows_say_what_happened():
         "replay",
     ]
     assert found.changepoints == 2 and found.vehicles == ("west", "south")
-    assert NoteKind.PAIRS_LEFT_OUT not in kinds_of(found.row("x"))
+    assert NoteKind.PAIRS_LEFT_OUT not in kinds_of(found.row("without changepoints"))
     assert found.value("replay", "e_position") < 1e-6 and found.value("replay", "min_ade") < 1e-6
     for key in ("e_position", "e_speed", "js_speed", "js_acceleration", "wasserstein_speed"):
         assert found.value("with changepoints", key) < found.value("without changepoints", key)
@@ -115,7 +115,7 @@ def test_vanished_conflicts_are_counted_for_themselves():
     assert found.value("recording", "conflicts") == 1.0
     assert (found.value("x", "conflicts"), found.value("x", "vanished_conflicts")) == (0.5, 0.5)
     assert found.value("x", "order_kept") == 1.0  # of those that are there
-    assert NoteKind.CONFLICTS_VANISHED in kinds_of(found.row("x"))
+    assert NoteKind.CONFLICTS_VANISHED in kinds_of(found.row("without changepoints"))
 
 
 def late(source, n, first):
@@ -268,7 +268,7 @@ def test_a_vehicle_left_out_for_an_ego_is_left_out_of_every_row():
         assert np.isnan(found.value("x", figure)), figure
     for figure in ("js_speed", "diversity", "min_ade", "coverage"):
         assert np.isfinite(found.value("x", figure)), figure
-    assert NoteKind.ONE_VEHICLE in kinds_of(found.row("x"))
+    assert NoteKind.ONE_VEHICLE in kinds_of(found.row("without changepoints"))
 
 
 def test_the_order_of_the_vehicles_does_not_matter():
