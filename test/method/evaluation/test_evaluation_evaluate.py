@@ -115,7 +115,7 @@ def test_vanished_conflicts_are_counted_for_themselves():
     assert found.value("recording", "conflicts") == 1.0
     assert (found.value("x", "conflicts"), found.value("x", "vanished_conflicts")) == (0.5, 0.5)
     assert found.value("x", "order_kept") == 1.0  # of those that are there
-    assert NoteKind.CONFLICTS_VANISHED in kinds_of(found.row("without changepoints"))
+    assert NoteKind.CONFLICTS_VANISHED in kinds_of(found.row("x"))
 
 
 def late(source, n, first):
@@ -268,7 +268,7 @@ def test_a_vehicle_left_out_for_an_ego_is_left_out_of_every_row():
         assert np.isnan(found.value("x", figure)), figure
     for figure in ("js_speed", "diversity", "min_ade", "coverage"):
         assert np.isfinite(found.value("x", figure)), figure
-    assert NoteKind.ONE_VEHICLE in kinds_of(found.row("without changepoints"))
+    assert NoteKind.ONE_VEHICLE in kinds_of(found.row("x"))
 
 
 def test_the_order_of_the_vehicles_does_not_matter():
