@@ -39,15 +39,20 @@ LABELS = {
 }
 """Labels of the notes that are printed."""
 WARNING_STYLE = "yellow"
+DETAILED_COUNT = 5  # cases that are described in full
 
 
 def summary(cases: Sequence[GenerationResult], *, verbose: bool = False) -> RenderableType:
     """Return a summary of each case for rich: recording, reactions, validity, variety.
 
+    Of more than `DETAILED_COUNT` cases it has validity and losses; the report has the rest.
+
     Args:
         cases: the generated sets.
         verbose: whether to add routes and the comparison with the recording (E).
     """
+    if len(cases) > DETAILED_COUNT and not verbose:
+        return Group(*(line for case in cases for line in _in_brief(case)))
     lines = [line for case in cases for line in _case(case, verbose)]
     if verbose:
         explained = (
@@ -58,13 +63,25 @@ def summary(cases: Sequence[GenerationResult], *, verbose: bool = False) -> Rend
     return Group(*lines)
 
 
+def _in_brief(case: GenerationResult) -> list[RenderableType]:
+    """Return a line with the validity of a case, and one for each loss."""
+    title = f"{printable(case.title)}: "
+    return [Text.assemble((title, "bold"), _validity(case.generated)), *_not_kept(case)]
+
+
+def _not_kept(case: GenerationResult) -> list[RenderableType]:
+    """Return a line for each loss of a case."""
+    losses = case.fit.losses if case.fit else ()
+    messages = [loss.message for loss in losses if loss.kind != "arm"]
+    messages += _vanished(case.evaluation.row(WITH), case.encounter.made)
+    messages += case.lost_reactions
+    return [Text(f" not kept  {printable(message)}", WARNING_STYLE) for message in messages]
+
+
 def _case(case: GenerationResult, verbose: bool) -> list[RenderableType]:
     """Return the title of a case and its table; deviations from the recording are yellow."""
     row = case.evaluation.row(WITH)
     losses = case.fit.losses if case.fit else ()
-    not_kept = [loss.message for loss in losses if loss.kind != "arm"]
-    not_kept += _vanished(row, case.encounter.made)
-    not_kept += case.lost_reactions
     notes = [loss.message for loss in losses if loss.kind == "arm"]
     notes += case.route_remarks
     notes += filter(None, [case.segmentation.remark(case.encounter.duration)])
@@ -79,12 +96,10 @@ def _case(case: GenerationResult, verbose: bool) -> list[RenderableType]:
             table.add_row("", label, printable(str(note)))
     if variety := _variety(case):
         table.add_row("", "variety", variety)
-    for message in not_kept:
-        table.add_row("", Text("not kept", WARNING_STYLE), Text(printable(message), WARNING_STYLE))
     for message in notes:
         table.add_row("", "note", printable(message))
     title = Text(printable(case.title), style="bold")
-    return [title, table, *(_details(case, row) if verbose else ())]
+    return [title, table, *_not_kept(case), *(_details(case, row) if verbose else ())]
 
 
 def _road_users(encounter: Encounter) -> str:
