@@ -426,7 +426,7 @@ def from_frame(
         signals, signal_notes = signals_of_table(usable, segments[0].label)
         notes = [*notes, *signal_notes]
     return RawLog(
-        name=paths[0].stem if len(paths) == 1 else paths[0].parent.name,
+        name=paths[0].stem if len(paths) == 1 else paths[0].resolve().parent.name,
         geographic="lat" in frame,
         vehicles=vehicles,
         rows=len(frame),

@@ -3,6 +3,8 @@
 
 """Tables: columns by name, units by suffix, options, and errors that name the place."""
 
+import shutil
+
 import numpy as np
 import pandas as pd
 import pytest
@@ -10,6 +12,7 @@ from support.log_builders import crossing, geographic, save
 
 from scenario_gen.base.errors import InputError
 from scenario_gen.logs import LogConfig, read_log
+from scenario_gen.logs.synthetic import bundled
 
 
 def test_a_plain_table(tmp_path):
@@ -177,3 +180,11 @@ def test_degrees_that_are_called_metres_are_refused(tmp_path, lon, lat):
     path.write_text("\n".join(["t,id,x,y,speed", *rows]) + "\n")
     with pytest.raises(InputError, match="lon=x,lat=y"):
         read_log(path)
+
+
+def test_files_of_the_current_folder_are_named_after_it(tmp_path, monkeypatch):
+    (tmp_path / "drives").mkdir()
+    monkeypatch.chdir(tmp_path / "drives")
+    for vehicle in "ab":
+        shutil.copy(bundled("follower"), f"{vehicle}.csv")
+    assert read_log(["a.csv", "b.csv"]).quality.name == "drives"
