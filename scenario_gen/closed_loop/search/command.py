@@ -186,10 +186,14 @@ class SearchResult:
             ]
         rate = self.estimate.rate
         if self.estimate.first:
+            natural = f"at most {_share(rate.high)} of drives fail (95 %; none was seen to)"
+            if rate.value > 0.0:
+                interval = f"95 % interval {_share(rate.low)} to {_share(rate.high)}"
+                natural = f"{_share(rate.value)} of drives fail ({interval})"
             messages = [
-                f"failure rate {_share(rate.value)} (95 % interval {_share(rate.low)} to"
-                f" {_share(rate.high)})",
-                f"first failure: drive {self.estimate.first} of {drives}",
+                f"{len(self.findings)} failures shown, the first in drive {self.estimate.first}"
+                f" of {drives} steered drives",
+                f"in natural traffic {natural}",
             ]
         else:
             messages = [
