@@ -11,10 +11,9 @@ state slows it down.
 from collections.abc import Callable
 from typing import Any
 
-import numpy as np
-from ompl import base, geometric, util
+from ompl import base
 
-from scenario_gen.method.routing.search.ompl.solve import PLANNERS
+from scenario_gen.method.routing.search.ompl.solve import search
 from scenario_gen.numerics import Floats
 from scenario_gen.roads import segment_free
 
@@ -74,32 +73,17 @@ def solve(
     Returns:
         The path (P, 2) in cells, without a row if none was found; and the number of calls.
     """
-    util.setLogLevel(util.LOG_NONE)
-    problem = base.ProblemDefinition(information)
     states = []
     for end in ends:
         state = information.getStateSpace().allocState()
         state[0], state[1] = float(end[0]), float(end[1])
         states.append(state)
-    problem.setStartAndGoalStates(*states)
-    problem.setOptimizationObjective(base.PathLengthOptimizationObjective(information))
-    search = getattr(geometric, PLANNERS[planner])(information)
-    if step is not None:
-        search.setRange(step)
-    search.setProblemDefinition(problem)
-    search.setup()
-    calls = 0
-
-    def is_over() -> bool:
-        nonlocal calls
-        calls += 1
-        return stop(calls)
-
-    search.solve(base.PlannerTerminationCondition(is_over))
-    if not problem.hasExactSolution():
-        return np.empty((0, 2)), calls
-    path = problem.getSolutionPath()
-    if simplify:
-        geometric.PathSimplifier(information).simplifyMax(path)
-    states = [path.getState(k) for k in range(path.getStateCount())]
-    return np.array([[state[0], state[1]] for state in states]), calls
+    return search(
+        information,
+        states,
+        lambda state: (state[0], state[1]),
+        planner,
+        stop,
+        step,
+        simplify=simplify,
+    )

@@ -37,7 +37,7 @@ OVERTIME_S = 5.0  # for which the stream lasts after the ego has arrived
 QUEUE_M = 9.0  # from the conflict area to where the ego stands in a queue
 QUEUE_GAP_M = 3.5  # ahead of it
 HEADWAY_S = 1.0  # by which the queue departs before the ego
-MIN_SAMPLES = 5  # of a vehicle of the stream
+MIN_SAMPLES_COUNT = 5  # of a vehicle of the stream
 LEAVES_M = 26.0  # behind the conflict area and the goal of the ego
 
 
@@ -197,9 +197,11 @@ class Stream:
             near = np.vstack([near, ahead < ego.exit + EXIT_M + LEAVES_M])
             vehicles.append(_named(ego.vehicle, 0))
             paths.append(ego.path)
-        rows = np.flatnonzero(near.sum(axis=1) > MIN_SAMPLES)
+        rows = np.flatnonzero(near.sum(axis=1) > MIN_SAMPLES_COUNT)
         if len(rows) < 2:
-            raise RefusedError(f"a vehicle of the stream would have {MIN_SAMPLES} samples or less")
+            raise RefusedError(
+                f"a vehicle of the stream would have {MIN_SAMPLES_COUNT} samples or less"
+            )
         poses = np.stack([paths[row].at(stations[row]) for row in rows])
         begins = near[rows].argmax(axis=1)
         who, whom = token(ego.vehicle.id), token(vehicles[rows[1]].id)

@@ -168,7 +168,7 @@ class FrameTree:
                 origin, turn = self._transforms_at(child, stamps)
                 turn = turn * (not points_north)
                 place, heading = origin + np.exp(1j * turn) * place, heading + turn
-        return _at(fixes, place, heading)
+        return _at_places(fixes, place, heading)
 
     def _transforms_at(self, child: str, stamps: Ints) -> tuple[Complexes, Floats]:
         """Return origin (F,) and turn (F,) of a frame in its parent at stamps (F,)."""
@@ -203,7 +203,7 @@ def _poses(fixes: Sequence[Fix]) -> tuple[Complexes, Floats]:
     return place, np.array([fix.heading for fix in fixes], dtype=float)
 
 
-def _at(fixes: Sequence[Fix], place: Complexes, heading: Floats) -> list[Fix]:
+def _at_places(fixes: Sequence[Fix], place: Complexes, heading: Floats) -> list[Fix]:
     """Return the fixes at other places (F,) with other headings (F,)."""
     poses = zip(fixes, place.tolist(), heading.tolist(), strict=True)
     return [fix._replace(x=z.real, y=z.imag, heading=yaw) for fix, z, yaw in poses]
@@ -256,7 +256,7 @@ def _centred(recording: Recording, centres: Mapping[str, str], tree: FrameTree) 
         ahead, left = tree.transforms[centres[child]][0][1:3]
         place, heading = _poses(recording.rows.fixes)
         place = place + np.exp(1j * heading) * complex(ahead, left)
-        recording.rows.fixes = _at(recording.rows.fixes, place, heading)
+        recording.rows.fixes = _at_places(recording.rows.fixes, place, heading)
         recording.ahead = 0.0
     elif "rear_axle" in child:
         recording.ahead = POINTS["rear_axle"]

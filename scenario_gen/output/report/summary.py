@@ -65,17 +65,20 @@ def summary(cases: Sequence[GenerationResult], *, verbose: bool = False) -> Rend
 
 def _in_brief(case: GenerationResult) -> list[RenderableType]:
     """Return a line with the validity of a case, and one for each loss."""
+    table = Table.grid(padding=(0, 1))
+    _add_losses(table, case)
     title = f"{printable(case.title)}: "
-    return [Text.assemble((title, "bold"), _validity(case.generated)), *_not_kept(case)]
+    return [Text.assemble((title, "bold"), _validity(case.generated)), table]
 
 
-def _not_kept(case: GenerationResult) -> list[RenderableType]:
-    """Return a line for each loss of a case."""
+def _add_losses(table: Table, case: GenerationResult) -> None:
+    """Add a row for each loss of a case."""
     losses = case.fit.losses if case.fit else ()
     messages = [loss.message for loss in losses if loss.kind != "arm"]
     messages += _vanished(case.evaluation.row(WITH), case.encounter.made)
     messages += case.lost_reactions
-    return [Text(f" not kept  {printable(message)}", WARNING_STYLE) for message in messages]
+    for message in messages:
+        table.add_row("", Text("not kept", WARNING_STYLE), Text(printable(message), WARNING_STYLE))
 
 
 def _case(case: GenerationResult, verbose: bool) -> list[RenderableType]:
@@ -96,10 +99,11 @@ def _case(case: GenerationResult, verbose: bool) -> list[RenderableType]:
             table.add_row("", label, printable(str(note)))
     if variety := _variety(case):
         table.add_row("", "variety", variety)
+    _add_losses(table, case)
     for message in notes:
         table.add_row("", "note", printable(message))
     title = Text(printable(case.title), style="bold")
-    return [title, table, *_not_kept(case), *(_details(case, row) if verbose else ())]
+    return [title, table, *(_details(case, row) if verbose else ())]
 
 
 def _road_users(encounter: Encounter) -> str:

@@ -7,7 +7,7 @@ OMPL searches the space of Dubins curves, with the exact sweep of our own planne
 validator: a compiled kernel in place of its own checks at a resolution of 1 % of the extent.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from time import process_time
 from typing import Any
 
@@ -83,21 +83,40 @@ def solve(
         Poses (P, 3) joined by Dubins curves, without a row if no path was found; and the number of
         calls.
     """
-    util.setLogLevel(util.LOG_NONE)
-    problem = base.ProblemDefinition(information)
     states = []
     for x, y, yaw in ends.tolist():
         state = information.getStateSpace().allocState()
         state.setXY(x, y)
         state.setYaw(yaw)
         states.append(state)
-    problem.setStartAndGoalStates(*states)
+    return search(information, states, _pose, planner, stop, step, simplify=simplify, first=first)
+
+
+def search(
+    information: Any,
+    ends: Sequence[Any],
+    read: Callable[[Any], Sequence[float]],
+    planner: str,
+    stop: Callable[[int], bool],
+    step: float | None,
+    *,
+    simplify: bool,
+    first: bool = False,
+) -> tuple[Floats, int]:
+    """Search for a path between two states of any space, as `solve` does.
+
+    `read` returns the numbers of a state; `step` None is OMPL's default. Returns a row for each
+    state of the path, none if no path was found, and the number of calls.
+    """
+    util.setLogLevel(util.LOG_NONE)
+    problem = base.ProblemDefinition(information)
+    problem.setStartAndGoalStates(*ends)
     problem.setOptimizationObjective(base.PathLengthOptimizationObjective(information))
-    search = getattr(geometric, PLANNERS[planner])(information)
-    if planner != "ompl_bit_star":  # it has no range
-        search.setRange(step)
-    search.setProblemDefinition(problem)
-    search.setup()
+    algorithm = getattr(geometric, PLANNERS[planner])(information)
+    if step is not None and planner != "ompl_bit_star":  # it has no range
+        algorithm.setRange(step)
+    algorithm.setProblemDefinition(problem)
+    algorithm.setup()
     calls = 0
 
     def is_over() -> bool:
@@ -105,13 +124,13 @@ def solve(
         calls += 1
         return stop(calls) or (first and problem.hasExactSolution())
 
-    search.solve(base.PlannerTerminationCondition(is_over))
+    algorithm.solve(base.PlannerTerminationCondition(is_over))
     if not problem.hasExactSolution():
-        return np.empty((0, 3)), calls
+        return np.empty((0, len(read(ends[0])))), calls
     path = problem.getSolutionPath()
     if simplify:
         geometric.PathSimplifier(information).simplifyMax(path)
-    return np.array([_pose(path.getState(k)) for k in range(path.getStateCount())]), calls
+    return np.array([read(path.getState(k)) for k in range(path.getStateCount())]), calls
 
 
 def solve_in_child(
