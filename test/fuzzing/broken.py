@@ -33,17 +33,6 @@ NUMBER = "9" * 5000
 """More digits than Python turns into a number."""
 
 
-def at(document: object, path: str, value: object) -> bytes:
-    """JSON with one value changed; `path` has keys and indices with dots between."""
-    changed = json.loads(json.dumps(document))
-    *way, last = [int(key) if key.isdigit() else key for key in path.split(".")]
-    inner = changed
-    for key in way:
-        inner = inner[key]
-    inner[last] = value
-    return json.dumps(changed).encode()
-
-
 YAML = {
     "an_integer_of_nothing": '!!int ""',
     "a_number_of_nothing": '!!float ""',
@@ -67,32 +56,19 @@ def image(kind: str, size: tuple[int, int] = (40, 40)) -> bytes:
 def bomb(width: int, height: int) -> bytes:
     """A PNG of a few bytes that says it is so large, of one bit each."""
 
-    def chunk(name: bytes, data: bytes) -> bytes:
-        return (
-            struct.pack(">I", len(data)) + name + data + struct.pack(">I", zlib.crc32(name + data))
-        )
-
-    head = chunk(b"IHDR", struct.pack(">IIBBBBB", width, height, 1, 0, 0, 0, 0))
-    return (
-        b"\x89PNG\r\n\x1a\n"
-        + head
-        + chunk(b"IDAT", zlib.compress(b"\0" * 1000))
-        + chunk(b"IEND", b"")
-    )
+    head = struct.pack(">IIBBBBB", width, height, 1, 0, 0, 0, 0)
+    out = b"\x89PNG\r\n\x1a\n"
+    for name, data in ((b"IHDR", head), (b"IDAT", zlib.compress(b"\0" * 1000)), (b"IEND", b"")):
+        size, check = (struct.pack(">I", n) for n in (len(data), zlib.crc32(name + data)))
+        out += size + name + data + check
+    return out
 
 
 def nav2(picture: str, **facts: str) -> bytes:
     """A map's facts."""
-    given = {
-        "image": picture,
-        "resolution": "0.2",
-        "origin": "[0, 0, 0]",
-        "negate": "0",
-        "occupied_thresh": "0.65",
-    }
-    return "".join(
-        f"{key}: {value}\n" for key, value in (given | {"free_thresh": "0.25"} | facts).items()
-    ).encode()
+    given = {"image": picture, "resolution": "0.2", "origin": "[0, 0, 0]", "negate": "0"}
+    given |= {"occupied_thresh": "0.65", "free_thresh": "0.25"} | facts
+    return "".join(f"{key}: {value}\n" for key, value in given.items()).encode()
 
 
 ALIASES = "a0: &a0 [1,1,1,1,1,1,1,1,1]\n" + "".join(
@@ -201,21 +177,14 @@ def sqlite(*changes: str, cut: int | None = None) -> bytes:
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "bag.db3"
         with sqlite3.connect(path) as bag:
-            columns = "name TEXT, type TEXT, serialization_format TEXT, offered_qos_profiles TEXT DEFAULT ''"
+            columns = "name TEXT, type TEXT, serialization_format TEXT, offered_qos_profiles TEXT"
             bag.execute(f"CREATE TABLE topics(id INTEGER PRIMARY KEY, {columns})")
-            bag.execute(
-                "CREATE TABLE messages(id INTEGER PRIMARY KEY, topic_id INTEGER, timestamp INTEGER, data BLOB)"
-            )
-            for k in range(3):
-                row = (k + 1, f"/vehicle_{k}/fix", "sensor_msgs/msg/NavSatFix", "cdr")
-                bag.execute(
-                    "INSERT INTO topics(id, name, type, serialization_format) VALUES(?, ?, ?, ?)",
-                    row,
-                )
-            rows = [(1 + k % 3, 10**8 * k, bytes(4) + bytes(120)) for k in range(90)]
-            bag.executemany(
-                "INSERT INTO messages(topic_id, timestamp, data) VALUES(?, ?, ?)", rows
-            )
+            columns = "topic_id INTEGER, timestamp INTEGER, data BLOB"
+            bag.execute(f"CREATE TABLE messages(id INTEGER PRIMARY KEY, {columns})")
+            topics = [(f"/vehicle_{k}/fix", "sensor_msgs/msg/NavSatFix") for k in range(3)]
+            bag.executemany("INSERT INTO topics VALUES(NULL, ?, ?, 'cdr', '')", topics)
+            rows = [(1 + k % 3, 10**8 * k, bytes(124)) for k in range(90)]
+            bag.executemany("INSERT INTO messages VALUES(NULL, ?, ?, ?)", rows)
             for statement in changes:
                 bag.execute(statement)
         bag.close()
@@ -278,6 +247,8 @@ def described(said: object) -> Make:
     )
 
 
+MISTYPED = {"name": "x_m", "field_name": "x_m", "metadata": None, "pandas_type": "int64"}
+MISTYPED["numpy_type"] = "]nt64"
 ROWS = len(crossing())
 NO_NUMBER = [None if k == 60 else k * 0.1 for k in range(ROWS)]
 TABLES: dict[str, Make] = {
@@ -307,19 +278,7 @@ TABLES: dict[str, Make] = {
     ),
     "parquet/columns_that_are_not_told.parquet": described({"index_columns": []}),
     "parquet/words_that_are_a_list.parquet": described([1]),
-    "parquet/a_type_that_is_none.parquet": described(
-        {
-            "columns": [
-                {
-                    "name": "x_m",
-                    "field_name": "x_m",
-                    "pandas_type": "int64",
-                    "numpy_type": "]nt64",
-                    "metadata": None,
-                }
-            ]
-        }
-    ),
+    "parquet/a_type_that_is_none.parquet": described({"columns": [MISTYPED]}),
     "parquet/a_stamp_far_away.parquet": stamps(
         pa.array([k * 0.1 for k in range(ROWS - 1)] + [3e8])
     ),

@@ -27,66 +27,25 @@ WORDS = (
     *(
         b"\x00",
         b"\x00" * 8,
-        b"\xff" * 4,
         b"\xff" * 8,
         b"\xef\xbb\xbf",
         b"\xff\xfe",
-        b"\n",
-        b"\r",
-        b"\r\n",
-        b",",
-        b";",
-        b"#",
+        *(bytes([k]) for k in b"\n\r,;#"),
     ),
     *(struct.pack("<d", value) for value in (math.nan, math.inf, 1e308, -0.0, 5e-324)),
     *(struct.pack("<q", value) for value in (-(2**63), 2**63 - 1, 2**31, 2**32 - 1)),
 )
 REALS = (None, 0.0, -1.0, 1e308, -0.0, 5e-324, math.nan, math.inf, -math.inf, 2.0**53)
 WHOLE = (None, 0, 1, -1, 127, 2**31, 2**53, 2**62, 2**63 - 1, -(2**63))
+PLAIN = "int8 int64 uint64 float32 float64 bool null string large_string binary date32 date64"
 TYPES = (
-    *(
-        pa.int8(),
-        pa.int64(),
-        pa.uint64(),
-        pa.uint8(),
-        pa.float32(),
-        pa.float64(),
-        pa.float16(),
-        pa.bool_(),
-        pa.null(),
-    ),
-    *(
-        pa.string(),
-        pa.large_string(),
-        pa.binary(),
-        pa.dictionary(pa.int32(), pa.string()),
-        pa.decimal128(38, 6),
-    ),
-    *(
-        pa.timestamp("s"),
-        pa.timestamp("ms", "UTC"),
-        pa.timestamp("us"),
-        pa.timestamp("us", "Europe/Berlin"),
-        pa.timestamp("ns"),
-    ),
-    *(
-        pa.timestamp("ns", "+05:30"),
-        pa.date32(),
-        pa.date64(),
-        pa.time32("ms"),
-        pa.time64("ns"),
-        pa.duration("us"),
-    ),
-    *(pa.list_(pa.int64()), pa.struct([("a", pa.int64())]), pa.map_(pa.string(), pa.int64())),
+    *map(pa.type_for_alias, PLAIN.split()),
+    *(pa.dictionary(pa.int32(), pa.string()), pa.decimal128(38, 6), pa.time64("ns")),
+    *(pa.timestamp(unit) for unit in ("s", "us", "ns")),
+    *(pa.timestamp("us", zone) for zone in ("UTC", "Europe/Berlin", "+05:30")),
+    *(pa.duration("us"), pa.list_(pa.int64()), pa.struct([("a", pa.int64())])),
 )
-PANDAS = (
-    b"{}",
-    b"[]",
-    b"null",
-    b"{",
-    b'{"columns": 3, "index_columns": []}',
-    b'{"index_columns": ["t_s"], "columns": []}',
-)
+PANDAS = (b"{}", b"[]", b"null", b"{", b'{"columns": 3, "index_columns": []}')
 
 
 def flip(rng: random.Random, data: bytes, seeds: Sequence[bytes]) -> bytes:
@@ -104,11 +63,8 @@ def cut(rng: random.Random, data: bytes, seeds: Sequence[bytes]) -> bytes:
     if not data:
         return data
     at = rng.randrange(len(data))
-    return (
-        data[:at]
-        if rng.random() < 0.5
-        else data[:at] + data[at + rng.choice((1, 2, 4, 8, rng.randrange(len(data)) + 1)) :]
-    )
+    size = rng.choice((1, 2, 4, 8, rng.randrange(len(data)) + 1, len(data), len(data), len(data)))
+    return data[:at] + data[at + size :]
 
 
 def splice(rng: random.Random, data: bytes, seeds: Sequence[bytes]) -> bytes:
@@ -135,23 +91,8 @@ def integer(rng: random.Random, data: bytes, seeds: Sequence[bytes]) -> bytes:
     at, order = rng.randrange(len(data) - size + 1), rng.choice(("little", "big"))
     there = int.from_bytes(data[at : at + size], order)
     top = 1 << 8 * size
-    value = (
-        rng.choice(
-            (
-                0,
-                1,
-                top - 1,
-                top // 2,
-                top // 2 - 1,
-                there + 1,
-                there - 1,
-                there * 2,
-                there << 8,
-                rng.randrange(top),
-            )
-        )
-        % top
-    )
+    extremes = (0, 1, top - 1, top // 2, top // 2 - 1, rng.randrange(top))
+    value = rng.choice((*extremes, there + 1, there - 1, there * 2, there << 8)) % top
     return data[:at] + value.to_bytes(size, order) + data[at + size :]
 
 
@@ -221,51 +162,32 @@ def columns(rng: random.Random, data: bytes, seeds: Sequence[bytes]) -> bytes:
 
 def changed(rng: random.Random, table: pa.Table) -> pa.Table:
     """Return an Arrow table with one thing wrong."""
-    at = rng.randrange(table.num_columns)
+    at, other = rng.randrange(table.num_columns), rng.randrange(table.num_columns)
     name, values = table.column_names[at], table.column(at)
-    match rng.randrange(9):
-        case 8:
-            return table.append_column(name, table.column(rng.randrange(table.num_columns)))
+    match rng.randrange(8):
         case 0:
-            return table.set_column(at, name, values.cast(rng.choice(TYPES), safe=False))
+            values = values.cast(rng.choice(TYPES), safe=False)
         case 1:
             few = rng.choice((WHOLE, REALS, NUMBERS))
-            return table.set_column(
-                at, name, pa.array([rng.choice(few) for _ in range(len(values))])
-            )
+            values = pa.array([rng.choice(few) for _ in values])
         case 2:
-            return table.set_column(
-                at,
-                name,
-                pa.array(
-                    [None if rng.random() < 0.1 else v.as_py() for v in values], type=values.type
-                ),
-            )
+            holed = [None if rng.random() < 0.1 else value.as_py() for value in values]
+            values = pa.array(holed, type=values.type)
         case 3:
-            numbers = values.cast(pa.float64(), safe=False).to_numpy() * rng.choice(
-                (0.0, -1.0, 1e-9, 1e3, 1e6, 1e9, 1e300)
-            )
-            return table.set_column(at, name, pa.array(numbers).cast(values.type, safe=False))
+            factor = rng.choice((0.0, -1.0, 1e-9, 1e3, 1e6, 1e9, 1e300))
+            numbers = values.cast(pa.float64(), safe=False).to_numpy() * factor
+            values = pa.array(numbers).cast(values.type, safe=False)
         case 4:
-            names = [
-                *table.column_names,
-                "t_s",
-                "time",
-                "utc",
-                "lat",
-                "id",
-                "speed",
-                "",
-                "\x00",
-                "x" * 3000,
-            ]
-            return table.set_column(at, rng.choice(names), values)
+            name = rng.choice(
+                (*table.column_names, *["t_s", "time", "utc", "lat", "id", "speed"], "", "\x00")
+            )
         case 5:
             return table.remove_column(at)
         case 6:
             return table.replace_schema_metadata({b"pandas": rng.choice(PANDAS)})
         case _:
-            return table.take([rng.randrange(table.num_rows) for _ in range(table.num_rows)])
+            return table.append_column(name, table.column(other))
+    return table.set_column(at, name, values)
 
 
 def records(rng: random.Random, data: bytes, seeds: Sequence[bytes]) -> bytes:
@@ -288,47 +210,23 @@ def records(rng: random.Random, data: bytes, seeds: Sequence[bytes]) -> bytes:
 
 def sentence(rng: random.Random, base: sqlite3.Connection) -> tuple[str, tuple[object, ...]]:
     """Return an SQL statement that damages one table, with its values."""
-    table = rng.choice(
-        [
-            name.decode()
-            for (name,) in base.execute("select name from sqlite_master where type = 'table'")
-        ]
-    )
-    column = rng.choice(
-        [entry[1].decode() for entry in base.execute(f'pragma table_info("{table}")')]
-    )
-    value = rng.choice(
-        (
-            *WHOLE,
-            *REALS,
-            "text",
-            "",
-            b"",
-            b"\xff\x00",
-            b"\x00\x01\x00\x00",
-            "é" * 2000,
-            rng.randbytes(40),
-            "{",
-            "[]",
-        )
-    )
+    tables = base.execute("select name from sqlite_master where type = 'table'").fetchall()
+    table = rng.choice(tables)[0].decode()
+    column = rng.choice(base.execute(f'pragma table_info("{table}")').fetchall())[1].decode()
+    texts = ("text", "", b"", b"\xff\x00", b"\x00\x01\x00\x00", "é" * 2000, "{", "[]")
+    value = rng.choice((*WHOLE, *REALS, *texts, rng.randbytes(40)))
     name = rng.choice(("id", "data", "x", "timestamp", "name", "type", "topic_id"))
     some = f"rowid * {rng.randrange(1, 97)} % 97 < {rng.choice((1, 10, 97))}"
-    statement = rng.choice(
-        (
-            *[f'update "{table}" set "{column}" = ? where {some}'] * 2,
-            *(
-                f'alter table "{table}" {how}'
-                for how in (f'rename column "{column}" to "{name}"', f'drop column "{column}"')
-            ),
-            *(
-                f'alter table "{table}" rename to "{name}"',
-                f'drop table "{table}"',
-                f'delete from "{table}" where {some}',
-            ),
-            f'insert into "{table}" select * from "{table}" limit 3',
-        )
+    update = f'update "{table}" set "{column}" = ? where {some}'
+    statements = (
+        f'alter table "{table}" rename column "{column}" to "{name}"',
+        f'alter table "{table}" drop column "{column}"',
+        f'alter table "{table}" rename to "{name}"',
+        f'drop table "{table}"',
+        f'delete from "{table}" where {some}',
+        f'insert into "{table}" select * from "{table}" limit 3',
     )
+    statement = rng.choice((update, update, *statements))
     return statement, (value,) * statement.count("?")
 
 

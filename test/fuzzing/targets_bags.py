@@ -73,7 +73,7 @@ def generated(folder: Path) -> list[bytes]:
 
 def ros1(folder: Path) -> list[bytes]:
     """Bags of ROS 1, with and without compression."""
-    store, types = get_typestore(Stores.ROS2_JAZZY), get_typestore(Stores.ROS1_NOETIC)
+    types = get_typestore(Stores.ROS1_NOETIC)
     for compression in (None, *Writer.CompressionFormat):
         writer = Writer(folder / f"{compression}.bag")
         if compression:
@@ -82,13 +82,7 @@ def ros1(folder: Path) -> list[bytes]:
             text = writer.add_connection("/a", "std_msgs/msg/String", typestore=types)
             head = writer.add_connection("/b", "std_msgs/msg/Header", typestore=types)
             for k in range(40):
-                writer.write(
-                    text,
-                    k,
-                    store.cdr_to_ros1(
-                        b"\x00\x01\x00\x00\x02\x00\x00\x00a\x00", "std_msgs/msg/String"
-                    ),
-                )
+                writer.write(text, k, b"\x01\x00\x00\x00a")
                 writer.write(head, k, bytes(16))
     return [path.read_bytes() for path in sorted(folder.glob("*.bag"))]
 
@@ -101,25 +95,20 @@ def messages(rng: random.Random, data: bytes, seeds: Sequence[bytes]) -> bytes:
             (folder / "in.mcap").write_bytes(data)
             found = list(read_messages(folder / "in.mcap"))
             chosen = {rng.randrange(len(found)) for _ in range(rng.choice((1, 1, 2, 5)))}
-            how = rng.randrange(8)
             with BagWriter(folder / "out", compress=False) as bag:
                 for k, message in enumerate(found):
                     if k in chosen:
                         other = rng.choice(found)
-                        content = rng.choice(BYTES)(
-                            rng, message.data, [message.data for message in found]
-                        )
-                        stamp = rng.choice(
-                            (0, 1, 2**62, message.stamp_ns + 1, rng.randrange(2**40))
-                        )
+                        content = rng.choice(BYTES)(rng, message.data, [other.data])
+                        stamp = rng.choice((0, 1, 2**62, message.stamp_ns + 1))
                         changes = (
                             {"topic": other.topic},
                             {"stamp_ns": stamp},
                             {"data": other.data},
                             {"type": other.type},
+                            *[{"data": content}] * 4,
                         )
-                        changed = changes[how] if how < len(changes) else {"data": content}
-                        message = replace(message, **changed)  # noqa: PLW2901
+                        message = replace(message, **rng.choice(changes))  # noqa: PLW2901
                     bag.add_topic(message.topic, message.type)
                     bag.write(message.topic, message.data, message.stamp_ns)
             return (folder / "out" / "out_0.mcap").read_bytes()
@@ -187,20 +176,11 @@ def maps(_folder: Path) -> list[bytes]:
     found = []
     grey = Image.fromarray(pixels)
     alpha = Image.merge("LA", (grey, Image.fromarray(np.full_like(pixels, 255))))
-    for name, image in (
-        *(
-            ("map.pgm", grey),
-            ("map.png", grey),
-            ("map.png", alpha),
-            ("map.bmp", grey),
-            ("map.jpg", grey),
-        ),
-        *(
-            ("map.png", grey.convert("P")),
-            ("map.pbm", grey.convert("1")),
-            ("map.ppm", grey.convert("RGB")),
-        ),
-    ):
+    pictures = (
+        *[(f"map.{kind}", grey) for kind in ("pgm", "png", "bmp", "jpg")],
+        *[("map.png", alpha), ("map.png", grey.convert("P")), ("map.ppm", grey.convert("RGB"))],
+    )
+    for name, image in pictures:
         text = f"image: {name}\nresolution: 0.2\norigin: [-5.0, 2.0, 0.0]\nnegate: 0\noccupied_thresh: 0.65\nfree_thresh: 0.25\n"
         file = io.BytesIO()
         image.save(file, {".jpg": "JPEG", ".png": "PNG", ".bmp": "BMP"}.get(name[-4:], "PPM"))
@@ -229,13 +209,13 @@ def assignments(_folder: Path) -> list[bytes]:
     odd = [
         "'",
         '"',
-        "[1, 2]",
-        "{a: [}",
-        "!!int ''",
-        "!!bool x",
+        "[1,2]",
+        "{a:[}",
+        "!!int",
+        "!!bool",
         "*a",
-        "&a [*a]",
-        "%YAML 9.9",
+        "&a[*a]",
+        "%YAML",
         "...",
         "2024-99-99",
     ]
@@ -295,22 +275,13 @@ def values(rng: random.Random, data: bytes, seeds: Sequence[bytes]) -> bytes:
         holder, place = None, None
         node = document
         while isinstance(node, dict | list) and node and (holder is None or rng.random() < 0.85):
-            holder, place = (
-                node,
-                rng.choice(list(node) if isinstance(node, dict) else range(len(node))),
-            )
+            keys = list(node) if isinstance(node, dict) else range(len(node))
+            holder, place = node, rng.choice(keys)
             node = node[place]
         if holder is None:
             return rng.choice(BYTES)(rng, data, seeds)
-        extremes = [*json.loads(EXTREMES), 10**400, "é" * 500]
-        more = [
-            float("nan"),
-            float("inf"),
-            [node],
-            {"a": node},
-            [node] * 3,
-            node[:-1] if isinstance(node, list) else node,
-        ]
+        extremes = [*json.loads(EXTREMES), 10**400, "é" * 500, float("nan"), float("inf")]
+        more = [[node], {"a": node}, [node] * 3, node[:-1] if isinstance(node, list) else node]
         if rng.random() < 0.15:
             del holder[place]
         else:

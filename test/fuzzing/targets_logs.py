@@ -17,6 +17,7 @@ from fuzzing.mutators import BYTES, columns, records, TEXT, tree
 import numpy as np
 import pandas as pd
 from rosbags.rosbag2 import Reader, StoragePlugin, Writer
+from support.log_builders import crossing
 
 from msg_conventions.autoware import AutowareEncoder
 from msg_conventions.ego import encode_state
@@ -36,30 +37,9 @@ SHORT = LogConfig(min_duration=1.0, travel=1.0)
 
 
 def cars() -> pd.DataFrame:
-    """Rows of two cars that meet: 6 s at 10 Hz, one driving east at 8 m/s, one driving north and braking."""
-    time = np.arange(61) / 10.0
-    east = {
-        "t_s": 1000.0 + time,
-        "vehicle_id": "a",
-        "x_m": 8.0 * time - 40.0,
-        "y_m": 0.0,
-        "speed_mps": 8.0,
-        "heading_rad": 0.0,
-    }
-    braking = 6.0 * time - 0.5 * time**2
-    north = {
-        "t_s": 1000.0 + time,
-        "vehicle_id": "b",
-        "x_m": 10.0,
-        "y_m": braking - 30.0,
-        "speed_mps": 6.0 - time,
-        "heading_rad": 1.57,
-    }
-    return (
-        pd.concat([pd.DataFrame(east), pd.DataFrame(north).assign(heading_rad=1.57)])
-        .sort_values(["t_s", "vehicle_id"], ignore_index=True)
-        .round(3)
-    )
+    """Rows of two cars that meet: 6 s at 10 Hz, with headings."""
+    rows = crossing(6.0).round(3)
+    return rows.assign(heading_rad=np.where(rows["vehicle_id"] == "a", 0.0, 1.57))
 
 
 def on_globe(rows: pd.DataFrame) -> pd.DataFrame:
@@ -78,27 +58,18 @@ def on_globe(rows: pd.DataFrame) -> pd.DataFrame:
 
 def variants() -> list[pd.DataFrame]:
     """Tables with stamps of different kinds."""
-    rows = cars()
+    rows, timeless = cars(), cars().drop(columns="t_s")
     dates = pd.to_datetime(rows["t_s"], unit="s", utc=True)
-    return [
-        rows,
-        on_globe(rows),
-        rows.assign(timestamp=dates.astype(str)).drop(columns="t_s"),
-        rows.assign(timestamp=dates).drop(columns="t_s"),
-        rows.assign(time_ns=(rows["t_s"] * 1e9).round().astype(np.int64).astype("Int64")).drop(
-            columns="t_s"
-        ),
-    ]
+    stamps = (rows["t_s"] * 1e9).round().astype("Int64")
+    timed = (timeless.assign(timestamp=dates.astype(str)), timeless.assign(timestamp=dates))
+    return [rows, on_globe(rows), *timed, timeless.assign(time_ns=stamps)]
 
 
 def texts(_folder: Path) -> list[bytes]:
     """Tables in text with commas, semicolons and tabs."""
-    tables = [rows.to_csv(index=False).encode() for rows in variants()[:3]]
-    return [
-        *tables,
-        cars().to_csv(index=False, sep=";").encode(),
-        cars().to_csv(index=False, sep="\t").encode(),
-    ]
+    tables = [rows.to_csv(index=False) for rows in variants()[:3]]
+    tables += [cars().to_csv(index=False, sep=sep) for sep in ";\t"]
+    return [table.encode() for table in tables]
 
 
 def parquets(_folder: Path) -> list[bytes]:
@@ -123,27 +94,14 @@ def pilots(_folder: Path) -> list[bytes]:
     """Basic safety messages in JSON, of Wyoming and of an event of New York."""
     messages, event = [], []
     for row in cars().itertuples():
-        core = {
-            "id": row.vehicle_id,
-            "secMark": round(row.t_s * 1000) % 60_000,
-            "speed": row.speed_mps,
-            "heading": 90.0,
-        }
-        place = {
-            "position": {"latitude": 48.0 + row.y_m * 1e-5, "longitude": 11.0 + row.x_m * 1e-5}
-        }
+        core = {"id": row.vehicle_id, "secMark": round(row.t_s * 1000) % 60_000, "heading": 90.0}
+        core["speed"] = row.speed_mps
+        place = {"latitude": 48.0 + row.y_m * 1e-5, "longitude": 11.0 + row.x_m * 1e-5}
         metadata = {"recordGeneratedAt": f"{pd.Timestamp(row.t_s, unit='s')}"}
-        messages.append(
-            json.dumps({"metadata": metadata, "payload": {"data": {"coreData": core | place}}})
-        )
-        own = {
-            "X_m": row.x_m,
-            "Y_m": row.y_m,
-            "T_s": row.t_s,
-            "speed_mps": row.speed_mps,
-            "heading_deg": 90.0,
-        }
-        event.append({"bsmRecord": {"bsmMsg": {"coreData": core | own}}})
+        data = {"coreData": core | {"position": place}}
+        messages.append(json.dumps({"metadata": metadata, "payload": {"data": data}}))
+        own = {"X_m": row.x_m, "Y_m": row.y_m, "T_s": row.t_s, "speed_mps": row.speed_mps}
+        event.append({"bsmRecord": {"bsmMsg": {"coreData": core | own | {"heading_deg": 90.0}}}})
     return ["\n".join(messages).encode(), json.dumps({"bsmList": event}).encode()]
 
 
@@ -173,19 +131,12 @@ def bags(storage: StoragePlugin, folder: Path) -> list[bytes]:
         ]
     tracks = [("/tracks", TRACKS, until, encode_tracks(encounter))]
     odometry = []
-    for vehicle, *track in zip(
-        encounter.vehicles, encounter.position, encounter.heading, encounter.speed, strict=True
-    ):
-        for k, state in enumerate(np.column_stack(track)):
+    states = np.dstack((encounter.position, encounter.heading, encounter.speed))
+    for vehicle, track in zip(encounter.vehicles, states, strict=True):
+        for k, state in enumerate(track):
             stamp = encounter.start_ns + k * encounter.dt_ns
-            odometry.append(
-                (
-                    f"/vehicle_{vehicle.id}/odom",
-                    ODOMETRY,
-                    stamp,
-                    encode_state(state, "car", "map", stamp),
-                )
-            )
+            message = encode_state(state, "car", "map", stamp)
+            odometry.append((f"/vehicle_{vehicle.id}/odom", ODOMETRY, stamp, message))
     perceived = [("/objects", TRACKED, stamp, data) for stamp, data in objects(encounter)]
     contents = {"s": streams, "t": tracks, "o": odometry, "p": perceived}
     return [written(folder / name, storage, content) for name, content in contents.items()]
