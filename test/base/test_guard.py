@@ -25,10 +25,6 @@ def test_a_message_is_short_and_prints(text, times):
     assert message.startswith("log.csv, line 3: ") and message.endswith("; name the column")
 
 
-def test_a_message_that_is_fit_stays_as_it_is():
-    assert str(InputError("σ of 3 m²: too much")) == "σ of 3 m²: too much"
-
-
 def test_a_line_break_in_a_name_is_no_line_of_an_error(capsys):
     print_error(RefusedError("no road:", "vehicle 1\nerror: fake", "vehicle 2"))
     assert capsys.readouterr().err == "error: no road:\nvehicle 1\\nerror: fake\nvehicle 2\n"

@@ -78,16 +78,6 @@ def test_inputs_stay(run, made, tmp_path):
         assert files(tmp_path) == before, words
 
 
-@pytest.mark.parametrize("out", ["/", ".", "..", "link", "file", "x" * 300, "/proc/x", "file/x"])
-def test_an_out_that_cannot_be(run, tmp_path, out):
-    (tmp_path / "file").touch()
-    (tmp_path / "link").symlink_to("nowhere")
-    for words in (GENERATE, ("demo",)):
-        code, said = run(*words, "--out", out)
-        assert code == 2 and len(said) <= len("error: \n") + 500 and "Traceback" not in said, said
-    assert sorted(path.name for path in tmp_path.iterdir()) == ["file", "link"]
-
-
 NAME = "[red]a\x1b[31m\n*b*\u202e[/]"
 
 

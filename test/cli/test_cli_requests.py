@@ -35,29 +35,11 @@ def test_a_planner_takes_the_place_of_a_vehicle_from_states_that_are_asked_for(r
     assert run("evaluate", "one/bag")[0] == 0
     assert run("evaluate", "one/bag", "--out", "page")[0] == 0
     assert "Vehicle 1 is left out" in (tmp_path / "page" / "report.html").read_text()
-    code, said = run(
-        "drive",
-        "one/bag",
-        "--planner",
-        "IdmFollower",
-        "--workers",
-        1,
-        "--out",
-        "driven",
-    )
+    drive = ("drive", "one/bag", "--planner", "IdmFollower")
+    code, said = run(*drive, "--workers", 1, "--out", "driven")
     driven = json.loads((tmp_path / "driven" / "drives.json").read_text())
     assert len(driven["drives"]) == 2, said
-    assert (
-        run(
-            "drive",
-            "one/bag",
-            "--planner",
-            "IdmFollower",
-            "--ego",
-            2,
-        )[0]
-        == 2
-    )
+    assert run(*drive, "--ego", 2)[0] == 2
     assert run("export", "one/bag", "--to", "commonroad", "--out", "exported")[0] == 0
 
 

@@ -7,23 +7,12 @@ import io
 import json
 import shutil
 import sys
-from unittest.mock import Mock
 
 import pytest
 from rich.console import Console
-import typer
-from typer.testing import CliRunner
 
-from scenario_gen.base.errors import RefusedError
 from scenario_gen.base.terminal import Terminal
-from scenario_gen.cli import commands, output
-from scenario_gen.cli.commands import app
-from scenario_gen.cli.corpus import shown
-
-
-def test_version(ran):
-    code, out, err = ran("--version")
-    assert code == 0 and out.startswith("scenario-gen ") and out.strip()[-1].isdigit() and not err
+from scenario_gen.cli import output
 
 
 def one_object(text):
@@ -93,17 +82,6 @@ ROW = (
 )
 
 
-def test_figures_are_short():
-    assert [shown(value) for value in (123.4, 12.34, 0.1, 99.96, -9.996, None)] == [
-        "123",
-        "12.3",
-        "0.10",
-        "100",
-        "-10.0",
-        "",
-    ]
-
-
 @pytest.mark.parametrize("columns", [3, 11])
 def test_a_table_in_80_columns_cuts_nothing_off(monkeypatch, columns):
     monkeypatch.setattr("scenario_gen.base.terminal.Terminal", Narrow)
@@ -134,30 +112,3 @@ def test_a_page_is_opened_where_somebody_looks(monkeypatch, tmp_path):
     monkeypatch.setattr(sys, "stdout", Console(force_terminal=True).file)
     monkeypatch.setattr("sys.stdout.isatty", lambda: True, raising=False)
     assert output.open_page(tmp_path / "page.html") and opened[0].startswith("file://")
-
-
-@pytest.mark.parametrize("name", sorted(typer.main.get_command(app).commands))
-def test_no_word_of_a_help_is_cut_at_80_columns(name, monkeypatch):
-    monkeypatch.setattr("typer.rich_utils.MAX_WIDTH", 80)
-    shown = CliRunner().invoke(app, [name, "--help"]).output
-    options = (
-        one
-        for one in typer.main.get_command(app).commands[name].params
-        if not getattr(one, "hidden", False)
-    )
-    helps = " ".join(option.help or "" for option in options).replace("\\[", "[")
-    assert "Usage" in shown and not [word for word in helps.split() if word not in shown]
-
-
-def test_each_line_of_an_error_is_a_line(monkeypatch, capsys):
-    error = RefusedError("nothing could be generated:", "road merge: no arm", "a\nname: no lane")
-    monkeypatch.setattr(commands, "run", Mock(side_effect=error))
-    monkeypatch.setattr(sys, "argv", ["scenario-gen"])
-    with pytest.raises(SystemExit):
-        commands.main()
-    lines = capsys.readouterr().err.splitlines()
-    assert lines == [
-        "error: nothing could be generated:",
-        "road merge: no arm",
-        r"a\nname: no lane",
-    ]

@@ -252,39 +252,6 @@ def test_a_killed_run_with_two_processes_ends_with_the_same_bytes(batch, corpus,
     assert digests(out) == digests(batch[0]) and made.lines() == batch[1].lines()
 
 
-@pytest.mark.long
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGKILL])
-def test_a_batch_of_two_processes_that_is_ended_leaves_only_what_is_done(corpus, tmp_path, number):
-    """By Ctrl-C in a terminal, which all processes get, at once; after SIGKILL with the next command."""
-    out, own = tmp_path / "out", os.environ | {"TMPDIR": str(tmp_path)}
-    words = [
-        sys.executable,
-        "-m",
-        "scenario_gen",
-        "batch",
-        str(corpus[0]),
-        "--out",
-        str(out),
-        "--count",
-        "200",
-    ]
-    words += ["--roads", ",".join(ROADS), "--workers", "2"]
-    pipes = {"stdout": subprocess.DEVNULL, "stderr": subprocess.PIPE, "text": True}
-    pipes |= {"start_new_session": True, "env": own}
-    with subprocess.Popen(words, preexec_fn=interruptible, **pipes) as run:  # noqa: PLW1509
-        at_work(run, out, ".scenario_gen-*/new/*")
-        os.kill(run.pid, number) if number == signal.SIGKILL else os.killpg(run.pid, number)
-        said = run.stderr.read()  # up to the end of the last process
-    assert said.strip() == ("" if number == signal.SIGKILL else "stopped by SIGINT")
-    if number == signal.SIGKILL:
-        subprocess.run(
-            [*words[:3], "evaluate", str(out)], env=own, capture_output=True, check=False
-        )
-    assert not list(tmp_path.rglob(".scenario_gen*")) and [
-        path.name for path in tmp_path.iterdir()
-    ] == ["out"]
-
-
 @pytest.mark.parametrize(
     ("inside", "said"),
     [("", "is within the input"), ("batch", "is within the input"), ("archive.json", "is a file")],

@@ -6,7 +6,6 @@
 import errno
 import multiprocessing
 import os
-from pathlib import Path
 
 import pytest
 from support.refusing import Counted, end_worker, refuse, write_once
@@ -52,36 +51,6 @@ def test_only_the_task_that_ends_its_local_process_fails(tmp_path):
     assert {path.name for path in tmp_path.iterdir()} == {str(k) for k in range(30)} - {"7"}
     assert [done for done, *_ in told] == list(range(1, 31))
     assert not multiprocessing.active_children()
-
-
-def test_local_processes_listen_on_no_port(tmp_path):
-    """Another account of the machine cannot connect to them."""
-
-    def listening():
-        inodes = {
-            line.split()[9]
-            for table in ("tcp", "tcp6")
-            for line in Path(f"/proc/net/{table}").read_text().splitlines()[1:]
-            if line.split()[3] == "0A"
-        }
-        processes = [
-            multiprocessing.current_process().pid,
-            *(child.pid for child in multiprocessing.active_children()),
-        ]
-        links = [
-            str(file.readlink())
-            for process in processes
-            for file in Path(f"/proc/{process}/fd").iterdir()
-            if file.is_symlink()
-        ]
-        return {link for link in links if link.removeprefix("socket:[").rstrip("]") in inodes}
-
-    before = listening()
-    seen = []
-    with spread(Workers(2, "", lambda *_: seen.append(listening()))) as go:
-        assert go(write_once, [Counted(str(k), tmp_path) for k in range(6)]) == []
-        assert len(multiprocessing.active_children()) == 2
-    assert all(sockets <= before for sockets in seen)
 
 
 def test_a_scheduler_that_is_lost_is_named(tmp_path):

@@ -149,19 +149,6 @@ def test_colcon_builds_what_ros2_run_needs(colcon):
     assert ran.returncode == 0 and "generate" in ran.stdout, ran.stderr
 
 
-def test_colcon_builds_with_symlinks(tmp_path):
-    """The build runs setup.py in a folder that has links to the listed files only."""
-    colcon = Path(sys.executable).with_name("colcon")
-    folders = [f"--{name}-base={tmp_path / name}" for name in ("build", "install")]
-    command = [colcon, f"--log-base={tmp_path / 'log'}", "build", "--symlink-install"]
-    command += ["--base-paths", ROOT, *folders]
-    built = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
-    assert built.returncode == 0, built.stderr
-    prefix = tmp_path / "install" / "scenario_gen"
-    assert (prefix / "lib" / "scenario_gen" / "gp_sampler").is_file()
-    assert (prefix / "share" / "scenario_gen" / "launch" / "suite.launch.py").is_symlink()
-
-
 def test_the_source_distribution_has_what_a_build_and_a_reader_need(tmp_path):
     command = [sys.executable, "setup.py", "--quiet", "egg_info", "--egg-base", tmp_path]
     subprocess.run([*command, "sdist", "--dist-dir", tmp_path], cwd=ROOT, check=True)

@@ -90,13 +90,6 @@ def test_values_are_tables_in_a_notebook():
     assert "<td>E speed [m]</td><td>lower</td><td>0.2</td>" in shown._repr_html_()
 
 
-def test_a_result_is_exported_for_other_software(tmp_path):
-    folder = hand_made_run().export(tmp_path / "files", "autoware")
-    assert len([path for path in folder.iterdir() if path.is_dir()]) == 5
-    with pytest.raises(InputError, match="choose one of commonroad"):
-        hand_made_run().export(tmp_path / "other", "oops")
-
-
 def test_what_drivers_do_is_an_attribute_and_vehicles_have_ids():
     result = hand_made_run()
     encounter = result.encounter

@@ -9,7 +9,6 @@ import pytest
 from scenario_gen.base.errors import InputError
 from scenario_gen.types import Encounter, Vehicle
 from scenario_gen.types.motion import ALWAYS, canonical_presence, cut, held, mask, together
-from scenario_gen.types.scenario import Scenario
 
 VEHICLES = (Vehicle("a"), Vehicle("b"))
 
@@ -58,31 +57,11 @@ def test_presence_in_a_window_is_that_of_its_samples(present, first, last):
         assert list(range(begin, end + 1)) == np.flatnonzero(row).tolist()
 
 
-def test_everybody_is_there_by_default():
-    assert encounter().present.tolist() == [[0, 8], [0, 8]]
-    assert encounter().all_present
-
-
 def test_an_encounter_holds_the_edge_values_where_a_vehicle_is_not_there():
     made = encounter(np.array([[0, 6], [2, 8]]))
     assert made.position[0, :, 0].tolist() == [0, 1, 2, 3, 4, 5, 6, 6, 6]
     assert made.position[1, :, 0].tolist() == [2, 2, 2, 3, 4, 5, 6, 7, 8]
     assert not made.all_present
-    assert made.is_present.sum() == 14
-
-
-def test_a_scenario_holds_them_too():
-    one = encounter()
-    made = Scenario(
-        VEHICLES,
-        one.time,
-        one.position,
-        one.heading,
-        one.speed,
-        one.speed,
-        present=np.array([[0, 6], [2, 8]]),
-    )
-    assert made.position[1, 0, 0] == 2.0
     assert made.is_present.sum() == 14
 
 

@@ -22,7 +22,7 @@ from support.evaluation_worlds import report_case
 from scenario_gen.bags.recordings.read import read_recording
 from scenario_gen.method.evaluation import coverage_of, feature_matrix
 from scenario_gen.output.report.data import case_data, MATRIX_SIZE_CELLS, pack, road_data
-from scenario_gen.output.report.page import render, ReportInput, write_report
+from scenario_gen.output.report.page import render, ReportInput
 from scenario_gen.output.report.summary import summary
 from scenario_gen.output.results import write_results
 from scenario_gen.roads import build_road
@@ -36,46 +36,6 @@ def page():
     return render(
         ReportInput(cases, "Title & more", ("12 rows dropped",), {"log": "demo.mcap", "seed": "7"})
     )
-
-
-def test_the_page_asks_for_nothing_outside_itself(page):
-    assert "default-src 'none'" in page
-    assert not re.search(r"""(src|href)\s*=\s*["'](?!data:)""", page)
-    assert "http" not in page.replace("http-equiv", "").replace("http://www.w3.org/2000/svg", "")
-
-
-def test_names_are_escaped_and_figures_are_there(page):
-    assert "alert(1)</script>" not in page and "Title &amp; more" in page
-    for text in (
-        "12 rows dropped",
-        "demo.mcap",
-        "end moved by 0.12 m",
-        "clock stretched by",
-        "lateral acceleration",
-    ):
-        assert text in page
-    assert "<b>16</b> of 16 requested scenarios are valid, of 26 candidates" in page
-
-
-def test_the_same_input_gives_the_same_bytes(tmp_path, page):
-    case = report_case(3)
-    write_report(tmp_path / "a.html", ReportInput([case]))
-    assert (tmp_path / "a.html").read_text(encoding="utf-8") == render(
-        ReportInput([report_case(3)])
-    )
-    assert (tmp_path / "a.html").stat().st_size < 2_000_000
-
-
-def test_the_data_can_be_read_back(page):
-    data = json.loads(re.search(r'id="data">(.*?)</script>', page, flags=re.S).group(1))
-    assert [list(case["arms"]) for case in data] == [
-        ["with", "replay"],
-        ["with", "replay"],
-    ]
-    assert data[0]["arms"]["with"]["states"]["shape"][:2] == [12, 2]
-    assert data[0]["template"]["bounds"] == [0.0, 4.0, 8.0, 12.0] and data[0]["template"][
-        "labels"
-    ] == [0, 1, 0]
 
 
 @given(arrays(np.float64, (5, 3, 4), elements=st.floats(-1000, 1000)))
@@ -156,19 +116,6 @@ def test_what_the_fitting_lost_and_how_far_a_route_is_from_it_are_said(tmp_path)
         *map(str, case.fit.notes)
     ]  # a remark about a route is not a note
     assert [route.figures() for route in read.fit[1]] == [route.figures() for route in routes]
-
-
-def test_the_summary_fits_on_a_screen():
-    console = Console(width=110, record=True, file=io.StringIO())
-    console.print(summary([report_case(5), report_case(4, "with [brackets]")]))
-    text = console.export_text()
-    assert (
-        "5 of 5 scenarios" in text
-        and "E position" not in text
-        and "with [brackets]" in text
-        and "3 overlap" in text
-    )
-    assert len(text.splitlines()) < 15 and max(map(len, text.splitlines())) <= 110
 
 
 def test_the_verdict_says_how_critical_the_set_is_and_a_cap_is_no_measurement():

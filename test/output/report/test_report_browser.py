@@ -81,15 +81,6 @@ def test_a_link_opens_one_scenario_and_the_address_names_the_shown_one(tab, repo
     assert tab.page.locator('[data-case="0"]').is_visible() and tab.troubles == []
 
 
-def test_the_table_of_figures_fits_a_desktop(tab):
-    table = tab.page.locator('[data-case="0"] .metrics')
-    assert table.evaluate("t => t.scrollWidth <= t.parentElement.clientWidth")
-    heading = table.locator("tr.group th").first
-    assert heading.evaluate(
-        "t => t.clientWidth > 0.9 * t.closest('table').clientWidth"
-    )  # spans all columns
-
-
 def test_it_plays_pauses_and_stops_at_the_end(tab):
     meeting = tab.time()
     assert 0.5 < meeting < 12.0, "the first picture shows where the vehicles meet"
@@ -204,17 +195,6 @@ def test_a_folded_part_is_opened_by_the_contents_and_drawn(tab):
     assert not chart.is_visible()
     tab.page.get_by_role("link", name="Motion").first.click()
     tab.wait(lambda: chart.is_visible() and chart.locator(".plot").bounding_box()["width"] > 600)
-
-
-def test_another_case_opens(tab):
-    tab.page.locator('[data-show="1"] button').click()
-    assert (
-        tab.page.locator('[data-case="1"]').is_visible()
-        and not tab.page.locator('[data-case="0"]').is_visible()
-    )
-    assert "Generated scenarios" in tab.page.locator('[data-case="1"]').inner_text()
-    tab.part("scrub", 1).fill("250")
-    assert tab.time(1) == 3.0 and tab.troubles == []
 
 
 def test_the_keyboard_drives_it(tab):

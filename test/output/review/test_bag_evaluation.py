@@ -220,15 +220,6 @@ def test_the_bag_says_how_its_scenarios_were_made_and_what_was_refused(tmp_path)
     assert told in map(str, cases[1].generated.adaptations) and told in render(ReportInput(cases))
 
 
-def test_a_bag_with_half_of_it_shows_what_it_has(tmp_path):
-    bag = write_recording(tmp_path / "run", real_run())
-    topics = ("tracks", "changepoints", "map", "fit", "scenarios")
-    (case,) = results(only(bag, tmp_path / "half", topics))
-    assert case.fit is None and case.routes == ()
-    assert case.segmentation.descriptions[0] == "segment 0"
-    assert "<h2>Fit and routes</h2>" not in render(ReportInput([case]))
-
-
 def test_what_a_bag_does_not_hold_is_left_out_and_said(tmp_path):
     bag = only(
         write_recording(tmp_path / "run", report_case(5)),

@@ -71,12 +71,6 @@ def rewritten(bag, target, change=lambda _, data: data, without=()):
     return copied(bag, target, changed)
 
 
-def test_what_is_published_is_valid(run, tmp_path):
-    (found,) = evaluate_bag(write_recording(tmp_path / "run", {"/here": run}))
-    assert (found.namespace, counts(found)) == ("/here", (4, 0))
-    assert skipped(found) == {} and found.causes == {}
-
-
 def test_each_fault_is_found_with_its_cause_and_place(run, tmp_path):
     good = run.generated.scenarios
     moved = [s.position.copy() for s in good]
