@@ -179,11 +179,18 @@ def _checked(
 ) -> object:
     """Return a value of a parameter, a whole number as a float where floats are declared.
 
+    Where text is declared, a mapping becomes "name=value, …", and a list "value, …".
+
     Raises:
         InputError: there is no such parameter, or it must not have this value.
     """
     if entry is None or not entry.metadata:
         raise InputError(_unknown(config, name, prefix))
+    if isinstance(entry.default, str):
+        if isinstance(value, Mapping):
+            value = [f"{part}={text}" for part, text in value.items()]
+        if isinstance(value, list | tuple):
+            value = ",".join(map(str, value))
     check_value(prefix + name, entry, value)
     return float(value) if isinstance(entry.default, float) else value
 

@@ -31,11 +31,11 @@ from scenario_gen.closed_loop.origin import Trial
 from scenario_gen.closed_loop.picture import picture
 from scenario_gen.closed_loop.planners import RouteFollower
 from scenario_gen.closed_loop.simulation import ClosedLoop, State
-from scenario_gen.closed_loop.trials import read_trials
+from scenario_gen.closed_loop.trials import read_trials, trials_of
 from scenario_gen.closed_loop.verdict import judge
 from scenario_gen.numerics import Floats
 from scenario_gen.numerics.plane import ahead_and_left, angle_between, place, unit
-from scenario_gen.types import MAX_PLANNED_CURVATURE_PER_M
+from scenario_gen.types import GenerationResult, MAX_PLANNED_CURVATURE_PER_M
 
 MAX_OTHERS_COUNT = 8
 ROUTE_STATIONS = np.array((0.0, 5.0, 10.0, 15.0, 20.0, 30.0, 40.0))
@@ -73,7 +73,7 @@ class DriveEnv(gymnasium.Env[Array, Array]):  # type: ignore[misc]
 
     def __init__(
         self,
-        trials: Sequence[Trial] | Path | str,
+        trials: GenerationResult | Sequence[Trial] | Path | str,
         config: ClosedLoopConfig = ClosedLoopConfig(),
         ego: str = "",
         render_mode: str | None = None,
@@ -81,9 +81,9 @@ class DriveEnv(gymnasium.Env[Array, Array]):  # type: ignore[misc]
         """Prepare an environment.
 
         Args:
-            trials: the scenarios, or the path of a bag.
+            trials: a result of `generate`, the path of a bag, or trials.
             config: the parameters.
-            ego: id of the vehicle that the ego replaces, for a bag.
+            ego: id of the vehicle that the ego replaces, for a result or a bag.
             render_mode: "rgb_array" or None.
 
         Raises:
@@ -95,9 +95,12 @@ class DriveEnv(gymnasium.Env[Array, Array]):  # type: ignore[misc]
                 f"render_mode {render_mode!r} is unknown; use {', '.join(modes)} or None"
             )
         self.render_mode = render_mode
-        self.trials = (
-            read_trials(Path(trials), ego) if isinstance(trials, Path | str) else list(trials)
-        )
+        if isinstance(trials, Path | str):
+            self.trials = read_trials(Path(trials), ego)
+        elif isinstance(trials, GenerationResult):
+            self.trials = trials_of(trials, ego)
+        else:
+            self.trials = list(trials)
         if not self.trials:
             raise InputError("no scenario to drive: trials are empty")
         self.config = config

@@ -35,6 +35,7 @@ from scenario_gen.logs.signals import lines_where_vehicles_stop, moved_signals, 
 from scenario_gen.logs.trailers import coupled
 from scenario_gen.types import Encounter
 from scenario_gen.types.html import html_list, html_table
+from scenario_gen.types.vehicle import Vehicles
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -80,6 +81,28 @@ class LogResult(Sequence[Encounter]):
             f"{len(self.doubts)} doubts)"
         )
 
+    @property
+    def vehicles(self) -> Vehicles:
+        """The vehicles of all encounters, each once."""
+        every = {vehicle.id: vehicle for encounter in self for vehicle in encounter.vehicles}
+        return Vehicles(every.values())
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What was dropped, bridged, smoothed and assumed, and the doubts, in sentences."""
+        return (*self.quality.lines(), *map(str, self.doubts))
+
+    def summary(self) -> "DataFrame":
+        """Return a row for each encounter: its name, kind, vehicles and measures."""
+        import pandas as pd
+
+        rows = [
+            {"name": each.name, "kind": each.kind, "vehicles": ", ".join(each.ids)}
+            | each.measures().drop("scenario").to_dict()
+            for each in self
+        ]
+        return pd.DataFrame(rows)
+
     def to_dataframe(self) -> "DataFrame":
         """Return the tables of the encounters in one, with a column encounter."""
         import pandas as pd
@@ -110,8 +133,7 @@ class LogResult(Sequence[Encounter]):
             )
             for k, encounter in enumerate(self.encounters)
         ]
-        notes = [*self.quality.lines(), *map(str, self.doubts)]
-        return html_table(repr(self), rows) + html_list(notes)
+        return html_table(repr(self), rows) + html_list(self.notes)
 
 
 def read_log(

@@ -3,14 +3,26 @@
 
 """Scenarios and their criticality as tables, and scenarios selected by a condition."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
+from itertools import count
 import math
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from scenario_gen.base.errors import describe, InputError, needs
-from scenario_gen.method.evaluation import MEASURES
-from scenario_gen.types import GenerationResult, join_ego, Note, NoteKind
+from scenario_gen.method.evaluation.measures import measure
+from scenario_gen.numerics import Floats
+from scenario_gen.types import (
+    Encounter,
+    GenerationResult,
+    join_ego,
+    Motion,
+    Note,
+    NoteKind,
+    Scenario,
+)
 
 if TYPE_CHECKING:
     from pandas import DataFrame
@@ -28,10 +40,12 @@ TABLES: Mapping[str, Callable[["DataFrame"], bytes]] = {
 """The content of a file with a table, by its suffix."""
 
 
-def measures(result: GenerationResult) -> "DataFrame":
-    """Return a row for each scenario of a result; the ego's reference drive counts as a vehicle.
+def measures(motions: Iterable[Scenario | Encounter]) -> "DataFrame":
+    """Return a row for each scenario of a result, or for each of some scenarios or encounters.
 
-    Columns: scenario (its index), seconds [s], ttc [s], pet [s], arrival_gap [s], distance [m] and
+    The ego's reference drive counts as a vehicle.
+
+    Columns: scenario (number), seconds [s], ttc [s], pet [s], arrival_gap [s], distance [m] and
     closing_speed [m/s], each of the most critical pair of vehicles, speed [m/s] and braking
     [m/s²], the largest of all vehicles. A figure that no pair has is NaN: ttc without a collision
     course, pet without crossing paths.
@@ -41,17 +55,25 @@ def measures(result: GenerationResult) -> "DataFrame":
     figures = ["ttc", "pet", "arrival_gap", "gap", "closing_speed"]
     rows = [
         [
-            scenario.index,
-            float(scenario.time[-1]),
-            *(MEASURES.figure(scenario, name, None) for name in figures),
-            float(scenario.speed.max()),
-            float(-scenario.acceleration.min()),
+            number,
+            motion.duration,
+            *(measure(motion, name) for name in figures),
+            float(motion.speed.max()),
+            float(-accelerations.min()),
         ]
-        for scenario in map(join_ego, result)
+        for number, motion, accelerations in map(_joined, count(), motions)
     ]
     columns = ["scenario", "seconds", *figures, "speed", "braking"]
     table = pd.DataFrame(rows, columns=columns).rename(columns={"gap": "distance"})
     return table.replace(math.inf, math.nan)
+
+
+def _joined(k: int, motion: Scenario | Encounter) -> tuple[int, Motion, Floats]:
+    """Return the number of a scenario, or k of an encounter; its motion and accelerations."""
+    if isinstance(motion, Scenario):
+        scenario = join_ego(motion)
+        return motion.index, scenario, scenario.acceleration
+    return k, motion, np.diff(motion.speed) / motion.dt
 
 
 def filter_scenarios(result: GenerationResult, condition: str) -> GenerationResult:

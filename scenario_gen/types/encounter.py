@@ -6,7 +6,7 @@
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
 import re
-from typing import Self
+from typing import Self, TYPE_CHECKING
 
 import numpy as np
 
@@ -16,6 +16,9 @@ from scenario_gen.types.decision import Decision
 from scenario_gen.types.html import html_table
 from scenario_gen.types.motion import Motion
 from scenario_gen.types.traffic_light import TrafficLight
+
+if TYPE_CHECKING:
+    from pandas import Series
 
 MAX_UNEVEN_S = 1e-6  # a time may differ by this from a whole multiple of the period
 
@@ -107,6 +110,12 @@ class Encounter(Motion):
         import scenario_gen
 
         return scenario_gen.Situation.of(self).reactions.sentences(self.vehicles)
+
+    def measures(self) -> "Series[float]":
+        """Return how critical it is, with the columns of `scenario_gen.measures` as names."""
+        import scenario_gen
+
+        return scenario_gen.measures([self]).iloc[0]
 
     @property
     def kind(self) -> str:

@@ -24,6 +24,7 @@ from scenario_gen.types.html import html_list
 from scenario_gen.types.notes import Note, NoteKind
 from scenario_gen.types.road import Road
 from scenario_gen.types.scenario import causes_in_words, dataframe, Scenario, ScenarioSet
+from scenario_gen.types.vehicle import Vehicle
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -277,6 +278,16 @@ class GenerationResult:
     def title(self) -> str:
         """Encounter and road, as a heading."""
         return f"{self.encounter.name} on {self.road.name}" if self.road else self.encounter.name
+
+    @property
+    def vehicles(self) -> tuple[Vehicle, ...]:
+        """The recorded vehicles; a scenario has its own, e.g. of other lengths."""
+        return self.encounter.vehicles
+
+    @property
+    def kind(self) -> str:
+        """What the first two vehicles of the recording do, as in `Encounter.kind`."""
+        return self.encounter.kind
 
     @property
     def reactions(self) -> tuple[str, ...]:

@@ -394,6 +394,17 @@ class Motion:
 
         return pd.DataFrame(self.columns())
 
+    def __getitem__(self, vehicle: str | int) -> "DataFrame":
+        """Return the rows of `to_dataframe` of one vehicle, by its id or index.
+
+        Raises:
+            InputError: there is no such vehicle.
+            IndexError: there is no vehicle with this index.
+        """
+        table = self.to_dataframe()
+        rows = table.vehicle == Vehicles(self.vehicles)[vehicle].id
+        return table[rows].reset_index(drop=True)
+
     def plot(self, ax: "Axes | None" = None) -> "Axes":
         """Draw the vehicles' paths, as `scenario_gen.plot` does.
 

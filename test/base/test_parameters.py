@@ -13,6 +13,7 @@ import yaml
 
 from scenario_gen.base.errors import InputError
 from scenario_gen.base.parameters import flatten, parameter, Parameters, updated
+from scenario_gen.logs import LogConfig
 from scenario_gen.method.config import PipelineConfig
 
 
@@ -79,6 +80,11 @@ def test_updated_sets_nested_values_and_leaves_the_rest():
 def test_a_bad_value_is_named(name, value, said):
     with pytest.raises(InputError, match=said):
         updated(Outer(), {name: value})
+
+
+def test_text_may_be_a_mapping_or_a_list():
+    log = updated(LogConfig(), {"columns": {"time": "t", "x": "px:ft"}, "vehicles": ["1", 2]})
+    assert (log.columns, log.vehicles) == ("time=t,x=px:ft", "1,2")
 
 
 def test_a_bad_value_is_refused_at_construction():

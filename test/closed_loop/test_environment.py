@@ -9,6 +9,7 @@ import gymnasium
 from gymnasium.utils.env_checker import check_env
 import numpy as np
 import pytest
+from support.bag_examples import hand_made_run
 from support.driving_scenes import following
 
 from benchmarks._driving_worlds import draw_scenario
@@ -93,6 +94,14 @@ def test_the_same_seed_gives_the_same_drive():
     assert env.reset(options={"index": 2})[1]["name"] == "5"
     with pytest.raises(InputError, match="no scenario with index 3"):
         env.reset(options={"index": 3})
+
+
+def test_it_drives_in_a_result_and_in_its_bag(tmp_path):
+    made = hand_made_run()
+    by_bag = DriveEnv(made.save(tmp_path / "bag"), ego="1")
+    by_result = DriveEnv(made, ego="1")
+    (one, _), (other, _) = (drive(env, 3) for env in (by_bag, by_result))
+    assert (one == other).all()
 
 
 @pytest.mark.parametrize("edge", [0.05, 0.5])

@@ -94,9 +94,18 @@ def test_what_drivers_do_is_an_attribute_and_vehicles_have_ids():
     result = hand_made_run()
     encounter = result.encounter
     assert encounter.reactions and encounter.kind in list(EncounterKind)
+    assert result.kind == encounter.kind and result.vehicles == encounter.vehicles
     assert result.reactions == tuple(result.reacting["sentences"])
     first = encounter.vehicles[0]
     assert encounter.vehicles[first.id] is first
+    for motion in (encounter, result[0]):
+        tables = [motion[vehicle.id] for vehicle in motion.vehicles]
+        assert [set(table.vehicle) for table in tables] == [{id_} for id_ in motion.ids]
+        assert sum(map(len, tables)) == len(motion.to_dataframe()) and len([*motion]) == len(
+            tables
+        )
+    assert result[1].measures().equals(result.measures().iloc[1])
+    assert encounter.measures().braking == -(np.diff(encounter.speed) / encounter.dt).min()
     with pytest.raises(InputError, match=f"no vehicle x; there are {first.id}"):
         encounter.vehicles["x"]
     table = evaluated(**{WITH: (0.1, 0.2)})
