@@ -26,6 +26,7 @@ PARTS = (
     "libraries",
     "long",
     "mutations",
+    "oracle",
     "properties",
     "recorded",
     "ros",

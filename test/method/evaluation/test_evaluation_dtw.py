@@ -49,20 +49,6 @@ def test_by_hand():
     assert dtw_distance([[0.0, 0.0]], [[3.0, 4.0]], "manhattan") == 7.0
 
 
-@settings(max_examples=60)
-@given(
-    series(2),
-    series(2),
-    st.sampled_from(["euclidean", "manhattan"]),
-    st.one_of(st.none(), st.integers(0, 5)),
-)
-def test_the_distance_agrees_with_a_naive_transcription(a, b, distance, band):
-    expected = naive(a, b, {"manhattan": "cityblock"}.get(distance, distance), band)
-    assert dtw_distance(a, b, distance, band) == pytest.approx(
-        expected[-1, -1], rel=1e-12, abs=1e-9
-    )
-
-
 @pytest.mark.parametrize("shape", [(300, 300), (257, 400), (1000, 700)])
 @pytest.mark.parametrize("band", [None, 30])
 def test_equals_dtaidistance(shape, band):

@@ -203,30 +203,6 @@ def test_counts_from_sets_and_verdicts():
     assert CheckCounts.of_verdicts([Verdict(), bad, bad]) == CheckCounts(3, {Cause.OVERLAP: 2})
 
 
-def test_the_oracle_goes_through_the_anchors():
-    encounter = crossing()
-    index = np.array([0, 40, 80, 120])
-    anchors = []
-    for n in range(2):
-        pose = np.column_stack([encounter.position[n, index], encounter.heading[n, index]])
-        turned = np.column_stack(
-            [-1.1 * pose[:, 1] + 5.0, 1.1 * pose[:, 0], pose[:, 2] + np.pi / 2]
-        )  # turned left, 10 % larger
-        anchors.append(turned)
-    ends = [np.stack([np.append(a[k], 0.0) for a in anchors]) for k in (0, -1)]
-    fitted = tuple(
-        FittedVehicle(a, np.zeros(4), np.zeros(3, dtype=bool), 1.1, "straight") for a in anchors
-    )
-    found = replay(encounter, Fit(CARS, fitted, index, BoundaryStates(*ends), ()))
-    expected = np.stack(
-        [-1.1 * encounter.position[..., 1] + 5.0, 1.1 * encounter.position[..., 0]], axis=-1
-    )
-    np.testing.assert_allclose(found.position, expected, atol=1e-6)
-    np.testing.assert_allclose(found.speed, 1.1 * encounter.speed, atol=1e-9)
-    turn = found.heading - encounter.heading - np.pi / 2
-    np.testing.assert_allclose(np.cos(turn), 1.0, atol=1e-9)
-
-
 def test_the_oracle_keeps_a_dwell_and_a_short_chord():
     time = np.arange(21) * 0.1
     x = np.minimum(time, 1.0) * 4.0

@@ -11,11 +11,10 @@ import numpy as np
 import pytest
 from scipy import stats
 from scipy.spatial.distance import jensenshannon
-from support.evaluation_worlds import CARS, crossing, replayed, samples
+from support.evaluation_worlds import CARS, crossing, samples
 
 from scenario_gen.method.evaluation import evaluate_scenarios, similarity
 from scenario_gen.method.evaluation.criticality import (
-    criticality,
     footprint_distance,
     time_to_collision,
 )
@@ -41,17 +40,6 @@ def still(xy, yaw, sizes=((4.0, 2.0), (4.0, 2.0)), speed=(0.0, 0.0)):
         np.array(speed, float)[:, None],
     )
     return Motion.sampled(vehicles, 0.1, position, heading, pace)
-
-
-def test_footprint_distance_by_hand():
-    assert footprint_distance(still([(0, 0), (10, 0)], (0, 0)), 0, 1) == pytest.approx(6.0)
-    assert footprint_distance(still([(0, 0), (7, 7)], (0, 0)), 0, 1) == pytest.approx(
-        math.hypot(3.0, 5.0)
-    )
-    assert (
-        footprint_distance(still([(0, 0), (0, 0)], (0, np.pi / 2), ((10, 1), (10, 1))), 0, 1)
-        == 0.0
-    )  # a cross, no corner inside
 
 
 def test_time_to_collision_by_hand():
@@ -96,18 +84,6 @@ def test_footprints_touch_at_the_time_to_collision(place, yaws, speeds):
     else:
         assert distance(found) < 1e-6
         assert all(distance(share * found) > 0.0 for share in (0.0, 0.3, 0.6, 0.9)) or found == 0.0
-
-
-def test_criticality_of_the_crossing():
-    found = criticality(crossing(lag=2.0), 10.0)
-    assert found.order == (((0, 1), 0),)
-    # car 0 (10 m/s, 4 m long) has left the 2 m wide track of car 1 at 5.3 s; car 1 comes in when its front is 1 m away
-    north = crossing(lag=2.0).position[1, :, 1]
-    entry = np.interp(-3.0, north, crossing().time)
-    assert found.pet == pytest.approx(entry - 5.3, abs=0.02)
-    other = criticality(crossing(lag=-2.0), 10.0)
-    assert other.order == (((0, 1), 1),)
-    assert other.keeps_order_of(found) == 0.0 and found.keeps_order_of(found) == 1.0
 
 
 def test_values_by_hand():
@@ -220,44 +196,12 @@ def test_intervals_hold_the_truth_as_often_as_they_say():
     assert 0.82 <= held / 200 <= 0.96
 
 
-def test_samples_that_depend_on_each_other_are_drawn_together():
-    rng = np.random.default_rng(8)
-    held = {"together": 0, "apart": 0}
-    for trial in range(200):
-        values = np.repeat(rng.normal(3.0, 1.0, 20), 2)
-        for how, unit in (("together", np.arange(40) // 2), ("apart", np.arange(40))):
-            found = Bootstrap.draw(unit, 400, 0.9, trial).mean(values)
-            held[how] += found.low <= 3.0 <= found.high
-    assert 0.82 <= held["together"] / 200 <= 0.96
-    assert held["apart"] / 200 < 0.8
-    weights = Bootstrap.draw(np.array([4, 4, 7, 9, 9]), 30, 0.9, 0).weights
-    assert (weights[:, 0] == weights[:, 1]).all() and (weights[:, 3] == weights[:, 4]).all()
-
-
-def test_one_sample_has_no_interval_and_the_seed_decides():
-    assert math.isnan(Bootstrap.draw(np.arange(1), 50, 0.95, 0).mean(np.array([2.0])).low)
-    assert math.isnan(
-        Bootstrap.draw(np.zeros(2, dtype=int), 50, 0.95, 0).mean(np.array([2.0, 3.0])).low
-    )  # a antithetic pair
-    one, two, other = (Bootstrap.draw(np.arange(9), 50, 0.95, seed).weights for seed in (4, 4, 5))
-    assert (one == two).all() and (one != other).any() and (one.sum(axis=1) == 9).all()
-
-
 @pytest.mark.parametrize(("count", "total"), [(0, 20), (3, 50), (50, 50)])
 def test_wilson_equals_scipy(count, total):
     expected = stats.binomtest(count, total).proportion_ci(0.95, "wilson")
     found = wilson(count, total, 0.95)
     assert (found.low, found.high) == pytest.approx((expected.low, expected.high), abs=1e-12)
     assert math.isnan(wilson(0, 0, 0.95).value)
-
-
-def test_motion_on_another_clock():
-    encounter = crossing()
-    assert encounter.resampled(0.1).position is encounter.position
-    coarse = replayed(encounter).resampled(0.25)
-    assert coarse.speed.shape[1] == 49 and coarse.position[0, -1, 0] == pytest.approx(70.0)
-    even = encounter.with_samples(7)
-    np.testing.assert_allclose(even.position[0, :, 0], np.linspace(-50, 70, 7), atol=1e-6)
 
 
 def test_a_large_set_has_the_same_error_and_nearly_the_same_interval_with_pooled_units(

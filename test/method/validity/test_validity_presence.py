@@ -135,8 +135,8 @@ def compare(seed, group=0):
 
 
 def test_checker_and_oracle_agree_on_who_comes_and_goes():
-    found = [compare(seed) for seed in range(1000 if LONG else 40)]
-    assert LONG or 5 <= sum(valid for valid, _ in found) <= 35
+    found = [compare(seed) for seed in range(40)]
+    assert 5 <= sum(valid for valid, _ in found) <= 35
     assert set().union(*(spans for _, spans in found)) == {0, 1, 2, 3}
     for seed in range(600 if LONG else 3):
         compare(seed, 9)
