@@ -89,3 +89,11 @@ def test_an_ego_that_takes_the_turn_of_another_one_does_not_pass():
     taken = [verdict for verdict in driven if verdict.failure == "took_turn"]
     assert taken and all("took the turn" in verdict.sentence() for verdict in taken)
     assert all(verdict.imposed_braking >= 4.0 and not verdict.passed for verdict in taken)
+
+
+@pytest.mark.parametrize(("start", "speed"), [(6.0, 8.0), (9.0, 9.0)])
+def test_a_constant_speed_is_the_stated_one(start, speed):
+    """8 m/s, or that at the start if it is higher."""
+    loop = ClosedLoop(crossing(second_speed=start, second_start=-48.0), 1)
+    drive = loop.drive(ConstantSpeed())
+    assert drive.motion.speed[drive.ego, 60] == pytest.approx(speed, abs=0.05)
