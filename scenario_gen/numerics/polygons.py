@@ -3,6 +3,8 @@
 
 """Cells of a grid: those inside polygons, and the distance to the nearest one."""
 
+import mmap
+
 import numpy as np
 
 from scenario_gen.numerics.arrays import Bools, Floats, Ints, sealed
@@ -64,16 +66,18 @@ def fill_slits(cells: Bools) -> Bools:
 def distance_field(is_open: Bools) -> Floats:
     """Return distances (H, W) [cells] from cell centres to the nearest closed square, read-only.
 
-    Closed cells are 0; everything outside the grid is closed.
+    Closed cells are 0; everything outside the grid is closed. Memory is used only near open cells.
     """
-    distance = np.empty(is_open.shape)
+    anonymous = mmap.MAP_PRIVATE | mmap.MAP_ANONYMOUS  # zeros; numpy would ask for huge pages
+    memory = mmap.mmap(-1, 8 * is_open.size, flags=anonymous)
+    distance = np.frombuffer(memory).reshape(is_open.shape)
     distance_transform(is_open, distance)
     return sealed(distance)
 
 
 @kernel(B2, OUT2)
 def distance_transform(is_open: Bools, out: Floats) -> None:
-    """Fill `out` (H, W) with the distances [cells] from cell centres to the nearest closed square.
+    """Fill `out` (H, W), zeros, with the distances [cells] from open cells to closed squares.
 
     Source: the lower envelope of parabolas (Felzenszwalb & Huttenlocher 2012), here of squares
     instead of points.
@@ -85,40 +89,52 @@ def distance_transform(is_open: Bools, out: Floats) -> None:
     begin = np.empty(width + 3, dtype=np.int64)
     level = np.empty(width + 2)
     for i in range(height):
-        _envelope_of_row(out, i, site, begin, level)
+        end = 0
+        while end < width:
+            first = end
+            while end < width and is_open[i, end]:
+                end += 1
+            if first < end:
+                _envelope_of_run(out, i, first, end, site, begin, level)
+            end += 1
 
 
 @kernel(inline=True)
 def _vertical_distances(is_open: Bools, out: Floats) -> None:
-    """Fill `out` (H, W) with the cells to the nearest closed one in each column."""
+    """Fill open cells of `out` (H, W) with the cells to the nearest closed one in each column."""
     height, width = is_open.shape
     for i in range(height):  # the nearest closed cell above
         for j in range(width):
-            above = out[i - 1, j] if i > 0 else 0.0
-            out[i, j] = above + 1.0 if is_open[i, j] else 0.0
+            if is_open[i, j]:
+                out[i, j] = (out[i - 1, j] if i > 0 else 0.0) + 1.0
     for i in range(height - 1, -1, -1):  # and below
         for j in range(width):
-            below = out[i + 1, j] if i < height - 1 else 0.0
-            out[i, j] = min(out[i, j], below + 1.0)
+            if is_open[i, j]:
+                below = out[i + 1, j] if i < height - 1 else 0.0
+                out[i, j] = min(out[i, j], below + 1.0)
 
 
 @kernel(inline=True)
-def _envelope_of_row(out: Floats, i: int, site: Ints, begin: Ints, level: Floats) -> None:
-    """Replace the vertical distances of row i by the lower envelope of phi(x - j) + h_j^2."""
-    width = out.shape[1]
-    site[0], begin[0], level[0] = -1, 0, 0.0
+def _envelope_of_run(
+    out: Floats, i: int, first: int, end: int, site: Ints, begin: Ints, level: Floats
+) -> None:
+    """Replace the vertical distances of a run in row i by the envelope of phi(x - j) + h_j^2.
+
+    The closed cells beside the run are nearer than all beyond them.
+    """
+    site[0], begin[0], level[0] = first - 1, first, 0.0
     top = 0
-    for j in range(width + 1):
-        height = max(out[i, j] - 0.5, 0.0) if j < width else 0.0
+    for j in range(first, end + 1):
+        height = max(out[i, j] - 0.5, 0.0) if j < end else 0.0
         square = height * height
-        first = _overtakes(site[top], level[top], j, square)
-        while top > 0 and first <= begin[top]:
+        governed = _overtakes(site[top], level[top], j, square)
+        while top > 0 and governed <= begin[top]:
             top -= 1
-            first = _overtakes(site[top], level[top], j, square)
-        if first < width:
+            governed = _overtakes(site[top], level[top], j, square)
+        if governed < end:
             top += 1
-            site[top], begin[top], level[top] = j, max(first, 0), square
-    begin[top + 1] = width
+            site[top], begin[top], level[top] = j, max(governed, first), square
+    begin[top + 1] = end
     for k in range(top + 1):
         for j in range(begin[k], begin[k + 1]):
             across = max(abs(j - site[k]) - 0.5, 0.0)

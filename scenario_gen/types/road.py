@@ -162,8 +162,8 @@ class Road:
         """(H, W + 1): number of closed cells left of each column, to count in any run."""
         height, width = self.drivable.shape
         closed = np.zeros((height, width + 1), dtype=np.int32)
-        np.cumsum(~self.drivable, axis=1, out=closed[:, 1:])
-        return sealed(closed)
+        np.logical_not(self.drivable, out=closed[:, 1:])
+        return sealed(np.cumsum(closed, axis=1, out=closed))
 
     @cached_property
     def walkable(self) -> "Road":
