@@ -116,18 +116,12 @@ class Drive:
 @takes(Drive)
 def drive(options: Drive) -> None:
     """Test planners in closed loop in the scenarios of bags. Exit code 1: below a threshold."""
-    from scenario_gen.closed_loop.command import (
-        drive_bags,
-        DriveRequest,
-        in_processes,
-        mutants_in_processes,
-    )
+    from scenario_gen.closed_loop.command import drive_bags, DriveRequest
 
     if options.mutants and options.ros:
         raise InputError("--mutants: faults are put around a Python planner; leave out --ros")
     for bag in options.bags:
         warn_of_metadata(bag)
-    processes = in_processes(options.workers)
     request = DriveRequest(
         options.bags,
         options.planner,
@@ -135,6 +129,9 @@ def drive(options: Drive) -> None:
         options.count,
         [f"repeat={options.repeat}", *(options.assignments or [])],
         options.against,
+        options.baseline,
+        options.mutants,
+        options.workers,
     )
     name = options.planner[0] if len(options.planner) == 1 else "drives"
     with progress() as advance:
@@ -142,9 +139,7 @@ def drive(options: Drive) -> None:
             request,
             options.out,
             progress=lambda done, total: advance(name, done, total),
-            run=_over_dds() if options.ros else processes,
-            baseline=processes if options.baseline else None,
-            mutants=mutants_in_processes(options.workers) if options.mutants else None,
+            run=_over_dds() if options.ros else None,
         )
     _report(result, options.out)
     if result.broken:

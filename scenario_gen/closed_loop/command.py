@@ -5,7 +5,7 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from functools import reduce
+from functools import partial, reduce
 import os
 from pathlib import Path
 
@@ -13,11 +13,11 @@ from scenario_gen.base.errors import InputError
 from scenario_gen.base.folders import replaced_folder
 from scenario_gen.base.parameters import assigned
 from scenario_gen.closed_loop.bars import Bars, broken_bars
-from scenario_gen.closed_loop.blind import blind_rate, BlindRate
+from scenario_gen.closed_loop.blind import blind_rate
 from scenario_gen.closed_loop.comparison import compared, read_drives, refuse_others
 from scenario_gen.closed_loop.config import ClosedLoopConfig
-from scenario_gen.closed_loop.mutants import mutation_score, MutationScore
-from scenario_gen.closed_loop.origin import origins_of, Trial
+from scenario_gen.closed_loop.mutants import mutation_score
+from scenario_gen.closed_loop.origin import origins_of
 from scenario_gen.closed_loop.results import DRIVEN, Drives
 from scenario_gen.closed_loop.simulation import ClosedLoop
 from scenario_gen.closed_loop.suite import bags_in, read_suite, Suite
@@ -29,8 +29,7 @@ from scenario_gen.closed_loop.trials import (
 )
 
 Progress = Callable[[int, int], None]  # numbers of finished and of all drives
-RunTrials = Callable[[Sequence[Trial], str, ClosedLoopConfig, Progress], list[Outcome]]
-RunMutants = Callable[[Sequence[Trial], str, Sequence[Outcome], ClosedLoopConfig], MutationScore]
+RunTrials = Callable[..., list[Outcome]]  # arguments as of `run_trials`
 MAX_BASELINE_COUNT = 200
 BASELINE = "scenario_gen.closed_loop.planners:NonReactive"
 
@@ -41,20 +40,6 @@ class DriveCommandConfig:
 
     drive: ClosedLoopConfig = field(default_factory=ClosedLoopConfig)
     bars: Bars = field(default_factory=Bars)
-
-
-def in_processes(workers: int = 0) -> RunTrials:
-    """Return a function that drives trials in several processes; 0: one per core."""
-    return lambda trials, planner, config, progress: run_trials(
-        trials, planner, config, workers or os.cpu_count() or 1, progress
-    )
-
-
-def mutants_in_processes(workers: int = 0) -> RunMutants:
-    """Return a function that drives the mutants of a planner, as `in_processes` drives it."""
-    return lambda trials, planner, outcomes, config: mutation_score(
-        trials, planner, outcomes, config, workers or os.cpu_count() or 1
-    )
 
 
 @dataclass(frozen=True)
@@ -70,6 +55,10 @@ class DriveRequest:
             as bars.name.
         against: drives.json of an earlier planner on the same scenarios, or its folder; with one
             planner only.
+        baseline: also drive the non-reactive baseline, in at most MAX_BASELINE_COUNT scenarios,
+            and the best open-loop speed laws.
+        mutants: also drive the mutants of each planner.
+        workers: number of processes; 0: one per core.
     """
 
     sources: Sequence[Path]
@@ -78,6 +67,9 @@ class DriveRequest:
     count: int = 0
     assignments: Sequence[str] = ()
     against: Path | None = None
+    baseline: bool = False
+    mutants: bool = False
+    workers: int = 0
 
     def config(self) -> DriveCommandConfig:
         """Return the parameters of the drives and the bars.
@@ -98,8 +90,6 @@ def drive_bags(
     *,
     progress: Progress = lambda *_: None,
     run: RunTrials | None = None,
-    baseline: RunTrials | None = None,
-    mutants: RunMutants | None = None,
 ) -> Suite:
     """Drive planners through the scenarios of bags and write the results.
 
@@ -107,15 +97,14 @@ def drive_bags(
         request: planners and bags.
         out: folder of the results.
         progress: called with the numbers of finished and of all drives.
-        run: drives a planner; default: `in_processes()`.
-        baseline: drives the non-reactive baseline in at most MAX_BASELINE_COUNT of the scenarios;
-            None: no baseline.
-        mutants: drives the mutants of a planner; None: no mutation score.
+        run: drives a planner; default: in the processes of the request.
 
     Raises:
         InputError: a bag, planner, folder, parameter or the file to compare with is invalid.
     """
-    config = request.config()
+    config = request.config().drive
+    workers = request.workers or os.cpu_count() or 1
+    in_processes = partial(run_trials, workers=workers)
     earlier = None
     if request.against is not None:
         if len(request.planners) > 1:
@@ -124,34 +113,37 @@ def drive_bags(
     bags = bags_in(request.sources)
     trials = read_suite(bags, request.ego, request.count)
     if earlier is not None:  # refuses before the drives
-        digests = {
-            trial.name: origin.digest
-            for trial, origin in zip(trials, origins_of(trials), strict=True)
-        }
-        refuse_others(digests, config.drive, earlier)
-    run = run or in_processes()
+        names = [trial.name for trial in trials]
+        digests = [origin.digest for origin in origins_of(trials)]
+        refuse_others(dict(zip(names, digests, strict=True)), config, earlier)
     total = len(trials) * len(request.planners)
     with replaced_folder(out, DRIVEN, bags) as folder:  # refuses before the drives
-        unreactive, blind = _baseline(trials, config.drive, baseline)
-        results: list[Drives] = []
-        for planner in request.planners:
-            before = len(results) * len(trials)
+        unreactive, blind = [], None
+        if request.baseline:
+            chosen = trials[:: max(1, -(-len(trials) // MAX_BASELINE_COUNT))]
+            unreactive = with_origins(in_processes(chosen, BASELINE, config), chosen)
+            loops = [ClosedLoop(trial.scenario, trial.ego, trial.road, config) for trial in chosen]
+            blind = blind_rate(loops)
+        results = []
+        for number, planner in enumerate(request.planners):
 
-            def advance(done: int, _: int, before: int = before) -> None:
+            def advance(done: int, _: int, before: int = number * len(trials)) -> None:
                 progress(before + done, total)
 
-            outcomes = with_origins(run(trials, planner, config.drive, advance), trials)
-            comparison = compared(outcomes, config.drive, earlier) if earlier is not None else None
-            broken = broken_bars(rates(outcomes), config.bars)
-            broken += _unusable(outcomes)
+            driven = (run or in_processes)(trials, planner, config, progress=advance)
+            outcomes = with_origins(driven, trials)
+            comparison = compared(outcomes, config, earlier) if earlier is not None else None
+            score = None
+            if request.mutants:
+                score = mutation_score(trials, planner, outcomes, config, workers)
+            broken = [*broken_bars(rates(outcomes), request.config().bars), *_unusable(outcomes)]
             if comparison is not None and comparison.worse:
                 broken.append(comparison.sentence())
-            score = mutants(trials, planner, outcomes, config.drive) if mutants else None
             results.append(
                 Drives(
                     outcomes,
                     planner,
-                    config.drive,
+                    config,
                     trials,
                     broken,
                     unreactive,
@@ -160,7 +152,7 @@ def drive_bags(
                     score,
                 )
             )
-        suite = Suite.of(results, bags)
+        suite = Suite(results, bags)
         suite.write(folder)
     return suite
 
@@ -179,18 +171,3 @@ def _unusable(outcomes: Sequence[Outcome]) -> list[str]:
             f"{differ[0].name}): the planner keeps state between drives, or draws at random"
         )
     return sentences
-
-
-def _baseline(
-    trials: Sequence[Trial], config: ClosedLoopConfig, run: RunTrials | None
-) -> tuple[list[Outcome], BlindRate | None]:
-    """Return drives of the non-reactive baseline, and how the best blind planner does.
-
-    They drive every k-th scenario if there are many. Without a function that drives there is none.
-    """
-    if run is None:
-        return [], None
-    chosen = trials[:: max(1, -(-len(trials) // MAX_BASELINE_COUNT))]
-    outcomes = with_origins(run(chosen, BASELINE, config, lambda *_: None), chosen)
-    loops = [ClosedLoop(trial.scenario, trial.ego, trial.road, config) for trial in chosen]
-    return outcomes, blind_rate(loops)

@@ -9,7 +9,7 @@ mutant if it fails in one of them that the planner itself passes.
 Source: mutation analysis, DeMillo, Lipton & Sayward 1978.
 """
 
-from collections import deque
+from collections import Counter, deque
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
@@ -20,7 +20,7 @@ import numpy as np
 from scenario_gen.closed_loop.config import ClosedLoopConfig
 from scenario_gen.closed_loop.ego import Command, Pose
 from scenario_gen.closed_loop.origin import Trial
-from scenario_gen.closed_loop.simulation import Observation, Planner, Task
+from scenario_gen.closed_loop.simulation import Observation, Task
 from scenario_gen.closed_loop.trials import find_planner, MakePlanner, Outcome, trial_runner
 from scenario_gen.numerics import Bools, Floats
 from scenario_gen.numerics.plane import ahead_and_left
@@ -258,20 +258,24 @@ def mutation_score(
         outcomes: those of the planner itself; scenarios that it does not pass are left out.
         config: the parameters.
         workers: number of processes.
-        progress: called with the number of finished mutants and that of all.
+        progress: called with the number of finished drives and that of all.
     """
     pairs = [pair for pair in zip(trials, outcomes, strict=True) if pair[1].verdict.passed]
-    passed = [trial for trial, _ in pairs]
-    results = []
-    for number, fault in enumerate(MUTANTS, start=1):
-        make: Callable[[], Planner] = partial(Mutant, planner, fault)
-        with trial_runner(make, config, workers) as run:
-            driven = list(run(passed))
-        killed = tuple(each.name for each in driven if not each.verdict.passed)
-        same = [
-            np.array_equal(each.drive.motion.position, sound.drive.motion.position)
-            for each, (_, sound) in zip(driven, pairs, strict=True)
-        ]
-        results.append(MutantResult(fault, killed, same.count(False)))
-        progress(number, len(MUTANTS))
-    return MutationScore(tuple(results))
+    cases = [(fault, *pair) for fault in MUTANTS for pair in pairs]
+    killed: dict[str, list[str]] = {fault: [] for fault in MUTANTS}
+    changed: Counter[str] = Counter()
+    with trial_runner(planner, config, min(workers, max(len(cases), 1))) as run:
+        driven = run(
+            [trial for _, trial, _ in cases],
+            [partial(Mutant, planner, fault) for fault, _, _ in cases],
+        )
+        for number, (case, mutant) in enumerate(zip(cases, driven, strict=True), start=1):
+            fault, trial, sound = case
+            if not mutant.verdict.passed:
+                killed[fault].append(trial.name)
+            same = np.array_equal(mutant.drive.motion.position, sound.drive.motion.position)
+            changed[fault] += not same
+            progress(number, len(cases))
+    return MutationScore(
+        tuple(MutantResult(fault, tuple(killed[fault]), changed[fault]) for fault in MUTANTS)
+    )

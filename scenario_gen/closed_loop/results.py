@@ -8,13 +8,15 @@ The same drives give the same bytes.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import partial
+from functools import cached_property, partial
+from itertools import zip_longest
 import json
 import math
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pandas as pd
 
 from scenario_gen.base.folders import Kind, write_text
 from scenario_gen.base.parameters import flatten
@@ -33,7 +35,6 @@ from scenario_gen.output.report.data import (
     states,
 )
 from scenario_gen.output.report.html import render_page, render_xml
-from scenario_gen.types import Decision
 
 JSON, JUNIT, PAGE = "drives.json", "junit.xml", "drives.html"
 DRIVEN = Kind("driven")
@@ -68,48 +69,62 @@ class Drives:
     comparison: Comparison | None = None
     mutants: MutationScore | None = None
 
+    @cached_property
+    def rows(self) -> list[dict[str, Any]]:
+        """The drives as JSON's types: name and origin of each scenario, and the verdict."""
+        decisions = [trial.scenario.facts.decision for trial in self.trials]
+        return [
+            {
+                "name": outcome.name,
+                "encounter": outcome.origin.encounter,
+                "scenario": outcome.origin.digest,
+                "copy_of": outcome.origin.copy_of or None,
+                "decision": decision and decision.document(),
+                **outcome.verdict.document(),
+            }
+            for outcome, decision in zip_longest(self.outcomes, decisions)
+        ]
+
+    @cached_property
+    def table(self) -> pd.DataFrame:
+        """The drives, a row each; the values of a decision and of terms are columns."""
+        return pd.json_normalize(self.rows)
+
     def by_severity(self) -> list[int]:
         """Return the indices of the outcomes, the worst first."""
-        order = range(len(self.outcomes))
-        return sorted(
-            order, key=lambda k: (*(-value for value in self.outcomes[k].verdict.severity), k)
-        )
+        severity = [outcome.verdict.severity for outcome in self.outcomes]
+        return sorted(range(len(severity)), key=lambda k: (*(-each for each in severity[k]), k))
 
     def scores(self) -> dict[str, float]:
         """Return the means of nuPlan's and NAVSIM's scores and terms, and shares of criteria."""
-        terms = []
-        for outcome in self.outcomes:
-            verdict = outcome.verdict
-            met = {f"criterion {each.name}": float(not each.missed) for each in verdict.criteria}
-            terms.append(verdict.document()["terms"] | met)
+        met = ({f"criterion {e['name']}": e["met"] for e in row["criteria"]} for row in self.rows)
+        terms = [row["terms"] | each for row, each in zip(self.rows, met, strict=True)]
         return {
-            name: math.fsum(values[name] for values in terms) / len(terms)
-            for name in (terms[0] if terms else ())
+            str(name): math.fsum(values) / len(values)
+            for name, values in pd.DataFrame(terms).items()
         }
 
     def notes(self) -> list[str]:
         """Return sentences that qualify the figures."""
-        messages = [
+        if not self.rows:
+            return []
+        observation = self.config.observation
+        messages = (
             self._origin_note(),
             self._outcomes_note(),
             self._copies_note(),
             self._baseline_note(),
-            "" if self.blind is None else str(self.blind),
-        ]
-        if not self.config.observation.is_perfect:
-            messages.append(f"observation of the others: {self.config.observation}")
-        if self.comparison is not None:
-            messages.append(self.comparison.sentence())
-        if self.mutants is not None:
-            messages.append(str(self.mutants))
-        messages += [self._faults_note(), self._scores_note()]
-        return [message for message in messages if message]
-
-    def _encounters(self) -> list[str]:
-        return sorted({outcome.origin.encounter for outcome in self.outcomes} - {""})
+            self.blind,
+            "" if observation.is_perfect else f"observation of the others: {observation}",
+            self.comparison and self.comparison.sentence(),
+            self.mutants,
+            self._faults_note(),
+            self._scores_note(),
+        )
+        return [str(message) for message in messages if message]
 
     def _origin_note(self) -> str:
-        encounters = self._encounters()
+        encounters = sorted({*self.table.encounter} - {""})
         if len(encounters) == 1:
             return f"intervals cover this one encounter only ({encounters[0]})"
         if encounters:
@@ -121,46 +136,36 @@ class Drives:
 
     def _outcomes_note(self) -> str:
         """Return how many drives pass with each outcome of the decisions, if they were drawn."""
-        passed: dict[tuple[str, Decision], list[bool]] = {}
-        for trial, outcome in zip(self.trials, self.outcomes, strict=False):
-            decision = trial.scenario.facts.decision
-            if decision is not None:
-                key = trial.encounter, decision
-                passed.setdefault(key, []).append(outcome.verdict.passed)
-        if not passed:
+        drawn = self.table.filter(like="decision.").columns.tolist()
+        if not drawn:
             return ""
-        by_outcome: dict[str, list[bool]] = {}
-        for (_, decision), drives in passed.items():
-            by_outcome.setdefault(decision.outcome, []).extend(drives)
-        counts = [f"{name}: {sum(each)} of {len(each)}" for name, each in by_outcome.items()]
-        shares = [sum(drives) / len(drives) for drives in passed.values()]
-        share = np.average(shares, weights=[decision.probability for _, decision in passed])
+        passed = self.table.groupby("decision.outcome", sort=False).passed.agg(["sum", "size"])
+        counts = [f"{name}: {hits} of {of}" for name, hits, of in passed.itertuples()]
+        shares = self.table.groupby(["encounter", *drawn]).passed.mean().reset_index()
+        share = np.average(shares.passed, weights=shares["decision.probability"])
         return (
             f"passed by outcome of the decision: {', '.join(counts)}; "
             f"{share:.0%} weighted by its probability"
         )
 
     def _copies_note(self) -> str:
-        copies = len([outcome for outcome in self.outcomes if outcome.origin.copy_of])
+        copies = self.table.copy_of.count()
         if not copies:
             return ""
-        of_all = f"{copies} of {len(self.outcomes)} scenarios"
+        of_all = f"{copies} of {len(self.rows)} scenarios"
         return f"{of_all} are copies of another scenario from the same encounter"
 
     def _baseline_note(self) -> str:
         if not self.baseline:
             return ""
-        groups: dict[str, list[bool]] = {name: [] for name in self._encounters()}
-        for outcome in self.baseline:
-            groups.setdefault(outcome.origin.encounter, []).append(outcome.verdict.passed)
+        passed = Drives(self.baseline, "", self.config).table.groupby("encounter").passed
         counts = [
-            f"{sum(passed)} of {len(passed)} from {name}"
-            for name, passed in groups.items()
-            if name and passed
+            f"{hits} of {of} from {name}"
+            for name, hits, of in passed.agg(["sum", "size"]).itertuples()
+            if name
         ]
         by_encounter = f": {', '.join(counts)}" if 1 < len(counts) <= 12 else ""
-        rate = passed_of(self.baseline)
-        return f"the non-reactive baseline passes {rate}{by_encounter}"
+        return f"the non-reactive baseline passes {passed_of(self.baseline)}{by_encounter}"
 
     def _faults_note(self) -> str:
         faulty = [outcome for outcome in self.outcomes if outcome.drive.faults]
@@ -175,8 +180,6 @@ class Drives:
 
     def _scores_note(self) -> str:
         scores = self.scores()
-        if not scores:
-            return ""
         nuplan, pdms = scores.pop("nuplan"), scores.pop("pdms")
         terms = [f"{name.replace('_', ' ')} {value:.3f}" for name, value in scores.items()]
         totals = f"nuPlan's score {nuplan:.3f}, NAVSIM's PDMS {pdms:.3f}"
@@ -184,19 +187,11 @@ class Drives:
 
     def document(self) -> dict[str, Any]:
         """Return all verdicts and their summary as JSON's types."""
-        known = [trial.scenario.facts.decision for trial in self.trials]
-        decisions = known or [None] * len(self.outcomes)
-        drives = [
-            {
-                "name": outcome.name,
-                "encounter": outcome.origin.encounter,
-                "scenario": outcome.origin.digest,
-                "copy_of": outcome.origin.copy_of or None,
-                "decision": decision.document() if decision else None,
-                **outcome.verdict.document(),
-            }
-            for outcome, decision in zip(self.outcomes, decisions, strict=False)
-        ]
+        parts = {
+            "best_blind": self.blind,
+            "against": self.comparison,
+            "mutants": self.mutants,
+        }
         return {
             "planner": self.planner,
             **self.config.facts(),
@@ -204,11 +199,9 @@ class Drives:
             "summary": {name: rate.document() for name, rate in rates(self.outcomes).items()},
             "scores": self.scores(),
             "baseline_pass": passed_of(self.baseline).document() if self.baseline else None,
-            "best_blind": None if self.blind is None else self.blind.document(),
-            "against": None if self.comparison is None else self.comparison.document(),
-            "mutants": None if self.mutants is None else self.mutants.document(),
+            **{name: part and part.document() for name, part in parts.items()},
             "notes": self.notes(),
-            "drives": drives,
+            "drives": self.rows,
         }
 
     def json(self) -> str:

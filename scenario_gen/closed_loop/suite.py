@@ -3,14 +3,16 @@
 
 """A suite: planners side by side in the scenarios of many bags, by kind of encounter."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 import json
 import os
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
+import pandas as pd
 
 from scenario_gen.bags.storage.files import files_of, METADATA
 from scenario_gen.base.documents import read_text
@@ -116,13 +118,17 @@ def population_weights(trials: Sequence[Trial]) -> Floats:
     All encounters weigh the same. The outcomes of a decision share the weight of their encounter
     by probability, and scenarios that share an outcome by their importance weights.
     """
-    groups: dict[Any, list[int]] = {}
-    for k, trial in enumerate(trials):
-        groups.setdefault((trial.encounter, trial.scenario.facts.decision), []).append(k)
-    weights = np.array([trial.scenario.facts.weight or 1.0 for trial in trials])
-    for (_, decision), members in groups.items():
-        probability = 1.0 if decision is None else decision.probability
-        weights[members] *= probability / weights[members].sum()
+    facts = [trial.scenario.facts for trial in trials]
+    table = pd.DataFrame(
+        {
+            "encounter": [trial.encounter for trial in trials],
+            "decision": [each.decision for each in facts],
+            "probability": [each.decision.probability if each.decision else 1.0 for each in facts],
+            "weight": [each.weight or 1.0 for each in facts],
+        }
+    )
+    groups = table.groupby(["encounter", "decision"], sort=False, dropna=False)
+    weights = table.weight * table.probability / groups.weight.transform("sum")
     return np.asarray(weights / weights.mean())
 
 
@@ -133,20 +139,18 @@ class Suite:
     Attributes:
         drives: the results of each planner.
         bags: the bags of the scenarios.
-        categories: (S,) categories of the scenarios.
-        weights: (S,) weights of the scenarios, of mean 1.
     """
 
     drives: Sequence[Drives]
     bags: Sequence[Path]
-    categories: Sequence[Category]
-    weights: Floats
 
-    @classmethod
-    def of(cls, drives: Sequence[Drives], bags: Sequence[Path]) -> "Suite":
-        """Return the suite of results that have the same trials."""
-        trials = drives[0].trials
-        return cls(drives, bags, [*map(category_of, trials)], population_weights(trials))
+    @cached_property
+    def scenarios(self) -> pd.DataFrame:
+        """The scenarios, a row each: name, kind of encounter, type of road user, and weight."""
+        trials = self.drives[0].trials
+        table = pd.DataFrame(map(category_of, trials), columns=Category._fields)
+        table.insert(0, "name", [trial.name for trial in trials])
+        return table.assign(weight=population_weights(trials))
 
     @property
     def is_single(self) -> bool:
@@ -181,15 +185,13 @@ class Suite:
 
     def table(self) -> list[Row]:
         """Return the shares of passed scenarios of all, then of each category, worst first."""
-        groups: dict[Category, list[int]] = {}
-        for k, category in enumerate(self.categories):
-            groups.setdefault(category, []).append(k)
-        rows = [self._row(*group) for group in groups.items()]
+        groups = self.scenarios.groupby([*Category._fields], sort=False).indices
+        rows = [self._row(Category(*name), members) for name, members in groups.items()]
         rows.sort(key=lambda row: min(rate.share.value for rate in row.passed))
-        return [self._row(Category("all", ""), range(len(self.categories))), *rows]
+        return [self._row(Category("all", ""), self.scenarios.index), *rows]
 
-    def _row(self, category: Category, members: Sequence[int]) -> Row:
-        weights = self.weights[list(members)]
+    def _row(self, category: Category, members: Iterable[int]) -> Row:
+        weights = self.scenarios.weight.to_numpy()[members]
         passed = (
             passed_of([drives.outcomes[k] for k in members], weights) for drives in self.drives
         )
@@ -197,7 +199,6 @@ class Suite:
 
     def document(self) -> dict[str, Any]:
         """Return the table and the scenarios as JSON's types."""
-        scenarios = zip(self.drives[0].outcomes, self.categories, self.weights, strict=True)
         return {
             "planners": [drives.planner for drives in self.drives],
             **self.drives[0].config.facts(),
@@ -208,10 +209,7 @@ class Suite:
             ],
             "notes": self.notes(),
             "thresholds_not_met": self.broken,
-            "scenarios": [
-                {"name": outcome.name, **category._asdict(), "weight": round(float(weight), 6)}
-                for outcome, category, weight in scenarios
-            ],
+            "scenarios": self.scenarios.round(6).to_dict("records"),
         }
 
     def write(self, folder: Path) -> None:
@@ -233,23 +231,21 @@ class Suite:
 
     def page(self) -> str:
         """Return the page: the table, and all scenarios with the planners side by side."""
-        cells = [
+        trials, planners = self.drives[0].trials, range(len(self.drives))
+        cells = sorted(
             (drives.outcomes[k].verdict.severity, k, number)
             for number, drives in enumerate(self.drives)
-            for k in range(len(drives.outcomes))
-        ]
-        rank = {(k, number): place for place, (_, k, number) in enumerate(sorted(cells))}
-        columns = range(len(self.drives))
-        worst = [
-            max((rank[k, number], number) for number in columns)[1]
-            for k in range(len(self.categories))
-        ]
-        order = sorted(range(len(worst)), key=lambda k: -rank[k, worst[k]])
+            for k in range(len(trials))
+        )
+        rank = np.empty((len(trials), len(planners)), dtype=np.int64)
+        for place, (_, k, number) in enumerate(cells):
+            rank[k, number] = place
+        worst = rank.argmax(axis=1).tolist()
+        order = np.argsort(-rank.max(axis=1)).tolist()
         shown = order[:MAX_REPLAYS_COUNT]
-        trials = self.drives[0].trials
         vehicles = sum(len(trials[k].scenario.vehicles) for k in shown)
         frames = max(REPLAY_BYTES // (FRAME_BYTES * vehicles), MIN_FRAMES_COUNT)
-        outcomes = [self.drives[worst[k]].outcomes[k] for k in range(len(worst))]
+        outcomes = [self.drives[number].outcomes[k] for k, number in enumerate(worst)]
         data = drawings(outcomes, trials, shown, frames)
         for drawing, k in zip(data["drives"], shown, strict=True):
             drawing["sentence"] = f"{self.planners[worst[k]]} {drawing['sentence']}"
@@ -258,13 +254,7 @@ class Suite:
             ("scene.js", "drives.js", "tables.js"),
             data,
             suite=self,
-            rows=[
-                (
-                    number if number < len(shown) else None,
-                    k,
-                    [(rank[k, each], self.drives[each].outcomes[k].verdict) for each in columns],
-                )
-                for number, k in enumerate(order)
-            ],
-            is_weighted=bool(np.ptp(self.weights) > 1e-9),
+            rank=rank.tolist(),
+            order=order,
+            shown=len(shown),
         )

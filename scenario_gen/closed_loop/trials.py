@@ -11,14 +11,14 @@ from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager, redirect_stdout
 from dataclasses import dataclass, replace
 from functools import lru_cache
-from itertools import chain, islice
+from itertools import chain, islice, repeat
 import math
 import os
 from pathlib import Path
 import pickle
 import sys
 import traceback
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -235,7 +235,13 @@ def with_origins(outcomes: Sequence[Outcome], trials: Sequence[Trial]) -> list[O
     ]
 
 
-RunTrials = Callable[[Sequence[Trial]], Iterator[Outcome]]
+class RunTrials(Protocol):
+    """Drives trials in their order."""
+
+    def __call__(
+        self, trials: Sequence[Trial], planners: Sequence[MakePlanner | str] = ()
+    ) -> Iterator[Outcome]:
+        """Yield the outcomes; `planners` drive instead of one planner, one for each trial."""
 
 
 def run_trials(
@@ -281,14 +287,20 @@ def trial_runner(
         find_planner(planner)  # reports errors before any process starts
     if workers <= 1:
         with end_named():
-            yield lambda trials: map(_run, ((trial, planner, config) for trial in trials))
+            yield lambda trials, planners=(): (
+                _run((trial, make, config))
+                for trial, make in zip(trials, planners or repeat(planner), strict=False)
+            )
         return
     with worker_pool(workers) as pool:
 
-        def run(trials: Sequence[Trial]) -> Iterator[Outcome]:
+        def run(
+            trials: Sequence[Trial], planners: Sequence[MakePlanner | str] = ()
+        ) -> Iterator[Outcome]:
+            makers = planners or repeat(planner)
             tasks = (
-                (replace(trial, road=None), road, planner, config)
-                for trial, road in zip(trials, _packed_roads(trials), strict=True)
+                (replace(trial, road=None), road, make, config)
+                for trial, road, make in zip(trials, _packed_roads(trials), makers, strict=False)
             )
             with ctrl_c_blocked():
                 results = pool.map(

@@ -20,7 +20,7 @@ from typer.testing import CliRunner
 from scenario_gen.bags.recordings.write import write_recording
 from scenario_gen.base.errors import InputError
 from scenario_gen.cli.commands import app
-from scenario_gen.closed_loop.command import drive_bags, DriveRequest, in_processes
+from scenario_gen.closed_loop.command import drive_bags, DriveRequest
 from scenario_gen.closed_loop.config import ClosedLoopConfig
 from scenario_gen.closed_loop.ego import Command, Pose
 from scenario_gen.closed_loop.results import as_junit, Drives
@@ -161,9 +161,13 @@ class FailsInTheSecond(Still):
 def driven(bag, out, planner, count=2, workers=1, sets=()):
     """Return the results of one planner, and the test cases in JUnit's file."""
     request = DriveRequest(
-        [bag], [f"{__name__}:{planner}"], count=count, assignments=["overtime=1", *sets]
+        [bag],
+        [f"{__name__}:{planner}"],
+        count=count,
+        assignments=["overtime=1", *sets],
+        workers=workers,
     )
-    result = drive_bags(request, out, run=in_processes(workers))
+    result = drive_bags(request, out)
     return result, list(ElementTree.parse(out / "junit.xml").getroot().iter("testcase"))
 
 
@@ -229,9 +233,13 @@ def test_compiled_code_that_hangs_is_ended_with_its_process(bag, tmp_path):
         match=r"ended after 0 of 2 drives: .* hung in compiled code for longer than drive_time",
     ):
         request = DriveRequest(
-            [bag], [f"{__name__}:HangsInCompiledCode"], count=2, assignments=["drive_time=0.5"]
+            [bag],
+            [f"{__name__}:HangsInCompiledCode"],
+            count=2,
+            assignments=["drive_time=0.5"],
+            workers=2,
         )
-        drive_bags(request, tmp_path, run=in_processes(2))
+        drive_bags(request, tmp_path)
 
 
 def test_slow_decisions_are_counted_and_change_nothing_that_is_written(bag, tmp_path):
@@ -239,9 +247,8 @@ def test_slow_decisions_are_counted_and_change_nothing_that_is_written(bag, tmp_
     for planner in ("Slow", "Still"):
         sets = ["step=0.04", "overtime=1.0"]
         (result,) = drive_bags(
-            DriveRequest([bag], [f"{__name__}:{planner}"], count=1, assignments=sets),
+            DriveRequest([bag], [f"{__name__}:{planner}"], count=1, assignments=sets, workers=1),
             tmp_path / planner,
-            run=in_processes(1),
         ).drives
         known[planner] = json.loads((tmp_path / planner / "drives.json").read_text())
         assert any(
@@ -256,9 +263,8 @@ def test_slow_decisions_are_counted_and_change_nothing_that_is_written(bag, tmp_
 @pytest.mark.parametrize("planner", ["Forks", "Nowhere"])
 def test_a_planner_that_forks_or_leaves_every_road_is_judged_once(bag, tmp_path, planner):
     drive_bags(
-        DriveRequest([bag], [f"{__name__}:{planner}"], count=1),
+        DriveRequest([bag], [f"{__name__}:{planner}"], count=1, workers=1),
         tmp_path / "out",
-        run=in_processes(1),
     )
     (drive,) = json.loads((tmp_path / "out" / "drives.json").read_text())["drives"]
     assert drive["faults"] > 0 and not drive["passed"]
