@@ -12,8 +12,10 @@ from scenario_gen.cli.demo import compare_with_nodes
 
 def test_scenarios_in_which_a_vehicle_leaves_early_are_compared_whole(tmp_path):
     encounter = read_log(bundled("ngsim_two_left_turns")).encounters[0]
-    made = generate(encounter, "t_intersection", count=2, seed=7)
-    other = generate(encounter, "t_intersection", count=2, seed=8)
+    quick = {"evaluation.resamples": 10}
+    made, other = (
+        generate(encounter, "t_intersection", quick, count=2, seed=seed) for seed in (7, 8)
+    )
     report(tmp_path / "out", made)
     compare_with_nodes([made], tmp_path / "out" / "bag")
     with pytest.raises(ScenarioGenError, match="the nodes generated other scenarios"):

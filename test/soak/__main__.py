@@ -31,7 +31,6 @@ PARTS = (
     "recorded",
     "ros",
     "tests",
-    "workspace",
 )
 OUT = Path("out/soak")
 

@@ -82,9 +82,7 @@ def test_each_freedom_has_its_monotone_effect(name, measure):
         0.0,
     )
     largest = {"pace_sigma": 0.08, "end_speed_sigma": 0.8, "place_sigma": 0.4}.get(name, 1.6)
-    found = [
-        measure(batch(**(others | {name: share * largest}))[1]) for share in (0.0, 0.25, 0.5, 1.0)
-    ]
+    found = [measure(batch(**(others | {name: share * largest}))[1]) for share in (0.0, 0.4, 1.0)]
     assert (np.diff(found) > 0.0).all(), found
     assert found[0] == pytest.approx(0.0, abs=1e-9)
 

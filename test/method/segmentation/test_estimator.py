@@ -267,6 +267,7 @@ def test_warns_of_chains_that_disagree_and_of_a_full_truncation():
     )
 
 
+@pytest.mark.long  # 8 s to import arviz
 def test_to_arviz_has_every_chain(fitted):
     arviz = pytest.importorskip("arviz", reason="arviz is not installed")
     model, x, _ = fitted

@@ -118,8 +118,7 @@ def written(tmp_path, lane_map, ending):
 
 
 @pytest.mark.parametrize("ending", ["xodr", "xml"])
-@pytest.mark.parametrize("side", ["right", "left"])
-@pytest.mark.parametrize("name", ["straight", "t_intersection", "four_way"])
+@pytest.mark.parametrize(("name", "side"), [("straight", "left"), ("four_way", "right")])
 def test_cycle_lanes_and_crossings_are_read_again_as_they_were_written(
     tmp_path, name, side, ending
 ):
