@@ -257,7 +257,7 @@ def fill_cells(
             start = max(k * cell, spans[i, 0])
             end = min((k + 1) * cell, spans[i, 1])
             if start > end:
-                fill_box(FAR_AWAY_M, FAR_AWAY_M, 0.0, 0.0, 0.0, out[i, k])
+                fill_box((1 + i) * FAR_AWAY_M, FAR_AWAY_M, 0.0, 0.0, 0.0, out[i, k])
                 continue
             pose_at(time, motion[i], start, a)
             pose_at(time, motion[i], end, b)
@@ -291,6 +291,18 @@ def _first_meeting(box: Floats, cells: Floats, first: int, last: int) -> int:
     return -1
 
 
+@kernel(inline=True)
+def _cells_on_scene(cells: Floats) -> tuple[int, int]:
+    """Return the first cell (K, 8) in which a vehicle is on the scene, and the first behind it."""
+    first = 0
+    end = cells.shape[0]
+    while first < end and cells[first, 6] == 0.0:
+        first += 1
+    while end > first and cells[end - 1, 6] == 0.0:
+        end -= 1
+    return first, end
+
+
 @kernel(F3, F, OUT3)
 def fill_order(cells: Floats, cell: float, out: Floats) -> None:
     """Fill the `order` (N, N, K) of `World` from the cells (N, K, 8) and their length [s].
@@ -307,10 +319,13 @@ def fill_order(cells: Floats, cell: float, out: Floats) -> None:
         j = pair % n
         if i == j:
             continue
-        last = count
+        first, last = _cells_on_scene(cells[i])
+        begin, end = _cells_on_scene(cells[j])
         limit = np.inf
         for k in range(count - 1, -1, -1):
-            meeting = _first_meeting(cells[j, k], cells[i], k, last)
+            meeting = -1
+            if begin <= k < end:
+                meeting = _first_meeting(cells[j, k], cells[i], max(k, first), last)
             if meeting >= 0:
                 last = meeting
                 limit = meeting * cell
@@ -323,10 +338,11 @@ def fill_meetings(cells: Floats, ego: int, cell: float, out: Floats) -> None:
     count = out.shape[1]
     out[:, :, 0] = np.inf
     out[:, :, 1] = -np.inf
+    first, end = _cells_on_scene(cells[ego])
     for place in range(out.shape[0] * count):
         i = place // count
         k = place % count
-        for m in range(count):
+        for m in range(first, end):
             if i != ego and boxes_meet(cells[i, k], cells[ego, m]):
                 out[i, k, 0] = min(out[i, k, 0], m * cell)
                 out[i, k, 1] = (m + 1) * cell

@@ -233,6 +233,8 @@ def advance(
             vehicles[i, 3] = 0.0  # it stands where its motion ended
         if vehicles[i, 4] > 0.0:
             _update_acceleration(world, parameters, i, before[i], after[i], vehicles[i, 3])
+        else:
+            after[i, HELD] = 0.0
     for i in range(len(world.motion)):
         clock = after[i, CLOCK]
         was_present = vehicles[i, 4] > 0.0

@@ -158,7 +158,7 @@ class Cause(StrEnum):
         "conflict_lost"  # the stretch in which all are there leaves out a conflict of the template
     )
     TOO_SHORT = "too_short"  # less than 5 s, or than half of a vehicle's recorded distance
-    LATE_BRAKING = "late_braking"  # before a record ends, 1 m/s² harder than recorded
+    LATE_BRAKING = "late_braking"  # before a record ends, above 2 m/s² and harder than recorded
     NOT_FINITE = "not_finite"
     OUT_OF_RANGE = "out_of_range"  # not in the requested range; it was not checked
     UNUSABLE = "unusable_message"  # damaged, or in a frame other than the road's

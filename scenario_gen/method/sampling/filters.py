@@ -28,6 +28,7 @@ _KEPT_SHARE = 0.4  # of the valid candidates with a conflict area that are kept 
 _SHARED_AREA_SHARE = 0.1  # of valid candidates, from which all must have one
 _ENDING_S = 2.5  # before a record's end
 _HARDER_MPS2 = 1.0  # braking at the end over the strongest of the undisturbed drive
+_COMFORTABLE_MPS2 = 2.0  # braking at the end that any driver may show
 
 
 @dataclass(frozen=True, eq=False)
@@ -116,6 +117,7 @@ class ValidityFilter:
         distances = np.array([_MIN_DISTANCE_SHARE * vehicle.path.length for vehicle in vehicles])
         duration = min(MIN_DURATION_S, MIN_RATE_RATIO * float(nominal.time[-1]))
         braking = _HARDER_MPS2 + _strongest_braking(undisturbed, math.inf)
+        braking = np.maximum(braking, _COMFORTABLE_MPS2)
         end = float(nominal.grid[-1]) - _ENDING_S
         for edge in sampler.model.reactions.edges:
             if edge.kind == FOLLOW and edge.until > end:
