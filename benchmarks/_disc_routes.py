@@ -7,16 +7,12 @@ import itertools
 
 import numpy as np
 
+from benchmarks._paper_planner import PAPER, plan_with_retry, Query, RrtStarConnect
 from scenario_gen.base.errors import RefusedError
-from scenario_gen.method.routing import PlanningConfig, Query
+from scenario_gen.method.routing import PlanningConfig
 from scenario_gen.method.routing.config import make_rrt_star_connect
 from scenario_gen.method.routing.legs import choose_waypoints
 from scenario_gen.method.routing.route_points import route_along
-from scenario_gen.method.routing.search.disc_planner import (
-    PAPER,
-    plan_with_retry,
-    RrtStarConnect,
-)
 from scenario_gen.method.routing.search.planner import BlockedError
 from scenario_gen.method.routing.task import VehicleTask
 from scenario_gen.numerics import Floats

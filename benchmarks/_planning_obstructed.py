@@ -18,8 +18,7 @@ from scenario_gen.base.errors import RefusedError
 from scenario_gen.method.routing.search.car_planner import PoseRrtStarConnect
 from scenario_gen.method.routing.search.dubins import Pose
 from scenario_gen.method.routing.search.planner import Budget, path_length, PoseQuery
-from scenario_gen.method.routing.search.steering import steering_cost
-from scenario_gen.method.routing.search.sweep import car_scene, poses_in_cells
+from scenario_gen.method.routing.search.sweep import car_scene, poses_in_cells, steering_cost
 from scenario_gen.numerics.arrays import Floats
 from scenario_gen.numerics.curve import Curve
 from scenario_gen.roads import build_road, RoadConfig
@@ -99,7 +98,7 @@ def rrt_connect(
     case: Obstructed, seconds: float, reach: float = REACH, *, simplify: bool = False
 ) -> tuple[Floats, float]:
     """OMPL's path (P, 3) in cells, no row if it found none in so much CPU time, and the time."""
-    from scenario_gen.method.routing.search.ompl.solve import curves, solve
+    from scenario_gen.method.routing.search.ompl_solve import curves, solve
 
     started = process_time()
     road, query = case.road, case.query

@@ -13,7 +13,7 @@ from typing import Any
 
 from ompl import base
 
-from scenario_gen.method.routing.search.ompl.solve import search
+from scenario_gen.method.routing.search.ompl_solve import search
 from scenario_gen.numerics import Floats
 from scenario_gen.roads import segment_free
 

@@ -15,6 +15,12 @@ from time import process_time
 
 import numpy as np
 
+from benchmarks._paper_planner import (
+    plan_with_retry,
+    Query,
+    RrtStarConnect,
+    RrtStarConnectConfig,
+)
 from benchmarks._planning_judge import is_drivable
 from benchmarks._planning_maps import (
     clutter,
@@ -41,17 +47,11 @@ from benchmarks.row import higher, lower, Row
 from scenario_gen.base.errors import RefusedError
 from scenario_gen.method.routing import plan_routes, PlanningConfig
 from scenario_gen.method.routing.search.car_planner import PoseRrtStarConnect
-from scenario_gen.method.routing.search.disc_planner import (
-    plan_with_retry,
-    RrtStarConnect,
-    RrtStarConnectConfig,
-)
-from scenario_gen.method.routing.search.ompl.solve import PLANNERS
+from scenario_gen.method.routing.search.ompl_solve import PLANNERS
 from scenario_gen.method.routing.search.planner import (
     Budget,
     BudgetSpentError,
     path_length,
-    Query,
 )
 from scenario_gen.numerics.arrays import Floats
 from scenario_gen.roads.connectivity import FreeSpace

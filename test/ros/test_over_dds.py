@@ -5,6 +5,7 @@
 
 import math
 
+import numpy as np
 import pytest
 from support.suite_processes import Client, whole_chain
 
@@ -111,6 +112,9 @@ def test_anyone_may_ask_for_a_plan_and_why_there_is_none(suite, client):
     request.start.header.frame_id, request.start.header.stamp.sec = "map", 123
     request.start.pose.position.x, request.start.pose.position.y = asked.start[0, :2]
     request.goal.pose.position.x, request.goal.pose.position.y = asked.end[0, :2]
+    for end, state in ((request.start, asked.start), (request.goal, asked.end)):
+        turn = end.pose.orientation
+        turn.z, turn.w = np.sin(0.5 * state[0, 2]), np.cos(0.5 * state[0, 2])
     plan = client.call(GetPlan, "/planner/get_plan", request).plan
     assert len(plan.poses) >= 2
     assert plan.header.stamp.sec == 123
@@ -121,6 +125,7 @@ def test_anyone_may_ask_for_a_plan_and_why_there_is_none(suite, client):
             ("tolerance", -1.0, "tolerance"),
             ("frame", "elsewhere", "elsewhere"),
             ("x", math.nan, "finite"),
+            ("w", 0.0, "no rotation"),
         )
     ):
         bad = GetPlan.Request(start=request.start, goal=request.goal)
@@ -129,6 +134,9 @@ def test_anyone_may_ask_for_a_plan_and_why_there_is_none(suite, client):
             bad.tolerance = value
         elif field == "frame":
             bad.start.header.frame_id = value
+        elif field == "w":
+            bad.start.header.frame_id, bad.start.pose.position.x = "map", 0.0
+            bad.start.pose.orientation.z = bad.start.pose.orientation.w = value
         else:
             bad.start.header.frame_id = "map"
             bad.start.pose.position.x = value

@@ -4,6 +4,7 @@
 """Planning: RRT*-Connect between fitted anchors, and routes that can be driven."""
 
 from scenario_gen.method.routing.config import MakePlanner, PlanningConfig
+from scenario_gen.method.routing.legs import checked_path
 from scenario_gen.method.routing.plan import deviations, make_planner, plan_routes
 from scenario_gen.method.routing.search.planner import (
     Budget,
@@ -11,7 +12,7 @@ from scenario_gen.method.routing.search.planner import (
     Plan,
     Planner,
     PoseQuery,
-    Query,
+    Preferences,
 )
 
 __all__ = [
@@ -22,7 +23,8 @@ __all__ = [
     "Planner",
     "PlanningConfig",
     "PoseQuery",
-    "Query",
+    "Preferences",
+    "checked_path",
     "deviations",
     "make_planner",
     "plan_routes",

@@ -10,7 +10,7 @@ from typing import Protocol
 from scenario_gen.base.parameters import parameter, Parameters
 from scenario_gen.base.registry import Registry
 from scenario_gen.method.routing.search.car_planner import PoseRrtStarConnect, PoseSearchConfig
-from scenario_gen.method.routing.search.ompl.planners import OmplConfig, OmplPlanner
+from scenario_gen.method.routing.search.ompl_planners import OmplConfig, OmplPlanner
 from scenario_gen.method.routing.search.planner import Planner
 
 

@@ -11,11 +11,10 @@ from scenario_gen.base.cancelling import stop_if_cancelled
 from scenario_gen.base.errors import RefusedError
 from scenario_gen.method.routing.config import PLANNERS, PlanningConfig
 from scenario_gen.method.routing.legs import anchor_weights, choose_waypoints, join_waypoints, Legs
-from scenario_gen.method.routing.refusals import not_drivable, too_narrow, too_tight
 from scenario_gen.method.routing.route_points import max_distance, route_along
 from scenario_gen.method.routing.search.planner import Planner
-from scenario_gen.method.routing.smooth import Curve, Guess, smooth
-from scenario_gen.method.routing.task import VehicleTask
+from scenario_gen.method.routing.smooth import Curve, Guess, not_drivable, smooth
+from scenario_gen.method.routing.task import too_narrow, too_tight, VehicleTask
 from scenario_gen.numerics import Floats
 from scenario_gen.roads import footprint_fits, ground_for, own_side
 from scenario_gen.types import Fit, FittedVehicle, Road, Route, TypeLimits

@@ -406,3 +406,21 @@ def _verified(task: VehicleTask, points: Floats) -> Curve:
     arc = running_sum(pieces)
     sharpest = poses[np.argmax(curvature), :2]
     return Curve(spline, u, arc, float(curvature.max()), sharpest, poses[~fits])
+
+
+def not_drivable(task: VehicleTask, curve: Curve) -> str:
+    """Return why a curve cannot be driven, and near which anchor."""
+    reasons, (x, y) = [], curve.sharpest
+    if curve.curvature > task.max_curvature:
+        reasons.append(
+            f"its curvature reaches {curve.curvature:.3f} 1/m at ({x:.2f}, {y:.2f}) m, the limit "
+            f"is {task.max_curvature:.3f} (9/10 of limits.{task.vehicle.type}.max_curvature)"
+        )
+    if len(curve.off_road):
+        x, y = curve.off_road[len(curve.off_road) // 2, :2]
+        reasons.append(f"its footprint leaves the road at ({x:.2f}, {y:.2f}) m")
+    nearest = int(np.argmin(np.hypot(*(task.anchors[:, :2] - [x, y]).T)))
+    return (
+        f"no drivable route for vehicle {task.vehicle.id} on road {task.road.name!r} near "
+        f"{task.anchor_name(nearest)}: {'; '.join(reasons)}"
+    )

@@ -3,12 +3,13 @@
 
 """planner: `map`, `tracks`, `changepoints` of one template in; `fit` and routes out.
 
-`~/get_plan` (nav_msgs/GetPlan) plans on the newest map. An impossible plan is empty, and
-/diagnostics has the reason.
+`~/get_plan` (nav_msgs/GetPlan) plans from pose to pose for a vehicle of the parameter
+`vehicle_type` on the newest map. An impossible plan is empty, and /diagnostics has the reason.
 """
 
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
+from functools import partial
 import math
 from typing import Any
 
@@ -27,14 +28,22 @@ from msg_conventions.paths import encode_path, encode_route
 from msg_conventions.roads import decode_map
 from msg_conventions.topics import vehicle_topic
 from msg_conventions.tracks import decode_tracks
+from msg_conventions.yaw import check_quaternions, yaw
 from scenario_gen.base.cancelling import stop_if_cancelled
 from scenario_gen.base.errors import InputError, RefusedError, ScenarioGenError
 from scenario_gen.base.parameters import parameter, Parameters
+from scenario_gen.base.road_users import CAR, VEHICLE_TYPES
 from scenario_gen.method.chain import Chain
 from scenario_gen.method.config import PipelineConfig
 from scenario_gen.method.fitting import FittingConfig
-from scenario_gen.method.routing import PlanningConfig, Query
-from scenario_gen.method.routing.search.disc_planner import plan_with_retry, RrtStarConnect
+from scenario_gen.method.routing import (
+    Budget,
+    checked_path,
+    make_planner,
+    PlanningConfig,
+    PoseQuery,
+    Preferences,
+)
 from scenario_gen.method.validity import Limits
 from scenario_gen.numerics import Floats
 from scenario_gen.ros.common.recording_part import request_part
@@ -55,8 +64,11 @@ class Config(Parameters):
     planning: PlanningConfig = field(default_factory=PlanningConfig)
     limits: Limits = field(default_factory=Limits)
     seed: int = parameter(0, "seed of the planner", low=0)
-    radius: float = parameter(
-        1.0, "radius of the disc that ~/get_plan plans for", unit="m", low=0.0, high=20.0
+    vehicle_type: str = parameter(
+        CAR,
+        "type of the vehicle that ~/get_plan plans for: its usual size, its limit of curvature",
+        choices=tuple(VEHICLE_TYPES.built_in),
+        group=VEHICLE_TYPES.group,
     )
     pair_map: bool = parameter(
         True, "take only a map with the recording's stamp; false: any map server's newest one"
@@ -156,8 +168,9 @@ class Planner(StageNode):
                 if grid is None or cancelled():
                     raise RefusedError("there is no map yet" if grid is None else "cancelled")
                 _, road = decode_map(grid)
-                query = query_of(request, road.frame_id, self.config.radius)
-                poses = plan_poses(road, query, self.config.planning, self.config.seed)
+                poses = plan_poses(
+                    road, query_of(request, road.frame_id, self.config), self.config
+                )
                 return encode_path(poses, np.full(len(poses), stamp), road.frame_id, stamp)
             except ScenarioGenError as error:
                 kind = type(error).__name__
@@ -192,35 +205,39 @@ def _part_of(segmentation: Segmentation, whole: Encounter, part: Encounter) -> S
     )
 
 
-def query_of(request: Any, frame_id: str, radius: float) -> Query:
+def query_of(request: Any, frame_id: str, config: Config) -> PoseQuery:
     """Return the query of a nav_msgs/srv/GetPlan request.
 
     Raises:
-        InputError: a pose is not finite, in another frame than the map, or the tolerance is
-            negative.
+        InputError: a pose is not finite, has no rotation, or is in another frame than the map, or
+            the tolerance is negative.
     """
     if not (math.isfinite(request.tolerance) and request.tolerance >= 0.0):
         raise InputError(f"tolerance is {request.tolerance}; it must be at least 0 m")
-    points = []
+    poses = []
     for name, stamped in (("start", request.start), ("goal", request.goal)):
-        position = stamped.pose.position
+        at, turn = stamped.pose.position, stamped.pose.orientation
         if stamped.header.frame_id not in ("", frame_id):
             raise InputError(
                 f"{name} is in frame {stamped.header.frame_id!r}; the map is in {frame_id!r}"
             )
-        if not (math.isfinite(position.x) and math.isfinite(position.y)):
-            raise InputError(f"{name} is not finite ({position.x}, {position.y})")
-        points.append(np.array([position.x, position.y]))
-    return Query(points[0], points[1], radius)
+        rotation = np.array([turn.x, turn.y, turn.z, turn.w])
+        if not np.isfinite([at.x, at.y, *rotation]).all():
+            raise InputError(f"{name} is not finite ({at.x}, {at.y})")
+        check_quaternions(rotation, name)
+        poses.append(np.array([at.x, at.y, float(yaw(rotation))]))
+    kind = VEHICLE_TYPES[config.vehicle_type]
+    curvature = config.limits.of(config.vehicle_type).planned.max_curvature
+    wanted = Preferences(config.planning.margin)
+    return PoseQuery(poses[0], poses[1], kind.length, kind.width, curvature, wanted)
 
 
-def plan_poses(road: Road, query: Query, config: PlanningConfig, seed: int) -> Floats:
-    """Return (M, 3) x, y [m], yaw [rad] along the planned path, with each next edge's yaw.
+def plan_poses(road: Road, query: PoseQuery, config: Config) -> Floats:
+    """Return poses (M, 3) x, y [m], yaw [rad] along the planned path.
 
     Raises:
         RefusedError: the start or goal is blocked, there is no route, or the budget is spent.
     """
-    path = plan_with_retry(RrtStarConnect(), road, query, config.iterations, seed).path
-    edges = np.diff(path, axis=0) if len(path) > 1 else np.zeros((1, 2))
-    heading = np.arctan2(edges[:, 1], edges[:, 0])
-    return np.column_stack([path, np.append(heading, heading[-1])[: len(path)]])
+    planner, budget = make_planner(config.planning), Budget(config.planning.iterations)
+    plan = partial(planner.plan_poses, road, query, budget, config.seed)
+    return checked_path(config.planning.planner, plan)

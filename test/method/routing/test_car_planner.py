@@ -222,7 +222,7 @@ def test_a_slalom_is_driven():
 
 
 def test_if_smoothing_fails_a_gentler_path_is_searched(monkeypatch):
-    case = obstructed(113)
+    case = obstructed(25)
     ends = (case.query.start, case.query.goal)
     route = route_on(case.road, *ends, seed=1)
     assert (

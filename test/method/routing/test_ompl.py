@@ -11,8 +11,8 @@ pytest.importorskip("ompl", reason="OMPL is not installed: pip install 'scenario
 from benchmarks._planning_obstructed import parked, straight_fit
 from scenario_gen.method.routing import plan_routes, PlanningConfig
 from scenario_gen.method.routing.search.car_planner import PoseRrtStarConnect
-from scenario_gen.method.routing.search.ompl.planners import OmplConfig, OmplPlanner
-from scenario_gen.method.routing.search.ompl.solve import PLANNERS
+from scenario_gen.method.routing.search.ompl_planners import OmplConfig, OmplPlanner
+from scenario_gen.method.routing.search.ompl_solve import PLANNERS
 from scenario_gen.method.routing.search.planner import (
     Budget,
     BudgetSpentError,

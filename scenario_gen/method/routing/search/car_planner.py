@@ -7,35 +7,38 @@ Most samples lie near a path for a disc inside the footprint, later near the bes
 """
 
 from dataclasses import dataclass
+import itertools
 import math
 
 import numpy as np
 
-from scenario_gen.base.errors import RefusedError
 from scenario_gen.base.parameters import parameter, Parameters
-from scenario_gen.method.routing.search.disc_planner import RrtStarConnect, RrtStarConnectConfig
-from scenario_gen.method.routing.search.dubins import Pose
+from scenario_gen.method.routing.search.dubins import dubins_poses, Pose
 from scenario_gen.method.routing.search.planner import (
     BlockedError,
     Budget,
-    BudgetSpentError,
     NO_POSES,
-    no_route,
     NoWayError,
     Plan,
     PoseQuery,
-    Query,
 )
-from scenario_gen.method.routing.search.sampler import Rules
+from scenario_gen.method.routing.search.rrt_star_connect import Rules
 from scenario_gen.method.routing.search.search import Search
-from scenario_gen.method.routing.search.shortcuts import dense_path, shortened, string_pulled
-from scenario_gen.method.routing.search.sweep import car_scene, poses_in_cells
+from scenario_gen.method.routing.search.sweep import (
+    car_scene,
+    costs_per_length,
+    disc_scene,
+    poses_in_cells,
+    Scene,
+    steering_cost,
+)
 from scenario_gen.numerics import Floats, Ints, wrap_angle
-from scenario_gen.numerics.plane import arc_lengths, edge_yaws
+from scenario_gen.numerics.plane import arc_lengths, edge_lengths, edge_yaws
 from scenario_gen.roads import (
     footprint_fits,
     free_cells,
     free_space,
+    segments_free,
     to_cells,
     to_metres,
 )
@@ -43,10 +46,12 @@ from scenario_gen.types import Road
 
 SPACING_M = 0.5  # between two poses of a path
 MAX_ROUND_ITERATIONS = 64  # between two checks of the budget
+MAX_DISC_ITERATIONS = 512  # of a search for a disc
 DISC_MARGINS_M = (0.0, 0.25, 0.05)  # of the discs whose paths are sampled near, in turn
 DISC_ITERATIONS = 5000  # for such a path
 NEXT_DISC_ITERATIONS = 512  # without a path, after which the next disc is tried
-DISC_PLANNER = RrtStarConnect(RrtStarConnectConfig(pull=False))
+DISC_STEP_CELLS = 120.0  # longest edge of such a path
+MIN_SAVING_CELLS = 1e-3  # of a shortcut
 # d of eq 10: a ball of radius r holds poses r ahead, r² / 2R sideways and r / R in heading, which
 # count 1 + 2 + 1 (Karaman & Frazzoli 2013)
 DIMENSIONS_COUNT = 4
@@ -165,14 +170,11 @@ class PoseRrtStarConnect:
         """
         road = search.road
         attempt = search.iteration // NEXT_DISC_ITERATIONS
-        line, radius = _disc_path(road, query, DISC_MARGINS_M[attempt % len(DISC_MARGINS_M)], seed)
-        cells = _reachable_cells(road, query, radius)
-        taut = string_pulled(
-            road.clearance_cells, to_cells(road, line), radius / road.resolution, 1
-        )
+        margin = DISC_MARGINS_M[attempt % len(DISC_MARGINS_M)]
+        line, cells = _disc_path(road, query, search.rules, margin, seed)
         samples = query.preferences.samples
         if not len(samples):
-            samples = poses_on_line(to_metres(road, taut), SPACING_M)
+            samples = poses_on_line(line, SPACING_M)
         # mu_free / V_d of eq 10, with the ball of DIMENSIONS_COUNT
         volume_ratio = len(cells) * 2.0 * math.pi * search.scene.body.turn_radius**2
         root = ((1.0 + 1.0 / DIMENSIONS_COUNT) * volume_ratio) ** (1.0 / DIMENSIONS_COUNT)
@@ -202,36 +204,71 @@ def least_radius(road: Road, query: PoseQuery) -> float:
     return max(half - 0.75 * road.resolution, 0.0)  # components may miss gaps between centres
 
 
-def _disc_path(road: Road, query: PoseQuery, margin: float, seed: int) -> tuple[Floats, float]:
-    """Return a path (P, 2) [m] for the largest disc of three that finds one, and its radius [m].
+def refuse_no_way(road: Road, query: PoseQuery) -> None:
+    """Raise NoWayError if not even a disc as wide as the footprint can get from start to goal."""
+    if _component(road, query, _least_radius(road, query)) is None:
+        (from_x, from_y), (to_x, to_y) = query.start[:2], query.goal[:2]
+        raise NoWayError(
+            f"no route leads from ({from_x:.2f}, {from_y:.2f}) m to ({to_x:.2f}, {to_y:.2f}) m "
+            f"on road {road.name!r}: it is too narrow for a width of {query.width:.2f} m"
+        )
+
+
+def _least_radius(road: Road, query: PoseQuery) -> float:
+    """Return the radius [m] of a disc without a way where the footprint has certainly none."""
+    half = 0.5 * min(query.width, query.length)
+    return max(half - 0.75 * road.resolution, 0.0)  # components may miss gaps between centres
+
+
+def _component(road: Road, query: PoseQuery, radius: float) -> int | None:
+    """Return the component of the free space by which a disc can get from start to goal.
+
+    It is 0 if only the straight line joins them, None if nothing does.
+    """
+    return free_space(road, radius).common_component(query.start[:2], query.goal[:2])
+
+
+def _disc_path(
+    road: Road, query: PoseQuery, rules: Rules, margin: float, seed: int
+) -> tuple[Floats, Ints]:
+    """Return a path (P, 2) [m] for the largest disc of three that finds one, and where it can be.
+
+    The latter are the flat indices of the cells to sample from. Without a path the straight line
+    takes its place.
 
     Raises:
         NoWayError: not even the smallest disc has a route.
     """
-    half, least = 0.5 * min(query.width, query.length), least_radius(road, query)
-    failure: RefusedError | None = None
-    for radius in (half + margin, half, least):
-        disc = Query(query.start[:2], query.goal[:2], radius)
-        try:
-            plan = DISC_PLANNER.plan(road, disc, Budget(DISC_ITERATIONS, first=True), seed)
-        except RefusedError as error:
-            failure = error
-        else:
-            return plan.path, radius
-    if isinstance(failure, BudgetSpentError):
-        return np.stack((query.start[:2], query.goal[:2])), least
-    raise NoWayError(
-        f"{no_route(road, query.start, query.goal)}: it is too narrow for a width of "
-        f"{query.width:.2f} m"
-    ) from failure
+    refuse_no_way(road, query)
+    half, everywhere = 0.5 * min(query.width, query.length), np.flatnonzero(road.drivable)
+    ends = np.stack((query.start[:2], query.goal[:2]))
+    start, goal = (Pose(x, y, 0.0) for x, y in to_cells(road, ends).tolist())
+    cells = everywhere
+    for radius in (half + margin, half, _least_radius(road, query)):
+        label = _component(road, query, radius)
+        if label is None:
+            continue
+        inside, _ = free_cells(free_space(road, radius), label)
+        cells = inside if label and len(inside) else everywhere
+        straight = rules._replace(cells=inside, near=NO_POSES, step=DISC_STEP_CELLS)
+        search = Search(road, disc_scene(road, radius), straight, (start, goal), seed)
+        for has_path in search.rounds(Budget(DISC_ITERATIONS), MAX_DISC_ITERATIONS):
+            if has_path:
+                first, second = search.chains()
+                line = to_metres(road, np.concatenate((first, second[-2::-1]))[:, :2])
+                line[[0, -1]] = ends
+                return _straightened(road, line, radius), cells
+    return ends, cells
 
 
-def _reachable_cells(road: Road, query: PoseQuery, radius: float) -> Ints:
-    """Return the flat indices of the cells that a disc can reach; all drivable ones if unknown."""
-    space = free_space(road, radius)
-    label = space.common_component(query.start[:2], query.goal[:2]) or 0
-    cells, _ = free_cells(space, label)
-    return cells if label and len(cells) else np.flatnonzero(road.drivable)
+def _straightened(road: Road, line: Floats, radius: float) -> Floats:
+    """Return a polyline (P, 2) [m] that goes from each vertex to the last one that it sees."""
+    kept = [0]
+    while kept[-1] < len(line) - 1:
+        ahead = line[kept[-1] + 1 :]
+        sees = segments_free(road, np.broadcast_to(line[kept[-1]], ahead.shape), ahead, radius)
+        kept.append(kept[-1] + 1 + int(np.flatnonzero(sees).max(initial=0)))
+    return line[kept]
 
 
 def _driven_path(search: Search) -> Floats:
@@ -242,6 +279,48 @@ def _driven_path(search: Search) -> Floats:
     path = np.concatenate((first, backwards[1:]))
     path[:, 2] = wrap_angle(path[:, 2])
     return path
+
+
+def dense_path(chain: Floats, radius: float, spacing: float) -> Floats:
+    """Return poses (P, 3) along the Dubins curves through a chain of poses (k, 3); in cells."""
+    pieces = [chain[:1]]
+    for start, end in itertools.pairwise(chain):
+        pieces.append(dubins_poses(start, end, radius, spacing)[1:])
+        pieces[-1][-1:] = end
+    return np.concatenate(pieces)
+
+
+def shortened(
+    path: Floats, attempts: int, spacing: float, scene: Scene, rng: np.random.Generator
+) -> tuple[Floats, float]:
+    """Put cheaper Dubins curves between random poses of a path (P, 3); return it and its cost.
+
+    The first attempt joins start and goal. All is in cells.
+
+    Source: shortcuts as in Geraerts & Overmars 2007, with Dubins curves.
+    """
+    radius, costs = scene.body.turn_radius, _costs(path, scene)
+    for attempt in range(attempts):
+        i, j = sorted(rng.integers(len(path), size=2).tolist())
+        if attempt == 0:
+            i, j = 0, len(path) - 1
+        if j - i < 2:
+            continue
+        cost = steering_cost(Pose(*path[i]), Pose(*path[j]), scene)
+        if cost > costs[i:j].sum() - MIN_SAVING_CELLS:
+            continue
+        piece = dense_path(path[[i, j]], radius, spacing)
+        path = np.concatenate((path[:i], piece, path[j + 1 :]))
+        costs = np.concatenate((costs[:i], _costs(piece, scene), costs[j:]))
+    return path, float(costs.sum())
+
+
+def _costs(path: Floats, scene: Scene) -> Floats:
+    """Return the cost (P - 1,) of each piece, an arc or a straight line, of a free path (P, 3)."""
+    per_length = np.empty(len(path) - 1)
+    costs_per_length(path[1:], scene, per_length)
+    half_turn = 0.5 * wrap_angle(np.diff(path[:, 2]))
+    return per_length * edge_lengths(path[:, :2]) / np.sinc(half_turn / np.pi)
 
 
 def poses_on_line(line: Floats, spacing: float) -> Floats:

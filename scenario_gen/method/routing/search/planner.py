@@ -11,9 +11,8 @@ from typing import Protocol
 import numpy as np
 
 from scenario_gen.base.errors import RefusedError
-from scenario_gen.numerics import Floats, frozen, sealed
+from scenario_gen.numerics import Floats, sealed
 from scenario_gen.numerics.plane import edge_lengths
-from scenario_gen.roads import FreeSpace, segments_free
 from scenario_gen.types import Road
 
 NO_POSES = sealed(np.empty((0, 3)))
@@ -33,19 +32,6 @@ class NoWayError(RefusedError):
 
 class BudgetSpentError(RefusedError):
     """A route may exist, but none was found within the budget, or the search was cancelled."""
-
-
-@dataclass(frozen=True)
-class Query:
-    """A query for a disc: start and goal (2,) [m] in the road's frame, radius [m]."""
-
-    start: Floats
-    goal: Floats
-    radius: float = 0.0
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "start", frozen(np.reshape(self.start, 2)))
-        object.__setattr__(self, "goal", frozen(np.reshape(self.goal, 2)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -106,7 +92,7 @@ class Plan:
     """A planner's answer.
 
     Attributes:
-        path: (P, 2) x, y [m] from start to goal; of a vehicle (P, 3) with yaw [rad].
+        path: (P, 3) x, y [m], yaw [rad] from start to goal.
         cost: its length [m], and the extra costs of the preferences.
         iterations: number of iterations (0 if the planner does not report it).
         history: (h, 3) iteration, CPU seconds, cost [m] of each improvement.
@@ -130,44 +116,6 @@ class Planner(Protocol):
             BudgetSpentError: none was found within the budget.
         """
         ...
-
-
-def joining_component(space: FreeSpace, query: Query) -> int:
-    """Return the label of the component that joins start and goal.
-
-    It is 0 if only the straight line joins them.
-
-    Raises:
-        BlockedError, NoWayError: no search could succeed.
-    """
-    road = space.road
-    label = space.common_component(query.start, query.goal)
-    if label:  # both ends can move to one of its cells
-        return label
-    ends = np.stack((query.start, query.goal))
-    free = segments_free(road, ends, ends, query.radius)
-    for name, (x, y), is_free in zip(("start", "goal"), ends, free, strict=True):
-        if not is_free:
-            raise BlockedError(
-                name,
-                f"the {name} ({x:.2f}, {y:.2f}) m is not drivable on road {road.name!r} "
-                f"for a disc of radius {query.radius:.2f} m",
-            )
-    if label is None:
-        raise NoWayError(
-            f"{no_route(road, query.start, query.goal)} for a disc of radius {query.radius:.2f} m"
-        )
-    return label
-
-
-def no_route(road: Road, start: Floats, goal: Floats) -> str:
-    """Return the sentence that there is no route between two positions (2 or more) [m]."""
-    from_x, from_y = start[:2]
-    to_x, to_y = goal[:2]
-    return (
-        f"no route leads from ({from_x:.2f}, {from_y:.2f}) m to ({to_x:.2f}, {to_y:.2f}) m "
-        f"on road {road.name!r}"
-    )
 
 
 def path_length(path: Floats) -> float:

@@ -11,8 +11,7 @@ import numpy as np
 
 from scenario_gen.method.routing.search.dubins import Pose
 from scenario_gen.method.routing.search.planner import Budget, BudgetSpentError, Plan
-from scenario_gen.method.routing.search.rrt_star_connect import grow
-from scenario_gen.method.routing.search.sampler import Rules, STATE
+from scenario_gen.method.routing.search.rrt_star_connect import grow, Rules, STATE
 from scenario_gen.method.routing.search.sweep import Scene
 from scenario_gen.method.routing.search.trees import (
     fill_buckets,

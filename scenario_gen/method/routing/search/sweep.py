@@ -1,22 +1,34 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Whether a footprint can follow a curve: its swept area against the grid, cell by cell.
+"""Edges of the search, and whether a footprint can follow them: its swept area, cell by cell.
 
 Between two near poses the convex hull of both footprints, widened by the sagitta of the arc, is
 compared with the cells. The hull contains the swept area, so no obstacle between two poses is
 missed. Lengths are in cells.
+
+An edge is a `Curve`. A body without a turning radius is a disc; its edges are straight lines, as
+in the paper: curves whose arcs have no length.
 """
 
 from typing import NamedTuple
 
 import numpy as np
 
-from scenario_gen.method.routing.search.dubins import Curve, part_of, Pose, TURNS
+from scenario_gen.method.routing.search.dubins import (
+    Curve,
+    LSL_CODE,
+    part_of,
+    POSE,
+    Pose,
+    pose_along,
+    shortest,
+    TURNS,
+)
 from scenario_gen.method.routing.search.planner import PoseQuery
 from scenario_gen.numerics import Counts, Floats, sealed, wrap_angle
-from scenario_gen.numerics.kernels import F, F2, kernel, N2, named, OUT2
-from scenario_gen.roads import CONTACT_CELLS, to_cells
+from scenario_gen.numerics.kernels import F, F2, kernel, N2, named, OUT1, OUT2
+from scenario_gen.roads import CONTACT_CELLS, segment_free, to_cells
 from scenario_gen.types import Road
 
 SWEEP_M = 0.2  # between two poses whose hull is compared with the grid
@@ -279,6 +291,62 @@ def follow(pose: Pose, curve: Curve, scene: Scene) -> float:
             part_cost, frame = _follow_part(frame, TURNS[curve.word, part], length, scene)
             cost += part_cost
     return cost
+
+
+@kernel(inline=True, forced=True)
+def distance(a: Pose, b: Pose) -> float:
+    """Return the straight distance between two poses: no edge between them is shorter."""
+    dx, dy = b.x - a.x, b.y - a.y
+    return float(np.sqrt(dx * dx + dy * dy))
+
+
+@kernel(inline=True, forced=True)
+def steer(start: Pose, end: Pose, body: Body) -> Curve:
+    """Return the shortest edge from pose to pose."""
+    if body.turn_radius == 0.0:
+        return Curve(LSL_CODE, 0.0, distance(start, end), 0.0)
+    return shortest(start, end, body.turn_radius)
+
+
+@kernel(inline=True, forced=True)
+def pose_on_edge(start: Pose, end: Pose, edge: Curve, length: float, body: Body) -> Pose:
+    """Return the pose at a length of an edge between two poses."""
+    if body.turn_radius == 0.0:
+        share = length / edge.second
+        x = start.x + (end.x - start.x) * share
+        return Pose(x, start.y + (end.y - start.y) * share, 0.0)
+    return pose_along(start, edge, length, body.turn_radius)
+
+
+@kernel(inline=True, forced=True)
+def edge_cost(start: Pose, end: Pose, edge: Curve, scene: Scene) -> float:
+    """Return the cost of an edge from a free pose; infinity if it is not free."""
+    body = scene.body
+    if body.turn_radius > 0.0:
+        return follow(start, edge, scene)
+    free = segment_free(scene.clearance, start.x, start.y, end.x, end.y, body.half_length)
+    return edge.second if free else np.inf
+
+
+@kernel(inline=True)
+def is_free(pose: Pose, scene: Scene) -> bool:
+    """Whether the body at a pose is free."""
+    if scene.body.turn_radius > 0.0:
+        return footprint_is_free(pose, scene)
+    return segment_free(scene.clearance, pose.x, pose.y, pose.x, pose.y, scene.body.half_length)
+
+
+@kernel(POSE, POSE, SCENE, on_demand=True)
+def steering_cost(start: Pose, end: Pose, scene: Scene) -> float:
+    """Return the cost of the shortest edge between two poses, of which the first is free."""
+    return edge_cost(start, end, steer(start, end, scene.body), scene)
+
+
+@kernel(F2, SCENE, OUT1, on_demand=True)
+def costs_per_length(poses: Floats, scene: Scene, costs: Floats) -> None:
+    """Write the cost per length (P,) at each of P free poses (P, 3)."""
+    for k in range(poses.shape[0]):
+        costs[k] = cost_at(Pose(poses[k, 0], poses[k, 1], poses[k, 2]), scene)
 
 
 @kernel(F2, SCENE, OUT2)

@@ -13,8 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scenario_gen.method.routing.search.dubins import length_of, POSE, Pose
-from scenario_gen.method.routing.search.steering import distance, steer
-from scenario_gen.method.routing.search.sweep import Body
+from scenario_gen.method.routing.search.sweep import Body, distance, steer
 from scenario_gen.numerics import Ints
 from scenario_gen.numerics.kernels import F, kernel, named, OUTI1, OUTI2
 from scenario_gen.numerics.numba_import import numba

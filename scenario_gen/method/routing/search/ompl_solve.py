@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""A query for one of OMPL's planners, in this process; `planners` protects the caller from it.
+"""A query for one of OMPL's planners, in this process; `ompl_planners` protects the caller.
 
 OMPL searches the space of Dubins curves, with the exact sweep of our own planner as its motion
 validator: a compiled kernel in place of its own checks at a resolution of 1 % of the extent.
@@ -15,8 +15,7 @@ import numpy as np
 from ompl import base, geometric, util
 
 from scenario_gen.method.routing.search.dubins import Pose
-from scenario_gen.method.routing.search.steering import steering_cost
-from scenario_gen.method.routing.search.sweep import Scene
+from scenario_gen.method.routing.search.sweep import Scene, steering_cost
 from scenario_gen.numerics import Floats
 
 PLANNERS = {

@@ -21,23 +21,21 @@ from scenario_gen.base.errors import needs
 from scenario_gen.base.parameters import parameter, Parameters
 from scenario_gen.base.signals import environment_set
 from scenario_gen.method.routing.search.car_planner import (
-    least_radius,
+    dense_path,
     refuse_blocked,
+    refuse_no_way,
     SPACING_M,
 )
 from scenario_gen.method.routing.search.planner import (
     Budget,
     BudgetSpentError,
-    joining_component,
     path_length,
     Plan,
     PoseQuery,
-    Query,
 )
-from scenario_gen.method.routing.search.shortcuts import dense_path
 from scenario_gen.method.routing.search.sweep import car_scene, poses_in_cells
 from scenario_gen.numerics import Floats
-from scenario_gen.roads import free_space, to_metres
+from scenario_gen.roads import to_metres
 from scenario_gen.types import Road
 
 CHECKS_COUNT = 10  # of OMPL's termination condition, in the time of one of our own iterations
@@ -83,14 +81,13 @@ class OmplPlanner:
             BudgetSpentError: no path was found within the budget.
         """
         refuse_blocked(road, query)
-        radius = least_radius(road, query)
-        joining_component(free_space(road, radius), Query(query.start[:2], query.goal[:2], radius))
+        refuse_no_way(road, query)
         needs("planners", "ompl")
-        from scenario_gen.method.routing.search.ompl.solve import solve_in_child  # loads OMPL
+        from scenario_gen.method.routing.search.ompl_solve import solve_in_child  # loads OMPL
 
         started = thread_time()
         context = multiprocessing.get_context("forkserver")
-        context.set_forkserver_preload(["scenario_gen.method.routing.search.ompl.solve"])
+        context.set_forkserver_preload(["scenario_gen.method.routing.search.ompl_solve"])
         receiver, sender = context.Pipe(duplex=False)
         cell, scene = road.resolution, car_scene(road, query)
         options = {
