@@ -3,6 +3,7 @@
 
 """The executable `scenario-gen`; it handles signals before it loads any library."""
 
+import gc
 import os
 import sys
 
@@ -16,6 +17,8 @@ def main() -> None:
     # Before numpy is loaded: the matrices are small, and BLAS threads would only wait.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     handle_signals()
+    # Libraries make a million objects while they load, and no garbage.
+    gc.set_threshold(50_000)
     if sys.argv[1:] == ["--version"]:  # without any extra, too
         print(f"scenario-gen {__version__}")
         return

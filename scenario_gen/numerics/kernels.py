@@ -8,7 +8,7 @@ Inputs are `F1`, `I2`, …, which the kernel only reads; outputs are `OUT1`, `OU
 """
 
 from collections.abc import Callable, Sequence
-from functools import update_wrapper
+from functools import cached_property, update_wrapper
 from hashlib import sha256
 import importlib
 from pathlib import Path
@@ -50,12 +50,6 @@ _kernels: list["Kernel"] = []
 def named(of: type[Any], *fields: Any) -> Any:
     """Return the numba type of a NamedTuple from the types of its fields."""
     return types.BaseTuple.from_types(fields, of)
-
-
-def _compiler(function: Callable[..., Any], **options: Any) -> Any:
-    """Apply `numba.njit` with the cache in our folder."""
-    with used_by_numba(Path(function.__code__.co_filename)):
-        return numba.njit(**OPTIONS, **options)(function)
 
 
 def _reader(declared: Any) -> Callable[[Any], Any]:
@@ -117,11 +111,18 @@ class Kernel:
     ) -> None:
         """Declare the kernel; its first call compiles or loads it."""
         update_wrapper(self, function)
+        self.function = function
         self.declared = tuple(declared)
-        self.group = str(Path(function.__code__.co_filename).parent) if on_demand else ""
-        self.dispatcher = _compiler(function, cache=True)
+        self.source = Path(function.__code__.co_filename)
+        self.group = str(self.source.parent) if on_demand else ""
         self._readers = [_reader(kind) for kind in declared]
         self._is_ready = False
+
+    @cached_property
+    def dispatcher(self) -> Any:
+        """Numba's function, with the cache in our folder."""
+        with used_by_numba(self.source):
+            return numba.njit(cache=True, **OPTIONS)(self.function)
 
     @property
     def name(self) -> str:
@@ -131,12 +132,12 @@ class Kernel:
     @property
     def size(self) -> int:
         """Bytes of its bytecode, a measure of its compile time."""
-        return len(self.dispatcher.py_func.__code__.co_code)
+        return len(self.function.__code__.co_code)
 
     @property
     def mark(self) -> Path:
         """The file with the hash of the cached kernel, which exists once the kernel is cached."""
-        return folder(Path(self.dispatcher.py_func.__code__.co_filename)) / f"{self.name}.sha256"
+        return folder(self.source) / f"{self.name}.sha256"
 
     def compile(self) -> Any:
         """Compile or load it, once, and return numba's function."""
@@ -150,7 +151,7 @@ class Kernel:
 
     def _cached(self) -> list[Path]:
         """Return its files in the cache."""
-        return sorted(self.mark.parent.glob(f"*.{self.dispatcher.py_func.__name__}-*"))
+        return sorted(self.mark.parent.glob(f"*.{self.function.__name__}-*"))
 
     def _digest(self) -> str:
         """Return the hash of its files in the cache."""
@@ -227,9 +228,8 @@ def kernel(
     def decorate(function: Function) -> Function:
         if inline:
             copied = "always" if merged else "never"
-            helper = _compiler(
-                function, no_cpython_wrapper=True, forceinline=forced, inline=copied
-            )
+            options = OPTIONS | {"forceinline": forced, "inline": copied}
+            helper = numba.njit(no_cpython_wrapper=True, **options)(function)
             helper.compile = _without_literals(helper.compile)
             return cast("Function", helper)
         _kernels.append(Kernel(function, declared, on_demand=on_demand))

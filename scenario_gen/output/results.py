@@ -11,7 +11,6 @@ from pathlib import Path
 import shutil
 from typing import Any
 
-from scenario_gen.bags.recordings.read import INFO, read_recording
 from scenario_gen.bags.recordings.write import add_results, write_recording
 from scenario_gen.bags.storage.config import BagConfig
 from scenario_gen.bags.storage.writer import BagWriter
@@ -161,6 +160,8 @@ def write_evaluation(
     Raises:
         OSError: the disk is full, or fails.
     """
+    from scenario_gen.bags.recordings.read import INFO, read_recording  # not needed to generate
+
     write_text(folder / TABLE, as_table(cases) + "\n")
     write_text(
         folder / FIGURES,
