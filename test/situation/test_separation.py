@@ -34,16 +34,16 @@ def test_gaps_of_two_that_never_meet_and_of_two_in_one_place():
     assert (least_gaps(queue(0.0, 1.0)) < 0.0).all()
 
 
-def test_vehicles_without_events_are_needed_when_they_are_nearest():
-    """For 5 s about the middle of 6.25 s, at which two pass each other that react to nothing."""
+@pytest.mark.parametrize(("meet", "begin"), [(6.25, 3.25), (0.5, 0.0), (9.5, 5.0)])
+def test_vehicles_without_events_are_needed_when_they_are_nearest(meet, begin):
+    """For 5 s about the instant at which two pass each other that react to nothing, or from an end on."""
     time = np.arange(101) * 0.1
     along = np.column_stack([8.0 * time, np.zeros(101)])
-    position = np.stack([along, [100.0, 3.5] - along])
+    position = np.stack([along, [16.0 * meet, 3.5] - along])
     heading = np.repeat([[0.0], [np.pi]], 101, axis=1)
     vehicles = (Vehicle("1"), Vehicle("2"))
-    passing = Encounter.sampled(
-        vehicles, 0.1, position, heading, np.full((2, 101), 8.0), "passing"
-    )
+    speed = np.full((2, 101), 8.0)
+    passing = Encounter.sampled(vehicles, 0.1, position, heading, speed, "passing")
     windows = interaction_windows(Situation.of(passing))
     assert windows[:, 1] - windows[:, 0] == pytest.approx(5.0)
-    assert windows[:, 0] == pytest.approx(3.25, abs=0.06)
+    assert windows[:, 0] == pytest.approx(begin, abs=0.06)

@@ -12,7 +12,7 @@ import pytest
 
 from scenario_gen.base.errors import RefusedError
 from scenario_gen.numerics.curve import crossings, Curve
-from scenario_gen.situation import Equation, solve_placement
+from scenario_gen.situation import abreast_in_lane, Equation, path_crossing, solve_placement
 from scenario_gen.situation.frenet import _extended, to_frenet
 from scenario_gen.situation.separation import separate, smallest_gaps
 from scenario_gen.situation.tracks import clean_tracks
@@ -213,3 +213,45 @@ def test_placements_are_the_weighted_least_squares_of_their_equations():
     assert solve_placement([7, 3, 5], chain) == pytest.approx({7: 2.0, 3: 12.0, 5: 8.0})
     apart = [Equation(((1, 1.0),), value, weight) for value, weight in ((0.0, 1.0), (5.0, 2.0))]
     assert solve_placement([1], apart) == pytest.approx({1: 4.0})
+
+
+@pytest.mark.parametrize(
+    ("yaw", "speed", "driven"),
+    [
+        *((90, 5.0, True), (90, 2.0, False), (90, 1.0, None)),
+        *((30, 5.0, True), (20, 5.0, None), (145, 5.0, True), (155, 5.0, None)),
+    ],
+)
+def test_paths_cross_where_lines_do(yaw, speed, driven):
+    """30 m from both beginnings; up to 15 m beyond an end, between 25° and 150°."""
+    yaw = np.radians(yaw)
+    second = line(10.0 - 30.0 * np.cos(yaw), -30.0 * np.sin(yaw), yaw, speed)
+    found = path_crossing(*clean_tracks(encounter_of(line(-20.0, 0.0, 0.0, 8.0), second)))
+    assert (found is None) == (driven is None)
+    if found:
+        assert (found.first, found.second) == pytest.approx((30.0, 30.0), abs=0.05)
+        assert found.driven == driven
+
+
+@pytest.mark.parametrize(("speed", "turned", "along"), [(5.0, 1, 12.68), (7.2, 5, 47.32)])
+def test_of_two_crossings_the_one_closer_in_time_counts(speed, turned, along):
+    """A circle of 20 m is crossed after 30° and after 150°, at 1.3 s and at 6.5 s."""
+    circle, north = arc(0.0, -20.0, 0.0, 20.0, 8.0), line(10.0, -30.0, np.pi / 2.0, speed)
+    found = path_crossing(*clean_tracks(encounter_of(circle, north)))
+    assert found.first == pytest.approx(turned * np.pi / 6.0 * 20.0, abs=0.3)
+    assert found.second == pytest.approx(along, abs=0.3)
+
+
+@pytest.mark.parametrize(
+    ("beside", "width", "count"),
+    [(1.6, 0.6, 1), (-2.9, 0.6, 1), (1.6, 1.9, 0), (0.9, 0.6, 0), (3.1, 0.6, 0)],
+)
+def test_a_bicycle_beside_a_car_shares_its_lane(beside, width, count):
+    encounter = encounter_of(line(0.0, 0.0, 0.0, 5.0), line(10.0, beside, 0.0, 5.0))
+    pair = (Vehicle("c", 4.5, 1.9), Vehicle("b", 1.8, width))
+    found = abreast_in_lane(clean_tracks(replace(encounter, vehicles=pair)))
+    assert len(found) == count
+    for one in found:
+        assert one.offset == pytest.approx(beside, abs=0.01)
+        assert one.clearance == pytest.approx(abs(beside) - 0.95 - 0.3, abs=0.01)
+        assert one.spans == pytest.approx(np.array([[10.0, 49.5], [0.0, 39.5]]), abs=0.6)
