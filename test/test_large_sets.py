@@ -4,8 +4,6 @@
 """Large sets: indices for any number of candidates, figures of a part."""
 
 from collections import Counter
-import json
-import sys
 
 from hypothesis import given
 from hypothesis import strategies as st
@@ -13,11 +11,10 @@ import numpy as np
 import pytest
 from support.given import answer, Given
 
-from scenario_gen import pipeline
 from scenario_gen.base.errors import InputError
 from scenario_gen.logs import read_log
 from scenario_gen.logs.synthetic import bundled
-from scenario_gen.method.evaluation import EvaluationConfig, MEASURED_SCENARIOS
+from scenario_gen.method.evaluation import MEASURED_SCENARIOS
 from scenario_gen.method.evaluation.evaluate import measured
 from scenario_gen.method.sampling import sampler
 from scenario_gen.method.sampling.sampler import (
@@ -29,12 +26,8 @@ from scenario_gen.method.sampling.sampler import (
     place_of,
 )
 from scenario_gen.method.segmentation import segment
-from scenario_gen.output.report.page import render, ReportInput
 from scenario_gen.roads import build_road
-from scenario_gen.types import WITH
 from scenario_gen.types.request import Request
-
-FIELDS = ("time", "position", "heading", "speed", "acceleration")
 
 
 @pytest.fixture(scope="module")
@@ -82,18 +75,3 @@ def test_of_a_large_set_evenly_spaced_runs_are_measured(size):
     assert steps[1] >= MEASURED_SCENARIOS - 20
     gaps = [step for step in steps if step != 1]
     assert not gaps or max(gaps) - min(gaps) <= 1
-
-
-def test_that_only_a_part_was_measured_is_said(chain, monkeypatch):
-    """In the page and the figures."""
-    evaluating = sys.modules[measured.__module__]  # the package has a function of that name
-    monkeypatch.setattr(evaluating, "MEASURED_SCENARIOS", 10)
-    monkeypatch.setattr(evaluating, "RUN_COUNT", 2)
-    config = pipeline.PipelineConfig(evaluation=EvaluationConfig(resamples=20))
-    case = pipeline.generate(chain.encounter, "t_intersection", config, count=24, seed=7)
-    rows = {row["name"]: row for row in json.loads(case.evaluation.to_json())["rows"]}
-    assert rows[WITH]["samples"] == 10
-    (said,) = [
-        note for note in rows[WITH]["notes"] if note.startswith("measured on 10 of 24 scenarios")
-    ]
-    assert said in render(ReportInput([case]))

@@ -6,7 +6,6 @@
 from io import StringIO
 import json
 from pathlib import Path
-import re
 
 from markupsafe import escape
 import numpy as np
@@ -16,12 +15,11 @@ from support.reaction_scenes import answering, lane_encounter, wander
 
 from scenario_gen.logs import read_log
 from scenario_gen.logs.synthetic import bundled
-from scenario_gen.method.evaluation import evaluate_scenarios, EvaluationConfig
+from scenario_gen.method.evaluation import EvaluationConfig
 from scenario_gen.method.sampling import SamplingConfig
 from scenario_gen.output.report.summary import summary
 from scenario_gen.output.results import write_results
 from scenario_gen.pipeline import generate, PipelineConfig
-from scenario_gen.types import REPLAY, WITH
 from scenario_gen.types.request import Request
 
 QUICK = EvaluationConfig(resamples=50)
@@ -48,24 +46,6 @@ def written(case, folder):
     write_results(folder, [case], title="", quality=(), provenance={})
     (figures,) = json.loads((folder / "evaluation.json").read_text())["cases"]
     return (folder / "report.html").read_text(encoding="utf-8"), figures
-
-
-def test_rows_of_the_evaluation(case):
-    assert [row.name for row in case.evaluation.rows] == ["recording", WITH, REPLAY]
-
-
-def test_the_first_figures_that_anybody_sees_are_those_of_the_delivered_set(case, tmp_path):
-    page, figures = written(case, tmp_path)
-    assert next(iter(figures)) == "similarity" and list(figures["similarity"]) == [WITH, REPLAY]
-    delivered = evaluate_scenarios(case.encounter, {WITH: case.generated}, config=QUICK).value(
-        WITH, "e_position"
-    )
-    assert figures["similarity"][WITH]["e_position"] == pytest.approx(delivered, rel=1e-5)
-    replay = case.evaluation.value(REPLAY, "e_position")
-    assert f"E position {delivered:.3g} (replay {replay:.3g})" in printed(case)
-    cell = re.search(r"<td>([\d.]+)<small>([\d.]+) replay", page)
-    assert float(cell[1]) == pytest.approx(delivered, rel=5e-3)
-    assert float(cell[2]) == pytest.approx(replay, rel=5e-3)
 
 
 def test_who_reacts_to_whom_is_said_in_terminal_page_and_figures(case, encounter, tmp_path):

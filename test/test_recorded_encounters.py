@@ -8,9 +8,8 @@ The short form takes those that the package ships and few scenarios.
 
 from dataclasses import replace
 
-import numpy as np
 import pytest
-from support.lengths import LOGS, LONG, SHIPPED
+from support.lengths import LOGS, LONG
 
 from benchmarks._recheck import Account, Recheck
 from benchmarks._reference_sets import evaluate_with_references, WITHOUT
@@ -117,20 +116,3 @@ def test_ngsim_encounters_run_on_their_own_map(own, data):
     slowed = any(note.kind is NoteKind.SLOWED for note in case.generated.adaptations)
     paced, config = at_the_recorded_pace(case) if slowed else (case, NARROW)
     assert_nearer(paced, "e_position", config)
-
-
-def test_same_seed_same_scenarios_and_another_seed_others():
-    (encounter,) = read_log(SHIPPED / "ngsim_left_turn.csv").encounters
-    first, again, other = (
-        generate(encounter, "corridor", CONFIG, count=3, seed=seed) for seed in (7, 7, 8)
-    )
-    for a, b, c in zip(
-        first.generated.scenarios,
-        again.generated.scenarios,
-        other.generated.scenarios,
-        strict=True,
-    ):
-        assert (
-            a.position.tobytes() == b.position.tobytes() and a.speed.tobytes() == b.speed.tobytes()
-        )
-        assert a.position.shape != c.position.shape or not np.array_equal(a.position, c.position)

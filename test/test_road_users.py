@@ -4,13 +4,11 @@
 """Trucks, buses, motorcycles, bicycles and pedestrians: read, kept with their types, and generated within their own limits."""
 
 from dataclasses import replace
-import io
 import re
 
 import numpy as np
 import pandas as pd
 import pytest
-from rich.console import Console
 from scipy.ndimage import binary_dilation
 from support.map_builders import write
 
@@ -23,7 +21,6 @@ from scenario_gen.method.config import PipelineConfig
 from scenario_gen.method.routing import PlanningConfig
 from scenario_gen.method.validity import Limits
 from scenario_gen.numerics.boxes import footprint_gaps
-from scenario_gen.output.report.summary import summary
 from scenario_gen.output.results import write_results
 from scenario_gen.roads import build_road, RoadConfig
 from scenario_gen.situation import Situation
@@ -167,14 +164,6 @@ def test_road_users_of_all_types_are_generated_within_their_limits(road, name):
     assert {tuple(vehicle.type for vehicle in scenario.vehicles) for scenario in made} == {
         tuple(v.type for v in encounter.vehicles)
     }
-
-
-def test_the_terminal_calls_road_users_by_their_types():
-    (encounter,) = read_log(WORLDS["a car waits for a pedestrian"][0]).encounters
-    console = Console(record=True, width=200, file=io.StringIO())
-    console.print(summary([generate(encounter, "corridor", count=1, seed=1)]))
-    text = console.export_text()
-    assert "2 road users (car, pedestrian)" in text and "vehicle c waits for pedestrian p" in text
 
 
 def test_pedestrians_stop_and_go_within_a_step_and_walk_as_people_do():

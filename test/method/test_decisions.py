@@ -4,12 +4,9 @@
 """Decisions: other outcomes of recorded conflicts, their probabilities, and their sets."""
 
 from dataclasses import replace
-from io import StringIO
-import re
 
 import numpy as np
 import pytest
-from rich.console import Console
 from support.textbook_motions import labelled, REACTIONS
 
 from msg_conventions.tracks import decode_tracks
@@ -21,7 +18,6 @@ from scenario_gen.closed_loop.trials import run_trials, trials_of
 from scenario_gen.method.decisions import DecidedConflict, goes_first_probability, offered_lags
 from scenario_gen.method.drives import recorded_drive
 from scenario_gen.method.outcome_sets import drawn_sizes, requested_decisions
-from scenario_gen.output.report.summary import summary
 from scenario_gen.output.review.evaluation import evaluate_bag
 from scenario_gen.situation import conflict_of, passing, Situation
 from scenario_gen.types import Decided, Encounter, NoteKind, Outcome, Request, YIELD
@@ -254,14 +250,6 @@ def test_one_set_has_one_outcome():
     assert first_to_enter(result[0]) == result[0].facts.decision.first == "2", "swapped"
 
 
-def test_one_seed_gives_the_same_scenarios(sets):
-    again = sg.generate_outcomes(recorded(), "corridor", DRAWN, count=12, seed=6)
-    for result, other in zip(sets, again, strict=True):
-        assert [s.facts for s in result] == [s.facts for s in other]
-        for scenario, same in zip(result, other, strict=True):
-            np.testing.assert_array_equal(scenario.position, same.position)
-
-
 def test_a_bag_keeps_outcome_and_probability(sets, tmp_path):
     result = sets[-1]
     result.save(tmp_path / "bag")
@@ -276,18 +264,6 @@ def test_a_bag_keeps_outcome_and_probability(sets, tmp_path):
     assert [s.facts.decision for s in read] == [s.facts.decision for s in result]
     (validation,) = evaluate_bag(tmp_path / "bag")
     assert validation.valid == len(result) and validation.result.generated.reactions
-
-
-def test_the_summary_states_the_mix(sets):
-    console = Console(width=200, record=True, file=StringIO())
-    console.print(summary(sets))
-    text = console.export_text()
-    sizes = {result.encounter.decision.outcome: len(result) for result in sets}
-    assert f"goes first in {sizes[Outcome.GOES_FIRST]} (probability 0.50)" in text
-    assert f"vehicle 2 stops in {sizes[Outcome.STOPS]} scenarios" in text
-    _, *made = re.split("vehicle 2 .* on corridor", text)
-    assert len(made) == 3 and not any("record" in words for words in made)
-    assert all("decided" in words for words in made)
 
 
 def test_the_requested_vehicles_take_part(sets):

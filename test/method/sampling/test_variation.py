@@ -134,13 +134,6 @@ def test_requested_states_hold_and_relaxed_ones_keep_their_bounds():
     assert np.ptp(ends[:, 0]) > 1.0  # its end is free
 
 
-def test_preset_narrow_relaxes_nothing():
-    plan = scene_plan()
-    config = SamplingConfig(drivers=0.0)
-    states = relaxed_states(plan.requested, plan.situation, config, Request())
-    assert states is plan.requested
-
-
 def test_a_start_off_its_bounds_is_refused():
     plan = relaxed_plan()
     made = draw_scenarios(plan, Checker(None, plan.requested, None, None).check, count=20)
