@@ -224,6 +224,7 @@ def select(
         fix_row=vehicle.fix_row[fixes],
         heading=vehicle.heading[fixes],
         height=None if vehicle.height is None else vehicle.height[fixes],
+        ego=None if vehicle.ego is None else vehicle.ego[fixes],
     )
     if speeds is None:
         return chosen
@@ -251,7 +252,7 @@ def _time_window(
             f"{log.segments[0].label}: no usable position in {log.rows} rows"
             + (f" ({causes})" if causes else "")
             + _no_fix_hint(log)
-            + "; check the columns and their units, or name them with --set log.columns=…"
+            + "; check the columns and their units" * bool(log.columns)
         )
     first_ns = int(stamps.min())
     last_ns = int(stamps.max())

@@ -35,7 +35,11 @@ NAMES: dict[str, tuple[str, ...]] = {
         "vy": "vy v_y velocity_y vel_y yvelocity y_velocity speed_y",
         "heading": "heading yaw theta course bearing psi hdg cog course_over_ground vehicle_angle",
         "height": "z height alt altitude elevation pos_z position_z",
-        "valid": "valid is_valid validity fix_type fix_quality gps_fix fix_status status",
+        "valid": "valid is_valid validity fix_type fix_quality gps_quality gps_fix fix_status "
+        "status num_sats num_satellites satellites",
+        "ego_x": "ego_x ego_pos_x ego_position_x",
+        "ego_y": "ego_y ego_pos_y ego_position_y",
+        "ego_heading": "ego_yaw ego_heading ego_theta",
         "length": "length len vehicle_length",
         "width": "width vehicle_width",
         "kind": "type kind class vehicle_type object_type agent_type actor_type obj_type category "
@@ -81,6 +85,13 @@ _TIMES_S = {
     "d": 86400.0,
     "hhmmss": 1.0,
 }
+_ANGLES = {
+    "rad": 1.0,
+    "deg": math.pi / 180.0,
+    "north_deg": math.nan,
+    "cw_deg": math.nan,
+    "north_rad": math.nan,
+}
 UNITS: dict[str, dict[str, float]] = {
     "time": _TIMES_S,
     "date": {},
@@ -102,13 +113,10 @@ UNITS: dict[str, dict[str, float]] = {
     "speed": _SPEEDS_MPS,
     "vx": _SPEEDS_MPS,
     "vy": _SPEEDS_MPS,
-    "heading": {
-        "rad": 1.0,
-        "deg": math.pi / 180.0,
-        "north_deg": math.nan,
-        "cw_deg": math.nan,
-        "north_rad": math.nan,
-    },
+    "heading": _ANGLES,
+    "ego_x": _LENGTHS_M,
+    "ego_y": _LENGTHS_M,
+    "ego_heading": _ANGLES,
 }
 """Factors of units to seconds, metres, m/s, radians, or degrees (lat, lon).
 
@@ -320,15 +328,17 @@ def _complete(columns: dict[str, Column], path: Path, header: Sequence[str]) -> 
     if "time" not in columns:
         raise _missing_column("time", ["time"], columns, path, header)
     ignored = ["x", "y"] if is_geographic else ["lat", "lon"]
-    if not {"vx", "vy"} <= columns.keys():
-        ignored += ["vx", "vy"]
+    for group in (["vx", "vy"], ["ego_x", "ego_y", "ego_heading"]):
+        ignored += [] if columns.keys() >= set(group) else group
     return {quantity: column for quantity, column in columns.items() if quantity not in ignored}
 
 
 def _wide_hint(header: Sequence[str]) -> str:
     """Return a hint if each vehicle has columns of its own; else ""."""
     names = {normalized(name) for name in header}
-    wide = sorted(name[2:] for name in names if name.startswith("x_") and f"y_{name[2:]}" in names)
+    pairs = [(name, name.replace("x", "y", 1)) for name in names if re.match(r"x[_.]", name)]
+    pairs += [(name, f"{name[:-1]}y") for name in names if re.search(r"[_.]x$", name)]
+    wide = sorted(re.sub(r"^x[_.]|[_.]x$", "", x) for x, y in pairs if y in names)
     if len(wide) < 2 or set(wide) & set(UNITS["x"]):
         return ""
     return (
@@ -395,7 +405,7 @@ def as_column(quantity: str, name: str, unit: str = "") -> Column:
         return Column(name, 1.0 / max(float(frame_rate[1]), 1e-3), unit=unit)
     suffixes = [known for known in UNITS[quantity] if lower.endswith(f"_{known}")]
     unit = unit or max(suffixes, key=len, default="")
-    is_clockwise = quantity == "heading" and (
+    is_clockwise = UNITS[quantity] is _ANGLES and (
         unit in ("north_deg", "cw_deg", "north_rad")
         or lower.removesuffix(f"_{unit}") in _CLOCKWISE_NAMES
     )

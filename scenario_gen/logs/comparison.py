@@ -125,6 +125,13 @@ class Comparison:
         """(V,) the ratio or its inverse, whichever is larger."""
         return np.asarray(np.exp(np.abs(np.log(self.ratio))))
 
+    @property
+    def disagreement(self) -> float:
+        """Mean share of displacements that something contradicts; infinite if nothing is known."""
+        shares = np.concatenate((self.speed_off, self.heading_off, self.course_off))
+        known = shares[np.isfinite(shares)]
+        return float(known.mean()) if len(known) else np.inf
+
     def contradicts(self, name: str) -> bool:
         """Return whether a share of displacements is off for more than a few vehicles."""
         values = getattr(self, name)

@@ -70,9 +70,13 @@ def _agreeing_changes(reading: Reading, quantity: str) -> list[Change]:
         is_turned = changes[0].columns == reading.units("north_rad", "heading")
         return changes + [m for m in mirrors if is_turned and m.columns.keys() == {"x", "y"}]
     axes = [mirror for mirror in mirrors if "heading" not in mirror.columns]
-    return _agreeing(reading, mirrors) or _agreeing(
-        reading, [_both(axis, convention) for axis in axes for convention in conventions]
-    )
+    both = [_both(axis, convention) for axis in axes for convention in conventions]
+    if conventions:
+        columns = reading.column("heading", "deg", flipped=True)
+        clockwise = with_heading(lambda heading: -np.radians(heading))
+        text = "headings are counted clockwise, in degrees"
+        both.append(Change(text, columns, clockwise, is_unit=False))
+    return _agreeing(reading, mirrors) or _agreeing(reading, both)
 
 
 def _without_body_frames(reading: Reading) -> Comparison:

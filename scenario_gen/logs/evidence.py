@@ -33,12 +33,18 @@ from scenario_gen.logs.config import LogConfig
 from scenario_gen.logs.directions import check_directions
 from scenario_gen.logs.legs import median_period
 from scenario_gen.logs.quality import Doubt, Quantity
-from scenario_gen.logs.raw import RawLog
+from scenario_gen.logs.raw import Observations, RawLog
 from scenario_gen.numerics import Floats
 
 _FRAME_RATES_HZ = (10, 12.5, 15, 20, 24, 25, 30, 29.97, 50, 60, 100)
 _SPEED_UNITS = {"kmh": "km/h", "mph": "mph", "kn": "knots", "fps": "ft/s", "cmps": "cm/s"}
-_POSITION_UNITS = {"ft": "feet", "cm": "centimetres", "km": "kilometres"}
+_POSITION_UNITS = {
+    "ft": "feet",
+    "dm": "decimetres",
+    "cm": "centimetres",
+    "mm": "millimetres",
+    "km": "kilometres",
+}
 _SPEED_FACT = "the recorded speeds are {:.2f} times those of the positions"
 _DEGREE_UNITS = ("e7", "ddmm", "min")
 _TIME_UNITS = ("ms", "us", "ns")
@@ -53,6 +59,7 @@ def interpret(log: RawLog, config: LogConfig) -> tuple[RawLog, list[str], list[D
         _find_degrees(reading)
     else:
         _check_metres(reading)
+        _find_ego_frame(reading)
     if not (log.geographic or reading.doubts):
         _check_staying(reading)
         _check_starts(reading)
@@ -198,7 +205,10 @@ def _check_metres(reading: Reading) -> None:
     """Add a doubt if x and y are degrees: as metres, no vehicle would move."""
     vehicles = reading.log.vehicles
     farthest = max((_extent(vehicle.fix) for vehicle in vehicles), default=0.0)
-    if not reading.has("x", "y") or not 0.0 < farthest < EVIDENCE.degrees_m:
+    if not reading.has("x", "y") or farthest <= 0.0:
+        return
+    if farthest >= EVIDENCE.degrees_m:
+        _check_grid(reading)
         return
     largest = np.nanmax(np.abs(np.concatenate([vehicle.fix for vehicle in vehicles])), axis=0)
     fastest = np.nanmax(np.concatenate([[0.0], *(vehicle.speed for vehicle in vehicles)]))
@@ -207,6 +217,84 @@ def _check_metres(reading: Reading) -> None:
         x, y = (reading.log.columns[name].name for name in ("x", "y"))
         cause = f"no vehicle drives farther than {farthest:.2g} m by x, y: they may be degrees"
         reading.doubt(Quantity.POSITION, farthest, cause, reading.option(lon=x, lat=y))
+
+
+def _check_grid(reading: Reading) -> None:
+    """Add a doubt if x is a northing of UTM, and y an easting."""
+    x, y = np.nanmedian(np.concatenate([v.fix for v in reading.log.vehicles]), axis=0).tolist()
+    if _is_easting(y) and not _is_easting(x) and 1e6 < x < 1e7:
+        cause = f"x is {x:.0f} and y {y:.0f} m: x is a northing of UTM, and y an easting"
+        option = reading.option(**reading.swapped("x", "y"))
+        reading.doubt(Quantity.FRAME, 0.0, cause, option)
+
+
+def _is_easting(metres: float) -> bool:
+    return 1e5 < metres < 9e5
+
+
+def _find_ego_frame(reading: Reading) -> None:
+    """Read positions as relative to an ego whose poses the table has, if they then agree better.
+
+    The parameter `columns` decides if it names the column of ego_x.
+    """
+    if not reading.has("ego_x"):
+        return
+    ego = reading.log.columns["ego_x"].option()
+    columns = {"ego_x": ego}
+    changes = [
+        Change("positions and headings are relative to the ego", columns, _on_ground),
+        Change(
+            "positions are relative to the ego",
+            columns,
+            lambda vehicle: replace(_on_ground(vehicle), heading=vehicle.heading),
+        ),
+    ]
+    disagreements = [reading.compared(change.convert).disagreement for change in changes]
+    best = int(np.argmin(disagreements))
+    as_recorded = reading.compared().disagreement
+    if "ego_x=" not in reading.config.columns:
+        if as_recorded == np.inf:
+            cause = "the table has poses of an ego; positions may be relative to it"
+            options = f"{reading.option(**columns)}, or else {reading.option(ego_x='none')}"
+            reading.doubt(Quantity.FRAME, 0.0, cause, options)
+            return
+        if as_recorded <= disagreements[best]:
+            return
+        reading.notes.append(f"{changes[best].text}, whose poses the table has")
+    ego_track = _ego_track(reading.log)
+    reading.apply(changes[best])
+    reading.log = replace(reading.log, vehicles=(*reading.log.vehicles, *ego_track))
+
+
+def _on_ground(vehicle: Observations) -> Observations:
+    """Return a vehicle whose pose was relative to the ego."""
+    if vehicle.ego is None:
+        return vehicle
+    ahead, left = vehicle.fix.T
+    x, y, turn = vehicle.ego.T
+    fix = np.column_stack(
+        (
+            x + np.cos(turn) * ahead - np.sin(turn) * left,
+            y + np.sin(turn) * ahead + np.cos(turn) * left,
+        )
+    )
+    return replace(vehicle, fix=fix, heading=vehicle.heading + turn, ego=None)
+
+
+def _ego_track(log: RawLog) -> list[Observations]:
+    """Return the ego as a vehicle, unless one of the vehicles stays at its place."""
+    recorded = [vehicle for vehicle in log.vehicles if vehicle.ego is not None]
+    if any(
+        np.nanmax(np.abs(vehicle.fix), initial=0.0) < EVIDENCE.origin_m for vehicle in recorded
+    ):
+        return []
+    stamps = np.concatenate([vehicle.fix_ns for vehicle in recorded])
+    rows = np.concatenate([vehicle.fix_row for vehicle in recorded])
+    stamps, first = np.unique(stamps, return_index=True)
+    poses = np.concatenate([vehicle.ego for vehicle in recorded if vehicle.ego is not None])[first]
+    states = np.column_stack((poses, np.zeros(len(poses))))
+    nothing = (np.nan, np.nan)
+    return [Observations.of_rows("ego", stamps, states, rows[first], nothing, measured=False)]
 
 
 def _check_staying(reading: Reading) -> None:
@@ -293,10 +381,27 @@ def _doubt_speeds(reading: Reading, compared: Comparison) -> None:
         parts = [f"{r:.2f} times for vehicle {n}" for n, r in zip(names, ratios, strict=True)]
         fact = f"the recorded speeds over those of the positions differ: {', '.join(parts)}"
     cause = f"{fact}: check the units of time, positions and speeds"
-    remedy = "name them with --set log.columns=…" if reading.log.columns else ""
+    if np.ptp(ratios) < 0.1 * ratio and np.nanmedian(compared.spread) < np.log(1.1):
+        scales = list(_scales(reading, ratio))
+        if len(scales) > 1:
+            reading.resolve(Quantity.SPEED, ratio, fact, scales)
+            return
+    remedy = "convert the rows that differ" if len(names) > 1 and reading.log.columns else ""
     is_gross = compared.gross_off[is_known] > EVIDENCE.gross_share
     is_serious = is_gross.mean() > EVIDENCE.many_share and bool(reading.log.columns)
     reading.doubt(Quantity.SPEED, ratio, cause, remedy, stops=bool(is_serious))
+
+
+def _scales(reading: Reading, ratio: float) -> Iterator[Change]:
+    """Yield the scales with which speeds agree that are a fixed ratio of the positions' ones."""
+    for text, scale, names in (
+        ("x, y are scaled", ratio, ("x", "y")),
+        ("speeds are scaled", 1.0 / ratio, ("speed",)),
+    ):
+        if reading.has(*names):
+            factor = reading.log.columns[names[0]].factor * scale
+            columns = reading.units(f"{factor:.3g}", *names)
+            yield Change(text, columns, scaled(), is_unit=False)
 
 
 def _extent(fix: Floats) -> float:
@@ -352,6 +457,10 @@ def _units(reading: Reading) -> Iterator[Change]:
         for unit, name in _SPEED_UNITS.items():
             columns = reading.units(unit, "speed")
             yield Change(f"speeds are in {name}", columns, scaled(speed=UNITS["speed"][unit]))
+    elif reading.has("vx", "vy"):
+        for unit, name in _SPEED_UNITS.items():
+            columns = reading.units(unit, "vx", "vy")
+            yield Change(f"vx, vy are in {name}", columns, scaled(speed=UNITS["speed"][unit]))
     if reading.has("lat", "lon"):
         swap = reading.swapped("lat", "lon")
         yield Change("lat and lon are swapped", swap, with_fix(swapped_fix), is_unit=False)

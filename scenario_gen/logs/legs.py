@@ -21,7 +21,7 @@ _PERIODS_S = (0.005, 5.0)  # usual periods; others have another unit
 _MAX_STRETCH_RATIO = 2.5  # duration of a leg over that of its steps
 _MAX_LEGS_COUNT = 2_000  # of a vehicle
 _MOVING_SHARE = 0.2  # of the longest displacement of a vehicle; shorter legs do not count
-_LONG_PERCENT = 95.0
+_USUAL_AND_LONG_PERCENT = (75.0, 95.0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -113,7 +113,8 @@ def _legs_of_vehicle(
     begin, end, middle = rows[first], rows[last], rows[(first + last) // 2]
     step = _displacements(fix[begin], fix[end], geographic=geographic)
     length = np.hypot(*step.T)
-    reach = np.percentile(length, _LONG_PERCENT) if len(length) else 0.0
+    usual, long = np.percentile(length, _USUAL_AND_LONG_PERCENT) if len(length) else (0.0, 0.0)
+    reach = min(long, 3.0 * usual) if usual else long  # jumps of places are longer
     moving = (length > _MOVING_SHARE * reach) & (length > 0.0)
     return Legs(
         vehicle=np.full(moving.sum(), number),

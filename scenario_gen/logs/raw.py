@@ -47,6 +47,7 @@ class Observations:
         origin: latitude and longitude [degrees] of the frame of a projected `fix`.
         height: (F,) metres, NaN where it is not recorded; None: nowhere.
         course: (S,) directions [rad] of recorded velocity vectors; None: not recorded.
+        ego: (F, 3) poses of the vehicle that recorded it [m, rad]; None: not recorded.
         ahead: how far its centre is ahead of the recorded point, in vehicle lengths; NaN: as the
             parameter `columns` says.
     """
@@ -67,6 +68,7 @@ class Observations:
     origin: tuple[float, float] | None = None
     height: Floats | None = None
     course: Floats | None = None
+    ego: Floats | None = None
     ahead: float = math.nan
 
     @classmethod

@@ -53,7 +53,9 @@ _FEW_ROW_COUNT = 10  # each of them may belong to another vehicle
 _NO_TRAILER = frozenset(("", "0", "False", "false", "no", "none"))
 _SECONDS = re.compile(r"(.*?)secs?", re.IGNORECASE)
 _NANOSECONDS = re.compile(r".*n(?:ano)?_?secs?", re.IGNORECASE)
-_NOT_VALID = frozenset(("false", "no", "invalid", "v", "n"))  # V is void, as of NMEA
+_NOT_VALID = frozenset(
+    ("false", "no", "invalid", "lost", "bad", "error", "none", "void", "v", "n")
+)  # V is void, as of NMEA
 
 
 @dataclass(frozen=True, eq=False)
@@ -471,6 +473,9 @@ def _observations(name: str, group: pd.DataFrame, position: tuple[str, str]) -> 
         observed = replace(observed, height=column("height"))
     if "course" in group:
         observed = replace(observed, course=column("course"))
+    if "ego_x" in group:
+        pose = np.column_stack([column(f"ego_{axis}") for axis in ("x", "y", "heading")])
+        observed = replace(observed, ego=pose)
     trailers = set(group["trailer"]) - _NO_TRAILER if "trailer" in group else set()
     return replace(observed, trailer_name=str(min(trailers, default="")))
 

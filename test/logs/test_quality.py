@@ -245,6 +245,18 @@ STOPPED = {  # what no option reads right, and what is said
         ),
         "x=x:ft,y=y:ft,length=length:ft,width=width:ft,speed=speed:fps",
     ),
+    "a scale": (
+        ROWS.drop(columns="h").assign(x=1.25 * ROWS.x, y=1.25 * ROWS.y),
+        r"x=x:0\.8,y=y:0\.8 or .*speed=speed:1\.25",
+    ),
+    "UTM with swapped axes": (
+        ROWS.assign(x=ROWS.y + 5_328_000.0, y=ROWS.x + 691_000.0),
+        "x is a northing of UTM.*x=y,y=x",
+    ),
+    "clockwise headings in degrees": (
+        ROWS.assign(h=-np.degrees(ROWS.h)),
+        "y=-y,heading=heading:deg .*heading=-heading:deg",
+    ),
     "a bridge": (ROWS.assign(z=np.where(ROWS.id == "A", 300.0, 308.5)), "8.5 m apart in height"),
 }
 
@@ -266,16 +278,42 @@ def test_a_stretch_of_wrong_speeds_is_a_doubt_that_does_not_stop(tmp_path):
 
 
 @pytest.mark.parametrize("sign", [1.0, -1.0])
-@pytest.mark.parametrize(
-    ("factor", "stops"), [(1.19, []), (1.21, [False]), (1.99, [False]), (2.01, [True])]
-)
+@pytest.mark.parametrize(("factor", "stops"), [(1.19, []), (1.21, [True]), (2.01, [True])])
 def test_speeds_contradict_positions_from_a_fifth_on(tmp_path, factor, stops, sign):
-    """From a factor of two on, they stop a log whose columns are named."""
     rows = ROWS.assign(v=ROWS.v * factor**sign).drop(columns="h").rename(columns=NAMES)
     rows.to_csv(tmp_path / "log.csv", index=False)
     config = LogConfig(allow="doubt", columns="speed=speed:mps")
     doubts = read_log(tmp_path / "log.csv", config).doubts
     assert [doubt.stops for doubt in doubts if "times those" in doubt.cause] == stops
+
+
+EGO_HEADINGS = {
+    "relative": lambda rows: rows.h - rows.ego_yaw,
+    "on the ground": lambda rows: rows.h,
+}
+
+
+@pytest.mark.parametrize("heading", EGO_HEADINGS.values(), ids=EGO_HEADINGS)
+@pytest.mark.parametrize("has_ego", [True, False])
+def test_poses_of_an_ego_are_applied_where_positions_are_relative_to_it(
+    tmp_path, heading, has_ego
+):
+    """The ego is a vehicle also if no row is its own."""
+    ego = ROWS[ROWS.id == "A"].rename(columns={"x": "ego_x", "y": "ego_y", "h": "ego_yaw"})
+    rows = ROWS.merge(ego[["t", "ego_x", "ego_y", "ego_yaw"]], on="t")
+    offset = (rows.x - rows.ego_x) + 1j * (rows.y - rows.ego_y)
+    offset *= np.exp(-1j * rows.ego_yaw)
+    rows = rows.assign(x=np.real(offset), y=np.imag(offset), h=heading(rows))
+    path = tmp_path / "log.csv"
+    rows[has_ego | (rows.id == "B")].rename(columns=NAMES).to_csv(path, index=False)
+    (encounter,) = read_log(path).encounters
+    assert distance(encounter, ("A" if has_ego else "ego", "B")) < 0.5
+    unknown = rows.drop(columns=["h", "v"]).rename(columns=NAMES)
+    unknown.to_csv(path, index=False)
+    with pytest.raises(DoubtError, match=r"ego_x=ego_x, or else .*ego_x=none"):
+        read_log(path)
+    (encounter,) = read_log(path, columns="ego_x=ego_x").encounters
+    assert distance(encounter, ("A", "B")) < 0.5
 
 
 @pytest.mark.parametrize("order", ["by time", "by vehicle", "column"])
