@@ -264,7 +264,8 @@ class Search:
         str,
         typer.Option(
             help="Definition of a failure: at_fault, collision, off_road, goal, or e.g. "
-            "'ttc<1.5', 'pet<1' (s), or a criterion: its name or MODULE:CLASS."
+            "'ttc<1.5', 'pet<1' (s), 'imposed_braking>3' (m/s²), or a criterion: its name or "
+            "MODULE:CLASS."
         ),
     ] = "at_fault"
     ego: Annotated[

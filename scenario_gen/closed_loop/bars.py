@@ -3,11 +3,47 @@
 
 """The bars: thresholds of the rates of failures that a planner must meet to pass."""
 
-from collections.abc import Mapping
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass
+from typing import NamedTuple
+
+import pandas as pd
 
 from scenario_gen.base.parameters import parameter, Parameters
-from scenario_gen.closed_loop.trials import Rate
+from scenario_gen.closed_loop.trials import Outcome, rates
+from scenario_gen.closed_loop.verdict import DriveVerdict
+
+
+class Figure(NamedTuple):
+    """A figure of a verdict that says how risky a drive was, though it may have passed.
+
+    Attributes:
+        unit: of the figure.
+        low_is_risky: whether low values are risky, else high ones.
+        limit: value beyond which a drive is risky.
+    """
+
+    unit: str
+    low_is_risky: bool
+    limit: float
+
+    def is_risky(self, value: float) -> bool:
+        """Whether a value is beyond the limit; NaN is not."""
+        return value < self.limit if self.low_is_risky else value > self.limit
+
+
+FIGURES = {
+    "min_ttc": Figure("s", low_is_risky=True, limit=1.5),
+    "min_pet": Figure("s", low_is_risky=True, limit=1.0),
+    "imposed_braking": Figure("m/s²", low_is_risky=False, limit=2.0),
+}
+"""The figures that bars bound, and that comparisons and mutants compare drive by drive."""
+
+
+def figures_of(verdicts: Sequence[DriveVerdict]) -> pd.DataFrame:
+    """Return the figures of drives, a column each; NaN where one does not exist."""
+    rows = [[getattr(verdict, name) for name in FIGURES] for verdict in verdicts]
+    return pd.DataFrame(rows, columns=[*FIGURES], dtype=float)
 
 
 @dataclass(frozen=True)
@@ -50,21 +86,42 @@ class Bars(Parameters):
         low=0.0,
         high=1.0,
     )
+    min_ttc: float = parameter(
+        0.0, "smallest time to collision in any drive", unit="s", low=0.0, high=60.0
+    )
+    min_pet: float = parameter(
+        -100.0, "smallest post-encroachment time in any drive", unit="s", low=-100.0, high=100.0
+    )
+    imposed_braking: float = parameter(
+        100.0,
+        "hardest braking, in any drive, of a vehicle whose turn the ego takes",
+        unit="m/s²",
+        low=0.0,
+        high=100.0,
+    )
 
 
-LOWER_BARS = ("goals", "progress")
+LOWER_BARS = ("goals", "progress", "min_ttc", "min_pet")
 """The bars that are lower bounds."""
 
 
-def broken_bars(rates_by_name: Mapping[str, Rate], bars: Bars) -> list[str]:
-    """Return a sentence for each bar that is not met."""
+def broken_bars(outcomes: Sequence[Outcome], bars: Bars) -> list[str]:
+    """Return a sentence for each bar that the outcomes do not meet."""
+    shares = {name: 100.0 * rate.share.value for name, rate in rates(outcomes).items()}
+    figures = figures_of([outcome.verdict for outcome in outcomes])
     messages = []
     for name, bar in asdict(bars).items():
-        if name not in rates_by_name:
-            continue  # no criteria are used
-        value = rates_by_name[name].share.value
         is_lower = name in LOWER_BARS
-        if value < bar if is_lower else value > bar:
+        if name in FIGURES:
+            text, unit = "{:.2f}", FIGURES[name].unit
+            value, least = figures[name].min() if is_lower else figures[name].max(), bar
+        elif name in shares:
+            text, unit = "{:.1f}", "%"
+            value, least = shares[name], 100.0 * bar
+        else:
+            continue  # no criteria are used
+        if value < least if is_lower else value > least:
             side = "at least" if is_lower else "at most"
-            messages.append(f"{name}: {100 * value:.1f} %; {side} {100 * bar:.1f} % is required")
+            required = f"{side} {text.format(least)} {unit} is required"
+            messages.append(f"{name}: {text.format(value)} {unit}; {required}")
     return messages

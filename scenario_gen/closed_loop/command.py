@@ -4,7 +4,7 @@
 """The work of `scenario-gen drive`: bags and planners' names in, a folder of verdicts out."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import partial, reduce
 import os
 from pathlib import Path
@@ -20,13 +20,8 @@ from scenario_gen.closed_loop.mutants import mutation_score
 from scenario_gen.closed_loop.origin import origins_of
 from scenario_gen.closed_loop.results import DRIVEN, Drives
 from scenario_gen.closed_loop.simulation import ClosedLoop
-from scenario_gen.closed_loop.suite import bags_in, read_suite, Suite
-from scenario_gen.closed_loop.trials import (
-    Outcome,
-    rates,
-    run_trials,
-    with_origins,
-)
+from scenario_gen.closed_loop.suite import bags_in, read_suite, Suite, write_selection
+from scenario_gen.closed_loop.trials import Outcome, run_trials, with_origins
 
 Progress = Callable[[int, int], None]  # numbers of finished and of all drives
 RunTrials = Callable[..., list[Outcome]]  # arguments as of `run_trials`
@@ -136,7 +131,9 @@ def drive_bags(
             score = None
             if request.mutants:
                 score = mutation_score(trials, planner, outcomes, config, workers)
-            broken = [*broken_bars(rates(outcomes), request.config().bars), *_unusable(outcomes)]
+                name = f"mutants-{number + 1}" if number else "mutants"
+                score = replace(score, saved=_saved(folder / name, bags, score.smallest_set()))
+            broken = [*broken_bars(outcomes, request.config().bars), *_unusable(outcomes)]
             if comparison is not None and comparison.worse:
                 broken.append(comparison.sentence())
             results.append(
@@ -155,6 +152,17 @@ def drive_bags(
         suite = Suite(results, bags)
         suite.write(folder)
     return suite
+
+
+def _saved(folder: Path, bags: Sequence[Path], names: Sequence[str]) -> str:
+    """Write a bag of the scenarios that catch mutants, and return a remark about it."""
+    if not names:
+        return ""
+    try:
+        write_selection(folder, bags, names)
+    except InputError as error:  # e.g. a live recording without a fit
+        return f" (not saved as a bag: {error})"
+    return f" (bag `{folder.name}`)"
 
 
 def _unusable(outcomes: Sequence[Outcome]) -> list[str]:

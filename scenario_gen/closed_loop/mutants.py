@@ -11,12 +11,13 @@ Source: mutation analysis, DeMillo, Lipton & Sayward 1978.
 
 from collections import Counter, deque
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from functools import partial
 from typing import Any
 
 import numpy as np
 
+from scenario_gen.closed_loop.bars import FIGURES
 from scenario_gen.closed_loop.config import ClosedLoopConfig
 from scenario_gen.closed_loop.ego import Command, Pose
 from scenario_gen.closed_loop.origin import Trial
@@ -190,25 +191,32 @@ class MutantResult:
         fault: its fault.
         killed_by: names of the scenarios in which it fails and the planner passes.
         changed: number of scenarios in which it drives otherwise than the planner.
+        riskier: number of scenarios that it passes, with a figure beyond its limit in `FIGURES`
+            though that of the planner is not.
     """
 
     fault: str
     killed_by: tuple[str, ...]
     changed: int
+    riskier: int = 0
 
     def __str__(self) -> str:
         if self.killed_by:
             return f"caught in {len(self.killed_by)}, first {self.killed_by[0]}"
+        if self.riskier:
+            bars = ", ".join(f"bars.{name}={each.limit:g}" for name, each in FIGURES.items())
+            return f"survives: drives worse in {self.riskier}, and passes; see {bars}"
         if self.changed:
-            return f"survives: drives otherwise in {self.changed}, and passes"
+            return f"survives: drives otherwise in {self.changed}, not worse"
         return "survives: these scenarios never exercise it"
 
 
 @dataclass(frozen=True)
 class MutationScore:
-    """The mutants of one planner."""
+    """The mutants of one planner, and where the scenarios that catch them are saved."""
 
     results: tuple[MutantResult, ...]
+    saved: str = ""
 
     @property
     def caught(self) -> int:
@@ -227,7 +235,7 @@ class MutationScore:
 
     def __str__(self) -> str:
         names = ", ".join(self.smallest_set())
-        few = f"; these scenarios suffice: {names}" if names else ""
+        few = f"; these scenarios suffice: {names}{self.saved}" if names else ""
         return f"mutation score {self.caught} of {len(self.results)}{few}"
 
     def document(self) -> dict[str, Any]:
@@ -235,8 +243,7 @@ class MutationScore:
         return {
             "caught": self.caught,
             "mutants": [
-                {"fault": each.fault, "killed_by": list(each.killed_by), "changed": each.changed}
-                for each in self.results
+                asdict(each) | {"killed_by": list(each.killed_by)} for each in self.results
             ],
             "smallest_set": self.smallest_set(),
         }
@@ -264,6 +271,7 @@ def mutation_score(
     cases = [(fault, *pair) for fault in MUTANTS for pair in pairs]
     killed: dict[str, list[str]] = {fault: [] for fault in MUTANTS}
     changed: Counter[str] = Counter()
+    riskier: Counter[str] = Counter()
     with trial_runner(planner, config, min(workers, max(len(cases), 1))) as run:
         driven = run(
             [trial for _, trial, _ in cases],
@@ -275,7 +283,15 @@ def mutation_score(
                 killed[fault].append(trial.name)
             same = np.array_equal(mutant.drive.motion.position, sound.drive.motion.position)
             changed[fault] += not same
+            riskier[fault] += any(
+                figure.is_risky(getattr(mutant.verdict, name))
+                and not figure.is_risky(getattr(sound.verdict, name))
+                for name, figure in FIGURES.items()
+            )
             progress(number, len(cases))
     return MutationScore(
-        tuple(MutantResult(fault, tuple(killed[fault]), changed[fault]) for fault in MUTANTS)
+        tuple(
+            MutantResult(fault, tuple(killed[fault]), changed[fault], riskier[fault])
+            for fault in MUTANTS
+        )
     )

@@ -3,7 +3,7 @@
 
 """A suite: planners side by side in the scenarios of many bags, by kind of encounter."""
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Collection, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 import json
@@ -14,6 +14,8 @@ from typing import Any, NamedTuple
 import numpy as np
 import pandas as pd
 
+from scenario_gen.bags.recordings.read import read_recording, result_in
+from scenario_gen.bags.recordings.write import write_recording
 from scenario_gen.bags.storage.files import files_of, METADATA
 from scenario_gen.base.documents import read_text
 from scenario_gen.base.errors import InputError
@@ -82,17 +84,47 @@ def read_suite(bags: Sequence[Path], ego: str = "", count: int = 0) -> list[Tria
 
     Arguments and errors are as in `read_trials`, `count` is for each bag.
     """
-    if len(bags) == 1:
-        return read_trials(bags[0], ego, count)
+    return [
+        replace(trial, name=_name(place, trial.name))
+        for bag, place in zip(bags, _places(bags), strict=True)
+        for trial in read_trials(bag, ego, count)
+    ]
+
+
+def _places(bags: Sequence[Path]) -> list[str]:
+    """Return the place of each bag; "" for a single one."""
     root = os.path.commonpath([bag.resolve() for bag in bags])
-    trials = []
-    for bag in bags:
-        place = os.path.relpath(bag.resolve(), root)
-        trials += [
-            replace(trial, name=f"{place} {trial.name.lstrip('/')}")
-            for trial in read_trials(bag, ego, count)
-        ]
-    return trials
+    places = [os.path.relpath(bag.resolve(), root) for bag in bags]
+    return places if len(places) > 1 else [""]
+
+
+def _name(place: str, name: str) -> str:
+    return f"{place} {name.lstrip('/')}" if place else name
+
+
+def write_selection(folder: Path, bags: Sequence[Path], names: Collection[str]) -> None:
+    """Write the scenarios whose trials have some names to a bag, with recordings and roads.
+
+    Of several requests in one namespace only the last one is searched, as in `load`.
+
+    Raises:
+        InputError: a road or a fit is unknown, or a bag cannot be read or written.
+    """
+    results = {}
+    for number, (bag, place) in enumerate(zip(bags, _places(bags), strict=True)):
+        recording = read_recording(bag)
+        for namespace in recording.results:
+            result = result_in(recording, namespace)
+            chosen = tuple(
+                scenario
+                for scenario in result
+                if _name(place, f"{namespace} {scenario.index}".strip()) in names
+            )
+            if chosen:
+                generated = replace(result.generated, scenarios=chosen)
+                prefix = f"/bag_{number}" if place else ""
+                results[prefix + namespace] = result.with_scenarios(generated)
+    write_recording(folder, results)
 
 
 def category_of(trial: Trial) -> Category:

@@ -7,6 +7,8 @@ import numpy as np
 import pytest
 from support.driving_scenes import crossing, following
 
+from scenario_gen.bags.recordings.write import write_recording
+from scenario_gen.closed_loop.command import drive_bags, DriveRequest
 from scenario_gen.closed_loop.ego import Command
 from scenario_gen.closed_loop.mutants import COMMANDS, Mutant, MUTANTS, mutation_score
 from scenario_gen.closed_loop.origin import Trial
@@ -14,6 +16,9 @@ from scenario_gen.closed_loop.planners import ConstantSpeed, IdmFollower, Refere
 from scenario_gen.closed_loop.simulation import ClosedLoop
 from scenario_gen.closed_loop.trials import run_trials
 from scenario_gen.closed_loop.verdict import judge
+from scenario_gen.logs import read_log
+from scenario_gen.method.evaluation import EvaluationConfig
+from scenario_gen.pipeline import generate, PipelineConfig
 
 
 class Records:
@@ -77,6 +82,27 @@ def test_mutants_are_caught_survive_or_are_never_exercised():
     assert "never exercise" in str(results["ignores bicycles"])
     assert set(score.smallest_set()) <= {"follower", "crossing"}
     assert score.document()["caught"] == score.caught
+    assert any("drives worse" in str(each) for each in score.results)
+
+
+def test_the_bag_of_few_scenarios_catches_all_that_are_caught(tmp_path):
+    """Of two bags; names of the scenarios differ in it, verdicts do not."""
+    (encounter,) = read_log("examples/my_log.csv").encounters
+    config = PipelineConfig(evaluation=EvaluationConfig(resamples=10))
+    made = generate(encounter, "four_way", config, count=4, seed=7)
+    for place in ("one", "two"):
+        write_recording(tmp_path / place, made)
+    planner = "scenario_gen.closed_loop.planners:IdmFollower"
+    first, second = (
+        drive_bags(DriveRequest(sources, [planner], "2", mutants=True, workers=2), tmp_path / out)
+        for sources, out in (
+            ([tmp_path / "one", tmp_path / "two"], "out"),
+            ([tmp_path / "out" / "mutants"], "again"),
+        )
+    )
+    (all_drives,), (few,) = first.drives, second.drives
+    assert few.mutants.caught == all_drives.mutants.caught > 0
+    assert len(few.outcomes) == len(all_drives.mutants.smallest_set()) < len(all_drives.outcomes)
 
 
 def test_an_ego_that_takes_the_turn_of_another_one_does_not_pass():

@@ -191,11 +191,13 @@ def test_json_junit_rates_and_bars(trials):
     ]
     said = json.loads(Drives(outcomes, "p:C", ClosedLoopConfig()).json())
     assert said["summary"]["collisions"]["count"] == 1 and len(said["drives"]) == 3
-    assert [line.split(":")[0] for line in broken_bars(found, Bars())] == [
+    assert [line.split(":")[0] for line in broken_bars(outcomes, Bars())] == [
         "collisions",
         "goals",
         "at_fault",
     ]
-    assert broken_bars(found, Bars(collisions=0.4, at_fault=0.4, goals=0.9)) == [
-        "goals: 66.7 %; at least 90.0 % is required"
+    loose = Bars(collisions=0.4, at_fault=0.4, goals=0.9, min_ttc=0.5, imposed_braking=0.0)
+    assert broken_bars(outcomes, loose) == [
+        "goals: 66.7 %; at least 90.0 % is required",
+        "min_ttc: 0.00 s; at least 0.50 s is required",
     ]

@@ -23,6 +23,7 @@ OFF_ROAD = "off_road"
 GOAL = "goal"
 TTC = "ttc"
 PET = "pet"
+IMPOSED = "imposed_braking"
 NAMES = (AT_FAULT, COLLISION, OFF_ROAD, GOAL)
 CONTACT_SPEED_MPS = 0.1  # added to the impact speed, so that every contact has a negative margin
 MIN_MARGIN_S = 1e-3  # of a drive without a contact that counts
@@ -31,8 +32,9 @@ UNKNOWN_MARGIN_S = 100.0  # of a drive for which the figure does not exist
 
 @dataclass(frozen=True)
 class Objective:
-    """A failure: at_fault, collision, off_road, goal (missed), or ttc or pet below a limit [s].
+    """A failure: at_fault, collision, off_road, goal (missed), or a figure beyond a limit.
 
+    The figures are ttc and pet, below it [s], and the imposed_braking, above it [m/s²].
     With `criterion`, its text, a failure is a drive that misses the criterion called `name`.
     """
 
@@ -47,14 +49,18 @@ class Objective:
         Raises:
             InputError: it is none of these.
         """
-        bound = re.fullmatch(rf"({TTC}|{PET})\s*<\s*(\d+\.?\d*|\.\d+)", text.strip())
+        bound = re.fullmatch(
+            rf"({TTC}(?=\s*<)|{PET}(?=\s*<)|{IMPOSED}(?=\s*>))\s*[<>]\s*(\d+\.?\d*|\.\d+)",
+            text.strip(),
+        )
         if bound is not None:
             return cls(bound[1], float(bound[2]))
         if text.strip() in NAMES:
             return cls(text.strip())
         name = re.split("[<>]", text)[0].strip()
         if ":" not in name and name not in CRITERIA:
-            known = f"{', '.join(NAMES)}, or e.g. {TTC}<1.5, {PET}<1 (seconds), or a criterion"
+            figures = f"{TTC}<1.5, {PET}<1 (seconds) or {IMPOSED}>3 (m/s²)"
+            known = f"{', '.join(NAMES)}, or e.g. {figures}, or a criterion"
             near = did_you_mean(text, (*NAMES, *CRITERIA.names()))
             raise InputError(f"objective {text!r} is not known; take {known}{near}")
         text = text.replace(",", " ")
@@ -78,7 +84,8 @@ class Objective:
     def __str__(self) -> str:
         if self.criterion:
             return self.criterion
-        return f"{self.name}<{self.limit:g}" if self.limit else self.name
+        side = ">" if self.name == IMPOSED else "<"
+        return f"{self.name}{side}{self.limit:g}" if self.limit else self.name
 
     def response(self, outcome: Outcome) -> Response:
         """Return the distance of a drive to failure.
@@ -125,13 +132,16 @@ class Objective:
                 return UNKNOWN_MARGIN_S + nearest
             return verdict.min_pet - self.limit
         hit = verdict.collision
-        counts = hit is not None and (self.name != AT_FAULT or verdict.at_fault)
+        counts = verdict.at_fault or self.name not in (AT_FAULT, IMPOSED)
         if hit is not None and counts:
             return -(CONTACT_SPEED_MPS + hit.speed)
-        if self.name != TTC:
+        if self.name == TTC:
+            margin = verdict.min_ttc - self.limit
+        elif self.name == IMPOSED:
+            margin = self.limit - verdict.imposed_braking
+        else:
             return max(nearest, MIN_MARGIN_S)
-        margin = verdict.min_ttc - self.limit
-        # Many drives have the same time to collision, or none: then the nearer one is better.
+        # Many drives have the same figure, or none: then the nearer one is better.
         return margin + 0.1 * nearest if margin > 0.0 else margin
 
 
@@ -170,6 +180,8 @@ def _kind(outcome: Outcome, name: str) -> str:
         elif outcome.verdict.fault == "standing":
             reason = ": it stands"
         return f"the ego does not come to its goal{reason}"
+    if name == IMPOSED:
+        return "another vehicle brakes in its turn"
     others = _others(outcome)
     nearest = others[int(np.argmin(_time_shifts(outcome)))] if others else 0
     return f"{name} too short with {outcome.drive.motion.vehicles[nearest].id}"

@@ -6,6 +6,7 @@
 from dataclasses import replace
 import json
 import math
+import re
 from xml.etree import ElementTree
 
 import pytest
@@ -198,14 +199,16 @@ def test_objectives():
     assert Objective.parsed(" pet < 1 ") == Objective("pet", 1.0) and Objective.parsed(
         "goal"
     ) == Objective("goal")
-    for text in ("speed", "ttc", "ttc<", "ttc<-1", "pet<1s", ""):
+    assert str(Objective.parsed("imposed_braking>2.5")) == "imposed_braking>2.5"
+    for text in ("speed", "ttc", "ttc<", "ttc>1", "ttc<-1", "pet<1s", "imposed_braking<1", ""):
         with pytest.raises(InputError, match="take at_fault"):
             Objective.parsed(text)
 
 
 def test_margins_are_zero_or_less_in_failures_alone(bag):
     outcomes = run_trials(read_trials(bag, "2") + read_trials(bag, "1"), f"{__name__}:Blind")
-    for text in ("at_fault", "collision", "off_road", "goal", "ttc<3", "pet<1"):
+    texts = ("at_fault", "collision", "off_road", "goal", "ttc<3", "pet<1", "imposed_braking>1")
+    for text in texts:
         for outcome in outcomes:
             response, verdict = Objective.parsed(text).response(outcome), outcome.verdict
             failed = {
@@ -215,7 +218,8 @@ def test_margins_are_zero_or_less_in_failures_alone(bag):
                 "goal": math.isnan(verdict.goal),
                 "ttc": verdict.collision is not None or verdict.min_ttc <= 3.0,
                 "pet": not math.isnan(verdict.min_pet) and verdict.min_pet <= 1.0,
-            }[text.split("<")[0]]
+                "imposed_braking": verdict.imposed_braking >= 1.0,
+            }[re.split("[<>]", text)[0]]
             assert response.failed == failed and bool(response.kind) == failed
             assert len(response.parts) == (1 if text in ("at_fault", "collision") else 0)
     for planner in ("Strays", "Blind"):
