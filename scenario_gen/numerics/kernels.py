@@ -213,6 +213,8 @@ def kernel(
 ) -> Callable[[Function], Function]:
     """Compile a function with numba: cached, without the GIL, IEEE arithmetic (no fastmath).
 
+    With NUMBA_DISABLE_JIT=1 it stays a function of Python, for debuggers and coverage.
+
     Args:
         declared: numba types of the positional arguments, e.g. `kernel(F2, I, OUT1)`.
         inline: a helper that only kernels call; it gets its types from them and is compiled with
@@ -226,6 +228,8 @@ def kernel(
     """
 
     def decorate(function: Function) -> Function:
+        if numba.config.DISABLE_JIT:
+            return function
         if inline:
             copied = "always" if merged else "never"
             options = OPTIONS | {"forceinline": forced, "inline": copied}

@@ -38,7 +38,7 @@ OPERATORS = {ast.Add: ast.Sub, ast.Sub: ast.Add, ast.Mult: ast.Div, ast.Div: ast
 COMPARISONS = {ast.Lt: ast.GtE, ast.GtE: ast.Lt, ast.Gt: ast.LtE, ast.LtE: ast.Gt}
 TEXTUAL = (ast.JoinedStr, ast.arg, ast.AnnAssign, ast.Subscript, ast.Raise)
 SYMMETRIC = {  # functions of which the first two arguments may be swapped
-    "_is_same", "allclose", "box_distance", "feature_extents", "hypot", "is_same_turn",
+    "_is_same", "_wasserstein", "allclose", "box_distance", "feature_extents", "hypot", "is_same_turn",
     "jensen_shannon", "present_slice",
 }  # fmt: skip
 EQUIVALENT = {  # (file, mutant): the reason why no test can fail
@@ -49,6 +49,10 @@ EQUIVALENT = {  # (file, mutant): the reason why no test can fail
         "scenario_gen/situation/tracks.py",
         "for wavelength in (8.0, (10.8), 16.0, 24.0, 32.0, 48.0, 64.0, 96.0, 128.0):",
     ): "a wavelength of a grid: another one takes its place, within the same deviation",
+    (
+        "scenario_gen/method/sampling/importance_sampling.py",
+        "_MIN_TTC_S = (0.09000000000000001)",
+    ): ("a bound of a guide of the proposal: the weights keep the share unbiased"),
     ("scenario_gen/method/fitting/state_check.py", "_ROUNDING_M = (0.018000000000000002)"): (
         "rounding takes 7 mm at most; any more keeps the room"
     ),

@@ -40,7 +40,10 @@ def run(**extra):
 
 def test_rows_say_what_happened():
     found = run(
-        checks={"with changepoints": CheckCounts(60, {Cause.OVERLAP: 9, Cause.SPEED: 1})},
+        checks={
+            "with changepoints": CheckCounts(60, {Cause.OVERLAP: 9, Cause.SPEED: 1}),
+            "without changepoints": CheckCounts(20, {Cause.OFF_ROAD: 4}),
+        },
         road="cross",
     )
     assert [row.name for row in found.rows] == [
@@ -57,6 +60,7 @@ def test_rows_say_what_happened():
     assert found.value("with changepoints", "collision_rate") == pytest.approx(0.15)
     assert found.value("with changepoints", "limit_rate") == pytest.approx(1 / 60)
     assert found.value("with changepoints", "acceptance") == pytest.approx(50 / 60)
+    assert found.value("without changepoints", "off_road_rate") == pytest.approx(0.2)
     assert "from 12 scenarios, not 50" in str(found.row("without changepoints").notes[0])
     assert not found.row("with changepoints").notes
     assert all(
@@ -115,7 +119,8 @@ def test_vanished_conflicts_are_counted_for_themselves():
     assert found.value("recording", "conflicts") == 1.0
     assert (found.value("x", "conflicts"), found.value("x", "vanished_conflicts")) == (0.5, 0.5)
     assert found.value("x", "order_kept") == 1.0  # of those that are there
-    assert NoteKind.CONFLICTS_VANISHED in kinds_of(found.row("x"))
+    (note,) = [n for n in found.row("x").notes if n.kind is NoteKind.CONFLICTS_VANISHED]
+    assert note.values == {"vanished": 0.5, "total": 1.0}
 
 
 def late(source, n, first):

@@ -99,6 +99,7 @@ def test_values_by_hand():
     values = values_of(motion)
     np.testing.assert_allclose(values["acceleration"].reshape(2, 31)[0, 1:-1], 2.0 * time[1:-1])
     jerk = values["jerk"].reshape(2, -1)
+    assert jerk.shape[1] == 31 - 5  # of means over 0.5 s
     np.testing.assert_allclose(jerk[0, 1:-1], 2.0)
     assert not jerk[1].any()
     np.testing.assert_allclose(values["yaw_rate"].reshape(2, 31)[0], 0.3)

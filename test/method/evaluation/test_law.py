@@ -16,6 +16,7 @@ from support.textbook_motions import labelled
 
 from scenario_gen import generate, PipelineConfig
 from scenario_gen.cli.folder import FolderRequest, generate_all
+from scenario_gen.method.evaluation.criticality import time_to_collision
 from scenario_gen.method.evaluation.law import (
     FEATURES,
     features_of,
@@ -147,6 +148,8 @@ def test_features_are_those_of_loops(kind, seed):
         closing = closing[[round(conflict.entry_first / dt)]]
         assert values["gap"] == pytest.approx(conflict.entry_second - conflict.exit_first)
         assert values["arrival gap"] == pytest.approx(conflict.entry_second - conflict.entry_first)
+    least = time_to_collision(one, first, second).min()
+    assert values["time to collision"] == pytest.approx(min(least, 10.0))
     assert values["closing speed"] == pytest.approx(closing.max())
     assert values["approach"] == pytest.approx(min(conflict.entry_second, 20.0))
     entries = ((first, conflict.entry_first, "first"), (second, conflict.entry_second, "second"))

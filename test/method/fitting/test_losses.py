@@ -11,9 +11,11 @@ from support.reaction_scenes import crossing, lane_encounter
 
 from scenario_gen.base.errors import InputError
 from scenario_gen.method.fitting import fit, fit_template, FittingConfig, LostEncounterError
+from scenario_gen.method.fitting.losses import find_unused
 from scenario_gen.method.fitting.placement import Placement
 from scenario_gen.method.segmentation import segment
 from scenario_gen.numerics.curve import Curve
+from scenario_gen.roads import build_road
 from scenario_gen.situation import clean_tracks, find_losses, LOSABLE
 from scenario_gen.types import Encounter, Vehicle
 from scenario_gen.types.request import Request
@@ -155,6 +157,17 @@ def test_what_is_lost_is_refused_by_name_and_taken_by_name(place):
         encounter, segment(encounter), OPEN, FittingConfig(allow="lost_following, lost_merge")
     )
     assert [loss.kind for loss in taken.losses] == ["following"]
+
+
+@pytest.mark.parametrize("driven", [1, 2, 3, 4])
+def test_arms_without_vehicles_are_counted(driven):
+    network = replace(build_road("four_way").lanes, drawn=True)
+    used = [lane for lanes in list(network.arms.values())[:driven] for lane in lanes]
+    losses = find_unused(network, used)
+    assert [loss.kind for loss in losses] == ["arm"] * (driven < 4)
+    assert not losses or losses[0].message.startswith(
+        f"{4 - driven} of the 4 arms of road four_way "
+    )
 
 
 def test_only_what_is_known_can_be_allowed():
