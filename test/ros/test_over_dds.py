@@ -64,24 +64,6 @@ def test_a_late_joiner_gets_everything(suite, client):
         late.close()
 
 
-def test_parameters_are_checked_on_set_with_a_reason(suite, client):
-    from rcl_interfaces.srv import SetParameters
-    from rclpy.parameter import Parameter
-
-    request = SetParameters.Request(
-        parameters=[Parameter("sampling.no_such", value=1).to_parameter_msg()]
-    )
-    assert (
-        not client.call(SetParameters, "/gp_sampler/set_parameters", request).results[0].successful
-    )
-    request = SetParameters.Request(
-        parameters=[Parameter("road.traffic_side", value="up").to_parameter_msg()]
-    )
-    (result,) = client.call(SetParameters, "/road_server/set_parameters", request).results
-    assert not result.successful
-    assert "left" in result.reason
-
-
 def test_maps_are_served_and_bad_ones_refused(suite, client):
     from nav_msgs.srv import GetMap, LoadMap
 

@@ -5,8 +5,6 @@
 
 from dataclasses import fields
 import importlib
-import subprocess
-import sys
 
 import pytest
 from support.node_server import start_nodes
@@ -14,17 +12,6 @@ from support.node_server import start_nodes
 from scenario_gen.ros.common.ros_parameters import help_of
 from scenario_gen.ros.common.start import node_class
 from scenario_gen.ros.node_names import COMPOSABLE
-
-
-@pytest.mark.dds
-def test_the_player_lists_its_parameters():
-    command = [sys.executable, "-m", "scenario_gen.ros.common.start", "player", "--help"]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=180.0, check=False)
-    assert done.returncode == 0 and done.stderr == ""
-    assert "[--namespace NAME]... [--ros-args -p PARAMETER:=VALUE ...]" in done.stdout
-    assert "  rate := 1.0\n      how many times as fast as it was recorded" in done.stdout
-    for name in ("bag", "topics", "rate", "start_offset", "loop", "paused", "clock"):
-        assert f"  {name} := " in done.stdout
 
 
 @pytest.mark.dds
