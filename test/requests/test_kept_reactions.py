@@ -32,7 +32,7 @@ def late(encounter, who, sample):
     return replace(encounter, present=present)
 
 
-def made(encounter, request=Request(), count=30):
+def made(encounter, request=Request(), count=20):
     road, segmentation = (
         build_road("corridor", encounter, CONFIG.road),
         segment(encounter, CONFIG.segmentation, 1),
@@ -85,7 +85,7 @@ def test_an_ego_slot_before_a_follower_or_behind_a_leader(ego, tmp_path):
     assert_kept(result, ["2 follows 1"])
     bag = write_recording(tmp_path / "bag", result)
     (found,) = evaluate_bag(bag)
-    assert found.causes == {} and found.valid == 30  # with the witness, from the bag alone
+    assert found.causes == {} and found.valid == 20  # with the witness, from the bag alone
     assert len(found.result.generated.reactions) == 1
     (strict,) = evaluate_bag(bag, PipelineConfig(limits=Limits(headway_share=0.01)))
     assert set(strict.causes) == {"reaction"}
@@ -93,7 +93,7 @@ def test_an_ego_slot_before_a_follower_or_behind_a_leader(ego, tmp_path):
 
 def test_an_ego_slot_inside_a_platoon():
     assert_kept(
-        made(platoon(4), Request(ego="2"), count=40), ["2 follows 1", "3 follows 2", "4 follows 3"]
+        made(platoon(4), Request(ego="2"), count=25), ["2 follows 1", "3 follows 2", "4 follows 3"]
     )
 
 
