@@ -60,7 +60,7 @@ CONTENTS = {
     "ego/trajectory": ("you", "stamped poses to track"),
     "ego/witness": ("gp_sampler", "the reference drive, before each scenario"),
     "fit": ("planner", "start, changepoints and end on the road, at stamps of the routes"),
-    "fit/info": ("planner", "names its inputs"),
+    "fit/info": ("planner", "JSON: fit, routes, what they were made from"),
     "map": (
         "road_server",
         "0 free, 100 occupied, −1 unknown; cells below 65 are drivable; not rotated",
@@ -74,11 +74,7 @@ CONTENTS = {
     "report": ("evaluator", "figures"),
     "road/entries": ("road_server", "poses at lane centres, into the road"),
     "road/exits": ("road_server", "poses at lane centres, out of the road"),
-    "road/info": ("road_server", "names its inputs"),
-    "road/lanes": (
-        "road_server",
-        "borders as a line list; text: JSON of lanes, users, rules (msg_conventions/lanes.py)",
-    ),
+    "road/lanes": ("road_server", "JSON: lanes, users, rules, entries, exits, the map"),
     "road/markings": ("road_server", "paint and signs"),
     "scenarios": ("gp_sampler", "one or several messages per scenario"),
     "scenarios/info": ("gp_sampler", "entries and summaries, below"),

@@ -1,29 +1,109 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Fit ⇄ `fit`: the changepoints on the road (conventions: trajectory.py).
+"""Fit and routes ⇄ `fit/info` (std_msgs/String, documents.py): all that the planner has decided.
 
-Points are the anchors (start, changepoints, end) in the road's frame, at the template's times; the
-first and last are the states requested of every scenario, speed included. Speeds in between are
-the template's, scaled; no stage reads them. The decisions of the fitting are in the diagnostics, a
-status for each vehicle. QoS: reliable, transient_local, depth 1.
+It names the messages that it was made from; see `Plan`. For other programs the planner also
+publishes each `vehicle_<id>/route` (paths.py) and `fit` (trajectory.py), the changepoints on the
+road: points are the anchors (start, changepoints, end) in the road's frame, at the template's
+times; the first and last are the states requested of every scenario, speed included. Speeds in
+between are the template's, scaled. QoS: reliable, transient_local, depth 1.
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
-import json
-import math
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from msg_conventions import trajectory
 from msg_conventions.diagnostics import Level, Status
+from msg_conventions.documents import decode_document, encode_document
+from msg_conventions.hashes import hash_of, LANES, PLAN
 from msg_conventions.trajectory import Trajectory
-from scenario_gen.base.errors import guarded, InputError
+from scenario_gen.base.errors import InputError
 from scenario_gen.numerics import Floats, Ints
-from scenario_gen.types import BoundaryStates, Encounter, Fit, FittedVehicle, Loss, Route
+from scenario_gen.types import BoundaryStates, Encounter, Fit, FittedVehicle, Loss, Note, Route
 
 CLOSE_ANCHORS_M = 1.0  # anchors that moved less need no warning
+INPUTS = ("tracks", "changepoints", "map", LANES)
+
+
+@dataclass(frozen=True, eq=False)
+class Plan:
+    """A template on a road.
+
+    Attributes:
+        stamp: of the tracks [ns].
+        frame_id: the road's.
+        inputs: hashes of the messages that it was made from, by topic (hashes.py).
+        anchors: (K + 2,) samples of the tracks: start, changepoints, end.
+        requested: states of the vehicles in the order of the tracks.
+        fitted: decisions for each vehicle, without the fitted path.
+        routes: of each vehicle.
+        notes, losses: as in `Fit`.
+    """
+
+    stamp: int
+    frame_id: str
+    inputs: Mapping[str, str]
+    anchors: Ints
+    requested: BoundaryStates
+    fitted: tuple[FittedVehicle, ...]
+    routes: tuple[Route, ...]
+    notes: tuple[Note, ...] = ()
+    losses: tuple[Loss, ...] = ()
+
+    def fit(self, encounter: Encounter) -> Fit:
+        """Return the fit of the vehicles in the tracks.
+
+        Raises:
+            InputError: it is one of other vehicles or instants.
+        """
+        vehicles, count = encounter.vehicles, len(self.anchors)
+        shapes = [vehicle.anchors.shape for vehicle in self.fitted]
+        lengths = {len(self.requested.start), len(self.requested.end), len(self.routes)}
+        if shapes != [(count, 3)] * len(vehicles) or lengths != {len(vehicles)}:
+            raise InputError(
+                f"{PLAN}: {len(shapes)} vehicles at {count} points; tracks have {len(vehicles)}"
+            )
+        if self.anchors[-1] != len(encounter.time) - 1:
+            raise InputError(f"{PLAN}: it ends at sample {self.anchors[-1]}, not with the tracks")
+        return Fit(vehicles, self.fitted, self.anchors, self.requested, self.notes, self.losses)
+
+
+def encode_plan(
+    encounter: Encounter,
+    fit: Fit,
+    routes: Sequence[Route],
+    frame_id: str,
+    messages: Mapping[str, bytes],
+) -> bytes:
+    """Return fit and routes as CDR bytes; `messages` has those that they were made from."""
+    inputs = {topic: hash_of(topic, messages[topic]) for topic in INPUTS if topic in messages}
+    fitted = tuple(replace(vehicle, path=np.zeros((0, 3))) for vehicle in fit.fitted)
+    requested = BoundaryStates(fit.requested.start, fit.requested.end)
+    return encode_document(
+        Plan(
+            encounter.start_ns,
+            frame_id,
+            inputs,
+            fit.anchor_index,
+            requested,
+            fitted,
+            tuple(routes),
+            fit.notes,
+            fit.losses,
+        )
+    )
+
+
+def decode_plan(data: bytes, source: str = PLAN) -> Plan:
+    """Return the plan.
+
+    Raises:
+        InputError: the message is damaged.
+    """
+    return decode_document(Plan, data, source)
 
 
 def anchor_stamps(encounter: Encounter, changepoints: Ints) -> list[int]:
@@ -74,122 +154,29 @@ def decode_fit(data: bytes, source: str = "fit") -> tuple[int, str, BoundaryStat
 def fit_statuses(
     fit: Fit, node: str, more: Mapping[str, str] | None = None, routes: Sequence[Route] = ()
 ) -> tuple[Status, ...]:
-    """Return the decisions of the fitting: a status per vehicle, and one with notes and losses.
+    """Return the fit for people: a status per vehicle, and one with notes and losses.
 
     Args:
         fit: the fit.
         node: full name of the planner.
         more: values for each status.
-        routes: the planned routes, whose figures and remarks are added.
+        routes: the planned routes, whose remarks are added.
     """
     common = dict(more or {})
     statuses = []
     notes = [str(note) for note in fit.notes]
     for k, (vehicle, fitted) in enumerate(zip(fit.vehicles, fit.fitted, strict=True)):
         remarks = routes[k].remarks(vehicle.id) if routes else ()
-        figures = routes[k].figures() if routes else {}
         notes += map(str, remarks)
         largest = float(fitted.moved.max())
         is_close = largest < CLOSE_ANCHORS_M and not remarks
-        statuses.append(
-            Status(
-                f"{node}: fit of {vehicle.id}",
-                Level.OK if is_close else Level.WARN,
-                f"{fitted.manoeuvre}, scale {fitted.scale:.3f}, moved by at most {largest:.2f} m",
-                _fitted_values(fitted)
-                | {key: json.dumps(value) for key, value in figures.items()}
-                | common,
-            )
-        )
+        level = Level.OK if is_close else Level.WARN
+        text = f"{fitted.manoeuvre}, scale {fitted.scale:.3f}, moved by at most {largest:.2f} m"
+        statuses.append(Status(f"{node}: fit of {vehicle.id}", level, text, common))
     values = {f"note.{k}": note for k, note in enumerate(notes)}
-    for k, loss in enumerate(fit.losses):
-        values[f"lost.{k}"] = json.dumps([loss.kind, list(loss.vehicles), loss.message])
+    values |= {f"lost.{k}": loss.message for k, loss in enumerate(fit.losses)}
     message = "recording fitted to the road"
     if fit.losses:
         message += f"; {len(fit.losses)} of its properties are not kept"
     level = Level.WARN if any(loss.kind != "arm" for loss in fit.losses) else Level.OK
     return (*statuses, Status(f"{node}: fit", level, message, values | common))
-
-
-def _fitted_values(fitted: FittedVehicle) -> dict[str, str]:
-    """Return the decisions of the fitting for a vehicle."""
-    has_turn = np.isfinite(fitted.turned).all()
-    return {
-        "manoeuvre": fitted.manoeuvre,
-        "scale": repr(fitted.scale),
-        "moved_m": json.dumps(fitted.moved.tolist()),
-        "stands": json.dumps([bool(value) for value in fitted.stands]),
-        "turned_rad": json.dumps(list(fitted.turned) if has_turn else None),
-    }
-
-
-def decode_losses(values: Mapping[str, str]) -> tuple[Loss, ...]:
-    """Return the losses in the planner's status `fit`.
-
-    Raises:
-        InputError: it is damaged.
-    """
-    losses = []
-    for key, text in values.items():
-        if key.startswith("lost."):
-            with guarded(f"fit: {key} is damaged"):
-                kind, vehicles, sentence = json.loads(text)
-                losses.append(Loss(str(kind), tuple(map(str, vehicles)), str(sentence)))
-    return tuple(losses)
-
-
-def with_figures(route: Route, statuses: Mapping[str, Mapping[str, str]], vehicle: str) -> Route:
-    """Return a decoded route with the figures in the planner's status `fit of <vehicle>`, if any.
-
-    Raises:
-        InputError: they are damaged.
-    """
-    values = statuses.get(f"fit of {vehicle}", {})
-    if "legs_joined" not in values:
-        return route
-    with guarded(f"fit of {vehicle}: damaged"):
-        joined, searched = (
-            None if (n := json.loads(values[f"legs_{key}"])) is None else int(n)
-            for key in ("joined", "searched")
-        )
-        left_out = tuple(int(k) for k in json.loads(values["anchors_left_out"]))
-        far = json.loads(values["farthest_from_fit_m"])
-    farthest = math.nan if far is None else float(far)
-    return replace(route, joined=joined, searched=searched, left_out=left_out, farthest=farthest)
-
-
-def decode_fitted(
-    anchors: Floats, statuses: Mapping[str, Mapping[str, str]], vehicle: str
-) -> FittedVehicle:
-    """Return the decisions of the fitting for a vehicle.
-
-    Args:
-        anchors: (K + 2, 3) x, y, yaw, as `decode_fit` returns them.
-        statuses: key-values of the planner's statuses by subject.
-        vehicle: its id.
-
-    Raises:
-        InputError: it is not there, or damaged.
-    """
-    values = statuses.get(f"fit of {vehicle}", {})
-    with guarded(f"fit of {vehicle}: damaged, or not there"):
-        moved = np.array(json.loads(values["moved_m"]), dtype=np.float64)
-        stands = np.array(json.loads(values["stands"]), dtype=np.bool_)
-        scale, manoeuvre = float(values["scale"]), values["manoeuvre"]
-        turn = json.loads(values.get("turned_rad", "null")) or (math.nan, math.nan)
-        turned = (float(turn[0]), float(turn[1]))
-    if (
-        moved.shape != anchors.shape[:1]
-        or stands.ndim != 1
-        or not np.isfinite(moved).all()
-        or not 0.0 < scale < math.inf
-    ):
-        raise InputError(f"fit of {vehicle}: damaged")
-    return FittedVehicle(
-        anchors=anchors,
-        moved=moved,
-        stands=stands,
-        scale=scale,
-        manoeuvre=manoeuvre,
-        turned=turned,
-    )

@@ -1,46 +1,57 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Hashes of messages that belong together, by topic ⇄ `road/info` and `fit/info`.
+"""Hashes of messages, by which a document names those that it belongs to (documents.py).
 
-The type is diagnostic_msgs/DiagnosticArray.
-
-Most types have no field for them. Stamp: the template's. QoS: reliable, transient_local, depth 1.
+Equal stamps alone do not show it: a second map, segmentation or reading of the log has the stamp
+of the first.
 """
 
 from collections.abc import Mapping
-import hashlib
-import re
+from dataclasses import dataclass
 
-from msg_conventions import lanes
-from msg_conventions.diagnostics import decode_diagnostics, encode_diagnostics, Level, Status
-from scenario_gen.base.errors import InputError
+from msg_conventions.documents import decode_document, short_hash
 
-INFOS = ("road/info", "fit/info")
-HASH_DIGITS = 12
+LANES, PLAN = "road/lanes", "fit/info"
+DOCUMENTS = (LANES, PLAN)
 TEMPLATE_HASH = "template_hash"
 MAP_HASH = "map_hash"
+
+
+@dataclass(frozen=True)
+class Head:
+    """What every document has: its stamp [ns], and the hashes of its inputs by topic."""
+
+    stamp: int
+    inputs: Mapping[str, str]
+
+
+def head_of(data: bytes, source: str) -> Head:
+    """Return the head of a document.
+
+    Raises:
+        InputError: it is damaged.
+    """
+    return decode_document(Head, data, source)
 
 
 def hash_of(topic: str, data: bytes) -> str:
     """Return the first 12 hexadecimal digits of the SHA-256 of a message's CDR bytes.
 
     The stamps of a map are excluded, so that equal maps for different templates have one hash.
+    DDS's padding is excluded; it adds up to 3 bytes to a map or a document.
     """
-    if topic == lanes.TOPIC:
-        data = data[: len(data) - (len(data) - lanes.TAIL_BYTES) % 4]  # without DDS's padding
+    if topic in DOCUMENTS:
+        data = data[: 8 + int.from_bytes(data[4:8], "little")]
     if topic == "map":
         data = _without_stamps(data)
-    return hashlib.sha256(data).hexdigest()[:HASH_DIGITS]
+    return short_hash(data)
 
 
 def _without_stamps(grid: bytes) -> bytes:
     """Return the bytes of a map without stamp, load time and padding.
 
     A damaged map gives some of its bytes.
-
-    DDS pads small messages to a multiple of 4 bytes. All other hashed messages end at one, except
-    `road/lanes`.
     """
     load_time = 16 + int.from_bytes(grid[12:16], "little")  # after the frame, aligned to 4
     load_time += -load_time % 4
@@ -61,34 +72,3 @@ def template_hashes(messages: Mapping[str, bytes]) -> dict[str, str]:
     return {
         key: hash_of(topic, messages[topic]) for topic, key in keys.items() if topic in messages
     }
-
-
-def encode_hashes(name: str, messages: Mapping[str, bytes], stamp_ns: int) -> bytes:
-    """Return the hashes of messages (by topic) as CDR bytes.
-
-    `name` is the subject of the status.
-    """
-    hashes = {
-        topic: hash_of(topic, data)
-        for topic, data in sorted(messages.items())
-        if topic not in INFOS
-    }
-    return encode_diagnostics([Status(name, Level.OK, "these belong together", hashes)], stamp_ns)
-
-
-def decode_hashes(data: bytes, source: str) -> dict[str, str]:
-    """Return the hashes by topic.
-
-    Raises:
-        InputError: the message is damaged, or has no hashes.
-    """
-    _, statuses = decode_diagnostics(data, source)
-    hashes = {topic: text for status in statuses for topic, text in status.values.items()}
-    if not hashes or not all(
-        re.fullmatch(rf"[0-9a-f]{{{HASH_DIGITS}}}", text) for text in hashes.values()
-    ):
-        raise InputError(
-            f"{source}: it must list by topic a hash of {HASH_DIGITS} hexadecimal digits of each "
-            "message"
-        )
-    return hashes

@@ -23,6 +23,7 @@ KINEMATICS: Layout = {
 }
 
 CLOCK: Layout = {"clock": "time"}
+STRING: Layout = {"data": "string"}
 VELOCITY: Layout = {"twist": TWIST}
 VELOCITY_STAMPED = HEADER | VELOCITY
 FIX = HEADER | {

@@ -1,35 +1,59 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Road ⇄ `map` (nav_msgs/OccupancyGrid), `road/entries`, `road/exits` (PoseArray).
+"""Road ⇄ `map` (nav_msgs/OccupancyGrid) and `road/lanes` (std_msgs/String, documents.py).
 
 Map: 0 free, 100 occupied, 99 occupied by an obstacle on the road, -1 unknown; a known cell below
 65 (nav2's occupied threshold) is drivable. `info.origin` is the lower-left corner of cell (0, 0),
-not rotated; row 0 has the lowest y. Entries head into the road, exits out of it. Stamp: that of
-the road's template, or 0 for any template. QoS: reliable, transient_local, depth 1. The road's
-name is not in the messages, because nothing is computed from it.
+not rotated; row 0 has the lowest y. `road/lanes` has all else: `RoadDescription` in JSON. Entries
+and exits are also on `road/entries` and `road/exits` (PoseArray) for others. Stamp: that of the
+road's template, or 0 for any template. QoS: reliable, transient_local, depth 1. The road's name is
+not in the messages, because nothing is computed from it.
 """
 
+from collections.abc import Mapping
+from dataclasses import dataclass
 from types import SimpleNamespace
 
 import numpy as np
 
 from msg_conventions.cdr import decode, encode
-from msg_conventions.lanes import decode_lanes
-from msg_conventions.lanes import TOPIC as LANES
+from msg_conventions.documents import decode_document, encode_document
+from msg_conventions.hashes import hash_of, LANES
 from msg_conventions.layouts import MAP, POSES
 from msg_conventions.poses import pose_rows, poses_of
 from msg_conventions.trajectory import MAX_COORDINATE_M
 from msg_conventions.yaw import check_quaternions, yaw
 from scenario_gen.base.errors import InputError
 from scenario_gen.numerics import Floats, Ints
-from scenario_gen.types import Road
+from scenario_gen.types import LaneNetwork, Road
 
 MAP_TYPE = "nav_msgs/msg/OccupancyGrid"
 POSES_TYPE = "geometry_msgs/msg/PoseArray"
 OCCUPIED_CODE = 100
 OBSTACLE_CODE = 99
 OCCUPIED_THRESHOLD_PERCENT = 65
+
+
+@dataclass(frozen=True, eq=False)
+class RoadDescription:
+    """What a map lacks.
+
+    Attributes:
+        stamp: of the map [ns].
+        frame_id: of all positions.
+        inputs: the hash of the map by its topic (hashes.py).
+        entries: (E, 3) x [m], y [m], yaw [rad] into the road.
+        exits: (X, 3) out of it.
+        lanes: those of all users, cars' lanes first; None: nothing is known of lanes.
+    """
+
+    stamp: int
+    frame_id: str
+    inputs: Mapping[str, str]
+    entries: Floats
+    exits: Floats
+    lanes: LaneNetwork | None = None
 
 
 def encode_map(road: Road, stamp_ns: int) -> bytes:
@@ -75,19 +99,40 @@ def decode_poses(data: bytes, source: str = "poses") -> tuple[int, str, Floats]:
     return message.stamp, message.frame_id, poses_of(message.poses, source)
 
 
+def encode_description(road: Road, grid: bytes, stamp_ns: int) -> bytes:
+    """Return the description of a road, whose map is `grid`, as CDR bytes."""
+    lanes = None if road.lanes is None else road.lanes.whole
+    inputs = {"map": hash_of("map", grid)}
+    return encode_document(
+        RoadDescription(stamp_ns, road.frame_id, inputs, road.entries, road.exits, lanes)
+    )
+
+
+def decode_description(data: bytes, source: str = LANES) -> RoadDescription:
+    """Return the description of a road.
+
+    Raises:
+        InputError: the message is damaged, its lanes are impossible, or a point is too far away.
+    """
+    road = decode_document(RoadDescription, data, source)
+    lanes = road.lanes.every_lane if road.lanes is not None else ()
+    for points in (road.entries, road.exits, *(lane.outline for lane in lanes)):
+        if not (np.abs(points) <= MAX_COORDINATE_M).all():
+            raise InputError(
+                f"{source}: a point is not finite or more than {MAX_COORDINATE_M:g} m away"
+            )
+    return road
+
+
 def decode_map(
-    data: bytes,
-    entries: bytes | None = None,
-    exits: bytes | None = None,
-    lanes: bytes | None = None,
-    name: str = "map",
+    data: bytes, description: bytes | None = None, name: str = "map"
 ) -> tuple[int, Road]:
     """Return the stamp [ns] and the road.
 
-    A road from a plain map server lacks entries, exits and lanes.
+    A road from a plain map server lacks a description.
 
     Raises:
-        InputError: the message is damaged, the map is rotated or empty, or the frames disagree.
+        InputError: a message is damaged, the map is rotated or empty, or the frames disagree.
     """
     message = decode(MAP, data, name, framed=True)
     _check_grid(message, name)
@@ -95,12 +140,12 @@ def decode_map(
     width, height = message.size.tolist()
     cells = message.cells.reshape(height, width)
 
-    inward = _ends(entries, "road/entries", frame_id)
-    outward = _ends(exits, "road/exits", frame_id)
-    network = None
-    if lanes is not None:
-        lanes_frame, network = decode_lanes(lanes)
-        _check_frame(LANES, lanes_frame, frame_id)
+    road = RoadDescription(message.stamp, frame_id, {}, np.zeros((0, 3)), np.zeros((0, 3)))
+    if description is not None:
+        road = decode_description(description)
+    if road.frame_id != frame_id:
+        raise InputError(f"{LANES}: frame {road.frame_id!r} is not the map's ({frame_id!r})")
+    network = None if road.lanes is None else road.lanes.with_lanes(road.lanes.lanes)
 
     drivable = (cells >= 0) & (cells < OCCUPIED_THRESHOLD_PERCENT)
     obstructed = cells == OBSTACLE_CODE
@@ -109,8 +154,8 @@ def decode_map(
         drivable,
         message.resolution,
         message.origin[:2],
-        inward,
-        outward,
+        road.entries,
+        road.exits,
         frame_id,
         network,
         obstructed if obstructed.any() else None,
@@ -133,21 +178,3 @@ def _check_grid(message: SimpleNamespace, name: str) -> None:
         raise InputError(
             f"{name}: info.origin is {distance:g} m away; at most {MAX_COORDINATE_M:g} is read"
         )
-
-
-def _ends(data: bytes | None, topic: str, frame_id: str) -> Floats:
-    """Return entries or exits (M, 3), none without a message.
-
-    Raises:
-        InputError: the message is damaged, or in another frame than the map.
-    """
-    if data is None:
-        return np.zeros((0, 3))
-    _, frame, poses = decode_poses(data, topic)
-    _check_frame(topic, frame, frame_id)
-    return poses
-
-
-def _check_frame(topic: str, frame: str, map_frame: str) -> None:
-    if frame != map_frame:
-        raise InputError(f"{topic}: frame {frame!r} is not the map's ({map_frame!r})")

@@ -14,17 +14,17 @@ from fuzzing.harness import Target
 from fuzzing.mutators import BYTES, NUMBERS, TEXT, tree
 from fuzzing.targets_bags import in_file, values
 import numpy as np
-from rosbags.typesys import get_typestore, Stores
 from support.map_builders import FORMATS
+from support.message_examples import road_with
 
-from msg_conventions.lanes import decode_lanes, encode_lanes
-from msg_conventions.markers import TYPE as MARKER_TYPE
+from msg_conventions.cdr import decode, encode
+from msg_conventions.layouts import STRING
+from msg_conventions.roads import decode_description, encode_description
+from scenario_gen.base.errors import InputError
 from scenario_gen.logs import read_log
 from scenario_gen.logs.synthetic import bundled
 from scenario_gen.roads import build_road
 from scenario_gen.types.lanes import Lane, LaneNetwork
-
-STORE = get_typestore(Stores.ROS2_JAZZY)
 
 
 def written(suffix: str, _folder: Path) -> list[bytes]:
@@ -81,16 +81,16 @@ def lanes() -> list[bytes]:
     border = np.column_stack((np.arange(3.0), np.zeros(3)))
     first = Lane("7", border + 1.0, border, (1,))
     network = LaneNetwork("m", (first, Lane("8", border + 1.0, border, (), (0,), 13.9, "j")))
-    return [encode_lanes(network, "map", 5), encode_lanes(None, "map", 5)]
+    road = road_with(network)
+    return [encode_description(each, b"", 5) for each in (road, replace(road, lanes=None))]
 
 
 def said(rng: random.Random, data: bytes, seeds: Sequence[bytes]) -> bytes:
-    """Change what a marker's text says of its lanes, and keep its form."""
+    """Change what a message says of its lanes, and keep its form."""
     try:
-        marker = STORE.deserialize_cdr(data, MARKER_TYPE)
-        text = values(rng, marker.text.encode(), seeds).decode()
-        return bytes(STORE.serialize_cdr(replace(marker, text=text), MARKER_TYPE))
-    except Exception:  # what was damaged before is no marker: rosbags has errors of many kinds
+        text = decode(STRING, data, "").data
+        return encode(STRING, data=values(rng, text.encode(), seeds).decode())
+    except (InputError, UnicodeError):  # it was damaged before
         return rng.choice(BYTES)(rng, data, seeds)
 
 
@@ -105,7 +105,7 @@ TARGETS = (
     Target(
         "message_lanes",
         lambda _: lanes(),
-        lambda data, _: decode_lanes(data),
+        lambda data, _: decode_description(data),
         (*BYTES, *[said] * 6),
     ),
 )

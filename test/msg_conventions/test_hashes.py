@@ -9,9 +9,8 @@ import pytest
 from support.bag_examples import hand_made_run
 from support.message_examples import encounter
 
-from msg_conventions.diagnostics import encode_diagnostics, Level, Status
-from msg_conventions.hashes import decode_hashes, encode_hashes, hash_of, template_hashes
-from msg_conventions.roads import encode_map
+from msg_conventions.hashes import hash_of, head_of, LANES, PLAN, template_hashes
+from msg_conventions.roads import encode_description, encode_map
 from msg_conventions.tracks import encode_tracks
 from scenario_gen.base.errors import InputError
 
@@ -31,12 +30,14 @@ def test_a_road_of_the_same_geometry_differs_in_the_templates_hash_only():
     assert hash_of("map", first["map"] + b"\x00") == one["map_hash"]
 
 
-def test_what_belongs_together_is_read_again_and_anything_else_refused():
-    messages = {"map": b"\x00\x01\x00\x00" + bytes(80), "fit": b"fit", "fit/info": b"never itself"}
-    sent = encode_hashes("fit", messages, 5)
-    assert decode_hashes(sent, "fit/info") == {
-        topic: hash_of(topic, messages[topic]) for topic in ("fit", "map")
-    }
-    for values in ({}, {"map": "no hash"}, {"map": "0" * 13}):
-        with pytest.raises(InputError, match="fit/info: it must list"):
-            decode_hashes(encode_diagnostics([Status("fit", Level.OK, "", values)], 5), "fit/info")
+def test_a_document_says_what_it_belongs_to():
+    run = hand_made_run()
+    grid = encode_map(run.road, 5)
+    road = encode_description(run.road, grid, 5)
+    assert (head_of(road, LANES).stamp, head_of(road, LANES).inputs) == (
+        5,
+        {"map": hash_of("map", grid)},
+    )
+    assert hash_of(LANES, road) == hash_of(LANES, road + bytes(3))  # as DDS fills it up
+    with pytest.raises(InputError, match="fit/info"):
+        head_of(grid, PLAN)

@@ -16,7 +16,9 @@ from support.message_examples import (
     assert_same,
     encounter,
     generator,
+    lanes_again,
     NASTY_HEADINGS,
+    road_with,
     route,
     scenario,
     seeds,
@@ -28,7 +30,6 @@ from msg_conventions import (
     diagnostics,
     ego,
     fits,
-    lanes,
     paths,
     pictures,
     roads,
@@ -37,12 +38,12 @@ from msg_conventions import (
     tracks,
     trajectory,
 )
-from msg_conventions.cdr import decode
-from msg_conventions.layouts import POLYGON
+from msg_conventions.cdr import decode, encode
+from msg_conventions.layouts import POLYGON, STRING
 from scenario_gen.base.errors import InputError
 from scenario_gen.numerics.arrays import canonical_angle
 from scenario_gen.numerics.plane import arc_lengths
-from scenario_gen.types import Note, NoteKind, token, tokens, Vehicle, with_witness
+from scenario_gen.types import Loss, Note, NoteKind, token, tokens, Vehicle, with_witness
 from scenario_gen.types.fit import Fit, FittedVehicle, Route
 from scenario_gen.types.lanes import DrawnFor, Lane, LaneNetwork, RuleKind, TrafficRule
 from scenario_gen.types.road import Road
@@ -107,10 +108,7 @@ def test_road(seed, height, width, ways):
     ends = np.column_stack([rng.normal(0, 50, (ways, 2)), rng.choice(NASTY_HEADINGS, ways)])
     sent = Road("map", drivable, 0.2, rng.normal(0, 50, 2), ends, ends[::-1], "a" * (seed % 5 + 1))
     grid = roads.encode_map(sent, 99)
-    entries, exits = (
-        roads.encode_poses(poses, sent.frame_id, 99) for poses in (sent.entries, sent.exits)
-    )
-    stamp, got = roads.decode_map(grid, entries, exits)
+    stamp, got = roads.decode_map(grid, roads.encode_description(sent, grid, 99))
     assert stamp == 99
     assert_same(sent, got, *(f for f in sent.__dataclass_fields__))
     assert len(roads.decode_map(grid)[1].entries) == 0
@@ -163,49 +161,43 @@ def test_lanes(seed, count):
         aim,
         origin,
     )
-    road = Road(
-        "map", np.ones((2, 2), dtype=bool), 0.5, np.zeros(2), np.zeros((0, 3)), np.zeros((0, 3))
-    )
-    got = roads.decode_map(roads.encode_map(road, 1), lanes=lanes.encode_lanes(sent, "map", 9))[
-        1
-    ].lanes
+    got = lanes_again(sent)
     assert (got.name, got.notes, got.drawn, got.origin) == (sent.name, sent.notes, True, origin)
     assert_same(got.drawn_for, aim, "frame", "lanes")
-    assert got.rules_kept == (sent.rules_kept or not sent.rules)
+    assert got.rules_kept == sent.rules_kept
     for one, other in zip(sent.rules, got.rules, strict=True):
         assert_same(one, other, "id", "kind", "lanes", "over", "line")
     for one, other in zip(sent.lanes, got.lanes, strict=True):
         assert_same(one, other, "id", "left", "right", "successors", "neighbours", "junction")
         assert np.array_equal(one.speed_limit, other.speed_limit, equal_nan=True)
-        assert np.array_equal(
-            other.height, one.height if sent.has_levels else np.nan * one.height, equal_nan=True
-        )
+        assert np.array_equal(other.height, one.height, equal_nan=True)
+    road = replace(road_with(sent), frame_id="odom")
+    data = roads.encode_description(road, b"", 9)
     with pytest.raises(InputError, match="frame 'odom' is not the map's"):
-        roads.decode_map(roads.encode_map(road, 1), lanes=lanes.encode_lanes(sent, "odom", 9))
+        roads.decode_map(roads.encode_map(road_with(sent), 1), data)
 
 
 @pytest.mark.parametrize(
     ("old", "new", "said"),
     [
-        (b'"points": 3', b'"points": 9', "borders of 9 points"),
-        (b'"points": 3', b'"points": 2', "belong to no lane"),
-        (b'"points": 3', b'"points":[]', "TypeError"),
-        (
-            b'"points": 3, "successors": [0], "beside": []',
-            b'"points":3, "successors":[1e999],"beside":[]',
-            "OverflowError",
-        ),
+        (b"[0.0, 0.0]", b"[0.0, 5e9]", "more than 1e.08 m away"),
+        (b"[0.0, 0.0]", b"[0.0, 1e999]", "not finite"),
+        (b"[0.0, 0.0], ", b"", "borders of shapes"),
+        (b'"successors": [0]', b'"successors": [0.5]', "0.5 is no int"),
         (b'"successors": [0]', b'"successors": [8]', "leads to a lane that is not there"),
-        (b'{"name"', b'{"nome"', "KeyError"),
-        (b'{"name"', b'["name"', "does not describe lanes"),
+        (b'"name"', b'"nome"', "LaneNetwork"),
+        (b'{"stamp"', b'["stamp"', "no RoadDescription"),
+        (b'{"stamp": 5', b'{"stamp": true', "True is no int"),
     ],
 )
 def test_lanes_that_say_what_cannot_be_are_refused(old, new, said):
     border = np.column_stack((np.arange(3.0), np.zeros(3)))
-    data = lanes.encode_lanes(LaneNetwork("m", (Lane("7", border + 1.0, border, (0,)),)), "map", 5)
-    assert old in data
+    network = LaneNetwork("m", (Lane("7", border + 1.0, border, (0,)),))
+    text = decode(STRING, roads.encode_description(road_with(network), b"", 5), "").data.encode()
+    assert old in text
+    data = encode(STRING, data=text.replace(old, new).decode())
     with pytest.raises(InputError, match=said):
-        lanes.decode_lanes(data.replace(old, new))
+        roads.decode_description(data)
 
 
 def test_unknown_cells_are_not_drivable():
@@ -282,6 +274,29 @@ def test_fit():
     ]
 
 
+def test_plan():
+    template, at = encounter(3), np.array([0, 7, 20, 39])
+    losses = (Loss("order", ("1", "2"), "é goes first"),)
+    sent = replace(_fit(template, at), losses=losses)
+    ways = (route(1), replace(route(2), joined=2, left_out=(1,), farthest=0.1), route(3))
+    messages = {"tracks": b"a", "changepoints": b"b", "map": b"c", "road/entries": b"d"}
+    plan = fits.decode_plan(fits.encode_plan(template, sent, ways, "map", messages))
+    assert (plan.stamp, plan.frame_id) == (template.start_ns, "map")
+    assert plan.inputs.keys() == {"tracks", "changepoints", "map"}
+    got = plan.fit(template)
+    assert (got.notes, got.losses) == (sent.notes, losses)
+    assert_same(sent.requested, got.requested, "start", "end", "relaxed")
+    for one, other in zip(sent.fitted, got.fitted, strict=True):
+        assert_same(one, other, "anchors", "moved", "stands", "scale", "manoeuvre")
+    for one, other in zip(ways, plan.routes, strict=True):
+        assert_same(one, other, *(f for f in one.__dataclass_fields__ if f != "farthest"))
+    assert math.isnan(plan.routes[0].farthest) and plan.routes[1].farthest == 0.1
+    with pytest.raises(InputError, match="3 vehicles at 4 points; tracks have 2"):
+        plan.fit(encounter(3, 2))
+    with pytest.raises(InputError, match="it ends at sample 39, not with the tracks"):
+        plan.fit(encounter(3, 3, 50))
+
+
 def test_reports():
     sent = ScenarioSet(
         50,
@@ -317,15 +332,6 @@ def test_reports():
     former = {**summary.values, "refused.time_law": "1"}  # as 0.2 wrote it
     with pytest.raises(InputError, match=r"time_law.* version"):
         replace(summary, status=replace(summary.status, values=former)).result()
-    by_subject = {status.name.partition(": ")[2]: status.values for status in statuses}
-    assert_same(
-        fits.decode_fitted(fit.fitted[0].anchors, by_subject, fit.vehicles[0].id),
-        fit.fitted[0],
-        "moved",
-        "stands",
-    )
-    with pytest.raises(InputError, match="fit of nobody"):
-        fits.decode_fitted(fit.fitted[0].anchors, by_subject, "nobody")
 
 
 def _entry(sent, data, **values):

@@ -6,6 +6,7 @@
 Fast CDR leaves padding bytes uninitialised, so rclpy's bytes are compared after rosbags has put zeros there.
 """
 
+from dataclasses import replace
 import importlib
 import subprocess
 import sys
@@ -18,8 +19,8 @@ from support.message_examples import encounter, route, scenario, segmentation
 from msg_conventions import (
     changepoints,
     diagnostics,
+    documents,
     ego,
-    lanes,
     markers,
     odometry,
     paths,
@@ -63,7 +64,8 @@ def _messages():
             (Lane("7", border + 1.0, border, (0,), (), 8.5 * seed, "j" * seed),),
             (Note.of(NoteKind.TEXT, text="née"),),
         )
-        yield markers.TYPE, lanes.encode_lanes(network if seed > 1 else None, frame, 5)
+        described = replace(road, lanes=network if seed > 1 else None)
+        yield documents.TYPE, roads.encode_description(described, b"", 5)
         yield roads.POSES_TYPE, roads.encode_poses(road.entries, frame, 5)
         sent = scenario(seed)
         asked = BoundaryStates(np.zeros((2, 4)), np.ones((2, 4)))

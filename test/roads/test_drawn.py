@@ -5,8 +5,8 @@
 
 import numpy as np
 import pytest
+from support.message_examples import lanes_again
 
-from msg_conventions.lanes import decode_lanes, encode_lanes
 from scenario_gen.base.errors import InputError, RefusedError
 from scenario_gen.logs import read_log
 from scenario_gen.logs.synthetic import bundled
@@ -26,7 +26,7 @@ def test_a_road_is_its_lanes_and_they_travel_in_messages(name, side):
         assert road.drivable_at(lane.centre[1:-1]).all()
         assert all(np.allclose(network.lanes[k].left[0], lane.left[-1]) for k in lane.successors)
     assert network.traffic_side == side and road.map_lanes is None
-    _, again = decode_lanes(encode_lanes(network, "map", 0))
+    again = lanes_again(network)
     assert again.drawn and again.arms == network.arms
 
 

@@ -11,8 +11,7 @@ from shapely import affinity
 from shapely.geometry import box, LineString, Point, Polygon
 from support import map_builders
 
-from msg_conventions.lanes import encode_lanes
-from msg_conventions.roads import decode_map, encode_map
+from msg_conventions.roads import decode_map, encode_description, encode_map
 from scenario_gen.base.errors import InputError
 from scenario_gen.base.parameters import updated
 from scenario_gen.roads import build_road, RoadConfig
@@ -83,8 +82,8 @@ def test_a_map_carries_them():
     np.testing.assert_array_equal(again.drivable, road.drivable)
     np.testing.assert_array_equal(again.cleared.drivable, plain.drivable)
     assert decode_map(encode_map(plain, 0))[1].obstructed is None
-    lanes = encode_lanes(road.lanes, "map", 0)
-    _, again = decode_map(encode_map(road, 0), lanes=lanes)
+    grid = encode_map(road, 0)
+    _, again = decode_map(grid, encode_description(road, grid, 0))
     assert again.obstacles == (Obstacle(20, 3, 0.1, 4, 2),)
     assert [lane.id for lane in again.lanes.lanes] == [lane.id for lane in road.lanes.lanes]
 

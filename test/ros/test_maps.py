@@ -12,8 +12,8 @@ from support.lengths import LONG
 from support.suite_processes import Client, whole_chain
 
 from msg_conventions.diagnostics import decode_diagnostics, Level
-from msg_conventions.hashes import decode_hashes, hash_of
-from msg_conventions.lanes import decode_lanes
+from msg_conventions.hashes import hash_of, head_of
+from msg_conventions.roads import decode_description
 from scenario_gen.bags.storage.bag import read_messages
 from scenario_gen.output.review.evaluation import evaluate_bag
 
@@ -58,7 +58,7 @@ def _fitted(client: Client, hashed: str) -> dict[str, str]:
     """Return the hashes that the newest fit names, once it is one to this map."""
 
     def newest() -> dict[str, str]:
-        return decode_hashes(client.wait("/fit/info")[-1], "fit/info")
+        return dict(head_of(client.wait("/fit/info")[-1], "fit/info").inputs)
 
     client.until(lambda: newest()["map"] == hashed, "a fit to this map")
     return newest()
@@ -145,7 +145,7 @@ def test_lanes_of_a_vector_map_travel_from_the_road_server_to_the_sampler(suite,
         lambda: hash_of("road/lanes", client.wait("/road/lanes")[-1]) == together,
         "the lanes that were fitted to",
     )
-    assert len(decode_lanes(client.heard["/road/lanes"][-1])[1].lanes) == 4
+    assert len(decode_description(client.heard["/road/lanes"][-1]).lanes.lanes) == 4
 
 
 def test_the_bag_is_valid_with_each_scenario_on_its_own_map(suite):

@@ -10,8 +10,8 @@ import pytest
 from rclpy.parameter import Parameter
 
 from msg_conventions.cdr import encode
-from msg_conventions.hashes import encode_hashes
-from msg_conventions.lanes import encode_lanes
+from msg_conventions.documents import encode_document
+from msg_conventions.hashes import hash_of, Head
 from msg_conventions.layouts import HEADER
 from scenario_gen.base.errors import InputError
 from scenario_gen.base.parameters import flatten
@@ -40,50 +40,35 @@ def test_inputs_are_complete_only_with_equal_stamps():
     assert inputs.complete() is not None
     inputs.put("tracks", _message(2))  # a new template: the old changepoints wait for their like
     assert inputs.missing() == ["changepoints"]
-    inputs.expect(["vehicle_1/route"])
-    assert inputs.missing() == ["vehicle_1/route", "changepoints"]
-    inputs.forget(["vehicle_1/route"])
     inputs.put("changepoints", _message(2))
     assert set(inputs.complete()) == {"tracks", "changepoints", "map"}
 
 
-def test_inputs_are_complete_only_if_they_are_those_that_belong_together():
-    inputs = Inputs(("tracks", "fit", "fit/info"), ("map",))
+def _document(messages: dict[str, bytes]) -> bytes:
+    hashes = {topic: hash_of(topic, data) for topic, data in messages.items()}
+    return encode_document(Head(1, hashes))
+
+
+def test_inputs_are_complete_only_if_they_are_those_that_the_documents_name():
+    inputs = Inputs(("tracks", "road/lanes", "fit/info"), ("map",))
     one, other = (encode(HEADER, stamp=1, frame_id=frame) for frame in ("map", "odom"))
-    messages = {"tracks": _message(1), "map": one, "fit": _message(1)}
+    messages = {"tracks": _message(1), "map": one, "road/lanes": _document({"map": one})}
     for topic, data in messages.items():
         inputs.put(topic, data)
     assert inputs.missing() == ["fit/info"]
-    inputs.put("fit/info", encode_hashes("fit", messages, 1))
+    inputs.put("fit/info", _document(messages) + bytes(3))  # as DDS fills it up
     complete = inputs.complete()
     assert complete is not None and not inputs.replaced(complete)
     inputs.put("map", other)  # the fit is not to this map, even if the planner never says another
-    assert inputs.missing() == ["fit/info of this map"]
+    assert inputs.missing() == ["road/lanes of this map", "fit/info of this map"]
     assert inputs.complete() is None and inputs.replaced(complete)
     with pytest.raises(InputError, match="fit/info"):
         inputs.put("fit/info", _message(1))
-    inputs.put("fit/info", encode_hashes("fit", messages | {"map": other}, 1))
+    inputs.put("road/lanes", _document({"map": other}))
+    assert inputs.missing() == ["fit/info of this map", "fit/info of this road/lanes"]
+    messages |= {"map": other, "road/lanes": _document({"map": other})}
+    inputs.put("fit/info", _document(messages))
     assert inputs.complete() is not None
-
-
-def test_lanes_count_only_where_an_info_names_them_and_are_waited_for_there():
-    inputs = Inputs(("tracks", "map"), (), ("road/lanes",))
-    messages = {"tracks": _message(1), "map": _message(1)}
-    for topic, data in messages.items():
-        inputs.put(topic, data)
-    assert set(inputs.complete()) == {"tracks", "map"}  # of a map server that knows no lanes
-    lanes = encode_lanes(None, "map", 1)
-    inputs.put("road/lanes", lanes)
-    assert inputs.missing() == ["road/info of this road/lanes"]
-    inputs.put(
-        "road/info", encode_hashes("road", messages | {"road/lanes": lanes + bytes(3)}, 1)
-    )  # as DDS fills it up
-    assert set(inputs.complete()) == {"tracks", "map", "road/info", "road/lanes"}
-    inputs.put("road/info", encode_hashes("road", messages, 1))
-    assert "road/lanes" not in inputs.complete()
-    inputs.put("road/info", encode_hashes("road", messages | {"road/lanes": lanes}, 1))
-    inputs.forget(["road/lanes"])
-    assert inputs.missing() == ["road/info of this road/lanes"]
 
 
 def test_a_waiting_job_is_replaced_and_a_running_one_cancelled():

@@ -6,8 +6,9 @@
 from hypothesis import strategies as st
 import numpy as np
 
+from msg_conventions import roads
 from scenario_gen.numerics.plane import arc_lengths
-from scenario_gen.types import Encounter, Vehicle
+from scenario_gen.types import Encounter, LaneNetwork, Road, Vehicle
 from scenario_gen.types.fit import Route, Segmentation
 from scenario_gen.types.scenario import Scenario
 
@@ -90,3 +91,18 @@ def assert_same(one: object, other: object, *names: str) -> None:
             assert left.tobytes() == right.tobytes(), name
         else:
             assert left == right, name
+
+
+def road_with(network: LaneNetwork) -> Road:
+    """Return a small road with these lanes."""
+    ends = np.zeros((0, 3))
+    return Road("map", np.ones((2, 2), dtype=bool), 0.5, np.zeros(2), ends, ends, lanes=network)
+
+
+def lanes_again(network: LaneNetwork) -> LaneNetwork:
+    """Return lanes as they arrive on `road/lanes`."""
+    road = road_with(network)
+    grid = roads.encode_map(road, 1)
+    _, again = roads.decode_map(grid, roads.encode_description(road, grid, 1))
+    assert again.lanes is not None
+    return again.lanes

@@ -5,8 +5,8 @@
 
 import numpy as np
 import pytest
+from support.message_examples import lanes_again
 
-from msg_conventions.lanes import decode_lanes, encode_lanes
 from scenario_gen.base.errors import InputError
 from scenario_gen.types import Lane, LaneNetwork, RuleKind, TrafficRule, VEHICLE_TYPES
 
@@ -52,7 +52,7 @@ def test_a_bicycle_has_other_lanes_than_a_car_and_the_rules_of_those_it_shares()
 
 
 def test_users_travel_in_messages_and_who_is_nobody_is_refused():
-    _, again = decode_lanes(encode_lanes(street(), "map", 0))
+    again = lanes_again(street())
     before = street()
     for one, other in zip(again.of_all, before.of_all, strict=True):
         assert (one.id, one.users, one.crossing, one.successors) == (

@@ -8,6 +8,7 @@ Messages are decoded when they are needed.
 """
 
 from collections.abc import Collection, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
@@ -15,7 +16,6 @@ import re
 
 import numpy as np
 
-from msg_conventions import fits
 from msg_conventions.cdr import stamp_of
 from msg_conventions.changepoints import (
     decode_changepoints,
@@ -23,18 +23,15 @@ from msg_conventions.changepoints import (
     segment_descriptions,
 )
 from msg_conventions.ego import WITNESS
-from msg_conventions.hashes import decode_hashes, hash_of
+from msg_conventions.fits import decode_plan
+from msg_conventions.hashes import DOCUMENTS, hash_of, head_of, LANES, PLAN
 from msg_conventions.roads import decode_map
 from msg_conventions.scenario_info import encode_info, INFO, RequestSummary, ScenarioEntry
 from msg_conventions.scenarios import messages_of
 from msg_conventions.tracks import decode_tracks
+from scenario_gen.bags.recordings.former import upgraded
 from scenario_gen.bags.recordings.scenarios import RecordedScenarios, SCENARIOS
-from scenario_gen.bags.recordings.template import (
-    anchor_index,
-    decode_routes,
-    lanes_beside,
-    template_statuses,
-)
+from scenario_gen.bags.recordings.template import template_statuses
 from scenario_gen.bags.storage.bag import naming_bag, read_messages
 from scenario_gen.bags.storage.config import BagConfig
 from scenario_gen.bags.storage.messages import BagMessage
@@ -44,8 +41,6 @@ from scenario_gen.types import (
     Encounter,
     Fit,
     GenerationResult,
-    Note,
-    NoteKind,
     Road,
     Route,
     ScenarioSet,
@@ -69,10 +64,10 @@ __all__ = [
 NO_ENTRY = f"{INFO} has no entry for them (lost with the end of a recording?)"
 
 _TEMPLATE_TOPICS = (
-    r"tracks|changepoints|map|fit|road/entries|road/exits|road/lanes|vehicle_\w+/route"
+    r"tracks|changepoints|map|fit(?:/info)?|road/(?:entries|exits|lanes)|vehicle_\w+/route"
     r"|ego/(?:start|goal)"
 )
-_OTHER_TOPICS = "posterior|fit/info|ego/witness|scenarios|scenarios/info|diagnostics"
+_OTHER_TOPICS = "posterior|road/info|ego/witness|scenarios|scenarios/info|diagnostics"
 _TEMPLATE_TOPIC = re.compile(_TEMPLATE_TOPICS, re.DOTALL)
 _TOPIC = re.compile(
     rf"(?:(?P<namespace>.*?)/)?(?P<topic>{_TEMPLATE_TOPICS}|{_OTHER_TOPICS})", re.DOTALL
@@ -164,9 +159,10 @@ class Namespace(RecordedScenarios):
         roads: "Roads",
     ) -> None:
         """Use messages by topic; /diagnostics and roads are shared by all namespaces of a bag."""
-        super().__init__(path, name, messages)
         self._shared = shared
         self._roads = roads
+        super().__init__(path, name, messages)
+        self._recorded = upgraded(messages, self._statuses_of)
 
     # The template and the road of one scenario.
 
@@ -205,12 +201,16 @@ class Namespace(RecordedScenarios):
         return None
 
     def _decode_road(self, data: bytes) -> Road:
-        lanes = lanes_beside(
-            data, self.data("map"), self.data("road/lanes"), self.data("fit/info")
+        map_hash = hash_of("map", data)
+        described = (
+            each
+            for each in reversed(self.data(LANES))
+            if head_of(each, LANES).inputs.get("map") == map_hash
         )
-        key = (hash_of("map", data), lanes, self.road_name)
+        description = next(described, None)
+        key = (map_hash, description, self.road_name)
         if key not in self._roads:
-            _, road = decode_map(data, lanes=lanes, name=self.where("map"))
+            _, road = decode_map(data, description, self.where("map"))
             self._roads[key] = replace(road, name=self.road_name)
         return self._roads[key]
 
@@ -245,22 +245,22 @@ class Namespace(RecordedScenarios):
         for topic, messages in self.messages.items():
             if not _TEMPLATE_TOPIC.fullmatch(topic):
                 continue
-            named_messages = [m for m in messages if _has_hash(m, topic, hashes.get(topic))]
-            stamped = [m for m in named_messages if stamp_of(m.data, m.topic) == stamp_ns]
-            if topic == "map":
-                stamped = stamped or named_messages
-            if stamped:
-                inputs_by_topic[topic] = stamped[-1]
+            chosen: Sequence[BagMessage] = ()
+            if topic in hashes:
+                chosen = [m for m in messages if hash_of(topic, m.data) == hashes[topic]]
+            elif topic not in DOCUMENTS:
+                chosen = [m for m in messages if stamp_of(m.data, m.topic) == stamp_ns]
+            if chosen or topic == "map":
+                inputs_by_topic[topic] = (chosen or messages)[-1]
         return inputs_by_topic
 
     def _fit_hashes(self, entry: ScenarioEntry) -> dict[str, str]:
-        """Return the hashes by topic in the last `fit/info` with a scenario's map and template."""
+        """Return the hashes by topic in the last `fit/info` of an entry's inputs, with its own."""
         hashes: dict[str, str] = {}
-        for message in self.messages.get("fit/info", ()):
-            named = decode_hashes(message.data, message.topic)
-            inputs = (named.get("map"), named.get("tracks"))
-            if inputs == (entry.map_hash, entry.template_hash):
-                hashes = named
+        for data in self.data(PLAN):
+            named = dict(head_of(data, PLAN).inputs)
+            if (named.get("map"), named.get("tracks")) == (entry.map_hash, entry.template_hash):
+                hashes = named | {PLAN: hash_of(PLAN, data)}
         return hashes
 
     def messages_of(
@@ -309,9 +309,13 @@ class Namespace(RecordedScenarios):
     @cached_property
     def statuses(self) -> Statuses:
         """The newest diagnostics about the newest template."""
-        stamp = self.encounter.start_ns
-        shared = template_statuses(self._shared, stamp, f"{self.name}/")
-        return shared | template_statuses(self.data("diagnostics"), stamp)
+        return self._statuses_of(self.encounter.start_ns)
+
+    def _statuses_of(self, stamp_ns: int) -> Statuses:
+        """Return the newest diagnostics about the template with a stamp."""
+        data = (message.data for message in self._recorded.get("diagnostics", ()))
+        shared = template_statuses(self._shared, stamp_ns, f"{self.name}/")
+        return shared | template_statuses(data, stamp_ns)
 
     @cached_property
     def road_name(self) -> str:
@@ -356,51 +360,15 @@ class Namespace(RecordedScenarios):
 
     @cached_property
     def fit(self) -> tuple[Fit | None, tuple[Route, ...]]:
-        """Fit and routes of the newest template; None and no routes unless both are complete."""
-        try:
-            return self._decoded_fit()
-        except InputError:
-            return None, ()
-
-    def _decoded_fit(self) -> tuple[Fit | None, tuple[Route, ...]]:
-        encounter, changepoints = self.encounter, self.segmentation.changepoints
-        vehicles = encounter.vehicles
-        stamps = fits.anchor_stamps(encounter, changepoints)
-        topics = [topic for topic in self.messages if topic.endswith(("fit", "/route"))]
-        newest = {topic: self.newest(topic, encounter.start_ns) for topic in topics}
-        messages = {topic: data for topic, data in newest.items() if data}
-        if "fit" not in messages:
-            return None, ()
-        _, _, requested, anchors = fits.decode_fit(messages["fit"])
-        if anchors.shape[:2] != (len(vehicles), len(stamps)):
-            return None, ()
-        fitted = tuple(
-            fits.decode_fitted(poses, self.statuses, vehicle.id)
-            for poses, vehicle in zip(anchors, vehicles, strict=True)
-        )
-        decoded = decode_routes(messages, encounter, stamps)
-        routes = tuple(
-            fits.with_figures(route, self.statuses, vehicle.id)
-            for vehicle, (_, _, route) in zip(vehicles, decoded, strict=True)
-        )
-        status = self.statuses.get("fit", {})
-        losses = fits.decode_losses(status)
-        notes = self._fit_notes(status, routes)
-        anchor_indices = anchor_index(encounter, changepoints)
-        return Fit(vehicles, fitted, anchor_indices, requested, notes, losses), routes
-
-    def _fit_notes(self, status: Mapping[str, str], routes: Sequence[Route]) -> tuple[Note, ...]:
-        """Return the recorded notes on a fit, without the remarks that the routes repeat."""
-        remarks: set[str] = set()
-        for vehicle, route in zip(self.encounter.vehicles, routes, strict=True):
-            remarks.update(route.remarks(vehicle.id))
-        texts = [text for key, text in status.items() if key.startswith("note.")]
-        return tuple(Note(NoteKind.TEXT, recorded=text) for text in texts if text not in remarks)
-
-
-def _has_hash(message: BagMessage, topic: str, wanted: str | None) -> bool:
-    """Return whether a message has a hash; any message if it is None."""
-    return wanted is None or hash_of(topic, message.data) == wanted
+        """Fit and routes of the newest template; None and no routes without a valid `fit/info`."""
+        for data in reversed(self.data(PLAN)):
+            with suppress(InputError):
+                plan = decode_plan(data)
+                if plan.stamp == self.encounter.start_ns and np.array_equal(
+                    plan.anchors[1:-1], self.segmentation.changepoints
+                ):
+                    return plan.fit(self.encounter), plan.routes
+        return None, ()
 
 
 def read_scenario_set(

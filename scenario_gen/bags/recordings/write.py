@@ -9,14 +9,12 @@ from pathlib import Path
 from msg_conventions.changepoints import encode_changepoints, encode_posterior, segmentation_status
 from msg_conventions.diagnostics import encode_diagnostics
 from msg_conventions.ego import ego_messages
-from msg_conventions.fits import anchor_stamps, encode_fit, fit_statuses
-from msg_conventions.hashes import encode_hashes, template_hashes
-from msg_conventions.lanes import encode_lanes
-from msg_conventions.lanes import TOPIC as LANES
+from msg_conventions.fits import anchor_stamps, encode_fit, encode_plan, fit_statuses
+from msg_conventions.hashes import LANES, PLAN, template_hashes
 from msg_conventions.paths import encode_route
 from msg_conventions.pictures import road_markers, scenario_markers
 from msg_conventions.request_messages import footprint_messages, RequestMessages
-from msg_conventions.roads import encode_map, encode_poses
+from msg_conventions.roads import encode_description, encode_map, encode_poses
 from msg_conventions.scenario_info import encode_info, INFO, request_summary, source_values
 from msg_conventions.scenarios import digest, encode_scenario
 from msg_conventions.topics import topic_entry, vehicle_topic
@@ -45,20 +43,16 @@ def result_messages(
         "road/entries": encode_poses(road.entries, road.frame_id, stamp),
         "road/exits": encode_poses(road.exits, road.frame_id, stamp),
     }
-    if road.lanes is not None:
-        template[LANES] = encode_lanes(road.lanes, road.frame_id, stamp)
-    hashes, infos = (
-        template_hashes(template),
-        {"road/info": encode_hashes("road", template, stamp)},
-    )
+    template[LANES] = encode_description(road, template["map"], stamp)
+    hashes = template_hashes(template)
     template["changepoints"] = encode_changepoints(encounter, result.segmentation)
     template["fit"] = encode_fit(encounter, fit, road.frame_id)
     anchors = anchor_stamps(encounter, result.segmentation.changepoints)
     names = tokens(encounter.ids)
     for name, route in zip(names, result.routes, strict=True):
         template[vehicle_topic(name, "route")] = encode_route(route, anchors, road.frame_id)
-    infos["fit/info"] = encode_hashes("fit", template, stamp)
-    for topic, data in (*template.items(), *infos.items()):
+    template[PLAN] = encode_plan(encounter, fit, result.routes, road.frame_id, template)
+    for topic, data in template.items():
         yield topic, data, stamp
     yield "road/markings", road_markers(road.lanes, road.frame_id, stamp), stamp
     if isinstance(encounter.source, Decided) and encounter.source.recorded is not None:

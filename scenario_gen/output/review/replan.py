@@ -14,7 +14,7 @@ from scenario_gen.bags.recordings.read import (
     RequestSummary,
     ScenarioEntry,
 )
-from scenario_gen.bags.recordings.template import decode_template, missing_topics
+from scenario_gen.bags.recordings.template import decode_template, NEEDED
 from scenario_gen.bags.storage.bag import naming_bag
 from scenario_gen.bags.storage.config import BagConfig
 from scenario_gen.bags.storage.messages import BagMessage
@@ -85,16 +85,12 @@ def replanned(
         published = _find(bag, entries, first.index, namespace, first.request)
         source = _replan(published, f"{bag}: request {published.entry.request}")
         facts, planned = published.entry.status.values, source.planned
-        road, placed = planned.road_and_fit()
-        fit = published.namespace.fit[0]  # has decisions that a request's messages lack
-        if fit is not None and not source.request.moves:
-            placed = replace(fit, requested=placed.requested)
+        road, _ = planned.road_and_fit()
         encounter = replace(planned.encounter, name=facts.get("template", planned.encounter.name))
         planned = replace(
             planned,
             encounter=encounter,
             road=replace(road, name=facts.get("road", road.name)),
-            fit=placed,
         )
         return replace(source, planned=planned)
 
@@ -143,11 +139,8 @@ class _Published:
             message.topic.removeprefix(self.namespace.where("")): message.data
             for message in self.messages
         }
-        missing = missing_topics(newest)
-        if missing:
-            raise InputError(
-                f"{origin}: the bag has no {', '.join(missing)} with the scenario's stamp"
-            )
+        if missing := [topic for topic in NEEDED if topic not in newest]:
+            raise InputError(f"{origin}: the bag has no {', '.join(missing)} for this scenario")
         template = decode_template(newest)
         encounter = replace(template.encounter, source=self.summary.source)
         return replace(template, encounter=encounter)

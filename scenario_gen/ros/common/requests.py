@@ -280,7 +280,7 @@ class OpenRequests:
             given = [parameter for parameter in parameters if parameter.name != "request"]
             config = values_of_call(node.config, given)
             request.n_requested = config.count
-            code, reason = await self._wait_for_inputs(request, config, wait)
+            code, reason = await self._wait_for_inputs(request, wait)
         except ScenarioGenError as error:
             self.end(request, Level.ERROR, str(error), error=type(error).__name__)
             return Outcome(Code.INVALID, f"request {request.name}: {error}", request.name)
@@ -292,7 +292,7 @@ class OpenRequests:
     async def _run(self, request: OpenRequest, config: Any) -> Outcome:
         """Generate off the executor's thread."""
         node = self._node
-        messages = node.messages()
+        messages = node.inputs.complete() or {}
 
         def outcome(code: Code, reason: str, answer: Answer | None = None) -> Outcome:
             return Outcome(code, f"request {request.name}: {reason}", request.name, answer)
@@ -317,9 +317,7 @@ class OpenRequests:
         ended: Outcome = await node.result_of(request.job, job, failed)
         return ended
 
-    async def _wait_for_inputs(
-        self, request: OpenRequest, config: Any, wait: float
-    ) -> tuple[Code, str]:
+    async def _wait_for_inputs(self, request: OpenRequest, wait: float) -> tuple[Code, str]:
         """Wait until the sampler is active and has its inputs.
 
         Then append the request to the queue.
@@ -327,7 +325,7 @@ class OpenRequests:
         deadline = monotonic() + wait
 
         def is_over() -> bool:
-            request.waiting_for = self.missing(config)
+            request.waiting_for = self.missing()
             return request.cancelled or not request.waiting_for or monotonic() >= deadline
 
         await self._until(is_over)
@@ -356,12 +354,12 @@ class OpenRequests:
         # The next waiter's turn comes when this request is in the queue.
         self._node.executor.create_task(self.check_waiting)
 
-    def missing(self, config: Any) -> list[str]:
+    def missing(self) -> list[str]:
         """Return the topics that a request waits for.
 
         `activation` while the node is not active.
         """
-        missing: list[str] = self._node.missing(config) if self._node.active else ["activation"]
+        missing: list[str] = self._node.inputs.missing() if self._node.active else ["activation"]
         return missing
 
     def position(self, request: OpenRequest) -> int:
@@ -390,7 +388,7 @@ class OpenRequests:
         self, _request: Trigger.Request, response: Trigger.Response
     ) -> Trigger.Response:
         """Answer once a request with the node's parameters can be served."""
-        await self._until(lambda: not self.missing(self._node.config))
+        await self._until(lambda: not self.missing())
         response.success = True
         response.message = "ready"
         return response

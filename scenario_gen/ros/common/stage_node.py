@@ -3,8 +3,8 @@
 
 """The base of all nodes with a stage: lifecycle, parameters, raw topics, a worker, diagnostics.
 
-The latched inputs of a node are complete once all have the same stamp, and the hashes in
-`road/info` and `fit/info` match.
+The latched inputs of a node are complete once all have the same stamp, and are those that the
+documents among them name.
 """
 
 from collections.abc import Callable, Iterable, Mapping
@@ -18,12 +18,9 @@ from rclpy.task import Future
 from msg_conventions import trajectory
 from msg_conventions.cdr import stamp_of
 from msg_conventions.diagnostics import Level
-from msg_conventions.fits import decode_fit
-from msg_conventions.hashes import decode_hashes, hash_of, INFOS
-from msg_conventions.lanes import decode_lanes
-from msg_conventions.lanes import TOPIC as LANES
-from msg_conventions.paths import decode_path
-from msg_conventions.roads import decode_map, decode_poses
+from msg_conventions.fits import decode_fit, decode_plan
+from msg_conventions.hashes import DOCUMENTS, hash_of, head_of, LANES, PLAN
+from msg_conventions.roads import decode_description, decode_map
 from msg_conventions.topics import LATCHED, topic_entry
 from msg_conventions.tracks import decode_tracks
 from scenario_gen.base.errors import InputError
@@ -59,13 +56,10 @@ def decode_checked_tracks(data: bytes) -> Encounter:
 DECODERS: dict[str, Callable[[bytes, str], object]] = {
     "tracks": lambda data, _: decode_checked_tracks(data),
     "map": lambda data, topic: decode_map(data, name=topic),
-    "road/entries": decode_poses,
-    "road/exits": decode_poses,
-    LANES: decode_lanes,
+    LANES: decode_description,
     "changepoints": trajectory.decode,
     "fit": decode_fit,
-    "route": decode_path,
-    **dict.fromkeys(INFOS, decode_hashes),
+    PLAN: decode_plan,
 }
 
 
@@ -75,18 +69,18 @@ def refuse_damaged(topic: str, data: bytes) -> None:
     Raises:
         InputError, RefusedError: it is damaged, or too large.
     """
-    if decode := DECODERS.get("route" if topic.endswith("/route") else topic):
+    if decode := DECODERS.get(topic):
         decode(data, topic)
 
 
 @dataclass(frozen=True)
 class _Message:
-    """A message with stamp and hash, and the hashes by topic that an info lists."""
+    """A message with stamp and hash, and the hashes of its inputs by topic if it is a document."""
 
     data: bytes
     stamp: int
     hash: str
-    listed: Mapping[str, str]
+    inputs: Mapping[str, str]
 
 
 class Inputs:
@@ -95,26 +89,12 @@ class Inputs:
     Args:
         paired: topics that must have the same stamp.
         unpaired: topics with any stamp.
-        optional: topics that are needed only if an info lists them.
     """
 
-    def __init__(
-        self, paired: Iterable[str], unpaired: Iterable[str] = (), optional: Iterable[str] = ()
-    ) -> None:
-        self._paired = set(paired)
-        self._unpaired = set(unpaired)
-        self._optional = set(optional)
+    def __init__(self, paired: Iterable[str], unpaired: Iterable[str] = ()) -> None:
+        self._paired = frozenset(paired)
+        self._unpaired = frozenset(unpaired)
         self._newest: dict[str, _Message] = {}
-
-    def expect(self, topics: Iterable[str]) -> None:
-        """Add topics to the paired ones, e.g. the routes of the vehicles in the tracks."""
-        self._paired |= set(topics)
-
-    def forget(self, topics: Iterable[str]) -> None:
-        """Remove topics and their messages."""
-        for topic in topics:
-            self._paired.discard(topic)
-            self._newest.pop(topic, None)
 
     def clear(self) -> None:
         """Remove all messages."""
@@ -126,17 +106,17 @@ class Inputs:
         Raises:
             InputError: it is damaged; the previous message stays.
         """
-        listed = decode_hashes(data, topic) if topic in INFOS else {}
-        self._newest[topic] = _Message(data, stamp_of(data, topic), hash_of(topic, data), listed)
+        if topic in DOCUMENTS:
+            head = head_of(data, topic)
+            stamp, inputs = head.stamp, head.inputs
+        else:
+            stamp, inputs = stamp_of(data, topic), {}
+        self._newest[topic] = _Message(data, stamp, hash_of(topic, data), inputs)
 
     def get(self, topic: str) -> bytes | None:
         """Return the newest message of a topic."""
         message = self._newest.get(topic)
         return message.data if message else None
-
-    def is_listed(self, info: str, topic: str) -> bool:
-        """Return whether an info lists a message of the topic."""
-        return info in self._newest and topic in self._newest[info].listed
 
     def replaced(self, messages: Mapping[str, bytes]) -> bool:
         """Return whether one of these messages is no longer the newest of its topic."""
@@ -154,32 +134,19 @@ class Inputs:
         return sorted(topic for topic, stamp in stamps.items() if stamp != newest)
 
     def _unmatched(self) -> list[str]:
-        """Return the infos that do not list the newest messages, as "road/info of this map"."""
-        infos = [info for info in INFOS if info in self._newest]
-        if not infos:  # an info may list them: work without it would have to be repeated
-            known = sorted(self._optional & set(self._newest))
-            return [f"road/info of this {topic}" for topic in known]
-        unmatched = []
-        for info in infos:
-            for topic, listed_hash in self._newest[info].listed.items():
-                message = self._newest.get(topic)
-                if message is None:
-                    matches = topic not in self._optional
-                else:
-                    matches = message.hash == listed_hash
-                if not matches:
-                    unmatched.append(f"{info} of this {topic}")
-        return unmatched
+        """Return the documents of other messages than the newest, as "fit/info of this map"."""
+        return [
+            f"{document} of this {topic}"
+            for document, message in self._newest.items()
+            for topic, wanted in message.inputs.items()
+            if topic not in self._newest or self._newest[topic].hash != wanted
+        ]
 
     def complete(self) -> dict[str, bytes] | None:
         """Return all messages that belong together, or None if one is missing."""
         if self.missing():
             return None
-        return {
-            topic: message.data
-            for topic, message in self._newest.items()
-            if topic not in self._optional or any(self.is_listed(info, topic) for info in INFOS)
-        }
+        return {topic: message.data for topic, message in self._newest.items()}
 
 
 Result = TypeVar("Result")

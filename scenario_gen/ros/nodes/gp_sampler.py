@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""gp_sampler: a template with road, fit and routes in; checked `scenarios` out.
+"""gp_sampler: a template with its road and plan in; checked `scenarios` out.
 
 `scenarios/info` describes each scenario. With `sampling.decisions=drawn` each outcome that differs
 from the recorded one is a namespace with a template of its own: `goes_first/tracks`,
@@ -20,12 +20,9 @@ import os
 import threading
 
 from msg_conventions.diagnostics import Level
-from msg_conventions.hashes import template_hashes
-from msg_conventions.lanes import TOPIC as LANES
+from msg_conventions.hashes import LANES, PLAN, template_hashes
 from msg_conventions.request_messages import RequestMessages
 from msg_conventions.scenario_info import request_summary
-from msg_conventions.topics import vehicle_topic
-from msg_conventions.tracks import decode_tracks
 from scenario_gen.bags.recordings.scenario_publisher import ScenarioPublisher
 from scenario_gen.bags.recordings.template import decode_template
 from scenario_gen.bags.recordings.write import result_messages
@@ -52,17 +49,15 @@ from scenario_gen.types import (
     GenerationResult,
     Scenario,
     token,
-    tokens,
 )
 
 GOAL = "ego/goal"
-ENDS = ("road/entries", "road/exits")  # only requests with start or end states need them
 
 
 class GpSampler(StageNode):
     """Samples valid scenarios around the planned routes."""
 
-    INPUTS = ("map", *ENDS, LANES, "tracks", "changepoints", "fit", "fit/info")
+    INPUTS = ("map", LANES, "tracks", "changepoints", PLAN)
     STAGES = (
         "situation",
         "roads",
@@ -77,12 +72,11 @@ class GpSampler(StageNode):
 
     def __init__(self, namespace: str | None = None) -> None:
         super().__init__("gp_sampler", Config(), namespace)
-        paired = ("tracks", "changepoints", "fit", "fit/info")
+        paired = ("tracks", "changepoints", PLAN)
         if self.config.pair_map:
-            self.inputs = Inputs((*paired, "map"), optional=(LANES,))
+            self.inputs = Inputs((*paired, "map", LANES))
         else:
-            self.inputs = Inputs(paired, unpaired=("map",), optional=(LANES,))
-        self._routes: set[str] = set()
+            self.inputs = Inputs(paired, unpaired=("map",))
         self._turn = threading.Lock()
         self._requests = OpenRequests(self)
         action = action_type()
@@ -115,47 +109,15 @@ class GpSampler(StageNode):
 
     def received(self, topic: str, data: bytes) -> None:
         """Generate when all inputs have arrived."""
+        if topic == LANES and not self.config.pair_map:
+            return  # not of the other server's map
         self.inputs.put(topic, data)
-        if topic == "tracks":
-            self._follow(data)
         self._requests.check_waiting()
-        config = self.config
-        if not config.generate_on_input or (topic in ENDS and not config.moves):
-            return
-        if not self.missing(config):
-            messages = self.messages()
+        config, messages = self.config, self.inputs.complete()
+        if messages and config.generate_on_input:
             self.work(
                 "inputs", lambda cancelled: self._generate_on_input(messages, config, cancelled)
             )
-
-    def missing(self, config: Config) -> list[str]:
-        """Return the topics that a request waits for."""
-        ends = ENDS if config.moves and config.pair_map else ()
-        return self.inputs.missing() or [topic for topic in ends if topic not in self.messages()]
-
-    def messages(self) -> dict[str, bytes]:
-        """Return the template's messages.
-
-        Entries, exits and lanes only if the fit was made with them.
-        """
-        messages = self.inputs.complete() or {}
-        return {
-            topic: data
-            for topic, data in messages.items()
-            if topic not in (*ENDS, LANES) or self.inputs.is_listed("fit/info", topic)
-        }
-
-    def _follow(self, tracks: bytes) -> None:
-        """Subscribe to the routes of the vehicles in the tracks, and no longer to others."""
-        names = tokens(decode_tracks(tracks).ids)
-        routes = {vehicle_topic(name, "route") for name in names}
-        self.inputs.forget(self._routes - routes)
-        for topic in sorted(self._routes - routes):
-            self.ignore(topic)
-        self.inputs.expect(routes)
-        self._routes = routes
-        for topic in sorted(routes):
-            self.listen(topic)
 
     def _generate_on_input(
         self, messages: Mapping[str, bytes], config: Config, cancelled: Cancelled

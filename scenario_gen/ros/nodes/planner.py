@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""planner: `map`, `tracks`, `changepoints` of one template in; `fit` and routes out.
+"""planner: road, `tracks`, `changepoints` of one template in; `fit/info`, `fit` and routes out.
 
 `~/get_plan` (nav_msgs/GetPlan) plans from pose to pose for a vehicle of the parameter
 `vehicle_type` on the newest map. An impossible plan is empty, and /diagnostics has the reason.
@@ -21,9 +21,8 @@ from rclpy.time import Time
 
 from msg_conventions.changepoints import decode_changepoints
 from msg_conventions.diagnostics import decimal_stamp, Level
-from msg_conventions.fits import anchor_stamps, encode_fit, fit_statuses
-from msg_conventions.hashes import encode_hashes, template_hashes
-from msg_conventions.lanes import TOPIC as LANES
+from msg_conventions.fits import anchor_stamps, encode_fit, encode_plan, fit_statuses
+from msg_conventions.hashes import LANES, PLAN, template_hashes
 from msg_conventions.paths import encode_path, encode_route
 from msg_conventions.roads import decode_map
 from msg_conventions.topics import vehicle_topic
@@ -53,8 +52,6 @@ from scenario_gen.ros.common.stage_node import Inputs, StageNode
 from scenario_gen.situation import Situation
 from scenario_gen.types import Encounter, GenerationResult, Road, Segmentation, tokens
 
-ROAD_TOPICS = ("map", "road/entries", "road/exits")
-
 
 @dataclass(frozen=True)
 class Config(Parameters):
@@ -78,9 +75,9 @@ class Config(Parameters):
 class Planner(StageNode):
     """Fits each template to the road and plans every vehicle's route between its changepoints."""
 
-    INPUTS = (*ROAD_TOPICS, LANES, "road/info", "tracks", "changepoints")
+    INPUTS = ("map", LANES, "tracks", "changepoints")
     STAGES = ("situation", "roads", "method.fitting", "method.routing")
-    OUTPUTS = ("fit", "fit/info", PART)
+    OUTPUTS = ("fit", PLAN, PART)
 
     def __init__(self, namespace: str | None = None) -> None:
         super().__init__("planner", Config(), namespace)
@@ -88,9 +85,9 @@ class Planner(StageNode):
         self._request_count = 0
         paired = ("tracks", "changepoints")
         if self.config.pair_map:
-            self.inputs = Inputs((*paired, *ROAD_TOPICS), optional=(LANES,))
+            self.inputs = Inputs((*paired, "map", LANES))
         else:
-            self.inputs = Inputs(paired, unpaired=("map",), optional=(LANES,))
+            self.inputs = Inputs(paired, unpaired=("map",))
 
     def stopped(self) -> None:
         """Forget the inputs, which are latched and arrive again."""
@@ -98,8 +95,8 @@ class Planner(StageNode):
 
     def received(self, topic: str, data: bytes) -> None:
         """Plan when road, tracks and changepoints of one template have arrived."""
-        if topic in ("road/info", LANES) and not self.config.pair_map:
-            return  # another map server does not list the messages for its map
+        if topic == LANES and not self.config.pair_map:
+            return  # not of the other server's map
         self.inputs.put(topic, data)
         messages = self.inputs.complete()
         # Incomplete inputs also replace, and so cancel, the work on the previous ones.
@@ -109,12 +106,7 @@ class Planner(StageNode):
         config = self.config
         encounter = decode_tracks(messages["tracks"])
         segmentation = decode_changepoints(messages["changepoints"], encounter)
-        _, road = decode_map(
-            messages["map"],
-            messages.get("road/entries"),
-            messages.get("road/exits"),
-            messages.get(LANES),
-        )
+        _, road = decode_map(messages["map"], messages.get(LANES))
         pipeline = PipelineConfig(
             fitting=config.fitting, planning=config.planning, limits=config.limits
         )
@@ -145,7 +137,7 @@ class Planner(StageNode):
             for name, route in zip(tokens(encounter.ids), routes, strict=True)
         }
         results["fit"] = encode_fit(encounter, fit, road.frame_id)
-        results["fit/info"] = encode_hashes("fit", messages | results, encounter.start_ns)
+        results[PLAN] = encode_plan(encounter, fit, routes, road.frame_id, messages)
         for topic, data in results.items():
             self.outputs.send(topic, data)
         self.get_logger().info(f"planned {len(routes)} routes through {len(anchors)} anchors")

@@ -40,7 +40,7 @@ DRAIN_S = RECORDER_END_S - 5.0  # at most, at the end, for messages that have ar
 BATCH_MESSAGES = 50  # of one topic, before others have their turn
 DOMAIN_TOPICS = r"diagnostics|clock|tf|tf_static"  # of a whole ROS domain, in any namespace
 SUITE_TOPICS = (
-    r"map|road/(entries|exits|info|lanes|markings)|"
+    r"map|road/(entries|exits|lanes|markings)|"
     r"tracks|changepoints|posterior|fit(/info)?|vehicle_\w+/(route|footprint|fix|speed)"
     r"|ego/(start|goal|witness)|scenarios(/info)?|markers|report"
 )

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""road_server: `map`, `road/entries`, `road/exits`; `~/get_map`, `~/load_map`.
+"""road_server: `map` and its description, `road/lanes`; `~/get_map`, `~/load_map`.
 
 Built-in roads are sized to the template: the node publishes the road for each encounter on
 `tracks`, with its stamp. Without tracks it publishes the road in its default size with stamp 0
@@ -22,11 +22,9 @@ from rclpy.serialization import deserialize_message
 
 from msg_conventions.cdr import stamp_of
 from msg_conventions.diagnostics import Level
-from msg_conventions.hashes import encode_hashes, template_hashes
-from msg_conventions.lanes import encode_lanes
-from msg_conventions.lanes import TOPIC as LANES
+from msg_conventions.hashes import LANES, template_hashes
 from msg_conventions.pictures import road_markers
-from msg_conventions.roads import encode_map, encode_poses
+from msg_conventions.roads import encode_description, encode_map, encode_poses
 from msg_conventions.tracks import decode_tracks
 from scenario_gen.base.cancelling import stop_if_cancelled
 from scenario_gen.base.errors import InputError, RefusedError, ScenarioGenError
@@ -83,14 +81,13 @@ class RoadServer(StageNode):
 
     INPUTS = ("tracks",)
     STAGES = ("roads",)
-    OUTPUTS = ("map", "road/entries", "road/exits", LANES, "road/info", "road/markings", PART)
+    OUTPUTS = ("map", "road/entries", "road/exits", LANES, "road/markings", PART)
 
     def __init__(self, namespace: str | None = None) -> None:
         super().__init__("road_server", Config(), namespace)
         self._tracks: bytes | None = None
         self._name = self.config.road_name
         self._grid: bytes | None = None
-        self._had_lanes = False  # whether the last road had lanes, which an empty message replaces
         self.create_service(GetMap, "~/get_map", self._get_map, qos_profile=REQUESTS)
         self._request_count = 0
         self.create_service(LoadMap, "~/load_map", self._load_map, qos_profile=REQUESTS)
@@ -117,23 +114,19 @@ class RoadServer(StageNode):
             request_part(self, partial(self._attempt, name), encounter, error)
             return
         stamp_ns = stamp_of(tracks, "tracks") if tracks else 0
+        grid = encode_map(road, stamp_ns)
         messages = {
+            "map": grid,
+            LANES: encode_description(road, grid, stamp_ns),
             "road/entries": encode_poses(road.entries, road.frame_id, stamp_ns),
             "road/exits": encode_poses(road.exits, road.frame_id, stamp_ns),
-            "map": encode_map(road, stamp_ns),
+            "road/markings": road_markers(road.lanes, road.frame_id, stamp_ns),
         }
-        if road.lanes is not None:  # lanes are published before their map
-            messages = {LANES: encode_lanes(road.lanes, road.frame_id, stamp_ns), **messages}
         stop_if_cancelled()
-        if self._had_lanes and road.lanes is None:
-            self.outputs.send(LANES, encode_lanes(None, road.frame_id, stamp_ns))
-        self._had_lanes = road.lanes is not None
         for topic, data in messages.items():
             self.outputs.send(topic, data)
-        template = {"tracks": tracks} if tracks else {}
-        self.outputs.send("road/info", encode_hashes("road", messages | template, stamp_ns))
-        self.outputs.send("road/markings", road_markers(road.lanes, road.frame_id, stamp_ns))
-        self._grid = messages["map"]
+        self._grid = grid
+        template = {"map": grid} | ({"tracks": tracks} if tracks else {})
         height, width = road.drivable.shape
         message = (
             f"{road.name}: {width} x {height} cells of {road.resolution:.2f} m, "
@@ -147,7 +140,7 @@ class RoadServer(StageNode):
         level, message = (
             (Level.WARN, "; ".join([message, *faults])) if faults else (Level.OK, message)
         )
-        self.status(level, message, "road", stamp_ns, **template_hashes(messages | template))
+        self.status(level, message, "road", stamp_ns, **template_hashes(template))
 
     def _attempt(self, name: str, part: Encounter) -> None:
         """Build the road for a part of the encounter.

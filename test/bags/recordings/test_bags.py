@@ -103,7 +103,8 @@ def test_a_run_is_read_back_from_its_bag(run, tmp_path):
     template = decode_tracks(by_topic["/tracks"])
     assert template.position.tobytes() == run.encounter.position.tobytes()
     assert template.vehicles[1] == Vehicle("bus_2", 12.0, 2.5)
-    _, road = decode_map(by_topic["/map"], by_topic["/road/entries"], by_topic["/road/exits"])
+    _, road = decode_map(by_topic["/map"], by_topic["/road/lanes"])
+    assert (road.entries == run.road.entries).all() and (road.exits == run.road.exits).all()
     assert (road.drivable == run.road.drivable).all()
     assert decode_posterior(by_topic["/posterior"]).changepoints.tolist() == [20, 45]
     assert decode_fit(by_topic["/fit"])[2].end.tobytes() == run.fit.requested.end.tobytes()

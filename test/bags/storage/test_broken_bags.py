@@ -15,6 +15,8 @@ import pytest
 from support.bag_examples import copied, hand_made_run
 
 from msg_conventions import trajectory
+from msg_conventions.documents import encode_document
+from msg_conventions.fits import decode_plan
 from scenario_gen.bags.recordings.template import decode_template
 from scenario_gen.bags.recordings.write import result_messages, write_recording
 from scenario_gen.bags.storage.bag import bag_warnings, read_messages
@@ -152,15 +154,11 @@ def test_figures_that_would_fill_the_memory_are_refused(tmp_path):
     assert re.search(r"gap from .* no vehicles move so", str(found.notes[-1]))
 
 
-def test_a_fit_of_other_vehicles_is_refused(tmp_path):
+def test_a_plan_of_other_vehicles_is_refused(tmp_path):
     def of_one(data):
-        fit = trajectory.decode(data, "/fit")
-        parts = {
-            key: getattr(fit, key)[:1]
-            for key in ("vehicles", "position", "heading", "speed", "acceleration")
-        }
-        return trajectory.encode(replace(fit, **parts))
+        plan = decode_plan(data)
+        return encode_document(replace(plan, fitted=plan.fitted[:1]))
 
-    messages = {m.topic[1:]: m.data for m in read_messages(changed(tmp_path, "/fit", of_one))}
-    with pytest.raises(InputError, match="fit: 1 vehicles at 4 points"):
+    messages = {m.topic[1:]: m.data for m in read_messages(changed(tmp_path, "/fit/info", of_one))}
+    with pytest.raises(InputError, match="fit/info: 1 vehicles at 4 points; tracks have 2"):
         decode_template(messages)

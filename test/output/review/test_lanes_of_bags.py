@@ -43,5 +43,4 @@ def test_a_wrong_way_driver_is_seen_in_a_bag(tmp_path, directions, wrong):
 
 def test_a_bag_of_a_grid_has_no_lanes(tmp_path):
     bag = write_recording(tmp_path / "bag", hand_made_run())
-    assert not read_recording(bag).namespaces[""].data("road/lanes")
     assert read_recording(bag).namespaces[""].road.lanes is None
