@@ -125,9 +125,10 @@ class Registry(Generic[T]):
         if name in self.built_in:
             return self.built_in[name]
         if name not in self:
+            kind = self.group.partition(".")[2].replace("_", " ")
             raise InputError(
-                f"{self.group} has no {name!r}; choose one of "
-                f"{', '.join(self.names())}{did_you_mean(name, self.names())}"
+                f"{name!r} is none of the {kind} {', '.join(self.names())}"
+                f"{did_you_mean(name, self.names())}"
             )
         entry = installed(self.group)[name]
         try:

@@ -15,13 +15,13 @@ import typer
 from scenario_gen.base.errors import printable_lines
 from scenario_gen.cli.options import (
     assigned_all,
+    bag_at,
     Commands,
     complete_format,
     configured,
     OUT,
     ParametersOption,
     SetOption,
-    warn_of_metadata,
 )
 from scenario_gen.cli.output import (
     default_output,
@@ -63,7 +63,7 @@ def evaluate(
     from scenario_gen.output.review.evaluation import evaluate_bag, measured
 
     config = configured(parameter_file, assignments)
-    warn_of_metadata(bag)
+    bag = bag_at(bag)
     inputs = [bag, *([parameter_file] if parameter_file else ())]
     with nullcontext() if out is None else replaced_folder(out, EVALUATED, inputs) as folder:
         with progress() as advance:
@@ -134,8 +134,8 @@ def report(
     results = path.parent if path.name == BAG else path  # a folder from `generate`
     page = results / REPORT
     if out is not None or not page.is_file():
-        warn_of_metadata(bag)
         folder = out or default_output(bag, f"{path.stem}_report")
+        bag = bag_at(bag)
         with progress() as advance:
             write_page(bag, folder, progress=partial(advance, "scenarios"))
         page = folder / REPORT
@@ -211,7 +211,7 @@ def export_scenarios(
     from scenario_gen.output.exchange.export import export_bag
 
     configs = _export_configs(ego, road_map, options or [])
-    warn_of_metadata(bag)
+    bag = bag_at(bag)
     folder = out or default_output(bag, f"{bag.resolve().name}_{to}")
     with progress() as advance:
         counted = partial(advance, "scenarios")

@@ -6,6 +6,7 @@
 from contextlib import suppress
 from importlib import metadata
 import os
+import re
 import sys
 import tempfile
 import traceback
@@ -147,7 +148,8 @@ def usage_error(error: Any) -> InputError:
     message = " ".join(error.format_message().split()).rstrip(".")
     parameter = getattr(error, "param", None)
     if parameter is not None and parameter.help and not error.message:  # it is missing
-        message = f"{message} ({parameter.help.split('. ')[0].rstrip('.')})"
+        first = re.split(r"\.(?: (?=[A-Z`])|$)", parameter.help)[0]
+        message = f"{message} ({first})"
     path = error.ctx.command_path if error.ctx else PROGRAM
     return InputError(f"{message}; see `{path} --help`")
 

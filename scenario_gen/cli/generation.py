@@ -40,18 +40,18 @@ class Generate:
         ),
     ]
     road: Annotated[
-        list[str],
+        list[str] | None,
         typer.Option(
             "--road",
             "--roads",
             help="straight, curve, t_intersection, four_way, merge, roundabout, corridor (drawn "
-            "around the recording), auto (the first of these that suits), a nav2 map (.yaml), or "
-            "a vector map: Lanelet2 (.osm), OpenDRIVE (.xodr), CommonRoad (.xml). Append "
-            "#box=x0,y0,x1,y1, #lanelet=ID or #junction=ID for a part of a vector map. "
+            "around the recording), auto (the first of these that suits; the default), a nav2 map "
+            "(.yaml), or a vector map: Lanelet2 (.osm), OpenDRIVE (.xodr), CommonRoad (.xml). "
+            "Append #box=x0,y0,x1,y1, #lanelet=ID or #junction=ID for a part of a vector map. "
             "`scenario-gen roads` draws a map with suitable places. Repeatable.",
             autocompletion=complete_road,
         ),
-    ]
+    ] = None
     count: Annotated[
         int, typer.Option(min=1, max=MAX_COUNT, help="Scenarios per encounter and road.")
     ] = 50
@@ -92,7 +92,7 @@ class Generate:
         list[str] | None,
         typer.Option(
             help="Range of pet, ttc, gap, arrival_gap, closing_speed or blind_margin, "
-            r"e.g. 'pet=0.5..1.5', 'ttc\[1,2]=1..2'. Repeatable."
+            r"e.g. 'pet < 2', 'ttc\[1,2]=1..2'. Repeatable."
         ),
     ] = None
     for_testing: Annotated[
@@ -177,10 +177,11 @@ def _request(options: Generate) -> "Request":
 def generate(options: Generate) -> None:
     """Generate scenarios from a log; write a bag, a report and figures to one folder."""
     from scenario_gen.cli.folder import FolderRequest, generate_folder
+    from scenario_gen.method.suitable_roads import AUTO
 
     logs = [options.log, *([path] for path in options.recording or [])]
     request = FolderRequest(
-        jobs=[(files, options.road) for files in logs],
+        jobs=[(files, options.road or [AUTO]) for files in logs],
         config=_config(options),
         count=options.count,
         seed=options.seed,
@@ -218,9 +219,9 @@ def roads(
     from scenario_gen.cli.folder import chosen
     from scenario_gen.logs import read_log
     from scenario_gen.method.segmentation import segment
-    from scenario_gen.method.suitable_roads import suitable_roads
+    from scenario_gen.method.suitable_roads import fits_road, suitable_roads
     from scenario_gen.output.plot import draw_map
-    from scenario_gen.roads import BUILT_IN
+    from scenario_gen.roads import BUILT_IN, CORRIDOR
     from scenario_gen.situation import Situation
 
     config = configured(parameter_file, assignments)
@@ -228,7 +229,7 @@ def roads(
         None if log is None else chosen(read_log(log, config.log).encounters, encounter or [])[0]
     )
     if not road:
-        names = [*BUILT_IN, "corridor"]
+        names = [*BUILT_IN, CORRIDOR]
         if template is not None:
             segmentation = segment(template, config.segmentation, 0)
             names = list(suitable_roads(Situation.of(template), segmentation, config))
@@ -242,6 +243,10 @@ def roads(
         raise InputError(f"--out {out} exists and is not a picture of a map; name another file")
     out.parent.mkdir(parents=True, exist_ok=True)
     notes = draw_map(road, out, template)
+    if template is not None and road in [*BUILT_IN, CORRIDOR]:
+        segmentation = segment(template, config.segmentation, 0)
+        fits = fits_road(road, Situation.of(template), segmentation, config)
+        notes.append(f"{template.name} {'fits' if fits else 'does not fit'} {road} unchanged")
     emit_json(picture=out, notes=notes)
     print_(*notes, f"picture: {out}", sep="\n")
 

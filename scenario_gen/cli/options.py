@@ -128,10 +128,18 @@ def configured(file: Path | None, assignments: Sequence[str] | None) -> "Pipelin
     return assigned_all(config, assignments)
 
 
-def warn_of_metadata(bag: Path) -> None:
-    """Print what is missing in a bag that can be read nevertheless."""
-    from scenario_gen.bags.storage.bag import bag_warnings
+def bag_at(path: Path) -> Path:
+    """Return a bag, or that in a folder from `generate`.
 
-    with suppress(InputError):  # the command says why it cannot be read
-        for warning in bag_warnings(bag):
+    Prints what is missing in a bag that can be read nevertheless.
+    """
+    from scenario_gen.bags.storage.bag import bag_warnings
+    from scenario_gen.bags.storage.files import files_of
+    from scenario_gen.output.results import BAG
+
+    with suppress(InputError, OSError):  # the command says why it cannot be read
+        if path.is_dir() and not files_of(path).files and (path / BAG).is_dir():
+            path /= BAG
+        for warning in bag_warnings(path):
             print_(warning)
+    return path

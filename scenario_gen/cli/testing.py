@@ -4,7 +4,7 @@
 """The commands that test a planner: drive it in scenarios, and search for its failures."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Annotated, TYPE_CHECKING
@@ -13,12 +13,12 @@ import typer
 
 from scenario_gen.base.errors import InputError
 from scenario_gen.cli.options import (
+    bag_at,
     Commands,
     complete_planner,
     OUT,
     SeedOption,
     takes,
-    warn_of_metadata,
     WorkersOption,
 )
 from scenario_gen.cli.output import emit_json, print_, print_table, progress
@@ -120,10 +120,8 @@ def drive(options: Drive) -> None:
 
     if options.mutants and options.ros:
         raise InputError("--mutants: faults are put around a Python planner; leave out --ros")
-    for bag in options.bags:
-        warn_of_metadata(bag)
     request = DriveRequest(
-        options.bags,
+        [bag_at(bag) for bag in options.bags],
         options.planner,
         options.ego,
         options.count,
@@ -350,8 +348,7 @@ def search(options: Search) -> None:
         raise InputError(
             "--max-rate: a search for the worst failure estimates no rate; omit one of both"
         )
-    warn_of_metadata(options.source)
-    source = drawn_from(options)
+    source = drawn_from(replace(options, source=bag_at(options.source)))
     request = SearchRequest(
         source.planned,
         source.request,

@@ -22,9 +22,9 @@ UNITS = {
 }
 """Figures that a target can be set on, with units; see `method.evaluation.measures`."""
 Pair = tuple[int, ...]  # of vehicle indices; one: with whom it is the most critical
-_FORM = "NAME=LOW..HIGH, NAME[a]=LOW..HIGH or NAME[a,b]=LOW..HIGH"
-_TARGET = re.compile(r"([^=\[]*)(?:\[([^=]*)\]\s*)?=(.*)", re.DOTALL)
-_EXAMPLE = "pet=0.5..1.5; ttc[1,2]=1..2"
+_FORM = "NAME=LOW..HIGH, NAME < HIGH or NAME > LOW, with NAME[a] or NAME[a,b] for some vehicles"
+_TARGET = re.compile(r"([^=<>\[]*)(?:\[([^=<>]*)\]\s*)?(=|[<>]=?)(.*)", re.DOTALL)
+_EXAMPLE = "pet=0.5..1.5; ttc[1,2] < 2"
 
 
 @dataclass(frozen=True)
@@ -124,7 +124,7 @@ class Reached:
 
 
 def read_targets(text: str) -> tuple[Target, ...]:
-    """Return the targets in a text such as `pet=0.5..1.5; ttc[1,2]=1..2`; bounds may be omitted.
+    """Return the targets in a text such as `pet=0.5..1.5; ttc[1,2] < 2`.
 
     Raises:
         InputError: it is not of that form, a figure is unknown or comes twice, or a range is
@@ -140,10 +140,12 @@ def read_targets(text: str) -> tuple[Target, ...]:
 
 
 def _read_target(piece: str) -> Target:
-    """Return the target in a text such as `ttc[1,2]=1..2`."""
+    """Return the target in a text such as `ttc[1,2]=1..2` or `ttc < 2`."""
     match = _TARGET.fullmatch(piece)
-    name, ids, bounds = match.groups() if match else ("", None, "")
+    name, ids, sign, bounds = match.groups() if match else ("", None, "=", "")
     name = name.strip()
+    if sign != "=":
+        bounds = f"..{bounds}" if sign[0] == "<" else f"{bounds}.."
     vehicles = () if ids is None else tuple(word.strip() for word in ids.split(","))
     words = [word.strip() for word in bounds.split("..")]
     if len(words) != 2 or len(vehicles) > 2 or not all(vehicles):

@@ -32,7 +32,7 @@ def test_a_planner_takes_the_place_of_a_vehicle_from_states_that_are_asked_for(r
         assert scenario.speed[0, 0] == pytest.approx(9.5, abs=1e-6)
     page = (tmp_path / "one" / "report.html").read_text()
     assert "Vehicle 1 is left out for a planner under test" in page
-    assert run("evaluate", "one/bag")[0] == 0
+    assert run("evaluate", "one")[0] == 0
     assert run("evaluate", "one/bag", "--out", "page")[0] == 0
     assert "Vehicle 1 is left out" in (tmp_path / "page" / "report.html").read_text()
     drive = ("drive", "one/bag", "--planner", "IdmFollower")

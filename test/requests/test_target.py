@@ -41,6 +41,7 @@ def test_texts_are_read_and_written():
         and two.holds(2.0)
     )
     assert read_targets(f"{one}; {two}") == (one, two)
+    assert read_targets("ttc[a b,2] < 2 ;pet>=.5") == (two, replace(one, high=np.inf))
 
 
 def test_unknown_vehicles_are_named(chain):

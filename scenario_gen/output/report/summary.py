@@ -134,7 +134,8 @@ def _variety(case: GenerationResult) -> str:
         values = [] if spread is None else [v for v in spread.values if math.isfinite(v)]
         if spread is None or not values:
             continue
-        figures = f"{spread.label} {min(values):.1f} to {max(values):.1f} {spread.unit}"
+        ends = dict.fromkeys((f"{min(values):.1f}", f"{max(values):.1f}"))
+        figures = f"{spread.label} {' to '.join(ends)} {spread.unit}"
         if math.isfinite(spread.template):
             ranges.append(f"{figures} ({case.encounter.made} {spread.template:.1f})")
         elif name == "speed":

@@ -97,7 +97,7 @@ def test_lanes_do_not_depend_on_what_is_chosen(small_bag):
     [
         (
             ["--to", "lanelet2"],
-            "choose one of commonroad, openscenario, autoware, scenarionet",
+            "is none of the exports commonroad, openscenario, autoware, scenarionet",
         ),
         (
             ["--to", "commonroad", "--ego", "9"],
