@@ -159,6 +159,10 @@ class Curve:
             pose[..., 1] += beyond * np.sin(pose[..., 2])
         return pose
 
+    def yaw_at(self, station: Floats) -> Floats:
+        """Return the yaw (...) [rad] at arc lengths (...) [m], also on the straight extensions."""
+        return np.asarray(np.interp(station, self.station, self.points[:, 2]))
+
     def at_offset(self, station: Floats, offset: Floats | float) -> Floats:
         """Return the poses (..., 3) at arc lengths and lateral offsets [m, left positive]."""
         pose = self.at(station)

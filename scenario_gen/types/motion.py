@@ -65,7 +65,7 @@ def at_ends(present: Ints, samples: int) -> Bools:
 
 def always(present: Ints, samples: int) -> bool:
     """Return whether all vehicles (N, 2) are present at all T `samples`."""
-    return bool(at_ends(present, samples).all())
+    return all(row == [0, samples - 1] for row in present.tolist())
 
 
 def held(values: Floats, present: Ints) -> Floats:
@@ -85,9 +85,9 @@ def mask(present: Ints, samples: int) -> Bools:
 
 def together(present: Ints, *rows: int) -> slice:
     """Return the samples at which all of these vehicles are present, possibly none."""
-    first = int(present[list(rows), 0].max())
-    last = int(present[list(rows), 1].min())
-    return slice(first, max(last + 1, first))
+    firsts, lasts = zip(*(present[row].tolist() for row in rows), strict=True)
+    first = max(firsts)
+    return slice(first, max(min(lasts) + 1, first))
 
 
 def cut(present: Ints, first: int, last: int) -> Ints:

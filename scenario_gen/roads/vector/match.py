@@ -75,11 +75,15 @@ class Match:
 
 
 class _Candidate(NamedTuple):
-    """A chain of lanes for one vehicle: its cost [m²], curve, and costs (K,) [m²] of the poses."""
+    """A chain of lanes for one vehicle: its cost [m²], its curve, and on it the K poses.
+
+    Each pose has a station [m] and a cost [m²], (K,).
+    """
 
     chain: LaneChain
     cost: float
     curve: Curve
+    stations: Floats
     pose_costs: Floats
 
 
@@ -170,8 +174,7 @@ def _lane_path(
     best = ranked[0]
     if not track.still and not reserved_share(best):
         best = _best_lane_change(graph.network, ranked[: LIMITS.changing_chains], poses)
-    station, _ = best.curve.project(poses[:, :2])
-    start = float(np.median(station - np.linspace(0.0, driven, len(station))))
+    start = float(np.median(best.stations - np.linspace(0.0, driven, len(poses))))
     return LanePath(best.chain, best.curve, start, scale * track.progress)
 
 
@@ -189,8 +192,11 @@ def _candidates(
     chains = (chain for chain in chains if not ends[1] or lasts.intersection(chain))
     for chain in dict.fromkeys(islice(chains, LIMITS.chains)):
         curve = _part_around(graph.curve(chain), poses, driven)
-        costs = _pose_costs(curve, poses)
-        yield _Candidate(chain, float(costs.mean()) + _turn_cost(curve, poses), curve, costs)
+        stations, offsets = curve.project(poses[:, :2])
+        turns = poses[:, 2] - curve.yaw_at(stations)
+        costs = _pose_costs(stations, offsets, turns, curve.length)
+        cost = float(costs.mean() + COSTS.turn_m2_per_rad2 * np.square(turns[-1] - turns[0]))
+        yield _Candidate(chain, cost, curve, stations, costs)
 
 
 def _part_around(curve: Curve, poses: Floats, driven: float) -> Curve:
@@ -201,22 +207,15 @@ def _part_around(curve: Curve, poses: Floats, driven: float) -> Curve:
     return curve.cut(low, high) if high - low > STEP_M else curve
 
 
-def _turn_cost(curve: Curve, poses: Floats) -> float:
-    """Return the cost [m²] of a lane path that turns otherwise than the poses (K, 3)."""
-    station, _ = curve.project(poses[[0, -1], :2])
-    yaw = curve.at(np.clip(station, 0.0, curve.length))[:, 2]
-    error = (yaw[1] - yaw[0]) - (poses[-1, 2] - poses[0, 2])
-    return float(COSTS.turn_m2_per_rad2 * np.square(error))
+def _pose_costs(stations: Floats, offsets: Floats, turns: Floats, length: float) -> Floats:
+    """Return how badly (K,) [m²] poses agree with a curve of a length [m].
 
-
-def _pose_costs(curve: Curve, poses: Floats) -> Floats:
-    """Return how badly (K,) [m²] poses (K, 3) agree with a curve."""
-    station, offset = curve.project(poses[:, :2])
-    turn = poses[:, 2] - curve.at(station)[:, 2]
-    beyond = np.maximum(-station, 0.0) + np.maximum(station - curve.length, 0.0)
-    squared = np.square(offset) + np.square(beyond)
+    Stations and offsets (K,) [m] are theirs on the curve, turns (K,) [rad] from it.
+    """
+    beyond = np.maximum(-stations, 0.0) + np.maximum(stations - length, 0.0)
+    squared = np.square(offsets) + np.square(beyond)
     capped = np.minimum(squared, COSTS.max_squared_distance_m2)
-    return np.asarray(capped + COSTS.yaw_m2 * (1.0 - np.cos(turn)))
+    return np.asarray(capped + COSTS.yaw_m2 * (1.0 - np.cos(turns)))
 
 
 def _best_lane_change(
@@ -231,7 +230,8 @@ def _best_lane_change(
             curve = lane_change_curve(before.curve, after.curve, poses[k, :2])
             if curve is not None:
                 chain = tuple(dict.fromkeys((*before.chain, *after.chain)))
-                best = _Candidate(chain, cost, curve, before.pose_costs)
+                stations, _ = curve.project(poses[:, :2])
+                best = _Candidate(chain, cost, curve, stations, before.pose_costs)
     return best
 
 

@@ -71,9 +71,11 @@ class RuleCheck:
         self._stops = [rule for rule in rules if rule.kind == RuleKind.STOP and len(rule.line)]
         self._rights = [rule for rule in rules if rule.kind in YIELDING_KINDS and rule.over]
         self.rules = (*self._stops, *self._rights)
-        self._yielding = sorted({k for rule in self._rights for k in rule.lanes})
+        self._yielding = {k for rule in self._rights for k in rule.lanes}
         going_first = {k for rule in self._rights for k in rule.over}
-        self._involved = sorted(going_first.union(self._yielding))
+        self._involved = np.array(sorted(going_first.union(self._yielding)), dtype=np.int64)
+        boxes = np.array([network.lanes[k].box for k in self._involved]).reshape(-1, 2, 2)
+        self._low, self._high = boxes[:, 0], boxes[:, 1]
 
     def breaches(self, motion: Motion, conflicts: Sequence[Conflict]) -> list[Breach]:
         """Return the breaches of rules.
@@ -172,26 +174,27 @@ class RuleCheck:
 
         Each is given by its index and the time [s] at which it enters the conflict area.
         """
-        lanes = self._lanes_before(motion, *yielding, self._yielding)
+        lanes = self._lanes_before(motion, *yielding) & self._yielding
         if not lanes:
             return None
-        other_lanes = self._lanes_before(motion, *other, self._involved)
+        other_lanes = self._lanes_before(motion, *other)
         for rule in self._rights:
             goes_first = other_lanes & set(rule.over) and not other_lanes & set(rule.lanes)
             if lanes & set(rule.lanes) and goes_first:
                 return rule
         return None
 
-    def _lanes_before(
-        self, motion: Motion, n: int, entry: float, lanes: Sequence[int]
-    ) -> set[int]:
-        """Return which lanes a vehicle drives on in the last metres before a time [s]."""
+    def _lanes_before(self, motion: Motion, n: int, entry: float) -> set[int]:
+        """Return which lanes of rules a vehicle drives on in the last metres before a time [s]."""
         before = motion.is_present[n] & (motion.time <= entry + 1e-9)
         if not before.any():
             return set()
         driven = arc_lengths(motion.position[n])
         before &= driven >= driven[before][-1] - _LIMITS.lane_to_conflict_m
         poses = np.column_stack((motion.position[n, before], motion.heading[n, before]))
+        low, high = poses[:, :2].min(axis=0), poses[:, :2].max(axis=0)
+        near = ((self._low <= high) & (self._high >= low)).all(axis=1)
+        lanes = self._involved[near].tolist()
         return {k for k in lanes if on_lane(self.network.lanes[k], poses)}
 
 
