@@ -21,8 +21,8 @@ from scenario_gen.method.fitting import fit_template, FittingConfig
 from scenario_gen.method.routing import PlanningConfig
 from scenario_gen.method.sampling import Features, Observations, Posterior, Regression
 from scenario_gen.numerics import Bools, Floats, wrap_angle
-from scenario_gen.roads import build_road, draw_layout, layout_for, RoadConfig
-from scenario_gen.situation import clean_tracks, find_waits, Wait
+from scenario_gen.roads import build_road, RoadConfig
+from scenario_gen.situation import find_waits, Wait
 from scenario_gen.types import Dynamics, Encounter, Fit, Road, Route, Segmentation
 
 SIGMA, LENGTH, NOISE, DEGREE = 10.0, 100.0, 10.0, 3
@@ -75,11 +75,10 @@ def place(encounter: Encounter, segmentation: Segmentation) -> tuple[Road, Float
         RefusedError: it fits none of the paper's roads; the message has the reason for each.
     """
     reasons = []
-    for name in ROADS:
+    reach = max(60.0, float(np.ptp(encounter.position, axis=(0, 1)).max()))
+    for name, lanes in product(ROADS, (1, 2, 3)):
         try:
-            metric = draw_layout(
-                name, layout_for(name, clean_tracks(encounter), RoadConfig()), RoadConfig()
-            )
+            metric = build_road(name, None, RoadConfig(lanes=lanes, arm_length=reach))
             fit = fit_template(
                 encounter, segmentation, metric, FittingConfig(allow="lost_conflict")
             )

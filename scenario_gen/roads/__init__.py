@@ -13,7 +13,6 @@ from scenario_gen.roads.build import (
     ROADS,
     ROUNDABOUT,
 )
-from scenario_gen.roads.builtin import draw_layout, layout_for
 from scenario_gen.roads.clearance import (
     CONTACT_CELLS,
     footprint_fits,
@@ -75,7 +74,6 @@ __all__ = [
     "along_lanes",
     "best_place",
     "build_road",
-    "draw_layout",
     "draw_plan",
     "draw_route",
     "drivable_width",
@@ -91,7 +89,6 @@ __all__ = [
     "is_vector_map",
     "lane_along",
     "lane_graph",
-    "layout_for",
     "lights_of",
     "max_repair",
     "nearest_pose_with_room",

@@ -14,22 +14,21 @@ from scipy.spatial.distance import cdist
 from scenario_gen.base.documents import shown
 from scenario_gen.base.errors import did_you_mean, InputError, reading, RefusedError
 from scenario_gen.base.registry import Registry
-from scenario_gen.roads.builtin import draw_corridor, draw_layout, draw_paper, layout_for
 from scenario_gen.roads.config import refuse_too_many_cells, RoadConfig
+from scenario_gen.roads.corridor import draw_corridor
 from scenario_gen.roads.junctions import draw_junction, draw_roundabout
 from scenario_gen.roads.lights import LIT
 from scenario_gen.roads.nav2 import read_map
 from scenario_gen.roads.obstacles import parked_cars, read_obstacles, with_obstacles
 from scenario_gen.roads.outline import road_of_shape, Shape
-from scenario_gen.roads.shaped import bends, draw_along, draw_merge, fitting_width, STRAIGHT_LINE
+from scenario_gen.roads.pavement import ARM_COUNT
+from scenario_gen.roads.shaped import draw_along, draw_merge, draw_paper, fitting_width, main_shape
 from scenario_gen.roads.vector.read import FORMATS, is_vector_map, read_network, split, vector_road
 from scenario_gen.situation import (
-    main_line,
     mirrored,
     refuse_reversing,
     refuse_too_large,
     Situation,
-    to_frenet,
     traffic_side,
 )
 from scenario_gen.types import Encounter, LaneNetwork, Note, NoteKind, Road
@@ -60,7 +59,7 @@ def build_road(
     Examples:
         >>> from scenario_gen import build_road
         >>> build_road("straight")
-        Road('straight', 120.2 x 11 m)
+        Road('straight', 124.2 x 11 m)
     """
     obstacles = read_obstacles(config.obstacles)
     if isinstance(name_or_path, (str, Path)):
@@ -220,26 +219,21 @@ def draw_main_road(name: str, encounter: Encounter | None, config: RoadConfig) -
     junction with the recorded arms.
     """
     if encounter is None:
-        if name == "curve":
-            return draw_along(name, STRAIGHT_LINE, max(config.lanes, 1), config)
-        return draw_layout(name, layout_for(name, None, config), config)
+        shape, lanes = main_shape(name, (), config)
+        return draw_along(name, shape, config.lanes or lanes, config)
     situation = Situation.of(encounter)
     tracks = situation.drivers
     config = fitting_width(tracks, config)
-    is_junction = name in ("t_intersection", "four_way")
+    is_junction = ARM_COUNT[name] > 2
     if is_junction and config.priority in LIT and encounter.lights:
         return draw_junction(name, situation, config)
     try:
-        frenet = to_frenet(tracks)
+        shape, lanes = main_shape(name, tracks, config)
     except RefusedError:  # turns or crossings need a junction
-        has_u_turn = any(track.makes_u_turn for track in tracks)
-        if is_junction and not has_u_turn:
+        if is_junction or any(track.makes_u_turn for track in tracks):
             return draw_junction(name, situation, config)
-    else:
-        main = main_line(frenet, tracks)
-        if bends(name, main):
-            return draw_along(name, main, config.lanes or frenet.spread().lanes, config)
-    return draw_layout(name, layout_for(name, tracks, config), config, tracks)
+        raise
+    return draw_along(name, shape, config.lanes or lanes, config)
 
 
 CORRIDOR = "corridor"

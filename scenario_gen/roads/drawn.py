@@ -74,8 +74,10 @@ def draw_plan(plan: Plan, name: str, config: RoadConfig, box: Floats | None = No
     if box is None:
         outlines = [shapely.MultiPoint(lane.outline) for lane in other_lanes]
         box = np.reshape(shapely.total_bounds([drawing.surface, *outlines]), (2, 2))
-        box = box + np.array([[-VERGE_M], [VERGE_M]])
-        box[0] = np.floor(box[0])
+        kerb = plan.arms[0].inward * config.lane_width  # lies on the edges of cells
+        beyond = (VERGE_M - box[0] - kerb) / config.resolution
+        box[1] += VERGE_M
+        box[0] = -kerb - config.resolution * np.ceil(beyond - 1e-6)
     low = box[0]
     surface = shapely.transform(drawing.surface, lambda points: points - low)
     return draw_lanes(network.moved(-low), surface, config, box - low)
@@ -111,8 +113,9 @@ class _RoadDrawing:
         self._width = config.lane_width
         # Lanes inward lie to the right of the dividing line (1) or to its left (-1).
         self._sign = 1.0 if config.traffic_side == "right" else -1.0
-        self._arm_count = len(plan.arms) if plan.has_junction else 1  # a road through has one
-        self._lines = [self._dividing_line(k) for k in range(len(plan.arms))]
+        self._lines = [
+            arm.line.cut(0.0, arm.line.length - plan.ring, _ARM_STEP_M) for arm in plan.arms
+        ]
         has_corners = plan.has_junction and not plan.ring and not plan.has_ramp
         self._corner_radius = config.corner_radius if has_corners else 0.0
         self.surface = paved(self._paved_pieces(), self._corner_radius)
@@ -126,7 +129,7 @@ class _RoadDrawing:
             self._mouths = self._find_mouths()
         self._lane_index: dict[tuple[int, bool, int], int] = {}  # by arm, inward, and number
         self._arm_of_route: dict[int, int] = {}  # the arm that each route's lane comes from
-        for k in range(self._arm_count):
+        for k in range(len(plan.arms)):
             self._add_arm_lanes(k, inward=True)
             self._add_arm_lanes(k, inward=False)
         if plan.has_junction:
@@ -180,13 +183,13 @@ class _RoadDrawing:
         """Return cycle lanes and crossings; their indices continue those of the car lanes."""
         others = self._cycle_lanes() if self._config.cycle_lane else []
         if self._config.crossing != "none":
-            others += [self._crossing(k) for k in range(self._arm_count)]
+            others += [self._crossing(k) for k in range(len(self._lines))]
         return others
 
     def _cycle_lanes(self) -> list[Lane]:
         lanes: list[Lane] = []
         index: dict[tuple[int, bool], int] = {}
-        for k in range(self._arm_count):
+        for k in range(len(self._lines)):
             for inward in (True, False):
                 count = self._lane_count(k, inward=inward)
                 inner = count * self._width
@@ -215,8 +218,6 @@ class _RoadDrawing:
         """Return the route between the cycle lanes of two arms; None if it is too sharp."""
         counts = self._plan.arms[a].inward, self._plan.arms[b].outward
         start, goal = (count * self._width + self._config.cycle_lane / 2.0 for count in counts)
-        if self._plan.axis is not None and max(a, b) < 2 and start == goal:
-            return self._route_along_axis(a, start)
         return self._clothoid(a, start, b, goal, _MAX_CYCLIST_CURVATURE_PER_M)
 
     def _crossing(self, k: int) -> Lane:
@@ -233,11 +234,7 @@ class _RoadDrawing:
         return crossing_lane(f"crossing {k + 1}", line, stations, reach)
 
     def _lane_count(self, arm: int, *, inward: bool) -> int:
-        """Return the number of lanes of an arm; a road through has one arm with all its lanes."""
-        arms = self._plan.arms
-        if inward:
-            return arms[arm].inward
-        return arms[arm].outward if self._plan.has_junction else arms[1].inward
+        return self._plan.arms[arm].inward if inward else self._plan.arms[arm].outward
 
     def _add_arm_lanes(self, k: int, *, inward: bool) -> None:
         count = self._lane_count(k, inward=inward)
@@ -295,21 +292,6 @@ class _RoadDrawing:
                 half = route.length / 2.0
                 inner = route.curve.cut(half, route.curve.length - half)
                 yield swept(inner, route.length, route.width, route.trailer)
-
-    def _dividing_line(self, k: int) -> Curve:
-        """Return the dividing line of an arm from its end to the middle of the junction.
-
-        That of a road through leads from end to end.
-        """
-        axis = self._plan.axis
-        if axis is not None and k < 2:
-            line = axis if k == 0 else axis.reversed()
-            if not self._plan.has_junction:
-                return line
-            return line.cut(0.0, float(line.project(np.zeros((1, 2)))[0][0]), _ARM_STEP_M)
-        start = reverse(self._plan.arms[k].pose)
-        length = -float((start[:2] * unit(start[2])).sum()) - self._plan.ring
-        return Curve(np.array([start, [*(start[:2] + length * unit(start[2])), start[2]]]))
 
     def _find_mouths(self) -> list[float]:
         """Return how far [m] from its end each arm has its lanes."""
@@ -407,19 +389,7 @@ class _RoadDrawing:
         driven = self._driven.get(connection)
         if driven is not None:
             return driven.cut(self._mouths[a], driven.length - self._mouths[b], _ROUTE_STEP_M)
-        if self._plan.axis is not None and max(a, b) < 2 and i == j:
-            return self._route_along_axis(a, (i + 0.5) * self._width)
         return self._clothoid(a, (i + 0.5) * self._width, b, (j + 0.5) * self._width)
-
-    def _route_along_axis(self, a: int, offset: float) -> Curve:
-        """Return the route from the first arm's mouth to the second one's, or back.
-
-        It has an offset [m] from the dividing line.
-        """
-        assert self._plan.axis is not None
-        line = self._plan.axis if a == 0 else self._plan.axis.reversed()
-        line = line.cut(self._mouths[a], line.length - self._mouths[1 - a], _ROUTE_STEP_M)
-        return Curve(line.at_offset(line.station, -self._sign * offset))
 
     def _clothoid(
         self,

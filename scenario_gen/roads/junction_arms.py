@@ -12,7 +12,7 @@ from scenario_gen.numerics import Floats
 from scenario_gen.numerics.plane import angle_between, unit, unit_left
 from scenario_gen.roads.config import RoadConfig
 from scenario_gen.roads.pavement import ARM_COUNT, LANE_GAP_M
-from scenario_gen.situation import Track, turn_of
+from scenario_gen.situation import pair_crossings, Track, turn_of
 
 EndKey = tuple[int, bool]
 """A vehicle, and whether the end of its path is the start."""
@@ -22,8 +22,10 @@ SURE_LENGTH_M = 5.0
 _SAME_ARM_RAD = np.radians(30.0)
 _MERGED_ARMS_RAD = np.radians(45.0)  # if the road has too few arms otherwise
 _MAX_REMAINING_TURN_RAD = np.radians(75.0)  # of a vehicle that is still turning into an arm
+_UNNOTICED_TURN_RAD = np.radians(12.0)  # of an arm
 _STEADY_TURN_RAD = np.radians(6.0)
 _STRAIGHT_THROUGH_RAD = np.radians(20.0)
+_U_TURN_WIDTH_M = 12.0  # between the lanes of a U-turn
 _MAX_LANES_BETWEEN_COUNT = 4  # left free between the two directions
 
 
@@ -93,6 +95,28 @@ class ArmLanes:
         return max(lanes, default=0) + 1
 
 
+def junction_centre(tracks: tuple[Track, ...]) -> Floats:
+    """Return (2,) [m] the mean of the places where paths cross and turn.
+
+    Without any it is the mean of all recorded positions.
+    """
+    crossings = list(pair_crossings(tracks))
+    points: list[Floats] = []
+    for i, track in enumerate(tracks):
+        points += [track.curve.at(crossing.first)[:2] for k, _, crossing in crossings if k == i]
+        if track.turns and not points:
+            points.append(track.curve.points[_middle_of_turn(track), :2])
+    if not points:
+        points = [track.poses[:, :2].mean(axis=0) for track in tracks]
+    return np.asarray(np.mean(points, axis=0))
+
+
+def _middle_of_turn(track: Track) -> int:
+    """Return the index of the path's point at which half of its turn is done."""
+    yaw = track.curve.points[:, 2]
+    return int(np.argmin(np.abs(yaw - (yaw[0] + yaw[-1]) / 2.0)))
+
+
 def find_arms(
     name: str, tracks: tuple[Track, ...], centre: Floats, ring: float = 0.0
 ) -> list[ArmDirection]:
@@ -112,6 +136,7 @@ def find_arms(
     arms = _cluster([end for end in ends if end.reaches_arm])
     _merge_to_count(name, arms, tracks)
     _assign_unreached(name, arms, [end for end in ends if not end.reaches_arm])
+    _make_regular(arms, tracks)
     if not arms:  # all ends are on the ring
         arms.append(ArmDirection(0.0, []))
     _fill_to_count(name, arms)
@@ -194,6 +219,16 @@ def _assign_unreached(name: str, arms: list[ArmDirection], ends: list[PathEnd]) 
                 arms.append(ArmDirection(end.yaw, [end]))
 
 
+def _make_regular(arms: list[ArmDirection], tracks: tuple[Track, ...]) -> None:
+    """Turn arms towards right angles with the longest one, as far as paths hardly notice it."""
+    longest = max(arms, key=lambda arm: arm.reach(tracks), default=None)
+    for arm in arms:
+        assert longest is not None
+        off = angle_between(arm.yaw, longest.yaw)
+        deviation = off - np.round(off / (np.pi / 2.0)) * np.pi / 2.0
+        arm.yaw -= float(np.clip(deviation, -_UNNOTICED_TURN_RAD, _UNNOTICED_TURN_RAD))
+
+
 def _fill_to_count(name: str, arms: list[ArmDirection]) -> None:
     """Add arms opposite or at right angles to others until a road has its number."""
     while len(arms) < ARM_COUNT[name]:
@@ -252,8 +287,10 @@ def _lanes_of_ends(offset: dict[EndKey, float], width: float) -> dict[EndKey, in
     outward = {key: at for key, at in offset.items() if not key[1]}
     free = 0
     if inward and outward:
-        between = min(inward.values()) + min(outward.values())
-        free = min(max(round(between / width) - 1, 0), _MAX_LANES_BETWEEN_COUNT)
+        between = round((min(inward.values()) + min(outward.values())) / width)
+        if {vehicle for vehicle, _ in inward} & {vehicle for vehicle, _ in outward}:  # U-turns
+            between = max(between, int(np.ceil(_U_TURN_WIDTH_M / width)))
+        free = min(max(between - 1, 0), _MAX_LANES_BETWEEN_COUNT)
     lanes_in, lanes_out = _numbered_lanes(inward, width), _numbered_lanes(outward, width)
     return {
         **{key: lane + (free + 1) // 2 for key, lane in lanes_in.items()},

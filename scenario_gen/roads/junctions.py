@@ -11,18 +11,21 @@ road, so there is room for it.
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from itertools import product
+from typing import NamedTuple
 
 import numpy as np
 
 from scenario_gen.base.errors import RefusedError
 from scenario_gen.numerics import Floats
-from scenario_gen.roads.builtin import junction_centre
+from scenario_gen.numerics.plane import place
 from scenario_gen.roads.config import RoadConfig
 from scenario_gen.roads.drawn import draw_plan
 from scenario_gen.roads.junction_arms import (
     ArmDirection,
+    ArmLanes,
     EndKey,
     find_arms,
+    junction_centre,
     lanes_of_arm,
     SURE_LENGTH_M,
 )
@@ -30,11 +33,12 @@ from scenario_gen.roads.lights import recorded_lights
 from scenario_gen.roads.pavement import END_ROOM_M, JUNCTION_SLACK_M, MIN_ARM_M
 from scenario_gen.roads.plan import aligned, Arm, Connection, Driven, Plan
 from scenario_gen.roads.shaped import fitting_width
-from scenario_gen.roads.ways import draw_ring_route, draw_route
+from scenario_gen.roads.ways import draw_ring_route, draw_route, draw_u_turn
 from scenario_gen.situation import driver_rows, sharpness_of, Situation, Track
 from scenario_gen.types import Encounter, Note, NoteKind, Road, YIELD
 
 _MAX_LANES_COUNT = 8
+_FACING = np.cos(np.radians(170.0))  # arms opposite
 _SWEPT_MARGIN_M = 0.6  # on each side of a footprint on its route
 
 
@@ -42,7 +46,7 @@ def draw_junction(name: str, situation: Situation, config: RoadConfig) -> Road:
     """Draw a junction with arms where the recorded vehicles come from and go to.
 
     Args:
-        name: `t_intersection` or `four_way`.
+        name: of a built-in road.
         situation: of the recording.
         config: how it is drawn.
 
@@ -53,44 +57,81 @@ def draw_junction(name: str, situation: Situation, config: RoadConfig) -> Road:
     tracks = situation.drivers
     centre = junction_centre(tracks)
     directions = find_arms(name, tracks, centre)
-    longest = max(
-        directions,
-        key=lambda direction: max((end.distance for end in direction.ends), default=0.0),
-    )
-    turn = np.pi - longest.yaw  # the longest arm leads west
-    lane_of: dict[EndKey, tuple[int, int]] = {}  # arm and lane
-    arms: list[Arm] = []
-    for direction in directions:
-        lanes = lanes_of_arm(direction, config)
-        inward, outward = lanes.count(inward=True), lanes.count(inward=False)
-        if max(inward, outward) > _MAX_LANES_COUNT:
-            raise RefusedError(
-                f"road {name} would need {max(inward, outward)} lanes in one direction; at most "
-                f"{_MAX_LANES_COUNT} are drawn"
-            )
-        needed = direction.reach(tracks) + END_ROOM_M + JUNCTION_SLACK_M
-        reach = config.arm_length or max(needed, MIN_ARM_M)
-        end = Arm.towards(direction.yaw + turn, reach, 0, lanes.offset).pose
-        lane_of.update({key: (len(arms), lane) for key, lane in lanes.lane_of.items()})
-        arms.append(Arm(end, max(inward, config.lanes), max(outward, config.lanes)))
-
+    longest = max(directions, key=lambda direction: direction.reach(tracks))
+    frame = _westwards(centre, longest)
+    arms, lane_of = _arms_of(name, directions, tracks, frame[2], config)
     driven = []
     for i, track in enumerate(tracks):
         if not track.still and {(i, True), (i, False)} <= lane_of.keys():
             connection = Connection(*lane_of[i, True], *lane_of[i, False])
             start = arms[connection.from_arm].lane(connection.from_lane, config, inward=True)
             goal = arms[connection.to_arm].lane(connection.to_lane, config, inward=False)
-            route = draw_route(start, goal, sharpness=sharpness_of(track))
+            if connection.from_arm == connection.to_arm:
+                route = draw_u_turn(start, goal, np.zeros(2))
+            else:
+                route = draw_route(start, goal, sharpness=sharpness_of(track))
             if route is not None:
                 vehicle = track.vehicle
                 width = vehicle.width + 2.0 * _SWEPT_MARGIN_M
                 size = vehicle.length, width, vehicle.trailer
                 driven.append(Driven(connection, route, *size))
-    drawn_for = aligned(tracks, lane_of, np.array([*centre, 0.0]), np.array([0.0, 0.0, turn]))
-    yielding = _yielding_arms(situation, lane_of, config)
-    lights = recorded_lights(situation, lane_of, drawn_for)
-    plan = Plan(arms, driven=driven, yielding=yielding, drawn_for=drawn_for, lights=lights)
-    return draw_plan(plan, name, config)
+    plan = Plan(
+        arms,
+        driven,
+        yielding=_yielding_arms(situation, lane_of, config),
+        drawn_for=aligned(tracks, lane_of, frame),
+    )
+    lights = recorded_lights(situation, lane_of, plan.drawn_for)
+    return draw_plan(replace(plan, lights=lights), name, config)
+
+
+def _westwards(centre: Floats, direction: ArmDirection) -> Floats:
+    """Return the recording's frame (3,) on a road about the origin, with an arm to the west."""
+    turn = np.pi - direction.yaw
+    return np.array([*place(np.array([0.0, 0.0, turn]), -centre[0], -centre[1]), turn])
+
+
+def _arms_of(
+    name: str,
+    directions: list[ArmDirection],
+    tracks: tuple[Track, ...],
+    turn: float,
+    config: RoadConfig,
+    ring: float = 0.0,
+) -> tuple[list[Arm], dict[EndKey, tuple[int, int]]]:
+    """Return arms in some directions, turned [rad], and the arm and lane of each path's end.
+
+    Arms of a roundabout with a radius `ring` [m] have one lane per direction.
+
+    Raises:
+        RefusedError: they would have too many lanes.
+    """
+    lane_of: dict[EndKey, tuple[int, int]] = {}
+    arms: list[Arm] = []
+    offsets: list[float] = []
+    for direction in directions:
+        lanes = lanes_of_arm(direction, config)
+        if ring:
+            lanes = ArmLanes(0.0, dict.fromkeys(lanes.lane_of, 0))
+        inward, outward = (
+            max(lanes.count(inward=side), 1 if ring else config.lanes) for side in (True, False)
+        )
+        if max(inward, outward) > _MAX_LANES_COUNT:
+            raise RefusedError(
+                f"road {name} would need {max(inward, outward)} lanes in one direction; at most "
+                f"{_MAX_LANES_COUNT} are drawn"
+            )
+        needed = direction.reach(tracks) + END_ROOM_M + max(JUNCTION_SLACK_M, ring)
+        reach = config.arm_length or max(needed, ring + MIN_ARM_M)
+        lane_of.update({key: (len(arms), lane) for key, lane in lanes.lane_of.items()})
+        offset = lanes.offset
+        if not direction.ends:  # straight on from the arm opposite
+            facing = [np.cos(other.yaw - direction.yaw) < _FACING for other in directions]
+            offset = -sum(at for at, faces in zip(offsets, facing, strict=False) if faces)
+        offsets.append(offset)
+        arm = Arm.towards(direction.yaw + turn, reach, inward, offset)
+        arms.append(replace(arm, outward=outward))
+    return arms, lane_of
 
 
 def _yielding_arms(
@@ -137,45 +178,35 @@ class _RingLimits:
 _RING = _RingLimits()
 
 
-@dataclass(frozen=True, eq=False)
-class _Ring:
-    """A roundabout's lane: the centre (2,) [m] in the recording, and the radius [m].
+class _Ring(NamedTuple):
+    """A roundabout's lane.
 
     Attributes:
         centre: (2,) [m] in the recording's frame.
         radius: [m].
         speed: [m/s] the highest recorded one there.
-        recorded: whether a recorded vehicle drives around it.
     """
 
     centre: Floats
     radius: float
     speed: float = 0.0
-    recorded: bool = True
 
-    @classmethod
-    def for_recording(cls, tracks: tuple[Track, ...], config: RoadConfig) -> "_Ring":
-        """Return the ring for the speeds of a recording.
 
-        A recorded ring is drawn as it was, if cars can drive around it as fast.
-        """
-        recorded = _recorded_ring(tracks, config)
-        if recorded is not None:
-            speed = _highest_speed(tracks, recorded.centre, recorded.radius + _RING.off_ring_m)
-            needed = speed**2 / _RING.max_lateral_mps2
-            radius = min(max(recorded.radius, needed), _RING.max_radius_m)
-            return cls(recorded.centre, radius, speed)
-        centre = junction_centre(tracks)
-        radii = np.arange(_RING.min_radius_m, _RING.max_radius_m, 0.25)
-        for radius in np.append(radii, _RING.max_radius_m).tolist():
-            speed = _highest_speed(tracks, centre, radius + _RING.near_ring_m)
-            if speed**2 <= _RING.usual_lateral_mps2 * radius:
-                break
-        return cls(centre, radius, speed, recorded=False)
+def _ring_for_speed(tracks: tuple[Track, ...]) -> _Ring:
+    """Return the ring for a recording without one: the smallest for its speeds, or the largest."""
+    centre = junction_centre(tracks)
+    radii = np.arange(_RING.min_radius_m, _RING.max_radius_m, 0.25)
+    for radius in np.append(radii, _RING.max_radius_m).tolist():
+        speed = _highest_speed(tracks, centre, radius + _RING.near_ring_m)
+        if speed**2 <= _RING.usual_lateral_mps2 * radius:
+            break
+    return _Ring(centre, radius, speed)
 
 
 def draw_roundabout(name: str, encounter: Encounter | None, config: RoadConfig) -> Road:
     """Draw a roundabout with one lane, sized for the recorded speeds, with arms where needed.
+
+    A recorded ring is drawn as it was, if cars can drive around it as fast.
 
     Raises:
         RefusedError: the recorded vehicles drive too fast for it, side by side, or use more than
@@ -184,12 +215,13 @@ def draw_roundabout(name: str, encounter: Encounter | None, config: RoadConfig) 
     if encounter is None:
         ring = _Ring(np.zeros(2), _RING.min_radius_m)
         directions = [ArmDirection(k * np.pi / 2.0, []) for k in range(4)]
-        return _draw_ring(name, config, ring, directions)
+        return draw_plan(_ring_plan(name, config, ring, directions, ()), name, config)
 
     situation = Situation.of(encounter)
     tracks = situation.drivers
     config = fitting_width(tracks, config)
-    ring = _Ring.for_recording(tracks, config)
+    recorded = _recorded_ring(tracks, config)
+    ring = recorded or _ring_for_speed(tracks)
     if ring.speed > np.sqrt(_RING.max_lateral_mps2 * ring.radius):
         possible = float(np.sqrt(_RING.max_lateral_mps2 * _RING.max_radius_m))
         raise RefusedError(
@@ -199,7 +231,15 @@ def draw_roundabout(name: str, encounter: Encounter | None, config: RoadConfig) 
     directions = find_arms(name, tracks, ring.centre, ring.radius + _RING.near_ring_m)
     for direction in directions:
         _refuse_parallel_lanes(direction, config)
-    return _draw_ring(name, config, ring, directions, situation)
+    plan = _ring_plan(name, config, ring, directions, tracks)
+    lane_of = {end.key: (a, 0) for a, arm in enumerate(directions) for end in arm.ends}
+    used = {arm for (_, inward), (arm, _) in lane_of.items() if inward}
+    yielding = set(range(len(plan.arms))) - used | _yielding_arms(situation, lane_of, config)
+    notes = () if recorded else (Note.of(NoteKind.NO_RING, radius=ring.radius),)
+    frame = _westwards(ring.centre, directions[0])
+    drawn_for = aligned(tracks, lane_of, frame)
+    plan = replace(plan, yielding=yielding, notes=notes, drawn_for=drawn_for)
+    return draw_plan(plan, name, config)
 
 
 def _refuse_parallel_lanes(direction: ArmDirection, config: RoadConfig) -> None:
@@ -218,22 +258,16 @@ def _refuse_parallel_lanes(direction: ArmDirection, config: RoadConfig) -> None:
         )
 
 
-def _draw_ring(
+def _ring_plan(
     name: str,
     config: RoadConfig,
     ring: _Ring,
     directions: list[ArmDirection],
-    situation: Situation | None = None,
-) -> Road:
-    """Draw a roundabout with arms in some directions, for a recording if there is one."""
-    tracks = () if situation is None else situation.drivers
+    tracks: tuple[Track, ...],
+) -> Plan:
+    """Return the plan of a roundabout with arms in some directions, which all give way."""
     turn = np.pi - directions[0].yaw
-    arms = []
-    for direction in directions:
-        needed = direction.reach(tracks) + END_ROOM_M + 2.0 * JUNCTION_SLACK_M
-        reach = config.arm_length or max(needed, ring.radius + MIN_ARM_M)
-        arms.append(Arm.towards(direction.yaw + turn, reach, 1))
-
+    arms, _ = _arms_of(name, directions, tracks, turn, config, ring.radius)
     length = max((track.vehicle.length for track in tracks), default=5.0)
     width = max((track.vehicle.width for track in tracks), default=2.0) + 2.0 * _SWEPT_MARGIN_M
     driven = []
@@ -242,25 +276,7 @@ def _draw_ring(
         route = draw_ring_route(start, goal, np.zeros(2), ring.radius)
         if route is not None:
             driven.append(Driven(Connection(a, 0, b, 0), route, length, width))
-
-    lane_of = {end.key: (a, 0) for a, arm in enumerate(directions) for end in arm.ends}
-    drawn_for = aligned(tracks, lane_of, np.array([*ring.centre, 0.0]), np.array([0.0, 0.0, turn]))
-    used = {arm for (_, inward), (arm, _) in lane_of.items() if inward}
-    yielding = set(range(len(arms))) - used
-    notes = []
-    if situation is not None:
-        yielding |= _yielding_arms(situation, lane_of, config)
-        if not ring.recorded:
-            notes.append(Note.of(NoteKind.NO_RING, radius=ring.radius))
-    plan = Plan(
-        arms,
-        driven=driven,
-        ring=ring.radius,
-        yielding=yielding,
-        drawn_for=drawn_for,
-        notes=tuple(notes),
-    )
-    return draw_plan(plan, name, config)
+    return Plan(arms, driven, ring=ring.radius, yielding=range(len(arms)))
 
 
 def drives_about_ring(situation: Situation, config: RoadConfig) -> bool:
@@ -284,7 +300,9 @@ def _recorded_ring(tracks: tuple[Track, ...], config: RoadConfig) -> _Ring | Non
         centre, radius = np.array([x, y]), float(np.sqrt(rest + x * x + y * y))
         near = np.abs(np.hypot(*(points - centre).T) - radius) < _RING.off_ring_m
         if near.all() and radius < _RING.max_recorded_radius_m:
-            return _Ring(centre, max(radius, _RING.min_recorded_radius_m))
+            speed = _highest_speed(tracks, centre, radius + _RING.off_ring_m)
+            needed = max(speed**2 / _RING.max_lateral_mps2, _RING.min_recorded_radius_m)
+            return _Ring(centre, min(max(radius, needed), _RING.max_radius_m), speed)
         points = points[near]
     return None
 

@@ -4,14 +4,14 @@
 """The plan of a drawn road: its arms, and the routes that it is drawn for."""
 
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
 import numpy as np
 
 from scenario_gen.numerics import Floats
 from scenario_gen.numerics.curve import Curve
-from scenario_gen.numerics.plane import place, unit, unit_left
+from scenario_gen.numerics.plane import unit, unit_left
 from scenario_gen.roads.config import RoadConfig
 from scenario_gen.roads.ways import reverse
 from scenario_gen.situation import Track
@@ -32,12 +32,12 @@ class Arm:
     """An arm of a road.
 
     Attributes:
-        pose: (3,) x, y [m], yaw [rad] of the end of its dividing line, heading out of the road.
+        line: its dividing line, from its end to the middle of the road.
         inward: its number of lanes towards the junction.
         outward: its number of lanes away from it.
     """
 
-    pose: Floats
+    line: Curve
     inward: int
     outward: int
 
@@ -47,21 +47,25 @@ class Arm:
 
         Its dividing line is `offset` [m] to the left of the origin.
         """
-        return cls(np.array([*(reach * unit(yaw) + offset * unit_left(yaw)), yaw]), lanes, lanes)
+        foot = offset * unit_left(yaw)
+        ends = np.stack((foot + reach * unit(yaw), foot))
+        return cls(Curve(np.column_stack((ends, np.full(2, yaw + np.pi)))), lanes, lanes)
 
     @classmethod
     def ramp(cls, entry: Floats, config: RoadConfig) -> "Arm":
         """Return an arm with one lane, in only, whose traffic enters at a pose (3,)."""
-        out = reverse(entry)
-        offset = 0.5 * config.lane_width * (1.0 if config.traffic_side == "right" else -1.0)
-        return cls(np.array([*(out[:2] - offset * unit_left(out[2])), out[2]]), 1, 0)
+        yaw = entry[2] + np.pi
+        left = float((entry[:2] * unit_left(yaw)).sum())
+        half = 0.5 * config.lane_width * (1.0 if config.traffic_side == "right" else -1.0)
+        arm = cls.towards(yaw, float((entry[:2] * unit(yaw)).sum()), 1, left - half)
+        return replace(arm, outward=0)
 
     def lane(self, k: int, config: RoadConfig, *, inward: bool) -> Floats:
         """Return the pose (3,) x, y [m], yaw [rad] of lane k, in the direction of its traffic."""
-        is_left = inward == (config.traffic_side == "right")
+        is_left = inward != (config.traffic_side == "right")
         left = (k + 0.5) * config.lane_width * (1.0 if is_left else -1.0)
-        yaw = self.pose[2]
-        return np.array([*(self.pose[:2] + left * unit_left(yaw)), yaw + np.pi if inward else yaw])
+        pose = self.line.at_offset(np.array(0.0), left)
+        return pose if inward else reverse(pose)
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,12 +89,10 @@ class Driven:
 
 @dataclass(frozen=True, eq=False)
 class Plan:
-    """The plan of a road; its arms lead away from the origin.
+    """The plan of a road about the origin.
 
     Attributes:
-        arms: its arms; an arm without lanes outward is a ramp.
-        axis: the dividing line from the end of the first arm to that of the second; None: these
-            arms are like the others.
+        arms: its arms; one without lanes outward is a ramp. A single arm is a road through.
         driven: routes through the junction.
         ring: radius [m] of a roundabout's lane about the origin; 0: there is none.
         yielding: the arms that give way if priorities are shown.
@@ -100,7 +102,6 @@ class Plan:
     """
 
     arms: Sequence[Arm]
-    axis: Curve | None = None
     driven: Sequence[Driven] = ()
     ring: float = 0.0
     yielding: Collection[int] = ()
@@ -110,8 +111,8 @@ class Plan:
 
     @property
     def has_junction(self) -> bool:
-        """Whether it is more than one road from its first arm to the second."""
-        return len(self.arms) > 2 or self.axis is None or len(self.driven) > 0
+        """Whether it is more than one road through."""
+        return len(self.arms) > 1
 
     @property
     def has_ramp(self) -> bool:
@@ -127,25 +128,19 @@ def lane_id(arm: int, lane: int, *, inward: bool) -> str:
 def aligned(
     tracks: Sequence[Track],
     lane_of: Mapping[tuple[int, bool], tuple[int, int]],
-    pose: Floats,
-    pose_on_road: Floats,
-) -> DrawnFor | None:
-    """Return where a recording lies on the road that is drawn for it; None without a recording.
+    frame: Floats,
+) -> DrawnFor:
+    """Return where a recording lies on the road that is drawn for it.
 
     Args:
         tracks: of the recording.
         lane_of: arm and lane of the ends of its tracks, as far as they are known, by vehicle and
             whether it is the start.
-        pose: (3,) x, y [m], yaw [rad] in the recording's frame.
-        pose_on_road: the same on the road, about the plan's origin.
+        frame: (3,) x, y [m], yaw [rad] of the recording's frame, about the plan's origin.
     """
-    if not tracks:
-        return None
-    turn = pose_on_road[2] - pose[2]
     ids = {key: lane_id(*arm_and_lane, inward=key[1]) for key, arm_and_lane in lane_of.items()}
     lanes = tuple((ids.get((i, True), ""), ids.get((i, False), "")) for i in range(len(tracks)))
-    moved = place(np.array([*pose_on_road[:2], turn]), -pose[0], -pose[1])
-    return DrawnFor(np.array([*moved, turn]), lanes)
+    return DrawnFor(frame, lanes)
 
 
 def ways_through(road: Road) -> dict[tuple[int, int], Curve]:

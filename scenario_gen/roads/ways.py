@@ -22,7 +22,8 @@ Fits = Callable[[Floats], bool]
 
 MAX_CAR_CURVATURE_PER_M = 0.2
 _STEP_M = 0.25
-_PARALLEL_RAD = np.radians(8.0)
+_PARALLEL_RAD = np.radians(0.5)
+_MAX_TURN_RAD = np.radians(172.0)
 _MAX_BLENDED_TURN_RAD = np.radians(35.0)  # while changing to the line of the exit
 _MAX_SHIFT_CURVATURE_PER_M = 0.05  # of a lane change on the way
 _MAX_SHIFT_M = 12.0  # sideways
@@ -53,17 +54,19 @@ def draw_route(
     """
     turn = angle_between(leave[2], entry[2])
     ahead, left = relative(entry, leave[:2])
-    if abs(turn) < _PARALLEL_RAD:
-        return _fitting(_shifted(entry, ahead, left, turn), fits) if ahead > 1.0 else None
-    if abs(turn) > np.pi - _PARALLEL_RAD:
+    if abs(turn) > _MAX_TURN_RAD:
         return None
-
-    from_intersection = left / np.sin(turn)  # of the lines of entry and exit, to the exit
+    # From the intersection of the lines of entry and exit to the exit.
+    from_intersection = left / np.sin(turn) if abs(turn) > _PARALLEL_RAD else -1.0
     to_intersection = ahead - from_intersection * np.cos(turn)
-    for curvature, ramp in _bend_shapes(sharpness or 0.09, max_curvature):
+    room = min(to_intersection, from_intersection) - 0.5
+    usual = 0.09
+    if abs(turn) < _MAX_BLENDED_TURN_RAD:  # as gently as there is room
+        usual = 0.8 * abs(turn) / max(room, 1.0)
+    for curvature, ramp in _bend_shapes(sharpness or usual, max_curvature) if room > 0.0 else ():
         bend = _bend(round(turn, 9), round(curvature, 9), ramp)
         tangent = float(bend[-1, 1]) / np.sin(turn)
-        if tangent <= min(to_intersection, from_intersection) - 0.5:
+        if tangent <= room:
             joined = _joined(entry, to_intersection - tangent, bend, from_intersection - tangent)
             route = _fitting(joined, fits)
             if route is not None:
@@ -83,20 +86,21 @@ def _bend_shapes(curvature: float, max_curvature: float) -> Iterator[tuple[float
             yield sharp, 0.12
 
 
-def draw_u_turn(entry: Floats, leave: Floats, apex: float) -> Curve | None:
-    """Return the route between two poses (3,) with a half circle after `apex` [m].
+def draw_u_turn(entry: Floats, leave: Floats, apex: Floats) -> Curve | None:
+    """Return the route between two poses (3,) with a half circle that ends abreast of `apex`.
 
-    It is None if the half circle is too narrow, or begins before the exit.
+    It is None if the half circle is too narrow, or begins before the exit; `apex` is (2,) [m].
     """
     ahead, left = relative(entry, leave[:2])
     radius = abs(left) / 2.0
-    if radius < _MIN_U_TURN_RADIUS_M or apex <= max(ahead, 0.0):
+    before = relative(entry, apex)[0] - radius
+    if radius < _MIN_U_TURN_RADIUS_M or before <= max(ahead, 0.0):
         return None
     count = int(np.ceil(np.pi * radius / _STEP_M)) + 1
     angle = np.linspace(0.0, np.copysign(np.pi, left), count)
     signed = np.copysign(radius, left)
     arc = np.column_stack((signed * np.sin(angle), signed * (1.0 - np.cos(angle)), angle))
-    return _joined(entry, apex, arc, apex - ahead)
+    return _joined(entry, before, arc, before - ahead)
 
 
 def draw_ring_route(entry: Floats, leave: Floats, centre: Floats, radius: float) -> Curve | None:
@@ -167,17 +171,13 @@ def reverse(pose: Floats) -> Floats:
     return np.asarray(pose + np.array([0.0, 0.0, np.pi]))
 
 
-def extended(shape: Curve, extra: float, run: float) -> Curve:
-    """Return a shape from the origin along x, evenly turned by `extra` [rad] more.
-
-    It goes straight on for `run` [m] at both ends.
-    """
+def with_turn(shape: Curve, turn: float) -> Curve:
+    """Return a shape from the origin along x that turns by `turn` [rad], evenly more or less."""
     count = max(int(np.ceil(shape.length / _STEP_M)), 1)
     s = np.linspace(0.0, shape.length, count + 1)
     yaw = np.interp(s, shape.station, shape.points[:, 2])
-    yaw = yaw - yaw[0] + extra * s / shape.length
-    bent = np.column_stack((polyline_of(yaw, shape.length / count), yaw))
-    return _joined(np.zeros(3), run, bent, run)
+    yaw += (turn - yaw[-1] + yaw[0]) * s / shape.length - yaw[0]
+    return Curve(np.column_stack((polyline_of(yaw, shape.length / count), yaw)))
 
 
 @lru_cache(maxsize=512)

@@ -97,8 +97,8 @@ def encounter(request):
 def test_every_recorded_encounter_fits_two_roads_and_refusals_say_why(encounter):
     fitted = 0
     for road_name in ROADS:
-        road = build_road(road_name, encounter)
         try:
+            road = build_road(road_name, encounter)
             fit = fit_template(encounter, every(encounter), road)
         except RefusedError as error:
             assert "vehicle" in str(error)
