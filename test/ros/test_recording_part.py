@@ -15,6 +15,7 @@ from msg_conventions.hashes import hash_of, head_of
 from msg_conventions.tracks import decode_tracks
 from scenario_gen.base.errors import RefusedError
 from scenario_gen.logs import read_log
+from scenario_gen.method.fitting import FittingConfig
 from scenario_gen.method.shortening import cut
 from scenario_gen.ros.common.recording_part import request_part, send_part, TOPIC
 from scenario_gen.types import Encounter
@@ -46,7 +47,7 @@ def test_the_sender_of_a_recording_sends_the_requested_part_of_it_alone() -> Non
             raise RefusedError("too long")
 
     planner, sender = Node(), Node()
-    request_part(planner, attempt, whole, RefusedError("too long"))
+    request_part(planner, attempt, whole, RefusedError("too long"), FittingConfig())
     data = planner.sent[TOPIC]
     assert decode_tracks(data).start_ns > whole.start_ns, "stages pair messages by their stamp"
     assert f"of {whole.duration:.1f} s (too long)" in planner.statuses[0]

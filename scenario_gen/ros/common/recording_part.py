@@ -26,7 +26,7 @@ def request_part(
     attempt: Callable[[Encounter], object],
     encounter: Encounter,
     refusal: RefusedError,
-    config: FittingConfig = FittingConfig(),
+    config: FittingConfig,
 ) -> None:
     """Request the part of a recording that fits with the smallest loss.
 

@@ -29,6 +29,7 @@ from msg_conventions.tracks import decode_tracks
 from scenario_gen.base.cancelling import stop_if_cancelled
 from scenario_gen.base.errors import InputError, RefusedError, ScenarioGenError
 from scenario_gen.base.parameters import parameter, Parameters
+from scenario_gen.method.fitting import FittingConfig
 from scenario_gen.roads import build_road, RoadConfig
 from scenario_gen.ros.common.node_parameters import ROAD_NAMES
 from scenario_gen.ros.common.recording_part import request_part
@@ -47,8 +48,8 @@ class Config(Parameters):
         f"{', '.join(ROAD_NAMES)}, a map_server YAML file, or a vector map (.osm, .xodr, .xml)",
     )
     wait_for_tracks: bool = parameter(False, "publish no road before tracks arrive")
-    shorten: bool = parameter(True, "request a part of a recording that does not fit as a whole")
     road: RoadConfig = field(default_factory=RoadConfig)
+    fitting: FittingConfig = field(default_factory=FittingConfig)
 
 
 def road_of_url(url: str) -> str:
@@ -109,9 +110,10 @@ class RoadServer(StageNode):
         try:
             road = build_road(name, encounter, self.config.road)
         except RefusedError as error:
-            if encounter is None or not self.config.shorten:
+            if encounter is None or not self.config.fitting.shorten:
                 raise
-            request_part(self, partial(self._attempt, name), encounter, error)
+            attempt = partial(self._attempt, name)
+            request_part(self, attempt, encounter, error, self.config.fitting)
             return
         stamp_ns = stamp_of(tracks, "tracks") if tracks else 0
         grid = encode_map(road, stamp_ns)
