@@ -272,21 +272,23 @@ class Suite:
         rank = np.empty((len(trials), len(planners)), dtype=np.int64)
         for place, (_, k, number) in enumerate(cells):
             rank[k, number] = place
-        worst = rank.argmax(axis=1).tolist()
         order = np.argsort(-rank.max(axis=1)).tolist()
-        shown = order[:MAX_REPLAYS_COUNT]
-        vehicles = sum(len(trials[k].scenario.vehicles) for k in shown)
+        shown = order[: max(1, MAX_REPLAYS_COUNT // len(planners))]
+        driven = [(number, k) for k in shown for number in planners]
+        outcomes = [self.drives[number].outcomes[k] for number, k in driven]
+        of_drives = [trials[k] for _, k in driven]
+        vehicles = sum(len(trial.scenario.vehicles) for trial in of_drives)
         frames = max(REPLAY_BYTES // (FRAME_BYTES * vehicles), MIN_FRAMES_COUNT)
-        outcomes = [self.drives[number].outcomes[k] for k, number in enumerate(worst)]
-        data = drawings(outcomes, trials, shown, frames)
-        for drawing, k in zip(data["drives"], shown, strict=True):
-            drawing["sentence"] = f"{self.planners[worst[k]]} {drawing['sentence']}"
+        data = drawings(outcomes, of_drives, range(len(driven)), frames)
+        for drawing, (number, _) in zip(data["drives"], driven, strict=True):
+            drawing["sentence"] = f"{self.planners[number]}: {drawing['sentence']}"
         return render_page(
             "suite.html.j2",
             ("scene.js", "drives.js", "tables.js"),
             data,
             suite=self,
             rank=rank.tolist(),
+            worst=rank.argmax(axis=1).tolist(),
             order=order,
             shown=len(shown),
         )

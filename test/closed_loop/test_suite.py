@@ -125,5 +125,8 @@ def test_the_page_sorts_by_planner_and_links_to_scenarios(browser, driven):
             row.locator("a").click()
             assert row.get_attribute("aria-current") == "true"
             title = tab.page.locator("#title").inner_text()
-            assert row.locator("a").inner_text() in title and "Stands did not reach" in title
+            assert row.locator("a").inner_text() in title and "Stands: did not reach" in title
+            row.locator("button").first.click()
+            assert "IdmFollower: " in tab.page.locator("#title").inner_text()
+            assert row.get_attribute("aria-current") == "true"
         tab.page.close()

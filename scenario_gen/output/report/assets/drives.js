@@ -19,9 +19,10 @@ function show(number) {
     box[3] = Math.max(box[3], y);
   });
   shown = { drive, motion, view: new View(byId("stage"), box, 8), duration: motion.durations[0] };
-  document.querySelectorAll("tr[data-show]").forEach((row) => row.setAttribute("aria-current", String(Number(row.dataset.show) === number)));
+  const chosen = [...document.querySelectorAll(`[data-show="${number}"]`)].pop(); // a planner's verdict in a row, or the row
+  document.querySelectorAll("[data-show]").forEach((each) => each.setAttribute("aria-current", String(each === chosen || each === chosen.closest("tr"))));
   byId("title").textContent = `Scenario ${drive.name}: ${drive.sentence}`;
-  listFigures(document.querySelector(`tr[data-show="${number}"]`));
+  listFigures(chosen.closest("tr"));
   byId("time").value = 0;
   draw();
 }
@@ -115,10 +116,16 @@ document.addEventListener("keydown", (event) => {
   toggle();
 });
 byId("time")?.addEventListener("input", draw);
-document.querySelectorAll("tr[data-show]").forEach((row) => row.addEventListener("click", () => show(Number(row.dataset.show))));
+document.querySelectorAll("[data-show]").forEach((each) => each.addEventListener("click", (event) => {
+  event.stopPropagation();
+  show(Number(each.dataset.show));
+}));
 window.addEventListener("resize", draw);
 
 /** A link to a scenario, #s12, shows its replay. */
-const linked = () => Number(/^#s(\d+)$/.exec(location.hash)?.[1] ?? 0);
+const linked = () => {
+  const number = /^#s(\d+)$/.exec(location.hash)?.[1] ?? 0;
+  return Number(byId(`s${number}`)?.dataset.show ?? number);
+};
 window.addEventListener("hashchange", () => show(linked()));
 show(linked());
