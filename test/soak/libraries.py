@@ -32,7 +32,8 @@ def install(python: Path, *options: object) -> None:
         subprocess.run([sys.executable, "-m", "venv", python.parents[1]], check=True)
     pip = [python, "-m", "pip", "install", "--quiet"]
     lists = (word for name in LISTS for word in ("-r", ROOT / "requirements" / f"{name}.in"))
-    subprocess.run([*pip, *options, *lists, f"{ROOT}[ros]"], check=True)
+    for wanted in ([f"{ROOT}[ros]"], lists):  # at once pip tries releases of test tools for hours
+        subprocess.run([*pip, *options, *wanted], check=True)
     subprocess.run([*pip, "--no-deps", "--no-build-isolation", "-e", ROOT], check=True)
 
 
