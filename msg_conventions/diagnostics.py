@@ -3,9 +3,9 @@
 
 """Reports ⇄ diagnostic_msgs/DiagnosticArray: one status with key-values per node and subject.
 
-Used for `scenarios/info` (scenario_info.py), `road/info` and `fit/info` (hashes.py), `report`
-and `/diagnostics`. `header.stamp` is the template's stamp. On /diagnostics it is the time of the
-message, and a status about a template has the template's stamp as the value `template_stamp`.
+Used for `report`, `verdicts` and `/diagnostics`. `header.stamp` is the template's stamp. On
+/diagnostics it is the time of the message, and a status about a template has the template's stamp
+as the value `template_stamp`.
 """
 
 from collections.abc import Mapping, Sequence

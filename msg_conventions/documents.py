@@ -26,6 +26,7 @@ from scenario_gen.types import Note, note_kinds, recorded_notes
 
 TYPE = "std_msgs/msg/String"
 HASH_DIGITS = 12
+_DAMAGES = (AttributeError, LookupError, OverflowError, RecursionError, TypeError, ValueError)
 Document = TypeVar("Document")
 
 
@@ -52,15 +53,29 @@ def decode_document(kind: type[Document], data: bytes, source: str) -> Document:
     Raises:
         InputError: naming `source`, it is damaged, or no such document.
     """
+    return document_of(kind, json_of(data, source), source)
+
+
+def json_of(data: bytes, source: str) -> Mapping[str, Any]:
+    """Return the members of the object in a message.
+
+    Raises:
+        InputError: naming `source`, it is damaged, or no object.
+    """
     text = decode(STRING, data, source).data
+    with guarded(f"{source}: no JSON", *_DAMAGES):
+        return dict(json.loads(text))
+
+
+def document_of(kind: type[Document], values: Mapping[str, Any], source: str) -> Document:
+    """Return the dataclass with these members; others are ignored.
+
+    Raises:
+        InputError: naming `source`, a member is missing or damaged.
+    """
     with guarded(f"{source}: no {kind.__name__}", *_DAMAGES):
-        result: Document = typed(kind, json.loads(text))
+        result: Document = typed(kind, values)
         return result
-
-
-_DAMAGES = (
-    AttributeError, KeyError, OverflowError, RecursionError, TypeError, ValueError,
-)  # fmt: skip
 
 
 def short_hash(data: bytes) -> str:
@@ -107,15 +122,33 @@ def typed(kind: Any, value: Any) -> Any:
     """Return a value of JSON as a value of a type.
 
     Raises:
-        InputError, KeyError, TypeError, ValueError, OverflowError: it is none.
+        InputError, LookupError, TypeError, ValueError, OverflowError: it is none.
     """
-    origin, inner = get_origin(kind), get_args(kind)
-    if origin is UnionType:
-        return None if value is None else typed(inner[0], value)
+    if kind is Any:
+        return value
     if kind is Note:
         return recorded_notes([str(value[1])], str(value[0]))[0]
     if is_dataclass(kind):
         return _dataclass(kind, value)
+    if get_origin(kind) is not None:
+        return _collection(get_origin(kind), get_args(kind), value)
+    if issubclass(kind, tuple):  # named
+        kinds = tuple(_hints(kind).values())
+        return kind(*(typed(each, item) for each, item in zip(kinds, value, strict=True)))
+    return _single(kind, value)
+
+
+def _dataclass(kind: Any, values: Mapping[str, Any]) -> Any:
+    """Return a dataclass; other values are ignored."""
+    hints = _hints(kind)
+    known = {key: value for key, value in values.items() if key in hints}
+    return kind(**{key: typed(hints[key], value) for key, value in known.items()})
+
+
+def _collection(origin: Any, inner: tuple[Any, ...], value: Any) -> Any:
+    """Return a value of JSON as an array, a tuple, a set, a mapping, or what may be missing."""
+    if origin is UnionType:
+        return None if value is None else typed(inner[0], value)
     if origin is np.ndarray:
         values = np.array(value, dtype=get_args(inner[1])[0])
         if np.isinf(values).any():
@@ -124,11 +157,11 @@ def typed(kind: Any, value: Any) -> Any:
     if origin in (tuple, frozenset):
         kinds = [inner[0]] * len(value) if origin is frozenset or inner[-1] is ... else inner
         return origin(typed(each, item) for each, item in zip(kinds, value, strict=True))
-    if origin is not None:  # a mapping
-        return {str(key): typed(inner[1], each) for key, each in value.items()}
-    if issubclass(kind, tuple):  # named
-        kinds = tuple(_hints(kind).values())
-        return kind(*(typed(each, item) for each, item in zip(kinds, value, strict=True)))
+    return {str(key): typed(inner[1], each) for key, each in value.items()}
+
+
+def _single(kind: Any, value: Any) -> Any:
+    """Return a value of JSON as a number, a text, a truth or a member of an enumeration."""
     if kind is float:
         number = math.nan if value is None else float(value)
         if math.isinf(number):
@@ -139,10 +172,3 @@ def typed(kind: Any, value: Any) -> Any:
     if type(value) is not kind:
         raise TypeError(f"{value!r:.40} is no {kind.__name__}")
     return value
-
-
-def _dataclass(kind: Any, values: Mapping[str, Any]) -> Any:
-    """Return a dataclass; other values are ignored."""
-    hints = _hints(kind)
-    known = {key: value for key, value in values.items() if key in hints}
-    return kind(**{key: typed(hints[key], value) for key, value in known.items()})

@@ -3,19 +3,18 @@
 
 """The ego slot ⇄ `ego/start`, `ego/goal` (nav_msgs/Odometry) and `ego/witness` (trajectory.py).
 
-Start and goal belong to the last request whose `scenarios/info` names the vehicle as its `ego`.
+Start and goal belong to the last request whose `scenarios/info` names the vehicle as its `ego.id`.
 Frame: the road's. Stamp: the template's, also for the goal. Odometry: `child_frame_id` is
 `vehicle_<id>`, `pose.pose` the centre of the footprint with z = 0 and the yaw as a quaternion,
 `twist.twist.linear.x` the speed along the heading [m/s]. All else is 0. QoS: reliable,
 transient_local, depth 1.
 
 `ego/witness` has one message per scenario, before the scenario: a trajectory of the ego on the
-scenario's clock, which proves the scenario valid. `ego_witness` in `scenarios/info` is the SHA-256
+scenario's clock, which proves the scenario valid. `ego.witness` in `scenarios/info` is the SHA-256
 of the message. QoS as for `scenarios`.
 """
 
 from collections.abc import Iterator
-import json
 
 import numpy as np
 
@@ -53,13 +52,3 @@ def ego_messages(slot: EgoSlot, frame_id: str, stamp_ns: int) -> Iterator[tuple[
     child = f"vehicle_{token(slot.vehicle.id)}"
     for topic, state in (("ego/start", slot.start), ("ego/goal", slot.goal)):
         yield topic, encode_state(state, child, frame_id, stamp_ns)
-
-
-def ego_values(slot: EgoSlot | None) -> dict[str, str]:
-    """Return the ego's id, start and goal for `scenarios/info`; none without an ego."""
-    if slot is None:
-        return {}
-    start, goal = (
-        json.dumps([float(value) for value in state]) for state in (slot.start, slot.goal)
-    )
-    return {"ego": token(slot.vehicle.id), "ego_start": start, "ego_goal": goal}

@@ -66,7 +66,7 @@ def _without_stamps(grid: bytes) -> bytes:
 def template_hashes(messages: Mapping[str, bytes]) -> dict[str, str]:
     """Return the hashes of the template (its `tracks`) and the map.
 
-    Diagnostics and `scenarios/info` contain them.
+    Diagnostics contain them.
     """
     keys = {"tracks": TEMPLATE_HASH, "map": MAP_HASH}
     return {

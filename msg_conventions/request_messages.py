@@ -32,14 +32,14 @@ class RequestMessages:
     Attributes:
         encounter: the template.
         request: the request's id.
-        node: full name of the publishing node.
-        about: further values of every entry (names of template and road, hashes).
+        inputs: hashes of `tracks` and `map`.
+        names: of the template and the road.
     """
 
     encounter: Encounter
     request: str
-    node: str
-    about: Mapping[str, str] = field(default_factory=dict)
+    inputs: Mapping[str, str] = field(default_factory=dict)
+    names: tuple[str, str] = ("", "")
 
     def of_scenario(
         self, scenario: Scenario, requested: BoundaryStates, ego: EgoSlot | None
@@ -58,7 +58,13 @@ class RequestMessages:
         for message in (data,) if scenario.all_present else messages_of(data):
             yield SCENARIOS, message
         entry = scenario_entry(
-            scenario, data, self.request, self.node,
-            template=self.encounter.vehicles, asked=requested, ego=ego, about=self.about,
-        )  # fmt: skip
-        yield INFO, encode_info(entry, stamp)
+            scenario,
+            data,
+            self.request,
+            template=self.encounter.vehicles,
+            asked=requested,
+            ego=ego,
+            inputs=self.inputs,
+            names=self.names,
+        )
+        yield INFO, encode_info(entry)

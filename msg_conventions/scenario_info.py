@@ -1,341 +1,287 @@
 # SPDX-FileCopyrightText: 2026 The scenario_gen authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""`scenarios/info`: an entry for each scenario, then a summary of its request.
+"""`scenarios/info` (std_msgs/String, documents.py): an entry per scenario, then a summary.
 
-The type is diagnostic_msgs/DiagnosticArray.
-
-All keys of both are in this file; docs/interfaces.md lists them. Stamp: the template's. Entries
-are joined with their scenarios by the SHA-256 of the scenario's CDR bytes. QoS: reliable,
-transient_local, depth 1000.
+A message is one of the two; docs/interfaces.md explains their fields. Entries are joined with
+their scenarios by the SHA-256 of the scenario's CDR bytes. QoS: reliable, transient_local, depth
+1000.
 """
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
-import json
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
 
 from msg_conventions.cdr import stamp_of
-from msg_conventions.diagnostics import decode_diagnostics, encode_diagnostics, Level, Status
-from msg_conventions.ego import ego_values
-from msg_conventions.hashes import MAP_HASH, TEMPLATE_HASH
-from msg_conventions.scenario_facts import decode_decision, decode_facts, fact_values
+from msg_conventions.documents import document_of, encode_document, json_of
 from msg_conventions.scenarios import digest, encode_scenario, messages_of
-from scenario_gen.base.documents import parse_json
-from scenario_gen.base.errors import guarded, InputError
+from scenario_gen.base.errors import InputError
 from scenario_gen.numerics import Floats
 from scenario_gen.types import (
     BoundaryStates,
     Cause,
     Decided,
+    Decision,
     EgoSlot,
     Facts,
-    note_kinds,
+    Note,
+    ORDERS,
     Recorded,
-    recorded_notes,
     Scenario,
     ScenarioSet,
+    token,
     Vehicle,
 )
 
 INFO = "scenarios/info"
-REFUSED, ADAPTATION, TARGET = "refused.", "adaptation.", "target."
-DECIDED = ("decided.encounter", "decided.decision")  # recording, and the decision as JSON
-KINDS = f"{ADAPTATION}kinds"  # of the adaptations, in their order
-REACTION, CUT = (
-    "reaction.",
-    "reaction.cut.",
-)  # who reacts to whom in the template, JSON; those cut because they closed a circle
-MESSAGES, PRESENT = "messages", "present"  # of a scenario in which not all are there throughout
-SIZES = "sizes"  # length and width of its vehicles [m], where they are not those of the template
-FREED = "freed"  # allowed deviation [m, m/s] of each vehicle from its requested states
-EGO_FREED = "ego_freed"  # likewise of the vehicle that was left out
-EGO_WITNESS = "ego_witness"  # of one with an ego slot
-Values = Mapping[str, str]
 
 
-def _value(key: str, default: str | None = "") -> Any:
-    """Return a property: one of the entry's values."""
-    return property(lambda entry: entry.status.values.get(key, default))
+@dataclass(frozen=True, eq=False)
+class EgoEntry:
+    """The vehicle that was left out.
+
+    Attributes:
+        id: its name in topics.
+        start, goal: (4,) requested states: x [m], y [m], yaw [rad], speed [m/s].
+        relaxed: (2, 2) by how much its start and end may differ from that [m, m/s].
+        witness: SHA-256 of the message on `ego/witness`, in an entry.
+    """
+
+    id: str
+    start: Floats
+    goal: Floats
+    relaxed: Floats = field(default_factory=lambda: np.zeros((2, 2)))
+    witness: str = ""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class ScenarioEntry:
     """The entry of one scenario.
 
     Attributes:
+        stamp: of the template [ns].
+        inputs: hashes of `tracks` and `map`, where they are known.
         request: id of its request.
         index: its number in the request.
         seed: of the request.
         sha256: of the scenario's CDR bytes.
-        status: with all values: `asked_start`, `asked_end`, `achieved_start`, `achieved_end`,
-            `template`, `road`, `ego…`, hashes.
-        messages: SHA-256 of each of the scenario's messages, in order; one, `sha256`, where all
-            are there throughout.
+        messages: SHA-256 of each of its messages in order, if there are several.
+        template, road: names, in process only.
+        facts: what is known about it.
+        requested: start and end states.
+        achieved: (2, N, 4) first and last states.
+        present: from when to when each vehicle is there [s], unless all are there throughout.
+        sizes: (N, 2) length and width [m], if they are not those of the template.
+        ego: the vehicle that was left out.
     """
 
+    stamp: int
+    inputs: Mapping[str, str]
     request: str
     index: int
     seed: int
     sha256: str
-    status: Status
-    messages: tuple[str, ...]
-
-    road = _value("road")  # name of the road; "" as in entries of the nodes
-    ego = _value("ego")  # token of the vehicle that was left out; "" if none was
-    witness = _value(
-        EGO_WITNESS
-    )  # SHA-256 of the message of its ego's witness; "" where it has none
-    template_hash = _value(
-        TEMPLATE_HASH, None
-    )  # of its template, the `tracks` (hashes.py); None: not known
-    map_hash = _value(MAP_HASH, None)
+    messages: tuple[str, ...] = ()
+    template: str = ""
+    road: str = ""
+    facts: Facts = field(default_factory=Facts)
+    requested: BoundaryStates | None = None
+    achieved: Floats = field(default_factory=lambda: np.zeros((2, 0, 4)))
+    present: Floats = field(default_factory=lambda: np.zeros((0, 2)))
+    sizes: Floats = field(default_factory=lambda: np.zeros((0, 2)))
+    ego: EgoEntry | None = None
 
     @property
-    def facts(self) -> Facts:
-        """What is known about the scenario.
+    def hashes(self) -> tuple[str, ...]:
+        """SHA-256 of each of its messages, in order."""
+        return self.messages or (self.sha256,)
 
-        Raises:
-            InputError: a value is damaged.
-        """
-        return decode_facts(self.status.values, f"{INFO}: {self.status.message}")
+    @property
+    def witness(self) -> str:
+        """SHA-256 of the message of its ego's witness; "" without one."""
+        return self.ego.witness if self.ego is not None else ""
 
-    def asked(self, source: str = INFO, *, witness: bool = False) -> BoundaryStates | None:
-        """Return the requested start and end states (N, 4), None where they are not there.
+    @property
+    def template_hash(self) -> str | None:
+        """The hash of its `tracks`; None: not known."""
+        return self.inputs.get("tracks")
 
-        Args:
-            source: names the topic in messages.
-            witness: add those of the ego in a last row.
+    @property
+    def map_hash(self) -> str | None:
+        """The hash of its `map`; None: not known."""
+        return self.inputs.get("map")
 
-        Raises:
-            InputError: naming `source`, they are damaged.
-        """
-        keys = (("asked_start", "ego_start"), ("asked_end", "ego_goal"))
-        values, where = self.status.values, f"{source}: the asked states of {self.status.message}"
-        if any(key not in values for pair in keys for key in pair[: 1 + witness]):
-            return None
-        start, end = (_states(values[key], where) for key, _ in keys)
-        if witness:
-            ego_start, ego_end = (_states(f"[{values[key]}]", where) for _, key in keys)
-            start = np.concatenate((start, ego_start))
-            end = np.concatenate((end, ego_end))
-        return BoundaryStates(start, end, self._relaxed(len(start), where, witness=witness))
+    def asked(self, *, witness: bool = False) -> BoundaryStates | None:
+        """Return the requested start and end states; with `witness` the ego's in a last row."""
+        if not witness or self.requested is None or self.ego is None:
+            return None if witness else self.requested
+        return BoundaryStates(
+            np.vstack((self.requested.start, self.ego.start)),
+            np.vstack((self.requested.end, self.ego.goal)),
+            np.concatenate((self.requested.relaxed, self.ego.relaxed[None])),
+        )
 
-    def _relaxed(self, count: int, where: str, *, witness: bool) -> Floats:
-        """Return by how much each of `count` vehicles may miss its states (count, 2, 2) [m, m/s].
+    def name(self) -> str:
+        """Return what it is called in messages."""
+        return f"scenario {self.index} of request {self.request}"
 
-        0 where it is not there.
-        """
-        relaxed = np.zeros((count, 2, 2))
-        vehicles = self._relaxed_of(FREED, count - witness, where)
-        relaxed[: len(vehicles)] = vehicles
-        ego = self._relaxed_of(EGO_FREED, 1, where)
-        if witness and len(ego):
-            relaxed[count - 1] = ego[0]
-        return relaxed
-
-    def _relaxed_of(self, key: str, max_count: int, where: str) -> Floats:
-        """Return the deviations (M, 2, 2) [m, m/s] of a key, M at most `max_count`."""
-        with guarded(where):
-            values = json.loads(self.status.values.get(key, "[]"))
-            relaxed = np.array(values, dtype=np.float64).reshape(-1, 2, 2)
-        if len(relaxed) > max_count or not np.isfinite(relaxed).all() or (relaxed < 0.0).any():
-            raise InputError(
-                f"{where}: {key} is not metres and m/s of at most {max_count} vehicles"
-            )
-        return relaxed
+    def join_key(self) -> "ScenarioEntry":
+        """Return the entry without what is not needed to join it, for there may be very many."""
+        return replace(
+            self, facts=Facts(), requested=None, achieved=np.zeros((2, 0, 4)), sizes=self.sizes[:0]
+        )
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class RequestSummary:
     """The summary of a closed request.
 
     Attributes:
+        stamp: of the template [ns].
+        inputs: hashes of `tracks` and `map`, where they are known.
         request: its id.
-        published: how many scenarios of it were published.
-        status: all of it: counts, adaptations, `ego…`, and source is needed to make it again
-            (parameters, versions, logs).
+        seed: of the request.
+        requested, published, candidates: numbers of scenarios.
+        refused: numbers of refused candidates by cause.
+        cancelled: whether it was ended early.
+        adaptations: notes on how scenarios were drawn.
+        reactions: who reacts to whom in the template, each as `Reaction.document` with `kept`.
+        cut: those that closed a circle.
+        target: share of natural candidates that are valid and in the range, …
+        decided: name of the encounter and decision of such a template.
+        ego: the vehicle that was left out.
+        provenance: parameters, versions, logs: what makes it again with the seed.
     """
 
+    stamp: int
+    inputs: Mapping[str, str]
     request: str
+    seed: int
+    requested: int
     published: int
-    status: Status
-
-    @property
-    def values(self) -> Values:
-        """All key-values."""
-        return self.status.values
-
-    @property
-    def cancelled(self) -> bool:
-        """Whether it was ended early."""
-        return "cancelled" in self.values
-
-    @property
-    def provenance(self) -> dict[str, str]:
-        """The values that regenerate it, and its seed.
-
-        All that are neither its identity nor its outcome.
-        """
-        known = {
-            "request",
-            "requested",
-            "published",
-            "candidates",
-            MAP_HASH,
-            TEMPLATE_HASH,
-        }
-        return {
-            key: value
-            for key, value in self.values.items()
-            if key not in known
-            and key not in DECIDED
-            and not key.startswith((REFUSED, ADAPTATION, TARGET, REACTION, "ego"))
-        }
+    candidates: int
+    refused: Mapping[str, int] = field(default_factory=dict)
+    cancelled: bool = False
+    adaptations: tuple[Note, ...] = ()
+    reactions: tuple[Mapping[str, Any], ...] = ()
+    cut: tuple[Mapping[str, Any], ...] = ()
+    target: Mapping[str, str] = field(default_factory=dict)
+    decided: tuple[str, Decision] | None = None
+    ego: EgoEntry | None = None
+    provenance: Mapping[str, str] = field(default_factory=dict)
 
     @property
     def source(self) -> Recorded | Decided:
         """Whether the vehicles of the template were recorded together, as they drive here."""
-        decided = [self.values[key] for key in DECIDED if key in self.values]
-        if len(decided) == len(DECIDED):
-            return Decided(decided[0], decode_decision(decided[1], INFO))
-        return Recorded()
+        return Recorded() if self.decided is None else Decided(*self.decided)
+
+    @property
+    def is_full(self) -> bool:
+        """Whether all requested scenarios were published."""
+        return self.published == self.requested
 
     def result(self, scenarios: tuple[Scenario, ...] = ()) -> ScenarioSet:
         """Return the counts as a set of these scenarios.
 
         Raises:
-            InputError: a count is missing or no number.
+            InputError: a cause is unknown.
         """
-        source = f"{INFO}: {self.status.name!r} is no summary of a request"
-        causes = [key.removeprefix(REFUSED) for key in self.values if key.startswith(REFUSED)]
         try:
-            refused = {
-                Cause(cause): _count(self.values, REFUSED + cause, source) for cause in causes
-            }
+            refused = {Cause(cause): count for cause, count in self.refused.items()}
         except ValueError as error:
             raise InputError(
-                f"{source} ({error}); it is of another version: generate its scenarios anew"
+                f"{INFO}: request {self.request} ({error}) is of another version: generate its "
+                "scenarios anew"
             ) from None
         return ScenarioSet(
-            requested=_count(self.values, "requested", source),
+            requested=self.requested,
             scenarios=scenarios,
-            candidates=_count(self.values, "candidates", source),
+            candidates=self.candidates,
             refused=Counter(refused),
-            adaptations=recorded_notes(
-                (
-                    text
-                    for key, text in self.values.items()
-                    if key.startswith(ADAPTATION) and key != KINDS
-                ),
-                self.values.get(KINDS, ""),
-            ),
+            adaptations=self.adaptations,
         )
 
-    @property
-    def reactions(self) -> tuple[dict[str, Any], ...]:
-        """The reactions in the template, each as `Reaction.document` with `kept`.
-
-        Reactions that were cut have no `kept`.
-
-        Raises:
-            InputError: they are damaged.
-        """
-        source = f"{INFO}: {REACTION} of {self.status.message}"
-        reactions = []
-        for key, text in self.values.items():
-            if key.startswith(REACTION):
-                reactions.append(
-                    parse_json(
-                        text,
-                        source,
-                        {"type": "object", "required": ["words", "lag", "confidence"]},
-                    )
-                )
-        return tuple(reactions)
+    def message(self) -> str:
+        """Return the result in short."""
+        return f"{self.published} of {self.requested} scenarios from {self.candidates} candidates"
 
     def sentence(self) -> str:
         """Return a sentence on the result of the request."""
-        words = (
-            self.values.get(key, "?")
-            for key in ("request", "published", "requested", "candidates")
+        text = (
+            f"by its own summary request {self.request} published {self.published} of "
+            f"{self.requested} from {self.candidates} candidates"
         )
-        text = "by its own summary request {} published {} of {} from {} candidates".format(*words)
-        refused = [
-            f"{key.removeprefix(REFUSED)} {n}"
-            for key, n in self.values.items()
-            if key.startswith(REFUSED) and n != "0"
-        ]
+        refused = [f"{cause} {n}" for cause, n in self.refused.items() if n]
         return f"{text}, refused: {', '.join(refused).replace('_', ' ')}" if refused else text
 
     def of_one_scenario(self) -> "RequestSummary":
         """Return the summary for a bag of one of its scenarios."""
-        values = {**self.values, "published": "1", "requested": "1"}
-        return replace(self, published=1, status=replace(self.status, values=values))
+        return replace(self, published=1, requested=1)
 
 
 Info = ScenarioEntry | RequestSummary
 
 
-def source_values(source: Recorded | Decided) -> dict[str, str]:
-    """Return the values of a summary that name the encounters a template was made from."""
-    if isinstance(source, Recorded):
-        return {}
-    decision = json.dumps(source.decision.document())
-    return dict(zip(DECIDED, (source.encounter, decision), strict=True))
-
-
-def encode_info(info: Info, stamp_ns: int) -> bytes:
+def encode_info(info: Info) -> bytes:
     """Return an entry or a summary as CDR bytes."""
-    return encode_diagnostics([info.status], stamp_ns)
+    return encode_document(info)
 
 
-def decode_info(data: bytes, source: str = INFO) -> tuple[Info, ...]:
-    """Return the entries and summaries of a message; statuses that are neither are left out.
+def decode_info(data: bytes, source: str = INFO) -> Info:
+    """Return the entry or the summary in a message.
 
     Raises:
-        InputError: naming `source`, the message is damaged, or a key that every entry or summary
-            has is missing.
+        InputError: naming `source`, the message is damaged.
     """
-    infos: list[Info] = []
-    for status in decode_diagnostics(data, source)[1]:
-        values, where = status.values, f"{source}: {status.name!r}"
-        if not {"published", "sha256"} & values.keys():
-            continue
-        if "request" not in values:
-            raise InputError(f"{where}: request is missing")
-        if "published" in values:
-            count = _count(values, "published", where)
-            infos.append(RequestSummary(values["request"], count, status))
-        else:
-            infos.append(_entry(status, where))
-    return tuple(infos)
+    values = json_of(data, source)
+    if "published" in values:
+        summary: RequestSummary = document_of(RequestSummary, values, source)
+        counts = (summary.requested, summary.published, summary.candidates, summary.seed)
+        if min(*counts, *summary.refused.values()) < 0:
+            raise InputError(f"{source}: a count of request {summary.request} is negative")
+        return summary
+    entry: ScenarioEntry = document_of(ScenarioEntry, values, source)
+    _check(entry, f"{source}: {entry.name()}")
+    return entry
 
 
-def _entry(status: Status, where: str) -> ScenarioEntry:
-    """Return the entry of a status."""
-    values = status.values
-    index, seed = (_count(values, key, where) for key in ("index", "seed"))
-    with guarded(f"{where}: {MESSAGES} of {status.message}"):
-        messages = json.loads(values.get(MESSAGES, "null")) or [values["sha256"]]
-    if not (isinstance(messages, list) and all(isinstance(sha256, str) for sha256 in messages)):
-        raise InputError(f"{where}: {MESSAGES} of {status.message} is no list of SHA-256")
-    return ScenarioEntry(values["request"], index, seed, values["sha256"], status, tuple(messages))
+def _check(entry: ScenarioEntry, where: str) -> None:
+    """Raise InputError naming `where` if a state has another shape, or a number is impossible."""
+    if min(entry.index, entry.seed) < 0:
+        raise InputError(f"{where}: its index or seed is negative")
+    if entry.facts.order not in ORDERS:
+        raise InputError(
+            f"{where}: order is {entry.facts.order!r}; choose one of {', '.join(ORDERS)}"
+        )
+    shapes: list[tuple[Floats, tuple[int, ...]]] = []
+    relaxed: list[tuple[Floats, tuple[int, ...]]] = []
+    if entry.requested is not None:
+        asked = entry.requested
+        shapes += [(asked.start, (len(asked.start), 4))]
+        shapes += [(asked.end, asked.start.shape)]
+        relaxed = [(asked.relaxed, (len(asked.start), 2, 2))]
+    if entry.ego is not None:
+        shapes += [(state, (4,)) for state in (entry.ego.start, entry.ego.goal)]
+        relaxed += [(entry.ego.relaxed, (2, 2))]
+    if any(state.shape != shape or np.isnan(state).any() for state, shape in shapes):
+        raise InputError(f"{where}: its requested states are no rows of four finite numbers")
+    if any(each.shape != shape or not (each >= 0.0).all() for each, shape in relaxed):
+        raise InputError(f"{where}: relaxed is not metres and m/s of each vehicle")
 
 
 def scenario_entry(
     scenario: Scenario,
     data: bytes,
     request: str,
-    node: str,
     *,
     template: Sequence[Vehicle],
     asked: BoundaryStates,
     ego: EgoSlot | None = None,
-    about: Values | None = None,
+    inputs: Mapping[str, str] | None = None,
+    names: tuple[str, str] = ("", ""),
 ) -> ScenarioEntry:
     """Return the entry of a scenario.
 
@@ -343,62 +289,69 @@ def scenario_entry(
         scenario: the scenario.
         data: its CDR bytes, of all its messages.
         request: the request's id.
-        node: full name of the publishing node.
         template: the template's vehicles, of which the scenario may have fewer.
         asked: their states.
         ego: the vehicle that was left out.
-        about: further values for all scenarios of the request (names of template and road,
-            hashes).
+        inputs: hashes of `tracks` and `map`.
+        names: of the template and the road.
     """
     ids = [vehicle.id for vehicle in template]
     rows = [ids.index(vehicle.id) for vehicle in scenario.vehicles]
-    values = {
-        "request": request,
-        "index": str(scenario.index),
-        "seed": str(scenario.seed),
-        "sha256": digest(data),
-        "achieved_start": _states_text(scenario, 0),
-        "achieved_end": _states_text(scenario, -1),
-        **_presence_values(scenario, data),
-        **(about or {}),
-        **fact_values(scenario.facts),
-        **ego_values(ego),
-        "asked_start": json.dumps(asked.start[rows].tolist()),
-        "asked_end": json.dumps(asked.end[rows].tolist()),
-    }
-    sizes = [[vehicle.length, vehicle.width] for vehicle in scenario.vehicles]
-    if sizes != [[template[n].length, template[n].width] for n in rows]:
-        values[SIZES] = json.dumps(sizes)
-    if scenario.reference_drive is not None:
-        witness = encode_scenario(scenario.reference_drive, stamp_of(data, INFO))
-        values[EGO_WITNESS] = digest(witness)
-    ego_rows = [] if ego is None else [ids.index(ego.vehicle.id)]
-    for key, relaxed in ((FREED, asked.relaxed[rows]), (EGO_FREED, asked.relaxed[ego_rows])):
-        if relaxed.any():
-            values[key] = json.dumps(relaxed.tolist())
-    message = f"scenario {scenario.index} of request {request}"
-    return _entry(Status(f"{node}: scenario", Level.OK, message, values), INFO)
+    stamp = stamp_of(data, INFO) if data else 0
+    sizes = np.array([(vehicle.length, vehicle.width) for vehicle in scenario.vehicles])
+    usual = np.array([(template[n].length, template[n].width) for n in rows])
+    states = np.stack(
+        (*np.moveaxis(scenario.position, -1, 0), scenario.heading, scenario.speed), axis=-1
+    )
+    messages: tuple[bytes, ...] = ()
+    if not scenario.all_present:
+        messages = messages_of(data)
+    left_out = None
+    if ego is not None:
+        relaxed = asked.relaxed[ids.index(ego.vehicle.id)]
+        left_out = replace(_ego(ego), relaxed=relaxed)
+        if scenario.reference_drive is not None:
+            witness = encode_scenario(scenario.reference_drive, stamp)
+            left_out = replace(left_out, witness=digest(witness))
+    return ScenarioEntry(
+        stamp,
+        inputs or {},
+        request,
+        scenario.index,
+        scenario.seed,
+        digest(data),
+        tuple(map(digest, messages)) if len(messages) > 1 else (),
+        *names,
+        facts=_rounded(scenario.facts),
+        requested=BoundaryStates(asked.start[rows], asked.end[rows], asked.relaxed[rows]),
+        achieved=np.moveaxis(states[:, [0, -1]], 1, 0),
+        present=np.zeros((0, 2)) if not messages else scenario.time[scenario.present],
+        sizes=np.zeros((0, 2)) if np.array_equal(sizes, usual) else sizes,
+        ego=left_out,
+    )
 
 
-def _presence_values(scenario: Scenario, data: bytes) -> dict[str, str]:
-    """Return the times of presence and the messages' hashes, unless all are present throughout."""
-    if scenario.all_present:
-        return {}
-    spans = scenario.time[scenario.present].tolist()
-    messages = messages_of(data)
-    values = {PRESENT: json.dumps(spans)}
-    if len(messages) > 1:
-        values[MESSAGES] = json.dumps([digest(message) for message in messages])
-    return values
+def _rounded(facts: Facts) -> Facts:
+    """Return facts whose figures do not depend on the processor."""
+    figures = (facts.closest_approach_m, facts.pet_s, facts.rarity)
+    gap, pet, rarity = (None if each is None else round(each, 3) for each in figures)
+    targets = {label: float(f"{value:.6g}") for label, value in facts.targets.items()}
+    return replace(facts, closest_approach_m=gap, pet_s=pet, rarity=rarity, targets=targets)
+
+
+def _ego(slot: EgoSlot) -> EgoEntry:
+    return EgoEntry(token(slot.vehicle.id), slot.start, slot.goal)
 
 
 def request_summary(
     result: ScenarioSet,
     request: str,
-    node: str,
     seed: int,
-    provenance: Values | None = None,
+    stamp_ns: int,
     *,
+    inputs: Mapping[str, str] | None = None,
+    provenance: Mapping[str, str] | None = None,
+    source: Recorded | Decided = Recorded(),
     cancelled: bool = False,
     reactions: Mapping[str, Any] | None = None,
 ) -> RequestSummary:
@@ -407,77 +360,31 @@ def request_summary(
     Args:
         result: its scenarios and counts.
         request: its id.
-        node: full name of the publishing node.
         seed: of the request.
+        stamp_ns: of the template.
+        inputs: hashes of `tracks` and `map`.
         provenance: the values that regenerate it.
+        source: of the template.
         cancelled: whether it was ended early.
         reactions: who reacts to whom in the template, `ReactionGraph.document` with the kept ones
             marked.
     """
-    edges = {REACTION: (reactions or {}).get("edges", ()), CUT: (reactions or {}).get("cut", ())}
-    values = {
-        **(provenance or {}),
-        **({"cancelled": "true"} if cancelled else {}),
-        **ego_values(result.ego),
-        "request": request,
-        "seed": str(seed),
-        "requested": str(result.requested),
-        "published": str(len(result.scenarios)),
-        "candidates": str(result.candidates),
-        **{
-            f"{REFUSED}{cause.value}": str(count)
-            for cause, count in sorted(result.refused.items())
-        },
-        **{f"{ADAPTATION}{k}": str(note) for k, note in enumerate(result.adaptations)},
-        **({KINDS: note_kinds(result.adaptations)} if result.adaptations else {}),
-        **{
-            f"{key}{k}": json.dumps(edge)
-            for key, listed in edges.items()
-            for k, edge in enumerate(listed)
-        },
-        **(
-            {}
-            if result.reached is None
-            else {f"{TARGET}{key}": text for key, text in result.reached.figures().items()}
-        ),
-    }
-    level = Level.OK if len(result.scenarios) == result.requested else Level.WARN
-    message = (
-        f"{len(result.scenarios)} of {result.requested} scenarios "
-        f"from {result.candidates} candidates"
-    )
+    edges, cut = (tuple((reactions or {}).get(key, ())) for key in ("edges", "cut"))
     return RequestSummary(
-        request, len(result.scenarios), Status(f"{node}: request", level, message, values)
+        stamp_ns,
+        inputs or {},
+        request,
+        seed,
+        result.requested,
+        len(result.scenarios),
+        result.candidates,
+        {cause.value: count for cause, count in sorted(result.refused.items())},
+        cancelled,
+        tuple(result.adaptations),
+        edges,
+        cut,
+        {} if result.reached is None else result.reached.figures(),
+        (source.encounter, source.decision) if isinstance(source, Decided) else None,
+        None if result.ego is None else _ego(result.ego),
+        provenance or {},
     )
-
-
-def _states_text(scenario: Scenario, at: int) -> str:
-    """Return the vehicles' x, y, yaw, speed at sample `at` as a JSON list, exact to the bit."""
-    rows = zip(
-        scenario.position[:, at], scenario.heading[:, at], scenario.speed[:, at], strict=True
-    )
-    return json.dumps(
-        [
-            [*map(float, position), float(heading), float(speed)]
-            for position, heading, speed in rows
-        ]
-    )
-
-
-def _states(text: str, source: str) -> Floats:
-    """Return the (N, 4) x, y, yaw, speed of such a list."""
-    with guarded(f"{source}: no rows of numbers"):
-        rows = np.array(json.loads(text), dtype=np.float64)
-    if rows.ndim != 2 or rows.shape[1] != 4 or not np.isfinite(rows).all():
-        raise InputError(
-            f"{source}: {len(text)} characters that are no rows of four finite numbers"
-        )
-    return rows
-
-
-def _count(values: Values, key: str, source: str) -> int:
-    """Return a whole number of at most 63 bits."""
-    text = values.get(key, "")
-    if not (text.isascii() and text.isdecimal() and len(text) < 20 and int(text) < 2**63):
-        raise InputError(f"{source}: {key} is {text!r}; a whole number is needed")
-    return int(text)

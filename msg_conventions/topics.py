@@ -48,6 +48,7 @@ _TABLE: tuple[tuple[str, Quality, str], ...] = (
     (roads.MAP_TYPE, NEWEST, "traffic/local_map"),
     (roads.POSES_TYPE, LATCHED, "road/entries road/exits"),
     (documents.TYPE, LATCHED, " ".join(hashes.DOCUMENTS)),
+    (documents.TYPE, MANY, "scenarios/info"),
     (markers.ARRAY_TYPE, LATCHED, "markers road/markings"),
     (markers.ARRAY_TYPE, LIVE, "traffic/markers preview"),
     (changepoints.POSTERIOR_TYPE, LATCHED, "posterior"),
@@ -63,7 +64,7 @@ _TABLE: tuple[tuple[str, Quality, str], ...] = (
     ("autoware_perception_msgs/msg/PredictedObjects", autoware.QUALITY, autoware.OBJECTS),
     (frames.TYPE, LIVE, "tf"),
     (diagnostics.TYPE, LATCHED, "report"),
-    (diagnostics.TYPE, MANY, "scenarios/info verdicts"),
+    (diagnostics.TYPE, MANY, "verdicts"),
     (diagnostics.TYPE, Quality(depth=100), "diagnostics"),  # one message in a bag without nodes
     (diagnostics.TYPE, LIVE, "/diagnostics"),  # repeated every second
 )

@@ -156,7 +156,7 @@ def trial_of(
         InputError: there is no such vehicle, the scenario was made for another ego, or the
             reference drive is missing.
     """
-    slot = entry.ego if entry else ""
+    slot = entry.ego.id if entry and entry.ego else ""
     return Trial(name, join_ego(scenario), _ego_of(scenario, slot, ego, place), road)
 
 
@@ -186,7 +186,7 @@ def _encounter_of(entry: ScenarioEntry | None) -> str:
     """
     if entry is None:
         return ""
-    name, digest = entry.status.values.get("template", ""), entry.template_hash or ""
+    name, digest = entry.template, entry.template_hash or ""
     if entry.facts.decision is not None:
         return name
     return f"{name} {digest[:8]}".strip()

@@ -5,7 +5,6 @@
 
 from collections import Counter
 from dataclasses import replace
-import json
 import math
 
 from hypothesis import given, settings
@@ -43,7 +42,7 @@ from msg_conventions.layouts import POLYGON, STRING
 from scenario_gen.base.errors import InputError
 from scenario_gen.numerics.arrays import canonical_angle
 from scenario_gen.numerics.plane import arc_lengths
-from scenario_gen.types import Loss, Note, NoteKind, token, tokens, Vehicle, with_witness
+from scenario_gen.types import Facts, Loss, Note, NoteKind, token, tokens, Vehicle, with_witness
 from scenario_gen.types.fit import Fit, FittedVehicle, Route
 from scenario_gen.types.lanes import DrawnFor, Lane, LaneNetwork, RuleKind, TrafficRule
 from scenario_gen.types.road import Road
@@ -186,7 +185,7 @@ def test_lanes(seed, count):
         (b'"successors": [0]', b'"successors": [0.5]', "0.5 is no int"),
         (b'"successors": [0]', b'"successors": [8]', "leads to a lane that is not there"),
         (b'"name"', b'"nome"', "LaneNetwork"),
-        (b'{"stamp"', b'["stamp"', "no RoadDescription"),
+        (b'{"stamp"', b'["stamp"', "no JSON"),
         (b'{"stamp": 5', b'{"stamp": true', "True is no int"),
     ],
 )
@@ -308,51 +307,60 @@ def test_reports():
     template = encounter(3)
     fit = _fit(template, np.array([0, 7, 20, 39]))
     asked = BoundaryStates(np.ones((2, 4)), np.zeros((2, 4)))
-    entry = _entry(sent.scenarios[0], b"bytes", asked=asked, about={"road": "straight"})
+    data = scenarios.encode_scenario(sent.scenarios[0], 5)
+    made = _entry(sent.scenarios[0], data, asked=asked, names=("log", "straight"))
     edge = {"kind": "yield", "words": "b waits for a", "lag": 1.4, "confidence": 0.9, "kept": True}
     cut = {"kind": "follow", "words": "a follows b (doubtful)", "lag": 1.0, "confidence": 0.4}
     reactions = {"edges": [edge], "cut": [cut], "sentences": ["b waits for a"]}
-    summary = scenario_info.request_summary(sent, "r1", "/gp_sampler", 7, reactions=reactions)
-    assert summary.reactions == (edge, cut) and not any(
-        key.startswith("reaction") for key in summary.provenance
-    )
-    damaged = replace(
-        summary, status=replace(summary.status, values={**summary.values, "reaction.0": "{"})
-    )
-    with pytest.raises(InputError, match=r"reaction\."):
-        _ = damaged.reactions
-    statuses = (entry.status, *fits.fit_statuses(fit, "/planner"), summary.status)
-    data = diagnostics.encode_diagnostics(statuses, 5)
-    assert diagnostics.decode_diagnostics(data) == (5, statuses)
-    assert scenario_info.decode_info(data) == (entry, summary)
-    assert entry.road == "straight" and entry.sha256 == scenarios.digest(b"bytes")
-    assert_same(entry.asked(), asked, "start", "end")
+    summary = _again(scenario_info.request_summary(sent, "r1", 7, 5, reactions=reactions))
+    assert (summary.reactions, summary.cut) == ((edge,), (cut,))
+    statuses = fits.fit_statuses(fit, "/planner")
+    said = diagnostics.encode_diagnostics(statuses, 5)
+    assert diagnostics.decode_diagnostics(said) == (5, statuses)
+    entry = _again(made)
+    assert (entry.stamp, entry.road, entry.sha256) == (5, "straight", scenarios.digest(data))
+    assert_same(entry.asked(), asked, "start", "end", "relaxed")
+    assert entry.achieved.tobytes() == made.achieved.tobytes()
+    assert entry.witness == "" and entry.asked(witness=True) is None
     assert summary.result(sent.scenarios) == sent
-    assert summary.status.level is diagnostics.Level.WARN
-    former = {**summary.values, "refused.time_law": "1"}  # as 0.2 wrote it
+    assert not summary.is_full
     with pytest.raises(InputError, match=r"time_law.* version"):
-        replace(summary, status=replace(summary.status, values=former)).result()
+        replace(summary, refused={"time_law": 1}).result()  # as 0.2 wrote it
+
+
+def _again(info):
+    return scenario_info.decode_info(scenario_info.encode_info(info))
 
 
 def _entry(sent, data, **values):
-    return scenario_info.scenario_entry(
-        sent, data, "r1", "/gp_sampler", template=sent.vehicles, **values
-    )
+    return scenario_info.scenario_entry(sent, data, "r1", template=sent.vehicles, **values)
 
 
-@pytest.mark.parametrize("key", ["request", "index", "seed", "published", "candidates"])
-def test_entries_and_summaries_that_lack_something_say_what(key):
-    sent = scenario(1)
-    entry = _entry(sent, b"", asked=BoundaryStates(np.zeros((2, 4)), np.zeros((2, 4))))
-    summary = scenario_info.request_summary(ScenarioSet(1, (sent,), 1), "r1", "/n", 7)
-    status = (entry if key in ("index", "seed") else summary).status
-    values = {name: text for name, text in status.values.items() if name != key} | (
-        {key: "?"} if key == "published" else {}
-    )
-    data = diagnostics.encode_diagnostics([replace(status, values=values)], 5)
-    with pytest.raises(InputError, match=f"scenarios/info.*{key} is"):
-        for info in scenario_info.decode_info(data):
-            info.result()
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        ('"index": 0', '"index": -1', "r1: its index or seed is negative"),
+        ('"index": 0', '"index": "0"', "'0' is no int"),
+        ('"request": "r1"', '"reqest": "r1"', "no ScenarioEntry"),
+        ('"start": [[0.0, ', '"start": [[', "requested states are no rows"),
+        ('"start": [[0.0', '"start": [[null', "requested states are no rows"),
+        ('"facts": {', '"facts": {"order": "late", ', "order is 'late'"),
+        ('"facts": {', '"facts": {"pet_s": "soon", ', "could not convert"),
+        ('"facts": {', '"facts": {"decision": {"who": "2"}, ', "no ScenarioEntry"),
+        ('"requested": {', '"requested": {"relaxed": [[[-1, 0], [0, 0]]], ', "relaxed is not"),
+        ("{", '{"published": 1, ', "no RequestSummary"),
+        ("{", "[", "no JSON"),
+    ],
+)
+def test_entries_that_say_what_cannot_be_are_refused(old, new, said):
+    sent = replace(scenario(1, 1), index=0, facts=Facts(rarity=0.5))
+    data = scenarios.encode_scenario(sent, 5)
+    states = BoundaryStates(np.zeros((1, 4)), np.zeros((1, 4)))
+    text = decode(STRING, scenario_info.encode_info(_entry(sent, data, asked=states)), "").data
+    text = text.replace('"relaxed": [[[0.0, 0.0], [0.0, 0.0]]]', '"of": 0')
+    assert old in text
+    with pytest.raises(InputError, match=rf"scenarios/info.*{said}"):
+        scenario_info.decode_info(encode(STRING, data=text.replace(old, new, 1)))
 
 
 @given(seeds)
@@ -376,12 +384,8 @@ def test_ego_slot():
         stamp, frame, child, state = ego.decode_state(sent[topic])
         assert (stamp, frame, child) == (17, "map", "vehicle_v0")
         assert state.tolist() == pytest.approx(asked.tolist(), abs=1e-12)
-    said = scenario_info.request_summary(
-        ScenarioSet(1, (), 1, ego=slot), "r", "/n", 7, {"count": "1", "ego": "v0"}
-    ).values
-    assert said["ego"] == "v0" and said["count"] == "1"
-    assert json.loads(said["ego_goal"])[3] == 6.0
-    assert ego.ego_values(None) == {}
+    said = _again(scenario_info.request_summary(ScenarioSet(1, (), 1, ego=slot), "r", 7, 5))
+    assert said.ego.id == "v0" and said.ego.goal[3] == 6.0
 
 
 def test_a_scenario_with_a_witness_names_its_message():
@@ -390,10 +394,8 @@ def test_a_scenario_with_a_witness_names_its_message():
     slot = EgoSlot(one.reference_drive.vehicles[0], np.full(4, 0.25), np.full(4, 0.5))
     data = scenarios.encode_scenario(one, 17)
     template = (*one.vehicles, *one.reference_drive.vehicles)
-    made = scenario_info.scenario_entry(
-        one, data, "r", "/n", template=template, asked=asked, ego=slot
-    )
-    (entry,) = scenario_info.decode_info(scenario_info.encode_info(made, 17))
+    made = scenario_info.scenario_entry(one, data, "r", template=template, asked=asked, ego=slot)
+    entry = _again(made)
     assert entry.witness == scenarios.digest(scenarios.encode_scenario(one.reference_drive, 17))
     assert entry.asked().start.tolist() == [[0.0] * 4] and entry.asked(
         witness=True
@@ -404,7 +406,7 @@ def test_asked_states_are_in_the_order_of_the_scenario():
     vehicles = tuple(Vehicle(f"v{k}") for k in range(3))
     asked = BoundaryStates(np.arange(12.0).reshape(3, 4) / 10.0, np.zeros((3, 4)))
     entry = scenario_info.scenario_entry(
-        scenario(1, n=2), b"", "r", "/n", template=vehicles, asked=asked
+        scenario(1, n=2), b"", "r", template=vehicles, asked=asked
     )
     assert entry.asked().start.tolist() == asked.start[:2].tolist()
 

@@ -69,10 +69,10 @@ def _messages():
         yield roads.POSES_TYPE, roads.encode_poses(road.entries, frame, 5)
         sent = scenario(seed)
         asked = BoundaryStates(np.zeros((2, 4)), np.ones((2, 4)))
-        entry = scenario_info.scenario_entry(
-            sent, b"", frame, "/n" * seed, template=sent.vehicles, asked=asked
-        )
-        yield diagnostics.TYPE, diagnostics.encode_diagnostics([entry.status] * (seed - 1), 1)
+        entry = scenario_info.scenario_entry(sent, b"", frame, template=sent.vehicles, asked=asked)
+        yield documents.TYPE, scenario_info.encode_info(entry)
+        status = diagnostics.Status("/n" * seed, diagnostics.Level.OK, frame, {frame: "é" * seed})
+        yield diagnostics.TYPE, diagnostics.encode_diagnostics([status] * (seed - 1), 1)
         yield pictures.FOOTPRINT_TYPE, pictures.encode_footprint(Vehicle("a"), 3, frame)
         yield markers.ARRAY_TYPE, pictures.scenario_markers(scenario(seed), 3)
 

@@ -10,8 +10,8 @@ import pytest
 from support.node_server import process
 from support.suite_processes import Processes, RESOURCES
 
-from msg_conventions.diagnostics import decode_diagnostics
-from msg_conventions.hashes import DOCUMENTS, template_hashes
+from msg_conventions.hashes import DOCUMENTS, hash_of
+from msg_conventions.scenario_info import decode_info
 from msg_conventions.scenarios import encode_scenario
 from scenario_gen.bags.recordings.write import result_messages
 from scenario_gen.bags.storage.bag import read_messages
@@ -62,12 +62,12 @@ def test_the_suite_records_several_jobs_in_their_namespaces(demo):
             ] == own
         messages = {topic: data for topic, data, _ in written}
         infos = [
-            m.data for m in read_messages(demo) if m.topic == f"{job.namespace}/scenarios/info"
+            decode_info(m.data)
+            for m in read_messages(demo)
+            if m.topic == f"{job.namespace}/scenarios/info"
         ]
-        assert all(
-            template_hashes(messages).items() <= decode_diagnostics(data)[1][0].values.items()
-            for data in infos
-        )
+        inputs = {topic: hash_of(topic, messages[topic]) for topic in ("tracks", "map")}
+        assert [info.inputs for info in infos] == [inputs] * 4
     assert [path.name for path in demo.parent.iterdir()] == ["bag"]
 
 

@@ -16,6 +16,7 @@ import sysconfig
 import pytest
 from support.suite_processes import Client, ROOT
 
+from msg_conventions.scenario_info import ScenarioEntry
 from scenario_gen.base.ros_domain import free_domain, this_host_only
 from scenario_gen.ros.common.requests import Code
 from scenario_gen.ros.nodes.gp_sampler import GpSampler
@@ -221,12 +222,11 @@ def test_requests_at_the_same_time_give_what_each_gives_alone_by_service_too(env
         for goal in goals:
 
             def published(name=goal["parameters"]["request"]):
-                every = [
-                    s.values
-                    for s in client.statuses("/scenarios/info")
-                    if s.values["request"] == name
+                return [
+                    info.sha256
+                    for info in client.infos()
+                    if info.request == name and isinstance(info, ScenarioEntry)
                 ]
-                return [values["sha256"] for values in every if "sha256" in values]
 
             client.until(
                 lambda published=published: len(published()) == 16, "the scenarios of both"

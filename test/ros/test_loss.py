@@ -18,8 +18,14 @@ from support.suite_processes import Client, Processes, RESOURCES
 from typer.testing import CliRunner
 import yaml
 
-from msg_conventions.diagnostics import decode_diagnostics, encode_diagnostics, Level, Status
-from msg_conventions.scenario_info import encode_info, scenario_entry
+from msg_conventions.diagnostics import encode_diagnostics, Level, Status
+from msg_conventions.scenario_info import (
+    decode_info,
+    encode_info,
+    RequestSummary,
+    scenario_entry,
+    ScenarioEntry,
+)
 from msg_conventions.scenarios import digest, encode_scenario
 from scenario_gen.bags.storage.bag import bag_topics, read_messages
 from scenario_gen.bags.storage.config import BagConfig
@@ -80,9 +86,10 @@ def test_a_large_request_arrives_whole(tmp_path, domain, client):
         if message.topic == "/scenarios":
             came.add(digest(message.data))
         else:
-            told += [s.values for s in decode_diagnostics(message.data)[1] if "sha256" in s.values]
-    assert {values["sha256"] for values in told} == came
-    assert len({values["index"] for values in told if values["seed"] == "3"}) == MANY
+            told.append(decode_info(message.data))
+    told = [info for info in told if isinstance(info, ScenarioEntry)]
+    assert {entry.sha256 for entry in told} == came
+    assert len({entry.index for entry in told if entry.seed == 3}) == MANY
 
 
 def test_a_hanging_subscriber_is_waited_for_no_longer_than_patience(domain, client):
@@ -178,10 +185,8 @@ def test_what_is_lost_is_said_in_all_places(domain, tmp_path):
             asked = BoundaryStates(
                 np.zeros((len(scenario.vehicles), 4)), np.zeros((len(scenario.vehicles), 4))
             )
-            entry = scenario_entry(
-                scenario, data, "1", "/x", template=scenario.vehicles, asked=asked
-            )
-            client.say("/scenarios/info", encode_info(entry, 0))
+            entry = scenario_entry(scenario, data, "1", template=scenario.vehicles, asked=asked)
+            client.say("/scenarios/info", encode_info(entry))
 
         publish(0)
         client.until(lambda: client.counted("/scenarios") == 1, "the first scenario in the bag")
@@ -190,12 +195,8 @@ def test_what_is_lost_is_said_in_all_places(domain, tmp_path):
             publish(k)
         recorder.send_signal(signal.SIGCONT)
         publish(count)
-        numbers = dict.fromkeys(("published", "requested", "candidates"), str(count + 1))
-        closing = {"request": "1", "seed": "1", **numbers}
-        client.say(
-            "/scenarios/info",
-            encode_diagnostics([Status("/x: request", Level.OK, "", closing)], 0),
-        )
+        closing = RequestSummary(0, {}, "1", 1, *[count + 1] * 3)
+        client.say("/scenarios/info", encode_info(closing))
 
         def told() -> str:
             losses = [

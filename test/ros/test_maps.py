@@ -11,9 +11,10 @@ from support.bag_examples import skipped, unaccounted
 from support.lengths import LONG
 from support.suite_processes import Client, whole_chain
 
-from msg_conventions.diagnostics import decode_diagnostics, Level
+from msg_conventions.diagnostics import Level
 from msg_conventions.hashes import hash_of, head_of
 from msg_conventions.roads import decode_description
+from msg_conventions.scenario_info import RequestSummary
 from scenario_gen.bags.storage.bag import read_messages
 from scenario_gen.output.review.evaluation import evaluate_bag
 
@@ -29,14 +30,16 @@ def suite(tmp_path_factory, domain):
     yield from whole_chain(tmp_path_factory.mktemp("maps"), domain, NODES, count=20)
 
 
-def _infos(client: Client) -> list[dict[str, str]]:
-    return [
-        decode_diagnostics(data)[1][0].values for data in list(client.heard["/scenarios/info"])
-    ]
+def _maps(client: Client) -> list[str]:
+    """Return the hash of the map that each entry and summary names."""
+    return [info.inputs["map"] for info in client.infos()]
 
 
 def _closed(client: Client, hashed: str) -> bool:
-    return any("published" in values and values["map_hash"] == hashed for values in _infos(client))
+    return any(
+        isinstance(info, RequestSummary) and info.inputs["map"] == hashed
+        for info in client.infos()
+    )
 
 
 def _another_road(client: Client, width: float) -> str:
@@ -78,15 +81,15 @@ def test_nothing_of_an_old_map_is_said_beside_the_new_one(suite, client):
             k % 3 == 0
         ):  # amid its publication; else while the planner or the sampler is at work, or before
             client.until(
-                lambda: any(v.get("map_hash") == hashes[-1] for v in _infos(client)),
+                lambda: hashes[-1] in _maps(client),
                 "a scenario on this map",
             )
         hashes.append(_another_road(client, 3.5 + 0.05 * (k + 1)))
     client.until(lambda: _closed(client, hashes[-1]), "the set on the last map")
     assert len(set(hashes)) == LOADS + 1
-    order = [hashes.index(values["map_hash"]) for values in _infos(client)]
+    order = list(map(hashes.index, _maps(client)))
     assert order == sorted(order), "a scenario on an older map came after one on a newer"
-    assert len({values["template_hash"] for values in _infos(client)}) == 1
+    assert len({info.inputs["tracks"] for info in client.infos()}) == 1
     _fitted(client, hashes[-1])
 
 
@@ -94,7 +97,9 @@ def test_routes_of_an_old_map_are_not_driven_on_one_that_the_planner_refuses(
     suite, client, tmp_path
 ):
     client.hear("/scenarios/info", "/map", "/diagnostics")
-    client.until(lambda: _infos(client) and "published" in _infos(client)[-1], "the last set")
+    client.until(
+        lambda: client.infos() and isinstance(client.infos()[-1], RequestSummary), "the last set"
+    )
     (tmp_path / "tiny.pgm").write_bytes(b"P5 20 20 255\n" + b"\xff" * 400)
     (tmp_path / "tiny.yaml").write_text(TINY)
     tiny = _loaded(client, str(tmp_path / "tiny.yaml"))
@@ -113,7 +118,7 @@ def test_routes_of_an_old_map_are_not_driven_on_one_that_the_planner_refuses(
         return not answer.successful and "fit/info of this map" in answer.reason
 
     client.until(is_told, f"a refusal that says why, of {reasons}")
-    assert tiny not in {values.get("map_hash") for values in _infos(client)}
+    assert tiny not in _maps(client)
 
 
 def _straight_lanes() -> str:

@@ -10,6 +10,7 @@ from support.bag_examples import skipped
 from support.suite_processes import Processes, RESOURCES
 
 from msg_conventions.ego import decode_state, ego_messages
+from msg_conventions.scenario_info import RequestSummary, ScenarioEntry
 from msg_conventions.scenarios import digest, encode_scenario
 from scenario_gen.bags.recordings.read import load, read_recording
 from scenario_gen.bags.recordings.write import result_messages
@@ -57,19 +58,18 @@ def published(client, result):
     request = re.match(r"request (\d+)", result.reason)[1]
 
     def accounts():
-        return [
-            s.values for s in client.statuses("/scenarios/info") if s.values["request"] == request
-        ]
+        return [info for info in client.infos() if info.request == request]
 
-    client.until(lambda: any("published" in values for values in accounts()), "the account")
-    own = [values for values in accounts() if "sha256" in values]
+    client.until(lambda: any(isinstance(info, RequestSummary) for info in accounts()), "the end")
+    own = [info for info in accounts() if isinstance(info, ScenarioEntry)]
     client.until(
         lambda: (
-            {v["sha256"] for v in own} <= {digest(data) for data in client.heard["/scenarios"]}
+            {entry.sha256 for entry in own}
+            <= {digest(data) for data in client.heard["/scenarios"]}
         ),
         "the scenarios",
     )
-    return [values["sha256"] for values in own], own
+    return [entry.sha256 for entry in own], own
 
 
 def test_the_same_bytes_as_in_process_with_an_ego(suite, client):
@@ -83,7 +83,7 @@ def test_the_same_bytes_as_in_process_with_an_ego(suite, client):
     witnesses = [
         digest(encode_scenario(s.reference_drive, encounter.start_ns)) for s in made.scenarios
     ]
-    assert [values["ego_witness"] for values in accounts] == witnesses
+    assert [entry.witness for entry in accounts] == witnesses
     client.until(
         lambda: set(witnesses) <= set(map(digest, client.heard["/ego/witness"])), "the witnesses"
     )
@@ -91,9 +91,7 @@ def test_the_same_bytes_as_in_process_with_an_ego(suite, client):
         assert client.wait(f"/{topic}")[-1] == data, topic
     stamp, frame, child, state = decode_state(client.heard["/ego/start"][-1])
     assert (stamp, frame, child) == (encounter.start_ns, "map", "vehicle_1")
-    assert all(
-        values["ego"] == "1" and values["ego_start"] == str(state.tolist()) for values in accounts
-    )
+    assert all(entry.ego.id == "1" and (entry.ego.start == state).all() for entry in accounts)
     client.announce("/ego/goal")  # as traffic does
     client.until(
         lambda: client.node.count_publishers("/ego/goal") == 1,

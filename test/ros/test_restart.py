@@ -10,6 +10,7 @@ import pytest
 from support.suite_processes import Processes, RESOURCES
 
 from msg_conventions.diagnostics import decode_diagnostics
+from msg_conventions.scenario_info import RequestSummary
 
 pytestmark = [pytest.mark.dds, pytest.mark.slow, pytest.mark.long]
 NODES = {
@@ -60,8 +61,8 @@ def test_killed_nodes_resume_and_the_others_do_not_notice(tmp_path, domain, clie
             "the same set again, for late joiners"
         )
         client.wait("/scenarios/info", 4 + 2 + 4)
-        infos = [decode_diagnostics(data)[1][0].values for data in client.heard["/scenarios/info"]]
-        assert [values["request"] for values in infos if "published" in values] == ["1", "2", "1"]
+        closed = [info for info in client.infos() if isinstance(info, RequestSummary)]
+        assert [summary.request for summary in closed] == ["1", "2", "1"]
         reports = client.wait("/report", 3)  # the evaluator's, which lives
         rows = [{row.name: row.values for row in decode_diagnostics(data)[1]} for data in reports]
         assert [row["/evaluator: with changepoints"]["samples"] for row in rows] == ["3", "1", "3"]

@@ -10,7 +10,7 @@ import time
 import pytest
 from support.suite_processes import Client, RESOURCES
 
-from msg_conventions.diagnostics import encode_diagnostics, Level, Status
+from msg_conventions.scenario_info import encode_info, RequestSummary, ScenarioEntry
 from msg_conventions.tracks import encode_tracks
 from scenario_gen.base.errors import RefusedError
 from scenario_gen.base.worker import MAX_WAITING_COUNT, Worker
@@ -114,14 +114,10 @@ def test_the_evaluator_gives_up_requests_whose_scenarios_never_come_and_says_so(
         node.trigger_activate()
         spun(node, lambda: _said(client).endswith("active"))
         for k in range(node.config.wait + 1):
-            entry = {"request": str(k), "index": "0", "seed": "0", "sha256": f"{k:064x}"}
-            node.received(
-                "scenarios/info", encode_diagnostics([Status("scenario", Level.OK, "", entry)], 0)
-            )
-            closing = {"request": str(k), "published": "1", "requested": "1"}
-            node.received(
-                "scenarios/info", encode_diagnostics([Status("request", Level.OK, "", closing)], 0)
-            )
+            entry = ScenarioEntry(0, {}, str(k), 0, 0, f"{k:064x}")
+            node.received("scenarios/info", encode_info(entry))
+            closing = RequestSummary(0, {}, str(k), 0, 1, 1, 1)
+            node.received("scenarios/info", encode_info(closing))
         spun(
             node,
             lambda: (

@@ -282,8 +282,8 @@ def test_live_scenarios_are_driven_on_the_road_that_they_name(start, client, sam
     client.hear("ego/goal", "traffic/local_map", "verdicts", "/diagnostics")
     publish("trial")
     publish("stopped")
-    cancelled = request_summary(live.generated, "stopped", "/gp_sampler", 1, cancelled=True)
-    client.say("scenarios/info", encode_info(cancelled, 0))
+    cancelled = request_summary(live.generated, "stopped", 1, 0, cancelled=True)
+    client.say("scenarios/info", encode_info(cancelled))
     _, _, child, goal = decode_state(client.wait("ego/goal")[0])
     witness = parted[0].reference_drive
     assert child == f"vehicle_{token(slot.vehicle.id)}"

@@ -13,7 +13,7 @@ import pytest
 from support.lengths import LONG
 from support.suite_processes import Processes, RESOURCES
 
-from msg_conventions.diagnostics import decode_diagnostics
+from msg_conventions.scenario_info import ScenarioEntry
 from msg_conventions.scenarios import digest
 from scenario_gen.ros.nodes.gp_sampler import GpSampler
 
@@ -88,12 +88,12 @@ def test_callers_from_many_processes_get_their_own_answers(suite, domain, client
     client.wait("/scenarios/info", sum(counts.values()) + len(counts))
     client.wait("/scenarios", sum(counts.values()))
     heard = {digest(data) for data in client.heard["/scenarios"]}
-    infos = [decode_diagnostics(data)[1][0].values for data in client.heard["/scenarios/info"]]
+    infos = [info for info in client.infos() if isinstance(info, ScenarioEntry)]
     for seed, request in requests.items():
-        own = [values for values in infos if values["request"] == request and "sha256" in values]
-        assert {values["seed"] for values in own} == {str(seed)}
+        own = [entry for entry in infos if entry.request == request]
+        assert {entry.seed for entry in own} == {seed}
         assert len(own) == counts[seed]
-        assert all(values["sha256"] in heard for values in own)
+        assert all(entry.sha256 in heard for entry in own)
 
 
 def test_a_map_is_served_while_another_is_loaded(suite, domain, client):

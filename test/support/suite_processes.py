@@ -170,6 +170,12 @@ class Client:
             status for data in list(self.heard[topic]) for status in decode_diagnostics(data)[1]
         ]
 
+    def infos(self):
+        """All entries and summaries that were heard so far."""
+        from msg_conventions.scenario_info import decode_info
+
+        return [decode_info(data) for data in list(self.heard["/scenarios/info"])]
+
     def counted(self, topic: str, node: str = "/recorder") -> int:
         """How many messages of a topic a recorder says are in its bag."""
         if not self.heard["/diagnostics"]:

@@ -26,8 +26,10 @@ from msg_conventions.layouts import MARKER
 from msg_conventions.markers import Action
 from msg_conventions.paths import decode_route
 from msg_conventions.roads import decode_map, decode_poses, RoadDescription
+from msg_conventions.scenario_info import INFO
 from msg_conventions.topics import vehicle_topic
 from msg_conventions.tracks import decode_tracks
+from scenario_gen.bags.recordings.former_info import upgraded_info
 from scenario_gen.bags.storage.messages import BagMessage
 from scenario_gen.base.errors import guarded, InputError
 from scenario_gen.types import FittedVehicle, LaneNetwork, Loss, Note, NoteKind, Route, tokens
@@ -40,7 +42,9 @@ Statuses = Callable[[int], Mapping[str, Mapping[str, str]]]
 
 
 def upgraded(messages: Messages, statuses: Statuses) -> Messages:
-    """Return messages with `road/lanes` and `fit/info` in the present layout."""
+    """Return messages with `road/lanes`, `fit/info` and `scenarios/info` in the present layout."""
+    entries = [_upgraded_info(message) for message in messages.get(INFO, ())]
+    messages = {**messages, INFO: entries} if entries else messages
     infos = [
         (topic, message)
         for topic in _INFOS
@@ -62,6 +66,15 @@ def upgraded(messages: Messages, statuses: Statuses) -> Messages:
                 upgrade = replace(info, topic=place, type=documents.TYPE, data=document)
                 documents_by_topic[name].append(upgrade)
     return {**messages, **documents_by_topic}
+
+
+def _upgraded_info(message: BagMessage) -> BagMessage:
+    """Return a message of `scenarios/info`; a damaged one as it is."""
+    if message.type == diagnostics.TYPE:
+        with suppress(InputError):
+            data = upgraded_info(message.data)
+            return replace(message, type=documents.TYPE, data=data)
+    return message
 
 
 def _named(messages: Messages, hashes: Mapping[str, str]) -> dict[str, bytes]:

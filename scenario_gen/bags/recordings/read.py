@@ -102,7 +102,8 @@ class Recording:
         values: dict[str, list[str]] = {}
         for namespace in self.namespaces.values():
             for summary in namespace.summaries:
-                for key, value in summary.provenance.items():
+                facts = {**summary.provenance, "seed": str(summary.seed)}
+                for key, value in facts.items():
                     values.setdefault(key, []).append(value)
         return {key: " | ".join(dict.fromkeys(texts)) for key, texts in values.items()}
 
@@ -276,7 +277,6 @@ class Namespace(RecordedScenarios):
         Raises:
             InputError: a message is damaged, or the scenario or its witness is missing.
         """
-        stamp = stamp_of(info.data, info.topic)
         messages = dict(zip(self.hashes, self.messages.get(SCENARIOS, ()), strict=True))
         if entry.sha256 not in messages:
             raise InputError(
@@ -290,11 +290,12 @@ class Namespace(RecordedScenarios):
             )
         message = messages[entry.sha256]
         parts = [message]
-        if len(entry.messages) > 1:
+        if entry.messages:
             parts = [replace(message, data=data) for data in messages_of(message.data)]
         witness = [self.witnesses[entry.witness]] if entry.witness else []
-        closing = replace(info, data=encode_info(summary.of_one_scenario(), stamp))
-        return (*self.template_messages(entry, stamp).values(), *witness, *parts, info, closing)
+        closing = replace(info, data=encode_info(summary.of_one_scenario()))
+        inputs = self.template_messages(entry, entry.stamp).values()
+        return (*inputs, *witness, *parts, info, closing)
 
     # To look at: the newest template and the diagnostics about it.
 

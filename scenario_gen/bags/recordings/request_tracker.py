@@ -8,18 +8,16 @@ reconnection) counts once.
 """
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 import heapq
 from typing import Generic, TypeVar
 
-from msg_conventions.diagnostics import Level, Status
 from msg_conventions.scenario_info import decode_info, Info, RequestSummary, ScenarioEntry
 from msg_conventions.scenarios import digest
 from scenario_gen.base.errors import InputError
 
 _MAX_ENTRY_COUNT = 300_000  # of open requests; the oldest requests are dropped
 _MAX_COMPLETE_COUNT = 1000  # remembered complete requests
-_NO_STATUS = Status("", Level.OK, "")
 _Message = TypeVar("_Message")
 
 
@@ -125,7 +123,7 @@ class RequestTracker:
         Args:
             max_unmatched: their number.
             with_witness: a scenario has arrived with the reference drive that its entry names,
-                which `add_scenario` gets, too. Otherwise entries lose their values.
+                which `add_scenario` gets, too. Otherwise entries are `join_key`s.
         """
         self.open: dict[str, TrackedRequest] = {}
         self._with_witness = with_witness
@@ -152,13 +150,12 @@ class RequestTracker:
     def _named(self, entry: ScenarioEntry) -> tuple[str, ...]:
         """Return the hashes of an entry's messages."""
         has_witness = self._with_witness and entry.witness
-        return (*entry.messages, entry.witness) if has_witness else entry.messages
+        return (*entry.hashes, entry.witness) if has_witness else entry.hashes
 
     def add_message(self, data: bytes) -> None:
         """Add a message of `scenarios/info`; a damaged one is ignored."""
         try:
-            for info in decode_info(data):
-                self.add_info(info)
+            self.add_info(decode_info(data))
         except InputError:
             return
 
@@ -175,7 +172,7 @@ class RequestTracker:
         self._n_entries += 1
         while self._n_entries > _MAX_ENTRY_COUNT and len(self.open) > 1:
             self.forget(next(iter(self.open)))
-        entry = info if self._with_witness else replace(info, status=_NO_STATUS)
+        entry = info if self._with_witness else info.join_key()
         tracked.awaited[entry.index] = entry
         for sha256 in self._named(entry):
             self._awaiting.setdefault(sha256, []).append(entry)

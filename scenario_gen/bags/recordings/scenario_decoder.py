@@ -31,8 +31,8 @@ class ScenarioDecoder:
         self._accepts = accepts
         self._tracker = RequestTracker(with_witness=True)
 
-    def add(self, topic: str, data: bytes) -> list[Decoded]:
-        """Add a message; return the scenarios that it completes.
+    def add(self, topic: str, data: bytes) -> Decoded | None:
+        """Add a message; return the scenario that it completes, if it does.
 
         Args:
             topic: one of `TOPICS`.
@@ -42,16 +42,16 @@ class ScenarioDecoder:
             InputError: the message, or a scenario, is damaged.
         """
         if topic == INFO:
-            infos = [info for info in decode_info(data) if self._accepts(info)]
-            matches = [self._tracker.add_info(info) for info in infos]
+            info = decode_info(data)
+            match = self._tracker.add_info(info) if self._accepts(info) else None
         else:
             self.unmatched += topic == SCENARIOS
-            matches = [self._tracker.add_scenario(digest(data), data)]
+            match = self._tracker.add_scenario(digest(data), data)
         self._tracker.forget_complete()
-        return [self._decode(match[1], match[2]) for match in matches if match]
+        return self._decode(match[1], match[2]) if match else None
 
     def _decode(self, entry: ScenarioEntry, messages: list[bytes]) -> Decoded:
-        count = len(entry.messages)
+        count = len(entry.hashes)
         self.unmatched -= count
         data = b"".join(messages[:count])
         witness = messages[count] if entry.witness else None

@@ -49,4 +49,4 @@ class ScenarioPublisher:
         self._begin(result.ego)
         if result.scenarios:
             self._send("markers", scenario_markers(result.scenarios[0], self._stamp_ns))
-        self._send(INFO, encode_info(summary, self._stamp_ns))
+        self._send(INFO, encode_info(summary))

@@ -69,14 +69,12 @@ class RecordedScenarios:
     # Requests, by `scenarios/info`.
 
     @cached_property
-    def infos(self) -> Sequence[tuple[BagMessage, tuple[Info, ...]]]:
+    def infos(self) -> Sequence[tuple[BagMessage, Info]]:
         """The messages of `scenarios/info`, decoded; without damaged ones (see `check_infos`)."""
         return self._decoded_infos[0]
 
     @cached_property
-    def _decoded_infos(
-        self,
-    ) -> tuple[list[tuple[BagMessage, tuple[Info, ...]]], InputError | None]:
+    def _decoded_infos(self) -> tuple[list[tuple[BagMessage, Info]], InputError | None]:
         decoded = []
         damage = None
         for message in self._recorded.get(INFO, ()):
@@ -99,16 +97,12 @@ class RecordedScenarios:
     @cached_property
     def entries(self) -> tuple[ScenarioEntry, ...]:
         """The entry of every scenario, in order."""
-        return tuple(
-            info for _, infos in self.infos for info in infos if isinstance(info, ScenarioEntry)
-        )
+        return tuple(info for _, info in self.infos if isinstance(info, ScenarioEntry))
 
     @cached_property
     def summaries(self) -> tuple[RequestSummary, ...]:
         """The summaries of the requests, in order."""
-        return tuple(
-            info for _, infos in self.infos for info in infos if isinstance(info, RequestSummary)
-        )
+        return tuple(info for _, info in self.infos if isinstance(info, RequestSummary))
 
     @cached_property
     def missing(self) -> tuple[str, ...]:
@@ -117,9 +111,8 @@ class RecordedScenarios:
         tracker = RequestTracker(max_unmatched=len(messages))
         for message in messages:
             tracker.add_scenario(digest(message.data))
-        for _, infos in self.infos:
-            for info in infos:
-                tracker.add_info(info)
+        for _, info in self.infos:
+            tracker.add_info(info)
         return tuple(request.sentence() for request in tracker.incomplete(closed=False))
 
     # Scenarios.
@@ -287,7 +280,7 @@ def joined_messages(
     A scenario with a missing message is not joined: its entry then has no scenario, which
     `missing` reports.
     """
-    several = [entry for entry in entries if len(entry.messages) > 1]
+    several = [entry for entry in entries if entry.messages]
     if not several:
         return messages
     pool = MessagePool[int](len(messages))

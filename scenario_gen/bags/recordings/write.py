@@ -10,12 +10,12 @@ from msg_conventions.changepoints import encode_changepoints, encode_posterior, 
 from msg_conventions.diagnostics import encode_diagnostics
 from msg_conventions.ego import ego_messages
 from msg_conventions.fits import anchor_stamps, encode_fit, encode_plan, fit_statuses
-from msg_conventions.hashes import LANES, PLAN, template_hashes
+from msg_conventions.hashes import hash_of, LANES, PLAN, template_hashes
 from msg_conventions.paths import encode_route
 from msg_conventions.pictures import road_markers, scenario_markers
 from msg_conventions.request_messages import footprint_messages, RequestMessages
 from msg_conventions.roads import encode_description, encode_map, encode_poses
-from msg_conventions.scenario_info import encode_info, INFO, request_summary, source_values
+from msg_conventions.scenario_info import encode_info, INFO, request_summary
 from msg_conventions.scenarios import digest, encode_scenario
 from msg_conventions.topics import topic_entry, vehicle_topic
 from msg_conventions.tracks import encode_tracks
@@ -68,28 +68,26 @@ def result_messages(
     ego = result.generated.ego
     for topic, data in () if ego is None else ego_messages(ego, road.frame_id, stamp):
         yield topic, data, stamp
-    messages = RequestMessages(
-        encounter,
-        request,
-        "/gp_sampler",
-        {"template": encounter.recording, "road": road.name, **hashes},
-    )
+    inputs = {topic: hash_of(topic, template[topic]) for topic in ("tracks", "map")}
+    names = (encounter.recording, road.name)
+    messages = RequestMessages(encounter, request, inputs, names)
     logged = stamp
     for scenario in result.generated.scenarios:
         for topic, data in messages.of_scenario(scenario, fit.requested, ego):
             yield topic, data, logged
         yield "markers", scenario_markers(scenario, stamp), logged
         logged += 100_000_000  # players show one scenario after the other
-    provenance = {**result.provenance, **hashes, **source_values(encounter.source)}
     summary = request_summary(
         result.generated,
         request,
-        "/gp_sampler",
         result.seed,
-        provenance,
+        stamp,
+        inputs=inputs,
+        provenance=result.provenance,
+        source=encounter.source,
         reactions=result.reacting,
     )
-    yield INFO, encode_info(summary, stamp), logged
+    yield INFO, encode_info(summary), logged
 
 
 def write_recording(

@@ -201,7 +201,7 @@ def _with_ego(
         InputError: the requested ego is not a vehicle of the scenario or its only one, another ego
             was left out, or the ego's track is not in the bag.
     """
-    slot = entry.ego if entry else ""
+    slot = entry.ego.id if entry and entry.ego else ""
     ids = list(tokens(scenario.ids))
     where = f"{space.where(SCENARIOS)}, scenario {scenario.index}"
     if slot:

@@ -245,7 +245,7 @@ def _checker(
     facts, states = Facts(), None
     if entry is not None:
         has_ego = scenario.reference_drive is not None
-        facts, states = entry.facts, entry.asked(namespace.where(INFO), witness=has_ego)
+        facts, states = entry.facts, entry.asked(witness=has_ego)
     ids = tokens(join_ego(scenario).ids)
     key = (
         *(stamp, ids, facts.order, facts.reactions, facts.lost_reactions),

@@ -84,20 +84,23 @@ def replanned(
         first = matching[0]
         published = _find(bag, entries, first.index, namespace, first.request)
         source = _replan(published, f"{bag}: request {published.entry.request}")
-        facts, planned = published.entry.status.values, source.planned
+        entry, planned = published.entry, source.planned
         road, _ = planned.road_and_fit()
-        encounter = replace(planned.encounter, name=facts.get("template", planned.encounter.name))
+        encounter = planned.encounter
+        encounter = replace(encounter, name=entry.template or encounter.name)
         planned = replace(
             planned,
             encounter=encounter,
-            road=replace(road, name=facts.get("road", road.name)),
+            road=replace(road, name=entry.road or road.name),
         )
         return replace(source, planned=planned)
 
 
 def _replan(published: "_Published", origin: str) -> Replanned:
     """Return the source of a scenario; `origin` names bag and request in messages."""
-    values, seed = published.summary.values, published.entry.seed
+    values, seed = dict(published.summary.provenance), published.entry.seed
+    if published.summary.ego is not None:
+        values["ego"] = published.summary.ego.id
     requested = Request(
         **{entry.name: values.get(entry.name, str(entry.default)) for entry in fields(Request)}
     )
@@ -160,8 +163,7 @@ def _entries(bag: Path, config: BagConfig) -> list[_Entry]:
         namespace.check_infos()
         entries += [
             (namespace, info, message)
-            for message, infos in namespace.infos
-            for info in infos
+            for message, info in namespace.infos
             if isinstance(info, ScenarioEntry)
         ]
     if not entries:

@@ -233,8 +233,8 @@ class ArrivingTrials:
         """The number of messages that wait for their entry."""
         return self._scenarios.unmatched
 
-    def receive(self, topic: str, data: bytes, sent_ns: int, ego: str) -> Iterator[Trial]:
-        """Receive a map, or a message of a scenario; yield the trials that it completes.
+    def receive(self, topic: str, data: bytes, sent_ns: int, ego: str) -> Trial | None:
+        """Receive a map, or a message of a scenario; return the trial that it completes, if any.
 
         Args:
             topic: of the message.
@@ -247,16 +247,17 @@ class ArrivingTrials:
         """
         if topic == "map":
             self._roads[hash_of("map", data)] = decode_map(data)[1]
-            return
+            return None
         if not self._request and 0 < sent_ns < self._started_ns:
-            return
-        for entry, _, scenario in self._scenarios.add(topic, data):
-            if entry.request in self._left_out:
-                continue
-            name = f"{entry.request} {entry.index}"
-            road = self._roads.get(entry.map_hash or "")
-            trial = trial_of(name, scenario, entry, road, ego, f"scenario {name}")
-            yield replace(trial, request=entry.request)
+            return None
+        decoded = self._scenarios.add(topic, data)
+        if decoded is None or decoded[0].request in self._left_out:
+            return None
+        entry, _, scenario = decoded
+        name = f"{entry.request} {entry.index}"
+        road = self._roads.get(entry.map_hash or "")
+        trial = trial_of(name, scenario, entry, road, ego, f"scenario {name}")
+        return replace(trial, request=entry.request)
 
     def _accepts(self, info: Info) -> bool:
         """Return whether an entry or a summary concerns the scenarios to be driven."""

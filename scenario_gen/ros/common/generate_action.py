@@ -18,7 +18,6 @@ from rclpy.action import ActionServer, CancelResponse
 from rclpy.action.server import ServerGoalHandle
 from rclpy.qos import QoSProfile
 
-from msg_conventions.scenario_info import REFUSED
 from scenario_gen.ros.common.requests import Code, OpenRequest, OpenRequests, Outcome
 from scenario_gen.ros.common.services import REQUESTS
 from scenario_gen.ros.common.timers import create_steady_timer
@@ -121,11 +120,9 @@ class Goals:
             result.published = len(indices)
             result.first_index = min(indices, default=0)
             result.last_index = max(indices, default=0)
-            result.account = [
-                KeyValue(key=key, value=text)
-                for key, text in summary.values.items()
-                if key == "candidates" or key.startswith(REFUSED)
-            ]
+            counts = {"candidates": summary.candidates}
+            counts |= {f"refused.{cause}": count for cause, count in summary.refused.items()}
+            result.account = [KeyValue(key=key, value=str(count)) for key, count in counts.items()]
         return result
 
 

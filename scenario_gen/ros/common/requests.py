@@ -307,7 +307,7 @@ class OpenRequests:
             if result is None:
                 return outcome(Code.CANCELLED, node.stop_reason(messages, lambda: True))
             code = Code.OK if result[0].generated.scenarios else Code.IMPOSSIBLE
-            return outcome(code, result[1].status.message, result)
+            return outcome(code, result[1].message(), result)
 
         def failed(error: BaseException) -> Outcome:
             if isinstance(error, CancelledError):

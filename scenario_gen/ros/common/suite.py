@@ -27,6 +27,7 @@ from rclpy.signals import SignalHandlerOptions
 import yaml
 
 from msg_conventions.diagnostics import decode_diagnostics, Level, Status, Subject
+from msg_conventions.scenario_info import decode_info, RequestSummary
 from scenario_gen.base.errors import InputError, RefusedError
 from scenario_gen.base.parameters import flatten
 from scenario_gen.base.ros_domain import own_domain
@@ -103,10 +104,10 @@ class Progress:
                 self._receive_status(status)
         elif topic.endswith("/scenarios/info"):
             namespace = topic.removesuffix("/scenarios/info")
-            for status in decode_diagnostics(data)[1]:
-                if "published" in status.values:
-                    self.published[namespace] = int(status.values["published"])
-                    self.notify(f"{namespace}: {status.message}")
+            info = decode_info(data)
+            if isinstance(info, RequestSummary):
+                self.published[namespace] = info.published
+                self.notify(f"{namespace}: {info.message()}")
 
     def _receive_status(self, status: Status) -> None:
         if status.subject == Subject.RECORDED:

@@ -80,8 +80,7 @@ class Evaluator(StageNode):
         if topic == "scenarios":
             self._keep(self._requests.add_scenario(digest(data), data))
         elif topic == INFO:
-            for info in decode_info(data, topic):
-                self._keep(self._requests.add_info(info))
+            self._keep(self._requests.add_info(decode_info(data, topic)))
         else:
             self._newest[topic] = data
         self._last_message = monotonic()

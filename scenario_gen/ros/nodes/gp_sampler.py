@@ -20,7 +20,7 @@ import os
 import threading
 
 from msg_conventions.diagnostics import Level
-from msg_conventions.hashes import LANES, PLAN, template_hashes
+from msg_conventions.hashes import hash_of, LANES, PLAN
 from msg_conventions.request_messages import RequestMessages
 from msg_conventions.scenario_info import request_summary
 from scenario_gen.bags.recordings.scenario_publisher import ScenarioPublisher
@@ -156,11 +156,11 @@ class GpSampler(StageNode):
             report = partial(self._report_pace, request.name)
             with self.outputs.paced(self.OUTPUTS[:2], config.patience, report):
                 result, summary = self._answer(messages, request, config, stop)
-            message = summary.status.message
+            message = summary.message()
             if summary.cancelled:
                 message = f"{self.stop_reason(messages, cancelled)}: {message}"
                 return None
-            level = summary.status.level
+            level = Level.OK if summary.is_full else Level.WARN
             return result, summary
         except Exception as error:
             if not stop():
@@ -192,9 +192,8 @@ class GpSampler(StageNode):
         template = decode_template(messages)
         encounter = template.encounter
         road, _ = template.road_and_fit()
-        hashes = template_hashes(messages)
-        node = self.get_fully_qualified_name()
-        encoder = RequestMessages(encounter, request.name, node, hashes)
+        inputs = {topic: hash_of(topic, messages[topic]) for topic in ("tracks", "map")}
+        encoder = RequestMessages(encounter, request.name, inputs)
         publisher = ScenarioPublisher(encoder, road.frame_id, partial(self._send, stop=stop))
 
         sets: list[GenerationResult] = []
@@ -239,9 +238,10 @@ class GpSampler(StageNode):
         summary = request_summary(
             result,
             request.name,
-            node,
             config.seed,
-            provenance | hashes,
+            encounter.start_ns,
+            inputs=inputs,
+            provenance=provenance,
             cancelled=stop() and len(result.scenarios) < result.requested,
             reactions=outcome.reacting,
         )

@@ -83,7 +83,8 @@ class Preview(StageNode):
         if topic == "fit":
             self._anchors = decode_fit(data)[3]
             return
-        for entry, _, scenario in self._arriving.add(topic, data):
+        if decoded := self._arriving.add(topic, data):
+            entry, _, scenario = decoded
             self._newest = scenario, entry
 
     def _pace_ticks(self) -> None:

@@ -160,8 +160,8 @@ class Traffic(Node):  # type: ignore[misc]
         """
         try:
             sent_ns = info["source_timestamp"]
-            trials = list(self._arriving.receive(topic, data, sent_ns, self.config.ego))
-            self._trials += trials
+            trial = self._arriving.receive(topic, data, sent_ns, self.config.ego)
+            self._trials += [trial] if trial else []
             if self._loop is None and len(self._trials) > self._index:
                 self._load(self._index)
             elif self._verdict and self._load_at == math.inf and self.config.follow_on:

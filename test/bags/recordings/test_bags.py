@@ -114,7 +114,7 @@ def test_a_run_is_read_back_from_its_bag(run, tmp_path):
         == run.routes[0].points.tobytes()
     )
     sent = [message.data for message in messages if message.topic == "/scenarios"]
-    *entries, summary = [decode_info(m.data)[0] for m in messages if m.topic == "/scenarios/info"]
+    *entries, summary = [decode_info(m.data) for m in messages if m.topic == "/scenarios/info"]
     assert [entry.sha256 for entry in entries] == [digest(data) for data in sent]
     scenarios = [decode_scenario(data)[1] for data in sent]
     assert [s.position.tobytes() for s in scenarios] == [
@@ -318,7 +318,7 @@ def test_scenarios_of_vehicles_that_come_and_go_are_read_back_whole(run, tmp_pat
     for before, after in zip(scenarios, found.scenario_set().scenarios, strict=True):
         for name in ("position", "heading", "speed", "acceleration", "present"):
             assert getattr(before, name).tobytes() == getattr(after, name).tobytes()
-    (info, (entry,)), summary = found.infos[2], found.summaries[0]
+    (info, entry), summary = found.infos[2], found.summaries[0]
     alone = found.messages_of(info, entry, summary)
     assert [message.data for message in alone if message.topic == "/scenarios"] == list(
         messages_of(found.data("scenarios")[2])

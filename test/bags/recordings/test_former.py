@@ -45,8 +45,13 @@ def test_a_former_bag_is_evaluated_driven_and_planned_again():
     assert (found.valid, found.causes, found.notes) == (2, {}, ())
     assert [trial.road.lanes.drawn for trial in read_trials(BAG)] == [True, True]
     recorded = read_recording(BAG).namespaces[""]
-    (info, (entry,)), summary = recorded.infos[0], recorded.summaries[0]
+    (info, entry), summary = recorded.infos[0], recorded.summaries[0]
     topics = [message.topic for message in recorded.messages_of(info, entry, summary)]
     assert {"/fit/info", "/road/lanes", "/tracks", "/changepoints", "/map"} <= set(topics)
+    assert (entry.index, entry.seed, entry.road, entry.ego.id) == (2, 3, "four_way", "1")
+    assert (entry.facts.pet_s, str(entry.facts.reactions[0])) == (4.388, "2 yields to 1")
+    assert entry.asked(witness=True).start.shape == (2, 4) and entry.achieved.shape == (2, 1, 4)
+    assert summary.message() == "2 of 2 scenarios from 8 candidates"
+    assert summary.refused["late_braking"] == 4 and summary.provenance["log.format"] == "auto"
     planned = replanned(BAG).planned
     assert planned.fit is not None and planned.fit.fitted and len(planned.routes) == 2
